@@ -224,7 +224,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Rea
     fn walk(&mut self, keys: &mut Keys<'_>, _: Option<&GridInput<Self>>) {
         let named = O::PARAMETERS.iter().zip(self.values);
         let pair = |(one, value): (&Parameter, f64)| (one.name.to_owned(), Value::from(value));
-        keys.write("parameters", named.map(pair).collect::<Value>());
+        keys.write("parameters", named.map(pair).collect());
     }
 
     fn schema_of_set() -> Value {

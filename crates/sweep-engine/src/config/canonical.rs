@@ -25,13 +25,15 @@ impl<M: Read> Plan<M> {
             reliability: self.reliability.clone(),
             ..Self::blank()
         };
-        let mut written = Keys::written(|keys| sections::walk(&mut plan, keys));
         let axes = self.axes.iter().map(|axis| self::axis(axis, self.design.as_ref()));
-        written.insert("axis".to_owned(), axes.collect());
-        if !self.set.is_empty() {
-            written.insert("set".to_owned(), self.set.iter().cloned().collect());
-        }
-        written.into()
+        let told = Keys::told(false, |keys| {
+            sections::walk(&mut plan, keys);
+            keys.write("axis", axes.collect());
+            if !self.set.is_empty() {
+                keys.write("set", self.set.iter().cloned().collect());
+            }
+        });
+        told.finish()
     }
 }
 

@@ -25,7 +25,7 @@ const MOST_SOBOL: u64 = 1 << 32;
 /// Walks over the section. Where it is read there is no design after a mistake, and a list has no
 /// points yet.
 pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
-    keys.table(Key::table("design"), |keys| {
+    keys.table(Key::new("design", ""), |keys| {
         let method =
             Key::new("method", "").needed("`latin_hypercube`, `sobol`, `monte_carlo` or `list`");
         let variants = Variants { all: METHODS.to_vec(), default: None, set: 0 };
@@ -33,20 +33,14 @@ pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
         let now = design.as_ref().and_then(of);
         let chosen = keys.variants(method, &variants, now, |keys, k| match METHODS[k].0 {
             "list" => listed(design, keys),
-            method => drop(spread(method, design, keys)),
+            method => spread(method, design, keys),
         });
         if chosen.is_none() {
             *design = None;
         }
         let is_spread = chosen.is_some_and(|method| METHODS[method].0 != "list");
         if matches!(keys.walk, Walk::Set(_)) && !is_spread {
-            for (name, field) in spread(METHODS[0].0, &mut None, keys) {
-                let title =
-                    format!("`{name}` belongs to a design, and this grid has none that takes it");
-                if let Field::Given(_) = field {
-                    keys.refuse(name, &title, "expected a grid file with [design]");
-                }
-            }
+            spread(METHODS[0].0, &mut None, keys);
         }
     })
 }
@@ -61,45 +55,50 @@ fn listed(design: &mut Option<Design>, keys: &mut Keys<'_>) {
         Some(Design::List { file, points, hash }) => (file, points, hash),
         _ => Default::default(),
     };
-    let found = keys.key(
-        key.needed("a CSV or Parquet file, relative to this file"),
-        &Kind::Text,
-        &mut file,
-    );
-    keys.write("points", points);
-    keys.write("hash", hash.as_str());
-    if found.given().is_some() || !keys.is_reading() {
+    let key = key.needed("a CSV or Parquet file, relative to this file");
+    let found = keys.key(key, &Kind::Text, &mut file);
+    keys.write("points", points.into());
+    keys.write("hash", hash.as_str().into());
+    if found.given().is_some() || keys.section().is_none() {
         *design = Some(Design::List { file, points, hash });
     }
 }
 
-fn spread(
-    method: &str,
-    design: &mut Option<Design>,
-    keys: &mut Keys<'_>,
-) -> [(&'static str, Field<()>); 2] {
+fn spread(method: &str, design: &mut Option<Design>, keys: &mut Keys<'_>) {
     keys.misplace(&["file"], "only the method \"list\" has it");
+    let numbers = match design {
+        Some(
+            Design::LatinHypercube { points, seed }
+            | Design::Sobol { points, seed }
+            | Design::MonteCarlo { points, seed },
+        ) => Some((*points, *seed)),
+        Some(Design::List { .. }) | None => None,
+    };
     // Stand-ins for what is refused, so that the axes are read all the same.
-    let mut numbers = [1, DEFAULT_SEED];
-    if let Some(
-        Design::LatinHypercube { points, seed }
-        | Design::Sobol { points, seed }
-        | Design::MonteCarlo { points, seed },
-    ) = design
-    {
-        numbers = [*points, *seed];
-    }
-    let [points, seed] = &mut numbers;
+    let (mut points, mut seed) = numbers.unwrap_or((1, DEFAULT_SEED));
     let most = if method == "sobol" { MOST_SOBOL } else { MOST_POINTS };
     let key = Key::new("points", "how many").needed("the number of points").set();
-    let points_found = keys.key(key, &Kind::Whole(1..=most), points);
-    let key = Key::new("seed", "another seed, another draw").set();
-    let seed_found = keys.key(key, &Kind::Whole(0..=MOST_SEED), seed);
-    let (points, seed) = (*points, *seed);
+    let found = [
+        ("points", keys.key(key, &Kind::Whole(1..=most), &mut points)),
+        (
+            "seed",
+            keys.key(
+                Key::new("seed", "another seed, another draw").set(),
+                &Kind::Whole(0..=MOST_SEED),
+                &mut seed,
+            ),
+        ),
+    ];
+    for (name, field) in found {
+        if let (None, Field::Given(_)) = (numbers, field) {
+            let title =
+                format!("`{name}` belongs to a design, and this grid has none that takes it");
+            keys.refuse(name, &title, "expected a grid file with [design]");
+        }
+    }
     *design = Some(match method {
         "sobol" => Design::Sobol { points, seed },
         "monte_carlo" => Design::MonteCarlo { points, seed },
         _ => Design::LatinHypercube { points, seed },
     });
-    [("points", points_found), ("seed", seed_found)]
 }

@@ -2,7 +2,6 @@
 //! value stands. By it a file is read, `--set` is put in place, a plan is written as JSON, and the
 //! schema of files is made.
 
-use std::borrow::Cow;
 use std::cell::RefCell;
 
 use serde::Serialize;
@@ -13,37 +12,32 @@ use super::section::listed;
 use super::{Field, Kind, Located, Report, Section, Written, twice};
 
 /// A key of a table.
-#[derive(Clone)]
-pub struct Key {
+#[derive(Clone, Copy)]
+pub struct Key<'k> {
     name: &'static str,
     /// For schemas.
-    description: Cow<'static, str>,
+    description: &'k str,
     /// What is expected where a file leaves it out, if it may not.
-    needed: Option<Cow<'static, str>>,
+    needed: Option<&'k str>,
     /// Whether `--set` takes it.
     is_set: bool,
 }
 
-impl Key {
+impl<'k> Key<'k> {
     /// A key that may be left out.
-    pub fn new(name: &'static str, description: impl Into<Cow<'static, str>>) -> Self {
-        Self { name, description: description.into(), needed: None, is_set: false }
-    }
-
-    /// The key of a table.
-    pub const fn table(name: &'static str) -> Self {
-        Self { name, description: Cow::Borrowed(""), needed: None, is_set: false }
+    pub const fn new(name: &'static str, description: &'k str) -> Self {
+        Self { name, description, needed: None, is_set: false }
     }
 
     /// The same, but it must be there.
     #[must_use]
-    pub fn needed(self, expected: impl Into<Cow<'static, str>>) -> Self {
-        Self { needed: Some(expected.into()), ..self }
+    pub const fn needed(self, expected: &'k str) -> Self {
+        Self { needed: Some(expected), ..self }
     }
 
     /// The same, but `--set` takes it too.
     #[must_use]
-    pub fn set(self) -> Self {
+    pub const fn set(self) -> Self {
         Self { is_set: true, ..self }
     }
 }
@@ -54,10 +48,8 @@ pub enum Walk<'a> {
     Read(Section<'a>),
     /// Puts options in place of values.
     Set(&'a Options<'a>),
-    /// Writes values as JSON.
-    Write(Map<String, Value>),
-    /// Describes keys and kinds.
-    Describe(Described),
+    /// Tells of values as JSON, or of keys as a schema.
+    Tell(Told),
 }
 
 /// Options of the command line that take the place of a file's values.
@@ -82,57 +74,67 @@ impl<'a> Options<'a> {
         Self { written, changed: RefCell::default(), report }
     }
 
-    fn of(&self, name: &str) -> Option<&Written<'a>> {
-        self.written.iter().find(|written| written.name.value == name)
-    }
-
-    /// The value that one gives, and whether it is another than that which stands.
-    fn value(&self, written: &Written<'_>, kind: &Kind<'_>, was: &Value) -> Field<Value> {
+    /// The value under a name. Another than that which stands is noted.
+    fn value(&self, name: &str, kind: &Kind<'_>, was: &Value) -> Field<Value> {
+        let Some(written) = self.written.iter().find(|written| written.name.value == name) else {
+            return Field::Absent;
+        };
         let Some(value) = kind.typed(written) else { return Field::Bad };
         if value != *was {
             // Several words are as they were written.
             let said = if value.is_array() { written.value.value.into() } else { value.clone() };
-            self.changed.borrow_mut().push((written.name.value.to_owned(), said));
+            self.changed.borrow_mut().push((name.to_owned(), said));
         }
         Field::Given(Located { value, at: written.value.at.clone() })
     }
 }
 
-/// A table's schema in the making.
+/// What was told of a table so far.
 #[derive(Default)]
-pub struct Described {
-    properties: Vec<(&'static str, Value)>,
+pub struct Told {
+    is_schema: bool,
+    entries: Map<String, Value>,
     required: Vec<&'static str>,
     variants: Vec<Value>,
     /// The keys that `--set` takes, of this table and those in it.
     pub set: Vec<&'static str>,
 }
 
-impl Described {
-    /// Adds a key.
-    pub fn add(&mut self, key: &Key, mut schema: Value) {
-        if !key.description.is_empty() {
-            schema["description"] = (*key.description).into();
+impl Told {
+    /// Adds a key with its value or schema.
+    pub fn add(&mut self, key: Key<'_>, mut value: Value) {
+        if self.is_schema {
+            if !key.description.is_empty() {
+                value["description"] = key.description.into();
+            }
+            self.required.extend(key.needed.map(|_| key.name));
+            self.set.extend(key.is_set.then_some(key.name));
         }
-        self.properties.push((key.name, schema));
-        self.required.extend(key.needed.as_ref().map(|_| key.name));
-        self.set.extend(key.is_set.then_some(key.name));
+        self.entries.insert(key.name.to_owned(), value);
+    }
+
+    /// What another walk of this kind tells.
+    fn inside<'a>(&mut self, walk: impl FnOnce(&mut Keys<'a>)) -> Value {
+        let mut told = Keys::told(self.is_schema, walk);
+        self.set.append(&mut told.set);
+        told.finish()
     }
 
     /// The table that has a key, if one of these has.
-    pub fn table_of(&self, key: &str, tables: &[&str]) -> Option<&'static str> {
+    pub fn table_of<'t>(&self, key: &str, tables: &[&'t str]) -> Option<&'t str> {
         let has = |schema: &Value| schema["properties"].get(key).is_some();
         let any =
             |schema: &Value| schema["oneOf"].as_array().is_some_and(|all| all.iter().any(has));
-        let mut tables = self.properties.iter().filter(|(name, _)| tables.contains(name));
-        tables.find(|(_, schema)| has(schema) || any(schema)).map(|(name, _)| *name)
+        let entry = |table: &str| self.entries.get(table).is_some_and(|it| has(it) || any(it));
+        tables.iter().copied().find(|table| entry(table))
     }
 
-    /// The schema.
+    /// The table, or its schema.
     pub fn finish(self) -> Value {
-        match self.variants.is_empty() {
-            true => table(self.properties, &self.required),
-            false => json!({ "oneOf": self.variants }),
+        match (self.is_schema, self.variants.is_empty()) {
+            (false, _) => self.entries.into(),
+            (true, false) => json!({ "oneOf": self.variants }),
+            (true, true) => table(self.entries, &self.required),
         }
     }
 }
@@ -153,18 +155,31 @@ impl<'a> Keys<'a> {
         Self { walk, places: String::new(), is_loose: false }
     }
 
-    /// What a walk writes.
-    pub fn written(walk: impl FnOnce(&mut Self)) -> Map<String, Value> {
-        let mut keys = Self::new(Walk::Write(Map::new()));
+    /// What a walk tells: of keys, or of values.
+    pub fn told(is_schema: bool, walk: impl FnOnce(&mut Self)) -> Told {
+        let mut keys = Self::new(Walk::Tell(Told { is_schema, ..Told::default() }));
         walk(&mut keys);
-        if let Walk::Write(plan) = keys.walk { plan } else { Map::new() }
+        if let Walk::Tell(told) = keys.walk { told } else { Told::default() }
     }
 
-    /// What a walk describes.
-    pub fn described(walk: impl FnOnce(&mut Self)) -> Described {
-        let mut keys = Self::new(Walk::Describe(Described::default()));
-        walk(&mut keys);
-        if let Walk::Describe(described) = keys.walk { described } else { Described::default() }
+    /// Whether a walk tells of keys.
+    pub fn is_schema(&self) -> bool {
+        matches!(&self.walk, Walk::Tell(told) if told.is_schema)
+    }
+
+    /// Adds what a walk that tells knows: a value, or the schema of a key.
+    pub fn tell(&mut self, key: Key<'_>, value: impl FnOnce(bool) -> Value) {
+        if let Walk::Tell(told) = &mut self.walk {
+            let value = value(told.is_schema);
+            told.add(key, value);
+        }
+    }
+
+    /// Adds a value to what is told of values: no file has it.
+    pub fn write(&mut self, name: &'static str, value: Value) {
+        if !self.is_schema() {
+            self.tell(Key::new(name, ""), |_| value);
+        }
     }
 
     /// The table that is read, if one is.
@@ -177,13 +192,8 @@ impl<'a> Keys<'a> {
         match &self.walk {
             Walk::Read(section) => Some(section.report),
             Walk::Set(options) => Some(options.report),
-            Walk::Write(_) | Walk::Describe(_) => None,
+            Walk::Tell(_) => None,
         }
-    }
-
-    /// Whether values are read.
-    pub fn is_reading(&self) -> bool {
-        self.section().is_some()
     }
 
     /// Refuses keys of a file that belong to another word, with a reason.
@@ -193,24 +203,16 @@ impl<'a> Keys<'a> {
 
     /// Refuses an option for which there is no place.
     pub fn refuse(&self, name: &str, title: &str, expected: &str) {
-        if let Walk::Set(options) = &self.walk
-            && let Some(written) = options.of(name)
-        {
+        let Walk::Set(options) = &self.walk else { return };
+        for written in options.written.iter().filter(|written| written.name.value == name) {
             options.report.refuse::<()>(&written.name.at, title, expected);
-        }
-    }
-
-    /// Adds to a plan what no file has.
-    pub fn write(&mut self, name: &str, value: impl Into<Value>) {
-        if let Walk::Write(plan) = &mut self.walk {
-            plan.insert(name.to_owned(), value.into());
         }
     }
 
     /// A key with its value: a wrong or missing one is reported, and leaves the value as it is.
     pub fn key<T: Serialize + DeserializeOwned>(
         &mut self,
-        key: Key,
+        key: Key<'_>,
         kind: &Kind<'_>,
         value: &mut T,
     ) -> Field<()> {
@@ -220,25 +222,23 @@ impl<'a> Keys<'a> {
         let found = match &mut self.walk {
             Walk::Read(section) if self.is_loose && section.is_known(key.name) => Field::Absent,
             Walk::Read(section) => {
-                let needed = key.needed.filter(|_| !self.is_loose);
-                section.expect(kind.read(section, key.name, &place), key.name, needed)
+                let field = kind.read(section, key.name, &place);
+                section.expect(field, key.name, key.needed.filter(|_| !self.is_loose))
             }
-            Walk::Set(options) => match options.of(key.name).filter(|_| key.is_set) {
-                Some(written) => options.value(written, kind, &was),
-                None => Field::Absent,
-            },
-            Walk::Write(plan) => {
-                plan.extend(is_there.then(|| (key.name.to_owned(), was)));
-                Field::Absent
-            }
-            Walk::Describe(described) => {
+            Walk::Set(options) if key.is_set => options.value(key.name, kind, &was),
+            Walk::Tell(told) if told.is_schema => {
                 let mut schema = kind.schema();
                 if is_there && key.needed.is_none() {
                     schema["default"] = was;
                 }
-                described.add(&key, schema);
+                told.add(key, schema);
                 Field::Absent
             }
+            Walk::Tell(told) if is_there => {
+                told.add(key, was);
+                Field::Absent
+            }
+            Walk::Set(_) | Walk::Tell(_) => Field::Absent,
         };
         found.then(|Located { value: found, at }| {
             *value = serde_json::from_value(found).ok()?;
@@ -247,25 +247,10 @@ impl<'a> Keys<'a> {
         })
     }
 
-    /// A key with one of these things, by their names.
-    pub fn word<T: Copy>(
-        &mut self,
-        key: Key,
-        all: &[T],
-        name: fn(T) -> &'static str,
-        value: &mut T,
-    ) -> Field<()> {
-        let names: Vec<&str> = all.iter().copied().map(name).collect();
-        let mut word = name(*value).to_owned();
-        let found = self.key(key, &Kind::Word(&names), &mut word);
-        all.iter().filter(|one| name(**one) == word).for_each(|one| *value = *one);
-        found
-    }
-
     /// A key with some of these things, by their names; messages call them so.
     pub fn words<T: Copy>(
         &mut self,
-        key: Key,
+        key: Key<'_>,
         what: &'static str,
         all: &[T],
         name: fn(T) -> &'static str,
@@ -280,48 +265,37 @@ impl<'a> Keys<'a> {
     }
 
     /// A table under a key.
-    pub fn table(&mut self, key: Key, walk: impl FnOnce(&mut Keys<'a>)) -> Field<()> {
-        let (mut at, name) = (None, key.name);
-        let inner = match &self.walk {
-            Walk::Read(root) => {
-                let title = format!("[{name}]");
-                let field = root.table(name, &title);
-                let needed = key.needed.as_ref().map(|_| format!("a section {title}"));
-                match root.expect(field, name, needed) {
-                    Field::Absent => return Field::Absent,
-                    Field::Bad => return Field::Bad,
-                    Field::Given(section) => {
-                        root.report.put(name, section.at.clone());
-                        at = Some(section.at);
-                        Walk::Read(section.value)
-                    }
+    pub fn table(&mut self, key: Key<'_>, walk: impl FnOnce(&mut Keys<'a>)) -> Field<()> {
+        let name = key.name;
+        let keys = |inner| Keys { places: format!("{name}."), ..Keys::new(inner) };
+        match &mut self.walk {
+            Walk::Read(root) => root
+                .expect(root.table(name, &format!("[{name}]")), name, key.needed)
+                .map(|section| {
+                    root.report.put(name, section.at);
+                    let mut keys = keys(Walk::Read(section.value));
+                    walk(&mut keys);
+                    keys.finish();
+                }),
+            Walk::Set(options) => {
+                walk(&mut keys(Walk::Set(options)));
+                Field::Absent
+            }
+            Walk::Tell(told) => {
+                let inner = told.inside(walk);
+                if inner != json!({}) {
+                    told.add(key, inner);
                 }
+                Field::Absent
             }
-            Walk::Set(options) => Walk::Set(options),
-            Walk::Write(_) => Walk::Write(Map::new()),
-            Walk::Describe(_) => Walk::Describe(Described::default()),
-        };
-        let mut keys = Keys { walk: inner, places: format!("{name}."), is_loose: false };
-        walk(&mut keys);
-        match (keys.walk, &mut self.walk) {
-            (Walk::Read(section), _) => section.finish(),
-            (Walk::Write(inner), Walk::Write(plan)) if !inner.is_empty() => {
-                plan.insert(name.to_owned(), inner.into());
-            }
-            (Walk::Describe(mut inner), Walk::Describe(described)) => {
-                described.set.append(&mut inner.set);
-                described.add(&key, inner.finish());
-            }
-            _ => {}
         }
-        at.map_or(Field::Absent, |at| Field::Given(Located { value: (), at }))
     }
 
     /// An array of tables under a key: those that are read, or so many; `walk` goes over one by its
     /// position.
     pub fn tables(
         &mut self,
-        key: Key,
+        key: Key<'_>,
         read: Vec<Section<'a>>,
         count: usize,
         mut walk: impl FnMut(&mut Keys<'a>, usize),
@@ -331,21 +305,18 @@ impl<'a> Keys<'a> {
             walk(&mut keys, k);
             keys.finish();
         }
-        match &mut self.walk {
-            Walk::Write(plan) => {
-                let one = |k| Value::from(Keys::written(|keys| walk(keys, k)));
-                plan.insert(key.name.to_owned(), (0..count).map(one).collect());
+        let Walk::Tell(told) = &mut self.walk else { return };
+        let value = if told.is_schema {
+            let items = told.inside(|keys| walk(keys, 0));
+            let mut schema = json!({ "type": "array", "items": items });
+            if key.needed.is_some() {
+                schema["minItems"] = 1.into();
             }
-            Walk::Describe(described) => {
-                let items = Keys::described(|keys| walk(keys, 0)).finish();
-                let mut schema = json!({ "type": "array", "items": items });
-                if key.needed.is_some() {
-                    schema["minItems"] = 1.into();
-                }
-                described.add(&key, schema);
-            }
-            Walk::Read(_) | Walk::Set(_) => {}
-        }
+            schema
+        } else {
+            (0..count).map(|k| told.inside(|keys| walk(keys, k))).collect()
+        };
+        told.add(key, value);
     }
 
     /// Ends a walk: keys that it did not come to are refused.
@@ -359,45 +330,44 @@ impl<'a> Keys<'a> {
     /// its position. `now` is the word that stands. Gives the word that is chosen.
     pub fn variants(
         &mut self,
-        key: Key,
+        key: Key<'_>,
         variants: &Variants,
         now: Option<usize>,
         mut walk: impl FnMut(&mut Self, usize),
     ) -> Option<usize> {
-        if let Walk::Describe(outer) = &mut self.walk {
+        if let Walk::Tell(told) = &mut self.walk
+            && told.is_schema
+        {
             for (k, (name, description)) in variants.all.iter().enumerate() {
-                let mut word = Described::default();
-                let key = Key { description: (*description).into(), ..key.clone() };
-                let key = if variants.default == Some(k) { key } else { key.needed("") };
-                word.add(&key, json!({ "const": name }));
-                let mut keys = Keys::new(Walk::Describe(word));
-                walk(&mut keys, k);
-                let Walk::Describe(mut word) = keys.walk else { continue };
-                outer.set.append(&mut word.set);
-                outer.variants.push(word.finish());
+                let needed = (variants.default != Some(k)).then_some("");
+                let variant = told.inside(|keys| {
+                    keys.tell(Key { description, needed, ..key }, |_| json!({ "const": name }));
+                    walk(keys, k);
+                });
+                told.variants.push(variant);
             }
             return None;
         }
         let names: Vec<&str> = variants.all.iter().map(|(name, _)| *name).collect();
-        let key = match (variants.default, &key.needed) {
-            (None, None) => key.needed(listed(&names)),
-            _ => key,
-        };
-        let settable = if let Walk::Set(_) = self.walk { variants.set } else { names.len() };
+        let expected = listed(&names);
+        let needed = key.needed.or(variants.default.is_none().then_some(&expected));
+        let can_be = if let Walk::Set(_) = self.walk { variants.set } else { names.len() };
         let mut word = now.map(|now| names[now].to_owned());
-        let found = self.key(key, &Kind::Word(&names[..settable]), &mut word);
+        let found = self.key(Key { needed, ..key }, &Kind::Word(&names[..can_be]), &mut word);
+        if let (Walk::Set(options), Field::Given(found)) = (&self.walk, &found) {
+            // What a word decides is the whole table.
+            options.report.put(self.places.trim_end_matches('.'), found.at.clone());
+        }
         let word = names.iter().position(|name| word.as_deref() == Some(name));
-        let chosen = match (self.is_reading(), found) {
-            (true, Field::Absent) => variants.default,
-            (true, Field::Bad) => None,
+        let chosen = match (&self.walk, found) {
+            (Walk::Read(_), Field::Absent) => variants.default,
+            (Walk::Read(_), Field::Bad) => None,
             _ => word,
         };
+        self.is_loose = chosen.is_none() && self.section().is_some();
         match chosen {
             Some(chosen) => walk(self, chosen),
-            None if self.is_reading() => {
-                self.is_loose = true;
-                (0..names.len()).for_each(|k| walk(self, k));
-            }
+            None if self.is_loose => (0..names.len()).for_each(|k| walk(self, k)),
             None => {}
         }
         chosen
@@ -415,12 +385,12 @@ pub struct Variants {
 }
 
 /// The schema of an object with these properties and no others.
-pub fn table<'k>(
-    properties: impl IntoIterator<Item = (&'k str, Value)>,
+pub fn table(
+    properties: impl IntoIterator<Item = (impl Into<String>, Value)>,
     required: &[&str],
 ) -> Value {
     let properties: Map<String, Value> =
-        properties.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+        properties.into_iter().map(|(key, value)| (key.into(), value)).collect();
     json!({
         "type": "object",
         "properties": properties,

@@ -16,12 +16,12 @@ const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 /// The schema of a model's grid files.
 pub fn grid<M: Read>() -> Value {
     let mut described = described::<M>();
-    described
-        .add(&Key::new("set", "constants, by the names of `sweep parameters`"), M::schema_of_set());
+    let key = Key::new("set", "constants, by the names of `sweep parameters`");
+    described.add(key, M::schema_of_set());
     let axes = json!({ "type": "array", "items": axis() });
     let about = "swept parameters; the first varies slowest. With [design] each has a range \
                  without a count";
-    described.add(&Key::new("axis", about), axes);
+    described.add(Key::new("axis", about), axes);
     let mut schema = described.finish();
     // Whether a range has a count depends on whether there is a design.
     schema["if"] = json!({ "required": ["design"] });

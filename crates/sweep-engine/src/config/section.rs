@@ -124,14 +124,9 @@ impl<'a> Section<'a> {
     }
 
     /// The same, where something is expected.
-    pub fn expect<T>(
-        &self,
-        field: Field<T>,
-        key: &str,
-        expected: Option<impl AsRef<str>>,
-    ) -> Field<T> {
+    pub fn expect<T>(&self, field: Field<T>, key: &str, expected: Option<&str>) -> Field<T> {
         if let (Field::Absent, Some(expected)) = (&field, expected) {
-            self.missing(key, expected.as_ref());
+            self.missing(key, expected);
         }
         field
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::json;
 use sweep_parameter::{Channel, Range, decimal};
 
-use super::keys::{Described, Variants};
+use super::keys::{Told, Variants};
 use super::kind::Numbers;
 use super::{
     Diagnostic, Field, GridInput, Key, Keys, Kind, Located, Location, Read, Report, Section, Walk,
@@ -40,8 +40,8 @@ pub fn walk<M: Read>(plan: &mut Plan<M>, keys: &mut Keys<'_>) {
 }
 
 /// The keys of grid files, described; but axes and `[set]`.
-pub fn described<M: Read>() -> Described {
-    Keys::described(|keys| walk(&mut Plan::<M>::blank(), keys))
+pub fn described<M: Read>() -> Told {
+    Keys::told(true, |keys| walk(&mut Plan::<M>::blank(), keys))
 }
 
 /// Those before `[set]`; `input` is what is read.
@@ -59,9 +59,9 @@ pub(super) fn sections<M: Read>(
     };
     keys.key(Key::new("name", about), &Kind::Own(&read, schema), name);
     model.walk(keys, input);
-    keys.table(Key::table("time").needed(""), |keys| time(end_s, window_s, keys));
-    keys.table(Key::table("integrator"), |keys| method(integrator, keys));
-    keys.table(Key::table("reliability"), |keys| {
+    keys.table(Key::new("time", "").needed("a section [time]"), |keys| time(end_s, window_s, keys));
+    keys.table(Key::new("integrator", ""), |keys| method(integrator, keys));
+    keys.table(Key::new("reliability", ""), |keys| {
         model.walk_reliability(keys);
         let Reliability { limits, channels } = reliability;
         let key = Key::new("ratio_limit", "a point is reliable where every ratio is below this");
@@ -141,10 +141,7 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
                  out";
     let expected = "expected two, [from, to], in s";
     let kind = Kind::Numbers(Numbers::new(Range::NonNegative, 2..=2, expected));
-    let mut edges = match &keys.walk {
-        Walk::Describe(_) => Vec::new(),
-        _ => window_s.to_vec(),
-    };
+    let mut edges = if keys.is_schema() { Vec::new() } else { window_s.to_vec() };
     let found = keys.key(Key::new("window_s", about), &kind, &mut edges);
     if let (Field::Given(found), Some(report)) = (found, keys.report())
         && let Some(window) = window(&found.at, &edges, end.as_ref(), report)
@@ -191,7 +188,7 @@ fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
         set: all.len(),
     };
     let now = all.iter().position(|entry| entry.name == integrator.name());
-    keys.variants(Key::table("method").set(), &variants, now, |keys, method| {
+    keys.variants(Key::new("method", "").set(), &variants, now, |keys, method| {
         let Entry { name, with, .. } = &all[method];
         for (Setting { key, .. }, owners) in settings::<I>() {
             if owners.contains(name) {

@@ -24,14 +24,13 @@ const MACHINES: [&str; 1] = [DEFAULT_MACHINE];
 /// The machine that a grid names, or the one given in its place.
 pub(super) fn machine(machine: &mut Machine, keys: &mut Keys<'_>, input: Option<&GridInput>) {
     let key = Key::new("machine", "\"paper\", or a machine file relative to this file");
-    match (&mut keys.walk, input) {
-        (Walk::Read(root), Some(input)) => *machine = named(input, root),
-        (Walk::Write(plan), _) => drop(plan.insert("machine".to_owned(), machine_json(machine))),
-        (Walk::Describe(described), _) => {
-            described.add(&key, json!({ "type": "string", "default": DEFAULT_MACHINE }));
-        }
-        _ => {}
+    if let (Some(root), Some(input)) = (keys.section(), input) {
+        *machine = named(input, root);
     }
+    keys.tell(key, |is_schema| match is_schema {
+        true => json!({ "type": "string", "default": DEFAULT_MACHINE }),
+        false => machine_json(machine),
+    });
 }
 
 fn named(input: &GridInput, root: &Section<'_>) -> Machine {
@@ -87,7 +86,7 @@ pub(super) fn stability(
                  of the metrics `growth` and `dwell`";
     let expected = "constant speeds in rpm, as 250, \"240,305\" or \"60:400:1\"";
     let mut text = speeds.as_ref().map(ToString::to_string);
-    let field = keys.table(Key::table("stability"), |keys| {
+    let field = keys.table(Key::new("stability", ""), |keys| {
         let read = |section: &Section<'_>, key| {
             section.text_or_number(key).map(|found| found.value.into())
         };

@@ -308,30 +308,32 @@ pub(super) fn read(text: &str, root: Section<'_>) -> Machine {
 
 /// The schema of machine files.
 pub(crate) fn schema() -> Value {
-    let described = Keys::described(|keys| walk(&mut with_one_of_each(), keys));
-    document("Machine file of sweep", described.finish())
+    let told = Keys::told(true, |keys| walk(&mut with_one_of_each(), keys));
+    document("Machine file of sweep", told.finish())
 }
 
 /// The machine as a machine file's tables hold it; every number as its shortest decimal that reads
 /// back the same.
 pub(crate) fn to_json(machine: &Machine) -> Value {
-    Keys::written(|keys| walk(&mut machine.clone(), keys)).into()
+    Keys::told(false, |keys| walk(&mut machine.clone(), keys)).finish()
 }
 
 /// Walks over every section.
 fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
     for part in &PARTS {
-        let table = keys::Key::table(part.section);
+        let table = keys::Key::new(part.section, "");
         match part.times {
             _ if part.section.is_empty() => part.walk(0, machine, keys),
             Times::Once => {
-                let field = keys.table(table.needed(""), |keys| part.walk(0, machine, keys));
+                let expected = format!("a section {}", part.header());
+                let table = table.needed(&expected);
+                let field = keys.table(table, |keys| part.walk(0, machine, keys));
                 if let (None, Some(report)) = (field.given(), keys.section().map(|it| it.report)) {
                     part.keys.iter().for_each(|key| doubt(key.names(part.prefix), report));
                 }
             }
             Times::AtMostOnce => drop(keys.table(table, |keys| {
-                if keys.is_reading() {
+                if keys.section().is_some() {
                     (part.fill)(machine, 1);
                 }
                 (0..(part.count)(machine)).for_each(|k| part.walk(k, machine, keys));
@@ -350,7 +352,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                 // The two that machines have always had are written even where there are none.
                 let count = (part.count)(machine);
                 if count > 0 || ["springs", "dampers"].contains(&part.section) {
-                    let table = needed.map_or(table.clone(), |needed| table.needed(needed));
+                    let table = needed.map_or(table, |needed| table.needed(needed));
                     keys.tables(table, sections, count, |keys, k| part.walk(k, machine, keys));
                 }
             }
@@ -396,12 +398,12 @@ impl Key {
             }
         };
         let is_needed = self.left_out == LeftOut::Refused;
-        let key = keys::Key::new(self.name, about);
-        let key = if is_needed { key.needed(expected) } else { key };
-        let mut value = match (&keys.walk, self.left_out) {
-            (Walk::Write(_), _) => self.json(part, k, machine),
-            (Walk::Describe(_), LeftOut::Auto) => AUTO.into(),
-            (Walk::Describe(_), LeftOut::Is(default)) if !self.is_vector() => default.into(),
+        let key = keys::Key::new(self.name, &about);
+        let key = if is_needed { key.needed(&expected) } else { key };
+        let mut value = match self.left_out {
+            _ if !keys.is_schema() => self.json(part, k, machine),
+            LeftOut::Auto => AUTO.into(),
+            LeftOut::Is(default) if !self.is_vector() => default.into(),
             _ => Value::Null,
         };
         let found = keys.key(key, &kind, &mut value);

@@ -1,7 +1,7 @@
 //! The washing machine in grid files.
 
 use serde_json::Value;
-use sweep_engine::config::{Draft, Key, Keys, Read, Walk};
+use sweep_engine::config::{Draft, Key, Keys, Kind, Read, Walk};
 use washer_model::Machine;
 use washer_row::{Criterion, Measures, Metric};
 
@@ -41,9 +41,15 @@ impl Read for Washer {
                      of the drum, or root mean squares";
         let criterion = &mut self.measures.criterion;
         // Plans that do not ask for another read as ever.
-        if !matches!(keys.walk, Walk::Write(_)) || *criterion != Criterion::default() {
+        if !matches!(keys.walk, Walk::Tell(_))
+            || keys.is_schema()
+            || *criterion != Criterion::default()
+        {
             let key = Key::new("criterion", about).set();
-            keys.word(key, &Criterion::ALL, Criterion::name, criterion);
+            let mut word = criterion.name().to_owned();
+            keys.key(key, &Kind::Word(&Criterion::ALL.map(Criterion::name)), &mut word);
+            let found = Criterion::ALL.into_iter().find(|one| one.name() == word);
+            *criterion = found.unwrap_or_default();
         }
     }
 

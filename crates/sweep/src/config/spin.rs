@@ -53,19 +53,19 @@ const fn name(spin: &Spin) -> &'static str {
 
 /// Walks over the section.
 pub(super) fn walk(spin: &mut Spin, keys: &mut Keys<'_>) {
-    keys.table(Key::table("spin").needed(""), |keys| {
+    keys.table(Key::new("spin", "").needed("a section [spin]"), |keys| {
         keys.places = "spin_".to_owned();
         let said = (TABLE, "linear between given points, constant after the last");
         let all = RAMPED.iter().map(|profile| (profile.name, profile.description));
         let variants =
             Variants { all: all.chain([said]).collect(), default: None, set: RAMPED.len() };
         let now = variants.all.iter().position(|(known, _)| *known == name(spin));
-        let key = Key::table("profile").set();
+        let key = Key::new("profile", "").set();
         let chosen = keys.variants(key, &variants, now, |keys, k| match RAMPED.get(k) {
             Some(profile) => ramped(profile, spin, keys),
             None => table(spin, keys),
         });
-        if chosen.is_none() && keys.is_reading() {
+        if chosen.is_none() && keys.section().is_some() {
             *spin = BLANK;
         }
     });
@@ -88,7 +88,8 @@ fn ramped(&Ramped { name, make, .. }: &Ramped, spin: &mut Spin, keys: &mut Keys<
         ("ramp_s", "spin_ramp_s", "the duration of the run-up in s", &mut *ramp_s),
     ] {
         if let Ok(parameter) = Parameter::find(parameter, &Machine::paper(), &BLANK) {
-            let key = Key::new(key, about(&parameter)).needed(expected);
+            let about = about(&parameter);
+            let key = Key::new(key, &about).needed(expected);
             keys.key(key, &Kind::Number(parameter.range()), value);
         }
     }
@@ -116,7 +117,7 @@ fn table(spin: &mut Spin, keys: &mut Keys<'_>) {
         column("time_s", "increasing times from 0, s", times, &mut time_s),
         column("speed_rpm", "speeds at these times, rpm", speeds, &mut speed_rpm),
     ];
-    if keys.is_reading() && found != [true; 2] {
+    if keys.section().is_some() && found != [true; 2] {
         // Their mistakes are reported; that the stand-in has no rows is not one of them.
         if let Some(report) = keys.report() {
             report.doubt("spin_time_s");
