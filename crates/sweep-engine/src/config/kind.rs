@@ -36,6 +36,8 @@ pub struct Numbers {
     pub read: Range,
     /// How many.
     pub count: RangeInclusive<usize>,
+    /// What their places are kept under, if not under that of all with the number of each.
+    pub places: Vec<String>,
     /// What is expected where they are more or fewer.
     pub expected: String,
     /// What to do then.
@@ -93,7 +95,14 @@ impl Kind<'_> {
 impl Numbers {
     /// So many numbers in a range.
     pub fn new(range: Range, count: RangeInclusive<usize>, expected: impl Into<String>) -> Self {
-        Self { range, read: range, count, expected: expected.into(), help: None }
+        Self {
+            range,
+            read: range,
+            count,
+            places: Vec::new(),
+            expected: expected.into(),
+            help: None,
+        }
     }
 
     fn read(&self, section: &Section<'_>, key: &'static str, place: &str) -> Field<Value> {
@@ -105,7 +114,8 @@ impl Numbers {
                 return None;
             }
             let put = |(k, number): (usize, Located<f64>)| {
-                section.report.put(format!("{place}[{k}]"), number.at);
+                let own = self.places.get(k).cloned();
+                section.report.put(own.unwrap_or_else(|| format!("{place}[{k}]")), number.at);
                 number.value
             };
             let value = found.value.into_iter().enumerate().map(put).collect();

@@ -129,7 +129,7 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
         let title = format!("`end_s` = {} is out of range", decimal(value));
         keys.report()?.refuse(&at, title, format!("expected {expected}at most {LONGEST_S:e} s"))
     });
-    let is_window_written = |report: &Report| report.place("window_to_s").is_some();
+    let is_window_written = |report: &Report| report.place(WINDOW[1]).is_some();
     if let Some(end) = &end {
         *end_s = end.value;
         // A window that was not written ends with the run.
@@ -140,7 +140,10 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     let about = "amplitudes are taken from the first to the second time, s; the whole run if left \
                  out";
     let expected = "expected two, [from, to], in s";
-    let kind = Kind::Numbers(Numbers::new(Range::NonNegative, 2..=2, expected));
+    let kind = Kind::Numbers(Numbers {
+        places: WINDOW.map(str::to_owned).to_vec(),
+        ..Numbers::new(Range::NonNegative, 2..=2, expected)
+    });
     let mut edges = if keys.is_schema() { Vec::new() } else { window_s.to_vec() };
     let found = keys.key(Key::new("window_s", about), &kind, &mut edges);
     if let (Field::Given(found), Some(report)) = (found, keys.report())
@@ -151,6 +154,9 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     }
 }
 
+/// The edges of the window, as parameters.
+const WINDOW: [&str; 2] = ["window_from_s", "window_to_s"];
+
 /// The window that was read, if it is one.
 fn window(
     at: &Location,
@@ -159,10 +165,6 @@ fn window(
     report: &Report,
 ) -> Option<[f64; 2]> {
     let &[from, to] = edges else { return None };
-    let place = |k: usize| report.place(&format!("time.window_s[{k}]"));
-    let to_at = place(1)?;
-    report.put("window_from_s", place(0)?);
-    report.put("window_to_s", to_at.clone());
     let [from_said, to_said] = [from, to].map(decimal);
     if from >= to {
         let what = if from > to { "reversed" } else { "empty" };
@@ -171,8 +173,8 @@ fn window(
     }
     if let Some(end) = end.filter(|end| to > end.value) {
         let title = format!("the window ends at {to_said} s, after the integration");
-        let refusal =
-            Diagnostic::new(title).at(&to_at, format!("expected at most {}", decimal(end.value)));
+        let refusal = Diagnostic::new(title)
+            .at(&report.place(WINDOW[1])?, format!("expected at most {}", decimal(end.value)));
         report.push(refusal.at(&end.at, "the integration ends here"));
         return None;
     }

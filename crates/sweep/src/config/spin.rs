@@ -83,6 +83,7 @@ fn ramped(&Ramped { name, make, .. }: &Ramped, spin: &mut Spin, keys: &mut Keys<
         keys.refuse("profile", title, "expected a grid file with `peak_rpm` and `ramp_s`");
         return;
     };
+    let mut is_right = true;
     for (key, parameter, expected, value) in [
         ("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm", &mut *peak_rpm),
         ("ramp_s", "spin_ramp_s", "the duration of the run-up in s", &mut *ramp_s),
@@ -90,10 +91,11 @@ fn ramped(&Ramped { name, make, .. }: &Ramped, spin: &mut Spin, keys: &mut Keys<
         if let Ok(parameter) = Parameter::find(parameter, &Machine::paper(), &BLANK) {
             let about = about(&parameter);
             let key = Key::new(key, &about).needed(expected);
-            keys.key(key, &Kind::Number(parameter.range()), value);
+            let found = keys.key(key, &Kind::Number(parameter.range()), value);
+            is_right &= matches!(found, Field::Given(_)) || keys.section().is_none();
         }
     }
-    *spin = make(*peak_rpm, *ramp_s);
+    *spin = if is_right { make(*peak_rpm, *ramp_s) } else { BLANK };
 }
 
 /// Speeds at times.
