@@ -9,7 +9,7 @@ use super::list::{self, List};
 use super::parameters::find;
 use super::report::{Diagnostic, Report};
 use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number, twice};
-use crate::design::{MOST_AXES, REACH, Shape};
+use crate::design::{MOST_AXES, REACH, Rule, Shape};
 use crate::plan::MOST_POINTS;
 use crate::{Axis, AxisValues, Design, Distribution};
 
@@ -59,7 +59,11 @@ pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Dra
     let (report, mut swept) = (root.report, Swept::new());
     let sections = root.tables("axis");
     if let (Some(design), Some(at)) = (&design, report.place("design")) {
-        let most = if matches!(design, Design::Sobol { .. }) { MOST_AXES } else { usize::MAX };
+        let most = if matches!(design, Design::Spread { rule: Rule::Sobol, .. }) {
+            MOST_AXES
+        } else {
+            usize::MAX
+        };
         if sections.is_empty() || sections.len() > most {
             let title = format!("a design by \"{}\" over {} axes", design.method(), sections.len());
             let expected = match most {
@@ -303,7 +307,7 @@ pub fn spacing(
     let count = match points {
         None => {
             let expected = "the number of values, both ends included";
-            section.require(section.count("count", MOST_POINTS), "count", expected)
+            section.require(section.whole("count", &(1..=MOST_POINTS)), "count", expected)
         }
         Some(value) => {
             let reason = "the number of points belongs in [design], as `points`";

@@ -53,14 +53,9 @@ impl NumberTable {
     /// A table in memory, which messages call so.
     pub fn of_columns(name: &str, columns: Vec<(String, Vec<f64>)>, report: &Report) -> Self {
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
-        let source = report.add(name, names.join(","));
-        let mut start = 0;
-        let located = |(name, values): (String, Vec<f64>)| {
-            let at = Location::new(source, start..start + name.len());
-            start = at.span.end + 1;
-            ListColumn { name: Located { value: name, at }, values }
-        };
-        let columns = columns.into_iter().map(located).collect();
+        let (source, places) = report.header(name, &names);
+        let located = |((value, values), at)| ListColumn { name: Located { value, at }, values };
+        let columns = columns.into_iter().zip(places).map(located).collect();
         Self { columns, rows: Rows::Binary(Location::new(source, 0..0)) }
     }
 

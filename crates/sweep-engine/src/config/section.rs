@@ -161,11 +161,6 @@ impl<'a> Section<'a> {
         self.read(key, |value, _| Some(self.number_of(&quoted(key), value, range)?.value))
     }
 
-    /// A whole number from 1 to `most`.
-    pub fn count(&self, key: &'static str, most: u64) -> Field<u64> {
-        self.whole(key, &(1..=most))
-    }
-
     /// A whole number within bounds.
     pub fn whole(&self, key: &'static str, bounds: &RangeInclusive<u64>) -> Field<u64> {
         self.read(key, |value, at| {
@@ -272,11 +267,8 @@ impl<'a> Section<'a> {
 
     /// Every key as written, for tables whose keys are names of parameters.
     pub fn names(&self) -> Vec<Located<&'a str>> {
-        let mut names = Vec::new();
-        for key in self.table.keys() {
-            names.push(Located { value: key.get_ref() as &'a str, at: self.place(key.span()) });
-        }
-        names
+        let keys = self.table.keys();
+        keys.map(|key| Located { value: &**key.get_ref(), at: self.place(key.span()) }).collect()
     }
 
     /// The number under a name from [`Section::names`].

@@ -7,7 +7,7 @@ use washer_model::{Machine, Parameter, Range, Spin};
 
 /// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are
 /// made ready together.
-const MOST_ROWS: usize = 20_000;
+pub(super) const MOST_ROWS: usize = 20_000;
 
 /// Stands in for a wrong spin, so that axes over its numbers are still known.
 pub(super) const BLANK: Spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
