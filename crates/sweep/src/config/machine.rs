@@ -167,6 +167,21 @@ const fn once(section: &'static str, prefix: &'static str) -> Part {
     Part { section, prefix, times: Times::Once, optional: &[], count, fill }
 }
 
+/// A list of the machine as an array of tables, each like this one; with the prefix of parameters,
+/// the number of the first, what a machine needs one for, and what may be left out.
+macro_rules! many {
+    ($list:ident: $like:expr, $prefix:literal, $first:literal, $needed:expr, $($optional:expr),*) => {
+        Part {
+            section: stringify!($list),
+            prefix: $prefix,
+            times: Times::Many($first, $needed),
+            optional: &[$($optional),*],
+            count: |machine| machine.$list.len(),
+            fill: |machine, count| machine.$list = vec![$like; count],
+        }
+    };
+}
+
 /// A spring's free length follows its ends where it is left out.
 const FREE_LENGTH: &str = "free_length_m";
 
@@ -187,65 +202,31 @@ pub(super) const PARTS: [Part; 14] = [
         count: |machine| usize::from(machine.cabinet.is_some()),
         fill: |machine, count| machine.cabinet = (count > 0).then(Cabinet::default),
     },
-    Part {
-        section: "springs",
-        prefix: "spring_",
-        times: Times::Many(1, Some("at least one [[springs]]: nothing else carries the machine")),
-        optional: &[(FREE_LENGTH, LeftOut::Nothing), ("cubic_n_per_m3", LeftOut::Is(0.0))],
-        count: |machine| machine.springs.len(),
-        fill: |machine, count| {
-            let like = Machine::paper().springs[0];
-            machine.springs = vec![Spring { free_length_m: None, ..like }; count];
-        },
-    },
-    Part {
-        section: "dampers",
-        prefix: "damper_",
-        times: Times::Many(1, None),
-        optional: &[
-            ("friction_n", LeftOut::Is(0.0)),
-            ("friction_speed_m_per_s", LeftOut::Is(Damper::FRICTION_SPEED_M_PER_S)),
-            ("friction_linear_speed_m_per_s", LeftOut::Auto),
-        ],
-        count: |machine| machine.dampers.len(),
-        fill: |machine, count| machine.dampers = vec![Machine::paper().dampers[0]; count],
-    },
-    Part {
-        section: "stops",
-        prefix: "stop_",
-        times: Times::Many(1, None),
-        optional: &[
-            ("damping_n_s_per_m", LeftOut::Is(0.0)),
-            ("softness_m", LeftOut::Is(BumpStop::SOFTNESS_M)),
-        ],
-        count: |machine| machine.stops.len(),
-        fill: |machine, count| machine.stops = vec![BumpStop::default(); count],
-    },
-    Part {
-        section: "bushings",
-        prefix: "bushing_",
-        times: Times::Many(1, None),
-        optional: &[("cubic_n_per_m3", LeftOut::Is(0.0)), ("damping_n_s_per_m", LeftOut::Is(0.0))],
-        count: |machine| machine.bushings.len(),
-        fill: |machine, count| machine.bushings = vec![Bushing::default(); count],
-    },
-    Part {
-        section: "further_unbalances",
-        prefix: "unbalance_",
-        // The first is `[unbalance]`.
-        times: Times::Many(2, None),
-        optional: &[],
-        count: |machine| machine.further_unbalances.len(),
-        fill: |machine, count| machine.further_unbalances = vec![Unbalance::default(); count],
-    },
-    Part {
-        section: "feet",
-        prefix: "foot_",
-        times: Times::Many(1, None),
-        optional: &[],
-        count: |machine| machine.feet.len(),
-        fill: |machine, count| machine.feet = vec![Foot::default(); count],
-    },
+    many!(
+        springs: Spring { free_length_m: None, ..Machine::paper().springs[0] },
+        "spring_", 1, Some("at least one [[springs]]: nothing else carries the machine"),
+        (FREE_LENGTH, LeftOut::Nothing), ("cubic_n_per_m3", LeftOut::Is(0.0))
+    ),
+    many!(
+        dampers: Machine::paper().dampers[0],
+        "damper_", 1, None,
+        ("friction_n", LeftOut::Is(0.0)),
+        ("friction_speed_m_per_s", LeftOut::Is(Damper::FRICTION_SPEED_M_PER_S)),
+        ("friction_linear_speed_m_per_s", LeftOut::Auto)
+    ),
+    many!(
+        stops: BumpStop::default(),
+        "stop_", 1, None,
+        ("damping_n_s_per_m", LeftOut::Is(0.0)), ("softness_m", LeftOut::Is(BumpStop::SOFTNESS_M))
+    ),
+    many!(
+        bushings: Bushing::default(),
+        "bushing_", 1, None,
+        ("cubic_n_per_m3", LeftOut::Is(0.0)), ("damping_n_s_per_m", LeftOut::Is(0.0))
+    ),
+    // The first is `[unbalance]`.
+    many!(further_unbalances: Unbalance::default(), "unbalance_", 2, None,),
+    many!(feet: Foot::default(), "foot_", 1, None,),
 ];
 /// Most elements of one list: enough for any machine, and what depends on all of them stays quick.
 const MOST_ELEMENTS: usize = 1000;
