@@ -170,7 +170,8 @@ const fn once(section: &'static str, prefix: &'static str) -> Part {
 /// A list of the machine as an array of tables, each like this one; with the prefix of parameters,
 /// the number of the first, what a machine needs one for, and what may be left out.
 macro_rules! many {
-    ($list:ident: $like:expr, $prefix:literal, $first:literal, $needed:expr, $($optional:expr),*) => {
+    ($list:ident: $like:expr, $prefix:literal, $first:literal, $needed:expr,
+        $($optional:expr),*) => {
         Part {
             section: stringify!($list),
             prefix: $prefix,
