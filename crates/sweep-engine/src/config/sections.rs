@@ -1,5 +1,6 @@
 //! The keys of a grid file, table by table. What is left out has the defaults of a blank plan.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::json;
@@ -11,7 +12,7 @@ use super::{
     Diagnostic, Field, GridInput, Key, Keys, Kind, Located, Location, Read, Report, Section, Walk,
     design,
 };
-use crate::method::{Entry, Integrator, Setting, default_method, settings};
+use crate::method::{Integrator, Setting, default_method};
 use crate::plan::{LONGEST_S, Plan, RATIO_MIN, Reliability, WrittenIn};
 
 impl<M: Read> Plan<M> {
@@ -191,11 +192,12 @@ fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
     };
     let now = all.iter().position(|entry| entry.name == integrator.name());
     keys.variants(Key::new("method", "").set(), &variants, now, |keys, method| {
-        let Entry { name, with, .. } = &all[method];
-        for (Setting { key, .. }, owners) in settings::<I>() {
-            if owners.contains(name) {
-                continue;
-            }
+        let entry = &all[method];
+        let name = entry.name;
+        let others = all.iter().flat_map(|other| other.settings).map(|setting| setting.key);
+        for key in others.filter(|key| !entry.has(key)).collect::<BTreeSet<_>>() {
+            let owners = all.iter().filter(|other| other.has(key)).map(|other| other.name);
+            let owners: Vec<&str> = owners.collect();
             let (noun, verb) =
                 if owners.len() == 1 { ("method", "has") } else { ("methods", "have") };
             let said = owners.join("\" and \"");
@@ -205,7 +207,7 @@ fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
         }
         // Settings that both methods have stay as they are.
         let was = integrator.settings();
-        *integrator = with(&mut |&Setting { key, range, default, description }| {
+        *integrator = (entry.with)(&mut |&Setting { key, range, default, description }| {
             let was = was.iter().find(|(known, _)| *known == key);
             let mut number = was.map_or(default, |(_, number)| *number);
             keys.key(Key::new(key, description).set(), &Kind::Number(range), &mut number);
