@@ -113,7 +113,7 @@ impl Part {
 
     /// Walks over the keys of element `k`.
     fn walk(&self, own: &'static [Key], k: usize, machine: &mut Machine, keys: &mut Keys<'_>) {
-        keys.places = self.prefix(k);
+        keys.places = format!("{}.", self.section);
         own.iter().for_each(|key| key.walk(self, k, machine, keys));
     }
 
@@ -370,10 +370,13 @@ impl Key {
         let Some(report) = keys.section().map(|section| section.report) else { return };
         let numbers = value.as_array().map_or(slice::from_ref(&value), Vec::as_slice);
         match found {
-            Field::Given(_) => {
+            Field::Given(found) => {
                 let numbers = numbers.iter().filter_map(Value::as_f64);
                 for (parameter, number) in parameters.iter().zip(numbers) {
                     parameter.set(machine, &mut no_spin(), number);
+                    if !self.is_vector() {
+                        report.put(parameter.name(), found.at.clone());
+                    }
                 }
             }
             Field::Absent if !is_needed => {}
