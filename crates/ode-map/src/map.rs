@@ -10,14 +10,13 @@ use sweep_engine::boundary::search::Values;
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
-use sweep_engine::config::Read;
 use sweep_engine::config::schema::set;
-use sweep_engine::config::section::Section;
+use sweep_engine::config::{Keys, Read};
 use sweep_engine::estimate::Estimate;
 use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Steps};
 use sweep_engine::store::{Done, Job, Layout, Rows, Shape, axis_columns};
 use sweep_engine::{
-    Build, Engine, Error, GridInput, Listed, Model as EngineModel, Plan, Scenario, Schema, Swept,
+    Build, Engine, Error, GridInput, Listed, Model as EngineModel, Plan, Scenario, Swept,
     UnknownParameter, Watch, methods,
 };
 use sweep_parameter::{Channel, Range};
@@ -218,24 +217,18 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Read
     for Map<O, C, D, P>
 {
-    fn read(_: &GridInput<Self>, _: &Section<'_>) -> Self {
+    fn blank() -> Self {
         Self { values: O::PARAMETERS.map(|one| one.default), of: PhantomData }
     }
 
-    fn describe(&self, plan: &mut JsonMap<String, Value>) {
+    fn walk(&mut self, keys: &mut Keys<'_>, _: Option<&GridInput<Self>>) {
         let named = O::PARAMETERS.iter().zip(self.values);
         let pair = |(one, value): (&Parameter, f64)| (one.name.to_owned(), Value::from(value));
-        let values: Value = named.map(pair).collect();
-        plan.insert("parameters".to_owned(), values);
+        keys.write("parameters", named.map(pair).collect());
     }
 
-    fn schema() -> Schema {
-        Schema {
-            top: Vec::new(),
-            required: Vec::new(),
-            reliability: Vec::new(),
-            set: set(&parameters::<O, C, D, P>(), JsonMap::new()),
-        }
+    fn schema_of_set() -> Value {
+        set(&parameters::<O, C, D, P>(), JsonMap::new())
     }
 }
 

@@ -46,48 +46,24 @@ impl AsRef<Self> for Compared {
     }
 }
 
-type Get<R, T> = Box<dyn Fn(&R) -> T + Send + Sync>;
-
-/// How a column takes its cell from a row, which settles its type too.
-pub enum Cell<R> {
-    /// Never null.
-    Count(Get<R, u64>),
-    /// Null where not known.
-    KnownCount(Get<R, Option<u64>>),
-    /// A number that hardly ever repeats.
-    Measured(Get<R, Option<f64>>),
-    /// A number that may repeat.
-    Time(Get<R, Option<f64>>),
-    /// True or false.
-    Flag(Get<R, Option<bool>>),
-    /// A position in a list of names that is the same for every row, batch and run of the plan.
-    Name(Vec<&'static str>, Get<R, Option<usize>>),
-}
-
 /// A column of the file.
 pub struct ResultColumn<R> {
     /// What the file says of it.
     pub declared: Column,
-    cell: Cell<R>,
+    /// Its cell of a row.
+    pub cell: Box<dyn Fn(&R) -> Option<u64> + Send + Sync>,
 }
 
 impl<R> ResultColumn<R> {
-    /// A column.
+    /// A column of this kind's cells.
     pub fn new(
         name: impl Into<String>,
         unit: &str,
         description: impl Into<String>,
-        cell: Cell<R>,
+        kind: Kind,
+        cell: impl Fn(&R) -> Option<u64> + Send + Sync + 'static,
     ) -> Self {
-        let kind = match &cell {
-            Cell::Count(_) => Kind::Count,
-            Cell::KnownCount(_) => Kind::KnownCount,
-            Cell::Measured(_) => Kind::Measured,
-            Cell::Time(_) => Kind::Time,
-            Cell::Flag(_) => Kind::Flag,
-            Cell::Name(names, _) => Kind::Name(names.clone()),
-        };
-        Self { declared: Column::new(name, unit, description, kind), cell }
+        Self { declared: Column::new(name, unit, description, kind), cell: Box::new(cell) }
     }
 
     /// A column of numbers that hardly ever repeat, null where there is none.
@@ -97,7 +73,8 @@ impl<R> ResultColumn<R> {
         description: impl Into<String>,
         get: impl Fn(&R) -> Option<f64> + Send + Sync + 'static,
     ) -> Self {
-        Self::new(name, unit, description, Cell::Measured(Box::new(get)))
+        let cell = move |row: &R| get(row).map(f64::to_bits);
+        Self::new(name, unit, description, Kind::Measured, cell)
     }
 
     /// A column of names, null where there is none.
@@ -107,7 +84,8 @@ impl<R> ResultColumn<R> {
         names: Vec<&'static str>,
         get: impl Fn(&R) -> Option<usize> + Send + Sync + 'static,
     ) -> Self {
-        Self::new(name, "", description, Cell::Name(names, Box::new(get)))
+        let cell = move |row: &R| get(row).map(|name| name as u64);
+        Self::new(name, "", description, Kind::Name(names), cell)
     }
 
     /// A column of truths, null where they are not known.
@@ -116,7 +94,7 @@ impl<R> ResultColumn<R> {
         description: impl Into<String>,
         get: impl Fn(&R) -> Option<bool> + Send + Sync + 'static,
     ) -> Self {
-        Self::new(name, "", description, Cell::Flag(Box::new(get)))
+        Self::new(name, "", description, Kind::Flag, move |row| get(row).map(u64::from))
     }
 
     /// The same, with which way it is bad.
@@ -133,29 +111,17 @@ impl<R> ResultColumn<R> {
 
     /// Its number of a row, if it is a column of numbers.
     pub fn number(&self, row: &R) -> Option<f64> {
-        match &self.cell {
-            Cell::Count(get) => Some(get(row) as f64),
-            Cell::KnownCount(get) => get(row).map(|count| count as f64),
-            Cell::Measured(get) | Cell::Time(get) => get(row),
-            Cell::Flag(_) | Cell::Name(..) => None,
-        }
-    }
-
-    /// Its cell of a row.
-    pub fn cell(&self, row: &R) -> Option<u64> {
-        match &self.cell {
-            Cell::Count(get) => Some(get(row)),
-            Cell::KnownCount(get) => get(row),
-            Cell::Measured(get) | Cell::Time(get) => get(row).map(f64::to_bits),
-            Cell::Flag(get) => get(row).map(u64::from),
-            Cell::Name(_, get) => get(row).map(|name| name as u64),
+        match self.declared.kind {
+            Kind::Count | Kind::KnownCount => (self.cell)(row).map(|count| count as f64),
+            Kind::Measured | Kind::Axis | Kind::Time => (self.cell)(row).map(f64::from_bits),
+            Kind::Flag | Kind::Name(_) => None,
         }
     }
 }
 
 /// The cells of a row.
 pub fn row<R>(columns: &[ResultColumn<R>], of: &R) -> Row {
-    columns.iter().map(|column| column.cell(of)).collect()
+    columns.iter().map(|column| (column.cell)(of)).collect()
 }
 
 /// What the file says of these columns.
@@ -251,18 +217,25 @@ pub fn run_columns<R: AsRef<Compared>>(statuses: Vec<&'static str>) -> Vec<Resul
     let status =
         "ok, or why the nonlinear model failed, or behind linear_ why the linear model alone did";
     let fail_time = "when the model named by status failed; null if none did or it never started";
-    let of_fail_time = Cell::Time(Box::new(|row: &R| row.as_ref().fail_time_s));
+    let of_fail_time = |row: &R| row.as_ref().fail_time_s.map(f64::to_bits);
     let mut columns = vec![
         ResultColumn::name("status", status, statuses, |row: &R| Some(row.as_ref().status)),
-        ResultColumn::new("fail_time_s", "s", fail_time, of_fail_time).worse(Worse::Less),
+        ResultColumn::new("fail_time_s", "s", fail_time, Kind::Time, of_fail_time)
+            .worse(Worse::Less),
     ];
     let counts: [(&str, &str, fn(&Compared) -> [u64; 2]); 2] =
         [("steps", "accepted", |row| row.steps), ("rejected", "rejected", |row| row.rejected)];
     for (name, kind, count) in counts {
         for (k, model) in MODELS.into_iter().enumerate() {
             let text = format!("{kind} integration steps, {model} model");
-            let cell = Cell::Count(Box::new(move |row: &R| count(row.as_ref())[k]));
-            columns.push(ResultColumn::new(format!("{name}_{model}"), "1", text, cell));
+            let cell = move |row: &R| Some(count(row.as_ref())[k]);
+            columns.push(ResultColumn::new(
+                format!("{name}_{model}"),
+                "1",
+                text,
+                Kind::Count,
+                cell,
+            ));
         }
     }
     columns

@@ -14,28 +14,10 @@ pub use sobol::MOST_AXES;
 /// How the points of a plan are laid out, if not as a grid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Design {
-    /// Every axis cut into as many strata as there are points, one point in each, at random within
-    /// it.
-    ///
-    /// M. D. McKay, R. J. Beckman, W. J. Conover, A comparison of three methods for selecting
-    /// values of input variables in the analysis of output from a computer code, Technometrics 21
-    /// (1979), 239-245.
-    LatinHypercube {
-        /// How many points.
-        points: u64,
-        /// Another seed, another draw.
-        seed: u64,
-    },
-    /// Sobol's sequence with direction numbers of Joe and Kuo, in Owen's nested scrambling.
-    Sobol {
-        /// How many points; a power of two is the most even.
-        points: u64,
-        /// Another seed, another scrambling.
-        seed: u64,
-    },
-    /// Every point at random, independent of all others: what averages, shares and their confidence
-    /// intervals by the binomial formulas assume.
-    MonteCarlo {
+    /// Over the axes' ranges.
+    Spread {
+        /// By which rule.
+        rule: Rule,
         /// How many points.
         points: u64,
         /// Another seed, another draw.
@@ -52,23 +34,53 @@ pub enum Design {
     },
 }
 
+/// What spreads points over a box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rule {
+    /// Every axis cut into as many strata as there are points, one point in each, at random within
+    /// it.
+    ///
+    /// M. D. McKay, R. J. Beckman, W. J. Conover, A comparison of three methods for selecting
+    /// values of input variables in the analysis of output from a computer code, Technometrics 21
+    /// (1979), 239-245.
+    LatinHypercube,
+    /// Sobol's sequence with direction numbers of Joe and Kuo, in Owen's nested scrambling; a power
+    /// of two points is the most even.
+    Sobol,
+    /// Every point at random, independent of all others: what averages, shares and their confidence
+    /// intervals by the binomial formulas assume.
+    MonteCarlo,
+}
+
+impl Rule {
+    /// Every rule with its name in grid files, and what it does.
+    pub const ALL: [(Self, &'static str, &'static str); 3] = [
+        (
+            Self::LatinHypercube,
+            "latin_hypercube",
+            "every axis cut into as many strata as there are points, one point in each",
+        ),
+        (
+            Self::Sobol,
+            "sobol",
+            "a scrambled Sobol sequence; a power of two points is the most even",
+        ),
+        (Self::MonteCarlo, "monte_carlo", "every point at random, independent of all others"),
+    ];
+}
+
 impl Design {
     /// Number of points.
     pub const fn points(&self) -> u64 {
         match self {
-            Self::LatinHypercube { points, .. }
-            | Self::Sobol { points, .. }
-            | Self::MonteCarlo { points, .. }
-            | Self::List { points, .. } => *points,
+            Self::Spread { points, .. } | Self::List { points, .. } => *points,
         }
     }
 
     /// Its name in grid files.
     pub const fn method(&self) -> &'static str {
         match self {
-            Self::LatinHypercube { .. } => "latin_hypercube",
-            Self::Sobol { .. } => "sobol",
-            Self::MonteCarlo { .. } => "monte_carlo",
+            Self::Spread { rule, .. } => Rule::ALL[*rule as usize].1,
             Self::List { .. } => "list",
         }
     }
@@ -76,12 +88,12 @@ impl Design {
     /// Where point `point` lies along axis `axis`, strictly between 0 and 1; `None` for a list,
     /// whose axes hold the values themselves.
     pub fn place(&self, point: u64, axis: usize) -> Option<f64> {
-        match *self {
-            Self::LatinHypercube { points, seed } => Some(latin::place(point, points, axis, seed)),
-            Self::Sobol { seed, .. } => Some(sobol::place(point, axis, seed)),
-            Self::MonteCarlo { seed, .. } => Some(at_random(point, axis, seed)),
-            Self::List { .. } => None,
-        }
+        let &Self::Spread { rule, points, seed } = self else { return None };
+        Some(match rule {
+            Rule::LatinHypercube => latin::place(point, points, axis, seed),
+            Rule::Sobol => sobol::place(point, axis, seed),
+            Rule::MonteCarlo => at_random(point, axis, seed),
+        })
     }
 }
 
@@ -113,7 +125,7 @@ mod tests {
 
     #[test]
     fn points_at_random_are_even_and_independent() {
-        let design = Design::MonteCarlo { points: 20_000, seed: 3 };
+        let design = Design::Spread { rule: Rule::MonteCarlo, points: 20_000, seed: 3 };
         let draw = |axis| (0..20_000).map(move |point| at_random(point, axis, 3));
         assert_eq!(design.place(7, 1), Some(at_random(7, 1, 3)));
         assert_eq!((design.points(), design.method()), (20_000, "monte_carlo"));

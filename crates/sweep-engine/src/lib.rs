@@ -34,7 +34,7 @@ pub mod threads;
 pub mod watch;
 
 pub use build::Build;
-pub use config::{Diagnostics, GridInput, Mistake, Read, Schema};
+pub use config::{Diagnostics, GridInput, Mistake, Read};
 pub use design::{Design, Distribution};
 pub use effort::{Effort, EffortArgs};
 pub use estimate::Estimate;

@@ -163,22 +163,13 @@ pub fn default_method<I: Integrator>() -> &'static Entry<I> {
 }
 
 impl<I> Entry<I> {
+    /// Whether it takes a setting.
+    pub fn has(&self, key: &str) -> bool {
+        self.settings.iter().any(|setting| setting.key == key)
+    }
+
     /// The method with every setting at its default.
     pub fn with_defaults(&self) -> I {
         (self.with)(&mut |setting| setting.default)
     }
-}
-
-/// Every setting once, each with the names of the methods that take it.
-pub fn settings<I: Integrator>() -> Vec<(&'static Setting, Vec<&'static str>)> {
-    let mut settings: Vec<(&Setting, Vec<&str>)> = Vec::new();
-    for entry in I::methods() {
-        for setting in entry.settings {
-            match settings.iter_mut().find(|(known, _)| known.key == setting.key) {
-                Some((_, methods)) => methods.push(entry.name),
-                None => settings.push((setting, vec![entry.name])),
-            }
-        }
-    }
-    settings
 }

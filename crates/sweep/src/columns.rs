@@ -3,8 +3,9 @@
 use std::mem::take;
 
 use sweep_engine::columns::{
-    Cell, Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
+    Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
+use sweep_engine::store::Kind as CellKind;
 use sweep_engine::store::read::FAR_OFF;
 use sweep_engine::store::{Column, Done, Layout, Rows, axis_columns};
 use sweep_parameter::{Limit, RatioLimits, Worse};
@@ -294,11 +295,9 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
 fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
     let number = |row: &ResultRow| Some(u64::from(growth(row)?.branch));
     // It says which of a speed's rows a row is, and so is never null there.
-    let branch = if prefix.is_empty() {
-        Cell::Count(Box::new(move |row: &ResultRow| number(row).unwrap_or(0)))
-    } else {
-        Cell::KnownCount(Box::new(number))
-    };
+    let is_of_speed = prefix.is_empty();
+    let kind = if is_of_speed { CellKind::Count } else { CellKind::KnownCount };
+    let branch = move |row: &ResultRow| number(row).or(is_of_speed.then_some(0));
     let folds = "how many folds the point's curve of responses has before this one, followed from \
                  a low speed up; a machine that runs up is on the least branch that there is at a \
                  speed";
@@ -316,7 +315,7 @@ fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
     };
     let names = Beyond::ALL.map(Beyond::name).to_vec();
     [
-        ResultColumn::new(format!("{prefix}branch"), "1", folds, branch),
+        ResultColumn::new(format!("{prefix}branch"), "1", folds, kind, branch),
         end("from", "below", 0),
         end("to", "above", 1),
         ResultColumn::name(format!("{prefix}beyond"), passed, names, beyond),
@@ -332,11 +331,11 @@ fn growing_mode_columns(prefix: &str, place: usize) -> [WasherColumn; 3] {
         "number, by frequency at this speed, of the linear model's mode {which} what grows; null \
          where nothing grows, or no such mode is needed"
     );
-    let number = Cell::KnownCount(Box::new(move |row| Some(u64::from(mode(row)?.number))));
+    let number = move |row: &ResultRow| Some(u64::from(mode(row)?.number));
     let (moves, names) = ("what moves in it", Motion::NAMES.to_vec());
     let frequency = "its damped natural frequency at this speed in cycles per minute";
     [
-        ResultColumn::new(name.clone(), "1", text, number),
+        ResultColumn::new(name.clone(), "1", text, CellKind::KnownCount, number),
         ResultColumn::name(format!("{name}_name"), moves, names, move |row| {
             Some(mode(row)?.name as usize)
         }),

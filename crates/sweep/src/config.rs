@@ -8,10 +8,9 @@
 //! stand in one place.
 
 pub(crate) mod grid;
-mod machine;
+pub(crate) mod machine;
 mod read;
-mod scalars;
-pub(crate) mod schema;
+mod schema;
 mod spin;
 #[cfg(test)]
 mod tests;

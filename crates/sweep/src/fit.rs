@@ -29,7 +29,7 @@ use crate::config::GridInput;
 use crate::engine::simd_from_environment;
 use sweep_engine::config::report::{Diagnostic, Report as Mistakes};
 use sweep_engine::config::source::Location;
-use sweep_engine::design::{Design, Distribution, Shape};
+use sweep_engine::design::{Design, Distribution, Rule, Shape};
 use sweep_engine::threads::Stop;
 use sweep_engine::{Diagnostics, Error, tell};
 
@@ -425,7 +425,7 @@ fn bootstrap(
 ) -> Option<Vec<Vec<f64>>> {
     const BLOCK: usize = 100;
     let measured = problem.cases.clone();
-    let draw = Design::MonteCarlo { points: 0, seed: SEED };
+    let draw = Design::Spread { rule: Rule::MonteCarlo, points: 0, seed: SEED };
     let mut drawn = 0;
     let mut found = Vec::new();
     for _ in 0..count {
@@ -501,7 +501,8 @@ impl Search<'_> {
         }
         let mut chosen = vec![start.clone()];
         if starts > 1 {
-            let design = Design::LatinHypercube { points: starts - 1, seed: SEED };
+            let design =
+                Design::Spread { rule: Rule::LatinHypercube, points: starts - 1, seed: SEED };
             let place = |point: u64, k: usize| {
                 let Free { range, start, .. } = &self.problem.free[k];
                 let around = AROUND.map(|share| share * start);
@@ -554,7 +555,7 @@ impl Search<'_> {
 
 /// So many draws from the standard normal distribution, evenly spread: of a draw the k-th number.
 fn evenly(count: u64) -> impl Fn(u64, usize) -> f64 {
-    let design = Design::LatinHypercube { points: count, seed: SEED };
+    let design = Design::Spread { rule: Rule::LatinHypercube, points: count, seed: SEED };
     let shape = Shape::Normal { mean: 0.0, sd: 1.0 };
     let normal = Distribution { shape, from: -6.0, to: 6.0 };
     move |point, k| normal.quantile(design.place(point, k).unwrap_or(0.5))

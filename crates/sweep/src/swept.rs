@@ -147,7 +147,8 @@ mod tests {
     #[test]
     fn what_a_user_wrote_is_not_ascribed_to_the_paper_whatever_its_value() {
         let folder = tempfile::tempdir().unwrap();
-        let machine = crate::config::machine_file(&Machine::paper());
+        let machine = crate::config::machine_file(&Machine::paper())
+            + "friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n";
         std::fs::write(folder.path().join("own.toml"), machine).unwrap();
         let grid = folder.path().join("grid.toml");
         let text = "spin = { profile = \"ramp\", peak_rpm = 120, ramp_s = 2 }\ntime.end_s = 2\n";
@@ -166,6 +167,10 @@ mod tests {
         assert_eq!(own("damper_1_damping_n_s_per_m"), "given: --set");
         assert_eq!(own("damping_n_s_per_m"), format!("given: --set, {file}"));
         assert_eq!(own("spring_1_cubic_n_per_m3"), "assumed: none unless given");
+        assert_eq!(own("damper_2_friction_n"), format!("given: {file}"));
+        // It is left to the program.
+        let speed = own("damper_2_friction_linear_speed_m_per_s");
+        assert_eq!(speed, "assumed: that of the linear motion");
         assert_eq!(own("spin_peak_rpm"), "the grid file's [spin]");
         let built_in = sources("", &["tub_mass_kg=23.87"]);
         assert_eq!(built_in("tub_mass_kg"), "given: --set");

@@ -9,7 +9,7 @@ use super::list::{self, List};
 use super::parameters::find;
 use super::report::{Diagnostic, Report};
 use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number, twice};
-use crate::design::{MOST_AXES, REACH, Shape};
+use crate::design::{MOST_AXES, REACH, Rule, Shape};
 use crate::plan::MOST_POINTS;
 use crate::{Axis, AxisValues, Design, Distribution};
 
@@ -55,22 +55,22 @@ fn is_fixed<M: Read>(parameter: &M::Parameter, draft: &Draft<'_, M>) -> bool {
 
 /// Reads every `[[axis]]`: of a grid, or of a design that fills a box: a range each, without a
 /// count.
-pub fn axes<M: Read>(
-    root: &Section<'_>,
-    design: Option<Located<Design>>,
-    draft: &mut Draft<'_, M>,
-) {
+pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Draft<'_, M>) {
     let (report, mut swept) = (root.report, Swept::new());
     let sections = root.tables("axis");
-    if let Some(Located { value, at }) = &design {
-        let most = if matches!(value, Design::Sobol { .. }) { MOST_AXES } else { usize::MAX };
+    if let (Some(design), Some(at)) = (&design, report.place("design")) {
+        let most = if matches!(design, Design::Spread { rule: Rule::Sobol, .. }) {
+            MOST_AXES
+        } else {
+            usize::MAX
+        };
         if sections.is_empty() || sections.len() > most {
-            let title = format!("a design by \"{}\" over {} axes", value.method(), sections.len());
+            let title = format!("a design by \"{}\" over {} axes", design.method(), sections.len());
             let expected = match most {
                 usize::MAX => "expected at least one [[axis]] with a range".to_owned(),
                 most => format!("expected from 1 to {most} [[axis]], each with a range"),
             };
-            report.refuse::<()>(at, title, expected);
+            report.refuse::<()>(&at, title, expected);
         }
     }
     let mut points: Option<u64> = Some(1);
@@ -80,7 +80,7 @@ pub fn axes<M: Read>(
         let parameter = name.as_ref().and_then(|name| find(name, draft));
         let range = parameter.as_ref().map_or(Range::Any, |parameter| parameter.range());
         let values = match &design {
-            Some(design) => extent(&section, range, design.value.points()),
+            Some(design) => extent(&section, range, design.points()),
             None => values(&section, range),
         };
         section.finish();
@@ -108,7 +108,7 @@ pub fn axes<M: Read>(
     }
     // Where every axis is fixed there is one point.
     let is_point = draft.plan.axes.is_empty();
-    draft.plan.design = design.map(|design| design.value).filter(|_| !is_point);
+    draft.plan.design = design.filter(|_| !is_point);
 }
 
 /// Adds an axis to the plan.
@@ -163,9 +163,10 @@ fn distribution(section: Section<'_>, range: Range, points: u64) -> Option<Locat
     let field = section.choice("kind", &DISTRIBUTIONS.map(|(kind, _)| kind));
     let kind = section.require(field, "kind", "`normal`, `lognormal` or `uniform`");
     let kind = kind.map(|kind| kind.value);
-    let number = |key, range, needed| {
+    let number = |key, range, needed: bool| {
         let field = section.number(key, range);
-        section.require_if(needed, field, key, "a number").map(|number| number.value)
+        let field = section.expect(field, key, needed.then_some("a number"));
+        field.given().map(|number| number.value)
     };
     // An unknown kind has no list of keys, but each key has its range.
     let own = kind.map_or(&DISTRIBUTIONS[..], |kind| &DISTRIBUTIONS[kind..=kind]);
@@ -306,7 +307,7 @@ pub fn spacing(
     let count = match points {
         None => {
             let expected = "the number of values, both ends included";
-            section.require(section.count("count", MOST_POINTS), "count", expected)
+            section.require(section.whole("count", &(1..=MOST_POINTS)), "count", expected)
         }
         Some(value) => {
             let reason = "the number of points belongs in [design], as `points`";

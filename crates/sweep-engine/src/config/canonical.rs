@@ -1,10 +1,9 @@
 //! A plan as JSON: a result file carries it as its input, and it tells the plans of two runs apart.
 
 use serde_json::{Value, json};
-use sweep_parameter::{Channel as _, Parameter as _};
+use sweep_parameter::Parameter as _;
 
-use super::Read;
-use crate::method::Integrator as _;
+use super::{Keys, Read, sections};
 use crate::{Axis, AxisValues, Design, Distribution, Plan};
 
 impl<M: Read> Plan<M> {
@@ -15,45 +14,26 @@ impl<M: Read> Plan<M> {
     /// Canonical: keys are sorted, and numbers are written as the shortest decimal that reads back
     /// to the same bits, so two plans are the same if and only if their texts are.
     pub fn to_json(&self) -> Value {
+        // Not the axes, which may be long.
+        let mut plan = Self {
+            name: self.name.clone(),
+            model: self.model.clone(),
+            end_s: self.end_s,
+            window_s: self.window_s,
+            integrator: self.integrator,
+            design: self.design.clone(),
+            reliability: self.reliability.clone(),
+            ..Self::blank()
+        };
         let axes = self.axes.iter().map(|axis| self::axis(axis, self.design.as_ref()));
-        let channels = self.reliability.channels.iter().map(|channel| channel.name());
-        let mut plan = json!({
-            "name": self.name,
-            "time": { "end_s": self.end_s, "window_s": self.window_s },
-            "integrator": self.integrator.to_json(),
-            "axis": axes.collect::<Value>(),
-            "reliability": {
-                "ratio_limit": self.reliability.limits.most,
-                "channels": channels.collect::<Value>(),
-            },
+        let told = Keys::told(false, |keys| {
+            sections::walk(&mut plan, keys);
+            keys.write("axis", axes.collect());
+            if !self.set.is_empty() {
+                keys.write("set", self.set.iter().cloned().collect());
+            }
         });
-        if let Some(least) = self.reliability.limits.least {
-            plan["reliability"]["ratio_min"] = least.into();
-        }
-        if let Some(design) = &self.design {
-            plan["design"] = self::design(design);
-        }
-        if let Value::Object(plan) = &mut plan {
-            self.model.describe(plan);
-        }
-        if !self.set.is_empty() {
-            plan["set"] = self.set.iter().cloned().collect();
-        }
-        plan
-    }
-}
-
-fn design(design: &Design) -> Value {
-    let method = design.method();
-    match design {
-        Design::LatinHypercube { points, seed }
-        | Design::Sobol { points, seed }
-        | Design::MonteCarlo { points, seed } => {
-            json!({ "method": method, "points": points, "seed": seed })
-        }
-        Design::List { file, points, hash } => {
-            json!({ "method": method, "file": file, "points": points, "hash": hash })
-        }
+        told.finish()
     }
 }
 

@@ -1,74 +1,80 @@
 //! `[design]`: points by a rule over the axes' ranges, or listed in a file of their own.
 
-use std::path::Path;
-
-use super::list::{self, List};
-use super::{Field, Located, Section};
+use super::keys::Variants;
+use super::{Field, Key, Keys, Kind, Walk};
 use crate::Design;
+use crate::design::Rule;
 use crate::plan::MOST_POINTS;
 
-/// The methods by name.
-pub const METHODS: [&str; 4] = ["latin_hypercube", "sobol", "monte_carlo", "list"];
 /// `seed` when the grid names none.
 pub const DEFAULT_SEED: u64 = 0;
 /// Greatest seed: what JSON and TOML carry exactly everywhere.
 pub const MOST_SEED: u64 = (1 << 53) - 1;
 /// Points of Sobol's sequence with 32 bits.
-pub const MOST_SOBOL: u64 = 1 << 32;
+const MOST_SOBOL: u64 = 1 << 32;
 
-/// What `[design]` says.
-pub enum WrittenDesign {
-    /// Nothing: a grid.
-    None,
-    /// Something wrong, already reported.
-    Bad,
-    /// Points over ranges.
-    Box(Located<Design>),
-    /// Points as listed.
-    List(List),
+/// Walks over the section. Where it is read there is no design after a mistake, and a list has no
+/// points yet.
+pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
+    keys.table(Key::new("design", ""), |keys| {
+        let rules = Rule::ALL.map(|(_, name, about)| (name, about));
+        let all = [&rules[..], &[("list", "points as listed")]].concat();
+        let now = design.as_ref().map(Design::method);
+        let now = all.iter().position(|(name, _)| Some(*name) == now);
+        let key =
+            Key::new("method", "").needed("`latin_hypercube`, `sobol`, `monte_carlo` or `list`");
+        let variants = Variants { all, default: None, set: 0 };
+        let chosen = keys.variants(key, &variants, now, |keys, k| match Rule::ALL.get(k) {
+            Some((rule, ..)) => spread(*rule, design, keys),
+            None => listed(design, keys),
+        });
+        if chosen.is_none() {
+            *design = None;
+        }
+        if matches!(keys.walk, Walk::Set(_)) && !matches!(design, Some(Design::Spread { .. })) {
+            spread(Rule::LatinHypercube, &mut None, keys);
+        }
+    })
 }
 
-/// Reads the section, and the file it names.
-pub fn read(root: &Section<'_>, grid: &Path) -> WrittenDesign {
-    let section = match root.table("design", "[design]") {
-        Field::Absent => return WrittenDesign::None,
-        Field::Bad => return WrittenDesign::Bad,
-        Field::Given(section) => section.value,
+fn listed(design: &mut Option<Design>, keys: &mut Keys<'_>) {
+    keys.misplace(&["points", "seed"], "a list has the points that it lists");
+    let key = Key::new(
+        "file",
+        "CSV or Parquet, relative to this file: one column a parameter, one row a point",
+    );
+    let (mut file, points, hash) = match design.take() {
+        Some(Design::List { file, points, hash }) => (file, points, hash),
+        _ => Default::default(),
     };
-    let at = section.at().clone();
-    let field = section.choice("method", &METHODS);
-    let expected = "`latin_hypercube`, `sobol`, `monte_carlo` or `list`";
-    let Some(method) = section.require(field, "method", expected) else {
-        // An unknown method has no list of keys, but each key has its range.
-        let _ = section.count("points", MOST_POINTS);
-        let _ = section.whole("seed", 0..=MOST_SEED);
-        let _ = section.text("file");
-        section.finish();
-        return WrittenDesign::Bad;
+    let key = key.needed("a CSV or Parquet file, relative to this file");
+    let found = keys.key(key, &Kind::Text, &mut file);
+    keys.write("points", points.into());
+    keys.write("hash", hash.as_str().into());
+    if found.given().is_some() || keys.section().is_none() {
+        *design = Some(Design::List { file, points, hash });
+    }
+}
+
+fn spread(rule: Rule, design: &mut Option<Design>, keys: &mut Keys<'_>) {
+    keys.misplace(&["file"], "only the method \"list\" has it");
+    let numbers = match design {
+        Some(Design::Spread { points, seed, .. }) => Some((*points, *seed)),
+        Some(Design::List { .. }) | None => None,
     };
-    let written = if METHODS[method.value] == "list" {
-        section.misplace(&["points", "seed"], "a list has the points that it lists");
-        let field = section.text("file");
-        let file = section.require(field, "file", "a CSV or Parquet file, relative to this file");
-        file.and_then(|file| list::read(&file, grid, root.report))
-            .map_or(WrittenDesign::Bad, WrittenDesign::List)
-    } else {
-        section.misplace(&["file"], "only the method \"list\" has it");
-        let chosen = METHODS[method.value];
-        let sobol = chosen == "sobol";
-        let field = section.count("points", if sobol { MOST_SOBOL } else { MOST_POINTS });
-        let points = section.require(field, "points", "the number of points");
-        let seed = section.whole("seed", 0..=MOST_SEED).or(DEFAULT_SEED);
-        // Stand-ins for what was refused, so that the axes are read all the same.
-        let (points, seed) =
-            (points.map_or(1, |points| points.value), seed.unwrap_or(DEFAULT_SEED));
-        let design = match chosen {
-            "sobol" => Design::Sobol { points, seed },
-            "monte_carlo" => Design::MonteCarlo { points, seed },
-            _ => Design::LatinHypercube { points, seed },
-        };
-        WrittenDesign::Box(Located { value: design, at })
-    };
-    section.finish();
-    written
+    // Stand-ins for what is refused, so that the axes are read all the same.
+    let (mut points, mut seed) = numbers.unwrap_or((1, DEFAULT_SEED));
+    let most = if rule == Rule::Sobol { MOST_SOBOL } else { MOST_POINTS };
+    let key = Key::new("points", "how many").needed("the number of points").set();
+    let points_found = keys.key(key, &Kind::Whole(1..=most), &mut points);
+    let key = Key::new("seed", "another seed, another draw").set();
+    let seed_found = keys.key(key, &Kind::Whole(0..=MOST_SEED), &mut seed);
+    for (name, field) in [("points", points_found), ("seed", seed_found)] {
+        if let (None, Field::Given(_)) = (numbers, field) {
+            let title =
+                format!("`{name}` belongs to a design, and this grid has none that takes it");
+            keys.refuse(name, &title, "expected a grid file with [design]");
+        }
+    }
+    *design = Some(Design::Spread { rule, points, seed });
 }

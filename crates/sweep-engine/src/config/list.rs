@@ -10,7 +10,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use super::report::{Diagnostic, Report};
-use super::section::{cut, short};
+use super::section::cut;
 use super::source::{Located, Location, SourceId, Sources, beside};
 use crate::design::Design;
 use sweep_files::regular;
@@ -53,14 +53,9 @@ impl NumberTable {
     /// A table in memory, which messages call so.
     pub fn of_columns(name: &str, columns: Vec<(String, Vec<f64>)>, report: &Report) -> Self {
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
-        let source = report.add(name, names.join(","));
-        let mut start = 0;
-        let located = |(name, values): (String, Vec<f64>)| {
-            let at = Location::new(source, start..start + name.len());
-            start = at.span.end + 1;
-            ListColumn { name: Located { value: name, at }, values }
-        };
-        let columns = columns.into_iter().map(located).collect();
+        let (source, places) = report.header(name, &names);
+        let located = |((value, values), at)| ListColumn { name: Located { value, at }, values };
+        let columns = columns.into_iter().zip(places).map(located).collect();
         Self { columns, rows: Rows::Binary(Location::new(source, 0..0)) }
     }
 
@@ -102,34 +97,7 @@ enum Rows {
 }
 
 /// Why a file is no list.
-#[derive(Debug, thiserror::Error)]
-enum Unreadable {
-    #[error(transparent)]
-    Io(#[from] std::io::Error),
-    #[error("it is longer than {} MiB", LONGEST_BYTES >> 20)]
-    TooLong,
-    #[error("unpacked, it is longer than {} MiB", LONGEST_BYTES >> 20)]
-    TooLongUnpacked,
-    #[error("it holds more than {MOST_NUMBERS} numbers")]
-    TooManyNumbers,
-    #[error("it has {0} columns, more than {MOST_COLUMNS}")]
-    TooManyColumns(usize),
-    #[error("it is neither Parquet nor UTF-8 text: byte {0} is wrong")]
-    NotText(usize),
-    #[error("its column `{}` holds no numbers but {found}", short(column))]
-    NotNumbers { column: String, found: String },
-    #[error("its column `{}` has no value in row {row}", short(column))]
-    NoValue { column: String, row: usize },
-    #[error(
-        "its column `{}` is compressed by {codec}, which this program does not read: \
-         write it with {}",
-        short(column),
-        parquet::READABLE_CODECS
-    )]
-    Codec { column: String, codec: String },
-    #[error("it is damaged: {0}")]
-    Damaged(String),
-}
+type Unreadable = String;
 
 /// A path in a message.
 fn shown(path: &Path) -> String {
@@ -154,7 +122,8 @@ fn table(
         return Ok(Some((NumberTable { columns, rows: Rows::Binary(file.clone()) }, hash)));
     }
     let text = String::from_utf8(bytes)
-        .map_err(|error| Unreadable::NotText(error.utf8_error().valid_up_to() + 1))?;
+        .map_err(|error| error.utf8_error().valid_up_to() + 1)
+        .map_err(|byte| format!("it is neither Parquet nor UTF-8 text: byte {byte} is wrong"))?;
     // Messages quote the text when all is read; until then it is held here.
     let source = report.add(shown(path), String::new());
     let read = csv::read(&text, source, gaps, report);
@@ -165,42 +134,53 @@ fn table(
 }
 
 /// Reads the listed points.
-pub(super) fn read(file: &Located<&str>, grid: &Path, report: &Report) -> Option<List> {
-    let path = beside(grid, file.value);
+pub(super) fn read(file: &str, grid: &Path, report: &Report) -> Option<List> {
+    let path = beside(grid, file);
+    let at = report.place("design.file")?;
     let shown = shown(&path);
-    let (table, hash) = match table(&path, &file.at, false, report) {
+    let (table, hash) = match table(&path, &at, false, report) {
         Ok(read) => read?,
         Err(reason) => {
             let title = format!("cannot read the list of points {shown}: {reason}");
             let expected = "expected a CSV or Parquet file of numbers, one column a parameter, \
                 relative to this file";
-            return report.refuse(&file.at, title, expected);
+            return report.refuse(&at, title, expected);
         }
     };
     let points = table.columns.first().map_or(0, |column| column.values.len());
     if points == 0 {
         let title = format!("the list of points {shown} is empty");
         let expected = "expected a line of parameter names, and under it a row of numbers a point";
-        return report.refuse(&file.at, title, expected);
+        return report.refuse(&at, title, expected);
     }
     if table.columns.iter().all(|column| column.name.value == ID) {
         let title = format!("the list of points {shown} has no column but `{ID}`");
-        return report.refuse(&file.at, title, "expected a column of a parameter");
+        return report.refuse(&at, title, "expected a column of a parameter");
     }
-    let design = Design::List { file: file.value.to_owned(), points: points as u64, hash };
+    let design = Design::List { file: file.to_owned(), points: points as u64, hash };
     Some(List { design, table })
 }
 
 fn bytes(path: &Path) -> Result<Vec<u8>, Unreadable> {
     let mut bytes = Vec::new();
-    regular::open(path)?.take(LONGEST_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LONGEST_BYTES { Err(Unreadable::TooLong) } else { Ok(bytes) }
+    let read = regular::open(path)
+        .and_then(|file| file.take(LONGEST_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|error| error.to_string())?;
+    match read as u64 > LONGEST_BYTES {
+        true => Err(format!("it is longer than {} MiB", LONGEST_BYTES >> 20)),
+        false => Ok(bytes),
+    }
 }
 
 /// Whether so many rows of so many columns are accepted.
 fn fits(rows: u64, columns: usize) -> Result<(), Unreadable> {
-    let fits = rows.checked_mul(columns as u64).is_some_and(|numbers| numbers <= MOST_NUMBERS);
-    if fits { Ok(()) } else { Err(Unreadable::TooManyNumbers) }
+    if columns > MOST_COLUMNS {
+        return Err(format!("it has {columns} columns, more than {MOST_COLUMNS}"));
+    }
+    match rows.checked_mul(columns as u64) {
+        Some(0..=MOST_NUMBERS) => Ok(()),
+        _ => Err(format!("it holds more than {MOST_NUMBERS} numbers")),
+    }
 }
 
 #[cfg(test)]

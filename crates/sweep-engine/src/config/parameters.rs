@@ -6,7 +6,9 @@ use std::collections::BTreeMap;
 use sweep_parameter::{Parameter as _, Range};
 
 use super::draft::{Draft, WrittenConstant};
-use super::{Diagnostic, Located, NamedValues, Read, Section, Written, quoted, scalars, twice};
+use super::{
+    Diagnostic, Located, NamedValues, Read, Section, Written, quoted, sections::described, twice,
+};
 use crate::{Plan, UnknownParameter, program};
 
 /// Names offered as the nearest one; a machine of thousands of springs has more than a reader wants
@@ -23,7 +25,7 @@ struct Constant<'a, M: Read> {
 /// Reads `[set]`, then `--set` and `--at`, which override it, and writes all into the plan.
 pub fn constants<M: Read>(
     root: &Section<'_>,
-    sets: &[String],
+    sets: Vec<&String>,
     at: &[String],
     draft: &mut Draft<'_, M>,
 ) {
@@ -36,9 +38,7 @@ pub fn constants<M: Read>(
         }
         apply(&constants, false, draft);
     }
-    let sets: Vec<String> =
-        sets.iter().filter(|argument| !scalars::is_one::<M>(argument)).cloned().collect();
-    let mut constants = arguments("--set", &sets, draft);
+    let mut constants = arguments("--set", sets, draft);
     constants.extend(arguments("--at", at, draft));
     let before = draft.plan.clone();
     apply(&constants, true, draft);
@@ -88,10 +88,10 @@ pub fn point<M: Read>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
 /// Reads NAME=VALUE arguments.
 fn arguments<'a, M: Read>(
     option: &str,
-    arguments: &'a [String],
+    arguments: impl IntoIterator<Item = &'a String>,
     draft: &Draft<'a, M>,
 ) -> Vec<Constant<'a, M>> {
-    let written = arguments.iter().filter_map(|one| Written::read(option, one, draft.report));
+    let written = arguments.into_iter().filter_map(|one| Written::read(option, one, draft.report));
     let constant = |one: Written<'a>| constant(one.name.clone(), |range| one.number(range), draft);
     written.filter_map(constant).collect()
 }
@@ -125,15 +125,11 @@ pub fn unknown<M: Read>(
 ) -> Diagnostic {
     let title = format!("unknown parameter {}", quoted(name.value));
     let diagnostic = Diagnostic::new(title).at(&name.at, reason.as_str());
-    let section = match name.value {
-        "end_s" | "window_s" => Some("[time]"),
-        "step_s" | "rtol" | "atol" | "accuracy" | "method" => Some("[integrator]"),
-        "ratio_limit" | "ratio_min" | "criterion" | "channels" => Some("[reliability]"),
-        _ => None,
-    };
-    match (is_strange, section) {
-        (true, Some(section)) => {
-            let set = format!("`{}` is set in {section} of the grid file", name.value);
+    let tables = ["time", "integrator", "reliability"];
+    let table = is_strange.then(|| described::<M>().table_of(name.value, &tables)).flatten();
+    match (is_strange, table) {
+        (true, Some(table)) => {
+            let set = format!("`{}` is set in [{table}] of the grid file", name.value);
             diagnostic.help(match name.value {
                 "window_s" => format!("{set}; `window_from_s` and `window_to_s` are its ends here"),
                 _ => format!("{set} and is the same at every point"),

@@ -23,18 +23,10 @@ where
     V: Iterator<Item = Option<f64>>,
 {
     let report = Report::default();
-    let header = names.join(",");
-    let source = report.add("table", header.as_str());
-    let mut start = 0;
-    let located = |name: &&'_ str| {
-        let at = Location::new(source, start..start + name.len());
-        start = at.span.end + 1;
-        Located { value: (*name).to_owned(), at }
-    };
-    let columns: Vec<Located<String>> = names.iter().map(located).collect();
+    let (source, places) = report.header("table", names);
     let mut of_axes: Vec<Option<usize>> = vec![None; plan.axes.len()];
-    for (k, column) in columns.iter().enumerate() {
-        let name = Located { value: column.value.as_str(), at: column.at.clone() };
+    for (k, (&value, at)) in names.iter().zip(&places).enumerate() {
+        let name = Located { value, at: at.clone() };
         let place = plan.axes.iter().position(|axis| axis.parameter.name() == name.value);
         let Some(place) = place else {
             report.push_with(|_| no_axis(&name, plan));
@@ -43,7 +35,7 @@ where
         if let Some(first) = of_axes[place] {
             let title = format!("the column {} is given twice", quoted(name.value));
             let diagnostic = Diagnostic::new(title).at(&name.at, "expected each axis once");
-            report.push(diagnostic.at(&columns[first].at, "first given here"));
+            report.push(diagnostic.at(&places[first], "first given here"));
             continue;
         }
         of_axes[place] = Some(k);
@@ -61,7 +53,7 @@ where
         if column.is_none() && axis.values.len() > 1 {
             let name = axis.parameter.name();
             let title = format!("the table has no column {}", quoted(name));
-            let whole = Location::new(source, 0..header.len());
+            let whole = Location::new(source, 0..places.last().map_or(0, |last| last.span.end));
             let expected = "expected a column for every axis of the plan";
             report.push(Diagnostic::new(title).at(&whole, expected));
         }
@@ -83,10 +75,9 @@ pub fn other_length(names: &[String], column: usize, length: usize, first: usize
 
 fn of_column(names: &[String], column: usize, title: String, expected: String) -> Diagnostics {
     let report = Report::default();
-    let source = report.add("table", names.join(","));
-    let start = names[..column].iter().map(|name| name.len() + 1).sum();
-    let at = Location::new(source, start..start + names[column].len());
-    report.push(Diagnostic::new(title).at(&at, expected));
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let (_, places) = report.header("table", &names);
+    report.push(Diagnostic::new(title).at(&places[column], expected));
     report.into_diagnostics()
 }
 

@@ -1,12 +1,12 @@
 //! The model's part of a grid file.
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
-use super::{Draft, GridInput, Section, Written};
+use super::{Draft, GridInput, Keys};
 use crate::Model;
 
-/// A model in grid files. The engine reads `name`, `[set]`, `[time]`, `[integrator]`,
-/// `[reliability]`, `[design]` and `[[axis]]`; what else there is, the model reads.
+/// A model in grid files. The engine walks over `name`, `[set]`, `[time]`, `[integrator]`,
+/// `[reliability]`, `[design]` and `[[axis]]`; over what else there is, the model does.
 pub trait Read: Model {
     /// The key under which a grid names a file of the model's own, if it may.
     const OWN_FILE: Option<&'static str> = None;
@@ -14,42 +14,20 @@ pub trait Read: Model {
     /// What to do where there is no grid file yet.
     const TO_START: Option<&'static str> = None;
 
-    /// Reads the model's keys of a grid file.
-    fn read(input: &GridInput<Self>, root: &Section<'_>) -> Self;
+    /// The model before anything is read: what is left out has these values.
+    fn blank() -> Self;
 
-    /// Reads what is the model's of `[reliability]`.
-    fn read_reliability(&mut self, _: &Section<'_>) {}
+    /// Walks over the model's keys at the top of a grid file; `input` is what is read.
+    fn walk(&mut self, _: &mut Keys<'_>, _input: Option<&GridInput<Self>>) {}
 
-    /// What `--set` takes beside parameters and the engine's own settings.
-    fn scalars() -> &'static [&'static str] {
-        &[]
-    }
-
-    /// Puts one of them in place; its value as it stands in the plan.
-    fn put(_: &Written<'_>, _: &mut Draft<'_, Self>) -> Option<Value> {
-        None
-    }
+    /// Walks over the model's keys of `[reliability]`.
+    fn walk_reliability(&mut self, _: &mut Keys<'_>) {}
 
     /// Judges the whole, once every value is in place.
     fn judge(draft: &Draft<'_, Self>) {
         super::whole::windows(draft);
     }
 
-    /// Writes the model into a plan as JSON; a default may be left out.
-    fn describe(&self, plan: &mut Map<String, Value>);
-
-    /// The model's part of the schema of grid files.
-    fn schema() -> Schema;
-}
-
-/// What a model adds to the schema of grid files.
-pub struct Schema {
-    /// Keys at the top.
-    pub top: Vec<(&'static str, Value)>,
-    /// Those that must be there.
-    pub required: Vec<&'static str>,
-    /// Keys of `[reliability]`.
-    pub reliability: Vec<(&'static str, Value)>,
-    /// `[set]`, by [`crate::config::schema::set`].
-    pub set: Value,
+    /// The schema of `[set]`, by [`crate::config::schema::set`].
+    fn schema_of_set() -> Value;
 }

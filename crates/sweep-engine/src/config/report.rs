@@ -92,6 +92,17 @@ impl Report {
         self.sources.borrow_mut().add(name, text)
     }
 
+    /// Keeps names of columns as a line under the name that messages show; the place of each.
+    pub fn header(&self, name: &str, columns: &[&str]) -> (SourceId, Vec<Location>) {
+        let (source, mut next) = (self.add(name, columns.join(",")), 0);
+        let place = |column: &&str| {
+            let start = next;
+            next += column.len() + 1;
+            Location::new(source, start..start + column.len())
+        };
+        (source, columns.iter().map(place).collect())
+    }
+
     /// Puts in the text of a source that was kept under its name alone.
     pub fn fill(&self, id: SourceId, text: String) {
         self.sources.borrow_mut().fill(id, text);

@@ -48,7 +48,8 @@ impl<T> Field<T> {
         })
     }
 
-    fn then<U>(self, next: impl FnOnce(Located<T>) -> Option<Located<U>>) -> Field<U> {
+    /// Another value at the same place, or none, which has been reported.
+    pub fn then<U>(self, next: impl FnOnce(Located<T>) -> Option<Located<U>>) -> Field<U> {
         match self {
             Self::Absent => Field::Absent,
             Self::Bad => Field::Bad,
@@ -98,6 +99,11 @@ impl<'a> Section<'a> {
         self.table.get(key)
     }
 
+    /// Whether a key was asked for.
+    pub fn is_known(&self, key: &str) -> bool {
+        self.known.borrow().contains(&key)
+    }
+
     /// The place of a key, if it is written.
     pub fn key_at(&self, key: &str) -> Option<Location> {
         self.table.get_key_value(key).map(|(key, _)| self.place(key.span()))
@@ -114,21 +120,15 @@ impl<'a> Section<'a> {
 
     /// Reports a key that must be there.
     pub fn require<T>(&self, field: Field<T>, key: &str, expected: &str) -> Option<Located<T>> {
-        if matches!(field, Field::Absent) {
-            self.missing(key, expected);
-        }
-        field.given()
+        self.expect(field, key, Some(expected)).given()
     }
 
-    /// As [`Self::require`] where the key is needed, else the value if it is there.
-    pub fn require_if<T>(
-        &self,
-        needed: bool,
-        field: Field<T>,
-        key: &str,
-        expected: &str,
-    ) -> Option<Located<T>> {
-        if needed { self.require(field, key, expected) } else { field.given() }
+    /// The same, where something is expected.
+    pub fn expect<T>(&self, field: Field<T>, key: &str, expected: Option<&str>) -> Field<T> {
+        if let (Field::Absent, Some(expected)) = (&field, expected) {
+            self.missing(key, expected);
+        }
+        field
     }
 
     /// Reports a key that must be there and is not.
@@ -161,13 +161,8 @@ impl<'a> Section<'a> {
         self.read(key, |value, _| Some(self.number_of(&quoted(key), value, range)?.value))
     }
 
-    /// A whole number from 1 to `most`.
-    pub fn count(&self, key: &'static str, most: u64) -> Field<u64> {
-        self.whole(key, 1..=most)
-    }
-
     /// A whole number within bounds.
-    pub fn whole(&self, key: &'static str, bounds: RangeInclusive<u64>) -> Field<u64> {
+    pub fn whole(&self, key: &'static str, bounds: &RangeInclusive<u64>) -> Field<u64> {
         self.read(key, |value, at| {
             let DeValue::Integer(integer) = value.get_ref() else {
                 return self.wrong(&quoted(key), value, "a whole number");
@@ -272,11 +267,8 @@ impl<'a> Section<'a> {
 
     /// Every key as written, for tables whose keys are names of parameters.
     pub fn names(&self) -> Vec<Located<&'a str>> {
-        let mut names = Vec::new();
-        for key in self.table.keys() {
-            names.push(Located { value: key.get_ref() as &'a str, at: self.place(key.span()) });
-        }
-        names
+        let keys = self.table.keys();
+        keys.map(|key| Located { value: &**key.get_ref(), at: self.place(key.span()) }).collect()
     }
 
     /// The number under a name from [`Section::names`].

@@ -1,41 +1,35 @@
 //! Lists of words, each one of those that there are.
 
-use super::{Diagnostic, Located, Report, Section, unknown_word};
+use serde_json::Value;
 
-/// A list of some of `all`, each once, by their names; an empty one is a mistake.
-pub fn names<T: Copy + PartialEq>(
-    section: &Section<'_>,
-    key: &'static str,
-    what: &str,
-    all: &[T],
-    name: fn(T) -> &'static str,
-) -> Option<Vec<T>> {
-    let list = section.texts(key).given()?;
-    if list.value.is_empty() {
-        let known: Vec<&str> = all.iter().copied().map(name).collect();
-        let expected = format!("expected at least one of `{}`", known.join("`, `"));
-        section.report.push(Diagnostic::new(format!("`{key}` is empty")).at(&list.at, expected));
-    }
-    Some(some_of(list.value, what, all, name, section.report).0)
+use super::{Diagnostic, Field, Located, Report, Section, unknown_word};
+
+/// A list of some of these words, each once; an empty one is a mistake.
+pub fn names(section: &Section<'_>, key: &'static str, what: &str, all: &[&str]) -> Field<Value> {
+    section.texts(key).map(|list| {
+        if list.value.is_empty() {
+            let expected = format!("expected at least one of `{}`", all.join("`, `"));
+            section.report.refuse::<()>(&list.at, format!("`{key}` is empty"), expected);
+        }
+        some_of(list.value, what, all, section.report).0.into()
+    })
 }
 
 /// Those of `all` that are named, each once, and whether that is what every name says.
-pub fn some_of<'t, T: Copy + PartialEq>(
+pub fn some_of<'t>(
     found: impl IntoIterator<Item = Located<&'t str>>,
     what: &str,
-    all: &[T],
-    name: fn(T) -> &'static str,
+    all: &[&str],
     report: &Report,
-) -> (Vec<T>, bool) {
-    let known: Vec<&str> = all.iter().copied().map(name).collect();
-    let (mut chosen, mut is_sound): (Vec<Located<T>>, _) = (Vec::new(), true);
+) -> (Vec<&'t str>, bool) {
+    let (mut chosen, mut is_sound): (Vec<Located<&str>>, _) = (Vec::new(), true);
     for found in found {
-        let one = all.iter().find(|one| name(**one) == found.value);
-        let first = chosen.iter().find(|other| Some(&other.value) == one);
-        is_sound &= one.is_some() && first.is_none();
-        match (one, first) {
-            (None, _) => report.push_with(|_| unknown_word(what, &found, &known)),
-            (Some(_), Some(first)) => {
+        let is_known = all.contains(&found.value);
+        let first = chosen.iter().find(|other| other.value == found.value);
+        is_sound &= is_known && first.is_none();
+        match first {
+            _ if !is_known => report.push_with(|_| unknown_word(what, &found, all)),
+            Some(first) => {
                 let title = format!("the {what} \"{}\" is given twice", found.value);
                 let refusal =
                     Diagnostic::new(title).at(&found.at, format!("expected each {what} once"));
@@ -45,7 +39,7 @@ pub fn some_of<'t, T: Copy + PartialEq>(
                     false => refusal.at(&first.at, "first given here"),
                 });
             }
-            (Some(&value), None) => chosen.push(Located { value, at: found.at }),
+            None => chosen.push(found),
         }
     }
     (chosen.into_iter().map(|one| one.value).collect(), is_sound)

@@ -1,5 +1,7 @@
 //! Arguments NAME=VALUE of the command line.
 
+use std::ops::RangeInclusive;
+
 use sweep_parameter::Range;
 
 use super::section::check_number;
@@ -12,7 +14,8 @@ pub struct Written<'a> {
     pub name: Located<&'a str>,
     /// To what.
     pub value: Located<&'a str>,
-    report: &'a Report,
+    /// Takes what is wrong.
+    pub report: &'a Report,
 }
 
 impl<'a> Written<'a> {
@@ -48,10 +51,11 @@ impl<'a> Written<'a> {
     }
 
     /// A whole number within bounds.
-    pub fn whole(&self, least: u64, most: u64) -> Option<u64> {
-        let number = self.value.value.parse::<u64>().ok();
-        number.filter(|number| (least..=most).contains(number)).or_else(|| {
+    pub fn whole(&self, bounds: &RangeInclusive<u64>) -> Option<u64> {
+        let number = self.value.value.parse().ok();
+        number.filter(|number| bounds.contains(number)).or_else(|| {
             let title = format!("`{}` is no such number", short(self.value.value));
+            let (least, most) = (bounds.start(), bounds.end());
             let expected = format!("expected a whole number from {least} to {most}");
             self.report.refuse(&self.value.at, title, expected)
         })
@@ -66,16 +70,11 @@ impl<'a> Written<'a> {
         place
     }
 
-    /// Names separated by commas, each once and at least one.
-    pub fn list<T: Copy + PartialEq>(
-        &self,
-        what: &str,
-        all: &[T],
-        name: fn(T) -> &'static str,
-    ) -> Option<Vec<T>> {
+    /// Words separated by commas, each once and at least one.
+    pub fn list(&self, what: &str, all: &[&str]) -> Option<Vec<&'a str>> {
         let Located { value, at } = &self.value;
         let parts = value.split(',').map(|part| Located { value: part.trim(), at: at.clone() });
-        let (chosen, is_sound) = some_of(parts, what, all, name, self.report);
+        let (chosen, is_sound) = some_of(parts, what, all, self.report);
         is_sound.then_some(chosen)
     }
 }

@@ -13,7 +13,7 @@
 
 use std::cmp::Ordering;
 
-use crate::design::Design;
+use crate::design::{Design, Rule};
 
 /// Share of a trial's coordinates that come from the mutant.
 const CROSSOVER: f64 = 0.9;
@@ -73,7 +73,7 @@ pub fn evolve<E>(
             break;
         }
         let first = tried.len();
-        let start = Design::LatinHypercube { points: count, seed };
+        let start = Design::Spread { rule: Rule::LatinHypercube, points: count, seed };
         let place = |k: u64| -> Vec<f64> {
             if generation == 0 {
                 return (0..parameters).filter_map(|axis| start.place(k, axis)).collect();
@@ -111,7 +111,11 @@ fn mutant(
     number: u64,
     evolution: &Evolution,
 ) -> Vec<f64> {
-    let draws = Design::MonteCarlo { points: evolution.candidates, seed: evolution.seed };
+    let draws = Design::Spread {
+        rule: Rule::MonteCarlo,
+        points: evolution.candidates,
+        seed: evolution.seed,
+    };
     let mut axis = 0;
     let mut draw = || {
         axis += 1;

@@ -9,13 +9,14 @@ use sweep_results::{Column, Goal, Mistake, columns};
 
 use crate::config::axes::{add, spacing};
 use crate::config::design::{DEFAULT_SEED, MOST_SEED};
-use crate::config::grid::{draft, name};
+use crate::config::grid::draft;
 use crate::config::parameters::find;
 use crate::config::section::listed;
+use crate::config::sections::name;
 use crate::config::source::beside;
 use crate::config::syntax::{self, parse};
 use crate::config::{Diagnostic, Draft, Field, Located, Location, Report, Section, twice, whole};
-use crate::design::MOST_AXES;
+use crate::design::{MOST_AXES, Rule};
 use crate::{AxisValues, Design, Diagnostics, GridInput, Job, Model, Plan, Rows};
 
 /// Most candidates, most rows that a candidate is tried at, and most parameters.
@@ -98,9 +99,9 @@ impl<M: Rows> Study<M> {
         }
         let design = grid.as_ref().and_then(|grid| grid.design.as_ref());
         let parameters = parameters(&root, design, &mut draft);
-        let population = root.whole("population", 4..=MOST[0]).or(0);
-        let candidates = root.count("candidates", MOST[0]).or(0);
-        let seed = root.whole("seed", 0..=MOST_SEED).or(DEFAULT_SEED);
+        let population = root.whole("population", &(4..=MOST[0])).or(0);
+        let candidates = root.whole("candidates", &(1..=MOST[0])).or(0);
+        let seed = root.whole("seed", &(0..=MOST_SEED)).or(DEFAULT_SEED);
         // Candidates of a single row fill whole groups of lanes.
         let usual = (10 * parameters.len() as u64).next_multiple_of(8).max(32);
         let population = population.filter(|&one| one > 0).unwrap_or(usual);
@@ -287,7 +288,7 @@ fn spreads<M: Rows>(design: Option<&Design>, draft: &Option<Draft<'_, M>>) -> bo
     let axes = draft.as_ref().map_or(0, |draft| draft.plan.axes.len());
     match design {
         None | Some(Design::List { .. }) => false,
-        Some(Design::Sobol { .. }) => axes < MOST_AXES,
+        Some(Design::Spread { rule: Rule::Sobol, .. }) => axes < MOST_AXES,
         Some(_) => true,
     }
 }

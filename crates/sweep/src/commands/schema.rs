@@ -1,6 +1,6 @@
 //! `sweep schema`: JSON Schema of the files a user writes.
 
-use crate::config::schema;
+use crate::config::machine;
 use sweep_engine::{Error, Exit, print};
 
 /// Arguments of `sweep schema`.
@@ -17,7 +17,7 @@ pub struct Args {
 /// When standard output cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let schema = if args.machine {
-        schema::machine()
+        machine::schema()
     } else {
         sweep_engine::config::schema::grid::<crate::Washer>()
     };

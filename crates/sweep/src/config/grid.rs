@@ -1,14 +1,16 @@
 //! The washing machine's part of a grid file: `machine`, `[spin]`, `metrics`, the criterion of
 //! `[reliability]`, `[stability]`.
 
+use serde_json::json;
 use sweep_engine::config::report::{Diagnostic, Report};
 use sweep_engine::config::section::{Field, Section, cut};
 use sweep_engine::config::source::{Location, beside, read};
 use sweep_engine::config::syntax::parse;
+use sweep_engine::config::{Key, Keys, Kind, Walk};
 use washer_model::Machine;
-use washer_row::{Criterion, Metric, Part};
+use washer_row::{Metric, Part};
 
-use super::{GridInput, machine};
+use super::{GridInput, machine, machine_json};
 use crate::speeds::SpeedList;
 
 /// `machine` when the grid names none.
@@ -20,7 +22,18 @@ const LONGEST_PATH: usize = 1000;
 const MACHINES: [&str; 1] = [DEFAULT_MACHINE];
 
 /// The machine that a grid names, or the one given in its place.
-pub(crate) fn machine(input: &GridInput, root: &Section<'_>) -> Machine {
+pub(super) fn machine(machine: &mut Machine, keys: &mut Keys<'_>, input: Option<&GridInput>) {
+    let key = Key::new("machine", "\"paper\", or a machine file relative to this file");
+    if let (Some(root), Some(input)) = (keys.section(), input) {
+        *machine = named(input, root);
+    }
+    keys.tell(key, |is_schema| match is_schema {
+        true => json!({ "type": "string", "default": DEFAULT_MACHINE }),
+        false => machine_json(machine),
+    });
+}
+
+fn named(input: &GridInput, root: &Section<'_>) -> Machine {
     let report = root.report;
     if let Some(text) = &input.own_file {
         return machine_of(text, "its machine", report);
@@ -52,43 +65,61 @@ fn machine_of(text: &str, name: &str, report: &Report) -> Machine {
     machine::read(text, Section::new("the machine file", at, table.get_ref(), report))
 }
 
-/// The criterion of `[reliability]`.
-pub(crate) fn criterion(section: &Section<'_>) -> Criterion {
-    section.misplace(&["metrics"], "it belongs at the top of the file, before the first [section]");
-    let criterion = section.choice("criterion", &Criterion::ALL.map(Criterion::name)).given();
-    criterion.map_or_else(Criterion::default, |found| {
-        section.report.put("reliability.criterion", found.at);
-        Criterion::ALL[found.value]
-    })
-}
-
 /// The speeds of the metrics that are of constant ones. The section and these need each other.
-pub(crate) fn stability(root: &Section<'_>, metrics: &[Metric]) -> Option<SpeedList> {
-    let (field, report) = (root.table("stability", "[stability]"), root.report);
+/// `found` is where the metrics were, if they were written.
+pub(super) fn stability(
+    metrics: &[Metric],
+    found: Field<()>,
+    speeds: &mut Option<SpeedList>,
+    keys: &mut Keys<'_>,
+) {
     let of_speeds = metrics.iter().find(|metric| metric.is_of_speeds());
-    if let (Field::Given(section), None) = (&field, of_speeds) {
-        let title = "[stability] is for the metrics `growth` and `dwell`, and neither is asked for";
-        let expected = "expected metrics = [\"growth\"] or [\"dwell\"] at the top of the file, or \
-                        no [stability]; `sweep stability` takes its speeds as --speed";
-        report.push(Diagnostic::new(title).at(&section.at, expected));
+    let lacking = |metric: &Metric| format!("the metric `{}` needs speeds", metric.name());
+    if let (Walk::Set(_), Field::Given(found)) = (&keys.walk, found) {
+        if let (Some(metric), None, Some(report)) = (of_speeds, &speeds, keys.report()) {
+            let expected = "expected a grid file with this metric and a section [stability]";
+            report.refuse::<()>(&found.at, lacking(metric), expected);
+        }
+        speeds.take_if(|_| of_speeds.is_none());
     }
-    if let (Field::Absent, Some(metric)) = (&field, of_speeds) {
-        let title = format!("the metric `{}` needs speeds", metric.name());
-        let expected = "expected a section [stability] with speed_rpm = 250 or \"FROM:TO:STEP\"";
-        report.push_missing(Diagnostic::new(title).at(root.at(), expected));
-    }
-    let section = field.given()?.value;
+    let about = "constant spin speeds in rpm, above 0, as 250, \"240,305\" or \"60:400:1\": those \
+                 of the metrics `growth` and `dwell`";
     let expected = "constant speeds in rpm, as 250, \"240,305\" or \"60:400:1\"";
-    let found = section.require(section.text_or_number("speed_rpm"), "speed_rpm", expected);
-    section.finish();
-    let found = found?;
-    found.value.parse().map_or_else(
-        |expected| {
-            let title = format!("`speed_rpm` = \"{}\" is no list of speeds", found.value);
-            report.refuse(&found.at, title, expected)
-        },
-        Some,
-    )
+    let mut text = speeds.as_ref().map(ToString::to_string);
+    let field = keys.table(Key::new("stability", ""), |keys| {
+        let read = |section: &Section<'_>, key| {
+            section.text_or_number(key).map(|found| found.value.into())
+        };
+        let kind = Kind::Own(&read, json!({ "type": ["string", "number"] }));
+        let field = keys.key(Key::new("speed_rpm", about).needed(expected), &kind, &mut text);
+        let (Field::Given(found), Some(text), Some(report)) = (field, text, keys.report()) else {
+            return;
+        };
+        match text.parse() {
+            Ok(read) => *speeds = Some(read),
+            Err(expected) => {
+                let title = format!("`speed_rpm` = \"{text}\" is no list of speeds");
+                report.refuse::<()>(&found.at, title, expected);
+            }
+        }
+    });
+    let Some(root) = keys.section() else { return };
+    match (field, of_speeds) {
+        (Field::Given(section), None) => {
+            let title =
+                "[stability] is for the metrics `growth` and `dwell`, and neither is asked for";
+            let expected = "expected metrics = [\"growth\"] or [\"dwell\"] at the top of the \
+                            file, or no [stability]; `sweep stability` takes its speeds as --speed";
+            root.report.refuse::<()>(&section.at, title, expected);
+        }
+        (Field::Absent, Some(metric)) => {
+            let expected =
+                "expected a section [stability] with speed_rpm = 250 or \"FROM:TO:STEP\"";
+            let refusal = Diagnostic::new(lacking(metric)).at(root.at(), expected);
+            root.report.push_missing(refusal);
+        }
+        _ => {}
+    }
 }
 
 /// What a machine has not got and this metric is of.

@@ -1,17 +1,23 @@
 //! Machine files: every section and key is a group of parameters, so one small table of their names
 //! reads a file, writes one, and describes it.
 
-use serde_json::{Map, Value};
+use std::slice;
+use std::sync::LazyLock;
+
+use serde_json::{Value, json};
 use washer_model::{
-    BumpStop, Bushing, Cabinet, Damper, Foot, Machine, Parameter, Spin, Spring, Unbalance,
+    BumpStop, Bushing, Cabinet, Damper, Foot, Machine, Parameter, Spin, Spring, Target, Unbalance,
 };
 
+use sweep_engine::config::keys::{self, Keys, Walk};
+use sweep_engine::config::kind::{Kind, Numbers, about};
 use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_engine::config::schema::{document, of};
 use sweep_engine::config::section::{Field, Section};
 use sweep_engine::config::source::is_blank;
 
-/// A section of the machine file. Parameters are named `<prefix>_<number>` and, for vectors, with
-/// the component before the unit: `inertia_kg_m2` holds `inertia_11_kg_m2` and two more.
+/// A section of the machine file. It holds the parameters whose names begin with its prefix. Three
+/// that differ in a component are an array: `inertia_kg_m2` holds `inertia_11_kg_m2` and two more.
 pub(super) struct Part {
     /// Key of the section; empty for the numbers at the top of the file.
     pub(super) section: &'static str,
@@ -20,8 +26,8 @@ pub(super) struct Part {
     pub(super) prefix: &'static str,
     /// How often it may stand in a file.
     pub(super) times: Times,
-    /// What it holds, in the order in which it is written.
-    pub(super) keys: &'static [Key],
+    /// What may be left out.
+    optional: &'static [(&'static str, LeftOut)],
     /// How many a machine has.
     count: fn(&Machine) -> usize,
     /// Gives a machine so many, each with what may be left out left out.
@@ -39,16 +45,16 @@ pub(super) enum Times {
 }
 
 /// A key of a section: a number, or three in an array.
-pub(super) struct Key {
-    pub(super) name: &'static str,
-    /// The parameters of the three; none for a number, which is named as its key.
-    parameters: &'static [&'static str],
-    pub(super) left_out: LeftOut,
+struct Key {
+    name: String,
+    /// Its parameters, behind the section's prefix.
+    parameters: Vec<String>,
+    left_out: LeftOut,
 }
 
 /// What it means that a key is not there.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum LeftOut {
+enum LeftOut {
     Refused,
     /// It is this.
     Is(f64),
@@ -59,11 +65,60 @@ pub(super) enum LeftOut {
 }
 
 /// What stands for a number that the program finds.
-pub(super) const AUTO: &str = "auto";
+const AUTO: &str = "auto";
+
+/// The keys of each part, by the table of parameters.
+static KEYS: LazyLock<Vec<Vec<Key>>> = LazyLock::new(|| {
+    let mut machine = Machine::paper();
+    PARTS.iter().for_each(|part| (part.fill)(&mut machine, 1));
+    let all = Parameter::all(&machine, &no_spin());
+    let is_single = |one: &&Parameter| matches!(one.target(), Target::Machine | Target::Cabinet);
+    let mut names = vec![Vec::new(); PARTS.len()];
+    for name in all.iter().filter(is_single).map(Parameter::name) {
+        let rest = |part: &Part| name.strip_prefix(&part.prefix(0));
+        let places = (0..PARTS.len()).filter_map(|k| Some((rest(&PARTS[k])?, k)));
+        // The longest prefix is its own.
+        let own = places.min_by_key(|(rest, _)| rest.len());
+        own.into_iter().for_each(|(rest, k)| names[k].push(rest.to_owned()));
+    }
+    PARTS.iter().zip(names).map(|(part, names)| part.keys(&names)).collect()
+});
+
+/// The name of a parameter without its component.
+fn stem(name: &str) -> String {
+    let is_component = |word: &&str| ["x", "y", "z", "11", "22", "33"].contains(word);
+    name.split('_').filter(|word| !is_component(word)).collect::<Vec<_>>().join("_")
+}
 
 impl Part {
+    /// The keys of these parameters, in the order in which they are written: numbers, arrays, and
+    /// what may be left out.
+    fn keys(&self, names: &[String]) -> Vec<Key> {
+        let key = |names: &[String]| {
+            let (first, stem) = (&names[0], stem(&names[0]));
+            let name = match names.len() {
+                1 => first.clone(),
+                // The place of a foot is that of nothing else.
+                _ if first.starts_with("x_") => format!("{}{stem}", self.prefix),
+                _ => stem,
+            };
+            let optional = self.optional.iter().find(|(known, _)| *known == name);
+            let left_out = optional.map_or(LeftOut::Refused, |(_, left_out)| *left_out);
+            Key { name, parameters: names.to_vec(), left_out }
+        };
+        let mut keys: Vec<Key> = names.chunk_by(|a, b| stem(a) == stem(b)).map(key).collect();
+        keys.sort_by_key(|key| (key.left_out != LeftOut::Refused, key.is_vector()));
+        keys
+    }
+
+    /// Walks over the keys of element `k`.
+    fn walk(&self, own: &'static [Key], k: usize, machine: &mut Machine, keys: &mut Keys<'_>) {
+        keys.places = format!("{}.", self.section);
+        own.iter().for_each(|key| key.walk(self, k, machine, keys));
+    }
+
     /// What the parameters of an element begin with.
-    pub(super) fn prefix(&self, k: usize) -> String {
+    fn prefix(&self, k: usize) -> String {
         match self.times {
             Times::Many(first, _) => format!("{}{}_", self.prefix, k + first),
             Times::Once | Times::AtMostOnce => self.prefix.to_owned(),
@@ -81,15 +136,13 @@ impl Part {
 
 impl Key {
     /// Whether it holds three numbers.
-    pub(super) const fn is_vector(&self) -> bool {
-        !self.parameters.is_empty()
+    fn is_vector(&self) -> bool {
+        self.parameters.len() > 1
     }
 
     /// Names of its parameters.
-    pub(super) fn names(&self, prefix: &str) -> Vec<String> {
-        let own = [self.name];
-        let names = if self.is_vector() { self.parameters } else { &own };
-        names.iter().map(|name| format!("{prefix}{name}")).collect()
+    fn names(&self, prefix: &str) -> Vec<String> {
+        self.parameters.iter().map(|name| format!("{prefix}{name}")).collect()
     }
 
     /// Its numbers in a machine, if they say more than leaving it out.
@@ -108,160 +161,73 @@ impl Key {
     }
 }
 
-const fn number(name: &'static str) -> Key {
-    Key { name, parameters: &[], left_out: LeftOut::Refused }
-}
-
-const fn optional(name: &'static str, left_out: LeftOut) -> Key {
-    Key { name, parameters: &[], left_out }
-}
-
-const fn vector(name: &'static str, parameters: &'static [&'static str; 3]) -> Key {
-    Key { name, parameters, left_out: LeftOut::Refused }
-}
-
-const fn optional_vector(name: &'static str, parameters: &'static [&'static str; 3]) -> Key {
-    Key { name, parameters, left_out: LeftOut::Is(0.0) }
-}
-
 /// A section that every file has once.
-const fn once(section: &'static str, prefix: &'static str, keys: &'static [Key]) -> Part {
-    Part { section, prefix, times: Times::Once, keys, count: |_| 1, fill: |_, _| () }
+const fn once(section: &'static str, prefix: &'static str) -> Part {
+    let (count, fill): (fn(&Machine) -> usize, fn(&mut Machine, usize)) = (|_| 1, |_, _| ());
+    Part { section, prefix, times: Times::Once, optional: &[], count, fill }
 }
 
-const INERTIA: Key =
-    vector("inertia_kg_m2", &["inertia_11_kg_m2", "inertia_22_kg_m2", "inertia_33_kg_m2"]);
-const CABINET_END: Key = vector("cabinet_m", &["cabinet_x_m", "cabinet_y_m", "cabinet_z_m"]);
-const TUB_END: Key = vector("tub_m", &["tub_x_m", "tub_y_m", "tub_z_m"]);
+/// A list of the machine as an array of tables, each like this one; with the prefix of parameters,
+/// the number of the first, what a machine needs one for, and what may be left out.
+macro_rules! many {
+    ($list:ident: $like:expr, $prefix:literal, $first:literal, $needed:expr,
+        $($optional:expr),*) => {
+        Part {
+            section: stringify!($list),
+            prefix: $prefix,
+            times: Times::Many($first, $needed),
+            optional: &[$($optional),*],
+            count: |machine| machine.$list.len(),
+            fill: |machine, count| machine.$list = vec![$like; count],
+        }
+    };
+}
+
 /// A spring's free length follows its ends where it is left out.
 const FREE_LENGTH: &str = "free_length_m";
 
 /// Every section of a machine file.
 pub(super) const PARTS: [Part; 14] = [
-    once("", "", &[number("gravity_m_per_s2"), number("radial_clearance_m")]),
-    once("tub", "tub_", &[number("mass_kg"), number("centre_x_m"), number("front_x_m"), INERTIA]),
-    once("shaft", "shaft_", &[number("mass_kg"), number("centre_x_m"), INERTIA]),
-    once(
-        "drum",
-        "drum_",
-        &[
-            number("mass_kg"),
-            number("centre_x_m"),
-            number("hinge_x_m"),
-            number("front_x_m"),
-            INERTIA,
-        ],
-    ),
-    once("unbalance", "unbalance_", &[number("mass_kg"), number("x_m"), number("radius_m")]),
-    once("flexure", "flexure_", &[number("stiffness_n_m_per_rad")]),
-    once(
-        "bearings",
-        "bearing_",
-        &[
-            number("front_x_m"),
-            number("rear_x_m"),
-            number("front_stiffness_n_per_m"),
-            number("rear_stiffness_n_per_m"),
-        ],
-    ),
+    once("", ""),
+    once("tub", "tub_"),
+    once("shaft", "shaft_"),
+    once("drum", "drum_"),
+    once("unbalance", "unbalance_"),
+    once("flexure", "flexure_"),
+    once("bearings", "bearing_"),
     Part {
         section: "cabinet",
         prefix: "cabinet_",
         times: Times::AtMostOnce,
-        keys: &[
-            number("mass_kg"),
-            number("friction"),
-            vector("centre_m", &["centre_x_m", "centre_y_m", "centre_z_m"]),
-        ],
+        optional: &[],
         count: |machine| usize::from(machine.cabinet.is_some()),
         fill: |machine, count| machine.cabinet = (count > 0).then(Cabinet::default),
     },
-    Part {
-        section: "springs",
-        prefix: "spring_",
-        times: Times::Many(1, Some("at least one [[springs]]: nothing else carries the machine")),
-        keys: &[
-            number("stiffness_n_per_m"),
-            CABINET_END,
-            TUB_END,
-            optional(FREE_LENGTH, LeftOut::Nothing),
-            optional("cubic_n_per_m3", LeftOut::Is(0.0)),
-        ],
-        count: |machine| machine.springs.len(),
-        fill: |machine, count| {
-            let like = Machine::paper().springs[0];
-            machine.springs = vec![Spring { free_length_m: None, ..like }; count];
-        },
-    },
-    Part {
-        section: "dampers",
-        prefix: "damper_",
-        times: Times::Many(1, None),
-        keys: &[
-            number("damping_n_s_per_m"),
-            CABINET_END,
-            TUB_END,
-            optional("friction_n", LeftOut::Is(0.0)),
-            optional("friction_speed_m_per_s", LeftOut::Is(Damper::FRICTION_SPEED_M_PER_S)),
-            optional("friction_linear_speed_m_per_s", LeftOut::Auto),
-        ],
-        count: |machine| machine.dampers.len(),
-        fill: |machine, count| machine.dampers = vec![Machine::paper().dampers[0]; count],
-    },
-    Part {
-        section: "stops",
-        prefix: "stop_",
-        times: Times::Many(1, None),
-        keys: &[
-            number("clearance_m"),
-            number("stiffness_n_per_m"),
-            TUB_END,
-            vector("direction", &["direction_x", "direction_y", "direction_z"]),
-            optional("damping_n_s_per_m", LeftOut::Is(0.0)),
-            optional("softness_m", LeftOut::Is(BumpStop::SOFTNESS_M)),
-        ],
-        count: |machine| machine.stops.len(),
-        fill: |machine, count| machine.stops = vec![BumpStop::default(); count],
-    },
-    Part {
-        section: "bushings",
-        prefix: "bushing_",
-        times: Times::Many(1, None),
-        keys: &[
-            TUB_END,
-            vector(
-                "stiffness_n_per_m",
-                &["stiffness_x_n_per_m", "stiffness_y_n_per_m", "stiffness_z_n_per_m"],
-            ),
-            optional_vector(
-                "cubic_n_per_m3",
-                &["cubic_x_n_per_m3", "cubic_y_n_per_m3", "cubic_z_n_per_m3"],
-            ),
-            optional_vector(
-                "damping_n_s_per_m",
-                &["damping_x_n_s_per_m", "damping_y_n_s_per_m", "damping_z_n_s_per_m"],
-            ),
-        ],
-        count: |machine| machine.bushings.len(),
-        fill: |machine, count| machine.bushings = vec![Bushing::default(); count],
-    },
-    Part {
-        section: "further_unbalances",
-        prefix: "unbalance_",
-        // The first is `[unbalance]`.
-        times: Times::Many(2, None),
-        keys: &[number("mass_kg"), number("x_m"), number("radius_m")],
-        count: |machine| machine.further_unbalances.len(),
-        fill: |machine, count| machine.further_unbalances = vec![Unbalance::default(); count],
-    },
-    Part {
-        section: "feet",
-        prefix: "foot_",
-        times: Times::Many(1, None),
-        keys: &[vector("foot_m", &["x_m", "y_m", "z_m"])],
-        count: |machine| machine.feet.len(),
-        fill: |machine, count| machine.feet = vec![Foot::default(); count],
-    },
+    many!(
+        springs: Spring { free_length_m: None, ..Machine::paper().springs[0] },
+        "spring_", 1, Some("at least one [[springs]]: nothing else carries the machine"),
+        (FREE_LENGTH, LeftOut::Nothing), ("cubic_n_per_m3", LeftOut::Is(0.0))
+    ),
+    many!(
+        dampers: Machine::paper().dampers[0],
+        "damper_", 1, None,
+        ("friction_n", LeftOut::Is(0.0)),
+        ("friction_speed_m_per_s", LeftOut::Is(Damper::FRICTION_SPEED_M_PER_S)),
+        ("friction_linear_speed_m_per_s", LeftOut::Auto)
+    ),
+    many!(
+        stops: BumpStop::default(),
+        "stop_", 1, None,
+        ("damping_n_s_per_m", LeftOut::Is(0.0)), ("softness_m", LeftOut::Is(BumpStop::SOFTNESS_M))
+    ),
+    many!(
+        bushings: Bushing::default(),
+        "bushing_", 1, None,
+        ("cubic_n_per_m3", LeftOut::Is(0.0)), ("damping_n_s_per_m", LeftOut::Is(0.0))
+    ),
+    // The first is `[unbalance]`.
+    many!(further_unbalances: Unbalance::default(), "unbalance_", 2, None,),
+    many!(feet: Foot::default(), "foot_", 1, None,),
 ];
 /// Most elements of one list: enough for any machine, and what depends on all of them stays quick.
 const MOST_ELEMENTS: usize = 1000;
@@ -290,45 +256,64 @@ pub(super) fn read(text: &str, root: Section<'_>) -> Machine {
             .push(Diagnostic::new("the machine file is empty").at(root.at(), "expected a machine"));
         return machine;
     }
-    for part in &PARTS {
-        if part.section.is_empty() {
-            part.keys.iter().for_each(|key| read_key(key, "", &root, &mut machine));
-            continue;
-        }
-        let header = part.header();
-        let sections: Vec<Section<'_>> = match part.times {
-            Times::Many(..) => elements(part, &root),
-            Times::Once | Times::AtMostOnce => {
-                let field = root.table(part.section, &header);
-                if matches!((part.times, &field), (Times::Once, Field::Absent)) {
-                    root.missing(part.section, &format!("a section {header}"));
+    let mut keys = Keys::new(Walk::Read(root));
+    walk(&mut machine, &mut keys);
+    keys.finish();
+    machine
+}
+
+/// The schema of machine files.
+pub(crate) fn schema() -> Value {
+    let told = Keys::told(true, |keys| walk(&mut with_one_of_each(), keys));
+    document("Machine file of sweep", told.finish())
+}
+
+/// The machine as a machine file's tables hold it; every number as its shortest decimal that reads
+/// back the same.
+pub(crate) fn to_json(machine: &Machine) -> Value {
+    Keys::told(false, |keys| walk(&mut machine.clone(), keys)).finish()
+}
+
+/// Walks over every section.
+fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
+    for (part, own) in PARTS.iter().zip(&*KEYS) {
+        let table = keys::Key::new(part.section, "");
+        match part.times {
+            _ if part.section.is_empty() => part.walk(own, 0, machine, keys),
+            Times::Once => {
+                let expected = format!("a section {}", part.header());
+                let table = table.needed(&expected);
+                let field = keys.table(table, |keys| part.walk(own, 0, machine, keys));
+                if let (None, Some(report)) = (field.given(), keys.section().map(|it| it.report)) {
+                    own.iter().for_each(|key| doubt(key.names(part.prefix), report));
                 }
-                field.given().map(|section| section.value).into_iter().collect()
             }
-        };
-        if sections.is_empty() {
-            match part.times {
-                Times::Once => {
-                    let keys = part.keys.iter();
-                    keys.for_each(|key| doubt(key.names(part.prefix), report));
+            Times::AtMostOnce => drop(keys.table(table, |keys| {
+                if keys.section().is_some() {
+                    (part.fill)(machine, 1);
                 }
-                // The paper's stand in.
-                Times::Many(_, Some(expected)) => {
-                    root.missing(part.section, expected);
-                    continue;
+                (0..(part.count)(machine)).for_each(|k| part.walk(own, k, machine, keys));
+            })),
+            Times::Many(_, needed) => {
+                let mut sections = Vec::new();
+                if let Some(root) = keys.section() {
+                    sections = elements(part, root);
+                    if let (true, Some(expected)) = (sections.is_empty(), needed) {
+                        // The paper's stand in.
+                        root.missing(part.section, expected);
+                        continue;
+                    }
+                    (part.fill)(machine, sections.len());
                 }
-                Times::AtMostOnce | Times::Many(_, None) => {}
+                // The two that machines have always had are written even where there are none.
+                let count = (part.count)(machine);
+                if count > 0 || ["springs", "dampers"].contains(&part.section) {
+                    let table = needed.map_or(table, |needed| table.needed(needed));
+                    keys.tables(table, sections, count, |keys, k| part.walk(own, k, machine, keys));
+                }
             }
-        }
-        (part.fill)(&mut machine, sections.len());
-        for (k, section) in sections.into_iter().enumerate() {
-            let prefix = part.prefix(k);
-            part.keys.iter().for_each(|key| read_key(key, &prefix, &section, &mut machine));
-            section.finish();
         }
     }
-    root.finish();
-    machine
 }
 
 /// The tables of a list, no more of them than are accepted.
@@ -343,39 +328,72 @@ fn elements<'a>(part: &Part, root: &Section<'a>) -> Vec<Section<'a>> {
     sections
 }
 
-fn read_key(key: &Key, prefix: &str, section: &Section<'_>, machine: &mut Machine) {
-    let (names, report) = (key.names(prefix), section.report);
-    if key.left_out == LeftOut::Auto && section.is_text(key.name) {
-        if section.choice(key.name, &[AUTO]).given().is_none() {
-            doubt(names, report);
-        }
-        return;
-    }
-    let parameters: Vec<_> = names.iter().filter_map(|name| find(name, machine)).collect();
-    let Some(first) = parameters.first() else { return };
-    let (field, expected) = if key.is_vector() {
-        (section.numbers(key.name, first.range()), "an array of three numbers".to_owned())
-    } else {
-        let or_auto = if key.left_out == LeftOut::Auto { ", or \"auto\"" } else { "" };
-        let expected = format!("{}: {}{or_auto}", first.description(), first.range());
-        (section.number(key.name, first.range()).map(|number| vec![number]), expected)
-    };
-    if matches!(field, Field::Absent) && key.left_out != LeftOut::Refused {
-        return;
-    }
-    match section.require(field, key.name, &expected) {
-        Some(numbers) if numbers.value.len() == parameters.len() => {
-            for (parameter, number) in parameters.iter().zip(numbers.value) {
-                parameter.set(machine, &mut no_spin(), number.value);
-                report.put(parameter.name(), number.at);
+impl Key {
+    /// Walks over the key of element `k`.
+    fn walk(&'static self, part: &Part, k: usize, machine: &mut Machine, keys: &mut Keys<'_>) {
+        let names = self.names(&part.prefix(k));
+        let parameters: Vec<_> = names.iter().filter_map(|name| find(name, machine)).collect();
+        let Some(first) = parameters.first() else { return };
+        let number = Kind::Number(first.range());
+        let or_auto = |section: &Section<'_>, key| match section.is_text(key) {
+            true => section.choice(key, &[AUTO]).map(|_| AUTO.into()),
+            false => number.read(section, key, ""),
+        };
+        let (kind, about, expected) = match self.left_out {
+            _ if self.is_vector() => {
+                let three = Numbers::new(first.range(), 3..=3, "expected three numbers");
+                (
+                    Kind::Numbers(Numbers { places: names.clone(), ..three }),
+                    String::new(),
+                    "an array of three numbers".to_owned(),
+                )
             }
+            LeftOut::Auto => {
+                let schema = json!({ "anyOf": [of(first), { "const": AUTO }] });
+                (Kind::Own(&or_auto, schema), String::new(), String::new())
+            }
+            _ => {
+                let expected = format!("{}: {}", first.description(), first.range());
+                (Kind::Number(first.range()), about(first), expected)
+            }
+        };
+        let is_needed = self.left_out == LeftOut::Refused;
+        let key = keys::Key::new(&self.name, &about);
+        let key = if is_needed { key.needed(&expected) } else { key };
+        let mut value = match self.left_out {
+            _ if !keys.is_schema() => self.json(part, k, machine),
+            LeftOut::Auto => AUTO.into(),
+            LeftOut::Is(default) if !self.is_vector() => default.into(),
+            _ => Value::Null,
+        };
+        let found = keys.key(key, &kind, &mut value);
+        let Some(report) = keys.section().map(|section| section.report) else { return };
+        let numbers = value.as_array().map_or(slice::from_ref(&value), Vec::as_slice);
+        match found {
+            Field::Given(found) => {
+                let numbers = numbers.iter().filter_map(Value::as_f64);
+                for (parameter, number) in parameters.iter().zip(numbers) {
+                    parameter.set(machine, &mut no_spin(), number);
+                    if !self.is_vector() {
+                        report.put(parameter.name(), found.at.clone());
+                    }
+                }
+            }
+            Field::Absent if !is_needed => {}
+            Field::Absent | Field::Bad => doubt(names, report),
         }
-        Some(numbers) => {
-            let title = format!("`{}` has {} numbers", key.name, numbers.value.len());
-            report.push(Diagnostic::new(title).at(&numbers.at, "expected three numbers"));
-            doubt(names, report);
+    }
+
+    /// What a machine's file has under the key; nothing where it is left out.
+    fn json(&self, part: &Part, k: usize, machine: &Machine) -> Value {
+        match self.given(part, k, machine) {
+            Some(values) if self.is_vector() => values.into(),
+            Some(values) => values[0].into(),
+            None if self.left_out == LeftOut::Auto && machine.dampers[k].friction_n != 0.0 => {
+                AUTO.into()
+            }
+            None => Value::Null,
         }
-        None => doubt(names, report),
     }
 }
 
@@ -392,42 +410,6 @@ fn value(name: &str, machine: &Machine) -> Option<f64> {
     find(name, machine)?.get(machine, &no_spin())
 }
 
-/// The machine as a machine file's tables hold it; every number as its shortest decimal that reads
-/// back the same.
-pub(crate) fn to_json(machine: &Machine) -> Value {
-    let mut root = Map::new();
-    for part in &PARTS {
-        let count = (part.count)(machine);
-        let entry = |key: &Key, k: usize| {
-            let value = match key.given(part, k, machine) {
-                Some(values) if key.is_vector() => values.into(),
-                Some(values) => values[0].into(),
-                None if key.left_out == LeftOut::Auto && machine.dampers[k].friction_n != 0.0 => {
-                    AUTO.into()
-                }
-                None => return None,
-            };
-            Some((key.name.to_owned(), value))
-        };
-        let element = |k: usize| -> Map<String, Value> {
-            part.keys.iter().filter_map(|key| entry(key, k)).collect()
-        };
-        // The two that machines have always had are written even where there are none.
-        let is_old = ["springs", "dampers"].contains(&part.section);
-        match part.times {
-            _ if part.section.is_empty() => root.extend(element(0)),
-            Times::Many(..) if count > 0 || is_old => {
-                root.insert(part.section.to_owned(), (0..count).map(element).collect());
-            }
-            Times::Once | Times::AtMostOnce if count > 0 => {
-                root.insert(part.section.to_owned(), element(0).into());
-            }
-            _ => {}
-        }
-    }
-    Value::Object(root)
-}
-
 /// The machine as the text of a machine file, each number with its meaning and source.
 pub(crate) fn to_toml(machine: &Machine) -> String {
     let mut text = "# A machine in full, in SI units. Lengths in m from O, midway between the \
@@ -435,13 +417,14 @@ pub(crate) fn to_toml(machine: &Machine) -> String {
          # drum axis towards the door, y up, z sideways. Inertia about each body's own mass \
          centre, in body axes.\n"
         .to_owned();
-    for (part, k) in
-        PARTS.iter().flat_map(|part| (0..(part.count)(machine)).map(move |k| (part, k)))
+    let parts = PARTS.iter().zip(&*KEYS);
+    for (part, own, k) in
+        parts.flat_map(|(part, own)| (0..(part.count)(machine)).map(move |k| (part, own, k)))
     {
         if !part.section.is_empty() {
             text.push_str(&format!("\n{}\n", part.header()));
         }
-        for key in part.keys {
+        for key in own {
             let Some(values) = key.given(part, k, machine) else { continue };
             let written = match key.is_vector() {
                 true => format!("{} = {values:?}", key.name),

@@ -1,14 +1,11 @@
 //! The washing machine in grid files.
 
-use serde_json::{Map, Value, json};
-use sweep_engine::Schema;
-use sweep_engine::config::section::Section;
-use sweep_engine::config::words::names;
-use sweep_engine::config::written::Written;
-use sweep_engine::config::{Draft, Read};
+use serde_json::Value;
+use sweep_engine::config::{Draft, Key, Keys, Kind, Read, Walk};
+use washer_model::Machine;
 use washer_row::{Criterion, Measures, Metric};
 
-use super::{GridInput, grid, machine_json, scalars, schema, spin, validate};
+use super::{GridInput, grid, schema, spin, validate};
 use crate::model::Washer;
 
 impl Read for Washer {
@@ -17,29 +14,43 @@ impl Read for Washer {
     const TO_START: Option<&'static str> =
         Some("`sweep init FILE` writes a grid file to start from");
 
-    fn read(input: &GridInput, root: &Section<'_>) -> Self {
-        let machine = grid::machine(input, root);
-        let spin = spin::read(root);
-        let metrics = names(root, "metrics", "metric", &Metric::ALL, Metric::name);
-        let metrics = metrics.unwrap_or_default();
-        grid::judge_metrics(&metrics, &machine, root);
-        let held_speeds = grid::stability(root, &metrics);
-        let (stops, feet) = (machine.stops.len(), machine.feet.len());
-        let dampers = machine.dampers.len();
-        let measures = Measures { metrics, stops, feet, dampers, ..Measures::default() };
-        Self { machine, spin, measures, held_speeds }
+    fn blank() -> Self {
+        let (machine, spin) = (Machine::paper(), spin::BLANK);
+        Self { machine, spin, measures: Measures::default(), held_speeds: None }
     }
 
-    fn read_reliability(&mut self, section: &Section<'_>) {
-        self.measures.criterion = grid::criterion(section);
+    fn walk(&mut self, keys: &mut Keys<'_>, input: Option<&GridInput>) {
+        let Self { machine, spin, measures, held_speeds } = self;
+        grid::machine(machine, keys, input);
+        spin::walk(spin, keys);
+        let key = Key::new("metrics", "further columns of the result").set();
+        let found = keys.words(key, "metric", &Metric::ALL, Metric::name, &mut measures.metrics);
+        measures.stops = machine.stops.len();
+        measures.feet = machine.feet.len();
+        measures.dampers = machine.dampers.len();
+        if let Some(root) = keys.section() {
+            grid::judge_metrics(&measures.metrics, machine, root);
+        }
+        grid::stability(&measures.metrics, found, held_speeds, keys);
     }
 
-    fn scalars() -> &'static [&'static str] {
-        scalars::NAMES
-    }
-
-    fn put(written: &Written<'_>, draft: &mut Draft<'_, Self>) -> Option<Value> {
-        scalars::put(written, draft)
+    fn walk_reliability(&mut self, keys: &mut Keys<'_>) {
+        let misplaced = "it belongs at the top of the file, before the first [section]";
+        keys.misplace(&["metrics"], misplaced);
+        let about = "what the models are compared by: largest deviations, the same turn by turn \
+                     of the drum, or root mean squares";
+        let criterion = &mut self.measures.criterion;
+        // Plans that do not ask for another read as ever.
+        if !matches!(keys.walk, Walk::Tell(_))
+            || keys.is_schema()
+            || *criterion != Criterion::default()
+        {
+            let key = Key::new("criterion", about).set();
+            let mut word = criterion.name().to_owned();
+            keys.key(key, &Kind::Word(&Criterion::ALL.map(Criterion::name)), &mut word);
+            let found = Criterion::ALL.into_iter().find(|one| one.name() == word);
+            *criterion = found.unwrap_or_default();
+        }
     }
 
     fn judge(draft: &Draft<'_, Self>) {
@@ -47,25 +58,7 @@ impl Read for Washer {
         validate::stability(draft);
     }
 
-    fn describe(&self, plan: &mut Map<String, Value>) {
-        plan.insert("machine".to_owned(), machine_json(&self.machine));
-        plan.insert("spin".to_owned(), spin::to_json(&self.spin));
-        // What is left out stands for the default, so that plans which do not ask for more read as
-        // ever. The machine says how many stops, feet and dampers it has.
-        let Measures { criterion, metrics, stops: _, feet: _, dampers: _ } = &self.measures;
-        if *criterion != Criterion::default() {
-            plan["reliability"]["criterion"] = criterion.name().into();
-        }
-        if !metrics.is_empty() {
-            let metrics = metrics.iter().map(|metric| metric.name()).collect();
-            plan.insert("metrics".to_owned(), metrics);
-        }
-        if let Some(speeds) = &self.held_speeds {
-            plan.insert("stability".to_owned(), json!({ "speed_rpm": speeds.to_string() }));
-        }
-    }
-
-    fn schema() -> Schema {
-        schema::grid()
+    fn schema_of_set() -> Value {
+        schema::set()
     }
 }

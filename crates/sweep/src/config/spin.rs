@@ -1,31 +1,26 @@
-//! `[spin]`: the profiles by name, and how each is read and described.
+//! `[spin]`: the profiles by name, and what each is given by.
 
-use serde_json::{Value, json};
-use washer_model::{Machine, Parameter, Range, Spin, decimal};
-
-use super::machine;
-use sweep_engine::config::report::Diagnostic;
-use sweep_engine::config::section::{Section, listed};
+use sweep_engine::config::keys::Variants;
+use sweep_engine::config::kind::{Numbers, about};
+use sweep_engine::config::{Field, Key, Keys, Kind};
+use washer_model::{Machine, Parameter, Range, Spin};
 
 /// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are
 /// made ready together.
 pub(super) const MOST_ROWS: usize = 20_000;
 
-/// The range of a parameter of the spin.
-fn range(parameter: &str, spin: &Spin) -> Range {
-    Parameter::find(parameter, &Machine::paper(), spin)
-        .map_or(Range::Any, |parameter| parameter.range())
-}
+/// Stands in for a wrong spin, so that axes over its numbers are still known.
+pub(super) const BLANK: Spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
 
 /// A profile that a peak and a ramp give.
-pub(super) struct Ramped {
-    pub(super) name: &'static str,
-    pub(super) description: &'static str,
+struct Ramped {
+    name: &'static str,
+    description: &'static str,
     make: fn(f64, f64) -> Spin,
 }
 
 /// The profiles that a peak and a ramp give.
-pub(super) const RAMPED: [Ramped; 3] = [
+const RAMPED: [Ramped; 3] = [
     Ramped {
         name: "cycloidal",
         description: "smooth run-up, then constant",
@@ -44,10 +39,10 @@ pub(super) const RAMPED: [Ramped; 3] = [
 ];
 
 /// The profile that is given as a table.
-pub(super) const TABLE: &str = "table";
+const TABLE: &str = "table";
 
 /// A spin's profile.
-pub(super) const fn name(spin: &Spin) -> &'static str {
+const fn name(spin: &Spin) -> &'static str {
     match spin {
         Spin::Cycloidal { .. } => RAMPED[0].name,
         Spin::Triangular { .. } => RAMPED[1].name,
@@ -56,108 +51,82 @@ pub(super) const fn name(spin: &Spin) -> &'static str {
     }
 }
 
-/// A spin as a grid file has it.
-pub(crate) fn to_json(spin: &Spin) -> Value {
-    let profile = name(spin);
-    match spin {
-        Spin::Cycloidal { peak_rpm, ramp_s }
-        | Spin::Triangular { peak_rpm, ramp_s }
-        | Spin::Ramp { peak_rpm, ramp_s } => {
-            json!({ "profile": profile, "peak_rpm": peak_rpm, "ramp_s": ramp_s })
+/// Walks over the section.
+pub(super) fn walk(spin: &mut Spin, keys: &mut Keys<'_>) {
+    keys.table(Key::new("spin", "").needed("a section [spin]"), |keys| {
+        keys.places = "spin_".to_owned();
+        let said = (TABLE, "linear between given points, constant after the last");
+        let all = RAMPED.iter().map(|profile| (profile.name, profile.description));
+        let variants =
+            Variants { all: all.chain([said]).collect(), default: None, set: RAMPED.len() };
+        let now = variants.all.iter().position(|(known, _)| *known == name(spin));
+        let key = Key::new("profile", "").set();
+        let chosen = keys.variants(key, &variants, now, |keys, k| match RAMPED.get(k) {
+            Some(profile) => ramped(profile, spin, keys),
+            None => table(spin, keys),
+        });
+        if chosen.is_none() && keys.section().is_some() {
+            *spin = BLANK;
         }
-        Spin::Table { time_s, speed_rpm } => {
-            json!({ "profile": profile, "time_s": time_s, "speed_rpm": speed_rpm })
-        }
-    }
-}
-
-/// The same spin by another profile that a peak and a ramp give; none of a table.
-pub(super) fn by_profile(spin: &Spin, profile: &Ramped) -> Option<Spin> {
-    match *spin {
-        Spin::Cycloidal { peak_rpm, ramp_s }
-        | Spin::Triangular { peak_rpm, ramp_s }
-        | Spin::Ramp { peak_rpm, ramp_s } => Some((profile.make)(peak_rpm, ramp_s)),
-        Spin::Table { .. } => None,
-    }
-}
-
-pub(crate) fn read(root: &Section<'_>) -> Spin {
-    // Stands in for a wrong spin, so that axes over its numbers are still known.
-    let stand_in = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
-    let field = root.table("spin", "[spin]");
-    let Some(section) = root.require(field, "spin", "a section [spin]") else { return stand_in };
-    let section = section.value;
-    let [cycloidal, triangular, ramp] = RAMPED.map(|profile| profile.name);
-    let profiles = [cycloidal, triangular, ramp, TABLE];
-    let field = section.choice("profile", &profiles);
-    let profile = section.require(field, "profile", &listed(&profiles));
-    // The table stands behind those that a peak and a ramp give.
-    let profile = profile.map(|profile| RAMPED.get(profile.value));
-    let spin = match profile {
-        Some(Some(Ramped { name, make, .. })) => {
-            let reason = format!("only the profile \"{TABLE}\" has it, not \"{name}\"");
-            section.misplace(&["time_s", "speed_rpm"], &reason);
-            ramped(&section, true, &stand_in).map(|[peak_rpm, ramp_s]| make(peak_rpm, ramp_s))
-        }
-        Some(None) => {
-            let reason = "a table gives `time_s` and `speed_rpm` instead";
-            section.misplace(&["peak_rpm", "ramp_s"], reason);
-            table(&section, true)
-        }
-        // Of none that there is, the numbers are still checked.
-        None => {
-            ramped(&section, false, &stand_in);
-            table(&section, false);
-            None
-        }
-    };
-    section.finish();
-    spin.unwrap_or_else(|| match profile {
-        Some(None) => {
-            // The table's mistakes are reported; that the stand-in has no rows is not one of them.
-            root.report.doubt("spin.time_s");
-            machine::no_spin()
-        }
-        Some(Some(_)) | None => stand_in,
-    })
+    });
 }
 
 /// Peak and ramp.
-fn ramped(section: &Section<'_>, needed: bool, stand_in: &Spin) -> Option<[f64; 2]> {
-    let number = |key, parameter: &str, expected| {
-        let field = section.number(key, range(parameter, stand_in));
-        let found = section.require_if(needed, field, key, expected)?;
-        section.report.put(parameter, found.at);
-        Some(found.value)
+fn ramped(&Ramped { name, make, .. }: &Ramped, spin: &mut Spin, keys: &mut Keys<'_>) {
+    let reason = format!("only the profile \"{TABLE}\" has it, not \"{name}\"");
+    keys.misplace(&["time_s", "speed_rpm"], &reason);
+    let (Spin::Cycloidal { peak_rpm, ramp_s }
+    | Spin::Triangular { peak_rpm, ramp_s }
+    | Spin::Ramp { peak_rpm, ramp_s }) = spin
+    else {
+        let title = "the grid's spin is a table, which has no peak and no ramp";
+        keys.refuse("profile", title, "expected a grid file with `peak_rpm` and `ramp_s`");
+        return;
     };
-    let peak_rpm = number("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm");
-    let ramp_s = number("ramp_s", "spin_ramp_s", "the duration of the run-up in s");
-    Some([peak_rpm?, ramp_s?])
+    let mut is_right = true;
+    for (key, parameter, expected, value) in [
+        ("peak_rpm", "spin_peak_rpm", "the greatest speed in rpm", &mut *peak_rpm),
+        ("ramp_s", "spin_ramp_s", "the duration of the run-up in s", &mut *ramp_s),
+    ] {
+        if let Ok(parameter) = Parameter::find(parameter, &Machine::paper(), &BLANK) {
+            let about = about(&parameter);
+            let key = Key::new(key, &about).needed(expected);
+            let found = keys.key(key, &Kind::Number(parameter.range()), value);
+            is_right &= matches!(found, Field::Given(_)) || keys.section().is_none();
+        }
+    }
+    *spin = if is_right { make(*peak_rpm, *ramp_s) } else { BLANK };
 }
 
-fn table(section: &Section<'_>, needed: bool) -> Option<Spin> {
-    let column = |key, range| {
-        let field = section.numbers(key, range);
-        let found = section.require_if(needed, field, key, "an array of numbers")?;
-        let report = section.report;
-        if found.value.len() > MOST_ROWS {
-            let title = format!("`{key}` has {} numbers", decimal(found.value.len() as f64));
-            let expected = format!("expected at most {MOST_ROWS}");
-            let refusal = Diagnostic::new(title).at(&found.at, expected);
-            report.push(refusal.help("leave out rows between which the speed is linear"));
-            return None;
-        }
-        report.put(format!("spin.{key}"), found.at);
-        let mut values = Vec::with_capacity(found.value.len());
-        for (k, entry) in found.value.into_iter().enumerate() {
-            report.put(format!("spin.{key}[{k}]"), entry.at);
-            values.push(entry.value);
-        }
-        Some(values)
+/// Speeds at times.
+fn table(spin: &mut Spin, keys: &mut Keys<'_>) {
+    keys.misplace(&["peak_rpm", "ramp_s"], "a table gives `time_s` and `speed_rpm` instead");
+    let (mut time_s, mut speed_rpm) = match std::mem::replace(spin, BLANK) {
+        Spin::Table { time_s, speed_rpm } => (time_s, speed_rpm),
+        _ => Default::default(),
     };
-    let (time_s, speed_rpm) =
-        (column("time_s", Range::NonNegative), column("speed_rpm", Range::Any));
-    Some(Spin::Table { time_s: time_s?, speed_rpm: speed_rpm? })
+    let times = Numbers {
+        help: Some("leave out rows between which the speed is linear"),
+        ..Numbers::new(Range::NonNegative, 0..=MOST_ROWS, format!("expected at most {MOST_ROWS}"))
+    };
+    // Whether they are in range is judged with the rest of the table.
+    let speeds = Numbers { range: Range::Within(-1e5, 1e5), read: Range::Any, ..times.clone() };
+    let mut column = |key: &'static str, about: &'static str, numbers, column: &mut Vec<f64>| {
+        let key = Key::new(key, about).needed("an array of numbers");
+        matches!(keys.key(key, &Kind::Numbers(numbers), column), Field::Given(_))
+    };
+    let found = [
+        column("time_s", "increasing times from 0, s", times, &mut time_s),
+        column("speed_rpm", "speeds at these times, rpm", speeds, &mut speed_rpm),
+    ];
+    if keys.section().is_some() && found != [true; 2] {
+        // Their mistakes are reported; that the stand-in has no rows is not one of them.
+        if let Some(report) = keys.report() {
+            report.doubt("spin_time_s");
+        }
+        (time_s, speed_rpm) = Default::default();
+    }
+    *spin = Spin::Table { time_s, speed_rpm };
 }
 
 #[cfg(test)]

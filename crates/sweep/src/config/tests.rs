@@ -18,7 +18,7 @@ use washer_row::{Measures, Metric};
 use super::*;
 use crate::method::Integrator;
 use crate::plan::AxisValues;
-use sweep_engine::design::Design;
+use sweep_engine::design::{Design, Rule};
 
 /// What the fuzzer's inputs are read as.
 #[path = "../../../../fuzz/src/input.rs"]
@@ -538,7 +538,7 @@ fn a_design_is_ranges_and_a_number_of_points() {
     let plan =
         |design: &str| load_text(format!("{SMALLEST}[design]\n{design}\n{axes}"), &[]).unwrap();
     let sobol = plan("method = \"sobol\"\npoints = 64\nseed = 3");
-    assert_eq!(sobol.design, Some(Design::Sobol { points: 64, seed: 3 }));
+    assert_eq!(sobol.design, Some(Design::Spread { rule: Rule::Sobol, points: 64, seed: 3 }));
     let latin = plan("method = \"latin_hypercube\"\npoints = 64");
     assert_eq!((latin.points(), latin.to_json()["design"]["seed"].as_u64()), (64, Some(0)));
     assert_ne!(latin.axis_values(0), sobol.axis_values(0));

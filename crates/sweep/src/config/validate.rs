@@ -164,7 +164,7 @@ fn turns(draft: &Draft<'_, Washer>, scenario: &Scenario, reported: &mut BTreeSet
 /// The keys under which the numbers' places are kept.
 fn keys(violation: &Violation, of_spin: bool) -> Vec<String> {
     let tabled = of_spin && !matches!(violation, Violation::OutOfRange { .. });
-    let key = |name: String| if tabled { format!("spin.{name}") } else { name };
+    let key = |name: String| if tabled { format!("spin_{name}") } else { name };
     violation.concerns().into_iter().map(key).collect()
 }
 

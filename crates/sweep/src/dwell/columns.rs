@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use sweep_engine::columns::{Cell, MODELS, ResultColumn};
+use sweep_engine::columns::{MODELS, ResultColumn};
+use sweep_engine::store::Kind;
 use washer_model::{COORDINATES, Channel, Ending, Endings, Response, STATE_LEN, Settled, State};
 use washer_row::{Measured, Status};
 
@@ -97,7 +98,7 @@ impl RowOf {
 
 /// Counts, null where they are not known.
 fn counts(name: &str, text: &str, of: fn(&RowOf) -> Option<u64>) -> DwellColumn {
-    ResultColumn::new(name, "1", text, Cell::KnownCount(Box::new(of)))
+    ResultColumn::new(name, "1", text, Kind::KnownCount, of)
 }
 
 /// Numbers of both models' motions at each channel.
@@ -131,12 +132,12 @@ fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
 /// Every column, in order; with those of states once a turn, if these are kept.
 pub(super) fn columns(plan: &Plan, with_sections: bool) -> Vec<DwellColumn> {
     let motion = |row: &RowOf| match row {
-        RowOf::Motion(_, motion, _) => *motion as u64,
-        RowOf::Failed(_) => 0,
+        RowOf::Motion(_, motion, _) => Some(*motion as u64),
+        RowOf::Failed(_) => Some(0),
     };
     let text = "number of the motion at this speed: 0 is the one that the disturbed periodic \
                 response ends in";
-    let mut columns = vec![ResultColumn::new("motion", "1", text, Cell::Count(Box::new(motion)))];
+    let mut columns = vec![ResultColumn::new("motion", "1", text, Kind::Count, motion)];
     columns.push(counts("starts", "how many starts ended in it", |row| {
         Some(u64::from(row.motion()?.starts))
     }));

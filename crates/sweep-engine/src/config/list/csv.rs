@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::super::report::{Diagnostic, Report};
 use super::super::section::short;
 use super::super::source::{Located, Location, SourceId};
-use super::{ID, ListColumn, MOST_COLUMNS, Unreadable, fits};
+use super::{ID, ListColumn, Unreadable, fits};
 
 /// Columns, the byte at which each row's line begins, and what separates cells.
 pub(super) type Read = (Vec<ListColumn>, Vec<u32>, char);
@@ -35,9 +35,7 @@ pub(super) fn read(
         }
         let count = 1 + line.matches(separator).count();
         if columns.is_empty() {
-            if count > MOST_COLUMNS {
-                return Err(Unreadable::TooManyColumns(count));
-            }
+            fits(0, count)?;
             let column = |(name, at): (&str, _)| ListColumn {
                 name: Located { value: name.to_owned(), at: Location::new(source, at) },
                 values: Vec::new(),

@@ -12,17 +12,18 @@ use parquet::file::metadata::ParquetMetaData;
 use sweep_files::pages::{self, Unpacked};
 use sweep_files::{Refused, cells, footer, panics};
 
-use super::{LONGEST_BYTES, MOST_COLUMNS, Unreadable, fits};
+use super::super::section::short;
+use super::{LONGEST_BYTES, Unreadable, fits};
 
 /// How a list may be compressed, for a message.
-pub(super) const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
+const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
 
 /// Rows that are decoded at a time.
 const BATCH_ROWS: usize = 8192;
 
 /// Names and values of the columns. With `gaps`, a null is NaN.
 pub(super) fn columns(bytes: Vec<u8>, gaps: bool) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
-    let panicked = |panic| Err(Unreadable::Damaged(format!("it makes no sense inside: {panic}")));
+    let panicked = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
     panics::caught(|| read(bytes.into(), gaps)).unwrap_or_else(panicked)
 }
 
@@ -30,12 +31,10 @@ fn read(bytes: Bytes, gaps: bool) -> Result<Vec<(String, Vec<f64>)>, Unreadable>
     footer::check(&mut Cursor::new(&bytes)).map_err(refused)?;
     let builder = ParquetRecordBatchReaderBuilder::try_new(bytes.clone()).map_err(damaged)?;
     let fields = builder.schema().fields().clone();
-    if fields.len() > MOST_COLUMNS {
-        return Err(Unreadable::TooManyColumns(fields.len()));
-    }
+    fits(0, fields.len())?;
     if let Some(field) = fields.iter().find(|field| !cells::is_number(field.data_type())) {
-        let found = field.data_type().to_string();
-        return Err(Unreadable::NotNumbers { column: field.name().clone(), found });
+        let (column, found) = (short(field.name()), field.data_type());
+        return Err(format!("its column `{column}` holds no numbers but {found}"));
     }
     check_sizes(builder.metadata(), &bytes, fields.len())?;
     let mut columns: Vec<(String, Vec<f64>)> =
@@ -47,7 +46,8 @@ fn read(bytes: Bytes, gaps: bool) -> Result<Vec<(String, Vec<f64>)>, Unreadable>
         for ((name, values), array) in columns.iter_mut().zip(batch.columns()) {
             let numbers = cells::numbers(array).map_err(|error| damaged(error.into()))?;
             for (k, value) in numbers.into_iter().enumerate() {
-                let no_value = || Unreadable::NoValue { column: name.clone(), row: rows + k + 1 };
+                let row = rows + k + 1;
+                let no_value = || format!("its column `{}` has no value in row {row}", short(name));
                 let value = if gaps { value.or(Some(f64::NAN)) } else { value };
                 values.push(value.ok_or_else(no_value)?);
             }
@@ -66,15 +66,18 @@ fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Resu
         for column in group.columns() {
             let codec = column.compression();
             if !is_readable(codec) {
-                let name = column.column_path().string();
+                let name = short(&column.column_path().string());
                 // Its level, in brackets, is nothing to a reader.
                 let codec = codec.to_string();
                 let codec = codec.split('(').next().unwrap_or_default().to_lowercase();
-                return Err(Unreadable::Codec { column: name, codec });
+                return Err(format!(
+                    "its column `{name}` is compressed by {codec}, which this program does not \
+                     read: write it with {READABLE_CODECS}"
+                ));
             }
             let (start, length) = column.byte_range();
             if start.checked_add(length).is_none_or(|end| end > bytes.len() as u64) {
-                return Err(Unreadable::Damaged("a column lies outside of it".to_owned()));
+                return Err("it is damaged: a column lies outside of it".to_owned());
             }
             let left = LONGEST_BYTES - unpacked;
             let most = Unpacked { total: left, at_once: left };
@@ -99,14 +102,14 @@ const fn is_readable(codec: Compression) -> bool {
 
 fn refused(refused: Refused) -> Unreadable {
     match refused {
-        Refused::Io(source) => Unreadable::Io(source),
-        Refused::TooLong => Unreadable::TooLongUnpacked,
-        refused => Unreadable::Damaged(refused.to_string()),
+        Refused::Io(error) => error.to_string(),
+        Refused::TooLong => format!("unpacked, it is longer than {} MiB", LONGEST_BYTES >> 20),
+        refused => format!("it is damaged: {refused}"),
     }
 }
 
 fn damaged(error: ParquetError) -> Unreadable {
     let text = error.to_string();
     let reason = text.strip_prefix("Parquet error: ").unwrap_or(&text);
-    Unreadable::Damaged(reason.trim().to_owned())
+    format!("it is damaged: {}", reason.trim())
 }

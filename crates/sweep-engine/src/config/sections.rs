@@ -1,0 +1,220 @@
+//! The keys of a grid file, table by table. What is left out has the defaults of a blank plan.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use serde_json::json;
+use sweep_parameter::{Channel, Range, decimal};
+
+use super::keys::{Told, Variants};
+use super::kind::Numbers;
+use super::{
+    Diagnostic, Field, GridInput, Key, Keys, Kind, Located, Location, Read, Report, Section, Walk,
+    design,
+};
+use crate::method::{Integrator, Setting, default_method};
+use crate::plan::{LONGEST_S, Plan, RATIO_MIN, Reliability, WrittenIn};
+
+impl<M: Read> Plan<M> {
+    /// A plan of which nothing is read: what is left out stays so.
+    pub(super) fn blank() -> Self {
+        let end_s = 50.0;
+        Self {
+            name: String::new(),
+            model: M::blank(),
+            end_s,
+            window_s: [0.0, end_s],
+            integrator: default_method::<M::Integrator>().with_defaults(),
+            axes: Vec::new(),
+            design: None,
+            reliability: Reliability { limits: 2.0.into(), channels: M::default_channels() },
+            set: Vec::new(),
+            written: WrittenIn::default(),
+        }
+    }
+}
+
+/// Walks over every key of a plan but its axes and `[set]`.
+pub fn walk<M: Read>(plan: &mut Plan<M>, keys: &mut Keys<'_>) {
+    sections(plan, keys, None);
+    design::walk(&mut plan.design, keys);
+}
+
+/// The keys of grid files, described; but axes and `[set]`.
+pub fn described<M: Read>() -> Told {
+    Keys::told(true, |keys| walk(&mut Plan::<M>::blank(), keys))
+}
+
+/// Those before `[set]`; `input` is what is read.
+pub(super) fn sections<M: Read>(
+    plan: &mut Plan<M>,
+    keys: &mut Keys<'_>,
+    input: Option<&GridInput<M>>,
+) {
+    let Plan { name, model, end_s, window_s, integrator, reliability, .. } = plan;
+    let about = "name of the run and of its result file; the grid file's own name if left out";
+    let schema = json!({ "type": "string", "pattern": "^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$" });
+    let read = |root: &Section<'_>, _| {
+        let path = input.map_or(Path::new(""), |input| &input.path);
+        Field::Given(Located { value: self::name(root, path).into(), at: root.at().clone() })
+    };
+    keys.key(Key::new("name", about), &Kind::Own(&read, schema), name);
+    model.walk(keys, input);
+    keys.table(Key::new("time", "").needed("a section [time]"), |keys| time(end_s, window_s, keys));
+    keys.table(Key::new("integrator", ""), |keys| method(integrator, keys));
+    keys.table(Key::new("reliability", ""), |keys| {
+        model.walk_reliability(keys);
+        let Reliability { limits, channels } = reliability;
+        let key = Key::new("ratio_limit", "a point is reliable where every ratio is below this");
+        keys.key(key.set(), &Kind::Number(Range::Positive), &mut limits.most);
+        let about = "if given, a point is reliable where every ratio is above this too";
+        keys.key(Key::new("ratio_min", about).set(), &Kind::Number(RATIO_MIN), &mut limits.least);
+        let key = Key::new("channels", "motions that are compared").set();
+        keys.words(key, "channel", M::Channel::every(), M::Channel::name, channels);
+    });
+}
+
+/// What a name may be: it becomes a file's.
+const PLAIN_NAME: &str = "letters, digits, `-`, `_` and `.`, beginning with a letter or digit, at \
+                          most 100 characters";
+
+fn is_plain(name: &str) -> bool {
+    let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
+    first
+        && name.len() <= 100
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
+}
+
+/// A run's name from the command line.
+pub fn plain_name(text: &str) -> Result<String, String> {
+    if is_plain(text) { Ok(text.to_owned()) } else { Err(format!("expected {PLAIN_NAME}")) }
+}
+
+/// The name that a file gives its run, or its own.
+pub fn name(root: &Section<'_>, path: &Path) -> String {
+    match root.text("name") {
+        Field::Given(found) if is_plain(found.value) => return found.value.to_owned(),
+        Field::Given(found) => {
+            let title = "`name` is not a plain file name";
+            root.report.refuse::<()>(&found.at, title, format!("expected {PLAIN_NAME}"));
+        }
+        Field::Bad => {}
+        Field::Absent => {
+            let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+            if is_plain(stem) {
+                return stem.to_owned();
+            }
+            let title = "`name` is missing, and the file's own name cannot stand in for it";
+            let refusal = Diagnostic::new(title).at(root.at(), format!("expected {PLAIN_NAME}"));
+            root.report.push_missing(refusal);
+        }
+    }
+    String::new()
+}
+
+/// End and window.
+fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
+    let about = Key::new("end_s", "end of the integration, s").set();
+    let key = about.needed("the end of the integration in s");
+    let described = json!({ "type": "number", "exclusiveMinimum": 0, "maximum": LONGEST_S });
+    let (kind, expected) = match &keys.walk {
+        Walk::Read(_) => (Kind::Number(Range::Any), "a time greater than 0, "),
+        Walk::Set(_) => (Kind::Number(Range::Positive), ""),
+        _ => (Kind::Own(&|_, _| Field::Absent, described), ""),
+    };
+    let mut value = *end_s;
+    let end = keys.key(key, &kind, &mut value).given().and_then(|Located { at, .. }| {
+        if 0.0 < value && value <= LONGEST_S {
+            return Some(Located { value, at });
+        }
+        let title = format!("`end_s` = {} is out of range", decimal(value));
+        keys.report()?.refuse(&at, title, format!("expected {expected}at most {LONGEST_S:e} s"))
+    });
+    let is_window_written = |report: &Report| report.place(WINDOW[1]).is_some();
+    if let Some(end) = &end {
+        *end_s = end.value;
+        // A window that was not written ends with the run.
+        if !keys.report().is_some_and(is_window_written) {
+            window_s[1] = end.value;
+        }
+    }
+    let about = "amplitudes are taken from the first to the second time, s; the whole run if left \
+                 out";
+    let expected = "expected two, [from, to], in s";
+    let kind = Kind::Numbers(Numbers {
+        places: WINDOW.map(str::to_owned).to_vec(),
+        ..Numbers::new(Range::NonNegative, 2..=2, expected)
+    });
+    let mut edges = if keys.is_schema() { Vec::new() } else { window_s.to_vec() };
+    let found = keys.key(Key::new("window_s", about), &kind, &mut edges);
+    if let (Field::Given(found), Some(report)) = (found, keys.report())
+        && let Some(window) = window(&found.at, &edges, end.as_ref(), report)
+        && end.is_some()
+    {
+        *window_s = window;
+    }
+}
+
+/// The edges of the window, as parameters.
+const WINDOW: [&str; 2] = ["window_from_s", "window_to_s"];
+
+/// The window that was read, if it is one.
+fn window(
+    at: &Location,
+    edges: &[f64],
+    end: Option<&Located<f64>>,
+    report: &Report,
+) -> Option<[f64; 2]> {
+    let &[from, to] = edges else { return None };
+    let [from_said, to_said] = [from, to].map(decimal);
+    if from >= to {
+        let what = if from > to { "reversed" } else { "empty" };
+        let title = format!("the window is {what}: it goes from {from_said} s to {to_said} s");
+        return report.refuse(at, title, "expected [from, to] with from < to");
+    }
+    if let Some(end) = end.filter(|end| to > end.value) {
+        let title = format!("the window ends at {to_said} s, after the integration");
+        let refusal = Diagnostic::new(title)
+            .at(&report.place(WINDOW[1])?, format!("expected at most {}", decimal(end.value)));
+        report.push(refusal.at(&end.at, "the integration ends here"));
+        return None;
+    }
+    Some([from, to])
+}
+
+/// The method and its settings.
+fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
+    let all = I::methods();
+    let variants = Variants {
+        all: all.iter().map(|entry| (entry.name, entry.description)).collect(),
+        default: Some(all.len() - 1),
+        set: all.len(),
+    };
+    let now = all.iter().position(|entry| entry.name == integrator.name());
+    keys.variants(Key::new("method", "").set(), &variants, now, |keys, method| {
+        let entry = &all[method];
+        let name = entry.name;
+        let others = all.iter().flat_map(|other| other.settings).map(|setting| setting.key);
+        for key in others.filter(|key| !entry.has(key)).collect::<BTreeSet<_>>() {
+            let owners = all.iter().filter(|other| other.has(key)).map(|other| other.name);
+            let owners: Vec<&str> = owners.collect();
+            let (noun, verb) =
+                if owners.len() == 1 { ("method", "has") } else { ("methods", "have") };
+            let said = owners.join("\" and \"");
+            keys.misplace(&[key], &format!("only the {noun} \"{said}\" {verb} it, not \"{name}\""));
+            let title = format!("the method \"{name}\" has no `{key}`");
+            keys.refuse(key, &title, &format!("`{key}` belongs to \"{}\"", owners.join("\", \"")));
+        }
+        // Settings that both methods have stay as they are.
+        let was = integrator.settings();
+        *integrator = (entry.with)(&mut |&Setting { key, range, default, description }| {
+            let was = was.iter().find(|(known, _)| *known == key);
+            let mut number = was.map_or(default, |(_, number)| *number);
+            keys.key(Key::new(key, description).set(), &Kind::Number(range), &mut number);
+            if let Some((section, at)) = keys.section().and_then(|s| Some((s, s.key_at(key)?))) {
+                section.report.put(format!("integrator.{key}"), at);
+            }
+            number
+        });
+    });
+}
