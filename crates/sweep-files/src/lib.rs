@@ -28,6 +28,7 @@ pub mod pages;
 pub mod panics;
 mod parquet;
 pub mod regular;
+mod rows;
 pub mod seal;
 mod thrift;
 
@@ -37,3 +38,4 @@ pub use footer::Refused;
 pub use kind::{EXPORTED_CSV, FileKind};
 pub use output::{Output, beside, judge, ready, write};
 pub use parquet::{Batches, CREATED_BY, ParquetFile};
+pub use rows::{Cell, ResultTable, Row, Rows, ratio_limits};

@@ -8,8 +8,8 @@
 use std::collections::BTreeMap;
 
 use super::error::PlotError;
-use super::grid::{Grid, GridAxis};
-use super::read::{Batch, ColumnFacts, Source};
+use super::grid::Grid;
+use super::read::{ColumnFacts, Row, Source};
 use super::table::{Column, NONE, SEVERAL, Table, Values, Words};
 use sweep_parameter::Worse;
 
@@ -104,22 +104,20 @@ impl Map {
     /// Reads the named columns of a map file into the cells of a grid. Some columns have levels.
     ///
     /// # Errors
-    /// As [`Source::batches`]; [`PlotError::NotAGrid`] for two rows at one point.
+    /// As [`Source::each_row`]; [`PlotError::NotAGrid`] for two rows at one point.
     pub(crate) fn read(
         source: Source,
         grid: Grid,
         columns: &[String],
         levels: &BTreeMap<String, Divide>,
     ) -> Result<Self, PlotError> {
-        let mut gather = Gather::new(&source, &grid, columns, levels);
-        let mut wanted: Vec<&str> = columns.iter().map(String::as_str).collect();
-        wanted.extend(grid.axes.iter().map(|axis| axis.swept.name.as_str()));
-        wanted.extend(["status", "reliable", "sensitive", "ratio_max"]);
-        wanted.sort_unstable();
-        wanted.dedup();
-        for batch in source.batches(&wanted)? {
-            gather.take(&batch?)?;
-        }
+        let names = grid.axes.iter().map(|axis| axis.swept.name.as_str());
+        let names = names.chain(["status", "reliable", "sensitive", "ratio_max"]);
+        let own: Vec<&ColumnFacts> =
+            source.columns.iter().filter(|column| columns.contains(&column.name)).collect();
+        let names: Vec<&str> = names.chain(own.iter().map(|facts| facts.name.as_str())).collect();
+        let mut gather = Gather::new(&source, &grid, &own, levels);
+        source.each_row(&names, |row| gather.take(row))?;
         let Gather { columns, counts, statuses, by_status, .. } = gather;
         let named = statuses.names.into_iter().zip(by_status.iter().copied());
         let unknown = (UNKNOWN.to_owned(), by_status[usize::from(NONE)]);
@@ -241,9 +239,6 @@ impl Dividing {
     }
 }
 
-/// Which rows of a batch are something.
-type Marked = Vec<bool>;
-
 /// All columns on their way into cells.
 struct Gather<'a> {
     source: &'a Source,
@@ -257,22 +252,21 @@ struct Gather<'a> {
     statuses: Words,
     /// Rows by the code of their status.
     by_status: [usize; 256],
-    row: usize,
     /// Value and place last found on each axis.
     last: Vec<(f64, Option<usize>)>,
+    /// By which a row is judged where the file has no verdicts.
+    limit: Option<f64>,
 }
 
 impl<'a> Gather<'a> {
     fn new(
         source: &'a Source,
         grid: &'a Grid,
-        columns: &[String],
+        columns: &[&'a ColumnFacts],
         levels: &BTreeMap<String, Divide>,
     ) -> Self {
         let cells = grid.cells();
-        let wanted = source.columns.iter().filter(|column| columns.contains(&column.name));
-        let columns = wanted.map(|facts| Gathered {
-            facts,
+        let columns = columns.iter().map(|&facts| Gathered {
             rule: Rule::of(facts),
             values: match facts.is_number() {
                 true => Values::Numbers(vec![f64::NAN; cells]),
@@ -284,6 +278,7 @@ impl<'a> Gather<'a> {
                 .get(&facts.name)
                 .filter(|_| grid.merged())
                 .map(|divide| Dividing::new(*divide, cells)),
+            facts,
         });
         Self {
             source,
@@ -294,84 +289,59 @@ impl<'a> Gather<'a> {
             greatest: vec![f64::NAN; cells],
             statuses: Words::default(),
             by_status: [0; 256],
-            row: 0,
             last: vec![(f64::NAN, None); grid.axes.len()],
+            limit: source.column("reliable").is_none().then(|| source.ratio_limit()),
         }
     }
 
-    fn take(&mut self, batch: &Batch<'_>) -> Result<(), PlotError> {
-        let cells = self.cells(batch)?;
-        let worst = self.worst(batch, &cells)?;
-        let failed = self.count(batch, &cells)?;
-        let rows = Rows { cells: &cells, worst: &worst, failed: &failed };
-        for column in &mut self.columns {
-            column.take(batch, &rows)?;
+    /// Takes a row: the values of the axes, what became of the point, and the columns.
+    fn take(&mut self, row: Row<'_>) -> Result<(), PlotError> {
+        let mut cell = Some(0);
+        for (column, (axis, last)) in self.grid.axes.iter().zip(&mut self.last).enumerate() {
+            let value = row.number(column);
+            if value != last.0 {
+                *last = (value, axis.place(value));
+            }
+            cell = cell.zip(last.1).map(|(cell, place)| cell * axis.values.len() + place);
         }
-        self.row += batch.rows;
+        let own = self.last.len();
+        let status = row.word(own);
+        self.by_status[usize::from(self.statuses.code(status))] += 1;
+        let failed = status != Some(OK);
+        let is_worst = cell.map(|cell| self.count(cell, row, failed)).transpose()?;
+        for (column, gathered) in (own + 4..).zip(&mut self.columns) {
+            gathered.take((row, column), cell.zip(is_worst), failed);
+        }
         Ok(())
     }
 
-    /// The cell of each row; none where it is not shown.
-    fn cells(&mut self, batch: &Batch<'_>) -> Result<Vec<Option<usize>>, PlotError> {
-        let mut cells = vec![Some(0_usize); batch.rows];
-        for (axis, last) in self.grid.axes.iter().zip(&mut self.last) {
-            for (cell, value) in cells.iter_mut().zip(batch.numbers(&axis.swept.name)?) {
-                if value != last.0 {
-                    *last = (value, GridAxis::place(axis, value));
-                }
-                *cell = cell.zip(last.1).map(|(cell, place)| cell * axis.values.len() + place);
-            }
+    /// Counts what a row is; gives whether it has the greatest ratio of its cell so far.
+    fn count(&mut self, cell: usize, row: Row<'_>, failed: bool) -> Result<bool, PlotError> {
+        let own = self.last.len();
+        let counts = &mut self.counts[cell];
+        let is_full = |points| counts.points as usize >= points;
+        if counts.points == 0 {
+            self.first[cell] = row.index();
+        } else if self.grid.points(cell).is_some_and(is_full) {
+            return Err(self.twice(cell, row.index()));
         }
-        Ok(cells)
-    }
-
-    /// Which rows have the greatest ratio of their cell so far.
-    fn worst(&mut self, batch: &Batch<'_>, cells: &[Option<usize>]) -> Result<Marked, PlotError> {
-        let ratios = batch.numbers("ratio_max")?;
-        let mut worst = vec![false; batch.rows];
-        for ((worst, cell), ratio) in worst.iter_mut().zip(cells).zip(ratios) {
-            let Some(cell) = *cell else { continue };
-            let known = &mut self.greatest[cell];
-            *worst = ratio > *known || (known.is_nan() && !ratio.is_nan());
-            if *worst {
-                *known = ratio;
-            }
+        let [verdict, sensitive] = [1, 2].map(|k| row.word(own + k));
+        let ratio = row.number(own + 3);
+        let verdict = match self.limit {
+            None => verdict.map(|word| word == "true"),
+            Some(limit) => (!ratio.is_nan()).then_some(ratio < limit),
+        };
+        counts.points += 1;
+        counts.failed += u32::from(failed);
+        counts.sensitive += u32::from(sensitive == Some("true"));
+        counts.reliable += u32::from(verdict == Some(true));
+        counts.unreliable += u32::from(verdict == Some(false));
+        let known = &mut self.greatest[cell];
+        let is_worst = ratio > *known || (known.is_nan() && !ratio.is_nan());
+        if is_worst {
+            *known = ratio;
         }
-        Ok(worst)
-    }
-
-    /// Counts what the rows are; gives which of them failed.
-    fn count(&mut self, batch: &Batch<'_>, cells: &[Option<usize>]) -> Result<Marked, PlotError> {
-        let limit = self.source.ratio_limit();
-        let statuses = batch.words("status")?;
-        let reliable = batch.words("reliable")?;
-        let sensitive = batch.words("sensitive")?;
-        let ratios = batch.numbers("ratio_max")?;
-        let mut failed = Vec::with_capacity(batch.rows);
-        for (k, cell) in cells.iter().enumerate() {
-            let status = statuses.get(k).copied().flatten();
-            self.by_status[usize::from(self.statuses.code(status))] += 1;
-            failed.push(status != Some(OK));
-            let Some(cell) = *cell else { continue };
-            let counts = &mut self.counts[cell];
-            let is_full = |points| counts.points as usize >= points;
-            if counts.points == 0 {
-                self.first[cell] = self.row + k;
-            } else if self.grid.points(cell).is_some_and(is_full) {
-                return Err(self.twice(cell, self.row + k));
-            }
-            counts.points += 1;
-            counts.failed += u32::from(status != Some(OK));
-            counts.sensitive += u32::from(sensitive.get(k).copied().flatten() == Some("true"));
-            let ratio = ratios.get(k).copied().unwrap_or(f64::NAN);
-            let verdict = match reliable.get(k) {
-                Some(word) => word.map(|word| word == "true"),
-                None => (!ratio.is_nan()).then_some(ratio < limit),
-            };
-            counts.reliable += u32::from(verdict == Some(true));
-            counts.unreliable += u32::from(verdict == Some(false));
-        }
-        Ok(failed)
+        Ok(is_worst)
     }
 
     fn twice(&self, cell: usize, row: usize) -> PlotError {
@@ -384,53 +354,38 @@ impl<'a> Gather<'a> {
     }
 }
 
-/// What is known of a batch's rows, one by one.
-struct Rows<'a> {
-    /// None where the row is not shown.
-    cells: &'a [Option<usize>],
-    /// Which have the greatest ratio of their cell so far.
-    worst: &'a [bool],
-    failed: &'a [bool],
-}
-
 impl Gathered<'_> {
-    fn take(&mut self, batch: &Batch<'_>, rows: &Rows<'_>) -> Result<(), PlotError> {
-        let &Rows { cells, worst, failed } = rows;
+    /// Takes what a row has in a column, into a cell if it is shown; whether the row has the
+    /// greatest ratio of the cell so far.
+    fn take(&mut self, (row, column): (Row<'_>, usize), cell: Option<(usize, bool)>, failed: bool) {
         match &mut self.values {
             Values::Numbers(kept) => {
-                let numbers = batch.numbers(&self.facts.name)?;
-                let rows = cells.iter().zip(numbers).zip(worst.iter().zip(failed));
-                for ((cell, value), (worst, failed)) in rows {
-                    self.extent.take(value);
-                    let Some(cell) = *cell else { continue };
-                    let known = kept[cell];
-                    let takes = match self.rule {
-                        Rule::Least => value < known,
-                        Rule::OfGreatestRatio => *worst,
-                        Rule::Greatest | Rule::Common => value > known,
-                    };
-                    if takes || known.is_nan() {
-                        kept[cell] = value;
-                    }
-                    if let Some(dividing) = &mut self.dividing {
-                        dividing.take(cell, value, *failed);
-                    }
+                let value = row.number(column);
+                self.extent.take(value);
+                let Some((cell, is_worst)) = cell else { return };
+                let known = kept[cell];
+                let takes = match self.rule {
+                    Rule::Least => value < known,
+                    Rule::OfGreatestRatio => is_worst,
+                    Rule::Greatest | Rule::Common => value > known,
+                };
+                if takes || known.is_nan() {
+                    kept[cell] = value;
+                }
+                if let Some(dividing) = &mut self.dividing {
+                    dividing.take(cell, value, failed);
                 }
             }
             Values::Words(words) => {
-                let texts = batch.words(&self.facts.name)?;
-                for ((cell, word), worst) in cells.iter().zip(texts).zip(worst) {
-                    let Some(cell) = *cell else { continue };
-                    let code = words.code(word);
-                    let known = &mut words.codes[cell];
-                    if *known == NONE || (self.rule == Rule::OfGreatestRatio && *worst) {
-                        *known = code;
-                    } else if self.rule == Rule::Common && code != NONE && code != *known {
-                        *known = SEVERAL;
-                    }
+                let Some((cell, is_worst)) = cell else { return };
+                let code = words.code(row.word(column));
+                let known = &mut words.codes[cell];
+                if *known == NONE || (self.rule == Rule::OfGreatestRatio && is_worst) {
+                    *known = code;
+                } else if self.rule == Rule::Common && code != NONE && code != *known {
+                    *known = SEVERAL;
                 }
             }
         }
-        Ok(())
     }
 }

@@ -3,15 +3,15 @@
 //! This is the one place that reads files. A map of ten million rows is read in several passes over
 //! the columns that a figure needs, and is never in memory whole.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use arrow_array::ArrayRef;
-use arrow_schema::{DataType, Schema};
+use arrow_schema::Schema;
 use serde_json::Value;
 
 use super::error::PlotError;
 use super::label;
-use sweep_files::{self as files, FileError, ParquetFile, cells};
+use sweep_files::{self as files, ParquetFile};
 
 /// A column without its rows, which [`super::table::Column`] has.
 pub(crate) use sweep_files::Column as ColumnFacts;
@@ -107,22 +107,16 @@ impl Source {
         Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, named, file })
     }
 
-    /// The rows of the named columns, from the first. Names that the file lacks are left out.
+    /// Calls `take` for each row, with the columns of these names. One that the file lacks is null.
     ///
     /// # Errors
-    /// [`PlotError::File`].
-    pub(crate) fn batches(
+    /// [`PlotError::File`], and whatever `take` says.
+    pub(crate) fn each_row(
         &self,
         names: &[&str],
-    ) -> Result<impl Iterator<Item = Result<Batch<'_>, PlotError>> + use<'_>, PlotError> {
-        let columns: Vec<&ColumnFacts> =
-            names.iter().filter_map(|name| self.column(name)).collect();
-        let batches = self.file.rows_of(&columns)?;
-        Ok(batches.map(move |batch| {
-            let (rows, cells) = batch?;
-            let columns = columns.iter().copied().zip(cells).collect();
-            Ok(Batch { path: &self.path, columns, rows })
-        }))
+        mut take: impl FnMut(Row<'_>) -> Result<(), PlotError>,
+    ) -> Result<(), PlotError> {
+        self.file.each_row(names, |row| take(Row(row)))
     }
 
     /// The column of that name.
@@ -245,43 +239,29 @@ pub(crate) fn some_of<'a>(names: impl Iterator<Item = &'a str>) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-/// Some rows of some columns.
-pub(crate) struct Batch<'a> {
-    path: &'a Path,
-    columns: Vec<(&'a ColumnFacts, ArrayRef)>,
-    /// Number of rows.
-    pub(crate) rows: usize,
-}
+/// A row of a file.
+#[derive(Clone, Copy)]
+pub(crate) struct Row<'a>(sweep_files::Row<'a>);
 
-impl Batch<'_> {
-    fn array(&self, name: &str) -> Option<&ArrayRef> {
-        self.columns.iter().find(|(column, _)| column.name == name).map(|(_, array)| array)
+impl<'a> Row<'a> {
+    /// Its number in the file.
+    pub(crate) fn index(self) -> usize {
+        self.0.index() as usize
     }
 
-    /// The numbers of a column as they are drawn, null as NaN; none for a column that was not asked
-    /// for.
-    ///
-    /// # Errors
-    /// [`PlotError::File`] if the cells are not what the schema says.
-    pub(crate) fn numbers(&self, name: &str) -> Result<Vec<f64>, PlotError> {
-        let Some(array) = self.array(name) else { return Ok(Vec::new()) };
-        let numbers = cells::numbers(array).map_err(FileError::cells(self.path))?;
-        Ok(numbers.into_iter().map(|value| drawable(value.unwrap_or(f64::NAN))).collect())
+    /// The number in a column as it is drawn, NaN where there is none.
+    pub(crate) fn number(self, column: usize) -> f64 {
+        drawable(self.0.value(column))
     }
 
-    /// The words of a column; none for a column that was not asked for.
-    ///
-    /// # Errors
-    /// [`PlotError::File`] if the cells are not what the schema says.
-    pub(crate) fn words(&self, name: &str) -> Result<Vec<Option<&str>>, PlotError> {
-        let Some(array) = self.array(name) else { return Ok(Vec::new()) };
-        let words = if matches!(array.data_type(), DataType::Boolean) {
-            let word = |flag: bool| if flag { "true" } else { "false" };
-            cells::flags(array).map(|flags| flags.iter().map(|flag| flag.map(word)).collect())
-        } else {
-            cells::texts(array)
-        };
-        Ok(words.map_err(FileError::cells(self.path))?)
+    /// The numbers in these columns.
+    pub(crate) fn numbers(self, columns: Range<usize>) -> Vec<f64> {
+        columns.map(|column| self.number(column)).collect()
+    }
+
+    /// The word in a column.
+    pub(crate) fn word(self, column: usize) -> Option<&'a str> {
+        self.0.word(column)
     }
 }
 

@@ -133,7 +133,7 @@ pub(crate) fn is_whole(source: &Source) -> Result<bool, PlotError> {
 /// The axes of a map file, in file order.
 ///
 /// # Errors
-/// As [`Source::batches`]; [`PlotError::Empty`] without rows or axes; [`PlotError::NotAGrid`] for
+/// As [`Source::each_row`]; [`PlotError::Empty`] without rows or axes; [`PlotError::NotAGrid`] for
 /// an axis value that is not a number, or rows that do not lie on a grid.
 pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
     if source.rows == 0 {
@@ -146,23 +146,22 @@ pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
     }
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
     let mut gathered: Vec<Gathered> = names.iter().map(|_| Gathered::new()).collect();
-    for batch in source.batches(&names)? {
-        let batch = batch?;
-        for (name, gathered) in names.iter().zip(&mut gathered) {
-            for value in batch.numbers(name)? {
-                if !value.is_finite() {
-                    return Err(no_grid(format!("axis `{name}` has a row without a value")));
-                }
-                gathered.take(value);
+    source.each_row(&names, |row| {
+        for (column, (name, gathered)) in names.iter().zip(&mut gathered).enumerate() {
+            let value = row.number(column);
+            if !value.is_finite() {
+                return Err(no_grid(format!("axis `{name}` has a row without a value")));
             }
+            gathered.take(value);
         }
-        // Checked batch by batch: scattered rows would fill the memory with values.
+        // Checked row by row: scattered rows would fill the memory with values.
         let mut known = gathered.iter().map(|axis| axis.seen.len());
         let size = known.try_fold(1_usize, usize::checked_mul);
         if size.is_none_or(|size| size > source.rows.saturating_add(MOST_MISSING)) {
             return Err(no_grid("its rows are scattered over the axes' values".to_owned()));
         }
-    }
+        Ok(())
+    })?;
     // What the file says of its rows need not be so.
     if gathered.iter().any(|axis| axis.seen.is_empty()) {
         return Err(source.empty("the map has no rows"));

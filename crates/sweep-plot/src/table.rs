@@ -130,7 +130,7 @@ impl Table {
     /// cut into stretches, as [`Table::read_thinned`] does.
     ///
     /// # Errors
-    /// As [`Source::batches`]; [`PlotError::TooMany`] for modes and boundaries beyond what a figure
+    /// As [`Source::each_row`]; [`PlotError::TooMany`] for modes and boundaries beyond what a figure
     /// keeps.
     pub(crate) fn read(source: Source) -> Result<Self, PlotError> {
         let most = MOST_NUMBERS / source.numeric().count().max(1);
@@ -151,25 +151,23 @@ impl Table {
         };
         let mut values: Vec<Values> = source.columns.iter().map(empty).collect();
         let mut rows = 0;
-        for batch in source.batches(&names)? {
-            let batch = batch?;
-            for (name, values) in names.iter().zip(&mut values) {
-                match values {
-                    Values::Numbers(numbers) => numbers.extend(batch.numbers(name)?),
-                    Values::Words(words) => {
-                        for word in batch.words(name)? {
-                            let code = words.code(word);
-                            words.codes.push(code);
-                        }
-                    }
-                }
-            }
-            rows += batch.rows;
+        source.each_row(&names, |row| {
+            rows += 1;
             // What the file says of its rows need not be so.
             if rows > most {
                 return Err(too_many(&source, rows));
             }
-        }
+            for (column, values) in values.iter_mut().enumerate() {
+                match values {
+                    Values::Numbers(numbers) => numbers.push(row.number(column)),
+                    Values::Words(words) => {
+                        let code = words.code(row.word(column));
+                        words.codes.push(code);
+                    }
+                }
+            }
+            Ok(())
+        })?;
         let columns = source.columns.iter().zip(values);
         let columns = columns.map(|(facts, values)| Column::new(facts, values)).collect();
         Ok(Self { source, columns, rows, stretch: None })
@@ -180,19 +178,18 @@ impl Table {
     /// first and middle instant.
     ///
     /// # Errors
-    /// As [`Source::batches`].
+    /// As [`Source::each_row`].
     pub(crate) fn read_thinned(source: Source, count: usize) -> Result<Self, PlotError> {
         let stretches = Stretches::new(source.rows, count);
         let names: Vec<&str> = source.numeric().map(|column| column.name.as_str()).collect();
         let keep = |name: &str| if name == "time_s" { Keep::Instants } else { Keep::Extremes };
         let mut thinners: Vec<Thinner> =
             names.iter().map(|name| Thinner::new(stretches, keep(name))).collect();
-        for batch in source.batches(&names)? {
-            let batch = batch?;
-            for (name, thinner) in names.iter().zip(&mut thinners) {
-                batch.numbers(name)?.into_iter().for_each(|value| thinner.push(value));
-            }
-        }
+        source.each_row(&names, |row| {
+            let thinners = thinners.iter_mut().enumerate();
+            thinners.for_each(|(column, thinner)| thinner.push(row.number(column)));
+            Ok(())
+        })?;
         let kept = thinners.into_iter().map(|thinner| Values::Numbers(thinner.finish()));
         let columns = source.numeric().zip(kept).map(|(facts, values)| Column::new(facts, values));
         let columns: Vec<Column> = columns.collect();

@@ -13,8 +13,8 @@ pub use boundary::{Crossing, Moved};
 pub use plans::PlanChange;
 
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable, ratio_limits};
 use side::Side;
+use sweep_files::{Cell, ResultTable, ratio_limits};
 
 /// What became of a row's verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

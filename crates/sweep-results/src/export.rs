@@ -8,7 +8,7 @@ use std::path::Path;
 use sweep_files::{FileKind, Output};
 
 use crate::error::ResultsError;
-use crate::rows::ResultTable;
+use sweep_files::ResultTable;
 
 /// A format, known by a file's ending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

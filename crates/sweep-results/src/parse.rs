@@ -16,7 +16,7 @@
 use std::ops::Range;
 
 use crate::condition::{Comparison, Condition, Fold, Mistake, Node, Operation};
-use crate::rows::{Cell, ResultTable};
+use sweep_files::{Cell, ResultTable};
 use sweep_files::{CellKind, Column};
 
 /// Deepest nesting: what no person writes, and no stack minds.

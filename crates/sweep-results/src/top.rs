@@ -1,9 +1,9 @@
 //! The rows that come first in an order.
 
-use crate::condition::{Condition, Node, each_row};
+use crate::condition::{Condition, each_row};
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable};
 use sweep_files::CellKind;
+use sweep_files::{Cell, ResultTable};
 use sweep_parameter::Worse;
 
 /// The first `count` rows by the column `by`, as if it were the worse the greater or the less it
@@ -33,21 +33,13 @@ pub fn top(
         return Err(ResultsError::NoOrder { path, name });
     }
     let read: Vec<&str> = columns.iter().copied().chain(by.map(|(name, _)| name)).collect();
-    let cells = Condition {
-        text: String::new(),
-        columns: read.iter().map(|name| (*name).to_owned()).collect(),
-        root: Node::Literal(Cell::Null),
-        folds: Vec::new(),
-        by_row: true,
-    };
     let mut found = Worst::new(by.map(|(_, worse)| worse), count);
-    each_row(table, &[&cells], keep, |at| {
-        let value = by.and_then(|_| match at.rows.cell(columns.len(), at.row) {
+    each_row(table, &read, keep, |at| {
+        let value = by.and_then(|_| match at.row.cell(columns.len()) {
             Cell::Flag(flag) => Some(f64::from(u8::from(flag))),
             cell => cell.number(),
         });
-        let cell = |column| at.rows.cell(column, at.row);
-        found.take(value, || (0..columns.len()).map(cell).collect());
+        found.take(value, || (0..columns.len()).map(|column| at.row.cell(column)).collect());
         Ok(())
     })?;
     Ok(found.finish())

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::run::counts;
 use super::{Lines as _, clipped, conditions, short, table, word};
-use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, Tally, overview, row, tally};
+use crate::store::read::{ColumnRange, Overview, ResultFile, Tally, overview, tally};
 use crate::{Error, Exit, nearest, show};
 use sweep_files::{ParquetFile, key};
 use sweep_parameter::Worse;
@@ -227,12 +227,16 @@ fn extremes_at(
     let axes: Vec<&str> =
         axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
     let extremes = [&tally.greatest_ratio, &tally.least_gap_nonlinear_m, &tally.greatest_off];
-    let place = |extreme: &Extreme| {
-        let values = row(file, extreme.point, &axes)?;
-        let named = axes.iter().map(|axis| (*axis).to_owned()).zip(values);
-        Ok::<_, Error>((extreme.point, named.collect()))
-    };
-    extremes.into_iter().flatten().map(place).collect()
+    let mut found = Vec::new();
+    file.each_row(&axes, |row| {
+        if extremes.iter().any(|it| it.as_ref().is_some_and(|it| it.point == row.index())) {
+            let values =
+                axes.iter().enumerate().map(|(k, axis)| ((*axis).to_owned(), row.value(k)));
+            found.push((row.index(), values.collect()));
+        }
+        Ok::<(), Error>(())
+    })?;
+    Ok(found)
 }
 
 fn provenance(text: &mut String, result: &ResultFile) {

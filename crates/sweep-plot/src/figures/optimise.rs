@@ -44,19 +44,11 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
     let mut names = vec!["feasible", "on_front", x.0.name.as_str()];
     names.extend(shown.iter().map(|(column, _)| column.name.as_str()));
     let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
-    for batch in source.batches(&names)? {
-        let batch = batch?;
-        let is = |name: &str| -> Result<Vec<bool>, PlotError> {
-            Ok(batch.words(name)?.iter().map(|word| *word == Some("true")).collect())
-        };
-        let (feasible, on_front) = (is("feasible")?, is("on_front")?);
-        let columns: Vec<Vec<f64>> =
-            names[2..].iter().map(|name| batch.numbers(name)).collect::<Result<_, _>>()?;
-        rows.extend((0..batch.rows).map(|row| {
-            let kind = usize::from(feasible[row]) + usize::from(on_front[row]);
-            (kind, columns.iter().map(|column| column[row]).collect())
-        }));
-    }
+    source.each_row(&names, |row| {
+        let is = |column| usize::from(row.word(column) == Some("true"));
+        rows.push((is(0) + is(1), row.numbers(2..names.len())));
+        Ok(())
+    })?;
     rows.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
     let units: Vec<(&str, f64)> =
         std::iter::once(&x).chain(&shown).map(|(column, _)| label::shown(&column.unit)).collect();

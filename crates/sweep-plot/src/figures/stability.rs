@@ -272,38 +272,33 @@ pub(super) struct Row<'a> {
 /// Reads such a file row by row.
 ///
 /// # Errors
-/// As [`Source::batches`].
+/// As [`Source::each_row`].
 pub(super) fn each_row<S: AsRef<str>>(
     source: &Source,
     axes: &[&ColumnFacts],
     columns: &[S],
     mut take: impl FnMut(Row<'_>),
 ) -> Result<(), PlotError> {
-    let own = axes.iter().map(|axis| axis.name.as_str()).chain(["speed_rpm", "growth_per_s"]);
-    let numbers: Vec<&str> = own.chain(columns.iter().map(S::as_ref)).collect();
-    for batch in source.batches(&[&numbers[..], &["kind"]].concat())? {
-        let batch = batch?;
-        let numbers = numbers.iter().map(|name| batch.numbers(name));
-        let numbers: Vec<Vec<f64>> = numbers.collect::<Result<_, _>>()?;
-        let kinds = batch.words("kind")?;
-        for row in 0..batch.rows {
-            let mut values = numbers.iter().map(|of| of.get(row).copied().unwrap_or(f64::NAN));
-            take(Row {
-                point: values.by_ref().take(axes.len()).collect(),
-                speed: values.next().unwrap_or(f64::NAN),
-                growth: values.next().unwrap_or(f64::NAN),
-                kind: kinds.get(row).copied().flatten(),
-                values: values.collect(),
-            });
-        }
-    }
-    Ok(())
+    let names = axes.iter().map(|axis| axis.name.as_str());
+    let names = names.chain(["speed_rpm", "growth_per_s", "kind"]);
+    let names: Vec<&str> = names.chain(columns.iter().map(S::as_ref)).collect();
+    let own = axes.len();
+    source.each_row(&names, |row| {
+        take(Row {
+            point: row.numbers(0..own),
+            speed: row.number(own),
+            growth: row.number(own + 1),
+            kind: row.word(own + 2),
+            values: row.numbers(own + 3..names.len()),
+        });
+        Ok(())
+    })
 }
 
 /// Every point of the file at the values asked for, in file order.
 ///
 /// # Errors
-/// As [`Source::batches`]; [`PlotError::NotThere`] for what is no axis, or no value of it;
+/// As [`Source::each_row`]; [`PlotError::NotThere`] for what is no axis, or no value of it;
 /// [`PlotError::Empty`] without rows.
 fn points(
     source: &Source,

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::SharedRow;
 use crate::error::ResultsError;
-use crate::rows::ResultTable;
+use sweep_files::ResultTable;
 
 /// One change of side along the second axis, in both files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -129,21 +129,18 @@ pub(super) fn of_boundaries(
         });
         let mut read = keys.clone();
         read.extend([axis, bracket[0], bracket[1]]);
-        for rows in table.read(&read)? {
-            let rows = rows?;
-            for row in 0..rows.count {
-                let number = |place: usize| rows.cell(place, row).number();
-                let place: Option<Vec<f64>> = (0..keys.len()).map(number).collect();
-                let Some(place) = place else { continue };
-                let line =
-                    lines.entry(ordered(&place)).or_insert_with(|| (place, Default::default()));
-                let count = keys.len();
-                if let (Some(low), Some(high)) = (number(count + 1), number(count + 2)) {
-                    let at = number(count).unwrap_or(f64::midpoint(low, high));
-                    line.1[side].push((at, [low, high]));
-                }
+        table.each_row(&read, |row| {
+            let number = |place: usize| row.cell(place).number();
+            let place: Option<Vec<f64>> = (0..keys.len()).map(number).collect();
+            let Some(place) = place else { return Ok(()) };
+            let line = lines.entry(ordered(&place)).or_insert_with(|| (place, Default::default()));
+            let count = keys.len();
+            if let (Some(low), Some(high)) = (number(count + 1), number(count + 2)) {
+                let at = number(count).unwrap_or(f64::midpoint(low, high));
+                line.1[side].push((at, [low, high]));
             }
-        }
+            Ok::<(), ResultsError>(())
+        })?;
     }
     let keys = keys.into_iter().map(str::to_owned).collect();
     Ok(Some(moved(axis, &unit, keys, lines)))

@@ -8,8 +8,8 @@ use sweep_files::key;
 
 use super::{Format, names, no_room};
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable};
 use sweep_files::Column;
+use sweep_files::{Cell, ResultTable};
 
 /// Rows of a sheet, less the two of headings.
 const MOST_ROWS: u64 = (1 << 20) - 2;
@@ -109,13 +109,9 @@ fn fill(
     sheet.row(names.iter().map(|name| text(name))).map_err(refused)?;
     sheet.row(table.columns.iter().map(|column| text(&column.unit))).map_err(refused)?;
     let heading = sheet.row - 1;
-    for rows in table.read(&names)? {
-        let rows = rows?;
-        for row in 0..rows.count {
-            let cells = (0..names.len()).map(|column| rows.cell(column, row));
-            sheet.row(cells).map_err(refused)?;
-        }
-    }
+    table.each_row(&names, |row| {
+        sheet.row((0..names.len()).map(|column| row.cell(column))).map_err(refused)
+    })?;
     let last = u16::try_from(names.len().saturating_sub(1)).unwrap_or(u16::MAX);
     // Its buttons stand beside the units, so that sorting moves neither units nor names.
     sheet.sheet.autofilter(heading, 0, sheet.row - 1, last).map_err(refused)?;
