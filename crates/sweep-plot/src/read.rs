@@ -20,40 +20,43 @@ use sweep_parameter::Worse;
 /// What a file holds. Its columns show which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
+    /// Candidates of a study.
+    Optimise,
+    /// Motions that held speeds end in.
+    Dwell,
+    /// Periodic responses over constant speeds.
+    Stability,
     /// One row per grid point.
     Map,
-    /// One row per point, scattered.
-    Design,
+    /// One row per grid point that two maps share.
+    Differences,
     /// Time histories of both models at one point, or of a measurement and the model fitted to it.
     Trace,
     /// Modes over spin speed.
     Modes,
     /// The curve on which the ratio is at its limit.
     Boundary,
-    /// One row per grid point that two maps share.
-    Differences,
-    /// Periodic responses over constant speeds.
-    Stability,
-    /// Motions that held speeds end in.
-    Dwell,
-    /// Candidates of a study.
-    Optimise,
+    /// A map whose points are scattered.
+    Design,
 }
+
+/// Each kind as in "a map file", with columns that show it, the surest first.
+const KINDS: [(Kind, &str, &[&str]); 9] = [
+    (Kind::Optimise, "study", &["candidate", "on_front"]),
+    (Kind::Dwell, "dwell", &["motion", "speed_rpm"]),
+    (Kind::Stability, "stability", &["growth_per_s", "speed_rpm"]),
+    (Kind::Map, "map", &["status", "ratio_max"]),
+    (Kind::Differences, "differences", &["ratio_change", "flip"]),
+    (Kind::Trace, "trace", &["time_s"]),
+    (Kind::Modes, "modes", &["mode", "frequency_rpm", "speed_rpm"]),
+    (Kind::Boundary, "boundary", &[]),
+    (Kind::Design, "design", &["status", "ratio_max"]),
+];
 
 impl Kind {
     /// As in "a map file".
     pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Map => "map",
-            Self::Design => "design",
-            Self::Trace => "trace",
-            Self::Modes => "modes",
-            Self::Boundary => "boundary",
-            Self::Differences => "differences",
-            Self::Stability => "stability",
-            Self::Dwell => "dwell",
-            Self::Optimise => "study",
-        }
+        KINDS[self as usize].1
     }
 }
 
@@ -314,23 +317,16 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 }
 
 fn recognise(names: &[&str]) -> Option<Kind> {
-    // The columns that show a kind, the surest first.
-    const SHOWN_BY: [(Kind, &[&str]); 5] = [
-        (Kind::Optimise, &["candidate", "on_front"]),
-        (Kind::Dwell, &["motion", "speed_rpm"]),
-        (Kind::Stability, &["growth_per_s", "speed_rpm"]),
-        (Kind::Map, &["status", "ratio_max"]),
-        (Kind::Differences, &["ratio_change", "flip"]),
-    ];
-    let has = |all: &[&str]| all.iter().all(|name| names.contains(name));
     let of_trace = |name: &&str| name.starts_with("nonlinear_") || name.starts_with("measured_");
-    let sure = SHOWN_BY.iter().find(|(_, columns)| has(columns)).map(|(kind, _)| *kind);
-    let further = [
-        (Kind::Trace, has(&["time_s"]) && names.iter().any(of_trace)),
-        (Kind::Modes, has(&["mode", "frequency_rpm", "speed_rpm"])),
-        (Kind::Boundary, bracket(names).is_some()),
-    ];
-    sure.or_else(|| further.into_iter().find(|(_, is)| *is).map(|(kind, _)| kind))
+    let is = |(kind, _, columns): &&(Kind, &str, &[&str])| {
+        columns.iter().all(|name| names.contains(name))
+            && match kind {
+                Kind::Trace => names.iter().any(of_trace),
+                Kind::Boundary => bracket(names).is_some(),
+                _ => true,
+            }
+    };
+    KINDS.iter().find(is).map(|(kind, ..)| *kind)
 }
 
 /// The two columns between which a boundary is known to lie, after its two coordinates.

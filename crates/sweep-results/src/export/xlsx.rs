@@ -4,7 +4,7 @@ use rust_xlsxwriter::{
     DocProperties, ExcelDateTime, Format as Style, Workbook, Worksheet, XlsxError,
 };
 use serde_json::Value;
-use sweep_files::key;
+use sweep_files::{dotted, key, leaves};
 
 use super::{Format, names, no_room};
 use crate::error::ResultsError;
@@ -136,17 +136,17 @@ fn about_columns(book: &mut Workbook, table: &ResultTable) -> Result<(), XlsxErr
 /// Every number and word of the plan under its path.
 fn about_plan(book: &mut Workbook, table: &ResultTable) -> Result<(), XlsxError> {
     let mut sheet = Sheet::new(book, "plan", 1)?;
-    let mut leaves = Vec::new();
+    let mut all = Vec::new();
     for (name, key) in [("version", key::VERSION), ("numerics", key::NUMERICS)] {
-        leaves.extend(table.file().value(key).map(|value| (name.to_owned(), value.into())));
+        all.extend(table.file().value(key).map(|value| (name.to_owned(), value.into())));
     }
     if let Some(plan) = &table.plan {
-        collect(plan, &mut String::new(), &mut leaves);
+        collect(plan, &mut all);
     }
-    let longest = leaves.iter().map(|(path, _)| path.as_str()).max_by_key(|path| path.len());
+    let longest = all.iter().map(|(path, _)| path.as_str()).max_by_key(|path| path.len());
     sheet.widths(longest.into_iter())?;
     sheet.row(["setting", "value"].map(text))?;
-    for (path, value) in leaves {
+    for (path, value) in all {
         let value = match &value {
             Value::Number(number) => number.as_f64().map_or(Cell::Null, Cell::Number),
             Value::String(word) => text(word),
@@ -157,23 +157,12 @@ fn about_plan(book: &mut Workbook, table: &ResultTable) -> Result<(), XlsxError>
     Ok(())
 }
 
-fn collect(value: &Value, path: &mut String, leaves: &mut Vec<(String, Value)>) {
-    let length = path.len();
-    let mut step = |name: &str, value: &Value| {
-        if !path.is_empty() {
-            path.push('.');
-        }
-        path.push_str(name);
-        collect(value, path, leaves);
-        path.truncate(length);
-    };
-    match value {
-        Value::Object(map) => map.iter().for_each(|(name, value)| step(name, value)),
-        Value::Array(values) if values.iter().any(Value::is_object) => {
-            (1..).zip(values).for_each(|(k, value): (usize, _)| step(&k.to_string(), value));
-        }
-        leaf => leaves.push((path.clone(), leaf.clone())),
-    }
+/// The leaves of a plan by their paths; a list of numbers is one.
+fn collect(plan: &Value, found: &mut Vec<(String, Value)>) {
+    let opens = |values: &[Value], _: &[Value]| values.iter().any(Value::is_object);
+    leaves([Some(plan); 2], opens, &mut Vec::new(), &mut |path, [value, _]| {
+        found.extend(value.map(|value| (dotted(path), value.clone())));
+    });
 }
 
 #[cfg(test)]
@@ -227,7 +216,7 @@ mod tests {
     #[test]
     fn the_plan_is_a_list_of_paths() {
         let mut leaves = Vec::new();
-        collect(&sample::plan(), &mut String::new(), &mut leaves);
+        collect(&sample::plan(), &mut leaves);
         let paths: Vec<&str> = leaves.iter().map(|(path, _)| path.as_str()).collect();
         assert!(paths.contains(&"machine.tub.mass_kg"), "{paths:?}");
         assert!(paths.contains(&"axis.1.values"), "{paths:?}");
