@@ -139,7 +139,7 @@ fn left_out(axis: &SweptAxis, shown: usize) -> String {
 /// The value of each axis that `--at` names, by its place.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] when `--at` names no axis beyond the second, or a value that its axis
+/// [`PlotError::Unfit`] when `--at` names no axis beyond the second, or a value that its axis
 /// does not have; [`PlotError::NotAGrid`] for an axis of more values than are kept.
 fn pins(
     source: &Source,

@@ -74,7 +74,7 @@ pub(crate) fn most_cells(columns: usize) -> usize {
 /// histories.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] for options that the file does not have, and any that reading the traces
+/// [`PlotError::Unfit`] for options that the file does not have, and any that reading the traces
 /// brings.
 pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<String, PlotError> {
     let source = &map.table.source;

@@ -177,7 +177,7 @@ pub(crate) fn chosen(source: &Source, options: &PlotOptions) -> Result<Option<Sh
 /// status.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] for a column that the file does not have.
+/// [`PlotError::Unfit`] for a column that the file does not have.
 pub(crate) fn asked(
     source: &Source,
     options: &PlotOptions,
@@ -262,7 +262,7 @@ impl Shown {
     /// The values of a map that was read with this column.
     ///
     /// # Errors
-    /// [`PlotError::Column`] if it was not, because the file does not have it.
+    /// [`PlotError::Undrawable`] if it was not, because the file does not have it.
     pub(crate) fn layer(&self, map: &Map) -> Result<Layer, PlotError> {
         let numbers = map.table.numbers(self.column())?;
         let (unit, factor) = label::shown(&self.facts.unit);

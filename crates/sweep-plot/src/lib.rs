@@ -217,7 +217,10 @@ fn format_of(path: &Path) -> Result<Format, PlotError> {
         "svg" => Ok(Format::Svg),
         "png" => Ok(Format::Png),
         "html" | "htm" => Ok(Format::Html),
-        _ => Err(PlotError::Format { path: path.to_owned() }),
+        _ => Err(PlotError::Unfit(format!(
+            "{}: the figure's format goes by its name's ending: .svg, .png or .html",
+            path.display()
+        ))),
     }
 }
 

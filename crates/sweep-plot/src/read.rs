@@ -3,6 +3,7 @@
 //! This is the one place that reads files. A map of ten million rows is read in several passes over
 //! the columns that a figure needs, and is never in memory whole.
 
+use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -85,7 +86,7 @@ impl Source {
     /// Opens a file and reads what it says of itself.
     ///
     /// # Errors
-    /// [`PlotError::File`], or [`PlotError::UnknownKind`] when the columns are not those of a file
+    /// [`PlotError::File`], or [`PlotError::Undrawable`] when the columns are not those of a file
     /// of ours.
     pub(crate) fn open(path: &Path) -> Result<Self, PlotError> {
         let file = ParquetFile::open(path)?;
@@ -102,9 +103,13 @@ impl Source {
         let columns: Vec<ColumnFacts> =
             columns.map(|column| by_name(column, file.schema())).collect();
         let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-        let kind = recognise(&names).ok_or_else(|| PlotError::UnknownKind {
+        let kind = recognise(&names).ok_or_else(|| PlotError::Undrawable {
             path: path.to_owned(),
-            columns: names.join(", "),
+            reason: format!(
+                "its columns ({}) are those of no map, trace, modes, boundary or stability file, \
+                 so there is no figure that fits it",
+                names.join(", ")
+            ),
         })?;
         let named = named(&provenance);
         Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, named, file })
@@ -142,18 +147,32 @@ impl Source {
     /// The error that something the options name is not there, and what is.
     pub(crate) fn not_there(
         &self,
-        option: &'static str,
-        given: impl Into<String>,
-        what: &'static str,
-        known: impl Into<String>,
+        option: &str,
+        given: impl fmt::Display,
+        what: &str,
+        known: impl fmt::Display,
     ) -> PlotError {
-        let (given, known) = (given.into(), known.into());
-        PlotError::NotThere { option, given, path: self.path.clone(), what, known }
+        let path = self.path.display();
+        PlotError::Unfit(format!(
+            "`{option} {given}`: {path}: there is no such {what}; it has {known}"
+        ))
+    }
+
+    fn undrawable(&self, reason: String) -> PlotError {
+        PlotError::Undrawable { path: self.path.clone(), reason }
     }
 
     /// Nothing in it can be drawn.
-    pub(crate) fn empty(&self, reason: &'static str) -> PlotError {
-        PlotError::Empty { path: self.path.clone(), reason }
+    pub(crate) fn empty(&self, reason: &str) -> PlotError {
+        self.undrawable(format!("nothing to draw: {reason}"))
+    }
+
+    /// More rows than a figure of its kind shows.
+    pub(crate) fn too_many(&self, rows: usize, most: usize) -> PlotError {
+        let kind = self.kind.name();
+        self.undrawable(format!(
+            "a {kind} file of {rows} rows is more than a figure can show, which is {most} of them"
+        ))
     }
 
     /// Refuses a file of another kind than an option takes.
@@ -169,13 +188,9 @@ impl Source {
     }
 
     /// A column that this kind of file must have is missing.
-    pub(crate) fn lacks(&self, column: &str, expected: &'static str) -> PlotError {
-        PlotError::Column {
-            path: self.path.clone(),
-            kind: self.kind.name(),
-            expected,
-            column: column.to_owned(),
-        }
+    pub(crate) fn lacks(&self, column: &str, expected: &str) -> PlotError {
+        let kind = self.kind.name();
+        self.undrawable(format!("a {kind} file needs the {expected} column `{column}`"))
     }
 
     /// The first value stored under `key` in the provenance, outer levels before inner ones.

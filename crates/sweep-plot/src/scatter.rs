@@ -95,7 +95,7 @@ impl Scatter {
     /// Reads a design's file: every point for the counts, and as many as a figure keeps.
     ///
     /// # Errors
-    /// As [`Source::each_row`] and [`layer::chosen`]; [`PlotError::Empty`] without points or
+    /// As [`Source::each_row`] and [`layer::chosen`]; [`PlotError::Undrawable`] without points or
     /// parameters that vary; [`PlotError::Unfit`] for a quantity that is no number.
     pub(crate) fn read(source: Source, options: &PlotOptions) -> Result<Self, PlotError> {
         let Some(shown) = layer::chosen(&source, options)? else {

@@ -133,7 +133,7 @@ pub(crate) fn is_whole(source: &Source) -> Result<bool, PlotError> {
 /// The axes of a map file, in file order.
 ///
 /// # Errors
-/// As [`Source::each_row`]; [`PlotError::Empty`] without rows or axes; [`PlotError::NotAGrid`] for
+/// As [`Source::each_row`]; [`PlotError::Undrawable`] without rows or axes; [`PlotError::NotAGrid`] for
 /// an axis value that is not a number, or rows that do not lie on a grid.
 pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
     if source.rows == 0 {

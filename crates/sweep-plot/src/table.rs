@@ -130,19 +130,15 @@ impl Table {
     /// cut into stretches, as [`Table::read_thinned`] does.
     ///
     /// # Errors
-    /// As [`Source::each_row`]; [`PlotError::TooMany`] for modes and boundaries beyond what a figure
+    /// As [`Source::each_row`]; [`PlotError::Undrawable`] for modes and boundaries beyond what a figure
     /// keeps.
     pub(crate) fn read(source: Source) -> Result<Self, PlotError> {
         let most = MOST_NUMBERS / source.numeric().count().max(1);
-        let too_many = |source: &Source, rows| {
-            let (path, kind) = (source.path.clone(), source.kind.name());
-            PlotError::TooMany { path, kind, rows, most }
-        };
         if source.rows > most {
             if source.kind == Kind::Trace {
                 return Self::read_thinned(source, most / 2);
             }
-            return Err(too_many(&source, source.rows));
+            return Err(source.too_many(source.rows, most));
         }
         let names: Vec<&str> = source.columns.iter().map(|column| column.name.as_str()).collect();
         let empty = |column: &ColumnFacts| match column.is_number() {
@@ -155,7 +151,7 @@ impl Table {
             rows += 1;
             // What the file says of its rows need not be so.
             if rows > most {
-                return Err(too_many(&source, rows));
+                return Err(source.too_many(rows, most));
             }
             for (column, values) in values.iter_mut().enumerate() {
                 match values {
@@ -213,7 +209,7 @@ impl Table {
     /// The numbers of a column that this kind of file must have.
     ///
     /// # Errors
-    /// [`PlotError::Column`].
+    /// [`PlotError::Undrawable`].
     pub(crate) fn numbers(&self, name: &str) -> Result<&[f64], PlotError> {
         let numbers = self.column(name).and_then(Column::numbers);
         numbers.ok_or_else(|| self.source.lacks(name, "numeric"))

@@ -192,12 +192,11 @@ fn kind(table: &ResultTable) -> &'static str {
 /// value there.
 ///
 /// # Errors
-/// [`ResultsError::Incomparable`] with the reason, [`ResultsError::File`].
+/// [`ResultsError::Refused`] with the reason, [`ResultsError::File`].
 pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, ResultsError> {
-    let refuse = |reason: String| ResultsError::Incomparable {
-        first: first.path().to_owned(),
-        second: second.path().to_owned(),
-        reason,
+    let refuse = |reason: String| {
+        let [first, second] = [first, second].map(|table| table.path().display());
+        ResultsError::Refused(format!("{first} and {second} cannot be compared: {reason}"))
     };
     let kinds = [kind(first), kind(second)];
     if kinds[0] != kinds[1] {

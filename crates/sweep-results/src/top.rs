@@ -29,8 +29,10 @@ pub fn top(
     if let Some((name, _)) = by
         && table.column(name).is_some_and(|column| column.kind == CellKind::Text)
     {
-        let (path, name) = (table.path().to_owned(), name.to_owned());
-        return Err(ResultsError::NoOrder { path, name });
+        let path = table.path().display();
+        return Err(ResultsError::Refused(format!(
+            "`{name}` of {path} holds no numbers, so it has no order"
+        )));
     }
     let read: Vec<&str> = columns.iter().copied().chain(by.map(|(name, _)| name)).collect();
     let mut found = Worst::new(by.map(|(_, worse)| worse), count);
@@ -114,7 +116,7 @@ mod tests {
     fn what_has_no_order_is_refused() {
         let table = sample::table();
         let by = |name| top(&table, &["point"], None, Some((name, Worse::Greater)), 1);
-        assert!(matches!(by("status"), Err(ResultsError::NoOrder { .. })));
+        assert!(matches!(by("status"), Err(ResultsError::Refused(_))));
         assert!(matches!(by("none"), Err(ResultsError::Column { .. })));
         assert!(by("reliable").is_ok());
     }

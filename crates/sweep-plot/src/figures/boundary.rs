@@ -30,7 +30,7 @@ struct Place {
 /// curve for every combination of the axes beyond the second.
 ///
 /// # Errors
-/// [`PlotError::Empty`] with fewer than two points.
+/// [`PlotError::Undrawable`] with fewer than two points.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let columns: Vec<&Column> =
         table.columns.iter().filter(|column| column.numbers().is_some()).collect();

@@ -25,7 +25,7 @@ pub(super) struct Mode {
 /// drawn too, with a star where such a sum is the speed.
 ///
 /// # Errors
-/// [`PlotError::Column`], or [`PlotError::Empty`] without two speeds; as
+/// [`PlotError::Undrawable`] without a column or two speeds; as
 /// [`stability::unstable_of`].
 pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
     let unstable = options.stability.as_ref();
@@ -93,7 +93,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
 /// speed.
 ///
 /// # Errors
-/// [`PlotError::Unfit`] when the file is not a modes file, [`PlotError::Column`] when it lacks a
+/// [`PlotError::Unfit`] when the file is not a modes file, [`PlotError::Undrawable`] when it lacks a
 /// column.
 pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
     table.source.expect(Kind::Modes, "--modes", "`sweep modes --out FILE` writes a modes file")?;

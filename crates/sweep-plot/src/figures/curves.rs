@@ -17,8 +17,7 @@ const MOST_MARKS: usize = 400;
 /// The chart of a map file of one axis.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] for a column that the file does not have, [`PlotError::Unfit`] for what
-/// is not a curve.
+/// [`PlotError::Unfit`] for a column that the file does not have, or that is not a curve.
 pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError> {
     let (axis, table) = (&map.grid.axes[0], &map.table);
     let source = &table.source;

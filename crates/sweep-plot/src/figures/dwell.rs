@@ -181,7 +181,7 @@ fn place_of(kind: Option<&str>) -> usize {
 /// each speed in a panel.
 ///
 /// # Errors
-/// As [`one_point`]; [`PlotError::Column`] where no states were kept.
+/// As [`one_point`]; [`PlotError::Undrawable`] where no states were kept.
 pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
     let axes = axes(source);
     let point = one_point(source, &axes, &options.at, "--at")?;

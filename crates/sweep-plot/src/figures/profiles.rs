@@ -15,7 +15,7 @@ const AT_95: f64 = 3.84;
 /// The chart of a fit's curves.
 ///
 /// # Errors
-/// [`PlotError::Empty`] for a file that has no profiles.
+/// [`PlotError::Undrawable`] for a file that has no profiles.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let empty = || {
         table.source.empty(

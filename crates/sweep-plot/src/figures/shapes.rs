@@ -31,7 +31,7 @@ type Line = [Vec<Phasor>; 2];
 /// are from rest when the greatest deflection is at its farthest, and a quarter of a period later.
 ///
 /// # Errors
-/// [`PlotError::Empty`] where the file holds no machine or no resonances.
+/// [`PlotError::Undrawable`] where the file holds no machine or no resonances.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let places = places(table)
         .ok_or_else(|| table.source.empty("the file does not say where the machine's parts are"))?;

@@ -12,7 +12,7 @@ use crate::table::Table;
 /// The chart of a fit's curves.
 ///
 /// # Errors
-/// [`PlotError::Empty`] for a file that has no spectra.
+/// [`PlotError::Undrawable`] for a file that has no spectra.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let spectra = table.source.find("spectra").ok_or_else(|| {
         table.source.empty("it has no spectra: they are in the curves of `sweep fit`")

@@ -106,7 +106,7 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
 /// over speed.
 ///
 /// # Errors
-/// As [`one_point`]; [`PlotError::NotThere`] for an unknown channel.
+/// As [`one_point`]; [`PlotError::Unfit`] for an unknown channel.
 pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
     let channels = channels_of(source, "linear");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
@@ -185,7 +185,7 @@ fn part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
 /// Which of the channels a picture shows: those asked for, else the usual ones, else all.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] for an unknown channel.
+/// [`PlotError::Unfit`] for an unknown channel.
 pub(super) fn shown(
     source: &Source,
     names: &[&str],
@@ -215,8 +215,8 @@ pub(super) struct Unstable {
 /// The unstable speeds of the machine that a trace or a modes file is of.
 ///
 /// # Errors
-/// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] or [`PlotError::NotThere`]
-/// where the stability file does not have this machine.
+/// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] where the stability file does not
+/// have this machine.
 pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
     let source = Source::open(path)?;
     source.expect(Kind::Stability, "--stability", "`sweep stability` writes a stability file")?;
@@ -298,8 +298,8 @@ pub(super) fn each_row<S: AsRef<str>>(
 /// Every point of the file at the values asked for, in file order.
 ///
 /// # Errors
-/// As [`Source::each_row`]; [`PlotError::NotThere`] for what is no axis, or no value of it;
-/// [`PlotError::Empty`] without rows.
+/// As [`Source::each_row`]; [`PlotError::Unfit`] for what is no axis, or no value of it;
+/// [`PlotError::Undrawable`] without rows.
 fn points(
     source: &Source,
     axes: &[&ColumnFacts],

@@ -18,7 +18,7 @@ use crate::together::{self, At};
 /// The chart of a trace file.
 ///
 /// # Errors
-/// [`PlotError::Column`] without time, [`PlotError::NotThere`] for an unknown channel, and as
+/// [`PlotError::Undrawable`] without time, [`PlotError::Unfit`] for an unknown channel, and as
 /// [`campbell::resonances`] for the modes file that gives the resonance speeds.
 pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
     let time = table.numbers("time_s")?.to_vec();

@@ -11,7 +11,7 @@ use crate::table::Table;
 /// to its greatest frequency over a turn, as a share of the mean.
 ///
 /// # Errors
-/// [`PlotError::Column`], or [`PlotError::Empty`] where no mode has a resonance.
+/// [`PlotError::Undrawable`] without a column, or where no mode has a resonance.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     table.numbers("frequency_min_rpm")?;
     table.numbers("frequency_max_rpm")?;

@@ -50,7 +50,7 @@ impl Side {
     /// Reads the columns that the other file has too.
     ///
     /// # Errors
-    /// [`ResultsError::TooLarge`], [`ResultsError::File`].
+    /// [`ResultsError::Refused`], [`ResultsError::File`].
     pub(super) fn read(
         table: &ResultTable,
         other: &ResultTable,
@@ -65,8 +65,10 @@ impl Side {
         columns.retain(in_both);
         let cells = table.rows().saturating_mul((columns.len() + keys.len()) as u64);
         if cells > MOST_CELLS {
-            let path = table.path().to_owned();
-            return Err(ResultsError::TooLarge { path, cells, most: MOST_CELLS });
+            return Err(ResultsError::Refused(format!(
+                "{} has {cells} cells, more than the {MOST_CELLS} that are kept in memory",
+                table.path().display()
+            )));
         }
         let names = keys.iter().chain(columns.iter().map(|column| &column.name));
         let names: Vec<&str> = names.map(String::as_str).collect();

@@ -23,7 +23,7 @@ const WIDTHS: [usize; 2] = [12, 60];
 const BUTTON: usize = 3;
 
 pub(super) fn bytes(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
-    let no_room = |reason: String| no_room(table, Format::Xlsx, reason);
+    let no_room = |reason: String| no_room(table, Format::Xlsx, &reason);
     if table.rows() > MOST_ROWS {
         let reason = format!("{} rows, and a sheet has room for {MOST_ROWS}", table.rows());
         return Err(no_room(reason));
