@@ -25,15 +25,6 @@ pub struct Mistake {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Comparison(pub(crate) [bool; 3]);
 
-/// How two numbers become one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Operation {
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
-}
-
 /// How all rows become one number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Fold {
@@ -49,25 +40,26 @@ pub(crate) enum Fold {
 }
 
 /// A node of an expression; the parser has made sure of the types.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) enum Node {
     Literal(Cell),
     /// A place among the condition's columns.
     Column(usize),
     /// A place among the condition's folds.
     Folded(usize),
-    Negative(Box<Node>),
-    Absolute(Box<Node>),
+    /// One number as another.
+    Changed(fn(f64) -> f64, Box<Node>),
     Not(Box<Node>),
     And(Box<Node>, Box<Node>),
     Or(Box<Node>, Box<Node>),
     IsNull(Box<Node>),
     Compare(Comparison, Box<Node>, Box<Node>),
-    Calculate(Operation, Box<Node>, Box<Node>),
+    /// Two numbers as one.
+    Calculate(fn(f64, f64) -> f64, Box<Node>, Box<Node>),
 }
 
 /// An expression that is true or false: of every row, or of a file as a whole.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Condition {
     /// As typed.
     pub text: String,
@@ -110,16 +102,10 @@ impl Node {
             Self::Literal(cell) => cell.clone(),
             Self::Column(column) => at.row.cell(at.first + *column),
             Self::Folded(fold) => at.folded.get(*fold).cloned().unwrap_or(Cell::Null),
-            Self::Negative(node) => number(node.number(at).map(|number| -number)),
-            Self::Absolute(node) => number(node.number(at).map(f64::abs)),
+            Self::Changed(change, node) => number(node.number(at).map(change)),
             Self::Calculate(operation, left, right) => {
                 let both = left.number(at).zip(right.number(at));
-                number(both.map(|(left, right)| match operation {
-                    Operation::Add => left + right,
-                    Operation::Subtract => left - right,
-                    Operation::Multiply => left * right,
-                    Operation::Divide => left / right,
-                }))
+                number(both.map(|(left, right)| operation(left, right)))
             }
             Self::Not(_) | Self::And(..) | Self::Or(..) | Self::IsNull(_) | Self::Compare(..) => {
                 self.truth(at).map_or(Cell::Null, Cell::Flag)

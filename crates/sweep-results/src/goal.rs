@@ -10,7 +10,7 @@ use sweep_files::{Cell, Rows};
 use sweep_files::{CellKind, Column};
 
 /// A number of rows that a search drives down.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Goal {
     expression: Condition,
     columns: Vec<Column>,
