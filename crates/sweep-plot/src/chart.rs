@@ -34,11 +34,12 @@ pub(crate) struct Chart {
 }
 
 /// One panel of a chart.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct ChartPanel {
     /// Short name, by which it is picked.
     pub(crate) name: String,
     /// What the y axis shows.
+    #[serde(flatten)]
     pub(crate) label: Label,
     /// Shown in a picture, and at first in a page.
     pub(crate) shown: bool,
@@ -49,10 +50,12 @@ pub(crate) struct ChartPanel {
     /// Height in a picture, px.
     pub(crate) height: f64,
     /// In drawing order.
+    #[serde(skip)]
     pub(crate) series: Vec<Series>,
     /// Level lines: value and meaning.
     pub(crate) levels: Vec<(f64, String)>,
     /// Starred points: x, y and a label.
+    #[serde(skip)]
     pub(crate) stars: Vec<(f64, f64, String)>,
     /// Ranges of x whose cells hold points on both sides of the level.
     pub(crate) mixed: Vec<[f64; 2]>,
@@ -278,7 +281,8 @@ fn draw_panel(
     dots
 }
 
-fn stroke(series: &Series) -> Stroke {
+/// How a series is drawn where it is a line.
+pub(crate) fn stroke(series: &Series) -> Stroke {
     match series.style {
         Style::Solid(width) => Stroke::solid(series.colour, width),
         Style::Dashed => Stroke::dashed(series.colour, 1.8, &[8.0, 5.0]),
@@ -296,7 +300,7 @@ fn mark_stroke() -> Stroke {
 }
 
 /// Radius of a dot, px.
-const DOT: f64 = 2.8;
+pub(crate) const DOT: f64 = 2.8;
 
 /// Radius of a star, px.
 const STAR: f64 = 10.0;

@@ -13,7 +13,7 @@ pub(crate) use report::told;
 use serde_json::{Value, json};
 
 use super::axis::{LEAST_TICKS, SLACK, Scale, Step, Tick, log_sets};
-use super::chart::{Chart, ChartPanel, Series, Style, x_scale, y_scale};
+use super::chart::{Chart, ChartPanel, DOT, Series, Style, stroke, x_scale, y_scale};
 use super::colour::{BOTH, FAILED, LEVELS, SHADE};
 use super::contour::MOST_POINTS;
 use super::cuts::Cuts;
@@ -275,18 +275,8 @@ fn rows_json(source: &Source) -> Value {
 }
 
 fn axis_json(axis: &GridAxis) -> Value {
-    let mut data = json!({
-        "name": axis.swept.name,
-        "words": axis.swept.words,
-        "unit": axis.swept.unit,
-        "log": axis.swept.log,
-        "ticks": log_ticks_json(axis.scale()),
-        "values": axis.values,
-        "borders": axis.borders,
-    });
-    if let Some(spans) = &axis.spans {
-        data["spans"] = json!(spans);
-    }
+    let mut data = json!(axis);
+    data["ticks"] = log_ticks_json(axis.scale());
     data
 }
 
@@ -428,37 +418,27 @@ fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
 fn panel_json(panel: &ChartPanel, curve: fn(&[f64]) -> Value) -> Value {
     let stars =
         panel.stars.iter().map(|(x, y, label)| json!([embed::short(*x), embed::short(*y), label]));
-    json!({
-        "name": panel.name,
-        "words": panel.label.words,
-        "unit": panel.label.unit,
-        "shown": panel.shown,
-        "log": panel.log,
-        "ticks": log_ticks_json(y_scale(panel)),
-        "range": panel.range.map(|(low, high)| [low, high]),
-        "height": panel.height,
-        "series": panel.series.iter().map(|series| series_json(series, curve)).collect::<Vec<_>>(),
-        "levels": panel.levels,
-        "stars": stars.collect::<Vec<_>>(),
-        "mixed": panel.mixed,
-    })
+    let mut data = json!(panel);
+    data["ticks"] = log_ticks_json(y_scale(panel));
+    data["stars"] = stars.collect();
+    data["series"] = panel.series.iter().map(|series| series_json(series, curve)).collect();
+    data
 }
 
 fn series_json(series: &Series, curve: fn(&[f64]) -> Value) -> Value {
-    let (width, dashed, low, high) = match &series.style {
-        Style::Solid(width) => (*width, false, None, None),
-        Style::Dashed => (1.8, true, None, None),
-        Style::Dots => (5.6, false, None, None),
-        Style::Band(low, high) => (2.2, false, Some(curve(low)), Some(curve(high))),
+    let (stroke, dots) = (stroke(series), series.style == Style::Dots);
+    let [low, high] = match &series.style {
+        Style::Band(low, high) => [low, high].map(|side| curve(side)),
+        _ => [Value::Null, Value::Null],
     };
     json!({
         "name": series.name,
         "colour": if series.colour == INK { "ink".to_owned() } else { series.colour.css() },
         "grid": series.grid,
         "alpha": embed::short(f64::from(series.colour.alpha) / 255.0),
-        "width": width,
-        "dashed": dashed,
-        "dots": series.style == Style::Dots,
+        "width": if dots { 2.0 * DOT } else { stroke.width },
+        "dashed": !stroke.dash.is_empty(),
+        "dots": dots,
         "y": curve(&series.y),
         "low": low,
         "high": high,

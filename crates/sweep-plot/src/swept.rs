@@ -11,7 +11,7 @@ use super::read::{ColumnFacts, Source};
 pub(crate) const MOST_VALUES: usize = 1 << 18;
 
 /// A swept parameter with all its values.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct SweptAxis {
     /// Name of the parameter.
     pub(crate) name: String,
@@ -23,8 +23,10 @@ pub(crate) struct SweptAxis {
     pub(crate) log: bool,
     /// The values, rising; of an axis of more than [`MOST_VALUES`] the least and the greatest
     /// alone.
+    #[serde(skip)]
     pub(crate) values: Vec<f64>,
     /// Whether the values are all there.
+    #[serde(skip)]
     pub(crate) complete: bool,
 }
 

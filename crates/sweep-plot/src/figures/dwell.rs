@@ -9,8 +9,8 @@ use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::stability::{
-    UNSTABLE, axes, channels_of, columns_of, each_row, notes_at, one_point, response, shown,
-    unstable,
+    UNSTABLE, axes, channels_of, columns_of, each_row, notes_at, one_point, panel, read, response,
+    shown, unstable,
 };
 use crate::figures::{passages, trace};
 use crate::label::{self, Label};
@@ -40,15 +40,8 @@ const TURN: &str = "turn";
 const YAW: &str = "q5_rad";
 const PITCH: &str = "q6_rad";
 
-/// The file's one point over speed.
-struct Held {
-    speed: Vec<f64>,
-    growth: Vec<f64>,
-    /// Each channel's deviations in the linear model and in the periodic response.
-    lines: Vec<[Vec<f64>; 2]>,
-    /// Each motion's speed, kind, and deviation by channel.
-    motions: Vec<(f64, usize, Vec<f64>)>,
-}
+/// A motion: its speed, kind, and deviation by channel.
+type Motion = (f64, usize, Vec<f64>);
 
 /// The chart of a dwell file's one point: deviations over speed.
 ///
@@ -60,24 +53,23 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
     let is_shown = shown(source, &names, &options.channels)?;
     let axes = axes(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
-    let held = read(source, &axes, &point, &channels)?;
+    let motions = motions(source, &axes, &point, &channels)?;
+    let columns = columns_of(&channels, ["linear", "periodic"]);
+    let one = read(source, &axes, &[point.clone()], &columns)?.remove(0);
     let passing = options.against.as_ref().map(|path| passing(source, (&axes, &point), path));
     let passing = passing.transpose()?;
     // A grid of speeds of the lines, then one of the motions of each kind, then those of a run.
-    let of_kind = |kind: usize| held.motions.iter().filter(move |(_, of, _)| *of == kind);
-    let mut grids = vec![held.speed.clone()];
+    let of_kind = |kind: usize| motions.iter().filter(move |(_, of, _)| *of == kind);
+    let mut grids = vec![one.speed.clone()];
     grids.extend((0..KINDS.len()).map(|kind| of_kind(kind).map(|(speed, ..)| *speed).collect()));
     let of_run = grids.len();
-    let (first, last) = (held.speed.first().copied(), held.speed.last().copied());
+    let (first, last) = (one.speed.first().copied(), one.speed.last().copied());
     let is_held = |speed: &f64| first <= Some(*speed) && Some(*speed) <= last;
     let grids_of_run = passing.iter().flat_map(|run| &run.grids);
     grids.extend(grids_of_run.map(|grid| grid.iter().copied().filter(is_held).collect()));
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
-        let (unit, factor) = label::shown(&facts.unit);
-        let scaled = |values: &[f64]| values.iter().map(|value| value * factor).collect();
-        let [linear, periodic] = &held.lines[k];
-        let lines = [scaled(linear), scaled(periodic)];
-        let mut series = response("periodic response", lines, &held.growth);
+        let (_, factor) = label::shown(&facts.unit);
+        let mut series = response("periodic response", &one, k, factor);
         for (kind, (_, words, colour)) in KINDS.iter().enumerate() {
             let y: Vec<f64> = of_kind(kind).map(|(_, _, values)| values[k] * factor).collect();
             if !y.is_empty() {
@@ -97,13 +89,7 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         let motions = series.iter().flat_map(|series| &series.y).copied();
         let log =
             extremes(motions.filter(|y| *y > 0.0)).is_some_and(|(low, high)| high > WIDE * low);
-        let words = label::capitalised(&label::channel(name));
-        ChartPanel {
-            shown: is_shown[k],
-            height: 190.0,
-            log,
-            ..ChartPanel::new(name, Label::new(&words, unit), series)
-        }
+        ChartPanel { height: 190.0, log, ..panel((name, facts), is_shown[k], series) }
     });
     let panels = panels.collect();
     let mut notes = notes_at(source, &axes, &point);
@@ -112,7 +98,7 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         title: "What a held speed ends in".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        shades: unstable(&held.speed, &held.growth),
+        shades: unstable(&one.speed, &one.growth),
         shade_meaning: UNSTABLE.to_owned(),
         grids,
         panels,
@@ -136,39 +122,25 @@ fn passing(
     passages::chart(&trace, &PlotOptions::default())
 }
 
-fn read(
+/// The motions at every speed.
+fn motions(
     source: &Source,
     axes: &[&ColumnFacts],
     point: &[f64],
     channels: &[(&str, &ColumnFacts)],
-) -> Result<Held, PlotError> {
-    let mut columns = columns_of(channels, ["linear", "periodic", "nonlinear"]);
-    let mut held = Held {
-        speed: Vec::new(),
-        growth: Vec::new(),
-        lines: vec![[Vec::new(), Vec::new()]; channels.len()],
-        motions: Vec::new(),
-    };
+) -> Result<Vec<Motion>, PlotError> {
+    let mut columns = columns_of(channels, ["nonlinear"]);
     columns.push(TURN.to_owned());
     let has_turns = source.column(TURN).is_some();
-    each_row(source, axes, &columns, |row| {
+    let mut motions = Vec::new();
+    each_row(source, axes, &columns, |mut row| {
         // The first turn of each motion.
-        let is_first = !has_turns || row.values.last().is_some_and(|turn| *turn <= 0.0);
-        if row.point != point || !is_first {
-            return;
+        let is_first = row.values.pop().is_some_and(|turn| turn <= 0.0) || !has_turns;
+        if row.point == point && is_first {
+            motions.push((row.speed, place_of(row.kind), row.values));
         }
-        if held.speed.last() != Some(&row.speed) {
-            held.speed.push(row.speed);
-            held.growth.push(row.growth);
-            for (lines, of) in held.lines.iter_mut().zip(row.values.chunks(3)) {
-                lines[0].push(of[0]);
-                lines[1].push(of[1]);
-            }
-        }
-        let deviations = row.values.chunks_exact(3).map(|of| of[2]).collect();
-        held.motions.push((row.speed, place_of(row.kind), deviations));
     })?;
-    Ok(held)
+    Ok(motions)
 }
 
 /// The place of a kind in [`KINDS`].

@@ -27,12 +27,12 @@ const MOST_EDGES: usize = 16;
 pub(super) const UNSTABLE: &str = "a dwell at this speed is unstable";
 
 /// One point over speed.
-struct Swept {
+pub(super) struct Swept {
     /// Values of the file's axes.
     values: Vec<f64>,
-    speed: Vec<f64>,
+    pub(super) speed: Vec<f64>,
     /// NaN where there is no response.
-    growth: Vec<f64>,
+    pub(super) growth: Vec<f64>,
     /// Values of each column asked for.
     columns: Vec<Vec<f64>>,
 }
@@ -114,19 +114,10 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
     let columns = columns_of(&channels, ["linear", "nonlinear"]);
     let axes = axes(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
-    let mut swept = read(source, &axes, &[point], &columns)?;
-    let one = swept.remove(0);
-    let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
-        let (unit, factor) = label::shown(&facts.unit);
-        let scaled = |column: &Vec<f64>| column.iter().map(|value| value * factor).collect();
-        let [linear, nonlinear] = [0, 1].map(|model| scaled(&one.columns[2 * k + model]));
-        let lines = response("nonlinear model", [linear, nonlinear], &one.growth);
-        let words = label::capitalised(&label::channel(name));
-        ChartPanel {
-            shown: is_shown[k],
-            height: 170.0,
-            ..ChartPanel::new(name, Label::new(&words, unit), lines)
-        }
+    let one = read(source, &axes, &[point], &columns)?.remove(0);
+    let panels = channels.iter().zip(is_shown).enumerate().map(|(k, (channel, shown))| {
+        let lines = response("nonlinear model", &one, k, label::shown(&channel.1.unit).1);
+        ChartPanel { height: 170.0, ..panel(*channel, shown, lines) }
     });
     let panels = panels.collect();
     let mut notes = notes_at(source, &axes, &one.values);
@@ -158,14 +149,23 @@ pub(super) fn columns_of<const N: usize>(
     channels.iter().flat_map(|(name, _)| kinds.map(|kind| format!("{kind}_{name}"))).collect()
 }
 
-/// A channel's lines in the linear model and in the periodic response of the nonlinear one, where
-/// that is stable and where it is not.
-pub(super) fn response(
-    name: &str,
-    [linear, periodic]: [Vec<f64>; 2],
-    growth: &[f64],
-) -> Vec<Series> {
-    let of = |wanted: bool| part(&periodic, growth, wanted);
+/// The panel of a channel.
+pub(super) fn panel(
+    (name, facts): (&str, &ColumnFacts),
+    shown: bool,
+    series: Vec<Series>,
+) -> ChartPanel {
+    let words = label::capitalised(&label::channel(name));
+    let label = Label::new(&words, label::shown(&facts.unit).0);
+    ChartPanel { shown, ..ChartPanel::new(name, label, series) }
+}
+
+/// The `k`-th channel's lines, so many times as high: in the linear model and in the periodic
+/// response of the nonlinear one, where that is stable and where it is not.
+pub(super) fn response(name: &str, one: &Swept, k: usize, factor: f64) -> Vec<Series> {
+    let [linear, periodic]: [Vec<f64>; 2] =
+        [2 * k, 2 * k + 1].map(|k| one.columns[k].iter().map(|value| value * factor).collect());
+    let of = |wanted: bool| part(&periodic, &one.growth, wanted);
     let [stable, unstable] = ["stable", "unstable"].map(|word| format!("{name}, {word}"));
     vec![
         Series::new("linear model", LINEAR, 0, linear, Style::Solid(1.6)),
@@ -366,7 +366,7 @@ pub(super) fn one_point(
 }
 
 /// Points over speed, with some columns.
-fn read(
+pub(super) fn read(
     source: &Source,
     axes: &[&ColumnFacts],
     points: &[Vec<f64>],
