@@ -340,7 +340,8 @@ fn draw_stars(scene: &mut Scene, (chart, content): (&Chart, &ChartPanel), panel:
             .min_by_key(|place| lines_through(chart, content, panel, extent(*place)));
         let place = place.unwrap_or([sides[1], y + 18.0]);
         taken.push(extent(place));
-        scene.text(Text::new(label.clone(), place, TICK_SIZE).bold().halo(PAPER));
+        let text = Text::new(label.clone(), place, TICK_SIZE).bold();
+        scene.text(Text { halo: Some(PAPER), ..text });
     }
 }
 

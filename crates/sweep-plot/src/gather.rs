@@ -13,32 +13,26 @@ use super::read::{ColumnFacts, Row, Source};
 use super::table::{Column, NONE, SEVERAL, Table, Values, Words};
 use sweep_parameter::Worse;
 
-/// Least and greatest finite values of a column over all rows of the file.
+/// Least, least positive and greatest finite value of a column over all rows of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Extent {
-    low: f64,
-    high: f64,
-    least_positive: f64,
-}
+pub(crate) struct Extent([f64; 3]);
 
 impl Extent {
-    const NONE: Self = {
-        let most = f64::INFINITY;
-        Self { low: most, high: -most, least_positive: most }
-    };
+    const NONE: Self = Self([f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY]);
 
     fn take(&mut self, value: f64) {
+        let [low, least_positive, high] = &mut self.0;
         if value.is_finite() {
-            (self.low, self.high) = (self.low.min(value), self.high.max(value));
+            (*low, *high) = (low.min(value), high.max(value));
             if value > 0.0 {
-                self.least_positive = self.least_positive.min(value);
+                *least_positive = least_positive.min(value);
             }
         }
     }
 
     /// Values with the same extremes as all, and as all that are positive.
     pub(crate) fn values(self) -> impl Iterator<Item = f64> {
-        [self.low, self.least_positive, self.high].into_iter().filter(|value| value.is_finite())
+        self.0.into_iter().filter(|value| value.is_finite())
     }
 }
 
@@ -118,10 +112,7 @@ impl Map {
         let names: Vec<&str> = names.chain(own.iter().map(|facts| facts.name.as_str())).collect();
         let mut gather = Gather::new(&source, &grid, &own, levels);
         source.each_row(&names, |row| gather.take(row))?;
-        let Gather { columns, counts, statuses, by_status, .. } = gather;
-        let named = statuses.names.into_iter().zip(by_status.iter().copied());
-        let unknown = (UNKNOWN.to_owned(), by_status[usize::from(NONE)]);
-        let statuses = named.chain([unknown]).filter(|(_, rows)| *rows > 0).collect();
+        let Gather { columns, counts, statuses, .. } = gather;
         let (mut extents, mut sides) = (BTreeMap::new(), BTreeMap::new());
         let mut kept = Vec::with_capacity(columns.len());
         for column in columns {
@@ -136,7 +127,7 @@ impl Map {
             if let Values::Words(words) = &mut values {
                 words.sort();
             }
-            kept.push(Column::new(column.facts, values));
+            kept.push(Column { facts: column.facts.clone(), values });
         }
         let table = Table { rows: grid.cells(), columns: kept, source, stretch: None };
         Ok(Self { table, grid, counts, extents, sides, statuses })
@@ -249,9 +240,8 @@ struct Gather<'a> {
     first: Vec<usize>,
     /// Greatest ratio of each cell so far.
     greatest: Vec<f64>,
-    statuses: Words,
-    /// Rows by the code of their status.
-    by_status: [usize; 256],
+    /// Rows by their status.
+    statuses: BTreeMap<String, usize>,
     /// Value and place last found on each axis.
     last: Vec<(f64, Option<usize>)>,
     /// By which a row is judged where the file has no verdicts.
@@ -287,8 +277,7 @@ impl<'a> Gather<'a> {
             counts: vec![Counts::default(); cells],
             first: vec![0; cells],
             greatest: vec![f64::NAN; cells],
-            statuses: Words::default(),
-            by_status: [0; 256],
+            statuses: BTreeMap::new(),
             last: vec![(f64::NAN, None); grid.axes.len()],
             limit: source.column("reliable").is_none().then(|| source.ratio_limit()),
         }
@@ -306,7 +295,11 @@ impl<'a> Gather<'a> {
         }
         let own = self.last.len();
         let status = row.word(own);
-        self.by_status[usize::from(self.statuses.code(status))] += 1;
+        let named = status.unwrap_or(UNKNOWN);
+        match self.statuses.get_mut(named) {
+            Some(rows) => *rows += 1,
+            None => drop(self.statuses.insert(named.to_owned(), 1)),
+        }
         let failed = status != Some(OK);
         let is_worst = cell.map(|cell| self.count(cell, row, failed)).transpose()?;
         for (column, gathered) in (own + 4..).zip(&mut self.columns) {

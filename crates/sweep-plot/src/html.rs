@@ -23,7 +23,7 @@ use super::frame::{Sign, failed_hatch};
 use super::gather::{Counts, Map};
 use super::grid::GridAxis;
 use super::label;
-use super::layer::{self, Group, Layer, Level, Shown};
+use super::layer::{self, Layer, Level, Shown};
 use super::read::Source;
 use super::scene::{Colour, Hatch, INK, PAPER};
 use super::svg::escape;
@@ -257,21 +257,18 @@ fn tick_json(tick: Tick) -> Value {
 /// The rows of a point's table: name, words, unit, and the columns that hold the values of both
 /// models and their ratio.
 fn rows_json(source: &Source) -> Value {
-    let row = |name: &str, words: &str, columns: [Option<String>; 3]| {
-        let unit = columns[0].as_ref().and_then(|name| source.column(name));
-        let unit = unit.map_or("", |column| label::shown(&column.unit).0);
-        json!({ "name": name, "words": words, "unit": unit, "columns": columns })
-    };
-    let channels = layer::channels(source, Group::Nonlinear).into_iter().map(|(name, _)| {
-        let columns = ["nonlinear", "linear", "ratio"].map(|kind| Some(format!("{kind}_{name}")));
-        row(name, &label::channel(name), columns)
-    });
-    let families = layer::families(source).into_iter().map(|family| {
+    let row = |family: layer::Family<'_>| {
         let mut columns = family.columns.iter().map(|(_, facts)| Some(facts.name.clone()));
         let [nonlinear, linear] = [0, 1].map(|_| columns.next().flatten());
-        row(&family.name, &family.words, [nonlinear, linear, None])
-    });
-    channels.chain(families).collect()
+        let ratio = family.is_channel.then(|| format!("ratio_{}", family.name));
+        json!({
+            "name": family.name,
+            "words": family.words,
+            "unit": label::shown(&family.columns[0].1.unit).0,
+            "columns": [nonlinear, linear, ratio],
+        })
+    };
+    layer::families(source).into_iter().map(row).collect()
 }
 
 fn axis_json(axis: &GridAxis) -> Value {
@@ -283,14 +280,14 @@ fn axis_json(axis: &GridAxis) -> Value {
 /// Every column of results as 32 bit floats in grid order, NaN where the file has no value.
 fn columns_json(table: &Table) -> Value {
     let numbers = |column: &Column| {
-        let (unit, factor) = label::shown(&column.unit);
+        let (unit, factor) = label::shown(&column.facts.unit);
         let data = json!({
             "unit": unit,
             "factor": factor,
-            "description": column.description,
+            "description": column.facts.description,
             "data": embed::floats(column.numbers()?.iter().copied()),
         });
-        Some((column.name.clone(), data))
+        Some((column.facts.name.clone(), data))
     };
     table.columns.iter().filter_map(numbers).collect()
 }
@@ -302,7 +299,7 @@ fn codes_json(table: &Table) -> Value {
         let words = column.words()?;
         let data =
             json!({ "data": embed::bytes(words.codes.iter().copied()), "words": words.names });
-        Some((column.name.clone(), data))
+        Some((column.facts.name.clone(), data))
     };
     table.columns.iter().filter_map(words).collect()
 }

@@ -53,38 +53,29 @@ impl SweptAxis {
 }
 
 /// One axis while its values are gathered.
+#[derive(Default)]
 struct Gathered {
     seen: BTreeSet<u64>,
-    last: f64,
-    low: f64,
-    high: f64,
-    complete: bool,
+    last: Option<f64>,
+    range: Option<[f64; 2]>,
+    /// More values than are kept.
+    overflows: bool,
 }
 
 impl Gathered {
-    fn new() -> Self {
-        Self {
-            seen: BTreeSet::new(),
-            last: f64::NAN,
-            low: f64::INFINITY,
-            high: f64::NEG_INFINITY,
-            complete: true,
-        }
-    }
-
     fn take(&mut self, value: f64) {
         // Rows in grid order repeat most axes' values.
-        if value == self.last {
+        if self.last.replace(value) == Some(value) {
             return;
         }
-        self.last = value;
-        (self.low, self.high) = (self.low.min(value), self.high.max(value));
+        let [low, high] = self.range.unwrap_or([value; 2]);
+        self.range = Some([low.min(value), high.max(value)]);
         // Zero has two signs and is one value.
         let bits = (value + 0.0).to_bits();
         if self.seen.len() < MOST_VALUES {
             self.seen.insert(bits);
         } else if !self.seen.contains(&bits) {
-            self.complete = false;
+            self.overflows = true;
         }
     }
 
@@ -92,9 +83,9 @@ impl Gathered {
         let mut values: Vec<f64> = self.seen.into_iter().map(f64::from_bits).collect();
         values.sort_by(f64::total_cmp);
         // The values that came first tell how an axis of too many is spaced.
-        let log = evenly_by_log(&values) && self.low > 0.0;
-        if !self.complete {
-            values = vec![self.low, self.high];
+        let log = evenly_by_log(&values) && self.range.is_some_and(|[low, _]| low > 0.0);
+        if self.overflows {
+            values = self.range.map_or_else(Vec::new, Vec::from);
         }
         SweptAxis {
             name: column.name.clone(),
@@ -102,7 +93,7 @@ impl Gathered {
             unit: column.unit.clone(),
             log,
             values,
-            complete: self.complete,
+            complete: !self.overflows,
         }
     }
 }
@@ -147,7 +138,7 @@ pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
         return Err(source.empty("the map has no axis"));
     }
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-    let mut gathered: Vec<Gathered> = names.iter().map(|_| Gathered::new()).collect();
+    let mut gathered: Vec<Gathered> = names.iter().map(|_| Gathered::default()).collect();
     source.each_row(&names, |row| {
         for (column, (name, gathered)) in names.iter().zip(&mut gathered).enumerate() {
             let value = row.number(column);

@@ -82,23 +82,13 @@ impl Words {
 /// A column.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Column {
-    /// As in the file.
-    pub(crate) name: String,
-    /// Empty for pure numbers.
-    pub(crate) unit: String,
-    /// May be empty.
-    pub(crate) description: String,
+    /// What the file says of it.
+    pub(crate) facts: ColumnFacts,
     /// One per row.
     pub(crate) values: Values,
 }
 
 impl Column {
-    /// A column of the file with these values.
-    pub(crate) fn new(facts: &ColumnFacts, values: Values) -> Self {
-        let ColumnFacts { name, unit, description, .. } = facts.clone();
-        Self { name, unit, description, values }
-    }
-
     /// The values, if they are numbers.
     pub(crate) fn numbers(&self) -> Option<&[f64]> {
         let Values::Numbers(values) = &self.values else { return None };
@@ -165,7 +155,8 @@ impl Table {
             Ok(())
         })?;
         let columns = source.columns.iter().zip(values);
-        let columns = columns.map(|(facts, values)| Column::new(facts, values)).collect();
+        let columns =
+            columns.map(|(facts, values)| Column { facts: facts.clone(), values }).collect();
         Ok(Self { source, columns, rows, stretch: None })
     }
 
@@ -187,8 +178,9 @@ impl Table {
             Ok(())
         })?;
         let kept = thinners.into_iter().map(|thinner| Values::Numbers(thinner.finish()));
-        let columns = source.numeric().zip(kept).map(|(facts, values)| Column::new(facts, values));
-        let columns: Vec<Column> = columns.collect();
+        let columns = source.numeric().cloned().zip(kept);
+        let columns: Vec<Column> =
+            columns.map(|(facts, values)| Column { facts, values }).collect();
         let rows = columns.first().and_then(Column::numbers).map_or(0, <[f64]>::len);
         Ok(Self { source, columns, rows, stretch: Some(stretches.longest()) })
     }
@@ -203,7 +195,7 @@ impl Table {
 
     /// The column of that name.
     pub(crate) fn column(&self, name: &str) -> Option<&Column> {
-        self.columns.iter().find(|column| column.name == name)
+        self.columns.iter().find(|column| column.facts.name == name)
     }
 
     /// The numbers of a column that this kind of file must have.
@@ -218,6 +210,8 @@ impl Table {
     /// Columns of numbers whose name starts with `prefix`, without it.
     pub(crate) fn with_prefix(&self, prefix: &str) -> Vec<(&str, &Column)> {
         let numbers = self.columns.iter().filter(|column| column.numbers().is_some());
-        numbers.filter_map(|column| Some((column.name.strip_prefix(prefix)?, column))).collect()
+        numbers
+            .filter_map(|column| Some((column.facts.name.strip_prefix(prefix)?, column)))
+            .collect()
     }
 }

@@ -12,6 +12,7 @@ mod condition;
 mod error;
 mod export;
 mod goal;
+mod nearest;
 mod parse;
 mod require;
 #[cfg(test)]
@@ -25,6 +26,7 @@ pub use condition::{Condition, Mistake};
 pub use error::ResultsError;
 pub use export::{Format, export};
 pub use goal::Goal;
+pub use nearest::nearest;
 pub use require::{Checked, Offender, check};
 pub use sweep_files::{Cell, CellKind, Column, ResultTable, columns, ratio_limits};
 pub use top::top;

@@ -2,6 +2,7 @@
 
 use crate::condition::{Condition, each_row};
 use crate::error::ResultsError;
+use crate::nearest::nearest;
 use sweep_files::CellKind;
 use sweep_files::{Cell, ResultTable};
 use sweep_parameter::Worse;
@@ -11,8 +12,8 @@ use sweep_parameter::Worse;
 /// as the cells of `columns`. Rows without a value of `by` come last, equal ones in file order.
 ///
 /// # Errors
-/// [`ResultsError::Column`] for a column that is not there, [`ResultsError::NoOrder`] for one of
-/// words, [`ResultsError::File`].
+/// [`ResultsError::Refused`] for a column that is not there, or for an order by words;
+/// [`ResultsError::File`].
 pub fn top(
     table: &ResultTable,
     columns: &[&str],
@@ -20,16 +21,16 @@ pub fn top(
     by: Option<(&str, Worse)>,
     count: usize,
 ) -> Result<Vec<Vec<Cell>>, ResultsError> {
-    for name in columns.iter().copied().chain(by.map(|(name, _)| name)) {
-        if table.column(name).is_none() {
-            let (path, name) = (table.path().to_owned(), name.to_owned());
-            return Err(ResultsError::Column { path, name, nearest: None });
-        }
+    let path = table.path().display();
+    let mut asked = columns.iter().copied().chain(by.map(|(name, _)| name));
+    if let Some(name) = asked.find(|name| table.column(name).is_none()) {
+        let near = nearest(name, table.columns.iter().map(|column| column.name.as_str()));
+        let meant = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
+        return Err(ResultsError::Refused(format!("{path} has no column `{name}`{meant}")));
     }
     if let Some((name, _)) = by
         && table.column(name).is_some_and(|column| column.kind == CellKind::Text)
     {
-        let path = table.path().display();
         return Err(ResultsError::Refused(format!(
             "`{name}` of {path} holds no numbers, so it has no order"
         )));
@@ -117,7 +118,7 @@ mod tests {
         let table = sample::table();
         let by = |name| top(&table, &["point"], None, Some((name, Worse::Greater)), 1);
         assert!(matches!(by("status"), Err(ResultsError::Refused(_))));
-        assert!(matches!(by("none"), Err(ResultsError::Column { .. })));
+        assert!(matches!(by("none"), Err(ResultsError::Refused(_))));
         assert!(by("reliable").is_ok());
     }
 }

@@ -6,15 +6,12 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use arrow_array::Array;
-use arrow_schema::{ArrowError, DataType};
 use parquet::errors::ParquetError;
 use serde::Serialize;
 use serde_json::Value;
 
 use super::error::StoreError;
-use sweep_files::cells;
-use sweep_files::{FileKind, ParquetFile, key};
+use sweep_files::{FileKind, ParquetFile, columns, key};
 use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::ratio_limits;
 
@@ -292,9 +289,8 @@ pub struct Overview {
 /// Reads through a file, in bounded memory.
 ///
 /// # Errors
-/// [`StoreError::File`] and [`StoreError::Parquet`].
+/// [`StoreError::File`].
 pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
-    let failed = StoreError::parquet("read", file.path());
     let new = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
         name: field.name().clone(),
         unit: field.metadata().get("unit").cloned().filter(|unit| !unit.is_empty()),
@@ -303,37 +299,30 @@ pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
         range: None,
         names: Vec::new(),
     };
-    let mut columns: Vec<ColumnRange> = file.schema().fields().iter().map(new).collect();
-    for batch in file.batches(|builder| builder)? {
-        for (column, array) in columns.iter_mut().zip(batch?.columns()) {
-            column.widen(array).map_err(|error| failed(error.into()))?;
+    let mut ranges: Vec<ColumnRange> = file.schema().fields().iter().map(new).collect();
+    // Nothing is known of cells of types that none of our files has.
+    let known = columns(file.schema());
+    let names: Vec<&str> = known.iter().map(|column| column.name.as_str()).collect();
+    file.each_row(&names, |row| {
+        for (k, column) in known.iter().enumerate() {
+            ranges[column.field].widen(row.value(k), row.word(k));
         }
-    }
-    Ok(Overview { result: own_word(file, FileKind::Map), rows: file.rows(), columns })
+        Ok::<(), StoreError>(())
+    })?;
+    Ok(Overview { result: own_word(file, FileKind::Map), rows: file.rows(), columns: ranges })
 }
 
 impl ColumnRange {
-    /// Takes in more rows. Of types that none of our files has, only the nulls are counted.
-    fn widen(&mut self, array: &dyn Array) -> Result<(), ArrowError> {
-        self.nulls += array.null_count() as u64;
-        match array.data_type() {
-            DataType::Boolean => {
-                for flag in cells::flags(array)?.iter().flatten() {
-                    self.count(if flag { "true" } else { "false" });
-                }
-            }
-            text if cells::is_text(text) => {
-                cells::texts(array)?.into_iter().flatten().for_each(|name| self.count(name));
-            }
-            number if cells::is_number(number) => {
-                for value in cells::numbers(array)?.into_iter().flatten() {
-                    let (least, greatest) = self.range.unwrap_or((value, value));
-                    self.range = Some((least.min(value), greatest.max(value)));
-                }
-            }
-            _ => {}
+    /// Takes in a number or a word, if there is one.
+    fn widen(&mut self, value: f64, word: Option<&str>) {
+        if let Some(word) = word {
+            self.count(word);
+        } else if value.is_nan() {
+            self.nulls += 1;
+        } else {
+            let (least, greatest) = self.range.unwrap_or((value, value));
+            self.range = Some((least.min(value), greatest.max(value)));
         }
-        Ok(())
     }
 
     fn count(&mut self, name: &str) {

@@ -34,11 +34,11 @@ struct Place {
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let columns: Vec<&Column> =
         table.columns.iter().filter(|column| column.numbers().is_some()).collect();
-    let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+    let names: Vec<&str> = columns.iter().map(|column| column.facts.name.as_str()).collect();
     let empty = || table.source.empty("a curve needs at least two points");
     let (low, high) = bracket(&names).ok_or_else(empty)?;
     let (x, y) = (columns[0], columns[1]);
-    let (xs, ys) = (table.numbers(&x.name)?, table.numbers(&y.name)?);
+    let (xs, ys) = (table.numbers(&x.facts.name)?, table.numbers(&y.facts.name)?);
     let (lows, highs) = (table.numbers(low)?, table.numbers(high)?);
     let mut grid: Vec<f64> = xs.iter().copied().filter(|x| x.is_finite()).collect();
     grid.sort_by(f64::total_cmp);
@@ -87,14 +87,18 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         subtitle: table.source.subtitle(&format!(
             "{} values of {}{side}",
             grid.len(),
-            label::words(&x.name).to_lowercase()
+            label::words(&x.facts.name).to_lowercase()
         )),
-        x_label: Label::new(&label::words(&x.name), &x.unit),
+        x_label: Label::new(&label::words(&x.facts.name), &x.facts.unit),
         x_log: evenly_by_log(&grid),
         grids: vec![grid],
         panels: vec![ChartPanel {
             height: 440.0,
-            ..ChartPanel::new("boundary", Label::new(&label::words(&y.name), &y.unit), series)
+            ..ChartPanel::new(
+                "boundary",
+                Label::new(&label::words(&y.facts.name), &y.facts.unit),
+                series,
+            )
         }],
         ..Chart::default()
     })
@@ -203,7 +207,7 @@ pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay, PlotErr
 fn limit(table: &Table) -> String {
     let about = table.source.find(key::BOUNDARY);
     let told = about.and_then(|about| about.get(key::LIMIT)?.as_f64());
-    let unit = table.column("quantity_low").map_or("", |column| &column.unit);
+    let unit = table.column("quantity_low").map_or("", |column| &column.facts.unit);
     let (unit, factor) = label::shown(unit);
     let limit = told.map_or(table.source.ratio_limit(), |limit| limit * factor);
     let limit = label::valued("", limit, unit);
@@ -221,7 +225,7 @@ fn further(table: &Table, row: usize) -> String {
     let said = table.source.planned_axes().skip(2).filter_map(|name| {
         let column = table.column(name)?;
         let value = *column.numbers()?.get(row)?;
-        Some(label::valued(&label::words(name), value, &column.unit))
+        Some(label::valued(&label::words(name), value, &column.facts.unit))
     });
     said.collect::<Vec<_>>().join(", ")
 }

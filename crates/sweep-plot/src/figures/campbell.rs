@@ -169,9 +169,9 @@ pub(super) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
     let frequency = table.numbers("frequency_rpm")?;
     let over_turn = |word: &str| {
         let mut columns = table.columns.iter().filter(|column| {
-            column.name.starts_with("frequency")
-                && column.unit == "rpm"
-                && column.name.split('_').any(|part| part == word)
+            column.facts.name.starts_with("frequency")
+                && column.facts.unit == "rpm"
+                && column.facts.name.split('_').any(|part| part == word)
         });
         columns.next().and_then(|column| column.numbers())
     };

@@ -42,7 +42,8 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
         ratios_asked.is_empty() || wanted(name)
     })];
     // A panel of both models' columns.
-    let panel = |name: &str, words: &str, columns: &[(&str, &ColumnFacts)]| {
+    let panel = |family: layer::Family<'_>| {
+        let columns = &family.columns;
         let (unit, factor) = label::shown(&columns[0].1.unit);
         let lines = columns.iter().filter_map(|(model, facts)| {
             let said = if model.is_empty() { String::new() } else { format!("{model} model") };
@@ -51,21 +52,16 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
         });
         let limit = columns[0].1.limit.map(|limit| limit * factor);
         let is_asked = |name: &String| asked.iter().any(|shown| shown.column() == name);
+        let label = Label::new(&label::capitalised(&family.words), unit);
+        let panel = ChartPanel::new(&family.name, label, lines.collect());
         ChartPanel {
             shown: columns.iter().any(|(_, facts)| is_asked(&facts.name)),
             levels: limit.map(|limit| (limit, "limit".to_owned())).into_iter().collect(),
-            ..ChartPanel::new(name, Label::new(&label::capitalised(words), unit), lines.collect())
+            height: if family.is_channel { 190.0 } else { panel.height },
+            ..panel
         }
     };
-    for (name, facts) in layer::channels(source, Group::Nonlinear) {
-        let of_linear = source.column(&format!("linear_{name}"));
-        let both = [Some(("nonlinear", facts)), of_linear.map(|facts| ("linear", facts))];
-        let columns: Vec<_> = both.into_iter().flatten().collect();
-        panels.push(ChartPanel { height: 190.0, ..panel(name, &label::channel(name), &columns) });
-    }
-    for family in layer::families(source) {
-        panels.push(panel(&family.name, &family.words, &family.columns));
-    }
+    panels.extend(layer::families(source).into_iter().map(panel));
     panels.retain(|panel| !panel.series.is_empty());
 
     let failed: Vec<usize> =
@@ -104,12 +100,13 @@ fn ratios(
     wanted: &impl Fn(&str) -> bool,
 ) -> ChartPanel {
     let limit = map.table.source.ratio_limit();
-    let channels = layer::channels(&map.table.source, Group::Ratio).into_iter().enumerate();
+    let mut channels = map.table.source.with_prefix("ratio_");
+    channels.retain(|(name, _)| !["max", "min", "change"].contains(name));
     let ratio = |(k, (name, facts)): (usize, (&str, &ColumnFacts))| {
         let column = map.table.column(&facts.name).filter(|_| wanted(name))?;
         Some(line(&label::channel(name), DISTINCT[k % DISTINCT.len()], values(column, 1.0)))
     };
-    let mut series: Vec<Series> = channels.filter_map(ratio).collect();
+    let mut series: Vec<Series> = channels.into_iter().enumerate().filter_map(ratio).collect();
     if let Some(column) = map.table.column("ratio_max") {
         let largest = Series { style: Style::Dashed, ..line("largest", INK, values(column, 1.0)) };
         series.push(largest);

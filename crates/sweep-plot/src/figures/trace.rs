@@ -74,7 +74,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let whole = other.as_ref().is_some_and(|other| table.stretch.or(other.stretch).is_none());
     let apart = if whole { difference(&panels) } else { None };
     for (name, column) in table.with_prefix("residual_") {
-        let (unit, factor) = label::shown(&column.unit);
+        let (unit, factor) = label::shown(&column.facts.unit);
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
         let residual = Series::new("residual", INK, 0, y, Style::Dots);
         let words = format!("residual, {}", label::words(name));
@@ -162,16 +162,16 @@ struct Quantity<'a> {
 fn quantities<'a>(table: &'a Table, sides: [&str; 2]) -> Vec<Quantity<'a>> {
     let channels = table.with_prefix(&format!("{}_", sides[0])).into_iter();
     let channels = channels.map(|(name, column)| {
-        let own = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
+        let own = Some(column.facts.unit.as_str()).filter(|unit| !unit.is_empty());
         let unit = own.unwrap_or(label::unit_of_channel(name));
         Quantity { name, unit, channel: true, columns: sides.map(|side| format!("{side}_{name}")) }
     });
     let numbers = table.columns.iter().filter(|column| column.numbers().is_some());
     let further = numbers.filter_map(|column| {
-        let split = column.name.split_once("_nonlinear_");
+        let split = column.facts.name.split_once("_nonlinear_");
         let (name, end) = split.filter(|(name, _)| *name != "gap")?;
         let columns = sides.map(|side| format!("{name}_{side}_{end}"));
-        Some(Quantity { name, unit: &column.unit, channel: false, columns })
+        Some(Quantity { name, unit: &column.facts.unit, channel: false, columns })
     });
     channels.chain(further).collect()
 }
