@@ -394,31 +394,10 @@ pub(super) fn read(
     Ok(swept)
 }
 
-/// The ranges of speed in which growth is above 0, taken as linear between the given speeds.
+/// The ranges of speed in which growth is above 0, taken as linear between the given speeds. A speed
+/// without an answer has no growth (NaN), and gives no edge to its neighbours.
 pub(super) fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
-    let mut ranges: Vec<[f64; 2]> = Vec::new();
-    // A speed without an answer has no growth (NaN), and is no part of a range.
-    for k in (0..speed.len()).filter(|&k| growth[k] > 0.0) {
-        // A neighbour that has no growth gives no edge between the two.
-        let edge = |other: Option<usize>| {
-            let other = other.filter(|&other| growth.get(other).is_some_and(|g| g.is_finite()));
-            other.map_or(speed[k], |other| {
-                let part = growth[k] / (growth[k] - growth[other]);
-                speed[k] + part * (speed[other] - speed[k])
-            })
-        };
-        let continues = k > 0 && growth[k - 1] > 0.0;
-        match ranges.last_mut() {
-            Some(last) if continues => last[1] = speed[k],
-            _ => ranges.push([edge(k.checked_sub(1)), speed[k]]),
-        }
-        if !growth.get(k + 1).is_some_and(|next| *next > 0.0)
-            && let Some(last) = ranges.last_mut()
-        {
-            last[1] = edge(Some(k + 1));
-        }
-    }
-    ranges
+    stretches_within(speed, growth, &[[0.0, f64::INFINITY]])
 }
 
 /// The stretches of x in which a curve over it is within one of these ranges; straight between its
@@ -426,31 +405,31 @@ pub(super) fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
 pub(super) fn stretches_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut found: Vec<[f64; 2]> = Vec::new();
     for &[low, high] in ranges {
-        let mut open: Option<[f64; 2]> = None;
-        for k in 1..x.len().min(y.len()) {
-            let (from, to) = (y[k - 1], y[k]);
-            // The part of this piece, from 0 to 1, that is within.
-            let part = if from == to {
-                (low..=high).contains(&from).then_some([0.0, 1.0])
-            } else {
-                let [a, b] = [low, high].map(|edge| (edge - from) / (to - from));
+        let first_own = found.len();
+        let is_within = |k: usize| low < y[k] && y[k] < high;
+        for k in 0..x.len().min(y.len()) {
+            let mut add = |[from, to]: [f64; 2]| match found[first_own..].last_mut() {
+                Some(last) if from <= last[1] => last[1] = to,
+                _ => found.push([from, to]),
+            };
+            if k > 0 && y[k - 1] == y[k] && is_within(k) {
+                add([x[k - 1], x[k]]);
+            } else if k > 0 && (y[k] - y[k - 1]).is_finite() {
+                // The part of this piece, from 0 to 1, that is within.
+                let [a, b] = [low, high].map(|edge| (edge - y[k - 1]) / (y[k] - y[k - 1]));
                 let [first, last] = [a.min(b).max(0.0), a.max(b).min(1.0)];
-                (last > first).then_some([first, last])
-            };
-            let Some(part) = part else {
-                found.extend(open.take());
-                continue;
-            };
-            let [first, last] = part.map(|share| x[k - 1] + share * (x[k] - x[k - 1]));
-            match &mut open {
-                Some(stretch) if part[0] == 0.0 => stretch[1] = last,
-                _ => {
-                    found.extend(open.take());
-                    open = Some([first, last]);
+                let at = |share: f64| match share {
+                    1.0 => x[k],
+                    share => x[k - 1] + share * (x[k] - x[k - 1]),
+                };
+                if last > first {
+                    add([at(first), at(last)]);
                 }
             }
+            if is_within(k) {
+                add([x[k]; 2]);
+            }
         }
-        found.extend(open);
     }
     found.sort_by(|a, b| a[0].total_cmp(&b[0]));
     found
