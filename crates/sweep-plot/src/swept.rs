@@ -126,8 +126,9 @@ pub(crate) fn is_whole(source: &Source) -> Result<bool, PlotError> {
 /// The axes of a map file, in file order.
 ///
 /// # Errors
-/// As [`Source::each_row`]; [`PlotError::Undrawable`] without rows or axes; [`PlotError::NotAGrid`] for
-/// an axis value that is not a number, or rows that do not lie on a grid.
+/// As [`Source::each_row`]; [`PlotError::Undrawable`] without rows or axes;
+/// [`PlotError::NotAGrid`] for an axis value that is not a number, or rows that do not lie on a
+/// grid.
 pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
     if source.rows == 0 {
         return Err(source.empty("the map has no rows"));

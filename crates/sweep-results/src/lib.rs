@@ -1,8 +1,8 @@
 //! Questions to finished results, from the files alone: whether conditions hold, which rows are
 //! extreme, what differs between two files. It also writes the rows in other formats.
 //!
-//! * [`Condition`] is an expression over a file's columns; [`check`] says which rows keep it, [`top`]
-//!   which rows come first in an order.
+//! * [`Condition`] is an expression over a file's columns; [`check`] says which rows keep it,
+//!   [`top`] which rows come first in an order.
 //! * [`compare`] says what differs between two files, [`export`] writes one in another format.
 //!
 //! Nothing here knows the model; [`sweep_files`] opens every file, so a damaged one is refused.

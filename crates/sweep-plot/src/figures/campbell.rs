@@ -93,8 +93,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
 /// speed.
 ///
 /// # Errors
-/// [`PlotError::Unfit`] when the file is not a modes file, [`PlotError::Undrawable`] when it lacks a
-/// column.
+/// [`PlotError::Unfit`] when the file is not a modes file, [`PlotError::Undrawable`] when it lacks
+/// a column.
 pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
     table.source.expect(Kind::Modes, "--modes", "`sweep modes --out FILE` writes a modes file")?;
     let mut speeds: Vec<f64> = modes(table)?.iter().flat_map(crossings).collect();

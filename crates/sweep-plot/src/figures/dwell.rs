@@ -55,7 +55,7 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
     let point = one_point(source, &axes, &options.at, "--at")?;
     let motions = motions(source, &axes, &point, &channels)?;
     let columns = columns_of(&channels, ["linear", "periodic"]);
-    let one = read(source, &axes, &[point.clone()], &columns)?.remove(0);
+    let one = read(source, &axes, std::slice::from_ref(&point), &columns)?.remove(0);
     let passing = options.against.as_ref().map(|path| passing(source, (&axes, &point), path));
     let passing = passing.transpose()?;
     // A grid of speeds of the lines, then one of the motions of each kind, then those of a run.

@@ -20,8 +20,8 @@ struct Stretch {
 /// The chart of a trace file.
 ///
 /// # Errors
-/// As [`trace::chart`]; besides [`PlotError::Undrawable`] without the speed, or where the drum makes
-/// no whole turn while its speed changes.
+/// As [`trace::chart`]; besides [`PlotError::Undrawable`] without the speed, or where the drum
+/// makes no whole turn while its speed changes.
 pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
     let mut chart = trace::chart(table, options)?;
     let time = table.numbers("time_s")?;

@@ -215,8 +215,8 @@ pub(super) struct Unstable {
 /// The unstable speeds of the machine that a trace or a modes file is of.
 ///
 /// # Errors
-/// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] where the stability file does not
-/// have this machine.
+/// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] where the stability file does
+/// not have this machine.
 pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
     let source = Source::open(path)?;
     source.expect(Kind::Stability, "--stability", "`sweep stability` writes a stability file")?;
@@ -394,8 +394,8 @@ pub(super) fn read(
     Ok(swept)
 }
 
-/// The ranges of speed in which growth is above 0, taken as linear between the given speeds. A speed
-/// without an answer has no growth (NaN), and gives no edge to its neighbours.
+/// The ranges of speed in which growth is above 0, taken as linear between the given speeds. A
+/// speed without an answer has no growth (NaN), and gives no edge to its neighbours.
 pub(super) fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
     stretches_within(speed, growth, &[[0.0, f64::INFINITY]])
 }

@@ -37,8 +37,8 @@ fn account(file: &ParquetFile) -> Value {
     Value::Object(account)
 }
 
-/// Every place where the accounts of two files part. Lists of other lengths, and of numbers, part as
-/// a whole.
+/// Every place where the accounts of two files part. Lists of other lengths, and of numbers, part
+/// as a whole.
 pub(super) fn changes(first: &ParquetFile, second: &ParquetFile) -> Vec<PlanChange> {
     let (first, second) = (account(first), account(second));
     let opens = |first: &[Value], second: &[Value]| {
