@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use super::error::PlotError;
+use super::label::{self, Label};
 use super::read::{ColumnFacts, Kind, Source};
 use super::thin::{Keep, Stretches, Thinner};
 
@@ -89,6 +90,11 @@ pub(crate) struct Column {
 }
 
 impl Column {
+    /// Its name in words, and its unit.
+    pub(crate) fn label(&self) -> Label {
+        Label::new(&label::words(&self.facts.name), &self.facts.unit)
+    }
+
     /// The values, if they are numbers.
     pub(crate) fn numbers(&self) -> Option<&[f64]> {
         let Values::Numbers(values) = &self.values else { return None };

@@ -8,7 +8,7 @@ use crate::axis::evenly_by_log;
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
 use crate::error::PlotError;
-use crate::label::{self, Label};
+use crate::label;
 use crate::read::bracket;
 use crate::table::{Column, Table};
 use crate::together;
@@ -87,18 +87,14 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         subtitle: table.source.subtitle(&format!(
             "{} values of {}{side}",
             grid.len(),
-            label::words(&x.facts.name).to_lowercase()
+            x.label().words.to_lowercase()
         )),
-        x_label: Label::new(&label::words(&x.facts.name), &x.facts.unit),
+        x_label: x.label(),
         x_log: evenly_by_log(&grid),
         grids: vec![grid],
         panels: vec![ChartPanel {
             height: 440.0,
-            ..ChartPanel::new(
-                "boundary",
-                Label::new(&label::words(&y.facts.name), &y.facts.unit),
-                series,
-            )
+            ..ChartPanel::new("boundary", y.label(), series)
         }],
         ..Chart::default()
     })
@@ -106,25 +102,18 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
 
 /// What the region above the uppermost places is, where all of these say the same.
 fn far_side(curves: &[(String, Vec<Place>)], [falling, rising]: [&str; 2]) -> String {
-    let mut uppermost: Vec<Place> = Vec::new();
-    let all = || curves.iter().flat_map(|(_, places)| places);
-    let crossings = || all().filter(|place| place.y.is_finite());
-    for place in crossings() {
-        match uppermost.iter_mut().find(|known| known.x == place.x) {
-            Some(known) if known.y < place.y => *known = *place,
-            Some(_) => {}
-            None => uppermost.push(*place),
-        }
-    }
-    let all = |rising: bool| {
-        !uppermost.is_empty() && uppermost.iter().all(|place| place.rising == Some(rising))
+    let all = curves.iter().flat_map(|(_, places)| places);
+    let mut uppermost: Vec<&Place> = all.filter(|place| place.y.is_finite()).collect();
+    let crossings = uppermost.len();
+    uppermost.sort_by(|a, b| a.x.total_cmp(&b.x).then(b.y.total_cmp(&a.y)));
+    uppermost.dedup_by(|a, b| a.x == b.x);
+    let side = uppermost.first().and_then(|place| place.rising);
+    let side = match side.filter(|_| uppermost.iter().all(|place| place.rising == side)) {
+        Some(true) => rising,
+        Some(false) => falling,
+        None => return String::new(),
     };
-    let side = match (all(true), all(false)) {
-        (false, true) => falling,
-        (true, false) => rising,
-        _ => return String::new(),
-    };
-    let line = if crossings().count() > uppermost.len() { "highest crossing" } else { "line" };
+    let line = if crossings > uppermost.len() { "highest crossing" } else { "line" };
     format!(" · {side} above the {line}")
 }
 
@@ -233,7 +222,8 @@ fn further(table: &Table, row: usize) -> String {
 /// A curve's places as lines that have one each along the grid: where there are several, each goes
 /// on from the line, of those with the same sides, whose last place is nearest.
 fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
-    let nowhere = |x: f64| Place { x, y: f64::NAN, low: f64::NAN, high: f64::NAN, rising: None };
+    const NOWHERE: Place =
+        Place { x: f64::NAN, y: f64::NAN, low: f64::NAN, high: f64::NAN, rising: None };
     let height =
         |place: &Place| if place.y.is_nan() { 0.5 * (place.low + place.high) } else { place.y };
     let mut lines: Vec<Vec<Place>> = Vec::new();
@@ -244,9 +234,8 @@ fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (line, known) in lines.iter().enumerate() {
             for (place, new) in here.iter().enumerate() {
-                let Some(last) = known.last() else { continue };
-                let apart = (height(last) - height(new)).abs();
-                if apart.is_finite() && last.rising == new.rising {
+                let apart = (height(&known[k - 1]) - height(new)).abs();
+                if apart.is_finite() && known[k - 1].rising == new.rising {
                     pairs.push((apart, line, place));
                 }
             }
@@ -259,19 +248,11 @@ fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
             }
         }
         for (place, line) in here.into_iter().zip(taken) {
-            match line {
-                Some(line) => lines[line].push(place),
-                None => {
-                    let mut line: Vec<Place> = grid[..k].iter().map(|x| nowhere(*x)).collect();
-                    line.push(place);
-                    lines.push(line);
-                }
-            }
-        }
-        for line in &mut lines {
-            if line.len() == k {
-                line.push(nowhere(x));
-            }
+            let line = line.unwrap_or_else(|| {
+                lines.push(vec![NOWHERE; grid.len()]);
+                lines.len() - 1
+            });
+            lines[line][k] = place;
         }
     }
     lines

@@ -37,11 +37,9 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     }
     let is_near = |mode: &Mode| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top);
     let (near, far): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(is_near);
-    let (_, highest) =
-        extremes(near.iter().flat_map(|mode| mode.frequency.iter().copied())).unwrap_or((0.0, top));
     let sums = unstable.as_ref().map_or_else(Vec::new, |unstable| sums(&near, unstable));
-    let (_, highest) = extremes(sums.iter().flat_map(|sum| sum.frequency.iter().copied()))
-        .map_or((0.0, highest), |(_, of_sums)| (0.0, highest.max(of_sums)));
+    let drawn = near.iter().chain(&sums).flat_map(|mode| mode.frequency.iter().copied());
+    let (_, highest) = extremes(drawn).unwrap_or((0.0, top));
     let range = (0.0, (1.06 * top).min(1.25 * highest));
 
     let mut grids = vec![vec![0.0, top]];
