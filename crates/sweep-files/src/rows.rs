@@ -121,18 +121,6 @@ impl ResultTable {
         names.retain(|name| self.column(name).is_some());
         names
     }
-
-    /// As [`ParquetFile::each_row`].
-    ///
-    /// # Errors
-    /// [`FileError`], and whatever `take` says.
-    pub fn each_row<E: From<FileError>>(
-        &self,
-        names: &[&str],
-        take: impl FnMut(Row<'_>) -> Result<(), E>,
-    ) -> Result<(), E> {
-        self.file.each_row(names, take)
-    }
 }
 
 /// Rows decoded at once.

@@ -273,7 +273,7 @@ pub(crate) fn each_row(
 ) -> Result<(), ResultsError> {
     let first = names.len();
     let names = [names, &keep.map_or_else(Vec::new, Condition::names)].concat();
-    table.each_row(&names, |row| {
+    table.file().each_row(&names, |row| {
         let at = |first| Context { row, first, folded: &[] };
         match keep.is_none_or(|keep| keep.root.truth(&at(first)) == Some(true)) {
             true => work(&at(0)),

@@ -163,6 +163,7 @@ impl Condition {
     }
 }
 
+#[derive(Default)]
 struct Parser<'a> {
     tokens: Vec<Spanned>,
     next: usize,
@@ -180,16 +181,7 @@ pub(crate) fn expression(
     columns: &[Column],
     wanted: CellKind,
 ) -> Result<Condition, Mistake> {
-    let mut parser = Parser {
-        tokens: tokens(text)?,
-        next: 0,
-        columns,
-        used: Vec::new(),
-        folds: Vec::new(),
-        by_row: false,
-        in_fold: false,
-        depth: 0,
-    };
+    let mut parser = Parser { tokens: tokens(text)?, columns, ..Parser::default() };
     let root = parser.any_of()?;
     let (token, span) = parser.peek().clone();
     if token != Token::End {

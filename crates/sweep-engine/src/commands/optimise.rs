@@ -111,7 +111,7 @@ fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Re
         ["candidate", "feasible", "on_front"].into_iter().chain(own).chain(objectives).collect();
     let chosen = args.candidate.or_else(|| about["best"].as_u64());
     let (mut feasible, mut front, mut values) = (0, Vec::new(), None);
-    file.each_row(&names, |row| {
+    file.file().each_row(&names, |row| {
         let cells: Vec<Cell> = (0..names.len()).map(|column| row.cell(column)).collect();
         feasible += usize::from(cells[1] == Cell::Flag(true));
         if Some(row.index()) == chosen {

@@ -1,6 +1,6 @@
 //! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::PlotOptions;
 use crate::axis::extremes;
@@ -41,26 +41,21 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         found.iter().zip(is_shown).filter(|(of, is_shown)| *is_shown && (any || of.channel));
     let shown: Vec<&str> = shown.map(|(quantity, _)| quantity.name).collect();
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
-    let names = other.as_ref().map(|other| told_apart(table, other));
+    let names = match &other {
+        Some(other) => told_apart(table, other),
+        None => sides.map(said_of),
+    };
+    // The second curve lies in front; where it hides the first one, this must shine through.
+    let drawn = [(table, NONLINEAR), (other.as_ref().unwrap_or(table), LINEAR.with_alpha(165))];
     let pair = |columns: &[String; 2], factor: f64| -> Vec<Series> {
-        // The second curve lies in front; where it hides the first one, this must shine through.
-        let front = LINEAR.with_alpha(165);
-        let [first, second] = columns;
-        let curves = match (&other, &names) {
-            (Some(other), Some([one, another])) => [
-                (table, first, one.clone(), NONLINEAR, 0),
-                (other, first, another.clone(), front, 1),
-            ],
-            _ => [
-                (table, first, said_of(sides[0]), NONLINEAR, 0),
-                (table, second, said_of(sides[1]), front, 0),
-            ],
+        let curve = |k: usize| {
+            let ((table, colour), is_other) = (drawn[k], other.is_some());
+            let column = table.column(&columns[if is_other { 0 } else { k }])?;
+            let y = column.numbers()?.iter().map(|value| value * factor).collect();
+            let grid = if is_other { k } else { 0 };
+            Some(Series::new(names[k].clone(), colour, grid, y, Style::Solid(1.3)))
         };
-        let curves = curves.into_iter().filter_map(|(table, column, name, colour, grid)| {
-            let y = table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
-            Some(Series::new(name, colour, grid, y, Style::Solid(1.3)))
-        });
-        curves.collect()
+        (0..2).filter_map(curve).collect()
     };
     let of = |quantity: &Quantity<'_>| {
         let (name, (unit, factor)) = (quantity.name, label::shown(quantity.unit));
@@ -109,12 +104,12 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         panels.push(ChartPanel { height: 130.0, ..spin });
     }
     Ok(Chart {
-        title: match &names {
+        title: match &other {
             Some(_) => "Nonlinear motion from static equilibrium".to_owned(),
             None if sides == FITTED => "A measurement, and the model fitted to it".to_owned(),
             None => "Motion of both models from static equilibrium".to_owned(),
         },
-        subtitle: match &names {
+        subtitle: match &other {
             // What one of them is would be wrong of the other.
             Some(_) => of_both(&least, apart).join(" · "),
             None => subtitle(table, &least, apart),
@@ -270,8 +265,10 @@ pub(super) fn unstable_speeds(
     table: &Table,
     options: &PlotOptions,
 ) -> Result<Vec<[f64; 2]>, PlotError> {
-    let unstable = |path: &PathBuf| stability::unstable_of(table, path);
-    Ok(options.stability.as_ref().map(unstable).transpose()?.map_or_else(Vec::new, |it| it.speeds))
+    match &options.stability {
+        Some(path) => Ok(stability::unstable_of(table, path)?.speeds),
+        None => Ok(Vec::new()),
+    }
 }
 
 /// The resonance speeds that the options name, rpm, and for the subtitle where the machine whose

@@ -129,7 +129,7 @@ pub(super) fn of_boundaries(
         });
         let mut read = keys.clone();
         read.extend([axis, bracket[0], bracket[1]]);
-        table.each_row(&read, |row| {
+        table.file().each_row(&read, |row| {
             let number = |place: usize| row.cell(place).number();
             let place: Option<Vec<f64>> = (0..keys.len()).map(number).collect();
             let Some(place) = place else { return Ok(()) };

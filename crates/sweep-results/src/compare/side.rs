@@ -38,7 +38,7 @@ pub(super) fn keys(table: &ResultTable, is_boundary: bool) -> Vec<String> {
 /// The value of a column that has one in all rows.
 pub(super) fn only_value(table: &ResultTable, name: &str) -> Result<Option<f64>, ResultsError> {
     let mut values = BTreeSet::new();
-    table.each_row(&[name], |row| {
+    table.file().each_row(&[name], |row| {
         values.insert(row.cell(0).number().map(|value| (value + 0.0).to_bits()));
         Ok::<(), ResultsError>(())
     })?;

@@ -29,7 +29,7 @@ pub(super) fn write(
     let names = names(table);
     let headings: Vec<String> = names.iter().map(|name| quoted(name)).collect();
     let _ = writeln!(text, "{}", headings.join(","));
-    table.each_row(&names, |row| {
+    table.file().each_row(&names, |row| {
         for column in 0..names.len() {
             let _ = match row.cell(column) {
                 Cell::Null => Ok(()),

@@ -109,7 +109,7 @@ fn fill(
     sheet.row(names.iter().map(|name| text(name))).map_err(refused)?;
     sheet.row(table.columns.iter().map(|column| text(&column.unit))).map_err(refused)?;
     let heading = sheet.row - 1;
-    table.each_row(&names, |row| {
+    table.file().each_row(&names, |row| {
         sheet.row((0..names.len()).map(|column| row.cell(column))).map_err(refused)
     })?;
     let last = u16::try_from(names.len().saturating_sub(1)).unwrap_or(u16::MAX);
