@@ -34,7 +34,7 @@ pub(crate) struct Chart {
 }
 
 /// One panel of a chart.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub(crate) struct ChartPanel {
     /// Short name, by which it is picked.
     pub(crate) name: String,
@@ -72,18 +72,8 @@ impl Mark {
 impl ChartPanel {
     /// A panel of these curves that is shown, even, as high as its series need, and 420 px tall.
     pub(crate) fn new(name: &str, label: Label, series: Vec<Series>) -> Self {
-        Self {
-            name: name.to_owned(),
-            label,
-            shown: true,
-            log: false,
-            range: None,
-            height: 420.0,
-            series,
-            levels: Vec::new(),
-            stars: Vec::new(),
-            mixed: Vec::new(),
-        }
+        let name = name.to_owned();
+        Self { name, label, series, shown: true, height: 420.0, ..Self::default() }
     }
 }
 

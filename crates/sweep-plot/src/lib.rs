@@ -194,7 +194,7 @@ pub struct Live {
 }
 
 /// A parameter that a page can move.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Slider {
     /// As in grid files.
     pub name: String,

@@ -33,13 +33,8 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
         });
         let y: Vec<f64> = both_ends.collect();
         let low = y.iter().map(|share| 0.0 * share).collect();
-        Some(Series {
-            name: scatter.words(side),
-            colour: colour(side),
-            grid: 0,
-            style: Style::Band(low, y.clone()),
-            y,
-        })
+        let style = Style::Band(low, y.clone());
+        Some(Series::new(scatter.words(side), colour(side), 0, y, style))
     });
     let series: Vec<Series> = series.collect();
     let greatest = extremes(series.iter().flat_map(|series| series.y.iter().copied()));
