@@ -10,6 +10,8 @@ mod report;
 pub(crate) use design::page_of as design_page;
 pub(crate) use report::told;
 
+use std::rc::Rc;
+
 use serde_json::{Value, json};
 
 use super::axis::{LEAST_TICKS, SLACK, Scale, Step, Tick, log_sets};
@@ -394,7 +396,13 @@ fn curve(values: &[f64]) -> Value {
 
 /// A chart, its curves by `curve`.
 fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
-    let grids = chart.grids.iter().map(|grid| embed::floats(grid.iter().copied()));
+    let mut grids: Vec<&Rc<Vec<f64>>> = Vec::new();
+    for series in chart.panels.iter().flat_map(|panel| &panel.series) {
+        if !grids.contains(&&series.x) {
+            grids.push(&series.x);
+        }
+    }
+    let panels = chart.panels.iter().map(|panel| panel_json(panel, &grids, curve));
     let marks = chart.marks.iter().map(|mark| json!([embed::short(mark.x), mark.label]));
     let xs = x_scale(chart);
     json!({
@@ -403,8 +411,8 @@ fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
         "xLog": chart.x_log,
         "xRange": [xs.from, xs.to],
         "xTicks": log_ticks_json(xs),
-        "grids": grids.collect::<Vec<_>>(),
-        "panels": chart.panels.iter().map(|panel| panel_json(panel, curve)).collect::<Vec<_>>(),
+        "grids": grids.iter().map(|grid| embed::floats(grid.iter().copied())).collect::<Value>(),
+        "panels": panels.collect::<Value>(),
         "marks": marks.collect::<Vec<_>>(),
         "markMeaning": chart.mark_meaning,
         "shades": chart.shades,
@@ -412,17 +420,18 @@ fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
     })
 }
 
-fn panel_json(panel: &ChartPanel, curve: fn(&[f64]) -> Value) -> Value {
+fn panel_json(panel: &ChartPanel, grids: &[&Rc<Vec<f64>>], curve: fn(&[f64]) -> Value) -> Value {
     let stars =
         panel.stars.iter().map(|(x, y, label)| json!([embed::short(*x), embed::short(*y), label]));
     let mut data = json!(panel);
     data["ticks"] = log_ticks_json(y_scale(panel));
     data["stars"] = stars.collect();
-    data["series"] = panel.series.iter().map(|series| series_json(series, curve)).collect();
+    let of_series = |series| series_json(series, grids, curve);
+    data["series"] = panel.series.iter().map(of_series).collect();
     data
 }
 
-fn series_json(series: &Series, curve: fn(&[f64]) -> Value) -> Value {
+fn series_json(series: &Series, grids: &[&Rc<Vec<f64>>], curve: fn(&[f64]) -> Value) -> Value {
     let (stroke, dots) = (stroke(series), series.style == Style::Dots);
     let [low, high] = match &series.style {
         Style::Band(low, high) => [low, high].map(|side| curve(side)),
@@ -431,7 +440,7 @@ fn series_json(series: &Series, curve: fn(&[f64]) -> Value) -> Value {
     json!({
         "name": series.name,
         "colour": if series.colour == INK { "ink".to_owned() } else { series.colour.css() },
-        "grid": series.grid,
+        "grid": grids.iter().position(|grid| **grid == series.x),
         "alpha": embed::short(f64::from(series.colour.alpha) / 255.0),
         "width": if dots { 2.0 * DOT } else { stroke.width },
         "dashed": !stroke.dash.is_empty(),

@@ -74,7 +74,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         series.extend(branches(&grid, places).into_iter().map(|branch| {
             let pick = |of: fn(&Place) -> f64| branch.iter().map(of).collect::<Vec<f64>>();
             let style = Style::Band(pick(|place| place.low), pick(|place| place.high));
-            Series::new(name.clone(), colour, 0, pick(|place| place.y), style)
+            Series::new(name.clone(), colour, grid.clone(), pick(|place| place.y), style)
         }));
     }
     let side = far_side(&curves, side_words(table));
@@ -91,7 +91,6 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         )),
         x_label: x.label(),
         x_log: evenly_by_log(&grid),
-        grids: vec![grid],
         panels: vec![ChartPanel {
             height: 440.0,
             ..ChartPanel::new("boundary", y.label(), series)
@@ -186,9 +185,8 @@ pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay, PlotErr
     }
     let chart = chart(table)?;
     let name = format!("traced boundary: {}", limit(table));
-    let xs = chart.grids.into_iter().next().unwrap_or_default();
     let series = chart.panels.into_iter().flat_map(|panel| panel.series);
-    let lines = series.map(|series| xs.iter().zip(series.y).map(|(&x, y)| [x, y]).collect());
+    let lines = series.map(|series| series.x.iter().zip(series.y).map(|(&x, y)| [x, y]).collect());
     Ok(Overlay { name, lines: lines.collect() })
 }
 

@@ -42,7 +42,6 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let (_, highest) = extremes(drawn).unwrap_or((0.0, top));
     let range = (0.0, (1.06 * top).min(1.25 * highest));
 
-    let mut grids = vec![vec![0.0, top]];
     let mut series = Vec::new();
     let mut stars = Vec::new();
     let of_modes = near.into_iter().enumerate().map(|(k, mut mode)| {
@@ -53,11 +52,10 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let of_sums = sums.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
     for (mode, colour, style) in of_modes.chain(of_sums) {
         stars.extend(crossings(&mode).into_iter().map(|at| (at, at, format!("{at:.1} rpm"))));
-        series.push(Series::new(mode.name, colour, grids.len(), mode.frequency, style));
-        grids.push(mode.speed);
+        series.push(Series::new(mode.name, colour, mode.speed, mode.frequency, style));
     }
-    let line = Series::new("frequency = spin speed", INK, 0, vec![0.0, top], Style::Dashed);
-    series.push(line);
+    let ends = vec![0.0, top];
+    series.push(Series::new("frequency = spin speed", INK, ends.clone(), ends, Style::Dashed));
     let mut notes = table.source.notes([]);
     if series.iter().any(|series| matches!(series.style, Style::Band(..))) {
         notes.push("shaded: least to greatest over a turn of the drum".to_owned());
@@ -70,7 +68,6 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         title: "Natural frequencies over spin speed".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Spin speed", "rpm"),
-        grids,
         panels: vec![ChartPanel {
             range: Some(range),
             height: 500.0,

@@ -58,33 +58,27 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
     let one = read(source, &axes, std::slice::from_ref(&point), &columns)?.remove(0);
     let passing = options.against.as_ref().map(|path| passing(source, (&axes, &point), path));
     let passing = passing.transpose()?;
-    // A grid of speeds of the lines, then one of the motions of each kind, then those of a run.
     let of_kind = |kind: usize| motions.iter().filter(move |(_, of, _)| *of == kind);
-    let mut grids = vec![one.speed.clone()];
-    grids.extend((0..KINDS.len()).map(|kind| of_kind(kind).map(|(speed, ..)| *speed).collect()));
-    let of_run = grids.len();
     let (first, last) = (one.speed.first().copied(), one.speed.last().copied());
     let is_held = |speed: &f64| first <= Some(*speed) && Some(*speed) <= last;
-    let grids_of_run = passing.iter().flat_map(|run| &run.grids);
-    grids.extend(grids_of_run.map(|grid| grid.iter().copied().filter(is_held).collect()));
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
         let (_, factor) = label::shown(&facts.unit);
         let mut series = response("periodic response", &one, k, factor);
         for (kind, (_, words, colour)) in KINDS.iter().enumerate() {
-            let y: Vec<f64> = of_kind(kind).map(|(_, _, values)| values[k] * factor).collect();
+            let ends = of_kind(kind).map(|(speed, _, values)| (speed, values[k] * factor));
+            let (x, y): (Vec<f64>, Vec<f64>) = ends.unzip();
             if !y.is_empty() {
                 let name = format!("ends in: {words}");
-                series.push(Series::new(name, *colour, 1 + kind, y, Style::Dots));
+                series.push(Series::new(name, *colour, x, y, Style::Dots));
             }
         }
         let runs = passing.iter().flat_map(|run| &run.panels).filter(|panel| panel.name == *name);
         let runs = runs.flat_map(|panel| &panel.series);
         let rising = runs.filter(|run| run.name == RISING);
-        series.extend(passing.iter().zip(rising).map(|(chart, run)| {
-            let of_run_y = chart.grids[run.grid].iter().zip(&run.y);
-            let y = of_run_y.filter_map(|(speed, y)| is_held(speed).then_some(*y)).collect();
-            let name = "a run that passes these speeds";
-            Series::new(name, INK, of_run + run.grid, y, Style::Solid(1.4))
+        series.extend(rising.map(|run| {
+            let held = run.x.iter().zip(&run.y).filter(|(speed, _)| is_held(speed));
+            let (x, y): (Vec<f64>, Vec<f64>) = held.unzip();
+            Series::new("a run that passes these speeds", INK, x, y, Style::Solid(1.4))
         }));
         let motions = series.iter().flat_map(|series| &series.y).copied();
         let log =
@@ -100,7 +94,6 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         x_label: Label::new("Constant spin speed", "rpm"),
         shades: unstable(&one.speed, &one.growth),
         shade_meaning: UNSTABLE.to_owned(),
-        grids,
         panels,
         ..Chart::default()
     })
@@ -174,7 +167,6 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
             None => found.push((row.speed, motion, place_of(row.kind), vec![state])),
         }
     })?;
-    let mut grids = Vec::new();
     let mut panels: Vec<ChartPanel> = Vec::new();
     for (speed, motion, kind, mut states) in found {
         states.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -183,9 +175,9 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
         let further = DISTINCT[motion as usize % DISTINCT.len()];
         let colour = if motion == 0.0 { colour } else { further };
         let name = format!("motion {motion}: {words}");
-        let pitch = states.iter().map(|state| state[1]).collect();
-        let series = Series::new(name, colour, grids.len(), pitch, Style::Dots);
-        grids.push(states.iter().map(|state| state[0]).collect());
+        let [yaw, pitch]: [Vec<f64>; 2] =
+            [0, 1].map(|k| states.iter().map(|state| state[k]).collect());
+        let series = Series::new(name, colour, yaw, pitch, Style::Dots);
         match panels.last_mut().filter(|panel| panel.name == said) {
             Some(panel) => panel.series.push(series),
             None => {
@@ -198,7 +190,6 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
         title: "States once a turn, where the unbalance is up".to_owned(),
         subtitle: notes_at(source, &axes, &point).join(" · "),
         x_label: Label::new("Yaw of the tub from equilibrium", "mrad"),
-        grids,
         panels,
         ..Chart::default()
     })

@@ -56,18 +56,17 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
         let own = rows.iter().filter(|(of, values)| *of == kind && values[0].is_finite());
         own.map(|(_, values)| values[k] * units[k].1).collect()
     };
-    let grids: Vec<Vec<f64>> = (0..KINDS.len()).map(|kind| of(kind, 0)).collect();
     let panels = shown.iter().enumerate().map(|(k, (column, words))| {
         let colours = [FAILED, DISTINCT[5], NONLINEAR];
         let dots = |kind: usize| {
-            Series::new(KINDS[kind], colours[kind], kind, of(kind, k + 1), Style::Dots)
+            Series::new(KINDS[kind], colours[kind], of(kind, 0), of(kind, k + 1), Style::Dots)
         };
-        let drawn = (0..KINDS.len()).filter(|&kind| !grids[kind].is_empty());
+        let dots = (0..KINDS.len()).map(dots).filter(|series| !series.x.is_empty());
         let label = Label::new(words, units[k + 1].0);
         ChartPanel {
             shown: k < ys.len(),
             height: 300.0,
-            ..ChartPanel::new(&column.name, label, drawn.map(dots).collect())
+            ..ChartPanel::new(&column.name, label, dots.collect())
         }
     });
     Ok(Chart {
@@ -76,7 +75,6 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
         subtitle: source.subtitle(&format!("{} candidates", source.rows)),
         x_label: Label::new(&x.1, units[0].0),
         panels: panels.collect(),
-        grids,
         ..Chart::default()
     })
 }

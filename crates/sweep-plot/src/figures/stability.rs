@@ -67,7 +67,8 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
         if named.is_empty() { "growth".to_owned() } else { named.join(", ") }
     };
     let series = swept.iter().enumerate().map(|(k, point)| {
-        Series::new(name(&point.values), DISTINCT[k], k, point.growth.clone(), Style::Solid(2.2))
+        let (x, y) = (point.speed.clone(), point.growth.clone());
+        Series::new(name(&point.values), DISTINCT[k], x, y, Style::Solid(2.2))
     });
     let common = axes.iter().zip(&shown[0]).enumerate().filter(|(k, _)| !differs(*k));
     let mut notes = source.notes(common.map(|(_, (axis, value))| said_within(axis, *value)));
@@ -92,7 +93,6 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
         title: "Where a dwell at constant speed is unstable".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        grids: swept.into_iter().map(|point| point.speed).collect(),
         panels: vec![panel],
         marks,
         mark_meaning: "edge".to_owned(),
@@ -128,7 +128,6 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         x_label: Label::new("Constant spin speed", "rpm"),
         shades: unstable(&one.speed, &one.growth),
         shade_meaning: UNSTABLE.to_owned(),
-        grids: vec![one.speed],
         panels,
         ..Chart::default()
     })
@@ -168,9 +167,9 @@ pub(super) fn response(name: &str, one: &Swept, k: usize, factor: f64) -> Vec<Se
     let of = |wanted: bool| part(&periodic, &one.growth, wanted);
     let [stable, unstable] = ["stable", "unstable"].map(|word| format!("{name}, {word}"));
     vec![
-        Series::new("linear model", LINEAR, 0, linear, Style::Solid(1.6)),
-        Series::new(stable, NONLINEAR, 0, of(false), Style::Solid(2.2)),
-        Series::new(unstable, NONLINEAR, 0, of(true), Style::Dashed),
+        Series::new("linear model", LINEAR, one.speed.clone(), linear, Style::Solid(1.6)),
+        Series::new(stable, NONLINEAR, one.speed.clone(), of(false), Style::Solid(2.2)),
+        Series::new(unstable, NONLINEAR, one.speed.clone(), of(true), Style::Dashed),
     ]
 }
 

@@ -1,6 +1,7 @@
 //! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
 
 use std::path::Path;
+use std::rc::Rc;
 
 use crate::PlotOptions;
 use crate::axis::extremes;
@@ -21,7 +22,7 @@ use crate::together::{self, At};
 /// [`PlotError::Undrawable`] without time, [`PlotError::Unfit`] for an unknown channel, and as
 /// [`campbell::resonances`] for the modes file that gives the resonance speeds.
 pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
-    let time = table.numbers("time_s")?.to_vec();
+    let time = Rc::new(table.numbers("time_s")?.to_vec());
     if time.len() < 2 {
         return Err(table.source.empty("a trace needs at least two instants"));
     }
@@ -46,14 +47,18 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         None => sides.map(said_of),
     };
     // The second curve lies in front; where it hides the first one, this must shine through.
-    let drawn = [(table, NONLINEAR), (other.as_ref().unwrap_or(table), LINEAR.with_alpha(165))];
+    let front = LINEAR.with_alpha(165);
+    let drawn = match &other {
+        Some(other) => (other, Rc::new(other.numbers("time_s")?.to_vec()), front),
+        None => (table, Rc::clone(&time), front),
+    };
+    let drawn = [(table, Rc::clone(&time), NONLINEAR), drawn];
     let pair = |columns: &[String; 2], factor: f64| -> Vec<Series> {
         let curve = |k: usize| {
-            let ((table, colour), is_other) = (drawn[k], other.is_some());
-            let column = table.column(&columns[if is_other { 0 } else { k }])?;
+            let ((table, time, colour), name) = (&drawn[k], names[k].clone());
+            let column = table.column(&columns[if other.is_some() { 0 } else { k }])?;
             let y = column.numbers()?.iter().map(|value| value * factor).collect();
-            let grid = if is_other { k } else { 0 };
-            Some(Series::new(names[k].clone(), colour, grid, y, Style::Solid(1.3)))
+            Some(Series::new(name, *colour, Rc::clone(time), y, Style::Solid(1.3)))
         };
         (0..2).filter_map(curve).collect()
     };
@@ -71,7 +76,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     for (name, column) in table.with_prefix("residual_") {
         let (unit, factor) = label::shown(&column.facts.unit);
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
-        let residual = Series::new("residual", INK, 0, y, Style::Dots);
+        let residual = Series::new("residual", INK, Rc::clone(&time), y, Style::Dots);
         let words = format!("residual, {}", label::words(name));
         let shown = shown.contains(&name);
         let label = Label::new(&words, unit);
@@ -99,7 +104,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         let passed = passages(&time, speed, &resonances).into_iter();
         marks.extend(passed.map(|(x, resonance)| Mark::of_speed(x, resonance)));
         shades = stability::stretches_within(&time, speed, &unstable);
-        let series = Series::new(String::new(), INK, 0, speed.to_vec(), Style::Solid(2.0));
+        let x = Rc::clone(&time);
+        let series = Series::new("", INK, x, speed.to_vec(), Style::Solid(2.0));
         let spin = panel("speed", Label::new("spin", "rpm"), true, vec![series]);
         panels.push(ChartPanel { height: 130.0, ..spin });
     }
@@ -115,10 +121,6 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
             None => subtitle(table, &least, apart),
         } + &note,
         x_label: Label::new("Time", "s"),
-        grids: match &other {
-            Some(other) => vec![time, other.numbers("time_s")?.to_vec()],
-            None => vec![time],
-        },
         panels,
         marks,
         mark_meaning: "resonance speed passed".to_owned(),
