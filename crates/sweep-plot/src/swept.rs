@@ -98,11 +98,11 @@ impl Gathered {
     }
 }
 
-/// The columns of a map file that are its axes, in file order: those of numbers between the point's
-/// index and the results.
+/// The columns that are a file's axes, in file order: those of numbers between the point's index
+/// and the results, or the speeds of each point.
 pub(crate) fn columns(source: &Source) -> Vec<&ColumnFacts> {
     let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
-    let is_result = |name: &str| of_model(name) || name == "ratio_change";
+    let is_result = |name: &str| of_model(name) || ["ratio_change", "speed_rpm"].contains(&name);
     let before = source.columns.iter().take_while(|column| !is_result(&column.name));
     before.filter(|column| column.is_number() && column.name != "point").collect()
 }

@@ -340,13 +340,12 @@ impl Parser<'_> {
                 }
                 _ => self.column(&word, span),
             },
-            Token::Sign(sign) => wrong(
-                format!("`{sign}` where a value should be"),
-                span,
-                "expected a column, a number or `(`",
-            ),
-            Token::End => {
-                wrong("the expression ends too early", span, "expected a column, a number or `(`")
+            Token::Sign(_) | Token::End => {
+                let title = match token {
+                    Token::Sign(sign) => format!("`{sign}` where a value should be"),
+                    _ => "the expression ends too early".to_owned(),
+                };
+                wrong(title, span, "expected a column, a number or `(`")
             }
         }
     }

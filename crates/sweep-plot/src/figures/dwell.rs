@@ -9,13 +9,14 @@ use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::stability::{
-    UNSTABLE, axes, channels_of, columns_of, each_row, notes_at, one_point, panel, read, response,
-    shown, unstable,
+    UNSTABLE, channels_of, columns_of, each_row, notes_at, one_point, panel, read, response, shown,
+    unstable,
 };
 use crate::figures::{passages, trace};
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Source};
 use crate::scene::{Colour, INK};
+use crate::swept;
 use crate::together::{self, At};
 
 /// Kinds of motions as the file has them, in words, and their colours; the last is what did not
@@ -51,7 +52,7 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
     let channels = channels_of(source, "periodic");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
-    let axes = axes(source);
+    let axes = swept::columns(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
     let motions = motions(source, &axes, &point, &channels)?;
     let columns = columns_of(&channels, ["linear", "periodic"]);
@@ -148,7 +149,7 @@ fn place_of(kind: Option<&str>) -> usize {
 /// # Errors
 /// As [`one_point`]; [`PlotError::Undrawable`] where no states were kept.
 pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
-    let axes = axes(source);
+    let axes = swept::columns(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
     let columns = ["motion", YAW, PITCH];
     if let Some(name) = columns.into_iter().find(|name| source.column(name).is_none()) {

@@ -10,7 +10,7 @@ use crate::error::PlotError;
 use crate::figures::machine::machine;
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Kind, Source, some_of};
-use crate::swept::SweptAxis;
+use crate::swept::{self, SweptAxis};
 use crate::table::Table;
 use crate::together;
 
@@ -40,18 +40,12 @@ pub(super) struct Swept {
 /// The point of a stability file with its axes' values, in file order.
 type Points = Vec<Vec<f64>>;
 
-/// The columns of numbers between the point's index and the speed.
-pub(super) fn axes(source: &Source) -> Vec<&ColumnFacts> {
-    let before = source.columns.iter().take_while(|column| column.name != "speed_rpm");
-    before.filter(|column| column.is_number() && column.name != "point").collect()
-}
-
 /// The chart of a stability file: growth over speed.
 ///
 /// # Errors
 /// As [`points`], [`read`].
 pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
-    let axes = axes(source);
+    let axes = swept::columns(source);
     let all = points(source, &axes, &options.at, "--at")?;
     let shown: Points = match all.len() {
         count if count <= MOST_CURVES => all.clone(),
@@ -112,7 +106,7 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
     let columns = columns_of(&channels, ["linear", "nonlinear"]);
-    let axes = axes(source);
+    let axes = swept::columns(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
     let one = read(source, &axes, &[point], &columns)?.remove(0);
     let panels = channels.iter().zip(is_shown).enumerate().map(|(k, (channel, shown))| {
@@ -219,7 +213,7 @@ pub(super) struct Unstable {
 pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
     let source = Source::open(path)?;
     source.expect(Kind::Stability, "--stability", "`sweep stability` writes a stability file")?;
-    let axes = axes(&source);
+    let axes = swept::columns(&source);
     let mut at: Vec<(String, f64)> =
         machine(table).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     let named = together::at(&table.source);
