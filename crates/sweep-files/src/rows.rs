@@ -277,11 +277,18 @@ fn decode(array: &ArrayRef, kind: CellKind) -> Result<Cells, ArrowError> {
             let mut names: Vec<String> = Vec::new();
             // Keyed by place: the words of a batch lie there once, and may be long.
             let mut places = HashMap::new();
+            // Neighbours mostly share theirs.
+            let mut last = (("".as_ptr(), usize::MAX), u32::MAX);
             let mut place = |word: &str| {
-                *places.entry((word.as_ptr(), word.len())).or_insert_with(|| {
-                    names.push(word.to_owned());
-                    u32::try_from(names.len() - 1).unwrap_or(u32::MAX)
-                })
+                let at = (word.as_ptr(), word.len());
+                if last.0 != at {
+                    let code = *places.entry(at).or_insert_with(|| {
+                        names.push(word.to_owned());
+                        u32::try_from(names.len() - 1).unwrap_or(u32::MAX)
+                    });
+                    last = (at, code);
+                }
+                last.1
             };
             let words = cells::texts(array)?.into_iter();
             let codes = words.map(|word| word.map_or(u32::MAX, &mut place)).collect();

@@ -315,13 +315,13 @@ pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
 impl ColumnRange {
     /// Takes in a number or a word, if there is one.
     fn widen(&mut self, value: f64, word: Option<&str>) {
-        if let Some(word) = word {
-            self.count(word);
-        } else if value.is_nan() {
-            self.nulls += 1;
-        } else {
+        if !value.is_nan() {
             let (least, greatest) = self.range.unwrap_or((value, value));
             self.range = Some((least.min(value), greatest.max(value)));
+        } else if let Some(word) = word {
+            self.count(word);
+        } else {
+            self.nulls += 1;
         }
     }
 
