@@ -1,11 +1,9 @@
-//! The columns of a file: what each says of itself, and the rows of some of them.
+//! The columns of a file: what each says of itself.
 
-use arrow_array::ArrayRef;
 use arrow_schema::{DataType, Field, Schema};
-use parquet::arrow::ProjectionMask;
 use sweep_parameter::Worse;
 
-use crate::{Batches, FileError, ParquetFile, cells, key};
+use crate::{cells, key};
 
 /// What the cells of a column are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,49 +81,4 @@ fn column(field: &Field, place: usize) -> Option<Column> {
         limit: told(key::LIMIT).parse().ok(),
         field: place,
     })
-}
-
-/// Rows decoded at once.
-const BATCH_ROWS: usize = 1 << 12;
-
-impl ParquetFile {
-    /// The rows, of the columns of these names as far as they are there.
-    ///
-    /// # Errors
-    /// As [`ParquetFile::batches`].
-    pub fn batches_of<'a>(
-        &self,
-        names: impl IntoIterator<Item = &'a str>,
-    ) -> Result<Batches, FileError> {
-        self.batches(|builder| {
-            let mask = ProjectionMask::columns(builder.parquet_schema(), names);
-            builder.with_projection(mask)
-        })
-    }
-
-    /// The rows batch by batch: how many, and the cells of each of these columns.
-    ///
-    /// # Errors
-    /// As [`ParquetFile::batches`].
-    pub fn rows_of(
-        &self,
-        columns: &[&Column],
-    ) -> Result<impl Iterator<Item = Result<(usize, Vec<ArrayRef>), FileError>> + use<>, FileError>
-    {
-        let mut fields: Vec<usize> = columns.iter().map(|column| column.field).collect();
-        fields.sort_unstable();
-        // Two columns of one name, in a file that is not ours, are the first of them twice.
-        fields.dedup();
-        let place = |column: &&Column| fields.partition_point(|&field| field < column.field);
-        let places: Vec<usize> = columns.iter().map(place).collect();
-        let batches = self.batches(|builder| {
-            let mask = ProjectionMask::roots(builder.parquet_schema(), fields);
-            builder.with_projection(mask).with_batch_size(BATCH_ROWS)
-        })?;
-        Ok(batches.map(move |batch| {
-            let batch = batch?;
-            let cells = places.iter().map(|&place| ArrayRef::clone(batch.column(place)));
-            Ok((batch.num_rows(), cells.collect()))
-        }))
-    }
 }

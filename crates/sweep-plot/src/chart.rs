@@ -1,5 +1,7 @@
 //! Curves over a common x axis, in panels one above the other. All figures but the map are charts.
 
+use std::rc::Rc;
+
 use super::axis::{Scale, extremes};
 use super::colour::{BOTH as BOTH_SIDES, ColourScale, SHADE};
 use super::decimate::envelope;
@@ -19,8 +21,6 @@ pub(crate) struct Chart {
     pub(crate) x_label: Label,
     /// The x axis is better read by its logarithm.
     pub(crate) x_log: bool,
-    /// Rising values of x that series share; they refer to these by index.
-    pub(crate) grids: Vec<Vec<f64>>,
     /// From top to bottom.
     pub(crate) panels: Vec<ChartPanel>,
     /// Upright lines through all panels.
@@ -34,11 +34,12 @@ pub(crate) struct Chart {
 }
 
 /// One panel of a chart.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub(crate) struct ChartPanel {
     /// Short name, by which it is picked.
     pub(crate) name: String,
     /// What the y axis shows.
+    #[serde(flatten)]
     pub(crate) label: Label,
     /// Shown in a picture, and at first in a page.
     pub(crate) shown: bool,
@@ -49,10 +50,12 @@ pub(crate) struct ChartPanel {
     /// Height in a picture, px.
     pub(crate) height: f64,
     /// In drawing order.
+    #[serde(skip)]
     pub(crate) series: Vec<Series>,
     /// Level lines: value and meaning.
     pub(crate) levels: Vec<(f64, String)>,
     /// Starred points: x, y and a label.
+    #[serde(skip)]
     pub(crate) stars: Vec<(f64, f64, String)>,
     /// Ranges of x whose cells hold points on both sides of the level.
     pub(crate) mixed: Vec<[f64; 2]>,
@@ -69,18 +72,8 @@ impl Mark {
 impl ChartPanel {
     /// A panel of these curves that is shown, even, as high as its series need, and 420 px tall.
     pub(crate) fn new(name: &str, label: Label, series: Vec<Series>) -> Self {
-        Self {
-            name: name.to_owned(),
-            label,
-            shown: true,
-            log: false,
-            range: None,
-            height: 420.0,
-            series,
-            levels: Vec::new(),
-            stars: Vec::new(),
-            mixed: Vec::new(),
-        }
+        let name = name.to_owned();
+        Self { name, label, series, shown: true, height: 420.0, ..Self::default() }
     }
 }
 
@@ -104,8 +97,8 @@ pub(crate) struct Series {
     pub(crate) name: String,
     /// Its colour.
     pub(crate) colour: Colour,
-    /// Index of its x values among the chart's grids.
-    pub(crate) grid: usize,
+    /// Rising; series mostly share theirs.
+    pub(crate) x: Rc<Vec<f64>>,
     /// One per x; NaN breaks the line.
     pub(crate) y: Vec<f64>,
     /// How it is drawn.
@@ -113,15 +106,15 @@ pub(crate) struct Series {
 }
 
 impl Series {
-    /// A series over one of the chart's grids.
+    /// A series.
     pub(crate) fn new(
         name: impl Into<String>,
         colour: Colour,
-        grid: usize,
+        x: impl Into<Rc<Vec<f64>>>,
         y: Vec<f64>,
         style: Style,
     ) -> Self {
-        Self { name: name.into(), colour, grid, y, style }
+        Self { name: name.into(), colour, x: x.into(), y, style }
     }
 }
 
@@ -169,7 +162,7 @@ pub(crate) fn draw(chart: &Chart) -> Scene {
             dots = draw_panel(scene, chart, content, &panel);
         });
         draw_marks(&mut scene, chart, &panel, index == 0);
-        draw_stars(&mut scene, (chart, content), &panel);
+        draw_stars(&mut scene, content, &panel);
         let last = index + 1 == panels.len();
         panel.frame(&mut scene, last, true);
         // Whole at the panel's edge too.
@@ -187,13 +180,14 @@ pub(crate) fn draw(chart: &Chart) -> Scene {
     scene
 }
 
-/// The scale of the x axis: all that the grids hold, with room for dots where there are no lines.
+/// The scale of the x axis: all that series hold, with room for dots where there are no lines.
 pub(crate) fn x_scale(chart: &Chart) -> Scale {
-    let mut series = chart.panels.iter().flat_map(|panel| &panel.series);
-    if !chart.x_log && series.all(|series| series.style == Style::Dots) {
-        return Scale::around(chart.grids.iter().flatten().copied());
+    let all = || chart.panels.iter().flat_map(|panel| &panel.series);
+    let xs = all().flat_map(|series| series.x.iter().copied());
+    if !chart.x_log && all().all(|series| series.style == Style::Dots) {
+        return Scale::around(xs);
     }
-    let (low, high) = extremes(chart.grids.iter().flatten().copied()).unwrap_or((0.0, 1.0));
+    let (low, high) = extremes(xs).unwrap_or((0.0, 1.0));
     let high = if high > low { high } else { low + 1.0 };
     if chart.x_log { Scale::log(low, high) } else { Scale::linear(low, high) }
 }
@@ -238,7 +232,7 @@ fn draw_panel(
         scene.fill(areas, colour);
     }
     for series in &content.series {
-        let xs = &chart.grids[series.grid];
+        let xs = &series.x;
         let at = |ys: &[f64], k: usize| {
             (xs[k].is_finite() && ys[k].is_finite()).then(|| panel.at(xs[k], ys[k]))
         };
@@ -278,7 +272,8 @@ fn draw_panel(
     dots
 }
 
-fn stroke(series: &Series) -> Stroke {
+/// How a series is drawn where it is a line.
+pub(crate) fn stroke(series: &Series) -> Stroke {
     match series.style {
         Style::Solid(width) => Stroke::solid(series.colour, width),
         Style::Dashed => Stroke::dashed(series.colour, 1.8, &[8.0, 5.0]),
@@ -296,7 +291,7 @@ fn mark_stroke() -> Stroke {
 }
 
 /// Radius of a dot, px.
-const DOT: f64 = 2.8;
+pub(crate) const DOT: f64 = 2.8;
 
 /// Radius of a star, px.
 const STAR: f64 = 10.0;
@@ -306,7 +301,7 @@ type Extent = [f64; 4];
 
 /// Stars first, then their labels, each where it covers neither a star nor a label before it, if
 /// there is such a place; of several, the one that the fewest lines run through.
-fn draw_stars(scene: &mut Scene, (chart, content): (&Chart, &ChartPanel), panel: &Panel) {
+fn draw_stars(scene: &mut Scene, content: &ChartPanel, panel: &Panel) {
     let mut taken: Vec<Extent> = Vec::new();
     for (x, y, _) in &content.stars {
         let [x, y] = panel.at(*x, *y);
@@ -331,20 +326,19 @@ fn draw_stars(scene: &mut Scene, (chart, content): (&Chart, &ChartPanel), panel:
                     right < other[0] || left > other[2] || bottom < other[1] || top > other[3]
                 })
         };
-        let place = places
-            .filter(free)
-            .min_by_key(|place| lines_through(chart, content, panel, extent(*place)));
+        let place =
+            places.filter(free).min_by_key(|place| lines_through(content, panel, extent(*place)));
         let place = place.unwrap_or([sides[1], y + 18.0]);
         taken.push(extent(place));
-        scene.text(Text::new(label.clone(), place, TICK_SIZE).bold().halo(PAPER));
+        let text = Text::new(label.clone(), place, TICK_SIZE).bold();
+        scene.text(Text { halo: Some(PAPER), ..text });
     }
 }
 
 /// How many curves of a panel run through a rectangle.
-fn lines_through(chart: &Chart, content: &ChartPanel, panel: &Panel, extent: Extent) -> usize {
+fn lines_through(content: &ChartPanel, panel: &Panel, extent: Extent) -> usize {
     let runs_through = |series: &&Series| {
-        let xs = &chart.grids[series.grid];
-        let places = xs.iter().zip(&series.y).map(|(&x, &y)| panel.at(x, y));
+        let places = series.x.iter().zip(&series.y).map(|(&x, &y)| panel.at(x, y));
         let places: Vec<[f64; 2]> = places.collect();
         places.windows(2).any(|pair| crosses([pair[0], pair[1]], extent))
     };
@@ -447,7 +441,7 @@ mod tests {
     #[test]
     fn labels_of_stars_stand_off_the_curves() {
         let speeds: Vec<f64> = (0..=30).map(|k| 10.0 * f64::from(k)).collect();
-        let flat = |y: f64| Series::new(String::new(), INK, 0, vec![y; 31], Style::Solid(2.0));
+        let flat = |y: f64| Series::new("", INK, speeds.clone(), vec![y; 31], Style::Solid(2.0));
         // The second curve is where the first one's label would stand.
         let mut series = vec![flat(147.8), flat(154.0), flat(162.1)];
         series.push(Series { y: speeds.clone(), ..flat(0.0) });
@@ -462,7 +456,6 @@ mod tests {
             subtitle: String::new(),
             x_label: Label::new("Speed", "rpm"),
             x_log: false,
-            grids: vec![speeds],
             panels: vec![panel],
             marks: Vec::new(),
             mark_meaning: String::new(),
@@ -483,7 +476,7 @@ mod tests {
             let [left, base] = text.at;
             let width = text_width(&text.text, TICK_SIZE, true);
             let extent = [left, base - TICK_SIZE, left + width, base + 4.0];
-            assert_eq!(lines_through(&chart, content, &panel, extent), 0, "{}", text.text);
+            assert_eq!(lines_through(content, &panel, extent), 0, "{}", text.text);
             count += 1;
         }
         assert_eq!(count, 2);

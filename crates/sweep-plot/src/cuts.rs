@@ -48,21 +48,18 @@ impl Cuts {
     ) -> Result<Self, PlotError> {
         let extra = axes.get(2..).unwrap_or_default();
         let pins = pins(source, extra, options)?;
-        let mut notes = Vec::new();
-        let mut picks = Vec::new();
-        for (k, (axis, pin)) in extra.iter().zip(&pins).enumerate() {
-            // The third axis becomes panels unless it is pinned.
-            if k == 0 && pin.is_none() {
-                let shown = axis.values.len().min(MOST_PANELS);
-                picks.push(evenly(axis.values.len(), shown));
-                continue;
-            }
-            let pin = pin.unwrap_or(0);
-            picks.push(vec![pin]);
-            notes.push(axis.said(axis.values[pin]));
-        }
+        // The third axis becomes panels unless it is pinned.
+        let is_free = pins.first() == Some(&None);
+        let pick = |(k, (axis, pin)): (usize, (&SweptAxis, &Option<usize>))| match pin {
+            None if k == 0 => evenly(axis.values.len(), axis.values.len().min(MOST_PANELS)),
+            pin => vec![pin.unwrap_or(0)],
+        };
+        let picks: Vec<Vec<usize>> = extra.iter().zip(&pins).enumerate().map(pick).collect();
+        let fixed = extra.iter().zip(&picks).skip(usize::from(is_free));
+        let mut notes: Vec<String> =
+            fixed.map(|(axis, pick)| axis.said(axis.values[pick[0]])).collect();
         let mut cuts = vec![Cut { rest: vec![0; extra.len()], name: None }];
-        if let (Some(axis), Some(None)) = (extra.first(), pins.first()) {
+        if let Some(axis) = extra.first().filter(|_| is_free) {
             if picks[0].len() < axis.values.len() {
                 notes.push(left_out(axis, picks[0].len()));
             }
@@ -139,7 +136,7 @@ fn left_out(axis: &SweptAxis, shown: usize) -> String {
 /// The value of each axis that `--at` names, by its place.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] when `--at` names no axis beyond the second, or a value that its axis
+/// [`PlotError::Unfit`] when `--at` names no axis beyond the second, or a value that its axis
 /// does not have; [`PlotError::NotAGrid`] for an axis of more values than are kept.
 fn pins(
     source: &Source,

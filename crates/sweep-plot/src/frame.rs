@@ -169,7 +169,7 @@ pub(crate) fn heading(scene: &mut Scene, title: &str, subtitle: &str) {
     let room = scene.width - 40.0;
     scene.text(Text::new(fit(title, TITLE_SIZE, true, room), [20.0, 32.0], TITLE_SIZE).bold());
     let subtitle = fit(subtitle, TICK_SIZE, false, room);
-    scene.text(Text::new(subtitle, [20.0, 55.0], TICK_SIZE).colour(MUTED));
+    scene.text(Text { colour: MUTED, ..Text::new(subtitle, [20.0, 55.0], TICK_SIZE) });
 }
 
 /// Height taken by [`heading`], px.

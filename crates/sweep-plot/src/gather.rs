@@ -8,37 +8,31 @@
 use std::collections::BTreeMap;
 
 use super::error::PlotError;
-use super::grid::{Grid, GridAxis};
-use super::read::{Batch, ColumnFacts, Source};
+use super::grid::Grid;
+use super::read::{ColumnFacts, Row, Source};
 use super::table::{Column, NONE, SEVERAL, Table, Values, Words};
 use sweep_parameter::Worse;
 
-/// Least and greatest finite values of a column over all rows of the file.
+/// Least, least positive and greatest finite value of a column over all rows of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Extent {
-    low: f64,
-    high: f64,
-    least_positive: f64,
-}
+pub(crate) struct Extent([f64; 3]);
 
 impl Extent {
-    const NONE: Self = {
-        let most = f64::INFINITY;
-        Self { low: most, high: -most, least_positive: most }
-    };
+    const NONE: Self = Self([f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY]);
 
     fn take(&mut self, value: f64) {
+        let [low, least_positive, high] = &mut self.0;
         if value.is_finite() {
-            (self.low, self.high) = (self.low.min(value), self.high.max(value));
+            (*low, *high) = (low.min(value), high.max(value));
             if value > 0.0 {
-                self.least_positive = self.least_positive.min(value);
+                *least_positive = least_positive.min(value);
             }
         }
     }
 
     /// Values with the same extremes as all, and as all that are positive.
     pub(crate) fn values(self) -> impl Iterator<Item = f64> {
-        [self.low, self.least_positive, self.high].into_iter().filter(|value| value.is_finite())
+        self.0.into_iter().filter(|value| value.is_finite())
     }
 }
 
@@ -104,26 +98,21 @@ impl Map {
     /// Reads the named columns of a map file into the cells of a grid. Some columns have levels.
     ///
     /// # Errors
-    /// As [`Source::batches`]; [`PlotError::NotAGrid`] for two rows at one point.
+    /// As [`Source::each_row`]; [`PlotError::NotAGrid`] for two rows at one point.
     pub(crate) fn read(
         source: Source,
         grid: Grid,
         columns: &[String],
         levels: &BTreeMap<String, Divide>,
     ) -> Result<Self, PlotError> {
-        let mut gather = Gather::new(&source, &grid, columns, levels);
-        let mut wanted: Vec<&str> = columns.iter().map(String::as_str).collect();
-        wanted.extend(grid.axes.iter().map(|axis| axis.swept.name.as_str()));
-        wanted.extend(["status", "reliable", "sensitive", "ratio_max"]);
-        wanted.sort_unstable();
-        wanted.dedup();
-        for batch in source.batches(&wanted)? {
-            gather.take(&batch?)?;
-        }
-        let Gather { columns, counts, statuses, by_status, .. } = gather;
-        let named = statuses.names.into_iter().zip(by_status.iter().copied());
-        let unknown = (UNKNOWN.to_owned(), by_status[usize::from(NONE)]);
-        let statuses = named.chain([unknown]).filter(|(_, rows)| *rows > 0).collect();
+        let names = grid.axes.iter().map(|axis| axis.swept.name.as_str());
+        let names = names.chain(["status", "reliable", "sensitive", "ratio_max"]);
+        let own: Vec<&ColumnFacts> =
+            source.columns.iter().filter(|column| columns.contains(&column.name)).collect();
+        let names: Vec<&str> = names.chain(own.iter().map(|facts| facts.name.as_str())).collect();
+        let mut gather = Gather::new(&source, &grid, &own, levels);
+        source.each_row(&names, |row| gather.take(row))?;
+        let Gather { columns, counts, statuses, .. } = gather;
         let (mut extents, mut sides) = (BTreeMap::new(), BTreeMap::new());
         let mut kept = Vec::with_capacity(columns.len());
         for column in columns {
@@ -138,7 +127,7 @@ impl Map {
             if let Values::Words(words) = &mut values {
                 words.sort();
             }
-            kept.push(Column::new(column.facts, values));
+            kept.push(Column { facts: column.facts.clone(), values });
         }
         let table = Table { rows: grid.cells(), columns: kept, source, stretch: None };
         Ok(Self { table, grid, counts, extents, sides, statuses })
@@ -241,9 +230,6 @@ impl Dividing {
     }
 }
 
-/// Which rows of a batch are something.
-type Marked = Vec<bool>;
-
 /// All columns on their way into cells.
 struct Gather<'a> {
     source: &'a Source,
@@ -254,25 +240,23 @@ struct Gather<'a> {
     first: Vec<usize>,
     /// Greatest ratio of each cell so far.
     greatest: Vec<f64>,
-    statuses: Words,
-    /// Rows by the code of their status.
-    by_status: [usize; 256],
-    row: usize,
+    /// Rows by their status.
+    statuses: BTreeMap<String, usize>,
     /// Value and place last found on each axis.
     last: Vec<(f64, Option<usize>)>,
+    /// By which a row is judged where the file has no verdicts.
+    limit: Option<f64>,
 }
 
 impl<'a> Gather<'a> {
     fn new(
         source: &'a Source,
         grid: &'a Grid,
-        columns: &[String],
+        columns: &[&'a ColumnFacts],
         levels: &BTreeMap<String, Divide>,
     ) -> Self {
         let cells = grid.cells();
-        let wanted = source.columns.iter().filter(|column| columns.contains(&column.name));
-        let columns = wanted.map(|facts| Gathered {
-            facts,
+        let columns = columns.iter().map(|&facts| Gathered {
             rule: Rule::of(facts),
             values: match facts.is_number() {
                 true => Values::Numbers(vec![f64::NAN; cells]),
@@ -284,6 +268,7 @@ impl<'a> Gather<'a> {
                 .get(&facts.name)
                 .filter(|_| grid.merged())
                 .map(|divide| Dividing::new(*divide, cells)),
+            facts,
         });
         Self {
             source,
@@ -292,86 +277,64 @@ impl<'a> Gather<'a> {
             counts: vec![Counts::default(); cells],
             first: vec![0; cells],
             greatest: vec![f64::NAN; cells],
-            statuses: Words::default(),
-            by_status: [0; 256],
-            row: 0,
+            statuses: BTreeMap::new(),
             last: vec![(f64::NAN, None); grid.axes.len()],
+            limit: source.column("reliable").is_none().then(|| source.ratio_limit()),
         }
     }
 
-    fn take(&mut self, batch: &Batch<'_>) -> Result<(), PlotError> {
-        let cells = self.cells(batch)?;
-        let worst = self.worst(batch, &cells)?;
-        let failed = self.count(batch, &cells)?;
-        let rows = Rows { cells: &cells, worst: &worst, failed: &failed };
-        for column in &mut self.columns {
-            column.take(batch, &rows)?;
+    /// Takes a row: the values of the axes, what became of the point, and the columns.
+    fn take(&mut self, row: Row<'_>) -> Result<(), PlotError> {
+        let mut cell = Some(0);
+        for (column, (axis, last)) in self.grid.axes.iter().zip(&mut self.last).enumerate() {
+            let value = row.number(column);
+            if value != last.0 {
+                *last = (value, axis.place(value));
+            }
+            cell = cell.zip(last.1).map(|(cell, place)| cell * axis.values.len() + place);
         }
-        self.row += batch.rows;
+        let own = self.last.len();
+        let status = row.word(own);
+        let named = status.unwrap_or(UNKNOWN);
+        match self.statuses.get_mut(named) {
+            Some(rows) => *rows += 1,
+            None => drop(self.statuses.insert(named.to_owned(), 1)),
+        }
+        let failed = status != Some(OK);
+        let is_worst = cell.map(|cell| self.count(cell, row, failed)).transpose()?;
+        for (column, gathered) in (own + 4..).zip(&mut self.columns) {
+            gathered.take((row, column), cell.zip(is_worst), failed);
+        }
         Ok(())
     }
 
-    /// The cell of each row; none where it is not shown.
-    fn cells(&mut self, batch: &Batch<'_>) -> Result<Vec<Option<usize>>, PlotError> {
-        let mut cells = vec![Some(0_usize); batch.rows];
-        for (axis, last) in self.grid.axes.iter().zip(&mut self.last) {
-            for (cell, value) in cells.iter_mut().zip(batch.numbers(&axis.swept.name)?) {
-                if value != last.0 {
-                    *last = (value, GridAxis::place(axis, value));
-                }
-                *cell = cell.zip(last.1).map(|(cell, place)| cell * axis.values.len() + place);
-            }
+    /// Counts what a row is; gives whether it has the greatest ratio of its cell so far.
+    fn count(&mut self, cell: usize, row: Row<'_>, failed: bool) -> Result<bool, PlotError> {
+        let own = self.last.len();
+        let counts = &mut self.counts[cell];
+        let is_full = |points| counts.points as usize >= points;
+        if counts.points == 0 {
+            self.first[cell] = row.index();
+        } else if self.grid.points(cell).is_some_and(is_full) {
+            return Err(self.twice(cell, row.index()));
         }
-        Ok(cells)
-    }
-
-    /// Which rows have the greatest ratio of their cell so far.
-    fn worst(&mut self, batch: &Batch<'_>, cells: &[Option<usize>]) -> Result<Marked, PlotError> {
-        let ratios = batch.numbers("ratio_max")?;
-        let mut worst = vec![false; batch.rows];
-        for ((worst, cell), ratio) in worst.iter_mut().zip(cells).zip(ratios) {
-            let Some(cell) = *cell else { continue };
-            let known = &mut self.greatest[cell];
-            *worst = ratio > *known || (known.is_nan() && !ratio.is_nan());
-            if *worst {
-                *known = ratio;
-            }
+        let [verdict, sensitive] = [1, 2].map(|k| row.word(own + k));
+        let ratio = row.number(own + 3);
+        let verdict = match self.limit {
+            None => verdict.map(|word| word == "true"),
+            Some(limit) => (!ratio.is_nan()).then_some(ratio < limit),
+        };
+        counts.points += 1;
+        counts.failed += u32::from(failed);
+        counts.sensitive += u32::from(sensitive == Some("true"));
+        counts.reliable += u32::from(verdict == Some(true));
+        counts.unreliable += u32::from(verdict == Some(false));
+        let known = &mut self.greatest[cell];
+        let is_worst = ratio > *known || (known.is_nan() && !ratio.is_nan());
+        if is_worst {
+            *known = ratio;
         }
-        Ok(worst)
-    }
-
-    /// Counts what the rows are; gives which of them failed.
-    fn count(&mut self, batch: &Batch<'_>, cells: &[Option<usize>]) -> Result<Marked, PlotError> {
-        let limit = self.source.ratio_limit();
-        let statuses = batch.words("status")?;
-        let reliable = batch.words("reliable")?;
-        let sensitive = batch.words("sensitive")?;
-        let ratios = batch.numbers("ratio_max")?;
-        let mut failed = Vec::with_capacity(batch.rows);
-        for (k, cell) in cells.iter().enumerate() {
-            let status = statuses.get(k).copied().flatten();
-            self.by_status[usize::from(self.statuses.code(status))] += 1;
-            failed.push(status != Some(OK));
-            let Some(cell) = *cell else { continue };
-            let counts = &mut self.counts[cell];
-            let is_full = |points| counts.points as usize >= points;
-            if counts.points == 0 {
-                self.first[cell] = self.row + k;
-            } else if self.grid.points(cell).is_some_and(is_full) {
-                return Err(self.twice(cell, self.row + k));
-            }
-            counts.points += 1;
-            counts.failed += u32::from(status != Some(OK));
-            counts.sensitive += u32::from(sensitive.get(k).copied().flatten() == Some("true"));
-            let ratio = ratios.get(k).copied().unwrap_or(f64::NAN);
-            let verdict = match reliable.get(k) {
-                Some(word) => word.map(|word| word == "true"),
-                None => (!ratio.is_nan()).then_some(ratio < limit),
-            };
-            counts.reliable += u32::from(verdict == Some(true));
-            counts.unreliable += u32::from(verdict == Some(false));
-        }
-        Ok(failed)
+        Ok(is_worst)
     }
 
     fn twice(&self, cell: usize, row: usize) -> PlotError {
@@ -384,53 +347,38 @@ impl<'a> Gather<'a> {
     }
 }
 
-/// What is known of a batch's rows, one by one.
-struct Rows<'a> {
-    /// None where the row is not shown.
-    cells: &'a [Option<usize>],
-    /// Which have the greatest ratio of their cell so far.
-    worst: &'a [bool],
-    failed: &'a [bool],
-}
-
 impl Gathered<'_> {
-    fn take(&mut self, batch: &Batch<'_>, rows: &Rows<'_>) -> Result<(), PlotError> {
-        let &Rows { cells, worst, failed } = rows;
+    /// Takes what a row has in a column, into a cell if it is shown; whether the row has the
+    /// greatest ratio of the cell so far.
+    fn take(&mut self, (row, column): (Row<'_>, usize), cell: Option<(usize, bool)>, failed: bool) {
         match &mut self.values {
             Values::Numbers(kept) => {
-                let numbers = batch.numbers(&self.facts.name)?;
-                let rows = cells.iter().zip(numbers).zip(worst.iter().zip(failed));
-                for ((cell, value), (worst, failed)) in rows {
-                    self.extent.take(value);
-                    let Some(cell) = *cell else { continue };
-                    let known = kept[cell];
-                    let takes = match self.rule {
-                        Rule::Least => value < known,
-                        Rule::OfGreatestRatio => *worst,
-                        Rule::Greatest | Rule::Common => value > known,
-                    };
-                    if takes || known.is_nan() {
-                        kept[cell] = value;
-                    }
-                    if let Some(dividing) = &mut self.dividing {
-                        dividing.take(cell, value, *failed);
-                    }
+                let value = row.number(column);
+                self.extent.take(value);
+                let Some((cell, is_worst)) = cell else { return };
+                let known = kept[cell];
+                let takes = match self.rule {
+                    Rule::Least => value < known,
+                    Rule::OfGreatestRatio => is_worst,
+                    Rule::Greatest | Rule::Common => value > known,
+                };
+                if takes || known.is_nan() {
+                    kept[cell] = value;
+                }
+                if let Some(dividing) = &mut self.dividing {
+                    dividing.take(cell, value, failed);
                 }
             }
             Values::Words(words) => {
-                let texts = batch.words(&self.facts.name)?;
-                for ((cell, word), worst) in cells.iter().zip(texts).zip(worst) {
-                    let Some(cell) = *cell else { continue };
-                    let code = words.code(word);
-                    let known = &mut words.codes[cell];
-                    if *known == NONE || (self.rule == Rule::OfGreatestRatio && *worst) {
-                        *known = code;
-                    } else if self.rule == Rule::Common && code != NONE && code != *known {
-                        *known = SEVERAL;
-                    }
+                let Some((cell, is_worst)) = cell else { return };
+                let code = words.code(row.word(column));
+                let known = &mut words.codes[cell];
+                if *known == NONE || (self.rule == Rule::OfGreatestRatio && is_worst) {
+                    *known = code;
+                } else if self.rule == Rule::Common && code != NONE && code != *known {
+                    *known = SEVERAL;
                 }
             }
         }
-        Ok(())
     }
 }

@@ -6,17 +6,20 @@ use super::label;
 use super::swept::{MOST_VALUES, SweptAxis};
 
 /// A swept parameter as the map shows it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct GridAxis {
     /// The parameter with its values.
+    #[serde(flatten)]
     pub(crate) swept: SweptAxis,
     /// Rising: the value of each place, of a block the middle.
     pub(crate) values: Vec<f64>,
     /// The borders of the cells around the values, one more than those: halfway between neighbours.
     pub(crate) borders: Vec<f64>,
     /// First and last value of each block; none where each value has a place of its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) spans: Option<Vec<[f64; 2]>>,
     /// How a value finds its place.
+    #[serde(skip)]
     places: Places,
 }
 

@@ -10,10 +10,12 @@ mod report;
 pub(crate) use design::page_of as design_page;
 pub(crate) use report::told;
 
+use std::rc::Rc;
+
 use serde_json::{Value, json};
 
 use super::axis::{LEAST_TICKS, SLACK, Scale, Step, Tick, log_sets};
-use super::chart::{Chart, ChartPanel, Series, Style, x_scale, y_scale};
+use super::chart::{Chart, ChartPanel, DOT, Series, Style, stroke, x_scale, y_scale};
 use super::colour::{BOTH, FAILED, LEVELS, SHADE};
 use super::contour::MOST_POINTS;
 use super::cuts::Cuts;
@@ -23,7 +25,7 @@ use super::frame::{Sign, failed_hatch};
 use super::gather::{Counts, Map};
 use super::grid::GridAxis;
 use super::label;
-use super::layer::{self, Group, Layer, Level, Shown};
+use super::layer::{self, Layer, Level, Shown};
 use super::read::Source;
 use super::scene::{Colour, Hatch, INK, PAPER};
 use super::svg::escape;
@@ -74,7 +76,7 @@ pub(crate) fn most_cells(columns: usize) -> usize {
 /// histories.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] for options that the file does not have, and any that reading the traces
+/// [`PlotError::Unfit`] for options that the file does not have, and any that reading the traces
 /// brings.
 pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<String, PlotError> {
     let source = &map.table.source;
@@ -257,50 +259,37 @@ fn tick_json(tick: Tick) -> Value {
 /// The rows of a point's table: name, words, unit, and the columns that hold the values of both
 /// models and their ratio.
 fn rows_json(source: &Source) -> Value {
-    let row = |name: &str, words: &str, columns: [Option<String>; 3]| {
-        let unit = columns[0].as_ref().and_then(|name| source.column(name));
-        let unit = unit.map_or("", |column| label::shown(&column.unit).0);
-        json!({ "name": name, "words": words, "unit": unit, "columns": columns })
-    };
-    let channels = layer::channels(source, Group::Nonlinear).into_iter().map(|(name, _)| {
-        let columns = ["nonlinear", "linear", "ratio"].map(|kind| Some(format!("{kind}_{name}")));
-        row(name, &label::channel(name), columns)
-    });
-    let families = layer::families(source).into_iter().map(|family| {
+    let row = |family: layer::Family<'_>| {
         let mut columns = family.columns.iter().map(|(_, facts)| Some(facts.name.clone()));
         let [nonlinear, linear] = [0, 1].map(|_| columns.next().flatten());
-        row(&family.name, &family.words, [nonlinear, linear, None])
-    });
-    channels.chain(families).collect()
+        let ratio = family.is_channel.then(|| format!("ratio_{}", family.name));
+        json!({
+            "name": family.name,
+            "words": family.words,
+            "unit": label::shown(&family.columns[0].1.unit).0,
+            "columns": [nonlinear, linear, ratio],
+        })
+    };
+    layer::families(source).into_iter().map(row).collect()
 }
 
 fn axis_json(axis: &GridAxis) -> Value {
-    let mut data = json!({
-        "name": axis.swept.name,
-        "words": axis.swept.words,
-        "unit": axis.swept.unit,
-        "log": axis.swept.log,
-        "ticks": log_ticks_json(axis.scale()),
-        "values": axis.values,
-        "borders": axis.borders,
-    });
-    if let Some(spans) = &axis.spans {
-        data["spans"] = json!(spans);
-    }
+    let mut data = json!(axis);
+    data["ticks"] = log_ticks_json(axis.scale());
     data
 }
 
 /// Every column of results as 32 bit floats in grid order, NaN where the file has no value.
 fn columns_json(table: &Table) -> Value {
     let numbers = |column: &Column| {
-        let (unit, factor) = label::shown(&column.unit);
+        let (unit, factor) = label::shown(&column.facts.unit);
         let data = json!({
             "unit": unit,
             "factor": factor,
-            "description": column.description,
+            "description": column.facts.description,
             "data": embed::floats(column.numbers()?.iter().copied()),
         });
-        Some((column.name.clone(), data))
+        Some((column.facts.name.clone(), data))
     };
     table.columns.iter().filter_map(numbers).collect()
 }
@@ -312,7 +301,7 @@ fn codes_json(table: &Table) -> Value {
         let words = column.words()?;
         let data =
             json!({ "data": embed::bytes(words.codes.iter().copied()), "words": words.names });
-        Some((column.name.clone(), data))
+        Some((column.facts.name.clone(), data))
     };
     table.columns.iter().filter_map(words).collect()
 }
@@ -407,7 +396,13 @@ fn curve(values: &[f64]) -> Value {
 
 /// A chart, its curves by `curve`.
 fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
-    let grids = chart.grids.iter().map(|grid| embed::floats(grid.iter().copied()));
+    let mut grids: Vec<&Rc<Vec<f64>>> = Vec::new();
+    for series in chart.panels.iter().flat_map(|panel| &panel.series) {
+        if !grids.contains(&&series.x) {
+            grids.push(&series.x);
+        }
+    }
+    let panels = chart.panels.iter().map(|panel| panel_json(panel, &grids, curve));
     let marks = chart.marks.iter().map(|mark| json!([embed::short(mark.x), mark.label]));
     let xs = x_scale(chart);
     json!({
@@ -416,8 +411,8 @@ fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
         "xLog": chart.x_log,
         "xRange": [xs.from, xs.to],
         "xTicks": log_ticks_json(xs),
-        "grids": grids.collect::<Vec<_>>(),
-        "panels": chart.panels.iter().map(|panel| panel_json(panel, curve)).collect::<Vec<_>>(),
+        "grids": grids.iter().map(|grid| embed::floats(grid.iter().copied())).collect::<Value>(),
+        "panels": panels.collect::<Value>(),
         "marks": marks.collect::<Vec<_>>(),
         "markMeaning": chart.mark_meaning,
         "shades": chart.shades,
@@ -425,40 +420,31 @@ fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
     })
 }
 
-fn panel_json(panel: &ChartPanel, curve: fn(&[f64]) -> Value) -> Value {
+fn panel_json(panel: &ChartPanel, grids: &[&Rc<Vec<f64>>], curve: fn(&[f64]) -> Value) -> Value {
     let stars =
         panel.stars.iter().map(|(x, y, label)| json!([embed::short(*x), embed::short(*y), label]));
-    json!({
-        "name": panel.name,
-        "words": panel.label.words,
-        "unit": panel.label.unit,
-        "shown": panel.shown,
-        "log": panel.log,
-        "ticks": log_ticks_json(y_scale(panel)),
-        "range": panel.range.map(|(low, high)| [low, high]),
-        "height": panel.height,
-        "series": panel.series.iter().map(|series| series_json(series, curve)).collect::<Vec<_>>(),
-        "levels": panel.levels,
-        "stars": stars.collect::<Vec<_>>(),
-        "mixed": panel.mixed,
-    })
+    let mut data = json!(panel);
+    data["ticks"] = log_ticks_json(y_scale(panel));
+    data["stars"] = stars.collect();
+    let of_series = |series| series_json(series, grids, curve);
+    data["series"] = panel.series.iter().map(of_series).collect();
+    data
 }
 
-fn series_json(series: &Series, curve: fn(&[f64]) -> Value) -> Value {
-    let (width, dashed, low, high) = match &series.style {
-        Style::Solid(width) => (*width, false, None, None),
-        Style::Dashed => (1.8, true, None, None),
-        Style::Dots => (5.6, false, None, None),
-        Style::Band(low, high) => (2.2, false, Some(curve(low)), Some(curve(high))),
+fn series_json(series: &Series, grids: &[&Rc<Vec<f64>>], curve: fn(&[f64]) -> Value) -> Value {
+    let (stroke, dots) = (stroke(series), series.style == Style::Dots);
+    let [low, high] = match &series.style {
+        Style::Band(low, high) => [low, high].map(|side| curve(side)),
+        _ => [Value::Null, Value::Null],
     };
     json!({
         "name": series.name,
         "colour": if series.colour == INK { "ink".to_owned() } else { series.colour.css() },
-        "grid": series.grid,
+        "grid": grids.iter().position(|grid| **grid == series.x),
         "alpha": embed::short(f64::from(series.colour.alpha) / 255.0),
-        "width": width,
-        "dashed": dashed,
-        "dots": series.style == Style::Dots,
+        "width": if dots { 2.0 * DOT } else { stroke.width },
+        "dashed": !stroke.dash.is_empty(),
+        "dots": dots,
         "y": curve(&series.y),
         "low": low,
         "high": high,

@@ -115,7 +115,7 @@ pub fn capitalised(text: &str) -> String {
 }
 
 /// What an axis shows; as text, with the unit in brackets.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub(crate) struct Label {
     /// In words.
     pub(crate) words: String,

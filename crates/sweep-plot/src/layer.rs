@@ -36,23 +36,19 @@ impl Group {
     /// Every group, in the order in which a page offers them.
     pub(crate) const ALL: [Self; 4] = [Self::Ratio, Self::Nonlinear, Self::Linear, Self::Other];
 
-    /// As a page knows it, which is what the names of a channel's columns start with; and in words,
-    /// for a list to choose from.
-    const fn named(self) -> [&'static str; 2] {
-        match self {
-            Self::Ratio => ["ratio", "ratio, nonlinear / linear"],
-            Self::Nonlinear => ["nonlinear", "amplitude, nonlinear model"],
-            Self::Linear => ["linear", "amplitude, linear model"],
-            Self::Other => ["other", "further quantities"],
-        }
-    }
-
+    /// As a page knows it, which is what the names of a channel's columns start with.
     pub(crate) const fn name(self) -> &'static str {
-        self.named()[0]
+        ["ratio", "nonlinear", "linear", "other"][self as usize]
     }
 
+    /// In words, for a list to choose from.
     pub(crate) const fn words(self) -> &'static str {
-        self.named()[1]
+        match self {
+            Self::Ratio => "ratio, nonlinear / linear",
+            Self::Nonlinear => "amplitude, nonlinear model",
+            Self::Linear => "amplitude, linear model",
+            Self::Other => "further quantities",
+        }
     }
 }
 
@@ -124,35 +120,33 @@ impl Layer {
     }
 }
 
-/// The columns of a motion by channel: `ratio_<channel>` and the like, without the extremes of all.
-pub(crate) fn channels(source: &Source, group: Group) -> Vec<(&str, &ColumnFacts)> {
-    let prefix = format!("{}_", group.name());
-    let mut columns = source.with_prefix(&prefix);
-    columns.retain(|(name, _)| !["max", "min", "change"].contains(name));
-    columns
-}
-
-/// A quantity that no channel has, with its column of each model or the one of none.
+/// A quantity with its column of each model, or the one of none.
 pub(crate) struct Family<'a> {
-    /// Without unit and model: `min_gap`.
+    /// A channel, or else what the columns are called without unit and model: `min_gap`.
     pub(crate) name: String,
     /// In words.
     pub(crate) words: String,
+    /// Whether it is an amplitude of a channel.
+    pub(crate) is_channel: bool,
     /// The columns by model; the empty one where no model is named.
     pub(crate) columns: Vec<(&'static str, &'a ColumnFacts)>,
 }
 
-/// Every family of a file, in file order.
+/// Everything but ratios that a file has to show: channels, then the rest in file order.
 pub(crate) fn families(source: &Source) -> Vec<Family<'_>> {
     let mut found: Vec<Family<'_>> = Vec::new();
-    for shown in all(source).into_iter().filter(|shown| shown.group == Group::Other) {
+    for shown in all(source).into_iter().filter(|shown| shown.group != Group::Ratio) {
         let Some(facts) = source.column(shown.column()) else { continue };
-        let (words, model) = label::of_model(&facts.name);
+        let (words, model) = match &shown.channel {
+            Some(channel) => (label::channel(channel), shown.group.name()),
+            None => label::of_model(&facts.name),
+        };
         match found.iter_mut().find(|family| family.words == words) {
             Some(family) => family.columns.push((model, facts)),
             None => {
-                let name = words.replace(' ', "_");
-                found.push(Family { name, words, columns: vec![(model, facts)] });
+                let is_channel = shown.channel.is_some();
+                let name = shown.channel.unwrap_or_else(|| words.replace(' ', "_"));
+                found.push(Family { name, words, is_channel, columns: vec![(model, facts)] });
             }
         }
     }
@@ -177,7 +171,7 @@ pub(crate) fn chosen(source: &Source, options: &PlotOptions) -> Result<Option<Sh
 /// status.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] for a column that the file does not have.
+/// [`PlotError::Unfit`] for a column that the file does not have.
 pub(crate) fn asked(
     source: &Source,
     options: &PlotOptions,
@@ -262,7 +256,7 @@ impl Shown {
     /// The values of a map that was read with this column.
     ///
     /// # Errors
-    /// [`PlotError::Column`] if it was not, because the file does not have it.
+    /// [`PlotError::Undrawable`] if it was not, because the file does not have it.
     pub(crate) fn layer(&self, map: &Map) -> Result<Layer, PlotError> {
         let numbers = map.table.numbers(self.column())?;
         let (unit, factor) = label::shown(&self.facts.unit);

@@ -194,7 +194,7 @@ pub struct Live {
 }
 
 /// A parameter that a page can move.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Slider {
     /// As in grid files.
     pub name: String,
@@ -217,7 +217,10 @@ fn format_of(path: &Path) -> Result<Format, PlotError> {
         "svg" => Ok(Format::Svg),
         "png" => Ok(Format::Png),
         "html" | "htm" => Ok(Format::Html),
-        _ => Err(PlotError::Format { path: path.to_owned() }),
+        _ => Err(PlotError::Unfit(format!(
+            "{}: the figure's format goes by its name's ending: .svg, .png or .html",
+            path.display()
+        ))),
     }
 }
 
@@ -396,83 +399,46 @@ fn image(scene: &Scene, format: Format) -> Result<Vec<u8>, PlotError> {
     }
 }
 
-/// What the view asked for is a figure of.
-fn view_of(options: &PlotOptions) -> &'static str {
-    match options.view.map(View::of) {
-        Some(Kind::Modes) => "modes files",
-        Some(Kind::Stability) => "stability files",
-        Some(Kind::Dwell) => "dwell files",
-        Some(Kind::Design) => "designs: results of a grid file with [design]",
-        _ => "traces",
-    }
-}
-
 /// Refuses options that the file's kind or the output's format would leave without effect.
 fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
-    let view_fits = options.view.is_some_and(|view| view.of() == source.kind);
+    let refuse = |option: &str, given: bool, fits: bool, for_what: &str| {
+        if !given || fits {
+            return Ok(());
+        }
+        let (kind, path) = (source.kind.name(), source.path.display());
+        Err(PlotError::Unfit(format!("`{option}` is for {for_what}; {path} is a {kind} file")))
+    };
     let is = |kind| source.kind == kind;
     let (map, design) = (is(Kind::Map) || is(Kind::Differences), is(Kind::Design));
     let (trace, modes) = (is(Kind::Trace), is(Kind::Modes));
     let (stability, dwell) = (is(Kind::Stability), is(Kind::Dwell));
     let over_modes = modes && matches!(options.view, None | Some(View::Frequencies));
-    let responses = stability && options.view == Some(View::Responses);
     let over_time = trace && matches!(options.view, None | Some(View::Time));
-    let rules = [
-        ("--quantity", !options.quantity.is_empty(), map || design, "maps"),
-        (
-            "--channel",
-            !options.channels.is_empty(),
-            trace || responses || dwell,
-            "traces, dwells and responses of stability files (a map shows a channel's column: \
-             --quantity ratio_tub_yaw)",
-        ),
-        (
-            "--at",
-            !options.at.is_empty(),
-            map || stability || dwell,
-            "maps, stability and dwell files",
-        ),
-        ("--resonances", !options.resonances_rpm.is_empty(), trace, "traces"),
-        ("--modes", options.modes.is_some(), trace, "traces"),
-        (
-            "--stability",
-            options.stability.is_some(),
-            trace || over_modes,
-            "traces, and frequencies of modes files",
-        ),
-        (
-            "--boundary",
-            options.boundary.is_some(),
-            map && format != Format::Html,
-            "maps drawn as .svg or .png",
-        ),
-        ("--view", options.view.is_some(), view_fits, view_of(options)),
-        (
-            "--against",
-            options.against.is_some(),
-            over_time || dwell,
-            "traces over time and dwell files",
-        ),
-        (
-            "--live",
-            options.live.is_some(),
-            (map || design) && format == Format::Html,
-            "maps drawn as .html",
-        ),
-        (
-            "--traces",
-            options.traces.is_some(),
-            map && format == Format::Html,
-            "maps drawn as .html",
-        ),
-    ];
-    for (option, given, fits, where_it_does) in rules {
-        if given && !fits {
-            let (kind, path) = (source.kind.name(), source.path.display());
-            return Err(PlotError::Unfit(format!(
-                "`{option}` is for {where_it_does}; {path} is a {kind} file"
-            )));
-        }
+    let (at, channels) = (!options.at.is_empty(), !options.channels.is_empty());
+    let moving = trace || dwell || stability && options.view == Some(View::Responses);
+    let moving_are = "traces, dwells and responses of stability files (a map shows a channel's \
+                      column: --quantity ratio_tub_yaw)";
+    let is_page = format == Format::Html;
+    refuse("--quantity", !options.quantity.is_empty(), map || design, "maps")?;
+    refuse("--channel", channels, moving, moving_are)?;
+    refuse("--at", at, map || stability || dwell, "maps, stability and dwell files")?;
+    refuse("--resonances", !options.resonances_rpm.is_empty(), trace, "traces")?;
+    refuse("--modes", options.modes.is_some(), trace, "traces")?;
+    let machines = "traces, and frequencies of modes files";
+    refuse("--stability", options.stability.is_some(), trace || over_modes, machines)?;
+    let pictures = "maps drawn as .svg or .png";
+    refuse("--boundary", options.boundary.is_some(), map && !is_page, pictures)?;
+    if let Some(kind) = options.view.map(View::of) {
+        let files = match kind {
+            Kind::Trace => "traces".to_owned(),
+            Kind::Design => "designs: results of a grid file with [design]".to_owned(),
+            other => format!("{} files", other.name()),
+        };
+        refuse("--view", true, kind == source.kind, &files)?;
     }
-    Ok(())
+    let over_runs = "traces over time and dwell files";
+    refuse("--against", options.against.is_some(), over_time || dwell, over_runs)?;
+    let pages = "maps drawn as .html";
+    refuse("--live", options.live.is_some(), (map || design) && is_page, pages)?;
+    refuse("--traces", options.traces.is_some(), map && is_page, pages)
 }

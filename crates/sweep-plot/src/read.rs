@@ -3,15 +3,16 @@
 //! This is the one place that reads files. A map of ten million rows is read in several passes over
 //! the columns that a figure needs, and is never in memory whole.
 
+use std::fmt;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use arrow_array::ArrayRef;
-use arrow_schema::{DataType, Schema};
+use arrow_schema::Schema;
 use serde_json::Value;
 
 use super::error::PlotError;
 use super::label;
-use sweep_files::{self as files, FileError, ParquetFile, cells};
+use sweep_files::{self as files, ParquetFile};
 
 /// A column without its rows, which [`super::table::Column`] has.
 pub(crate) use sweep_files::Column as ColumnFacts;
@@ -20,40 +21,43 @@ use sweep_parameter::Worse;
 /// What a file holds. Its columns show which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
+    /// Candidates of a study.
+    Optimise,
+    /// Motions that held speeds end in.
+    Dwell,
+    /// Periodic responses over constant speeds.
+    Stability,
     /// One row per grid point.
     Map,
-    /// One row per point, scattered.
-    Design,
+    /// One row per grid point that two maps share.
+    Differences,
     /// Time histories of both models at one point, or of a measurement and the model fitted to it.
     Trace,
     /// Modes over spin speed.
     Modes,
     /// The curve on which the ratio is at its limit.
     Boundary,
-    /// One row per grid point that two maps share.
-    Differences,
-    /// Periodic responses over constant speeds.
-    Stability,
-    /// Motions that held speeds end in.
-    Dwell,
-    /// Candidates of a study.
-    Optimise,
+    /// A map whose points are scattered.
+    Design,
 }
+
+/// Each kind as in "a map file", with columns that show it, the surest first.
+const KINDS: [(Kind, &str, &[&str]); 9] = [
+    (Kind::Optimise, "study", &["candidate", "on_front"]),
+    (Kind::Dwell, "dwell", &["motion", "speed_rpm"]),
+    (Kind::Stability, "stability", &["growth_per_s", "speed_rpm"]),
+    (Kind::Map, "map", &["status", "ratio_max"]),
+    (Kind::Differences, "differences", &["ratio_change", "flip"]),
+    (Kind::Trace, "trace", &["time_s"]),
+    (Kind::Modes, "modes", &["mode", "frequency_rpm", "speed_rpm"]),
+    (Kind::Boundary, "boundary", &[]),
+    (Kind::Design, "design", &["status", "ratio_max"]),
+];
 
 impl Kind {
     /// As in "a map file".
     pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Map => "map",
-            Self::Design => "design",
-            Self::Trace => "trace",
-            Self::Modes => "modes",
-            Self::Boundary => "boundary",
-            Self::Differences => "differences",
-            Self::Stability => "stability",
-            Self::Dwell => "dwell",
-            Self::Optimise => "study",
-        }
+        KINDS[self as usize].1
     }
 }
 
@@ -82,7 +86,7 @@ impl Source {
     /// Opens a file and reads what it says of itself.
     ///
     /// # Errors
-    /// [`PlotError::File`], or [`PlotError::UnknownKind`] when the columns are not those of a file
+    /// [`PlotError::File`], or [`PlotError::Undrawable`] when the columns are not those of a file
     /// of ours.
     pub(crate) fn open(path: &Path) -> Result<Self, PlotError> {
         let file = ParquetFile::open(path)?;
@@ -99,30 +103,28 @@ impl Source {
         let columns: Vec<ColumnFacts> =
             columns.map(|column| by_name(column, file.schema())).collect();
         let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-        let kind = recognise(&names).ok_or_else(|| PlotError::UnknownKind {
+        let kind = recognise(&names).ok_or_else(|| PlotError::Undrawable {
             path: path.to_owned(),
-            columns: names.join(", "),
+            reason: format!(
+                "its columns ({}) are those of no map, trace, modes, boundary or stability file, \
+                 so there is no figure that fits it",
+                names.join(", ")
+            ),
         })?;
         let named = named(&provenance);
         Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, named, file })
     }
 
-    /// The rows of the named columns, from the first. Names that the file lacks are left out.
+    /// Calls `take` for each row, with the columns of these names. One that the file lacks is null.
     ///
     /// # Errors
-    /// [`PlotError::File`].
-    pub(crate) fn batches(
+    /// [`PlotError::File`], and whatever `take` says.
+    pub(crate) fn each_row(
         &self,
         names: &[&str],
-    ) -> Result<impl Iterator<Item = Result<Batch<'_>, PlotError>> + use<'_>, PlotError> {
-        let columns: Vec<&ColumnFacts> =
-            names.iter().filter_map(|name| self.column(name)).collect();
-        let batches = self.file.rows_of(&columns)?;
-        Ok(batches.map(move |batch| {
-            let (rows, cells) = batch?;
-            let columns = columns.iter().copied().zip(cells).collect();
-            Ok(Batch { path: &self.path, columns, rows })
-        }))
+        mut take: impl FnMut(Row<'_>) -> Result<(), PlotError>,
+    ) -> Result<(), PlotError> {
+        self.file.each_row(names, |row| take(Row(row)))
     }
 
     /// The column of that name.
@@ -145,18 +147,32 @@ impl Source {
     /// The error that something the options name is not there, and what is.
     pub(crate) fn not_there(
         &self,
-        option: &'static str,
-        given: impl Into<String>,
-        what: &'static str,
-        known: impl Into<String>,
+        option: &str,
+        given: impl fmt::Display,
+        what: &str,
+        known: impl fmt::Display,
     ) -> PlotError {
-        let (given, known) = (given.into(), known.into());
-        PlotError::NotThere { option, given, path: self.path.clone(), what, known }
+        let path = self.path.display();
+        PlotError::Unfit(format!(
+            "`{option} {given}`: {path}: there is no such {what}; it has {known}"
+        ))
+    }
+
+    fn undrawable(&self, reason: String) -> PlotError {
+        PlotError::Undrawable { path: self.path.clone(), reason }
     }
 
     /// Nothing in it can be drawn.
-    pub(crate) fn empty(&self, reason: &'static str) -> PlotError {
-        PlotError::Empty { path: self.path.clone(), reason }
+    pub(crate) fn empty(&self, reason: &str) -> PlotError {
+        self.undrawable(format!("nothing to draw: {reason}"))
+    }
+
+    /// More rows than a figure of its kind shows.
+    pub(crate) fn too_many(&self, rows: usize, most: usize) -> PlotError {
+        let kind = self.kind.name();
+        self.undrawable(format!(
+            "a {kind} file of {rows} rows is more than a figure can show, which is {most} of them"
+        ))
     }
 
     /// Refuses a file of another kind than an option takes.
@@ -172,13 +188,9 @@ impl Source {
     }
 
     /// A column that this kind of file must have is missing.
-    pub(crate) fn lacks(&self, column: &str, expected: &'static str) -> PlotError {
-        PlotError::Column {
-            path: self.path.clone(),
-            kind: self.kind.name(),
-            expected,
-            column: column.to_owned(),
-        }
+    pub(crate) fn lacks(&self, column: &str, expected: &str) -> PlotError {
+        let kind = self.kind.name();
+        self.undrawable(format!("a {kind} file needs the {expected} column `{column}`"))
     }
 
     /// The first value stored under `key` in the provenance, outer levels before inner ones.
@@ -245,43 +257,29 @@ pub(crate) fn some_of<'a>(names: impl Iterator<Item = &'a str>) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-/// Some rows of some columns.
-pub(crate) struct Batch<'a> {
-    path: &'a Path,
-    columns: Vec<(&'a ColumnFacts, ArrayRef)>,
-    /// Number of rows.
-    pub(crate) rows: usize,
-}
+/// A row of a file.
+#[derive(Clone, Copy)]
+pub(crate) struct Row<'a>(sweep_files::Row<'a>);
 
-impl Batch<'_> {
-    fn array(&self, name: &str) -> Option<&ArrayRef> {
-        self.columns.iter().find(|(column, _)| column.name == name).map(|(_, array)| array)
+impl<'a> Row<'a> {
+    /// Its number in the file.
+    pub(crate) fn index(self) -> usize {
+        self.0.index() as usize
     }
 
-    /// The numbers of a column as they are drawn, null as NaN; none for a column that was not asked
-    /// for.
-    ///
-    /// # Errors
-    /// [`PlotError::File`] if the cells are not what the schema says.
-    pub(crate) fn numbers(&self, name: &str) -> Result<Vec<f64>, PlotError> {
-        let Some(array) = self.array(name) else { return Ok(Vec::new()) };
-        let numbers = cells::numbers(array).map_err(FileError::cells(self.path))?;
-        Ok(numbers.into_iter().map(|value| drawable(value.unwrap_or(f64::NAN))).collect())
+    /// The number in a column as it is drawn, NaN where there is none.
+    pub(crate) fn number(self, column: usize) -> f64 {
+        drawable(self.0.value(column))
     }
 
-    /// The words of a column; none for a column that was not asked for.
-    ///
-    /// # Errors
-    /// [`PlotError::File`] if the cells are not what the schema says.
-    pub(crate) fn words(&self, name: &str) -> Result<Vec<Option<&str>>, PlotError> {
-        let Some(array) = self.array(name) else { return Ok(Vec::new()) };
-        let words = if matches!(array.data_type(), DataType::Boolean) {
-            let word = |flag: bool| if flag { "true" } else { "false" };
-            cells::flags(array).map(|flags| flags.iter().map(|flag| flag.map(word)).collect())
-        } else {
-            cells::texts(array)
-        };
-        Ok(words.map_err(FileError::cells(self.path))?)
+    /// The numbers in these columns.
+    pub(crate) fn numbers(self, columns: Range<usize>) -> Vec<f64> {
+        columns.map(|column| self.number(column)).collect()
+    }
+
+    /// The word in a column.
+    pub(crate) fn word(self, column: usize) -> Option<&'a str> {
+        self.0.word(column)
     }
 }
 
@@ -334,23 +332,16 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 }
 
 fn recognise(names: &[&str]) -> Option<Kind> {
-    // The columns that show a kind, the surest first.
-    const SHOWN_BY: [(Kind, &[&str]); 5] = [
-        (Kind::Optimise, &["candidate", "on_front"]),
-        (Kind::Dwell, &["motion", "speed_rpm"]),
-        (Kind::Stability, &["growth_per_s", "speed_rpm"]),
-        (Kind::Map, &["status", "ratio_max"]),
-        (Kind::Differences, &["ratio_change", "flip"]),
-    ];
-    let has = |all: &[&str]| all.iter().all(|name| names.contains(name));
     let of_trace = |name: &&str| name.starts_with("nonlinear_") || name.starts_with("measured_");
-    let sure = SHOWN_BY.iter().find(|(_, columns)| has(columns)).map(|(kind, _)| *kind);
-    let further = [
-        (Kind::Trace, has(&["time_s"]) && names.iter().any(of_trace)),
-        (Kind::Modes, has(&["mode", "frequency_rpm", "speed_rpm"])),
-        (Kind::Boundary, bracket(names).is_some()),
-    ];
-    sure.or_else(|| further.into_iter().find(|(_, is)| *is).map(|(kind, _)| kind))
+    let is = |(kind, _, columns): &&(Kind, &str, &[&str])| {
+        columns.iter().all(|name| names.contains(name))
+            && match kind {
+                Kind::Trace => names.iter().any(of_trace),
+                Kind::Boundary => bracket(names).is_some(),
+                _ => true,
+            }
+    };
+    KINDS.iter().find(is).map(|(kind, ..)| *kind)
 }
 
 /// The two columns between which a boundary is known to lie, after its two coordinates.

@@ -95,7 +95,7 @@ impl Scatter {
     /// Reads a design's file: every point for the counts, and as many as a figure keeps.
     ///
     /// # Errors
-    /// As [`Source::batches`] and [`layer::chosen`]; [`PlotError::Empty`] without points or
+    /// As [`Source::each_row`] and [`layer::chosen`]; [`PlotError::Undrawable`] without points or
     /// parameters that vary; [`PlotError::Unfit`] for a quantity that is no number.
     pub(crate) fn read(source: Source, options: &PlotOptions) -> Result<Self, PlotError> {
         let Some(shown) = layer::chosen(&source, options)? else {
@@ -116,32 +116,24 @@ impl Scatter {
         let dividing = level.as_ref().filter(|_| !shown.is_verdict(&source));
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); axes.len()];
         let (mut points, mut quantity, mut sides) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut counts, mut row) = ([0; 4], 0_usize);
+        let mut counts = [0; 4];
         let names = [&axes[..], &[shown.column(), "reliable", layer::STATUS]].concat();
-        for batch in source.batches(&names)? {
-            let batch = batch?;
-            let raw = batch.numbers(shown.column())?;
-            let (verdicts, statuses) = (batch.words("reliable")?, batch.words("status")?);
-            let of_axes = axes.iter().map(|name| batch.numbers(name));
-            let of_axes = of_axes.collect::<Result<Vec<_>, _>>()?;
-            for k in 0..batch.rows {
-                let [verdict, status] =
-                    [&verdicts, &statuses].map(|words| words.get(k).copied().flatten());
-                let value = raw.get(k).copied().unwrap_or(f64::NAN) * factor;
-                let side = side_of(dividing, value, verdict, status);
-                counts[side as usize] += 1;
-                if picked(row as u64, stride) {
-                    let none = ratio && !(value > 0.0 && value.is_finite());
-                    quantity.push(if none { f64::NAN } else { value });
-                    sides.push(side);
-                    points.push(row);
-                    for (values, axis) in values.iter_mut().zip(&of_axes) {
-                        values.push(axis.get(k).copied().unwrap_or(f64::NAN));
-                    }
+        source.each_row(&names, |row| {
+            let own = axes.len();
+            let value = row.number(own) * factor;
+            let side = side_of(dividing, value, row.word(own + 1), row.word(own + 2));
+            counts[side as usize] += 1;
+            if picked(row.index() as u64, stride) {
+                let none = ratio && !(value > 0.0 && value.is_finite());
+                quantity.push(if none { f64::NAN } else { value });
+                sides.push(side);
+                points.push(row.index());
+                for (column, values) in values.iter_mut().enumerate() {
+                    values.push(row.number(column));
                 }
-                row += 1;
             }
-        }
+            Ok(())
+        })?;
         if points.is_empty() {
             return Err(source.empty("the design has no points"));
         }

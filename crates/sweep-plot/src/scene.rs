@@ -238,12 +238,6 @@ impl Text {
         self
     }
 
-    /// The same, in a colour.
-    pub(crate) fn colour(mut self, colour: Colour) -> Self {
-        self.colour = colour;
-        self
-    }
-
     /// The same, placed by another part.
     pub(crate) fn anchor(mut self, anchor: Anchor) -> Self {
         self.anchor = anchor;
@@ -253,12 +247,6 @@ impl Text {
     /// The same, reading upwards.
     pub(crate) fn upright(mut self) -> Self {
         self.upright = true;
-        self
-    }
-
-    /// The same, with an outline behind the letters.
-    pub(crate) fn halo(mut self, colour: Colour) -> Self {
-        self.halo = Some(colour);
         self
     }
 }

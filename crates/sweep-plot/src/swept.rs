@@ -11,7 +11,7 @@ use super::read::{ColumnFacts, Source};
 pub(crate) const MOST_VALUES: usize = 1 << 18;
 
 /// A swept parameter with all its values.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct SweptAxis {
     /// Name of the parameter.
     pub(crate) name: String,
@@ -23,8 +23,10 @@ pub(crate) struct SweptAxis {
     pub(crate) log: bool,
     /// The values, rising; of an axis of more than [`MOST_VALUES`] the least and the greatest
     /// alone.
+    #[serde(skip)]
     pub(crate) values: Vec<f64>,
     /// Whether the values are all there.
+    #[serde(skip)]
     pub(crate) complete: bool,
 }
 
@@ -51,38 +53,29 @@ impl SweptAxis {
 }
 
 /// One axis while its values are gathered.
+#[derive(Default)]
 struct Gathered {
     seen: BTreeSet<u64>,
-    last: f64,
-    low: f64,
-    high: f64,
-    complete: bool,
+    last: Option<f64>,
+    range: Option<[f64; 2]>,
+    /// More values than are kept.
+    overflows: bool,
 }
 
 impl Gathered {
-    fn new() -> Self {
-        Self {
-            seen: BTreeSet::new(),
-            last: f64::NAN,
-            low: f64::INFINITY,
-            high: f64::NEG_INFINITY,
-            complete: true,
-        }
-    }
-
     fn take(&mut self, value: f64) {
         // Rows in grid order repeat most axes' values.
-        if value == self.last {
+        if self.last.replace(value) == Some(value) {
             return;
         }
-        self.last = value;
-        (self.low, self.high) = (self.low.min(value), self.high.max(value));
+        let [low, high] = self.range.unwrap_or([value; 2]);
+        self.range = Some([low.min(value), high.max(value)]);
         // Zero has two signs and is one value.
         let bits = (value + 0.0).to_bits();
         if self.seen.len() < MOST_VALUES {
             self.seen.insert(bits);
         } else if !self.seen.contains(&bits) {
-            self.complete = false;
+            self.overflows = true;
         }
     }
 
@@ -90,9 +83,9 @@ impl Gathered {
         let mut values: Vec<f64> = self.seen.into_iter().map(f64::from_bits).collect();
         values.sort_by(f64::total_cmp);
         // The values that came first tell how an axis of too many is spaced.
-        let log = evenly_by_log(&values) && self.low > 0.0;
-        if !self.complete {
-            values = vec![self.low, self.high];
+        let log = evenly_by_log(&values) && self.range.is_some_and(|[low, _]| low > 0.0);
+        if self.overflows {
+            values = self.range.map_or_else(Vec::new, Vec::from);
         }
         SweptAxis {
             name: column.name.clone(),
@@ -100,16 +93,16 @@ impl Gathered {
             unit: column.unit.clone(),
             log,
             values,
-            complete: self.complete,
+            complete: !self.overflows,
         }
     }
 }
 
-/// The columns of a map file that are its axes, in file order: those of numbers between the point's
-/// index and the results.
+/// The columns that are a file's axes, in file order: those of numbers between the point's index
+/// and the results, or the speeds of each point.
 pub(crate) fn columns(source: &Source) -> Vec<&ColumnFacts> {
     let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
-    let is_result = |name: &str| of_model(name) || name == "ratio_change";
+    let is_result = |name: &str| of_model(name) || ["ratio_change", "speed_rpm"].contains(&name);
     let before = source.columns.iter().take_while(|column| !is_result(&column.name));
     before.filter(|column| column.is_number() && column.name != "point").collect()
 }
@@ -133,8 +126,9 @@ pub(crate) fn is_whole(source: &Source) -> Result<bool, PlotError> {
 /// The axes of a map file, in file order.
 ///
 /// # Errors
-/// As [`Source::batches`]; [`PlotError::Empty`] without rows or axes; [`PlotError::NotAGrid`] for
-/// an axis value that is not a number, or rows that do not lie on a grid.
+/// As [`Source::each_row`]; [`PlotError::Undrawable`] without rows or axes;
+/// [`PlotError::NotAGrid`] for an axis value that is not a number, or rows that do not lie on a
+/// grid.
 pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
     if source.rows == 0 {
         return Err(source.empty("the map has no rows"));
@@ -145,24 +139,23 @@ pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
         return Err(source.empty("the map has no axis"));
     }
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-    let mut gathered: Vec<Gathered> = names.iter().map(|_| Gathered::new()).collect();
-    for batch in source.batches(&names)? {
-        let batch = batch?;
-        for (name, gathered) in names.iter().zip(&mut gathered) {
-            for value in batch.numbers(name)? {
-                if !value.is_finite() {
-                    return Err(no_grid(format!("axis `{name}` has a row without a value")));
-                }
-                gathered.take(value);
+    let mut gathered: Vec<Gathered> = names.iter().map(|_| Gathered::default()).collect();
+    source.each_row(&names, |row| {
+        for (column, (name, gathered)) in names.iter().zip(&mut gathered).enumerate() {
+            let value = row.number(column);
+            if !value.is_finite() {
+                return Err(no_grid(format!("axis `{name}` has a row without a value")));
             }
+            gathered.take(value);
         }
-        // Checked batch by batch: scattered rows would fill the memory with values.
+        // Checked row by row: scattered rows would fill the memory with values.
         let mut known = gathered.iter().map(|axis| axis.seen.len());
         let size = known.try_fold(1_usize, usize::checked_mul);
         if size.is_none_or(|size| size > source.rows.saturating_add(MOST_MISSING)) {
             return Err(no_grid("its rows are scattered over the axes' values".to_owned()));
         }
-    }
+        Ok(())
+    })?;
     // What the file says of its rows need not be so.
     if gathered.iter().any(|axis| axis.seen.is_empty()) {
         return Err(source.empty("the map has no rows"));

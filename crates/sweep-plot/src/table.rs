@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use super::error::PlotError;
+use super::label::{self, Label};
 use super::read::{ColumnFacts, Kind, Source};
 use super::thin::{Keep, Stretches, Thinner};
 
@@ -82,21 +83,16 @@ impl Words {
 /// A column.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Column {
-    /// As in the file.
-    pub(crate) name: String,
-    /// Empty for pure numbers.
-    pub(crate) unit: String,
-    /// May be empty.
-    pub(crate) description: String,
+    /// What the file says of it.
+    pub(crate) facts: ColumnFacts,
     /// One per row.
     pub(crate) values: Values,
 }
 
 impl Column {
-    /// A column of the file with these values.
-    pub(crate) fn new(facts: &ColumnFacts, values: Values) -> Self {
-        let ColumnFacts { name, unit, description, .. } = facts.clone();
-        Self { name, unit, description, values }
+    /// Its name in words, and its unit.
+    pub(crate) fn label(&self) -> Label {
+        Label::new(&label::words(&self.facts.name), &self.facts.unit)
     }
 
     /// The values, if they are numbers.
@@ -130,19 +126,15 @@ impl Table {
     /// cut into stretches, as [`Table::read_thinned`] does.
     ///
     /// # Errors
-    /// As [`Source::batches`]; [`PlotError::TooMany`] for modes and boundaries beyond what a figure
-    /// keeps.
+    /// As [`Source::each_row`]; [`PlotError::Undrawable`] for modes and boundaries beyond what a
+    /// figure keeps.
     pub(crate) fn read(source: Source) -> Result<Self, PlotError> {
         let most = MOST_NUMBERS / source.numeric().count().max(1);
-        let too_many = |source: &Source, rows| {
-            let (path, kind) = (source.path.clone(), source.kind.name());
-            PlotError::TooMany { path, kind, rows, most }
-        };
         if source.rows > most {
             if source.kind == Kind::Trace {
                 return Self::read_thinned(source, most / 2);
             }
-            return Err(too_many(&source, source.rows));
+            return Err(source.too_many(source.rows, most));
         }
         let names: Vec<&str> = source.columns.iter().map(|column| column.name.as_str()).collect();
         let empty = |column: &ColumnFacts| match column.is_number() {
@@ -151,27 +143,26 @@ impl Table {
         };
         let mut values: Vec<Values> = source.columns.iter().map(empty).collect();
         let mut rows = 0;
-        for batch in source.batches(&names)? {
-            let batch = batch?;
-            for (name, values) in names.iter().zip(&mut values) {
+        source.each_row(&names, |row| {
+            rows += 1;
+            // What the file says of its rows need not be so.
+            if rows > most {
+                return Err(source.too_many(rows, most));
+            }
+            for (column, values) in values.iter_mut().enumerate() {
                 match values {
-                    Values::Numbers(numbers) => numbers.extend(batch.numbers(name)?),
+                    Values::Numbers(numbers) => numbers.push(row.number(column)),
                     Values::Words(words) => {
-                        for word in batch.words(name)? {
-                            let code = words.code(word);
-                            words.codes.push(code);
-                        }
+                        let code = words.code(row.word(column));
+                        words.codes.push(code);
                     }
                 }
             }
-            rows += batch.rows;
-            // What the file says of its rows need not be so.
-            if rows > most {
-                return Err(too_many(&source, rows));
-            }
-        }
+            Ok(())
+        })?;
         let columns = source.columns.iter().zip(values);
-        let columns = columns.map(|(facts, values)| Column::new(facts, values)).collect();
+        let columns =
+            columns.map(|(facts, values)| Column { facts: facts.clone(), values }).collect();
         Ok(Self { source, columns, rows, stretch: None })
     }
 
@@ -180,22 +171,22 @@ impl Table {
     /// first and middle instant.
     ///
     /// # Errors
-    /// As [`Source::batches`].
+    /// As [`Source::each_row`].
     pub(crate) fn read_thinned(source: Source, count: usize) -> Result<Self, PlotError> {
         let stretches = Stretches::new(source.rows, count);
         let names: Vec<&str> = source.numeric().map(|column| column.name.as_str()).collect();
         let keep = |name: &str| if name == "time_s" { Keep::Instants } else { Keep::Extremes };
         let mut thinners: Vec<Thinner> =
             names.iter().map(|name| Thinner::new(stretches, keep(name))).collect();
-        for batch in source.batches(&names)? {
-            let batch = batch?;
-            for (name, thinner) in names.iter().zip(&mut thinners) {
-                batch.numbers(name)?.into_iter().for_each(|value| thinner.push(value));
-            }
-        }
+        source.each_row(&names, |row| {
+            let thinners = thinners.iter_mut().enumerate();
+            thinners.for_each(|(column, thinner)| thinner.push(row.number(column)));
+            Ok(())
+        })?;
         let kept = thinners.into_iter().map(|thinner| Values::Numbers(thinner.finish()));
-        let columns = source.numeric().zip(kept).map(|(facts, values)| Column::new(facts, values));
-        let columns: Vec<Column> = columns.collect();
+        let columns = source.numeric().cloned().zip(kept);
+        let columns: Vec<Column> =
+            columns.map(|(facts, values)| Column { facts, values }).collect();
         let rows = columns.first().and_then(Column::numbers).map_or(0, <[f64]>::len);
         Ok(Self { source, columns, rows, stretch: Some(stretches.longest()) })
     }
@@ -210,13 +201,13 @@ impl Table {
 
     /// The column of that name.
     pub(crate) fn column(&self, name: &str) -> Option<&Column> {
-        self.columns.iter().find(|column| column.name == name)
+        self.columns.iter().find(|column| column.facts.name == name)
     }
 
     /// The numbers of a column that this kind of file must have.
     ///
     /// # Errors
-    /// [`PlotError::Column`].
+    /// [`PlotError::Undrawable`].
     pub(crate) fn numbers(&self, name: &str) -> Result<&[f64], PlotError> {
         let numbers = self.column(name).and_then(Column::numbers);
         numbers.ok_or_else(|| self.source.lacks(name, "numeric"))
@@ -225,6 +216,8 @@ impl Table {
     /// Columns of numbers whose name starts with `prefix`, without it.
     pub(crate) fn with_prefix(&self, prefix: &str) -> Vec<(&str, &Column)> {
         let numbers = self.columns.iter().filter(|column| column.numbers().is_some());
-        numbers.filter_map(|column| Some((column.name.strip_prefix(prefix)?, column))).collect()
+        numbers
+            .filter_map(|column| Some((column.facts.name.strip_prefix(prefix)?, column)))
+            .collect()
     }
 }

@@ -86,13 +86,13 @@ fn columns_come_with_units_words_and_provenance() {
     assert_eq!((table.source.kind, table.rows), (Kind::Map, 90));
     let column = |name: &str| table.column(name).unwrap();
     assert_eq!(
-        column("damping_n_s_per_m").unit,
+        column("damping_n_s_per_m").facts.unit,
         "N s/m",
         "by the name where the file does not say"
     );
-    assert_eq!(column("nonlinear_tub_yaw").unit, "rad");
-    assert_eq!(column("nonlinear_tub_yaw").description, "nonlinear_tub_yaw, said");
-    assert_eq!(column("ratio_max").unit, "", "1 is no unit to show");
+    assert_eq!(column("nonlinear_tub_yaw").facts.unit, "rad");
+    assert_eq!(column("nonlinear_tub_yaw").facts.description, "nonlinear_tub_yaw, said");
+    assert_eq!(column("ratio_max").facts.unit, "", "1 is no unit to show");
     let words = |name: &str| column(name).words().unwrap();
     let without = (0..table.rows).filter(|&row| words("reliable").get(row).is_none()).count();
     assert_eq!((words("reliable").names.join(" "), without), ("false true".to_owned(), 2));

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use serde_json::Value;
-use sweep_files::key;
+use sweep_files::{Step, dotted, key, leaves};
 
 use crate::error::PlotError;
 use crate::read::Source;
@@ -36,13 +36,12 @@ pub(crate) fn parted(files: [(&Source, &At); 2], parts: &[&str]) -> Vec<String> 
     let [Some(first), Some(second)] = plans else { return Vec::new() };
     let mut found = Vec::new();
     for part in parts {
-        let mut path: Vec<String> = part.split('.').map(str::to_owned).collect();
-        let sides = [first, second].map(|plan| {
-            let section = plan.get(&path[0])?;
-            Some(path.get(1).map_or(section, |key| &section[key.as_str()]))
-        });
-        if let [Some(first), Some(second)] = sides {
-            descend([(first, files[0].1), (second, files[1].1)], &mut path, &mut found);
+        let path: Vec<Step<'_>> = part.split('.').map(Step::Name).collect();
+        let pointer = format!("/{}", part.replace('.', "/"));
+        let (section, _) = part.split_once('.').unwrap_or((part, ""));
+        if [first, second].iter().all(|plan| plan.get(section).is_some()) {
+            let sides = [first, second].map(|plan| plan.pointer(&pointer));
+            descend(sides, files.map(|(_, at)| at), path, &mut found);
         }
     }
     found
@@ -77,72 +76,54 @@ pub(crate) fn some(places: &[String], most: usize) -> String {
     if more > 0 { format!("{first} and {more} more") } else { first }
 }
 
-fn descend(sides: [(&Value, &At); 2], path: &mut Vec<String>, found: &mut Vec<String>) {
-    let [(first, _), (second, _)] = sides;
-    let mut step = |name: String, first: &Value, second: &Value| {
-        path.push(name);
-        descend([(first, sides[0].1), (second, sides[1].1)], path, found);
-        path.pop();
-    };
-    match (first, second) {
-        (Value::Object(first), Value::Object(second)) => {
-            let further = second.keys().filter(|name| !first.contains_key(*name));
-            for name in first.keys().chain(further) {
-                let [first, second] = [first, second].map(|side| side.get(name));
-                step(name.clone(), first.unwrap_or(&Value::Null), second.unwrap_or(&Value::Null));
+/// Where two values of a plan part, from this path on.
+fn descend<'a>(
+    sides: [Option<&'a Value>; 2],
+    points: [&At; 2],
+    mut path: Vec<Step<'a>>,
+    found: &mut Vec<String>,
+) {
+    let opens = |first: &[Value], second: &[Value]| first.len() == second.len();
+    leaves(sides, opens, &mut path, &mut |path, own| {
+        let [first, second] = [0, 1].map(|side| moved(own[side], points[side], path));
+        if first != second && !is_of_point([&first, &second], points, path) {
+            let [first, second] = [first, second].map(|value| match value {
+                Value::Null => "none".to_owned(),
+                value => value.to_string(),
+            });
+            // Springs, dampers and the like part one as another.
+            let place = path.iter().copied().filter(|step| matches!(step, Step::Name(_)));
+            let said = format!("{} {first} and {second}", dotted(&place.collect::<Vec<_>>()));
+            if !found.contains(&said) {
+                found.push(said);
             }
         }
-        (Value::Array(first), Value::Array(second)) if first.len() == second.len() => {
-            for (k, (first, second)) in first.iter().zip(second).enumerate() {
-                step((k + 1).to_string(), first, second);
-            }
-        }
-        _ => {
-            let values = sides.map(|(value, at)| moved(value, at, path));
-            if values[0] != values[1] && !is_of_point(&values, sides, path) {
-                let [first, second] = values.map(|value| match value {
-                    Value::Null => "none".to_owned(),
-                    value => value.to_string(),
-                });
-                // Springs, dampers and the like part one as another.
-                let place: Vec<&str> =
-                    path.iter().map(String::as_str).filter(|it| !is_number(it)).collect();
-                let said = format!("{} {first} and {second}", place.join("."));
-                if !found.contains(&said) {
-                    found.push(said);
-                }
-            }
-        }
-    }
-}
-
-fn is_number(name: &str) -> bool {
-    name.parse::<usize>().is_ok()
+    });
 }
 
 /// A value of the plan, or what its point says in its place.
-fn moved(value: &Value, at: &At, path: &[String]) -> Value {
+fn moved(value: Option<&Value>, at: &At, path: &[Step<'_>]) -> Value {
     let named = at.iter().find(|(name, _)| names(name, path));
-    named.map_or_else(|| value.clone(), |(_, value)| (*value).into())
+    named.map_or_else(|| value.cloned().unwrap_or_default(), |(_, value)| (*value).into())
 }
 
 /// Whether a parameter is the value at this place: `tub_mass_kg` is `machine.tub.mass_kg`,
 /// `damping_n_s_per_m` that of every damper, `damper_2_damping_n_s_per_m` that of one.
-fn names(parameter: &str, path: &[String]) -> bool {
-    let own = if path[0] == "machine" { &path[1..] } else { path };
-    let (Some(last), Some(list)) = (own.last(), own.first()) else { return false };
-    let one = list.strip_suffix('s').unwrap_or(list);
-    let place = own.get(1).filter(|place| is_number(place));
+fn names(parameter: &str, path: &[Step<'_>]) -> bool {
+    let own = if path[0] == Step::Name("machine") { &path[1..] } else { path };
+    let (Some(last), Some(Step::Name(list))) = (own.last(), own.first()) else { return false };
+    let (last, one) = (last.to_string(), list.strip_suffix('s').unwrap_or(list));
+    let place = own.get(1).filter(|place| matches!(place, Step::Place(_)));
     parameter == last
         || parameter == format!("{one}_{last}")
         || place.is_some_and(|place| parameter == format!("{one}_{place}_{last}"))
 }
 
 /// Whether a value is that of a parameter of the point whose place in the plan has another name.
-fn is_of_point(values: &[Value; 2], sides: [(&Value, &At); 2], path: &[String]) -> bool {
-    sides.iter().flat_map(|(_, at)| at.iter()).any(|(name, value)| {
+fn is_of_point(values: [&Value; 2], points: [&At; 2], path: &[Step<'_>]) -> bool {
+    points.into_iter().flatten().any(|(name, value)| {
         let mut tokens = name.split('_').filter(|token| token.len() > 1);
-        let words = path.join("_");
+        let words = dotted(path);
         !names(name, path)
             && values.iter().any(|known| known.as_f64() == Some(*value))
             && tokens.next().is_some_and(|first| words.contains(first))
@@ -157,7 +138,8 @@ mod tests {
 
     fn parts_of(first: (&Value, &At), second: (&Value, &At)) -> Vec<String> {
         let mut found = Vec::new();
-        descend([first, second], &mut vec!["machine".to_owned()], &mut found);
+        let (sides, points) = ([Some(first.0), Some(second.0)], [first.1, second.1]);
+        descend(sides, points, vec![Step::Name("machine")], &mut found);
         found
     }
 

@@ -13,8 +13,8 @@ pub use boundary::{Crossing, Moved};
 pub use plans::PlanChange;
 
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable, ratio_limits};
 use side::Side;
+use sweep_files::{Cell, ResultTable, ratio_limits};
 
 /// What became of a row's verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -192,12 +192,11 @@ fn kind(table: &ResultTable) -> &'static str {
 /// value there.
 ///
 /// # Errors
-/// [`ResultsError::Incomparable`] with the reason, [`ResultsError::File`].
+/// [`ResultsError::Refused`] with the reason, [`ResultsError::File`].
 pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, ResultsError> {
-    let refuse = |reason: String| ResultsError::Incomparable {
-        first: first.path().to_owned(),
-        second: second.path().to_owned(),
-        reason,
+    let refuse = |reason: String| {
+        let [first, second] = [first, second].map(|table| table.path().display());
+        ResultsError::Refused(format!("{first} and {second} cannot be compared: {reason}"))
     };
     let kinds = [kind(first), kind(second)];
     if kinds[0] != kinds[1] {

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use std::ops::Range;
 
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable, Rows};
+use sweep_files::{Cell, ResultTable, Row};
 
 /// A mistake in the text of a condition.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,15 +25,6 @@ pub struct Mistake {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Comparison(pub(crate) [bool; 3]);
 
-/// How two numbers become one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Operation {
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
-}
-
 /// How all rows become one number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Fold {
@@ -49,25 +40,26 @@ pub(crate) enum Fold {
 }
 
 /// A node of an expression; the parser has made sure of the types.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) enum Node {
     Literal(Cell),
     /// A place among the condition's columns.
     Column(usize),
     /// A place among the condition's folds.
     Folded(usize),
-    Negative(Box<Node>),
-    Absolute(Box<Node>),
+    /// One number as another.
+    Changed(fn(f64) -> f64, Box<Node>),
     Not(Box<Node>),
     And(Box<Node>, Box<Node>),
     Or(Box<Node>, Box<Node>),
     IsNull(Box<Node>),
     Compare(Comparison, Box<Node>, Box<Node>),
-    Calculate(Operation, Box<Node>, Box<Node>),
+    /// Two numbers as one.
+    Calculate(fn(f64, f64) -> f64, Box<Node>, Box<Node>),
 }
 
 /// An expression that is true or false: of every row, or of a file as a whole.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Condition {
     /// As typed.
     pub text: String,
@@ -85,6 +77,11 @@ impl Condition {
         self.by_row
     }
 
+    /// The columns that it reads.
+    pub(crate) fn names(&self) -> Vec<&str> {
+        self.columns.iter().map(String::as_str).collect()
+    }
+
     /// Whether it has functions over all rows.
     pub const fn has_folds(&self) -> bool {
         !self.folds.is_empty()
@@ -93,8 +90,9 @@ impl Condition {
 
 /// What a node is evaluated on.
 pub(crate) struct Context<'a> {
-    pub(crate) rows: &'a Rows,
-    pub(crate) row: usize,
+    pub(crate) row: Row<'a>,
+    /// Where the columns of the expression begin among the row's.
+    pub(crate) first: usize,
     pub(crate) folded: &'a [Cell],
 }
 
@@ -102,18 +100,12 @@ impl Node {
     pub(crate) fn value(&self, at: &Context<'_>) -> Cell {
         match self {
             Self::Literal(cell) => cell.clone(),
-            Self::Column(column) => at.rows.cell(*column, at.row),
+            Self::Column(column) => at.row.cell(at.first + *column),
             Self::Folded(fold) => at.folded.get(*fold).cloned().unwrap_or(Cell::Null),
-            Self::Negative(node) => number(node.number(at).map(|number| -number)),
-            Self::Absolute(node) => number(node.number(at).map(f64::abs)),
+            Self::Changed(change, node) => number(node.number(at).map(change)),
             Self::Calculate(operation, left, right) => {
                 let both = left.number(at).zip(right.number(at));
-                number(both.map(|(left, right)| match operation {
-                    Operation::Add => left + right,
-                    Operation::Subtract => left - right,
-                    Operation::Multiply => left * right,
-                    Operation::Divide => left / right,
-                }))
+                number(both.map(|(left, right)| operation(left, right)))
             }
             Self::Not(_) | Self::And(..) | Self::Or(..) | Self::IsNull(_) | Self::Compare(..) => {
                 self.truth(at).map_or(Cell::Null, Cell::Flag)
@@ -218,7 +210,7 @@ impl Condition {
             return Ok(Vec::new());
         }
         let mut foldings = vec![Folding::default(); self.folds.len()];
-        each_row(table, &[self], keep, |at| {
+        each_row(table, &self.names(), keep, |at| {
             for ((fold, node), folding) in self.folds.iter().zip(&mut foldings) {
                 folding.add(*fold, node, at);
             }
@@ -269,37 +261,23 @@ fn quantile(mut numbers: Vec<f64>, part: f64) -> Option<f64> {
     Some(below + (above - below) * place.fract())
 }
 
-/// Calls `work` for each row that `keep` takes, with the columns of the first of `conditions`.
+/// Calls `work` for each row that `keep` takes, with the columns of these names.
 ///
 /// # Errors
 /// [`ResultsError::File`], and whatever `work` says.
 pub(crate) fn each_row(
     table: &ResultTable,
-    conditions: &[&Condition],
+    names: &[&str],
     keep: Option<&Condition>,
     mut work: impl FnMut(&Context<'_>) -> Result<(), ResultsError>,
 ) -> Result<(), ResultsError> {
-    let read = |conditions: &[&Condition]| {
-        let names = conditions.iter().flat_map(|condition| &condition.columns);
-        let mut names: Vec<&str> = names.map(String::as_str).collect();
-        if names.is_empty() {
-            // Every row counts, whether or not a column is read of it.
-            names.extend(table.columns.first().map(|column| column.name.as_str()));
+    let first = names.len();
+    let names = [names, &keep.map_or_else(Vec::new, Condition::names)].concat();
+    table.file().each_row(&names, |row| {
+        let at = |first| Context { row, first, folded: &[] };
+        match keep.is_none_or(|keep| keep.root.truth(&at(first)) == Some(true)) {
+            true => work(&at(0)),
+            false => Ok(()),
         }
-        table.read(&names)
-    };
-    let mut filter = keep.map(|keep| read(&[keep])).transpose()?;
-    for rows in read(conditions)? {
-        let rows = rows?;
-        let beside = filter.as_mut().and_then(Iterator::next).transpose()?;
-        let is_kept = |row: &usize| {
-            keep.zip(beside.as_ref()).is_none_or(|(keep, rows)| {
-                keep.root.truth(&Context { rows, row: *row, folded: &[] }) == Some(true)
-            })
-        };
-        for row in (0..rows.count).filter(is_kept) {
-            work(&Context { rows: &rows, row, folded: &[] })?;
-        }
-    }
-    Ok(())
+    })
 }

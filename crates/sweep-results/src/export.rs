@@ -8,7 +8,7 @@ use std::path::Path;
 use sweep_files::{FileKind, Output};
 
 use crate::error::ResultsError;
-use crate::rows::ResultTable;
+use sweep_files::ResultTable;
 
 /// A format, known by a file's ending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +46,7 @@ impl Format {
 /// Writes all rows of a result.
 ///
 /// # Errors
-/// [`ResultsError::File`], and [`ResultsError::Export`] where the format has no room for it.
+/// [`ResultsError::File`], and [`ResultsError::Refused`] where the format has no room for it.
 pub fn export(
     table: &ResultTable,
     format: Format,
@@ -68,7 +68,7 @@ fn names(table: &ResultTable) -> Vec<&str> {
 }
 
 /// A refusal of a format.
-fn no_room(table: &ResultTable, format: Format, reason: impl Into<String>) -> ResultsError {
-    let path = table.path().to_owned();
-    ResultsError::Export { path, ending: format.ending(), reason: reason.into() }
+fn no_room(table: &ResultTable, format: Format, reason: &str) -> ResultsError {
+    let (path, ending) = (table.path().display(), format.ending());
+    ResultsError::Refused(format!("{path} cannot be exported as .{ending}: {reason}"))
 }

@@ -6,11 +6,11 @@ use arrow_schema::ArrowError;
 
 use crate::condition::{Condition, Context, Folding, Mistake, Node};
 use crate::parse::expression;
-use crate::rows::{Cell, Rows};
+use sweep_files::{Cell, Rows};
 use sweep_files::{CellKind, Column};
 
 /// A number of rows that a search drives down.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Goal {
     expression: Condition,
     columns: Vec<Column>,
@@ -75,7 +75,7 @@ impl Goal {
     /// Rows of other columns.
     pub fn over(&self, batch: &RecordBatch) -> Result<Option<f64>, ArrowError> {
         let rows = Rows::of(batch, &self.columns)?;
-        let at = |row| Context { rows: &rows, row, folded: &[] };
+        let at = |row| Context { row: rows.row(row), first: 0, folded: &[] };
         let fold = |(fold, node): &(_, Node)| {
             let mut folding = Folding::default();
             (0..rows.count).for_each(|row| folding.add(*fold, node, &at(row)));

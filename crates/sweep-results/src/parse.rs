@@ -15,9 +15,8 @@
 
 use std::ops::Range;
 
-use crate::condition::{Comparison, Condition, Fold, Mistake, Node, Operation};
-use crate::rows::{Cell, ResultTable};
-use sweep_files::{CellKind, Column};
+use crate::condition::{Comparison, Condition, Fold, Mistake, Node};
+use sweep_files::{Cell, CellKind, Column, ResultTable};
 
 /// Deepest nesting: what no person writes, and no stack minds.
 const DEEPEST: usize = 64;
@@ -71,8 +70,18 @@ const COMPARISONS: [(&str, Comparison); 6] = [
     ("==", Comparison([false, true, false])),
     ("!=", Comparison([true, false, true])),
 ];
-const SUMS: [(&str, Operation); 2] = [("+", Operation::Add), ("-", Operation::Subtract)];
-const PRODUCTS: [(&str, Operation); 2] = [("*", Operation::Multiply), ("/", Operation::Divide)];
+
+/// How two parts become one.
+type Joining = fn(Box<Node>, Box<Node>) -> Node;
+
+const SUMS: [(&str, Joining); 2] = [
+    ("+", |left, right| Node::Calculate(|a, b| a + b, left, right)),
+    ("-", |left, right| Node::Calculate(|a, b| a - b, left, right)),
+];
+const PRODUCTS: [(&str, Joining); 2] = [
+    ("*", |left, right| Node::Calculate(|a, b| a * b, left, right)),
+    ("/", |left, right| Node::Calculate(|a, b| a / b, left, right)),
+];
 
 fn wrong<T>(
     title: impl Into<String>,
@@ -154,6 +163,7 @@ impl Condition {
     }
 }
 
+#[derive(Default)]
 struct Parser<'a> {
     tokens: Vec<Spanned>,
     next: usize,
@@ -171,16 +181,7 @@ pub(crate) fn expression(
     columns: &[Column],
     wanted: CellKind,
 ) -> Result<Condition, Mistake> {
-    let mut parser = Parser {
-        tokens: tokens(text)?,
-        next: 0,
-        columns,
-        used: Vec::new(),
-        folds: Vec::new(),
-        by_row: false,
-        in_fold: false,
-        depth: 0,
-    };
+    let mut parser = Parser { tokens: tokens(text)?, columns, ..Parser::default() };
     let root = parser.any_of()?;
     let (token, span) = parser.peek().clone();
     if token != Token::End {
@@ -213,38 +214,49 @@ impl Parser<'_> {
         token
     }
 
-    fn takes_word(&mut self, word: &str) -> bool {
-        let is = matches!(&self.peek().0, Token::Word(found) if found == word);
-        self.next += usize::from(is);
-        is
+    fn takes_word(&mut self, word: &'static str) -> bool {
+        self.takes_one(&[(word, ())]).is_some()
     }
 
-    /// What the next sign means, if it is one of these.
-    fn takes_one<T: Copy>(&mut self, signs: &[(&'static str, T)]) -> Option<T> {
-        let Token::Sign(next) = self.peek().0 else { return None };
-        let (_, meaning) = signs.iter().find(|(sign, _)| *sign == next)?;
+    /// The next word or sign and what it means, if it is one of these.
+    fn takes_one<T: Copy>(&mut self, known: &[(&'static str, T)]) -> Option<(&'static str, T)> {
+        let next = match &self.peek().0 {
+            Token::Word(word) => word.as_str(),
+            Token::Sign(sign) => sign,
+            _ => return None,
+        };
+        let found = known.iter().find(|(name, _)| *name == next).copied()?;
         self.next += 1;
-        Some(*meaning)
+        Some(found)
     }
 
     fn any_of(&mut self) -> Parsed {
-        self.logical(Self::all_of, "or", Node::Or)
+        self.joined(Self::all_of, CellKind::Flag, &[("or", Node::Or)])
     }
 
     fn all_of(&mut self) -> Parsed {
-        self.logical(Self::negated, "and", Node::And)
+        self.joined(Self::negated, CellKind::Flag, &[("and", Node::And)])
     }
 
-    fn logical(
+    /// Parts of one kind, joined from the left to a part of that kind.
+    fn joined(
         &mut self,
         part: fn(&mut Self) -> Parsed,
-        word: &str,
-        node: fn(Box<Node>, Box<Node>) -> Node,
+        kind: CellKind,
+        known: &[(&'static str, Joining)],
     ) -> Parsed {
         let mut left = part(self)?;
-        while self.takes_word(word) {
-            let why = format!("`{word}` joins what is true or false");
-            left = joined(left, part(self)?, CellKind::Flag, &why, node)?;
+        while let Some((word, node)) = self.takes_one(known) {
+            let right = part(self)?;
+            let why = match kind {
+                CellKind::Flag => format!("`{word}` joins what is true or false"),
+                _ => "only numbers are calculated with".to_owned(),
+            };
+            for side in [&left, &right] {
+                expect(side, kind, &why)?;
+            }
+            let span = left.span.start..right.span.end;
+            left = Typed { node: node(Box::new(left.node), Box::new(right.node)), kind, span };
         }
         Ok(left)
     }
@@ -273,7 +285,7 @@ impl Parser<'_> {
             let node = if negated { Node::Not(Box::new(node)) } else { node };
             return Ok(Typed { node, kind: CellKind::Flag, span });
         }
-        let Some(comparison) = self.takes_one(&COMPARISONS) else { return Ok(left) };
+        let Some((_, comparison)) = self.takes_one(&COMPARISONS) else { return Ok(left) };
         let right = self.sum()?;
         if left.kind != right.kind {
             let title = format!("{} is compared with {}", left.kind.name(), right.kind.name());
@@ -294,25 +306,11 @@ impl Parser<'_> {
     }
 
     fn sum(&mut self) -> Parsed {
-        self.calculated(Self::product, &SUMS)
+        self.joined(Self::product, CellKind::Number, &SUMS)
     }
 
     fn product(&mut self) -> Parsed {
-        self.calculated(Self::factor, &PRODUCTS)
-    }
-
-    fn calculated(
-        &mut self,
-        part: fn(&mut Self) -> Parsed,
-        signs: &[(&'static str, Operation)],
-    ) -> Parsed {
-        let mut left = part(self)?;
-        while let Some(operation) = self.takes_one(signs) {
-            let node = |left, right| Node::Calculate(operation, left, right);
-            let why = "only numbers are calculated with";
-            left = joined(left, part(self)?, CellKind::Number, why, node)?;
-        }
-        Ok(left)
+        self.joined(Self::factor, CellKind::Number, &PRODUCTS)
     }
 
     fn factor(&mut self) -> Parsed {
@@ -325,7 +323,7 @@ impl Parser<'_> {
                 let inner = self.deeper(Self::factor)?;
                 expect(&inner, CellKind::Number, "only a number has a sign")?;
                 let span = span.start..inner.span.end;
-                let node = Node::Negative(Box::new(inner.node));
+                let node = Node::Changed(|number| -number, Box::new(inner.node));
                 Ok(Typed { node, kind: CellKind::Number, span })
             }
             Token::Sign("(") => {
@@ -342,13 +340,12 @@ impl Parser<'_> {
                 }
                 _ => self.column(&word, span),
             },
-            Token::Sign(sign) => wrong(
-                format!("`{sign}` where a value should be"),
-                span,
-                "expected a column, a number or `(`",
-            ),
-            Token::End => {
-                wrong("the expression ends too early", span, "expected a column, a number or `(`")
+            Token::Sign(_) | Token::End => {
+                let title = match token {
+                    Token::Sign(sign) => format!("`{sign}` where a value should be"),
+                    _ => "the expression ends too early".to_owned(),
+                };
+                wrong(title, span, "expected a column, a number or `(`")
             }
         }
     }
@@ -398,7 +395,7 @@ impl Parser<'_> {
                 self.folds.push((fold, inner.node));
                 Node::Folded(self.folds.len() - 1)
             }
-            None => Node::Absolute(Box::new(inner.node)),
+            None => Node::Changed(f64::abs, Box::new(inner.node)),
         };
         Ok(Typed { node, kind: CellKind::Number, span: span.start..end })
     }
@@ -444,21 +441,6 @@ fn expect(found: &Typed, wanted: CellKind, why: &str) -> Result<(), Mistake> {
     }
     let expected = format!("expected {}, found {}", wanted.name(), found.kind.name());
     wrong(why, found.span.clone(), expected)
-}
-
-/// Two parts of one kind as a part of that kind.
-fn joined(
-    left: Typed,
-    right: Typed,
-    kind: CellKind,
-    why: &str,
-    node: impl FnOnce(Box<Node>, Box<Node>) -> Node,
-) -> Parsed {
-    for side in [&left, &right] {
-        expect(side, kind, why)?;
-    }
-    let span = left.span.start..right.span.end;
-    Ok(Typed { node: node(Box::new(left.node), Box::new(right.node)), kind, span })
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use crate::condition::{Condition, Context, Folded, each_row};
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable};
 use crate::top::Worst;
+use sweep_files::{Cell, ResultTable};
 
 /// A row that does not keep a condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -73,11 +73,8 @@ pub fn check(
     let by = condition.columns.iter().enumerate().find_map(column);
     let (mut whole, mut offenders) = (None, Worst::new(by.map(|(_, worse)| worse), most_offenders));
     let places = table.places();
-    let place = Condition {
-        columns: places.iter().map(|name| (*name).to_owned()).collect(),
-        ..condition.clone()
-    };
-    each_row(table, &[condition, &place], keep, |at| {
+    let names = [&condition.names()[..], &places].concat();
+    each_row(table, &names, keep, |at| {
         checked.rows += 1;
         let truth = condition.root.truth(&Context { folded: &folded, ..*at });
         if !condition.by_row {
@@ -92,20 +89,15 @@ pub fn check(
         if allow_null && truth.is_none() {
             return Ok(());
         }
-        let value = by.and_then(|(column, _)| at.rows.cell(column, at.row).number());
+        let value = by.and_then(|(column, _)| at.row.cell(column).number());
         offenders.take(value, || {
             let own = condition.columns.len();
             let placed = places.iter().enumerate().map(|(k, name)| (*name, own + k));
             let read = condition.columns.iter().enumerate().map(|(k, name)| (name.as_str(), k));
             let read = read.filter(|(name, _)| !places.contains(name));
-            let cells = placed
-                .chain(read)
-                .map(|(name, column)| (name.to_owned(), at.rows.cell(column, at.row)));
-            Offender {
-                row: at.rows.first + at.row as u64,
-                undefined: truth.is_none(),
-                cells: cells.collect(),
-            }
+            let cells = placed.chain(read);
+            let cells = cells.map(|(name, column)| (name.to_owned(), at.row.cell(column)));
+            Offender { row: at.row.index(), undefined: truth.is_none(), cells: cells.collect() }
         });
         Ok(())
     })?;

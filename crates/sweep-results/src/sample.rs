@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use sweep_files::key;
 use sweep_parameter::Worse;
 
-use crate::rows::ResultTable;
+use sweep_files::ResultTable;
 
 /// A column of a file in the making: name, unit, cells.
 pub(crate) type Made = (&'static str, &'static str, ArrayRef);

@@ -1,9 +1,10 @@
 //! The rows that come first in an order.
 
-use crate::condition::{Condition, Node, each_row};
+use crate::condition::{Condition, each_row};
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable};
+use crate::nearest::nearest;
 use sweep_files::CellKind;
+use sweep_files::{Cell, ResultTable};
 use sweep_parameter::Worse;
 
 /// The first `count` rows by the column `by`, as if it were the worse the greater or the less it
@@ -11,8 +12,8 @@ use sweep_parameter::Worse;
 /// as the cells of `columns`. Rows without a value of `by` come last, equal ones in file order.
 ///
 /// # Errors
-/// [`ResultsError::Column`] for a column that is not there, [`ResultsError::NoOrder`] for one of
-/// words, [`ResultsError::File`].
+/// [`ResultsError::Refused`] for a column that is not there, or for an order by words;
+/// [`ResultsError::File`].
 pub fn top(
     table: &ResultTable,
     columns: &[&str],
@@ -20,34 +21,28 @@ pub fn top(
     by: Option<(&str, Worse)>,
     count: usize,
 ) -> Result<Vec<Vec<Cell>>, ResultsError> {
-    for name in columns.iter().copied().chain(by.map(|(name, _)| name)) {
-        if table.column(name).is_none() {
-            let (path, name) = (table.path().to_owned(), name.to_owned());
-            return Err(ResultsError::Column { path, name, nearest: None });
-        }
+    let path = table.path().display();
+    let mut asked = columns.iter().copied().chain(by.map(|(name, _)| name));
+    if let Some(name) = asked.find(|name| table.column(name).is_none()) {
+        let near = nearest(name, table.columns.iter().map(|column| column.name.as_str()));
+        let meant = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
+        return Err(ResultsError::Refused(format!("{path} has no column `{name}`{meant}")));
     }
     if let Some((name, _)) = by
         && table.column(name).is_some_and(|column| column.kind == CellKind::Text)
     {
-        let (path, name) = (table.path().to_owned(), name.to_owned());
-        return Err(ResultsError::NoOrder { path, name });
+        return Err(ResultsError::Refused(format!(
+            "`{name}` of {path} holds no numbers, so it has no order"
+        )));
     }
     let read: Vec<&str> = columns.iter().copied().chain(by.map(|(name, _)| name)).collect();
-    let cells = Condition {
-        text: String::new(),
-        columns: read.iter().map(|name| (*name).to_owned()).collect(),
-        root: Node::Literal(Cell::Null),
-        folds: Vec::new(),
-        by_row: true,
-    };
     let mut found = Worst::new(by.map(|(_, worse)| worse), count);
-    each_row(table, &[&cells], keep, |at| {
-        let value = by.and_then(|_| match at.rows.cell(columns.len(), at.row) {
+    each_row(table, &read, keep, |at| {
+        let value = by.and_then(|_| match at.row.cell(columns.len()) {
             Cell::Flag(flag) => Some(f64::from(u8::from(flag))),
             cell => cell.number(),
         });
-        let cell = |column| at.rows.cell(column, at.row);
-        found.take(value, || (0..columns.len()).map(cell).collect());
+        found.take(value, || (0..columns.len()).map(|column| at.row.cell(column)).collect());
         Ok(())
     })?;
     Ok(found.finish())
@@ -122,8 +117,8 @@ mod tests {
     fn what_has_no_order_is_refused() {
         let table = sample::table();
         let by = |name| top(&table, &["point"], None, Some((name, Worse::Greater)), 1);
-        assert!(matches!(by("status"), Err(ResultsError::NoOrder { .. })));
-        assert!(matches!(by("none"), Err(ResultsError::Column { .. })));
+        assert!(matches!(by("status"), Err(ResultsError::Refused(_))));
+        assert!(matches!(by("none"), Err(ResultsError::Refused(_))));
         assert!(by("reliable").is_ok());
     }
 }

@@ -27,7 +27,7 @@ use sweep_engine::commands::{
     boundary, check, compare, examples, export, optimise, parameters, report, require,
     show as show_engine,
 };
-use sweep_engine::nearest::nearest;
+use sweep_engine::nearest;
 use sweep_engine::{Error, Exit};
 
 /// Subcommands by what they are for, as help lists them.

@@ -360,13 +360,11 @@ fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
         })
     };
     let most = usize::from(args.rows);
+    let all = |rows: Vec<&SharedRow>| rows.into_iter().map(row).collect::<Value>();
     let greatest = |sensitive| {
-        json!({
-            "ratio": found.greatest(most, sensitive, SharedRow::ratio_by).into_iter().map(row)
-                .collect::<Value>(),
-            "gap": found.greatest(most, sensitive, SharedRow::gap_by_m).into_iter().map(row)
-                .collect::<Value>(),
-        })
+        let [ratio, gap] = [SharedRow::ratio_by, SharedRow::gap_by_m]
+            .map(|by| all(found.greatest(most, sensitive, by)));
+        json!({ "ratio": ratio, "gap": gap })
     };
     json!({
         "first": args.first.display().to_string(),

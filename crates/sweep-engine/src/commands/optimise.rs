@@ -111,20 +111,18 @@ fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Re
         ["candidate", "feasible", "on_front"].into_iter().chain(own).chain(objectives).collect();
     let chosen = args.candidate.or_else(|| about["best"].as_u64());
     let (mut feasible, mut front, mut values) = (0, Vec::new(), None);
-    for rows in file.read(&names)? {
-        let rows = rows?;
-        for row in 0..rows.count {
-            let cells: Vec<Cell> = (0..names.len()).map(|column| rows.cell(column, row)).collect();
-            feasible += usize::from(cells[1] == Cell::Flag(true));
-            if rows.first + row as u64 == chosen.unwrap_or(u64::MAX) {
-                let own = cells[3..].iter().take(study.parameters.len());
-                values = own.map(Cell::number).collect::<Option<Vec<f64>>>();
-            }
-            if cells[2] == Cell::Flag(true) {
-                front.push(cells);
-            }
+    file.file().each_row(&names, |row| {
+        let cells: Vec<Cell> = (0..names.len()).map(|column| row.cell(column)).collect();
+        feasible += usize::from(cells[1] == Cell::Flag(true));
+        if Some(row.index()) == chosen {
+            let own = cells[3..].iter().take(study.parameters.len());
+            values = own.map(Cell::number).collect::<Option<Vec<f64>>>();
         }
-    }
+        if cells[2] == Cell::Flag(true) {
+            front.push(cells);
+        }
+        Ok::<(), Error>(())
+    })?;
     let all = file.rows();
     text.line("feasible", format!("{feasible} of {all}, {} on the front", front.len()));
     if let Some(best) = about["best"].as_u64() {

@@ -7,11 +7,11 @@ use serde_json::{Value, json};
 
 use super::run::counts;
 use super::{Lines as _, clipped, conditions, short, table, word};
-use crate::store::read::{ColumnRange, Extreme, Overview, ResultFile, Tally, overview, row, tally};
-use crate::{Error, Exit, nearest, show};
+use crate::store::read::{ColumnRange, Overview, ResultFile, Tally, overview, tally};
+use crate::{Error, Exit, show};
 use sweep_files::{ParquetFile, key};
 use sweep_parameter::Worse;
-use sweep_results::{Cell, Condition, ResultTable, ResultsError, ratio_limits, top};
+use sweep_results::{Cell, Condition, ResultTable, ratio_limits, top};
 
 /// Rows shown where none are asked for by number.
 const ROWS_SHOWN: u16 = 10;
@@ -129,8 +129,7 @@ fn rows(args: &Args) -> Result<Exit, Error> {
     let by = args.by.as_deref().map(|by| (by, order(by)));
     let count = usize::from(args.top.unwrap_or(ROWS_SHOWN));
     let names: Vec<&str> = columns.iter().map(String::as_str).collect();
-    let rows = top(&file, &names, keep.as_ref(), by, count);
-    let rows = rows.map_err(|error| with_nearest(error, &file))?;
+    let rows = top(&file, &names, keep.as_ref(), by, count)?;
     if args.json {
         let object = |row: &Vec<Cell>| -> Value {
             columns.iter().zip(row).map(|(name, cell)| (name.as_str(), json!(cell))).collect()
@@ -142,18 +141,6 @@ fn rows(args: &Args) -> Result<Exit, Error> {
         return show("no rows\n");
     }
     show(&table(&columns, &rows, ""))
-}
-
-/// An error about a column with the name that was meant.
-pub fn with_nearest(error: ResultsError, file: &ResultTable) -> ResultsError {
-    match error {
-        ResultsError::Column { path, name, .. } => {
-            let names = file.columns.iter().map(|column| column.name.as_str());
-            let nearest = nearest(&name, names).map(str::to_owned);
-            ResultsError::Column { path, name, nearest }
-        }
-        other => other,
-    }
 }
 
 /// The columns to show of rows: those asked for, or where a row is, how its verdict came about, and
@@ -227,12 +214,16 @@ fn extremes_at(
     let axes: Vec<&str> =
         axes(&result.plan).iter().filter_map(|axis| axis["parameter"].as_str()).collect();
     let extremes = [&tally.greatest_ratio, &tally.least_gap_nonlinear_m, &tally.greatest_off];
-    let place = |extreme: &Extreme| {
-        let values = row(file, extreme.point, &axes)?;
-        let named = axes.iter().map(|axis| (*axis).to_owned()).zip(values);
-        Ok::<_, Error>((extreme.point, named.collect()))
-    };
-    extremes.into_iter().flatten().map(place).collect()
+    let mut found = Vec::new();
+    file.each_row(&axes, |row| {
+        if extremes.iter().any(|it| it.as_ref().is_some_and(|it| it.point == row.index())) {
+            let values =
+                axes.iter().enumerate().map(|(k, axis)| ((*axis).to_owned(), row.value(k)));
+            found.push((row.index(), values.collect()));
+        }
+        Ok::<(), Error>(())
+    })?;
+    Ok(found)
 }
 
 fn provenance(text: &mut String, result: &ResultFile) {

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::source::{Location, SourceId, Sources};
-use crate::nearest::nearest;
+use sweep_results::nearest;
 
 /// More mistakes than this are counted but not kept: a wrong file should not fill a terminal or the
 /// memory.

@@ -26,7 +26,7 @@ const MOST: [u64; 3] = [1_000_000, 100_000, 20];
 const GENERATIONS: u64 = 24;
 
 /// A search for the least of some numbers over some parameters.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Study<M: Model> {
     /// Name of the study: its file defaults to `results/<name>.parquet`.
     pub name: String,
@@ -59,7 +59,7 @@ pub struct Sought {
 }
 
 /// A number that is least, or greatest.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Objective {
     /// Name of its column.
     pub name: String,

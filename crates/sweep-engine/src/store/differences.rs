@@ -5,6 +5,7 @@ use std::fmt;
 use serde_json::Value;
 
 use crate::config::section::cut;
+use sweep_files::{Step, leaves};
 
 /// One place where two plans part.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,46 +28,17 @@ impl fmt::Display for PlanDifference {
 /// Every leaf at which two JSON values part.
 pub(super) fn differences(was: &Value, is: &Value) -> Vec<PlanDifference> {
     let mut found = Vec::new();
-    descend(Some(was), Some(is), &mut String::new(), &mut found);
+    leaves([Some(was), Some(is)], |_, _| true, &mut Vec::new(), &mut |path, [was, is]| {
+        if was != is {
+            let step = |step: &Step<'_>| match step {
+                Step::Name(name) => format!("/{}", name.replace('~', "~0").replace('/', "~1")),
+                Step::Place(place) => format!("/{place}"),
+            };
+            let pointer = path.iter().map(step).collect();
+            found.push(PlanDifference { pointer, was: was.map(brief), is: is.map(brief) });
+        }
+    });
     found
-}
-
-fn descend(
-    was: Option<&Value>,
-    is: Option<&Value>,
-    pointer: &mut String,
-    found: &mut Vec<PlanDifference>,
-) {
-    if was == is {
-        return;
-    }
-    let length = pointer.len();
-    let mut step = |key: &str, was: Option<&Value>, is: Option<&Value>| {
-        pointer.push('/');
-        pointer.push_str(&key.replace('~', "~0").replace('/', "~1"));
-        descend(was, is, pointer, found);
-        pointer.truncate(length);
-    };
-    match (was, is) {
-        (Some(Value::Object(was)), Some(Value::Object(is))) => {
-            for (key, value) in was {
-                step(key, Some(value), is.get(key));
-            }
-            for (key, value) in is.iter().filter(|(key, _)| !was.contains_key(*key)) {
-                step(key, None, Some(value));
-            }
-        }
-        (Some(Value::Array(was)), Some(Value::Array(is))) => {
-            for i in 0..was.len().max(is.len()) {
-                step(&i.to_string(), was.get(i), is.get(i));
-            }
-        }
-        _ => found.push(PlanDifference {
-            pointer: pointer.clone(),
-            was: was.map(brief),
-            is: is.map(brief),
-        }),
-    }
 }
 
 /// A value on one line; long ones (a whole machine part) are cut.

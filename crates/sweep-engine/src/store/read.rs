@@ -6,18 +6,12 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use arrow_array::cast::AsArray;
-use arrow_array::types::UInt64Type;
-use arrow_array::{Array, RecordBatch};
-use arrow_schema::{ArrowError, DataType};
-use parquet::arrow::ProjectionMask;
 use parquet::errors::ParquetError;
 use serde::Serialize;
 use serde_json::Value;
 
 use super::error::StoreError;
-use sweep_files::cells;
-use sweep_files::{FileKind, ParquetFile, key};
+use sweep_files::{FileKind, ParquetFile, columns, key};
 use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::ratio_limits;
 
@@ -167,10 +161,9 @@ pub(super) fn add(counts: &mut NameCounts, name: &str) {
 /// # Errors
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
 pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 12] = [
+    const COLUMNS: [&str; 11] = [
         "point",
         "status",
-        "motion",
         "stable",
         "beyond",
         "reliable",
@@ -181,68 +174,47 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         "min_gap_nonlinear_m",
         "friction_speed_off",
     ];
-    let failed = StoreError::parquet("read", file.path());
-    let mut tally = Tally::default();
-    let fields = file.schema().fields().iter().map(|field| field.name().clone());
-    let ratios: Vec<String> = fields.filter(|name| name.starts_with("ratio_")).collect();
-    let columns = COLUMNS.into_iter().chain(ratios.iter().map(String::as_str));
-    let batches = file.batches_of(columns)?;
-    let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
-    for batch in batches {
-        count(&batch?, &ratios, limits, &mut tally).map_err(&failed)?;
-    }
-    Ok(tally)
-}
-
-fn count(
-    batch: &RecordBatch,
-    ratios: &[String],
-    limits: Option<RatioLimits>,
-    tally: &mut Tally,
-) -> Result<(), ParquetError> {
-    let column = |name: &str| {
-        batch
-            .column_by_name(name)
-            .ok_or_else(|| ParquetError::General(format!("there is no column `{name}`")))
+    let fields = file.schema().fields().iter().map(|field| field.name().as_str());
+    let ratios: Vec<&str> = fields.clone().filter(|name| name.starts_with("ratio_")).collect();
+    let has = |name: &str| fields.clone().any(|field| field == name);
+    // A result of `sweep stability` or `sweep dwell` has no verdicts.
+    let (is_of_stability, has_verdicts) = (has("stable"), !has("stable") && !has("motion"));
+    let needed = match has_verdicts {
+        true => &["point", "status", "reliable", "sensitive", "method"][..],
+        false => &["point", "status"],
     };
-    let points = column("point")?;
-    let points = points.as_primitive_opt::<UInt64Type>().ok_or_else(|| {
-        ParquetError::General(format!("column `point` is of type {}", points.data_type()))
-    })?;
-    for name in cells::texts(column("status")?)?.into_iter().flatten() {
-        add(&mut tally.by_status, name);
+    if let Some(name) = needed.iter().find(|name| !has(name)) {
+        let reason = ParquetError::General(format!("there is no column `{name}`"));
+        return Err(StoreError::parquet("read", file.path())(reason));
     }
-    tally.points += batch.num_rows() as u64;
-    if let Some(stable) = batch.column_by_name("stable") {
-        let dwells = tally.dwells.get_or_insert_default();
-        let beyond = cells::texts(column("beyond")?)?;
-        for (stable, beyond) in cells::flags(stable)?.iter().zip(beyond) {
-            match stable {
+    let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
+    let over = limits.map_or(0.0, RatioLimits::over_estimate);
+    let greatest_ratio = ratios.iter().position(|name| *name == "ratio_max");
+    let own = COLUMNS.len();
+    let [point, status, stable, beyond, reliable, sensitive, method, error, converged, gap, off] =
+        std::array::from_fn(|column| column);
+    let mut tally = Tally::default();
+    let names = [&COLUMNS[..], &ratios].concat();
+    file.each_row(&names, |row| {
+        let flag = |column| row.cell(column).flag();
+        tally.points += 1;
+        row.word(status).into_iter().for_each(|name| add(&mut tally.by_status, name));
+        if is_of_stability {
+            let dwells = tally.dwells.get_or_insert_default();
+            match flag(stable) {
                 Some(true) => {
                     dwells.stable += 1;
-                    dwells.beyond += u64::from(beyond.is_some());
+                    dwells.beyond += u64::from(row.word(beyond).is_some());
                 }
                 Some(false) => dwells.unstable += 1,
                 None => dwells.unknown += 1,
             }
         }
-        return Ok(());
-    }
-    // A result of `sweep dwell` has no verdicts.
-    if batch.column_by_name("motion").is_some() {
-        return Ok(());
-    }
-    let mut least = vec![f64::INFINITY; batch.num_rows()];
-    for column in ratios.iter().filter_map(|name| batch.column_by_name(name)) {
-        if cells::is_number(column.data_type()) {
-            let ratios = cells::numbers(column)?.into_iter();
-            least.iter_mut().zip(ratios).for_each(|(least, ratio)| {
-                *least = least.min(ratio.unwrap_or(f64::INFINITY));
-            });
+        if !has_verdicts {
+            return Ok(());
         }
-    }
-    let over = limits.map_or(0.0, RatioLimits::over_estimate);
-    for (reliable, least) in cells::flags(column("reliable")?)?.iter().zip(least) {
+        let least = (own..names.len()).map(|k| row.value(k)).fold(f64::INFINITY, f64::min);
+        let reliable = flag(reliable);
         match reliable {
             Some(true) => tally.reliable += 1,
             Some(false) => tally.unreliable += 1,
@@ -250,52 +222,36 @@ fn count(
         }
         tally.over_estimated += u64::from(least < over);
         tally.over_estimated_reliable += u64::from(least < over && reliable == Some(true));
-    }
-    tally.sensitive += cells::flags(column("sensitive")?)?.true_count() as u64;
-    // Older files have no such column.
-    if let Some(converged) = batch.column_by_name("converged") {
-        tally.unconverged += cells::flags(converged)?.false_count() as u64;
-    }
-    for name in cells::texts(column("method")?)?.into_iter().flatten() {
-        add(&mut tally.by_method, name);
-    }
-    let extreme = |name: &str, best: &mut Option<Extreme>, better: fn(f64, f64) -> bool| {
-        let Some(column) = batch.column_by_name(name) else { return Ok(()) };
-        for (value, point) in cells::numbers(column)?.into_iter().zip(points) {
-            if let (Some(value), Some(point)) = (value, point)
-                && best.as_ref().is_none_or(|best| better(value, best.value))
-            {
-                *best = Some(Extreme { value, point });
+        tally.sensitive += u64::from(flag(sensitive) == Some(true));
+        tally.unconverged += u64::from(flag(converged) == Some(false));
+        row.word(method).into_iter().for_each(|name| add(&mut tally.by_method, name));
+        tally.far_off += u64::from(row.value(off) > FAR_OFF);
+        let extreme = |best: &mut Option<Extreme>, value: f64, better: fn(&f64, &f64) -> bool| {
+            let is_best = best.as_ref().is_none_or(|best| better(&value, &best.value));
+            if is_best && !value.is_nan() {
+                *best = Some(Extreme { value, point: row.value(point) as u64 });
             }
-        }
-        Ok::<(), ParquetError>(())
-    };
-    if let Some(off) = batch.column_by_name("friction_speed_off") {
-        let is_far = |off: &f64| *off > FAR_OFF;
-        let far = cells::numbers(off)?.into_iter().flatten().filter(is_far).count();
-        tally.far_off += far as u64;
-    }
-    extreme("friction_speed_off", &mut tally.greatest_off, |a, b| a > b)?;
-    extreme("error", &mut tally.greatest_error, |a, b| a > b)?;
-    extreme("ratio_max", &mut tally.greatest_ratio, |a, b| a > b)?;
-    extreme("min_gap_nonlinear_m", &mut tally.least_gap_nonlinear_m, |a, b| a < b)?;
-    Ok(())
+        };
+        extreme(&mut tally.greatest_off, row.value(off), f64::gt);
+        extreme(&mut tally.greatest_error, row.value(error), f64::gt);
+        let ratio = greatest_ratio.map_or(f64::NAN, |k| row.value(own + k));
+        extreme(&mut tally.greatest_ratio, ratio, f64::gt);
+        extreme(&mut tally.least_gap_nonlinear_m, row.value(gap), f64::lt);
+        Ok::<(), StoreError>(())
+    })?;
+    Ok(tally)
 }
 
 /// Which method each row's numbers come from; nothing where the file does not say.
 ///
 /// # Errors
-/// [`StoreError::File`], and [`StoreError::Parquet`] for a file without such a column.
+/// [`StoreError::File`].
 pub fn levels(file: &ParquetFile) -> Result<Vec<Option<String>>, StoreError> {
-    let failed = StoreError::parquet("read", file.path());
-    let absent = || ParquetError::General("there is no column `method`".to_owned());
     let mut levels = Vec::new();
-    for batch in file.batches_of(["method"])? {
-        let batch = batch?;
-        let names = batch.column_by_name("method").ok_or_else(absent).map_err(&failed)?;
-        let names = cells::texts(names).map_err(|error| failed(error.into()))?;
-        levels.extend(names.into_iter().map(|name| name.map(str::to_owned)));
-    }
+    file.each_row(&["method"], |row| {
+        levels.push(row.word(0).map(str::to_owned));
+        Ok::<(), StoreError>(())
+    })?;
     Ok(levels)
 }
 
@@ -333,9 +289,8 @@ pub struct Overview {
 /// Reads through a file, in bounded memory.
 ///
 /// # Errors
-/// [`StoreError::File`] and [`StoreError::Parquet`].
+/// [`StoreError::File`].
 pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
-    let failed = StoreError::parquet("read", file.path());
     let new = |field: &std::sync::Arc<arrow_schema::Field>| ColumnRange {
         name: field.name().clone(),
         unit: field.metadata().get("unit").cloned().filter(|unit| !unit.is_empty()),
@@ -344,37 +299,30 @@ pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
         range: None,
         names: Vec::new(),
     };
-    let mut columns: Vec<ColumnRange> = file.schema().fields().iter().map(new).collect();
-    for batch in file.batches(|builder| builder)? {
-        for (column, array) in columns.iter_mut().zip(batch?.columns()) {
-            column.widen(array).map_err(|error| failed(error.into()))?;
+    let mut ranges: Vec<ColumnRange> = file.schema().fields().iter().map(new).collect();
+    // Nothing is known of cells of types that none of our files has.
+    let known = columns(file.schema());
+    let names: Vec<&str> = known.iter().map(|column| column.name.as_str()).collect();
+    file.each_row(&names, |row| {
+        for (k, column) in known.iter().enumerate() {
+            ranges[column.field].widen(row.value(k), row.word(k));
         }
-    }
-    Ok(Overview { result: own_word(file, FileKind::Map), rows: file.rows(), columns })
+        Ok::<(), StoreError>(())
+    })?;
+    Ok(Overview { result: own_word(file, FileKind::Map), rows: file.rows(), columns: ranges })
 }
 
 impl ColumnRange {
-    /// Takes in more rows. Of types that none of our files has, only the nulls are counted.
-    fn widen(&mut self, array: &dyn Array) -> Result<(), ArrowError> {
-        self.nulls += array.null_count() as u64;
-        match array.data_type() {
-            DataType::Boolean => {
-                for flag in cells::flags(array)?.iter().flatten() {
-                    self.count(if flag { "true" } else { "false" });
-                }
-            }
-            text if cells::is_text(text) => {
-                cells::texts(array)?.into_iter().flatten().for_each(|name| self.count(name));
-            }
-            number if cells::is_number(number) => {
-                for value in cells::numbers(array)?.into_iter().flatten() {
-                    let (least, greatest) = self.range.unwrap_or((value, value));
-                    self.range = Some((least.min(value), greatest.max(value)));
-                }
-            }
-            _ => {}
+    /// Takes in a number or a word, if there is one.
+    fn widen(&mut self, value: f64, word: Option<&str>) {
+        if !value.is_nan() {
+            let (least, greatest) = self.range.unwrap_or((value, value));
+            self.range = Some((least.min(value), greatest.max(value)));
+        } else if let Some(word) = word {
+            self.count(word);
+        } else {
+            self.nulls += 1;
         }
-        Ok(())
     }
 
     fn count(&mut self, name: &str) {
@@ -384,26 +332,4 @@ impl ColumnRange {
             self.names.push((name.to_owned(), 1));
         }
     }
-}
-
-/// Numeric columns of one row, counted from 0.
-///
-/// # Errors
-/// [`StoreError::File`], and [`StoreError::Parquet`] for a row or column that is not there.
-pub fn row(file: &ParquetFile, row: u64, columns: &[&str]) -> Result<Vec<f64>, StoreError> {
-    let failed = StoreError::parquet("read", file.path());
-    let absent = || ParquetError::General(format!("there is no row {row} with all of {columns:?}"));
-    let mut batches = file.batches(|builder| {
-        let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().copied());
-        builder
-            .with_projection(mask)
-            .with_offset(usize::try_from(row).unwrap_or(usize::MAX))
-            .with_limit(1)
-    })?;
-    let batch = batches.next().ok_or_else(absent).map_err(&failed)??;
-    let value = |name: &&str| {
-        let column = batch.column_by_name(name).ok_or_else(absent)?;
-        cells::numbers(column)?.first().copied().flatten().ok_or_else(absent)
-    };
-    columns.iter().map(value).collect::<Result<_, _>>().map_err(&failed)
 }

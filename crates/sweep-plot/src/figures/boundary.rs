@@ -8,7 +8,7 @@ use crate::axis::evenly_by_log;
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
 use crate::error::PlotError;
-use crate::label::{self, Label};
+use crate::label;
 use crate::read::bracket;
 use crate::table::{Column, Table};
 use crate::together;
@@ -30,15 +30,15 @@ struct Place {
 /// curve for every combination of the axes beyond the second.
 ///
 /// # Errors
-/// [`PlotError::Empty`] with fewer than two points.
+/// [`PlotError::Undrawable`] with fewer than two points.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let columns: Vec<&Column> =
         table.columns.iter().filter(|column| column.numbers().is_some()).collect();
-    let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+    let names: Vec<&str> = columns.iter().map(|column| column.facts.name.as_str()).collect();
     let empty = || table.source.empty("a curve needs at least two points");
     let (low, high) = bracket(&names).ok_or_else(empty)?;
     let (x, y) = (columns[0], columns[1]);
-    let (xs, ys) = (table.numbers(&x.name)?, table.numbers(&y.name)?);
+    let (xs, ys) = (table.numbers(&x.facts.name)?, table.numbers(&y.facts.name)?);
     let (lows, highs) = (table.numbers(low)?, table.numbers(high)?);
     let mut grid: Vec<f64> = xs.iter().copied().filter(|x| x.is_finite()).collect();
     grid.sort_by(f64::total_cmp);
@@ -74,7 +74,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         series.extend(branches(&grid, places).into_iter().map(|branch| {
             let pick = |of: fn(&Place) -> f64| branch.iter().map(of).collect::<Vec<f64>>();
             let style = Style::Band(pick(|place| place.low), pick(|place| place.high));
-            Series::new(name.clone(), colour, 0, pick(|place| place.y), style)
+            Series::new(name.clone(), colour, grid.clone(), pick(|place| place.y), style)
         }));
     }
     let side = far_side(&curves, side_words(table));
@@ -87,14 +87,13 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         subtitle: table.source.subtitle(&format!(
             "{} values of {}{side}",
             grid.len(),
-            label::words(&x.name).to_lowercase()
+            x.label().words.to_lowercase()
         )),
-        x_label: Label::new(&label::words(&x.name), &x.unit),
+        x_label: x.label(),
         x_log: evenly_by_log(&grid),
-        grids: vec![grid],
         panels: vec![ChartPanel {
             height: 440.0,
-            ..ChartPanel::new("boundary", Label::new(&label::words(&y.name), &y.unit), series)
+            ..ChartPanel::new("boundary", y.label(), series)
         }],
         ..Chart::default()
     })
@@ -102,25 +101,18 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
 
 /// What the region above the uppermost places is, where all of these say the same.
 fn far_side(curves: &[(String, Vec<Place>)], [falling, rising]: [&str; 2]) -> String {
-    let mut uppermost: Vec<Place> = Vec::new();
-    let all = || curves.iter().flat_map(|(_, places)| places);
-    let crossings = || all().filter(|place| place.y.is_finite());
-    for place in crossings() {
-        match uppermost.iter_mut().find(|known| known.x == place.x) {
-            Some(known) if known.y < place.y => *known = *place,
-            Some(_) => {}
-            None => uppermost.push(*place),
-        }
-    }
-    let all = |rising: bool| {
-        !uppermost.is_empty() && uppermost.iter().all(|place| place.rising == Some(rising))
+    let all = curves.iter().flat_map(|(_, places)| places);
+    let mut uppermost: Vec<&Place> = all.filter(|place| place.y.is_finite()).collect();
+    let crossings = uppermost.len();
+    uppermost.sort_by(|a, b| a.x.total_cmp(&b.x).then(b.y.total_cmp(&a.y)));
+    uppermost.dedup_by(|a, b| a.x == b.x);
+    let side = uppermost.first().and_then(|place| place.rising);
+    let side = match side.filter(|_| uppermost.iter().all(|place| place.rising == side)) {
+        Some(true) => rising,
+        Some(false) => falling,
+        None => return String::new(),
     };
-    let side = match (all(true), all(false)) {
-        (false, true) => falling,
-        (true, false) => rising,
-        _ => return String::new(),
-    };
-    let line = if crossings().count() > uppermost.len() { "highest crossing" } else { "line" };
+    let line = if crossings > uppermost.len() { "highest crossing" } else { "line" };
     format!(" · {side} above the {line}")
 }
 
@@ -193,9 +185,8 @@ pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay, PlotErr
     }
     let chart = chart(table)?;
     let name = format!("traced boundary: {}", limit(table));
-    let xs = chart.grids.into_iter().next().unwrap_or_default();
     let series = chart.panels.into_iter().flat_map(|panel| panel.series);
-    let lines = series.map(|series| xs.iter().zip(series.y).map(|(&x, y)| [x, y]).collect());
+    let lines = series.map(|series| series.x.iter().zip(series.y).map(|(&x, y)| [x, y]).collect());
     Ok(Overlay { name, lines: lines.collect() })
 }
 
@@ -203,7 +194,7 @@ pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay, PlotErr
 fn limit(table: &Table) -> String {
     let about = table.source.find(key::BOUNDARY);
     let told = about.and_then(|about| about.get(key::LIMIT)?.as_f64());
-    let unit = table.column("quantity_low").map_or("", |column| &column.unit);
+    let unit = table.column("quantity_low").map_or("", |column| &column.facts.unit);
     let (unit, factor) = label::shown(unit);
     let limit = told.map_or(table.source.ratio_limit(), |limit| limit * factor);
     let limit = label::valued("", limit, unit);
@@ -221,7 +212,7 @@ fn further(table: &Table, row: usize) -> String {
     let said = table.source.planned_axes().skip(2).filter_map(|name| {
         let column = table.column(name)?;
         let value = *column.numbers()?.get(row)?;
-        Some(label::valued(&label::words(name), value, &column.unit))
+        Some(label::valued(&label::words(name), value, &column.facts.unit))
     });
     said.collect::<Vec<_>>().join(", ")
 }
@@ -229,7 +220,8 @@ fn further(table: &Table, row: usize) -> String {
 /// A curve's places as lines that have one each along the grid: where there are several, each goes
 /// on from the line, of those with the same sides, whose last place is nearest.
 fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
-    let nowhere = |x: f64| Place { x, y: f64::NAN, low: f64::NAN, high: f64::NAN, rising: None };
+    const NOWHERE: Place =
+        Place { x: f64::NAN, y: f64::NAN, low: f64::NAN, high: f64::NAN, rising: None };
     let height =
         |place: &Place| if place.y.is_nan() { 0.5 * (place.low + place.high) } else { place.y };
     let mut lines: Vec<Vec<Place>> = Vec::new();
@@ -240,9 +232,8 @@ fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (line, known) in lines.iter().enumerate() {
             for (place, new) in here.iter().enumerate() {
-                let Some(last) = known.last() else { continue };
-                let apart = (height(last) - height(new)).abs();
-                if apart.is_finite() && last.rising == new.rising {
+                let apart = (height(&known[k - 1]) - height(new)).abs();
+                if apart.is_finite() && known[k - 1].rising == new.rising {
                     pairs.push((apart, line, place));
                 }
             }
@@ -255,19 +246,11 @@ fn branches(grid: &[f64], places: &[Place]) -> Vec<Vec<Place>> {
             }
         }
         for (place, line) in here.into_iter().zip(taken) {
-            match line {
-                Some(line) => lines[line].push(place),
-                None => {
-                    let mut line: Vec<Place> = grid[..k].iter().map(|x| nowhere(*x)).collect();
-                    line.push(place);
-                    lines.push(line);
-                }
-            }
-        }
-        for line in &mut lines {
-            if line.len() == k {
-                line.push(nowhere(x));
-            }
+            let line = line.unwrap_or_else(|| {
+                lines.push(vec![NOWHERE; grid.len()]);
+                lines.len() - 1
+            });
+            lines[line][k] = place;
         }
     }
     lines

@@ -25,7 +25,7 @@ pub(super) struct Mode {
 /// drawn too, with a star where such a sum is the speed.
 ///
 /// # Errors
-/// [`PlotError::Column`], or [`PlotError::Empty`] without two speeds; as
+/// [`PlotError::Undrawable`] without a column or two speeds; as
 /// [`stability::unstable_of`].
 pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
     let unstable = options.stability.as_ref();
@@ -37,14 +37,11 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     }
     let is_near = |mode: &Mode| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top);
     let (near, far): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(is_near);
-    let (_, highest) =
-        extremes(near.iter().flat_map(|mode| mode.frequency.iter().copied())).unwrap_or((0.0, top));
     let sums = unstable.as_ref().map_or_else(Vec::new, |unstable| sums(&near, unstable));
-    let (_, highest) = extremes(sums.iter().flat_map(|sum| sum.frequency.iter().copied()))
-        .map_or((0.0, highest), |(_, of_sums)| (0.0, highest.max(of_sums)));
+    let drawn = near.iter().chain(&sums).flat_map(|mode| mode.frequency.iter().copied());
+    let (_, highest) = extremes(drawn).unwrap_or((0.0, top));
     let range = (0.0, (1.06 * top).min(1.25 * highest));
 
-    let mut grids = vec![vec![0.0, top]];
     let mut series = Vec::new();
     let mut stars = Vec::new();
     let of_modes = near.into_iter().enumerate().map(|(k, mut mode)| {
@@ -55,11 +52,10 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let of_sums = sums.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
     for (mode, colour, style) in of_modes.chain(of_sums) {
         stars.extend(crossings(&mode).into_iter().map(|at| (at, at, format!("{at:.1} rpm"))));
-        series.push(Series::new(mode.name, colour, grids.len(), mode.frequency, style));
-        grids.push(mode.speed);
+        series.push(Series::new(mode.name, colour, mode.speed, mode.frequency, style));
     }
-    let line = Series::new("frequency = spin speed", INK, 0, vec![0.0, top], Style::Dashed);
-    series.push(line);
+    let ends = vec![0.0, top];
+    series.push(Series::new("frequency = spin speed", INK, ends.clone(), ends, Style::Dashed));
     let mut notes = table.source.notes([]);
     if series.iter().any(|series| matches!(series.style, Style::Band(..))) {
         notes.push("shaded: least to greatest over a turn of the drum".to_owned());
@@ -72,7 +68,6 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         title: "Natural frequencies over spin speed".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Spin speed", "rpm"),
-        grids,
         panels: vec![ChartPanel {
             range: Some(range),
             height: 500.0,
@@ -93,8 +88,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
 /// speed.
 ///
 /// # Errors
-/// [`PlotError::Unfit`] when the file is not a modes file, [`PlotError::Column`] when it lacks a
-/// column.
+/// [`PlotError::Unfit`] when the file is not a modes file, [`PlotError::Undrawable`] when it lacks
+/// a column.
 pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
     table.source.expect(Kind::Modes, "--modes", "`sweep modes --out FILE` writes a modes file")?;
     let mut speeds: Vec<f64> = modes(table)?.iter().flat_map(crossings).collect();
@@ -169,9 +164,9 @@ pub(super) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
     let frequency = table.numbers("frequency_rpm")?;
     let over_turn = |word: &str| {
         let mut columns = table.columns.iter().filter(|column| {
-            column.name.starts_with("frequency")
-                && column.unit == "rpm"
-                && column.name.split('_').any(|part| part == word)
+            column.facts.name.starts_with("frequency")
+                && column.facts.unit == "rpm"
+                && column.facts.name.split('_').any(|part| part == word)
         });
         columns.next().and_then(|column| column.numbers())
     };

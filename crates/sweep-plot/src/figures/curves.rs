@@ -17,8 +17,7 @@ const MOST_MARKS: usize = 400;
 /// The chart of a map file of one axis.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] for a column that the file does not have, [`PlotError::Unfit`] for what
-/// is not a curve.
+/// [`PlotError::Unfit`] for a column that the file does not have, or that is not a curve.
 pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError> {
     let (axis, table) = (&map.grid.axes[0], &map.table);
     let source = &table.source;
@@ -30,43 +29,41 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
         ));
     };
     let cells: Vec<usize> = (0..map.counts.len()).filter(|&cell| map.filled(cell)).collect();
-    let values = |column: &Column, factor: f64| -> Vec<f64> {
+    let xs: Vec<f64> = cells.iter().map(|&cell| axis.values[cell]).collect();
+    let line = |name: &str, colour: Colour, column: &Column, factor: f64| {
         let values = column.numbers().unwrap_or_default();
-        cells.iter().map(|&cell| values[cell] * factor).collect()
+        let y = cells.iter().map(|&cell| values[cell] * factor).collect();
+        Series::new(name, colour, xs.clone(), y, Style::Solid(2.2))
     };
     let ratios_asked: Vec<&Shown> =
         asked.iter().filter(|shown| shown.group == Group::Ratio).collect();
     let wanted = |name: &str| {
         ratios_asked.iter().any(|shown| shown.channel.as_deref().is_none_or(|of| of == name))
     };
-    let mut panels = vec![ratios(map, !ratios_asked.is_empty(), &values, &|name| {
+    let mut panels = vec![ratios(map, !ratios_asked.is_empty(), &line, &|name| {
         ratios_asked.is_empty() || wanted(name)
     })];
     // A panel of both models' columns.
-    let panel = |name: &str, words: &str, columns: &[(&str, &ColumnFacts)]| {
+    let panel = |family: layer::Family<'_>| {
+        let columns = &family.columns;
         let (unit, factor) = label::shown(&columns[0].1.unit);
         let lines = columns.iter().filter_map(|(model, facts)| {
             let said = if model.is_empty() { String::new() } else { format!("{model} model") };
             let colour = if *model == "linear" { LINEAR } else { NONLINEAR };
-            Some(line(&said, colour, values(table.column(&facts.name)?, factor)))
+            Some(line(&said, colour, table.column(&facts.name)?, factor))
         });
         let limit = columns[0].1.limit.map(|limit| limit * factor);
         let is_asked = |name: &String| asked.iter().any(|shown| shown.column() == name);
+        let label = Label::new(&label::capitalised(&family.words), unit);
+        let panel = ChartPanel::new(&family.name, label, lines.collect());
         ChartPanel {
             shown: columns.iter().any(|(_, facts)| is_asked(&facts.name)),
             levels: limit.map(|limit| (limit, "limit".to_owned())).into_iter().collect(),
-            ..ChartPanel::new(name, Label::new(&label::capitalised(words), unit), lines.collect())
+            height: if family.is_channel { 190.0 } else { panel.height },
+            ..panel
         }
     };
-    for (name, facts) in layer::channels(source, Group::Nonlinear) {
-        let of_linear = source.column(&format!("linear_{name}"));
-        let both = [Some(("nonlinear", facts)), of_linear.map(|facts| ("linear", facts))];
-        let columns: Vec<_> = both.into_iter().flatten().collect();
-        panels.push(ChartPanel { height: 190.0, ..panel(name, &label::channel(name), &columns) });
-    }
-    for family in layer::families(source) {
-        panels.push(panel(&family.name, &family.words, &family.columns));
-    }
+    panels.extend(layer::families(source).into_iter().map(panel));
     panels.retain(|panel| !panel.series.is_empty());
 
     let failed: Vec<usize> =
@@ -92,7 +89,6 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
         x_log: axis.swept.log,
         marks: failed.iter().step_by(each).map(mark).collect(),
         mark_meaning,
-        grids: vec![cells.iter().map(|&cell| axis.values[cell]).collect()],
         panels,
         ..Chart::default()
     })
@@ -101,19 +97,19 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
 fn ratios(
     map: &Map,
     shown: bool,
-    values: &impl Fn(&Column, f64) -> Vec<f64>,
+    line: &impl Fn(&str, Colour, &Column, f64) -> Series,
     wanted: &impl Fn(&str) -> bool,
 ) -> ChartPanel {
     let limit = map.table.source.ratio_limit();
-    let channels = layer::channels(&map.table.source, Group::Ratio).into_iter().enumerate();
+    let mut channels = map.table.source.with_prefix("ratio_");
+    channels.retain(|(name, _)| !["max", "min", "change"].contains(name));
     let ratio = |(k, (name, facts)): (usize, (&str, &ColumnFacts))| {
         let column = map.table.column(&facts.name).filter(|_| wanted(name))?;
-        Some(line(&label::channel(name), DISTINCT[k % DISTINCT.len()], values(column, 1.0)))
+        Some(line(&label::channel(name), DISTINCT[k % DISTINCT.len()], column, 1.0))
     };
-    let mut series: Vec<Series> = channels.filter_map(ratio).collect();
+    let mut series: Vec<Series> = channels.into_iter().enumerate().filter_map(ratio).collect();
     if let Some(column) = map.table.column("ratio_max") {
-        let largest = Series { style: Style::Dashed, ..line("largest", INK, values(column, 1.0)) };
-        series.push(largest);
+        series.push(Series { style: Style::Dashed, ..line("largest", INK, column, 1.0) });
     }
     let words = format!("Ratio of {}, nonlinear / linear", map.table.source.compared());
     ChartPanel {
@@ -123,10 +119,6 @@ fn ratios(
         mixed: mixed(map),
         ..ChartPanel::new("ratio", Label::new(&words, ""), series)
     }
-}
-
-fn line(name: &str, colour: Colour, y: Vec<f64>) -> Series {
-    Series::new(name, colour, 0, y, Style::Solid(2.2))
 }
 
 /// Where a cell holds reliable and unreliable points, as ranges of the axis. Those too near to each

@@ -9,13 +9,14 @@ use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::stability::{
-    UNSTABLE, axes, channels_of, columns_of, each_row, notes_at, one_point, response, shown,
+    UNSTABLE, channels_of, columns_of, each_row, notes_at, one_point, panel, read, response, shown,
     unstable,
 };
 use crate::figures::{passages, trace};
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Source};
 use crate::scene::{Colour, INK};
+use crate::swept;
 use crate::together::{self, At};
 
 /// Kinds of motions as the file has them, in words, and their colours; the last is what did not
@@ -40,15 +41,8 @@ const TURN: &str = "turn";
 const YAW: &str = "q5_rad";
 const PITCH: &str = "q6_rad";
 
-/// The file's one point over speed.
-struct Held {
-    speed: Vec<f64>,
-    growth: Vec<f64>,
-    /// Each channel's deviations in the linear model and in the periodic response.
-    lines: Vec<[Vec<f64>; 2]>,
-    /// Each motion's speed, kind, and deviation by channel.
-    motions: Vec<(f64, usize, Vec<f64>)>,
-}
+/// A motion: its speed, kind, and deviation by channel.
+type Motion = (f64, usize, Vec<f64>);
 
 /// The chart of a dwell file's one point: deviations over speed.
 ///
@@ -58,52 +52,39 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
     let channels = channels_of(source, "periodic");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
-    let axes = axes(source);
+    let axes = swept::columns(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
-    let held = read(source, &axes, &point, &channels)?;
+    let motions = motions(source, &axes, &point, &channels)?;
+    let columns = columns_of(&channels, ["linear", "periodic"]);
+    let one = read(source, &axes, std::slice::from_ref(&point), &columns)?.remove(0);
     let passing = options.against.as_ref().map(|path| passing(source, (&axes, &point), path));
     let passing = passing.transpose()?;
-    // A grid of speeds of the lines, then one of the motions of each kind, then those of a run.
-    let of_kind = |kind: usize| held.motions.iter().filter(move |(_, of, _)| *of == kind);
-    let mut grids = vec![held.speed.clone()];
-    grids.extend((0..KINDS.len()).map(|kind| of_kind(kind).map(|(speed, ..)| *speed).collect()));
-    let of_run = grids.len();
-    let (first, last) = (held.speed.first().copied(), held.speed.last().copied());
+    let of_kind = |kind: usize| motions.iter().filter(move |(_, of, _)| *of == kind);
+    let (first, last) = (one.speed.first().copied(), one.speed.last().copied());
     let is_held = |speed: &f64| first <= Some(*speed) && Some(*speed) <= last;
-    let grids_of_run = passing.iter().flat_map(|run| &run.grids);
-    grids.extend(grids_of_run.map(|grid| grid.iter().copied().filter(is_held).collect()));
     let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
-        let (unit, factor) = label::shown(&facts.unit);
-        let scaled = |values: &[f64]| values.iter().map(|value| value * factor).collect();
-        let [linear, periodic] = &held.lines[k];
-        let lines = [scaled(linear), scaled(periodic)];
-        let mut series = response("periodic response", lines, &held.growth);
+        let (_, factor) = label::shown(&facts.unit);
+        let mut series = response("periodic response", &one, k, factor);
         for (kind, (_, words, colour)) in KINDS.iter().enumerate() {
-            let y: Vec<f64> = of_kind(kind).map(|(_, _, values)| values[k] * factor).collect();
+            let ends = of_kind(kind).map(|(speed, _, values)| (speed, values[k] * factor));
+            let (x, y): (Vec<f64>, Vec<f64>) = ends.unzip();
             if !y.is_empty() {
                 let name = format!("ends in: {words}");
-                series.push(Series::new(name, *colour, 1 + kind, y, Style::Dots));
+                series.push(Series::new(name, *colour, x, y, Style::Dots));
             }
         }
         let runs = passing.iter().flat_map(|run| &run.panels).filter(|panel| panel.name == *name);
         let runs = runs.flat_map(|panel| &panel.series);
         let rising = runs.filter(|run| run.name == RISING);
-        series.extend(passing.iter().zip(rising).map(|(chart, run)| {
-            let of_run_y = chart.grids[run.grid].iter().zip(&run.y);
-            let y = of_run_y.filter_map(|(speed, y)| is_held(speed).then_some(*y)).collect();
-            let name = "a run that passes these speeds";
-            Series::new(name, INK, of_run + run.grid, y, Style::Solid(1.4))
+        series.extend(rising.map(|run| {
+            let held = run.x.iter().zip(&run.y).filter(|(speed, _)| is_held(speed));
+            let (x, y): (Vec<f64>, Vec<f64>) = held.unzip();
+            Series::new("a run that passes these speeds", INK, x, y, Style::Solid(1.4))
         }));
         let motions = series.iter().flat_map(|series| &series.y).copied();
         let log =
             extremes(motions.filter(|y| *y > 0.0)).is_some_and(|(low, high)| high > WIDE * low);
-        let words = label::capitalised(&label::channel(name));
-        ChartPanel {
-            shown: is_shown[k],
-            height: 190.0,
-            log,
-            ..ChartPanel::new(name, Label::new(&words, unit), series)
-        }
+        ChartPanel { height: 190.0, log, ..panel((name, facts), is_shown[k], series) }
     });
     let panels = panels.collect();
     let mut notes = notes_at(source, &axes, &point);
@@ -112,9 +93,8 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         title: "What a held speed ends in".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        shades: unstable(&held.speed, &held.growth),
+        shades: unstable(&one.speed, &one.growth),
         shade_meaning: UNSTABLE.to_owned(),
-        grids,
         panels,
         ..Chart::default()
     })
@@ -136,39 +116,25 @@ fn passing(
     passages::chart(&trace, &PlotOptions::default())
 }
 
-fn read(
+/// The motions at every speed.
+fn motions(
     source: &Source,
     axes: &[&ColumnFacts],
     point: &[f64],
     channels: &[(&str, &ColumnFacts)],
-) -> Result<Held, PlotError> {
-    let mut columns = columns_of(channels, ["linear", "periodic", "nonlinear"]);
-    let mut held = Held {
-        speed: Vec::new(),
-        growth: Vec::new(),
-        lines: vec![[Vec::new(), Vec::new()]; channels.len()],
-        motions: Vec::new(),
-    };
+) -> Result<Vec<Motion>, PlotError> {
+    let mut columns = columns_of(channels, ["nonlinear"]);
     columns.push(TURN.to_owned());
     let has_turns = source.column(TURN).is_some();
-    each_row(source, axes, &columns, |row| {
+    let mut motions = Vec::new();
+    each_row(source, axes, &columns, |mut row| {
         // The first turn of each motion.
-        let is_first = !has_turns || row.values.last().is_some_and(|turn| *turn <= 0.0);
-        if row.point != point || !is_first {
-            return;
+        let is_first = row.values.pop().is_some_and(|turn| turn <= 0.0) || !has_turns;
+        if row.point == point && is_first {
+            motions.push((row.speed, place_of(row.kind), row.values));
         }
-        if held.speed.last() != Some(&row.speed) {
-            held.speed.push(row.speed);
-            held.growth.push(row.growth);
-            for (lines, of) in held.lines.iter_mut().zip(row.values.chunks(3)) {
-                lines[0].push(of[0]);
-                lines[1].push(of[1]);
-            }
-        }
-        let deviations = row.values.chunks_exact(3).map(|of| of[2]).collect();
-        held.motions.push((row.speed, place_of(row.kind), deviations));
     })?;
-    Ok(held)
+    Ok(motions)
 }
 
 /// The place of a kind in [`KINDS`].
@@ -181,9 +147,9 @@ fn place_of(kind: Option<&str>) -> usize {
 /// each speed in a panel.
 ///
 /// # Errors
-/// As [`one_point`]; [`PlotError::Column`] where no states were kept.
+/// As [`one_point`]; [`PlotError::Undrawable`] where no states were kept.
 pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
-    let axes = axes(source);
+    let axes = swept::columns(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
     let columns = ["motion", YAW, PITCH];
     if let Some(name) = columns.into_iter().find(|name| source.column(name).is_none()) {
@@ -202,7 +168,6 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
             None => found.push((row.speed, motion, place_of(row.kind), vec![state])),
         }
     })?;
-    let mut grids = Vec::new();
     let mut panels: Vec<ChartPanel> = Vec::new();
     for (speed, motion, kind, mut states) in found {
         states.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -211,9 +176,9 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
         let further = DISTINCT[motion as usize % DISTINCT.len()];
         let colour = if motion == 0.0 { colour } else { further };
         let name = format!("motion {motion}: {words}");
-        let pitch = states.iter().map(|state| state[1]).collect();
-        let series = Series::new(name, colour, grids.len(), pitch, Style::Dots);
-        grids.push(states.iter().map(|state| state[0]).collect());
+        let [yaw, pitch]: [Vec<f64>; 2] =
+            [0, 1].map(|k| states.iter().map(|state| state[k]).collect());
+        let series = Series::new(name, colour, yaw, pitch, Style::Dots);
         match panels.last_mut().filter(|panel| panel.name == said) {
             Some(panel) => panel.series.push(series),
             None => {
@@ -226,7 +191,6 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
         title: "States once a turn, where the unbalance is up".to_owned(),
         subtitle: notes_at(source, &axes, &point).join(" · "),
         x_label: Label::new("Yaw of the tub from equilibrium", "mrad"),
-        grids,
         panels,
         ..Chart::default()
     })

@@ -13,6 +13,7 @@ const MOST_BINS: f64 = 60.0;
 /// The chart of a design: how many points have which value of the quantity.
 pub(crate) fn chart(scatter: &Scatter) -> Chart {
     let edges = edges(scatter);
+    let ends: Vec<f64> = edges.windows(2).flatten().copied().collect();
     let valued = scatter.valued().max(1) as f64;
     let series = [Side::Good, Side::Bad].into_iter().filter_map(|side| {
         let mut counts = vec![0_u32; edges.len() - 1];
@@ -33,13 +34,8 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
         });
         let y: Vec<f64> = both_ends.collect();
         let low = y.iter().map(|share| 0.0 * share).collect();
-        Some(Series {
-            name: scatter.words(side),
-            colour: colour(side),
-            grid: 0,
-            style: Style::Band(low, y.clone()),
-            y,
-        })
+        let style = Style::Band(low, y.clone());
+        Some(Series::new(scatter.words(side), colour(side), ends.clone(), y, style))
     });
     let series: Vec<Series> = series.collect();
     let greatest = extremes(series.iter().flat_map(|series| series.y.iter().copied()));
@@ -50,13 +46,11 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
         label: label::with_unit(&label::significant(level.value, 4), &scatter.label.unit)
             .replace(['(', ')'], ""),
     });
-    let ends = edges.windows(2).flatten().copied().collect();
     Chart {
         title: title(scatter),
         subtitle: scatter.subtitle(&notes(scatter)),
         x_label: scatter.label.clone(),
         x_log: scatter.log,
-        grids: vec![ends],
         panels: vec![ChartPanel {
             range: Some((0.0, highest)),
             ..ChartPanel::new("points", Label::new("Share of the points", "%"), series)

@@ -417,9 +417,8 @@ impl<'a> Cells<'a> {
             let found = roomiest(area, size, clear).or_else(|| roomiest(area, size, inside));
             if let Some([x, y]) = found {
                 let at = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];
-                scene.text(
-                    Text::new(name, at, LABEL_SIZE).bold().anchor(Anchor::Middle).halo(PAPER),
-                );
+                let text = Text::new(name, at, LABEL_SIZE).bold().anchor(Anchor::Middle);
+                scene.text(Text { halo: Some(PAPER), ..text });
             }
         }
     }

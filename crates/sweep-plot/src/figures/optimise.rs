@@ -44,19 +44,11 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
     let mut names = vec!["feasible", "on_front", x.0.name.as_str()];
     names.extend(shown.iter().map(|(column, _)| column.name.as_str()));
     let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
-    for batch in source.batches(&names)? {
-        let batch = batch?;
-        let is = |name: &str| -> Result<Vec<bool>, PlotError> {
-            Ok(batch.words(name)?.iter().map(|word| *word == Some("true")).collect())
-        };
-        let (feasible, on_front) = (is("feasible")?, is("on_front")?);
-        let columns: Vec<Vec<f64>> =
-            names[2..].iter().map(|name| batch.numbers(name)).collect::<Result<_, _>>()?;
-        rows.extend((0..batch.rows).map(|row| {
-            let kind = usize::from(feasible[row]) + usize::from(on_front[row]);
-            (kind, columns.iter().map(|column| column[row]).collect())
-        }));
-    }
+    source.each_row(&names, |row| {
+        let is = |column| usize::from(row.word(column) == Some("true"));
+        rows.push((is(0) + is(1), row.numbers(2..names.len())));
+        Ok(())
+    })?;
     rows.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
     let units: Vec<(&str, f64)> =
         std::iter::once(&x).chain(&shown).map(|(column, _)| label::shown(&column.unit)).collect();
@@ -64,18 +56,17 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
         let own = rows.iter().filter(|(of, values)| *of == kind && values[0].is_finite());
         own.map(|(_, values)| values[k] * units[k].1).collect()
     };
-    let grids: Vec<Vec<f64>> = (0..KINDS.len()).map(|kind| of(kind, 0)).collect();
     let panels = shown.iter().enumerate().map(|(k, (column, words))| {
         let colours = [FAILED, DISTINCT[5], NONLINEAR];
         let dots = |kind: usize| {
-            Series::new(KINDS[kind], colours[kind], kind, of(kind, k + 1), Style::Dots)
+            Series::new(KINDS[kind], colours[kind], of(kind, 0), of(kind, k + 1), Style::Dots)
         };
-        let drawn = (0..KINDS.len()).filter(|&kind| !grids[kind].is_empty());
+        let dots = (0..KINDS.len()).map(dots).filter(|series| !series.x.is_empty());
         let label = Label::new(words, units[k + 1].0);
         ChartPanel {
             shown: k < ys.len(),
             height: 300.0,
-            ..ChartPanel::new(&column.name, label, drawn.map(dots).collect())
+            ..ChartPanel::new(&column.name, label, dots.collect())
         }
     });
     Ok(Chart {
@@ -84,7 +75,6 @@ pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
         subtitle: source.subtitle(&format!("{} candidates", source.rows)),
         x_label: Label::new(&x.1, units[0].0),
         panels: panels.collect(),
-        grids,
         ..Chart::default()
     })
 }

@@ -17,24 +17,32 @@ struct Stretch {
     gains: bool,
 }
 
+/// The whole turns in a stretch, and the mean speed of each.
+struct Way {
+    gains: bool,
+    turns: Vec<[usize; 2]>,
+    speed: Vec<f64>,
+}
+
 /// The chart of a trace file.
 ///
 /// # Errors
-/// As [`trace::chart`]; besides [`PlotError::Column`] without the speed, and [`PlotError::Empty`]
-/// where the drum makes no whole turn while its speed changes.
+/// As [`trace::chart`]; besides [`PlotError::Undrawable`] without the speed, or where the drum
+/// makes no whole turn while its speed changes.
 pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
     let mut chart = trace::chart(table, options)?;
     let time = table.numbers("time_s")?;
     let speed: Vec<f64> = table.numbers("speed_rpm")?.iter().map(|speed| speed.abs()).collect();
-    let turns = |stretch: Stretch| (stretch.gains, turns(time, &speed, stretch));
-    let mut turns: Vec<(bool, Vec<[usize; 2]>)> =
-        stretches(&speed).into_iter().map(turns).collect();
-    turns.retain(|(_, turns)| !turns.is_empty());
+    let mean = |&[from, to]: &[usize; 2]| 0.5 * (speed[from] + speed[to]);
+    let way = |stretch: Stretch| {
+        let turns = turns(time, &speed, stretch);
+        Way { gains: stretch.gains, speed: turns.iter().map(mean).collect::<Vec<_>>(), turns }
+    };
+    let mut turns: Vec<Way> = stretches(&speed).into_iter().map(way).collect();
+    turns.retain(|way| !way.turns.is_empty());
     if turns.is_empty() {
         return Err(table.source.empty("the drum makes no whole turn while its speed changes"));
     }
-    let mean = |&[from, to]: &[usize; 2]| 0.5 * (speed[from] + speed[to]);
-    chart.grids = turns.iter().map(|(_, turns)| turns.iter().map(mean).collect()).collect();
     chart.panels.retain(|panel| panel.name != "gap" && panel.name != "speed");
     for panel in &mut chart.panels {
         panel.series = panel.series.iter().flat_map(|series| by_turn(series, &turns)).collect();
@@ -51,16 +59,16 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
 }
 
 /// A curve over time as one over speed for each stretch.
-fn by_turn(series: &Series, stretches: &[(bool, Vec<[usize; 2]>)]) -> Vec<Series> {
+fn by_turn(series: &Series, ways: &[Way]) -> Vec<Series> {
     let linear = series.name.starts_with("linear") || series.name == "model";
-    let curve = |(grid, (gains, turns)): (usize, &(bool, Vec<[usize; 2]>))| {
-        let way = if *gains { "rising" } else { "falling" };
-        let name = format!("{}, speed {way}", series.name);
-        let y = turns.iter().map(|&[from, to]| greatest(&series.y[from..=to])).collect();
+    let curve = |way: &Way| {
+        let name =
+            format!("{}, speed {}", series.name, if way.gains { "rising" } else { "falling" });
+        let y = way.turns.iter().map(|&[from, to]| greatest(&series.y[from..=to])).collect();
         let style = if linear { Style::Dashed } else { Style::Solid(1.8) };
-        Series::new(name, DISTINCT[usize::from(!gains)], grid, y, style)
+        Series::new(name, DISTINCT[usize::from(!way.gains)], way.speed.clone(), y, style)
     };
-    stretches.iter().enumerate().map(curve).collect()
+    ways.iter().map(curve).collect()
 }
 
 /// The greatest magnitude; NaN where there is no value.

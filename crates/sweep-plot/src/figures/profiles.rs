@@ -15,7 +15,7 @@ const AT_95: f64 = 3.84;
 /// The chart of a fit's curves.
 ///
 /// # Errors
-/// [`PlotError::Empty`] for a file that has no profiles.
+/// [`PlotError::Undrawable`] for a file that has no profiles.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let empty = || {
         table.source.empty(
@@ -28,10 +28,11 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let series = profiles.iter().enumerate().map(|(k, profile)| {
         let name = label::words(profile["name"].as_str().unwrap_or_default());
         let y = numbers(&profile["cost_above"]);
-        Series::new(name, DISTINCT[k % 6], 0, y, Style::Solid(1.8))
+        Series::new(name, DISTINCT[k % 6], grid.clone(), y, Style::Solid(1.8))
     });
     let parabola = grid.iter().map(|deviation| deviation * deviation).collect();
-    let parabola = Series::new("by the standard errors", MUTED, 0, parabola, Style::Dashed);
+    let parabola =
+        Series::new("by the standard errors", MUTED, grid.clone(), parabola, Style::Dashed);
     let series = series.chain([parabola]).collect();
     let panel = ChartPanel {
         levels: vec![(AT_95, "95 %".to_owned())],
@@ -41,7 +42,6 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         title: "How well the fitted numbers are known".to_owned(),
         subtitle: table.source.subtitle("each moved, the others fitted again"),
         x_label: Label::new("Distance from the fitted number in standard errors", ""),
-        grids: vec![grid],
         panels: vec![panel],
         ..Chart::default()
     })

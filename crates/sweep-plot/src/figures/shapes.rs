@@ -31,7 +31,7 @@ type Line = [Vec<Phasor>; 2];
 /// are from rest when the greatest deflection is at its farthest, and a quarter of a period later.
 ///
 /// # Errors
-/// [`PlotError::Empty`] where the file holds no machine or no resonances.
+/// [`PlotError::Undrawable`] where the file holds no machine or no resonances.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let places = places(table)
         .ok_or_else(|| table.source.empty("the file does not say where the machine's parts are"))?;
@@ -65,10 +65,6 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
             .source
             .subtitle("deflection of the axis as a share of the greatest, unbalance up"),
         x_label: Label::new("Place along the drum's axis, towards the door", "m"),
-        grids: vec![
-            vec![places.rear, places.tub_front],
-            vec![places.rear, places.hinge, places.drum_front],
-        ],
         panels,
         ..Chart::default()
     })
@@ -132,7 +128,7 @@ fn series(places: &Places, q: &[Phasor]) -> Vec<Series> {
     for (k, direction) in ["vertical", "horizontal"].into_iter().enumerate() {
         let tub_line: Vec<Phasor> = tub[k].iter().copied().map(turned).collect();
         let drum_line: Vec<Phasor> = drum[k].iter().copied().map(turned).collect();
-        let mut add = |body: &str, grid: usize, line: &[Phasor], colour: usize| {
+        let mut add = |body: &str, x: &[f64], line: &[Phasor], colour: usize| {
             // The real part of exp(i w t); a quarter of a period later, less its imaginary part.
             for (part, sign, style, when) in [
                 (0, 1.0, Style::Solid(2.6), ""),
@@ -140,12 +136,13 @@ fn series(places: &Places, q: &[Phasor]) -> Vec<Series> {
             ] {
                 let name = format!("{body}{direction}{when}");
                 let y = line.iter().map(|phasor| sign * phasor[part]).collect();
-                series.push(Series::new(name, DISTINCT[colour], grid, y, style));
+                series.push(Series::new(name, DISTINCT[colour], x.to_vec(), y, style));
             }
         };
-        add("", 0, &tub_line, k);
+        add("", &[places.rear, places.tub_front], &tub_line, k);
         if apart(places, &tub_line, &drum_line) > TOGETHER {
-            add("drum, ", 1, &drum_line, k + 2);
+            let along = [places.rear, places.hinge, places.drum_front];
+            add("drum, ", &along, &drum_line, k + 2);
         }
     }
     series

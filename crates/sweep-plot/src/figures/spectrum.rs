@@ -12,7 +12,7 @@ use crate::table::Table;
 /// The chart of a fit's curves.
 ///
 /// # Errors
-/// [`PlotError::Empty`] for a file that has no spectra.
+/// [`PlotError::Undrawable`] for a file that has no spectra.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let spectra = table.source.find("spectra").ok_or_else(|| {
         table.source.empty("it has no spectra: they are in the curves of `sweep fit`")
@@ -23,7 +23,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         let curve = |key: &str, colour| {
             let values = numbers(&column[key]);
             let y = values.iter().map(|value| value * factor).collect();
-            Series::new(key, colour, 0, y, Style::Solid(1.3))
+            Series::new(key, colour, numbers(&spectra["hz"]), y, Style::Solid(1.3))
         };
         let series = vec![curve("measured", MUTED), curve("residual", INK)];
         let label = Label::new(&label::words(text("name")), &format!("{unit} per root Hz"));
@@ -33,7 +33,6 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         title: "What the fitted model leaves over, by frequency".to_owned(),
         subtitle: table.source.subtitle("noise is even; a motion stands out"),
         x_label: Label::new("Frequency", "Hz"),
-        grids: vec![numbers(&spectra["hz"])],
         panels: spectra["columns"].as_array().into_iter().flatten().map(panel).collect(),
         ..Chart::default()
     })

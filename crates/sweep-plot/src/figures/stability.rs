@@ -10,7 +10,7 @@ use crate::error::PlotError;
 use crate::figures::machine::machine;
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Kind, Source, some_of};
-use crate::swept::SweptAxis;
+use crate::swept::{self, SweptAxis};
 use crate::table::Table;
 use crate::together;
 
@@ -27,12 +27,12 @@ const MOST_EDGES: usize = 16;
 pub(super) const UNSTABLE: &str = "a dwell at this speed is unstable";
 
 /// One point over speed.
-struct Swept {
+pub(super) struct Swept {
     /// Values of the file's axes.
     values: Vec<f64>,
-    speed: Vec<f64>,
+    pub(super) speed: Vec<f64>,
     /// NaN where there is no response.
-    growth: Vec<f64>,
+    pub(super) growth: Vec<f64>,
     /// Values of each column asked for.
     columns: Vec<Vec<f64>>,
 }
@@ -40,18 +40,12 @@ struct Swept {
 /// The point of a stability file with its axes' values, in file order.
 type Points = Vec<Vec<f64>>;
 
-/// The columns of numbers between the point's index and the speed.
-pub(super) fn axes(source: &Source) -> Vec<&ColumnFacts> {
-    let before = source.columns.iter().take_while(|column| column.name != "speed_rpm");
-    before.filter(|column| column.is_number() && column.name != "point").collect()
-}
-
 /// The chart of a stability file: growth over speed.
 ///
 /// # Errors
 /// As [`points`], [`read`].
 pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
-    let axes = axes(source);
+    let axes = swept::columns(source);
     let all = points(source, &axes, &options.at, "--at")?;
     let shown: Points = match all.len() {
         count if count <= MOST_CURVES => all.clone(),
@@ -67,7 +61,8 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
         if named.is_empty() { "growth".to_owned() } else { named.join(", ") }
     };
     let series = swept.iter().enumerate().map(|(k, point)| {
-        Series::new(name(&point.values), DISTINCT[k], k, point.growth.clone(), Style::Solid(2.2))
+        let (x, y) = (point.speed.clone(), point.growth.clone());
+        Series::new(name(&point.values), DISTINCT[k], x, y, Style::Solid(2.2))
     });
     let common = axes.iter().zip(&shown[0]).enumerate().filter(|(k, _)| !differs(*k));
     let mut notes = source.notes(common.map(|(_, (axis, value))| said_within(axis, *value)));
@@ -92,7 +87,6 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
         title: "Where a dwell at constant speed is unstable".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
-        grids: swept.into_iter().map(|point| point.speed).collect(),
         panels: vec![panel],
         marks,
         mark_meaning: "edge".to_owned(),
@@ -106,27 +100,18 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
 /// over speed.
 ///
 /// # Errors
-/// As [`one_point`]; [`PlotError::NotThere`] for an unknown channel.
+/// As [`one_point`]; [`PlotError::Unfit`] for an unknown channel.
 pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
     let channels = channels_of(source, "linear");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
     let columns = columns_of(&channels, ["linear", "nonlinear"]);
-    let axes = axes(source);
+    let axes = swept::columns(source);
     let point = one_point(source, &axes, &options.at, "--at")?;
-    let mut swept = read(source, &axes, &[point], &columns)?;
-    let one = swept.remove(0);
-    let panels = channels.iter().enumerate().map(|(k, (name, facts))| {
-        let (unit, factor) = label::shown(&facts.unit);
-        let scaled = |column: &Vec<f64>| column.iter().map(|value| value * factor).collect();
-        let [linear, nonlinear] = [0, 1].map(|model| scaled(&one.columns[2 * k + model]));
-        let lines = response("nonlinear model", [linear, nonlinear], &one.growth);
-        let words = label::capitalised(&label::channel(name));
-        ChartPanel {
-            shown: is_shown[k],
-            height: 170.0,
-            ..ChartPanel::new(name, Label::new(&words, unit), lines)
-        }
+    let one = read(source, &axes, &[point], &columns)?.remove(0);
+    let panels = channels.iter().zip(is_shown).enumerate().map(|(k, (channel, shown))| {
+        let lines = response("nonlinear model", &one, k, label::shown(&channel.1.unit).1);
+        ChartPanel { height: 170.0, ..panel(*channel, shown, lines) }
     });
     let panels = panels.collect();
     let mut notes = notes_at(source, &axes, &one.values);
@@ -137,7 +122,6 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart,
         x_label: Label::new("Constant spin speed", "rpm"),
         shades: unstable(&one.speed, &one.growth),
         shade_meaning: UNSTABLE.to_owned(),
-        grids: vec![one.speed],
         panels,
         ..Chart::default()
     })
@@ -158,19 +142,28 @@ pub(super) fn columns_of<const N: usize>(
     channels.iter().flat_map(|(name, _)| kinds.map(|kind| format!("{kind}_{name}"))).collect()
 }
 
-/// A channel's lines in the linear model and in the periodic response of the nonlinear one, where
-/// that is stable and where it is not.
-pub(super) fn response(
-    name: &str,
-    [linear, periodic]: [Vec<f64>; 2],
-    growth: &[f64],
-) -> Vec<Series> {
-    let of = |wanted: bool| part(&periodic, growth, wanted);
+/// The panel of a channel.
+pub(super) fn panel(
+    (name, facts): (&str, &ColumnFacts),
+    shown: bool,
+    series: Vec<Series>,
+) -> ChartPanel {
+    let words = label::capitalised(&label::channel(name));
+    let label = Label::new(&words, label::shown(&facts.unit).0);
+    ChartPanel { shown, ..ChartPanel::new(name, label, series) }
+}
+
+/// The `k`-th channel's lines, so many times as high: in the linear model and in the periodic
+/// response of the nonlinear one, where that is stable and where it is not.
+pub(super) fn response(name: &str, one: &Swept, k: usize, factor: f64) -> Vec<Series> {
+    let [linear, periodic]: [Vec<f64>; 2] =
+        [2 * k, 2 * k + 1].map(|k| one.columns[k].iter().map(|value| value * factor).collect());
+    let of = |wanted: bool| part(&periodic, &one.growth, wanted);
     let [stable, unstable] = ["stable", "unstable"].map(|word| format!("{name}, {word}"));
     vec![
-        Series::new("linear model", LINEAR, 0, linear, Style::Solid(1.6)),
-        Series::new(stable, NONLINEAR, 0, of(false), Style::Solid(2.2)),
-        Series::new(unstable, NONLINEAR, 0, of(true), Style::Dashed),
+        Series::new("linear model", LINEAR, one.speed.clone(), linear, Style::Solid(1.6)),
+        Series::new(stable, NONLINEAR, one.speed.clone(), of(false), Style::Solid(2.2)),
+        Series::new(unstable, NONLINEAR, one.speed.clone(), of(true), Style::Dashed),
     ]
 }
 
@@ -185,7 +178,7 @@ fn part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
 /// Which of the channels a picture shows: those asked for, else the usual ones, else all.
 ///
 /// # Errors
-/// [`PlotError::NotThere`] for an unknown channel.
+/// [`PlotError::Unfit`] for an unknown channel.
 pub(super) fn shown(
     source: &Source,
     names: &[&str],
@@ -215,12 +208,12 @@ pub(super) struct Unstable {
 /// The unstable speeds of the machine that a trace or a modes file is of.
 ///
 /// # Errors
-/// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] or [`PlotError::NotThere`]
-/// where the stability file does not have this machine.
+/// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] where the stability file does
+/// not have this machine.
 pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
     let source = Source::open(path)?;
     source.expect(Kind::Stability, "--stability", "`sweep stability` writes a stability file")?;
-    let axes = axes(&source);
+    let axes = swept::columns(&source);
     let mut at: Vec<(String, f64)> =
         machine(table).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     let named = together::at(&table.source);
@@ -272,39 +265,34 @@ pub(super) struct Row<'a> {
 /// Reads such a file row by row.
 ///
 /// # Errors
-/// As [`Source::batches`].
+/// As [`Source::each_row`].
 pub(super) fn each_row<S: AsRef<str>>(
     source: &Source,
     axes: &[&ColumnFacts],
     columns: &[S],
     mut take: impl FnMut(Row<'_>),
 ) -> Result<(), PlotError> {
-    let own = axes.iter().map(|axis| axis.name.as_str()).chain(["speed_rpm", "growth_per_s"]);
-    let numbers: Vec<&str> = own.chain(columns.iter().map(S::as_ref)).collect();
-    for batch in source.batches(&[&numbers[..], &["kind"]].concat())? {
-        let batch = batch?;
-        let numbers = numbers.iter().map(|name| batch.numbers(name));
-        let numbers: Vec<Vec<f64>> = numbers.collect::<Result<_, _>>()?;
-        let kinds = batch.words("kind")?;
-        for row in 0..batch.rows {
-            let mut values = numbers.iter().map(|of| of.get(row).copied().unwrap_or(f64::NAN));
-            take(Row {
-                point: values.by_ref().take(axes.len()).collect(),
-                speed: values.next().unwrap_or(f64::NAN),
-                growth: values.next().unwrap_or(f64::NAN),
-                kind: kinds.get(row).copied().flatten(),
-                values: values.collect(),
-            });
-        }
-    }
-    Ok(())
+    let names = axes.iter().map(|axis| axis.name.as_str());
+    let names = names.chain(["speed_rpm", "growth_per_s", "kind"]);
+    let names: Vec<&str> = names.chain(columns.iter().map(S::as_ref)).collect();
+    let own = axes.len();
+    source.each_row(&names, |row| {
+        take(Row {
+            point: row.numbers(0..own),
+            speed: row.number(own),
+            growth: row.number(own + 1),
+            kind: row.word(own + 2),
+            values: row.numbers(own + 3..names.len()),
+        });
+        Ok(())
+    })
 }
 
 /// Every point of the file at the values asked for, in file order.
 ///
 /// # Errors
-/// As [`Source::batches`]; [`PlotError::NotThere`] for what is no axis, or no value of it;
-/// [`PlotError::Empty`] without rows.
+/// As [`Source::each_row`]; [`PlotError::Unfit`] for what is no axis, or no value of it;
+/// [`PlotError::Undrawable`] without rows.
 fn points(
     source: &Source,
     axes: &[&ColumnFacts],
@@ -371,7 +359,7 @@ pub(super) fn one_point(
 }
 
 /// Points over speed, with some columns.
-fn read(
+pub(super) fn read(
     source: &Source,
     axes: &[&ColumnFacts],
     points: &[Vec<f64>],
@@ -399,31 +387,10 @@ fn read(
     Ok(swept)
 }
 
-/// The ranges of speed in which growth is above 0, taken as linear between the given speeds.
+/// The ranges of speed in which growth is above 0, taken as linear between the given speeds. A
+/// speed without an answer has no growth (NaN), and gives no edge to its neighbours.
 pub(super) fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
-    let mut ranges: Vec<[f64; 2]> = Vec::new();
-    // A speed without an answer has no growth (NaN), and is no part of a range.
-    for k in (0..speed.len()).filter(|&k| growth[k] > 0.0) {
-        // A neighbour that has no growth gives no edge between the two.
-        let edge = |other: Option<usize>| {
-            let other = other.filter(|&other| growth.get(other).is_some_and(|g| g.is_finite()));
-            other.map_or(speed[k], |other| {
-                let part = growth[k] / (growth[k] - growth[other]);
-                speed[k] + part * (speed[other] - speed[k])
-            })
-        };
-        let continues = k > 0 && growth[k - 1] > 0.0;
-        match ranges.last_mut() {
-            Some(last) if continues => last[1] = speed[k],
-            _ => ranges.push([edge(k.checked_sub(1)), speed[k]]),
-        }
-        if !growth.get(k + 1).is_some_and(|next| *next > 0.0)
-            && let Some(last) = ranges.last_mut()
-        {
-            last[1] = edge(Some(k + 1));
-        }
-    }
-    ranges
+    stretches_within(speed, growth, &[[0.0, f64::INFINITY]])
 }
 
 /// The stretches of x in which a curve over it is within one of these ranges; straight between its
@@ -431,31 +398,31 @@ pub(super) fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
 pub(super) fn stretches_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut found: Vec<[f64; 2]> = Vec::new();
     for &[low, high] in ranges {
-        let mut open: Option<[f64; 2]> = None;
-        for k in 1..x.len().min(y.len()) {
-            let (from, to) = (y[k - 1], y[k]);
-            // The part of this piece, from 0 to 1, that is within.
-            let part = if from == to {
-                (low..=high).contains(&from).then_some([0.0, 1.0])
-            } else {
-                let [a, b] = [low, high].map(|edge| (edge - from) / (to - from));
+        let first_own = found.len();
+        let is_within = |k: usize| low < y[k] && y[k] < high;
+        for k in 0..x.len().min(y.len()) {
+            let mut add = |[from, to]: [f64; 2]| match found[first_own..].last_mut() {
+                Some(last) if from <= last[1] => last[1] = to,
+                _ => found.push([from, to]),
+            };
+            if k > 0 && y[k - 1] == y[k] && is_within(k) {
+                add([x[k - 1], x[k]]);
+            } else if k > 0 && (y[k] - y[k - 1]).is_finite() {
+                // The part of this piece, from 0 to 1, that is within.
+                let [a, b] = [low, high].map(|edge| (edge - y[k - 1]) / (y[k] - y[k - 1]));
                 let [first, last] = [a.min(b).max(0.0), a.max(b).min(1.0)];
-                (last > first).then_some([first, last])
-            };
-            let Some(part) = part else {
-                found.extend(open.take());
-                continue;
-            };
-            let [first, last] = part.map(|share| x[k - 1] + share * (x[k] - x[k - 1]));
-            match &mut open {
-                Some(stretch) if part[0] == 0.0 => stretch[1] = last,
-                _ => {
-                    found.extend(open.take());
-                    open = Some([first, last]);
+                let at = |share: f64| match share {
+                    1.0 => x[k],
+                    share => x[k - 1] + share * (x[k] - x[k - 1]),
+                };
+                if last > first {
+                    add([at(first), at(last)]);
                 }
             }
+            if is_within(k) {
+                add([x[k]; 2]);
+            }
         }
-        found.extend(open);
     }
     found.sort_by(|a, b| a[0].total_cmp(&b[0]));
     found

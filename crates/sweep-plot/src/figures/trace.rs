@@ -1,6 +1,7 @@
 //! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::rc::Rc;
 
 use crate::PlotOptions;
 use crate::axis::extremes;
@@ -18,10 +19,10 @@ use crate::together::{self, At};
 /// The chart of a trace file.
 ///
 /// # Errors
-/// [`PlotError::Column`] without time, [`PlotError::NotThere`] for an unknown channel, and as
+/// [`PlotError::Undrawable`] without time, [`PlotError::Unfit`] for an unknown channel, and as
 /// [`campbell::resonances`] for the modes file that gives the resonance speeds.
 pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
-    let time = table.numbers("time_s")?.to_vec();
+    let time = Rc::new(table.numbers("time_s")?.to_vec());
     if time.len() < 2 {
         return Err(table.source.empty("a trace needs at least two instants"));
     }
@@ -41,26 +42,25 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         found.iter().zip(is_shown).filter(|(of, is_shown)| *is_shown && (any || of.channel));
     let shown: Vec<&str> = shown.map(|(quantity, _)| quantity.name).collect();
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
-    let names = other.as_ref().map(|other| told_apart(table, other));
+    let names = match &other {
+        Some(other) => told_apart(table, other),
+        None => sides.map(said_of),
+    };
+    // The second curve lies in front; where it hides the first one, this must shine through.
+    let front = LINEAR.with_alpha(165);
+    let drawn = match &other {
+        Some(other) => (other, Rc::new(other.numbers("time_s")?.to_vec()), front),
+        None => (table, Rc::clone(&time), front),
+    };
+    let drawn = [(table, Rc::clone(&time), NONLINEAR), drawn];
     let pair = |columns: &[String; 2], factor: f64| -> Vec<Series> {
-        // The second curve lies in front; where it hides the first one, this must shine through.
-        let front = LINEAR.with_alpha(165);
-        let [first, second] = columns;
-        let curves = match (&other, &names) {
-            (Some(other), Some([one, another])) => [
-                (table, first, one.clone(), NONLINEAR, 0),
-                (other, first, another.clone(), front, 1),
-            ],
-            _ => [
-                (table, first, said_of(sides[0]), NONLINEAR, 0),
-                (table, second, said_of(sides[1]), front, 0),
-            ],
+        let curve = |k: usize| {
+            let ((table, time, colour), name) = (&drawn[k], names[k].clone());
+            let column = table.column(&columns[if other.is_some() { 0 } else { k }])?;
+            let y = column.numbers()?.iter().map(|value| value * factor).collect();
+            Some(Series::new(name, *colour, Rc::clone(time), y, Style::Solid(1.3)))
         };
-        let curves = curves.into_iter().filter_map(|(table, column, name, colour, grid)| {
-            let y = table.column(column)?.numbers()?.iter().map(|value| value * factor).collect();
-            Some(Series::new(name, colour, grid, y, Style::Solid(1.3)))
-        });
-        curves.collect()
+        (0..2).filter_map(curve).collect()
     };
     let of = |quantity: &Quantity<'_>| {
         let (name, (unit, factor)) = (quantity.name, label::shown(quantity.unit));
@@ -74,9 +74,9 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
     let whole = other.as_ref().is_some_and(|other| table.stretch.or(other.stretch).is_none());
     let apart = if whole { difference(&panels) } else { None };
     for (name, column) in table.with_prefix("residual_") {
-        let (unit, factor) = label::shown(&column.unit);
+        let (unit, factor) = label::shown(&column.facts.unit);
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
-        let residual = Series::new("residual", INK, 0, y, Style::Dots);
+        let residual = Series::new("residual", INK, Rc::clone(&time), y, Style::Dots);
         let words = format!("residual, {}", label::words(name));
         let shown = shown.contains(&name);
         let label = Label::new(&words, unit);
@@ -104,26 +104,23 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         let passed = passages(&time, speed, &resonances).into_iter();
         marks.extend(passed.map(|(x, resonance)| Mark::of_speed(x, resonance)));
         shades = stability::stretches_within(&time, speed, &unstable);
-        let series = Series::new(String::new(), INK, 0, speed.to_vec(), Style::Solid(2.0));
+        let x = Rc::clone(&time);
+        let series = Series::new("", INK, x, speed.to_vec(), Style::Solid(2.0));
         let spin = panel("speed", Label::new("spin", "rpm"), true, vec![series]);
         panels.push(ChartPanel { height: 130.0, ..spin });
     }
     Ok(Chart {
-        title: match &names {
+        title: match &other {
             Some(_) => "Nonlinear motion from static equilibrium".to_owned(),
             None if sides == FITTED => "A measurement, and the model fitted to it".to_owned(),
             None => "Motion of both models from static equilibrium".to_owned(),
         },
-        subtitle: match &names {
+        subtitle: match &other {
             // What one of them is would be wrong of the other.
             Some(_) => of_both(&least, apart).join(" · "),
             None => subtitle(table, &least, apart),
         } + &note,
         x_label: Label::new("Time", "s"),
-        grids: match &other {
-            Some(other) => vec![time, other.numbers("time_s")?.to_vec()],
-            None => vec![time],
-        },
         panels,
         marks,
         mark_meaning: "resonance speed passed".to_owned(),
@@ -162,16 +159,16 @@ struct Quantity<'a> {
 fn quantities<'a>(table: &'a Table, sides: [&str; 2]) -> Vec<Quantity<'a>> {
     let channels = table.with_prefix(&format!("{}_", sides[0])).into_iter();
     let channels = channels.map(|(name, column)| {
-        let own = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
+        let own = Some(column.facts.unit.as_str()).filter(|unit| !unit.is_empty());
         let unit = own.unwrap_or(label::unit_of_channel(name));
         Quantity { name, unit, channel: true, columns: sides.map(|side| format!("{side}_{name}")) }
     });
     let numbers = table.columns.iter().filter(|column| column.numbers().is_some());
     let further = numbers.filter_map(|column| {
-        let split = column.name.split_once("_nonlinear_");
+        let split = column.facts.name.split_once("_nonlinear_");
         let (name, end) = split.filter(|(name, _)| *name != "gap")?;
         let columns = sides.map(|side| format!("{name}_{side}_{end}"));
-        Some(Quantity { name, unit: &column.unit, channel: false, columns })
+        Some(Quantity { name, unit: &column.facts.unit, channel: false, columns })
     });
     channels.chain(further).collect()
 }
@@ -270,8 +267,10 @@ pub(super) fn unstable_speeds(
     table: &Table,
     options: &PlotOptions,
 ) -> Result<Vec<[f64; 2]>, PlotError> {
-    let unstable = |path: &PathBuf| stability::unstable_of(table, path);
-    Ok(options.stability.as_ref().map(unstable).transpose()?.map_or_else(Vec::new, |it| it.speeds))
+    match &options.stability {
+        Some(path) => Ok(stability::unstable_of(table, path)?.speeds),
+        None => Ok(Vec::new()),
+    }
 }
 
 /// The resonance speeds that the options name, rpm, and for the subtitle where the machine whose

@@ -11,11 +11,10 @@ use crate::table::Table;
 /// to its greatest frequency over a turn, as a share of the mean.
 ///
 /// # Errors
-/// [`PlotError::Column`], or [`PlotError::Empty`] where no mode has a resonance.
+/// [`PlotError::Undrawable`] without a column, or where no mode has a resonance.
 pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     table.numbers("frequency_min_rpm")?;
     table.numbers("frequency_max_rpm")?;
-    let mut grids = Vec::new();
     let mut series = Vec::new();
     let mut stars = Vec::new();
     for (k, mode) in modes(table)?.into_iter().enumerate() {
@@ -29,8 +28,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
             stars.push((speed, between(&mode.speed, &percent, speed), format!("{speed:.1} rpm")));
         }
         let colour = DISTINCT[k % DISTINCT.len()];
-        series.push(Series::new(mode.name, colour, grids.len(), percent, Style::Solid(2.2)));
-        grids.push(mode.speed);
+        series.push(Series::new(mode.name, colour, mode.speed, percent, Style::Solid(2.2)));
     }
     if series.is_empty() {
         return Err(table.source.empty("no mode's frequency meets the spin speed"));
@@ -39,7 +37,6 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         title: "Natural frequencies over a turn of the drum".to_owned(),
         subtitle: table.source.subtitle("half the distance from least to greatest"),
         x_label: Label::new("Spin speed", "rpm"),
-        grids,
         panels: vec![ChartPanel {
             stars,
             ..ChartPanel::new(

@@ -36,16 +36,11 @@ fn metric(columns: &[String; 2]) -> Value {
 }
 
 fn slider(slider: &Slider, axes: &[(&str, bool)]) -> Value {
-    let axis = axes.iter().find(|(name, _)| *name == slider.name);
-    json!({
-        "name": slider.name,
-        "words": label::words(&slider.name),
-        "unit": label::unit_of_name(&slider.name),
-        "description": slider.description,
-        "from": slider.from,
-        "to": slider.to,
-        "value": slider.value.unwrap_or(slider.from),
-        "axis": slider.value.is_none(),
-        "log": axis.is_some_and(|(_, log)| *log),
-    })
+    let mut data = json!(slider);
+    data["words"] = label::words(&slider.name).into();
+    data["unit"] = label::unit_of_name(&slider.name).into();
+    data["value"] = slider.value.unwrap_or(slider.from).into();
+    data["axis"] = slider.value.is_none().into();
+    data["log"] = axes.iter().any(|(name, log)| *name == slider.name && *log).into();
+    data
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::SharedRow;
 use crate::error::ResultsError;
-use crate::rows::ResultTable;
+use sweep_files::ResultTable;
 
 /// One change of side along the second axis, in both files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -80,7 +80,7 @@ type Found = (f64, [f64; 2]);
 /// The crossings of both files by line.
 type Lines = BTreeMap<Vec<u64>, (Vec<f64>, [Vec<Found>; 2])>;
 
-fn moved(axis: &str, unit: &str, keys: Vec<String>, lines: Lines) -> Moved {
+fn moved(first: &ResultTable, axis: &str, keys: Vec<String>, lines: Lines) -> Moved {
     let (mut crossings, mut unlike) = (Vec::new(), Vec::new());
     for (place, [first, second]) in lines.into_values() {
         if first.len() != second.len() {
@@ -96,7 +96,8 @@ fn moved(axis: &str, unit: &str, keys: Vec<String>, lines: Lines) -> Moved {
             });
         }
     }
-    Moved { axis: axis.to_owned(), unit: unit.to_owned(), keys, crossings, unlike }
+    let unit = first.column(axis).map(|column| column.unit.clone()).unwrap_or_default();
+    Moved { axis: axis.to_owned(), unit, keys, crossings, unlike }
 }
 
 /// Numbers in order, as a key.
@@ -116,7 +117,6 @@ pub(super) fn of_boundaries(
 ) -> Result<Option<Moved>, ResultsError> {
     let (names, others) = (first.axes(), second.axes());
     let [_, axis, ..] = names[..] else { return Ok(None) };
-    let unit = first.column(axis).map(|column| column.unit.clone()).unwrap_or_default();
     let keys: Vec<&str> =
         names.iter().copied().filter(|name| *name != axis && others.contains(name)).collect();
     let mut lines = Lines::new();
@@ -129,24 +129,21 @@ pub(super) fn of_boundaries(
         });
         let mut read = keys.clone();
         read.extend([axis, bracket[0], bracket[1]]);
-        for rows in table.read(&read)? {
-            let rows = rows?;
-            for row in 0..rows.count {
-                let number = |place: usize| rows.cell(place, row).number();
-                let place: Option<Vec<f64>> = (0..keys.len()).map(number).collect();
-                let Some(place) = place else { continue };
-                let line =
-                    lines.entry(ordered(&place)).or_insert_with(|| (place, Default::default()));
-                let count = keys.len();
-                if let (Some(low), Some(high)) = (number(count + 1), number(count + 2)) {
-                    let at = number(count).unwrap_or(f64::midpoint(low, high));
-                    line.1[side].push((at, [low, high]));
-                }
+        table.file().each_row(&read, |row| {
+            let number = |place: usize| row.cell(place).number();
+            let place: Option<Vec<f64>> = (0..keys.len()).map(number).collect();
+            let Some(place) = place else { return Ok(()) };
+            let line = lines.entry(ordered(&place)).or_insert_with(|| (place, Default::default()));
+            let count = keys.len();
+            if let (Some(low), Some(high)) = (number(count + 1), number(count + 2)) {
+                let at = number(count).unwrap_or(f64::midpoint(low, high));
+                line.1[side].push((at, [low, high]));
             }
-        }
+            Ok::<(), ResultsError>(())
+        })?;
     }
     let keys = keys.into_iter().map(str::to_owned).collect();
-    Ok(Some(moved(axis, &unit, keys, lines)))
+    Ok(Some(moved(first, axis, keys, lines)))
 }
 
 /// From the verdicts of two maps: between neighbours along the second axis whose verdicts differ.
@@ -157,7 +154,6 @@ pub(super) fn of_maps(first: &ResultTable, keys: &[String], shared: &[SharedRow]
         return None;
     }
     let axis = &keys[1];
-    let unit = first.column(axis).map(|column| column.unit.clone()).unwrap_or_default();
     let mut rows: BTreeMap<Vec<u64>, Vec<&SharedRow>> = BTreeMap::new();
     for row in shared {
         let mut place = row.place.clone();
@@ -184,5 +180,5 @@ pub(super) fn of_maps(first: &ResultTable, keys: &[String], shared: &[SharedRow]
         lines.insert(key, (place, crossings));
     }
     let others = keys.iter().enumerate().filter(|(k, _)| *k != 1).map(|(_, key)| key.clone());
-    Some(moved(axis, &unit, others.collect(), lines))
+    Some(moved(first, axis, others.collect(), lines))
 }

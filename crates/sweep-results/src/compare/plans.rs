@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use serde_json::{Map, Value};
-use sweep_files::{ParquetFile, key};
+use sweep_files::{ParquetFile, dotted, key, leaves};
 
 /// One place where the plans of two files part.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -37,47 +37,19 @@ fn account(file: &ParquetFile) -> Value {
     Value::Object(account)
 }
 
-/// Every place where the accounts of two files part.
+/// Every place where the accounts of two files part. Lists of other lengths, and of numbers, part
+/// as a whole.
 pub(super) fn changes(first: &ParquetFile, second: &ParquetFile) -> Vec<PlanChange> {
-    let mut found = Vec::new();
-    descend(&account(first), &account(second), &mut String::new(), &mut found);
-    found
-}
-
-fn descend(first: &Value, second: &Value, path: &mut String, found: &mut Vec<PlanChange>) {
-    if first == second {
-        return;
-    }
-    let length = path.len();
-    let mut step = |name: &str, first: &Value, second: &Value| {
-        if !path.is_empty() {
-            path.push('.');
-        }
-        path.push_str(name);
-        descend(first, second, path, found);
-        path.truncate(length);
+    let (first, second) = (account(first), account(second));
+    let opens = |first: &[Value], second: &[Value]| {
+        first.len() == second.len() && first.iter().any(Value::is_object)
     };
-    match (first, second) {
-        (Value::Object(first), Value::Object(second)) => {
-            for (name, value) in first {
-                step(name, value, second.get(name).unwrap_or(&Value::Null));
-            }
-            for (name, value) in second.iter().filter(|(name, _)| !first.contains_key(*name)) {
-                step(name, &Value::Null, value);
-            }
+    let mut found = Vec::new();
+    leaves([Some(&first), Some(&second)], opens, &mut Vec::new(), &mut |path, sides| {
+        let [first, second] = sides.map(|side| side.cloned().unwrap_or_default());
+        if first != second {
+            found.push(PlanChange { path: dotted(path), first, second });
         }
-        // Lists of other lengths, and of numbers, part as a whole.
-        (Value::Array(first), Value::Array(second))
-            if first.len() == second.len() && first.iter().any(Value::is_object) =>
-        {
-            for (k, (first, second)) in first.iter().zip(second).enumerate() {
-                step(&(k + 1).to_string(), first, second);
-            }
-        }
-        _ => found.push(PlanChange {
-            path: path.clone(),
-            first: first.clone(),
-            second: second.clone(),
-        }),
-    }
+    });
+    found
 }

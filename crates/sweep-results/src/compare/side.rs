@@ -1,9 +1,11 @@
 //! One of two files, in memory.
 
+use std::collections::BTreeSet;
+
 use super::{Flip, SharedRow};
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable, Rows};
 use sweep_files::Column;
+use sweep_files::{Cell, ResultTable, Rows};
 
 /// Most cells of a file that are kept: two files of so many take some gigabytes.
 const MOST_CELLS: u64 = 100_000_000;
@@ -12,7 +14,8 @@ const MOST_CELLS: u64 = 100_000_000;
 #[derive(Debug)]
 pub(super) struct Side {
     /// The keys' columns first.
-    cells: Rows,
+    parts: Vec<Rows>,
+    rows: usize,
     keys: usize,
     columns: Vec<Column>,
 }
@@ -34,25 +37,20 @@ pub(super) fn keys(table: &ResultTable, is_boundary: bool) -> Vec<String> {
 
 /// The value of a column that has one in all rows.
 pub(super) fn only_value(table: &ResultTable, name: &str) -> Result<Option<f64>, ResultsError> {
-    let mut value = None;
-    for rows in table.read(&[name])? {
-        let rows = rows?;
-        for row in 0..rows.count {
-            let found = rows.cell(0, row).number();
-            if found.is_none() || value.is_some_and(|value| Some(value) != found) {
-                return Ok(None);
-            }
-            value = found;
-        }
-    }
-    Ok(value)
+    let mut values = BTreeSet::new();
+    table.file().each_row(&[name], |row| {
+        values.insert(row.cell(0).number().map(|value| (value + 0.0).to_bits()));
+        Ok::<(), ResultsError>(())
+    })?;
+    let only = values.pop_first().flatten().filter(|_| values.is_empty());
+    Ok(only.map(f64::from_bits))
 }
 
 impl Side {
     /// Reads the columns that the other file has too.
     ///
     /// # Errors
-    /// [`ResultsError::TooLarge`], [`ResultsError::File`].
+    /// [`ResultsError::Refused`], [`ResultsError::File`].
     pub(super) fn read(
         table: &ResultTable,
         other: &ResultTable,
@@ -67,21 +65,21 @@ impl Side {
         columns.retain(in_both);
         let cells = table.rows().saturating_mul((columns.len() + keys.len()) as u64);
         if cells > MOST_CELLS {
-            let path = table.path().to_owned();
-            return Err(ResultsError::TooLarge { path, cells, most: MOST_CELLS });
+            return Err(ResultsError::Refused(format!(
+                "{} has {cells} cells, more than the {MOST_CELLS} that are kept in memory",
+                table.path().display()
+            )));
         }
         let names = keys.iter().chain(columns.iter().map(|column| &column.name));
         let names: Vec<&str> = names.map(String::as_str).collect();
-        let mut cells = Rows::default();
-        for rows in table.read(&names)? {
-            cells.extend(rows?);
-        }
-        Ok(Self { cells, keys: keys.len(), columns })
+        let parts = table.file().read(&names)?.collect::<Result<Vec<Rows>, _>>()?;
+        let rows = parts.iter().map(|part| part.count).sum();
+        Ok(Self { parts, rows, keys: keys.len(), columns })
     }
 
     /// How many rows it has.
     pub(super) fn rows(&self) -> usize {
-        self.cells.count
+        self.rows
     }
 
     /// The columns, each with its place in [`Side::cell`].
@@ -96,7 +94,9 @@ impl Side {
 
     /// The cell of a row in the column at a place.
     pub(super) fn cell(&self, place: usize, row: usize) -> Cell {
-        self.cells.cell(place, row)
+        let part = self.parts.partition_point(|part| part.first <= row as u64) - 1;
+        let part = &self.parts[part];
+        part.row(row - part.first as usize).cell(place)
     }
 
     /// The values by which a row is told from others.

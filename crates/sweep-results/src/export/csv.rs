@@ -5,8 +5,7 @@ use std::fmt::Write as _;
 use sweep_files::{EXPORTED_CSV, FileError, key};
 
 use super::names;
-use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable};
+use sweep_files::{Cell, ResultTable};
 
 /// Bytes of text that are written at once, at least.
 const AT_ONCE: usize = 1 << 16;
@@ -15,7 +14,7 @@ const AT_ONCE: usize = 1 << 16;
 pub(super) fn write(
     table: &ResultTable,
     put: &mut dyn FnMut(&str) -> Result<(), FileError>,
-) -> Result<(), ResultsError> {
+) -> Result<(), FileError> {
     let version = table.file().value(key::VERSION).unwrap_or("of another version");
     let mut text = format!("{EXPORTED_CSV}{}\n", no_cells(version));
     // Writing to a String cannot fail.
@@ -30,26 +29,24 @@ pub(super) fn write(
     let names = names(table);
     let headings: Vec<String> = names.iter().map(|name| quoted(name)).collect();
     let _ = writeln!(text, "{}", headings.join(","));
-    for rows in table.read(&names)? {
-        let rows = rows?;
-        for row in 0..rows.count {
-            for column in 0..names.len() {
-                let _ = match rows.cell(column, row) {
-                    Cell::Null => Ok(()),
-                    // The shortest digits that read back to the same number.
-                    Cell::Number(number) => text.write_str(&shortest(number)),
-                    Cell::Text(word) => text.write_str(&quoted(&word)),
-                    Cell::Flag(flag) => write!(text, "{flag}"),
-                };
-                text.push(if column + 1 < names.len() { ',' } else { '\n' });
-            }
-            if text.len() >= AT_ONCE {
-                put(&text)?;
-                text.clear();
-            }
+    table.file().each_row(&names, |row| {
+        for column in 0..names.len() {
+            let _ = match row.cell(column) {
+                Cell::Null => Ok(()),
+                // The shortest digits that read back to the same number.
+                Cell::Number(number) => text.write_str(&shortest(number)),
+                Cell::Text(word) => text.write_str(&quoted(&word)),
+                Cell::Flag(flag) => write!(text, "{flag}"),
+            };
+            text.push(if column + 1 < names.len() { ',' } else { '\n' });
         }
-    }
-    Ok(put(&text)?)
+        if text.len() >= AT_ONCE {
+            put(&text)?;
+            text.clear();
+        }
+        Ok::<(), FileError>(())
+    })?;
+    put(&text)
 }
 
 /// The shortest digits of a number, with an exponent where that is shorter.

@@ -4,12 +4,12 @@ use rust_xlsxwriter::{
     DocProperties, ExcelDateTime, Format as Style, Workbook, Worksheet, XlsxError,
 };
 use serde_json::Value;
-use sweep_files::key;
+use sweep_files::{dotted, key, leaves};
 
 use super::{Format, names, no_room};
 use crate::error::ResultsError;
-use crate::rows::{Cell, ResultTable};
 use sweep_files::Column;
+use sweep_files::{Cell, ResultTable};
 
 /// Rows of a sheet, less the two of headings.
 const MOST_ROWS: u64 = (1 << 20) - 2;
@@ -23,7 +23,7 @@ const WIDTHS: [usize; 2] = [12, 60];
 const BUTTON: usize = 3;
 
 pub(super) fn bytes(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
-    let no_room = |reason: String| no_room(table, Format::Xlsx, reason);
+    let no_room = |reason: String| no_room(table, Format::Xlsx, &reason);
     if table.rows() > MOST_ROWS {
         let reason = format!("{} rows, and a sheet has room for {MOST_ROWS}", table.rows());
         return Err(no_room(reason));
@@ -109,13 +109,9 @@ fn fill(
     sheet.row(names.iter().map(|name| text(name))).map_err(refused)?;
     sheet.row(table.columns.iter().map(|column| text(&column.unit))).map_err(refused)?;
     let heading = sheet.row - 1;
-    for rows in table.read(&names)? {
-        let rows = rows?;
-        for row in 0..rows.count {
-            let cells = (0..names.len()).map(|column| rows.cell(column, row));
-            sheet.row(cells).map_err(refused)?;
-        }
-    }
+    table.file().each_row(&names, |row| {
+        sheet.row((0..names.len()).map(|column| row.cell(column))).map_err(refused)
+    })?;
     let last = u16::try_from(names.len().saturating_sub(1)).unwrap_or(u16::MAX);
     // Its buttons stand beside the units, so that sorting moves neither units nor names.
     sheet.sheet.autofilter(heading, 0, sheet.row - 1, last).map_err(refused)?;
@@ -140,17 +136,17 @@ fn about_columns(book: &mut Workbook, table: &ResultTable) -> Result<(), XlsxErr
 /// Every number and word of the plan under its path.
 fn about_plan(book: &mut Workbook, table: &ResultTable) -> Result<(), XlsxError> {
     let mut sheet = Sheet::new(book, "plan", 1)?;
-    let mut leaves = Vec::new();
+    let mut all = Vec::new();
     for (name, key) in [("version", key::VERSION), ("numerics", key::NUMERICS)] {
-        leaves.extend(table.file().value(key).map(|value| (name.to_owned(), value.into())));
+        all.extend(table.file().value(key).map(|value| (name.to_owned(), value.into())));
     }
     if let Some(plan) = &table.plan {
-        collect(plan, &mut String::new(), &mut leaves);
+        collect(plan, &mut all);
     }
-    let longest = leaves.iter().map(|(path, _)| path.as_str()).max_by_key(|path| path.len());
+    let longest = all.iter().map(|(path, _)| path.as_str()).max_by_key(|path| path.len());
     sheet.widths(longest.into_iter())?;
     sheet.row(["setting", "value"].map(text))?;
-    for (path, value) in leaves {
+    for (path, value) in all {
         let value = match &value {
             Value::Number(number) => number.as_f64().map_or(Cell::Null, Cell::Number),
             Value::String(word) => text(word),
@@ -161,23 +157,12 @@ fn about_plan(book: &mut Workbook, table: &ResultTable) -> Result<(), XlsxError>
     Ok(())
 }
 
-fn collect(value: &Value, path: &mut String, leaves: &mut Vec<(String, Value)>) {
-    let length = path.len();
-    let mut step = |name: &str, value: &Value| {
-        if !path.is_empty() {
-            path.push('.');
-        }
-        path.push_str(name);
-        collect(value, path, leaves);
-        path.truncate(length);
-    };
-    match value {
-        Value::Object(map) => map.iter().for_each(|(name, value)| step(name, value)),
-        Value::Array(values) if values.iter().any(Value::is_object) => {
-            (1..).zip(values).for_each(|(k, value): (usize, _)| step(&k.to_string(), value));
-        }
-        leaf => leaves.push((path.clone(), leaf.clone())),
-    }
+/// The leaves of a plan by their paths; a list of numbers is one.
+fn collect(plan: &Value, found: &mut Vec<(String, Value)>) {
+    let opens = |values: &[Value], _: &[Value]| values.iter().any(Value::is_object);
+    leaves([Some(plan); 2], opens, &mut Vec::new(), &mut |path, [value, _]| {
+        found.extend(value.map(|value| (dotted(path), value.clone())));
+    });
 }
 
 #[cfg(test)]
@@ -231,7 +216,7 @@ mod tests {
     #[test]
     fn the_plan_is_a_list_of_paths() {
         let mut leaves = Vec::new();
-        collect(&sample::plan(), &mut String::new(), &mut leaves);
+        collect(&sample::plan(), &mut leaves);
         let paths: Vec<&str> = leaves.iter().map(|(path, _)| path.as_str()).collect();
         assert!(paths.contains(&"machine.tub.mass_kg"), "{paths:?}");
         assert!(paths.contains(&"axis.1.values"), "{paths:?}");

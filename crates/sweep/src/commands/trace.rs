@@ -139,8 +139,7 @@ fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> 
              row"
         ))
     })?;
-    let rows = top(&file, &["point", column], None, Some((column, worse)), 1);
-    let rows = rows.map_err(|error| sweep_engine::commands::show::with_nearest(error, &file))?;
+    let rows = top(&file, &["point", column], None, Some((column, worse)), 1)?;
     match rows.first().map(Vec::as_slice) {
         Some([Cell::Number(point), Cell::Number(_)]) => Ok((*point as u64, worse)),
         _ => Err(refused(format!("a column that has values in {}", path.display()))),

@@ -2,11 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use arrow_schema::ArrowError;
-
 use crate::places;
-use sweep_engine::StoreError;
-use sweep_files::{ParquetFile, cells};
+use sweep_files::{FileError, ParquetFile};
 
 /// Places that are listed.
 const MOST_LISTED: usize = 12;
@@ -17,9 +14,8 @@ const TOLD: [&str; 2] = ["tub_yaw", "tub_pitch"];
 /// Reads through a file: lines, each with its name.
 ///
 /// # Errors
-/// [`StoreError::File`] and [`StoreError::Parquet`].
-pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, StoreError> {
-    let failed = StoreError::parquet("read", file.path());
+/// As [`ParquetFile::read`].
+pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, FileError> {
     let mut axes = places::axes(file);
     axes.push("speed_rpm".to_owned());
     let mut kinds: BTreeMap<String, u64> = BTreeMap::new();
@@ -28,41 +24,33 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, S
     let mut several: Vec<(Vec<f64>, u64)> = Vec::new();
     // By channel: how far, which kind of motion, where.
     let mut farthest: [Option<(f64, String, Vec<f64>)>; TOLD.len()] = [None, None];
-    for batch in file.batches(|builder| builder)? {
-        let batch = batch?;
-        let mut add = || -> Result<(), ArrowError> {
-            let missing =
-                |name: &str| ArrowError::SchemaError(format!("there is no column {name}"));
-            let column = |name: &str| batch.column_by_name(name).ok_or_else(|| missing(name));
-            let numbers = |name: &str| cells::numbers(column(name)?);
-            let (kind, status) = (cells::texts(column("kind")?)?, cells::texts(column("status")?)?);
-            let motion = numbers("motion")?;
-            // A motion counts by the first of its turns, if these were kept.
-            let turn = batch.column_by_name("turn").map(|turn| cells::numbers(turn)).transpose()?;
-            let at = axes.iter().map(|axis| numbers(axis)).collect::<Result<Vec<_>, _>>()?;
-            let told = TOLD.map(|name| numbers(&format!("nonlinear_{name}")).unwrap_or_default());
-            let is_first = |i: &usize| turn.as_ref().is_none_or(|turn| turn[*i] <= Some(0.0));
-            for i in (0..batch.num_rows()).filter(is_first) {
-                let place = || at.iter().map(|values| values[i].unwrap_or(f64::NAN)).collect();
-                let what = kind[i].or(status[i]).unwrap_or_default();
-                rows += 1;
-                *kinds.entry(what.to_owned()).or_default() += 1;
-                match motion[i] {
-                    Some(0.0) => places += 1,
-                    Some(1.0) => several.push((place(), 2)),
-                    _ => several.iter_mut().last().into_iter().for_each(|(_, count)| *count += 1),
-                }
-                for (farthest, values) in farthest.iter_mut().zip(&told) {
-                    let value = values.get(i).copied().flatten();
-                    if value > farthest.as_ref().map(|(known, ..)| *known) {
-                        *farthest = value.map(|value| (value, what.to_owned(), place()));
-                    }
-                }
+    let has_turns = file.schema().index_of("turn").is_ok();
+    let channels = TOLD.map(|name| format!("nonlinear_{name}"));
+    let names = ["kind", "status", "motion", "turn"].into_iter();
+    let names = names.chain(channels.iter().map(String::as_str));
+    let names: Vec<&str> = names.chain(axes.iter().map(String::as_str)).collect();
+    file.each_row(&names, |row| {
+        // A motion counts by the first of its turns, if these were kept.
+        if has_turns && row.value(3) > 0.0 {
+            return Ok(());
+        }
+        let place = || (4 + TOLD.len()..names.len()).map(|column| row.value(column)).collect();
+        let what = row.word(0).or(row.word(1)).unwrap_or_default();
+        rows += 1;
+        *kinds.entry(what.to_owned()).or_default() += 1;
+        match row.value(2) {
+            0.0 => places += 1,
+            1.0 => several.push((place(), 2)),
+            _ => several.iter_mut().last().into_iter().for_each(|(_, count)| *count += 1),
+        }
+        for (column, farthest) in (4..).zip(&mut farthest) {
+            let value = row.value(column);
+            if value > farthest.as_ref().map_or(f64::NEG_INFINITY, |(known, ..)| *known) {
+                *farthest = Some((value, what.to_owned(), place()));
             }
-            Ok(())
-        };
-        add().map_err(|error| failed(error.into()))?;
-    }
+        }
+        Ok::<(), FileError>(())
+    })?;
     let list: Vec<String> =
         kinds.iter().map(|(kind, count)| format!("{count} {}", kind.replace('_', " "))).collect();
     let counted = format!("{rows} at {places} points and speeds: {}", list.join(", "));

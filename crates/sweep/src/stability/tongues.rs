@@ -2,12 +2,10 @@
 
 use std::fmt::Write as _;
 
-use arrow_schema::ArrowError;
 use washer_model::decimal;
 
 use crate::places;
-use sweep_engine::StoreError;
-use sweep_files::{ParquetFile, cells};
+use sweep_files::{FileError, ParquetFile};
 
 /// Tongues that a summary lists.
 const MOST_LISTED: usize = 12;
@@ -172,52 +170,37 @@ impl Summary {
 /// Reads through a stability file.
 ///
 /// # Errors
-/// [`StoreError::File`] and [`StoreError::Parquet`].
-pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, StoreError> {
-    let failed = StoreError::parquet("read", file.path());
-    let mut summary = Summary { axes: places::axes(file), ..Summary::default() };
-    let axes = summary.axes.clone();
-    for batch in file.batches(|builder| builder)? {
-        let batch = batch?;
-        let missing = |name: &str| ArrowError::SchemaError(format!("there is no column {name}"));
-        let numbers =
-            |name: &str| cells::numbers(batch.column_by_name(name).ok_or_else(|| missing(name))?);
-        let words =
-            |name: &str| cells::texts(batch.column_by_name(name).ok_or_else(|| missing(name))?);
-        let mut add = || -> Result<(), ArrowError> {
-            let [point, speed, growth, frequency, mode_1, mode_2] =
-                ["point", "speed_rpm", "growth_per_s", "frequency_cpm", "mode_1", "mode_2"]
-                    .map(numbers);
-            let (branch_to, beyond) = (numbers("branch_to_rpm")?, words("beyond")?);
-            let [kind, name_1, name_2, status] =
-                ["kind", "mode_1_name", "mode_2_name", "status"].map(words);
-            let at = axes.iter().map(|axis| numbers(axis)).collect::<Result<Vec<_>, _>>()?;
-            let (point, speed, growth, frequency) = (point?, speed?, growth?, frequency?);
-            let modes = [(mode_1?, name_1?), (mode_2?, name_2?)];
-            let (kind, status) = (kind?, status?);
-            for i in 0..batch.num_rows() {
-                let number = |of: &[Option<f64>]| of[i].unwrap_or(f64::NAN);
-                let word = |of: &[Option<&str>]| of[i].unwrap_or_default().to_owned();
-                let named = modes.iter().filter_map(|(numbers, names)| {
-                    Some((numbers[i]?, names[i].unwrap_or_default().to_owned()))
-                });
-                summary.add(Row {
-                    point: number(&point),
-                    at: at.iter().map(|values| number(values)).collect(),
-                    speed_rpm: number(&speed),
-                    growth_per_s: number(&growth),
-                    frequency_cpm: number(&frequency),
-                    kind: word(&kind),
-                    branch_to_rpm: branch_to[i],
-                    beyond: beyond[i].map(str::to_owned),
-                    modes: named.collect(),
-                    status: word(&status),
-                });
-            }
-            Ok(())
-        };
-        add().map_err(|error| failed(error.into()))?;
-    }
+/// As [`ParquetFile::read`].
+pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, FileError> {
+    let axes = places::axes(file);
+    let numbers = ["point", "speed_rpm", "growth_per_s", "frequency_cpm", "branch_to_rpm"];
+    let modes = ["mode_1", "mode_2", "mode_1_name", "mode_2_name"];
+    let words = ["kind", "status", "beyond"];
+    let own = [&numbers[..], &modes, &words].concat();
+    let names = [&own[..], &axes.iter().map(String::as_str).collect::<Vec<_>>()].concat();
+    let mut summary = Summary { axes: axes.clone(), ..Summary::default() };
+    file.each_row(&names, |row| {
+        let [point, speed_rpm, growth_per_s, frequency_cpm, branch_to_rpm] =
+            std::array::from_fn(|column| row.value(column));
+        let [kind, status, beyond] = [9, 10, 11].map(|column| row.word(column).map(str::to_owned));
+        let modes = [5, 6].map(|column| (row.value(column), row.word(column + 2)));
+        let modes = modes.into_iter().filter(|(number, _)| !number.is_nan());
+        summary.add(Row {
+            point,
+            at: (own.len()..names.len()).map(|column| row.value(column)).collect(),
+            speed_rpm,
+            growth_per_s,
+            frequency_cpm,
+            kind: kind.unwrap_or_default(),
+            branch_to_rpm: Some(branch_to_rpm).filter(|speed| !speed.is_nan()),
+            beyond,
+            modes: modes
+                .map(|(number, name)| (number, name.unwrap_or_default().to_owned()))
+                .collect(),
+            status: status.unwrap_or_default(),
+        });
+        Ok::<(), FileError>(())
+    })?;
     Ok(summary)
 }
 

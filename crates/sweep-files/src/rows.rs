@@ -1,16 +1,16 @@
 //! A result file as columns and rows.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::ArrowError;
+use parquet::arrow::ProjectionMask;
 use serde::Serialize;
 use serde_json::Value;
-use sweep_files::{CellKind, Column, FileError, ParquetFile, cells, columns, key};
 use sweep_parameter::RatioLimits;
 
-use crate::error::ResultsError;
+use crate::{CellKind, Column, FileError, ParquetFile, cells, columns, key};
 
 /// One cell.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -61,8 +61,8 @@ impl ResultTable {
     /// Opens a file.
     ///
     /// # Errors
-    /// [`ResultsError::File`].
-    pub fn open(path: &Path) -> Result<Self, ResultsError> {
+    /// As [`ParquetFile::open`].
+    pub fn open(path: &Path) -> Result<Self, FileError> {
         Ok(Self::of(ParquetFile::open(path)?))
     }
 
@@ -121,63 +121,134 @@ impl ResultTable {
         names.retain(|name| self.column(name).is_some());
         names
     }
+}
 
-    /// Reads the named columns, batch by batch. A name that the file lacks gives no column.
+/// Rows decoded at once.
+const BATCH_ROWS: usize = 1 << 12;
+
+impl ParquetFile {
+    /// The rows batch by batch, of the columns of these names. One that the file lacks is null.
     ///
     /// # Errors
-    /// [`ResultsError::File`].
+    /// [`FileError::Io`], [`FileError::NotParquet`].
     pub fn read(
         &self,
         names: &[&str],
-    ) -> Result<impl Iterator<Item = Result<Rows, ResultsError>> + use<'_>, ResultsError> {
-        let chosen: Vec<&Column> = names.iter().filter_map(|name| self.column(name)).collect();
-        let kinds: Vec<CellKind> = chosen.iter().map(|column| column.kind).collect();
-        let batches = self.file.rows_of(&chosen)?;
+    ) -> Result<impl Iterator<Item = Result<Rows, FileError>> + use<'_>, FileError> {
+        let all = columns(self.schema());
+        let named = |name: &&str| all.iter().find(|column| column.name == **name);
+        let chosen: Vec<Option<&Column>> = names.iter().map(named).collect();
+        // Each is decoded once.
+        let fields: BTreeMap<usize, CellKind> =
+            chosen.iter().flatten().map(|column| (column.field, column.kind)).collect();
+        let place = |column: &Column| fields.keys().position(|field| *field == column.field);
+        let places: Vec<Option<usize>> = chosen.iter().map(|column| place((*column)?)).collect();
+        let batches = self.batches(|builder| {
+            let mask = ProjectionMask::roots(builder.parquet_schema(), fields.keys().copied());
+            builder.with_projection(mask).with_batch_size(BATCH_ROWS)
+        })?;
         let mut first = 0;
         Ok(batches.map(move |batch| {
-            let (count, cells) = batch?;
-            let columns = cells.iter().zip(&kinds).map(|(cells, kind)| decode(cells, *kind));
-            let columns: Result<_, _> = columns.collect();
-            let rows =
-                Rows { first, count, columns: columns.map_err(FileError::cells(self.path()))? };
-            first += count as u64;
+            let batch = batch?;
+            let columns = batch.columns().iter().zip(fields.values());
+            let columns =
+                columns.map(|(cells, kind)| decode(cells, *kind)).collect::<Result<_, _>>();
+            let columns = columns.map_err(FileError::cells(self.path()))?;
+            let rows = Rows { first, count: batch.num_rows(), places: places.clone(), columns };
+            first += rows.count as u64;
             Ok(rows)
         }))
+    }
+
+    /// Calls `take` for each row, with the columns of these names. One that the file lacks is null.
+    ///
+    /// # Errors
+    /// As [`ParquetFile::read`], and whatever `take` says.
+    pub fn each_row<E: From<FileError>>(
+        &self,
+        names: &[&str],
+        mut take: impl FnMut(Row<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        for rows in self.read(names)? {
+            let rows = rows?;
+            (0..rows.count).try_for_each(|at| take(rows.row(at)))?;
+        }
+        Ok(())
     }
 }
 
 /// Some rows of some columns.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Rows {
     /// Number of the first of them in the file, from 0.
     pub first: u64,
     /// How many there are.
     pub count: usize,
+    /// Where each of the columns asked for is, if the file has it.
+    places: Vec<Option<usize>>,
     columns: Vec<Cells>,
 }
 
 impl Rows {
     /// These columns of rows in memory.
-    pub(crate) fn of(batch: &RecordBatch, columns: &[Column]) -> Result<Self, ArrowError> {
+    ///
+    /// # Errors
+    /// Rows of other columns.
+    pub fn of(batch: &RecordBatch, columns: &[Column]) -> Result<Self, ArrowError> {
         let decoded = |column: &Column| decode(batch.column(column.field), column.kind);
-        let columns = columns.iter().map(decoded).collect::<Result<_, _>>()?;
-        Ok(Self { first: 0, count: batch.num_rows(), columns })
+        let columns = columns.iter().map(decoded).collect::<Result<Vec<_>, _>>()?;
+        let places = (0..columns.len()).map(Some).collect();
+        Ok(Self { first: 0, count: batch.num_rows(), places, columns })
     }
 
-    /// The cell of a row in the `column`-th of the columns that were asked for.
-    pub fn cell(&self, column: usize, row: usize) -> Cell {
-        self.columns.get(column).map_or(Cell::Null, |cells| cells.get(row))
+    /// One of them.
+    pub const fn row(&self, at: usize) -> Row<'_> {
+        Row { rows: self, at }
+    }
+}
+
+/// A row, whose cells are in the order of the columns that were asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Row<'a> {
+    rows: &'a Rows,
+    at: usize,
+}
+
+impl<'a> Row<'a> {
+    /// Its number in the file, from 0.
+    pub const fn index(self) -> u64 {
+        self.rows.first + self.at as u64
     }
 
-    /// Takes up further rows of these columns.
-    pub(crate) fn extend(&mut self, further: Self) {
-        self.count += further.count;
-        if self.columns.is_empty() {
-            self.columns = further.columns;
-            return;
+    #[inline]
+    fn cells(self, column: usize) -> Option<&'a Cells> {
+        self.rows.places[column].map(|place| &self.rows.columns[place])
+    }
+
+    /// The cell of a column.
+    pub fn cell(self, column: usize) -> Cell {
+        match self.cells(column) {
+            Some(Cells::Numbers(cells)) if cells[self.at].is_nan() => Cell::Null,
+            Some(Cells::Numbers(cells)) => Cell::Number(cells[self.at]),
+            Some(Cells::Flags(cells)) => cells[self.at].map_or(Cell::Null, Cell::Flag),
+            _ => self.word(column).map_or(Cell::Null, |word| Cell::Text(word.to_owned())),
         }
-        for (cells, further) in self.columns.iter_mut().zip(further.columns) {
-            cells.extend(further);
+    }
+
+    /// The number in a column, NaN where there is none.
+    #[inline]
+    pub fn value(self, column: usize) -> f64 {
+        let Some(Cells::Numbers(cells)) = self.cells(column) else { return f64::NAN };
+        cells[self.at]
+    }
+
+    /// The word in a column; what is true or false is a word too.
+    #[inline]
+    pub fn word(self, column: usize) -> Option<&'a str> {
+        match self.cells(column)? {
+            Cells::Texts { names, codes } => names.get(codes[self.at] as usize).map(String::as_str),
+            Cells::Flags(cells) => cells[self.at].map(|flag| if flag { "true" } else { "false" }),
+            Cells::Numbers(_) => None,
         }
     }
 }
@@ -195,45 +266,6 @@ enum Cells {
     Flags(Vec<Option<bool>>),
 }
 
-impl Cells {
-    fn get(&self, row: usize) -> Cell {
-        match self {
-            Self::Numbers(cells) if cells[row].is_nan() => Cell::Null,
-            Self::Numbers(cells) => Cell::Number(cells[row]),
-            Self::Texts { names, codes } => {
-                names.get(codes[row] as usize).map_or(Cell::Null, |name| Cell::Text(name.clone()))
-            }
-            Self::Flags(cells) => cells[row].map_or(Cell::Null, Cell::Flag),
-        }
-    }
-
-    fn extend(&mut self, further: Self) {
-        match (self, further) {
-            (Self::Numbers(cells), Self::Numbers(further)) => cells.extend(further),
-            (Self::Flags(cells), Self::Flags(further)) => cells.extend(further),
-            (Self::Texts { names, codes }, Self::Texts { names: words, codes: further }) => {
-                let place = |word: String| {
-                    let known = names.iter().position(|name| *name == word);
-                    known.unwrap_or_else(|| {
-                        names.push(word);
-                        names.len() - 1
-                    })
-                };
-                let places: Vec<u32> = words.into_iter().map(place).map(code).collect();
-                let place = |code: u32| places.get(code as usize).copied().unwrap_or(u32::MAX);
-                codes.extend(further.into_iter().map(place));
-            }
-            // A column is of one kind.
-            _ => {}
-        }
-    }
-}
-
-/// A place among names.
-fn code(place: usize) -> u32 {
-    u32::try_from(place).unwrap_or(u32::MAX)
-}
-
 fn decode(array: &ArrayRef, kind: CellKind) -> Result<Cells, ArrowError> {
     Ok(match kind {
         CellKind::Number => {
@@ -245,11 +277,18 @@ fn decode(array: &ArrayRef, kind: CellKind) -> Result<Cells, ArrowError> {
             let mut names: Vec<String> = Vec::new();
             // Keyed by place: the words of a batch lie there once, and may be long.
             let mut places = HashMap::new();
+            // Neighbours mostly share theirs.
+            let mut last = (("".as_ptr(), usize::MAX), u32::MAX);
             let mut place = |word: &str| {
-                *places.entry((word.as_ptr(), word.len())).or_insert_with(|| {
-                    names.push(word.to_owned());
-                    code(names.len() - 1)
-                })
+                let at = (word.as_ptr(), word.len());
+                if last.0 != at {
+                    let code = *places.entry(at).or_insert_with(|| {
+                        names.push(word.to_owned());
+                        u32::try_from(names.len() - 1).unwrap_or(u32::MAX)
+                    });
+                    last = (at, code);
+                }
+                last.1
             };
             let words = cells::texts(array)?.into_iter();
             let codes = words.map(|word| word.map_or(u32::MAX, &mut place)).collect();

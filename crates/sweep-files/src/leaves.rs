@@ -1,0 +1,58 @@
+//! JSON values walked side by side, such as the plans of two files.
+
+use std::fmt;
+
+use serde_json::Value;
+
+/// A step of the path that leads into a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step<'a> {
+    /// To a value by its name.
+    Name(&'a str),
+    /// To an element of a list, from 0.
+    Place(usize),
+}
+
+impl fmt::Display for Step<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name(name) => formatter.write_str(name),
+            // People count from 1.
+            Self::Place(place) => write!(formatter, "{}", place + 1),
+        }
+    }
+}
+
+/// A path as people write it: `machine.dampers.1.damping_n_s_per_m`.
+pub fn dotted(path: &[Step<'_>]) -> String {
+    path.iter().map(Step::to_string).collect::<Vec<_>>().join(".")
+}
+
+/// Calls `take` with each pair of leaves of two values and the path to it; a side without a value
+/// there has none. Two lists are leaves unless `opens` says so.
+pub fn leaves<'a>(
+    sides: [Option<&'a Value>; 2],
+    opens: fn(&[Value], &[Value]) -> bool,
+    path: &mut Vec<Step<'a>>,
+    take: &mut dyn FnMut(&[Step<'a>], [Option<&'a Value>; 2]),
+) {
+    let mut go = |step: Step<'a>, sides| {
+        path.push(step);
+        leaves(sides, opens, path, take);
+        path.pop();
+    };
+    match sides {
+        [Some(Value::Object(first)), Some(Value::Object(second))] => {
+            let further = second.keys().filter(|name| !first.contains_key(*name));
+            for name in first.keys().chain(further) {
+                go(Step::Name(name), [first.get(name), second.get(name)]);
+            }
+        }
+        [Some(Value::Array(first)), Some(Value::Array(second))] if opens(first, second) => {
+            for place in 0..first.len().max(second.len()) {
+                go(Step::Place(place), [first.get(place), second.get(place)]);
+            }
+        }
+        sides => take(path, sides),
+    }
+}
