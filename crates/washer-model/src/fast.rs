@@ -613,8 +613,8 @@ mod tests {
         let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
         let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
         let cases = Cases::new(points.iter().flatten().map(|point| (point, &spin)), timing.end_s);
-        let geared = cases.choose(ModelKind::Nonlinear, 1e-4).unwrap().unwrap();
-        let steady = cases.choose_steady(ModelKind::Nonlinear, 1e-4).unwrap().unwrap();
+        let geared = cases.choose(ModelKind::Nonlinear, 1e-5).unwrap().unwrap();
+        let steady = cases.choose_steady(ModelKind::Nonlinear, 1e-5).unwrap().unwrap();
         assert_eq!(steady, Geared::steady(geared.top().step_s, geared.top().caps));
     }
 
