@@ -72,6 +72,8 @@ struct Climb {
     is_beside_what_rings: bool,
     /// What `run` errs by its caps, however alike the runs are.
     of_sag: f64,
+    /// What its least gap errs by what no comparison shows.
+    of_gap: f64,
     /// What a near twin says, once there was one.
     twin: Option<Twin>,
 }
@@ -110,11 +112,13 @@ impl Climb {
         self.is_beside_what_rings = levels == [true, false] && self.unseen > rule.accuracy;
         self.unseen = unseen(&now, &ladder.rungs[rung], point, rule);
         self.of_sag = of_sag(&now, &ladder.rungs[rung], point, rule);
+        self.of_gap = of_gap(&now, &ladder.rungs[rung], point);
         self.difference = found;
         (self.rung, self.run) = (rung, Some(now));
     }
 
-    /// The error left; absent where nothing says so. `unseen` is what no comparison shows.
+    /// The error left, but for the gap's; absent where nothing says so. `unseen` is what no
+    /// comparison shows.
     fn error_with(&self, ladder: &Ladder, unseen: f64) -> Option<f64> {
         if self.is_chaotic() {
             return self.spread().map(|spread| (ROUGHLY * spread).max(unseen));
@@ -132,7 +136,7 @@ impl Climb {
     }
 
     fn error(&self, ladder: &Ladder) -> Option<f64> {
-        self.error_with(ladder, self.unseen)
+        self.error_with(ladder, self.unseen).map(|error| error.max(self.of_gap))
     }
 
     /// The error left, also where errors are not of first order any more.
@@ -182,7 +186,7 @@ impl Climb {
                 return Some(ladder.twin());
             }
             // The last step is for bearings that ring.
-            if self.unseen <= tolerance {
+            if self.unseen.max(self.of_gap) <= tolerance {
                 return None;
             }
         }
@@ -355,21 +359,28 @@ fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
     if rung.follows_bearings {
         return 0.0;
     }
-    let (swings, of_gap_m) = point.ringing(!rung.level.is_capped());
+    let (swings, _) = point.ringing(!rung.level.is_capped());
     let mut of_swings = of_motion(&swings, &run.trajectory, rule);
     if of_swings > FREE_OF_DECAY * rule.accuracy {
         of_swings *= point.ringing_left();
     }
-    // The least gap may be before any of it has decayed.
-    let gap_m = run.trajectory.min_gap_m;
-    let of_gap = gap_m.map_or(0.0, |gap_m| of_gap_m / gap_m.abs().max(point.clearance_m()));
     let metrics = rule.measures.of_model().zip(&run.trajectory.metrics);
     let of_clash = metrics.filter(|(number, _)| number.metric == Metric::ClashTime);
     let clash_s = of_clash.map(|(_, time)| *time);
     let of_clash = clash_s
         .zip(run.clash_doubt_s)
         .map(|(time_s, doubt_s)| doubt_s / time_s.max(clash_floor_s(rule)));
-    of_clash.fold(of_swings.max(of_gap), f64::max)
+    of_clash.fold(of_swings, f64::max)
+}
+
+/// What the gap rings, as a share of the clearance. It may be least before any of that has decayed.
+/// No motion amplifies it.
+fn of_gap(run: &RungRun, rung: &Rung, point: &Point) -> f64 {
+    let Some(gap_m) = run.trajectory.min_gap_m.filter(|_| !rung.follows_bearings) else {
+        return 0.0;
+    };
+    let (_, swing_m) = point.ringing(!rung.level.is_capped());
+    swing_m / gap_m.abs().max(point.clearance_m())
 }
 
 /// What caps make of the hinge's bend under gravity. No motion amplifies that.
