@@ -6,8 +6,7 @@ use arrow_schema::ArrowError;
 
 use crate::condition::{Condition, Context, Folding, Mistake, Node};
 use crate::parse::expression;
-use sweep_files::{Cell, Rows};
-use sweep_files::{CellKind, Column};
+use sweep_files::{Cell, CellKind, Column, Rows};
 
 /// A number of rows that a search drives down.
 #[derive(Clone, Debug)]

@@ -1,11 +1,8 @@
 //! One of two files, in memory.
 
-use std::collections::BTreeSet;
-
 use super::{Flip, SharedRow};
 use crate::error::ResultsError;
-use sweep_files::Column;
-use sweep_files::{Cell, ResultTable, Rows};
+use sweep_files::{Cell, Column, ResultTable, Rows};
 
 /// Most cells of a file that are kept: two files of so many take some gigabytes.
 const MOST_CELLS: u64 = 100_000_000;
@@ -37,13 +34,18 @@ pub(super) fn keys(table: &ResultTable, is_boundary: bool) -> Vec<String> {
 
 /// The value of a column that has one in all rows.
 pub(super) fn only_value(table: &ResultTable, name: &str) -> Result<Option<f64>, ResultsError> {
-    let mut values = BTreeSet::new();
-    table.file().each_row(&[name], |row| {
-        values.insert(row.cell(0).number().map(|value| (value + 0.0).to_bits()));
-        Ok::<(), ResultsError>(())
-    })?;
-    let only = values.pop_first().flatten().filter(|_| values.is_empty());
-    Ok(only.map(f64::from_bits))
+    let mut value = None;
+    for rows in table.file().read(&[name])? {
+        let rows = rows?;
+        for at in 0..rows.count {
+            let found = rows.row(at).cell(0).number();
+            if found.is_none() || value.is_some_and(|value| Some(value) != found) {
+                return Ok(None);
+            }
+            value = found;
+        }
+    }
+    Ok(value)
 }
 
 impl Side {

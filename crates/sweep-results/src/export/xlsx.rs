@@ -8,8 +8,7 @@ use sweep_files::{dotted, key, leaves};
 
 use super::{Format, names, no_room};
 use crate::error::ResultsError;
-use sweep_files::Column;
-use sweep_files::{Cell, ResultTable};
+use sweep_files::{Cell, Column, ResultTable};
 
 /// Rows of a sheet, less the two of headings.
 const MOST_ROWS: u64 = (1 << 20) - 2;
