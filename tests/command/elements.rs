@@ -277,7 +277,7 @@ fn responses_with_friction_are_followed_round_their_folds() {
 }
 
 #[test]
-#[ignore = "takes half a minute; .ci/run runs it"]
+#[ignore = "takes a minute; .ci/run runs it"]
 fn growth_with_friction_ends_where_a_boundary_says() {
     let point = "machine = \"paper\"\nmetrics = [\"growth\"]\n[set]\ndamping_n_s_per_m = 20.0\n\
                  [spin]\nprofile = \"ramp\"\npeak_rpm = 350.0\nramp_s = 6.0\n\

@@ -44,8 +44,8 @@ use crate::fast::geared::{Formula, GEARS, Gear, Geared, interpolation_phase};
 use crate::kind::ModelKind;
 use crate::machine::spin::Spin;
 use crate::modes::{
-    Mode, Modes, Motion, NoModes, fastest_rigid_rad_per_s, highest_with_caps, modes,
-    modes_with_caps, motions_with_caps,
+    Mode, Modes, Motion, NoModes, fastest_rigid_rad_per_s, highest_with_caps, modes_with_caps,
+    motions,
 };
 use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
@@ -196,7 +196,7 @@ impl<'a> Case<'a> {
             if slow.iter().any(|mode| error_of_shift(mode, hinge(mode), top_rad_per_s) > accuracy) {
                 return Ok(false);
             }
-            let capped = motions_with_caps(self.point, state.speed_rad_per_s, &trial.caps)?;
+            let capped = motions(self.point, state.speed_rad_per_s, Some(&trial.caps))?;
             if !trial.is_stable(capped[COORDINATES - 1].magnitude_rad_per_s) {
                 return Ok(false);
             }
@@ -228,7 +228,7 @@ impl<'a> Case<'a> {
         caps: &Caps,
     ) -> Result<[Motion; COORDINATES], NoModes> {
         let of_bearings = Caps { hinge_rad_per_s: None, ..*caps };
-        motions_with_caps(self.point, state.speed_rad_per_s, &of_bearings)
+        motions(self.point, state.speed_rad_per_s, Some(&of_bearings))
     }
 
     /// Relative error of amplitudes by the shifts of slow modes; `capped` are the motions with the
@@ -525,11 +525,11 @@ impl Point {
     #[must_use]
     pub fn ringing_left(&self) -> f64 {
         let fastest_rad_per_s = self.legs.last().map_or(0.0, |leg| leg.fastest_rad_per_s);
-        let decay_per_s = |modes: Modes| {
-            let fast = modes.modes[SUSPENSION_MODES..].iter();
-            fast.map(|mode| -mode.re_per_s).fold(f64::INFINITY, f64::min)
+        let slowest = |all: [Motion; COORDINATES]| {
+            let fast = all[SUSPENSION_MODES..].iter();
+            fast.map(|motion| -motion.s.re).fold(f64::INFINITY, f64::min)
         };
-        let of_speed = |speed_rad_per_s| modes(self, 0.0, speed_rad_per_s).map_or(0.0, decay_per_s);
+        let of_speed = |speed_rad_per_s| motions(self, speed_rad_per_s, None).map_or(0.0, slowest);
         let decay_per_s = match self.friction_speeds.is_empty() {
             true => of_speed(0.0).min(of_speed(fastest_rad_per_s)).max(0.0),
             false => 0.0,

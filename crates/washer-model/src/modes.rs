@@ -144,12 +144,12 @@ pub(crate) fn modes_with_caps(
 }
 
 /// The eigenvalues of these motions alone, in a third of the time.
-pub(crate) fn motions_with_caps(
+pub(crate) fn motions(
     point: &Point,
     speed_rad_per_s: f64,
-    caps: &Caps,
+    caps: Option<&Caps>,
 ) -> Result<[Motion; COORDINATES], NoModes> {
-    let (system, _) = first_order(point, &point.linear, 0.0, speed_rad_per_s, Some(caps))?;
+    let (system, _) = first_order(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
     let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
     natural_motions(values.into_iter().map(|s| s * system.unit_per_s))
 }

@@ -97,14 +97,22 @@ impl Point {
     }
 
     /// A bound on the swing of each channel (m, rad; in the order of
-    /// [`Channel::ALL`](crate::Channel::ALL)), and of the gap between drum and tub (m), by the
-    /// modes of bearings and hinge, after all jumps of the drum's acceleration up to the window's
-    /// end. Steps longer than their periods leave it out; steps that follow the hinge, what the
-    /// bearings swing.
+    /// [`Channel::ALL`](crate::Channel::ALL)) by the modes of bearings and hinge, after all jumps
+    /// of the drum's acceleration up to the window's end. Steps longer than their periods leave it
+    /// out; steps that follow the hinge, what the bearings swing.
     #[must_use]
-    pub fn ringing(&self, follows_hinge: bool) -> ([f64; CHANNELS], f64) {
-        let ringing = if follows_hinge { self.ringing.of_bearings() } else { self.ringing };
-        (ringing.channels(), ringing.gap_m())
+    pub fn ringing(&self, follows_hinge: bool) -> [f64; CHANNELS] {
+        self.unfollowed(follows_hinge).channels()
+    }
+
+    /// As [`Self::ringing`], of the gap between drum and tub (m).
+    #[must_use]
+    pub fn gap_ringing_m(&self, follows_hinge: bool) -> f64 {
+        self.unfollowed(follows_hinge).gap_m()
+    }
+
+    fn unfollowed(&self, follows_hinge: bool) -> Ringing {
+        if follows_hinge { self.ringing.of_bearings() } else { self.ringing }
     }
 
     /// How far each channel (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) is

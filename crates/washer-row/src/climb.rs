@@ -70,10 +70,8 @@ struct Climb {
     /// Whether the run before is capped and rings by more than is asked, and `run` is plain RK4:
     /// their difference then says nothing of `run`'s error, which may be twice as much.
     is_beside_what_rings: bool,
-    /// What `run` errs by its caps, however alike the runs are.
-    of_sag: f64,
-    /// What its least gap errs by what no comparison shows.
-    of_gap: f64,
+    /// What `run` errs besides, however alike the runs are: by its caps, and in its least gap.
+    besides: f64,
     /// What a near twin says, once there was one.
     twin: Option<Twin>,
 }
@@ -111,13 +109,13 @@ impl Climb {
         let levels = [self.rung, rung].map(|rung| ladder.rungs[rung].level.is_capped());
         self.is_beside_what_rings = levels == [true, false] && self.unseen > rule.accuracy;
         self.unseen = unseen(&now, &ladder.rungs[rung], point, rule);
-        self.of_sag = of_sag(&now, &ladder.rungs[rung], point, rule);
-        self.of_gap = of_gap(&now, &ladder.rungs[rung], point);
+        let of_sag = of_sag(&now, &ladder.rungs[rung], point, rule);
+        self.besides = of_sag.max(of_gap(&now, &ladder.rungs[rung], point));
         self.difference = found;
         (self.rung, self.run) = (rung, Some(now));
     }
 
-    /// The error left, but for the gap's; absent where nothing says so. `unseen` is what no
+    /// The error left of what is compared; absent where nothing says so. `unseen` is what no
     /// comparison shows.
     fn error_with(&self, ladder: &Ladder, unseen: f64) -> Option<f64> {
         if self.is_chaotic() {
@@ -132,11 +130,11 @@ impl Climb {
             let share = if is_common { convergence.contraction } else { ROUGHLY };
             return Some((share * found.of_numbers).max(unseen));
         }
-        Some(convergence.error_left(found.greatest(), unseen).max(self.of_sag))
+        Some(convergence.error_left(found.greatest(), unseen))
     }
 
     fn error(&self, ladder: &Ladder) -> Option<f64> {
-        self.error_with(ladder, self.unseen).map(|error| error.max(self.of_gap))
+        self.error_with(ladder, self.unseen).map(|error| error.max(self.besides))
     }
 
     /// The error left, also where errors are not of first order any more.
@@ -186,7 +184,7 @@ impl Climb {
                 return Some(ladder.twin());
             }
             // The last step is for bearings that ring.
-            if self.unseen.max(self.of_gap) <= tolerance {
+            if self.unseen.max(self.besides) <= tolerance {
                 return None;
             }
         }
@@ -359,7 +357,7 @@ fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
     if rung.follows_bearings {
         return 0.0;
     }
-    let (swings, _) = point.ringing(!rung.level.is_capped());
+    let swings = point.ringing(!rung.level.is_capped());
     let mut of_swings = of_motion(&swings, &run.trajectory, rule);
     if of_swings > FREE_OF_DECAY * rule.accuracy {
         of_swings *= point.ringing_left();
@@ -379,8 +377,7 @@ fn of_gap(run: &RungRun, rung: &Rung, point: &Point) -> f64 {
     let Some(gap_m) = run.trajectory.min_gap_m.filter(|_| !rung.follows_bearings) else {
         return 0.0;
     };
-    let (_, swing_m) = point.ringing(!rung.level.is_capped());
-    swing_m / gap_m.abs().max(point.clearance_m())
+    point.gap_ringing_m(!rung.level.is_capped()) / gap_m.abs().max(point.clearance_m())
 }
 
 /// What caps make of the hinge's bend under gravity. No motion amplifies that.

@@ -5,7 +5,7 @@ use super::monodromy::{INSTANTS, INSTANTS_AT_CORNERS};
 use super::orbit::{Row, caps};
 use crate::coordinates::COORDINATES;
 use crate::fast::{HINGE_TO_DRUM, SUSPENSION_MODES, hinge_shift};
-use crate::modes::{Modes, highest_frequency_rad_per_s, modes, motions_with_caps};
+use crate::modes::{Modes, highest_frequency_rad_per_s, modes, motions};
 use crate::nonlinear::coupling::Caps;
 use crate::point::Point;
 use core::f64::consts::TAU;
@@ -247,8 +247,8 @@ fn shift_per_s(
     caps: &Caps,
 ) -> Result<f64, NoAnswer> {
     let of_bearings = Caps { hinge_rad_per_s: None, ..*caps };
-    let capped = motions_with_caps(point, speed_rad_per_s, &of_bearings)
-        .map_err(|_| NoAnswer::Eigenvalues)?;
+    let capped =
+        motions(point, speed_rad_per_s, Some(&of_bearings)).map_err(|_| NoAnswer::Eigenvalues)?;
     let shifts = frozen.modes.iter().zip(&capped).take(SUSPENSION_MODES).map(|(mode, capped)| {
         let (slower, detuned) = (capped.s.re - mode.re_per_s, capped.s.im - mode.im_rad_per_s);
         let of_hinge = hinge_shift(point, mode, speed_rad_per_s, caps.hinge_rad_per_s);
