@@ -49,7 +49,6 @@ use crate::modes::{
 };
 use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
-use crate::point::ringing::left;
 
 /// Modes of the suspension: yaw, pitch, two translations.
 pub(crate) const SUSPENSION_MODES: usize = 4;
@@ -517,30 +516,9 @@ impl Search<'_, '_> {
     }
 }
 
-impl Point {
-    /// What share of [`Self::ringing`] is left in the window: it decays as the least damped of the
-    /// modes of bearings and hinge does, at rest or at the drum's greatest speed. With friction all
-    /// of it counts as left: that may hold the tub, whose dampers are all that takes energy from
-    /// these modes.
-    #[must_use]
-    pub fn ringing_left(&self) -> f64 {
-        let fastest_rad_per_s = self.legs.last().map_or(0.0, |leg| leg.fastest_rad_per_s);
-        let slowest = |all: [Motion; COORDINATES]| {
-            let fast = all[SUSPENSION_MODES..].iter();
-            fast.map(|motion| -motion.s.re).fold(f64::INFINITY, f64::min)
-        };
-        let of_speed = |speed_rad_per_s| motions(self, speed_rad_per_s, None).map_or(0.0, slowest);
-        let decay_per_s = match self.friction_speeds.is_empty() {
-            true => of_speed(0.0).min(of_speed(fastest_rad_per_s)).max(0.0),
-            false => 0.0,
-        };
-        left(&self.jumps, rounded_down(decay_per_s), self.window_s()[0])
-    }
-}
-
 /// A number of few digits. The last digits of an eigenvalue depend on the processor and on the
 /// system's mathematical library; a result must not.
-fn rounded_down(number: f64) -> f64 {
+pub(crate) fn rounded_down(number: f64) -> f64 {
     f64::from_bits(
         number.to_bits() >> (f64::MANTISSA_DIGITS - 1 - STEP_BITS)
             << (f64::MANTISSA_DIGITS - 1 - STEP_BITS),

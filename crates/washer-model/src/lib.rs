@@ -96,6 +96,7 @@ pub use modes::shape::{Motion, Movement, Plane};
 pub use modes::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
 pub use nonlinear::coupling::Caps;
 pub use point::friction::FrictionSpeed;
+pub use point::ringing::Swing;
 pub use point::{NoEquilibrium, Point, Timing};
 pub use ready::prepare;
 pub use run::equations::{Equations, STATE_LEN};
@@ -104,8 +105,8 @@ pub use run::history::{
 };
 pub use run::suspension::Forces;
 pub use run::{
-    Course, Extra, Method, Record, Snapshot, Stop, StopLoad, Wanted, simulate, simulate_until,
-    simulate_with,
+    Course, Extra, Method, Record, Snapshot, Stop, StopLoad, Wanted, Waypoint, simulate,
+    simulate_until, simulate_with,
 };
 pub use stability::{
     Beyond, Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant,

@@ -11,13 +11,14 @@ use crate::linear::{LinearPoint, Matrices, linearise, tub_tangents};
 use crate::machine::Machine;
 use crate::machine::feet::Feet;
 use crate::machine::spin::{Spin, SpinState, SpinStretch, stretch_at};
+use crate::modes::NoModes;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, Motion};
 use crate::point::friction::FrictionSpeed;
-use crate::point::ringing::{Jump, Ringing, jumps};
+use crate::point::ringing::{Decaying, Jump, Ringing, jumps};
 use lane_ode::{Kernel, Lane, N, Simd};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// When a trajectory ends, and when its amplitudes are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +57,9 @@ pub struct Point {
     pub(crate) stretches: Arc<[SpinStretch]>,
     pub(crate) legs: Arc<[PlannedLeg]>,
     pub(crate) ringing: Ringing,
-    /// Of the drum's acceleration, until the window ends.
+    /// The same by modes, of hinge and bearings, once it was asked for.
+    pub(crate) ringing_by_modes: OnceLock<Result<[Decaying; 2], NoModes>>,
+    /// Of the drum's acceleration, until the run ends.
     pub(crate) jumps: Arc<[Jump]>,
     /// By how much the nonlinear model starts beside its equilibrium, in every coordinate (m, rad).
     pub(crate) nudge: f64,
@@ -96,25 +99,6 @@ impl Point {
         -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[TUB_Y])).0
     }
 
-    /// A bound on the swing of each channel (m, rad; in the order of
-    /// [`Channel::ALL`](crate::Channel::ALL)) by the modes of bearings and hinge, after all jumps
-    /// of the drum's acceleration up to the window's end. Steps longer than their periods leave it
-    /// out; steps that follow the hinge, what the bearings swing.
-    #[must_use]
-    pub fn ringing(&self, follows_hinge: bool) -> [f64; CHANNELS] {
-        self.unfollowed(follows_hinge).channels()
-    }
-
-    /// As [`Self::ringing`], of the gap between drum and tub (m).
-    #[must_use]
-    pub fn gap_ringing_m(&self, follows_hinge: bool) -> f64 {
-        self.unfollowed(follows_hinge).gap_m()
-    }
-
-    fn unfollowed(&self, follows_hinge: bool) -> Ringing {
-        if follows_hinge { self.ringing.of_bearings() } else { self.ringing }
-    }
-
     /// How far each channel (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) is
     /// where it is because the weight of drum and unbalance bends the hinge. Seen from the shaft
     /// that bend turns backwards, where a cap on the hinge is not exact.
@@ -150,7 +134,8 @@ impl Point {
     }
 
     /// The window's edges (s).
-    pub(crate) fn window_s(&self) -> [f64; 2] {
+    #[must_use]
+    pub fn window_s(&self) -> [f64; 2] {
         let inside = || self.legs.iter().filter(|leg| leg.in_window);
         let from = inside().next().map_or(0.0, |leg| leg.start_s);
         [from, inside().next_back().map_or(from, |leg| leg.end_s)]
@@ -271,6 +256,7 @@ impl Kernel for Prepare<'_> {
                     let steepest = steepest.map(|tangents| Box::new(linear.with_tub(tangents)));
                     Ok(Point {
                         ringing: Ringing::new(machine, ringing::sum_rad_per_s2(&course.jumps)),
+                        ringing_by_modes: OnceLock::new(),
                         jumps: course.jumps,
                         nudge: 0.0,
                         instants_s: [].into(),
@@ -333,7 +319,7 @@ fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<Course> {
         let shared = if k > 0 && points[k - 1].1 == *spin { courses.last().cloned() } else { None };
         courses.push(shared.unwrap_or_else(|| {
             let stretches = spin.stretches();
-            let jumps = jumps(&stretches, timing.window_s[1]).into();
+            let jumps = jumps(&stretches, timing.end_s).into();
             let legs = legs(&stretches, timing).into();
             Course { legs, jumps, stretches: stretches.into() }
         }));

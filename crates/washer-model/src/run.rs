@@ -76,8 +76,17 @@ pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
 /// Says whether to stop.
 pub type Stop<'a> = &'a dyn Fn() -> bool;
 
-/// Coordinates (m, rad) at the ends of a trajectory's legs, up to its own end.
-pub type Course = Vec<[f64; COORDINATES]>;
+/// The ends of a trajectory's legs, up to its own end.
+pub type Course = Vec<Waypoint>;
+
+/// A trajectory at the end of a leg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Waypoint {
+    /// Coordinates (m, rad).
+    pub coordinates: [f64; COORDINATES],
+    /// Greatest distance so far of the drum's front centre from the tub's axis (m).
+    pub radial_m: f64,
+}
 
 /// The record of one trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -254,7 +263,9 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
         }
         let point = self.points[state.point];
         if let Some(course) = self.courses.get_mut(state.point) {
-            course.push(core::array::from_fn(|i| x[i].0.get(lane)));
+            let coordinates = core::array::from_fn(|i| x[i].0.get(lane));
+            let [radial_squared] = self.radial.lane(lane);
+            course.push(Waypoint { coordinates, radial_m: radial_squared.sqrt() });
         }
         if failure.is_none() && state.leg + 1 < point.legs.len() {
             state.leg += 1;

@@ -1,6 +1,6 @@
 //! A row on its way: both models' trajectories, each as far up its ladder as it has come.
 
-use washer_model::{Channel, ModelKind, Point};
+use washer_model::{Channel, ModelKind, Point, Swing};
 
 use crate::ladder::{Ladder, Rung};
 use crate::measures::{Floor, Metric, TURN_FLOOR};
@@ -45,9 +45,12 @@ const METRIC_FLOOR: f64 = 1e-3;
 /// seen. So motions as small as that bend times this are for plain RK4.
 const SAGS: f64 = 32.0;
 
-/// Ringing that is a greater share of the accuracy is looked at again, by how it decays: that takes
+/// Ringing whose bound is a greater share of the accuracy is looked at again, by modes: that takes
 /// eigenvalues.
-const FREE_OF_DECAY: f64 = 0.1;
+const FREE_OF_MODES: f64 = 0.1;
+
+/// An error that a further halving of RK4's step brings within the accuracy, as a multiple of that.
+const NEAR: f64 = 16.0;
 
 /// Differences of a turn's peak count so many times. Where it lies beside the turn's cut, it errs
 /// with the phase of the motion, and shrinks less from rung to rung than the motion's error does.
@@ -110,7 +113,7 @@ impl Climb {
         self.is_beside_what_rings = levels == [true, false] && self.unseen > rule.accuracy;
         self.unseen = unseen(&now, &ladder.rungs[rung], point, rule);
         let of_sag = of_sag(&now, &ladder.rungs[rung], point, rule);
-        self.besides = of_sag.max(of_gap(&now, &ladder.rungs[rung], point));
+        self.besides = of_sag.max(of_gap(&now, &ladder.rungs[rung], point, rule));
         self.difference = found;
         (self.rung, self.run) = (rung, Some(now));
     }
@@ -163,10 +166,17 @@ impl Climb {
 
     /// The run to ask for next for an error of at most `tolerance`; none if it is there, or if no
     /// further run would help.
-    fn higher(&self, ladder: &Ladder, model: ModelKind, tolerance: f64) -> Option<usize> {
+    fn higher(
+        &self,
+        ladder: &Ladder,
+        point: &Point,
+        model: ModelKind,
+        rule: &Rule,
+    ) -> Option<usize> {
         if self.run.is_none() {
-            return Some(0);
+            return Some(first(ladder, point, rule));
         }
+        let tolerance = rule.accuracy;
         let reference = ladder.reference()?;
         if self.failed() && self.rung + 1 < reference {
             // It may be the caps that do not hold: RK4 has the word, and at both steps.
@@ -183,8 +193,10 @@ impl Climb {
             if may_be_chaos && self.twin.is_none() && Some(self.rung) == ladder.judge() {
                 return Some(ladder.twin());
             }
-            // The last step is for bearings that ring.
-            if self.unseen.max(self.besides) <= tolerance {
+            // The last step is for bearings that ring, and for what is nearly there.
+            let is_near =
+                self.error_with(ladder, 0.0).is_some_and(|error| error <= NEAR * tolerance);
+            if self.unseen.max(self.besides) <= tolerance && !(is_in_doubt && is_near) {
                 return None;
             }
         }
@@ -250,7 +262,7 @@ impl Climbs {
         };
         let higher = |(model, climb): (usize, &Climb)| {
             let ladder = &ladders[model];
-            let rung = climb.higher(ladder, MODELS[model], rule.accuracy)?;
+            let rung = climb.higher(ladder, point, MODELS[model], rule)?;
             (!is_sure(climb, ladder)).then_some((model, rung))
         };
         let mut runs: Vec<_> = self.0.iter().enumerate().filter_map(higher).collect();
@@ -308,6 +320,17 @@ impl Climbs {
     }
 }
 
+/// The rung to begin with: plain RK4 where the gap still rings at the end of the run by more than
+/// capped rungs may err.
+fn first(ladder: &Ladder, point: &Point, rule: &Rule) -> usize {
+    let share = |swing: &Swing| swing.gap_m / point.clearance_m();
+    let of_gap = |rung| of_ringing(rung, point, rule, |_| [rule.end_s; 2], share);
+    match ladder.reference() {
+        Some(reference) if of_gap(&ladder.rungs[0]) > rule.accuracy => reference - 1,
+        _ => 0,
+    }
+}
+
 /// How far the ratios are from a limit, as a share of the limit.
 fn margin(outcome: &Outcome, rule: &Rule) -> Option<f64> {
     let Verdict { least, greatest, .. } = Verdict::new(outcome, rule.channels.len(), rule.limits);
@@ -357,11 +380,8 @@ fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
     if rung.follows_bearings {
         return 0.0;
     }
-    let swings = point.ringing(!rung.level.is_capped());
-    let mut of_swings = of_motion(&swings, &run.trajectory, rule);
-    if of_swings > FREE_OF_DECAY * rule.accuracy {
-        of_swings *= point.ringing_left();
-    }
+    let share = |swing: &Swing| of_motion(&swing.channels, &run.trajectory, rule);
+    let of_swings = of_ringing(rung, point, rule, |_| point.window_s(), share);
     let metrics = rule.measures.of_model().zip(&run.trajectory.metrics);
     let of_clash = metrics.filter(|(number, _)| number.metric == Metric::ClashTime);
     let clash_s = of_clash.map(|(_, time)| *time);
@@ -371,13 +391,32 @@ fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
     of_clash.fold(of_swings, f64::max)
 }
 
-/// What the gap rings, as a share of the clearance. It may be least before any of that has decayed.
-/// No motion amplifies it.
-fn of_gap(run: &RungRun, rung: &Rung, point: &Point) -> f64 {
-    let Some(gap_m) = run.trajectory.min_gap_m.filter(|_| !rung.follows_bearings) else {
+/// What the gap rings where it may be least, as a share of the clearance. No motion amplifies it.
+fn of_gap(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
+    let Some(gap_m) = run.trajectory.min_gap_m else { return 0.0 };
+    let least_m = gap_m.abs().max(point.clearance_m());
+    let within_s = |bound: &Swing| [point.gap_least_from_s(&run.course, bound.gap_m), rule.end_s];
+    of_ringing(rung, point, rule, within_s, |swing| swing.gap_m / least_m)
+}
+
+/// What a rung leaves out of ringing, in parts of the motion by `share`: by a bound, and where that
+/// is not enough, by modes and what is left of them in an interval.
+fn of_ringing(
+    rung: &Rung,
+    point: &Point,
+    rule: &Rule,
+    within_s: impl Fn(&Swing) -> [f64; 2],
+    share: impl Fn(&Swing) -> f64,
+) -> f64 {
+    if rung.follows_bearings {
         return 0.0;
-    };
-    point.gap_ringing_m(!rung.level.is_capped()) / gap_m.abs().max(point.clearance_m())
+    }
+    let follows_hinge = !rung.level.is_capped();
+    let bound = point.ringing(follows_hinge);
+    match share(&bound) > FREE_OF_MODES * rule.accuracy {
+        true => share(&point.ringing_left(follows_hinge, within_s(&bound))),
+        false => share(&bound),
+    }
 }
 
 /// What caps make of the hinge's bend under gravity. No motion amplifies that.

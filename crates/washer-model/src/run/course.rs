@@ -1,6 +1,6 @@
 //! The difference of two runs of one trajectory.
 
-use super::Course;
+use super::{Course, Waypoint};
 use crate::coordinates::COORDINATES;
 use crate::kind::ModelKind;
 use crate::point::{PlannedLeg, Point};
@@ -26,6 +26,7 @@ impl Point {
         let mut greatest = [[0.0_f64; FOLLOWED]; 2];
         let mut difference = greatest;
         for ((a, b), leg) in a.iter().zip(b).zip(&*self.legs) {
+            let (a, b) = (&a.coordinates, &b.coordinates);
             for i in 0..FOLLOWED {
                 let (deviation, apart) = ((b[i] - rest[i]).abs(), (a[i] - b[i]).abs());
                 for place in 0..=usize::from(leg.in_window) {
@@ -40,6 +41,16 @@ impl Point {
             .fold(0.0, f64::max)
     }
 
+    /// From when on (s) the gap between drum and tub may be least, if it swings by this much beside
+    /// what a run has: the beginning of the first leg in which it came so near to its least.
+    #[must_use]
+    pub fn gap_least_from_s(&self, course: &Course, swing_m: f64) -> f64 {
+        let farthest_m = course.last().map_or(0.0, |last| last.radial_m);
+        let is_near = |at: &Waypoint| at.radial_m >= farthest_m - 2.0 * swing_m;
+        let mut legs = self.legs.iter().zip(course);
+        legs.find(|(_, end)| is_near(end)).map_or(0.0, |(leg, _)| leg.start_s)
+    }
+
     /// How far two runs of the nonlinear model are apart at each instant that both recorded: the
     /// instant (s) and the greatest difference of any coordinate but the hinge's, as a share of
     /// that coordinate's greatest deviation from equilibrium in the whole run.
@@ -48,12 +59,12 @@ impl Point {
         let mut greatest = [0.0_f64; FOLLOWED];
         for now in b {
             for (i, greatest) in greatest.iter_mut().enumerate() {
-                *greatest = greatest.max((now[i] - self.equilibrium[i]).abs());
+                *greatest = greatest.max((now.coordinates[i] - self.equilibrium[i]).abs());
             }
         }
-        let apart = |((a, b), leg): ((&[f64; COORDINATES], &[f64; COORDINATES]), &PlannedLeg)| {
+        let apart = |((a, b), leg): ((&Waypoint, &Waypoint), &PlannedLeg)| {
             let share = |i: usize| {
-                let apart = (a[i] - b[i]).abs();
+                let apart = (a.coordinates[i] - b.coordinates[i]).abs();
                 if apart == 0.0 { 0.0 } else { apart / greatest[i] }
             };
             (leg.end_s, (0..FOLLOWED).map(share).fold(0.0, f64::max))

@@ -66,7 +66,8 @@ fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
         snapshots: _,
     } = extra;
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
-    bits.extend(course.iter().flatten().map(|q| q.to_bits()));
+    let waypoints = course.iter().flat_map(|at| at.coordinates.iter().chain([&at.radial_m]));
+    bits.extend(waypoints.map(|of| of.to_bits()));
     let metrics = [cabinet_force_n, clash_time_s, clash_doubt_s, slip_margin_n, walk_margin_n];
     let of_each = foot_loads_n.iter().chain(damper_speeds_m_per_s);
     bits.extend(metrics.into_iter().flatten().chain(of_each).map(|number| number.to_bits()));

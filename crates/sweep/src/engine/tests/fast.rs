@@ -62,6 +62,13 @@ fn hold_against_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> 
             continue;
         }
         assert_eq!(reliable(plan, row), reliable(plan, expected), "{}: {row:?}", plan.name);
+        if error(row, expected) <= accuracy {
+            continue;
+        }
+        // It may be the judge that is off: rows climb to shorter steps.
+        let finer = Plan { integrator: Integrator::Rk4 { step_s: step_s / 4.0 }, ..plan.clone() };
+        let at = [plan.axis_values(row.point)];
+        let expected = &ModelEngine::new(&finer).unwrap().evaluate_at(&at)[0];
         let error = error(row, expected);
         assert!(
             error <= accuracy,
@@ -424,6 +431,22 @@ fn the_least_gap_is_rk4s() {
     );
     let rows = hold_against_rk4(&plan, 1e-2);
     assert!(rows.iter().any(|row| row.method == Level::Fast), "{rows:?}");
+}
+
+/// Hinge and bearings ring after the jump at the start, by more than the accuracy. With 300 N s/m
+/// too little of it is left where the gap is least and where amplitudes are taken.
+#[test]
+fn ringing_that_has_decayed_is_no_reason_for_rk4() {
+    let plan = load(
+        "name = \"decayed\"\n[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 30\n\
+         [time]\nend_s = 30\nwindow_s = [18, 30]\n\
+         [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.4]\n\
+         [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100, 300]\n\
+         [reliability]\n",
+    );
+    let rows = hold_against_rk4_at(1.25e-5, &plan, 1e-5);
+    let is_capped = rows.iter().map(|row| row.method != Level::Rk4);
+    assert_eq!(is_capped.collect::<Vec<_>>(), [false, true, true, true], "{rows:?}");
 }
 
 #[test]
