@@ -166,7 +166,7 @@ fn columns() -> String {
         })
         .collect();
     let metrics = Metric::ALL.to_vec();
-    let measures = Measures { metrics, stops: 2, feet: 3, dampers: 2, ..Measures::default() };
+    let measures = Measures { metrics, stops: 1, feet: 1, dampers: 1, ..Measures::default() };
     let columns = Columns::of_measures(&Channel::ALL, 2.0.into(), &measures, true);
     let layout = Layout::of_map(axes, columns.declared());
     row(&mut text, &["column", "type", "unit", "worse", "limit", "meaning"]);
@@ -244,13 +244,16 @@ fn commands(program: clap::Command) -> String {
     let mut program = program.term_width(100);
     program.build();
     let mut part = |title: &str, help: String, more: &str| {
+        // The usage says it.
+        let help = help.replace("Arguments:\n  <GRID.toml>  Grid file\n\n", "");
         let help: Vec<&str> = help.lines().map(str::trim_end).collect();
         // Writing to a String cannot fail.
         let _ =
             writeln!(text, "## {title}\n\n```text\n{}\n```\n{more}", help.join("\n").trim_end());
     };
-    let help_of_program = program.clone().render_help().to_string();
-    part("sweep", help_of_program.trim_start().into(), "");
+    // Examples and the flag that shows them are for a terminal.
+    let help_of_program = program.clone().before_help(None::<&'static str>).render_help();
+    part("sweep", help_of_program.to_string().trim_start().into(), "");
     let shared = shared_options(&program);
     let mut options = clap::Command::new("options").disable_help_flag(true).term_width(100);
     options = options.help_template("{options}").args(shared.clone());
@@ -267,7 +270,6 @@ fn commands(program: clap::Command) -> String {
         } else {
             format!("\nAlso {}: [above](#options-of-several-commands).\n", longs.join(", "))
         };
-        // Examples and the flag that shows them are for a terminal.
         let is_hidden = |arg: &clap::Arg| is_shared(arg) || arg.get_long() == Some("help");
         let mut alone = command.clone().before_help(None::<&'static str>);
         alone = alone.mut_args(|arg| if is_hidden(&arg) { arg.hide(true) } else { arg });
