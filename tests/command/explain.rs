@@ -46,10 +46,13 @@ fn within(value: &Value, meant: f64, tolerance: f64) {
 
 #[test]
 fn the_papers_machine_has_two_tongues_with_the_references_edges_and_dampings() {
-    let done = explain(&grid(PAPER, AXES), &["--at", "damping_n_s_per_m=140", "--json"]);
+    let more = ["--json", "--ratio-limit", "2.5", "--name", "own"];
+    let arguments = [&["--at", "damping_n_s_per_m=140"], &more[..]].concat();
+    let done = explain(&grid(PAPER, AXES), &arguments);
     assert_eq!(done.status.code(), Some(0), "{}", said(&done));
     let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
     assert_eq!(found["swept"]["reliable"], true);
+    assert_eq!((&found["swept"]["ratio_limit"], &found["name"]), (&2.5.into(), &"own".into()));
     let tongues = found["tongues"].as_array().expect("a list");
     assert_eq!(tongues.len(), 2);
     // Edges, growth and critical damping as in stability.json, which another program made.

@@ -57,7 +57,7 @@ fn a_fit_ends_in_a_machine_file_that_runs() {
     let home = bench();
     let words = ["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m,unbalance_mass_kg"];
     let more = ["--json", "--draws", "4", "--out", "bench.toml", "--curves", "fit.parquet"];
-    let more = [&more[..], &["--set", "unbalance_mass_kg=0.3"]].concat();
+    let more = [&more[..], &["--set", "unbalance_mass_kg=0.3", "--name", "monday"]].concat();
     let done = home.sweep(&[&words[..], &more].concat());
     assert!(done.status.success(), "{}", said(&done));
     let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
@@ -97,10 +97,21 @@ fn a_fit_ends_in_a_machine_file_that_runs() {
     // The picture names the fitted machine, and not where the fit began.
     let picture = fs::read_to_string(home.path("t.svg")).expect("it is text");
     assert!(picture.contains("damping 1") && !picture.contains("damping 120 N s/m"));
+    assert!(picture.contains("monday"));
     assert!(!picture.contains("unbalance_mass_kg = 0.3"));
     let again = home.sweep(&[&words[..], &more].concat());
     assert_eq!(again.status.code(), Some(1), "{}", said(&again));
     assert!(said(&again).contains("give another name"), "{}", said(&again));
+}
+
+#[test]
+fn a_fit_is_at_the_point_that_is_given() {
+    let words = ["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m", "--draws", "0"];
+    let done = bench().sweep(&[&words[..], &["--json", "--at", "unbalance_mass_kg=0.35"]].concat());
+    assert!(done.status.success(), "{}", said(&done));
+    let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
+    let value = found["parameters"][0]["value"].as_f64().expect("a number");
+    assert!((value / 180.0 - 1.0).abs() < 0.01, "{found}");
 }
 
 #[test]

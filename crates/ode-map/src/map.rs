@@ -1,12 +1,10 @@
 //! An oscillator as a model of the engine.
 
 use std::marker::PhantomData;
-use std::sync::Mutex;
 use std::time::Instant;
 
 use lane_ode::{Failure, MAX_LANES, Simd};
 use serde_json::{Map as JsonMap, Value};
-use sweep_engine::boundary::search::Values;
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
@@ -24,7 +22,6 @@ use sweep_parameter::{Channel, Range};
 use crate::equations::Case;
 use crate::run::{Method, Model, Run, runs};
 use crate::{Coordinate, Oscillator, Parameter};
-use sweep_files::panics::{lock, unlocked};
 
 methods! {
     Rk4 = "rk4", "classical Runge-Kutta of order 4, in fixed steps" { step_s: STEP_S }
@@ -243,7 +240,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Row
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swept
     for Map<O, C, D, P>
 {
-    fn engine(plan: &Plan<Self>) -> Result<Box<dyn Engine + '_>, Error> {
+    fn engine<'a>(plan: &'a Plan<Self>, _: Option<&str>) -> Result<Box<dyn Engine + 'a>, Error> {
         Simd::check().map_err(Error::model)?;
         Ok(Box::new(Evaluator { plan }))
     }
@@ -275,11 +272,6 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
             result_bytes,
             method: format!("{}{steps}", plan.integrator),
         })
-    }
-
-    fn search<'a>(plan: &'a Plan<Self>, column: &str) -> Result<Box<dyn Values + 'a>, Error> {
-        let column = columns(plan).into_iter().find(|known| known.declared.name == column);
-        Ok(Box::new(Searched { rows: Evaluator { plan }, column }))
     }
 
     fn listed(plan: Option<&Plan<Self>>) -> Vec<Listed<Self>> {
@@ -510,42 +502,5 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
 
     fn simd(&self) -> &str {
         Simd::best().name()
-    }
-}
-
-/// The numbers of a column.
-struct Searched<'a, O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> {
-    rows: Evaluator<'a, O, C, D, P>,
-    column: Option<ResultColumn<Compared>>,
-}
-
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Values
-    for Searched<'_, O, C, D, P>
-{
-    fn values(
-        &self,
-        axis_values: &[Vec<f64>],
-        seen: &(dyn Fn(usize, Option<f64>) + Sync),
-        watch: &Watch<'_>,
-    ) -> Option<Vec<Option<f64>>> {
-        let next = Mutex::new((0..axis_values.len()).step_by(MAX_LANES));
-        let found = Mutex::new(vec![None; axis_values.len()]);
-        rayon::broadcast(|_| {
-            while !watch.stopped() {
-                let Some(first) = lock(&next).next() else { break };
-                let last = (first + MAX_LANES).min(axis_values.len());
-                let rows = self.rows.compared(&axis_values[first..last], &|| watch.stopped());
-                if watch.stopped() {
-                    break;
-                }
-                for (place, row) in (first..last).zip(&rows) {
-                    let value = self.column.as_ref().and_then(|column| column.number(row));
-                    seen(place, value);
-                    lock(&found)[place] = value;
-                }
-            }
-        });
-        let found = unlocked(found);
-        (!watch.stopped()).then_some(found)
     }
 }

@@ -158,14 +158,3 @@ pub struct Traced {
     /// Batches they went in.
     pub rounds: usize,
 }
-
-/// Progress of a trace before a batch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Standing {
-    /// Rows that are done, unless a neighbour will announce something.
-    pub rows: usize,
-    /// Trials that are done.
-    pub trials: usize,
-    /// Trials of the batch.
-    pub batch: usize,
-}

@@ -108,15 +108,6 @@ impl<R> ResultColumn<R> {
         self.declared.limit = Some(Limit { value, scale });
         self
     }
-
-    /// Its number of a row, if it is a column of numbers.
-    pub fn number(&self, row: &R) -> Option<f64> {
-        match self.declared.kind {
-            Kind::Count | Kind::KnownCount => (self.cell)(row).map(|count| count as f64),
-            Kind::Measured | Kind::Axis | Kind::Time => (self.cell)(row).map(f64::from_bits),
-            Kind::Flag | Kind::Name(_) => None,
-        }
-    }
 }
 
 /// The cells of a row.

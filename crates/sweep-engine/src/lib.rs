@@ -6,9 +6,11 @@
 //! * `run` has an [`Engine`] compute a plan's points on all cores and keeps them as they come.
 //!   `store` is the folder on disk meanwhile, and the result file; [`sweep_files`] has the rules of
 //!   writing and reading.
-//! * `boundary` traces the curve where a quantity is at its limit.
+//! * `boundary` traces the curve where a quantity is at its limit; `optimise` looks for the least
+//!   of some numbers. Both ask the engine through `asking`.
 //! * `commands` is the command line; `progress`, `interrupt` and `exit` serve it.
 
+pub mod asking;
 pub mod boundary;
 pub mod build;
 pub mod columns;

@@ -1,15 +1,16 @@
 //! What computes a model's rows.
 
-use crate::boundary::search::Values;
 use crate::{Engine, Error, Estimate, Model, Plan, Rows};
 
 /// A model whose rows can be computed: all that commands need.
 pub trait Swept: Rows {
-    /// What computes the rows of a plan.
+    /// What computes the rows of a plan. If one column alone is asked for, the others may be
+    /// anything, and a ratio need only be good for telling on which side of the plan's limit it is,
+    /// and near the limit for its value.
     ///
     /// # Errors
     /// No engine for it.
-    fn engine(plan: &Plan<Self>) -> Result<Box<dyn Engine + '_>, Error>;
+    fn engine<'a>(plan: &'a Plan<Self>, only: Option<&str>) -> Result<Box<dyn Engine + 'a>, Error>;
 
     /// What a run of a plan will take, on so many threads.
     ///
@@ -35,12 +36,6 @@ pub trait Swept: Rows {
     fn variants(_: &Plan<Self>) -> Vec<Plan<Self>> {
         Vec::new()
     }
-
-    /// What computes the numbers of one column of the plan's rows.
-    ///
-    /// # Errors
-    /// As [`Self::engine`].
-    fn search<'a>(plan: &'a Plan<Self>, column: &str) -> Result<Box<dyn Values + 'a>, Error>;
 
     /// Every parameter with its value, as `parameters` lists them; without a plan those that need
     /// no grid file.

@@ -97,12 +97,6 @@ impl Columns {
         Done { point, rows: rows.collect() }
     }
 
-    /// The number of one column of what came of a point.
-    pub(crate) fn number(&self, column: &str, outcome: &Outcome) -> Option<f64> {
-        let column = self.columns.iter().find(|known| known.declared.name == column)?;
-        column.number(&self.result(outcome.clone()))
-    }
-
     fn result(&self, mut outcome: Outcome) -> ResultRow {
         let Verdict { ratios, greatest, least, reliable } =
             Verdict::new(&outcome, self.channels, self.limits);

@@ -10,6 +10,7 @@ mod man;
 mod merge;
 mod modes;
 mod plot;
+#[cfg(test)]
 mod reference;
 mod run;
 mod schema;
@@ -109,9 +110,6 @@ pub enum Command {
     Man(man::Args),
     /// Print shell completions
     Completions(completions::Args),
-    /// Print a page of the guide that is made from this program's tables
-    #[command(hide = true)]
-    Reference(reference::Args),
 }
 
 /// The examples of a subcommand; of the program, by its name.
@@ -226,7 +224,6 @@ impl Command {
             Self::Schema(args) => schema::run(args),
             Self::Completions(args) => completions::run(args, shown_command()),
             Self::Man(args) => man::run(args, command(), &examples_of),
-            Self::Reference(args) => reference::run(args, command()),
         }
     }
 }

@@ -38,8 +38,6 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
     GridInput::file(path.to_owned(), sets.to_vec()).load()
 }
 
-pub(crate) use machine::with_one_of_each;
-
 /// A machine in full, as a result file carries it.
 pub(crate) fn machine_json(machine: &Machine) -> serde_json::Value {
     machine::to_json(machine)

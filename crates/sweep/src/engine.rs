@@ -56,6 +56,8 @@ pub(crate) struct Quick {
 /// Both models over a plan's points.
 pub struct ModelEngine<'a> {
     plan: &'a Plan,
+    /// What its rows are good for.
+    pub(crate) demand: Demand,
     /// What groups run on; else as few lanes as a group needs.
     forced: Option<Simd>,
     timing: Timing,
@@ -101,7 +103,8 @@ impl<'a> ModelEngine<'a> {
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
         let forced = forced_simd()?;
-        Ok(Self { plan, forced, timing, rule: rule(plan), ladders: OnceCell::new() })
+        let (demand, ladders) = (Demand::Row, OnceCell::new());
+        Ok(Self { plan, demand, forced, timing, rule: rule(plan), ladders })
     }
 
     /// As [`Self::new`], with the rungs of another engine.
@@ -174,16 +177,13 @@ impl<'a> ModelEngine<'a> {
     pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
         let interrupt = Interrupt::new();
         let watch = Watch::new(&interrupt);
-        self.evaluate_for(axis_values, Demand::Row, &|_| {}, &watch).unwrap_or_default()
+        self.evaluate_under(axis_values, &watch).unwrap_or_default()
     }
 
-    /// As [`Self::evaluate_at`], with outcomes good for what is asked, each shown to `seen` as it
-    /// comes, on any thread; `None` if `watch` stopped it.
-    pub fn evaluate_for(
+    /// As [`Self::evaluate_at`]; `None` if `watch` stopped it.
+    pub fn evaluate_under(
         &self,
         axis_values: &[Vec<f64>],
-        demand: Demand,
-        seen: &(dyn Fn(&Outcome) + Sync),
         watch: &Watch<'_>,
     ) -> Option<Vec<Outcome>> {
         let next = Mutex::new(0..axis_values.len());
@@ -196,20 +196,16 @@ impl<'a> ModelEngine<'a> {
                 .collect()
         };
         let found = Mutex::new(Vec::with_capacity(axis_values.len()));
-        let keep = |outcome: Outcome| {
-            watch.done(1);
-            seen(&outcome);
-            lock(&found).push(outcome);
-        };
-        self.through_lanes(demand, &feed, &keep, watch);
+        let keep = |outcome: Outcome| lock(&found).push(outcome);
+        self.through_lanes(&feed, &keep, watch);
         let mut found = unlocked(found);
         found.sort_by_key(|outcome| outcome.point);
         (found.len() == axis_values.len()).then_some(found)
     }
 
     /// Rows from a feed to a keeper, on all threads of the rayon pool this is called in.
-    fn through_lanes(&self, demand: Demand, feed: &Feed<'_>, keep: &Keep<'_>, watch: &Watch<'_>) {
-        let pool = Pool { engine: self, demand, feed, keep, watch, shared: Shared::default() };
+    fn through_lanes(&self, feed: &Feed<'_>, keep: &Keep<'_>, watch: &Watch<'_>) {
+        let pool = Pool { engine: self, feed, keep, watch, shared: Shared::default() };
         match rayon::current_thread_index() {
             Some(_) => drop(rayon::broadcast(|_| pool.work())),
             // An estimate is of one thread.
@@ -308,7 +304,7 @@ impl Engine for ModelEngine<'_> {
             let rows = std::iter::from_fn(next).take(most);
             rows.map(|(row, values)| (row, self.plan.scenario_at(&values))).collect()
         };
-        self.through_lanes(Demand::Row, &feed, &keep, watch);
+        self.through_lanes(&feed, &keep, watch);
     }
 
     fn simd(&self) -> &str {

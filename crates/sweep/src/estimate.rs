@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use lane_ode::MAX_LANES;
 use washer_model::ModelKind;
-use washer_row::{Demand, Deviations, Ladder, Metric, Outcome};
+use washer_row::{Deviations, Ladder, Metric, Outcome};
 
 use crate::engine::{Engine, EngineError, MOST_WAITING, ModelEngine, ROWS_A_THREAD, Watch};
 use crate::plan::Plan;
@@ -212,7 +212,7 @@ fn cost_within(
             }
         });
         let began_s = busy_s();
-        let outcomes = engine.evaluate_for(&axis_values, Demand::Row, &|_| {}, watch);
+        let outcomes = engine.evaluate_under(&axis_values, watch);
         let cost_s = busy_s() - began_s;
         drop(done);
         outcomes.map(|_| cost_s)

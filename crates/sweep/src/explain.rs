@@ -22,7 +22,7 @@ use sweep_engine::{Error, Interrupt};
 use sweep_parameter::RatioLimits;
 use tongue::{Asker, Seen, tongues};
 pub(crate) use tongue::{Closing, End, Resonance, Tongue};
-use washer_row::{Demand, Outcome, ROW_STATUSES, Status, Trajectory, Verdict, row_status};
+use washer_row::{Outcome, ROW_STATUSES, Status, Trajectory, Verdict, row_status};
 
 /// Distance between the speeds that are looked at (rpm), unless `--speed` says another.
 const STEP_RPM: f64 = 1.0;
@@ -161,7 +161,7 @@ fn swept(plan: &Plan, interrupt: &Interrupt) -> Result<Swept, Error> {
     let scenario = plan.scenario(0);
     let channels = plan.reliability.channels.clone();
     let (engine, watch) = (ModelEngine::new(plan)?, Watch::new(interrupt));
-    let outcomes = engine.evaluate_for(&[Vec::new()], Demand::Row, &|_| {}, &watch);
+    let outcomes = engine.evaluate_under(&[Vec::new()], &watch);
     // Where it was stopped: nothing.
     let none = || Trajectory::failed(Status::Panicked);
     let outcome = outcomes.and_then(|mut outcomes| outcomes.pop());

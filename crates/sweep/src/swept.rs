@@ -2,21 +2,29 @@
 
 use std::borrow::Cow;
 
-use sweep_engine::boundary::search::Values;
 use sweep_engine::estimate::Estimate;
-use sweep_engine::{Engine, Error, Swept, Watch};
+use sweep_engine::{Engine, Error, Swept};
 use washer_model::{Machine, Parameter, Spin, Target};
-use washer_row::{Criterion, Demand, Metric, Outcome};
+use washer_row::{Criterion, Demand, Metric};
 
-use crate::columns::Columns;
 use crate::config::grid::lacking;
 use crate::engine::ModelEngine;
 use crate::model::Washer;
 use crate::plan::Plan;
 
 impl Swept for Washer {
-    fn engine(plan: &Plan) -> Result<Box<dyn Engine + '_>, Error> {
-        Ok(Box::new(ModelEngine::new(plan).map_err(Error::model)?))
+    fn engine<'a>(plan: &'a Plan, only: Option<&str>) -> Result<Box<dyn Engine + 'a>, Error> {
+        // It makes sure of a ratio's side, and knows nothing of the limits of other columns.
+        let is_of = |kind| only.is_some_and(|only| only.starts_with(kind));
+        let mut engine = ModelEngine::new(plan).map_err(Error::model)?;
+        engine.demand = if is_of("ratio_") {
+            Demand::Side
+        } else if is_of("growth_") || is_of("dwell_") {
+            Demand::Growth
+        } else {
+            Demand::Row
+        };
+        Ok(Box::new(engine))
     }
 
     fn estimate(plan: &Plan, threads: usize) -> Result<Estimate, Error> {
@@ -52,11 +60,6 @@ impl Swept for Washer {
         Metric::ALL.into_iter().filter(can_have).map(with).collect()
     }
 
-    fn search<'a>(plan: &'a Plan, column: &str) -> Result<Box<dyn Values + 'a>, Error> {
-        let engine = ModelEngine::new(plan).map_err(Error::model)?;
-        Ok(Box::new(Searched { engine, columns: Columns::of_run(plan), column: column.to_owned() }))
-    }
-
     fn listed(plan: Option<&Plan>) -> Vec<Listed> {
         listed(plan)
     }
@@ -89,41 +92,6 @@ fn listed(plan: Option<&Plan>) -> Vec<Listed> {
         Listed { parameter, value, source }
     };
     Parameter::all(machine, spin).into_iter().map(row).collect()
-}
-
-/// The numbers of a column, by the engine.
-struct Searched<'a> {
-    engine: ModelEngine<'a>,
-    columns: Columns,
-    column: String,
-}
-
-impl Searched<'_> {
-    /// What the engine is asked for: it makes sure of a ratio's side, and knows nothing of the
-    /// limits of other columns.
-    fn demand(&self) -> Demand {
-        if self.column.starts_with("ratio_") {
-            Demand::Side
-        } else if ["growth_", "dwell_"].iter().any(|of| self.column.starts_with(of)) {
-            Demand::Growth
-        } else {
-            Demand::Row
-        }
-    }
-}
-
-impl Values for Searched<'_> {
-    fn values(
-        &self,
-        axis_values: &[Vec<f64>],
-        seen: &(dyn Fn(usize, Option<f64>) + Sync),
-        watch: &Watch<'_>,
-    ) -> Option<Vec<Option<f64>>> {
-        let value = |outcome: &Outcome| self.columns.number(&self.column, outcome);
-        let shown = |outcome: &Outcome| seen(outcome.point as usize, value(outcome));
-        let found = self.engine.evaluate_for(axis_values, self.demand(), &shown, watch)?;
-        Some(found.iter().map(value).collect())
-    }
 }
 
 #[cfg(test)]

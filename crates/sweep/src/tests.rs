@@ -4,8 +4,9 @@ use crate::config;
 use crate::engine::ModelEngine;
 use crate::model::Washer;
 use crate::plan::Plan;
+use sweep_engine::asking::{Asking, Stopped};
 use sweep_engine::boundary::file::{job, table};
-use sweep_engine::boundary::search::{BoundaryError, BoundaryTask, Models, Stopped};
+use sweep_engine::boundary::search::{BoundaryError, BoundaryTask, Models};
 use sweep_engine::boundary::{Edge, EdgeKind, Traced, quantity, trace};
 use sweep_engine::store::{OpenedTrials, Rows as _, Trials};
 use sweep_engine::{Interrupt, Swept as _};
@@ -61,8 +62,9 @@ fn traced(
     interrupt: &Interrupt,
 ) -> Result<Traced, Stopped> {
     let (quantity, _) = quantity::traced(plan, "ratio_max", None).unwrap();
-    let values = Washer::search(plan, &quantity.name).unwrap();
-    let models = Models::new(plan, (&quantity, values), threads, interrupt, &|_| {}).unwrap();
+    let engine = Washer::engine(plan, Some(&quantity.name)).unwrap();
+    let asking = Asking::new(engine, threads, interrupt, None, &|_| {}).unwrap();
+    let models = Models::new(plan, &quantity, asking);
     trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {})
 }
 
@@ -212,11 +214,11 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
                 interrupt.raise(2);
             }
         };
-        let values = Washer::search(&plan, &quantity.name).unwrap();
-        let models = Models::new(&plan, (&quantity, values), 2, &interrupt, &tell).unwrap();
-        let models = models.keeping(*trials);
+        let engine = Washer::engine(&plan, Some(&quantity.name)).unwrap();
+        let asking = Asking::new(engine, 2, &interrupt, Some(*trials), &tell).unwrap();
+        let models = Models::new(&plan, &quantity, asking);
         let found = trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {});
-        let trials = models.into_kept().unwrap();
+        let trials = models.into_asking().into_trials().unwrap();
         match found {
             Ok(found) => break (found, trials),
             Err(Stopped::Interrupted) => assert!(trials.count() > there),
@@ -337,9 +339,10 @@ fn a_force_crosses_its_limit_where_the_grid_says_so() {
     let (quantity, plan) =
         quantity::traced(&plan, "cabinet_force_nonlinear_n", Some(limit)).unwrap();
     let task = BoundaryTask::new(&plan, Some(2.0), 3).unwrap();
-    let values = Washer::search(&plan, &quantity.name).unwrap();
     let interrupt = Interrupt::new();
-    let models = Models::new(&plan, (&quantity, values), 2, &interrupt, &|_| {}).unwrap();
+    let engine = Washer::engine(&plan, Some(&quantity.name)).unwrap();
+    let asking = Asking::new(engine, 2, &interrupt, None, &|_| {}).unwrap();
+    let models = Models::new(&plan, &quantity, asking);
     let rows = trace(&models, &task.firsts, 1, &task.search, &mut |_| {}).unwrap().curves.remove(0);
     let crossings = rows.iter().flat_map(|row| row.edges.iter().map(|edge| (row.first, edge)));
     let mut found = 0;

@@ -4,7 +4,6 @@
 use serde_json::{Value, json};
 use sweep_parameter::{Parameter as _, unit_suffix};
 
-use super::search::further_values;
 use super::{BoundaryTask, Edge, Traced, TracedQuantity, TracedRow};
 use crate::{Job, Plan, Rows, Table};
 use sweep_files::{FileKind, key};
@@ -135,7 +134,8 @@ fn add_axes<M: Rows>(
         table.numbers(&within(name, unit, word), unit, &said, lines.iter().map(value));
     }
     for (k, axis) in further.iter().enumerate() {
-        let values = lines.iter().map(|line| further_values(plan, line.curve).get(k).copied());
+        let values =
+            lines.iter().map(|line| plan.axis_values(line.curve as u64).get(2 + k).copied());
         table.parameter(&axis.parameter, values);
     }
 }

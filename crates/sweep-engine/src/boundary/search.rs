@@ -1,14 +1,10 @@
-//! The evaluator over a model: its distances at trial points, on all cores, with a memory; and the
-//! settings a plan gives a search.
-
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard};
+//! The evaluator over a model: its distances at trial points; and the settings a plan gives a
+//! search.
 
 use super::{Evaluate, Search, TracedQuantity, Trial};
-use crate::store::{Key, Trials};
-use crate::threads::{self};
-use crate::{Axis, AxisValues, Interrupt, Model, Plan, StoreError, ThreadsError, Watch};
-use sweep_files::panics::{lock, unlocked};
+use crate::asking::{Asking, Stopped};
+use crate::store::{Column, Done, Key, Rows};
+use crate::{Axis, AxisValues, Model, Plan};
 use sweep_parameter::Parameter as _;
 
 /// Rows of all curves together that are accepted: what is known of them stays in memory.
@@ -127,127 +123,49 @@ fn all<M: Model>(axis: &Axis<M>) -> Vec<f64> {
     (0..axis.values.len()).map(|k| axis.values.value(k)).collect()
 }
 
-/// Values of the axes beyond the second, of a curve; the last varies fastest.
-pub fn further_values<M: Model>(plan: &Plan<M>, curve: usize) -> Vec<f64> {
-    let further = plan.axes.get(2..).unwrap_or_default();
-    let mut values = vec![0.0; further.len()];
-    let mut rest = curve as u64;
-    for (value, axis) in values.iter_mut().zip(further).rev() {
-        *value = axis.values.value(rest % axis.values.len());
-        rest /= axis.values.len();
-    }
-    values
-}
-
-/// What computes the numbers of a column.
-pub trait Values: Sync {
-    /// One number a point given by the values of the axes, `None` where it is null. Each is shown
-    /// to `seen` by its position as it comes, on any thread of the rayon pool that this is called
-    /// in; `None` if `watch` stopped it. A ratio's is good for telling on which side of the plan's
-    /// limit it is, and near the limit for its value.
-    fn values(
-        &self,
-        axis_values: &[Vec<f64>],
-        seen: &(dyn Fn(usize, Option<f64>) + Sync),
-        watch: &Watch<'_>,
-    ) -> Option<Vec<Option<f64>>>;
-}
-
 /// A model at trial points.
 pub struct Models<'a, M: Model> {
     plan: &'a Plan<M>,
     quantity: &'a TracedQuantity,
-    values: Box<dyn Values + 'a>,
-    pool: rayon::ThreadPool,
-    interrupt: &'a Interrupt,
-    /// What is known from before, and where answers are kept as they come.
-    kept: Option<Mutex<Trials>>,
-    done: AtomicU64,
-    tell: &'a (dyn Fn(u64) + Sync),
+    /// The quantity's column of the plan's rows, and its place among them.
+    column: Option<(usize, Column)>,
+    asking: Asking<'a>,
 }
 
-impl<'a, M: Model> Models<'a, M> {
-    /// An evaluator over a plan; `tell` hears how many trials are done.
-    ///
-    /// # Errors
-    /// [`ThreadsError::Start`].
-    pub fn new(
-        plan: &'a Plan<M>,
-        (quantity, values): (&'a TracedQuantity, Box<dyn Values + 'a>),
-        threads: usize,
-        interrupt: &'a Interrupt,
-        tell: &'a (dyn Fn(u64) + Sync),
-    ) -> Result<Self, ThreadsError> {
-        let pool = threads::pool(threads)?;
-        let done = AtomicU64::new(0);
-        Ok(Self { plan, quantity, values, pool, interrupt, kept: None, done, tell })
+impl<'a, M: Rows> Models<'a, M> {
+    /// An evaluator over a plan by its engine.
+    pub fn new(plan: &'a Plan<M>, quantity: &'a TracedQuantity, asking: Asking<'a>) -> Self {
+        let mut columns = M::layout(plan).columns.into_iter().enumerate();
+        let column = columns.find(|(_, column)| column.name == quantity.name);
+        Self { plan, quantity, column, asking }
     }
 
-    /// The same with a memory: it makes no trial again that is known from before.
-    pub fn keeping(self, trials: Trials) -> Self {
-        Self { kept: Some(Mutex::new(trials)), ..self }
+    /// What it asks.
+    pub fn into_asking(self) -> Asking<'a> {
+        self.asking
     }
 
-    /// The memory, at the end.
-    pub fn into_kept(self) -> Option<Trials> {
-        self.kept.map(unlocked)
-    }
-
-    fn kept(&self) -> Option<MutexGuard<'_, Trials>> {
-        self.kept.as_ref().map(lock)
-    }
-
-    /// Counts trials that are done.
-    fn count(&self, trials: u64) {
-        (self.tell)(self.done.fetch_add(trials, Ordering::Relaxed) + trials);
+    fn distance(&self, done: &Done) -> Option<f64> {
+        let (place, column) = self.column.as_ref()?;
+        let value = column.number(done.rows.first()?[*place])?;
+        Some(self.quantity.distance(value))
     }
 }
 
-/// Why the evaluator stopped. The answers that it has given are kept.
-#[derive(Debug)]
-pub enum Stopped {
-    /// The interrupt stopped it.
-    Interrupted,
-    /// An answer could not be kept.
-    Failed(StoreError),
-}
-
-impl<M: Model> Evaluate for Models<'_, M> {
+impl<M: Rows> Evaluate for Models<'_, M> {
     type Stop = Stopped;
 
     fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Stopped> {
-        let known = |trial: &Trial| self.kept()?.recall(&key(trial));
-        let mut distances: Vec<Option<Option<f64>>> = trials.iter().map(known).collect();
-        let new: Vec<usize> = (0..trials.len()).filter(|k| distances[*k].is_none()).collect();
-        self.count((trials.len() - new.len()) as u64);
-        let values = |k: &usize| {
-            let trial = trials[*k];
-            let further = further_values(self.plan, trial.curve);
-            [trial.first, trial.second].into_iter().chain(further).collect()
+        let keys: Vec<Vec<Key>> = trials.iter().map(|trial| vec![key(trial)]).collect();
+        let values = |k: usize, _| {
+            let Trial { curve, first, second } = trials[k];
+            // The axes beyond the second vary fastest.
+            let mut values = self.plan.axis_values(curve as u64);
+            values[..2].copy_from_slice(&[first, second]);
+            values
         };
-        let axis_values: Vec<Vec<f64>> = new.iter().map(values).collect();
-        let watch = Watch::new(self.interrupt);
-        let failure = Mutex::new(None);
-        let distance = |value: Option<f64>| value.map(|value| self.quantity.distance(value));
-        let seen = |place: usize, value| {
-            if let (Some(mut kept), Some(position)) = (self.kept(), new.get(place))
-                && let Err(error) = kept.keep(key(&trials[*position]), distance(value))
-            {
-                lock(&failure).get_or_insert(error);
-                watch.abort();
-            }
-            self.count(1);
-        };
-        let found = self.pool.install(|| self.values.values(&axis_values, &seen, &watch));
-        let settled = self.kept().map_or(Ok(()), |kept| kept.settle());
-        let failure = unlocked(failure);
-        if let Some(error) = failure.or(settled.err()) {
-            return Err(Stopped::Failed(error));
-        }
-        for (position, value) in new.iter().zip(found.ok_or(Stopped::Interrupted)?) {
-            distances[*position] = Some(distance(value));
-        }
-        Ok(distances.into_iter().flatten().collect())
+        let answer = |_, points: Vec<Done>| Ok(points.iter().map(|of| self.distance(of)).collect());
+        Ok(self.asking.ask(&keys, 1, &values, &answer)?.concat())
     }
 }
 

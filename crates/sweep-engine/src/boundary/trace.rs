@@ -5,7 +5,7 @@ use super::batch::{LANES, deal, lane_groups};
 use super::pockets::Beside;
 use super::span::{Question, SideRange, Span, Tried};
 use super::warm::{self, HEARD};
-use super::{Evaluate, Neighbour, RowSearch, Search, Standing, Traced, TracedRow, Trial, Want};
+use super::{Evaluate, Neighbour, RowSearch, Search, Traced, TracedRow, Trial, Want};
 
 /// Rows that are worked on at once, in whole curves: bounds memory, and is plenty to fill lanes.
 const ROWS_AT_ONCE: usize = 1 << 14;
@@ -17,8 +17,8 @@ const ANNOUNCED: [isize; 6] = [-1, 1, -2, 2, -4, 4];
 /// Where rows disagree, no gap between trials is wider than this part of a cell of the lattice.
 const GAP: f64 = 0.25;
 
-/// Traces `curves` curves over these values of the first axis, and reports its progress before
-/// every batch.
+/// Traces `curves` curves over these values of the first axis. Before every batch `tell` hears how
+/// many rows are done, unless a neighbour will announce something.
 ///
 /// # Errors
 /// Whatever stopped the evaluator.
@@ -27,7 +27,7 @@ pub fn trace<E: Evaluate>(
     firsts: &[f64],
     curves: usize,
     search: &Search,
-    tell: &mut dyn FnMut(&Standing),
+    tell: &mut dyn FnMut(usize),
 ) -> Result<Traced, E::Stop> {
     let mut traced = Traced { curves: Vec::with_capacity(curves), ..Traced::default() };
     let at_once = (ROWS_AT_ONCE / firsts.len().max(1)).max(1);
@@ -37,8 +37,7 @@ pub fn trace<E: Evaluate>(
         let mut block = Block::new(begun..end, firsts, search);
         while let Some(batch) = block.next() {
             let trials: Vec<Trial> = batch.iter().map(|(trial, ..)| *trial).collect();
-            let rows = begun * firsts.len() + block.rows_done();
-            tell(&Standing { rows, trials: traced.trials, batch: trials.len() });
+            tell(begun * firsts.len() + block.rows_done());
             let distances = evaluator.evaluate(&trials)?;
             for ((_, place, at), distance) in batch.iter().zip(distances) {
                 block.insert(*place, *at, distance);

@@ -6,10 +6,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use super::{GridArgs, Lines as _, finite, installed, short};
+use crate::asking::{Asking, Stopped};
 use crate::boundary::file::{self, job};
 use crate::boundary::quantity::{offered, traced};
-use crate::boundary::search::{Models, Stopped};
-use crate::boundary::{BoundaryTask, EdgeKind, Standing, Traced, TracedQuantity, trace};
+use crate::boundary::search::Models;
+use crate::boundary::{BoundaryTask, EdgeKind, Traced, TracedQuantity, trace};
 use crate::effort::{Effort, EffortArgs};
 use crate::store::{Column, OpenedTrials, Trials};
 use crate::{Axis, Error, Exit, Plan, Progress, StoreError, Swept, duration, show, tell};
@@ -218,16 +219,12 @@ pub fn search<M: Swept>(
             progress.show_search(rows_done.load(Ordering::Relaxed), points);
         }
     };
-    let threads = effort.threads()?;
-    let values = M::search(plan, &quantity.name)?;
-    let models = Models::new(plan, (quantity, values), threads, effort.interrupt, &shown)?;
-    let models = match trials {
-        Some(trials) => models.keeping(trials),
-        None => models,
-    };
-    let mut standing =
-        |standing: &Standing| rows_done.store(standing.rows as u64, Ordering::Relaxed);
+    let (threads, interrupt) = (effort.threads()?, effort.interrupt);
+    let engine = M::engine(plan, Some(&quantity.name))?;
+    let asking = Asking::new(engine, threads, interrupt, trials, &shown)?;
+    let models = Models::new(plan, quantity, asking);
+    let mut standing = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
     let found = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
     lock(&progress).finish();
-    Ok((found, models.into_kept()))
+    Ok((found, models.into_asking().into_trials()))
 }

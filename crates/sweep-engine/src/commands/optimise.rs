@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::cells::table as text_table;
 use super::{Lines as _, installed, word};
-use crate::boundary::search::Stopped;
+use crate::asking::Stopped;
 use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;

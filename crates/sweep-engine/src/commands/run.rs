@@ -63,7 +63,7 @@ impl WorkArgs {
 /// Mistakes in the grid file, and whatever kept the run from its end.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
-    let engine = M::engine(&plan)?;
+    let engine = M::engine(&plan, None)?;
     let report = execute(args, &plan, engine.as_ref(), &installed()?, "")?;
     Ok(exit(args.fail_on_error, &report))
 }

@@ -116,6 +116,15 @@ impl Column {
         Self { name, unit: unit.into(), description, kind, worse: None, limit: None }
     }
 
+    /// The number in a cell, if it is a column of numbers.
+    pub fn number(&self, cell: Option<u64>) -> Option<f64> {
+        match self.kind {
+            Kind::Count | Kind::KnownCount => cell.map(|count| count as f64),
+            Kind::Measured | Kind::Axis | Kind::Time => cell.map(f64::from_bits),
+            Kind::Flag | Kind::Name(_) => None,
+        }
+    }
+
     fn field(&self) -> Field {
         let names = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
         let (data_type, nullable) = match self.kind {

@@ -1,6 +1,5 @@
 //! `sweep explain GRID.toml --at NAME=VALUE`: why the linear model fails at a point.
 
-use crate::config::GridInput;
 use crate::engine::simd_from_environment;
 use crate::explain::{explain, json, words};
 use crate::speeds::{Speeds, turning};
@@ -37,8 +36,7 @@ disturbance is measured by its energy. docs/stability.md explains every line.";
 /// Mistakes in the grid file or the options, a profile that cannot be explained, and a machine
 /// without equilibrium or modes.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let grid = GridInput::file(args.grid.grid.clone(), args.grid.sets.clone());
-    let (plan, at) = grid.load_point(&args.grid.at)?;
+    let (plan, at) = args.grid.load_point(&args.grid.at)?;
     let threads = threads::count(args.threads, &threads::process)?;
     let simd = simd_from_environment()?;
     // A signal ends the process: there is nothing to keep.

@@ -55,11 +55,16 @@ on from there. docs/fit.md explains every line.";
 /// Mistakes in the grid file, the measurements or the options; data that cannot tell; and a machine
 /// file that cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let grid = GridInput::file(args.grid.grid.clone(), args.grid.sets());
+    let GridArgs { grid, at, name, .. } = &args.grid;
+    let grid = GridInput::file(grid.clone(), args.grid.sets()).fixing(at);
     let mut cases = Vec::new();
     for text in &args.measured {
         let (path, constants) = parted(text);
-        cases.push(fit::case(&grid, &constants, Measured::read(path)?)?);
+        let mut case = fit::case(&grid, &constants, Measured::read(path)?)?;
+        if let Some(name) = name {
+            case.plan.name.clone_from(name);
+        }
+        cases.push(case);
     }
     let taken = |path: &PathBuf| Error::File {
         action: "write",

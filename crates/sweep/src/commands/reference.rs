@@ -1,60 +1,25 @@
-//! `sweep reference PAGE`: pages of the guide that are made from the program's own tables, as
-//! Markdown.
+//! Pages of the guide that are made from the program's own tables: `docs/reference/` holds what
+//! stands here.
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
-use std::iter;
+use std::path::Path;
+use std::{env, fs, iter};
 
 use washer_model::{Channel, Machine, Parameter, Range, Source, Spin, Target};
 use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 
+use super::command;
 use crate::columns::Columns;
-use crate::config;
+use crate::config::machine::with_one_of_each;
 use crate::method::Integrator;
 use sweep_engine::method::{Integrator as _, default_method};
 use sweep_engine::store::{Column, Kind, Layout};
-use sweep_engine::{Error, Exit, print};
 use sweep_files::key;
 
-/// Arguments of `sweep reference`.
-#[derive(Debug, clap::Args)]
-pub struct Args {
-    /// Page to print
-    page: Page,
-}
-
-/// Pages made from tables of the code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Page {
-    /// Every parameter that can be set or swept.
-    Parameters,
-    /// Every method of integration with its settings.
-    Methods,
-    /// Every column of a result file.
-    Columns,
-    /// Every command with its options.
-    Commands,
-}
-
-/// Prints a page.
-///
-/// # Errors
-/// Standard output that cannot be written.
-pub(crate) fn run(args: &Args, program: clap::Command) -> Result<Exit, Error> {
-    print(&match args.page {
-        Page::Parameters => parameters(),
-        Page::Methods => methods(),
-        Page::Columns => columns(),
-        Page::Commands => commands(program),
-    })
-}
-
 /// The head of a page, which says that it is generated.
-fn head(title: &str, page: &str) -> String {
-    format!(
-        "# {title}\n\n<!-- Made by `sweep reference {page}`; scripts/checks/check_docs.py holds it \
-         against the program. -->\n\n"
-    )
+fn head(title: &str) -> String {
+    format!("# {title}\n\n<!-- Made by crates/sweep/src/commands/reference.rs. -->\n\n")
 }
 
 /// A table row; a bar inside a cell would end it.
@@ -65,9 +30,9 @@ fn row(text: &mut String, cells: &[&str]) {
 }
 
 fn parameters() -> String {
-    let mut text = head("Parameters", "parameters");
+    let mut text = head("Parameters");
     let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
-    let all = Parameter::all(&config::with_one_of_each(), &spin);
+    let all = Parameter::all(&with_one_of_each(), &spin);
     // Told once, before the table.
     let told = all.iter().find_map(|parameter| match parameter.source() {
         Source::Derived(how) => Some(how),
@@ -133,7 +98,7 @@ fn allowed(range: Range) -> String {
 }
 
 fn methods() -> String {
-    let mut text = head("Methods of integration", "methods");
+    let mut text = head("Methods of integration");
     text.push_str(
         "The `method` of `[integrator]`, with its keys. [Method and \
          accuracy](../method.md)\nsays which one to take.\n\n",
@@ -155,7 +120,7 @@ fn methods() -> String {
 }
 
 fn columns() -> String {
-    let mut text = head("Columns of a result file", "columns");
+    let mut text = head("Columns of a result file");
     text.push_str(include_str!("reference/columns.txt"));
     let (machine, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
     let axes = Parameter::all(&machine, &spin)
@@ -166,7 +131,7 @@ fn columns() -> String {
         })
         .collect();
     let metrics = Metric::ALL.to_vec();
-    let measures = Measures { metrics, stops: 2, feet: 3, dampers: 2, ..Measures::default() };
+    let measures = Measures { metrics, stops: 1, feet: 1, dampers: 1, ..Measures::default() };
     let columns = Columns::of_measures(&Channel::ALL, 2.0.into(), &measures, true);
     let layout = Layout::of_map(axes, columns.declared());
     row(&mut text, &["column", "type", "unit", "worse", "limit", "meaning"]);
@@ -238,19 +203,22 @@ fn of_any_model(description: &str) -> String {
 }
 
 fn commands(program: clap::Command) -> String {
-    let mut text = head("Commands", "commands");
+    let mut text = head("Commands");
     text.push_str("`sweep COMMAND --help` begins with examples of the command.\n\n");
     // The width of a terminal must not show in a file.
     let mut program = program.term_width(100);
     program.build();
     let mut part = |title: &str, help: String, more: &str| {
+        // The usage says it.
+        let help = help.replace("Arguments:\n  <GRID.toml>  Grid file\n\n", "");
         let help: Vec<&str> = help.lines().map(str::trim_end).collect();
         // Writing to a String cannot fail.
         let _ =
             writeln!(text, "## {title}\n\n```text\n{}\n```\n{more}", help.join("\n").trim_end());
     };
-    let help_of_program = program.clone().render_help().to_string();
-    part("sweep", help_of_program.trim_start().into(), "");
+    // Examples and the flag that shows them are for a terminal.
+    let help_of_program = program.clone().before_help(None::<&'static str>).render_help();
+    part("sweep", help_of_program.to_string().trim_start().into(), "");
     let shared = shared_options(&program);
     let mut options = clap::Command::new("options").disable_help_flag(true).term_width(100);
     options = options.help_template("{options}").args(shared.clone());
@@ -267,7 +235,6 @@ fn commands(program: clap::Command) -> String {
         } else {
             format!("\nAlso {}: [above](#options-of-several-commands).\n", longs.join(", "))
         };
-        // Examples and the flag that shows them are for a terminal.
         let is_hidden = |arg: &clap::Arg| is_shared(arg) || arg.get_long() == Some("help");
         let mut alone = command.clone().before_help(None::<&'static str>);
         alone = alone.mut_args(|arg| if is_hidden(&arg) { arg.hide(true) } else { arg });
@@ -298,35 +265,33 @@ fn shared_options(program: &clap::Command) -> Vec<clap::Arg> {
     shared
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::commands::command;
-
-    #[test]
-    fn further_springs_and_dampers_are_left_out_and_nothing_else() {
-        assert!(
-            is_a_further_one("spring_2_tub_x_m")
-                && is_a_further_one("damper_12_damping_n_s_per_m")
-                && is_a_further_one("foot_3_load_linear_n")
-        );
-        assert!(
-            !is_a_further_one("spring_1_tub_x_m") && !is_a_further_one("spring_stiffness_n_per_m")
-        );
-    }
-
-    #[test]
-    fn pages_hold_what_the_tables_hold() {
-        let page = parameters();
-        for name in ["tub_mass_kg", "spring_1_free_length_m", "spin_peak_rpm"] {
-            assert!(page.contains(&format!("| `{name}` |")), "{name}");
+/// With `RENEW` in the environment it writes them.
+#[test]
+fn the_guide_has_these_pages() {
+    let pages = [
+        ("parameters", parameters()),
+        ("methods", methods()),
+        ("columns", columns()),
+        ("commands", commands(command())),
+    ];
+    for (page, made) in pages {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference");
+        let path = folder.join(page).with_extension("md");
+        if env::var_os("RENEW").is_some() {
+            fs::write(path, made).unwrap();
+        } else {
+            let is_made = fs::read_to_string(&path).unwrap() == made;
+            assert!(is_made, "{page}.md: RENEW=1 cargo test --release -p sweep --lib reference");
         }
-        for entry in Integrator::methods() {
-            assert!(methods().contains(&format!("| `{}`", entry.name)), "{}", entry.name);
-        }
-        assert!(columns().contains("| `ratio_max_channel` | text |"));
-        let page = commands(command());
-        assert!(page.contains("## sweep run\n") && page.contains("--fail-on-error"));
-        assert!(!page.contains("sweep reference PAGE"), "hidden commands stay hidden");
     }
+}
+
+#[test]
+fn further_springs_and_dampers_are_left_out_and_nothing_else() {
+    assert!(
+        is_a_further_one("spring_2_tub_x_m")
+            && is_a_further_one("damper_12_damping_n_s_per_m")
+            && is_a_further_one("foot_3_load_linear_n")
+    );
+    assert!(!is_a_further_one("spring_1_tub_x_m") && !is_a_further_one("spring_stiffness_n_per_m"));
 }

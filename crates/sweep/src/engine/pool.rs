@@ -103,7 +103,6 @@ enum Work {
 /// Rows on their way through the lanes.
 pub(super) struct Pool<'a> {
     pub(super) engine: &'a ModelEngine<'a>,
-    pub(super) demand: Demand,
     pub(super) feed: &'a Feed<'a>,
     pub(super) keep: &'a Keep<'a>,
     pub(super) watch: &'a Watch<'a>,
@@ -199,7 +198,7 @@ impl Pool<'_> {
             } else {
                 // Nothing is kept of what is put down.
                 let Some(ladders) = self.engine.ladders_under(self.watch) else { break };
-                row.next(ladders, self.demand, &self.engine.rule)
+                row.next(ladders, self.engine.demand, &self.engine.rule)
             };
             match next {
                 Next::Runs(kinds) => {

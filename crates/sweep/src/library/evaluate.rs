@@ -1,9 +1,8 @@
 //! Points through the engine, into rows in memory.
 
 use std::collections::BTreeMap;
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, OnceLock};
-use std::time::Duration;
 
 use arrow_array::RecordBatch;
 use arrow_schema::{ArrowError, SchemaRef};
@@ -16,13 +15,9 @@ use crate::engine::{Engine, ModelEngine, Watch};
 use crate::plan::Plan;
 use sweep_engine::progress::Progress;
 use sweep_engine::store::{BATCH_ROWS, Done, Layout, ResultRows};
-use sweep_engine::threads::ThreadsError;
 use sweep_engine::{Error, Job, StoreError, threads};
 use sweep_files::panics::{self, lock};
 use washer_row::Ladder;
-
-/// How often progress is shown while rows are computed.
-const SHOWN_EVERY: Duration = Duration::from_millis(100);
 
 /// A plan that is evaluated any number of times. The steps of its method are found once.
 pub struct Evaluator {
@@ -100,8 +95,7 @@ pub(super) fn in_memory(
     effort: Effort<'_>,
     engine: &dyn Engine,
 ) -> Result<Evaluated, Error> {
-    let threads = effort.threads()?;
-    let pool = threads::pool(threads)?;
+    let pool = threads::pool(effort.threads()?)?;
     let watch = Watch::new(effort.interrupt);
     let rows = Mutex::new(0..job.points);
     let next = || {
@@ -112,28 +106,20 @@ pub(super) fn in_memory(
     let last = job.points.saturating_sub(1);
     let defect = |reason| StoreError::Engine { first: 0, last, reason };
     let gathered = Gathered::new(job);
-    let keep = |outcome| gathered.keep(outcome, &watch);
-    let mut progress = Progress::new(effort.progress, job.points, 0);
-    std::thread::scope(|scope| {
-        // Hung up when the work is done.
-        let (working, ended) = channel::<()>();
-        let (pool, next, keep, watch) = (&pool, &next, &keep, &watch);
-        let work = move || {
-            let _working = working;
-            pool.install(|| engine.evaluate(next, keep, watch));
-        };
-        let work = std::thread::Builder::new()
-            .spawn_scoped(scope, work)
-            .map_err(|error| ThreadsError::start(threads + 1)(&error))?;
-        while ended.recv_timeout(SHOWN_EVERY) == Err(RecvTimeoutError::Timeout) {
+    let progress = Mutex::new(Progress::new(effort.progress, job.points, 0));
+    let keep = |outcome| {
+        gathered.keep(outcome, &watch);
+        // A thread that finds another showing it goes on.
+        if let Ok(mut progress) = progress.try_lock() {
             progress.show(watch.points_done());
         }
-        work.join().map_err(|panic| {
-            let reason = format!("the engine panicked: {}", panics::text(panic.as_ref()));
-            Error::Store(defect(reason))
-        })
+    };
+    let evaluate = || pool.install(|| engine.evaluate(&next, &keep, &watch));
+    let evaluated = catch_unwind(AssertUnwindSafe(evaluate));
+    lock(&progress).finish();
+    evaluated.map_err(|panic| {
+        defect(format!("the engine panicked: {}", panics::text(panic.as_ref())))
     })?;
-    progress.finish();
     let is_whole = watch.points_done() == job.points;
     let batches = gathered.into_batches().map_err(|error| defect(error.to_string()))?;
     Ok(Evaluated { table: ResultTable::of_rows(job, batches, is_whole), is_whole })

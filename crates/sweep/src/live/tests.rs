@@ -97,7 +97,7 @@ fn a_setup_comes_back_from_its_numbers() {
         "\"triangular\", peak_rpm = 350, ramp_s = 50",
         "\"table\", time_s = [0, 20, 50], speed_rpm = [0, 350, 100]",
     ));
-    plan.model.machine = crate::config::with_one_of_each();
+    plan.model.machine = crate::config::machine::with_one_of_each();
     (plan.model.measures.stops, plan.model.measures.feet) =
         (plan.model.machine.stops.len(), plan.model.machine.feet.len());
     plan.model.measures.metrics = vec![Metric::SlipMargin, Metric::CabinetForce];

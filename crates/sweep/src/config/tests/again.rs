@@ -2,7 +2,8 @@
 
 use washer_row::Metric;
 
-use super::super::{GridInput, with_one_of_each};
+use super::super::GridInput;
+use super::super::machine::with_one_of_each;
 
 const GRID: &str = r#"
 name = "again"

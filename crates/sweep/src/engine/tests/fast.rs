@@ -329,9 +329,8 @@ fn a_side_is_that_of_the_row() {
     let plan = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };
     let engine = ModelEngine::new(&plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
-    let interrupt = Interrupt::new();
-    let sides =
-        engine.evaluate_for(&values, Demand::Side, &|_| {}, &Watch::new(&interrupt)).unwrap();
+    let of_sides = ModelEngine { demand: Demand::Side, ..ModelEngine::new(&plan).unwrap() };
+    let sides = of_sides.evaluate_at(&values);
     let rows = engine.evaluate_at(&values);
     let steps =
         |outcomes: &[Outcome]| outcomes.iter().map(|outcome| outcome.nonlinear.steps).sum::<u64>();
