@@ -27,7 +27,7 @@ POINTS = 20 if IS_CHECK else 1000
 # Where errors are measured: the ensemble's first points; and other programs run so many of these,
 # or fewer where a trajectory takes more than SLOW_S.
 REFERENCE_POINTS, SAMPLE, FEW = (2, 2, 2) if IS_CHECK else (40, 20, 5)
-SLOW_S = 1.0
+SLOW_S = 2.0
 # Half of it changes the results by what the page says.
 REFERENCE_STEP_S = 2.5e-5
 ACCURACIES = (1e-3, 1e-6)
@@ -105,15 +105,15 @@ def peers():
     python = [sys.executable, ROOT / "scripts/peers/python_peers.py"]
     return [
         ([cvode, "bdf", 2], range(3, 7)),
-        ([cvode, "bdf", 5], range(3, 8)),
+        ([cvode, "bdf", 5], range(3, 8, 2)),
         ([cvode, "adams", 12], range(4, 7)),
-        ([diffsol, "bdf"], range(3, 8)),
-        ([diffsol, "tr_bdf2"], range(3, 8)),
-        ([diffsol, "esdirk34"], range(3, 8)),
+        ([diffsol, "bdf"], range(3, 8, 2)),
+        ([diffsol, "tr_bdf2"], range(3, 9)),
+        ([diffsol, "esdirk34"], range(3, 10)),
         ([odeint], range(3, 7)),
         ([*python, "numbalsoda"], range(3, 7)),
         ([*python, "radau"], range(3, 6)),
-        ([*python, "lsoda"], range(3, 7)),
+        ([*python, "lsoda"], range(3, 7, 3)),
     ]
 
 
@@ -134,7 +134,7 @@ def trajectories(command, points):
         process.stdin.close()
         processes.append(process)
     lines = [[json.loads(line) for line in process.stdout] for process in processes]
-    if any(process.wait() for process in processes):
+    if any([process.wait() for process in processes]):
         raise SystemExit(f"{' '.join(map(str, command))} failed")
     lines = [line for turn in itertools.zip_longest(*lines) for line in turn if line]
     rows = []
@@ -161,6 +161,8 @@ def theirs(reference):
             entry["both_s"] = sum(entry[f"{model}_s"] for model in MODELS)
             entry |= {"points": len(rows), "error": max(errors(rows, reference))}
             yield entry
+            if IS_CHECK and entry["error"] > 0.1:
+                raise SystemExit("that is another trajectory")
             if IS_CHECK or entry["error"] <= min(ACCURACIES):
                 break
 
@@ -250,6 +252,11 @@ def main():
     for entry in itertools.chain(ours(reference), theirs(reference)):
         print(json.dumps(entry), file=sys.stderr)
         entries.append(entry)
+    write(entries, left, load)
+
+
+def write(entries, left, load):
+    """The page with its files, and the sentence of README."""
     OUT.mkdir(parents=True, exist_ok=True)
     (OUT / "peers.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in entries))
     diagram(entries, OUT / "peers.svg")
@@ -258,13 +265,14 @@ def main():
     text = [
         "# An ensemble by other programs' integrators",
         paragraphs(
-            f"{POINTS} points by both models: unbalance masses of 0.2 to 0.6 kg and dampings of 50 "
-            "to 200 N s/m by a Sobol sequence (`scripts/peers/ensemble.toml`), 0 to 350 rpm in "
-            f"50 s, on {len(CORES)} cores. `sweep run` computes all of it, start to end, checks and "
-            "recomputed points included. The others call its right-hand side by way of the C ABI "
-            "(`crates/washer-capi`), implicit ones with its exact Jacobian, a trajectory at a time "
-            f"on each core. They run the first {SAMPLE} points, or {FEW} where a trajectory takes "
-            f"more than {SLOW_S:.0f} s; their times are those of the trajectories, scaled up.",
+            f"{POINTS} points by both models on {len(CORES)} cores: unbalance masses of 0.2 to 0.6 "
+            "kg and dampings of 50 to 200 N s/m by a Sobol sequence "
+            "(`scripts/peers/ensemble.toml`), 0 to 350 rpm in 50 s. `sweep run` computes all of "
+            "it, start to end, checks and recomputed points included. The others call its "
+            "right-hand side by way of the C ABI (`crates/washer-capi`), implicit ones with its "
+            "exact Jacobian, a trajectory at a time on each core. They run the first "
+            f"{SAMPLE} points, or {FEW} where a trajectory takes more than {SLOW_S:.0f} s; their "
+            "times are those of the trajectories, scaled up.",
             "Error: relative, on the greatest yaw in 30 to 50 s, the worst of the points run by "
             f"either model (of `sweep run`: of the first {SAMPLE}) against RK4 at "
             f"{REFERENCE_STEP_S / 2} s, of which twice the step changes nothing by more than "
@@ -290,16 +298,15 @@ def main():
             ),
         ]
         sentence.append(
-            f"{best['both_s'] / own['both_s']:.0f} times as long at {accuracy:.0e} "
-            f"({best['program']}, {best['method']}; its error {best['error']:.0e}, this one's "
-            f"{own['error']:.0e})"
+            f"{best['both_s'] / own['both_s']:.0f} times as long within {accuracy:.0e} "
+            f"({best['program']}, {best['method']})"
         )
     (OUT / "peers.md").write_text("\n\n".join(text) + "\n")
     if not IS_CHECK:
         readme = ROOT / "README.md"
         line = paragraphs(
-            f"For {POINTS} points by both models, the quickest other integrator takes "
-            f"{', and '.join(sentence)}: [peers](results/benchmarks/peers.md)."
+            f"For {POINTS} points by both models the quickest [other "
+            f"integrator](results/benchmarks/peers.md) takes {', and '.join(sentence)}."
         )
         marked = re.compile(r"(?s)(<!-- peers: begin -->\n).*?(<!-- peers: end -->)")
         readme.write_text(marked.sub(lambda m: f"{m[1]}\n{line}\n\n{m[2]}", readme.read_text()))

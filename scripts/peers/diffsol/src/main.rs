@@ -79,7 +79,9 @@ fn main() -> Result<(), Box<dyn Error>> {
                     let (at, of, rows) = &mut *last.borrow_mut();
                     if *at != t || of != x {
                         (*at, *of) = (t, x.try_into().expect("a state"));
-                        unsafe { washer_jacobian(t, of.as_ptr(), rows.as_mut_ptr().cast(), machine) };
+                        unsafe {
+                            washer_jacobian(t, of.as_ptr(), rows.as_mut_ptr().cast(), machine)
+                        };
                     }
                     for (y, row) in y.iter_mut().zip(rows) {
                         *y = row.iter().zip(v).map(|(a, b)| a * b).sum();
