@@ -37,6 +37,15 @@ PLAN = (ROOT / "scripts/peers/ensemble.toml").read_text()
 CHANNELS = tomllib.loads(PLAN)["reliability"]["channels"]
 
 
+def power(number):
+    """A figure and its power of ten, as in 1e-3."""
+    return f"{number:.0e}".replace("e-0", "e-")
+
+
+def rounded(number):
+    return f"{number:.0f}" if number >= 100 else f"{number:.3g}"
+
+
 def sweep(integrator, points):
     """Seconds of `sweep run` from start to end, and its rows."""
     plan = re.sub(r'method = "rk4-mass-scaled"\n.*', integrator, PLAN)
@@ -90,7 +99,7 @@ def ours(reference):
         yield {
             "program": program,
             "method": "`sweep run`",
-            "settings": f"accuracy {accuracy:.0e}",
+            "settings": f"accuracy {power(accuracy)}",
             "points": POINTS,
             "error": max(errors(rows[:SAMPLE], reference)),
             "both_s": statistics.median(seconds),
@@ -189,19 +198,20 @@ def quickest(entries, accuracy):
 
 def table(entries, accuracy):
     """Our run of this accuracy, then the others' quickest ones within it."""
-    own = next(e for e in entries if e["settings"] == f"accuracy {accuracy:.0e}")
+    own = next(e for e in entries if e["settings"] == f"accuracy {power(accuracy)}")
     others = quickest([e for e in entries if e["program"] != own["program"]], accuracy)
     lines = [
-        f"| program and method | for {accuracy:.0e} | its error | points run | nonlinear, s | "
+        f"| program and method | for {power(accuracy)} | its error | points run | nonlinear, s | "
         "linear, s | both, s | times `sweep run` |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for entry in [own, *others]:
-        parts = [f"{entry[f'{model}_s']:.0f}" if entry is not own else "" for model in MODELS]
+        parts = ["" if entry is own else rounded(entry[f"{model}_s"]) for model in MODELS]
         lines.append(
-            f"| {entry['program']}, {entry['method']} | {entry['settings']} | {entry['error']:.0e} "
-            f"| {entry['points']} | {' | '.join(parts)} | {entry['both_s']:.3g} "
-            f"| {entry['both_s'] / own['both_s']:.3g} |"
+            f"| {entry['program']}, {entry['method']} "
+            f"| {entry['settings'].replace('e-0', 'e-')} "
+            f"| {power(entry['error'])} | {entry['points']} | {' | '.join(parts)} "
+            f"| {rounded(entry['both_s'])} | {rounded(entry['both_s'] / own['both_s'])} |"
         )
     return own, others[0], lines
 
@@ -275,8 +285,8 @@ def write(entries, left, load):
             "times are those of the trajectories, scaled up.",
             "Error: relative, on the greatest yaw in 30 to 50 s, the worst of the points run by "
             f"either model (of `sweep run`: of the first {SAMPLE}) against RK4 at "
-            f"{REFERENCE_STEP_S} s, of which twice the step changes nothing by more than "
-            f"{left:.0e}.",
+            f"{REFERENCE_STEP_S * 1e3} ms, of which twice the step changes nothing by more than "
+            f"{power(left)}.",
             "heyoka is left out: its steps need the equations as its own expressions.",
             f"Machine: {machine()}. {rust}; {compiler}, `-O3 -march=native`; Python "
             f"{platform.python_version()}. Load when it began: {load:.1f} on {os.cpu_count()} "
@@ -289,24 +299,25 @@ def write(entries, left, load):
     for accuracy in ACCURACIES:
         own, best, lines = table(entries, accuracy)
         text += [
-            f"## Within {accuracy:.0e}",
+            f"## Within {power(accuracy)}",
             "\n".join(lines),
             paragraphs(
                 f"Observed in all six channels of both models over the first {REFERENCE_POINTS} "
-                f"points of `sweep run`: 95 % within {own['observed_95_percent']:.0e}, the worst "
-                f"{own['observed_worst']:.0e}."
+                f"points of `sweep run`: 95 % within {power(own['observed_95_percent'])}, the "
+                f"worst {power(own['observed_worst'])}."
             ),
         ]
+        times = best["both_s"] / own["both_s"]
         sentence.append(
-            f"{best['both_s'] / own['both_s']:.0f} times as long within {accuracy:.0e} "
+            f"{times:.{0 if times >= 10 else 1}f} times as long within {power(accuracy)} "
             f"({best['program']}, {best['method']})"
         )
     (OUT / "peers.md").write_text("\n\n".join(text) + "\n")
     if not IS_CHECK:
         readme = ROOT / "README.md"
         line = paragraphs(
-            f"For {POINTS} points by both models the quickest [other "
-            f"integrator](results/benchmarks/peers.md) takes {', and '.join(sentence)}."
+            f"The quickest [other integrator](results/benchmarks/peers.md) for {POINTS} points by "
+            f"both models takes {', and '.join(sentence)}."
         )
         marked = re.compile(r"(?s)(<!-- peers: begin -->\n).*?(<!-- peers: end -->)")
         readme.write_text(marked.sub(lambda m: f"{m[1]}\n{line}\n\n{m[2]}", readme.read_text()))
