@@ -68,7 +68,7 @@ def traced(binary, simd, first, last):
                 "-D",
                 fifo,
             ]
-            + ["-dfilter", f"{BASE + first:#x}..{BASE + last:#x}", binary, simd, "rk4", "2.5e-4"],
+            + ["-dfilter", f"{BASE + first:#x}..{BASE + last:#x}", binary, simd],
             stdout=subprocess.DEVNULL,
         )
         with open(fifo) as trace:

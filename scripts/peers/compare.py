@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""Runs every program of the comparison in turns and writes the table and the work-precision
-diagram: called by run.sh, which says how."""
+"""Runs every program of the comparison and writes the page of it: called by run.sh, which says
+how."""
 
+import csv
+import itertools
 import json
 import os
 import pathlib
@@ -10,160 +12,175 @@ import re
 import statistics
 import subprocess
 import sys
+import textwrap
 import time
+import tomllib
 
 import matplotlib
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 WORK = ROOT / "target/peers"
-# A check runs everything once for a trajectory of a second, and keeps what it writes to itself.
+# A check runs everything once for trajectories of a second, and keeps what it writes to itself.
 IS_CHECK = "END_S" in os.environ
 OUT = WORK if IS_CHECK else ROOT / "results/benchmarks"
-SWEEP = ROOT / "target/release/examples/trajectory"
-PYTHON = [sys.executable, str(ROOT / "scripts/peers/python_peers.py")]
-SLOW_S = 10.0
-# Converged: half of its step changes the result by less than 1e-9 of it, which the table shows.
-REFERENCE = "step 2.5e-5 s"
+CORES = sorted(os.sched_getaffinity(0))
+POINTS = 20 if IS_CHECK else 1000
+# Where errors are measured: the ensemble's first points; and other programs run so many of these,
+# or fewer where a trajectory takes more than SLOW_S.
+REFERENCE_POINTS, SAMPLE, FEW = (2, 2, 2) if IS_CHECK else (40, 20, 5)
+SLOW_S = 2.0
+# Twice of it changes the results by what the page says.
+REFERENCE_STEP_S = 1.25e-5
+ACCURACIES = (1e-3, 1e-6)
+MODELS = ("nonlinear", "linear")
+PLAN = (ROOT / "scripts/peers/ensemble.toml").read_text()
+CHANNELS = tomllib.loads(PLAN)["reliability"]["channels"]
 
 
-def instruction_sets():
-    """The widest first, as this machine has them."""
-    listed = [name for name in ["avx512", "avx2", "neon", "scalar"] if has(name)]
-    return listed, listed[0]
+def power(number):
+    """A figure and its power of ten, as in 1e-3."""
+    return f"{number:.0e}".replace("e-0", "e-")
 
 
-def has(name):
-    return subprocess.run([SWEEP, name, "rk4", "0.01"], capture_output=True).returncode != 2
+def rounded(number):
+    return f"{number:.0f}" if number >= 100 else f"{number:.3g}"
 
 
-def commands():
-    sets, best = instruction_sets()
-    sweep = [[SWEEP, name, "rk4", "2.5e-4"] for name in sets]
-    sweep += [[SWEEP, best, "rk4", step] for step in ["1e-4", "5e-5", "2.5e-5"]]
-    adaptive = [
-        ("1e-3", "1e-6"),
-        ("1e-4", "1e-7"),
-        ("1e-5", "1e-8"),
-        ("1e-6", "1e-9"),
-        ("1e-7", "1e-10"),
-    ]
-    sweep += [
-        [SWEEP, name, "rk4-mass-scaled", accuracy]
-        for accuracy in ["1e-3", "1e-4", "1e-6"]
-        for name in sets
-    ]
-    sweep += [[SWEEP, best, "dopri5", *pair] for pair in adaptive[1:4:2]]
-    loose = [("3e-2", "3e-5"), ("1e-2", "1e-5"), ("3e-3", "3e-6")]
-    sweep += [[SWEEP, "scalar", "rodas5p", *pair] for pair in [*loose, *adaptive[:4]]]
-    cvode = [[WORK / "cvode", "bdf", "2", *pair] for pair in adaptive[:4]]
-    cvode += [[WORK / "cvode", "bdf", "5", *pair] for pair in adaptive[1:]]
-    cvode += [[WORK / "cvode", "adams", "12", *pair] for pair in adaptive[1:4:2]]
-    odeint = [[WORK / "odeint", *pair] for pair in adaptive[:4]]
-    lsoda = [[*PYTHON, "numbalsoda", *pair] for pair in adaptive[:4]]
-    scipy = [[*PYTHON, "radau", *pair] for pair in adaptive[:3]]
-    scipy += [[*PYTHON, "lsoda", *pair] for pair in adaptive[:4:3]]
-    scipy += [[*PYTHON, "rk45", *adaptive[0]]]
-    return sweep + cvode + odeint + lsoda + scipy
-
-
-def measure(repeats):
-    """Raw runs, and one entry by command with the median of its times."""
-    raw, entries = [], {}
-    for turn in range(repeats):
-        for command in map(tuple, commands()):
-            if turn and entries[command][0]["seconds"] > SLOW_S:
-                continue
-            done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
-            if done.returncode:
-                raise SystemExit(f"{' '.join(map(str, command))}: {done.stderr.strip()}")
-            found = json.loads(done.stdout)
-            entries.setdefault(command, []).append(found)
-            raw.append({"round": turn + 1, **found})
-            print(
-                f"round {turn + 1}: {found['program']}, {found['method']}, {found['settings']}: "
-                f"{found['seconds'] * 1e3:.1f} ms",
-                file=sys.stderr,
-            )
-    medians = {
-        command: {
-            **runs[0],
-            "seconds": statistics.median(run["seconds"] for run in runs),
-            "runs": len(runs),
-        }
-        for command, runs in entries.items()
-    }
-    return raw, medians
-
-
-def whole_map(medians, repeats):
-    """Fig. 12 by `sweep run`, checks and recomputed points included, beside CVODE's time for one
-    point as often as the map has points."""
-    grid = (ROOT / "sweeps/fig12.toml").read_text()
+def sweep(integrator, points):
+    """Seconds of `sweep run` from start to end, and its rows."""
+    plan = re.sub(r'method = "rk4-mass-scaled"\n.*', integrator, PLAN)
+    plan = re.sub(r"points = .*", f"points = {points}", plan)
     if IS_CHECK:
-        grid = subprocess.run(
-            ["scripts/tools/short_grid.sh", "fast"], cwd=ROOT, capture_output=True, text=True
-        ).stdout
-    lines = [
-        "| accuracy | `sweep run`, s | CVODE | its error | nonlinear, ms | linear, ms | "
-        "the map, s | times longer |",
-        "|---|---|---|---|---|---|---|---|",
+        end = float(os.environ["END_S"])
+        plan = re.sub(r"end_s = .*", f"end_s = {end}", plan)
+        plan = re.sub(r"window_s = .*", f"window_s = [{0.6 * end}, {end}]", plan)
+    path = WORK / "ensemble.toml"
+    path.write_text(plan)
+    program, result, rows = ROOT / "target/release/sweep", WORK / "ensemble.parquet", WORK / "e.csv"
+    begin = time.perf_counter()
+    run(program, "run", path, "--out", result, "--fresh", "--threads", len(CORES),
+        "--progress", "none")
+    seconds = time.perf_counter() - begin
+    run(program, "export", result, rows)
+    lines = [line for line in rows.read_text().splitlines() if not line.startswith("#")]
+    return seconds, list(csv.DictReader(lines))
+
+
+def run(*command):
+    """What it prints; its failure ends the comparison."""
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, cwd=ROOT)
+    if done.returncode:
+        raise SystemExit(f"{' '.join(map(str, command))}: {done.stderr.strip()}")
+    return done.stdout.strip()
+
+
+def amplitudes(row, channels):
+    return [float(row[f"{model}_{channel}"]) for model in MODELS for channel in channels]
+
+
+def errors(rows, reference, channels=("tub_yaw",)):
+    """Relative, of every amplitude."""
+    return [
+        abs(a / b - 1.0)
+        for row, true in zip(rows, reference)
+        for a, b in zip(amplitudes(row, channels), amplitudes(true, channels))
     ]
-    for accuracy in ["1e-3", "1e-6"]:
-        path, out = WORK / "fig12.toml", WORK / "fig12.parquet"
-        path.write_text(re.sub(r"(?m)^accuracy = \S+", f"accuracy = {accuracy}", grid))
+
+
+def ours(reference):
+    """`sweep run` by each accuracy: its checks and recomputed points are part of it."""
+    program = run(ROOT / "target/release/sweep", "--version")
+    for accuracy in (1e-2, 1e-3, 1e-4, 1e-6):
         seconds = []
-        for _ in range(repeats):
-            begin = time.perf_counter()
-            subprocess.run(
-                [
-                    ROOT / "target/release/sweep",
-                    "run",
-                    path,
-                    "--out",
-                    out,
-                    "--fresh",
-                    "--threads",
-                    "1",
-                    "--progress",
-                    "none",
-                ],
-                check=True,
-                capture_output=True,
-            )
-            seconds.append(time.perf_counter() - begin)
-        run = json.loads(out.with_suffix(".run.json").read_text())
-        ours = statistics.median(seconds)
-        peers = [
-            (entry["seconds"], command, entry)
-            for command, entry in medians.items()
-            if "CVODE" in entry["program"] and (IS_CHECK or entry["error"] <= float(accuracy))
-        ]
-        _, command, nonlinear = min(peers, key=lambda peer: peer[0])
-        done = subprocess.run(
-            list(map(str, command)),
-            capture_output=True,
-            text=True,
-            check=True,
-            env={**os.environ, "LINEAR": "1"},
-        )
-        linear = json.loads(done.stdout)["seconds"]
-        theirs = run["points"] * (nonlinear["seconds"] + linear)
-        lines.append(
-            f"| {accuracy} | {ours:.2f} | {nonlinear['method']}, "
-            f"{nonlinear['settings']} "
-            f"| {nonlinear['error']:.0e} | {nonlinear['seconds'] * 1e3:.1f} | {linear * 1e3:.1f} | "
-            f"{theirs:.0f} "
-            f"| {theirs / ours:.0f} |"
-        )
-    return lines
+        while len(seconds) < 3 and sum(seconds) < 30.0:
+            took, rows = sweep(f'method = "rk4-mass-scaled"\naccuracy = {accuracy}', POINTS)
+            seconds.append(took)
+        observed = sorted(errors(rows, reference, CHANNELS))
+        yield {
+            "program": program,
+            "method": "`sweep run`",
+            "settings": f"accuracy {power(accuracy)}",
+            "points": POINTS,
+            "error": max(errors(rows[:SAMPLE], reference)),
+            "both_s": statistics.median(seconds),
+            "observed_worst": observed[-1],
+            "observed_95_percent": observed[int(0.95 * (len(observed) - 1))],
+        }
 
 
-def version(command, line=0):
-    return (
-        subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
-        .stdout.splitlines()[line]
-        .strip()
-    )
+def peers():
+    """Commands without their tolerances, and the digits of these, looser ones first."""
+    cvode, odeint, diffsol = WORK / "cvode", WORK / "odeint", WORK / "diffsol/release/diffsol-peer"
+    python = [sys.executable, ROOT / "scripts/peers/python_peers.py"]
+    return [
+        ([cvode, "bdf", 2], range(3, 7)),
+        ([cvode, "bdf", 5], range(3, 8, 2)),
+        ([cvode, "adams", 12], range(4, 7)),
+        ([diffsol, "bdf"], range(3, 8, 2)),
+        ([diffsol, "tr_bdf2"], range(3, 9)),
+        ([diffsol, "esdirk34"], range(3, 10)),
+        ([odeint], range(3, 7)),
+        ([*python, "numbalsoda"], range(3, 7)),
+        ([*python, "radau"], range(3, 6)),
+        ([*python, "lsoda"], range(3, 7, 3)),
+    ]
+
+
+def trajectories(command, points):
+    """A row per point of both models; each core has a process, and they share the trajectories."""
+    tasks = [
+        f"{model} {row['unbalance_mass_kg']} {row['damping_n_s_per_m']}\n"
+        for model in MODELS
+        for row in points
+    ]
+    processes = []
+    for k, core in enumerate(CORES):
+        process = subprocess.Popen(
+            ["taskset", "-c", str(core), *map(str, command)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        )
+        process.stdin.write("".join(tasks[k :: len(CORES)]))
+        process.stdin.close()
+        processes.append(process)
+    lines = [[json.loads(line) for line in process.stdout] for process in processes]
+    for process in processes:
+        if process.wait():
+            raise subprocess.CalledProcessError(process.returncode, process.args)
+    lines = [line for turn in itertools.zip_longest(*lines) for line in turn if line]
+    rows = []
+    for pair in zip(lines[: len(points)], lines[len(points) :]):
+        row = {key: pair[0][key] for key in ("program", "method", "settings")}
+        for model, line in zip(MODELS, pair):
+            row |= {f"{model}_tub_yaw": line["tub_yaw"], f"{model}_s": line["seconds"]}
+        rows.append(row)
+    return rows
+
+
+def theirs(reference):
+    """Each program by finer and finer tolerances, until it is as accurate as asked."""
+    for command, digits in peers():
+        for digit in digits:
+            asked = [*command, f"1e-{digit}", f"1e-{digit + 3}"]
+            try:
+                rows = trajectories(asked, reference[:FEW])
+                if max(row["nonlinear_s"] for row in rows) < SLOW_S:
+                    rows += trajectories(asked, reference[FEW:SAMPLE])
+            except subprocess.CalledProcessError as failed:
+                if IS_CHECK:
+                    raise
+                print(failed, file=sys.stderr)
+                continue
+            entry = {key: rows[0][key] for key in ("program", "method", "settings")}
+            for model in MODELS:
+                mean = statistics.mean(row[f"{model}_s"] for row in rows)
+                entry[f"{model}_s"] = POINTS * mean / len(CORES)
+            entry["both_s"] = sum(entry[f"{model}_s"] for model in MODELS)
+            entry |= {"points": len(rows), "error": max(errors(rows, reference))}
+            yield entry
+            if IS_CHECK and entry["error"] > 0.1:
+                raise SystemExit("that is another trajectory")
+            if IS_CHECK or entry["error"] <= min(ACCURACIES):
+                break
 
 
 def machine():
@@ -172,122 +189,146 @@ def machine():
         for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines()
         if line.startswith("model name")
     ]
-    family = version(
-        ["sh", "-c", "lscpu | grep -E '^(CPU family|Model):' | tr -s ' ' | paste -sd, -"]
-    )
+    family = run("sh", "-c", "lscpu | grep -E '^(CPU family|Model):' | tr -s ' ' | paste -sd, -")
     model = models[0] if models else platform.machine()
     return f"{model} ({family}), {platform.system()} {platform.release()}"
 
 
-def quickest(medians, accuracy):
-    """The quickest setting of each method that is at least so accurate."""
+def quickest(entries, accuracy):
+    """Of each method the quickest setting that is at least so accurate; the quickest first."""
     chosen = {}
-    for entry in medians:
-        if entry["error"] <= accuracy and entry["settings"] != REFERENCE:
-            key = (entry["program"], entry["method"])
-            if key not in chosen or entry["seconds"] < chosen[key]["seconds"]:
-                chosen[key] = entry
-    return chosen
+    for entry in sorted(entries, key=lambda entry: entry["both_s"]):
+        if IS_CHECK or entry["error"] <= accuracy:
+            chosen.setdefault((entry["program"], entry["method"]), entry)
+    return list(chosen.values())
 
 
-def table(medians):
-    """Both bounds side by side, in the order of the looser one."""
-    loose, tight = (quickest(medians, accuracy) for accuracy in (1e-3, 1e-6))
-
-    def cells(entry):
-        return f"{entry['settings']} | {entry['error']:.0e} | {entry['seconds'] * 1e3:.1f}"
-
+def table(entries, accuracy):
+    """Our run of this accuracy, then the others' quickest ones within it."""
+    own = next(e for e in entries if e["settings"] == f"accuracy {power(accuracy)}")
+    others = quickest([e for e in entries if e["program"] != own["program"]], accuracy)
     lines = [
-        "| program and method | for 1e-3 | error | ms | for 1e-6 | error | ms |",
-        "|---|---|---|---|---|---|---|",
+        f"| program and method | for {power(accuracy)} | its error | points run | nonlinear, s | "
+        "linear, s | both, s | times `sweep run` |",
+        "|---|---|---|---|---|---|---|---|",
     ]
-    for key, entry in sorted(loose.items(), key=lambda item: item[1]["seconds"]):
-        other = tight.get(key)
-        right = "the same | | " if other is entry else cells(other) if other else "none | | "
-        lines.append(f"| {', '.join(key)} | {cells(entry)} | {right} |")
-    return lines
+    for entry in [own, *others]:
+        parts = ["" if entry is own else rounded(entry[f"{model}_s"]) for model in MODELS]
+        lines.append(
+            f"| {entry['program']}, {entry['method']} "
+            f"| {entry['settings'].replace('e-0', 'e-')} "
+            f"| {power(entry['error'])} | {entry['points']} | {' | '.join(parts)} "
+            f"| {rounded(entry['both_s'])} | {rounded(entry['both_s'] / own['both_s'])} |"
+        )
+    return own, others[0], lines
 
 
-def diagram(medians, path):
+def diagram(entries, path):
     matplotlib.use("svg")
     matplotlib.rcParams["svg.hashsalt"] = "peers"
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(figsize=(9, 6), layout="constrained")
     curves = {}
-    for entry in medians:
-        if entry["settings"] != REFERENCE and entry["error"] > 0:
+    for entry in entries:
+        if entry["error"] > 0:
             curves.setdefault((entry["program"], entry["method"]), []).append(
-                (entry["error"], entry["seconds"] * 1e3)
+                (entry["error"], entry["both_s"])
             )
     for k, ((program, method), points) in enumerate(curves.items()):
         points.sort()
-        ours = program.startswith("sweep")
+        own = program.startswith("sweep")
         axes.loglog(
             *zip(*points),
             marker="osD^v<>PX"[k % 9],
-            linewidth=2.2 if ours else 1.2,
-            linestyle="-" if ours else "--",
+            linewidth=2.2 if own else 1.2,
+            linestyle="-" if own else "--",
             color=matplotlib.colormaps["tab20"](k % 20),
             label=f"{program}, {method}",
         )
     axes.invert_xaxis()
-    axes.set_xlabel("relative error of the greatest yaw in 30 to 50 s")
-    axes.set_ylabel("ms a trajectory, one core")
+    axes.set_xlabel("relative error of the greatest yaw, worst of the points run, both models")
+    axes.set_ylabel(f"seconds for {POINTS} points by both models")
     axes.grid(True, which="major", alpha=0.4)
     axes.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.savefig(path, metadata={"Date": None})
 
 
+def paragraphs(*texts):
+    return "\n\n".join(textwrap.fill(text, 100, break_on_hyphens=False) for text in texts)
+
+
 def main():
-    repeats = int(sys.argv[1])
     load = os.getloadavg()[0]
-    raw, by_command = measure(repeats)
-    medians = list(by_command.values())
-    reference = next(entry for entry in medians if entry["settings"] == REFERENCE)["yaw_rad"]
-    for entry in medians:
-        entry["error"] = abs(entry["yaw_rad"] / reference - 1.0)
+    reference, coarser = (
+        sweep(f'method = "rk4"\nstep_s = {step}', REFERENCE_POINTS)[1]
+        for step in (REFERENCE_STEP_S, 2.0 * REFERENCE_STEP_S)
+    )
+    left = max(errors(coarser, reference, CHANNELS))
+    entries = []
+    for entry in itertools.chain(ours(reference), theirs(reference)):
+        print(json.dumps(entry), file=sys.stderr)
+        entries.append(entry)
+    write(entries, left, load)
+
+
+def write(entries, left, load):
+    """The page with its files, and the sentence of README."""
     OUT.mkdir(parents=True, exist_ok=True)
-    (OUT / "peers.jsonl").write_text("".join(json.dumps(run) + "\n" for run in raw))
-    diagram(medians, OUT / "peers.svg")
+    (OUT / "peers.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in entries))
+    diagram(entries, OUT / "peers.svg")
+
+    compiler, rust = run("c++", "--version").splitlines()[0], run("rustc", "--version")
     text = [
-        "# One trajectory by other programs' integrators",
-        "",
-        "One nonlinear trajectory of the paper's machine: 0.4 kg, 140 N s/m, 0 to 350 rpm in 50 s. "
-        "Every program calls this project's right-hand",
-        "side, the others by way of the C ABI (`crates/washer-capi`), implicit ones with its exact "
-        "Jacobian. Error: relative, on the greatest yaw in",
-        f"30 to 50 s, against converged RK4 ({REFERENCE}).",
-        "",
-        f"Machine: {machine()}; one core (`taskset`). {version(['rustc', '--version'])}; "
-        f"{version(['c++', '--version'])}, `-O3 -march=native`; "
-        f"Python {platform.python_version()}. Load when it began: {load:.1f} on {os.cpu_count()} "
-        f"cores. Commit {version(['git', 'describe', '--always', '--dirty'])}.",
-        f"Command: `scripts/peers/run.sh {repeats}`; medians of {repeats} round(s) in which all "
-        f"take turns, of one where a run takes more than "
-        f"{SLOW_S:.0f} s. Raw runs: `peers.jsonl`.",
-        "Times in lanes are a trajectory's share of a full lane group.",
-        "",
+        "# An ensemble by other programs' integrators",
+        paragraphs(
+            f"{POINTS} points by both models on {len(CORES)} cores: unbalance masses of 0.2 to 0.6 "
+            "kg and dampings of 50 to 200 N s/m by a Sobol sequence "
+            "(`scripts/peers/ensemble.toml`), 0 to 350 rpm in 50 s. `sweep run` computes all of "
+            "it, start to end, checks and recomputed points included. The others call its "
+            "right-hand side by way of the C ABI (`crates/washer-capi`), implicit ones but "
+            "numbalsoda with its exact Jacobian, a trajectory at a time on each core. They run the "
+            f"first {SAMPLE} points, or {FEW} where a trajectory takes more than {SLOW_S:.0f} s; "
+            "their times are those of the trajectories, without the program's start, scaled up. A "
+            "setting with which a program fails on a point is left out.",
+            "Error: relative, on the greatest yaw in 30 to 50 s, the worst of the points run by "
+            f"either model (of `sweep run`: of the first {SAMPLE}) against RK4 at "
+            f"{REFERENCE_STEP_S * 1e3} ms, of which twice the step changes nothing by more than "
+            f"{power(left)}.",
+            "heyoka is left out: its steps need the equations as its own expressions.",
+            f"Machine: {machine()}. {rust}; {compiler}, `-O3 -march=native`; Python "
+            f"{platform.python_version()}. Load when it began: {load:.1f} on {os.cpu_count()} "
+            f"cores. Commit {run('git', 'describe', '--always', '--dirty')}. Command: "
+            "`scripts/peers/run.sh`. Every setting: `peers.jsonl`.",
+        ),
         "![work-precision diagram](peers.svg)",
     ]
-    text += [
-        "",
-        "## The quickest setting of each within either error, ms a trajectory",
-        "",
-        *table(medians),
-    ]
-    text += [
-        "",
-        "## A whole map",
-        "",
-        "Fig. 12, 1287 points by both models, on the same core: `sweep run sweeps/fig12.toml`, "
-        "checks and recomputed points included, start to end;",
-        "and CVODE's quickest setting that is so accurate, as if all points cost what the one "
-        "above does (the chaotic ones cost more).",
-        "",
-        *whole_map(by_command, repeats),
-    ]
-    (OUT / "peers.md").write_text("\n".join(text) + "\n")
+    sentence = []
+    for accuracy in ACCURACIES:
+        own, best, lines = table(entries, accuracy)
+        text += [
+            f"## Within {power(accuracy)}",
+            "\n".join(lines),
+            paragraphs(
+                f"Observed in all six channels of both models over the first {REFERENCE_POINTS} "
+                f"points of `sweep run`: 95 % within {power(own['observed_95_percent'])}, the "
+                f"worst {power(own['observed_worst'])}."
+            ),
+        ]
+        times = best["both_s"] / own["both_s"]
+        sentence.append(
+            f"{times:.{0 if times >= 10 else 1}f} times as long within {power(accuracy)} "
+            f"({best['program']}, {best['method']})"
+        )
+    (OUT / "peers.md").write_text("\n\n".join(text) + "\n")
+    if not IS_CHECK:
+        readme = ROOT / "README.md"
+        line = paragraphs(
+            f"The quickest [other integrator](results/benchmarks/peers.md) for {POINTS} points by "
+            f"both models takes {', and '.join(sentence)}."
+        )
+        marked = re.compile(r"(?s)(<!-- peers: begin -->\n).*?(<!-- peers: end -->)")
+        readme.write_text(marked.sub(lambda m: f"{m[1]}\n{line}\n\n{m[2]}", readme.read_text()))
 
 
 if __name__ == "__main__":

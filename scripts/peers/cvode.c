@@ -1,4 +1,7 @@
-/* SUNDIALS CVODE on the trajectory: cvode bdf|adams MAX_ORDER RTOL ATOL */
+/* SUNDIALS CVODE: cvode bdf|adams MAX_ORDER RTOL ATOL */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cvode/cvode.h>
@@ -41,49 +44,35 @@ int main(int argc, char **argv) {
     const int lmm = strcmp(argv[1], "bdf") == 0 ? CV_BDF : CV_ADAMS;
     const int order = atoi(argv[2]);
     const double rtol = atof(argv[3]), atol = atof(argv[4]);
-
-    washer *machine = paper_trajectory();
-    SUNContext context;
-    check(SUNContext_Create(NULL, &context), "SUNContext_Create");
-    N_Vector x = N_VNew_Serial(DIMENSION, context);
-    washer_initial_state(machine, N_VGetArrayPointer(x));
-    const double rest = N_VGetArrayPointer(x)[YAW];
-    SUNMatrix matrix = SUNDenseMatrix(DIMENSION, DIMENSION, context);
-    SUNLinearSolver solver = SUNLinSol_Dense(x, matrix, context);
-    static double yaw[SAMPLES + 1], rate[SAMPLES + 1];
-
-    const double begin = seconds_now();
-    void *cvode = CVodeCreate(lmm, context);
-    check(CVodeInit(cvode, right_hand_side, 0.0, x), "CVodeInit");
-    check(CVodeSStolerances(cvode, rtol, atol), "CVodeSStolerances");
-    check(CVodeSetUserData(cvode, machine), "CVodeSetUserData");
-    check(CVodeSetMaxOrd(cvode, order), "CVodeSetMaxOrd");
-    check(CVodeSetMaxNumSteps(cvode, 1000000000L), "CVodeSetMaxNumSteps");
-    check(CVodeSetLinearSolver(cvode, solver, matrix), "CVodeSetLinearSolver");
-    check(CVodeSetJacFn(cvode, jacobian), "CVodeSetJacFn");
-    check(CVodeSetStopTime(cvode, END_S), "CVodeSetStopTime");
-    for (int i = 0; i <= SAMPLES; ++i) {
-        realtype reached;
-        check(CVode(cvode, sample_time(i), x, &reached, CV_NORMAL), "CVode");
-        yaw[i] = N_VGetArrayPointer(x)[YAW];
-        rate[i] = N_VGetArrayPointer(x)[YAW_RATE];
-    }
-    const double most = greatest(yaw, rate, rest);
-    const double seconds = seconds_now() - begin;
-
-    long evaluations, steps;
-    check(CVodeGetNumRhsEvals(cvode, &evaluations), "CVodeGetNumRhsEvals");
-    check(CVodeGetNumSteps(cvode, &steps), "CVodeGetNumSteps");
     char program[64], method[64];
     snprintf(program, sizeof program, "SUNDIALS CVODE %s", SUNDIALS_VERSION);
     snprintf(method, sizeof method, "%s, order to %d", lmm == CV_BDF ? "BDF" : "Adams", order);
-    report(program, method, rtol, atol, most, seconds, evaluations, steps);
 
-    CVodeFree(&cvode);
+    SUNContext context;
+    check(SUNContext_Create(NULL, &context), "SUNContext_Create");
+    N_Vector x = N_VNew_Serial(DIMENSION, context);
+    SUNMatrix matrix = SUNDenseMatrix(DIMENSION, DIMENSION, context);
+    SUNLinearSolver solver = SUNLinSol_Dense(x, matrix, context);
+    for (washer *machine; (machine = next_machine(N_VGetArrayPointer(x)));) {
+        void *cvode = CVodeCreate(lmm, context);
+        check(CVodeInit(cvode, right_hand_side, 0.0, x), "CVodeInit");
+        check(CVodeSStolerances(cvode, rtol, atol), "CVodeSStolerances");
+        check(CVodeSetUserData(cvode, machine), "CVodeSetUserData");
+        check(CVodeSetMaxOrd(cvode, order), "CVodeSetMaxOrd");
+        check(CVodeSetMaxNumSteps(cvode, 1000000000L), "CVodeSetMaxNumSteps");
+        check(CVodeSetLinearSolver(cvode, solver, matrix), "CVodeSetLinearSolver");
+        check(CVodeSetJacFn(cvode, jacobian), "CVodeSetJacFn");
+        for (int i = 0; isfinite(sample_time(i)); ++i) {
+            realtype reached;
+            check(CVode(cvode, sample_time(i), x, &reached, CV_NORMAL), "CVode");
+            sample(i, N_VGetArrayPointer(x));
+        }
+        report(machine, program, method, rtol, atol);
+        CVodeFree(&cvode);
+    }
     SUNLinSolFree(solver);
     SUNMatDestroy(matrix);
     N_VDestroy(x);
     SUNContext_Free(&context);
-    washer_free(machine);
     return 0;
 }

@@ -31,5 +31,7 @@ needs valgrind valgrind
 # scripts/checks/check_arm.sh
 needs aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu libc6-dev-arm64-cross
 needs qemu-aarch64 qemu-user
+# scripts/peers/run.sh; libraries, of which no program tells.
+packages="$packages libsundials-dev libboost-dev"
 # shellcheck disable=SC2086 # A list of words.
 "$(dirname "$0")/packages.sh" $packages

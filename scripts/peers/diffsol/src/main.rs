@@ -1,0 +1,108 @@
+//! diffsol on the trajectories of `trajectory.h`: `diffsol-peer bdf|tr_bdf2|esdirk34 RTOL ATOL`
+use std::cell::RefCell;
+use std::env;
+use std::error::Error;
+use std::ffi::{CString, c_char, c_int};
+
+use diffsol::{NalgebraLU, NalgebraMat, NalgebraVec, OdeBuilder, OdeEquations, OdeSolverMethod};
+
+const DIMENSION: usize = 20;
+type Lu = NalgebraLU<f64>;
+
+#[repr(C)]
+struct Washer([u8; 0]);
+
+#[link(name = "washer_capi")]
+unsafe extern "C" {
+    fn washer_rhs(t_s: f64, x: *const f64, dx: *mut f64, machine: *mut Washer);
+    fn washer_jacobian(t_s: f64, x: *const f64, rows: *mut f64, machine: *mut Washer);
+}
+
+#[link(name = "trajectory")]
+unsafe extern "C" {
+    fn next_machine(x: *mut f64) -> *mut Washer;
+    safe fn sample_time(i: c_int) -> f64;
+    fn sample(i: c_int, x: *const f64);
+    fn report(
+        machine: *mut Washer,
+        program: *const c_char,
+        method: *const c_char,
+        rtol: f64,
+        atol: f64,
+    );
+}
+
+/// Steps over all sampled times.
+fn run<'a, Eqn>(mut solver: impl OdeSolverMethod<'a, Eqn>) -> Result<(), Box<dyn Error>>
+where
+    Eqn: OdeEquations<T = f64, V = NalgebraVec<f64>> + 'a,
+{
+    let mut x = solver.state().y.clone();
+    let mut next = 0;
+    while sample_time(next).is_finite() {
+        solver.step()?;
+        while sample_time(next) <= solver.state().t {
+            solver.interpolate_inplace(sample_time(next), &mut x)?;
+            // SAFETY: a state.
+            unsafe { sample(next, x.batch_as_slice(0).as_ptr()) };
+            next += 1;
+        }
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let words: Vec<String> = env::args().skip(1).collect();
+    let [method, rtol, atol] = &words[..] else {
+        return Err("usage: diffsol-peer bdf|tr_bdf2|esdirk34 RTOL ATOL".into());
+    };
+    let (rtol, atol) = (rtol.parse::<f64>()?, atol.parse::<f64>()?);
+    // Of the manifest's only `version = "=..."`.
+    let version = include_str!("../Cargo.toml").split("\"=").nth(1).expect("a version");
+    let version = version.split('"').next().expect("its end");
+    let mut rest = [0.0; DIMENSION];
+    loop {
+        // SAFETY: there is room for a state.
+        let machine = unsafe { next_machine(rest.as_mut_ptr()) };
+        if machine.is_null() {
+            return Ok(());
+        }
+        // It asks for the Jacobian column by column, of one state after the other.
+        let last = RefCell::new((f64::NAN, [0.0; DIMENSION], [[0.0; DIMENSION]; DIMENSION]));
+        let mut problem = OdeBuilder::<NalgebraMat<f64>>::new()
+            .rhs_implicit(
+                // SAFETY (of both): states, and room for what is asked.
+                |x: &[f64], _: &[f64], t, dx: &mut [f64]| unsafe {
+                    washer_rhs(t, x.as_ptr(), dx.as_mut_ptr(), machine);
+                },
+                |x: &[f64], _: &[f64], t, v: &[f64], y: &mut [f64]| {
+                    let (at, of, rows) = &mut *last.borrow_mut();
+                    if *at != t || of != x {
+                        (*at, *of) = (t, x.try_into().expect("a state"));
+                        unsafe {
+                            washer_jacobian(t, of.as_ptr(), rows.as_mut_ptr().cast(), machine)
+                        };
+                    }
+                    for (y, row) in y.iter_mut().zip(rows) {
+                        *y = row.iter().zip(v).map(|(a, b)| a * b).sum();
+                    }
+                },
+            )
+            .init(|_: &[f64], _, x: &mut [f64]| x.copy_from_slice(&rest), DIMENSION)
+            .rtol(rtol)
+            .atol([atol])
+            .h0(1e-5)
+            .build()?;
+        // Of a whole trajectory, not of a step.
+        problem.ode_options.max_nonlinear_solver_failures = usize::MAX;
+        let name = match method.as_str() {
+            "bdf" => run(problem.bdf::<Lu>()?).map(|()| "BDF, order to 5")?,
+            "tr_bdf2" => run(problem.tr_bdf2::<Lu>()?).map(|()| "TR-BDF2")?,
+            "esdirk34" => run(problem.esdirk34::<Lu>()?).map(|()| "ESDIRK34")?,
+            _ => return Err(format!("no method {method}").into()),
+        };
+        let program = CString::new(format!("diffsol {version}"))?;
+        // SAFETY: texts, and the machine is not used again.
+        unsafe { report(machine, program.as_ptr(), CString::new(name)?.as_ptr(), rtol, atol) };
+    }
+}
