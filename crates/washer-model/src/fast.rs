@@ -36,6 +36,7 @@
 //! at any.
 
 pub(crate) mod geared;
+pub(crate) mod ringing;
 
 use crate::coordinates::COORDINATES;
 use core::iter;

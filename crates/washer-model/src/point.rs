@@ -11,12 +11,11 @@ use crate::linear::{LinearPoint, Matrices, linearise, tub_tangents};
 use crate::machine::Machine;
 use crate::machine::feet::Feet;
 use crate::machine::spin::{Spin, SpinState, SpinStretch, stretch_at};
-use crate::modes::NoModes;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, Motion};
 use crate::point::friction::FrictionSpeed;
-use crate::point::ringing::{Decaying, Jump, Ringing, jumps};
+use crate::point::ringing::{Decaying, Jump, Ringing, Swing, jumps};
 use lane_ode::{Kernel, Lane, N, Simd};
 use std::sync::{Arc, OnceLock};
 
@@ -58,7 +57,7 @@ pub struct Point {
     pub(crate) legs: Arc<[PlannedLeg]>,
     pub(crate) ringing: Ringing,
     /// The same by modes, of hinge and bearings, once it was asked for.
-    pub(crate) ringing_by_modes: OnceLock<Result<[Decaying; 2], NoModes>>,
+    pub(crate) ringing_by_modes: OnceLock<Option<[Decaying; 2]>>,
     /// Of the drum's acceleration, until the run ends.
     pub(crate) jumps: Arc<[Jump]>,
     /// By how much the nonlinear model starts beside its equilibrium, in every coordinate (m, rad).
@@ -97,6 +96,15 @@ impl Point {
     pub fn static_sag_m(&self) -> f64 {
         let (sin_pitch, _) = N(self.equilibrium[TUB_PITCH]).sin_cos();
         -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[TUB_Y])).0
+    }
+
+    /// A bound on the swing of hinge and bearings after all jumps of the drum's acceleration. Steps
+    /// longer than their periods leave it out; steps that follow the hinge leave out what the
+    /// bearings swing.
+    #[must_use]
+    pub fn ringing(&self, follows_hinge: bool) -> Swing {
+        let ringing = if follows_hinge { self.ringing.of_bearings() } else { self.ringing };
+        Swing { channels: ringing.channels(), gap_m: ringing.gap_m() }
     }
 
     /// How far each channel (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) is
