@@ -49,9 +49,6 @@ const SAGS: f64 = 32.0;
 /// eigenvalues.
 const FREE_OF_MODES: f64 = 0.1;
 
-/// An error that a further halving of RK4's step brings within the accuracy, as a multiple of that.
-const NEAR: f64 = 16.0;
-
 /// Differences of a turn's peak count so many times. Where it lies beside the turn's cut, it errs
 /// with the phase of the motion, and shrinks less from rung to rung than the motion's error does.
 const TURN_WEIGHT: f64 = 3.0;
@@ -193,10 +190,8 @@ impl Climb {
             if may_be_chaos && self.twin.is_none() && Some(self.rung) == ladder.judge() {
                 return Some(ladder.twin());
             }
-            // The last step is for bearings that ring, and for what is nearly there.
-            let is_near =
-                self.error_with(ladder, 0.0).is_some_and(|error| error <= NEAR * tolerance);
-            if self.unseen.max(self.besides) <= tolerance && !(is_in_doubt && is_near) {
+            // The last step is for bearings that ring.
+            if self.unseen.max(self.besides) <= tolerance {
                 return None;
             }
         }

@@ -56,19 +56,12 @@ fn hold_against_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> 
     let fast = Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
     let at = |step_s: f64| rows(&Plan { integrator: Integrator::Rk4 { step_s }, ..plan.clone() });
     let (rows, expected) = (rows(&fast), at(step_s));
-    for (point, (row, expected)) in rows.iter().zip(&expected).enumerate() {
+    for (row, expected) in rows.iter().zip(&expected) {
         assert_eq!(row.nonlinear.status, expected.nonlinear.status, "{row:?}");
         if row.converged == Some(false) {
             continue;
         }
         assert_eq!(reliable(plan, row), reliable(plan, expected), "{}: {row:?}", plan.name);
-        if error(row, expected) <= accuracy {
-            continue;
-        }
-        // It may be the judge that is off: rows climb to shorter steps.
-        let finer = Plan { integrator: Integrator::Rk4 { step_s: step_s / 4.0 }, ..plan.clone() };
-        let at = [plan.axis_values(point as u64)];
-        let expected = &ModelEngine::new(&finer).unwrap().evaluate_at(&at)[0];
         let error = error(row, expected);
         assert!(
             error <= accuracy,
