@@ -207,15 +207,15 @@ def table(entries, accuracy):
     """Our run of this accuracy, our quickest one that is as good, and the others' quickest ones."""
     own = next(e for e in entries if e["settings"] == f"accuracy {power(accuracy)}")
     others = quickest([e for e in entries if e["program"] != own["program"]], accuracy)
-    ours = quickest([e for e in entries if e["program"] == own["program"]], accuracy)
-    ours = [own, *(entry for entry in ours if entry is not own)]
+    quick = quickest([e for e in entries if e["program"] == own["program"]], accuracy)
+    runs = [own, *(entry for entry in quick if entry is not own)]
     lines = [
         f"| program and method | for {power(accuracy)} | its error | points run | nonlinear, s | "
         "linear, s | both, s | times `sweep run` |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for entry in [*ours, *others]:
-        parts = ["" if entry in ours else rounded(entry[f"{model}_s"]) for model in MODELS]
+    for entry in [*runs, *others]:
+        parts = ["" if entry in runs else rounded(entry[f"{model}_s"]) for model in MODELS]
         lines.append(
             f"| {entry['program']}, {entry['method']} "
             f"| {entry['settings'].replace('e-0', 'e-')} "

@@ -7,8 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::ThreadPool;
 
 use crate::store::{Done, Key, Trials};
-use crate::threads::{self};
-use crate::{Engine, Interrupt, StoreError, ThreadsError, Watch};
+use crate::{Engine, Interrupt, StoreError, ThreadsError, Watch, threads};
 use sweep_files::panics::{lock, unlocked};
 
 /// Why a search stopped. The answers that it was given are kept.

@@ -436,13 +436,13 @@ fn attack(seed: u64, kind: Kind, folder: &std::path::Path) -> Found {
             found.needlessly += u64::from(agrees);
             continue;
         }
-        let mut halved = halved.clone();
-        if difference(&plan, row, &halved) > accuracy {
+        let mut judge = halved;
+        if difference(&plan, row, judge) > accuracy {
             // It may be the judge that is off: rows climb to shorter steps.
             let finer = Integrator::Rk4 { step_s: step_s / 4.0 };
-            halved = quarter.get_or_insert_with(|| evaluate(finer))[i].clone();
+            judge = &quarter.get_or_insert_with(|| evaluate(finer))[i];
         }
-        let (halved, error) = (&halved, difference(&plan, row, &halved));
+        let (halved, error) = (judge, difference(&plan, row, judge));
         if row.converged == Some(false) {
             found.unconverged += 1;
             let is_right = statuses(row) == statuses(halved) && error <= accuracy;

@@ -315,8 +315,8 @@ impl Climbs {
     }
 }
 
-/// The rung to begin with: plain RK4 where the gap still rings at the end of the run by more than
-/// capped rungs may err.
+/// The rung to begin with: the reference's longer step where the first rung leaves out more of what
+/// the gap rings than it may err, even at the end of the run.
 fn first(ladder: &Ladder, point: &Point, rule: &Rule) -> usize {
     let share = |swing: &Swing| swing.gap_m / point.clearance_m();
     let of_gap = |rung| of_ringing(rung, point, rule, |_| [rule.end_s; 2], share);
@@ -372,9 +372,6 @@ fn difference(
 /// The error that this rung has in common with others, so that no comparison shows it: what
 /// bearings and hinge swing after jumps.
 fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
-    if rung.follows_bearings {
-        return 0.0;
-    }
     let share = |swing: &Swing| of_motion(&swing.channels, &run.trajectory, rule);
     let of_swings = of_ringing(rung, point, rule, |_| point.window_s(), share);
     let metrics = rule.measures.of_model().zip(&run.trajectory.metrics);
