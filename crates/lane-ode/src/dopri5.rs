@@ -4,10 +4,11 @@
 //! output and step control: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I,
 //! sections II.4 to II.6.
 
-use crate::control::{StepControl, Tolerance, Verdict};
-use crate::lane::{Lane, MAX_LANES};
+use crate::adaptive::Lanes;
+use crate::control::Tolerance;
+use crate::lane::Lane;
 use crate::num::N;
-use crate::system::{Count, Ended, Failure, Step, System as _, Task};
+use crate::system::{Step, System as _, Task};
 
 const STAGES: usize = 7;
 
@@ -64,14 +65,6 @@ fn combined<T: Lane, const D: usize>(
     sums
 }
 
-/// The state of one lane.
-#[derive(Clone, Copy, Default)]
-struct Progress {
-    is_active: bool,
-    end_s: f64,
-    count: Count,
-}
-
 /// Runs every trajectory that the task has; no lane waits for another's error.
 #[inline(always)]
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
@@ -81,44 +74,21 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
 ) {
     let zero = N(zero);
     let mut x = [zero; D];
-    let mut t = zero;
-    let mut control = StepControl::new(zero);
+    let mut lanes = Lanes::new(zero);
     let mut k = [[zero; D]; STAGES];
-    let mut lanes = [Progress::default(); MAX_LANES];
-    let mut ended = [Some(Ended::Idle); MAX_LANES];
     let mut is_fresh = true;
 
     loop {
-        for lane in 0..T::LANES {
-            let Some(how) = ended[lane].take() else { continue };
-            is_fresh = true;
-            let leg = task.next_leg(lane, how, &mut x);
-            lanes[lane] = Progress {
-                is_active: leg.is_some(),
-                end_s: leg.map_or(0.0, |l| l.end_s),
-                ..Progress::default()
-            };
-            t.0.set(lane, leg.map_or(0.0, |l| l.start_s));
-            control.start(lane, leg.map_or(0.0, |l| l.step_s));
-        }
-        if task.is_stopped() || !lanes[..T::LANES].iter().any(|lane| lane.is_active) {
+        is_fresh |= lanes.take_up(task, &mut x);
+        if task.is_stopped() || !lanes.are_active() {
             return;
         }
-        // Never past the end of a leg, nor a sliver short of it.
-        let mut h = control.step;
-        for (lane, progress) in lanes[..T::LANES].iter().enumerate() {
-            let left = progress.end_s - t.0.get(lane);
-            if progress.is_active && h.0.get(lane) * 1.01 >= left {
-                h.0.set(lane, left);
-            } else if !progress.is_active {
-                h.0.set(lane, 0.0);
-            }
-        }
+        let h = lanes.steps();
 
         // The last stage of a step is the first of the next, unless something new has begun.
         let mut y = x;
         for stage in usize::from(!is_fresh)..STAGES {
-            let forcing = task.system().forcing(h * NODE[stage] + t);
+            let forcing = task.system().forcing(h * NODE[stage] + lanes.time);
             for i in 0..D {
                 let mut sum = zero;
                 for j in 0..stage {
@@ -133,68 +103,27 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         }
         is_fresh = false;
 
-        let error = tolerance.norm(&x, &y, &combined(h, &k, &ERROR));
-        let accepted = T::bits(error.0.less(zero.lit(1.0).0));
         let in_range = T::bits(task.system().in_range(&y));
-
-        // Lane by lane: bookkeeping in scalars is small beside seven evaluations.
-        let mut length = zero;
+        let error = tolerance.norm(&x, &y, &combined(h, &k, &ERROR));
+        let accepted = error.0.less(zero.lit(1.0).0);
         let before = x;
         let slope_before = k[0];
-        let mut slope_after = k[0];
         let dense = combined(h, &k, &DENSE);
-        let next = control.proposals(error, h);
-        for (lane, progress) in
-            lanes[..T::LANES].iter_mut().enumerate().filter(|(_, lane)| lane.is_active)
-        {
-            let step = h.0.get(lane);
-            let time = t.0.get(lane);
-            let is_last = time + step >= progress.end_s || step == progress.end_s - time;
-            let fail = |reason, time_s, count| Some(Ended::Failed { reason, time_s, count });
-            if accepted >> lane & 1 == 1 {
-                let reached = if is_last { progress.end_s } else { time + step };
-                length.0.set(lane, step);
-                t.0.set(lane, reached);
-                for i in 0..D {
-                    x[i].0.set(lane, y[i].0.get(lane));
-                    slope_after[i].0.set(lane, k[STAGES - 1][i].0.get(lane));
-                }
-                progress.count.accepted += 1;
-                if in_range >> lane & 1 == 0 {
-                    ended[lane] = fail(Failure::Diverged, reached, progress.count);
-                } else if is_last {
-                    ended[lane] = Some(Ended::Arrived(progress.count));
-                }
-                control.settle(lane, Verdict::Accepted, &next);
-            } else {
-                progress.count.rejected += 1;
-                control.settle(lane, Verdict::Rejected, &next);
-                if control.step.0.get(lane) <= 16.0 * f64::EPSILON * time.abs().max(progress.end_s)
-                {
-                    let reason = if in_range >> lane & 1 == 0 {
-                        Failure::Diverged
-                    } else {
-                        Failure::StepTooSmall
-                    };
-                    ended[lane] = fail(reason, time, progress.count);
-                }
-            }
-            let made = progress.count.accepted + progress.count.rejected;
-            if made >= tolerance.max_steps && ended[lane].is_none() {
-                ended[lane] = fail(Failure::StepLimit, time, progress.count);
-            }
+        for i in 0..D {
+            x[i] = N(T::select(accepted, y[i].0, x[i].0));
+            k[0][i] = N(T::select(accepted, k[STAGES - 1][i].0, k[0][i].0));
         }
-        k[0] = slope_after;
-        let forcing = task.system().forcing(t);
+        let length = lanes.settle(h, error, in_range, tolerance);
+        let forcing = task.system().forcing(lanes.time);
         task.observe(
             &forcing,
             &Step {
-                end_s: t,
+                end_s: lanes.time,
                 length_s: length,
                 before: &before,
                 slope_before: &slope_before,
                 after: &x,
-                slope_after: &slope_after,
+                slope_after: &k[0],
                 dense: Some(&dense),
             },
         );

@@ -18,8 +18,9 @@
 //!    runs it on one.
 //!
 //! The methods are [`rk4`] (classical, fixed step), [`dop853`] (order 8, fixed step), [`dopri5`]
-//! (Dormand-Prince 5(4), adaptive, with dense output) and [`rodas`] (Rodas5P, linearly implicit,
-//! for stiff systems).
+//! (Dormand-Prince 5(4), adaptive, with dense output), [`additive`] (Kennedy and Carpenter's
+//! ARK5(4), adaptive, for systems with a stiff linear part) and [`rodas`] (Rodas5P, linearly
+//! implicit, for stiff systems).
 //!
 //! # Example
 //!
@@ -111,6 +112,8 @@
 
 #[cfg(target_arch = "aarch64")]
 mod aarch64;
+mod adaptive;
+pub mod additive;
 mod control;
 pub mod dop853;
 pub mod dopri5;
@@ -152,7 +155,7 @@ pub use quintic::Sample;
 pub use real::Real;
 pub use simd::{Kernel, ScalarKernel, Simd, UnsupportedProcessor};
 pub use squares::SquareIntegrals;
-pub use system::{Count, Ended, Failure, Forcing, Leg, Step, System, Task};
+pub use system::{Count, Ended, Failure, Forcing, Leg, Split, Step, System, Task};
 pub use time_above::TimeAbove;
 
 #[cfg(test)]

@@ -26,6 +26,27 @@ pub trait System<T: Lane, const D: usize> {
     fn in_range(&self, x: &[N<T>; D]) -> T::Mask;
 }
 
+/// A system with a linear part, x' = L x, that is too stiff for explicit formulas.
+pub trait Split<T: Lane, const D: usize>: System<T, D> {
+    /// L at a state, or near enough to it that the rest is not stiff.
+    type Stiff: Copy;
+    /// What it takes to solve with I - g L.
+    type Factored: Copy;
+
+    /// f and L at state `x`.
+    fn derivative_and_stiff(
+        &self,
+        forcing: &Self::Forcing,
+        x: &[N<T>; D],
+    ) -> ([N<T>; D], Self::Stiff);
+
+    /// I - g L, for `g_s` above zero.
+    fn factored(&self, stiff: &Self::Stiff, g_s: N<T>) -> Self::Factored;
+
+    /// z with z - g L z = r, and L z.
+    fn solve(&self, factored: &Self::Factored, r: &[N<T>; D]) -> ([N<T>; D], [N<T>; D]);
+}
+
 /// Trajectories fed into lanes one after another: a lane that ends takes up the next at once.
 pub trait Task<T: Lane, const D: usize> {
     /// The system whose trajectories they are.

@@ -11,8 +11,8 @@ mod recorders;
 mod trig;
 
 use crate::{
-    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, Tolerance, dop853,
-    dopri5, rk4,
+    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Split, Step, System, Task, Tolerance,
+    additive, dop853, dopri5, rk4,
 };
 use core::marker::PhantomData;
 
@@ -22,6 +22,10 @@ trait Equation<const D: usize, const P: usize> {
     const FARTHEST: f64 = 1e6;
     /// f
     fn derivative<T: Lane>(p: &[N<T>; P], t_s: N<T>, x: &[N<T>; D]) -> [N<T>; D];
+    /// A linear part L of f: z with z - g L z = r, and L z. None of f unless said otherwise.
+    fn solve<T: Lane>(_p: &[N<T>; P], _g: N<T>, r: &[N<T>; D]) -> ([N<T>; D], [N<T>; D]) {
+        (*r, [r[0].lit(0.0); D])
+    }
     /// The solution, where it is known; NaN otherwise.
     fn exact(_p: &[f64; P], _t_s: f64) -> [f64; D] {
         [f64::NAN; D]
@@ -41,6 +45,7 @@ enum Method {
     Rk4,
     Dop853,
     Dopri5(Tolerance),
+    Additive(Tolerance),
 }
 
 /// How a trajectory went.
@@ -113,6 +118,7 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for Solve<'_, E, 
             Method::Rk4 => rk4::integrate(zero, &mut batch),
             Method::Dop853 => dop853::integrate(zero, &mut batch),
             Method::Dopri5(tolerance) => dopri5::integrate(zero, &mut batch, &tolerance),
+            Method::Additive(tolerance) => additive::integrate(zero, &mut batch, &tolerance),
         });
         (batch.outcomes, heap.count_total)
     }
@@ -155,6 +161,26 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D> fo
             sum += share * share;
         }
         sum.0.less(sum.lit(1.0).0)
+    }
+}
+
+impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Split<T, D> for Member<T, E, P> {
+    type Stiff = [N<T>; P];
+    type Factored = ([N<T>; P], N<T>);
+
+    #[inline(always)]
+    fn derivative_and_stiff(&self, t_s: &N<T>, x: &[N<T>; D]) -> ([N<T>; D], [N<T>; P]) {
+        (self.derivative(t_s, x), self.p)
+    }
+
+    #[inline(always)]
+    fn factored(&self, p: &[N<T>; P], g_s: N<T>) -> ([N<T>; P], N<T>) {
+        (*p, g_s)
+    }
+
+    #[inline(always)]
+    fn solve(&self, (p, g_s): &([N<T>; P], N<T>), r: &[N<T>; D]) -> ([N<T>; D], [N<T>; D]) {
+        E::solve(p, *g_s, r)
     }
 }
 
@@ -227,9 +253,40 @@ impl Equation<3, 1> for Swing {
         [(w * (x[0] * cos)).v(), (w * x[2]).v(), -(w * x[1]).v()]
     }
 
+    /// The oscillator.
+    #[inline(always)]
+    fn solve<T: Lane>(&[w]: &[N<T>; 1], g: N<T>, r: &[N<T>; 3]) -> ([N<T>; 3], [N<T>; 3]) {
+        let turn = (g * w).v();
+        let per = (1.0 + turn * turn).recip();
+        let (y, z) = (r[1] + turn * r[2], r[2] - turn * r[1]);
+        let (y, z) = ((per * y).v(), (per * z).v());
+        ([r[0], y, z], [r[0].lit(0.0), (w * z).v(), -(w * y).v()])
+    }
+
     fn exact(&[w]: &[f64; 1], t_s: f64) -> [f64; 3] {
         let (sin, cos) = (w * t_s).sin_cos();
         [sin.exp(), cos, -sin]
+    }
+}
+
+/// Two masses on a stiff spring, one of them on a soft one: x1'' = k (x2 - x1) - x1, x2'' = k (x1 -
+/// x2). The stiff spring is implicit.
+struct Coupled;
+
+impl Equation<4, 1> for Coupled {
+    #[inline(always)]
+    fn derivative<T: Lane>(&[k]: &[N<T>; 1], _: N<T>, x: &[N<T>; 4]) -> [N<T>; 4] {
+        let pull = (k * (x[1] - x[0])).v();
+        [x[2], x[3], pull - x[0], -pull]
+    }
+
+    #[inline(always)]
+    fn solve<T: Lane>(&[k]: &[N<T>; 1], g: N<T>, r: &[N<T>; 4]) -> ([N<T>; 4], [N<T>; 4]) {
+        let ahead = r[1] - r[0] + g * (r[3] - r[2]);
+        let pull = (k * ahead).v() / (1.0 + 2.0 * (k * (g * g).v()).v());
+        let speeds = [r[2] + g * pull, r[3] - g * pull];
+        let places = [r[0] + g * speeds[0], r[1] + g * speeds[1]];
+        ([places[0], places[1], speeds[0], speeds[1]], [speeds[0], speeds[1], pull, -pull])
     }
 }
 

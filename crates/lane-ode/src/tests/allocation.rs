@@ -16,7 +16,8 @@ fn a_whole_integration_asks_nothing_of_the_heap() {
         .collect();
     let tolerance = Tolerance { relative: 1e-8, absolute: 1e-8, max_steps: 100_000 };
     for simd in instruction_sets() {
-        for method in [Method::Rk4, Method::Dop853, Method::Dopri5(tolerance)] {
+        let adaptive = [Method::Dopri5(tolerance), Method::Additive(tolerance)];
+        for method in [Method::Rk4, Method::Dop853].into_iter().chain(adaptive) {
             let (outcomes, asked) = solve::<Swing, 3, 1>(simd, method, &trajectories);
             assert!(
                 outcomes

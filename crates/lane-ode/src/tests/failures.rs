@@ -44,8 +44,8 @@ fn is_fast() -> Trajectory<3, 5> {
     trajectory([0.01, 0.0, 100.0, 100.0, 1e4])
 }
 
-const DOPRI5: Method =
-    Method::Dopri5(Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 2000 });
+const TOLERANCE: Tolerance = Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 2000 };
+const ADAPTIVE: [Method; 2] = [Method::Dopri5(TOLERANCE), Method::Additive(TOLERANCE)];
 
 /// Solves mishaps among sound trajectories, in every order of arrival, and the sound ones alone;
 /// asserts that these are the same bits, and returns what became of the mishaps.
@@ -90,7 +90,7 @@ fn failure(outcome: &Outcome<3>) -> (Failure, f64) {
 
 #[test]
 fn a_diverged_trajectory_ends_alone() {
-    for method in [Method::Rk4, Method::Dop853, DOPRI5] {
+    for method in [Method::Rk4, Method::Dop853].into_iter().chain(ADAPTIVE) {
         let outcomes = among_others(method, &[explodes()]);
         let (reason, time_s) = failure(&outcomes[0]);
         assert_eq!(reason, Failure::Diverged, "{method:?}");
@@ -101,7 +101,7 @@ fn a_diverged_trajectory_ends_alone() {
 
 #[test]
 fn a_state_that_is_not_finite_ends_alone() {
-    for method in [Method::Rk4, Method::Dop853, DOPRI5] {
+    for method in [Method::Rk4, Method::Dop853].into_iter().chain(ADAPTIVE) {
         let outcomes = among_others(method, &[has_no_value_after(0.7), has_no_value_after(0.2)]);
         for (outcome, at_s) in outcomes.iter().zip([0.7, 0.2]) {
             let (reason, time_s) = failure(outcome);
@@ -113,19 +113,21 @@ fn a_state_that_is_not_finite_ends_alone() {
 
 #[test]
 fn a_step_too_small_for_time_ends_alone() {
-    let outcomes = among_others(DOPRI5, &[runs_into_a_pole_at(0.6), runs_into_a_pole_at(1.5)]);
-    for (outcome, at_s) in outcomes.iter().zip([0.6, 1.5]) {
-        let (reason, time_s) = failure(outcome);
-        assert_eq!(reason, Failure::StepTooSmall, "{outcome:?}");
-        assert!((time_s - at_s).abs() < 1e-9, "{time_s} s");
+    for method in ADAPTIVE {
+        let outcomes = among_others(method, &[runs_into_a_pole_at(0.6), runs_into_a_pole_at(1.5)]);
+        for (outcome, at_s) in outcomes.iter().zip([0.6, 1.5]) {
+            let (reason, time_s) = failure(outcome);
+            assert_eq!(reason, Failure::StepTooSmall, "{outcome:?}");
+            assert!((time_s - at_s).abs() < 1e-9, "{time_s} s");
+        }
     }
 }
 
 #[test]
 fn a_spent_allowance_of_steps_ends_alone() {
-    let outcomes = among_others(DOPRI5, &[is_fast(), is_fast()]);
-    for outcome in &outcomes {
-        let (reason, _) = failure(outcome);
+    for outcome in ADAPTIVE.iter().flat_map(|method| among_others(*method, &[is_fast(), is_fast()]))
+    {
+        let (reason, _) = failure(&outcome);
         assert_eq!(reason, Failure::StepLimit);
         let Ended::Failed { count, .. } = outcome.ended else { unreachable!() };
         assert_eq!(count.accepted + count.rejected, 2000);
@@ -135,9 +137,11 @@ fn a_spent_allowance_of_steps_ends_alone() {
 #[test]
 fn all_mishaps_together_leave_the_others_as_they_are() {
     let mishaps = [explodes(), has_no_value_after(0.3), runs_into_a_pole_at(0.9), is_fast()];
-    let reasons: Vec<_> = among_others(DOPRI5, &mishaps).iter().map(|o| failure(o).0).collect();
-    assert_eq!(
-        reasons,
-        [Failure::Diverged, Failure::Diverged, Failure::StepTooSmall, Failure::StepLimit]
-    );
+    for method in ADAPTIVE {
+        let reasons: Vec<_> = among_others(method, &mishaps).iter().map(|o| failure(o).0).collect();
+        assert_eq!(
+            reasons,
+            [Failure::Diverged, Failure::Diverged, Failure::StepTooSmall, Failure::StepLimit]
+        );
+    }
 }

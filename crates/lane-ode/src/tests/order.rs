@@ -1,6 +1,6 @@
 //! Orders of convergence, of both methods and of what they say between steps.
 
-use super::{Equation, Method, Outcome, Swing, Trajectory, solve};
+use super::{Coupled, Equation, Method, Outcome, Swing, Trajectory, solve};
 use crate::{Ended, Leg, Simd, Tolerance};
 
 const END_S: f64 = 6.0;
@@ -14,7 +14,7 @@ fn errors(method: Method, steps: &[u32]) -> Vec<[f64; 2]> {
         .iter()
         .map(|&n| match method {
             Method::Rk4 | Method::Dop853 => Trajectory::swing(1.0, END_S, 1, END_S / f64::from(n)),
-            Method::Dopri5(_) => Trajectory::swing(1.0, END_S, n, END_S),
+            Method::Dopri5(_) | Method::Additive(_) => Trajectory::swing(1.0, END_S, n, END_S),
         })
         .collect();
     let (outcomes, _) = solve::<Swing, 3, 1>(Simd::best(), method, &trajectories);
@@ -85,6 +85,36 @@ fn dopri5_has_order_5_and_so_has_its_dense_output() {
 }
 
 #[test]
+fn additive_has_order_5_with_a_part_that_is_implicit() {
+    let [order, between] = slopes("additive", Method::Additive(ANYTHING), &[64, 91, 128, 181, 256]);
+    assert!((order - 5.0).abs() < 0.1, "order {order}");
+    // The cubic.
+    assert!((between - 4.0).abs() < 0.1, "between steps {between}");
+}
+
+#[test]
+fn additive_steps_over_a_stiff_part_and_keeps_its_tolerance() {
+    // Rigid, they swing at the root of 1/2.
+    let legs = vec![Leg { start_s: 0.0, end_s: 10.0, step_s: 1e-4 }];
+    let trajectory = Trajectory { parameters: [1e8], start: [1.0, 1.0, 0.0, 0.0], legs };
+    for tolerance in [1e-4, 1e-6] {
+        let allowed = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 5_000 };
+        let (outcomes, _) = solve::<Coupled, 4, 1>(
+            Simd::best(),
+            Method::Additive(allowed),
+            core::slice::from_ref(&trajectory),
+        );
+        let Outcome { ended, x, count, .. } = outcomes[0];
+        assert!(matches!(ended, Ended::Arrived(_)), "{ended:?}");
+        let error = (x[0] - (10.0 * 0.5_f64.sqrt()).cos()).abs();
+        eprintln!("additive at {tolerance:e}: error {error:.1e}, {count:?}");
+        assert!(error < 10.0 * tolerance, "{tolerance:e} gave {error:e}");
+        // An explicit formula would take some 5e4.
+        assert!(count.accepted + count.rejected < 1_000, "{count:?}");
+    }
+}
+
+#[test]
 fn dopri5_keeps_the_tolerance_it_is_given_with_steps_by_the_fifth_root() {
     let trajectory = Trajectory::swing(1.0, 20.0, 1, 1e-3);
     let exact = Swing::exact(&[1.0], 20.0);
@@ -118,6 +148,7 @@ fn every_leg_ends_where_it_should() {
         Method::Rk4,
         Method::Dop853,
         Method::Dopri5(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
+        Method::Additive(Tolerance { relative: 1e-6, absolute: 1e-6, max_steps: 100_000 }),
     ] {
         let trajectories: Vec<_> = ends
             .into_iter()

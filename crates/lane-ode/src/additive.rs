@@ -1,0 +1,273 @@
+//! Kennedy and Carpenter's additive method of order 5(4), `ARK5(4)8L[2]SA`: adaptive, every lane
+//! with its own time and step, for systems with a stiff linear part ([`Split`]).
+//!
+//! The stiff part is taken implicitly and is damped where steps are long for it (L-stable), the
+//! rest explicitly. The part may be another one in every step, and need not be exact: what it
+//! leaves is explicit, and the order is kept.
+//!
+//! Coefficients: C. A. Kennedy, M. H. Carpenter, Additive Runge-Kutta schemes for
+//! convection-diffusion-reaction equations, Applied Numerical Mathematics 44 (2003) 139. The tests
+//! measure the order that they give.
+
+use crate::adaptive::Lanes;
+use crate::control::Tolerance;
+use crate::lane::Lane;
+use crate::num::N;
+use crate::system::{Split, Step, System as _, Task};
+
+const STAGES: usize = 8;
+
+/// The implicit coefficient of every stage but the first.
+const GAMMA: f64 = 41.0 / 200.0;
+
+/// Nodes c.
+const NODE: [f64; STAGES] = [
+    0.0,
+    41.0 / 100.0,
+    2_935_347_310_677.0 / 11_292_855_782_101.0,
+    1_426_016_391_358.0 / 7_196_633_302_097.0,
+    92.0 / 100.0,
+    24.0 / 100.0,
+    3.0 / 5.0,
+    1.0,
+];
+
+/// The matrix of the explicit part.
+const EXPLICIT: [[f64; STAGES]; STAGES] = [
+    [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [41.0 / 100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [
+        367_902_744_464.0 / 2_072_280_473_677.0,
+        677_623_207_551.0 / 8_224_143_866_563.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    ],
+    [
+        1_268_023_523_408.0 / 10_340_822_734_521.0,
+        0.0,
+        1_029_933_939_417.0 / 13_636_558_850_479.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    ],
+    [
+        14_463_281_900_351.0 / 6_315_353_703_477.0,
+        0.0,
+        66_114_435_211_212.0 / 5_879_490_589_093.0,
+        -54_053_170_152_839.0 / 4_284_798_021_562.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    ],
+    [
+        14_090_043_504_691.0 / 34_967_701_212_078.0,
+        0.0,
+        15_191_511_035_443.0 / 11_219_624_916_014.0,
+        -18_461_159_152_457.0 / 12_425_892_160_975.0,
+        -281_667_163_811.0 / 9_011_619_295_870.0,
+        0.0,
+        0.0,
+        0.0,
+    ],
+    [
+        19_230_459_214_898.0 / 13_134_317_526_959.0,
+        0.0,
+        21_275_331_358_303.0 / 2_942_455_364_971.0,
+        -38_145_345_988_419.0 / 4_862_620_318_723.0,
+        -1.0 / 8.0,
+        -1.0 / 8.0,
+        0.0,
+        0.0,
+    ],
+    [
+        -19_977_161_125_411.0 / 11_928_030_595_625.0,
+        0.0,
+        -40_795_976_796_054.0 / 6_384_907_823_539.0,
+        177_454_434_618_887.0 / 12_078_138_498_510.0,
+        782_672_205_425.0 / 8_267_701_900_261.0,
+        -69_563_011_059_811.0 / 9_646_580_694_205.0,
+        7_356_628_210_526.0 / 4_942_186_776_405.0,
+        0.0,
+    ],
+];
+
+/// The matrix of the implicit part, without its diagonal.
+const IMPLICIT: [[f64; STAGES]; STAGES] = [
+    [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [41.0 / 200.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [41.0 / 400.0, -567_603_406_766.0 / 11_931_857_230_679.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [
+        683_785_636_431.0 / 9_252_920_307_686.0,
+        0.0,
+        -110_385_047_103.0 / 1_367_015_193_373.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    ],
+    [
+        3_016_520_224_154.0 / 10_081_342_136_671.0,
+        0.0,
+        30_586_259_806_659.0 / 12_414_158_314_087.0,
+        -22_760_509_404_356.0 / 11_113_319_521_817.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    ],
+    [
+        218_866_479_029.0 / 1_489_978_393_911.0,
+        0.0,
+        638_256_894_668.0 / 5_436_446_318_841.0,
+        -1_179_710_474_555.0 / 5_321_154_724_896.0,
+        -60_928_119_172.0 / 8_023_461_067_671.0,
+        0.0,
+        0.0,
+        0.0,
+    ],
+    [
+        1_020_004_230_633.0 / 5_715_676_835_656.0,
+        0.0,
+        25_762_820_946_817.0 / 25_263_940_353_407.0,
+        -2_161_375_909_145.0 / 9_755_907_335_909.0,
+        -211_217_309_593.0 / 5_846_859_502_534.0,
+        -4_269_925_059_573.0 / 7_827_059_040_749.0,
+        0.0,
+        0.0,
+    ],
+    [
+        -872_700_587_467.0 / 9_133_579_230_613.0,
+        0.0,
+        0.0,
+        22_348_218_063_261.0 / 9_555_858_737_531.0,
+        -1_143_369_518_992.0 / 8_141_816_002_931.0,
+        -39_379_526_789_629.0 / 19_018_526_304_540.0,
+        32_727_382_324_388.0 / 42_900_044_865_799.0,
+        0.0,
+    ],
+];
+
+/// Weights of order 5, of both parts.
+const WEIGHT: [f64; STAGES] = [
+    -872_700_587_467.0 / 9_133_579_230_613.0,
+    0.0,
+    0.0,
+    22_348_218_063_261.0 / 9_555_858_737_531.0,
+    -1_143_369_518_992.0 / 8_141_816_002_931.0,
+    -39_379_526_789_629.0 / 19_018_526_304_540.0,
+    32_727_382_324_388.0 / 42_900_044_865_799.0,
+    41.0 / 200.0,
+];
+
+/// Those of order 4.
+const COMPANION: [f64; STAGES] = [
+    -975_461_918_565.0 / 9_796_059_967_033.0,
+    0.0,
+    0.0,
+    78_070_527_104_295.0 / 32_432_590_147_079.0,
+    -548_382_580_838.0 / 3_424_219_808_633.0,
+    -33_438_840_321_285.0 / 15_594_753_105_479.0,
+    3_629_800_801_594.0 / 4_656_183_773_603.0,
+    4_035_322_873_751.0 / 18_575_991_585_200.0,
+];
+
+/// Runs every trajectory that the task has; no lane waits for another's error.
+#[inline(always)]
+pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
+    zero: T,
+    task: &mut P,
+    tolerance: &Tolerance,
+) where
+    P::System: Split<T, D>,
+{
+    let zero = N(zero);
+    let mut x = [zero; D];
+    let mut lanes = Lanes::new(zero);
+    // f and L z at every stage.
+    let (mut k, mut l) = ([[zero; D]; STAGES], [[zero; D]; STAGES]);
+    let mut before = x;
+    let mut slope_before = x;
+    let mut length = zero;
+    let mut is_fresh = lanes.take_up(task, &mut x);
+    while lanes.are_active() && !task.is_stopped() {
+        let forcing = task.system().forcing(lanes.time);
+        let (slope, stiff) = task.system().derivative_and_stiff(&forcing, &x);
+        k[0] = slope;
+        if is_fresh {
+            task.begin(&forcing, &x, &k[0]);
+        } else {
+            task.observe(
+                &forcing,
+                &Step {
+                    end_s: lanes.time,
+                    length_s: length,
+                    before: &before,
+                    slope_before: &slope_before,
+                    after: &x,
+                    slope_after: &k[0],
+                    dense: None,
+                },
+            );
+            is_fresh = lanes.take_up(task, &mut x);
+            if is_fresh {
+                continue;
+            }
+        }
+        is_fresh = false;
+
+        let h = lanes.steps();
+        // Of any length in an idle lane.
+        let g = N((h * GAMMA).v().0.larger(zero.lit(f64::MIN_POSITIVE.sqrt()).0));
+        let factored = task.system().factored(&stiff, g);
+        let mut y = x;
+        for stage in 1..STAGES {
+            let mut r = [zero; D];
+            for i in 0..D {
+                let mut sum = zero;
+                for j in 0..stage {
+                    sum += k[j][i] * EXPLICIT[stage][j];
+                }
+                // z is nothing at the first.
+                for j in 1..stage {
+                    sum += l[j][i] * (IMPLICIT[stage][j] - EXPLICIT[stage][j]);
+                }
+                r[i] = (h * sum).v();
+            }
+            let (z, of_stiff) = task.system().solve(&factored, &r);
+            l[stage] = of_stiff;
+            for i in 0..D {
+                y[i] = x[i] + z[i];
+            }
+            let forcing = task.system().forcing(h * NODE[stage] + lanes.time);
+            k[stage] = task.system().derivative(&forcing, &y);
+        }
+        let mut error = [zero; D];
+        for i in 0..D {
+            let (mut sum, mut off) = (zero, zero);
+            for j in 0..STAGES {
+                sum += k[j][i] * WEIGHT[j];
+                off += k[j][i] * (WEIGHT[j] - COMPANION[j]);
+            }
+            y[i] = x[i] + h * sum;
+            error[i] = (h * off).v();
+        }
+
+        let in_range = task.system().in_range(&y);
+        let error = tolerance.norm(&x, &y, &error);
+        before = x;
+        slope_before = k[0];
+        let accepted = error.0.less(zero.lit(1.0).0);
+        for i in 0..D {
+            x[i] = N(T::select(accepted, y[i].0, x[i].0));
+        }
+        length = lanes.settle(h, error, T::bits(in_range), tolerance);
+    }
+}
