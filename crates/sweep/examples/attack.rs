@@ -27,7 +27,10 @@
 use std::process::ExitCode;
 
 use rayon::prelude::*;
-use sweep::{Floor, Integrator, ModelEngine, Outcome, Plan, Status, Trajectory, Verdict};
+use sweep::{
+    CREEPING_M_PER_S, Floor, Integrator, Level, ModelEngine, Outcome, Plan, Status, Trajectory,
+    Verdict,
+};
 
 /// What is asked of the fast method.
 const ACCURACIES: [f64; 4] = [1e-3, 1e-3, 1e-4, 1e-2];
@@ -210,9 +213,9 @@ struct Found {
     /// By more than the row's own `error` says, though not by more than the accuracy.
     above_error: u64,
     worst: f64,
-    by_method: [u64; 6],
+    by_method: [u64; Level::ALL.len()],
     /// The greatest error as a share of what the row says, by method.
-    of_said: [f64; 6],
+    of_said: [f64; Level::ALL.len()],
     exceptions: Vec<String>,
 }
 
@@ -300,6 +303,7 @@ fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
                     Floor::PartOfWindow => CLASH_FLOOR * (to_s - from_s),
                     Floor::Weight => weight_n,
                     Floor::PartOfWeight => PUSH_FLOOR * weight_n,
+                    Floor::Creeping => CREEPING_M_PER_S,
                 };
                 (number.column(model), relative_from(least, *a, *b))
             },
@@ -512,7 +516,7 @@ fn main() -> ExitCode {
     // What is left in the temporary folder harms nobody.
     let _ = std::fs::remove_dir_all(&folder);
     eprintln!("{} rows of {grids} grids ({} refused), seed {first}", found.rows, found.refused);
-    eprintln!("  by method fast, fine, finest, rk4: {:?}", &found.by_method[..4]);
+    eprintln!("  by method {:?}: {:?}", Level::ALL.map(Level::name), found.by_method);
     eprintln!(
         "  failed {}, sensitive {} ({} of them needlessly), unconverged {} ({} of them right)",
         found.failed, found.sensitive, found.needlessly, found.unconverged, found.doubted
@@ -522,7 +526,7 @@ fn main() -> ExitCode {
          {} above their `error`",
         found.wrong_status, found.wrong_verdict, found.inaccurate, found.worst, found.above_error
     );
-    eprintln!("  greatest error as a share of `error`, by method: {:.2?}", &found.of_said[..4]);
+    eprintln!("  greatest error as a share of `error`, by method: {:.2?}", found.of_said);
     found.exceptions.iter().for_each(|line| eprintln!("  {line}"));
     if found.exceptions.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

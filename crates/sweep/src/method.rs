@@ -8,13 +8,10 @@ use washer_model::Method;
 use washer_row::Level;
 
 /// Steps that one leg of an adaptive trajectory may take.
-const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
+pub(crate) const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
 
 /// Share of the longest stable step that plain RK4 uses as the fast method's reference.
 pub(crate) const REFERENCE_SHARE: f64 = 0.75;
-
-/// The shortest step of RK4 where forces have corners, as a share of the reference's.
-pub(crate) const SHORTEST_AT_CORNERS: f64 = 0.25;
 
 methods! {
     Rk4 = "rk4", "classical Runge-Kutta of order 4, in fixed steps" { step_s: STEP_S }

@@ -1,5 +1,6 @@
 //! What a page computes with.
 
+use lane_ode::Tolerance;
 use sweep_parameter::RatioLimits;
 use washer_model::{
     BumpStop, Bushing, Cabinet, Caps, Channel, Foot, Gear, Geared, Machine, Method, Parameter,
@@ -184,6 +185,12 @@ fn write_rung(out: &mut Writer, rung: &Rung) {
             out.count(0);
             out.number(step_s);
         }
+        Method::Additive(Tolerance { relative, absolute, max_steps }) => {
+            out.count(2);
+            out.number(relative);
+            out.number(absolute);
+            out.number(max_steps as f64);
+        }
         // Nothing that reads this knows them.
         Method::Dopri5(_) | Method::Rodas5p(_) => out.number(f64::NAN),
     }
@@ -198,8 +205,13 @@ fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
         expected: from.number()?,
     };
     let follows_bearings = from.count(2)? > 0;
-    let method = match from.count(2)? {
+    let method = match from.count(3)? {
         0 => Method::Rk4 { step_s: from.number()? },
+        2 => {
+            let (relative, absolute) = (from.number()?, from.number()?);
+            let max_steps = from.number()? as u64;
+            Method::Additive(Tolerance { relative, absolute, max_steps })
+        }
         _ => {
             let mut gear = || -> Option<Gear> {
                 let (up_to_rad_per_s, step_s) = (from.number()?, from.number()?);

@@ -29,11 +29,9 @@
 //!
 //! The polynomial of degree 5 between steps bounds the step as well.
 //!
-//! Elements that are not linear (friction, stops, stiffening springs, bushings) count as their
-//! steepest tangents: a step is stable with friction at standing still and with every stop closed,
-//! and the motion to follow includes the tub's swing on closed stops. Where forces have corners
-//! ([`Cases::are_nonsmooth`]), one step serves all speeds of the drum, because a stop rings as fast
-//! at any.
+//! Elements that are not linear (stiffening springs, bushings) count in the nonlinear model as
+//! their steepest tangents, and the motion to follow includes the tub's swing on these. Where
+//! forces have corners ([`Cases::are_nonsmooth`]), no such step is for the nonlinear model.
 
 pub(crate) mod geared;
 pub(crate) mod ringing;
@@ -45,8 +43,8 @@ use crate::fast::geared::{Formula, GEARS, Gear, Geared, interpolation_phase};
 use crate::kind::ModelKind;
 use crate::machine::spin::Spin;
 use crate::modes::{
-    Mode, Modes, Motion, NoModes, fastest_rigid_rad_per_s, highest_with_caps, modes_with_caps,
-    motions,
+    Mode, Modes, Motion, NoModes, fastest_rigid_rad_per_s, highest_frequency_rad_per_s,
+    highest_with_caps, modes_with_caps, motions,
 };
 use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
@@ -117,14 +115,16 @@ pub struct Cases<'a> {
 
 struct Case<'a> {
     point: &'a Point,
-    /// Fastest of the motions that the method has to follow.
+    /// Fastest of the motions that the nonlinear model's method has to follow.
     fastest_followed_rad_per_s: f64,
-    /// What `fastest_followed_rad_per_s` would be if all elements were as at rest.
+    /// The same if all elements were as at rest, which is where the linear model has them.
     fastest_at_rest_rad_per_s: f64,
     /// Fastest of all modes, at rest and turning.
     fastest_rad_per_s: f64,
-    /// Frequency of the hinge at rest over the greatest speed of the drum.
-    hinge_to_drum: f64,
+    /// The hinge's slower frequency at rest.
+    hinge_rad_per_s: f64,
+    /// The greatest speed of the drum.
+    top_rad_per_s: f64,
     /// The drum at the greatest speed of each gear.
     turning: [State; GEARS],
     rest: State,
@@ -142,17 +142,17 @@ impl State {
     }
 }
 
-/// A step and its caps, for a formula.
+/// A step and its caps, for a model's formula.
 #[derive(Clone, Copy)]
 struct Trial {
-    formula: Formula,
+    model: ModelKind,
     step_s: f64,
     caps: Caps,
 }
 
 impl Trial {
     fn is_stable(&self, frequency_rad_per_s: f64) -> bool {
-        self.step_s * frequency_rad_per_s <= self.formula.limit()
+        self.step_s * frequency_rad_per_s <= Formula::of(self.model).limit()
     }
 }
 
@@ -161,26 +161,28 @@ impl<'a> Case<'a> {
         let top = spin.greatest_speed_rad_per_s(end_s);
         let rest = State::new(point, 0.0)?;
         let [first, second, third] = GEAR_SHARES.map(|share| State::new(point, share * top));
-        let slow = &rest.modes.modes;
-        let at_rest = top.max(slow[SUSPENSION_MODES - 1].magnitude_rad_per_s);
+        // Where strong dampers let motions of the suspension creep, these are not to be followed.
+        let swings = |mode: &&Mode| mode.im_rad_per_s != 0.0;
+        let swinging = rest.modes.modes.iter().filter(swings).map(|mode| mode.magnitude_rad_per_s);
+        let swinging: Vec<f64> = swinging.collect();
+        let of_suspension = SUSPENSION_MODES.saturating_sub(COORDINATES - swinging.len());
+        let at_rest = swinging[..of_suspension].iter().copied().fold(top, f64::max);
         let followed = match &point.steepest {
             Some(steepest) => at_rest.max(fastest_rigid_rad_per_s(point, steepest)?),
             None => at_rest,
         };
-        let hinge = slow[SUSPENSION_MODES].magnitude_rad_per_s;
+        let hinge = swinging.get(of_suspension).copied().unwrap_or(f64::INFINITY);
+        // A soft hinge takes part in the motion. Stops may drive faster motions than the hinge's.
+        let with_hinge =
+            |fastest: f64| if hinge < 2.0 * fastest { hinge.max(fastest) } else { fastest };
         Ok(Self {
             point,
-            // A soft hinge takes part in the motion.
-            // Stops may drive faster motions than the hinge's.
-            fastest_followed_rad_per_s: if hinge < 2.0 * followed {
-                hinge.max(followed)
-            } else {
-                followed
-            },
-            fastest_at_rest_rad_per_s: at_rest,
-            hinge_to_drum: hinge / top,
-            fastest_rad_per_s: highest_with_caps(point, 0.0, None)?
-                .max(highest_with_caps(point, top, None)?),
+            fastest_followed_rad_per_s: with_hinge(followed),
+            fastest_at_rest_rad_per_s: with_hinge(at_rest),
+            hinge_rad_per_s: hinge,
+            top_rad_per_s: top,
+            fastest_rad_per_s: highest_frequency_rad_per_s(point, 0.0)?
+                .max(highest_frequency_rad_per_s(point, top)?),
             turning: [first?, second?, third?],
             rest,
         })
@@ -210,11 +212,10 @@ impl<'a> Case<'a> {
             }
         }
         for state in [&self.turning[gear], &self.rest] {
-            if !trial.is_stable(highest_with_caps(
-                self.point,
-                state.speed_rad_per_s,
-                Some(&trial.caps),
-            )?) {
+            let speed_rad_per_s = state.speed_rad_per_s;
+            let caps = Some(&trial.caps);
+            if !trial.is_stable(highest_with_caps(self.point, trial.model, speed_rad_per_s, caps)?)
+            {
                 return Ok(false);
             }
         }
@@ -240,7 +241,10 @@ impl<'a> Case<'a> {
         caps: &Caps,
         top_rad_per_s: f64,
     ) -> f64 {
-        let errors = state.modes.modes[..SLOW_MODES].iter().zip(capped).map(|(plain, capped)| {
+        let slow = state.modes.modes[..SLOW_MODES].iter().zip(capped);
+        // Strong dampers let a motion creep; how fast it is brought to that matters to nothing.
+        let swinging = slow.filter(|(plain, _)| plain.im_rad_per_s != 0.0);
+        let errors = swinging.map(|(plain, capped)| {
             let (slower, detuned) =
                 (capped.s.re - plain.re_per_s, capped.s.im - plain.im_rad_per_s);
             let of_bearings = (slower * slower + detuned * detuned).sqrt();
@@ -252,17 +256,25 @@ impl<'a> Case<'a> {
 
     /// Weighted shift (rad/s) of a suspension mode by a capped hinge while the drum turns.
     fn hinge_shift(&self, mode: &Mode, turning_rad_per_s: f64, caps: &Caps) -> f64 {
-        let is_of_suspension =
-            mode.magnitude_rad_per_s <= self.rest.modes.modes[SUSPENSION_MODES].magnitude_rad_per_s;
+        let is_of_suspension = mode.magnitude_rad_per_s <= self.hinge_rad_per_s;
         if !is_of_suspension {
             return 0.0;
         }
         hinge_shift(self.point, mode, turning_rad_per_s, caps.hinge_rad_per_s)
     }
 
+    /// Fastest of the motions that a model's method has to follow (rad/s).
+    fn fastest_followed_rad_per_s(&self, model: ModelKind) -> f64 {
+        match model {
+            ModelKind::Nonlinear => self.fastest_followed_rad_per_s,
+            ModelKind::Linear => self.fastest_at_rest_rad_per_s,
+        }
+    }
+
     /// Relative error of amplitudes by truncation.
-    fn error_of_truncation(&self, formula: Formula, step_s: f64) -> f64 {
-        formula.error_per_radian(step_s * self.fastest_followed_rad_per_s) / MEMORY_DAMPING_RATIO
+    fn error_of_truncation(&self, model: ModelKind, step_s: f64) -> f64 {
+        let phase = step_s * self.fastest_followed_rad_per_s(model);
+        Formula::of(model).error_per_radian(phase) / MEMORY_DAMPING_RATIO
     }
 }
 
@@ -335,7 +347,11 @@ impl<'a> Cases<'a> {
     /// ringing, hardly damped. Runs with caps have the ringing, but soon not its phase.
     #[must_use]
     pub fn hinge_to_drum(&self) -> f64 {
-        self.cases.iter().flatten().map(|case| case.hinge_to_drum).fold(f64::INFINITY, f64::min)
+        self.cases
+            .iter()
+            .flatten()
+            .map(|case| case.hinge_rad_per_s / case.top_rad_per_s)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Whether closed stops or stiffened springs make the tub swing faster (rad/s, given back) than
@@ -360,13 +376,10 @@ impl<'a> Cases<'a> {
     /// # Errors
     /// [`NoModes`] of a machine that has none.
     pub fn choose(&self, model: ModelKind, accuracy: f64) -> Result<Option<Geared>, NoModes> {
-        let Some((mut search, trial)) = self.choose_top(Formula::of(model), accuracy, 0.0)? else {
+        let Some((mut search, trial)) = self.choose_top(model, accuracy, 0.0)? else {
             return Ok(None);
         };
         let mut geared = Geared::steady(trial.step_s, trial.caps);
-        if self.are_nonsmooth() {
-            return Ok(Some(geared));
-        }
         for gear in 0..TOP {
             let steps_s = [WORTH_A_GEAR * trial.step_s, search.longest_s / GEAR_SHARES[gear]];
             if let Some(Trial { step_s, caps, .. }) = search.longest(gear, steps_s)? {
@@ -391,14 +404,14 @@ impl<'a> Cases<'a> {
         model: ModelKind,
         accuracy: f64,
     ) -> Result<Option<Geared>, NoModes> {
-        let chosen = self.choose_top(Formula::of(model), accuracy, HINGE_CAP_TO_DRUM)?;
+        let chosen = self.choose_top(model, accuracy, HINGE_CAP_TO_DRUM)?;
         Ok(chosen.map(|(_, trial)| Geared::steady(trial.step_s, trial.caps)))
     }
 
     /// The choice for the fastest drum, and the search that found it.
     fn choose_top(
         &self,
-        formula: Formula,
+        model: ModelKind,
         accuracy: f64,
         hinge_cap_to_drum: f64,
     ) -> Result<Option<(Search<'_, 'a>, Trial)>, NoModes> {
@@ -408,14 +421,16 @@ impl<'a> Cases<'a> {
             return Ok(None);
         }
         let most_evaluations_per_s = Formula::Rk4.evaluations_per_s(plain_step_s);
-        let followed = cases.iter().map(|case| case.fastest_followed_rad_per_s).fold(0.0, f64::max);
+        let formula = Formula::of(model);
+        let followed = cases.iter().map(|case| case.fastest_followed_rad_per_s(model));
+        let followed = followed.fold(0.0, f64::max);
         let longest_phase =
             formula.step_phase(MEMORY_DAMPING_RATIO * accuracy).min(interpolation_phase(accuracy));
         let longest_s = longest_phase / followed;
         let shortest_s = formula.evaluations_per_s(1.0) / most_evaluations_per_s;
         let is_stopped = self.is_stopped;
         let mut search =
-            Search { cases, formula, accuracy, hinge_cap_to_drum, longest_s, is_stopped };
+            Search { cases, model, accuracy, hinge_cap_to_drum, longest_s, is_stopped };
         let trial = search.longest(TOP, [shortest_s, longest_s])?;
         Ok(trial.map(|trial| (search, trial)))
     }
@@ -429,7 +444,7 @@ impl<'a> Cases<'a> {
         let Gear { step_s, caps, .. } = *geared.top();
         let mut error = 0.0_f64;
         for case in self.with_modes()? {
-            error = error.max(case.error_of_truncation(Formula::of(model), step_s));
+            error = error.max(case.error_of_truncation(model, step_s));
             let state = &case.turning[TOP];
             let of_bearings = case.motions_with_capped_bearings(state, &caps)?;
             let of_caps = case.error_of_caps(state, &of_bearings, &caps, state.speed_rad_per_s);
@@ -444,7 +459,7 @@ struct Search<'c, 'a> {
     /// In the order in which they are asked: those that refused a trial last come first, because
     /// they mostly refuse the next one too.
     cases: Vec<&'c Case<'a>>,
-    formula: Formula,
+    model: ModelKind,
     accuracy: f64,
     /// The least cap of a hinge over the drum's speed.
     hinge_cap_to_drum: f64,
@@ -485,13 +500,13 @@ impl Search<'_, '_> {
 
     /// The best caps with which a step holds in a gear, if any.
     fn holding(&mut self, gear: usize, step_s: f64) -> Result<Option<Trial>, NoModes> {
-        let formula = self.formula;
+        let model = self.model;
         for step_times_cap in STEP_TIMES_CAP {
-            let cap = step_times_cap * formula.limit() / step_s;
+            let cap = step_times_cap * Formula::of(model).limit() / step_s;
             for multiple in HINGE_CAP {
                 let hinge_rad_per_s = multiple.map(|multiple| multiple * cap);
                 let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s };
-                let trial = Trial { formula, step_s, caps };
+                let trial = Trial { model, step_s, caps };
                 let fastest = self.cases.iter().map(|case| case.turning[gear].speed_rad_per_s);
                 let least = self.hinge_cap_to_drum * fastest.fold(0.0, f64::max);
                 let is_fast = hinge_rad_per_s.is_none_or(|cap_rad_per_s| cap_rad_per_s >= least);

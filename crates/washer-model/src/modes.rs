@@ -7,6 +7,7 @@ pub(crate) mod campbell;
 pub(crate) mod shape;
 
 use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT, STATES, TUB};
+use crate::kind::ModelKind;
 use crate::linear::{LinearPoint, Matrices};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
@@ -218,18 +219,20 @@ fn unit_mass(
 /// # Errors
 /// As [`modes`].
 pub fn highest_frequency_rad_per_s(point: &Point, speed_rad_per_s: f64) -> Result<f64, NoModes> {
-    highest_with_caps(point, speed_rad_per_s, None)
+    highest_with_caps(point, ModelKind::Nonlinear, speed_rad_per_s, None)
 }
 
-/// The same, with caps on the modes of bearings and hinge if any are given (section 4.3 of the
-/// model page).
+/// The same of a model, whose elements are as at rest in the linear one, with caps on the modes of
+/// bearings and hinge if any are given (section 4.3 of the model page).
 pub(crate) fn highest_with_caps(
     point: &Point,
+    model: ModelKind,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
 ) -> Result<f64, NoModes> {
     let mut highest = 0.0_f64;
-    let models = core::iter::once(&point.linear).chain(point.steepest.as_deref());
+    let steepest = point.steepest.as_deref().filter(|_| model == ModelKind::Nonlinear);
+    let models = core::iter::once(&point.linear).chain(steepest);
     let angles = (0..ANGLES).map(|angle| TAU * angle as f64 / ANGLES as f64);
     for (model, theta) in models.flat_map(|model| angles.clone().map(move |theta| (model, theta))) {
         let (system, _) = first_order(point, model, theta, speed_rad_per_s, caps)?;

@@ -44,6 +44,10 @@ pub enum Method {
     Geared(Geared),
     /// Dormand-Prince 5(4).
     Dopri5(Tolerance),
+    /// Kennedy and Carpenter's additive method of order 5(4), the bearings implicit, for forces
+    /// with corners: its steps see these, and the bearings do not hold them short. The linear model
+    /// takes Dormand-Prince in its place.
+    Additive(Tolerance),
     /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others.
     /// One trajectory at a time.
     Rodas5p(Tolerance),
@@ -60,7 +64,7 @@ pub(crate) fn first_step(method: &Method, leg: &PlannedLeg) -> (f64, Option<Caps
             let gear = geared.gear(leg.fastest_rad_per_s);
             (gear.step_s, Some(gear.caps))
         }
-        Method::Dopri5(_) | Method::Rodas5p(_) => (FIRST_STEP_S, None),
+        Method::Dopri5(_) | Method::Additive(_) | Method::Rodas5p(_) => (FIRST_STEP_S, None),
     }
 }
 
@@ -69,7 +73,9 @@ pub(crate) fn first_step(method: &Method, leg: &PlannedLeg) -> (f64, Option<Caps
 pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
     match method {
         Method::Geared(geared) => Coupling::new(zero, Some(&geared.top().caps)),
-        Method::Rk4 { .. } | Method::Dopri5(_) | Method::Rodas5p(_) => Coupling::Springs,
+        Method::Rk4 { .. } | Method::Dopri5(_) | Method::Additive(_) | Method::Rodas5p(_) => {
+            Coupling::Springs
+        }
     }
 }
 
@@ -141,6 +147,7 @@ pub fn simulate_until(
         Method::Rk4 { .. } => Stepper::Plain,
         Method::Geared(_) => Stepper::Capped,
         Method::Dopri5(tolerance) => Stepper::Dopri5(*tolerance),
+        Method::Additive(tolerance) => Stepper::Additive(*tolerance),
         Method::Rodas5p(tolerance) => {
             return stiff::simulate(model, tolerance, points, wanted, stop);
         }
@@ -158,6 +165,7 @@ enum Stepper {
     /// By the model's formula for capped modes.
     Capped,
     Dopri5(Tolerance),
+    Additive(Tolerance),
 }
 
 /// A model before the lanes' type is known.
@@ -201,6 +209,9 @@ impl<F: Family> Kernel for Simulate<'_, F> {
             (Stepper::Plain, _) | (Stepper::Capped, Formula::Rk4) => rk4::integrate(zero, &mut run),
             (Stepper::Capped, Formula::Dop853) => dop853::integrate(zero, &mut run),
             (Stepper::Dopri5(tolerance), _) => dopri5::integrate(zero, &mut run, &tolerance),
+            (Stepper::Additive(tolerance), _) => {
+                F::Over::<T>::integrate_at_corners(zero, &mut run, &tolerance);
+            }
         }
         run.recorded()
     }

@@ -3,7 +3,7 @@
 use washer_model::{Channel, ModelKind, Point, Swing};
 
 use crate::ladder::{Ladder, Rung};
-use crate::measures::{Floor, Metric, TURN_FLOOR};
+use crate::measures::{CREEPING_M_PER_S, Floor, Metric, TURN_FLOOR};
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::run::{Rule, RungRun};
 use crate::twin::Departure;
@@ -52,6 +52,10 @@ const FREE_OF_MODES: f64 = 0.1;
 /// Differences of a turn's peak count so many times. Where it lies beside the turn's cut, it errs
 /// with the phase of the motion, and shrinks less from rung to rung than the motion's error does.
 const TURN_WEIGHT: f64 = 3.0;
+
+/// Differences of a damper's speed in the linear model count so many times: what capped modes ring
+/// is more of a speed than of a motion, by their frequency over the drum's.
+const SPEED_WEIGHT: f64 = 10.0;
 
 /// Both models in the order of [`Climbs`].
 pub const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
@@ -366,7 +370,7 @@ fn difference(
         return ((a_s - b_s).abs() <= SAME_TIME * rule.end_s).then_some(Difference::NONE);
     }
     let of_course = point.course_difference(model, &a.course, &b.course);
-    Some(Difference { of_course, of_numbers: of_numbers(of_a, of_b, point, rule) })
+    Some(Difference { of_course, of_numbers: of_numbers(of_a, of_b, point, model, rule) })
 }
 
 /// The error that this rung has in common with others, so that no comparison shows it: what
@@ -441,7 +445,7 @@ fn clash_floor_s(rule: &Rule) -> f64 {
 }
 
 /// The greatest relative difference of what a row takes from two trajectories.
-fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, rule: &Rule) -> f64 {
+fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, model: ModelKind, rule: &Rule) -> f64 {
     let mut greatest = 0.0_f64;
     let mut compare = |a: f64, b: f64, least: f64| {
         if a != b {
@@ -462,14 +466,19 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, rule: &Rule) -> f64
             Floor::PartOfWindow => clash_floor_s(rule),
             Floor::Weight => point.weight_n(),
             Floor::PartOfWeight => METRIC_FLOOR * point.weight_n(),
+            Floor::Creeping => CREEPING_M_PER_S,
         };
-        compare(*a, *b, least);
+        // Exaggerated, as what errs more than its difference shows.
+        let weight = match (number.metric, model) {
+            (Metric::DamperSpeed, ModelKind::Linear) => SPEED_WEIGHT,
+            _ => 1.0,
+        };
+        compare(b + weight * (a - b), *b, least);
     }
     for (a, b) in a.turns.iter().zip(&b.turns) {
         for channel in &rule.channels {
             let i = channel.index();
             let (a, b) = (a[i].max(TURN_FLOOR), b[i].max(TURN_FLOOR));
-            // Exaggerated, as a number that errs more than its difference shows.
             compare(b + TURN_WEIGHT * (a - b), b, 0.0);
         }
     }

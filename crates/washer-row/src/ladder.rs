@@ -44,6 +44,7 @@ impl Rung {
                 )
             }
             Method::Rk4 { step_s } => format!("{name} (step {:.3} ms)", 1e3 * step_s),
+            Method::Additive(tolerance) => format!("{name} (tolerance {:.0e})", tolerance.relative),
             // Not on the fast method's ladder.
             Method::Dopri5(_) | Method::Rodas5p(_) => name.to_owned(),
         }
@@ -69,8 +70,8 @@ impl Ladder {
         Self { rungs: vec![rung], reference: None, held_back: None }
     }
 
-    /// Rungs that check one another, at least two. The last two are plain RK4, the very last the
-    /// reference.
+    /// Rungs that check one another, at least two, of which the last is the reference: plain RK4
+    /// after the same in longer steps, or the additive method.
     #[must_use]
     pub const fn checked(rungs: Vec<Rung>, held_back: Option<String>) -> Self {
         let reference = Some(rungs.len() - 1);
@@ -84,8 +85,8 @@ impl Ladder {
         self
     }
 
-    /// The place of the reference: plain RK4 whose step agrees with a longer one, mostly. None
-    /// where there is nothing but one method.
+    /// The place of the reference, which agrees with the rung before, mostly. None where there is
+    /// nothing but one method.
     #[must_use]
     pub const fn reference(&self) -> Option<usize> {
         self.reference
@@ -96,8 +97,8 @@ impl Ladder {
         self.reference.is_some_and(|reference| rung > reference)
     }
 
-    /// The place of the rung whose twin tells chaos: half the reference's step where there is such
-    /// a rung, because that settles most of what the reference leaves in doubt.
+    /// The place of the rung whose twin tells chaos: the one behind the reference where there is
+    /// one, because that settles most of what the reference leaves in doubt.
     #[must_use]
     pub(crate) fn judge(&self) -> Option<usize> {
         self.reference.map(|reference| (reference + 1).min(self.rungs.len() - 1))

@@ -15,18 +15,27 @@ pub enum Level {
     Dopri5,
     /// Rodas5P.
     Rodas5p,
+    /// The additive method, for forces with corners.
+    Additive,
 }
 
 impl Level {
     /// Every level; the position is its code in chunk files, so new ones go to the end.
-    pub const ALL: [Self; 6] =
-        [Self::Fast, Self::Fine, Self::Finest, Self::Rk4, Self::Dopri5, Self::Rodas5p];
+    pub const ALL: [Self; 7] = [
+        Self::Fast,
+        Self::Fine,
+        Self::Finest,
+        Self::Rk4,
+        Self::Dopri5,
+        Self::Rodas5p,
+        Self::Additive,
+    ];
 
     /// Whether it is a rung on which modes of bearings and hinge are capped.
     pub const fn is_capped(self) -> bool {
         match self {
             Self::Fast | Self::Fine | Self::Finest => true,
-            Self::Rk4 | Self::Dopri5 | Self::Rodas5p => false,
+            Self::Rk4 | Self::Dopri5 | Self::Rodas5p | Self::Additive => false,
         }
     }
 
@@ -39,6 +48,7 @@ impl Level {
             Self::Rk4 => "rk4",
             Self::Dopri5 => "dopri5",
             Self::Rodas5p => "rodas5p",
+            Self::Additive => "additive",
         }
     }
 }

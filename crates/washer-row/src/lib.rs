@@ -24,7 +24,7 @@ pub use climb::{Climbs, Demand, MODELS, Next};
 pub use convergence::Convergence;
 pub use ladder::{Ladder, Rung};
 pub use level::Level;
-pub use measures::{Criterion, Floor, Measured, Measures, Metric, Part};
+pub use measures::{CREEPING_M_PER_S, Criterion, Floor, Measured, Measures, Metric, Part};
 pub use outcome::{Deviations, Dwelt, GrowingMode, Growth, Outcome, Status, Trajectory};
 pub use run::{Rule, RungRun, runs};
 pub use verdict::{ROW_STATUSES, Verdict, row_status};

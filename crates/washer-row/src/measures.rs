@@ -9,6 +9,10 @@ use crate::outcome::{Deviations, Outcome};
 /// no machine feels decides.
 pub(crate) const TURN_FLOOR: f64 = 1e-5;
 
+/// The speed (m/s) of a damper that friction all but holds. What bearings ring is a part of slower
+/// ones.
+pub const CREEPING_M_PER_S: f64 = 0.01;
+
 /// What counts as the amplitude of a motion, and so as a ratio of two.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Criterion {
@@ -206,6 +210,8 @@ pub enum Floor {
     Weight,
     /// A part of that weight: of open stops no more is left than rounding.
     PartOfWeight,
+    /// Of [`CREEPING_M_PER_S`].
+    Creeping,
 }
 
 /// What there is to say of a metric, once.
@@ -354,6 +360,7 @@ const METRICS: [Facts; Metric::ALL.len()] = [
                       `friction_linear_speed_m_per_s` should be near",
         part: Some(Part::Damper),
         of_each: Some(["speed", "greatest speed along the damper in the window"]),
+        floor: Floor::Creeping,
         record: |wanted| wanted.damper_speeds = true,
         of: Some(|extra| extra.damper_speeds_m_per_s.clone()),
         ..PLAIN

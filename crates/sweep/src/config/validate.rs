@@ -8,7 +8,7 @@ use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use washer_model::{Spin, Target, Violation, decimal, highest_frequency_rad_per_s, prepare};
 use washer_row::Criterion;
 
-use crate::method::{REFERENCE_SHARE, SHORTEST_AT_CORNERS};
+use crate::method::REFERENCE_SHARE;
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, timing};
 use sweep_engine::config::Draft;
@@ -182,10 +182,6 @@ pub(crate) fn stability(draft: &Draft<'_, Washer>) {
     let (step_s, share) = match draft.plan.integrator.steps() {
         Steps::Fixed(step_s) => (Some(step_s), 1.0),
         Steps::Explicit => (None, 1.0),
-        // No rung costs more than the last.
-        Steps::Checked(_) if crate::plan::corners_of_forces(&draft.plan).is_some() => {
-            (None, REFERENCE_SHARE * SHORTEST_AT_CORNERS)
-        }
         Steps::Checked(_) => (None, REFERENCE_SHARE),
         // Stable at any step.
         Steps::Implicit => return,

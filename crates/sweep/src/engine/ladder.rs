@@ -12,24 +12,21 @@
 //! swinging after them, and only the last steps follow.
 //!
 //! Friction and stops give forces corners. A step that spans one errs by its own length, whatever
-//! the order of its formula, and two long steps that pass the same corner in the same way agree on
-//! an error that neither shows. Friction's harmonics also drive the hinge, which swings hardly
-//! damped at 411 rad/s, and which caps detune: with bearings capped at 1300 rad/s, in steps of 1
-//! ms, half of 36 rows of `sweeps/friction.toml` err by more than 4.3e-3. With so much less mass at
-//! the hinge that its modes are as fast as without caps (4.6 % of its stiffness over the cap
-//! squared) it is 6.1e-4, and 9.1e-5 at 4000 rad/s. But 10 of the 36 then err by more than 1e-3,
-//! up to 3e-2, and 6 of them at a quarter of the step, where 4 do by plain RK4 at the reference's
-//! step, which costs no more. So the nonlinear model with corners climbs by plain RK4 alone, from
-//! the reference's step to a quarter of it.
+//! the order of its formula. Friction's harmonics also drive the hinge, which swings hardly damped
+//! at 411 rad/s, and which caps detune: with bearings capped at 1300 rad/s and steps that see the
+//! corners, half of 120 rows of `sweeps/friction.toml` err by more than 5.6e-3, at 2600 rad/s by
+//! more than 1.7e-3. So the nonlinear model with corners climbs by the additive method: it takes
+//! the bearings implicitly, as they are, and its error estimate finds the corners.
 //!
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
+use lane_ode::Tolerance;
 use lane_ode::dop853::DOP853_STABILITY_LIMIT;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use washer_model::{Caps, Cases, Formula, Gear, Geared, Method, ModelKind};
 use washer_row::{Convergence, Ladder, Level, Rung};
 
-use crate::method::{REFERENCE_SHARE, SHORTEST_AT_CORNERS};
+use crate::method::{MAX_ADAPTIVE_STEPS, REFERENCE_SHARE};
 
 /// Step of the reference method, where the machine allows it (s): amplitudes are converged to about
 /// 1e-9.
@@ -52,6 +49,9 @@ const CONTRACTION_OF_FOLLOWING: f64 = 0.2;
 /// by 0.07 a second, their dampers by 0.3. At 0.5 rad it damps it by 2 a second, and the reference
 /// at 2 rad within a few steps.
 const FOLLOWED_RAD: f64 = 0.25;
+
+/// A rung's step is shorter than the one's before by this at least.
+const SHORTER: f64 = 1.5;
 
 /// A finest rung is climbed if it costs less than this share of the reference.
 const WORTH_IT: f64 = 0.5;
@@ -113,13 +113,20 @@ const HARMONIC_OF_ACCURACY: f64 = 1e-2;
 /// How far the whirl is kept above the last harmonic that matters.
 const CLEAR_OF_HARMONIC: f64 = 16.0 / 15.0;
 
-/// Steps of RK4 where forces have corners, as shares of the reference's. With friction of 90 N that
-/// turns within 3 mm/s, amplitudes err by up to 7e-3 at the first, 5e-4 and 1e-4 at the others.
-const STEPS_AT_CORNERS: [f64; 3] = [1.0, 0.5, SHORTEST_AT_CORNERS];
+/// Rungs of the additive method up to its reference; one more is behind it.
+const RUNGS_AT_CORNERS: i32 = 3;
 
-/// Error of one of these steps as a share of its difference from the one before: 1 where errors are
-/// of first order; and as much again, because where in a step a corner falls is chance.
-const CONTRACTION_AT_CORNERS: f64 = 2.0;
+/// The first one's relative error per step is the accuracy, but not more than this.
+const COARSEST_TOLERANCE: f64 = 1e-3;
+
+/// Each rung's relative error per step over that of the rung before.
+const FINER_TOLERANCE: f64 = 0.1;
+
+/// Absolute error per step (m, rad, m/s, rad/s) over the relative one.
+const ABSOLUTE_TOLERANCE: f64 = 2e-2;
+
+/// Error of a rung of the additive method as a share of its difference from the one before.
+const CONTRACTION_AT_CORNERS: f64 = 1.0;
 
 /// A contraction better than this is not believed.
 const BEST_CONTRACTION: f64 = 1e-3;
@@ -136,10 +143,10 @@ pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladd
     };
     let reference_step_s = reference_step_s(cases);
     if has_corners {
-        let rungs = STEPS_AT_CORNERS
-            .map(|share| plain(share * reference_step_s, CONTRACTION_AT_CORNERS, f64::INFINITY))
-            .to_vec();
-        return Ladder::checked(rungs, Some(AT_CORNERS.to_owned()));
+        let mut rungs: Vec<_> =
+            (0..=RUNGS_AT_CORNERS).map(|place| at_corners(place, accuracy)).collect();
+        let finer = rungs.pop();
+        return Ladder::checked(rungs, Some(AT_CORNERS.to_owned())).with_finer(finer);
     }
     let mut rungs = capped(cases, model, accuracy);
     let held_back = if rungs.is_empty() { too_fast(cases, accuracy) } else { None };
@@ -159,9 +166,25 @@ pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladd
     Ladder::checked(rungs, held_back).with_finer(finer.into_iter().flatten())
 }
 
-/// Why a machine with friction or stops has no quick rungs.
+/// A rung for forces with corners.
+fn at_corners(place: i32, accuracy: f64) -> Rung {
+    let relative = accuracy.min(COARSEST_TOLERANCE) * FINER_TOLERANCE.powi(place);
+    let absolute = ABSOLUTE_TOLERANCE * relative;
+    Rung {
+        level: Level::Additive,
+        method: Method::Additive(Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS }),
+        convergence: Convergence {
+            contraction: CONTRACTION_AT_CORNERS,
+            believed_to: f64::INFINITY,
+            ..Convergence::NONE
+        },
+        follows_bearings: false,
+    }
+}
+
+/// Why a machine with friction or stops has no rungs with capped modes.
 const AT_CORNERS: &str =
-    "rk4 alone, because friction and stops give forces corners, which longer steps miss";
+    "no modes are capped, because friction and stops give forces corners, which shake the hinge";
 
 /// Why elements or the drum's speed keep a machine from the quick rungs, if they do.
 fn too_fast(cases: &Cases<'_>, accuracy: f64) -> Option<String> {
@@ -189,7 +212,7 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
     if cases.hinge_to_drum() < least_hinge_to_drum(accuracy) {
         return Vec::new();
     }
-    let mut chosen: Vec<(Level, Geared)> = Vec::new();
+    let mut chosen: Vec<(Level, f64, Geared)> = Vec::new();
     for (level, aim) in [Level::Fast, Level::Fast, Level::Fine].into_iter().zip(aims(model)) {
         // The nonlinear model has one gear after the first: what instability amplifies later is
         // small while the drum is slow, and a window may end early.
@@ -198,18 +221,21 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
             false => cases.choose_steady(model, aim * accuracy),
         };
         let Ok(Some(geared)) = found else { break };
-        chosen.push((level, geared));
+        // Where strong dampers hold both steps short, they agree on an error that neither shows.
+        let is_near = |before: &Geared| before.top().step_s < SHORTER * geared.top().step_s;
+        chosen.pop_if(|(_, _, before)| is_near(before));
+        chosen.push((level, aim * accuracy, geared));
     }
     let plain_evaluations_per_s = Formula::Rk4.evaluations_per_s(reference_step_s(cases));
     let evaluations_per_s =
         |geared: &Geared| Formula::of(model).evaluations_per_s(geared.top().step_s);
     let finest =
-        chosen.last().filter(|_| model == ModelKind::Nonlinear).map(|(_, last)| refined(last));
+        chosen.last().filter(|_| model == ModelKind::Nonlinear).map(|(_, _, last)| refined(last));
     let finest = finest.filter(|it| evaluations_per_s(it) < WORTH_IT * plain_evaluations_per_s);
-    chosen.extend(finest.map(|finest| (Level::Finest, finest)));
-    let rung = |(place, (level, geared)): (usize, &(Level, Geared))| {
-        let before = place.checked_sub(1).map(|before| &chosen[before].1);
-        let contraction = before.map_or(1.0, |before| match model {
+    chosen.extend(finest.map(|finest| (Level::Finest, f64::INFINITY, finest)));
+    let rung = |(place, (level, _, geared)): (usize, &(Level, f64, Geared))| {
+        let before = place.checked_sub(1).map(|before| &chosen[before]);
+        let contraction = before.map_or(1.0, |(_, _, before)| match model {
             ModelKind::Nonlinear => reserve(place) * geared.share_of_error(before),
             ModelKind::Linear => {
                 expected_share(cases, model, before, geared).max(LEAST_EXPECTED_SHARE)
@@ -224,8 +250,8 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
                 contraction,
                 believed_to: first_order(model),
                 own_error: 0.0,
-                expected: match place.checked_sub(1) {
-                    Some(before) if *level != Level::Finest => aims(model)[before] * accuracy,
+                expected: match before {
+                    Some((_, aim, _)) if *level != Level::Finest => *aim,
                     // What reaches the finest rung is amplified far more than ringing is: of
                     // Fig. 12's rows this rule sent 46 on to RK4, which they agree with to 1.1e-4.
                     _ => f64::INFINITY,

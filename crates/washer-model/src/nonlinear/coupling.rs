@@ -189,10 +189,20 @@ impl<T: Real> Coupling<T> {
                 mass_scaled_load(bodies, squares, deflection, sag, &of_tub, &of_rotor)
             }
         };
-        let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia, &on_shaft.reaction());
-        let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(rotor_inertia, &on_shaft);
-        [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
+        under_load((tub, tub_inertia), (rotor, rotor_inertia), &on_shaft)
     }
+}
+
+/// Accelerations of both halves under a load on the shaft.
+#[inline(always)]
+pub(crate) fn under_load<T: Real>(
+    (tub, tub_inertia): (&Floating<T, 2>, &Factors<T, 2>),
+    (rotor, rotor_inertia): (&Floating<T, 4>, &Factors<T, 4>),
+    on_shaft: &AxisLoad<T>,
+) -> [N<T>; COORDINATES] {
+    let ([a1, a2], [a5, a6]) = tub.accelerations(tub_inertia, &on_shaft.reaction());
+    let ([a3, a4], [a7, a8, a9, a10]) = rotor.accelerations(rotor_inertia, on_shaft);
+    [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
 }
 
 /// w^2 K^-1 + C, lower triangle: from the compliances of the bearings in one direction (offset by

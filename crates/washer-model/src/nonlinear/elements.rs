@@ -28,17 +28,18 @@ lane_struct! {
         stops: Vec<StopOf<T>>,
         bushings: Vec<BushingOf<T>>,
         /// Whether some machine has more than springs and dampers that are linear along their
-        /// lines. Where none has, none pays.
+        /// lines: springs that stiffen, friction, or any of these. Where none has, none pays.
+        stiffens: InAnyLane<T>,
+        rubs: InAnyLane<T>,
         has_further: InAnyLane<T>,
     }
 }
 
 impl Elements<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
-        let has_further = machine.springs.iter().any(|spring| spring.cubic_n_per_m3 != 0.0)
-            || machine.dampers.iter().any(|damper| damper.friction_n != 0.0)
-            || !machine.stops.is_empty()
-            || !machine.bushings.is_empty();
+        let stiffens = machine.springs.iter().any(|spring| spring.cubic_n_per_m3 != 0.0);
+        let rubs = machine.dampers.iter().any(|damper| damper.friction_n != 0.0);
+        let has_more = !machine.stops.is_empty() || !machine.bushings.is_empty();
         Self {
             springs: machine.springs.iter().map(SpringOf::new).collect(),
             dampers: machine.dampers.iter().map(DamperOf::new).collect(),
@@ -46,7 +47,9 @@ impl Elements<f64> {
             frictions: machine.dampers.iter().map(FrictionOf::new).collect(),
             stops: machine.stops.iter().map(StopOf::new).collect(),
             bushings: machine.bushings.iter().map(BushingOf::new).collect(),
-            has_further: InAnyLane::new(has_further),
+            stiffens: InAnyLane::new(stiffens),
+            rubs: InAnyLane::new(rubs),
+            has_further: InAnyLane::new(stiffens || rubs || has_more),
         }
     }
 
@@ -129,8 +132,12 @@ impl<T: Lane> Aside for Further<'_, T> {
     fn run(self) {
         let Self { elements, tub, load } = self;
         let velocity = tub.midpoint_velocity_in_tub();
-        add(load, &elements.stiffenings, tub, &());
-        add(load, &elements.frictions, tub, &velocity);
+        if elements.stiffens.holds() {
+            add(load, &elements.stiffenings, tub, &());
+        }
+        if elements.rubs.holds() {
+            add(load, &elements.frictions, tub, &velocity);
+        }
         for stop in &elements.stops {
             let point = tub.point(&stop.tub, &velocity);
             let push = stop.push(&point);

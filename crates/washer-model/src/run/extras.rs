@@ -15,8 +15,11 @@ use crate::nonlinear::outputs::{RADIAL, squared};
 use crate::point::Point;
 use lane_ode::{Aside, Lane, N, PartPeaks, Sample, SquareIntegrals, TimeAbove};
 
-/// Parts into which the cabinet's force cuts steps that are not held short by the bearings.
+/// Parts into which forces and speeds cut steps that are not held short by the bearings.
 const PARTS_OF_A_LONG_STEP: u32 = 4;
+
+/// Parts of steps with capped modes need be no shorter than this (s).
+const SHORTEST_PART_S: f64 = 1e-3;
 
 /// Records to make beyond a [`Record`](super::Record); none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -106,11 +109,14 @@ impl Instants {
     }
 
     /// Of a method's steps.
-    pub(crate) const fn of(method: &Method) -> Self {
+    pub(crate) fn of(method: &Method) -> Self {
         match method {
             Method::Rk4 { .. } => Self::of_steps(true),
-            Method::Geared(_) => Self { clearances: 3, ..Self::of_steps(false) },
-            Method::Dopri5(_) | Method::Rodas5p(_) => Self::of_steps(false),
+            Method::Geared(geared) => {
+                let parts = (geared.top().step_s / SHORTEST_PART_S).ceil() as u32;
+                Self { parts: parts.clamp(1, PARTS_OF_A_LONG_STEP), clearances: 3 }
+            }
+            Method::Dopri5(_) | Method::Additive(_) | Method::Rodas5p(_) => Self::of_steps(false),
         }
     }
 }

@@ -8,6 +8,7 @@ use crate::linear::rotor_terms::Terms;
 use crate::linear::step::{self, RotorAt, StepConstants};
 use crate::machine::spin::{SpinLanes, SpinState, SpinStretch};
 use crate::nonlinear;
+use crate::nonlinear::bearings::{Bearings, Factored, accelerations_with_bearings};
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Caps, Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
@@ -16,7 +17,7 @@ use crate::nonlinear::frame::Tilt;
 use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
 use crate::point::Point;
 use core::f64::consts::FRAC_PI_2;
-use lane_ode::{Lane, N, Sample, System};
+use lane_ode::{Lane, N, Sample, Split, System, Task, Tolerance, additive, dopri5};
 
 /// Coordinates farther than this from equilibrium (m) have left the machine.
 const FARTHEST_M: f64 = 10.0;
@@ -33,6 +34,12 @@ pub(crate) trait Model<T: Lane>: System<T, STATES> {
     fn set_caps(&mut self, lane: usize, caps: &Caps);
     /// State at rest.
     fn at_rest(point: &Point) -> [f64; STATES];
+    /// Runs a task whose forces may have corners, in steps that see them.
+    fn integrate_at_corners<P: Task<T, STATES, System = Self>>(
+        zero: T,
+        task: &mut P,
+        tolerance: &Tolerance,
+    );
     /// Adds the forces with corners at a state to a list, if the model has any.
     fn corner_forces(&self, _x: &[N<T>; STATES], _forces: &mut Vec<CornerForce<T>>) {}
     /// Position of the drum's front centre relative to the tub axis, and the channels' deviations
@@ -111,6 +118,37 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
     }
 }
 
+/// The bearings, which must be springs, are the stiff part.
+impl<T: Lane> Split<T, STATES> for Nonlinear<T> {
+    type Stiff = Bearings<T>;
+    type Factored = Factored<T>;
+
+    #[inline(always)]
+    fn derivative_and_stiff(
+        &self,
+        spin: &SpinState<T>,
+        x: &[N<T>; STATES],
+    ) -> ([N<T>; STATES], Bearings<T>) {
+        let (q, u) = split(x);
+        let (a, bearings) = accelerations_with_bearings(&self.machine, spin, &q, &u);
+        (joined(&u, &a), bearings)
+    }
+
+    #[inline(always)]
+    fn factored(&self, bearings: &Bearings<T>, g_s: N<T>) -> Factored<T> {
+        bearings.factored(g_s)
+    }
+
+    #[inline(always)]
+    fn solve(
+        &self,
+        factored: &Factored<T>,
+        r: &[N<T>; STATES],
+    ) -> ([N<T>; STATES], [N<T>; STATES]) {
+        factored.solve(r)
+    }
+}
+
 impl<T: Lane> Nonlinear<T> {
     /// The motions that forces with corners hang on, depth (m) and speed (m/s) of each.
     #[inline(always)]
@@ -167,6 +205,15 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
     fn at_rest(point: &Point) -> [f64; STATES] {
         let nudged = |i: usize| point.equilibrium[i] + point.nudge;
         core::array::from_fn(|i| if i < COORDINATES { nudged(i) } else { 0.0 })
+    }
+
+    #[inline(always)]
+    fn integrate_at_corners<P: Task<T, STATES, System = Self>>(
+        zero: T,
+        task: &mut P,
+        tolerance: &Tolerance,
+    ) {
+        additive::integrate(zero, task, tolerance);
     }
 
     #[inline(always)]
@@ -288,6 +335,16 @@ impl<T: Lane> Model<T> for Linear<T> {
 
     fn at_rest(_: &Point) -> [f64; STATES] {
         [0.0; STATES]
+    }
+
+    // It has no corners; nothing takes this way.
+    #[inline(always)]
+    fn integrate_at_corners<P: Task<T, STATES, System = Self>>(
+        zero: T,
+        task: &mut P,
+        tolerance: &Tolerance,
+    ) {
+        dopri5::integrate(zero, task, tolerance);
     }
 
     #[inline(always)]

@@ -20,10 +20,11 @@ const GEARED: Geared = {
     geared.gears[0] = Gear { up_to_rad_per_s: 15.0, step_s: 1.3e-3, caps: CAPS };
     geared
 };
-const METHODS: [Method; 3] = [
+const METHODS: [Method; 4] = [
     Method::Rk4 { step_s: 1e-4 },
     Method::Geared(GEARED),
     Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
+    Method::Additive(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
 
 /// Corners, edges and middle of the quick map and a few between, its spin in a second: eleven
@@ -199,7 +200,8 @@ fn a_stop_is_answered_within_a_leg_by_every_method() {
     let tolerance = Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000 };
     let dop853 = Method::Geared(Geared::steady(2e-5, CAPS));
     let stiff = Method::Rodas5p(tolerance);
-    for method in [Method::Rk4 { step_s: 2e-5 }, dop853, Method::Dopri5(tolerance), stiff] {
+    let adaptive = [Method::Dopri5(tolerance), Method::Additive(tolerance), stiff];
+    for method in [Method::Rk4 { step_s: 2e-5 }, dop853].into_iter().chain(adaptive) {
         for model in MODELS {
             let asked = Cell::new(0);
             let until = |most: u32| {

@@ -9,7 +9,7 @@ use crate::{
     Unbalance, history, simulate,
 };
 use core::f64::consts::PI;
-use lane_ode::Simd;
+use lane_ode::{Simd, Tolerance};
 use serde_json::Value;
 
 /// The speed amplitude of the linear model's friction, where a test does not care.
@@ -74,8 +74,8 @@ pub(super) fn with_every_element() -> Machine {
 }
 
 /// The case of a reference made ready, and the largest difference from its history as a share of
-/// each channel's peak, by RK4 at two steps.
-fn held_against(name: &str, steps_s: [f64; 2]) -> [f64; 2] {
+/// each channel's peak, by each method.
+fn held_against<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N] {
     let case = reference(&format!("elements_{name}.json"));
     let (peak_rpm, ramp_s) = (case["peak_rpm"].as_f64().unwrap(), case["ramp_s"].as_f64().unwrap());
     let spin = match case["spin"].as_str().unwrap() {
@@ -101,8 +101,7 @@ fn held_against(name: &str, steps_s: [f64; 2]) -> [f64; 2] {
     };
     let channels: Vec<Channel> = names.iter().filter_map(channel).collect();
     assert_eq!((names[0], channels.len()), ("time_s", 6));
-    steps_s.map(|step_s| {
-        let method = Method::Rk4 { step_s };
+    methods.map(|method| {
         let history = history(ModelKind::Nonlinear, &method, &point, &Start::default(), 0.01);
         assert_eq!(history.len(), rows.len());
         let mut worst = 0.0_f64;
@@ -120,9 +119,16 @@ fn held_against(name: &str, steps_s: [f64; 2]) -> [f64; 2] {
 #[test]
 fn val_histories_with_every_element_match_independent_ones() {
     for name in ["friction", "stops", "gasket_cubic", "second_unbalance", "all"] {
-        let [coarse, fine] = held_against(name, [1e-4, 5e-5]);
-        eprintln!("{name}: {coarse:.1e} of the peak at steps of 1e-4 s, {fine:.1e} at 5e-5 s");
+        let rk4 = |step_s| Method::Rk4 { step_s };
+        let tolerance = Tolerance { relative: 1e-6, absolute: 1e-8, max_steps: 10_000_000 };
+        let methods = [rk4(1e-4), rk4(5e-5), Method::Additive(tolerance)];
+        let [coarse, fine, additive] = held_against(name, methods);
+        eprintln!(
+            "{name}: {coarse:.1e} of the peak at steps of 1e-4 s, {fine:.1e} at 5e-5 s, \
+             {additive:.1e} by the additive method"
+        );
         assert!(fine < 1e-5, "{name}: {fine:e}");
+        assert!(additive < 1e-4, "{name}: {additive:e} by the additive method");
     }
 }
 
