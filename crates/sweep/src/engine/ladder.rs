@@ -113,14 +113,12 @@ const HARMONIC_OF_ACCURACY: f64 = 1e-2;
 /// How far the whirl is kept above the last harmonic that matters.
 const CLEAR_OF_HARMONIC: f64 = 16.0 / 15.0;
 
-/// Rungs of the additive method up to its reference; one more is behind it.
-const RUNGS_AT_CORNERS: i32 = 3;
-
 /// The first one's relative error per step is the accuracy, but not more than this.
 const COARSEST_TOLERANCE: f64 = 1e-3;
 
-/// Each rung's relative error per step over that of the rung before.
-const FINER_TOLERANCE: f64 = 0.1;
+/// Those of all rungs of the additive method, as shares of the first one's; the last is behind the
+/// reference. Products, because powers may differ in a digit from one system to another.
+const SHARES_AT_CORNERS: [f64; 4] = [1.0, 0.1, 0.1 * 0.1, 0.1 * 0.1 * 0.1];
 
 /// Absolute error per step (m, rad, m/s, rad/s) over the relative one.
 const ABSOLUTE_TOLERANCE: f64 = 2e-2;
@@ -143,8 +141,7 @@ pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladd
     };
     let reference_step_s = reference_step_s(cases);
     if has_corners {
-        let mut rungs: Vec<_> =
-            (0..=RUNGS_AT_CORNERS).map(|place| at_corners(place, accuracy)).collect();
+        let mut rungs = SHARES_AT_CORNERS.map(|share| at_corners(share, accuracy)).to_vec();
         let finer = rungs.pop();
         return Ladder::checked(rungs, Some(AT_CORNERS.to_owned())).with_finer(finer);
     }
@@ -167,8 +164,8 @@ pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladd
 }
 
 /// A rung for forces with corners.
-fn at_corners(place: i32, accuracy: f64) -> Rung {
-    let relative = accuracy.min(COARSEST_TOLERANCE) * FINER_TOLERANCE.powi(place);
+fn at_corners(share: f64, accuracy: f64) -> Rung {
+    let relative = accuracy.min(COARSEST_TOLERANCE) * share;
     let absolute = ABSOLUTE_TOLERANCE * relative;
     Rung {
         level: Level::Additive,
