@@ -77,18 +77,18 @@ impl<T: Lane> Lanes<T> {
         h
     }
 
-    /// After steps `h` with this error, a norm below 1 where they are good, to states of which
-    /// these are `in_range`: how far each lane has gone.
+    /// After steps `h` with this error, in lanes where they were accepted and where the states they
+    /// led to are in range: how far each lane has gone.
     #[inline(always)]
     pub(crate) fn settle(
         &mut self,
         h: N<T>,
         error: N<T>,
-        in_range: u32,
+        lanes: [T::Mask; 2],
         tolerance: &Tolerance,
     ) -> N<T> {
         let mut length = h.lit(0.0);
-        let accepted = T::bits(error.0.less(h.lit(1.0).0));
+        let [accepted, in_range] = lanes.map(T::bits);
         let next = self.control.proposals(error, h);
         // Lane by lane: bookkeeping in scalars is small beside a step's evaluations.
         for (lane, leg) in

@@ -98,7 +98,19 @@ const EXPLICIT: [[f64; STAGES]; STAGES] = [
     ],
 ];
 
-/// The matrix of the implicit part, without its diagonal.
+/// Weights of order 5, of both parts.
+const WEIGHT: [f64; STAGES] = [
+    -872_700_587_467.0 / 9_133_579_230_613.0,
+    0.0,
+    0.0,
+    22_348_218_063_261.0 / 9_555_858_737_531.0,
+    -1_143_369_518_992.0 / 8_141_816_002_931.0,
+    -39_379_526_789_629.0 / 19_018_526_304_540.0,
+    32_727_382_324_388.0 / 42_900_044_865_799.0,
+    41.0 / 200.0,
+];
+
+/// The matrix of the implicit part below its diagonal; its last row is the weights.
 const IMPLICIT: [[f64; STAGES]; STAGES] = [
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [41.0 / 200.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -143,28 +155,7 @@ const IMPLICIT: [[f64; STAGES]; STAGES] = [
         0.0,
         0.0,
     ],
-    [
-        -872_700_587_467.0 / 9_133_579_230_613.0,
-        0.0,
-        0.0,
-        22_348_218_063_261.0 / 9_555_858_737_531.0,
-        -1_143_369_518_992.0 / 8_141_816_002_931.0,
-        -39_379_526_789_629.0 / 19_018_526_304_540.0,
-        32_727_382_324_388.0 / 42_900_044_865_799.0,
-        0.0,
-    ],
-];
-
-/// Weights of order 5, of both parts.
-const WEIGHT: [f64; STAGES] = [
-    -872_700_587_467.0 / 9_133_579_230_613.0,
-    0.0,
-    0.0,
-    22_348_218_063_261.0 / 9_555_858_737_531.0,
-    -1_143_369_518_992.0 / 8_141_816_002_931.0,
-    -39_379_526_789_629.0 / 19_018_526_304_540.0,
-    32_727_382_324_388.0 / 42_900_044_865_799.0,
-    41.0 / 200.0,
+    WEIGHT,
 ];
 
 /// Those of order 4.
@@ -241,7 +232,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
                 }
                 r[i] = (h * sum).v();
             }
-            let (z, of_stiff) = task.system().solve(&factored, &r);
+            let (z, of_stiff) = task.system().solve(&stiff, &factored, &r);
             l[stage] = of_stiff;
             for i in 0..D {
                 y[i] = x[i] + z[i];
@@ -268,6 +259,6 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         for i in 0..D {
             x[i] = N(T::select(accepted, y[i].0, x[i].0));
         }
-        length = lanes.settle(h, error, T::bits(in_range), tolerance);
+        length = lanes.settle(h, error, [accepted, in_range], tolerance);
     }
 }

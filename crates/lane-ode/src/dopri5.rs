@@ -103,7 +103,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         }
         is_fresh = false;
 
-        let in_range = T::bits(task.system().in_range(&y));
+        let in_range = task.system().in_range(&y);
         let error = tolerance.norm(&x, &y, &combined(h, &k, &ERROR));
         let accepted = error.0.less(zero.lit(1.0).0);
         let before = x;
@@ -113,7 +113,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
             x[i] = N(T::select(accepted, y[i].0, x[i].0));
             k[0][i] = N(T::select(accepted, k[STAGES - 1][i].0, k[0][i].0));
         }
-        let length = lanes.settle(h, error, in_range, tolerance);
+        let length = lanes.settle(h, error, [accepted, in_range], tolerance);
         let forcing = task.system().forcing(lanes.time);
         task.observe(
             &forcing,

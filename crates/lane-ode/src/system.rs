@@ -29,9 +29,9 @@ pub trait System<T: Lane, const D: usize> {
 /// A system with a linear part, x' = L x, that is too stiff for explicit formulas.
 pub trait Split<T: Lane, const D: usize>: System<T, D> {
     /// L at a state, or near enough to it that the rest is not stiff.
-    type Stiff: Copy;
-    /// What it takes to solve with I - g L.
-    type Factored: Copy;
+    type Stiff;
+    /// What it takes, beside L, to solve with I - g L.
+    type Factored;
 
     /// f and L at state `x`.
     fn derivative_and_stiff(
@@ -44,7 +44,12 @@ pub trait Split<T: Lane, const D: usize>: System<T, D> {
     fn factored(&self, stiff: &Self::Stiff, g_s: N<T>) -> Self::Factored;
 
     /// z with z - g L z = r, and L z.
-    fn solve(&self, factored: &Self::Factored, r: &[N<T>; D]) -> ([N<T>; D], [N<T>; D]);
+    fn solve(
+        &self,
+        stiff: &Self::Stiff,
+        factored: &Self::Factored,
+        r: &[N<T>; D],
+    ) -> ([N<T>; D], [N<T>; D]);
 }
 
 /// Trajectories fed into lanes one after another: a lane that ends takes up the next at once.

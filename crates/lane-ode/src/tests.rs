@@ -166,7 +166,7 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D> fo
 
 impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Split<T, D> for Member<T, E, P> {
     type Stiff = [N<T>; P];
-    type Factored = ([N<T>; P], N<T>);
+    type Factored = N<T>;
 
     #[inline(always)]
     fn derivative_and_stiff(&self, t_s: &N<T>, x: &[N<T>; D]) -> ([N<T>; D], [N<T>; P]) {
@@ -174,12 +174,12 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Split<T, D> for
     }
 
     #[inline(always)]
-    fn factored(&self, p: &[N<T>; P], g_s: N<T>) -> ([N<T>; P], N<T>) {
-        (*p, g_s)
+    fn factored(&self, _: &[N<T>; P], g_s: N<T>) -> N<T> {
+        g_s
     }
 
     #[inline(always)]
-    fn solve(&self, (p, g_s): &([N<T>; P], N<T>), r: &[N<T>; D]) -> ([N<T>; D], [N<T>; D]) {
+    fn solve(&self, p: &[N<T>; P], g_s: &N<T>, r: &[N<T>; D]) -> ([N<T>; D], [N<T>; D]) {
         E::solve(p, *g_s, r)
     }
 }

@@ -161,17 +161,15 @@ impl<'a> Case<'a> {
         let top = spin.greatest_speed_rad_per_s(end_s);
         let rest = State::new(point, 0.0)?;
         let [first, second, third] = GEAR_SHARES.map(|share| State::new(point, share * top));
+        let modes = &rest.modes.modes;
         // Where strong dampers let motions of the suspension creep, these are not to be followed.
-        let swings = |mode: &&Mode| mode.im_rad_per_s != 0.0;
-        let swinging = rest.modes.modes.iter().filter(swings).map(|mode| mode.magnitude_rad_per_s);
-        let swinging: Vec<f64> = swinging.collect();
-        let of_suspension = SUSPENSION_MODES.saturating_sub(COORDINATES - swinging.len());
-        let at_rest = swinging[..of_suspension].iter().copied().fold(top, f64::max);
+        let swinging = modes[..SUSPENSION_MODES].iter().filter(|mode| mode.im_rad_per_s != 0.0);
+        let at_rest = swinging.map(|mode| mode.magnitude_rad_per_s).fold(top, f64::max);
         let followed = match &point.steepest {
             Some(steepest) => at_rest.max(fastest_rigid_rad_per_s(point, steepest)?),
             None => at_rest,
         };
-        let hinge = swinging.get(of_suspension).copied().unwrap_or(f64::INFINITY);
+        let hinge = modes[SUSPENSION_MODES].magnitude_rad_per_s;
         // A soft hinge takes part in the motion. Stops may drive faster motions than the hinge's.
         let with_hinge =
             |fastest: f64| if hinge < 2.0 * fastest { hinge.max(fastest) } else { fastest };

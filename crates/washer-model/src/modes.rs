@@ -134,17 +134,19 @@ pub(crate) fn modes_with_caps(
     let (system, mass) = first_order(point, &point.linear, theta_rad, speed_rad_per_s, caps)?;
     let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
     let (values, vectors) = (decomposition.S().column_vector(), decomposition.U());
-    let motions = natural_motions((0..STATES).map(|k| values[k] * system.unit_per_s))?;
-    let modes = motions.map(|Motion { s, magnitude_rad_per_s, state }| Mode {
+    let shape = |state: usize| unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, state)]));
+    let likeness = |a: usize, b: usize| assurance(&mass, &shape(a), &shape(b));
+    let motions = natural_motions((0..STATES).map(|k| values[k] * system.unit_per_s), &likeness)?;
+    let modes = motions.map(|(Motion { s, magnitude_rad_per_s }, state)| Mode {
         re_per_s: s.re,
         im_rad_per_s: s.im,
         magnitude_rad_per_s,
-        shape: unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, state)])),
+        shape: shape(state),
     });
     Ok(Modes { modes, mass })
 }
 
-/// The eigenvalues of these motions alone, in a third of the time.
+/// The eigenvalues of these motions alone, in a third of the time unless several of them creep.
 pub(crate) fn motions(
     point: &Point,
     speed_rad_per_s: f64,
@@ -152,7 +154,15 @@ pub(crate) fn motions(
 ) -> Result<[Motion; COORDINATES], NoModes> {
     let (system, _) = first_order(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
     let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
-    natural_motions(values.into_iter().map(|s| s * system.unit_per_s))
+    if values.iter().filter(|s| s.im == 0.0).count() > 2 {
+        // Which rates belong together is told by shapes.
+        return Ok(modes_with_caps(point, 0.0, speed_rad_per_s, caps)?.modes.map(|mode| Motion {
+            s: c64::new(mode.re_per_s, mode.im_rad_per_s),
+            magnitude_rad_per_s: mode.magnitude_rad_per_s,
+        }));
+    }
+    let values = values.into_iter().map(|s| s * system.unit_per_s);
+    Ok(natural_motions(values, &|_, _| 1.0)?.map(|(motion, _)| motion))
 }
 
 /// A natural motion by its eigenvalue.
@@ -162,12 +172,14 @@ pub(crate) struct Motion {
     pub(crate) s: c64,
     /// As in [`Mode`].
     pub(crate) magnitude_rad_per_s: f64,
-    /// Which of the eigenvalues it is.
-    state: usize,
 }
 
-/// The natural motions of all eigenvalues, the slowest first.
-fn natural_motions(values: impl Iterator<Item = c64>) -> Result<[Motion; COORDINATES], NoModes> {
+/// The natural motions of all eigenvalues, the slowest first, each with the place of its eigenvalue
+/// or of the slower of its two rates; `likeness` compares the shapes at two places.
+fn natural_motions(
+    values: impl Iterator<Item = c64>,
+    likeness: &dyn Fn(usize, usize) -> f64,
+) -> Result<[(Motion, usize); COORDINATES], NoModes> {
     let mut swinging = Vec::with_capacity(COORDINATES);
     let mut steady = Vec::new();
     for (state, s) in values.enumerate() {
@@ -175,20 +187,22 @@ fn natural_motions(values: impl Iterator<Item = c64>) -> Result<[Motion; COORDIN
             return Err(NoModes::Eigenvalues);
         }
         if s.im > 0.0 {
-            swinging.push(Motion { s, magnitude_rad_per_s: magnitude(s), state });
+            swinging.push((Motion { s, magnitude_rad_per_s: magnitude(s) }, state));
         } else if s.im == 0.0 {
             steady.push((s.re, state));
         }
     }
-    // The two rates of one motion lie symmetrically about their mean, so neighbours belong
-    // together, not the slowest and the fastest.
-    steady.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
-    for pair in steady.chunks_exact(2) {
-        let [(slow, state), (fast, _)] = [pair[0], pair[1]];
+    // The two rates of one motion have nearly one shape. Of several motions that creep, the slow
+    // rates may all lie below the fast ones, so that neighbours do not belong together.
+    steady.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+    while let Some((slow, state)) = steady.pop() {
+        let alike = |&at: &usize| likeness(state, steady[at].1);
+        let most = (0..steady.len()).rev().max_by(|a, b| alike(a).total_cmp(&alike(b)));
+        let (fast, _) = steady.remove(most.ok_or(NoModes::Eigenvalues)?);
         let s = c64::new(0.5 * (slow + fast), 0.0);
-        swinging.push(Motion { s, magnitude_rad_per_s: (slow * fast).abs().sqrt(), state });
+        swinging.push((Motion { s, magnitude_rad_per_s: (slow * fast).abs().sqrt() }, state));
     }
-    swinging.sort_by(|a, b| a.magnitude_rad_per_s.total_cmp(&b.magnitude_rad_per_s));
+    swinging.sort_by(|a, b| a.0.magnitude_rad_per_s.total_cmp(&b.0.magnitude_rad_per_s));
     swinging.try_into().map_err(|_| NoModes::Eigenvalues)
 }
 

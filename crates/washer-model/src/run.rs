@@ -208,9 +208,12 @@ impl<F: Family> Kernel for Simulate<'_, F> {
         match (stepper, F::FORMULA) {
             (Stepper::Plain, _) | (Stepper::Capped, Formula::Rk4) => rk4::integrate(zero, &mut run),
             (Stepper::Capped, Formula::Dop853) => dop853::integrate(zero, &mut run),
-            (Stepper::Dopri5(tolerance), _) => dopri5::integrate(zero, &mut run, &tolerance),
-            (Stepper::Additive(tolerance), _) => {
-                F::Over::<T>::integrate_at_corners(zero, &mut run, &tolerance);
+            (Stepper::Dopri5(tolerance), _) if F::KIND == ModelKind::Nonlinear => {
+                dopri5::integrate(zero, &mut run, &tolerance);
+            }
+            // One and the same for the linear model: its loop is compiled once.
+            (Stepper::Dopri5(tolerance) | Stepper::Additive(tolerance), _) => {
+                F::Over::<T>::integrate_additive(zero, &mut run, &tolerance);
             }
         }
         run.recorded()

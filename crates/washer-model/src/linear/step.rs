@@ -77,11 +77,7 @@ impl StepConstants<f64> {
                 b.front_stiffness * (b.bearing_front * b.bearing_front)
                     + b.rear_stiffness * (b.bearing_rear * b.bearing_rear),
             ],
-            bearing_compliance: [
-                b.bearing_force_compliance,
-                b.bearing_mixed_compliance,
-                b.bearing_moment_compliance,
-            ],
+            bearing_compliance: b.bearing_compliance(),
         };
         for column in 0..4 {
             let of_matrix = |matrix: &[[N<f64>; 4]; 4]| matrix.map(|row| -row[column]);

@@ -10,7 +10,7 @@
 
 use crate::coordinates::{COORDINATES, STATES};
 use crate::machine::spin::SpinState;
-use crate::nonlinear::coefficients::{Bodies, Coefficients};
+use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{mass_scaled_system, under_load};
 use crate::nonlinear::floating::{Factors, Floating};
 use crate::nonlinear::forces::{AxisLoad, Deflection};
@@ -18,20 +18,16 @@ use crate::nonlinear::{rotor, tub};
 use lane_ode::{Lane, N};
 
 /// Both halves at a state, free of every load.
-#[derive(Clone, Copy)]
 pub(crate) struct Bearings<T> {
     tub: (Floating<T, 2>, Factors<T, 2>),
     rotor: (Floating<T, 4>, Factors<T, 4>),
     /// Of tub and rotor; lower triangles.
     compliances: [[[N<T>; 4]; 4]; 2],
-    /// Of the bearings in one direction: offset by force, offset by moment, tilt by moment.
     of_bearings: [N<T>; 3],
 }
 
-/// The same for steps of one length.
-#[derive(Clone, Copy)]
+/// What stands beside these for steps of one length.
 pub(crate) struct Factored<T> {
-    bearings: Bearings<T>,
     system: Factors<T, 4>,
     g: N<T>,
     per_g_squared: N<T>,
@@ -58,14 +54,9 @@ pub(crate) fn accelerations_with_bearings<T: Lane>(
         tub: (tub.floating.free_of_load(), of_tub),
         rotor: (rotor.floating.free_of_load(), of_rotor),
         compliances,
-        of_bearings: compliance(b),
+        of_bearings: b.bearing_compliance(),
     };
     (accelerations, bearings)
-}
-
-#[inline(always)]
-fn compliance<T: Lane>(b: &Bodies<T>) -> [N<T>; 3] {
-    [b.bearing_force_compliance, b.bearing_mixed_compliance, b.bearing_moment_compliance]
 }
 
 impl<T: Lane> Bearings<T> {
@@ -75,15 +66,17 @@ impl<T: Lane> Bearings<T> {
         let per_g_squared = (g * g).v().recip();
         let [tub, rotor] = &self.compliances;
         let system = mass_scaled_system(per_g_squared, self.of_bearings, tub, rotor);
-        Factored { bearings: *self, system: Factors::new(system), g, per_g_squared }
+        Factored { system: Factors::new(system), g, per_g_squared }
     }
-}
 
-impl<T: Lane> Factored<T> {
     /// z with z - g L z = r, and L z.
     #[inline(always)]
-    pub(crate) fn solve(&self, r: &[N<T>; STATES]) -> ([N<T>; STATES], [N<T>; STATES]) {
-        let Self { bearings: Bearings { tub, rotor, .. }, system, g, per_g_squared } = self;
+    pub(crate) fn solve(
+        &self,
+        Factored { system, g, per_g_squared }: &Factored<T>,
+        r: &[N<T>; STATES],
+    ) -> ([N<T>; STATES], [N<T>; STATES]) {
+        let Self { tub, rotor, .. } = self;
         let (mut z, mut of_stiff) = (*r, *r);
         let mut ahead = [*g; COORDINATES];
         for i in 0..COORDINATES {

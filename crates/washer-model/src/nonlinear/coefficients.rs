@@ -46,10 +46,22 @@ lane_struct! {
         drum_i11, drum_i22, drum_i33, drum_i12,
         flexure_stiffness,
         bearing_front, bearing_rear, front_stiffness, rear_stiffness,
-        /// The bearings' stiffness over (offset, tilt) of their midpoint, inverted: offset by
-        /// force, offset by moment, tilt by moment.
+        /// The bearings' stiffness over (offset, tilt) of their midpoint, inverted.
         bearing_force_compliance, bearing_mixed_compliance, bearing_moment_compliance,
         tub_front, drum_hinge, hinge_to_front, clearance,
+    }
+}
+
+impl<T: Copy> Bodies<T> {
+    /// The bearings' compliance in one direction: offset by force, offset by moment, tilt by
+    /// moment.
+    #[inline(always)]
+    pub(crate) fn bearing_compliance(&self) -> [N<T>; 3] {
+        [
+            self.bearing_force_compliance,
+            self.bearing_mixed_compliance,
+            self.bearing_moment_compliance,
+        ]
     }
 }
 

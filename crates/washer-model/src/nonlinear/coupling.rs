@@ -205,8 +205,7 @@ pub(crate) fn under_load<T: Real>(
     [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
 }
 
-/// w^2 K^-1 + C, lower triangle: from the compliances of the bearings in one direction (offset by
-/// force, offset by moment, tilt by moment) and of both halves.
+/// w^2 K^-1 + C, lower triangle: from the compliances of the bearings and of both halves.
 #[inline(always)]
 pub(crate) fn mass_scaled_system<T: Real>(
     cap_squared: N<T>,
@@ -238,9 +237,8 @@ fn mass_scaled_load<T: Real>(
     tub: &Response<T>,
     rotor: &Response<T>,
 ) -> AxisLoad<T> {
-    let of_bearings =
-        [b.bearing_force_compliance, b.bearing_mixed_compliance, b.bearing_moment_compliance];
-    let system = mass_scaled_system(cap_squared, of_bearings, &tub.compliance, &rotor.compliance);
+    let system =
+        mass_scaled_system(cap_squared, b.bearing_compliance(), &tub.compliance, &rotor.compliance);
     let both_squared = cap_squared + speed_squared;
     let (d, sag) = (deflection.rows(), sag.rows());
     let mut load = d;

@@ -258,9 +258,11 @@ impl<F: Family> ScalarKernel for Sample<'_, F> {
                 Formula::Rk4 => rk4::integrate(0.0, &mut sampling),
                 Formula::Dop853 => dop853::integrate(0.0, &mut sampling),
             },
-            Method::Dopri5(tolerance) => dopri5::integrate(0.0, &mut sampling, tolerance),
-            Method::Additive(tolerance) => {
-                F::Over::<f64>::integrate_at_corners(0.0, &mut sampling, tolerance);
+            Method::Dopri5(tolerance) if F::KIND == ModelKind::Nonlinear => {
+                dopri5::integrate(0.0, &mut sampling, tolerance);
+            }
+            Method::Dopri5(tolerance) | Method::Additive(tolerance) => {
+                F::Over::<f64>::integrate_additive(0.0, &mut sampling, tolerance);
             }
             Method::Rodas5p(tolerance) => {
                 let mut task = StiffTask::<f64, _, F::Over<Dual<f64>>>::new(0.0, sampling, point);

@@ -34,12 +34,16 @@ pub(crate) trait Model<T: Lane>: System<T, STATES> {
     fn set_caps(&mut self, lane: usize, caps: &Caps);
     /// State at rest.
     fn at_rest(point: &Point) -> [f64; STATES];
-    /// Runs a task whose forces may have corners, in steps that see them.
-    fn integrate_at_corners<P: Task<T, STATES, System = Self>>(
+    /// Runs a task by the additive method, or by Dormand-Prince where the model has no stiff part
+    /// apart.
+    #[inline(always)]
+    fn integrate_additive<P: Task<T, STATES, System = Self>>(
         zero: T,
         task: &mut P,
         tolerance: &Tolerance,
-    );
+    ) {
+        dopri5::integrate(zero, task, tolerance);
+    }
     /// Adds the forces with corners at a state to a list, if the model has any.
     fn corner_forces(&self, _x: &[N<T>; STATES], _forces: &mut Vec<CornerForce<T>>) {}
     /// Position of the drum's front centre relative to the tub axis, and the channels' deviations
@@ -142,10 +146,11 @@ impl<T: Lane> Split<T, STATES> for Nonlinear<T> {
     #[inline(always)]
     fn solve(
         &self,
+        bearings: &Bearings<T>,
         factored: &Factored<T>,
         r: &[N<T>; STATES],
     ) -> ([N<T>; STATES], [N<T>; STATES]) {
-        factored.solve(r)
+        bearings.solve(factored, r)
     }
 }
 
@@ -208,7 +213,7 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
     }
 
     #[inline(always)]
-    fn integrate_at_corners<P: Task<T, STATES, System = Self>>(
+    fn integrate_additive<P: Task<T, STATES, System = Self>>(
         zero: T,
         task: &mut P,
         tolerance: &Tolerance,
@@ -335,16 +340,6 @@ impl<T: Lane> Model<T> for Linear<T> {
 
     fn at_rest(_: &Point) -> [f64; STATES] {
         [0.0; STATES]
-    }
-
-    // It has no corners; nothing takes this way.
-    #[inline(always)]
-    fn integrate_at_corners<P: Task<T, STATES, System = Self>>(
-        zero: T,
-        task: &mut P,
-        tolerance: &Tolerance,
-    ) {
-        dopri5::integrate(zero, task, tolerance);
     }
 
     #[inline(always)]

@@ -1,7 +1,8 @@
 //! The speeds at which the linear model takes friction, where they are its own motion's.
 
+use crate::modes::motions;
 use crate::{
-    Damper, Machine, Method, ModelKind, Point, Spin, Timing, Wanted, prepare, simulate_with,
+    Damper, Machine, Method, ModelKind, Point, Spin, Timing, Wanted, modes, prepare, simulate_with,
 };
 use lane_ode::Simd;
 
@@ -64,4 +65,32 @@ fn a_damper_that_is_stuck_is_taken_as_its_law_has_it() {
     for taken in stuck.friction_speeds() {
         assert!((taken.speed_m_per_s / least - 1.0).abs() < 1e-12, "{taken:?}, least {least}");
     }
+}
+
+/// Neighbouring rates would make a slow motion of two slow rates and one as fast as the hinge's of
+/// two fast ones.
+#[test]
+fn motions_that_creep_have_two_rates_of_one_shape() {
+    let frequencies = |frictions_n: [f64; 2]| {
+        let point = ready(&[machine(0.1, frictions_n, None)]).remove(0);
+        let found = modes(&point, 0.0, 0.0).unwrap().modes;
+        let alone = motions(&point, 0.0, None).unwrap();
+        for (mode, motion) in found.iter().zip(alone) {
+            let apart = motion.magnitude_rad_per_s / mode.magnitude_rad_per_s - 1.0;
+            assert!(apart.abs() < 1e-9, "{frictions_n:?}: {apart:e}");
+        }
+        found
+    };
+    let free = frequencies([0.0, 0.0]);
+    let mut most_creeping = 0;
+    for friction_n in [20.0, 40.0, 60.0, 120.0, 300.0] {
+        let held = frequencies([friction_n, 0.9 * friction_n]);
+        let creeping = held.iter().filter(|mode| mode.im_rad_per_s == 0.0).count();
+        most_creeping = most_creeping.max(creeping);
+        for (held, free) in held.iter().zip(&free) {
+            let ratio = held.magnitude_rad_per_s / free.magnitude_rad_per_s;
+            assert!((0.8..1.25).contains(&ratio), "{friction_n} N: {ratio}");
+        }
+    }
+    assert_eq!(most_creeping, 2);
 }
