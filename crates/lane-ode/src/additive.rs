@@ -189,7 +189,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     let mut length = zero;
     let mut is_fresh = lanes.take_up(task, &mut x);
     while lanes.are_active() && !task.is_stopped() {
-        let forcing = task.system().forcing(lanes.time);
+        let forcing = task.system().forcing_aside(lanes.time);
         let (slope, stiff) = task.system().derivative_and_stiff(&forcing, &x);
         k[0] = slope;
         if is_fresh {

@@ -131,7 +131,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let h = clock.h;
         let mut time = clock.at(index);
         // Hidden from the compiler, which would copy it from place to place.
-        let mut forcing = task.system().forcing(time);
+        let mut forcing = task.system().forcing_aside(time);
         let forcing = black_box(&mut forcing);
         // States of this step's start and of the last one's, which change places, and the stage's;
         // the last step's first slope, which observers want, after this step's.

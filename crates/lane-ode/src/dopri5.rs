@@ -114,7 +114,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
             k[0][i] = N(T::select(accepted, k[STAGES - 1][i].0, k[0][i].0));
         }
         let length = lanes.settle(h, error, [accepted, in_range], tolerance);
-        let forcing = task.system().forcing(lanes.time);
+        let forcing = task.system().forcing_aside(lanes.time);
         task.observe(
             &forcing,
             &Step {

@@ -137,7 +137,7 @@ impl<T: Lane> Lane for Dual<T> {
         T::bits(mask)
     }
     #[inline(always)]
-    fn aside<W: Aside>(self, work: W) {
-        self.value.aside(work);
+    fn aside<W: Aside>(self, work: W) -> W::Output {
+        self.value.aside(work)
     }
 }

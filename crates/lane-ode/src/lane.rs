@@ -33,20 +33,23 @@ pub trait Lane: Real {
     /// Runs work over lanes of this type as a function of its own, compiled with the type's
     /// instructions once for all callers.
     #[inline(always)]
-    fn aside<W: Aside>(self, work: W) {
-        out_of_line(work);
+    fn aside<W: Aside>(self, work: W) -> W::Output {
+        out_of_line(work)
     }
 }
 
 /// Work over lanes of one type that is compiled once, as a function of its own, not wherever it is
 /// called from: for what is long and runs seldom beside what surrounds it. [`Lane::aside`] runs it.
+/// The time that a function takes to compile grows faster than its length.
 pub trait Aside {
+    /// What the work gives.
+    type Output;
     /// Does the work. Mark it `#[inline(always)]` as [`Kernel::run`](crate::Kernel::run).
-    fn run(self);
+    fn run(self) -> Self::Output;
 }
 
 /// Work without any instruction set of its own.
 #[inline(never)]
-pub(crate) fn out_of_line<W: Aside>(work: W) {
-    work.run();
+pub(crate) fn out_of_line<W: Aside>(work: W) -> W::Output {
+    work.run()
 }

@@ -40,9 +40,9 @@ impl<const C: usize> Partials<C> {
         const { assert!(D == 2 * C, "a state is the coordinates and their speeds") };
         let zero = N(zero);
         let mut time = zero.lit(t_s).constant();
-        let still = system.forcing(time);
+        let still = system.forcing_aside(time);
         time.0.slope = zero.lit(1.0).0;
-        let moving = system.forcing(time);
+        let moving = system.forcing_aside(time);
         let mut constant = [zero.constant(); D];
         for i in 0..D {
             constant[i] = zero.lit(x[i].0).constant();
@@ -59,7 +59,7 @@ impl<const C: usize> Partials<C> {
                     seeded[first + lane].0.slope.set(lane, 1.0);
                 }
             }
-            let slopes = system.derivative(forcing, &seeded);
+            let slopes = system.derivative_aside(forcing, &seeded);
             for i in 0..C {
                 let slope = slopes[C + i].0.slope;
                 if group == groups {

@@ -30,7 +30,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         // At the step's start, then its middle, then its end, which is the next one's start. Hidden
         // from the compiler, which would hold it in variables, and copy all of them from place to
         // place in every step.
-        let mut forcing = task.system().forcing(time);
+        let mut forcing = task.system().forcing_aside(time);
         let forcing = black_box(&mut forcing);
         // States and slopes of this step's start and of the last one's, which change places too;
         // then two more for the states of stages. All states in one array, so that a stage's is one

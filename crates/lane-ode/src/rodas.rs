@@ -231,7 +231,7 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(
 
             let mut stages = [[N(0.0); D]; STAGES];
             let mut y = x;
-            let at_start = task.system().forcing(N(t));
+            let at_start = task.system().forcing_aside(N(t));
             let mut forcing = at_start;
             // A matrix without factors makes no step: the error stays NaN and the next try is
             // shorter.
@@ -242,7 +242,7 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(
                     if stage > 0 && NODE[stage] != NODE[stage - 1] {
                         let time =
                             if NODE[stage] == 1.0 { N(reached) } else { h * NODE[stage] + N(t) };
-                        task.system().renew(time, &mut forcing);
+                        forcing = task.system().forcing_aside(time);
                     }
                     y = x;
                     let mut earlier = [N(0.0); D];
@@ -253,7 +253,7 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(
                             earlier[i] += weight * stages[j][i];
                         }
                     }
-                    let slope = task.system().derivative(&forcing, &y);
+                    let slope = task.system().derivative_aside(&forcing, &y);
                     let time_weight = (h * TIME[stage]).v();
                     let mut b = slope;
                     for i in 0..D {

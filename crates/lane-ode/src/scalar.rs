@@ -95,8 +95,8 @@ impl Lane for f64 {
         u32::from(mask)
     }
     #[inline(always)]
-    fn aside<W: Aside>(self, work: W) {
-        Simd::aside(work);
+    fn aside<W: Aside>(self, work: W) -> W::Output {
+        Simd::aside(work)
     }
 }
 

@@ -172,11 +172,13 @@ impl Simd {
 
     /// Runs work over `f64` as a function of its own.
     #[inline(always)]
-    pub(crate) fn aside<W: Aside>(work: W) {
+    pub(crate) fn aside<W: Aside>(work: W) -> W::Output {
         #[cfg(target_arch = "x86_64")]
-        x86::aside(work);
+        {
+            x86::aside(work)
+        }
         #[cfg(not(target_arch = "x86_64"))]
-        out_of_line(work);
+        out_of_line(work)
     }
 
     /// Runs a kernel that follows one trajectory and uses lanes for something else, on a few lanes.
@@ -240,11 +242,11 @@ mod x86 {
     entry!(avx2, "avx2,fma", super::Simd::Avx2, unsafe { F64x4::first(0.0) });
     entry!(scalar, "avx2,fma", super::Simd::Avx2, 0.0_f64);
 
-    pub(super) fn aside<W: Aside>(work: W) {
+    pub(super) fn aside<W: Aside>(work: W) -> W::Output {
         #[inline(never)]
         #[target_feature(enable = "avx2,fma")]
-        fn inner<W: Aside>(work: W) {
-            work.run();
+        fn inner<W: Aside>(work: W) -> W::Output {
+            work.run()
         }
         assert!(
             super::Simd::Avx2.is_available(),

@@ -1,6 +1,6 @@
 //! What integrators need of a system, and what they report of a trajectory.
 
-use crate::lane::Lane;
+use crate::lane::{Aside, Lane};
 use crate::num::N;
 
 /// A first-order system x' = f(t, x) with `D` states, in lanes.
@@ -18,12 +18,60 @@ pub trait System<T: Lane, const D: usize> {
         *forcing = self.forcing(t_s);
     }
 
+    /// [`Self::forcing`] as a function of its own that all callers share: for where it is not most
+    /// of the time.
+    #[inline(always)]
+    fn forcing_aside(&self, t_s: N<T>) -> Self::Forcing
+    where
+        Self: Sized,
+    {
+        t_s.0.aside(ForcingAside::<T, D, Self> { system: self, t_s })
+    }
+
     /// f at state `x`.
     fn derivative(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D];
+
+    /// [`Self::derivative`], likewise.
+    #[inline(always)]
+    fn derivative_aside(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D]
+    where
+        Self: Sized,
+    {
+        x[0].0.aside(DerivativeAside { system: self, forcing, x })
+    }
 
     /// The lanes whose states are in the model's range. A lane that leaves it has diverged. NaN is
     /// outside.
     fn in_range(&self, x: &[N<T>; D]) -> T::Mask;
+}
+
+struct ForcingAside<'a, T, const D: usize, S> {
+    system: &'a S,
+    t_s: N<T>,
+}
+
+impl<T: Lane, const D: usize, S: System<T, D>> Aside for ForcingAside<'_, T, D, S> {
+    type Output = S::Forcing;
+
+    #[inline(always)]
+    fn run(self) -> S::Forcing {
+        self.system.forcing(self.t_s)
+    }
+}
+
+struct DerivativeAside<'a, T: Lane, const D: usize, S: System<T, D>> {
+    system: &'a S,
+    forcing: &'a S::Forcing,
+    x: &'a [N<T>; D],
+}
+
+impl<T: Lane, const D: usize, S: System<T, D>> Aside for DerivativeAside<'_, T, D, S> {
+    type Output = [N<T>; D];
+
+    #[inline(always)]
+    fn run(self) -> [N<T>; D] {
+        self.system.derivative(self.forcing, self.x)
+    }
 }
 
 /// A system with a linear part, x' = L x, that is too stiff for explicit formulas.

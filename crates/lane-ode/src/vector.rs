@@ -142,11 +142,11 @@ macro_rules! vector {
                 $bits
             }
             #[inline(always)]
-            fn aside<W: $crate::Aside>(self, work: W) {
+            fn aside<W: $crate::Aside>(self, work: W) -> W::Output {
                 #[inline(never)]
                 #[target_feature(enable = $features)]
-                fn inner<W: $crate::Aside>(work: W) {
-                    work.run();
+                fn inner<W: $crate::Aside>(work: W) -> W::Output {
+                    work.run()
                 }
                 // SAFETY: as in `lit`.
                 unsafe { inner(work) }

@@ -25,7 +25,7 @@ use crate::nonlinear::coefficients::{Bodies, Coefficients};
 use crate::nonlinear::forces::{AxisLoad, Deflection};
 use crate::nonlinear::frame::Tilt;
 use crate::nonlinear::{Half, rotor, tub};
-use lane_ode::{Dual, Lane, N, Real};
+use lane_ode::{Aside, Dual, Lane, N, Real};
 
 /// Entries of all arrays of the rotor, its inertia after all others.
 const ALL_ENTRIES: usize = ENTRIES + INERTIA_ENTRIES;
@@ -55,83 +55,92 @@ pub(crate) struct LinearPoint {
 }
 
 /// Linearises one machine per lane about the equilibrium `q`.
-#[inline(always)]
-pub(crate) fn linearise<T: Lane>(
-    machine: &Coefficients<T>,
-    q: &[N<T>; COORDINATES],
-) -> Vec<LinearPoint> {
-    let zero = q[0].lit(0.0);
-    let still = [zero; COORDINATES];
-    let bodies = &machine.bodies;
-    let on_shaft = Deflection::new(q, &Tilt::of_tub(q), &Tilt::of_shaft(q)).load(bodies);
-    let lifted = machine.constant();
+pub(crate) struct Linearise<'a, T> {
+    pub(crate) machine: &'a Coefficients<T>,
+    pub(crate) q: &'a [N<T>; COORDINATES],
+}
 
-    // The tub does not depend on the spin.
-    let at_rest = tub(machine, q, &still);
-    let [tub_stiffness, tub_damping] = tub_tangents(machine, q);
+impl<T: Lane> Aside for Linearise<'_, T> {
+    type Output = Vec<LinearPoint>;
 
-    let mut samples = [[[zero; HARMONICS]; ALL_ENTRIES]; 3];
-    for (k, &(cos, sin)) in SAMPLES.iter().enumerate() {
-        for (kind, (speed, acceleration)) in
-            [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate()
-        {
-            let spin = SpinState::new(
-                (zero.lit(sin), zero.lit(cos)),
-                zero.lit(speed),
-                zero.lit(acceleration),
-            );
-            let Half { mut floating, inertia, .. } = rotor(bodies, &spin, q, &still);
-            floating.apply(&on_shaft);
-            let (force, torque) = floating.generalised_forces();
-            let arm = floating.arm;
-            let lifted_spin = spin.constant();
-            // Stiffness at every kind of spin, damping only at unit speed: without spin the rotor
-            // has none.
-            let directions = if kind == 1 { 8 } else { 4 };
-            for direction in 0..directions {
-                let column = direction % 4;
-                let entry = if direction < 4 { entry::stiffness } else { entry::damping };
-                let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
-                let (q, u) =
-                    (seeded(q, ROTOR_TURNS[column], dq), seeded(&still, ROTOR_TURNS[column], du));
-                let Half { mut floating, .. } = rotor(&lifted.bodies, &lifted_spin, &q, &u);
-                floating.apply(&on_shaft.constant());
-                let rows: [_; ROWS] = about_centre(floating.generalised_forces(), &arm);
-                for row in 0..ROWS {
-                    samples[kind][entry(row, column)][k] = -rows[row];
+    #[inline(always)]
+    fn run(self) -> Vec<LinearPoint> {
+        let Self { machine, q } = self;
+        let zero = q[0].lit(0.0);
+        let still = [zero; COORDINATES];
+        let bodies = &machine.bodies;
+        let on_shaft = Deflection::new(q, &Tilt::of_tub(q), &Tilt::of_shaft(q)).load(bodies);
+        let lifted = machine.constant();
+
+        // The tub does not depend on the spin.
+        let at_rest = tub(machine, q, &still);
+        let [tub_stiffness, tub_damping] = tub_tangents(machine, q);
+
+        let mut samples = [[[zero; HARMONICS]; ALL_ENTRIES]; 3];
+        for (k, &(cos, sin)) in SAMPLES.iter().enumerate() {
+            for (kind, (speed, acceleration)) in
+                [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate()
+            {
+                let spin = SpinState::new(
+                    (zero.lit(sin), zero.lit(cos)),
+                    zero.lit(speed),
+                    zero.lit(acceleration),
+                );
+                let Half { mut floating, inertia, .. } = rotor(bodies, &spin, q, &still);
+                floating.apply(&on_shaft);
+                let (force, torque) = floating.generalised_forces();
+                let arm = floating.arm;
+                let lifted_spin = spin.constant();
+                // Stiffness at every kind of spin, damping only at unit speed: without spin the rotor
+                // has none.
+                let directions = if kind == 1 { 8 } else { 4 };
+                for direction in 0..directions {
+                    let column = direction % 4;
+                    let entry = if direction < 4 { entry::stiffness } else { entry::damping };
+                    let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
+                    let (q, u) = (
+                        seeded(q, ROTOR_TURNS[column], dq),
+                        seeded(&still, ROTOR_TURNS[column], du),
+                    );
+                    let Half { mut floating, .. } = rotor(&lifted.bodies, &lifted_spin, &q, &u);
+                    floating.apply(&on_shaft.constant());
+                    let rows: [_; ROWS] = about_centre(floating.generalised_forces(), &arm);
+                    for row in 0..ROWS {
+                        samples[kind][entry(row, column)][k] = -rows[row];
+                    }
                 }
-            }
-            for i in 0..2 {
-                samples[kind][entry::force(i)][k] = force[i];
-            }
-            for r in 0..4 {
-                samples[kind][entry::force(2 + r)][k] =
-                    torque[r] - arm[r][0] * force[0] - arm[r][1] * force[1];
-                for s in 0..=r {
-                    samples[kind][ENTRIES + entry::inertia(r, s)][k] = inertia[r][s];
+                for i in 0..2 {
+                    samples[kind][entry::force(i)][k] = force[i];
                 }
-                samples[kind][entry::arm(r, 0)][k] = arm[r][0];
-                samples[kind][entry::arm(r, 1)][k] = arm[r][1];
+                for r in 0..4 {
+                    samples[kind][entry::force(2 + r)][k] =
+                        torque[r] - arm[r][0] * force[0] - arm[r][1] * force[1];
+                    for s in 0..=r {
+                        samples[kind][ENTRIES + entry::inertia(r, s)][k] = inertia[r][s];
+                    }
+                    samples[kind][entry::arm(r, 0)][k] = arm[r][0];
+                    samples[kind][entry::arm(r, 1)][k] = arm[r][1];
+                }
             }
         }
-    }
 
-    let constants = Constants {
-        tub_per_mass: bodies.tub_per_mass,
-        tub_arm: at_rest.floating.arm,
-        tub_axis: at_rest.floating.axis,
-        tub_inertia: at_rest.inertia,
-        tub_stiffness,
-        tub_damping,
-        rotor_per_mass: bodies.rotor_per_mass,
-        rotor_axis: Tilt::of_shaft(q).axis_partials(),
-    };
-    (0..T::LANES)
-        .map(|lane| LinearPoint {
-            constants: constants.get_lane(lane),
-            terms: terms_of_lane(&samples, lane),
-        })
-        .collect()
+        let constants = Constants {
+            tub_per_mass: bodies.tub_per_mass,
+            tub_arm: at_rest.floating.arm,
+            tub_axis: at_rest.floating.axis,
+            tub_inertia: at_rest.inertia,
+            tub_stiffness,
+            tub_damping,
+            rotor_per_mass: bodies.rotor_per_mass,
+            rotor_axis: Tilt::of_shaft(q).axis_partials(),
+        };
+        (0..T::LANES)
+            .map(|lane| LinearPoint {
+                constants: constants.get_lane(lane),
+                terms: terms_of_lane(&samples, lane),
+            })
+            .collect()
+    }
 }
 
 /// Stiffness and damping of the tub about the equilibrium `q`, as in [`Constants`].

@@ -6,8 +6,8 @@ pub(crate) mod ringing;
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, TUB_PITCH, TUB_Y};
 use crate::lanes::InLanes as _;
-use crate::linear::outputs::{LinearOutputs, linearise_outputs};
-use crate::linear::{LinearPoint, Matrices, linearise, tub_tangents};
+use crate::linear::outputs::{LinearOutputs, LineariseOutputs};
+use crate::linear::{LinearPoint, Linearise, Matrices, tub_tangents};
 use crate::machine::Machine;
 use crate::machine::feet::Feet;
 use crate::machine::spin::{Spin, SpinState, SpinStretch, stretch_at};
@@ -236,12 +236,12 @@ impl Kernel for Prepare<'_> {
             let machines: Vec<_> =
                 group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
             let lanes = in_lanes(zero, &machines);
-            let (q, found) = equilibrium::find(zero, &lanes);
+            let (q, found) = zero.0.aside(equilibrium::Find { zero, machine: &lanes });
             let steepest = steepest(&machines, &q);
             let viscous: Vec<_> =
                 machines.iter().map(Coefficients::with_viscous_friction).collect();
-            let linear = linearise(&in_lanes(zero, &viscous), &q);
-            let linear_outputs = linearise_outputs(&lanes.bodies, &q);
+            let linear = zero.0.aside(Linearise { machine: &in_lanes(zero, &viscous), q: &q });
+            let linear_outputs = zero.0.aside(LineariseOutputs { bodies: &lanes.bodies, q: &q });
             let still = [zero; COORDINATES];
             let at_rest = Motion { q, u: still, a: still };
             let unbalance_up = SpinState::new((zero, zero.lit(1.0)), zero, zero);

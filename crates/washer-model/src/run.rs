@@ -18,7 +18,7 @@ pub use snapshots::Snapshot;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
-use crate::fast::geared::{Formula, Geared};
+use crate::fast::geared::Geared;
 use crate::kind::ModelKind;
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::outputs::{RADIAL, squared};
@@ -27,7 +27,7 @@ use crate::run::model::{Linear, Model, Nonlinear};
 use core::marker::PhantomData;
 use extras::{Extras, Instants, Seen};
 use lane_ode::{
-    Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, Task,
+    Aside, Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, Task,
     Tolerance, dop853, dopri5, rk4,
 };
 
@@ -143,46 +143,97 @@ pub fn simulate_until(
     if points.is_empty() {
         return Some((Vec::new(), Vec::new()));
     }
-    let stepper = match method {
-        Method::Rk4 { .. } => Stepper::Plain,
-        Method::Geared(_) => Stepper::Capped,
-        Method::Dopri5(tolerance) => Stepper::Dopri5(*tolerance),
-        Method::Additive(tolerance) => Stepper::Additive(*tolerance),
-        Method::Rodas5p(tolerance) => {
-            return stiff::simulate(model, tolerance, points, wanted, stop);
-        }
-    };
-    let order = Order { points, method, stepper, wanted, stop };
+    let order = Order { points, method, wanted, stop };
     match model {
-        ModelKind::Nonlinear => simd.dispatch(Simulate::<OfNonlinear>(order, PhantomData)),
-        ModelKind::Linear => simd.dispatch(Simulate::<OfLinear>(order, PhantomData)),
+        ModelKind::Nonlinear => order.dispatch::<OfNonlinear>(simd),
+        ModelKind::Linear => order.dispatch::<OfLinear>(simd),
     }
 }
 
-/// The integrators whose lanes are trajectories.
-enum Stepper {
-    Plain,
-    /// By the model's formula for capped modes.
-    Capped,
-    Dopri5(Tolerance),
-    Additive(Tolerance),
+/// An integrator whose lanes are trajectories. Each is compiled as a kernel of its own: one
+/// function of all of them takes the compiler longer than all apart.
+pub(crate) trait Stepper {
+    fn integrate<T: Lane, M: Model<T>, P: Task<T, STATES, System = M>>(self, zero: T, task: &mut P);
 }
 
-/// A model before the lanes' type is known.
+pub(crate) struct ByRk4;
+pub(crate) struct ByDop853;
+pub(crate) struct ByDopri5(pub(crate) Tolerance);
+pub(crate) struct ByAdditive(Tolerance);
+
+impl Stepper for ByRk4 {
+    #[inline(always)]
+    fn integrate<T: Lane, M: Model<T>, P: Task<T, STATES, System = M>>(
+        self,
+        zero: T,
+        task: &mut P,
+    ) {
+        rk4::integrate(zero, task);
+    }
+}
+
+impl Stepper for ByDop853 {
+    #[inline(always)]
+    fn integrate<T: Lane, M: Model<T>, P: Task<T, STATES, System = M>>(
+        self,
+        zero: T,
+        task: &mut P,
+    ) {
+        dop853::integrate(zero, task);
+    }
+}
+
+impl Stepper for ByDopri5 {
+    #[inline(always)]
+    fn integrate<T: Lane, M: Model<T>, P: Task<T, STATES, System = M>>(
+        self,
+        zero: T,
+        task: &mut P,
+    ) {
+        dopri5::integrate(zero, task, &self.0);
+    }
+}
+
+impl Stepper for ByAdditive {
+    #[inline(always)]
+    fn integrate<T: Lane, M: Model<T>, P: Task<T, STATES, System = M>>(
+        self,
+        zero: T,
+        task: &mut P,
+    ) {
+        M::integrate_additive(zero, task, &self.0);
+    }
+}
+
+/// A model before the lanes' type is known, and what integrates it.
 pub(crate) trait Family {
     type Over<T: Lane>: Model<T>;
+    /// [`Method::Geared`], by the formula that [`Formula::of`](crate::fast::geared::Formula::of) has
+    /// for the model.
+    type Geared: Stepper;
+    const GEARED: Self::Geared;
+    /// [`Method::Additive`].
+    type Additive: Stepper;
+    const ADDITIVE: fn(Tolerance) -> Self::Additive;
     const KIND: ModelKind;
-    const FORMULA: Formula = Formula::of(Self::KIND);
 }
 
 pub(crate) enum OfNonlinear {}
 pub(crate) enum OfLinear {}
 impl Family for OfNonlinear {
     type Over<T: Lane> = Nonlinear<T>;
+    type Geared = ByRk4;
+    const GEARED: ByRk4 = ByRk4;
+    type Additive = ByAdditive;
+    const ADDITIVE: fn(Tolerance) -> ByAdditive = ByAdditive;
     const KIND: ModelKind = ModelKind::Nonlinear;
 }
 impl Family for OfLinear {
     type Over<T: Lane> = Linear<T>;
+    type Geared = ByDop853;
+    const GEARED: ByDop853 = ByDop853;
+    type Additive = ByDopri5;
+    const ADDITIVE: fn(Tolerance) -> ByDopri5 = ByDopri5;
     const KIND: ModelKind = ModelKind::Linear;
 }
 
@@ -190,32 +241,38 @@ impl Family for OfLinear {
 struct Order<'a> {
     points: &'a [&'a Point],
     method: &'a Method,
-    stepper: Stepper,
     wanted: Wanted,
     stop: Stop<'a>,
 }
 
-struct Simulate<'a, F>(Order<'a>, PhantomData<F>);
+impl<'a> Order<'a> {
+    fn dispatch<F: Family>(self, simd: Simd) -> Option<(Vec<Record>, Vec<Extra>)> {
+        match *self.method {
+            Method::Rk4 { .. } => simd.dispatch(self.by::<F, _>(ByRk4)),
+            Method::Geared(_) => simd.dispatch(self.by::<F, _>(F::GEARED)),
+            Method::Dopri5(tolerance) => simd.dispatch(self.by::<F, _>(ByDopri5(tolerance))),
+            Method::Additive(tolerance) => simd.dispatch(self.by::<F, _>(F::ADDITIVE(tolerance))),
+            Method::Rodas5p(tolerance) => {
+                let family = PhantomData::<F>;
+                Simd::dispatch_narrow(stiff::Simulate { order: self, tolerance, family })
+            }
+        }
+    }
 
-impl<F: Family> Kernel for Simulate<'_, F> {
+    fn by<F, S>(self, stepper: S) -> Simulate<'a, F, S> {
+        Simulate(self, stepper, PhantomData)
+    }
+}
+
+struct Simulate<'a, F, S>(Order<'a>, S, PhantomData<F>);
+
+impl<F: Family, S: Stepper> Kernel for Simulate<'_, F, S> {
     type Output = Option<(Vec<Record>, Vec<Extra>)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let Order { points, method, stepper, wanted, stop } = self.0;
-        let mut run = Run::<T, F::Over<T>>::new(N(zero), points, method, stop);
-        run.record(N(zero), wanted, F::KIND);
-        match (stepper, F::FORMULA) {
-            (Stepper::Plain, _) | (Stepper::Capped, Formula::Rk4) => rk4::integrate(zero, &mut run),
-            (Stepper::Capped, Formula::Dop853) => dop853::integrate(zero, &mut run),
-            (Stepper::Dopri5(tolerance), _) if F::KIND == ModelKind::Nonlinear => {
-                dopri5::integrate(zero, &mut run, &tolerance);
-            }
-            // One and the same for the linear model: its loop is compiled once.
-            (Stepper::Dopri5(tolerance) | Stepper::Additive(tolerance), _) => {
-                F::Over::<T>::integrate_additive(zero, &mut run, &tolerance);
-            }
-        }
+        let mut run = Run::<T, F::Over<T>>::new(N(zero), self.0, F::KIND);
+        self.1.integrate(zero, &mut run);
         run.recorded()
     }
 }
@@ -302,13 +359,7 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
 
     #[inline(always)]
     fn begin(&mut self, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
-        let inside = self.inside();
-        let (radial, channels) = self.model.observe(forcing, x, dx, T::bits(inside) != 0);
-        if let Some(channels) = channels {
-            self.channels.begin(&channels, inside);
-            self.show(None, (x, dx), &radial, &channels, inside);
-        }
-        self.radial.begin(&[squared(&radial)], everywhere(self.windows));
+        self.windows.0.aside(Begin { run: self, forcing, x, dx });
     }
 
     #[inline(always)]
@@ -329,6 +380,30 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
     }
 }
 
+/// A leg begins.
+struct Begin<'r, 'a, T: Lane, M: Model<T>> {
+    run: &'r mut Run<'a, T, M>,
+    forcing: &'r M::Forcing,
+    x: &'r [N<T>; STATES],
+    dx: &'r [N<T>; STATES],
+}
+
+impl<T: Lane, M: Model<T>> Aside for Begin<'_, '_, T, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { run, forcing, x, dx } = self;
+        let inside = run.inside();
+        let (radial, channels) = run.model.observe(forcing, x, dx, T::bits(inside) != 0);
+        if let Some(channels) = channels {
+            run.channels.begin(&channels, inside);
+            run.show(None, (x, dx), &radial, &channels, inside);
+        }
+        run.radial.begin(&[squared(&radial)], everywhere(run.windows));
+    }
+}
+
 /// True in every lane.
 #[inline(always)]
 fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
@@ -338,7 +413,10 @@ fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
 impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     /// Every point still to be taken up; there is at least one.
     #[inline(always)]
-    fn new(zero: N<T>, points: &'a [&'a Point], method: &'a Method, stop: Stop<'a>) -> Self {
+    fn new(zero: N<T>, order: Order<'a>, model: ModelKind) -> Self {
+        let Order { points, method, wanted, stop } = order;
+        let instants = Instants::of(method);
+        let course = |point: &&Point| Vec::with_capacity(point.legs.len());
         Self {
             model: M::splat(zero, points[0], coupling(method, zero)),
             points,
@@ -351,24 +429,8 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
             radial: Peaks::new(zero),
             windows: zero,
             records: vec![EMPTY; points.len()],
-            extras: None,
-            courses: Vec::new(),
-        }
-    }
-
-    /// Asks for more records than the peaks.
-    #[inline(always)]
-    fn record(&mut self, zero: N<T>, wanted: Wanted, model: ModelKind) {
-        self.extras = Extras::new(
-            zero,
-            wanted,
-            (model, Instants::of(self.method)),
-            self.points[0],
-            self.points.len(),
-        );
-        if wanted.course {
-            self.courses =
-                self.points.iter().map(|point| Vec::with_capacity(point.legs.len())).collect();
+            extras: Extras::new(zero, wanted, (model, instants), points[0], points.len()),
+            courses: if wanted.course { points.iter().map(course).collect() } else { Vec::new() },
         }
     }
 

@@ -53,10 +53,6 @@ const FREE_OF_MODES: f64 = 0.1;
 /// with the phase of the motion, and shrinks less from rung to rung than the motion's error does.
 const TURN_WEIGHT: f64 = 3.0;
 
-/// Differences of a damper's speed in the linear model count so many times: what capped modes ring
-/// is more of a speed than of a motion, by their frequency over the drum's.
-const SPEED_WEIGHT: f64 = 10.0;
-
 /// Both models in the order of [`Climbs`].
 pub const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
 
@@ -468,12 +464,7 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, model: ModelKind, r
             Floor::PartOfWeight => METRIC_FLOOR * point.weight_n(),
             Floor::Creeping => CREEPING_M_PER_S,
         };
-        // Exaggerated, as what errs more than its difference shows.
-        let weight = match (number.metric, model) {
-            (Metric::DamperSpeed, ModelKind::Linear) => SPEED_WEIGHT,
-            _ => 1.0,
-        };
-        compare(b + weight * (a - b), *b, least);
+        compare(b + number.metric.weight(model) * (a - b), *b, least);
     }
     for (a, b) in a.turns.iter().zip(&b.turns) {
         for channel in &rule.channels {

@@ -1,7 +1,7 @@
 //! What a run measures: the amplitude by which the two models are compared, and metrics.
 
 use sweep_parameter::{Limit, Worse};
-use washer_model::{Channel, Extra, Wanted};
+use washer_model::{Channel, Extra, ModelKind, Wanted};
 
 use crate::outcome::{Deviations, Outcome};
 
@@ -145,6 +145,11 @@ impl Metric {
         self.facts().floor
     }
 
+    /// So many times a difference of it counts.
+    pub(crate) fn weight(self, model: ModelKind) -> f64 {
+        if model == ModelKind::Linear { self.facts().linear_weight } else { 1.0 }
+    }
+
     /// Unit.
     pub const fn unit(self) -> &'static str {
         self.facts().unit
@@ -224,6 +229,8 @@ struct Facts {
     /// In the column of one part, and what that holds; none if parts have no columns.
     of_each: Option<[&'static str; 2]>,
     floor: Floor,
+    /// Of the linear model so many times a difference counts, as what errs more than it shows.
+    linear_weight: f64,
     /// What trajectories must record.
     record: fn(&mut Wanted),
     /// Its values in such a record, of each part or the only one; none if it is the machine's own.
@@ -242,6 +249,7 @@ const PLAIN: Facts = Facts {
     part: None,
     of_each: None,
     floor: Floor::None,
+    linear_weight: 1.0,
     record: |_| (),
     of: None,
     worse: Worse::Greater,
@@ -317,6 +325,7 @@ const METRICS: [Facts; Metric::ALL.len()] = [
         of: Some(|extra| extra.foot_loads_n.clone()),
         worse: Worse::Less,
         limit: Some(Limit { value: 0.0, scale: 100.0 }),
+        ..PLAIN
     },
     Facts {
         name: "slip_margin",
@@ -361,6 +370,9 @@ const METRICS: [Facts; Metric::ALL.len()] = [
         part: Some(Part::Damper),
         of_each: Some(["speed", "greatest speed along the damper in the window"]),
         floor: Floor::Creeping,
+        // What capped modes ring is more of a speed than of a motion, by their frequency over the
+        // drum's.
+        linear_weight: 10.0,
         record: |wanted| wanted.damper_speeds = true,
         of: Some(|extra| extra.damper_speeds_m_per_s.clone()),
         ..PLAIN

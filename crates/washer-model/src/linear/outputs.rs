@@ -12,7 +12,7 @@ use crate::linear::sparse::sparse_sums;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
 use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
-use lane_ode::{Lane, N, Real, Sample};
+use lane_ode::{Aside, Lane, N, Real, Sample};
 
 /// Columns of an expansion: the slope along each coordinate, then the value at equilibrium.
 const COLUMNS: usize = COORDINATES + 1;
@@ -252,29 +252,36 @@ fn product<T: Real>(a: &[N<T>; 3], b: &[N<T>; 3]) -> [N<T>; 3] {
 }
 
 /// Expands the nonlinear outputs of one machine per lane about the equilibrium `q`.
-#[inline(always)]
-pub(crate) fn linearise_outputs<T: Lane>(
-    bodies: &Bodies<T>,
-    q: &[N<T>; COORDINATES],
-) -> Vec<LinearOutputs<f64>> {
-    let zero = q[0].lit(0.0);
-    let lifted = bodies.constant();
-    let still = [zero.constant(); COORDINATES];
-    let mut samples = [[[zero; COLUMNS]; OUTPUTS]; 3];
-    for (k, (cos, sin)) in SAMPLES.into_iter().enumerate() {
-        let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero, zero).constant();
-        for j in 0..COORDINATES {
-            let motion = Motion { q: seeded(q, j, 1.0), u: still, a: still };
-            let axes = Axes::new(&spin, &motion);
-            let (channels, radial) =
-                (axes.channels(&lifted, &motion), axes.radial(&lifted, &motion));
-            for (output, y) in channels.iter().chain(&radial).enumerate() {
-                samples[k][output][AT_REST] = N(y.value.0.value);
-                samples[k][output][j] = N(y.value.0.slope);
+pub(crate) struct LineariseOutputs<'a, T> {
+    pub(crate) bodies: &'a Bodies<T>,
+    pub(crate) q: &'a [N<T>; COORDINATES],
+}
+
+impl<T: Lane> Aside for LineariseOutputs<'_, T> {
+    type Output = Vec<LinearOutputs<f64>>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self { bodies, q } = self;
+        let zero = q[0].lit(0.0);
+        let lifted = bodies.constant();
+        let still = [zero.constant(); COORDINATES];
+        let mut samples = [[[zero; COLUMNS]; OUTPUTS]; 3];
+        for (k, (cos, sin)) in SAMPLES.into_iter().enumerate() {
+            let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero, zero).constant();
+            for j in 0..COORDINATES {
+                let motion = Motion { q: seeded(q, j, 1.0), u: still, a: still };
+                let axes = Axes::new(&spin, &motion);
+                let (channels, radial) =
+                    (axes.channels(&lifted, &motion), axes.radial(&lifted, &motion));
+                for (output, y) in channels.iter().chain(&radial).enumerate() {
+                    samples[k][output][AT_REST] = N(y.value.0.value);
+                    samples[k][output][j] = N(y.value.0.slope);
+                }
             }
         }
+        (0..T::LANES).map(|lane| of_lane(&samples.get_lane(lane))).collect()
     }
-    (0..T::LANES).map(|lane| of_lane(&samples.get_lane(lane))).collect()
 }
 
 fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64> {

@@ -128,6 +128,8 @@ struct Further<'a, T> {
 }
 
 impl<T: Lane> Aside for Further<'_, T> {
+    type Output = ();
+
     #[inline(always)]
     fn run(self) {
         let Self { elements, tub, load } = self;

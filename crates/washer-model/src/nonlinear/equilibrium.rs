@@ -7,7 +7,7 @@ use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::floating::Factors;
 use crate::nonlinear::{Halves, halves};
-use lane_ode::{Lane, N};
+use lane_ode::{Aside, Lane, N};
 
 /// Newton steps before giving up.
 const MAX_ITERATIONS: usize = 120;
@@ -27,6 +27,21 @@ const LAST_STEP: f64 = 1e-12;
 const LEAST_SHIFT: f64 = 10.0;
 /// A machine that needs more has no place of rest.
 const GREATEST_SHIFT: f64 = 1e9;
+
+/// [`find`], aside.
+pub(crate) struct Find<'a, T> {
+    pub(crate) zero: N<T>,
+    pub(crate) machine: &'a Coefficients<T>,
+}
+
+impl<T: Lane> Aside for Find<'_, T> {
+    type Output = ([N<T>; COORDINATES], u32);
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        find(self.zero, self.machine)
+    }
+}
 
 /// Coordinates at rest, and in which lanes they were found. A machine without a stable place of
 /// rest has none: its stiffness is not positive definite.

@@ -249,6 +249,8 @@ pub(crate) struct Seen<'a, T: Lane> {
 }
 
 impl<T: Lane> Aside for Seen<'_, T> {
+    type Output = ();
+
     #[inline(always)]
     fn run(self) {
         let Self { extras, step, x, dx, radial, channels, inside } = self;

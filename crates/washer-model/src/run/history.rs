@@ -8,7 +8,6 @@
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
-use crate::fast::geared::Formula;
 use crate::kind::ModelKind;
 use crate::machine::spin::stretch_at;
 use crate::nonlinear::coupling::Coupling;
@@ -17,11 +16,13 @@ use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::stiff::{OnLeg, StiffTask};
 use crate::run::suspension::{Forces, forces};
-use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, first_step};
+use crate::run::{
+    ByDopri5, ByRk4, Family, Method, OfLinear, OfNonlinear, Stepper, Stop, coupling, first_step,
+};
 use core::marker::PhantomData;
 use lane_ode::{
     Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, ScalarKernel, Simd,
-    Step, Task, dop853, dopri5, rk4, rodas,
+    Step, Task, Tolerance, rodas,
 };
 
 /// An instant this share of a step past its end is its end.
@@ -139,27 +140,31 @@ pub fn together() -> usize {
 
 fn sample<'a>(model: ModelKind, asked: [Asked<'a>; 1], stop: Stop<'_>) -> [History<'a>; 1] {
     let sampled = match model {
-        ModelKind::Nonlinear => {
-            Simd::one_lane(Sample::<OfNonlinear> { asked: &asked, stop, family: PhantomData })
-        }
-        ModelKind::Linear => {
-            Simd::one_lane(Sample::<OfLinear> { asked: &asked, stop, family: PhantomData })
-        }
+        ModelKind::Nonlinear => one_lane::<OfNonlinear>(&asked, stop),
+        ModelKind::Linear => one_lane::<OfLinear>(&asked, stop),
     };
     let mut sampled = sampled.into_iter();
     asked.map(|asked| of(model, asked, sampled.next().unwrap_or_default()))
 }
 
+fn one_lane<F: Family>(asked: &[Asked<'_>; 1], stop: Stop<'_>) -> Vec<States> {
+    match asked[0].method {
+        Method::Rk4 { .. } => Simd::one_lane(by::<F, _>(asked, stop, ByRk4)),
+        Method::Geared(_) => Simd::one_lane(by::<F, _>(asked, stop, F::GEARED)),
+        Method::Dopri5(tolerance) => Simd::one_lane(by::<F, _>(asked, stop, ByDopri5(tolerance))),
+        Method::Additive(tolerance) => {
+            Simd::one_lane(by::<F, _>(asked, stop, F::ADDITIVE(tolerance)))
+        }
+        Method::Rodas5p(tolerance) => {
+            Simd::one_lane(StiffSample::<F> { asked, stop, tolerance, family: PhantomData })
+        }
+    }
+}
+
 fn side_by_side<'a>(model: ModelKind, asked: Vec<Asked<'a>>, stop: Stop<'_>) -> Vec<History<'a>> {
     let sampled = match model {
-        ModelKind::Nonlinear => Simd::dispatch_narrow(Sample::<OfNonlinear> {
-            asked: &asked,
-            stop,
-            family: PhantomData,
-        }),
-        ModelKind::Linear => {
-            Simd::dispatch_narrow(Sample::<OfLinear> { asked: &asked, stop, family: PhantomData })
-        }
+        ModelKind::Nonlinear => Simd::dispatch_narrow(by::<OfNonlinear, _>(&asked, stop, ByRk4)),
+        ModelKind::Linear => Simd::dispatch_narrow(by::<OfLinear, _>(&asked, stop, ByRk4)),
     };
     asked.into_iter().zip(sampled).map(|(asked, sampled)| of(model, asked, sampled)).collect()
 }
@@ -238,50 +243,56 @@ struct States {
     failure: Option<(Failure, f64)>,
 }
 
-struct Sample<'a, F> {
+struct Sample<'a, F, S> {
     /// No more than there are lanes.
     asked: &'a [Asked<'a>],
     stop: Stop<'a>,
+    stepper: S,
     family: PhantomData<F>,
 }
 
-impl<F: Family> ScalarKernel for Sample<'_, F> {
-    type Output = Vec<States>;
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        let mut sampling = Sampling::<f64, F::Over<f64>>::new(N(0.0), self.asked, self.stop);
-        let Asked { point, method, .. } = &self.asked[0];
-        match method {
-            Method::Rk4 { .. } => rk4::integrate(0.0, &mut sampling),
-            Method::Geared(_) => match F::FORMULA {
-                Formula::Rk4 => rk4::integrate(0.0, &mut sampling),
-                Formula::Dop853 => dop853::integrate(0.0, &mut sampling),
-            },
-            Method::Dopri5(tolerance) if F::KIND == ModelKind::Nonlinear => {
-                dopri5::integrate(0.0, &mut sampling, tolerance);
-            }
-            Method::Dopri5(tolerance) | Method::Additive(tolerance) => {
-                F::Over::<f64>::integrate_additive(0.0, &mut sampling, tolerance);
-            }
-            Method::Rodas5p(tolerance) => {
-                let mut task = StiffTask::<f64, _, F::Over<Dual<f64>>>::new(0.0, sampling, point);
-                rodas::integrate(&mut task, tolerance);
-                sampling = task.task;
-            }
-        }
-        sampling.found
-    }
+fn by<'a, F, S>(asked: &'a [Asked<'a>], stop: Stop<'a>, stepper: S) -> Sample<'a, F, S> {
+    Sample { asked, stop, stepper, family: PhantomData }
 }
 
-impl<F: Family> Kernel for Sample<'_, F> {
+impl<F: Family, S: Stepper> Kernel for Sample<'_, F, S> {
     type Output = Vec<States>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut sampling = Sampling::<T, F::Over<T>>::new(N(zero), self.asked, self.stop);
-        rk4::integrate(zero, &mut sampling);
+        self.stepper.integrate(zero, &mut sampling);
         sampling.found
+    }
+}
+
+impl<F: Family, S: Stepper> ScalarKernel for Sample<'_, F, S> {
+    type Output = Vec<States>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        Kernel::run(self, 0.0)
+    }
+}
+
+/// The same by the stiff method, which wants derivatives.
+struct StiffSample<'a, F> {
+    asked: &'a [Asked<'a>; 1],
+    stop: Stop<'a>,
+    tolerance: Tolerance,
+    family: PhantomData<F>,
+}
+
+impl<F: Family> ScalarKernel for StiffSample<'_, F> {
+    type Output = Vec<States>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let sampling = Sampling::<f64, F::Over<f64>>::new(N(0.0), self.asked, self.stop);
+        let point = self.asked[0].point;
+        let mut task = StiffTask::<f64, _, F::Over<Dual<f64>>>::new(0.0, sampling, point);
+        rodas::integrate(&mut task, &self.tolerance);
+        task.task.found
     }
 }
 

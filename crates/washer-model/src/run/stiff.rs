@@ -1,48 +1,20 @@
 //! Trajectories by the stiff method: one at a time, its derivatives by lanes of dual numbers.
 
-use super::{Extra, Family, Method, OfLinear, OfNonlinear, Record, Run, Stop, Wanted};
+use super::{Extra, Family, Order, Record, Run};
 use crate::coordinates::{COORDINATES, STATES};
-use crate::kind::ModelKind;
 use crate::point::Point;
 use crate::run::model::Model;
 use crate::run::tangent::Tangent;
 use core::marker::PhantomData;
 use lane_ode::{
-    Dual, Ended, Forcing, Kernel, Lane, Leg, N, Partials, Simd, Step, Task, Tolerance, rodas,
+    Dual, Ended, Forcing, Kernel, Lane, Leg, N, Partials, Step, Task, Tolerance, rodas,
 };
 
 /// Integrates one model at every point and records peaks.
-pub(super) fn simulate(
-    model: ModelKind,
-    tolerance: &Tolerance,
-    points: &[&Point],
-    wanted: Wanted,
-    stop: Stop<'_>,
-) -> Option<(Vec<Record>, Vec<Extra>)> {
-    match model {
-        ModelKind::Nonlinear => {
-            let family = PhantomData;
-            Simd::dispatch_narrow(Simulate::<OfNonlinear> {
-                points,
-                tolerance,
-                wanted,
-                stop,
-                family,
-            })
-        }
-        ModelKind::Linear => {
-            let family = PhantomData;
-            Simd::dispatch_narrow(Simulate::<OfLinear> { points, tolerance, wanted, stop, family })
-        }
-    }
-}
-
-struct Simulate<'a, F> {
-    points: &'a [&'a Point],
-    tolerance: &'a Tolerance,
-    wanted: Wanted,
-    stop: Stop<'a>,
-    family: PhantomData<F>,
+pub(super) struct Simulate<'a, F> {
+    pub(super) order: Order<'a>,
+    pub(super) tolerance: Tolerance,
+    pub(super) family: PhantomData<F>,
 }
 
 impl<F: Family> Kernel for Simulate<'_, F> {
@@ -50,11 +22,10 @@ impl<F: Family> Kernel for Simulate<'_, F> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let method = Method::Rodas5p(*self.tolerance);
-        let mut run = Run::<f64, F::Over<f64>>::new(N(0.0), self.points, &method, self.stop);
-        run.record(N(0.0), self.wanted, F::KIND);
-        let mut run = StiffTask::<T, _, F::Over<Dual<T>>>::new(zero, run, self.points[0]);
-        rodas::integrate(&mut run, self.tolerance);
+        let first = self.order.points[0];
+        let run = Run::<f64, F::Over<f64>>::new(N(0.0), self.order, F::KIND);
+        let mut run = StiffTask::<T, _, F::Over<Dual<T>>>::new(zero, run, first);
+        rodas::integrate(&mut run, &self.tolerance);
         run.task.recorded()
     }
 }
@@ -137,7 +108,8 @@ impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> rodas::Stiff<STATES, COORDINATES>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Channel, Machine, Spin, Timing, prepare};
+    use crate::{Channel, Machine, Method, ModelKind, Spin, Timing, prepare};
+    use lane_ode::Simd;
 
     const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
     const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.7, 2.9], checkpoints: 0 };

@@ -9,7 +9,7 @@ use crate::lanes::lane_struct;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::run::model::Nonlinear;
-use lane_ode::{Dual, Lane, N};
+use lane_ode::{Aside, Dual, Lane, N};
 
 /// Of every acceleration, its derivative by each coordinate, then by each speed.
 pub(super) type Slopes = [[N<f64>; STATES]; COORDINATES];
@@ -47,20 +47,27 @@ impl<T: Lane> Corner<T> {
             bend: [[zero; BENDS.len()]; COORDINATES],
         }
     }
+}
 
-    /// The motions of a machine's forces with corners in a state.
+/// The motions of a machine's forces with corners in a state.
+pub(super) struct Corners<'a, T> {
+    pub(super) model: &'a Nonlinear<Dual<T>>,
+    pub(super) spin: &'a SpinState<Dual<T>>,
+    pub(super) x: &'a [N<T>; STATES],
+}
+
+impl<T: Lane> Aside for Corners<'_, T> {
+    type Output = Vec<Corner<T>>;
+
     #[inline(always)]
-    pub(super) fn all(
-        model: &Nonlinear<Dual<T>>,
-        spin: &SpinState<Dual<T>>,
-        x: &[N<T>; STATES],
-    ) -> Vec<Self> {
+    fn run(self) -> Vec<Corner<T>> {
+        let Self { model, spin, x } = self;
         let zero = x[0].lit(0.0);
         let mut state = [zero.constant(); STATES];
         for i in 0..STATES {
             state[i] = x[i].constant();
         }
-        let mut corners = vec![Self::none(zero); model.at_corners(&state).len()];
+        let mut corners = vec![Corner::none(zero); model.at_corners(&state).len()];
         for by in 0..BENDS.len() {
             state[BENDS[by]].0.slope = zero.lit(1.0).0;
             let motions = model.at_corners(&state);

@@ -159,7 +159,7 @@ impl Leg {
         k: usize,
     ) -> [S::Forcing; 3] {
         let k = k as f64;
-        let at = |steps: f64| system.forcing(zero.lit(self.time_s(steps)));
+        let at = |steps: f64| system.forcing_aside(zero.lit(self.time_s(steps)));
         [at(k), at(k + 0.5), at(k + 1.0)]
     }
 }

@@ -6,13 +6,13 @@
 //! from the trigonometric polynomial through those at all others. Classical Runge-Kutta takes all
 //! disturbances through the turn together. Lanes share a row's instants, then its disturbances.
 
-use super::corners::{Corner, Slopes};
+use super::corners::{Corner, Corners, Slopes};
 use super::turn::{Clock, REACH, WEIGHT};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::InLanes as _;
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::run::model::Nonlinear;
-use lane_ode::{Dual, Lane, MAX_LANES, N, System, trig};
+use lane_ode::{Aside, Dual, Lane, MAX_LANES, N, System, trig};
 
 /// Instants a turn at which the derivatives are taken, at most: harmonics of the turn up to the
 /// seventh.
@@ -36,6 +36,9 @@ const PLACES: usize = 2 * AT_ONCE + 1;
 
 /// Rows along their turns.
 pub(super) struct Along<'a, T> {
+    pub(super) zero: N<T>,
+    /// Those of [`weights`].
+    pub(super) weights: &'a [Vec<f64>],
     /// In lanes one row after another, again and again.
     pub(super) model: Nonlinear<Dual<T>>,
     pub(super) clock: Clock<T>,
@@ -83,11 +86,13 @@ impl Smooth {
     }
 }
 
-impl<T: Lane> Along<'_, T> {
-    /// Of each row what its turn makes of disturbances of its start. The weights are those of
-    /// [`weights`].
+/// Of each row what its turn makes of disturbances of its start.
+impl<T: Lane> Aside for Along<'_, T> {
+    type Output = Vec<Square>;
+
     #[inline(always)]
-    pub(super) fn monodromies(&self, zero: N<T>, weights: &[Vec<f64>]) -> Vec<Square> {
+    fn run(self) -> Vec<Square> {
+        let Self { zero, weights, .. } = self;
         let taken = self.take(zero);
         let vectors = STATES.div_ceil(BLOCK * T::LANES) * BLOCK;
         let mut columns = vec![vec![[zero; STATES]; vectors]; self.rows];
@@ -134,7 +139,9 @@ impl<T: Lane> Along<'_, T> {
         }
         found
     }
+}
 
+impl<T: Lane> Along<'_, T> {
     /// Of each row what is taken at its instants.
     #[inline(always)]
     fn take(&self, zero: N<T>) -> Vec<Vec<Smooth>> {
@@ -152,11 +159,11 @@ impl<T: Lane> Along<'_, T> {
                     state[i].0.set(lane, self.path[at[lane] * every][i].0.get(lane % self.rows));
                 }
             }
-            let spin = self.model.forcing((self.clock.step_s * step).v().constant());
+            let spin = self.model.forcing_aside((self.clock.step_s * step).v().constant());
             self.slopes(zero, &spin, &state, &mut found);
             let mut corners = Vec::new();
             if !self.forces.is_empty() {
-                corners = Corner::all(&self.model, &spin, &state);
+                corners = zero.0.aside(Corners { model: &self.model, spin: &spin, x: &state });
             }
             for lane in 0..T::LANES {
                 let row = lane % self.rows;
@@ -198,7 +205,7 @@ impl<T: Lane> Along<'_, T> {
         }
         for j in 0..STATES {
             state[j].0.slope = zero.lit(1.0).0;
-            let derivative = self.model.derivative(forcing, &state);
+            let derivative = self.model.derivative_aside(forcing, &state);
             state[j].0.slope = zero.0;
             for i in 0..COORDINATES {
                 slopes[i][j] = N(derivative[COORDINATES + i].0.slope);

@@ -195,6 +195,8 @@ fn see<T: Lane>(zero: N<T>, asked: &[Asked<'_>], weights: &[Vec<f64>], turned: &
     if seen > 0 {
         let spread: Vec<Row<'_>> = rows[..seen].iter().copied().cycle().take(T::LANES).collect();
         let along = Along {
+            zero,
+            weights,
             model: self::model(zero.constant(), &spread),
             clock: self::clock(zero, &spread),
             rows: seen,
@@ -202,7 +204,7 @@ fn see<T: Lane>(zero: N<T>, asked: &[Asked<'_>], weights: &[Vec<f64>], turned: &
             path: &watched.states[..watched.instants],
             forces: &watched.forces,
         };
-        monodromies = along.monodromies(zero, weights);
+        monodromies = zero.0.aside(along);
     }
     let in_lane = |state: &[N<T>; STATES], lane: usize| -> [f64; STATES] {
         from_fn(|i| state[i].0.get(lane))

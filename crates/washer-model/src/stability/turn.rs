@@ -33,11 +33,7 @@ pub(super) type Forcings<F> = [F; 3];
 /// Those of the first step.
 #[inline(always)]
 fn first<T: Lane, S: System<T, STATES>>(system: &S, clock: &Clock<T>) -> Forcings<S::Forcing> {
-    let start = system.forcing(clock.time_s(0.0));
-    let mut forcings = [start; 3];
-    system.renew(clock.time_s(0.5), &mut forcings[1]);
-    system.renew(clock.time_s(1.0), &mut forcings[2]);
-    forcings
+    [0.0, 0.5, 1.0].map(|steps| system.forcing_aside(clock.time_s(steps)))
 }
 
 /// Those of step `k`, from those of the one before.
@@ -50,8 +46,10 @@ fn next<T: Lane, S: System<T, STATES>>(
 ) {
     let k = k as f64;
     forcings[0] = forcings[2];
-    system.renew(clock.time_s(k + 0.5), &mut forcings[1]);
-    system.renew(clock.time_s(k + 1.0), &mut forcings[2]);
+    // A loop, for one copy of its code.
+    for (place, steps) in [(1, 0.5), (2, 1.0)] {
+        system.renew(clock.time_s(k + steps), &mut forcings[place]);
+    }
 }
 
 /// One step.

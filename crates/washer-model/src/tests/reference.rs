@@ -13,7 +13,7 @@ use crate::{
     Channel, Method, ModelKind, Spin, Timing, highest_frequency_rad_per_s, modes, prepare, simulate,
 };
 use core::f64::consts::TAU;
-use lane_ode::{N, Simd};
+use lane_ode::{Aside, N, Simd};
 use serde_json::Value;
 
 pub(crate) fn reference(file: &str) -> Value {
@@ -86,7 +86,7 @@ fn val_linear_matrices_match_an_independent_expansion() {
     for case in reference("linear_matrices.json")["cases"].as_array().unwrap() {
         let coefficients = Coefficients::new(&machine(case));
         let (q, _) = equilibrium::find(N(0.0), &coefficients);
-        let point = linear::linearise(&coefficients, &q).remove(0);
+        let point = linear::Linearise { machine: &coefficients, q: &q }.run().remove(0);
         let ours = point.matrices(&coefficients.bodies, &spin(case));
         for (name, ours) in [("M", ours.mass), ("C", ours.damping), ("K", ours.stiffness)] {
             let theirs: [[f64; COORDINATES]; COORDINATES] =
