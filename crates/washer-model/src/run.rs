@@ -8,6 +8,7 @@ pub(crate) mod history;
 pub(crate) mod loads;
 pub(crate) mod model;
 mod snapshots;
+pub(crate) mod stepper;
 pub(crate) mod stiff;
 pub(crate) mod suspension;
 mod tangent;
@@ -18,17 +19,18 @@ pub use snapshots::Snapshot;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
-use crate::fast::geared::Geared;
+use crate::fast::geared::{Formula, Geared};
 use crate::kind::ModelKind;
 use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::outputs::{RADIAL, squared};
 use crate::point::{PlannedLeg, Point};
 use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::stepper::{ByAdditive, ByDop853, ByDopri5, ByRk4, Fixed, Stepper};
 use core::marker::PhantomData;
 use extras::{Extras, Instants, Seen};
 use lane_ode::{
     Aside, Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, Task,
-    Tolerance, dop853, dopri5, rk4,
+    Tolerance,
 };
 
 /// How trajectories are integrated.
@@ -150,68 +152,11 @@ pub fn simulate_until(
     }
 }
 
-/// An integrator whose lanes are trajectories. Each is compiled as a kernel of its own: one
-/// function of all of them takes the compiler longer than all apart.
-pub(crate) trait Stepper {
-    fn integrate<T: Lane, M: Model<T>, P: Task<T, STATES, System = M>>(self, zero: T, task: &mut P);
-}
-
-pub(crate) struct ByRk4;
-pub(crate) struct ByDop853;
-pub(crate) struct ByDopri5(pub(crate) Tolerance);
-pub(crate) struct ByAdditive(Tolerance);
-
-impl Stepper for ByRk4 {
-    #[inline(always)]
-    fn integrate<T: Lane, M: Model<T>, P: Task<T, STATES, System = M>>(
-        self,
-        zero: T,
-        task: &mut P,
-    ) {
-        rk4::integrate(zero, task);
-    }
-}
-
-impl Stepper for ByDop853 {
-    #[inline(always)]
-    fn integrate<T: Lane, M: Model<T>, P: Task<T, STATES, System = M>>(
-        self,
-        zero: T,
-        task: &mut P,
-    ) {
-        dop853::integrate(zero, task);
-    }
-}
-
-impl Stepper for ByDopri5 {
-    #[inline(always)]
-    fn integrate<T: Lane, M: Model<T>, P: Task<T, STATES, System = M>>(
-        self,
-        zero: T,
-        task: &mut P,
-    ) {
-        dopri5::integrate(zero, task, &self.0);
-    }
-}
-
-impl Stepper for ByAdditive {
-    #[inline(always)]
-    fn integrate<T: Lane, M: Model<T>, P: Task<T, STATES, System = M>>(
-        self,
-        zero: T,
-        task: &mut P,
-    ) {
-        M::integrate_additive(zero, task, &self.0);
-    }
-}
-
 /// A model before the lanes' type is known, and what integrates it.
 pub(crate) trait Family {
     type Over<T: Lane>: Model<T>;
-    /// [`Method::Geared`], by the formula that [`Formula::of`](crate::fast::geared::Formula::of) has
-    /// for the model.
-    type Geared: Stepper;
-    const GEARED: Self::Geared;
+    /// [`Method::Geared`], by the model's formula.
+    type Geared: Fixed;
     /// [`Method::Additive`].
     type Additive: Stepper;
     const ADDITIVE: fn(Tolerance) -> Self::Additive;
@@ -222,16 +167,14 @@ pub(crate) enum OfNonlinear {}
 pub(crate) enum OfLinear {}
 impl Family for OfNonlinear {
     type Over<T: Lane> = Nonlinear<T>;
-    type Geared = ByRk4;
-    const GEARED: ByRk4 = ByRk4;
+    type Geared = ByDop853;
     type Additive = ByAdditive;
     const ADDITIVE: fn(Tolerance) -> ByAdditive = ByAdditive;
     const KIND: ModelKind = ModelKind::Nonlinear;
 }
 impl Family for OfLinear {
     type Over<T: Lane> = Linear<T>;
-    type Geared = ByDop853;
-    const GEARED: ByDop853 = ByDop853;
+    type Geared = ByRk4;
     type Additive = ByDopri5;
     const ADDITIVE: fn(Tolerance) -> ByDopri5 = ByDopri5;
     const KIND: ModelKind = ModelKind::Linear;
@@ -247,9 +190,11 @@ struct Order<'a> {
 
 impl<'a> Order<'a> {
     fn dispatch<F: Family>(self, simd: Simd) -> Option<(Vec<Record>, Vec<Extra>)> {
+        // A match on the formula would compile both of its arms.
+        const { assert!(F::Geared::FORMULA as u8 == Formula::of(F::KIND) as u8) };
         match *self.method {
             Method::Rk4 { .. } => simd.dispatch(self.by::<F, _>(ByRk4)),
-            Method::Geared(_) => simd.dispatch(self.by::<F, _>(F::GEARED)),
+            Method::Geared(_) => simd.dispatch(self.by::<F, _>(F::Geared::NEW)),
             Method::Dopri5(tolerance) => simd.dispatch(self.by::<F, _>(ByDopri5(tolerance))),
             Method::Additive(tolerance) => simd.dispatch(self.by::<F, _>(F::ADDITIVE(tolerance))),
             Method::Rodas5p(tolerance) => {

@@ -14,11 +14,10 @@ use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::squared;
 use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::stepper::{ByDopri5, ByRk4, Fixed, Stepper};
 use crate::run::stiff::{OnLeg, StiffTask};
 use crate::run::suspension::{Forces, forces};
-use crate::run::{
-    ByDopri5, ByRk4, Family, Method, OfLinear, OfNonlinear, Stepper, Stop, coupling, first_step,
-};
+use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, first_step};
 use core::marker::PhantomData;
 use lane_ode::{
     Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, ScalarKernel, Simd,
@@ -150,7 +149,7 @@ fn sample<'a>(model: ModelKind, asked: [Asked<'a>; 1], stop: Stop<'_>) -> [Histo
 fn one_lane<F: Family>(asked: &[Asked<'_>; 1], stop: Stop<'_>) -> Vec<States> {
     match asked[0].method {
         Method::Rk4 { .. } => Simd::one_lane(by::<F, _>(asked, stop, ByRk4)),
-        Method::Geared(_) => Simd::one_lane(by::<F, _>(asked, stop, F::GEARED)),
+        Method::Geared(_) => Simd::one_lane(by::<F, _>(asked, stop, F::Geared::NEW)),
         Method::Dopri5(tolerance) => Simd::one_lane(by::<F, _>(asked, stop, ByDopri5(tolerance))),
         Method::Additive(tolerance) => {
             Simd::one_lane(by::<F, _>(asked, stop, F::ADDITIVE(tolerance)))
