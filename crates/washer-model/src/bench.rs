@@ -66,7 +66,7 @@ impl<F: Family> Kernel for Evaluate<'_, F> {
         let mut t = zero.lit(10.0);
         match part {
             Part::Forcing => {
-                let mut forcing = model.forcing(t);
+                let mut forcing = model.forcing_aside(t);
                 for _ in 0..evaluations {
                     t += zero.lit(1e-4);
                     model.renew(t, &mut forcing);
@@ -74,7 +74,7 @@ impl<F: Family> Kernel for Evaluate<'_, F> {
                 }
             }
             Part::Derivative => {
-                let forcing = model.forcing(t);
+                let forcing = model.forcing_aside(t);
                 for _ in 0..evaluations {
                     // Opaque, so that the compiler computes nothing in advance.
                     let slope = model.derivative(black_box(&forcing), &x);

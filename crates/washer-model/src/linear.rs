@@ -91,8 +91,8 @@ impl<T: Lane> Aside for Linearise<'_, T> {
                 let (force, torque) = floating.generalised_forces();
                 let arm = floating.arm;
                 let lifted_spin = spin.constant();
-                // Stiffness at every kind of spin, damping only at unit speed: without spin the rotor
-                // has none.
+                // Stiffness at every kind of spin, damping only at unit speed: without spin the
+                // rotor has none.
                 let directions = if kind == 1 { 8 } else { 4 };
                 for direction in 0..directions {
                     let column = direction % 4;

@@ -1,5 +1,5 @@
-//! Integrators whose lanes are trajectories. Each is compiled as a kernel of its own: one function of
-//! all of them takes the compiler longer than all apart.
+//! Integrators whose lanes are trajectories. Each is compiled as a kernel of its own: one function
+//! of all of them takes the compiler longer than all apart.
 
 use crate::coordinates::STATES;
 use crate::fast::geared::Formula;

@@ -19,7 +19,7 @@ use crate::run::loads::damper_speeds_m_per_s;
 use crate::run::model::{Linear, Model, Nonlinear};
 use core::array::from_fn;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
-use lane_ode::{Kernel, Lane, Lu, N, Peaks, Simd};
+use lane_ode::{Aside, Kernel, Lane, Lu, N, Peaks, Simd};
 
 /// Step times cap, as a share of the formula's limit. Gyroscopic effects may make whirls of the
 /// capped hinge faster than its cap.
@@ -399,6 +399,22 @@ impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
     }
 }
 
+/// Forces with corners at a state.
+struct Cornered<'a, T, M> {
+    model: &'a M,
+    x: &'a [N<T>; STATES],
+    forces: &'a mut Vec<CornerForce<T>>,
+}
+
+impl<T: Lane, M: Model<T>> Aside for Cornered<'_, T, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.model.corner_forces(self.x, self.forces);
+    }
+}
+
 impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
     #[inline(always)]
     fn see(&mut self, k: usize, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
@@ -412,9 +428,9 @@ impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
                 for i in 0..STATES {
                     middle[i] = (0.5 * (start[i] + x[i])).v() + eighth * (rate[i] - dx[i]);
                 }
-                self.model.corner_forces(&middle, &mut self.forces);
+                x[0].0.aside(Cornered { model: self.model, x: &middle, forces: &mut self.forces });
             }
-            self.model.corner_forces(x, &mut self.forces);
+            x[0].0.aside(Cornered { model: self.model, x, forces: &mut self.forces });
             self.before = [*x, *dx];
         }
         let everywhere = self.windows.lit(0.0).0.less(self.windows.0);
