@@ -6,7 +6,6 @@ use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use crate::boundary::search::BoundaryError;
 use crate::{Diagnostics, StoreError, ThreadsError};
 use sweep_files::FileError;
 use sweep_plot::PlotError;
@@ -70,9 +69,9 @@ pub enum Error {
     /// Mistakes in what the user wrote.
     #[error(transparent)]
     Input(#[from] Diagnostics),
-    /// A boundary that cannot be traced.
-    #[error(transparent)]
-    Boundary(#[from] BoundaryError),
+    /// What cannot be done with what the user gave, and why.
+    #[error("{0}")]
+    Refused(String),
     /// A run's files.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -135,7 +134,7 @@ impl Error {
     /// The exit code it ends with.
     pub fn exit(&self) -> Exit {
         let is_refusal = match self {
-            Self::Input(_) | Self::Model(_) | Self::Option { .. } | Self::Boundary(_) => true,
+            Self::Input(_) | Self::Model(_) | Self::Option { .. } | Self::Refused(_) => true,
             Self::Store(StoreError::Busy { .. }) => return Exit::Busy,
             Self::Store(error) => error.is_refusal(),
             Self::Files(error) => error.is_refusal(),

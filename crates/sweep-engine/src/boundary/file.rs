@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use sweep_parameter::{Parameter as _, unit_suffix};
 
 use super::{BoundaryTask, Edge, Traced, TracedQuantity, TracedRow};
-use crate::{Job, Plan, Rows, Table};
+use crate::{Job, Rows, Table};
 use sweep_files::{FileKind, key};
 
 /// One line of the file.
@@ -25,118 +25,103 @@ fn within(name: &str, unit: &str, word: &str) -> String {
     format!("{stem}_{word}{}", &name[stem.len()..])
 }
 
-/// What the store must know of a search: its plan, with what is asked of it beside the grid.
-pub fn job<'a, M: Rows>(
-    plan: &'a Plan<M>,
-    quantity: &TracedQuantity,
-    task: &BoundaryTask,
-) -> Job<'a> {
-    let mut job = Job::of(plan);
-    job.layout.kind = FileKind::Boundary;
-    job.plan["boundary"] = asked(quantity, task);
-    job
-}
+impl<M: Rows> BoundaryTask<M> {
+    /// What the store must know of it: its plan, with what is asked of it beside the grid.
+    pub fn job(&self) -> Job<'_> {
+        let mut job = Job::of(&self.plan);
+        job.layout.kind = FileKind::Boundary;
+        job.plan["boundary"] = self.asked();
+        job
+    }
 
-fn asked(quantity: &TracedQuantity, task: &BoundaryTask) -> Value {
-    json!({
-        "quantity": &quantity.name,
-        "limit": quantity.limit,
-        "tolerance": task.search.tolerance,
-        "lattice": task.search.lattice,
-    })
-}
-
-/// The file of a [`job`].
-pub fn table<M: Rows>(
-    job: &Job<'_>,
-    plan: &Plan<M>,
-    quantity: &TracedQuantity,
-    task: &BoundaryTask,
-    traced: &Traced,
-) -> Table {
-    let mut about = asked(quantity, task);
-    about["worse"] = quantity.worse.name().into();
-    about["points"] = traced.trials.into();
-    about["rounds"] = traced.rounds.into();
-    let mut table = Table::new(M::BUILD);
-    add_columns(&mut table, plan, quantity, traced);
-    table.metadata(key::PLAN, &job.plan);
-    table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
-    table.metadata(key::BOUNDARY, &about);
-    table
-}
-
-fn add_columns<M: Rows>(
-    table: &mut Table,
-    plan: &Plan<M>,
-    quantity: &TracedQuantity,
-    traced: &Traced,
-) {
-    let lines: Vec<Line<'_>> = traced
-        .curves
-        .iter()
-        .enumerate()
-        .flat_map(|(curve, rows)| rows.iter().map(move |row| (curve, row)))
-        .flat_map(|(curve, row)| {
-            row.edges.iter().enumerate().map(move |(k, edge)| {
-                let number = if edge.bracket.is_some() { k + 1 } else { 0 };
-                Line { curve, row, number, edge }
-            })
+    fn asked(&self) -> Value {
+        json!({
+            "quantity": self.quantity.name,
+            "limit": self.quantity.limit,
+            "tolerance": self.search.tolerance,
+            "lattice": self.search.lattice,
         })
-        .collect();
-    add_axes(table, plan, quantity, &lines);
-    table.words(
-        "kind",
-        "crossing, jump (the quantity leaps over its limit), undefined (it is not defined on one \
-         side), or why there is none in \
-         range: reliable, unreliable or undefined wherever it was evaluated",
-        lines.iter().map(|line| line.edge.kind.name()),
-    );
-    table.counts(
-        "crossing",
-        "number of this change of side at this value of the first axis, from 1 upwards along the \
-         second; 0 where none is in range",
-        lines.iter().map(|line| line.number as u64),
-    );
-    let changes = lines
-        .iter()
-        .map(|line| line.row.edges.iter().filter(|edge| edge.bracket.is_some()).count() as u64);
-    table.counts("crossings", "how many changes of side there are", changes);
-    for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
-        let (name, unit) = (format!("quantity_{word}"), &quantity.unit);
-        let of = &quantity.name;
-        let said = format!("{of} at the bracket's {side} end; null where not defined");
-        let value = |line: &Line<'_>| Some(quantity.value(line.edge.distances[end]?));
-        table.numbers(&name, unit, &said, lines.iter().map(value));
     }
-    let trials = lines.iter().map(|line| line.row.trials as u64);
-    table.counts("points", "points evaluated at this value of the first axis", trials);
-}
 
-/// Where the boundary is: both axes, the bracket, and the axes beyond the second.
-fn add_axes<M: Rows>(
-    table: &mut Table,
-    plan: &Plan<M>,
-    quantity: &TracedQuantity,
-    lines: &[Line<'_>],
-) {
-    let [first, second, further @ ..] = plan.axes.as_slice() else { return };
-    let (name, unit) = (second.parameter.name(), second.parameter.unit());
-    table.parameter(&first.parameter, lines.iter().map(|line| Some(line.row.first)));
-    let (what, TracedQuantity { name: of, limit, .. }) = (second.parameter.description(), quantity);
-    let said = format!("{what}, where {of} = {limit}; null unless it is a crossing");
-    table.numbers(name, unit, &said, lines.iter().map(|line| line.edge.at));
-    for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
-        let said = format!(
-            "{side} end of the bracket in which the side changes; null where none is in range"
-        );
-        let value = |line: &Line<'_>| Some(line.edge.bracket?[end]);
-        table.numbers(&within(name, unit, word), unit, &said, lines.iter().map(value));
+    /// The file of what was found.
+    pub fn table(&self, traced: &Traced) -> Table {
+        let mut about = self.asked();
+        about["worse"] = self.quantity.worse.name().into();
+        about["points"] = traced.trials.into();
+        about["rounds"] = traced.rounds.into();
+        let mut table = Table::new(M::BUILD);
+        self.add_columns(&mut table, traced);
+        let job = self.job();
+        table.metadata(key::PLAN, &job.plan);
+        table.text(key::PLAN_HASH, job.hash().to_hex().to_string());
+        table.metadata(key::BOUNDARY, &about);
+        table
     }
-    for (k, axis) in further.iter().enumerate() {
-        let values =
-            lines.iter().map(|line| plan.axis_values(line.curve as u64).get(2 + k).copied());
-        table.parameter(&axis.parameter, values);
+
+    fn add_columns(&self, table: &mut Table, traced: &Traced) {
+        let TracedQuantity { name: of, unit, .. } = &self.quantity;
+        let lines: Vec<Line<'_>> = traced
+            .curves
+            .iter()
+            .enumerate()
+            .flat_map(|(curve, rows)| rows.iter().map(move |row| (curve, row)))
+            .flat_map(|(curve, row)| {
+                row.edges.iter().enumerate().map(move |(k, edge)| {
+                    let number = if edge.bracket.is_some() { k + 1 } else { 0 };
+                    Line { curve, row, number, edge }
+                })
+            })
+            .collect();
+        self.add_axes(table, &lines);
+        table.words(
+            "kind",
+            "crossing, jump (the quantity leaps over its limit), undefined (it is not defined on \
+             one side), or why there is none in range: reliable, unreliable or undefined wherever \
+             it was evaluated",
+            lines.iter().map(|line| line.edge.kind.name()),
+        );
+        table.counts(
+            "crossing",
+            "number of this change of side at this value of the first axis, from 1 upwards along \
+             the second; 0 where none is in range",
+            lines.iter().map(|line| line.number as u64),
+        );
+        let changes = lines
+            .iter()
+            .map(|line| line.row.edges.iter().filter(|edge| edge.bracket.is_some()).count() as u64);
+        table.counts("crossings", "how many changes of side there are", changes);
+        for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
+            let name = format!("quantity_{word}");
+            let said = format!("{of} at the bracket's {side} end; null where not defined");
+            let value = |line: &Line<'_>| Some(self.quantity.value(line.edge.distances[end]?));
+            table.numbers(&name, unit, &said, lines.iter().map(value));
+        }
+        let trials = lines.iter().map(|line| line.row.trials as u64);
+        table.counts("points", "points evaluated at this value of the first axis", trials);
+    }
+
+    /// Where the boundary is: both axes, the bracket, and the axes beyond the second.
+    fn add_axes(&self, table: &mut Table, lines: &[Line<'_>]) {
+        let [first, second, further @ ..] = self.plan.axes.as_slice() else { return };
+        let (name, unit) = (second.parameter.name(), second.parameter.unit());
+        table.parameter(&first.parameter, lines.iter().map(|line| Some(line.row.first)));
+        let what = second.parameter.description();
+        let TracedQuantity { name: of, limit, .. } = &self.quantity;
+        let said = format!("{what}, where {of} = {limit}; null unless it is a crossing");
+        table.numbers(name, unit, &said, lines.iter().map(|line| line.edge.at));
+        for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
+            let said = format!(
+                "{side} end of the bracket in which the side changes; null where none is in range"
+            );
+            let value = |line: &Line<'_>| Some(line.edge.bracket?[end]);
+            table.numbers(&within(name, unit, word), unit, &said, lines.iter().map(value));
+        }
+        for (k, axis) in further.iter().enumerate() {
+            let values = lines
+                .iter()
+                .map(|line| self.plan.axis_values(line.curve as u64).get(2 + k).copied());
+            table.parameter(&axis.parameter, values);
+        }
     }
 }
 

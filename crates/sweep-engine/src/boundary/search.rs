@@ -1,10 +1,10 @@
-//! The evaluator over a model: its distances at trial points; and the settings a plan gives a
-//! search.
+//! The task of a plan, and the evaluator over a model: its distances at trial points.
 
+use super::quantity::traced;
 use super::{Evaluate, Search, TracedQuantity, Trial};
 use crate::asking::{Asking, Stopped};
 use crate::store::{Column, Done, Key, Rows};
-use crate::{Axis, AxisValues, Model, Plan};
+use crate::{Axis, AxisValues, Error, Model, Plan, Swept};
 use sweep_parameter::Parameter as _;
 
 /// Rows of all curves together that are accepted: what is known of them stays in memory.
@@ -16,55 +16,13 @@ const FINEST: f64 = 1e-9;
 /// Parts of the range in the default tolerance.
 const DEFAULT_PARTS: f64 = 480.0;
 
-/// Why a plan has no boundary to trace.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum BoundaryError {
-    /// Fewer than two axes.
-    #[error(
-        "a boundary runs over two axes, and this grid has {0}: give [[axis]] twice, first the one \
-         along which the curve is wanted, then the one that is searched; one that --at gives a \
-         value is no axis, one with `values` of one number is"
-    )]
-    Axes(usize),
-    /// The points come from a design.
-    #[error(
-        "a boundary runs over the axes of a grid, and this file has a [design]: remove it, and \
-         give [[axis]] twice"
-    )]
-    Design,
-    /// The second axis has no extent.
-    #[error(
-        "the second axis, `{0}`, has one value: give it the range to search, as range = {{ from, \
-         to, count }} or as `values` whose least and greatest are its ends"
-    )]
-    NoRange(String),
-    /// Too many rows.
-    #[error(
-        "{rows} rows (values of the first axis, times the combinations of the axes beyond the \
-         second) are more than {MOST_ROWS}: trace parts of them"
-    )]
-    Rows {
-        /// How many.
-        rows: u64,
-    },
-    /// A tolerance that cannot be met or means nothing.
-    #[error(
-        "--tolerance {given} is out of range: expected from {least:e} to {greatest} for the \
-         second axis"
-    )]
-    Tolerance {
-        /// As given.
-        given: f64,
-        /// Least.
-        least: f64,
-        /// Greatest.
-        greatest: f64,
-    },
-}
-
-/// What is traced over which values.
+/// A boundary that is looked for: where, and of what.
 #[derive(Clone, Debug)]
-pub struct BoundaryTask {
+pub struct BoundaryTask<M: Model> {
+    /// Computes the quantity.
+    pub plan: Plan<M>,
+    /// What is at its limit.
+    pub quantity: TracedQuantity,
     /// Values of the first axis, in grid order.
     pub firsts: Vec<f64>,
     /// Number of curves: combinations of the axes beyond the second.
@@ -73,39 +31,63 @@ pub struct BoundaryTask {
     pub search: Search,
 }
 
-impl BoundaryTask {
-    /// The task of a plan. `tolerance` is in the second axis's unit, or a fraction of its value if
-    /// that axis is logarithmic; the default is 1/480 of the range.
+impl<M: Rows + Swept> BoundaryTask<M> {
+    /// The task of a plan: a column by its name, at a limit or at its own. `tolerance` is in the
+    /// second axis's unit, or a fraction of its value if that axis is logarithmic; the default is
+    /// 1/480 of the range.
     ///
     /// # Errors
-    /// Any [`BoundaryError`].
-    pub fn new<M: Model>(
+    /// As [`traced`], and [`Error::Refused`] for a plan without a boundary or a tolerance that
+    /// cannot be met or means nothing.
+    pub fn new(
         plan: &Plan<M>,
+        (column, limit): (&str, Option<f64>),
         tolerance: Option<f64>,
         lattice: usize,
-    ) -> Result<Self, BoundaryError> {
+    ) -> Result<Self, Error> {
+        let (quantity, plan) = traced(plan, column, limit)?;
+        let refused = |why: String| Err(Error::Refused(why));
         if plan.design.is_some() {
-            return Err(BoundaryError::Design);
+            return refused(
+                "a boundary runs over the axes of a grid, and this file has a [design]: remove \
+                 it, and give [[axis]] twice"
+                    .to_owned(),
+            );
         }
         let [first, second, further @ ..] = plan.axes.as_slice() else {
-            return Err(BoundaryError::Axes(plan.axes.len()));
+            return refused(format!(
+                "a boundary runs over two axes, and this grid has {}: give [[axis]] twice, first \
+                 the one along which the curve is wanted, then the one that is searched; one that \
+                 --at gives a value is no axis, one with `values` of one number is",
+                plan.axes.len()
+            ));
         };
         let [least, greatest] = second.values.extremes().map(|k| second.values.value(k));
         if least >= greatest {
-            return Err(BoundaryError::NoRange(second.parameter.name().to_owned()));
+            return refused(format!(
+                "the second axis, `{}`, has one value: give it the range to search, as range = {{ \
+                 from, to, count }} or as `values` whose least and greatest are its ends",
+                second.parameter.name()
+            ));
         }
         // Plans hold at most 1e12 points, so the products fit.
         let curves: u64 = further.iter().map(|axis| axis.values.len()).product();
         let rows = first.values.len() * curves;
-        let curves = usize::try_from(curves).ok().filter(|_| rows <= MOST_ROWS);
-        let curves = curves.ok_or(BoundaryError::Rows { rows })?;
+        if rows > MOST_ROWS {
+            return refused(format!(
+                "{rows} rows (values of the first axis, times the combinations of the axes beyond \
+                 the second) are more than {MOST_ROWS}: trace parts of them"
+            ));
+        }
         let second_log = matches!(second.values, AxisValues::Log { .. });
         let extent = if second_log { libm::log(greatest / least) } else { greatest - least };
         let given = tolerance.unwrap_or(extent / DEFAULT_PARTS);
-        let allowed = [extent * FINEST, extent];
-        if !(allowed[0]..=allowed[1]).contains(&given) {
-            let [least, greatest] = allowed;
-            return Err(BoundaryError::Tolerance { given, least, greatest });
+        if !(extent * FINEST..=extent).contains(&given) {
+            return refused(format!(
+                "--tolerance {given} is out of range: expected from {:e} to {extent} for the \
+                 second axis",
+                extent * FINEST
+            ));
         }
         let search = Search {
             least,
@@ -115,7 +97,8 @@ impl BoundaryTask {
             tolerance: given,
             lattice,
         };
-        Ok(Self { firsts: all(first), curves, search })
+        let firsts = all(first);
+        Ok(Self { plan, quantity, firsts, curves: curves as usize, search })
     }
 }
 
@@ -125,19 +108,18 @@ fn all<M: Model>(axis: &Axis<M>) -> Vec<f64> {
 
 /// A model at trial points.
 pub struct Models<'a, M: Model> {
-    plan: &'a Plan<M>,
-    quantity: &'a TracedQuantity,
+    task: &'a BoundaryTask<M>,
     /// The quantity's column of the plan's rows, and its place among them.
     column: Option<(usize, Column)>,
     asking: Asking<'a>,
 }
 
 impl<'a, M: Rows> Models<'a, M> {
-    /// An evaluator over a plan by its engine.
-    pub fn new(plan: &'a Plan<M>, quantity: &'a TracedQuantity, asking: Asking<'a>) -> Self {
-        let mut columns = M::layout(plan).columns.into_iter().enumerate();
-        let column = columns.find(|(_, column)| column.name == quantity.name);
-        Self { plan, quantity, column, asking }
+    /// An evaluator over a task's plan by its engine.
+    pub fn new(task: &'a BoundaryTask<M>, asking: Asking<'a>) -> Self {
+        let mut columns = M::layout(&task.plan).columns.into_iter().enumerate();
+        let column = columns.find(|(_, column)| column.name == task.quantity.name);
+        Self { task, column, asking }
     }
 
     /// What it asks.
@@ -148,7 +130,7 @@ impl<'a, M: Rows> Models<'a, M> {
     fn distance(&self, done: &Done) -> Option<f64> {
         let (place, column) = self.column.as_ref()?;
         let value = column.number(done.rows.first()?[*place])?;
-        Some(self.quantity.distance(value))
+        Some(self.task.quantity.distance(value))
     }
 }
 
@@ -160,7 +142,7 @@ impl<M: Rows> Evaluate for Models<'_, M> {
         let values = |k: usize, _| {
             let Trial { curve, first, second } = trials[k];
             // The axes beyond the second vary fastest.
-            let mut values = self.plan.axis_values(curve as u64);
+            let mut values = self.task.plan.axis_values(curve as u64);
             values[..2].copy_from_slice(&[first, second]);
             values
         };

@@ -7,10 +7,9 @@ use std::time::Instant;
 
 use super::{GridArgs, Lines as _, finite, installed, short};
 use crate::asking::{Asking, Stopped};
-use crate::boundary::file::{self, job};
-use crate::boundary::quantity::{offered, traced};
+use crate::boundary::quantity::offered;
 use crate::boundary::search::Models;
-use crate::boundary::{BoundaryTask, EdgeKind, Traced, TracedQuantity, trace};
+use crate::boundary::{BoundaryTask, EdgeKind, Traced, trace};
 use crate::effort::{Effort, EffortArgs};
 use crate::store::{Column, OpenedTrials, Trials};
 use crate::{Axis, Error, Exit, Plan, Progress, StoreError, Swept, duration, show, tell};
@@ -87,14 +86,13 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     if args.quantity.is_empty() {
         return show(&listing(&plan));
     }
-    let (quantity, plan) = traced(&plan, &args.quantity, args.limit)?;
-    let task = BoundaryTask::new(&plan, args.tolerance, usize::from(args.lattice))?;
+    let quantity = (args.quantity.as_str(), args.limit);
+    let task = BoundaryTask::new(&plan, quantity, args.tolerance, usize::from(args.lattice))?;
     let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
     let output = args.out.clone().unwrap_or_else(default);
     let file = Output::begin(&output, FileKind::Boundary)?;
     let interrupt = installed()?;
-    let job = job(&plan, &quantity, &task);
-    let mut trials = match Trials::open(&output, &job, args.fresh)? {
+    let mut trials = match Trials::open(&output, &task.job(), args.fresh)? {
         OpenedTrials::Open(trials) => *trials,
         OpenedTrials::Finished => {
             let there = "the boundary is there already (--fresh traces it again)";
@@ -108,7 +106,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     }
     let began = Instant::now();
     let effort = args.effort.with(&interrupt);
-    let (found, trials) = search(&plan, &quantity, &task, Some(trials), effort)?;
+    let (found, trials) = search(&task, Some(trials), effort)?;
     let found = match found {
         Ok(found) => found,
         Err(Stopped::Failed(error)) => return Err(error.into()),
@@ -122,12 +120,12 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
             return Ok(Exit::interrupted(interrupt.signal()));
         }
     };
-    let bytes = file::table(&job, &plan, &quantity, &task, &found).into_bytes();
+    let bytes = task.table(&found).into_bytes();
     file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
-    let text = summary(&plan, &quantity, &task, &found, began.elapsed().as_secs_f64());
+    let text = summary(&task, &found, began.elapsed().as_secs_f64());
     Ok(told(text, &output))
 }
 
@@ -153,19 +151,17 @@ fn told(mut text: String, output: &Path) -> Exit {
     Exit::Done
 }
 
-fn summary<M: Swept>(
-    plan: &Plan<M>,
-    quantity: &TracedQuantity,
-    task: &BoundaryTask,
-    traced: &Traced,
-    wall_s: f64,
-) -> String {
+fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> String {
+    let BoundaryTask { plan, quantity, search, .. } = task;
     let grid: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
-    let (name, TracedQuantity { name: of, limit, .. }) = (&plan.name, quantity);
-    let (Traced { trials, rounds, .. }, wall) = (traced, duration(wall_s));
     let mut text = format!(
-        "{name}: {of} = {limit} traced with {trials} points (the grid has {grid}) in {rounds} \
-         rounds, {wall}\n"
+        "{}: {} = {} traced with {} points (the grid has {grid}) in {} rounds, {}\n",
+        plan.name,
+        quantity.name,
+        quantity.limit,
+        traced.trials,
+        traced.rounds,
+        duration(wall_s)
     );
     let rows = || traced.curves.iter().flatten();
     let counted = |(kind, name): (EdgeKind, &str)| {
@@ -183,13 +179,13 @@ fn summary<M: Swept>(
     let brackets = rows().flat_map(|row| &row.edges).filter_map(|edge| edge.bracket);
     if let Some(widest) = brackets.map(|[low, high]| high - low).reduce(f64::max) {
         let unit = plan.axes.get(1).map_or("", |axis| axis.parameter.unit());
-        let told = format!("at most {widest:.3} {unit} wide (asked: {})", task.search.tolerance);
+        let told = format!("at most {widest:.3} {unit} wide (asked: {})", search.tolerance);
         text.line("brackets", told);
     }
     // Cells of a logarithmic axis grow: the largest counts.
     let cell = |axis: &Axis<M>| {
-        let edge = |k: usize| axis.values.between(k as f64 / task.search.lattice as f64);
-        let cells = (0..task.search.lattice).map(|k| (edge(k + 1) - edge(k)).abs());
+        let edge = |k: usize| axis.values.between(k as f64 / search.lattice as f64);
+        let cells = (0..search.lattice).map(|k| (edge(k + 1) - edge(k)).abs());
         format!("{:.3} {}", cells.fold(0.0, f64::max), axis.parameter.unit())
     };
     let cell = plan.axes.iter().map(cell).collect::<Vec<_>>().join(" by ");
@@ -203,9 +199,7 @@ fn summary<M: Swept>(
 /// # Errors
 /// No threads; `SWEEP_SIMD` naming nothing this machine has.
 pub fn search<M: Swept>(
-    plan: &Plan<M>,
-    quantity: &TracedQuantity,
-    task: &BoundaryTask,
+    task: &BoundaryTask<M>,
     trials: Option<Trials>,
     effort: Effort<'_>,
 ) -> Result<(Result<Traced, Stopped>, Option<Trials>), Error> {
@@ -220,9 +214,9 @@ pub fn search<M: Swept>(
         }
     };
     let (threads, interrupt) = (effort.threads()?, effort.interrupt);
-    let engine = M::engine(plan, Some(&quantity.name))?;
+    let engine = M::engine(&task.plan, Some(&task.quantity.name))?;
     let asking = Asking::new(engine, threads, interrupt, trials, &shown)?;
-    let models = Models::new(plan, quantity, asking);
+    let models = Models::new(task, asking);
     let mut standing = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
     let found = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
     lock(&progress).finish();

@@ -7,9 +7,7 @@ use super::result::ResultTable;
 use crate::model::Washer;
 use crate::plan::Plan;
 use sweep_engine::asking::Stopped;
-use sweep_engine::boundary::file::{job, table as boundary_table};
-use sweep_engine::boundary::quantity::traced;
-use sweep_engine::boundary::search::BoundaryTask;
+use sweep_engine::boundary::BoundaryTask;
 use sweep_engine::commands::boundary::search as trace;
 use sweep_engine::optimise::Study;
 use sweep_engine::optimise::file::table as study_table;
@@ -50,14 +48,13 @@ pub fn find_boundary(
     if !(1..=1000).contains(&options.lattice) {
         return Err(Error::option("lattice", options.lattice, "from 1 to 1000"));
     }
-    let (quantity, plan) = &traced(plan, options.quantity, options.limit)?;
-    let task = BoundaryTask::new(plan, options.tolerance, usize::from(options.lattice))?;
-    let job = job(plan, quantity, &task);
+    let quantity = (options.quantity, options.limit);
+    let task = BoundaryTask::new(plan, quantity, options.tolerance, usize::from(options.lattice))?;
     found(
-        (&job, FileKind::Boundary),
+        (&task.job(), FileKind::Boundary),
         (options.output, options.fresh),
-        |trials| trace(plan, quantity, &task, trials, effort),
-        |found| boundary_table(&job, plan, quantity, &task, found),
+        |trials| trace(&task, trials, effort),
+        |found| task.table(found),
     )
 }
 
