@@ -21,27 +21,13 @@ use washer_row::{Demand, Ladder, Level, MODELS, Outcome, Rule, RungRun, Status, 
 
 use crate::columns::Columns;
 use crate::plan::{Plan, Scenario};
-use sweep_engine::Interrupt;
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::store::Done;
+use sweep_engine::{Error, Interrupt};
 use sweep_files::panics::{lock, unlocked};
 
 /// Parts of a run at whose ends two runs of a trajectory are compared.
 pub(crate) const CHECKPOINTS: u32 = 128;
-
-/// Why there is no engine for a plan.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum EngineError {
-    /// `SWEEP_SIMD` names nothing this machine has.
-    #[error("SWEEP_SIMD={0}: expected one that this machine has: {1}")]
-    Simd(String, String),
-}
-
-impl From<EngineError> for sweep_engine::Error {
-    fn from(error: EngineError) -> Self {
-        Self::model(error)
-    }
-}
 
 /// What a row by capped modes came from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,18 +56,18 @@ pub struct ModelEngine<'a> {
 ///
 /// # Errors
 /// A name that is not one of this machine's.
-pub(crate) fn simd_from_environment() -> Result<Simd, EngineError> {
+pub(crate) fn simd_from_environment() -> Result<Simd, Error> {
     Ok(forced_simd()?.unwrap_or_else(Simd::best))
 }
 
 /// The instruction set that `SWEEP_SIMD` asks for, if it does.
-fn forced_simd() -> Result<Option<Simd>, EngineError> {
+fn forced_simd() -> Result<Option<Simd>, Error> {
     let Ok(name) = std::env::var("SWEEP_SIMD") else { return Ok(None) };
     let available = || Simd::ALL.into_iter().filter(|simd| simd.is_available());
     let named = available().find(|simd| simd.name() == name);
     named.map(Some).ok_or_else(|| {
-        let names: Vec<_> = available().map(Simd::name).collect();
-        EngineError::Simd(name, names.join(", "))
+        let names = available().map(Simd::name).collect::<Vec<_>>().join(", ");
+        Error::Refused(format!("SWEEP_SIMD={name}: expected one that this machine has: {names}"))
     })
 }
 
@@ -98,7 +84,7 @@ impl<'a> ModelEngine<'a> {
     ///
     /// # Errors
     /// A method or an instruction set that is not there.
-    pub fn new(plan: &'a Plan) -> Result<Self, EngineError> {
+    pub fn new(plan: &'a Plan) -> Result<Self, Error> {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
@@ -111,7 +97,7 @@ impl<'a> ModelEngine<'a> {
     ///
     /// # Errors
     /// As there.
-    pub(crate) fn with_ladders(plan: &'a Plan, ladders: [Ladder; 2]) -> Result<Self, EngineError> {
+    pub(crate) fn with_ladders(plan: &'a Plan, ladders: [Ladder; 2]) -> Result<Self, Error> {
         Ok(Self { ladders: OnceCell::with_value(ladders), ..Self::new(plan)? })
     }
 

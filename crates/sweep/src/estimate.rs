@@ -8,13 +8,13 @@ use lane_ode::MAX_LANES;
 use washer_model::ModelKind;
 use washer_row::{Deviations, Ladder, Metric, Outcome};
 
-use crate::engine::{Engine, EngineError, MOST_WAITING, ModelEngine, ROWS_A_THREAD, Watch};
+use crate::engine::{Engine, MOST_WAITING, ModelEngine, ROWS_A_THREAD, Watch};
 use crate::plan::Plan;
 use sweep_engine::estimate::Estimate;
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::plan::shortest_step_s;
 use sweep_engine::store::{Shape, chunk_points};
-use sweep_engine::{Interrupt, Job};
+use sweep_engine::{Error, Interrupt, Job};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long.
 const LONG_ENOUGH: Duration = Duration::from_millis(60);
@@ -54,12 +54,12 @@ const RESULT_COLUMN_BYTES: f64 = 800.0;
 ///
 /// # Errors
 /// What keeps a run from having an engine.
-pub(crate) fn of(plan: &Plan, threads: usize) -> Result<Estimate, EngineError> {
+pub(crate) fn of(plan: &Plan, threads: usize) -> Result<Estimate, Error> {
     reckoned(plan, threads, WHOLE)
 }
 
 /// As [`of`], where whole trajectories are given up after a time.
-fn reckoned(plan: &Plan, threads: usize, whole: Duration) -> Result<Estimate, EngineError> {
+fn reckoned(plan: &Plan, threads: usize, whole: Duration) -> Result<Estimate, Error> {
     let engine = ModelEngine::new(plan)?;
     let ladders = engine.ladders();
     let began = Instant::now();
@@ -109,7 +109,7 @@ impl Measured {
         ladders: &[Ladder; 2],
         place: f64,
         whole: Duration,
-    ) -> Result<Self, EngineError> {
+    ) -> Result<Self, Error> {
         let points = plan.points().min(MAX_LANES as u64);
         let first = (plan.points().saturating_sub(points) as f64 * place) as u64;
         // What checks itself costs most where little moves, so that a beginning says too much.
@@ -153,11 +153,7 @@ impl Measured {
     /// Whole trajectories of points from all over the grid, integrated together: the rows that are
     /// left to a slower rung then share its lanes, as in the run. Few points leave such lanes
     /// empty, and cost several times as much each.
-    fn spread(
-        plan: &Plan,
-        ladders: &[Ladder; 2],
-        first: &Self,
-    ) -> Result<Option<Self>, EngineError> {
+    fn spread(plan: &Plan, ladders: &[Ladder; 2], first: &Self) -> Result<Option<Self>, Error> {
         if first.integrated_s < plan.end_s || plan.points() <= first.points {
             return Ok(None);
         }
@@ -187,7 +183,7 @@ fn cost_s(
     cut: &Plan,
     ladders: &[Ladder; 2],
     points: &mut dyn Iterator<Item = u64>,
-) -> Result<f64, EngineError> {
+) -> Result<f64, Error> {
     Ok(cost_within(Duration::MAX, cut, ladders, points)?.unwrap_or(f64::INFINITY))
 }
 
@@ -197,7 +193,7 @@ fn cost_within(
     cut: &Plan,
     ladders: &[Ladder; 2],
     points: &mut dyn Iterator<Item = u64>,
-) -> Result<Option<f64>, EngineError> {
+) -> Result<Option<f64>, Error> {
     // A shorter run alone would be slower spin, and longer steps.
     let engine = ModelEngine::with_ladders(cut, ladders.clone())?;
     let axis_values: Vec<Vec<f64>> = points.map(|point| cut.axis_values(point)).collect();

@@ -38,7 +38,7 @@ use journal::Journal;
 pub(crate) use measured::Measured;
 use model::{Against, Case, Free, Problem, Summary};
 pub(crate) use report::Report;
-use search::{Descent, Stopped, descend};
+use search::{Descent, Ended, descend};
 use statistics::Statistics;
 
 /// Shares of a start between which further starts lie, where no range is given.
@@ -87,28 +87,6 @@ pub struct FitOptions {
 /// The models that can be fitted.
 const NONLINEAR: &str = "nonlinear";
 const LINEAR: &str = "linear";
-
-/// Why there is no fit.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-enum FitError {
-    #[error("{unknowns} unknowns for {samples} samples: expected more samples, or fewer `--free`")]
-    TooFew { unknowns: usize, samples: usize },
-    #[error(
-        "the measurement does not depend on {0}: expected another channel, another start \
-         (`--set NAME=VALUE`), or to leave it out of `--free`"
-    )]
-    NoInfluence(String),
-    #[error(
-        "{name} begins at {rpm:.0} rpm, and where its unbalance was then is not known: expected \
-         the record from rest on"
-    )]
-    Moving { name: String, rpm: f64 },
-    #[error(
-        "the model does not get through the record at the starting values: expected a start from \
-         which it does (`--set NAME=VALUE`)"
-    )]
-    NoAnswer,
-}
 
 /// A fit that was made.
 pub(crate) struct Fitted {
@@ -239,6 +217,15 @@ pub(crate) fn fit(
     options: &FitOptions,
     work: &Work<'_>,
 ) -> Result<Option<Fitted>, Error> {
+    match fitted(cases, options, work) {
+        Ok(fitted) => Ok(Some(fitted)),
+        Err(Ended::Stopped) => Ok(None),
+        Err(Ended::Refused(error)) => Err(error),
+    }
+}
+
+fn fitted(cases: Vec<Case>, options: &FitOptions, work: &Work<'_>) -> Result<Fitted, Ended> {
+    let refused = |why: String| Err(Error::Refused(why).into());
     let free = free(options, &cases)?;
     let method = Problem::method(&cases).map_err(Error::model)?;
     let model = if options.model == LINEAR { ModelKind::Linear } else { ModelKind::Nonlinear };
@@ -248,25 +235,26 @@ pub(crate) fn fit(
     let samples: usize = problem.cases.iter().map(|case| case.measured.count()).sum();
     let unknowns = problem.unknowns() + problem.signals().count();
     if unknowns >= samples {
-        return Err(Error::model(FitError::TooFew { unknowns, samples }));
+        return refused(format!(
+            "{unknowns} unknowns for {samples} samples: expected more samples, or fewer `--free`"
+        ));
     }
     for case in &problem.cases {
         let rpm = case.first_rpm().unwrap_or_default();
         if rpm.abs() > MOST_AT_START * case.greatest_rpm() {
-            let name = case.measured.name.clone();
-            return Err(Error::model(FitError::Moving { name, rpm }));
+            return refused(format!(
+                "{} begins at {rpm:.0} rpm, and where its unbalance was then is not known: \
+                 expected the record from rest on",
+                case.measured.name
+            ));
         }
     }
     let journal = work.journal.as_deref();
     let journal = journal.map(|path| open(path, &problem)).transpose()?;
     let made = AtomicUsize::new(0);
     let search = Search { problem: &problem, journal: journal.as_ref(), work, made: &made };
-    let Ok(minima) = search.minima(u64::from(options.starts)) else { return Ok(None) };
-    let mut minima = minima.map_err(Error::model)?;
-    if minima.is_empty() {
-        return Err(Error::model(FitError::NoAnswer));
-    }
-    let mut best = minima[0].clone();
+    let mut minima = search.minima(u64::from(options.starts))?;
+    let mut best = minima.first().cloned().ok_or_else(no_answer)?;
     let mut step_effect = None;
     // A step too long for the forces' corners shows in the numbers: then it is halved.
     for _ in 0..=HALVINGS {
@@ -274,9 +262,9 @@ pub(crate) fn fit(
         if !best.is_settled {
             break;
         }
-        let Some(against) = problem.against(&best.x, work.stop) else { return Ok(None) };
+        let against = problem.against(&best.x, work.stop).ok_or(Ended::Stopped)?;
         problem.method = Method::Rk4 { step_s: 0.5 * step_s };
-        let Some(finer) = problem.against(&best.x, work.stop) else { return Ok(None) };
+        let finer = problem.against(&best.x, work.stop).ok_or(Ended::Stopped)?;
         let bread = algebra::inverse(&best.summary.normal);
         let moved = effect(&bread, &best.summary, &against, &finer);
         let moved = moved.into_iter().fold(0.0, f64::max);
@@ -286,15 +274,11 @@ pub(crate) fn fit(
             break;
         }
         let search = Search { problem: &problem, journal: None, work, made: &made };
-        match search.from(&best.x) {
-            Ok(Some(found)) => best = found,
-            Ok(None) => return Err(Error::model(FitError::NoAnswer)),
-            Err(Stopped) => return Ok(None),
-        }
+        best = search.from(&best.x)?.ok_or_else(no_answer)?;
         minima[0] = best.clone();
     }
     let evaluations = made.load(Ordering::Relaxed);
-    let Some(against) = problem.against(&best.x, work.stop) else { return Ok(None) };
+    let against = problem.against(&best.x, work.stop).ok_or(Ended::Stopped)?;
     // A wrong unit may lead numbers so far away that only the start shows it.
     let at_start = problem.against(&problem.start(), work.stop);
     let at_start = at_start.unwrap_or_else(|| against.clone());
@@ -311,10 +295,7 @@ pub(crate) fn fit(
     }
     let mut repeated = None;
     if options.bootstrap > 0 {
-        repeated = bootstrap(&mut problem, &best.x, &against, options.bootstrap, work);
-        if repeated.is_none() {
-            return Ok(None);
-        }
+        repeated = Some(bootstrap(&mut problem, &best.x, &against, options.bootstrap, work)?);
     }
     let found = report::Found {
         problem: &problem,
@@ -330,12 +311,20 @@ pub(crate) fn fit(
     };
     let report = found.report()?;
     if (work.stop)() {
-        return Ok(None);
+        return Err(Ended::Stopped);
     }
     if let Some(journal) = journal {
         journal.complete();
     }
-    Ok(Some(Fitted { problem, x: best.x, against, report }))
+    Ok(Fitted { problem, x: best.x, against, report })
+}
+
+fn no_answer() -> Error {
+    Error::Refused(
+        "the model does not get through the record at the starting values: expected a start from \
+         which it does (`--set NAME=VALUE`)"
+            .to_owned(),
+    )
 }
 
 /// The journal of a problem.
@@ -415,14 +404,14 @@ fn by_tachometer(
 }
 
 /// The fit again and again, with its residuals resampled in blocks longer than they are correlated:
-/// the free numbers of each; `None` if it was stopped.
+/// the free numbers of each.
 fn bootstrap(
     problem: &mut Problem,
     x: &[f64],
     against: &[Against],
     count: u32,
     work: &Work<'_>,
-) -> Option<Vec<Vec<f64>>> {
+) -> Result<Vec<Vec<f64>>, Ended> {
     const BLOCK: usize = 100;
     let measured = problem.cases.clone();
     let draw = Design::Spread { rule: Rule::MonteCarlo, points: 0, seed: SEED };
@@ -446,11 +435,11 @@ fn bootstrap(
         }
         let made = AtomicUsize::new(0);
         let search = Search { problem, journal: None, work, made: &made };
-        let again = search.from(x).ok()?;
+        let again = search.from(x)?;
         found.extend(again.map(|again| again.x[..problem.free.len()].to_vec()));
     }
     problem.cases = measured;
-    Some(found)
+    Ok(found)
 }
 
 /// A search for the least cost of a problem.
@@ -463,11 +452,11 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn evaluate(&self, x: &[f64]) -> Result<Option<Summary>, Stopped> {
+    fn evaluate(&self, x: &[f64]) -> Result<Option<Summary>, Ended> {
         let find = || {
             let found = self.problem.against(x, self.work.stop);
             if (self.work.stop)() {
-                return Err(Stopped);
+                return Err(Ended::Stopped);
             }
             Ok(found.map(|against| self.problem.summary(&against)))
         };
@@ -480,24 +469,30 @@ impl Search<'_> {
     }
 
     /// The descent from a start.
-    fn from(&self, start: &[f64]) -> Result<Option<Descent>, Stopped> {
+    fn from(&self, start: &[f64]) -> Result<Option<Descent>, Ended> {
         let ranges: Vec<[f64; 2]> =
             (0..self.problem.unknowns()).map(|k| self.problem.range(k)).collect();
         descend(start, &ranges, &|x| self.evaluate(x))
     }
 
     /// Every minimum that is found from so many starts, the least first.
-    fn minima(&self, starts: u64) -> Result<Result<Vec<Descent>, FitError>, Stopped> {
+    fn minima(&self, starts: u64) -> Result<Vec<Descent>, Ended> {
         let start = self.problem.start();
         let dead = |summary: &Summary| {
             let dead = |k: &usize| summary.normal[*k][*k] == 0.0;
             let dead = (0..self.problem.free.len()).filter(dead);
             let names: Vec<&str> = dead.map(|k| self.problem.free[k].parameter.name()).collect();
-            (!names.is_empty()).then(|| FitError::NoInfluence(names.join(", ")))
+            (!names.is_empty()).then(|| names.join(", "))
+        };
+        let no_influence = |names: String| {
+            Err(Ended::Refused(Error::Refused(format!(
+                "the measurement does not depend on {names}: expected another channel, another \
+                 start (`--set NAME=VALUE`), or to leave it out of `--free`"
+            ))))
         };
         let dead_at_start = self.evaluate(&start)?.as_ref().and_then(dead);
-        if let (Some(error), 1) = (&dead_at_start, starts) {
-            return Ok(Err(error.clone()));
+        if let (Some(names), 1) = (&dead_at_start, starts) {
+            return no_influence(names.clone());
         }
         let mut chosen = vec![start.clone()];
         if starts > 1 {
@@ -531,8 +526,8 @@ impl Search<'_> {
         minima.sort_by(|a, b| a.summary.cost.total_cmp(&b.summary.cost));
         // Of several starts another may be where all count.
         let is_dead = |minimum: &Descent| dead(&minimum.summary).is_some();
-        if let Some(error) = dead_at_start.filter(|_| minima.iter().all(is_dead)) {
-            return Ok(Err(error));
+        if let Some(names) = dead_at_start.filter(|_| minima.iter().all(is_dead)) {
+            return no_influence(names);
         }
         let mut apart: Vec<Descent> = Vec::new();
         for minimum in minima {
@@ -540,7 +535,7 @@ impl Search<'_> {
                 apart.push(minimum);
             }
         }
-        Ok(Ok(apart))
+        Ok(apart)
     }
 
     /// Whether two descents ended in one minimum: within a few standard errors, or a thousandth.

@@ -13,9 +13,7 @@ use washer_row::{Growth, Outcome, Status, Trajectory};
 
 use crate::columns::Columns;
 use crate::dwell::{Motions, Search};
-use crate::engine::{
-    Engine, EngineError, Watch, responses, simd_from_environment, together_or_alone,
-};
+use crate::engine::{Engine, Watch, responses, simd_from_environment, together_or_alone};
 use crate::plan::{Plan, timing};
 use sweep_engine::store::{Column, Done, Kind, Layout, axis_columns};
 use sweep_engine::{Error, Job};
@@ -130,7 +128,7 @@ impl<'a> Held<'a> {
     ///
     /// # Errors
     /// An instruction set that is not there.
-    pub(crate) fn engine(&self) -> Result<DwellEngine<'a>, EngineError> {
+    pub(crate) fn engine(&self) -> Result<DwellEngine<'a>, Error> {
         let Self { plan, speeds_rpm, search } = *self;
         let asked = match search {
             Some(search) => Asked::Motions(Motions::new(plan, search)),

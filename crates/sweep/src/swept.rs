@@ -16,7 +16,7 @@ impl Swept for Washer {
     fn engine<'a>(plan: &'a Plan, only: Option<&str>) -> Result<Box<dyn Engine + 'a>, Error> {
         // It makes sure of a ratio's side, and knows nothing of the limits of other columns.
         let is_of = |kind| only.is_some_and(|only| only.starts_with(kind));
-        let mut engine = ModelEngine::new(plan).map_err(Error::model)?;
+        let mut engine = ModelEngine::new(plan)?;
         engine.demand = if is_of("ratio_") {
             Demand::Side
         } else if is_of("growth_") || is_of("dwell_") {
@@ -28,7 +28,7 @@ impl Swept for Washer {
     }
 
     fn estimate(plan: &Plan, threads: usize) -> Result<Estimate, Error> {
-        crate::estimate::of(plan, threads).map_err(Error::model)
+        crate::estimate::of(plan, threads)
     }
 
     fn words(plan: &Plan) -> Vec<(&'static str, String)> {

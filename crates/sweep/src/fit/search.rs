@@ -5,6 +5,7 @@
 
 use super::algebra::{Symmetric, dot, scaled};
 use super::model::Summary;
+use sweep_engine::Error;
 
 /// A descent ends where a step would lower the cost by less: some hundredth of a standard error.
 const WORTH: f64 = 2e-4;
@@ -31,8 +32,8 @@ pub(crate) struct Descent {
 pub(crate) fn descend(
     start: &[f64],
     ranges: &[[f64; 2]],
-    evaluate: &dyn Fn(&[f64]) -> Result<Option<Summary>, Stopped>,
-) -> Result<Option<Descent>, Stopped> {
+    evaluate: &dyn Fn(&[f64]) -> Result<Option<Summary>, Ended>,
+) -> Result<Option<Descent>, Ended> {
     let Some(mut now) = evaluate(start)? else { return Ok(None) };
     let mut x = start.to_vec();
     let (mut evaluations, mut damping) = (1, 1e-3);
@@ -89,16 +90,27 @@ pub(crate) fn descend(
     }
 }
 
-/// The work was stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Stopped;
+/// Why a search came to no end.
+#[derive(Debug)]
+pub(crate) enum Ended {
+    /// The work was stopped.
+    Stopped,
+    /// What was asked cannot be answered.
+    Refused(Error),
+}
+
+impl<E: Into<Error>> From<E> for Ended {
+    fn from(error: E) -> Self {
+        Self::Refused(error.into())
+    }
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// Rosenbrock's valley as residuals 10 (b - a^2) and 1 - a of noise 1.
-    fn valley(x: &[f64]) -> Result<Option<Summary>, Stopped> {
+    fn valley(x: &[f64]) -> Result<Option<Summary>, Ended> {
         let residual = [-10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
         let slopes = [[-20.0 * x[0], 1.0], [10.0, 0.0]];
         let normal = slopes.map(|a| slopes.map(|b| dot(&a, &b)).to_vec()).to_vec();
