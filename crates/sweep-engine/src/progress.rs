@@ -1,9 +1,11 @@
 //! Progress of a run: a bar on a terminal, a line now and then elsewhere, or nothing.
 
 use std::io::{IsTerminal, Write};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use sweep_files::panics::lock;
 
 /// What `--progress` said.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -17,9 +19,9 @@ pub enum ProgressMode {
     None,
 }
 
-/// Something that shows how far the run is, on stderr.
+/// Something that shows how far the run is, on stderr; any thread may have it do so.
 pub struct Progress {
-    shown: Shown,
+    shown: Mutex<Shown>,
     total: u64,
     /// Points that were there at the start: they count as done, but not towards the rate.
     start: u64,
@@ -58,7 +60,7 @@ impl Progress {
             }
             ProgressMode::Auto => lines(60),
         };
-        let mut progress = Self { shown, total, start, began: Instant::now() };
+        let progress = Self { shown: Mutex::new(shown), total, start, began: Instant::now() };
         if template == BAR {
             progress.show(start);
         }
@@ -66,15 +68,15 @@ impl Progress {
     }
 
     /// Shows that `done` points of the total are there.
-    pub fn show(&mut self, done: u64) {
-        self.tell(done, |progress, _| progress.line(done));
+    pub fn show(&self, done: u64) {
+        self.tell(done, |_| self.line(done));
     }
 
     /// Shows that so many rows of a search are done, with so many points.
-    pub fn show_search(&mut self, rows: u64, points: u64) {
-        self.tell(rows, |progress, counts_rows| {
-            let points = progress.points(points);
-            match progress.total {
+    pub fn show_search(&self, rows: u64, points: u64) {
+        self.tell(rows, |counts_rows| {
+            let points = self.points(points);
+            match self.total {
                 total if total > 0 && !counts_rows => format!("{rows} of {total} rows, {points}"),
                 _ => points,
             }
@@ -87,16 +89,18 @@ impl Progress {
     }
 
     /// Says it beside the bar, which counts on its own; or in a line, and then none for a while.
-    fn tell(&mut self, position: u64, text: impl FnOnce(&Self, bool) -> String) {
-        match self.shown {
-            Shown::Bar(ref bar) => {
+    fn tell(&self, position: u64, text: impl FnOnce(bool) -> String) {
+        // A thread that finds another saying it goes on.
+        let Ok(mut shown) = self.shown.try_lock() else { return };
+        match &mut *shown {
+            Shown::Bar(bar) => {
                 bar.set_position(position);
-                bar.set_message(text(self, true));
+                bar.set_message(text(true));
             }
-            Shown::Lines { every, next } if Instant::now() >= next => {
+            Shown::Lines { every, next } if Instant::now() >= *next => {
                 // A log that cannot be written to must not end the run.
-                let _ = writeln!(std::io::stderr(), "{}", text(self, false));
-                self.shown = Shown::Lines { every, next: Instant::now() + every };
+                let _ = writeln!(std::io::stderr(), "{}", text(false));
+                *next = Instant::now() + *every;
             }
             _ => {}
         }
@@ -109,7 +113,7 @@ impl Progress {
 
     /// Says that the chunks are being joined.
     pub fn joining(&self) {
-        if let Shown::Bar(bar) = &self.shown {
+        if let Shown::Bar(bar) = &*lock(&self.shown) {
             bar.set_style(style("{spinner} joining {human_len} points"));
             bar.tick();
         }
@@ -117,7 +121,7 @@ impl Progress {
 
     /// Clears the bar away.
     pub fn finish(&self) {
-        if let Shown::Bar(bar) = &self.shown {
+        if let Shown::Bar(bar) = &*lock(&self.shown) {
             bar.finish_and_clear();
         }
     }

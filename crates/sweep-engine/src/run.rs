@@ -99,8 +99,8 @@ pub fn run(
         (options.tell)(&format!("going on: {there} of {points} points are there"));
     }
     let (began, started_unix_s) = (Instant::now(), provenance::now_unix_s());
-    let mut progress = Progress::new(options.progress, points, there);
-    let result = compute_and_join(engine, job, &mut run, threads, &mut progress, interrupt);
+    let progress = Progress::new(options.progress, points, there);
+    let result = compute_and_join(engine, job, &mut run, threads, &progress, interrupt);
     progress.finish();
     let wall_s = began.elapsed().as_secs_f64();
     let computed = run.own_points().1.saturating_sub(there);
@@ -151,7 +151,7 @@ fn compute_and_join(
     job: &Job<'_>,
     run: &mut OpenRun,
     threads: usize,
-    progress: &mut Progress,
+    progress: &Progress,
     interrupt: &Interrupt,
 ) -> Result<Option<Tally>, StoreError> {
     let mut attempts_left = 2;
@@ -177,7 +177,7 @@ fn compute(
     job: &Job<'_>,
     run: &OpenRun,
     threads: usize,
-    progress: &mut Progress,
+    progress: &Progress,
     interrupt: &Interrupt,
 ) -> Result<(), StoreError> {
     let pool = threads::pool(threads)?;

@@ -1,7 +1,6 @@
 //! `sweep boundary GRID.toml`: the curve itself.
 
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -13,7 +12,6 @@ use crate::boundary::{BoundaryTask, EdgeKind, Traced, trace};
 use crate::effort::{Effort, EffortArgs};
 use crate::store::{Column, OpenedTrials, Trials};
 use crate::{Axis, Error, Exit, Plan, Progress, StoreError, Swept, duration, show, tell};
-use sweep_files::panics::lock;
 use sweep_files::{FileKind, Output};
 use sweep_parameter::{Parameter as _, Worse};
 
@@ -206,19 +204,14 @@ pub fn search<M: Swept>(
     let there = trials.as_ref().map_or(0, |trials| trials.count() as u64);
     let rows = (task.firsts.len() * task.curves) as u64;
     let rows_done = AtomicU64::new(0);
-    let progress = Mutex::new(Progress::of_search(effort.progress, rows, there));
-    let shown = |points: u64| {
-        // A thread that finds another showing it goes on.
-        if let Ok(mut progress) = progress.try_lock() {
-            progress.show_search(rows_done.load(Ordering::Relaxed), points);
-        }
-    };
+    let progress = Progress::of_search(effort.progress, rows, there);
+    let shown = |points| progress.show_search(rows_done.load(Ordering::Relaxed), points);
     let (threads, interrupt) = (effort.threads()?, effort.interrupt);
     let engine = M::engine(&task.plan, Some(&task.quantity.name))?;
     let asking = Asking::new(engine, threads, interrupt, trials, &shown)?;
     let models = Models::new(task, asking);
     let mut standing = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
     let found = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
-    lock(&progress).finish();
+    progress.finish();
     Ok((found, models.into_asking().into_trials()))
 }

@@ -1,14 +1,11 @@
 //! Candidates through a model's engine, with a memory.
 
-use std::sync::Mutex;
-
 use arrow_schema::ArrowError;
 
 use super::{Candidate, Evolution, Study, evolve};
 use crate::asking::{Answer, Asking, Stopped};
 use crate::store::{Done, Key, Layout, ResultRows, Row, Trials};
 use crate::{Effort, Error, Progress, StoreError, Swept};
-use sweep_files::panics::lock;
 use sweep_results::Goal;
 
 /// Everything that a study tries, with a memory of trials if there is one, which it gives back.
@@ -21,13 +18,8 @@ pub fn search<M: Swept>(
     effort: Effort<'_>,
 ) -> Result<(Result<Vec<Candidate>, Stopped>, Option<Trials>), Error> {
     let there = trials.as_ref().map_or(0, |trials| trials.count() / study.answers()) as u64;
-    let progress = Mutex::new(Progress::new(effort.progress, study.candidates, there));
-    let shown = |candidates: u64| {
-        // A thread that finds another showing it goes on.
-        if let Ok(mut progress) = progress.try_lock() {
-            progress.show(candidates);
-        }
-    };
+    let progress = Progress::new(effort.progress, study.candidates, there);
+    let shown = |candidates| progress.show(candidates);
     let (threads, engine) = (effort.threads()?, M::engine(&study.plan, None)?);
     let asking = Asking::new(engine, threads, effort.interrupt, trials, &shown)?;
     let evolution = Evolution {
@@ -52,7 +44,7 @@ pub fn search<M: Swept>(
         // Without one number there are none.
         Ok(found.into_iter().map(|numbers| numbers.into_iter().collect()).collect())
     });
-    lock(&progress).finish();
+    progress.finish();
     Ok((found, asking.into_trials()))
 }
 

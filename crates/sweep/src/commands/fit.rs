@@ -3,14 +3,12 @@
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 use crate::config::{self, GridInput};
 use crate::fit::{self, FitOptions, Measured, Work};
 use sweep_engine::commands::grid::GridArgs;
 use sweep_engine::progress::Progress;
 use sweep_engine::{EffortArgs, Error, Exit, Interrupt, StoreError, show, tell, threads};
-use sweep_files::panics::lock;
 use sweep_files::{self as files, FileKind, atomic};
 
 /// Arguments of `sweep fit`.
@@ -83,8 +81,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         files::judge(path, FileKind::Fit)?;
     }
     let interrupt = Interrupt::install().map_err(Error::signals)?;
-    let progress = Mutex::new(Progress::of_search(args.effort.progress, 0, 0));
-    let seen = |made: usize| lock(&progress).show_search(0, made as u64);
+    let progress = Progress::of_search(args.effort.progress, 0, 0);
+    let seen = |made: usize| progress.show_search(0, made as u64);
     let journal = args.out.as_ref().map(|out| {
         let mut name = out.as_os_str().to_owned();
         name.push(".partial");
@@ -94,7 +92,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let work = Work { stop: &stop, seen: &seen, journal };
     let threads = threads::count(args.effort.threads, &threads::process)?;
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &work))?;
-    lock(&progress).finish();
+    progress.finish();
     let Some(fitted) = found else {
         tell("interrupted: with --out, what was found out is kept, and the same command goes on");
         return Ok(Exit::interrupted(interrupt.signal()));

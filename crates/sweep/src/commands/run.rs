@@ -1,6 +1,5 @@
 //! `sweep run GRID.toml`: the sweep, with time histories beside it.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::engine::ModelEngine;
@@ -11,7 +10,6 @@ use sweep_engine::commands::run::{execute, exit, installed};
 use sweep_engine::progress::Progress;
 use sweep_engine::run::Ended;
 use sweep_engine::{Error, Exit, tell, threads};
-use sweep_files::panics::lock;
 use sweep_files::{self as files, ParquetFile};
 
 /// Arguments of `sweep run`.
@@ -46,19 +44,13 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         let threads = threads::count(args.run.work.effort.threads, &threads::process)?;
         let folder = files::beside(&output, "traces");
         tell(&format!("traces of {} points go to {}", plan.points(), folder.display()));
-        let progress = Mutex::new(Progress::new(args.run.work.effort.progress, plan.points(), 0));
+        let progress = Progress::new(args.run.work.effort.progress, plan.points(), 0);
         let kept = AtomicU64::new(0);
-        let done = || {
-            let kept = kept.fetch_add(1, Ordering::Relaxed) + 1;
-            // A thread that finds another showing it goes on.
-            if let Ok(mut progress) = progress.try_lock() {
-                progress.show(kept);
-            }
-        };
+        let done = || progress.show(kept.fetch_add(1, Ordering::Relaxed) + 1);
         let map = ParquetFile::open(&output)?;
         let stop = || interrupt.stopped();
         let ended = trace::keep(&engine, &map, &folder, threads, &stop, &done);
-        lock(&progress).finish();
+        progress.finish();
         ended?;
         if let Some(signal) = interrupt.signal() {
             tell("interrupted; the map is kept, and the traces so far");

@@ -106,17 +106,14 @@ pub(super) fn in_memory(
     let last = job.points.saturating_sub(1);
     let defect = |reason| StoreError::Engine { first: 0, last, reason };
     let gathered = Gathered::new(job);
-    let progress = Mutex::new(Progress::new(effort.progress, job.points, 0));
+    let progress = Progress::new(effort.progress, job.points, 0);
     let keep = |outcome| {
         gathered.keep(outcome, &watch);
-        // A thread that finds another showing it goes on.
-        if let Ok(mut progress) = progress.try_lock() {
-            progress.show(watch.points_done());
-        }
+        progress.show(watch.points_done());
     };
     let evaluate = || pool.install(|| engine.evaluate(&next, &keep, &watch));
     let evaluated = catch_unwind(AssertUnwindSafe(evaluate));
-    lock(&progress).finish();
+    progress.finish();
     evaluated.map_err(|panic| {
         defect(format!("the engine panicked: {}", panics::text(panic.as_ref())))
     })?;
