@@ -9,15 +9,13 @@ use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, NONLINEAR};
 use crate::error::PlotError;
 use crate::figures::stability::{
-    UNSTABLE, channels_of, columns_of, each_row, notes_at, one_point, panel, read, response, shown,
-    unstable,
+    Held, UNSTABLE, channels_of, columns_of, panel, response, shown, unstable,
 };
 use crate::figures::{passages, trace};
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Source};
 use crate::scene::{Colour, INK};
-use crate::swept;
-use crate::together::{self, At};
+use crate::together;
 
 /// Kinds of motions as the file has them, in words, and their colours; the last is what did not
 /// settle.
@@ -47,18 +45,15 @@ type Motion = (f64, usize, Vec<f64>);
 /// The chart of a dwell file's one point: deviations over speed.
 ///
 /// # Errors
-/// As [`one_point`] and [`shown`].
+/// As [`Held::one`] and [`shown`].
 pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
     let channels = channels_of(source, "periodic");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
-    let axes = swept::columns(source);
-    let point = one_point(source, &axes, &options.at, "--at")?;
-    let motions = motions(source, &axes, &point, &channels)?;
-    let columns = columns_of(&channels, ["linear", "periodic"]);
-    let one = read(source, &axes, std::slice::from_ref(&point), &columns)?.remove(0);
-    let passing = options.against.as_ref().map(|path| passing(source, (&axes, &point), path));
-    let passing = passing.transpose()?;
+    let held = Held::one(source, &options.at, "--at")?;
+    let motions = motions(source, &held, &channels)?;
+    let one = held.read(&columns_of(&channels, ["linear", "periodic"]))?.remove(0);
+    let passing = options.against.as_ref().map(|path| passing(source, &held, path)).transpose()?;
     let of_kind = |kind: usize| motions.iter().filter(move |(_, of, _)| *of == kind);
     let (first, last) = (one.speed.first().copied(), one.speed.last().copied());
     let is_held = |speed: &f64| first <= Some(*speed) && Some(*speed) <= last;
@@ -87,7 +82,7 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
         ChartPanel { height: 190.0, log, ..panel((name, facts), is_shown[k], series) }
     });
     let panels = panels.collect();
-    let mut notes = notes_at(source, &axes, &point);
+    let mut notes = held.notes();
     notes.push("largest deviation from equilibrium".to_owned());
     Ok(Chart {
         title: "What a held speed ends in".to_owned(),
@@ -104,14 +99,9 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for a file that is no trace or of another machine.
-fn passing(
-    source: &Source,
-    (axes, point): (&[&ColumnFacts], &[f64]),
-    path: &Path,
-) -> Result<Chart, PlotError> {
+fn passing(source: &Source, held: &Held<'_>, path: &Path) -> Result<Chart, PlotError> {
     let trace = trace::other_trace(path)?;
-    let own: At = axes.iter().map(|axis| axis.name.clone()).zip(point.iter().copied()).collect();
-    let files = [(&trace.source, &together::at(&trace.source)), (source, &own)];
+    let files = [(&trace.source, &together::at(&trace.source)), (source, &held.values())];
     together::agree("--against", path, files, together::MACHINE)?;
     passages::chart(&trace, &PlotOptions::default())
 }
@@ -119,18 +109,16 @@ fn passing(
 /// The motions at every speed.
 fn motions(
     source: &Source,
-    axes: &[&ColumnFacts],
-    point: &[f64],
+    held: &Held<'_>,
     channels: &[(&str, &ColumnFacts)],
 ) -> Result<Vec<Motion>, PlotError> {
     let mut columns = columns_of(channels, ["nonlinear"]);
     columns.push(TURN.to_owned());
     let has_turns = source.column(TURN).is_some();
     let mut motions = Vec::new();
-    each_row(source, axes, &columns, |mut row| {
+    held.each_row(&columns, |_, mut row| {
         // The first turn of each motion.
-        let is_first = row.values.pop().is_some_and(|turn| turn <= 0.0) || !has_turns;
-        if row.point == point && is_first {
+        if row.values.pop().is_some_and(|turn| turn <= 0.0) || !has_turns {
             motions.push((row.speed, place_of(row.kind), row.values));
         }
     })?;
@@ -147,21 +135,17 @@ fn place_of(kind: Option<&str>) -> usize {
 /// each speed in a panel.
 ///
 /// # Errors
-/// As [`one_point`]; [`PlotError::Undrawable`] where no states were kept.
+/// As [`Held::one`]; [`PlotError::Undrawable`] where no states were kept.
 pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
-    let axes = swept::columns(source);
-    let point = one_point(source, &axes, &options.at, "--at")?;
+    let held = Held::one(source, &options.at, "--at")?;
     let columns = ["motion", YAW, PITCH];
     if let Some(name) = columns.into_iter().find(|name| source.column(name).is_none()) {
         return Err(source.lacks(name, "numeric"));
     }
     // Speed, motion, its kind, and its states by yaw.
     let mut found: Vec<(f64, f64, usize, Vec<[f64; 2]>)> = Vec::new();
-    each_row(source, &axes, &columns, |row| {
+    held.each_row(&columns, |_, row| {
         let [motion, yaw, pitch] = [0, 1, 2].map(|k| row.values[k]);
-        if row.point != point {
-            return;
-        }
         let state = [1e3 * yaw, 1e3 * pitch];
         match found.last_mut().filter(|last| (last.0, last.1) == (row.speed, motion)) {
             Some((.., states)) => states.push(state),
@@ -189,7 +173,7 @@ pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, 
     }
     Ok(Chart {
         title: "States once a turn, where the unbalance is up".to_owned(),
-        subtitle: notes_at(source, &axes, &point).join(" · "),
+        subtitle: held.notes().join(" · "),
         x_label: Label::new("Yaw of the tub from equilibrium", "mrad"),
         panels,
         ..Chart::default()

@@ -12,7 +12,7 @@ use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Kind, Source, some_of};
 use crate::swept::{self, SweptAxis};
 use crate::table::Table;
-use crate::together;
+use crate::together::{self, At};
 
 /// Most points whose growth is drawn: each needs a colour.
 const MOST_CURVES: usize = DISTINCT.len();
@@ -27,9 +27,8 @@ const MOST_EDGES: usize = 16;
 pub(super) const UNSTABLE: &str = "a dwell at this speed is unstable";
 
 /// One point over speed.
+#[derive(Clone, Default)]
 pub(super) struct Swept {
-    /// Values of the file's axes.
-    values: Vec<f64>,
     pub(super) speed: Vec<f64>,
     /// NaN where there is no response.
     pub(super) growth: Vec<f64>,
@@ -37,37 +36,33 @@ pub(super) struct Swept {
     columns: Vec<Vec<f64>>,
 }
 
-/// The point of a stability file with its axes' values, in file order.
-type Points = Vec<Vec<f64>>;
-
 /// The chart of a stability file: growth over speed.
 ///
 /// # Errors
-/// As [`points`], [`read`].
+/// As [`Held::at`], [`Held::read`].
 pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
-    let axes = swept::columns(source);
-    let all = points(source, &axes, &options.at, "--at")?;
-    let shown: Points = match all.len() {
-        count if count <= MOST_CURVES => all.clone(),
-        count => {
-            (0..MOST_CURVES).map(|k| all[k * (count - 1) / (MOST_CURVES - 1)].clone()).collect()
-        }
-    };
-    let swept = read(source, &axes, &shown, &[])?;
+    let mut held = Held::at(source, &options.at, "--at")?;
+    let count = held.points.len();
+    if count > MOST_CURVES {
+        let some = (0..MOST_CURVES).map(|k| k * (count - 1) / (MOST_CURVES - 1));
+        held.points = some.map(|place| held.points[place].clone()).collect();
+    }
+    let swept = held.read(&[])?;
+    let Held { axes, points: shown, .. } = &held;
     let differs = |k: usize| shown.iter().any(|point| point[k] != shown[0][k]);
     let name = |point: &[f64]| {
         let named = axes.iter().zip(point).enumerate().filter(|(k, _)| differs(*k));
         let named: Vec<String> = named.map(|(_, (axis, value))| said(axis, *value)).collect();
         if named.is_empty() { "growth".to_owned() } else { named.join(", ") }
     };
-    let series = swept.iter().enumerate().map(|(k, point)| {
+    let series = swept.iter().zip(shown).enumerate().map(|(k, (point, values))| {
         let (x, y) = (point.speed.clone(), point.growth.clone());
-        Series::new(name(&point.values), DISTINCT[k], x, y, Style::Solid(2.2))
+        Series::new(name(values), DISTINCT[k], x, y, Style::Solid(2.2))
     });
     let common = axes.iter().zip(&shown[0]).enumerate().filter(|(k, _)| !differs(*k));
     let mut notes = source.notes(common.map(|(_, (axis, value))| said_within(axis, *value)));
-    if shown.len() < all.len() {
-        notes.push(format!("{} of {} points", shown.len(), all.len()));
+    if shown.len() < count {
+        notes.push(format!("{} of {count} points", shown.len()));
     }
     let panel = ChartPanel {
         levels: vec![(0.0, "unstable above".to_owned())],
@@ -100,21 +95,20 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
 /// over speed.
 ///
 /// # Errors
-/// As [`one_point`]; [`PlotError::Unfit`] for an unknown channel.
+/// As [`Held::one`]; [`PlotError::Unfit`] for an unknown channel.
 pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
     let channels = channels_of(source, "linear");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
     let columns = columns_of(&channels, ["linear", "nonlinear"]);
-    let axes = swept::columns(source);
-    let point = one_point(source, &axes, &options.at, "--at")?;
-    let one = read(source, &axes, &[point], &columns)?.remove(0);
+    let held = Held::one(source, &options.at, "--at")?;
+    let one = held.read(&columns)?.remove(0);
     let panels = channels.iter().zip(is_shown).enumerate().map(|(k, (channel, shown))| {
         let lines = response("nonlinear model", &one, k, label::shown(&channel.1.unit).1);
         ChartPanel { height: 170.0, ..panel(*channel, shown, lines) }
     });
     let panels = panels.collect();
-    let mut notes = notes_at(source, &axes, &one.values);
+    let mut notes = held.notes();
     notes.push("largest deviation from equilibrium over a turn".to_owned());
     Ok(Chart {
         title: "Periodic responses at constant speed".to_owned(),
@@ -213,20 +207,17 @@ pub(super) struct Unstable {
 pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
     let source = Source::open(path)?;
     source.expect(Kind::Stability, "--stability", "`sweep stability` writes a stability file")?;
-    let axes = swept::columns(&source);
-    let mut at: Vec<(String, f64)> =
+    let mut at: At =
         machine(table).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     let named = together::at(&table.source);
     at.retain(|(known, _)| !named.iter().any(|(name, _)| name == known));
     at.extend(named.iter().cloned());
+    let axes = swept::columns(&source);
     at.retain(|(name, _)| axes.iter().any(|axis| axis.name == *name));
-    let point = one_point(&source, &axes, &at, "--stability")?;
-    let own = axes.iter().map(|axis| axis.name.clone()).zip(point.iter().copied()).collect();
-    let files = [(&table.source, &named), (&source, &own)];
+    let held = Held::one(&source, &at, "--stability")?;
+    let files = [(&table.source, &named), (&source, &held.values())];
     together::agree("--stability", path, files, together::MACHINE)?;
-    let columns = ["mode_1_cpm", "mode_2_cpm"].map(str::to_owned);
-    let swept = read(&source, &axes, &[point], &columns)?;
-    let one = &swept[0];
+    let one = held.read(&["mode_1_cpm", "mode_2_cpm"].map(str::to_owned))?.remove(0);
     let frequency = |place: usize, k: usize| one.columns[place].get(k).copied().unwrap_or(f64::NAN);
     Ok(Unstable {
         speeds: unstable(&one.speed, &one.growth),
@@ -246,145 +237,153 @@ fn said_within(axis: &ColumnFacts, value: f64) -> String {
     label::valued(&label::words(&axis.name).to_lowercase(), value, &axis.unit)
 }
 
-/// The run and the point.
-pub(super) fn notes_at(source: &Source, axes: &[&ColumnFacts], point: &[f64]) -> Vec<String> {
-    source.notes(axes.iter().zip(point).map(|(axis, value)| said_within(axis, *value)))
-}
-
 /// A row of a file over constant speeds. What the file does not have is NaN.
 pub(super) struct Row<'a> {
     /// Values of the file's axes.
-    pub(super) point: Vec<f64>,
+    point: Vec<f64>,
     pub(super) speed: f64,
-    pub(super) growth: f64,
+    growth: f64,
     pub(super) kind: Option<&'a str>,
     /// Of the columns asked for.
     pub(super) values: Vec<f64>,
 }
 
-/// Reads such a file row by row.
-///
-/// # Errors
-/// As [`Source::each_row`].
-pub(super) fn each_row<S: AsRef<str>>(
-    source: &Source,
-    axes: &[&ColumnFacts],
-    columns: &[S],
-    mut take: impl FnMut(Row<'_>),
-) -> Result<(), PlotError> {
-    let names = axes.iter().map(|axis| axis.name.as_str());
-    let names = names.chain(["speed_rpm", "growth_per_s", "kind"]);
-    let names: Vec<&str> = names.chain(columns.iter().map(S::as_ref)).collect();
-    let own = axes.len();
-    source.each_row(&names, |row| {
-        take(Row {
-            point: row.numbers(0..own),
-            speed: row.number(own),
-            growth: row.number(own + 1),
-            kind: row.word(own + 2),
-            values: row.numbers(own + 3..names.len()),
-        });
-        Ok(())
-    })
+/// Points of a file over constant speeds.
+pub(super) struct Held<'a> {
+    source: &'a Source,
+    axes: Vec<&'a ColumnFacts>,
+    /// Values of the axes, in file order.
+    points: Vec<Vec<f64>>,
 }
 
-/// Every point of the file at the values asked for, in file order.
-///
-/// # Errors
-/// As [`Source::each_row`]; [`PlotError::Unfit`] for what is no axis, or no value of it;
-/// [`PlotError::Undrawable`] without rows.
-fn points(
-    source: &Source,
-    axes: &[&ColumnFacts],
-    at: &[(String, f64)],
-    option: &'static str,
-) -> Result<Points, PlotError> {
-    let mut pins: Vec<(usize, f64)> = Vec::with_capacity(at.len());
-    for (name, value) in at {
-        match axes.iter().position(|axis| axis.name == *name) {
-            Some(place) => pins.push((place, *value)),
-            None => {
-                let names = axes.iter().map(|axis| axis.name.as_str());
-                return Err(source.not_there(option, name, "axis", some_of(names)));
-            }
-        }
-    }
-    let mut found: Points = Vec::new();
-    let mut seen_rows = false;
-    each_row(source, axes, &[""; 0], |row| {
-        seen_rows = true;
-        let is_pinned = pins.iter().all(|&(place, value)| SweptAxis::near(row.point[place], value));
-        // Speeds vary fastest: a point's rows follow each other.
-        if is_pinned && found.last() != Some(&row.point) {
-            found.push(row.point);
-        }
-    })?;
-    if !seen_rows {
-        return Err(source.empty("it has no rows"));
-    }
-    if found.is_empty() {
-        let given: Vec<String> = at.iter().map(|(name, value)| format!("{name}={value}")).collect();
-        return Err(source.not_there(
-            option,
-            given.join(", "),
-            "point",
-            "other values of these axes",
-        ));
-    }
-    Ok(found)
-}
-
-/// The one point of the file, or the one at the values asked for.
-///
-/// # Errors
-/// As [`points`]; [`PlotError::Unfit`] where there are several.
-pub(super) fn one_point(
-    source: &Source,
-    axes: &[&ColumnFacts],
-    at: &[(String, f64)],
-    option: &'static str,
-) -> Result<Vec<f64>, PlotError> {
-    let mut found = points(source, axes, at, option)?;
-    if found.len() > 1 {
-        let free = axes.iter().map(|axis| axis.name.as_str());
-        let free = some_of(free.filter(|axis| !at.iter().any(|(name, _)| name == axis)));
-        let what = match option {
-            "--at" => format!("one is wanted: give --at NAME=VALUE for {free}"),
-            _ => format!("the file to be drawn does not say which by {free}"),
+impl<'a> Held<'a> {
+    /// Every point of the file at the values asked for.
+    ///
+    /// # Errors
+    /// As [`Source::each_row`]; [`PlotError::Unfit`] for what is no axis, or no value of it;
+    /// [`PlotError::Undrawable`] without rows.
+    fn at(source: &'a Source, at: &At, option: &str) -> Result<Self, PlotError> {
+        let mut held = Self { source, axes: swept::columns(source), points: Vec::new() };
+        let place = |name: &str| {
+            let names = || held.axes.iter().map(|axis| axis.name.as_str());
+            let place = names().position(|axis| axis == name);
+            place.ok_or_else(|| source.not_there(option, name, "axis", some_of(names())))
         };
-        let (path, count) = (source.path.display(), found.len());
-        return Err(PlotError::Unfit(format!("{path}: this file has {count} points, and {what}")));
+        let pins = at.iter().map(|(name, value)| Ok((place(name)?, *value)));
+        let pins = pins.collect::<Result<Vec<_>, PlotError>>()?;
+        let mut points: Vec<Vec<f64>> = Vec::new();
+        let mut seen_rows = false;
+        held.each_row_of_all(&[""; 0], |row| {
+            seen_rows = true;
+            let is_pinned =
+                pins.iter().all(|&(place, value)| SweptAxis::near(row.point[place], value));
+            // Speeds vary fastest: a point's rows follow each other.
+            if is_pinned && points.last() != Some(&row.point) {
+                points.push(row.point);
+            }
+        })?;
+        if !seen_rows {
+            return Err(source.empty("it has no rows"));
+        }
+        if points.is_empty() {
+            let given = at.iter().map(|(name, value)| format!("{name}={value}"));
+            let given = given.collect::<Vec<_>>().join(", ");
+            return Err(source.not_there(option, given, "point", "other values of these axes"));
+        }
+        held.points = points;
+        Ok(held)
     }
-    Ok(found.remove(0))
-}
 
-/// Points over speed, with some columns.
-pub(super) fn read(
-    source: &Source,
-    axes: &[&ColumnFacts],
-    points: &[Vec<f64>],
-    columns: &[String],
-) -> Result<Vec<Swept>, PlotError> {
-    let empty = |values: &Vec<f64>| Swept {
-        values: values.clone(),
-        speed: Vec::new(),
-        growth: Vec::new(),
-        columns: vec![Vec::new(); columns.len()],
-    };
-    let mut swept: Vec<Swept> = points.iter().map(empty).collect();
-    each_row(source, axes, columns, |row| {
-        let Some(point) = swept.iter_mut().find(|point| point.values == row.point) else { return };
-        // Further rows of a speed are other responses; a machine that runs up is on the first.
-        if point.speed.last() == Some(&row.speed) {
-            return;
+    /// The one point of the file, or the one at the values asked for.
+    ///
+    /// # Errors
+    /// As [`Self::at`]; [`PlotError::Unfit`] where there are several.
+    pub(super) fn one(source: &'a Source, at: &At, option: &str) -> Result<Self, PlotError> {
+        let held = Self::at(source, at, option)?;
+        if held.points.len() > 1 {
+            let free = held.axes.iter().map(|axis| axis.name.as_str());
+            let free = some_of(free.filter(|axis| !at.iter().any(|(name, _)| name == axis)));
+            let what = match option {
+                "--at" => format!("one is wanted: give --at NAME=VALUE for {free}"),
+                _ => format!("the file to be drawn does not say which by {free}"),
+            };
+            let (path, count) = (source.path.display(), held.points.len());
+            let said = format!("{path}: this file has {count} points, and {what}");
+            return Err(PlotError::Unfit(said));
         }
-        point.speed.push(row.speed);
-        point.growth.push(row.growth);
-        for (kept, value) in point.columns.iter_mut().zip(row.values) {
-            kept.push(value);
-        }
-    })?;
-    Ok(swept)
+        Ok(held)
+    }
+
+    /// The axes with their values at the first point.
+    pub(super) fn values(&self) -> At {
+        let values = self.axes.iter().zip(&self.points[0]);
+        values.map(|(axis, value)| (axis.name.clone(), *value)).collect()
+    }
+
+    /// The run and the first point, in words.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let values = self.axes.iter().zip(&self.points[0]);
+        self.source.notes(values.map(|(axis, value)| said_within(axis, *value)))
+    }
+
+    /// The points' rows, each with the place of its point.
+    ///
+    /// # Errors
+    /// As [`Source::each_row`].
+    pub(super) fn each_row<S: AsRef<str>>(
+        &self,
+        columns: &[S],
+        mut take: impl FnMut(usize, Row<'_>),
+    ) -> Result<(), PlotError> {
+        self.each_row_of_all(columns, |row| {
+            if let Some(place) = self.points.iter().position(|point| *point == row.point) {
+                take(place, row);
+            }
+        })
+    }
+
+    fn each_row_of_all<S: AsRef<str>>(
+        &self,
+        columns: &[S],
+        mut take: impl FnMut(Row<'_>),
+    ) -> Result<(), PlotError> {
+        let names = self.axes.iter().map(|axis| axis.name.as_str());
+        let names = names.chain(["speed_rpm", "growth_per_s", "kind"]);
+        let names: Vec<&str> = names.chain(columns.iter().map(S::as_ref)).collect();
+        let own = self.axes.len();
+        self.source.each_row(&names, |row| {
+            take(Row {
+                point: row.numbers(0..own),
+                speed: row.number(own),
+                growth: row.number(own + 1),
+                kind: row.word(own + 2),
+                values: row.numbers(own + 3..names.len()),
+            });
+            Ok(())
+        })
+    }
+
+    /// The points over speed, with some columns.
+    ///
+    /// # Errors
+    /// As [`Source::each_row`].
+    pub(super) fn read(&self, columns: &[String]) -> Result<Vec<Swept>, PlotError> {
+        let empty = Swept { columns: vec![Vec::new(); columns.len()], ..Swept::default() };
+        let mut swept = vec![empty; self.points.len()];
+        self.each_row(columns, |place, row| {
+            let point = &mut swept[place];
+            // Further rows of a speed are other responses; a machine that runs up is on the first.
+            if point.speed.last() == Some(&row.speed) {
+                return;
+            }
+            point.speed.push(row.speed);
+            point.growth.push(row.growth);
+            for (kept, value) in point.columns.iter_mut().zip(row.values) {
+                kept.push(value);
+            }
+        })?;
+        Ok(swept)
+    }
 }
 
 /// The ranges of speed in which growth is above 0, taken as linear between the given speeds. A
