@@ -14,8 +14,8 @@ use sweep_engine::estimate::Estimate;
 use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Steps};
 use sweep_engine::store::{Done, Job, Layout, Rows, Shape, axis_columns};
 use sweep_engine::{
-    Build, Engine, Error, GridInput, Listed, Model as EngineModel, Plan, Scenario, Swept,
-    UnknownParameter, Watch, methods,
+    Build, Engine, Error, GridInput, KeepRow, Listed, Model as EngineModel, NextRow, Plan,
+    Scenario, Swept, UnknownParameter, Watch, methods,
 };
 use sweep_parameter::{Channel, Range};
 
@@ -474,12 +474,7 @@ fn error_left<const C: usize>(
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Engine
     for Evaluator<'_, O, C, D, P>
 {
-    fn evaluate(
-        &self,
-        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
-        keep: &(dyn Fn(Done) + Sync),
-        watch: &Watch<'_>,
-    ) {
+    fn evaluate(&self, next: &NextRow<'_>, keep: &KeepRow<'_>, watch: &Watch<'_>) {
         let columns = columns(self.plan);
         rayon::broadcast(|_| {
             while !watch.stopped() {

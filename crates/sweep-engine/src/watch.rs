@@ -5,6 +5,12 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use crate::interrupt::Interrupt;
 use crate::store::Done;
 
+/// Gives a row: what it is known by, and the values of the plan's axes there.
+pub type NextRow<'a> = dyn Fn() -> Option<(u64, Vec<f64>)> + Sync + 'a;
+
+/// Takes what came of a row.
+pub type KeepRow<'a> = dyn Fn(Done) + Sync + 'a;
+
 /// What computes points.
 pub trait Engine: Sync {
     /// Evaluates points until `next` gives none, each with what it is known by and the values of
@@ -14,12 +20,7 @@ pub trait Engine: Sync {
     ///
     /// A point that fails, even by a panic, is an outcome; a panic that leaves this function costs
     /// all that is in hand.
-    fn evaluate(
-        &self,
-        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
-        keep: &(dyn Fn(Done) + Sync),
-        watch: &Watch<'_>,
-    );
+    fn evaluate(&self, next: &NextRow<'_>, keep: &KeepRow<'_>, watch: &Watch<'_>);
 
     /// The instruction set in use.
     fn simd(&self) -> &str;

@@ -22,8 +22,7 @@ use washer_row::{Demand, Ladder, Level, MODELS, Outcome, Rule, RungRun, Status, 
 use crate::columns::Columns;
 use crate::plan::{Plan, Scenario};
 use sweep_engine::method::{Integrator as _, Steps};
-use sweep_engine::store::Done;
-use sweep_engine::{Error, Interrupt};
+use sweep_engine::{Error, Interrupt, KeepRow, NextRow};
 use sweep_files::panics::{lock, unlocked};
 
 /// Parts of a run at whose ends two runs of a trajectory are compared.
@@ -85,12 +84,21 @@ impl<'a> ModelEngine<'a> {
     /// # Errors
     /// A method or an instruction set that is not there.
     pub fn new(plan: &'a Plan) -> Result<Self, Error> {
+        Ok(Self::on(forced_simd()?, plan))
+    }
+
+    fn on(forced: Option<Simd>, plan: &'a Plan) -> Self {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
-        let forced = forced_simd()?;
         let (demand, ladders) = (Demand::Row, OnceCell::new());
-        Ok(Self { plan, demand, forced, timing, rule: rule(plan), ladders })
+        Self { plan, demand, forced, timing, rule: rule(plan), ladders }
+    }
+
+    /// An engine for another plan, with the instruction set and the rungs of this one.
+    pub(crate) fn over<'b>(&self, plan: &'b Plan) -> ModelEngine<'b> {
+        let ladders = OnceCell::with_value(self.ladders().clone());
+        ModelEngine { ladders, ..ModelEngine::on(self.forced, plan) }
     }
 
     /// As [`Self::new`], with the rungs of another engine.
@@ -278,12 +286,7 @@ pub(crate) fn together_or_alone<I, R>(
 }
 
 impl Engine for ModelEngine<'_> {
-    fn evaluate(
-        &self,
-        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
-        keep: &(dyn Fn(Done) + Sync),
-        watch: &Watch<'_>,
-    ) {
+    fn evaluate(&self, next: &NextRow<'_>, keep: &KeepRow<'_>, watch: &Watch<'_>) {
         let columns = Columns::of_run(self.plan);
         let keep = |outcome: Outcome| keep(columns.done(outcome));
         let feed = |most: usize| {

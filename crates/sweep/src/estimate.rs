@@ -61,16 +61,14 @@ pub(crate) fn of(plan: &Plan, threads: usize) -> Result<Estimate, Error> {
 /// As [`of`], where whole trajectories are given up after a time.
 fn reckoned(plan: &Plan, threads: usize, whole: Duration) -> Result<Estimate, Error> {
     let engine = ModelEngine::new(plan)?;
-    let ladders = engine.ladders();
+    // Finding the rungs is no cost of points.
+    engine.ladders();
     let began = Instant::now();
-    let first = Measured::take(plan, ladders, PLACES[0], whole)?;
-    let mut samples = match Measured::spread(plan, ladders, &first)? {
-        Some(spread) => vec![spread],
-        None => vec![first],
-    };
+    let first = Measured::take(&engine, PLACES[0], whole);
+    let mut samples = vec![Measured::spread(&engine, &first).unwrap_or(first)];
     for place in &PLACES[1..] {
         if samples[0].integrated_s < plan.end_s && began.elapsed() < BUDGET {
-            samples.push(Measured::take(plan, ladders, *place, whole)?);
+            samples.push(Measured::take(&engine, *place, whole));
         }
     }
     let core_s_per_point =
@@ -92,7 +90,7 @@ fn reckoned(plan: &Plan, threads: usize, whole: Duration) -> Result<Estimate, Er
         memory_bytes: memory_bytes(plan, threads),
         disk_bytes,
         result_bytes: disk_bytes + columns * RESULT_COLUMN_BYTES,
-        method: method(plan, &ladders[0]),
+        method: method(plan, &engine.ladders()[0]),
     })
 }
 
@@ -104,20 +102,16 @@ struct Measured {
 }
 
 impl Measured {
-    fn take(
-        plan: &Plan,
-        ladders: &[Ladder; 2],
-        place: f64,
-        whole: Duration,
-    ) -> Result<Self, Error> {
+    fn take(engine: &ModelEngine<'_>, place: f64, whole: Duration) -> Self {
+        let plan = engine.plan();
         let points = plan.points().min(MAX_LANES as u64);
         let first = (plan.points().saturating_sub(points) as f64 * place) as u64;
         // What checks itself costs most where little moves, so that a beginning says too much.
         if let Steps::Checked(_) = plan.integrator.steps()
-            && let Some(cost_s) = cost_within(whole, plan, ladders, &mut (first..first + points))?
+            && let Some(cost_s) = cost_within(whole, engine, first..first + points)
         {
             let core_s_per_point = cost_s / points as f64;
-            return Ok(Self { core_s_per_point, points, integrated_s: plan.end_s });
+            return Self { core_s_per_point, points, integrated_s: plan.end_s };
         }
         let mut shorter: Option<(f64, f64)> = None;
         let mut end_s = first_end_s(plan);
@@ -127,7 +121,8 @@ impl Measured {
         loop {
             cut.end_s = end_s;
             cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
-            let cost_s = cost_s(&cut, ladders, &mut (first..first + points))?;
+            // The cut plan's own rungs would be of slower spin, and longer steps.
+            let cost_s = cost_s(&engine.over(&cut), first..first + points);
             let of_length = |metric: &Metric| !matches!(metric, Metric::Growth | Metric::Dwell);
             if !cut.model.measures.metrics.iter().all(of_length) {
                 cut.model.measures.metrics.retain(of_length);
@@ -139,11 +134,8 @@ impl Measured {
                 let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
                 let rate = ((cost_s - base_s) / (end_s - base_end_s)).max(0.0);
                 let whole_s = held_s + cost_s + rate * (plan.end_s - end_s);
-                return Ok(Self {
-                    core_s_per_point: whole_s / points as f64,
-                    points,
-                    integrated_s: end_s,
-                });
+                let core_s_per_point = whole_s / points as f64;
+                return Self { core_s_per_point, points, integrated_s: end_s };
             }
             shorter = Some((end_s, cost_s));
             end_s = (4.0 * end_s).min(plan.end_s);
@@ -153,16 +145,16 @@ impl Measured {
     /// Whole trajectories of points from all over the grid, integrated together: the rows that are
     /// left to a slower rung then share its lanes, as in the run. Few points leave such lanes
     /// empty, and cost several times as much each.
-    fn spread(plan: &Plan, ladders: &[Ladder; 2], first: &Self) -> Result<Option<Self>, Error> {
+    fn spread(engine: &ModelEngine<'_>, first: &Self) -> Option<Self> {
+        let plan = engine.plan();
         if first.integrated_s < plan.end_s || plan.points() <= first.points {
-            return Ok(None);
+            return None;
         }
         let affordable = (TOGETHER_S / first.core_s_per_point) as u64;
         let points = affordable.clamp(first.points, MOST_TOGETHER).min(plan.points());
         let place = |k| (u128::from(plan.points()) * u128::from(k) / u128::from(points)) as u64;
-        let cost_s = cost_s(plan, ladders, &mut (0..points).map(place))?;
-        let core_s_per_point = cost_s / points as f64;
-        Ok(Some(Self { core_s_per_point, points, integrated_s: plan.end_s }))
+        let core_s_per_point = cost_s(engine, (0..points).map(place)) / points as f64;
+        Some(Self { core_s_per_point, points, integrated_s: plan.end_s })
     }
 }
 
@@ -178,28 +170,22 @@ fn first_end_s(plan: &Plan) -> f64 {
     short_s.min(plan.end_s)
 }
 
-/// Time that one core takes for these points' runs, which are cut short.
-fn cost_s(
-    cut: &Plan,
-    ladders: &[Ladder; 2],
-    points: &mut dyn Iterator<Item = u64>,
-) -> Result<f64, Error> {
-    Ok(cost_within(Duration::MAX, cut, ladders, points)?.unwrap_or(f64::INFINITY))
+/// Time that one core takes for these points' runs.
+fn cost_s(engine: &ModelEngine<'_>, points: impl Iterator<Item = u64>) -> f64 {
+    cost_within(Duration::MAX, engine, points).unwrap_or(f64::INFINITY)
 }
 
 /// The same, if they are done by then.
 fn cost_within(
     most: Duration,
-    cut: &Plan,
-    ladders: &[Ladder; 2],
-    points: &mut dyn Iterator<Item = u64>,
-) -> Result<Option<f64>, Error> {
-    // A shorter run alone would be slower spin, and longer steps.
-    let engine = ModelEngine::with_ladders(cut, ladders.clone())?;
-    let axis_values: Vec<Vec<f64>> = points.map(|point| cut.axis_values(point)).collect();
+    engine: &ModelEngine<'_>,
+    points: impl Iterator<Item = u64>,
+) -> Option<f64> {
+    let axis_values = points.map(|point| engine.plan().axis_values(point));
+    let axis_values: Vec<Vec<f64>> = axis_values.collect();
     let interrupt = Interrupt::new();
     let watch = Watch::new(&interrupt);
-    Ok(std::thread::scope(|scope| {
+    std::thread::scope(|scope| {
         let (done, is_done) = mpsc::channel::<()>();
         let watch = &watch;
         scope.spawn(move || {
@@ -212,7 +198,7 @@ fn cost_within(
         let cost_s = busy_s() - began_s;
         drop(done);
         outcomes.map(|_| cost_s)
-    }))
+    })
 }
 
 /// Time that this thread has had a core for: what others do on the machine meanwhile is no cost of

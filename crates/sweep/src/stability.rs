@@ -16,7 +16,7 @@ use crate::dwell::{Motions, Search};
 use crate::engine::{Engine, Watch, responses, simd_from_environment, together_or_alone};
 use crate::plan::{Plan, timing};
 use sweep_engine::store::{Column, Done, Kind, Layout, axis_columns};
-use sweep_engine::{Error, Job};
+use sweep_engine::{Error, Job, KeepRow, NextRow};
 use sweep_files::{FileKind, key};
 
 /// Rows that a thread takes at once: those of enough points to fill lanes, because a point's rows
@@ -224,12 +224,7 @@ fn failed(row: u64, status: Status) -> Outcome {
 }
 
 impl Engine for DwellEngine<'_> {
-    fn evaluate(
-        &self,
-        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
-        keep: &(dyn Fn(Done) + Sync),
-        watch: &Watch<'_>,
-    ) {
+    fn evaluate(&self, next: &NextRow<'_>, keep: &KeepRow<'_>, watch: &Watch<'_>) {
         let speeds = self.speeds_rpm.len() as u64;
         // All threads have some of few rows.
         let share = self.plan.points().saturating_mul(speeds) / rayon::current_num_threads() as u64;
