@@ -198,7 +198,8 @@ impl Motions {
 
     /// The row of a point at a speed where nothing was found.
     pub(crate) fn failed(&self, number: u64, status: Status) -> Done {
-        Done { point: number, rows: vec![row(&self.columns, &RowOf::Failed(status))] }
+        let none = RowOf { found: Err(status), motion: 0, turn: 0 };
+        Done { point: number, rows: vec![row(&self.columns, &none)] }
     }
 
     /// The rows of these dwells, each with its number. Once `is_stopped` says so, what comes means
@@ -249,24 +250,22 @@ impl Motions {
     }
 
     fn done(&self, number: u64, found: Result<Endings, Status>) -> Done {
-        match found {
-            Ok(mut found) => {
-                for motion in &mut found.motions {
-                    let others =
-                        motion.sections.len().saturating_sub(self.search.sections as usize);
-                    motion.sections.drain(..others);
-                }
-                let found = Arc::new(found);
-                let turns = |motion: usize| 0..found.motions[motion].sections.len().max(1);
-                let places = (0..found.motions.len())
-                    .flat_map(|motion| turns(motion).map(move |turn| (motion, turn)));
-                let of = |(motion, turn)| {
-                    row(&self.columns, &RowOf::Motion(Arc::clone(&found), motion, turn))
-                };
-                Done { point: number, rows: places.map(of).collect() }
-            }
-            Err(status) => self.failed(number, status),
+        let mut found = match found {
+            Ok(found) => found,
+            Err(status) => return self.failed(number, status),
+        };
+        for motion in &mut found.motions {
+            let others = motion.sections.len().saturating_sub(self.search.sections as usize);
+            motion.sections.drain(..others);
         }
+        let found = Arc::new(found);
+        let turns = |motion: usize| 0..found.motions[motion].sections.len().max(1);
+        let places = (0..found.motions.len())
+            .flat_map(|motion| turns(motion).map(move |turn| (motion, turn)));
+        let of = |(motion, turn)| {
+            row(&self.columns, &RowOf { found: Ok(Arc::clone(&found)), motion, turn })
+        };
+        Done { point: number, rows: places.map(of).collect() }
     }
 }
 

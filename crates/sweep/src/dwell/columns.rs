@@ -10,9 +10,10 @@ use washer_row::{Measured, Status};
 use crate::plan::Plan;
 
 /// A row: one of the motions of a dwell, at one of its turns from 0 if these are kept; or none.
-pub(super) enum RowOf {
-    Motion(Arc<Endings>, usize, usize),
-    Failed(Status),
+pub(super) struct RowOf {
+    pub(super) found: Result<Arc<Endings>, Status>,
+    pub(super) motion: usize,
+    pub(super) turn: usize,
 }
 
 pub(super) type DwellColumn = ResultColumn<RowOf>;
@@ -34,17 +35,11 @@ const STATUSES: [&str; 8] = [
 
 impl RowOf {
     fn found(&self) -> Option<&Endings> {
-        match self {
-            Self::Motion(found, ..) => Some(found),
-            Self::Failed(_) => None,
-        }
+        self.found.as_deref().ok()
     }
 
     fn motion(&self) -> Option<&Ending> {
-        match self {
-            Self::Motion(found, motion, _) => found.motions.get(*motion),
-            Self::Failed(_) => None,
-        }
+        self.found()?.motions.get(self.motion)
     }
 
     /// The motion, if it stayed within what the model is good for.
@@ -81,17 +76,17 @@ impl RowOf {
     }
 
     fn status(&self) -> &'static str {
-        match self {
-            Self::Motion(..) => match self.motion().map(|motion| motion.state) {
+        match self.found {
+            Ok(_) => match self.motion().map(|motion| motion.state) {
                 Some(State::Ok) => "ok",
                 Some(State::LeftRange { .. }) => "left_range",
                 Some(State::NotSettled) | None => "not_settled",
             },
-            Self::Failed(Status::NoEquilibrium) => "no_equilibrium",
-            Self::Failed(Status::NoMultipliers) => "no_multipliers",
-            Self::Failed(Status::TooSlow) => "too_slow",
-            Self::Failed(Status::NoResponse) => "no_response",
-            Self::Failed(_) => "panicked",
+            Err(Status::NoEquilibrium) => "no_equilibrium",
+            Err(Status::NoMultipliers) => "no_multipliers",
+            Err(Status::TooSlow) => "too_slow",
+            Err(Status::NoResponse) => "no_response",
+            Err(_) => "panicked",
         }
     }
 }
@@ -131,10 +126,7 @@ fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
 
 /// Every column, in order; with those of states once a turn, if these are kept.
 pub(super) fn columns(plan: &Plan, with_sections: bool) -> Vec<DwellColumn> {
-    let motion = |row: &RowOf| match row {
-        RowOf::Motion(_, motion, _) => Some(*motion as u64),
-        RowOf::Failed(_) => Some(0),
-    };
+    let motion = |row: &RowOf| Some(row.motion as u64);
     let text = "number of the motion at this speed: 0 is the one that the disturbed periodic \
                 response ends in";
     let mut columns = vec![ResultColumn::new("motion", "1", text, Kind::Count, motion)];
@@ -223,10 +215,7 @@ pub(super) fn columns(plan: &Plan, with_sections: bool) -> Vec<DwellColumn> {
 /// Columns of states once a turn.
 fn section_columns() -> Vec<DwellColumn> {
     let text = "number of the turn among those kept, from 0: what follows is where it ends";
-    let mut columns = vec![counts("turn", text, |row| match row {
-        RowOf::Motion(_, _, turn) => Some(*turn as u64),
-        RowOf::Failed(_) => None,
-    })];
+    let mut columns = vec![counts("turn", text, |row| row.found().map(|_| row.turn as u64))];
     for i in 0..STATE_LEN {
         let q = i % COORDINATES;
         let unit = if q < 4 { "m" } else { "rad" };
@@ -234,12 +223,7 @@ fn section_columns() -> Vec<DwellColumn> {
             true => (format!("q{}_{unit}", q + 1), unit.to_owned(), "coordinate from equilibrium"),
             false => (format!("u{}_{unit}_per_s", q + 1), format!("{unit}/s"), "its speed"),
         };
-        let of = move |row: &RowOf| match row {
-            RowOf::Motion(found, motion, turn) => {
-                Some(found.motions.get(*motion)?.sections.get(*turn)?[i])
-            }
-            RowOf::Failed(_) => None,
-        };
+        let of = move |row: &RowOf| Some(row.motion()?.sections.get(row.turn)?[i]);
         let text = format!("{text}, where the unbalance is up");
         columns.push(ResultColumn::measured(name, &unit, text, of));
     }
