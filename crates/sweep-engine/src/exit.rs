@@ -146,13 +146,13 @@ impl Error {
         if is_refusal { Exit::BadInput } else { Exit::Failed }
     }
 
-    /// What to do about it, where something can be said.
-    pub fn hint(&self) -> Option<&'static str> {
+    /// The text, with what to do about it where something can be said.
+    pub fn worded(&self) -> String {
         match self {
             Self::File { source, .. } if source.kind() == io::ErrorKind::AlreadyExists => {
-                Some("give another name, or remove the file first")
+                format!("{self}\n  = help: give another name, or remove the file first")
             }
-            _ => None,
+            _ => self.to_string(),
         }
     }
 
@@ -166,10 +166,7 @@ impl Error {
                 // With standard error gone there is nobody left to tell; the exit code still does.
                 let _ = writeln!(anstream::stderr(), "{text}");
             }
-            other => match other.hint() {
-                Some(hint) => tell(&format!("error: {other}\n  = help: {hint}")),
-                None => tell(&format!("error: {other}")),
-            },
+            other => tell(&format!("error: {}", other.worded())),
         }
     }
 }
@@ -267,6 +264,6 @@ mod tests {
         let error = Error::File { action: "write", path: "grid.toml".into(), source: exists };
         assert_eq!(error.exit(), Exit::Failed);
         assert!(error.to_string().starts_with("cannot write grid.toml: "));
-        assert_eq!(error.hint(), Some("give another name, or remove the file first"));
+        assert!(error.worded().ends_with("help: give another name, or remove the file first"));
     }
 }

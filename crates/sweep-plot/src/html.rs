@@ -185,13 +185,11 @@ pub(crate) fn with_still(page: &[u8], picture: &[u8]) -> Vec<u8> {
 }
 
 /// A page of this body, which is HTML, without scripts: to be read and printed.
-#[must_use]
 pub fn sheet(title: &str, body: &str) -> String {
     SHEET.replace("{{title}}", &escape(title)).replace("{{style}}", STYLE).replace("{{body}}", body)
 }
 
 /// A table under a heading; nothing without rows.
-#[must_use]
 pub fn table(title: &str, heads: &[&str], rows: &[Vec<String>]) -> String {
     if rows.is_empty() {
         return String::new();

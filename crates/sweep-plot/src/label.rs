@@ -58,7 +58,6 @@ pub(crate) fn unit_of_name(name: &str) -> String {
 
 /// A parameter's or column's name in words, without its unit: `unbalance_mass_kg` is "Unbalance
 /// mass".
-#[must_use]
 pub fn words(name: &str) -> String {
     capitalised(&parted(name).0.join(" "))
 }
@@ -82,7 +81,6 @@ pub(crate) fn of_model(name: &str) -> (String, &'static str) {
 
 /// A result's column in words, without unit and model: `nonlinear_tub_front_y` is "Tub front,
 /// vertical".
-#[must_use]
 pub fn quantity(name: &str) -> String {
     capitalised(&channel(&of_model(name).0.replace(' ', "_")))
 }
@@ -108,7 +106,6 @@ pub(crate) fn unit_of_channel(name: &str) -> &'static str {
 }
 
 /// With a capital first letter.
-#[must_use]
 pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
@@ -156,7 +153,6 @@ pub(crate) fn shown(unit: &str) -> (&str, f64) {
 }
 
 /// A number to `digits` significant digits, without trailing zeros.
-#[must_use]
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".to_owned() } else { "–".to_owned() };

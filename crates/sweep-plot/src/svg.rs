@@ -157,7 +157,6 @@ fn number(value: f64) -> String {
 }
 
 /// Text as XML character data.
-#[must_use]
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {

@@ -45,19 +45,16 @@ impl Goal {
     }
 
     /// As typed.
-    #[must_use]
     pub fn text(&self) -> &str {
         &self.expression.text
     }
 
     /// Whether it speaks of single rows, so that a number needs there to be one.
-    #[must_use]
     pub const fn is_by_row(&self) -> bool {
         self.expression.by_row
     }
 
     /// The unit of the column, if it is a column's least, greatest or mean number or a quantile.
-    #[must_use]
     pub fn unit(&self) -> &str {
         let of_one = |node: &Node| matches!(node, Node::Column(_));
         let one = match (&self.expression.root, self.expression.folds.as_slice()) {

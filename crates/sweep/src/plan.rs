@@ -34,7 +34,6 @@ pub(crate) fn has_friction(plan: &Plan) -> bool {
 }
 
 /// What gives forces corners at some point of a plan, in words; `None` where all are smooth.
-#[must_use]
 pub(crate) fn corners_of_forces(plan: &Plan) -> Option<&'static str> {
     match (has_friction(plan), plan.model.machine.stops.is_empty()) {
         (true, true) => Some("dampers with friction"),

@@ -40,20 +40,12 @@ pub(crate) fn error(py: Python<'_>, error: &Error) -> PyErr {
         Error::Files(_)
         | Error::File { .. }
         | Error::Store(StoreError::File(_))
-        | Error::Plot(PlotError::File(_)) => PyOSError::new_err(worded(error)),
+        | Error::Plot(PlotError::File(_)) => PyOSError::new_err(error.worded()),
         other if other.exit() == Exit::BadInput => {
             let nothing = PyList::empty(py).into_any().unbind();
-            raised(py, "PlanError", worded(other), nothing)
+            raised(py, "PlanError", other.worded(), nothing)
         }
-        _ => PyRuntimeError::new_err(worded(error)),
-    }
-}
-
-/// The text with what to do about it.
-fn worded(error: &Error) -> String {
-    match error.hint() {
-        Some(hint) => format!("{error}\n  = help: {hint}"),
-        None => error.to_string(),
+        _ => PyRuntimeError::new_err(error.worded()),
     }
 }
 

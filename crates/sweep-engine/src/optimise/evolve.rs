@@ -49,7 +49,6 @@ pub struct Candidate {
 
 impl Candidate {
     /// Whether it has every number and breaks no condition.
-    #[must_use]
     pub fn is_feasible(&self, objectives: usize) -> bool {
         self.answers.as_ref().is_some_and(|all| all[objectives..].iter().all(|&one| one <= 0.0))
     }
@@ -138,7 +137,6 @@ fn mutant(
 }
 
 /// The candidates that are on the front of all: feasible, and beaten in every objective by none.
-#[must_use]
 pub fn front(tried: &[Candidate], objectives: usize) -> Vec<usize> {
     let ranks = Ranks::of(tried, objectives);
     let feasible = (0..tried.len()).filter(|&k| tried[k].is_feasible(objectives));

@@ -6,7 +6,6 @@ use super::{Candidate, Study, front};
 use crate::{Axis, GridInput, Rows, Table};
 
 /// The file of what a study has tried.
-#[must_use]
 pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
     let objectives = study.objectives.len();
     let front = front(tried, objectives);
@@ -71,7 +70,6 @@ fn best(tried: &[Candidate], front: &[usize], objectives: usize) -> Option<usize
 }
 
 /// The model's own file with these values of the parameters, if the model has one.
-#[must_use]
 pub fn own_file<M: Rows>(study: &Study<M>, values: &[f64]) -> Option<String> {
     let mut plan = study.grid.clone();
     let mut scenario = crate::plan::Scenario { model: plan.model, window_s: plan.window_s };

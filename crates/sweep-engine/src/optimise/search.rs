@@ -2,7 +2,7 @@
 
 use arrow_schema::ArrowError;
 
-use super::{Candidate, Evolution, Study, evolve};
+use super::{Candidate, Study, evolve};
 use crate::asking::{Answer, Asking, Stopped};
 use crate::store::{Done, Key, Layout, ResultRows, Row, Trials};
 use crate::{Effort, Error, Progress, StoreError, Swept};
@@ -18,20 +18,13 @@ pub fn search<M: Swept>(
     effort: Effort<'_>,
 ) -> Result<(Result<Vec<Candidate>, Stopped>, Option<Trials>), Error> {
     let there = trials.as_ref().map_or(0, |trials| trials.count() / study.answers()) as u64;
-    let progress = Progress::new(effort.progress, study.candidates, there);
+    let progress = Progress::new(effort.progress, study.evolution.candidates, there);
     let shown = |candidates| progress.show(candidates);
     let (threads, engine) = (effort.threads()?, M::engine(&study.plan, None)?);
     let asking = Asking::new(engine, threads, effort.interrupt, trials, &shown)?;
-    let evolution = Evolution {
-        parameters: study.parameters.len(),
-        objectives: study.objectives.len(),
-        population: study.population,
-        candidates: study.candidates,
-        seed: study.seed,
-    };
     let layout = M::layout(&study.plan);
     let mut count = 0;
-    let found = evolve(&evolution, &mut |places| {
+    let found = evolve(&study.evolution, &mut |places| {
         let candidates: Vec<Vec<f64>> = places.iter().map(|place| study.values(place)).collect();
         let keys = (count..).zip(&candidates).map(|(number, values)| {
             (0..study.answers()).map(|answer| key(number, answer, values)).collect()

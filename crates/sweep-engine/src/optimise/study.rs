@@ -7,6 +7,7 @@ use sweep_files::FileKind;
 use sweep_parameter::{Parameter as _, Range};
 use sweep_results::{Column, Goal, Mistake, columns};
 
+use super::Evolution;
 use crate::config::axes::{add, spacing};
 use crate::config::design::{DEFAULT_SEED, MOST_SEED};
 use crate::config::grid::draft;
@@ -40,12 +41,8 @@ pub struct Study<M: Model> {
     pub objectives: Vec<Objective>,
     /// What must hold.
     pub conditions: Vec<Goal>,
-    /// Candidates of a generation.
-    pub population: u64,
-    /// Candidates in all.
-    pub candidates: u64,
-    /// Another seed, another search.
-    pub seed: u64,
+    /// How it is looked for.
+    pub evolution: Evolution,
 }
 
 /// The values of a parameter that are looked among.
@@ -126,40 +123,33 @@ impl<M: Rows> Study<M> {
         root.finish();
         let (mut plan, grid, seed) = (plan?, grid?, seed?);
         plan.name.clone_from(&name);
-        Some(Self {
-            name,
-            plan,
-            grid,
-            parameters,
-            objectives,
-            conditions,
+        let evolution = Evolution {
+            parameters: parameters.len(),
+            objectives: objectives.len(),
             population,
             candidates,
             seed,
-        })
+        };
+        Some(Self { name, plan, grid, parameters, objectives, conditions, evolution })
     }
 
     /// Numbers that answer a candidate: objectives, then excesses over conditions.
-    #[must_use]
     pub fn answers(&self) -> usize {
         self.objectives.len() + self.conditions.len()
     }
 
     /// Rows of a candidate.
-    #[must_use]
     pub fn rows(&self) -> u64 {
         self.grid.points()
     }
 
     /// The candidate's parameters at a place in the box of their bounds, each from 0 to 1.
-    #[must_use]
     pub fn values(&self, place: &[f64]) -> Vec<f64> {
         let values = self.parameters.iter().zip(place);
         values.map(|(parameter, &place)| parameter.bounds.between(place)).collect()
     }
 
     /// Values of the plan's axes in a row of a candidate.
-    #[must_use]
     pub fn axis_values(&self, values: &[f64], row: u64) -> Vec<f64> {
         let mut at = self.grid.axis_values(row);
         let own = at.len();
@@ -177,7 +167,6 @@ impl<M: Rows> Study<M> {
     }
 
     /// What the store must know of it.
-    #[must_use]
     pub fn job(&self) -> Job<'_> {
         let mut job = Job::of(&self.plan);
         job.layout.kind = FileKind::Optimise;
@@ -186,7 +175,6 @@ impl<M: Rows> Study<M> {
     }
 
     /// What is asked beside the plan.
-    #[must_use]
     pub fn asked(&self) -> Value {
         let verb = |one: &Objective| if one.sign > 0.0 { "minimise" } else { "maximise" };
         let objectives = self.objectives.iter();
@@ -197,9 +185,9 @@ impl<M: Rows> Study<M> {
             "objective": objectives.collect::<Value>(),
             "conditions": self.conditions.iter().map(Goal::text).collect::<Value>(),
             "tolerance": self.parameters.iter().map(|one| one.tolerance).collect::<Value>(),
-            "population": self.population,
-            "candidates": self.candidates,
-            "seed": self.seed,
+            "population": self.evolution.population,
+            "candidates": self.evolution.candidates,
+            "seed": self.evolution.seed,
         })
     }
 }

@@ -111,10 +111,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         files::write(path, FileKind::Fit, &bytes)?;
         tell(&format!("wrote {0}; next: sweep plot {0}", path.display()));
     }
-    match args.json {
-        true => show(&format!("{:#}\n", serde_json::json!(fitted.report))),
-        false => show(&fitted.report.text()),
-    }
+    let report = &fitted.report;
+    show(&if args.json { format!("{:#}\n", serde_json::json!(report)) } else { report.text() })
 }
 
 /// The file of curves of a case: the first has the name itself.
