@@ -41,7 +41,7 @@ pub use distance::TracedQuantity;
 use neighbour::{Neighbour, hint, nearest, shared};
 use net::{Net, Want};
 use row::RowSearch;
-pub use search::BoundaryTask;
+pub use search::{BoundaryOptions, BoundaryTask};
 use span::{Hint, Question, Side, SideRange, Span, Tried};
 pub use trace::trace;
 

@@ -28,7 +28,6 @@ use crate::survive_file_size_limits;
 use crate::{Error, Exit, Swept};
 use cells::{Lines, clipped, short, table, word};
 use grid::{GridArgs, ResultArgs, quoted};
-use plot::finite;
 use run::installed;
 
 #[derive(Debug, Parser)]

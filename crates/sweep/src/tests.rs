@@ -6,7 +6,9 @@ use crate::model::Washer;
 use crate::plan::Plan;
 use sweep_engine::asking::{Asking, Stopped};
 use sweep_engine::boundary::search::Models;
-use sweep_engine::boundary::{BoundaryTask, Edge, EdgeKind, Traced, quantity, trace};
+use sweep_engine::boundary::{
+    BoundaryOptions, BoundaryTask, Edge, EdgeKind, Traced, quantity, trace,
+};
 use sweep_engine::store::{OpenedTrials, Rows as _, Trials};
 use sweep_engine::{Interrupt, Swept as _};
 use sweep_parameter::Worse;
@@ -56,6 +58,11 @@ fn a_held_speed_may_be_a_number() {
 
 type Task = BoundaryTask<Washer>;
 
+/// The boundary of the greatest ratio.
+fn asked(tolerance: Option<f64>, lattice: u16) -> BoundaryOptions {
+    BoundaryOptions { quantity: "ratio_max".to_owned(), limit: None, tolerance, lattice }
+}
+
 fn traced(task: &Task, threads: usize, interrupt: &Interrupt) -> Result<Traced, Stopped> {
     let engine = Washer::engine(&task.plan, Some(&task.quantity.name)).unwrap();
     let asking = Asking::new(engine, threads, interrupt, None, &|_| {}).unwrap();
@@ -71,7 +78,7 @@ fn all_points(plan: &Plan) -> Vec<Vec<f64>> {
 #[test]
 fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, ("ratio_max", None), Some(0.5), 3).unwrap();
+    let task = Task::new(&plan, &asked(Some(0.5), 3)).unwrap();
     let interrupt = Interrupt::new();
     let traced = [1, 3].map(|threads| traced(&task, threads, &interrupt).unwrap());
     let [one, three] = [0, 1].map(|k| task.table(&traced[k]).into_bytes().unwrap());
@@ -146,7 +153,7 @@ fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
     for criterion in Criterion::ALL {
         let told = format!("{head}[reliability]\ncriterion = \"{}\"\n", criterion.name());
         let wide = plan(&format!("{told}{}", axes(&[0.39, 0.395, 0.41], 60.0, 300.0, 33)));
-        let task = Task::new(&wide, ("ratio_max", None), Some(0.5), 4).unwrap();
+        let task = Task::new(&wide, &asked(Some(0.5), 4)).unwrap();
         let rows = traced(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
         let edges: Vec<_> = rows.iter().map(|row| row.edges.last().copied().unwrap()).collect();
         assert!(
@@ -179,7 +186,7 @@ fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
 #[test]
 fn a_stop_is_heeded_before_the_next_group() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, ("ratio_max", None), None, 6).unwrap();
+    let task = Task::new(&plan, &asked(None, 6)).unwrap();
     assert_eq!(task.search.tolerance, 0.5, "1/480 of 240 N s/m");
     let interrupt = Interrupt::new();
     interrupt.raise(2);
@@ -189,7 +196,7 @@ fn a_stop_is_heeded_before_the_next_group() {
 #[test]
 fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, ("ratio_max", None), Some(2.0), 2).unwrap();
+    let task = Task::new(&plan, &asked(Some(2.0), 2)).unwrap();
     let whole = traced(&task, 1, &Interrupt::new()).unwrap();
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.parquet");
@@ -230,7 +237,7 @@ fn a_pocket_is_followed_along_a_damper_that_is_moved() {
                 [[axis]]\nparameter = \"damping_n_s_per_m\"\n\
                 range = { from = 60.0, to = 300.0, count = 33 }\n";
     let plan = plan(&format!("{head}{axes}"));
-    let task = Task::new(&plan, ("ratio_max", None), None, 6).unwrap();
+    let task = Task::new(&plan, &asked(None, 6)).unwrap();
     let rows = traced(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
     // At 0.1 m nothing is reliable, from 0.125 m on all is from a crossing upwards; the row between
     // has a part of that, which no point of the lattice meets.
@@ -267,7 +274,7 @@ fn plans_without_a_boundary_say_why() {
     let mass = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.2]\n";
     let refused = |text: &str, tolerance: Option<f64>| {
         let plan = plan(&format!("{HEAD}{text}"));
-        Task::new(&plan, ("ratio_max", None), tolerance, 6).unwrap_err().to_string()
+        Task::new(&plan, &asked(tolerance, 6)).unwrap_err().to_string()
     };
     assert!(refused(mass, None).contains("two axes, and this grid has 1"));
     let one = format!("{mass}[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100.0]\n");
@@ -328,8 +335,10 @@ fn every_column_of_numbers_that_is_bad_one_way_has_a_boundary() {
 fn a_force_crosses_its_limit_where_the_grid_says_so() {
     let plan = plan(&format!("{HEAD}{GRID}"));
     let limit = 900.0;
-    let quantity = ("cabinet_force_nonlinear_n", Some(limit));
-    let task = Task::new(&plan, quantity, Some(2.0), 3).unwrap();
+    let quantity = "cabinet_force_nonlinear_n".to_owned();
+    let task =
+        Task::new(&plan, &BoundaryOptions { quantity, limit: Some(limit), ..asked(Some(2.0), 3) })
+            .unwrap();
     let rows = traced(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
     let crossings = rows.iter().flat_map(|row| row.edges.iter().map(|edge| (row.first, edge)));
     let mut found = 0;

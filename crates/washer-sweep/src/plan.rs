@@ -143,9 +143,10 @@ impl PyPlan {
         fresh: bool,
     ) -> PyResult<PyResultTable> {
         let output = out.as_deref();
-        let options = BoundaryOptions { quantity, limit, tolerance, lattice, output, fresh };
+        let quantity = quantity.to_owned();
+        let options = BoundaryOptions { quantity, limit, tolerance, lattice };
         let found = attended(py, How { threads, progress }, |effort| {
-            sweep::find_boundary(self.evaluator.plan(), options, effort)
+            sweep::find_boundary(self.evaluator.plan(), &options, output, fresh, effort)
         })?;
         ended::table(py, found, || {
             let text = match output {

@@ -3,6 +3,7 @@
 use super::quantity::traced;
 use super::{Evaluate, Search, TracedQuantity, Trial};
 use crate::asking::{Asking, Stopped};
+use crate::config::written::finite;
 use crate::store::{Column, Done, Key, Rows};
 use crate::{Axis, AxisValues, Error, Model, Plan, Swept};
 use sweep_parameter::Parameter as _;
@@ -15,6 +16,29 @@ const FINEST: f64 = 1e-9;
 
 /// Parts of the range in the default tolerance.
 const DEFAULT_PARTS: f64 = 480.0;
+
+/// What is asked of a boundary.
+#[derive(Clone, Debug, clap::Args)]
+pub struct BoundaryOptions {
+    /// What is at its limit: any column of numbers that the grid's rows can have, such as
+    /// ratio_max, ratio_CHANNEL or nonlinear_CHANNEL; without a name, lists them
+    #[arg(long, value_name = "COLUMN", default_value = "ratio_max")]
+    #[arg(num_args = 0..=1, default_missing_value = "")]
+    pub quantity: String,
+    /// Where its limit is, in the column's unit [default: the column's own; of ratios that of the
+    /// grid file]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
+    pub limit: Option<f64>,
+    /// Width of the final brackets, in the second axis's unit; if that axis is logarithmic, as a
+    /// fraction of its value [default: 1/480 of the range]
+    #[arg(long, value_name = "WIDTH")]
+    pub tolerance: Option<f64>,
+    /// Cells along each axis of the lattice that guards against islands: the finer, the smaller the
+    /// island it cannot miss, and the more points it takes
+    #[arg(long, value_name = "CELLS", default_value_t = 6)]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub lattice: u16,
+}
 
 /// A boundary that is looked for: where, and of what.
 #[derive(Clone, Debug)]
@@ -32,20 +56,13 @@ pub struct BoundaryTask<M: Model> {
 }
 
 impl<M: Rows + Swept> BoundaryTask<M> {
-    /// The task of a plan: a column by its name, at a limit or at its own. `tolerance` is in the
-    /// second axis's unit, or a fraction of its value if that axis is logarithmic; the default is
-    /// 1/480 of the range.
+    /// The task of a plan.
     ///
     /// # Errors
     /// As [`traced`], and [`Error::Refused`] for a plan without a boundary or a tolerance that
     /// cannot be met or means nothing.
-    pub fn new(
-        plan: &Plan<M>,
-        (column, limit): (&str, Option<f64>),
-        tolerance: Option<f64>,
-        lattice: usize,
-    ) -> Result<Self, Error> {
-        let (quantity, plan) = traced(plan, column, limit)?;
+    pub fn new(plan: &Plan<M>, options: &BoundaryOptions) -> Result<Self, Error> {
+        let (quantity, plan) = traced(plan, &options.quantity, options.limit)?;
         let refused = |why: String| Err(Error::Refused(why));
         if plan.design.is_some() {
             return refused(
@@ -81,7 +98,7 @@ impl<M: Rows + Swept> BoundaryTask<M> {
         }
         let second_log = matches!(second.values, AxisValues::Log { .. });
         let extent = if second_log { libm::log(greatest / least) } else { greatest - least };
-        let given = tolerance.unwrap_or(extent / DEFAULT_PARTS);
+        let given = options.tolerance.unwrap_or(extent / DEFAULT_PARTS);
         if !(extent * FINEST..=extent).contains(&given) {
             return refused(format!(
                 "--tolerance {given} is out of range: expected from {:e} to {extent} for the \
@@ -95,7 +112,7 @@ impl<M: Rows + Swept> BoundaryTask<M> {
             first_log: matches!(first.values, AxisValues::Log { .. }),
             second_log,
             tolerance: given,
-            lattice,
+            lattice: options.lattice.into(),
         };
         let firsts = all(first);
         Ok(Self { plan, quantity, firsts, curves: curves as usize, search })

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use super::{GridArgs, Lines as _, finite, installed, short};
+use super::{GridArgs, Lines as _, installed, short};
 use crate::asking::{Asking, Stopped};
 use crate::boundary::quantity::offered;
 use crate::boundary::search::Models;
-use crate::boundary::{BoundaryTask, EdgeKind, Traced, trace};
+use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, trace};
 use crate::effort::{Effort, EffortArgs};
 use crate::store::{Column, OpenedTrials, Trials};
 use crate::{Axis, Error, Exit, Plan, Progress, StoreError, Swept, duration, show, tell};
@@ -25,33 +25,9 @@ pub struct Args {
     /// Boundary file [default: results/NAME-boundary.parquet]
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// What is at its limit: any column of numbers that the grid's rows can have, such as
-    /// ratio_max, ratio_CHANNEL or nonlinear_CHANNEL; without a name, lists them
-    #[arg(
-        long,
-        value_name = "COLUMN",
-        default_value = "ratio_max",
-        num_args = 0..=1,
-        default_missing_value = ""
-    )]
-    pub quantity: String,
-    /// Where its limit is, in the column's unit [default: the column's own; of ratios that of the
-    /// grid file]
-    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
-    pub limit: Option<f64>,
-    /// Width of the final brackets, in the second axis's unit; if that axis is logarithmic, as a
-    /// fraction of its value [default: 1/480 of the range]
-    #[arg(long, value_name = "WIDTH")]
-    pub tolerance: Option<f64>,
-    /// Cells along each axis of the lattice that guards against islands: the finer, the smaller the
-    /// island it cannot miss, and the more points it takes
-    #[arg(
-        long,
-        value_name = "CELLS",
-        default_value_t = 6,
-        value_parser = clap::value_parser!(u16).range(1..=1000)
-    )]
-    pub lattice: u16,
+    /// What is looked for.
+    #[command(flatten)]
+    pub options: BoundaryOptions,
     /// How it goes about it.
     #[command(flatten)]
     pub effort: EffortArgs,
@@ -63,16 +39,14 @@ pub struct Args {
 /// What `--help` adds.
 const LONG: &str = "\
 For each value of the first axis, the places along the second where the quantity passes its \
-limit, each with the bracket \
-it is known to lie in. Where there is no such place, or the quantity leaps over its limit, the \
-file says so and gives \
-no number. The least and greatest value of the second axis are the range, however it is written. \
-Axes beyond the second \
-give one curve for every combination of their values.
+limit, each with the bracket it is known to lie in. Where there is no such place, or the quantity \
+leaps over its limit, the file says so and gives no number. The least and greatest value of the \
+second axis are the range, however it is written. Axes beyond the second give one curve for every \
+combination of their values.
 
 The file is a pure function of its input, whatever the number of threads and interruptions. What \
-    an interrupted \
-search has found out stays in FILE.partial, and the same command goes on from there.";
+an interrupted search has found out stays in FILE.partial, and the same command goes on from \
+there.";
 
 /// Traces the boundary of a grid.
 ///
@@ -81,11 +55,10 @@ search has found out stays in FILE.partial, and the same command goes on from th
 /// being written.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.grid.load()?;
-    if args.quantity.is_empty() {
+    if args.options.quantity.is_empty() {
         return show(&listing(&plan));
     }
-    let quantity = (args.quantity.as_str(), args.limit);
-    let task = BoundaryTask::new(&plan, quantity, args.tolerance, usize::from(args.lattice))?;
+    let task = BoundaryTask::new(&plan, &args.options)?;
     let default = || PathBuf::from(format!("results/{}-boundary.parquet", plan.name));
     let output = args.out.clone().unwrap_or_else(default);
     let file = Output::begin(&output, FileKind::Boundary)?;

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::config::written::finite;
 use crate::exit::{Error, Exit, tell};
 use sweep_files::beside;
 use sweep_plot::{PlotOptions, View, render};
@@ -72,16 +73,4 @@ pub fn draw(args: &Args, further: PlotOptions) -> Result<Exit, Error> {
 fn assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, as in mass_kg=3.5")?;
     Ok((name.trim().to_owned(), finite(value)?))
-}
-
-/// A finite number of the command line.
-///
-/// # Errors
-/// What it is not.
-pub fn finite(text: &str) -> Result<f64, String> {
-    text.trim()
-        .parse::<f64>()
-        .ok()
-        .filter(|value| value.is_finite())
-        .ok_or_else(|| format!("`{}` is not a finite number", text.trim()))
 }

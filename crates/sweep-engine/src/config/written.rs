@@ -78,3 +78,15 @@ impl<'a> Written<'a> {
         is_sound.then_some(chosen)
     }
 }
+
+/// A finite number of the command line.
+///
+/// # Errors
+/// What it is not.
+pub fn finite(text: &str) -> Result<f64, String> {
+    text.trim()
+        .parse::<f64>()
+        .ok()
+        .filter(|value| value.is_finite())
+        .ok_or_else(|| format!("`{}` is not a finite number", text.trim()))
+}

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::live::{SliderRange, live, slider_range};
 use sweep_engine::commands::plot;
-use sweep_engine::commands::plot::finite;
+use sweep_engine::config::written::finite;
 use sweep_engine::{Error, Exit};
 use sweep_plot::PlotOptions;
 

@@ -79,8 +79,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     if args.shards > USUAL_MOST_TASKS {
         tell(
             "note: many clusters allow arrays of 1000 tasks (scontrol show config | grep \
-             MaxArraySize); more --cpus-per-task \
-             need fewer shards",
+             MaxArraySize); more --cpus-per-task need fewer shards",
         );
     }
     print(&script(args, &plan, &folder, &program))

@@ -206,9 +206,8 @@ pub(crate) fn stability(draft: &Draft<'_, Washer>) {
             diagnostic.at(&at, format!("expected at most {MOST_STEPS:e} steps"))
         });
         draft.report.push(refusal.help(format!(
-            "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mass, a \
-             moment of inertia or a \
-             stiffness that is not meant so, or use method = \"rodas5p\""
+            "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mass, a moment \
+             of inertia or a stiffness that is not meant so, or use method = \"rodas5p\""
         )));
     } else if let Some(step_s) = step_s.filter(|&step_s| step_s > limit_s) {
         let title = format!(

@@ -7,6 +7,7 @@ use super::result::ResultTable;
 use crate::model::Washer;
 use crate::plan::Plan;
 use sweep_engine::asking::Stopped;
+pub use sweep_engine::boundary::BoundaryOptions;
 use sweep_engine::boundary::BoundaryTask;
 use sweep_engine::commands::boundary::search as trace;
 use sweep_engine::optimise::Study;
@@ -16,43 +17,26 @@ use sweep_engine::store::{OpenedTrials, Trials};
 use sweep_engine::{Error, Job, Table};
 use sweep_files::{FileKind, Output};
 
-/// What is asked of a boundary.
-#[derive(Clone, Copy, Debug)]
-pub struct BoundaryOptions<'a> {
-    /// Any column of numbers that the plan's rows can have.
-    pub quantity: &'a str,
-    /// Where its limit is, in the column's unit; if `None`, its own.
-    pub limit: Option<f64>,
-    /// Width of the final brackets, in the second axis's unit, or as a fraction of its value if it
-    /// is logarithmic; if `None`, 1/480 of the range.
-    pub tolerance: Option<f64>,
-    /// Cells along each axis of the lattice that guards against islands, 1 to 1000.
-    pub lattice: u16,
-    /// The file to write, which keeps what an interrupted search has found out; without one, it is
-    /// lost.
-    pub output: Option<&'a Path>,
-    /// Whether to start over.
-    pub fresh: bool,
-}
-
-/// Traces the boundary of a plan's grid; `None` if the interrupt was raised.
+/// Traces the boundary of a plan's grid; `None` if the interrupt was raised. The output keeps what
+/// an interrupted search has found out, and goes on there; `fresh` starts over.
 ///
 /// # Errors
 /// A plan without a range to search, options that make no sense, and whatever keeps the file from
 /// being written.
 pub fn find_boundary(
     plan: &Plan,
-    options: BoundaryOptions<'_>,
+    options: &BoundaryOptions,
+    output: Option<&Path>,
+    fresh: bool,
     effort: Effort<'_>,
 ) -> Result<Option<ResultTable>, Error> {
     if !(1..=1000).contains(&options.lattice) {
         return Err(Error::option("lattice", options.lattice, "from 1 to 1000"));
     }
-    let quantity = (options.quantity, options.limit);
-    let task = BoundaryTask::new(plan, quantity, options.tolerance, usize::from(options.lattice))?;
+    let task = BoundaryTask::new(plan, options)?;
     found(
         (&task.job(), FileKind::Boundary),
-        (options.output, options.fresh),
+        (output, fresh),
         |trials| trace(&task, trials, effort),
         |found| task.table(found),
     )
