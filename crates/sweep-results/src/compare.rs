@@ -110,9 +110,6 @@ pub struct ColumnChange {
     pub rows: u64,
     /// The greatest difference of numbers.
     pub greatest: f64,
-    /// Where that is, as a place among the shared rows.
-    #[serde(skip)]
-    pub at: usize,
 }
 
 /// What differs.
@@ -300,9 +297,8 @@ fn changes(sides: &[Side; 2], pairs: &[[usize; 2]], shared: &mut [SharedRow]) ->
             unit: column.unit.clone(),
             rows: 0,
             greatest: 0.0,
-            at: 0,
         };
-        for (place, (pair, row)) in pairs.iter().zip(shared.iter_mut()).enumerate() {
+        for (pair, row) in pairs.iter().zip(shared.iter_mut()) {
             let [first, second] = [sides[0].cell(first, pair[0]), sides[1].cell(second, pair[1])];
             if first == second {
                 continue;
@@ -310,10 +306,7 @@ fn changes(sides: &[Side; 2], pairs: &[[usize; 2]], shared: &mut [SharedRow]) ->
             change.rows += 1;
             row.differs = true;
             if let (Cell::Number(first), Cell::Number(second)) = (first, second) {
-                let by = (second - first).abs();
-                if by > change.greatest {
-                    (change.greatest, change.at) = (by, place);
-                }
+                change.greatest = change.greatest.max((second - first).abs());
             }
         }
         if change.rows > 0 {

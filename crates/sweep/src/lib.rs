@@ -66,7 +66,7 @@ pub use engine::ModelEngine;
 pub use fit::FitOptions;
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use library::{
-    BoundaryOptions, Effort, Evaluated, Evaluator, Explained, PointTable, RanToFile, ResultTable,
+    BoundaryOptions, Effort, Evaluator, Explained, PointTable, RanToFile, ResultTable,
     TraceOptions, explain_point, find_boundary, find_held, find_modes, fit_tables, held_to_file,
     list_parameters, optimise_study, run_to_file, trace_point,
 };

@@ -14,7 +14,7 @@ mod search;
 mod stability;
 mod trace;
 
-pub use evaluate::{Evaluated, Evaluator};
+pub use evaluate::Evaluator;
 pub use explain::{Explained, explain_point};
 pub use fit::fit_tables;
 pub use modes::find_modes;

@@ -216,7 +216,7 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
         let asking = Asking::new(engine, 2, &interrupt, Some(*trials), &tell).unwrap();
         let models = Models::new(&task, asking);
         let found = trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {});
-        let trials = models.into_asking().into_trials().unwrap();
+        let trials = models.asking.into_trials().unwrap();
         match found {
             Ok(found) => break (found, trials),
             Err(Stopped::Interrupted) => assert!(trials.count() > there),

@@ -4,23 +4,23 @@ use std::path::{Path, PathBuf};
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sweep::{Effort, Error, Evaluated, RanToFile, ResultTable};
+use sweep::{Effort, Error, RanToFile, ResultTable};
 
 use crate::errors;
 use crate::result::PyResultTable;
 use crate::work::{Attended, How, attended};
 
 /// The rows, or those that were computed before Ctrl-C.
-pub(crate) fn rows(py: Python<'_>, evaluated: Attended<Evaluated>) -> PyResult<PyResultTable> {
-    let evaluated = evaluated.or_raise(py, |evaluated| match evaluated {
+pub(crate) fn rows(py: Python<'_>, evaluated: Attended<ResultTable>) -> PyResult<PyResultTable> {
+    let table = evaluated.or_raise(py, |evaluated| match evaluated {
         Err(error) => errors::error(py, &error),
-        Ok(evaluated) => {
-            let rows = evaluated.table.rows();
+        Ok(table) => {
+            let rows = table.rows();
             let text = format!("interrupted; `result` of this exception holds {rows} rows");
-            holding(py, text, Some(evaluated.table))
+            holding(py, text, Some(table))
         }
     })?;
-    Ok(PyResultTable::new(evaluated.table))
+    Ok(PyResultTable::new(table))
 }
 
 /// The rows of a work that keeps them in memory or, if there is one, in a file; if it is shown, it
@@ -29,7 +29,7 @@ pub(crate) fn rows_or_file(
     py: Python<'_>,
     out: Option<&PathBuf>,
     how: How,
-    in_memory: impl FnOnce(Effort<'_>) -> Result<Evaluated, Error> + Send,
+    in_memory: impl FnOnce(Effort<'_>) -> Result<ResultTable, Error> + Send,
     to_file: impl FnOnce(&Path, &dyn Fn(&str), Effort<'_>) -> Result<RanToFile, Error> + Send,
 ) -> PyResult<PyResultTable> {
     let Some(out) = out else { return rows(py, attended(py, how, in_memory)?) };

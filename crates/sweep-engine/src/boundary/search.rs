@@ -128,7 +128,8 @@ pub struct Models<'a, M: Model> {
     task: &'a BoundaryTask<M>,
     /// The quantity's column of the plan's rows, and its place among them.
     column: Option<(usize, Column)>,
-    asking: Asking<'a>,
+    /// What it asks.
+    pub asking: Asking<'a>,
 }
 
 impl<'a, M: Rows> Models<'a, M> {
@@ -137,11 +138,6 @@ impl<'a, M: Rows> Models<'a, M> {
         let mut columns = M::layout(&task.plan).columns.into_iter().enumerate();
         let column = columns.find(|(_, column)| column.name == task.quantity.name);
         Self { task, column, asking }
-    }
-
-    /// What it asks.
-    pub fn into_asking(self) -> Asking<'a> {
-        self.asking
     }
 
     fn distance(&self, done: &Done) -> Option<f64> {

@@ -186,5 +186,5 @@ pub fn search<M: Swept>(
     let mut standing = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
     let found = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
     progress.finish();
-    Ok((found, models.into_asking().into_trials()))
+    Ok((found, models.asking.into_trials()))
 }

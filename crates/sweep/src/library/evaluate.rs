@@ -25,15 +25,6 @@ pub struct Evaluator {
     ladders: OnceLock<[Ladder; 2]>,
 }
 
-/// What came of an evaluation.
-#[derive(Debug)]
-pub struct Evaluated {
-    /// The rows that were computed, in order; the column `point` counts points from 0.
-    pub table: ResultTable,
-    /// Whether those are all; if not, the interrupt was raised.
-    pub is_whole: bool,
-}
-
 impl Evaluator {
     /// An evaluator of this plan.
     pub fn new(plan: Plan) -> Self {
@@ -53,7 +44,7 @@ impl Evaluator {
     /// # Errors
     /// Columns or values that do not fit the plan's axes; no threads; `SWEEP_SIMD` naming nothing
     /// this machine has.
-    pub fn evaluate(&self, table: &PointTable, effort: Effort<'_>) -> Result<Evaluated, Error> {
+    pub fn evaluate(&self, table: &PointTable, effort: Effort<'_>) -> Result<ResultTable, Error> {
         let points = table.on(&self.plan)?;
         let mut job = Job::of(&self.plan);
         job.points = table.rows() as u64;
@@ -68,11 +59,11 @@ impl Evaluator {
     ///
     /// # Errors
     /// As [`Self::evaluate`].
-    pub fn run(&self, effort: Effort<'_>) -> Result<Evaluated, Error> {
+    pub fn run(&self, effort: Effort<'_>) -> Result<ResultTable, Error> {
         self.rows(&Job::of(&self.plan), effort)
     }
 
-    fn rows(&self, job: &Job<'_>, effort: Effort<'_>) -> Result<Evaluated, Error> {
+    fn rows(&self, job: &Job<'_>, effort: Effort<'_>) -> Result<ResultTable, Error> {
         let engine = match self.ladders.get() {
             Some(ladders) => ModelEngine::with_ladders(&self.plan, ladders.clone())?,
             None => ModelEngine::new(&self.plan)?,
@@ -94,7 +85,7 @@ pub(super) fn in_memory(
     job: &Job<'_>,
     effort: Effort<'_>,
     engine: &dyn Engine,
-) -> Result<Evaluated, Error> {
+) -> Result<ResultTable, Error> {
     let pool = threads::pool(effort.threads()?)?;
     let watch = Watch::new(effort.interrupt);
     let rows = Mutex::new(0..job.points);
@@ -119,7 +110,7 @@ pub(super) fn in_memory(
     })?;
     let is_whole = watch.points_done() == job.points;
     let batches = gathered.into_batches().map_err(|error| defect(error.to_string()))?;
-    Ok(Evaluated { table: ResultTable::of_rows(job, batches, is_whole), is_whole })
+    Ok(ResultTable::of_rows(job, batches, is_whole))
 }
 
 /// Outcomes as they come, and the batches that are whole.
@@ -197,7 +188,7 @@ mod tests {
         let effort =
             Effort { threads: Some(2), progress: ProgressMode::None, interrupt: &interrupt };
         let found = evaluator.run(effort).unwrap();
-        let [first, second] = found.table.batches() else { panic!("{:?}", found.table) };
+        let [first, second] = found.batches() else { panic!("{found:?}") };
         assert_eq!([first.num_rows(), second.num_rows()], [BATCH_ROWS, 1]);
         assert!(Arc::ptr_eq(&first.schema(), &second.schema()));
     }

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::evaluate::{Evaluated, in_memory};
+use super::evaluate::in_memory;
+use super::result::ResultTable;
 use super::run::{RanToFile, into_file};
 use super::{Effort, check_speeds};
 use crate::dwell::Search;
@@ -22,7 +23,7 @@ pub fn find_held(
     speeds_rpm: &[f64],
     search: Option<Search>,
     effort: Effort<'_>,
-) -> Result<Evaluated, Error> {
+) -> Result<ResultTable, Error> {
     let held = checked(plan, speeds_rpm, search)?;
     in_memory(&held.job(), effort, &held.engine()?)
 }
