@@ -3,8 +3,6 @@
 use std::fmt;
 use std::str::FromStr;
 
-use washer_model::decimal;
-
 /// Most speeds that are accepted: an hour of computing.
 pub(crate) const MOST_SPEEDS: f64 = 100_000.0;
 
@@ -17,13 +15,6 @@ pub(crate) struct Speeds {
     pub(crate) to: f64,
     /// Between two (rpm).
     pub(crate) step: f64,
-}
-
-impl fmt::Display for Speeds {
-    /// As it is written on a command line.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}", decimal(self.from), decimal(self.to), decimal(self.step))
-    }
 }
 
 impl FromStr for Speeds {
