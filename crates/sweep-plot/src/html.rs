@@ -215,7 +215,9 @@ pub(crate) fn picture(svg: &[u8]) -> String {
 
 /// A page of these data, and of what is `told` of the run in HTML.
 fn page(title: &str, mut data: Value, scripts: &[&str], source: &Source, told: &str) -> String {
-    data["ticks"] = ticks_json();
+    // Where ticks of even axes can be, with the decimals of their numbers, and how one is chosen.
+    let steps: Value = Step::all().map(|step| json!([step.length(), step.decimals()])).collect();
+    data["ticks"] = json!({ "steps": steps, "slack": SLACK, "least": LEAST_TICKS });
     data["both"] = json!(BOTH.css());
     data["shade"] = json!(format!("{}{:02x}", SHADE.css(), SHADE.alpha));
     let worker = if data.get("live").is_some() { live::WORKER } else { "" };
@@ -231,14 +233,6 @@ fn page(title: &str, mut data: Value, scripts: &[&str], source: &Source, told: &
         .replace("{{worker}}", worker)
         .replace("{{script}}", &scripts.concat())
         .replace("{{data}}", &data)
-}
-
-/// Where ticks can be: the steps of even axes, each with the decimals of its numbers, and how one
-/// is chosen.
-fn ticks_json() -> Value {
-    let steps: Vec<Value> =
-        Step::all().map(|step| json!([step.length(), step.decimals()])).collect();
-    json!({ "steps": steps, "slack": SLACK, "least": LEAST_TICKS })
 }
 
 /// The ticks of a logarithmic axis in ever denser sets, null for an even one.

@@ -234,7 +234,9 @@ pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), 
     let file = Output::begin(output, format)?;
     let mut bytes = figure(input, options, format)?;
     if format == Format::Html {
-        let still = figure(input, &of_still(options), Format::Png)?;
+        // What the page shows where scripts are switched off.
+        let options = PlotOptions { traces: None, live: None, ..options.clone() };
+        let still = figure(input, &options, Format::Png)?;
         bytes = html::with_still(&bytes, &still);
     }
     Ok(file.finish(&bytes)?)
@@ -261,11 +263,6 @@ fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>
         Kind::Differences => differences(source, options, format),
         _ => curves(source, options, format),
     }
-}
-
-/// The options of the picture that a page shows where scripts are switched off.
-fn of_still(options: &PlotOptions) -> PlotOptions {
-    PlotOptions { traces: None, live: None, ..options.clone() }
 }
 
 /// Whether a map file's points are a design's. One that lists a whole grid, or spreads points over

@@ -72,11 +72,6 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// Whether it speaks of single rows; if not, of the file as a whole.
-    pub const fn is_by_row(&self) -> bool {
-        self.by_row
-    }
-
     /// The columns that it reads.
     pub(crate) fn names(&self) -> Vec<&str> {
         self.columns.iter().map(String::as_str).collect()

@@ -494,7 +494,7 @@ mod tests {
     #[test]
     fn what_is_about_rows_is_told_from_what_is_about_the_file() {
         let table = sample::table();
-        let by_row = |text: &str| Condition::parse(text, &table).unwrap().is_by_row();
+        let by_row = |text: &str| Condition::parse(text, &table).unwrap().by_row;
         assert!(by_row("ratio_max < 1.5 and reliable"));
         assert!(by_row("ratio_max < 2 * mean(ratio_max)"));
         assert!(!by_row("count(not reliable) == 0 and max(abs(ratio_max - 1)) < 3"));

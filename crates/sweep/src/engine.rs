@@ -48,7 +48,7 @@ pub struct ModelEngine<'a> {
     timing: Timing,
     rule: Rule,
     /// The ladders of both models; found when first asked for.
-    ladders: OnceCell<[Ladder; 2]>,
+    pub(crate) ladders: OnceCell<[Ladder; 2]>,
 }
 
 /// The instruction set that `SWEEP_SIMD` asks for, else the best.
@@ -117,11 +117,6 @@ impl<'a> ModelEngine<'a> {
     /// The rungs of both models.
     pub(crate) fn ladders(&self) -> &[Ladder; 2] {
         self.ladders.get_or_init(|| self.find_ladders(&|| false))
-    }
-
-    /// The rungs, if they were asked for.
-    pub(crate) fn ladders_found(&self) -> Option<&[Ladder; 2]> {
-        self.ladders.get()
     }
 
     /// As [`Self::ladders`]; `None` if `watch` says to stop before they are found.

@@ -69,7 +69,7 @@ impl Evaluator {
             None => ModelEngine::new(&self.plan)?,
         };
         let evaluated = in_memory(job, effort, &engine)?;
-        if let Some(found) = engine.ladders_found() {
+        if let Some(found) = engine.ladders.get() {
             // Another call may have found the same.
             let _ = self.ladders.set(found.clone());
         }
