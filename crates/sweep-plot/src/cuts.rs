@@ -1,10 +1,10 @@
 //! Where a map of three or more axes is cut: which values of the axes beyond the second are shown.
 
-use super::PlotOptions;
 use super::error::PlotError;
 use super::label;
 use super::read::{Source, some_of};
 use super::swept::SweptAxis;
+use super::together::At;
 
 /// Most values of a third axis that are drawn side by side.
 const MOST_PANELS: usize = 9;
@@ -44,10 +44,10 @@ impl Cuts {
     pub(crate) fn of_picture(
         source: &Source,
         axes: &[SweptAxis],
-        options: &PlotOptions,
+        at: &At,
     ) -> Result<Self, PlotError> {
         let extra = axes.get(2..).unwrap_or_default();
-        let pins = pins(source, extra, options)?;
+        let pins = pins(source, extra, at)?;
         // The third axis becomes panels unless it is pinned.
         let is_free = pins.first() == Some(&None);
         let pick = |(k, (axis, pin)): (usize, (&SweptAxis, &Option<usize>))| match pin {
@@ -82,11 +82,11 @@ impl Cuts {
     pub(crate) fn of_page(
         source: &Source,
         axes: &[SweptAxis],
-        options: &PlotOptions,
+        at: &At,
         most: usize,
     ) -> Result<Self, PlotError> {
         let extra = axes.get(2..).unwrap_or_default();
-        let pins = pins(source, extra, options)?;
+        let pins = pins(source, extra, at)?;
         let side = |axis: &SweptAxis| axis.values.len().min(LEAST_SIDE);
         let most_cuts = (most / axes.iter().take(2).map(side).product::<usize>()).max(1);
         let mut counts: Vec<usize> = extra.iter().map(|axis| axis.values.len()).collect();
@@ -138,17 +138,13 @@ fn left_out(axis: &SweptAxis, shown: usize) -> String {
 /// # Errors
 /// [`PlotError::Unfit`] when `--at` names no axis beyond the second, or a value that its axis
 /// does not have; [`PlotError::NotAGrid`] for an axis of more values than are kept.
-fn pins(
-    source: &Source,
-    extra: &[SweptAxis],
-    options: &PlotOptions,
-) -> Result<Vec<Option<usize>>, PlotError> {
+fn pins(source: &Source, extra: &[SweptAxis], at: &At) -> Result<Vec<Option<usize>>, PlotError> {
     if let Some(endless) = extra.iter().find(|axis| !axis.complete) {
         let reason = format!("axis `{}` has too many values to choose from", endless.name);
         return Err(PlotError::NotAGrid { path: source.path.clone(), reason });
     }
     let mut pins = vec![None; extra.len()];
-    for (name, value) in &options.at {
+    for (name, value) in at {
         let missing =
             |what, known: String| source.not_there("--at", format!("{name}={value}"), what, known);
         let place = extra.iter().position(|axis| axis.name == *name).ok_or_else(|| {

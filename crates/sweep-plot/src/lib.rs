@@ -301,7 +301,7 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
         let shown = layer::chosen(&source, options)?;
         let columns = shown.iter().map(|shown| shown.column()).chain([layer::STATUS]);
         let columns: Vec<String> = columns.map(str::to_owned).collect();
-        let cuts = Cuts::of_picture(&source, &axes, options)?;
+        let cuts = Cuts::of_picture(&source, &axes, &options.at)?;
         let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
         let map = Map::read(source, grid, &columns, &levels)?;
         let overlay = options.boundary.as_ref();
@@ -311,7 +311,7 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
     }
     let columns = html::carried(&source, &axes);
     let most = html::most_cells(columns.len());
-    let cuts = Cuts::of_page(&source, &axes, options, most)?;
+    let cuts = Cuts::of_page(&source, &axes, &options.at, most)?;
     let grid = Grid::new(&axes, &cuts.picks, most);
     let map = Map::read(source, grid, &columns, &levels)?;
     if axes.len() == 1 {

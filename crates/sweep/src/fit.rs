@@ -225,7 +225,6 @@ pub(crate) fn fit(
 }
 
 fn fitted(cases: Vec<Case>, options: &FitOptions, work: &Work<'_>) -> Result<Fitted, Ended> {
-    let refused = |why: String| Err(Error::Refused(why).into());
     let free = free(options, &cases)?;
     let method = Problem::method(&cases).map_err(Error::model)?;
     let model = if options.model == LINEAR { ModelKind::Linear } else { ModelKind::Nonlinear };
@@ -235,18 +234,17 @@ fn fitted(cases: Vec<Case>, options: &FitOptions, work: &Work<'_>) -> Result<Fit
     let samples: usize = problem.cases.iter().map(|case| case.measured.count()).sum();
     let unknowns = problem.unknowns() + problem.signals().count();
     if unknowns >= samples {
-        return refused(format!(
-            "{unknowns} unknowns for {samples} samples: expected more samples, or fewer `--free`"
-        ));
+        let expected = "expected more samples, or fewer `--free`";
+        let said = format!("{unknowns} unknowns for {samples} samples: {expected}");
+        return Err(Error::Refused(said).into());
     }
     for case in &problem.cases {
         let rpm = case.first_rpm().unwrap_or_default();
         if rpm.abs() > MOST_AT_START * case.greatest_rpm() {
-            return refused(format!(
-                "{} begins at {rpm:.0} rpm, and where its unbalance was then is not known: \
-                 expected the record from rest on",
-                case.measured.name
-            ));
+            let unknown = "where its unbalance was then is not known: expected the record from \
+                           rest on";
+            let said = format!("{} begins at {rpm:.0} rpm, and {unknown}", case.measured.name);
+            return Err(Error::Refused(said).into());
         }
     }
     let journal = work.journal.as_deref();
@@ -320,11 +318,9 @@ fn fitted(cases: Vec<Case>, options: &FitOptions, work: &Work<'_>) -> Result<Fit
 }
 
 fn no_answer() -> Error {
-    Error::Refused(
-        "the model does not get through the record at the starting values: expected a start from \
-         which it does (`--set NAME=VALUE`)"
-            .to_owned(),
-    )
+    let said = "the model does not get through the record at the starting values: expected a start \
+                from which it does (`--set NAME=VALUE`)";
+    Error::Refused(said.to_owned())
 }
 
 /// The journal of a problem.
@@ -460,10 +456,7 @@ impl Search<'_> {
             }
             Ok(found.map(|against| self.problem.summary(&against)))
         };
-        let found = match self.journal {
-            Some(journal) => journal.answer(x, find),
-            None => find(),
-        }?;
+        let found = self.journal.map_or_else(find, |journal| journal.answer(x, find))?;
         (self.work.seen)(1 + self.made.fetch_add(1, Ordering::Relaxed));
         Ok(found)
     }
@@ -484,15 +477,14 @@ impl Search<'_> {
             let names: Vec<&str> = dead.map(|k| self.problem.free[k].parameter.name()).collect();
             (!names.is_empty()).then(|| names.join(", "))
         };
-        let no_influence = |names: String| {
-            Err(Ended::Refused(Error::Refused(format!(
-                "the measurement does not depend on {names}: expected another channel, another \
-                 start (`--set NAME=VALUE`), or to leave it out of `--free`"
-            ))))
+        let no_influence = |names: &str| {
+            let expected = "expected another channel, another start (`--set NAME=VALUE`), or to \
+                            leave it out of `--free`";
+            Error::Refused(format!("the measurement does not depend on {names}: {expected}"))
         };
         let dead_at_start = self.evaluate(&start)?.as_ref().and_then(dead);
         if let (Some(names), 1) = (&dead_at_start, starts) {
-            return no_influence(names.clone());
+            return Err(no_influence(names).into());
         }
         let mut chosen = vec![start.clone()];
         if starts > 1 {
@@ -527,7 +519,7 @@ impl Search<'_> {
         // Of several starts another may be where all count.
         let is_dead = |minimum: &Descent| dead(&minimum.summary).is_some();
         if let Some(names) = dead_at_start.filter(|_| minima.iter().all(is_dead)) {
-            return no_influence(names);
+            return Err(no_influence(&names).into());
         }
         let mut apart: Vec<Descent> = Vec::new();
         for minimum in minima {
