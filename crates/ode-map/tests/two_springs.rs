@@ -55,7 +55,7 @@ impl Home {
 
     fn rows(&self, name: &str) -> RecordBatch {
         let file = sweep_files::ParquetFile::open(&self.0.path().join(name)).unwrap();
-        file.batches(|builder| builder).unwrap().next().unwrap().unwrap()
+        file.batches((0..file.schema().fields().len()).collect()).unwrap().next().unwrap().unwrap()
     }
 }
 

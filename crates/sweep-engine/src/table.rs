@@ -9,15 +9,14 @@ use arrow_array::{
     ArrayRef, BooleanArray, DictionaryArray, Float64Array, RecordBatch, UInt64Array,
 };
 use arrow_schema::{DataType, Field, Schema};
-use parquet::arrow::ArrowWriter;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use serde_json::Value;
 
 use crate::build::Build;
 use crate::store::schema::{Column, Kind, writer};
-use sweep_files::panics;
-use sweep_files::{key, seal};
+use sweep_files::batches::of_arrow;
+use sweep_files::{Writer, key, panics, seal};
 use sweep_parameter::{Parameter, Worse};
 
 /// Columns on their way to a file.
@@ -121,8 +120,6 @@ impl Table {
         let Build { version, numerics } = self.build;
         self.text(key::VERSION, version.to_owned());
         self.text(key::NUMERICS, numerics.to_string());
-        let dictionary: Value = self.columns.iter().map(|(column, _)| column.entry()).collect();
-        self.metadata(key::COLUMNS, &dictionary);
         let properties = writer(version, self.metadata).set_dictionary_enabled(false).build();
         let field = |(column, array): (Column, ArrayRef)| {
             let data_type = array.data_type().clone();
@@ -131,13 +128,14 @@ impl Table {
         };
         let (fields, arrays): (Vec<Field>, _) = self.columns.into_iter().map(field).unzip();
         let schema = Arc::new(Schema::new(fields));
-        let batch = RecordBatch::try_new(schema.clone(), arrays)?;
+        let batch = RecordBatch::try_new(schema.clone(), arrays).map_err(of_arrow)?;
         let rows = batch.clone();
         let bytes = panics::in_parquet("the library gave up writing", move || {
-            let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties))?;
+            let mut writer = Writer::new(Vec::new(), &schema, properties)?;
             writer.write(&rows)?;
-            writer.append_key_value_metadata(seal::blank());
-            writer.into_inner()
+            let mut file = writer.end()?;
+            file.append_key_value_metadata(seal::blank());
+            file.into_inner()
         })?;
         let mut file = Cursor::new(bytes);
         seal::seal(&mut file)?;

@@ -6,7 +6,7 @@ use arrow_array::types::{
     Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
     UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, BooleanArray};
+use arrow_array::{Array, BooleanArray, DictionaryArray};
 use arrow_schema::{ArrowError, DataType};
 
 fn unreadable(array: &dyn Array, wanted: &str) -> ArrowError {
@@ -50,6 +50,14 @@ pub fn is_number(data_type: &DataType) -> bool {
 /// [`ArrowError::SchemaError`] if the column does not hold such.
 pub fn flags(array: &dyn Array) -> Result<&BooleanArray, ArrowError> {
     array.as_boolean_opt().ok_or_else(|| unreadable(array, "true and false"))
+}
+
+/// Words, as they are read and kept in memory.
+///
+/// # Errors
+/// [`ArrowError::SchemaError`] if the column does not hold such.
+pub(crate) fn words(array: &dyn Array) -> Result<&DictionaryArray<Int32Type>, ArrowError> {
+    array.as_dictionary_opt().ok_or_else(|| unreadable(array, "words"))
 }
 
 /// Texts, one per row, plain or dictionary coded.

@@ -170,14 +170,12 @@ mod tests {
     use std::io::Cursor;
     use std::sync::Arc;
 
-    use arrow_array::builder::{Int64Builder, ListBuilder, MapBuilder, StringBuilder};
-    use arrow_array::{
-        ArrayRef, BooleanArray, Date32Array, Decimal128Array, Float64Array, Int8Array, RecordBatch,
-        StringArray, StructArray, Time64MicrosecondArray, TimestampMillisecondArray,
-    };
-    use parquet::arrow::ArrowWriter;
+    use parquet::column::writer::ColumnWriter;
+    use parquet::data_type::{ByteArray, FixedLenByteArray};
     use parquet::file::metadata::{KeyValue, SortingColumn};
     use parquet::file::properties::{EnabledStatistics, WriterProperties};
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::parser::parse_message_type;
 
     use super::*;
     use crate::thrift::encode::varint;
@@ -211,29 +209,25 @@ mod tests {
 
     #[test]
     fn footers_of_every_type_and_setting_are_fine() {
-        let mut lists = ListBuilder::new(Int64Builder::new());
-        lists.values().append_value(7);
-        lists.append(true);
-        let mut maps = MapBuilder::new(None, StringBuilder::new(), Int64Builder::new());
-        maps.keys().append_value("k");
-        maps.values().append_value(1);
-        maps.append(true).unwrap();
-        let numbers: ArrayRef = Arc::new(Float64Array::from(vec![1.5]));
-        let decimals = Decimal128Array::from(vec![5]).with_precision_and_scale(9, 2).unwrap();
-        let columns: Vec<(&str, ArrayRef)> = vec![
-            ("double", numbers.clone()),
-            ("truth", Arc::new(BooleanArray::from(vec![true]))),
-            ("byte", Arc::new(Int8Array::from(vec![1]))),
-            ("text", Arc::new(StringArray::from(vec!["long".repeat(90)]))),
-            ("date", Arc::new(Date32Array::from(vec![1]))),
-            ("time", Arc::new(Time64MicrosecondArray::from(vec![1]))),
-            ("stamp", Arc::new(TimestampMillisecondArray::from(vec![1]).with_timezone("UTC"))),
-            ("decimal", Arc::new(decimals)),
-            ("list", Arc::new(lists.finish())),
-            ("map", Arc::new(maps.finish())),
-            ("group", Arc::new(StructArray::try_from(vec![("inner", numbers)]).unwrap())),
-        ];
-        let batch = RecordBatch::try_from_iter(columns).unwrap();
+        let schema = "message x {
+            required double double;
+            optional boolean truth;
+            optional int32 byte (INTEGER(8, true));
+            optional binary text (STRING);
+            optional int32 date (DATE);
+            optional int64 time (TIME(MICROS, false));
+            optional int64 stamp (TIMESTAMP(MILLIS, true));
+            optional fixed_len_byte_array(4) decimal (DECIMAL(9, 2));
+            optional group list (LIST) { repeated group list { optional int64 element; } }
+            optional group map (MAP) {
+                repeated group key_value {
+                    required binary key (STRING);
+                    optional int64 value;
+                }
+            }
+            optional group group { optional float inner; }
+        }";
+        let schema = Arc::new(parse_message_type(schema).unwrap());
         for statistics in
             [EnabledStatistics::None, EnabledStatistics::Chunk, EnabledStatistics::Page]
         {
@@ -245,8 +239,33 @@ mod tests {
                 .set_key_value_metadata(Some(vec![KeyValue::new("k".to_owned(), None)]))
                 .build();
             let mut writer =
-                ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties)).unwrap();
-            writer.write(&batch).unwrap();
+                SerializedFileWriter::new(Vec::new(), Arc::clone(&schema), properties.into())
+                    .unwrap();
+            let mut group = writer.next_row_group().unwrap();
+            while let Some(mut column) = group.next_column().unwrap() {
+                macro_rules! write {
+                    ($column:expr, $value:expr) => {{
+                        let level = $column.get_descriptor().max_def_level();
+                        $column.write_batch(&[$value], Some(&[level]), Some(&[0])).unwrap()
+                    }};
+                }
+                match column.untyped() {
+                    ColumnWriter::BoolColumnWriter(column) => write!(column, true),
+                    ColumnWriter::Int32ColumnWriter(column) => write!(column, 1),
+                    ColumnWriter::Int64ColumnWriter(column) => write!(column, 1),
+                    ColumnWriter::FloatColumnWriter(column) => write!(column, 1.5),
+                    ColumnWriter::DoubleColumnWriter(column) => write!(column, 1.5),
+                    ColumnWriter::ByteArrayColumnWriter(column) => {
+                        write!(column, ByteArray::from("long".repeat(90).as_str()))
+                    }
+                    ColumnWriter::FixedLenByteArrayColumnWriter(column) => {
+                        write!(column, FixedLenByteArray::from(vec![5; 4]))
+                    }
+                    ColumnWriter::Int96ColumnWriter(_) => unreachable!(),
+                };
+                column.close().unwrap();
+            }
+            group.close().unwrap();
             assert_eq!(told(&writer.into_inner().unwrap()), "fine");
         }
     }

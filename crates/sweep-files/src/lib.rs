@@ -17,6 +17,7 @@
 //! the library, panics included, into an error with the file's name.
 
 pub mod atomic;
+pub mod batches;
 pub mod cells;
 mod columns;
 mod error;
@@ -32,6 +33,7 @@ pub mod regular;
 mod rows;
 pub mod seal;
 mod thrift;
+mod writer;
 
 pub use columns::{CellKind, Column, columns};
 pub use error::FileError;
@@ -39,5 +41,6 @@ pub use footer::Refused;
 pub use kind::{EXPORTED_CSV, FileKind};
 pub use leaves::{Step, dotted, leaves};
 pub use output::{Output, beside, judge, ready, write};
-pub use parquet::{Batches, CREATED_BY, ParquetFile};
+pub use parquet::{CREATED_BY, ParquetFile};
 pub use rows::{Cell, ResultTable, Row, Rows, ratio_limits};
+pub use writer::Writer;

@@ -130,12 +130,11 @@ mod tests {
     use std::sync::Arc;
 
     use arrow_array::{ArrayRef, Float64Array, RecordBatch};
-    use parquet::arrow::ArrowWriter;
     use parquet::file::metadata::KeyValue;
     use serde_json::json;
 
     use super::*;
-    use crate::{key, seal};
+    use crate::{Writer, key, seal};
 
     const PARQUET: [FileKind<'_>; 9] = [
         FileKind::Map,
@@ -182,8 +181,9 @@ mod tests {
     fn sealed(keys: &[&str]) -> Vec<u8> {
         let numbers: ArrayRef = Arc::new(Float64Array::from(vec![1.0]));
         let batch = RecordBatch::try_from_iter([("x", numbers)]).unwrap();
-        let mut writer = ArrowWriter::try_new(Vec::new(), batch.schema(), None).unwrap();
+        let mut writer = Writer::new(Vec::new(), &batch.schema(), Default::default()).unwrap();
         writer.write(&batch).unwrap();
+        let mut writer = writer.end().unwrap();
         for key in keys {
             let value = "{}".to_owned();
             writer.append_key_value_metadata(KeyValue::new((*key).to_owned(), value));

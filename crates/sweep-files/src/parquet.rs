@@ -6,16 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow_array::RecordBatch;
-use arrow_schema::{DataType, Field, FieldRef, Schema, SchemaRef};
-use parquet::arrow::arrow_reader::{
-    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader,
-    ParquetRecordBatchReaderBuilder,
-};
+use arrow_schema::SchemaRef;
 use parquet::basic::Type;
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{FileMetaData, KeyValue};
+use parquet::file::metadata::{FileMetaData, KeyValue, ParquetMetaData, ParquetMetaDataReader};
 use serde_json::Value;
 
+use crate::batches::{self, Batches};
 use crate::pages::{self, Unpacked};
 use crate::seal::{self, Seal};
 use crate::{FileError, Refused, footer, key, panics, regular};
@@ -33,7 +30,8 @@ pub const CREATED_BY: &str = "sweep version ";
 pub struct ParquetFile {
     path: PathBuf,
     file: File,
-    metadata: ArrowReaderMetadata,
+    metadata: Arc<ParquetMetaData>,
+    schema: SchemaRef,
     seal: Seal,
 }
 
@@ -71,7 +69,7 @@ impl ParquetFile {
 
     /// Refuses pages that do not fit in memory, before any is unpacked.
     fn check_pages(&self) -> Result<(), FileError> {
-        for group in self.metadata.metadata().row_groups() {
+        for group in self.metadata.row_groups() {
             let mut at_once = 0_u64;
             for column in group.columns() {
                 // It panics where the file places a column before its beginning.
@@ -101,12 +99,11 @@ impl ParquetFile {
     fn parse(path: &Path, file: File, seal: Seal) -> Result<Self, FileError> {
         footer::check(&mut &file).map_err(refused(path))?;
         let load = || {
-            let found = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())?;
-            let coded = ArrowReaderOptions::new().with_schema(with_words_once(found.schema()));
-            ArrowReaderMetadata::try_new(Arc::clone(found.metadata()), coded)
+            let metadata = ParquetMetaDataReader::new().parse_and_finish(&file)?;
+            Ok((batches::schema(&metadata), Arc::new(metadata)))
         };
-        let metadata = guarded(load).map_err(not_parquet(path))?;
-        Ok(Self { path: path.to_path_buf(), file, metadata, seal })
+        let (schema, metadata) = guarded(load).map_err(not_parquet(path))?;
+        Ok(Self { path: path.to_path_buf(), file, metadata, schema, seal })
     }
 
     /// Where it is.
@@ -136,12 +133,12 @@ impl ParquetFile {
     }
 
     fn about(&self) -> &FileMetaData {
-        self.metadata.metadata().file_metadata()
+        self.metadata.file_metadata()
     }
 
     /// The columns: names, types, and the metadata of each.
     pub fn schema(&self) -> &SchemaRef {
-        self.metadata.schema()
+        &self.schema
     }
 
     /// How many rows it has, by its own account.
@@ -169,58 +166,27 @@ impl ParquetFile {
         serde_json::from_str(self.value(key)?).ok()
     }
 
-    /// The rows, of the columns and in the portions that `choose` asks for.
+    /// The rows, of the columns at these places. After an error there are no more.
     ///
     /// # Errors
     /// [`FileError::Io`], [`FileError::NotParquet`].
     pub fn batches(
         &self,
-        choose: impl FnOnce(
-            ParquetRecordBatchReaderBuilder<File>,
-        ) -> ParquetRecordBatchReaderBuilder<File>,
-    ) -> Result<Batches, FileError> {
+        fields: Vec<usize>,
+    ) -> Result<impl Iterator<Item = Result<RecordBatch, FileError>> + use<'_>, FileError> {
         let file = self.file.try_clone().map_err(FileError::io("open", &self.path))?;
-        let reader = guarded(|| {
-            choose(ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone()))
-                .build()
-        });
-        let reader = Some(reader.map_err(not_parquet(&self.path))?);
-        Ok(Batches { path: self.path.clone(), reader })
+        let batches = Batches::new(file, Arc::clone(&self.metadata), &self.schema, fields);
+        let mut batches = Some(batches.map_err(not_parquet(&self.path))?);
+        Ok(std::iter::from_fn(move || {
+            let reader = batches.as_mut()?;
+            let batch = guarded(|| reader.batch()).transpose();
+            if !matches!(batch, Some(Ok(_))) {
+                // What a panic has left of it is of no use.
+                batches = None;
+            }
+            batch.map(|batch| batch.map_err(not_parquet(&self.path)))
+        }))
     }
-}
-
-/// Rows as they are read. After an error there are no more.
-pub struct Batches {
-    path: PathBuf,
-    reader: Option<ParquetRecordBatchReader>,
-}
-
-impl Iterator for Batches {
-    type Item = Result<RecordBatch, FileError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let reader = self.reader.as_mut()?;
-        let batch = guarded(|| reader.next().transpose().map_err(ParquetError::from)).transpose();
-        if !matches!(batch, Some(Ok(_))) {
-            // What a panic has left of it is of no use.
-            self.reader = None;
-        }
-        batch.map(|batch| batch.map_err(not_parquet(&self.path)))
-    }
-}
-
-/// A schema in which a word takes memory once, however many rows have it: a file of a few hundred
-/// bytes may repeat one of a megabyte.
-fn with_words_once(schema: &SchemaRef) -> SchemaRef {
-    let fields = schema.fields().iter().map(|field| match field.data_type() {
-        DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View => {
-            let words = DataType::Dictionary(DataType::Int32.into(), DataType::Utf8.into());
-            Arc::new(Field::clone(field).with_data_type(words))
-        }
-        _ => Arc::clone(field),
-    });
-    let fields: Vec<FieldRef> = fields.collect();
-    Arc::new(Schema::new_with_metadata(fields, schema.metadata().clone()))
 }
 
 /// Has the library read.
@@ -264,11 +230,12 @@ fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
 
 #[cfg(test)]
 mod tests {
-    use arrow_array::{Float64Array, StringArray};
-    use parquet::arrow::ArrowWriter;
+    use arrow_array::types::Int32Type;
+    use arrow_array::{DictionaryArray, Float64Array};
     use parquet::file::properties::WriterProperties;
 
     use super::*;
+    use crate::Writer;
 
     /// The bytes of a file that this program has written, with its digest.
     fn ours() -> Vec<u8> {
@@ -276,9 +243,9 @@ mod tests {
         let batch = RecordBatch::try_from_iter([("x", Arc::new(values) as _)]).unwrap();
         let properties =
             WriterProperties::builder().set_created_by(format!("{CREATED_BY}0.0.0")).build();
-        let mut writer =
-            ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties)).unwrap();
+        let mut writer = Writer::new(Vec::new(), &batch.schema(), properties).unwrap();
         writer.write(&batch).unwrap();
+        let mut writer = writer.end().unwrap();
         writer.append_key_value_metadata(seal::blank());
         let mut bytes = io::Cursor::new(writer.into_inner().unwrap());
         seal::seal(&mut bytes).unwrap();
@@ -325,18 +292,19 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
         // 3 GB if it were read row by row, more than Arrow's offsets can count.
-        let words: StringArray = vec![Some("a".repeat(1 << 20)); 3].into_iter().collect();
+        let long = "a".repeat(1 << 20);
+        let words: DictionaryArray<Int32Type> = [long.as_str(); 3].into_iter().collect();
         let batch = RecordBatch::try_from_iter([("status", Arc::new(words) as _)]).unwrap();
         let file = File::create(&path).unwrap();
         let properties =
             WriterProperties::builder().set_dictionary_page_size_limit(4 << 20).build();
-        let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties)).unwrap();
+        let mut writer = Writer::new(file, &batch.schema(), properties).unwrap();
         for _ in 0..1000 {
             writer.write(&batch).unwrap();
         }
-        writer.close().unwrap();
+        writer.end().unwrap().close().unwrap();
         let file = ParquetFile::open(&path).unwrap();
-        let rows = file.batches(|builder| builder.with_batch_size(4096)).unwrap();
+        let rows = file.batches(vec![0]).unwrap();
         let rows: Vec<RecordBatch> = rows.collect::<Result<_, _>>().unwrap();
         assert_eq!(rows.iter().map(RecordBatch::num_rows).sum::<usize>(), 3000);
         assert!(rows.iter().all(|rows| rows.get_array_memory_size() < 8 << 20));
@@ -352,13 +320,14 @@ mod tests {
             .set_write_batch_size(1 << 20)
             .set_compression(parquet::basic::Compression::ZSTD(Default::default()));
         let write = |mebibytes: usize| {
-            let words: StringArray =
-                vec![Some("a".repeat(1 << 20)); mebibytes].into_iter().collect();
+            let long = "a".repeat(1 << 20);
+            let words: DictionaryArray<Int32Type> =
+                vec![long.as_str(); mebibytes].into_iter().collect();
             let batch = RecordBatch::try_from_iter([("status", Arc::new(words) as _)]).unwrap();
             let (file, properties) = (File::create(&path).unwrap(), properties.clone().build());
-            let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties)).unwrap();
+            let mut writer = Writer::new(file, &batch.schema(), properties).unwrap();
             writer.write(&batch).unwrap();
-            writer.close().unwrap();
+            writer.end().unwrap().close().unwrap();
             ParquetFile::open(&path)
         };
         assert_eq!(write(10).unwrap().rows(), 10);
@@ -389,10 +358,9 @@ mod tests {
         let values: Float64Array = (0..3000).map(|k| f64::from(k % 1500)).collect();
         let batch = RecordBatch::try_from_iter([("x", Arc::new(values) as _)]).unwrap();
         let properties = WriterProperties::builder().build();
-        let mut writer =
-            ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties)).unwrap();
+        let mut writer = Writer::new(Vec::new(), &batch.schema(), properties).unwrap();
         writer.write(&batch).unwrap();
-        let sound = writer.into_inner().unwrap();
+        let sound = writer.end().unwrap().into_inner().unwrap();
         std::fs::write(&path, &sound).unwrap();
         assert_eq!(ParquetFile::open(&path).unwrap().rows(), 3000);
         // Its header's number of entries, 1500, becomes 8191; the library believes any.

@@ -1,11 +1,10 @@
 //! A result file as columns and rows.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::ArrowError;
-use parquet::arrow::ProjectionMask;
 use serde::Serialize;
 use serde_json::Value;
 use sweep_parameter::RatioLimits;
@@ -123,9 +122,6 @@ impl ResultTable {
     }
 }
 
-/// Rows decoded at once.
-const BATCH_ROWS: usize = 1 << 12;
-
 impl ParquetFile {
     /// The rows batch by batch, of the columns of these names. One that the file lacks is null.
     ///
@@ -143,10 +139,7 @@ impl ParquetFile {
             chosen.iter().flatten().map(|column| (column.field, column.kind)).collect();
         let place = |column: &Column| fields.keys().position(|field| *field == column.field);
         let places: Vec<Option<usize>> = chosen.iter().map(|column| place((*column)?)).collect();
-        let batches = self.batches(|builder| {
-            let mask = ProjectionMask::roots(builder.parquet_schema(), fields.keys().copied());
-            builder.with_projection(mask).with_batch_size(BATCH_ROWS)
-        })?;
+        let batches = self.batches(fields.keys().copied().collect())?;
         let mut first = 0;
         Ok(batches.map(move |batch| {
             let batch = batch?;
@@ -274,24 +267,11 @@ fn decode(array: &ArrayRef, kind: CellKind) -> Result<Cells, ArrowError> {
         }
         CellKind::Flag => Cells::Flags(cells::flags(array)?.iter().collect()),
         CellKind::Text => {
-            let mut names: Vec<String> = Vec::new();
-            // Keyed by place: the words of a batch lie there once, and may be long.
-            let mut places = HashMap::new();
-            // Neighbours mostly share theirs.
-            let mut last = (("".as_ptr(), usize::MAX), u32::MAX);
-            let mut place = |word: &str| {
-                let at = (word.as_ptr(), word.len());
-                if last.0 != at {
-                    let code = *places.entry(at).or_insert_with(|| {
-                        names.push(word.to_owned());
-                        u32::try_from(names.len() - 1).unwrap_or(u32::MAX)
-                    });
-                    last = (at, code);
-                }
-                last.1
-            };
-            let words = cells::texts(array)?.into_iter();
-            let codes = words.map(|word| word.map_or(u32::MAX, &mut place)).collect();
+            let coded = cells::words(array)?;
+            let names = cells::texts(coded.values())?.into_iter();
+            let names = names.map(|name| name.unwrap_or_default().to_owned()).collect();
+            let codes = coded.keys().iter();
+            let codes = codes.map(|code| code.map_or(u32::MAX, i32::cast_unsigned)).collect();
             Cells::Texts { names, codes }
         }
     })

@@ -9,9 +9,9 @@ use arrow_array::{
     Array as _, ArrayRef, BooleanArray, DictionaryArray, Float64Array, RecordBatch, UInt64Array,
 };
 use arrow_schema::{Field, Schema};
-use parquet::arrow::ArrowWriter;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
+use sweep_files::Writer;
 
 /// Columns with their units, and metadata, on the way to a file.
 #[derive(Clone, Default)]
@@ -92,7 +92,7 @@ impl Sample {
 /// first.
 fn write_all(folder: &Path, name: &str, samples: impl IntoIterator<Item = Sample>) -> PathBuf {
     let path = folder.join(name);
-    let mut writer: Option<ArrowWriter<std::fs::File>> = None;
+    let mut writer: Option<Writer<std::fs::File>> = None;
     for sample in samples {
         let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = sample.columns.into_iter().unzip();
         let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap();
@@ -100,11 +100,11 @@ fn write_all(folder: &Path, name: &str, samples: impl IntoIterator<Item = Sample
             let properties =
                 WriterProperties::builder().set_key_value_metadata(Some(sample.metadata)).build();
             let file = std::fs::File::create(&path).unwrap();
-            ArrowWriter::try_new(file, batch.schema(), Some(properties)).unwrap()
+            Writer::new(file, &batch.schema(), properties).unwrap()
         });
         writer.write(&batch).unwrap();
     }
-    writer.unwrap().close().unwrap();
+    writer.unwrap().end().unwrap().close().unwrap();
     path
 }
 

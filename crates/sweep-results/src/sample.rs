@@ -4,13 +4,15 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow_array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray, UInt64Array};
+use arrow_array::types::Int32Type;
+use arrow_array::{
+    ArrayRef, BooleanArray, DictionaryArray, Float64Array, RecordBatch, UInt64Array,
+};
 use arrow_schema::{Field, Schema};
-use parquet::arrow::ArrowWriter;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde_json::{Value, json};
-use sweep_files::key;
+use sweep_files::{Writer, key};
 use sweep_parameter::Worse;
 
 use sweep_files::ResultTable;
@@ -27,7 +29,7 @@ pub(crate) fn flags(values: &[Option<bool>]) -> ArrayRef {
 }
 
 pub(crate) fn texts(values: &[&str]) -> ArrayRef {
-    Arc::new(StringArray::from(values.to_vec()))
+    Arc::new(values.iter().copied().collect::<DictionaryArray<Int32Type>>())
 }
 
 /// Writes a file of these columns with these keys.
@@ -49,9 +51,9 @@ pub(crate) fn write(path: &Path, columns: Vec<Made>, keys: &[(&str, Value)]) {
     let properties =
         WriterProperties::builder().set_key_value_metadata(Some(pairs.collect())).build();
     let file = File::create(path).unwrap();
-    let mut writer = ArrowWriter::try_new(file, schema, Some(properties)).unwrap();
+    let mut writer = Writer::new(file, &schema, properties).unwrap();
     writer.write(&batch).unwrap();
-    writer.close().unwrap();
+    writer.end().unwrap().close().unwrap();
 }
 
 /// The plan of the sample.

@@ -5,7 +5,6 @@ use std::io::BufWriter;
 use std::path::Path;
 
 use arrow_array::RecordBatch;
-use parquet::arrow::ArrowWriter;
 use parquet::errors::ParquetError;
 use tempfile::NamedTempFile;
 
@@ -14,8 +13,9 @@ use super::provenance::{self};
 use super::read::{self};
 use super::schema::{self};
 use super::{BATCH_ROWS, Job, OpenRun, ResultRows, Session, StoreError, Tally};
+use sweep_files::batches::of_arrow;
 use sweep_files::panics;
-use sweep_files::{self as files, ParquetFile, atomic, seal};
+use sweep_files::{self as files, ParquetFile, Writer, atomic, seal};
 
 /// A finished result.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ pub struct Joined {
 struct MapWriter<'a> {
     output: &'a Path,
     file: NamedTempFile,
-    writer: ArrowWriter<BufWriter<File>>,
+    writer: Writer<BufWriter<File>>,
 }
 
 impl<'a> MapWriter<'a> {
@@ -38,7 +38,7 @@ impl<'a> MapWriter<'a> {
     fn begin(job: &Job<'_>, file: NamedTempFile, output: &'a Path) -> Result<Self, StoreError> {
         let (schema, properties) = (job.layout.schema(), schema::properties(job));
         let handle = file.as_file().try_clone().map_err(StoreError::io("write", output))?;
-        let begin = || ArrowWriter::try_new(BufWriter::new(handle), schema, Some(properties));
+        let begin = || Writer::new(BufWriter::new(handle), &schema, properties);
         Ok(Self { output, file, writer: written(output, begin)? })
     }
 
@@ -48,11 +48,14 @@ impl<'a> MapWriter<'a> {
 
     /// The whole file, with its digest.
     fn finish(self) -> Result<NamedTempFile, StoreError> {
-        let Self { output, mut file, mut writer } = self;
+        let Self { output, mut file, writer } = self;
         // Closing flushes to the file. (Taking the file back out of the writer would tell a full
         // disk as text only.)
-        writer.append_key_value_metadata(seal::blank());
-        written(output, || writer.close())?;
+        written(output, || {
+            let mut file = writer.end()?;
+            file.append_key_value_metadata(seal::blank());
+            file.close()
+        })?;
         seal::seal(file.as_file_mut()).map_err(StoreError::io("write", output))?;
         Ok(file)
     }
@@ -100,7 +103,7 @@ impl OpenRun {
     ) -> Result<Option<Tally>, StoreError> {
         let output = self.output().to_path_buf();
         let file = atomic::begin(self.folder())?;
-        let from_arrow = |error| StoreError::parquet("write", &output)(ParquetError::from(error));
+        let from_arrow = |error| StoreError::parquet("write", &output)(of_arrow(error));
         let mut rows = ResultRows::new(&job.layout);
         let mut writer = MapWriter::begin(job, file, &output)?;
         for chunk in 0..self.chunks() {

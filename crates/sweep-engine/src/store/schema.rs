@@ -15,7 +15,7 @@ use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 use parquet::schema::types::ColumnPath;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::Job;
 use sweep_files::{CREATED_BY, FileKind, key};
@@ -140,33 +140,15 @@ impl Column {
 
     /// The field of such data, with what the file says of the column.
     pub(crate) fn declared(&self, data_type: DataType, nullable: bool) -> Field {
-        let told = [("unit", &self.unit), ("description", &self.description)];
-        let told = told.map(|(key, text)| (key.to_owned(), text.clone()));
-        let of_worth = self.of_worth().map(|(key, value)| {
-            (key.to_owned(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
-        });
-        let metadata: HashMap<String, String> = told.into_iter().chain(of_worth).collect();
-        Field::new(&self.name, data_type, nullable).with_metadata(metadata)
-    }
-
-    /// Its entry in the column dictionary, the JSON under `key::COLUMNS`: type, unit, description.
-    pub(crate) fn entry(&self) -> (String, Value) {
-        let type_name = match self.kind {
-            Kind::Count | Kind::KnownCount => "uint64",
-            Kind::Axis | Kind::Measured | Kind::Time => "float64",
-            Kind::Flag => "bool",
-            Kind::Name(_) => "string",
-        };
-        let mut entry =
-            json!({ "type": type_name, "unit": self.unit, "description": self.description });
-        self.of_worth().for_each(|(key, value)| entry[key] = value);
-        (self.name.clone(), entry)
-    }
-
-    /// Which way it is bad, and up to where it is good, as the file says them.
-    fn of_worth(&self) -> impl Iterator<Item = (&'static str, Value)> {
-        let worse = self.worse.map(|worse| (key::WORSE, worse.name().into()));
-        worse.into_iter().chain(self.limit.map(|limit| (key::LIMIT, limit.value.into())))
+        let mut told = HashMap::from([
+            ("unit".to_owned(), self.unit.clone()),
+            ("description".to_owned(), self.description.clone()),
+        ]);
+        told.extend(self.worse.map(|worse| (key::WORSE.to_owned(), worse.name().to_owned())));
+        told.extend(
+            self.limit.map(|limit| (key::LIMIT.to_owned(), Value::from(limit.value).to_string())),
+        );
+        Field::new(&self.name, data_type, nullable).with_metadata(told)
     }
 
     /// The column's array; cells that must be there and are not become zeros.
@@ -233,7 +215,6 @@ pub fn properties(job: &Job<'_>) -> WriterProperties {
         pair(key::PLAN_HASH, job.hash().to_hex().to_string()),
         pair(key::VERSION, job.version.to_owned()),
         pair(key::NUMERICS, job.numerics.to_string()),
-        pair(key::COLUMNS, job.layout.all().map(Column::entry).collect::<Value>().to_string()),
     ];
     metadata.extend(job.layout.metadata.iter().map(|(key, value)| pair(key, value.to_string())));
     let builder = writer(job.version, metadata)

@@ -6,15 +6,13 @@ use std::path::{Path, PathBuf};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, UInt64Type};
 use arrow_array::{Array, RecordBatch};
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use proptest::prelude::*;
 use serde_json::json;
 use tempfile::TempDir;
 
 use super::merge::Joined;
 use super::*;
-use sweep_files::FileError;
-use sweep_files::cells;
+use sweep_files::{FileError, ParquetFile, cells};
 
 mod chunks;
 mod plans;
@@ -85,6 +83,7 @@ fn undisturbed(points: u64) -> Vec<u8> {
 }
 
 fn batches(path: &Path) -> Vec<RecordBatch> {
-    let reader = ParquetRecordBatchReaderBuilder::try_new(fs::File::open(path).unwrap()).unwrap();
-    reader.with_batch_size(1 << 20).build().unwrap().map(Result::unwrap).collect()
+    let file = ParquetFile::open(path).unwrap();
+    let all = (0..file.schema().fields().len()).collect();
+    file.batches(all).unwrap().map(Result::unwrap).collect()
 }

@@ -62,12 +62,9 @@ impl ResultTable {
         let plan = file.json(key::PLAN).or_else(|| file.json(key::DIFFERENCES));
         let plan = plan.ok_or_else(not_ours)?;
         let kind = file.kind().ok_or_else(not_ours)?;
-        let batches = file.batches(|builder| builder)?.collect::<Result<Vec<_>, _>>()?;
-        // The file's own keys are no part of the rows' schema.
-        let schema = SchemaRef::new(Schema::new(file.schema().fields().clone()));
-        let alike = |batch: RecordBatch| batch.with_schema(SchemaRef::clone(&schema));
-        let batches = batches.into_iter().map(alike).collect::<Result<Vec<_>, _>>();
-        let batches = batches.map_err(FileError::cells(path))?;
+        let all = (0..file.schema().fields().len()).collect();
+        let batches = file.batches(all)?.collect::<Result<Vec<_>, _>>()?;
+        let schema = SchemaRef::clone(file.schema());
         let file = FileContent::Bytes(file.bytes()?);
         Ok(Self { kind, plan, schema, batches, file })
     }

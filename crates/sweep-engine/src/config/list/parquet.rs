@@ -2,13 +2,15 @@
 //! checked first.
 
 use std::io::Cursor;
+use std::sync::Arc;
 
+use arrow_schema::DataType;
 use bytes::Bytes;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
-use parquet::file::metadata::ParquetMetaData;
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
 
+use sweep_files::batches::{self, Batches};
 use sweep_files::pages::{self, Unpacked};
 use sweep_files::{Refused, cells, footer, panics};
 
@@ -18,9 +20,6 @@ use super::{LONGEST_BYTES, Unreadable, fits};
 /// How a list may be compressed, for a message.
 const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
 
-/// Rows that are decoded at a time.
-const BATCH_ROWS: usize = 8192;
-
 /// Names and values of the columns. With `gaps`, a null is NaN.
 pub(super) fn columns(bytes: Vec<u8>, gaps: bool) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
     let panicked = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
@@ -29,22 +28,29 @@ pub(super) fn columns(bytes: Vec<u8>, gaps: bool) -> Result<Vec<(String, Vec<f64
 
 fn read(bytes: Bytes, gaps: bool) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
     footer::check(&mut Cursor::new(&bytes)).map_err(refused)?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(bytes.clone()).map_err(damaged)?;
-    let fields = builder.schema().fields().clone();
+    let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes).map_err(damaged)?;
+    let schema = batches::schema(&metadata);
+    let fields = schema.fields();
     fits(0, fields.len())?;
     if let Some(field) = fields.iter().find(|field| !cells::is_number(field.data_type())) {
-        let (column, found) = (short(field.name()), field.data_type());
-        return Err(format!("its column `{column}` holds no numbers but {found}"));
+        let found = match field.data_type() {
+            DataType::Boolean => "true and false",
+            text if cells::is_text(text) => "text",
+            _ => "dates, times, lists or bytes",
+        };
+        return Err(format!("its column `{}` holds no numbers but {found}", short(field.name())));
     }
-    check_sizes(builder.metadata(), &bytes, fields.len())?;
+    check_sizes(&metadata, &bytes, fields.len())?;
     let mut columns: Vec<(String, Vec<f64>)> =
         fields.iter().map(|field| (field.name().clone(), Vec::new())).collect();
     let mut rows = 0;
-    for batch in builder.with_batch_size(BATCH_ROWS).build().map_err(damaged)? {
-        let batch = batch.map_err(|error| damaged(error.into()))?;
+    let all = (0..fields.len()).collect();
+    let reader = Batches::new(bytes, Arc::new(metadata), &schema, all);
+    let mut reader = reader.map_err(damaged)?;
+    while let Some(batch) = reader.batch().map_err(damaged)? {
         fits((rows + batch.num_rows()) as u64, columns.len())?;
         for ((name, values), array) in columns.iter_mut().zip(batch.columns()) {
-            let numbers = cells::numbers(array).map_err(|error| damaged(error.into()))?;
+            let numbers = cells::numbers(array).map_err(|error| error.to_string())?;
             for (k, value) in numbers.into_iter().enumerate() {
                 let row = rows + k + 1;
                 let no_value = || format!("its column `{}` has no value in row {row}", short(name));

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use ::parquet::arrow::ArrowWriter;
 use ::parquet::basic::{Compression, GzipLevel, ZstdLevel};
 use ::parquet::file::properties::{WriterProperties, WriterVersion};
-use arrow_array::{ArrayRef, Float64Array, Int32Array, RecordBatch, StringArray};
+use arrow_array::types::Int32Type;
+use arrow_array::{ArrayRef, DictionaryArray, Float64Array, RecordBatch, UInt64Array};
+use sweep_files::Writer;
 
 use super::*;
 
@@ -25,11 +26,11 @@ fn readable() -> [Compression; 5] {
 fn file(columns: &[(&str, ArrayRef)], batches: usize, properties: WriterProperties) -> Vec<u8> {
     let batch = RecordBatch::try_from_iter(columns.iter().cloned()).unwrap();
     let mut bytes = Vec::new();
-    let mut writer = ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties)).unwrap();
+    let mut writer = Writer::new(&mut bytes, &batch.schema(), properties).unwrap();
     for _ in 0..batches {
         writer.write(&batch).unwrap();
     }
-    writer.close().unwrap();
+    writer.end().unwrap().close().unwrap();
     bytes
 }
 
@@ -42,7 +43,7 @@ fn small(codec: Compression, version: WriterVersion) -> Vec<u8> {
     let masses = (0..300).map(|k| 0.1 + 0.001 * f64::from(k % 50)).collect::<Vec<_>>();
     let frames = (0..300).map(|k| 20 + k % 7).collect::<Vec<_>>();
     let masses: ArrayRef = Arc::new(Float64Array::from(masses));
-    let frames: ArrayRef = Arc::new(Int32Array::from(frames));
+    let frames: ArrayRef = Arc::new(UInt64Array::from(frames));
     file(&[(NAME, masses), ("frame_mass_kg", frames)], 1, compressed(codec, version))
 }
 
@@ -81,10 +82,10 @@ fn a_compression_that_is_not_read_is_named_with_those_that_are() {
 
 #[test]
 fn what_is_no_number_is_told_by_column() {
-    let texts: ArrayRef = Arc::new(StringArray::from(vec!["a"]));
+    let texts: ArrayRef = Arc::new(["a"].into_iter().collect::<DictionaryArray<Int32Type>>());
     let none: ArrayRef = Arc::new(Float64Array::from(vec![Some(1.0), None]));
     let of = |column: ArrayRef| refusal(file(&[("x", column)], 1, WriterProperties::default()));
-    assert!(of(texts).contains("`x` holds no numbers but Utf8"));
+    assert!(of(texts).contains("`x` holds no numbers but text"));
     assert!(of(none).contains("`x` has no value in row 2"));
 }
 

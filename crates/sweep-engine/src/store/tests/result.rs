@@ -55,11 +55,9 @@ fn the_file_says_what_it_is_and_nothing_of_where_or_when() {
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
-    let reader =
-        ParquetRecordBatchReaderBuilder::try_new(fs::File::open(home.output()).unwrap()).unwrap();
-    let file = reader.metadata().file_metadata();
+    let file = ParquetFile::open(&home.output()).unwrap();
     assert_eq!(file.created_by(), Some("sweep version 0.0.0-test"));
-    let pairs = file.key_value_metadata().unwrap();
+    let pairs: Vec<_> = file.pairs().collect();
     let keys: Vec<&str> = pairs.iter().map(|pair| pair.key.as_str()).collect();
     let expected = [
         "sweep.plan",
@@ -67,12 +65,13 @@ fn the_file_says_what_it_is_and_nothing_of_where_or_when() {
         "sweep.version",
         "sweep.numerics",
         "sweep.columns",
-        "ARROW:schema",
         "sweep.digest",
     ];
     assert_eq!(keys, expected);
     assert_eq!(serde_json::from_str::<Value>(pairs[0].value.as_ref().unwrap()).unwrap(), job.plan);
-    assert_eq!(reader.schema().field(1).metadata()["unit"], "kg");
+    assert_eq!(file.schema(), &job.layout.schema());
+    let columns: Value = file.json("sweep.columns").unwrap();
+    assert_eq!(columns["mass_kg"]["type"], "float64");
     let bytes = fs::read(home.output()).unwrap();
     let host = provenance::host();
     let home_text = home.0.path().to_str().unwrap();

@@ -1,0 +1,241 @@
+//! Columns of a Parquet file as Arrow's arrays, by the Parquet library's own column readers.
+//!
+//! Its reader of Arrow's arrays would bring every type that Arrow has, and how to select from and
+//! compare each. Our files have numbers, truths and words.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use arrow_array::types::{
+    ArrowPrimitiveType, Float32Type, Float64Type, Int32Type, Int64Type, UInt32Type, UInt64Type,
+};
+use arrow_array::{
+    ArrayRef, BooleanArray, DictionaryArray, Int32Array, PrimitiveArray, RecordBatch,
+    RecordBatchOptions, StringArray,
+};
+use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
+use parquet::basic::{ConvertedType, Repetition, Type};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
+use parquet::data_type::{ByteArray, DataType as Physical};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::ParquetMetaData;
+use parquet::file::reader::ChunkReader;
+use parquet::file::serialized_reader::SerializedPageReader;
+use parquet::schema::types::Type as Declared;
+use serde_json::Value;
+
+use crate::key;
+
+/// Rows of a batch, which never come from two row groups.
+const BATCH_ROWS: usize = 1 << 12;
+
+/// Words that are read at once, and their bytes in a batch (each word counts once): how they are
+/// coded may make a few bytes of a file many long words.
+const WORDS_AT_ONCE: usize = 16;
+const MOST_WORD_BYTES: usize = 1 << 30;
+
+/// The columns of a file. One that is not read, such as a group or a time, is of no type.
+pub fn schema(file: &ParquetMetaData) -> SchemaRef {
+    let about = file.file_metadata();
+    let pairs = about.key_value_metadata().into_iter().flatten();
+    let told = pairs.filter(|pair| pair.key == key::COLUMNS).find_map(|pair| pair.value.as_deref());
+    let told: Value = told.and_then(|told| serde_json::from_str(told).ok()).unwrap_or_default();
+    let fields = about.schema_descr().root_schema().get_fields().iter().map(|declared| {
+        let told = told[declared.name()].as_object().into_iter().flatten();
+        let told = told.filter(|(key, _)| *key != "type").map(|(key, value)| {
+            (key.clone(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+        });
+        let told: HashMap<String, String> = told.collect();
+        let is_nullable = declared.get_basic_info().repetition() != Repetition::REQUIRED;
+        Field::new(declared.name(), data_type(declared), is_nullable).with_metadata(told)
+    });
+    Arc::new(Schema::new(fields.collect::<Vec<_>>()))
+}
+
+fn data_type(declared: &Declared) -> DataType {
+    let about = declared.get_basic_info();
+    if declared.is_group() || about.repetition() == Repetition::REPEATED {
+        return DataType::Null;
+    }
+    let is_plain = about.logical_type_ref().is_none();
+    match (declared.get_physical_type(), about.converted_type()) {
+        (Type::BOOLEAN, _) => DataType::Boolean,
+        (Type::FLOAT, _) => DataType::Float32,
+        (Type::DOUBLE, _) => DataType::Float64,
+        (Type::INT32, ConvertedType::INT_8 | ConvertedType::INT_16 | ConvertedType::INT_32) => {
+            DataType::Int32
+        }
+        (Type::INT32, ConvertedType::UINT_8 | ConvertedType::UINT_16 | ConvertedType::UINT_32) => {
+            DataType::UInt32
+        }
+        (Type::INT32, ConvertedType::NONE) if is_plain => DataType::Int32,
+        (Type::INT64, ConvertedType::INT_64) => DataType::Int64,
+        (Type::INT64, ConvertedType::UINT_64) => DataType::UInt64,
+        (Type::INT64, ConvertedType::NONE) if is_plain => DataType::Int64,
+        // A word takes memory once, however many rows have it.
+        (Type::BYTE_ARRAY, ConvertedType::UTF8 | ConvertedType::JSON) => {
+            DataType::Dictionary(DataType::Int32.into(), DataType::Utf8.into())
+        }
+        _ => DataType::Null,
+    }
+}
+
+/// The rows of some columns of a file.
+pub struct Batches<R> {
+    source: Arc<R>,
+    file: Arc<ParquetMetaData>,
+    schema: SchemaRef,
+    /// Where each column is among those of a row group.
+    leaves: Vec<usize>,
+    /// The next row group.
+    group: usize,
+    /// Rows left in this one.
+    left: usize,
+    columns: Vec<ColumnReader>,
+}
+
+impl<R: ChunkReader + 'static> Batches<R> {
+    /// The columns at these places of a file's [`schema`].
+    ///
+    /// # Errors
+    /// A column of a type that is not read.
+    pub fn new(
+        source: R,
+        file: Arc<ParquetMetaData>,
+        schema: &Schema,
+        fields: Vec<usize>,
+    ) -> Result<Self, ParquetError> {
+        let schema = Arc::new(schema.project(&fields).map_err(of_arrow)?);
+        if let Some(other) =
+            schema.fields().iter().find(|field| *field.data_type() == DataType::Null)
+        {
+            let reason = format!("its column `{}` is of a type that is not read", other.name());
+            return Err(ParquetError::General(reason));
+        }
+        let about = file.file_metadata().schema_descr();
+        let mut leaves = vec![0; about.root_schema().get_fields().len()];
+        (0..about.num_columns()).for_each(|leaf| leaves[about.get_column_root_idx(leaf)] = leaf);
+        let leaves = fields.into_iter().map(|field| leaves[field]).collect();
+        let (source, columns) = (Arc::new(source), Vec::new());
+        Ok(Self { source, file, schema, leaves, group: 0, left: 0, columns })
+    }
+
+    /// The next rows; `None` behind the last.
+    ///
+    /// # Errors
+    /// What is wrong with the file.
+    pub fn batch(&mut self) -> Result<Option<RecordBatch>, ParquetError> {
+        while self.left == 0 {
+            let Some(group) = self.file.row_groups().get(self.group) else { return Ok(None) };
+            self.group += 1;
+            self.left = usize::try_from(group.num_rows()).map_err(|_| short())?;
+            let open = |leaf: &usize| {
+                let column = group.column(*leaf);
+                let source = Arc::clone(&self.source);
+                let pages = SerializedPageReader::new(source, column, self.left, None)?;
+                Ok(get_column_reader(column.column_descr_ptr(), Box::new(pages)))
+            };
+            self.columns = self.leaves.iter().map(open).collect::<Result<_, ParquetError>>()?;
+        }
+        let rows = self.left.min(BATCH_ROWS);
+        self.left -= rows;
+        let columns = self.columns.iter_mut().zip(self.schema.fields());
+        let arrays = columns.map(|(column, field)| array(column, field.data_type(), rows));
+        let arrays = arrays.collect::<Result<Vec<_>, _>>()?;
+        // There may be no column.
+        let count = RecordBatchOptions::new().with_row_count(Some(rows));
+        let batch = RecordBatch::try_new_with_options(Arc::clone(&self.schema), arrays, &count);
+        batch.map(Some).map_err(of_arrow)
+    }
+}
+
+/// What Arrow reported, among what the Parquet library does.
+pub fn of_arrow(error: ArrowError) -> ParquetError {
+    ParquetError::External(Box::new(error))
+}
+
+fn short() -> ParquetError {
+    ParquetError::General("a column has not as many rows as it should".to_owned())
+}
+
+fn array(
+    column: &mut ColumnReader,
+    data_type: &DataType,
+    rows: usize,
+) -> Result<ArrayRef, ParquetError> {
+    use ColumnReader as By;
+    match (column, data_type) {
+        (By::BoolColumnReader(column), _) => {
+            Ok(Arc::new(cells(column, rows)?.collect::<BooleanArray>()))
+        }
+        (By::Int32ColumnReader(column), DataType::UInt32) => {
+            numbers::<_, UInt32Type>(column, rows, i32::cast_unsigned)
+        }
+        (By::Int32ColumnReader(column), _) => numbers::<_, Int32Type>(column, rows, |cell| cell),
+        (By::Int64ColumnReader(column), DataType::UInt64) => {
+            numbers::<_, UInt64Type>(column, rows, i64::cast_unsigned)
+        }
+        (By::Int64ColumnReader(column), _) => numbers::<_, Int64Type>(column, rows, |cell| cell),
+        (By::FloatColumnReader(column), _) => numbers::<_, Float32Type>(column, rows, |cell| cell),
+        (By::DoubleColumnReader(column), _) => numbers::<_, Float64Type>(column, rows, |cell| cell),
+        (By::ByteArrayColumnReader(column), _) => words(column, rows),
+        _ => unreachable!(),
+    }
+}
+
+/// The next cells of a column.
+fn cells<T: Physical>(
+    column: &mut ColumnReaderImpl<T>,
+    rows: usize,
+) -> Result<impl Iterator<Item = Option<T::T>> + use<T>, ParquetError> {
+    let (mut levels, mut values) = (Vec::new(), Vec::new());
+    let (read, ..) = column.read_records(rows, Some(&mut levels), None, &mut values)?;
+    if read != rows {
+        return Err(short());
+    }
+    // A column that is never null has no levels.
+    levels.resize(rows, 1);
+    let mut values = values.into_iter();
+    Ok(levels.into_iter().map(move |level| if level == 1 { values.next() } else { None }))
+}
+
+fn numbers<T: Physical, A: ArrowPrimitiveType>(
+    column: &mut ColumnReaderImpl<T>,
+    rows: usize,
+    typed: fn(T::T) -> A::Native,
+) -> Result<ArrayRef, ParquetError> {
+    let cells = cells(column, rows)?.map(|cell| cell.map(typed));
+    Ok(Arc::new(cells.collect::<PrimitiveArray<A>>()))
+}
+
+fn words(
+    column: &mut ColumnReaderImpl<parquet::data_type::ByteArrayType>,
+    rows: usize,
+) -> Result<ArrayRef, ParquetError> {
+    let (mut words, mut bytes) = (Vec::<ByteArray>::new(), 0);
+    // By place: a page's dictionary has each word once. They are held, so no place is another's.
+    let mut codes = HashMap::new();
+    let mut keys = Vec::with_capacity(rows);
+    while keys.len() < rows {
+        for word in cells(column, WORDS_AT_ONCE.min(rows - keys.len()))? {
+            let Some(word) = word else {
+                keys.push(None);
+                continue;
+            };
+            let place = (word.data().as_ptr(), word.len());
+            let code = codes.entry(place).or_insert_with(|| {
+                bytes += word.len();
+                words.push(word);
+                words.len() as i32 - 1
+            });
+            keys.push(Some(*code));
+        }
+        if bytes > MOST_WORD_BYTES {
+            return Err(ParquetError::General("its words are too long".to_owned()));
+        }
+    }
+    let words = words.iter().map(ByteArray::as_utf8).collect::<Result<Vec<_>, _>>()?;
+    let words = Arc::new(StringArray::from(words));
+    let coded = DictionaryArray::<Int32Type>::try_new(Int32Array::from(keys), words);
+    Ok(Arc::new(coded.map_err(of_arrow)?))
+}
