@@ -6,9 +6,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use arrow_array::types::{
-    ArrowPrimitiveType, Float32Type, Float64Type, Int32Type, Int64Type, UInt32Type, UInt64Type,
-};
+use arrow_array::types::{ArrowPrimitiveType, Float64Type, Int32Type, Int64Type, UInt64Type};
 use arrow_array::{
     ArrayRef, BooleanArray, DictionaryArray, Int32Array, PrimitiveArray, RecordBatch,
     RecordBatchOptions, StringArray,
@@ -16,7 +14,7 @@ use arrow_array::{
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use parquet::basic::{ConvertedType, Repetition, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
-use parquet::data_type::{ByteArray, DataType as Physical};
+use parquet::data_type::{ByteArrayType, DataType as Physical};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 use parquet::file::reader::ChunkReader;
@@ -31,7 +29,7 @@ const BATCH_ROWS: usize = 1 << 12;
 
 /// Words that are read at once, and their bytes in a batch (each word counts once): how they are
 /// coded may make a few bytes of a file many long words.
-const WORDS_AT_ONCE: usize = 16;
+const WORDS_AT_ONCE: usize = 32;
 const MOST_WORD_BYTES: usize = 1 << 30;
 
 /// The columns of a file. One that is not read, such as a group or a time, is of no type.
@@ -52,28 +50,24 @@ pub fn schema(file: &ParquetMetaData) -> SchemaRef {
     Arc::new(Schema::new(fields.collect::<Vec<_>>()))
 }
 
+/// Numbers are of the widest type of their kind.
 fn data_type(declared: &Declared) -> DataType {
+    use ConvertedType as As;
     let about = declared.get_basic_info();
     if declared.is_group() || about.repetition() == Repetition::REPEATED {
         return DataType::Null;
     }
-    let is_plain = about.logical_type_ref().is_none();
     match (declared.get_physical_type(), about.converted_type()) {
         (Type::BOOLEAN, _) => DataType::Boolean,
-        (Type::FLOAT, _) => DataType::Float32,
-        (Type::DOUBLE, _) => DataType::Float64,
-        (Type::INT32, ConvertedType::INT_8 | ConvertedType::INT_16 | ConvertedType::INT_32) => {
-            DataType::Int32
+        (Type::FLOAT | Type::DOUBLE, _) => DataType::Float64,
+        (_, As::INT_8 | As::INT_16 | As::INT_32 | As::INT_64) => DataType::Int64,
+        (_, As::UINT_8 | As::UINT_16 | As::UINT_32 | As::UINT_64) => DataType::UInt64,
+        // Nanoseconds are said by a logical type alone.
+        (Type::INT32 | Type::INT64, As::NONE) if about.logical_type_ref().is_none() => {
+            DataType::Int64
         }
-        (Type::INT32, ConvertedType::UINT_8 | ConvertedType::UINT_16 | ConvertedType::UINT_32) => {
-            DataType::UInt32
-        }
-        (Type::INT32, ConvertedType::NONE) if is_plain => DataType::Int32,
-        (Type::INT64, ConvertedType::INT_64) => DataType::Int64,
-        (Type::INT64, ConvertedType::UINT_64) => DataType::UInt64,
-        (Type::INT64, ConvertedType::NONE) if is_plain => DataType::Int64,
         // A word takes memory once, however many rows have it.
-        (Type::BYTE_ARRAY, ConvertedType::UTF8 | ConvertedType::JSON) => {
+        (_, As::UTF8 | As::JSON) => {
             DataType::Dictionary(DataType::Int32.into(), DataType::Utf8.into())
         }
         _ => DataType::Null,
@@ -128,7 +122,7 @@ impl<R: ChunkReader + 'static> Batches<R> {
         while self.left == 0 {
             let Some(group) = self.file.row_groups().get(self.group) else { return Ok(None) };
             self.group += 1;
-            self.left = usize::try_from(group.num_rows()).map_err(|_| short())?;
+            self.left = usize::try_from(group.num_rows())?;
             let open = |leaf: &usize| {
                 let column = group.column(*leaf);
                 let source = Arc::clone(&self.source);
@@ -154,87 +148,101 @@ pub fn of_arrow(error: ArrowError) -> ParquetError {
     ParquetError::External(Box::new(error))
 }
 
-fn short() -> ParquetError {
-    ParquetError::General("a column has not as many rows as it should".to_owned())
-}
-
 fn array(
     column: &mut ColumnReader,
     data_type: &DataType,
     rows: usize,
 ) -> Result<ArrayRef, ParquetError> {
     use ColumnReader as By;
-    match (column, data_type) {
-        (By::BoolColumnReader(column), _) => {
-            Ok(Arc::new(cells(column, rows)?.collect::<BooleanArray>()))
+    let is_unsigned = *data_type == DataType::UInt64;
+    match column {
+        By::BoolColumnReader(column) => {
+            Ok(Arc::new(cells(read(column, rows)?).collect::<BooleanArray>()))
         }
-        (By::Int32ColumnReader(column), DataType::UInt32) => {
-            numbers::<_, UInt32Type>(column, rows, i32::cast_unsigned)
+        By::Int32ColumnReader(column) if is_unsigned => {
+            numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned().into())
         }
-        (By::Int32ColumnReader(column), _) => numbers::<_, Int32Type>(column, rows, |cell| cell),
-        (By::Int64ColumnReader(column), DataType::UInt64) => {
-            numbers::<_, UInt64Type>(column, rows, i64::cast_unsigned)
+        By::Int32ColumnReader(column) => numbers::<_, Int64Type>(column, rows, i64::from),
+        By::Int64ColumnReader(column) if is_unsigned => {
+            numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned())
         }
-        (By::Int64ColumnReader(column), _) => numbers::<_, Int64Type>(column, rows, |cell| cell),
-        (By::FloatColumnReader(column), _) => numbers::<_, Float32Type>(column, rows, |cell| cell),
-        (By::DoubleColumnReader(column), _) => numbers::<_, Float64Type>(column, rows, |cell| cell),
-        (By::ByteArrayColumnReader(column), _) => words(column, rows),
-        _ => unreachable!(),
+        By::Int64ColumnReader(column) => numbers::<_, Int64Type>(column, rows, |cell| cell),
+        By::FloatColumnReader(column) => numbers::<_, Float64Type>(column, rows, f64::from),
+        By::DoubleColumnReader(column) => numbers::<_, Float64Type>(column, rows, |cell| cell),
+        By::ByteArrayColumnReader(column) => words(column, rows),
+        _ => unreachable!("`data_type` takes no others"),
     }
 }
 
-/// The next cells of a column.
-fn cells<T: Physical>(
+/// The next values of a column, and which rows have one.
+fn read<T: Physical>(
     column: &mut ColumnReaderImpl<T>,
     rows: usize,
-) -> Result<impl Iterator<Item = Option<T::T>> + use<T>, ParquetError> {
+) -> Result<(Vec<i16>, Vec<T::T>), ParquetError> {
     let (mut levels, mut values) = (Vec::new(), Vec::new());
     let (read, ..) = column.read_records(rows, Some(&mut levels), None, &mut values)?;
     if read != rows {
-        return Err(short());
+        return Err(ParquetError::General("a column has fewer rows than it should".to_owned()));
     }
     // A column that is never null has no levels.
     levels.resize(rows, 1);
+    Ok((levels, values))
+}
+
+/// Each value in its row.
+fn cells<T>((levels, values): (Vec<i16>, Vec<T>)) -> impl Iterator<Item = Option<T>> {
     let mut values = values.into_iter();
-    Ok(levels.into_iter().map(move |level| if level == 1 { values.next() } else { None }))
+    levels.into_iter().map(move |level| if level == 1 { values.next() } else { None })
 }
 
 fn numbers<T: Physical, A: ArrowPrimitiveType>(
     column: &mut ColumnReaderImpl<T>,
     rows: usize,
-    typed: fn(T::T) -> A::Native,
+    typed: impl Fn(T::T) -> A::Native,
 ) -> Result<ArrayRef, ParquetError> {
-    let cells = cells(column, rows)?.map(|cell| cell.map(typed));
-    Ok(Arc::new(cells.collect::<PrimitiveArray<A>>()))
+    let (levels, values) = read(column, rows)?;
+    let values: Vec<A::Native> = values.into_iter().map(typed).collect();
+    Ok(Arc::new(if values.len() == rows {
+        PrimitiveArray::<A>::new(values.into(), None)
+    } else {
+        cells((levels, values)).collect()
+    }))
 }
 
 fn words(
-    column: &mut ColumnReaderImpl<parquet::data_type::ByteArrayType>,
+    column: &mut ColumnReaderImpl<ByteArrayType>,
     rows: usize,
 ) -> Result<ArrayRef, ParquetError> {
-    let (mut words, mut bytes) = (Vec::<ByteArray>::new(), 0);
-    // By place: a page's dictionary has each word once. They are held, so no place is another's.
+    let (mut words, mut bytes) = (Vec::<String>::new(), 0);
+    // By place: a dictionary has each word once. Behind its page another word may lie there.
     let mut codes = HashMap::new();
     let mut keys = Vec::with_capacity(rows);
     while keys.len() < rows {
-        for word in cells(column, WORDS_AT_ONCE.min(rows - keys.len()))? {
+        // Neighbours mostly share theirs.
+        let mut last = (("".as_ptr(), usize::MAX), 0);
+        for word in cells(read(column, WORDS_AT_ONCE.min(rows - keys.len()))?) {
             let Some(word) = word else {
                 keys.push(None);
                 continue;
             };
             let place = (word.data().as_ptr(), word.len());
-            let code = codes.entry(place).or_insert_with(|| {
-                bytes += word.len();
-                words.push(word);
-                words.len() as i32 - 1
-            });
-            keys.push(Some(*code));
+            if place != last.0 {
+                let known = codes.get(&place).copied();
+                let known = known.filter(|code| words[*code as usize].as_bytes() == word.data());
+                let code = known.unwrap_or(words.len() as i32);
+                if known.is_none() {
+                    bytes += word.len();
+                    words.push(word.as_utf8()?.to_owned());
+                    codes.insert(place, code);
+                }
+                last = (place, code);
+            }
+            keys.push(Some(last.1));
         }
         if bytes > MOST_WORD_BYTES {
             return Err(ParquetError::General("its words are too long".to_owned()));
         }
     }
-    let words = words.iter().map(ByteArray::as_utf8).collect::<Result<Vec<_>, _>>()?;
     let words = Arc::new(StringArray::from(words));
     let coded = DictionaryArray::<Int32Type>::try_new(Int32Array::from(keys), words);
     Ok(Arc::new(coded.map_err(of_arrow)?))

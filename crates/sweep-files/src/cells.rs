@@ -6,7 +6,7 @@ use arrow_array::types::{
     Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
     UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, BooleanArray, DictionaryArray};
+use arrow_array::{Array, BooleanArray, StringArray, TypedDictionaryArray};
 use arrow_schema::{ArrowError, DataType};
 
 fn unreadable(array: &dyn Array, wanted: &str) -> ArrowError {
@@ -52,49 +52,28 @@ pub fn flags(array: &dyn Array) -> Result<&BooleanArray, ArrowError> {
     array.as_boolean_opt().ok_or_else(|| unreadable(array, "true and false"))
 }
 
-/// Words, as they are read and kept in memory.
+/// Words, one per row: each lies there once, however many rows have it.
 ///
 /// # Errors
 /// [`ArrowError::SchemaError`] if the column does not hold such.
-pub(crate) fn words(array: &dyn Array) -> Result<&DictionaryArray<Int32Type>, ArrowError> {
-    array.as_dictionary_opt().ok_or_else(|| unreadable(array, "words"))
+pub fn words(
+    array: &dyn Array,
+) -> Result<TypedDictionaryArray<'_, Int32Type, StringArray>, ArrowError> {
+    let coded = array.as_dictionary_opt::<Int32Type>();
+    let typed = coded.and_then(|coded| coded.downcast_dict());
+    typed.ok_or_else(|| unreadable(array, "words"))
 }
 
-/// Texts, one per row, plain or dictionary coded.
-///
-/// # Errors
-/// [`ArrowError::SchemaError`] if the column does not hold such.
-pub fn texts(array: &dyn Array) -> Result<Vec<Option<&str>>, ArrowError> {
-    Ok(match array.data_type() {
-        DataType::Utf8 => array.as_string::<i32>().iter().collect(),
-        DataType::LargeUtf8 => array.as_string::<i64>().iter().collect(),
-        DataType::Utf8View => array.as_string_view().iter().collect(),
-        DataType::Dictionary(..) => {
-            let coded = array.as_any_dictionary();
-            let names = texts(coded.values().as_ref())?;
-            let name = |key: Option<f64>| names.get(key? as usize).copied().flatten();
-            numbers(coded.keys())?.into_iter().map(name).collect()
-        }
-        _ => return Err(unreadable(array, "text")),
-    })
-}
-
-/// Whether [`texts`] can read it.
+/// Whether [`words`] can read it.
 pub fn is_text(data_type: &DataType) -> bool {
-    match data_type {
-        DataType::Dictionary(_, value) => is_text(value),
-        other => matches!(other, DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View),
-    }
+    *data_type == DataType::Dictionary(DataType::Int32.into(), DataType::Utf8.into())
 }
 
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
-    use arrow_array::{
-        ArrayRef, DictionaryArray, Float32Array, Int8Array, LargeStringArray, StringArray,
-        StringViewArray, UInt8Array, UInt64Array,
-    };
+    use arrow_array::{ArrayRef, Float32Array, Int8Array, UInt8Array, UInt64Array};
 
     use super::*;
 
@@ -113,27 +92,11 @@ mod tests {
     }
 
     #[test]
-    fn texts_read_alike_however_they_are_kept() {
-        let said = vec![Some("ok"), None, Some("diverged"), Some("ok")];
-        let arrays: [ArrayRef; 5] = [
-            Arc::new(StringArray::from(said.clone())),
-            Arc::new(LargeStringArray::from(said.clone())),
-            Arc::new(StringViewArray::from(said.clone())),
-            Arc::new(said.iter().copied().collect::<DictionaryArray<Int32Type>>()),
-            Arc::new(said.iter().copied().collect::<DictionaryArray<UInt8Type>>()),
-        ];
-        for array in arrays {
-            assert!(is_text(array.data_type()));
-            assert_eq!(texts(&array).unwrap(), said, "{}", array.data_type());
-        }
-    }
-
-    #[test]
     fn what_does_not_fit_is_an_error_that_names_both_types() {
         let names: ArrayRef = Arc::new(StringArray::from(vec!["ok"]));
         let error = numbers(&names).unwrap_err().to_string();
         assert!(error.contains("numbers") && error.contains("Utf8"), "{error}");
-        assert!(flags(&names).is_err() && texts(&BooleanArray::from(vec![true])).is_err());
+        assert!(flags(&names).is_err() && words(&names).is_err());
         assert!(!is_number(names.data_type()));
     }
 }

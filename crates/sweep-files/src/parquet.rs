@@ -17,10 +17,11 @@ use crate::pages::{self, Unpacked};
 use crate::seal::{self, Seal};
 use crate::{FileError, Refused, footer, key, panics, regular};
 
-/// Most bytes that the pages of a file may unpack into at once, and those of one column of words,
-/// which are copied as they are coded. Ours have pages of 1 MiB.
+/// Most bytes that the pages of a file may unpack into at once. A byte of words counts as several:
+/// the library takes 32 for a word of a dictionary, which may be empty after its length of 4. Ours
+/// have pages of 1 MiB.
 const MOST_AT_ONCE: u64 = 1 << 30;
-const MOST_WORDS_AT_ONCE: u64 = 1 << 27;
+const BYTE_OF_WORDS: u64 = 8;
 
 /// The beginning of the name by which this program signs its files; a version follows.
 pub const CREATED_BY: &str = "sweep version ";
@@ -77,11 +78,12 @@ impl ParquetFile {
                 let outside = |_| FileError::not_parquet(&self.path, "a column lies outside of it");
                 let (start, length) = range.map_err(outside)?;
                 let is_words = column.column_type() == Type::BYTE_ARRAY;
-                let most = if is_words { MOST_WORDS_AT_ONCE } else { MOST_AT_ONCE };
-                let most = Unpacked { total: u64::MAX, at_once: most.min(MOST_AT_ONCE - at_once) };
+                let weight = if is_words { BYTE_OF_WORDS } else { 1 };
+                let left = (MOST_AT_ONCE - at_once) / weight;
+                let most = Unpacked { total: u64::MAX, at_once: left };
                 let codec = column.compression();
                 let sizes = pages::unpacked(&mut &self.file, start, length, codec, most);
-                at_once += sizes.map_err(refused(&self.path))?.at_once;
+                at_once += weight * sizes.map_err(refused(&self.path))?.at_once;
             }
         }
         Ok(())
@@ -199,7 +201,7 @@ fn refused(path: &Path) -> impl FnOnce(Refused) -> FileError {
     move |refused| match refused {
         Refused::Io(source) => FileError::io("read", path)(source),
         Refused::TooLong => {
-            let [all, words] = [MOST_AT_ONCE, MOST_WORDS_AT_ONCE].map(|bytes| bytes >> 20);
+            let [all, words] = [1, BYTE_OF_WORDS].map(|weight| (MOST_AT_ONCE / weight) >> 20);
             let reason = format!(
                 "its pages unpack into more than {all} MiB at once, or into {words} MiB of words"
             );
@@ -230,12 +232,16 @@ fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
 
 #[cfg(test)]
 mod tests {
+    use arrow_array::cast::AsArray;
     use arrow_array::types::Int32Type;
-    use arrow_array::{DictionaryArray, Float64Array};
+    use arrow_array::{Array as _, DictionaryArray, Float64Array};
+    use parquet::column::writer::ColumnWriter;
     use parquet::file::properties::WriterProperties;
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::parser::parse_message_type;
 
     use super::*;
-    use crate::Writer;
+    use crate::{Writer, cells};
 
     /// The bytes of a file that this program has written, with its digest.
     fn ours() -> Vec<u8> {
@@ -371,5 +377,93 @@ mod tests {
         std::fs::write(&path, &other).unwrap();
         let told = ParquetFile::open(&path).unwrap_err().to_string();
         assert!(told.contains("the header of a page makes no sense"), "{told}");
+    }
+
+    /// A file of two rows, in each column something and, where there may be, nothing.
+    fn foreign(schema: &str) -> ParquetFile {
+        let schema = parse_message_type(schema).unwrap();
+        let mut writer =
+            SerializedFileWriter::new(Vec::new(), schema.into(), Default::default()).unwrap();
+        let mut group = writer.next_row_group().unwrap();
+        while let Some(mut column) = group.next_column().unwrap() {
+            macro_rules! write {
+                ($column:expr, $value:expr) => {{
+                    let level = $column.get_descriptor().max_def_level();
+                    let values = vec![$value; if level > 0 { 1 } else { 2 }];
+                    $column.write_batch(&values, Some(&[level, 0]), Some(&[0, 0])).unwrap()
+                }};
+            }
+            match column.untyped() {
+                ColumnWriter::BoolColumnWriter(column) => write!(column, true),
+                ColumnWriter::Int32ColumnWriter(column) => write!(column, -2),
+                ColumnWriter::Int64ColumnWriter(column) => write!(column, -2),
+                ColumnWriter::FloatColumnWriter(column) => write!(column, 0.5),
+                ColumnWriter::DoubleColumnWriter(column) => write!(column, 0.5),
+                ColumnWriter::ByteArrayColumnWriter(column) => write!(column, "word".into()),
+                _ => unreachable!(),
+            };
+            column.close().unwrap();
+        }
+        group.close().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.parquet");
+        std::fs::write(&path, writer.into_inner().unwrap()).unwrap();
+        // The open file outlives its name.
+        ParquetFile::open(&path).unwrap()
+    }
+
+    fn rows(file: &ParquetFile) -> Result<Vec<RecordBatch>, FileError> {
+        file.batches((0..file.schema().fields().len()).collect())?.collect()
+    }
+
+    #[test]
+    fn numbers_truths_and_words_of_other_programs_are_read() {
+        let file = foreign(
+            "message x {
+                optional int32 a (INTEGER(8, true));
+                required int32 b (INT_16);
+                optional int32 c;
+                required int64 d;
+                optional int64 e (INTEGER(64, true));
+                optional float f;
+                required double g;
+                optional int32 h (INTEGER(32, false));
+                required int64 i (UINT_64);
+                optional boolean j;
+                optional binary k (STRING);
+                required binary l (UTF8);
+            }",
+        );
+        let batches = rows(&file).unwrap();
+        let [batch] = batches.as_slice() else { panic!("{batches:?}") };
+        let numbers = [-2.0, -2.0, -2.0, -2.0, -2.0, 0.5, 0.5, 4294967294.0, u64::MAX as f64];
+        for (column, number) in batch.columns().iter().zip(numbers) {
+            let second = (!column.is_nullable()).then_some(number);
+            assert_eq!(cells::numbers(column).unwrap(), [Some(number), second]);
+        }
+        assert_eq!(batch.column(9).as_boolean().iter().collect::<Vec<_>>(), [Some(true), None]);
+        let words = |k: usize| {
+            let words = cells::words(batch.column(k)).unwrap();
+            (words.values().len(), words.into_iter().collect::<Vec<_>>())
+        };
+        assert_eq!(words(10), (1, vec![Some("word"), None]));
+        assert_eq!(words(11), (1, vec![Some("word"); 2]));
+    }
+
+    #[test]
+    fn what_is_none_of_them_is_refused_by_name() {
+        for column in [
+            "optional int32 x (DATE);",
+            "optional int64 x (TIMESTAMP(NANOS, true));",
+            "optional int64 x (TIME(MICROS, true));",
+            "optional int32 x (DECIMAL(9, 2));",
+            "optional binary x;",
+            "repeated int64 x;",
+            "optional group x (LIST) { repeated group list { optional int64 element; } }",
+        ] {
+            let file = foreign(&format!("message m {{ required double y; {column} }}"));
+            let told = rows(&file).unwrap_err().to_string();
+            assert!(told.contains("`x` is of a type that is not read"), "{column}: {told}");
+        }
     }
 }

@@ -268,7 +268,7 @@ fn decode(array: &ArrayRef, kind: CellKind) -> Result<Cells, ArrowError> {
         CellKind::Flag => Cells::Flags(cells::flags(array)?.iter().collect()),
         CellKind::Text => {
             let coded = cells::words(array)?;
-            let names = cells::texts(coded.values())?.into_iter();
+            let names = coded.values().iter();
             let names = names.map(|name| name.unwrap_or_default().to_owned()).collect();
             let codes = coded.keys().iter();
             let codes = codes.map(|code| code.map_or(u32::MAX, i32::cast_unsigned)).collect();

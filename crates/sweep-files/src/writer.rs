@@ -31,7 +31,7 @@ impl<W: Write + Send> Writer<W> {
     /// Begins a file of these columns, which says under [`key::COLUMNS`] what each is.
     ///
     /// # Errors
-    /// Columns of other types; what the library says.
+    /// What the library says.
     pub fn new(
         sink: W,
         schema: &Schema,
@@ -117,8 +117,7 @@ fn declared(field: &Field) -> Result<Declared, ParquetError> {
         DataType::Boolean => (Type::BOOLEAN, None),
         DataType::UInt64 => (Type::INT64, Some(LogicalType::integer(64, false))),
         DataType::Float64 => (Type::DOUBLE, None),
-        DataType::Dictionary(..) => (Type::BYTE_ARRAY, Some(LogicalType::String)),
-        other => return Err(ParquetError::General(format!("columns of {other} are not written"))),
+        _ => (Type::BYTE_ARRAY, Some(LogicalType::String)),
     };
     let is_nullable = field.is_nullable();
     Declared::primitive_type_builder(field.name(), physical)

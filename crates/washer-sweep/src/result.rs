@@ -185,8 +185,7 @@ fn append(values: &Bound<'_, PyList>, part: &ArrayRef) -> PyResult<()> {
     if let Ok(flags) = cells::flags(part) {
         return flags.iter().try_for_each(|flag| values.append(flag));
     }
-    let words = cells::texts(part).unwrap_or_else(|_| vec![None; part.len()]);
-    words.into_iter().try_for_each(|word| values.append(word))
+    cells::words(part).into_iter().flatten().try_for_each(|word| values.append(word))
 }
 
 /// Reads a result file of any kind.

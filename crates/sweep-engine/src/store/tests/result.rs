@@ -15,8 +15,8 @@ fn every_cell_is_what_the_outcome_says() {
         column.is_valid(row).then(|| column.value(row))
     };
     let text = |name: &str, row: usize| {
-        let column = cells::texts(batch.column_by_name(name).unwrap()).unwrap();
-        column[row].map(str::to_owned)
+        let column = cells::words(batch.column_by_name(name).unwrap()).unwrap();
+        column.into_iter().nth(row).unwrap().map(str::to_owned)
     };
     let flag = |name: &str, row: usize| {
         let column = batch.column_by_name(name).unwrap().as_boolean();
