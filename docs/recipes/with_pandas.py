@@ -1,5 +1,4 @@
-"""The map with pandas, which drops the fields' metadata: units come from the column dictionary of
-the file itself.
+"""The map with pandas, which drops metadata: units come from the file by way of pyarrow.
 
     python docs/recipes/with_pandas.py results/quick.parquet [MASS_KG]
 

@@ -1,5 +1,4 @@
-"""The map with pyarrow, which sees everything: types, nulls, and each column's unit in the field
-metadata.
+"""The map with pyarrow, which sees everything: types, nulls, and the file's own metadata.
 
     python docs/recipes/with_pyarrow.py results/quick.parquet [MASS_KG]
 
@@ -14,8 +13,9 @@ import pyarrow.parquet as pq
 
 
 def units(path):
-    """Column name to unit, from the fields themselves."""
-    return {field.name: field.metadata[b"unit"].decode() for field in pq.read_schema(path)}
+    """Column name to unit, from the file's metadata."""
+    dictionary = json.loads(pq.read_metadata(path).metadata[b"sweep.columns"])
+    return {name: dictionary[name]["unit"] for name in pq.read_schema(path).names}
 
 
 def least_damping(path, mass_kg):

@@ -22,8 +22,9 @@ sweep, source = sys.argv[1:]
 result = pyarrow.parquet.read_table(source)
 names = result.column_names
 rows = [[result[name][k].as_py() for name in names] for k in range(result.num_rows)]
-units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in result.schema}
-plan = json.loads(pyarrow.parquet.read_metadata(source).metadata[b"sweep.plan"])
+metadata = pyarrow.parquet.read_metadata(source).metadata
+units = {name: told["unit"] for name, told in json.loads(metadata[b"sweep.columns"]).items()}
+plan = json.loads(metadata[b"sweep.plan"])
 
 
 def shown(name):

@@ -44,8 +44,7 @@ def without_verdicts(path, copy):
     gone = pc.or_(pa.chunked_array([pa.array(point % 7 == 3)]), pc.and_(strongest, greatest))
     place = table.column_names.index("reliable")
     verdicts = pc.if_else(gone, pa.scalar(None, pa.bool_()), table["reliable"])
-    metadata = pq.read_metadata(path).metadata
-    told = {key: value for key, value in metadata.items() if key != b"ARROW:schema"}
+    told = pq.read_metadata(path).metadata
     table = table.set_column(place, table.field(place), verdicts).replace_schema_metadata(told)
     pq.write_table(table, copy)
 

@@ -74,8 +74,9 @@ def read(path):
     failed[places] = np.array(table["status"].to_pylist()) != "ok"
 
     cut = (slice(None), slice(None)) + (0,) * (len(axes) - 2)
-    labels = [axis_label(table.schema.field(name)) for name in axes]
     told = provenance(file)
+    units = told.get("sweep.columns", {})
+    labels = [axis_label(name, units.get(name, {}).get("unit", "")) for name in axes]
     title = value_of(told, "name") or pathlib.Path(path).stem
     for label, axis in zip(labels[2:], values[2:]):
         title += f" · {label} = {axis[0]:g}"
@@ -83,11 +84,10 @@ def read(path):
     return list(zip(labels, values))[:2], ratio[cut], failed[cut], limit, title
 
 
-def axis_label(field):
+def axis_label(name, unit):
     """Name in words and unit: `damping_n_s_per_m` is "damping (N s/m)"."""
-    unit = (field.metadata or {}).get(b"unit", b"").decode()
     suffix = "_" + unit.lower().replace("/", " per ").replace(" ", "_")
-    words = field.name.removesuffix(suffix).replace("_", " ")
+    words = name.removesuffix(suffix).replace("_", " ")
     return f"{words} ({unit})" if unit else words
 
 

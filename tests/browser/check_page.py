@@ -68,8 +68,9 @@ class Map:
                          if name not in ("ratio_max", "ratio_max_channel")]
         # What a page shows of every column of numbers, as a part of the file's unit.
         shown = {"m": 1000, "rad": 1000}
+        told = json.loads(table.schema.metadata[b"sweep.columns"])
         self.factors = {
-            field.name: shown.get((field.metadata or {}).get(b"unit", b"").decode(), 1)
+            field.name: shown.get(told[field.name]["unit"], 1)
             for field in table.schema
             if (pa.types.is_floating(field.type) or pa.types.is_integer(field.type))
             and field.name not in self.axes and not field.name.startswith(UNSHOWN)}
