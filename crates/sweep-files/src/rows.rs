@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use arrow_array::{ArrayRef, RecordBatch};
+use arrow_array::cast::AsArray;
+use arrow_array::types::Float64Type;
+use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::ArrowError;
 use serde::Serialize;
 use serde_json::Value;
@@ -261,10 +263,13 @@ enum Cells {
 
 fn decode(array: &ArrayRef, kind: CellKind) -> Result<Cells, ArrowError> {
     Ok(match kind {
-        CellKind::Number => {
-            let cells = cells::numbers(array)?.into_iter();
-            Cells::Numbers(cells.map(|cell| cell.unwrap_or(f64::NAN)).collect())
-        }
+        CellKind::Number => Cells::Numbers(match array.as_primitive_opt::<Float64Type>() {
+            Some(whole) if whole.null_count() == 0 => whole.values().to_vec(),
+            _ => {
+                let cells = cells::numbers(array)?.into_iter();
+                cells.map(|cell| cell.unwrap_or(f64::NAN)).collect()
+            }
+        }),
         CellKind::Flag => Cells::Flags(cells::flags(array)?.iter().collect()),
         CellKind::Text => {
             let coded = cells::words(array)?;
