@@ -215,7 +215,9 @@ fn refused(path: &Path) -> impl FnOnce(Refused) -> FileError {
 fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
     move |error| match error {
         ParquetError::External(inner) => match inner.downcast::<io::Error>() {
-            Ok(source) => FileError::io("read", path)(*source),
+            // A decompressor fails so too, but not by the system's word.
+            Ok(source) if source.raw_os_error().is_some() => FileError::io("read", path)(*source),
+            Ok(inner) => FileError::not_parquet(path, inner.to_string()),
             Err(inner) => FileError::not_parquet(path, inner.to_string()),
         },
         error => {
