@@ -6,8 +6,8 @@ use std::process::Output;
 use std::sync::Arc;
 
 use arrow_array::{ArrayRef, Float64Array, RecordBatch};
-use parquet::arrow::ArrowWriter;
 use serde_json::{Value, json};
+use sweep_files::Writer;
 
 use crate::home::{Home, grid, said};
 
@@ -72,9 +72,9 @@ fn write_ratios(home: &Home, name: &str, ratio: impl Fn(u32) -> Option<f64>) {
     ];
     let rows = RecordBatch::try_from_iter(columns).expect("columns of one length");
     let file = File::create(home.path(name)).expect("the file can be made");
-    let mut writer = ArrowWriter::try_new(file, rows.schema(), None).expect("a writer");
+    let mut writer = Writer::new(file, &rows.schema(), Default::default()).expect("a writer");
     writer.write(&rows).expect("rows are written");
-    writer.close().expect("the file is written");
+    writer.end().and_then(|file| file.close()).expect("the file is written");
 }
 
 #[test]

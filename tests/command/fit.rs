@@ -22,7 +22,8 @@ fn bench() -> Home {
     let traced = home.sweep(&words);
     assert!(traced.status.success(), "{}", said(&traced));
     let file = ParquetFile::open(&home.path("t.parquet")).expect("it is there");
-    let batches = file.batches(|builder| builder).expect("it is read");
+    let all = (0..file.schema().fields().len()).collect();
+    let batches = file.batches(all).expect("it is read");
     let mut text = "time_s,tub_front_y_m_per_s2,tub_yaw_rad,tub_pitch_rad_per_s\n".to_owned();
     for batch in batches {
         let batch = batch.expect("it is read");

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use arrow_array::types::Int32Type;
 use arrow_array::{ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array};
 use arrow_array::{RecordBatch, StringArray, UInt64Array};
-use parquet::arrow::ArrowWriter;
+use sweep_files::Writer;
 
 use crate::flips::finished;
 use crate::home::sweep_binary;
@@ -91,17 +91,17 @@ fn rows(from: u64, to: u64, side: u64, rough: f64) -> RecordBatch {
 /// A map of `side` masses by `side` dampings.
 fn write_map(path: &Path, side: u64, rough: f64) {
     let file = File::create(path).expect("the map can be made");
-    let mut writer: Option<ArrowWriter<File>> = None;
+    let mut writer: Option<Writer<File>> = None;
     let mut file = Some(file);
     for from in (0..side * side).step_by(ROWS_AT_ONCE as usize) {
         let batch = rows(from, (from + ROWS_AT_ONCE).min(side * side), side, rough);
         let writer = writer.get_or_insert_with(|| {
             let file = file.take().expect("one writer");
-            ArrowWriter::try_new(file, batch.schema(), None).expect("a writer")
+            Writer::new(file, &batch.schema(), Default::default()).expect("a writer")
         });
         writer.write(&batch).expect("rows are written");
     }
-    writer.expect("rows").close().expect("the map is written");
+    writer.expect("rows").end().and_then(|file| file.close()).expect("the map is written");
 }
 
 /// The command with no more address space than that.

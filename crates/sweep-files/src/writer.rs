@@ -127,7 +127,10 @@ fn declared(field: &Field) -> Result<Declared, ParquetError> {
 }
 
 fn write(column: &mut ColumnWriter<'_>, array: &dyn Array) -> Result<usize, ParquetError> {
-    let levels: Vec<i16> = (0..array.len()).map(|row| array.is_valid(row).into()).collect();
+    let levels: Vec<i16> = match array.nulls() {
+        None => vec![1; array.len()],
+        Some(nulls) => nulls.iter().map(i16::from).collect(),
+    };
     let levels = Some(levels.as_slice());
     match column {
         ColumnWriter::BoolColumnWriter(column) => {
@@ -139,8 +142,11 @@ fn write(column: &mut ColumnWriter<'_>, array: &dyn Array) -> Result<usize, Parq
             column.write_batch(&cells.map(u64::cast_signed).collect::<Vec<_>>(), levels, None)
         }
         ColumnWriter::DoubleColumnWriter(column) => {
-            let cells = array.as_primitive::<Float64Type>().iter().flatten();
-            column.write_batch(&cells.collect::<Vec<_>>(), levels, None)
+            let array = array.as_primitive::<Float64Type>();
+            if array.null_count() == 0 {
+                return column.write_batch(array.values(), levels, None);
+            }
+            column.write_batch(&array.iter().flatten().collect::<Vec<_>>(), levels, None)
         }
         ColumnWriter::ByteArrayColumnWriter(column) => {
             let coded = array.as_dictionary::<Int32Type>();
