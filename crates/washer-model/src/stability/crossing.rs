@@ -158,9 +158,13 @@ impl Leg {
         system: &S,
         k: usize,
     ) -> [S::Forcing; 3] {
-        let k = k as f64;
-        let at = |steps: f64| system.forcing_aside(zero.lit(self.time_s(steps)));
-        [at(k), at(k + 0.5), at(k + 1.0)]
+        let mut forcings = [system.forcing_aside(zero.lit(self.time_s(k as f64))); 3];
+        // No closure: it would be compiled without the instruction set.
+        for place in 1..3 {
+            let steps = k as f64 + 0.5 * place as f64;
+            forcings[place] = system.forcing_aside(zero.lit(self.time_s(steps)));
+        }
+        forcings
     }
 }
 

@@ -33,7 +33,12 @@ pub(super) type Forcings<F> = [F; 3];
 /// Those of the first step.
 #[inline(always)]
 fn first<T: Lane, S: System<T, STATES>>(system: &S, clock: &Clock<T>) -> Forcings<S::Forcing> {
-    [0.0, 0.5, 1.0].map(|steps| system.forcing_aside(clock.time_s(steps)))
+    let mut forcings = [system.forcing_aside(clock.time_s(0.0)); 3];
+    // No closure: it would be compiled without the instruction set.
+    for place in 1..3 {
+        forcings[place] = system.forcing_aside(clock.time_s(0.5 * place as f64));
+    }
+    forcings
 }
 
 /// Those of step `k`, from those of the one before.
