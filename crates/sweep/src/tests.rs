@@ -276,9 +276,18 @@ fn plans_without_a_boundary_say_why() {
         let plan = plan(&format!("{HEAD}{text}"));
         Task::new(&plan, &asked(tolerance, 6)).unwrap_err().to_string()
     };
-    assert!(refused(mass, None).contains("two axes, and this grid has 1"));
+    assert_eq!(
+        refused(mass, None),
+        "a boundary runs over two axes, and this grid has 1: give [[axis]] twice, first the one \
+         along which the curve is wanted, then the one that is searched; one that --at gives a \
+         value is no axis, one with `values` of one number is"
+    );
     let one = format!("{mass}[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100.0]\n");
-    assert!(refused(&one, None).contains("`damping_n_s_per_m`, has one value"));
+    assert_eq!(
+        refused(&one, None),
+        "the second axis, `damping_n_s_per_m`, has one value: give it the range to search, as \
+         range = { from, to, count } or as `values` whose least and greatest are its ends"
+    );
     for tolerance in [0.0, -1.0, f64::NAN, 1e9] {
         let error = refused(GRID, Some(tolerance));
         assert!(error.contains("--tolerance") && error.contains("240"), "{error}");
@@ -286,7 +295,11 @@ fn plans_without_a_boundary_say_why() {
     let design = "[design]\nmethod = \"sobol\"\npoints = 8\n\
                   [[axis]]\nparameter = \"unbalance_mass_kg\"\n\
                   range = { from = 0.1, to = 0.2 }\n";
-    assert!(refused(design, None).contains("[design]"));
+    assert_eq!(
+        refused(design, None),
+        "a boundary runs over the axes of a grid, and this file has a [design]: remove it, and \
+         give [[axis]] twice"
+    );
 }
 
 #[test]
