@@ -24,8 +24,10 @@ pub(super) const INSTANTS_AT_CORNERS: usize = 32;
 /// Rows and columns of a state's disturbance.
 pub(super) type Square = [[N<f64>; STATES]; STATES];
 
-/// Disturbances taken through a step at once, so that they stay in the nearest cache.
+/// Lanes of disturbances taken through a step at once, so that they stay in the nearest cache; the
+/// same for wide lanes, of which so many are enough.
 const BLOCK: usize = 5;
+const WIDE_BLOCK: usize = STATES.div_ceil(MAX_LANES);
 
 /// Steps whose derivatives are kept at once: as many for every turn.
 const AT_ONCE: usize = 8;
@@ -94,7 +96,8 @@ impl<T: Lane> Aside for Along<'_, T> {
     fn run(self) -> Vec<Square> {
         let Self { zero, weights, .. } = self;
         let taken = self.take(zero);
-        let vectors = STATES.div_ceil(BLOCK * T::LANES) * BLOCK;
+        let block = if T::LANES == MAX_LANES { WIDE_BLOCK } else { BLOCK };
+        let vectors = STATES.div_ceil(block * T::LANES) * block;
         let mut columns = vec![vec![[zero; STATES]; vectors]; self.rows];
         for columns in &mut columns {
             for j in 0..STATES {
@@ -123,8 +126,15 @@ impl<T: Lane> Aside for Along<'_, T> {
                 for k in 0..AT_ONCE {
                     let (start, middle) = (&at[2 * k].slopes, &at[2 * k + 1].slopes);
                     let end = &at[2 * k + 2].slopes;
-                    for block in columns.chunks_exact_mut(BLOCK) {
-                        step(zero, step_s, [start, middle, middle, end], block);
+                    let at = [start, middle, middle, end];
+                    if T::LANES == MAX_LANES {
+                        for block in columns.as_chunks_mut::<WIDE_BLOCK>().0 {
+                            step(zero, step_s, at, block);
+                        }
+                    } else {
+                        for block in columns.as_chunks_mut::<BLOCK>().0 {
+                            step(zero, step_s, at, block);
+                        }
                     }
                 }
             }
@@ -249,9 +259,13 @@ fn interpolate(taken: &[Smooth], weights: &[Vec<f64>], place: usize, at: &mut Sm
 
 /// One step of some disturbances; the derivatives are those at its stages.
 #[inline(always)]
-fn step<T: Lane>(zero: N<T>, h: N<T>, at: [&Slopes; 4], block: &mut [[N<T>; STATES]]) {
-    let mut along = [[zero; STATES]; BLOCK];
-    along.copy_from_slice(block);
+fn step<T: Lane, const BLOCK: usize>(
+    zero: N<T>,
+    h: N<T>,
+    at: [&Slopes; 4],
+    block: &mut [[N<T>; STATES]; BLOCK],
+) {
+    let mut along = *block;
     let start = along;
     for stage in 0..4 {
         let slopes = at[stage];

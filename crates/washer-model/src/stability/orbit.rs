@@ -110,7 +110,7 @@ pub(super) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<T
     let mut turned: Vec<Option<Turned>> = asked.iter().map(|_| None).collect();
     for places in order.chunk_by(|&a, &b| kind(a) == kind(b)) {
         let together: Vec<Asked<'_>> = places.iter().map(|&k| asked[k]).collect();
-        let found = Simd::dispatch_narrow(Turns { asked: &together, is_stopped });
+        let found = Simd::best().dispatch(Turns { asked: &together, is_stopped });
         for (&k, found) in places.iter().zip(found) {
             turned[k] = Some(found);
         }
