@@ -166,8 +166,8 @@ fn read_rule(from: &mut Reader<'_>, machine: &Machine) -> Option<Rule> {
 
 fn write_rung(out: &mut Writer, rung: &Rung) {
     out.number(f64::from(rung.level as u8));
-    let Convergence { contraction, believed_to, own_error, expected } = rung.convergence;
-    for number in [contraction, believed_to, own_error, expected] {
+    let Convergence { contraction, of_caps, believed_to, own_error, expected } = rung.convergence;
+    for number in [contraction, of_caps, believed_to, own_error, expected] {
         out.number(number);
     }
     out.count(usize::from(rung.follows_bearings));
@@ -200,6 +200,7 @@ fn read_rung(from: &mut Reader<'_>) -> Option<Rung> {
     let level = *Level::ALL.get(from.count(MOST)?)?;
     let convergence = Convergence {
         contraction: from.number()?,
+        of_caps: from.number()?,
         believed_to: from.number()?,
         own_error: from.number()?,
         expected: from.number()?,

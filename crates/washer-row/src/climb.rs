@@ -123,14 +123,16 @@ impl Climb {
         }
         let found = self.difference.filter(|_| !self.is_beside_what_rings)?;
         let convergence = &ladder.rungs[self.rung].convergence;
-        // Nothing finer settles the course. Bearings that still ring do so soon in another phase,
-        // which the course shows and no number.
-        if ladder.is_finer(self.rung) {
-            let is_common = found.of_course <= COMMON_COURSE;
+        let is_common = found.of_course <= COMMON_COURSE;
+        let is_finer = ladder.is_finer(self.rung);
+        // From the reference on, a course in common is enough: phases that differ, and bearings
+        // that still ring in another, are no number's error. Nothing behind it settles the course.
+        if is_finer || is_common && Some(self.rung) == ladder.reference() {
             let share = if is_common { convergence.contraction } else { ROUGHLY };
             return Some((share * found.of_numbers).max(unseen));
         }
-        Some(convergence.error_left(found.greatest(), unseen))
+        let of_caps = convergence.of_caps * found.of_caps;
+        Some(convergence.error_left(found.greatest(), unseen).max(of_caps))
     }
 
     fn error(&self, ladder: &Ladder) -> Option<f64> {
@@ -339,10 +341,12 @@ struct Difference {
     of_course: f64,
     /// In every number that a row takes from it.
     of_numbers: f64,
+    /// In those of them that caps move more than the motion.
+    of_caps: f64,
 }
 
 impl Difference {
-    const NONE: Self = Self { of_course: 0.0, of_numbers: 0.0 };
+    const NONE: Self = Self { of_course: 0.0, of_numbers: 0.0, of_caps: 0.0 };
 
     fn greatest(self) -> f64 {
         self.of_course.max(self.of_numbers)
@@ -366,7 +370,8 @@ fn difference(
         return ((a_s - b_s).abs() <= SAME_TIME * rule.end_s).then_some(Difference::NONE);
     }
     let of_course = point.course_difference(model, &a.course, &b.course);
-    Some(Difference { of_course, of_numbers: of_numbers(of_a, of_b, point, model, rule) })
+    let [of_motion, of_caps] = of_numbers(of_a, of_b, point, rule);
+    Some(Difference { of_course, of_numbers: of_motion.max(of_caps), of_caps })
 }
 
 /// The error that this rung has in common with others, so that no comparison shows it: what
@@ -440,21 +445,23 @@ fn clash_floor_s(rule: &Rule) -> f64 {
     METRIC_FLOOR * (to_s - from_s)
 }
 
-/// The greatest relative difference of what a row takes from two trajectories.
-fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, model: ModelKind, rule: &Rule) -> f64 {
-    let mut greatest = 0.0_f64;
-    let mut compare = |a: f64, b: f64, least: f64| {
+/// The greatest relative differences of what a row takes from two trajectories: of the motion, and
+/// of what caps move more.
+fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, rule: &Rule) -> [f64; 2] {
+    let mut greatest = [0.0_f64; 2];
+    let mut compare = |is_of_caps: bool, a: f64, b: f64, least: f64| {
         if a != b {
             // A quotient that is no number must not pass for none.
             let share = (a - b).abs() / b.abs().max(least);
-            greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
+            let greatest = &mut greatest[usize::from(is_of_caps)];
+            *greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
         }
     };
     for (a, b) in a.amplitudes.iter().zip(&b.amplitudes) {
-        compare(*a, *b, 0.0);
+        compare(false, *a, *b, 0.0);
     }
     if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
-        compare(a, b, point.clearance_m());
+        compare(true, a, b, point.clearance_m());
     }
     for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(rule.measures.of_model()) {
         let least = match number.metric.floor() {
@@ -464,13 +471,13 @@ fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, model: ModelKind, r
             Floor::PartOfWeight => METRIC_FLOOR * point.weight_n(),
             Floor::Creeping => CREEPING_M_PER_S,
         };
-        compare(b + number.metric.weight(model) * (a - b), *b, least);
+        compare(number.metric.is_of_caps(), *a, *b, least);
     }
     for (a, b) in a.turns.iter().zip(&b.turns) {
         for channel in &rule.channels {
             let i = channel.index();
             let (a, b) = (a[i].max(TURN_FLOOR), b[i].max(TURN_FLOOR));
-            compare(b + TURN_WEIGHT * (a - b), b, 0.0);
+            compare(false, b + TURN_WEIGHT * (a - b), b, 0.0);
         }
     }
     greatest

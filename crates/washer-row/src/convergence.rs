@@ -14,6 +14,8 @@ const RESERVE: f64 = 2.5;
 pub struct Convergence {
     /// The error left as a share of the difference.
     pub contraction: f64,
+    /// The same of what caps alone err in.
+    pub of_caps: f64,
     /// Up to which difference that is so. Beyond, errors are not of first order, and the difference
     /// itself counts.
     pub believed_to: f64,
@@ -25,13 +27,18 @@ pub struct Convergence {
 
 impl Convergence {
     /// The convergence of a run that is compared with nothing.
-    pub const NONE: Self =
-        Self { contraction: 1.0, believed_to: 0.0, own_error: 0.0, expected: f64::INFINITY };
+    pub const NONE: Self = Self {
+        contraction: 1.0,
+        of_caps: 0.0,
+        believed_to: 0.0,
+        own_error: 0.0,
+        expected: f64::INFINITY,
+    };
 
     /// The error left, of this difference. `unseen` is what both runs leave out, as a share of the
     /// motion without amplification: it grows with the motion as their difference did.
     pub fn error_left(&self, difference: f64, unseen: f64) -> f64 {
-        let Self { contraction, believed_to, own_error, expected } = *self;
+        let Self { contraction, believed_to, own_error, expected, .. } = *self;
         let seen = if difference <= believed_to {
             contraction * difference + own_error.min(OWN_SHARE * difference)
         } else {
@@ -47,7 +54,8 @@ mod tests {
 
     #[test]
     fn what_is_unseen_grows_as_the_difference_did() {
-        let of = Convergence { contraction: 0.1, believed_to: 0.1, own_error: 0.0, expected: 1e-5 };
+        let of = Convergence { contraction: 0.1, believed_to: 0.1, ..Convergence::NONE };
+        let of = Convergence { expected: 1e-5, ..of };
         assert_eq!(of.error_left(1e-6, 1e-6), 1e-6);
         // Eight and a half times what is expected: a row that was off by 2.2e-4.
         assert!(of.error_left(8.5e-5, 1.3e-5) > 2.2e-4);

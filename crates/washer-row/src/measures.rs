@@ -1,7 +1,7 @@
 //! What a run measures: the amplitude by which the two models are compared, and metrics.
 
 use sweep_parameter::{Limit, Worse};
-use washer_model::{Channel, Extra, ModelKind, Wanted};
+use washer_model::{Channel, Extra, Wanted};
 
 use crate::outcome::{Deviations, Outcome};
 
@@ -145,9 +145,9 @@ impl Metric {
         self.facts().floor
     }
 
-    /// So many times a difference of it counts.
-    pub(crate) fn weight(self, model: ModelKind) -> f64 {
-        if model == ModelKind::Linear { self.facts().linear_weight } else { 1.0 }
+    /// Whether caps move it more than the motion, so that their share of an error is what is left.
+    pub(crate) const fn is_of_caps(self) -> bool {
+        self.facts().is_of_caps
     }
 
     /// Unit.
@@ -229,8 +229,8 @@ struct Facts {
     /// In the column of one part, and what that holds; none if parts have no columns.
     of_each: Option<[&'static str; 2]>,
     floor: Floor,
-    /// Of the linear model so many times a difference counts, as what errs more than it shows.
-    linear_weight: f64,
+    /// Whether caps move it more than the motion.
+    is_of_caps: bool,
     /// What trajectories must record.
     record: fn(&mut Wanted),
     /// Its values in such a record, of each part or the only one; none if it is the machine's own.
@@ -249,7 +249,7 @@ const PLAIN: Facts = Facts {
     part: None,
     of_each: None,
     floor: Floor::None,
-    linear_weight: 1.0,
+    is_of_caps: false,
     record: |_| (),
     of: None,
     worse: Worse::Greater,
@@ -272,6 +272,8 @@ const METRICS: [Facts; Metric::ALL.len()] = [
         unit: "s",
         description: "time in the window with a gap between drum and tub below zero",
         floor: Floor::PartOfWindow,
+        // Of the gap, which the hinge bends.
+        is_of_caps: true,
         record: |wanted| wanted.clash_time = true,
         of: Some(|extra| extra.clash_time_s.into_iter().collect()),
         ..PLAIN
@@ -372,7 +374,7 @@ const METRICS: [Facts; Metric::ALL.len()] = [
         floor: Floor::Creeping,
         // What capped modes ring is more of a speed than of a motion, by their frequency over the
         // drum's.
-        linear_weight: 10.0,
+        is_of_caps: true,
         record: |wanted| wanted.damper_speeds = true,
         of: Some(|extra| extra.damper_speeds_m_per_s.clone()),
         ..PLAIN
