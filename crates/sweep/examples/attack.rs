@@ -500,6 +500,9 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    // A thread that waits for rows of its grid takes another grid, on the same stack.
+    let pool = rayon::ThreadPoolBuilder::new().stack_size(1 << 28).build_global();
+    pool.expect("nothing has used the pool");
     let folder = std::env::temp_dir().join(format!("sweep-attack-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     let grids = rows.div_ceil(9);
