@@ -13,14 +13,11 @@ mkdir -p results/benchmarks
 cargo build --release --bin sweep
 cargo bench --no-run
 
-fact() { lscpu | sed -n "s/^$1: *//p"; }
 {
   echo "# Benchmarks"
   echo
-  model="$(fact 'Model name') (family $(fact 'CPU family'), model $(fact Model))"
-  echo "Machine: $model, $(nproc) cores, $(uname -sr);"
-  echo "load when it began: $(cut -d' ' -f1 /proc/loadavg)." \
-    "$(rustc --version), commit $(git describe --always --dirty)."
+  python3 scripts/benchmarks/measured.py
+  echo "$(rustc --version). Load when it began: $(cut -d' ' -f1 /proc/loadavg)."
   echo "Command: \`scripts/benchmarks/benchmark.sh $name $rounds\`."
   echo
   echo "## Ratios"

@@ -6,7 +6,6 @@ import csv
 import itertools
 import json
 import os
-import pathlib
 import platform
 import re
 import statistics
@@ -17,8 +16,8 @@ import time
 import tomllib
 
 import matplotlib
+from measured import ROOT, commit, machine, put, run
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 WORK = ROOT / "target/peers"
 # A check runs everything once for trajectories of a second, and keeps what it writes to itself.
 IS_CHECK = "END_S" in os.environ
@@ -64,14 +63,6 @@ def sweep(integrator, points):
     run(program, "export", result, rows)
     lines = [line for line in rows.read_text().splitlines() if not line.startswith("#")]
     return seconds, list(csv.DictReader(lines))
-
-
-def run(*command):
-    """What it prints; its failure ends the comparison."""
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, cwd=ROOT)
-    if done.returncode:
-        raise SystemExit(f"{' '.join(map(str, command))}: {done.stderr.strip()}")
-    return done.stdout.strip()
 
 
 def amplitudes(row, channels):
@@ -183,17 +174,6 @@ def theirs(reference):
                 break
 
 
-def machine():
-    models = [
-        line.split(":", 1)[1].strip()
-        for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines()
-        if line.startswith("model name")
-    ]
-    family = run("sh", "-c", "lscpu | grep -E '^(CPU family|Model):' | tr -s ' ' | paste -sd, -")
-    model = models[0] if models else platform.machine()
-    return f"{model} ({family}), {platform.system()} {platform.release()}"
-
-
 def quickest(entries, accuracy):
     """Of each method the quickest setting that is at least so accurate; the quickest first."""
     chosen = {}
@@ -276,7 +256,6 @@ def main():
 
 def write(entries, left, load):
     """The page with its files, and the sentence of README."""
-    commit = run("git", "describe", "--always", "--dirty")
     OUT.mkdir(parents=True, exist_ok=True)
     (OUT / "peers.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in entries))
     diagram(entries, OUT / "peers.svg")
@@ -300,9 +279,8 @@ def write(entries, left, load):
             f"{power(left)}.",
             "heyoka is left out: its steps need the equations as its own expressions.",
             f"Machine: {machine()}. {rust}; {compiler}, `-O3 -march=native`; Python "
-            f"{platform.python_version()}. Load when it began: {load:.1f} on {os.cpu_count()} "
-            f"cores. Commit {commit}. Command: "
-            "`scripts/peers/run.sh`. Every setting: `peers.jsonl`.",
+            f"{platform.python_version()}. Load when it began: {load:.1f}. Commit {commit()}. "
+            "Command: `scripts/peers/run.sh`. Every setting: `peers.jsonl`.",
         ),
         "![work-precision diagram](peers.svg)",
     ]
@@ -325,13 +303,11 @@ def write(entries, left, load):
         )
     (OUT / "peers.md").write_text("\n\n".join(text) + "\n")
     if not IS_CHECK:
-        readme = ROOT / "README.md"
         line = paragraphs(
             f"The quickest [other integrator](results/benchmarks/peers.md) for {POINTS} points by "
             f"both models takes {', and '.join(sentence)}."
         )
-        marked = re.compile(r"(?s)(<!-- peers: begin -->\n).*?(<!-- peers: end -->)")
-        readme.write_text(marked.sub(lambda m: f"{m[1]}\n{line}\n\n{m[2]}", readme.read_text()))
+        put("README.md", "peers", line)
 
 
 if __name__ == "__main__":

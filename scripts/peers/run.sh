@@ -29,4 +29,4 @@ RUSTFLAGS="-Ctarget-cpu=native -L$PWD/$work -L$PWD/target/release \
   cargo build --release --locked --manifest-path scripts/peers/diffsol/Cargo.toml \
   --target-dir "$work/diffsol"
 
-"$venv/bin/python" scripts/peers/compare.py
+PYTHONPATH=scripts/benchmarks "$venv/bin/python" scripts/peers/compare.py

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What each method costs and how accurate it is: writes the table of docs/method.md.
 
-    scripts/tools/python.sh scripts/figures/method_costs.py SWEEP_BINARY [POINTS_PER_AXIS]
+    scripts/tools/python.sh scripts/benchmarks/method_costs.py SWEEP_BINARY [POINTS_PER_AXIS]
 
 Runs the map of `sweeps/quick.toml` by each method on one thread. Processor time is told, which
 other work on the machine disturbs less than it does the wall's. The error is the worst relative
@@ -12,18 +12,14 @@ digits.
 
 import pathlib
 import re
-import resource
-import subprocess
 import sys
 import tempfile
 
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from measured import ROOT, Spent, put, said
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 GRID = (ROOT / "sweeps/quick.toml").read_text()
-DOCUMENT = ROOT / "docs/method.md"
-BEGIN, END = "<!-- costs: begin -->", "<!-- costs: end -->"
 
 REFERENCE = 'method = "rk4"\nstep_s = 5e-5'
 METHODS = [
@@ -42,12 +38,8 @@ def run(sweep, folder, integrator, count):
     grid, out = folder / "grid.toml", folder / "map.parquet"
     text = re.sub(r"\[integrator\].*?\n\n", f"[integrator]\n{integrator}\n\n", GRID, flags=re.S)
     grid.write_text(text.replace("count = 9", f"count = {count}"))
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    command = [sweep, "run", grid, "--out", out, "--fresh", "--threads", "1", "--progress", "none"]
-    subprocess.run(command, check=True, capture_output=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    spent_s = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
-    return pq.read_table(out), spent_s
+    spent = Spent(sweep, "run", grid, "--out", out, "--fresh", "--threads", "1")
+    return pq.read_table(out), spent.core_s
 
 
 def error(table, reference):
@@ -87,10 +79,7 @@ def main():
             ]
             lines.append(f"| {' | '.join(cells)} |")
             print(lines[-1], file=sys.stderr, flush=True)
-    text = DOCUMENT.read_text()
-    before, rest = text.split(BEGIN)
-    _, after = rest.split(END)
-    DOCUMENT.write_text(before + BEGIN + "\n\n" + "\n".join(lines) + "\n\n" + END + after)
+    put("docs/method.md", "costs", "\n".join(lines), said())
 
 
 if __name__ == "__main__":

@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# Measures every timed claim of README, docs and results anew, of one commit, on this machine, and
+# writes each into its page. An hour in which nothing else should run.
+#
+#     scripts/benchmarks/claims.sh [PART ...]
+#
+# Parts: kernels, methods, elements, points, build, peers.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+parts=("$@")
+[ $# -gt 0 ] || parts=(kernels methods elements points build peers)
+if ! git diff --quiet HEAD; then
+  echo "there are changes that no commit has: figures would say they are of none" >&2
+  exit 1
+fi
+MEASURED_COMMIT=$(git describe --always)
+export MEASURED_COMMIT
+cargo build --release --locked
+sweep=target/release/sweep
+for part in "${parts[@]}"; do
+  case $part in
+    kernels) scripts/benchmarks/benchmark.sh kernels 3 ;;
+    methods) scripts/tools/python.sh scripts/benchmarks/method_costs.py "$sweep" ;;
+    elements | points | build)
+      scripts/tools/python.sh scripts/benchmarks/costs.py "$sweep" "$part"
+      ;;
+    peers) scripts/peers/run.sh ;;
+    *)
+      echo "$part: no such part" >&2
+      exit 2
+      ;;
+  esac
+done

@@ -1,0 +1,260 @@
+#!/usr/bin/env python3
+"""What features, many points and a build cost: writes the tables of docs/friction.md,
+docs/scaling.md and docs/building.md.
+
+    scripts/tools/python.sh scripts/benchmarks/costs.py SWEEP_BINARY [PART ...]
+
+Parts: elements, points, build. Processor times are told, which other work on the machine disturbs
+less than it does the wall's.
+"""
+
+import math
+import pathlib
+import re
+import statistics
+import sys
+import tempfile
+
+from measured import ROOT, Spent, put, run, said
+
+# The machine of docs/friction.md, by its tables.
+TABLES = re.split(r"\n(?=\[)", (ROOT / "docs/examples/friction.toml").read_text())
+RUN_UP = """name = "elements"
+machine = "machine.toml"
+
+[spin]
+profile = "ramp"
+peak_rpm = 350.0
+ramp_s = 6.0
+
+[time]
+end_s = 6.0
+
+[[axis]]
+parameter = "unbalance_mass_kg"
+values = [0.2, 0.4]
+"""
+SHARDS = 64
+
+
+def figure(number):
+    """Three digits at most."""
+    return f"{number:.0f}" if number >= 100 else f"{number:.3g}"
+
+
+def table(heads, rows):
+    """Markdown."""
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+
+
+def with_elements(names):
+    """The machine with these kinds of elements alone."""
+    kept = []
+    for text in TABLES:
+        head = text.split("]")[0].lstrip("[")
+        if head in ("stops", "bushings") and head not in names:
+            continue
+        if head == "dampers" and "friction" not in names:
+            text = text.replace("damping_n_s_per_m = 10.0 ", "damping_n_s_per_m = 100.0 ")
+            text = re.sub(r"friction_n = \S+", "friction_n = 0.0", text)
+        if head == "springs" and "springs" in names:
+            text += "\ncubic_n_per_m3 = 1e6"
+        kept.append(text)
+    return "\n".join(kept)
+
+
+def elements(sweep, folder):
+    """Each feature for a machine with each kind of element, and a row with friction."""
+    grid, point = folder / "elements.toml", ("--at", "unbalance_mass_kg=0.4")
+    speeds = ("--speed", "200:300:10")
+    grid.write_text(RUN_UP)
+    result, page = folder / "elements.parquet", folder / "elements.html"
+    commands = {
+        "run": ("run", grid, "--out", result, "--fresh"),
+        "trace": ("trace", grid, *point, "--out", folder / "trace.parquet"),
+        "modes": ("modes", grid),
+        "stability": ("stability", grid, *point, *speeds, "--out", folder / "s.parquet"),
+        "dwell": ("dwell", grid, *point, "--speed", "250", "--out", folder / "d.parquet"),
+        "explain": ("explain", grid, *point, *speeds),
+        "plot --live": ("plot", result, "--live", "-o", page),
+    }
+    kinds = {
+        "none": (),
+        "friction": ("friction",),
+        "stops": ("stops",),
+        "gasket": ("bushings",),
+        "stiffening springs": ("springs",),
+        "all of these": ("friction", "stops", "bushings", "springs"),
+    }
+    rows = []
+    for kind, names in kinds.items():
+        (folder / "machine.toml").write_text(with_elements(names))
+        spent = [figure(Spent(sweep, *command).core_s) for command in commands.values()]
+        rows.append([kind, *spent])
+        print(rows[-1], file=sys.stderr, flush=True)
+    maps = {"fig12": [], "friction": []}
+    for _ in range(3):
+        for name, core_s in maps.items():
+            command = ("run", f"sweeps/{name}.toml", "--out", folder / "map.parquet", "--fresh")
+            core_s.append(Spent(sweep, *command).core_s)
+    per_row_ms = {
+        name: 1e3 * statistics.median(core_s) / points(sweep, f"sweeps/{name}.toml")
+        for name, core_s in maps.items()
+    }
+    ratio = per_row_ms["friction"] / per_row_ms["fig12"]
+    put(
+        "docs/friction.md",
+        "elements",
+        f"A row of `sweeps/friction.toml` takes {figure(ratio)} times as long as one of "
+        f"`sweeps/fig12.toml` ({figure(per_row_ms['friction'])} and "
+        f"{figure(per_row_ms['fig12'])} core-milliseconds, three runs of each in turns): "
+        "friction's corners take short steps. Core-seconds:",
+        table(["element", *(f"`{name}`" for name in commands)], rows),
+        said(),
+    )
+
+
+def points(sweep, grid):
+    """How many a grid has."""
+    return int(re.search(r"^points +(\d+)", run(sweep, "check", grid), re.MULTILINE)[1])
+
+
+def of_threads(sweep, grid, folder):
+    """Core-seconds of a run, and the main thread's share of them."""
+    command = [sys.executable, "scripts/benchmarks/thread_times.py", sweep, "run", grid]
+    text = run(*command, "--fresh", "--out", folder / "threads.parquet", "--progress", "none")
+    spent = re.findall(r"^ *(\S+) +(\S+) s +\S+ %$", text, re.MULTILINE)
+    total_s = sum(float(seconds) for _, seconds in spent)
+    return total_s, sum(float(seconds) for name, seconds in spent if name == "main") / total_s
+
+
+def many(sweep, folder):
+    """What points cost, and what files of a million and of ten million rows cost beside them."""
+    rows, per_core_s, shares = [], {}, []
+    for name, words in (
+        ("fig12", "`rk4-mass-scaled`, accuracy 1e-3, checks included"),
+        ("fig12_reference", "`rk4`, step 2e-4 s"),
+    ):
+        core_s, share = of_threads(sweep, f"sweeps/{name}.toml", folder)
+        count = points(sweep, f"sweeps/{name}.toml")
+        per_core_s[name] = count / core_s
+        shares.append(f"{100 * share:.2f} %")
+        rows.append([f"a point, {words}",
+                     f"{figure(count / core_s)} a core-second ({count} in {core_s:.1f} s)",
+                     f"`scripts/benchmarks/thread_times.py` of `sweep run sweeps/{name}.toml`"])
+    rows.append(["chunks, hashes, syncs, progress and join",
+                 " and ".join(shares) + " of these times", "the same: the main thread"])
+    grid, result = ROOT / "sweeps/million.toml", folder / "million.parquet"
+    whole = Spent(sweep, "run", grid, "--out", result, "--fresh")
+    result_mb = result.stat().st_size / 1e6
+    rows.append(["a million rows", told(whole, result_mb), "`sweep run sweeps/million.toml`"])
+    parts = in_two(sweep, grid, result, 0.5 * whole.wall_s)
+    rows.append(["the same, interrupted in the middle and resumed", told(parts, result_mb),
+                 "the same, SIGINT, the same again"])
+    shards = [Spent(sweep, "run", grid, "--out", result, "--fresh", "--shard", f"{k}/{SHARDS}")
+              for k in range(1, SHARDS + 1)]
+    chunks_mb = sum(path.stat().st_size for path in folder.rglob("*.partial/**/*")) / 1e6
+    merged = Spent(sweep, "merge", grid, "--out", result)
+    core_s = sum(shard.core_s for shard in shards)
+    rows.append([f"the same by {SHARDS} shards, one after the other",
+                 f"{figure(core_s)} core-s, {figure(chunks_mb)} MB of chunks",
+                 f"`--shard K/{SHARDS}`"])
+    rows.append(["their merge", told(merged, result_mb), "`sweep merge sweeps/million.toml`"])
+    ten = folder / "ten_million.toml"
+    ten.write_text(grid.read_text().replace("count = 1000", "count = 10_000", 1))
+    result = folder / "ten_million.parquet"
+    parts = in_two(sweep, ten, result, 5.0 * whole.wall_s)
+    rows.append(["ten million, interrupted in the middle and resumed",
+                 told(parts, result.stat().st_size / 1e6), "the same, of 10,000 masses"])
+    put("docs/scaling.md", "points", table(["what", "figure", "command"], rows), said())
+    put("docs/scaling.md", "estimates", *estimates(per_core_s, chunks_mb, result_mb, merged.core_s))
+
+
+def in_two(sweep, grid, result, half_s):
+    """A run that is interrupted, and resumed."""
+    half = Spent(sweep, "run", grid, "--out", result, "--fresh", interrupted_after_s=half_s)
+    rest = Spent(sweep, "run", grid, "--out", result)
+    rest.wall_s += half.wall_s
+    rest.core_s += half.core_s
+    rest.memory_mb = max(half.memory_mb, rest.memory_mb)
+    return rest
+
+
+def told(spent, result_mb):
+    """Time, memory and size of a run."""
+    return (f"{figure(spent.wall_s)} s, {figure(spent.core_s)} core-s, "
+            f"{figure(spent.memory_mb)} MB of memory, {figure(result_mb)} MB written")
+
+
+def duration(seconds):
+    """In a unit of a clock or a calendar."""
+    for unit, length_s in (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 1.5 * length_s:
+            return f"{figure(seconds / length_s)} {unit}"
+    return f"{figure(seconds)} s"
+
+
+def estimates(per_core_s, chunks_mb, result_mb, join_s):
+    """What a million and a billion points of 50 s would cost."""
+    fast = per_core_s["fig12"]
+    chunks = [(1e6, 1024), (1e9, 4096)]
+    whole = [(count, math.ceil(count / size), size) for count, size in chunks]
+    rows = [
+        ["core-time, and 1 core", *(duration(count / fast) for count, _ in chunks)],
+        ["100 cores", *(duration(count / fast / 100) for count, _ in chunks)],
+        ["10,000 cores", *(
+            f"{duration(rounds * size / fast)}: {figure(size / fast)} s a chunk, chunks a core: "
+            f"{rounds}"
+            for _, number, size in whole
+            for rounds in [math.ceil(number / 1e4)]
+        )],
+        ["chunks", *(f"{number} of {size} points, {figure(count / 1e9 * chunks_mb)} GB"
+                     for count, number, size in whole)],
+        ["result", *(f"{figure(count / 1e9 * result_mb)} GB" for count, _ in chunks)],
+        ["join, one core", *(duration(count / 1e6 * join_s) for count, _ in chunks)],
+    ]
+    return (f"By the fast method; plain `rk4` takes {figure(fast / per_core_s['fig12_reference'])} "
+            "times the core-time.", table(["", "10^6 points", "10^9 points"], rows))
+
+
+def build(_, folder):
+    """The program from nothing, and what it is made of."""
+    spent = Spent("cargo", "build", "--release", "--locked", "-p", "sweep", "--target-dir", folder)
+    program, stripped = folder / "release/sweep", folder / "stripped"
+    run("strip", "-o", stripped, program)
+    sizes = [f"{path.stat().st_size / 1e6:.1f} MB" for path in (program, stripped)]
+
+    def crates(package):
+        tree = run("cargo", "tree", "--locked", "-p", package, "-e", "normal", "--prefix", "none")
+        return len({line.split(" (")[0] for line in tree.splitlines()})
+
+    tree = "`cargo tree -p sweep -e normal --prefix none \\| sed 's/ (.*//' \\| sort -u \\| wc -l`"
+    minutes, seconds = divmod(spent.wall_s, 60)
+    rows = [
+        ["crates in the binary, ours included", crates("sweep"), tree],
+        ["`lane-ode` alone", crates("lane-ode"), "the same with `-p lane-ode`"],
+        ["`washer-model` alone, most of them of faer, the linear algebra",
+         crates("washer-model"), "the same with `-p washer-model`"],
+        ["the binary, and without symbols", ", ".join(sizes),
+         "`ls -l target/release/sweep`, and after `strip`"],
+        ["from an empty target folder",
+         f"{spent.core_s / 60:.1f} core-minutes, {minutes:.0f}:{seconds:02.0f} min",
+         "`time cargo build --release --locked -p sweep`"],
+    ]
+    put("docs/building.md", "build", table(["what", "figure", "command"], rows), said())
+
+
+PARTS = {"elements": elements, "points": many, "build": build}
+
+
+def main():
+    """Measure, and put the tables into their pages."""
+    sweep, *parts = sys.argv[1:]
+    for part in parts or PARTS:
+        with tempfile.TemporaryDirectory() as folder:
+            PARTS[part](pathlib.Path(sweep).resolve(), pathlib.Path(folder))
+
+
+if __name__ == "__main__":
+    main()

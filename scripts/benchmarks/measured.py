@@ -1,0 +1,81 @@
+"""What scripts that measure share: where and of what a figure is, and its place in a page."""
+
+import os
+import pathlib
+import platform
+import re
+import subprocess
+import textwrap
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+
+
+def run(*command):
+    """What it prints; its failure ends the measurement."""
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, cwd=ROOT)
+    if done.returncode:
+        raise SystemExit(f"{' '.join(map(str, command))}: {done.stderr.strip()}")
+    return done.stdout.strip()
+
+
+def machine():
+    """Processor and system."""
+    facts = dict(re.findall(r"^([^:]+):\s*(.*)$", run("lscpu"), re.MULTILINE))
+    model = facts.get("Model name", platform.machine())
+    return (
+        f"{model} (family {facts.get('CPU family')}, model {facts.get('Model')}), "
+        f"{len(os.sched_getaffinity(0))} cores, {platform.system()} {platform.release()}"
+    )
+
+
+def commit():
+    """The commit that is measured: of one command that writes many pages, the one it began with."""
+    return os.environ.get("MEASURED_COMMIT") or run("git", "describe", "--always", "--dirty")
+
+
+def said():
+    """The line under a table: where and of what it was measured."""
+    return f"Measured on {machine()}, of commit {commit()}."
+
+
+def wrapped(text):
+    """A paragraph in lines of at most 100 columns; a table as it is."""
+    return text if text.startswith("|") else textwrap.fill(text, 100, break_on_hyphens=False)
+
+
+def put(page, name, *paragraphs):
+    """Paragraphs between the marks of this name."""
+    path, paragraphs = ROOT / page, map(wrapped, paragraphs)
+    marked = re.compile(rf"(?s)(<!-- {name}: begin -->).*?(<!-- {name}: end -->)")
+    text, count = marked.subn(lambda m: "\n\n".join([m[1], *paragraphs, m[2]]), path.read_text())
+    if count != 1:
+        raise SystemExit(f"{page}: there is no place for {name}")
+    path.write_text(text)
+
+
+class Spent:
+    """A command's time on the wall and of the processor (s), and the most memory it had (MB)."""
+
+    def __init__(self, *command, interrupted_after_s=None):
+        began = time.perf_counter()
+        process = subprocess.Popen(
+            list(map(str, command)), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            text=True,
+        )
+        if interrupted_after_s is not None:
+            time.sleep(interrupted_after_s)
+            process.send_signal(2)
+        text = process.stdout.read()
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        expected = 0 if interrupted_after_s is None else 130
+        if process.returncode != expected:
+            raise SystemExit(f"{' '.join(map(str, command))}: {text.strip()}")
+        self.wall_s = time.perf_counter() - began
+        self.core_s = usage.ru_utime + usage.ru_stime
+        self.memory_mb = usage.ru_maxrss / 1024
+
+
+if __name__ == "__main__":
+    print(f"Measured on {machine()}, of commit {commit()}.")
