@@ -15,6 +15,7 @@ import statistics
 import sys
 import tempfile
 
+import pyarrow.parquet as pq
 from measured import ROOT, Spent, put, run, said
 
 # The machine of docs/friction.md, by its tables.
@@ -70,12 +71,16 @@ def elements(sweep, folder):
     speeds = ("--speed", "200:300:10")
     grid.write_text(RUN_UP)
     result, page = folder / "elements.parquet", folder / "elements.html"
+
+    def fresh(name):
+        return "--out", folder / f"{name}.parquet", "--fresh"
+
     commands = {
-        "run": ("run", grid, "--out", result, "--fresh"),
+        "run": ("run", grid, *fresh("elements")),
         "trace": ("trace", grid, *point, "--out", folder / "trace.parquet"),
         "modes": ("modes", grid),
-        "stability": ("stability", grid, *point, *speeds, "--out", folder / "s.parquet"),
-        "dwell": ("dwell", grid, *point, "--speed", "250", "--out", folder / "d.parquet"),
+        "stability": ("stability", grid, *point, *speeds, *fresh("speeds")),
+        "dwell": ("dwell", grid, *point, "--speed", "250", *fresh("held")),
         "explain": ("explain", grid, *point, *speeds),
         "plot --live": ("plot", result, "--live", "-o", page),
     }
@@ -93,15 +98,12 @@ def elements(sweep, folder):
         spent = [figure(Spent(sweep, *command).core_s) for command in commands.values()]
         rows.append([kind, *spent])
         print(rows[-1], file=sys.stderr, flush=True)
-    maps = {"fig12": [], "friction": []}
+    a_row_ms = {"fig12": [], "friction": []}
     for _ in range(3):
-        for name, core_s in maps.items():
-            command = ("run", f"sweeps/{name}.toml", "--out", folder / "map.parquet", "--fresh")
-            core_s.append(Spent(sweep, *command).core_s)
-    per_row_ms = {
-        name: 1e3 * statistics.median(core_s) / points(sweep, f"sweeps/{name}.toml")
-        for name, core_s in maps.items()
-    }
+        for name, found in a_row_ms.items():
+            core_s = Spent(sweep, "run", f"sweeps/{name}.toml", *fresh("map")).core_s
+            found.append(1e3 * core_s / rows_in(folder / "map.parquet"))
+    per_row_ms = {name: statistics.median(found) for name, found in a_row_ms.items()}
     ratio = per_row_ms["friction"] / per_row_ms["fig12"]
     put(
         "docs/friction.md",
@@ -115,15 +117,15 @@ def elements(sweep, folder):
     )
 
 
-def points(sweep, grid):
-    """How many a grid has."""
-    return int(re.search(r"^points +(\d+)", run(sweep, "check", grid), re.MULTILINE)[1])
+def rows_in(result):
+    """How many a file has."""
+    return pq.read_metadata(result).num_rows
 
 
-def of_threads(sweep, grid, folder):
+def of_threads(sweep, grid, result):
     """Core-seconds of a run, and the main thread's share of them."""
     command = [sys.executable, "scripts/benchmarks/thread_times.py", sweep, "run", grid]
-    text = run(*command, "--fresh", "--out", folder / "threads.parquet", "--progress", "none")
+    text = run(*command, "--fresh", "--out", result, "--progress", "none")
     spent = re.findall(r"^ *(\S+) +(\S+) s +\S+ %$", text, re.MULTILINE)
     total_s = sum(float(seconds) for _, seconds in spent)
     return total_s, sum(float(seconds) for name, seconds in spent if name == "main") / total_s
@@ -136,8 +138,8 @@ def many(sweep, folder):
         ("fig12", "`rk4-mass-scaled`, accuracy 1e-3, checks included"),
         ("fig12_reference", "`rk4`, step 2e-4 s"),
     ):
-        core_s, share = of_threads(sweep, f"sweeps/{name}.toml", folder)
-        count = points(sweep, f"sweeps/{name}.toml")
+        core_s, share = of_threads(sweep, f"sweeps/{name}.toml", folder / "threads.parquet")
+        count = rows_in(folder / "threads.parquet")
         per_core_s[name] = count / core_s
         shares.append(f"{100 * share:.2f} %")
         rows.append([f"a point, {words}",
@@ -204,8 +206,8 @@ def estimates(per_core_s, chunks_mb, result_mb, join_s):
         ["core-time, and 1 core", *(duration(count / fast) for count, _ in chunks)],
         ["100 cores", *(duration(count / fast / 100) for count, _ in chunks)],
         ["10,000 cores", *(
-            f"{duration(rounds * size / fast)}: {figure(size / fast)} s a chunk, chunks a core: "
-            f"{rounds}"
+            f"{duration(rounds * size / fast)}: {rounds} of the chunks a core, "
+            f"{figure(size / fast)} s each"
             for _, number, size in whole
             for rounds in [math.ceil(number / 1e4)]
         )],
