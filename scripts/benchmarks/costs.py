@@ -5,7 +5,7 @@ docs/scaling.md and docs/building.md.
     scripts/tools/python.sh scripts/benchmarks/costs.py SWEEP_BINARY [PART ...]
 
 Parts: elements, points, build. Processor times are told, which other work on the machine disturbs
-less than it does the wall's.
+less than it does the wall's. With CHECK=1 it runs on little, and prints; in CI.
 """
 
 import math
@@ -16,7 +16,7 @@ import sys
 import tempfile
 
 import pyarrow.parquet as pq
-from measured import ROOT, Spent, put, run, said
+from measured import IS_CHECK, ROOT, Spent, put, run, said
 
 # The machine of docs/friction.md, by its tables.
 TABLES = re.split(r"\n(?=\[)", (ROOT / "docs/examples/friction.toml").read_text())
@@ -35,7 +35,11 @@ end_s = 6.0
 parameter = "unbalance_mass_kg"
 values = [0.2, 0.4]
 """
-SHARDS = 64
+SHARDS = 3 if IS_CHECK else 64
+ROUNDS = 1 if IS_CHECK else 3
+# Maps by the fast method and by plain rk4, and masses of the grids that show what files cost.
+MAPS = ("quick", "quick") if IS_CHECK else ("fig12", "fig12_reference")
+MASSES = (100, 300) if IS_CHECK else (1000, 10_000)
 
 
 def figure(number):
@@ -92,6 +96,8 @@ def elements(sweep, folder):
         "stiffening springs": ("springs",),
         "all of these": ("friction", "stops", "bushings", "springs"),
     }
+    if IS_CHECK:
+        kinds = {kind: kinds[kind] for kind in ("none", "all of these")}
     rows = []
     for kind, names in kinds.items():
         (folder / "machine.toml").write_text(with_elements(names))
@@ -99,7 +105,7 @@ def elements(sweep, folder):
         rows.append([kind, *spent])
         print(rows[-1], file=sys.stderr, flush=True)
     a_row_ms = {"fig12": [], "friction": []}
-    for _ in range(3):
+    for _ in range(ROUNDS):
         for name, found in a_row_ms.items():
             core_s = Spent(sweep, "run", f"sweeps/{name}.toml", *fresh("map")).core_s
             found.append(1e3 * core_s / rows_in(folder / "map.parquet"))
@@ -131,42 +137,44 @@ def of_threads(sweep, grid, result):
     return total_s, sum(float(seconds) for name, seconds in spent if name == "main") / total_s
 
 
-def many(sweep, folder):
+def files(sweep, folder):
     """What points cost, and what files of a million and of ten million rows cost beside them."""
-    rows, per_core_s, shares = [], {}, []
-    for name, words in (
-        ("fig12", "`rk4-mass-scaled`, accuracy 1e-3, checks included"),
-        ("fig12_reference", "`rk4`, step 2e-4 s"),
-    ):
+    rows, per_core_s, shares = [], [], []
+    methods = "`rk4-mass-scaled`, accuracy 1e-3, checks included", "`rk4`, step 2e-4 s"
+    for name, words in zip(MAPS, methods):
         core_s, share = of_threads(sweep, f"sweeps/{name}.toml", folder / "threads.parquet")
         count = rows_in(folder / "threads.parquet")
-        per_core_s[name] = count / core_s
+        per_core_s.append(count / core_s)
         shares.append(f"{100 * share:.2f} %")
         rows.append([f"a point, {words}",
                      f"{figure(count / core_s)} a core-second ({count} in {core_s:.1f} s)",
                      f"`scripts/benchmarks/thread_times.py` of `sweep run sweeps/{name}.toml`"])
     rows.append(["chunks, hashes, syncs, progress and join",
                  " and ".join(shares) + " of these times", "the same: the main thread"])
-    grid, result = ROOT / "sweeps/million.toml", folder / "million.parquet"
+    few, many = (folder / f"{count}.toml" for count in MASSES)
+    for grid, count in zip((few, many), MASSES):
+        million = (ROOT / "sweeps/million.toml").read_text()
+        grid.write_text(million.replace("count = 1000", f"count = {count}", 1))
+    grid, result = few, folder / "few.parquet"
     whole = Spent(sweep, "run", grid, "--out", result, "--fresh")
     result_mb = result.stat().st_size / 1e6
     rows.append(["a million rows", told(whole, result_mb), "`sweep run sweeps/million.toml`"])
     parts = in_two(sweep, grid, result, 0.5 * whole.wall_s)
     rows.append(["the same, interrupted in the middle and resumed", told(parts, result_mb),
                  "the same, SIGINT, the same again"])
-    shards = [Spent(sweep, "run", grid, "--out", result, "--fresh", "--shard", f"{k}/{SHARDS}")
+    result = folder / "shards.parquet"
+    shards = [Spent(sweep, "run", grid, "--out", result, "--shard", f"{k}/{SHARDS}")
               for k in range(1, SHARDS + 1)]
-    chunks_mb = sum(path.stat().st_size for path in folder.rglob("*.partial/**/*")) / 1e6
+    chunks = (folder / "shards.parquet.partial").rglob("chunk-*")
+    chunks_mb = sum(path.stat().st_size for path in chunks) / 1e6
     merged = Spent(sweep, "merge", grid, "--out", result)
     core_s = sum(shard.core_s for shard in shards)
     rows.append([f"the same by {SHARDS} shards, one after the other",
                  f"{figure(core_s)} core-s, {figure(chunks_mb)} MB of chunks",
                  f"`--shard K/{SHARDS}`"])
     rows.append(["their merge", told(merged, result_mb), "`sweep merge sweeps/million.toml`"])
-    ten = folder / "ten_million.toml"
-    ten.write_text(grid.read_text().replace("count = 1000", "count = 10_000", 1))
-    result = folder / "ten_million.parquet"
-    parts = in_two(sweep, ten, result, 5.0 * whole.wall_s)
+    result = folder / "many.parquet"
+    parts = in_two(sweep, many, result, 0.5 * whole.wall_s * MASSES[1] / MASSES[0])
     rows.append(["ten million, interrupted in the middle and resumed",
                  told(parts, result.stat().st_size / 1e6), "the same, of 10,000 masses"])
     put("docs/scaling.md", "points", table(["what", "figure", "command"], rows), said())
@@ -199,7 +207,7 @@ def duration(seconds):
 
 def estimates(per_core_s, chunks_mb, result_mb, join_s):
     """What a million and a billion points of 50 s would cost."""
-    fast = per_core_s["fig12"]
+    fast, plain = per_core_s
     chunks = [(1e6, 1024), (1e9, 4096)]
     whole = [(count, math.ceil(count / size), size) for count, size in chunks]
     rows = [
@@ -216,8 +224,8 @@ def estimates(per_core_s, chunks_mb, result_mb, join_s):
         ["result", *(f"{figure(count / 1e9 * result_mb)} GB" for count, _ in chunks)],
         ["join, one core", *(duration(count / 1e6 * join_s) for count, _ in chunks)],
     ]
-    return (f"By the fast method; plain `rk4` takes {figure(fast / per_core_s['fig12_reference'])} "
-            "times the core-time.", table(["", "10^6 points", "10^9 points"], rows))
+    return (f"By the fast method; plain `rk4` takes {figure(fast / plain)} times the core-time.",
+            table(["", "10^6 points", "10^9 points"], rows))
 
 
 def build(_, folder):
@@ -247,7 +255,7 @@ def build(_, folder):
     put("docs/building.md", "build", table(["what", "figure", "command"], rows), said())
 
 
-PARTS = {"elements": elements, "points": many, "build": build}
+PARTS = {"elements": elements, "points": files, "build": build}
 
 
 def main():

@@ -9,6 +9,8 @@ import textwrap
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+# Whether to see that all of it still runs, on little, and to write nothing.
+IS_CHECK = "CHECK" in os.environ
 
 
 def run(*command):
@@ -45,8 +47,11 @@ def wrapped(text):
 
 
 def put(page, name, *paragraphs):
-    """Paragraphs between the marks of this name."""
-    path, paragraphs = ROOT / page, map(wrapped, paragraphs)
+    """Paragraphs between the marks of this name; a check prints them."""
+    path, paragraphs = ROOT / page, list(map(wrapped, paragraphs))
+    if IS_CHECK:
+        print(*paragraphs, sep="\n\n")
+        return
     marked = re.compile(rf"(?s)(<!-- {name}: begin -->).*?(<!-- {name}: end -->)")
     text, count = marked.subn(lambda m: "\n\n".join([m[1], *paragraphs, m[2]]), path.read_text())
     if count != 1:
