@@ -16,7 +16,7 @@ import sys
 import tempfile
 
 import pyarrow.parquet as pq
-from measured import IS_CHECK, ROOT, Spent, put, run, said
+from measured import IS_CHECK, ROOT, Spent, figure, put, run, said, table
 
 # The machine of docs/friction.md, by its tables.
 TABLES = re.split(r"\n(?=\[)", (ROOT / "docs/examples/friction.toml").read_text())
@@ -40,17 +40,6 @@ ROUNDS = 1 if IS_CHECK else 3
 # Maps by the fast method and by plain rk4, and masses of the grids that show what files cost.
 MAPS = ("quick", "quick") if IS_CHECK else ("fig12", "fig12_reference")
 MASSES = (100, 300) if IS_CHECK else (1000, 10_000)
-
-
-def figure(number):
-    """Three digits at most."""
-    return f"{number:.0f}" if number >= 100 else f"{number:.3g}"
-
-
-def table(heads, rows):
-    """Markdown."""
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
 
 
 def with_elements(names):
@@ -159,31 +148,37 @@ def files(sweep, folder):
     whole = Spent(sweep, "run", grid, "--out", result, "--fresh")
     result_mb = result.stat().st_size / 1e6
     rows.append(["a million rows", told(whole, result_mb), "`sweep run sweeps/million.toml`"])
-    parts = in_two(sweep, grid, result, 0.5 * whole.wall_s)
-    rows.append(["the same, interrupted in the middle and resumed", told(parts, result_mb),
-                 "the same, SIGINT, the same again"])
     result = folder / "shards.parquet"
     shards = [Spent(sweep, "run", grid, "--out", result, "--shard", f"{k}/{SHARDS}")
               for k in range(1, SHARDS + 1)]
-    chunks = (folder / "shards.parquet.partial").rglob("chunk-*")
-    chunks_mb = sum(path.stat().st_size for path in chunks) / 1e6
+    chunks_mb = in_chunks_mb(result)
     merged = Spent(sweep, "merge", grid, "--out", result)
     core_s = sum(shard.core_s for shard in shards)
     rows.append([f"the same by {SHARDS} shards, one after the other",
                  f"{figure(core_s)} core-s, {figure(chunks_mb)} MB of chunks",
                  f"`--shard K/{SHARDS}`"])
     rows.append(["their merge", told(merged, result_mb), "`sweep merge sweeps/million.toml`"])
+    parts = in_two(sweep, grid, folder / "few.parquet", 0.5 * chunks_mb)
+    rows.append(["a million, interrupted in the middle and resumed", told(parts, result_mb),
+                 "`sweep run`, SIGINT, the same again"])
     result = folder / "many.parquet"
-    parts = in_two(sweep, many, result, 0.5 * whole.wall_s * MASSES[1] / MASSES[0])
+    parts = in_two(sweep, many, result, 0.5 * chunks_mb * MASSES[1] / MASSES[0])
     rows.append(["ten million, interrupted in the middle and resumed",
                  told(parts, result.stat().st_size / 1e6), "the same, of 10,000 masses"])
     put("docs/scaling.md", "points", table(["what", "figure", "command"], rows), said())
     put("docs/scaling.md", "estimates", *estimates(per_core_s, chunks_mb, result_mb, merged.core_s))
 
 
-def in_two(sweep, grid, result, half_s):
+def in_chunks_mb(result):
+    """What a run that is under way has written."""
+    chunks = result.with_name(f"{result.name}.partial").glob("chunk-*.bin")
+    return sum(path.stat().st_size for path in chunks) / 1e6
+
+
+def in_two(sweep, grid, result, half_mb):
     """A run that is interrupted, and resumed."""
-    half = Spent(sweep, "run", grid, "--out", result, "--fresh", interrupted_after_s=half_s)
+    half = Spent(sweep, "run", grid, "--out", result, "--fresh",
+                 is_enough=lambda: in_chunks_mb(result) >= half_mb)
     rest = Spent(sweep, "run", grid, "--out", result)
     rest.wall_s += half.wall_s
     rest.core_s += half.core_s

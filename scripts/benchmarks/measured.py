@@ -4,6 +4,7 @@ import os
 import pathlib
 import platform
 import re
+import signal
 import subprocess
 import textwrap
 import time
@@ -46,6 +47,17 @@ def wrapped(text):
     return text if text.startswith("|") else textwrap.fill(text, 100, break_on_hyphens=False)
 
 
+def figure(number):
+    """Three digits at most."""
+    return f"{number:.0f}" if number >= 100 else f"{number:.3g}"
+
+
+def table(heads, rows):
+    """Markdown."""
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+
+
 def put(page, name, *paragraphs):
     """Paragraphs between the marks of this name; a check prints them."""
     path, paragraphs = ROOT / page, list(map(wrapped, paragraphs))
@@ -60,22 +72,24 @@ def put(page, name, *paragraphs):
 
 
 class Spent:
-    """A command's time on the wall and of the processor (s), and the most memory it had (MB)."""
+    """A command's time on the wall and of the processor (s), and the most memory it had (MB). It is
+    interrupted once `is_enough` says so, if that is given."""
 
-    def __init__(self, *command, interrupted_after_s=None):
+    def __init__(self, *command, is_enough=None):
         began = time.perf_counter()
         process = subprocess.Popen(
             list(map(str, command)), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             text=True,
         )
-        if interrupted_after_s is not None:
-            time.sleep(interrupted_after_s)
-            process.send_signal(2)
+        if is_enough:
+            ended = os.WEXITED | os.WNOHANG | os.WNOWAIT
+            while not is_enough() and os.waitid(os.P_PID, process.pid, ended) is None:
+                time.sleep(0.1)
+            process.send_signal(signal.SIGINT)
         text = process.stdout.read()
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
-        expected = 0 if interrupted_after_s is None else 130
-        if process.returncode != expected:
+        if process.returncode != (130 if is_enough else 0):
             raise SystemExit(f"{' '.join(map(str, command))}: {text.strip()}")
         self.wall_s = time.perf_counter() - began
         self.core_s = usage.ru_utime + usage.ru_stime

@@ -17,7 +17,7 @@ import tempfile
 
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
-from measured import ROOT, Spent, put, said
+from measured import ROOT, Spent, figure, put, said, table
 
 GRID = (ROOT / "sweeps/quick.toml").read_text()
 
@@ -42,14 +42,14 @@ def run(sweep, folder, integrator, count):
     return pq.read_table(out), spent.core_s
 
 
-def error(table, reference):
+def error(found, reference):
     """Worst relative difference of an amplitude where the reference is reliable."""
     reliable = reference["reliable"]
     worst = 0.0
     for name in reference.column_names:
         if name.startswith(("nonlinear_", "linear_")):
             right = reference[name].filter(reliable)
-            apart = pc.abs(pc.divide(pc.subtract(table[name].filter(reliable), right), right))
+            apart = pc.abs(pc.divide(pc.subtract(found[name].filter(reliable), right), right))
             worst = max(worst, pc.max(apart).as_py())
     return worst
 
@@ -57,29 +57,21 @@ def error(table, reference):
 def main():
     """Measure, and put the table into the page."""
     sweep, count = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 9
-    lines = [
-        "| `[integrator]` | points per core-second | steps, both models | worst error "
-        "| verdicts other than the reference's |",
-        "|---|---|---|---|---|",
-    ]
+    heads = ["`[integrator]`", "points per core-second", "steps, both models", "worst error",
+             "verdicts other than the reference's"]
+    rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         reference, _ = run(sweep, folder, REFERENCE, count)
         for integrator in METHODS:
-            table, spent_s = run(sweep, folder, integrator, count)
-            steps = pc.mean(pc.add(table["steps_nonlinear"], table["steps_linear"])).as_py()
-            other = pc.sum(pc.not_equal(table["reliable"], reference["reliable"])).as_py()
+            found, spent_s = run(sweep, folder, integrator, count)
+            steps = pc.mean(pc.add(found["steps_nonlinear"], found["steps_linear"])).as_py()
+            other = pc.sum(pc.not_equal(found["reliable"], reference["reliable"])).as_py()
             shown = integrator.replace("\n", ", ").replace('"', "").replace("method = ", "")
-            cells = [
-                f"`{shown}`",
-                f"{table.num_rows / spent_s:.3g}",
-                f"{steps:.0f}",
-                f"{error(table, reference):.0e}",
-                str(other),
-            ]
-            lines.append(f"| {' | '.join(cells)} |")
-            print(lines[-1], file=sys.stderr, flush=True)
-    put("docs/method.md", "costs", "\n".join(lines), said())
+            rows.append([f"`{shown}`", figure(found.num_rows / spent_s), f"{steps:.0f}",
+                         f"{error(found, reference):.0e}", other])
+            print(rows[-1], file=sys.stderr, flush=True)
+    put("docs/method.md", "costs", table(heads, rows), said())
 
 
 if __name__ == "__main__":

@@ -11,16 +11,14 @@ import re
 import statistics
 import subprocess
 import sys
-import textwrap
 import time
 import tomllib
 
 import matplotlib
-from measured import ROOT, commit, machine, put, run
+from measured import IS_CHECK, ROOT, commit, figure, machine, put, run, wrapped
 
 WORK = ROOT / "target/peers"
 # A check runs everything once for trajectories of a second, and keeps what it writes to itself.
-IS_CHECK = "END_S" in os.environ
 OUT = WORK if IS_CHECK else ROOT / "results/benchmarks"
 CORES = sorted(os.sched_getaffinity(0))
 POINTS = 20 if IS_CHECK else 1000
@@ -39,10 +37,6 @@ CHANNELS = tomllib.loads(PLAN)["reliability"]["channels"]
 def power(number):
     """A figure and its power of ten, as in 1e-3."""
     return f"{number:.0e}".replace("e-0", "e-")
-
-
-def rounded(number):
-    return f"{number:.0f}" if number >= 100 else f"{number:.3g}"
 
 
 def sweep(integrator, points):
@@ -195,12 +189,12 @@ def table(entries, accuracy):
         "|---|---|---|---|---|---|---|---|",
     ]
     for entry in [*runs, *others]:
-        parts = ["" if entry in runs else rounded(entry[f"{model}_s"]) for model in MODELS]
+        parts = ["" if entry in runs else figure(entry[f"{model}_s"]) for model in MODELS]
         lines.append(
             f"| {entry['program']}, {entry['method']} "
             f"| {entry['settings'].replace('e-0', 'e-')} "
             f"| {power(entry['error'])} | {entry['points']} | {' | '.join(parts)} "
-            f"| {rounded(entry['both_s'])} | {rounded(entry['both_s'] / own['both_s'])} |"
+            f"| {figure(entry['both_s'])} | {figure(entry['both_s'] / own['both_s'])} |"
         )
     return own, others[0], lines
 
@@ -237,7 +231,7 @@ def diagram(entries, path):
 
 
 def paragraphs(*texts):
-    return "\n\n".join(textwrap.fill(text, 100, break_on_hyphens=False) for text in texts)
+    return "\n\n".join(map(wrapped, texts))
 
 
 def main():
@@ -302,12 +296,12 @@ def write(entries, left, load):
             f"({best['program']}, {best['method']})"
         )
     (OUT / "peers.md").write_text("\n\n".join(text) + "\n")
-    if not IS_CHECK:
-        line = paragraphs(
-            f"The quickest [other integrator](results/benchmarks/peers.md) for {POINTS} points by "
-            f"both models takes {', and '.join(sentence)}."
-        )
-        put("README.md", "peers", line)
+    put(
+        "README.md",
+        "peers",
+        f"The quickest [other integrator](results/benchmarks/peers.md) for {POINTS} points by both "
+        f"models takes {', and '.join(sentence)}.",
+    )
 
 
 if __name__ == "__main__":

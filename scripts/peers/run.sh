@@ -8,7 +8,7 @@
 # --check only sees that all of it still runs: trajectories of a second, written to target/peers.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-if [ "${1:-}" = --check ]; then export END_S=1; fi
+if [ "${1:-}" = --check ]; then export CHECK=1 END_S=1; fi
 work=target/peers
 mkdir -p "$work"
 
