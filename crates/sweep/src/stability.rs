@@ -250,7 +250,7 @@ impl Engine for DwellEngine<'_> {
 
     fn simd(&self) -> &str {
         match self.asked {
-            Asked::Responses(_) => Simd::narrow().name(),
+            Asked::Responses(_) => Simd::best().name(),
             Asked::Motions(_) => self.simd.name(),
         }
     }
