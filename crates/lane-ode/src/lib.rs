@@ -155,7 +155,7 @@ pub use quintic::Sample;
 pub use real::Real;
 pub use simd::{Kernel, ScalarKernel, Simd, UnsupportedProcessor};
 pub use squares::SquareIntegrals;
-pub use system::{Count, Ended, Failure, Forcing, Leg, Split, Step, System, Task};
+pub use system::{Count, Ended, Failure, Forcing, Leg, SemiImplicit, Step, System, Task};
 pub use time_above::TimeAbove;
 
 #[cfg(test)]

@@ -74,30 +74,17 @@ impl<T: Lane, const D: usize, S: System<T, D>> Aside for DerivativeAside<'_, T, 
     }
 }
 
-/// A system with a linear part, x' = L x, that is too stiff for explicit formulas.
-pub trait Split<T: Lane, const D: usize>: System<T, D> {
-    /// L at a state, or near enough to it that the rest is not stiff.
-    type Stiff;
-    /// What it takes, beside L, to solve with I - g L.
-    type Factored;
-
-    /// f and L at state `x`.
-    fn derivative_and_stiff(
+/// A system x' = H(t, x, x) with a part that is too stiff for explicit formulas: the part is in the
+/// last argument, in which H is linear.
+pub trait SemiImplicit<T: Lane, const D: usize>: System<T, D> {
+    /// k with k = H(t, x, r + g k), for `g_s` above zero.
+    fn derivative_ahead(
         &self,
         forcing: &Self::Forcing,
         x: &[N<T>; D],
-    ) -> ([N<T>; D], Self::Stiff);
-
-    /// I - g L, for `g_s` above zero.
-    fn factored(&self, stiff: &Self::Stiff, g_s: N<T>) -> Self::Factored;
-
-    /// z with z - g L z = r, and L z.
-    fn solve(
-        &self,
-        stiff: &Self::Stiff,
-        factored: &Self::Factored,
         r: &[N<T>; D],
-    ) -> ([N<T>; D], [N<T>; D]);
+        g_s: N<T>,
+    ) -> [N<T>; D];
 }
 
 /// Trajectories fed into lanes one after another: a lane that ends takes up the next at once.

@@ -11,8 +11,8 @@ mod recorders;
 mod trig;
 
 use crate::{
-    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Split, Step, System, Task, Tolerance,
-    additive, dop853, dopri5, rk4,
+    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, SemiImplicit, Simd, Step, System, Task,
+    Tolerance, additive, dop853, dopri5, rk4,
 };
 use core::marker::PhantomData;
 
@@ -22,9 +22,15 @@ trait Equation<const D: usize, const P: usize> {
     const FARTHEST: f64 = 1e6;
     /// f
     fn derivative<T: Lane>(p: &[N<T>; P], t_s: N<T>, x: &[N<T>; D]) -> [N<T>; D];
-    /// A linear part L of f: z with z - g L z = r, and L z. None of f unless said otherwise.
-    fn solve<T: Lane>(_p: &[N<T>; P], _g: N<T>, r: &[N<T>; D]) -> ([N<T>; D], [N<T>; D]) {
-        (*r, [r[0].lit(0.0); D])
+    /// k with k = H(t, x, r + g k), where H(t, x, x) is f. H is f(t, x) unless said otherwise.
+    fn derivative_ahead<T: Lane>(
+        p: &[N<T>; P],
+        t_s: N<T>,
+        x: &[N<T>; D],
+        _r: &[N<T>; D],
+        _g: N<T>,
+    ) -> [N<T>; D] {
+        Self::derivative(p, t_s, x)
     }
     /// The solution, where it is known; NaN otherwise.
     fn exact(_p: &[f64; P], _t_s: f64) -> [f64; D] {
@@ -164,23 +170,12 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> System<T, D> fo
     }
 }
 
-impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Split<T, D> for Member<T, E, P> {
-    type Stiff = [N<T>; P];
-    type Factored = N<T>;
-
+impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> SemiImplicit<T, D>
+    for Member<T, E, P>
+{
     #[inline(always)]
-    fn derivative_and_stiff(&self, t_s: &N<T>, x: &[N<T>; D]) -> ([N<T>; D], [N<T>; P]) {
-        (self.derivative(t_s, x), self.p)
-    }
-
-    #[inline(always)]
-    fn factored(&self, _: &[N<T>; P], g_s: N<T>) -> N<T> {
-        g_s
-    }
-
-    #[inline(always)]
-    fn solve(&self, p: &[N<T>; P], g_s: &N<T>, r: &[N<T>; D]) -> ([N<T>; D], [N<T>; D]) {
-        E::solve(p, *g_s, r)
+    fn derivative_ahead(&self, t_s: &N<T>, x: &[N<T>; D], r: &[N<T>; D], g_s: N<T>) -> [N<T>; D] {
+        E::derivative_ahead(&self.p, *t_s, x, r, g_s)
     }
 }
 
@@ -253,14 +248,22 @@ impl Equation<3, 1> for Swing {
         [(w * (x[0] * cos)).v(), (w * x[2]).v(), -(w * x[1]).v()]
     }
 
-    /// The oscillator.
+    /// Of the oscillator, the implicit part w (1 + y^2) is more than all, by what both states know.
     #[inline(always)]
-    fn solve<T: Lane>(&[w]: &[N<T>; 1], g: N<T>, r: &[N<T>; 3]) -> ([N<T>; 3], [N<T>; 3]) {
-        let turn = (g * w).v();
-        let per = (1.0 + turn * turn).recip();
-        let (y, z) = (r[1] + turn * r[2], r[2] - turn * r[1]);
-        let (y, z) = ((per * y).v(), (per * z).v());
-        ([r[0], y, z], [r[0].lit(0.0), (w * z).v(), -(w * y).v()])
+    fn derivative_ahead<T: Lane>(
+        p: &[N<T>; 1],
+        t_s: N<T>,
+        x: &[N<T>; 3],
+        r: &[N<T>; 3],
+        g: N<T>,
+    ) -> [N<T>; 3] {
+        let [of_x, by_z, by_y] = Self::derivative(p, t_s, x);
+        let more = (x[1] * x[1]).v();
+        let rate = (p[0] * (1.0 + more)).v();
+        let turn = (g * rate).v();
+        let by_r = [rate * r[2] - more * by_z, -(rate * r[1]) - more * by_y];
+        let to_y = (by_r[0] + turn * by_r[1]) / (1.0 + turn * turn);
+        [of_x, to_y, by_r[1] - turn * to_y]
     }
 
     fn exact(&[w]: &[f64; 1], t_s: f64) -> [f64; 3] {
@@ -281,12 +284,22 @@ impl Equation<4, 1> for Coupled {
     }
 
     #[inline(always)]
-    fn solve<T: Lane>(&[k]: &[N<T>; 1], g: N<T>, r: &[N<T>; 4]) -> ([N<T>; 4], [N<T>; 4]) {
-        let ahead = r[1] - r[0] + g * (r[3] - r[2]);
-        let pull = (k * ahead).v() / (1.0 + 2.0 * (k * (g * g).v()).v());
-        let speeds = [r[2] + g * pull, r[3] - g * pull];
-        let places = [r[0] + g * speeds[0], r[1] + g * speeds[1]];
-        ([places[0], places[1], speeds[0], speeds[1]], [speeds[0], speeds[1], pull, -pull])
+    fn derivative_ahead<T: Lane>(
+        &[k]: &[N<T>; 1],
+        _: N<T>,
+        x: &[N<T>; 4],
+        r: &[N<T>; 4],
+        g: N<T>,
+    ) -> [N<T>; 4] {
+        let apart = r[1] - r[0] + g * (r[3] - r[2] + g * x[0]);
+        let pull = (k * apart).v() / (1.0 + 2.0 * (k * (g * g).v()).v());
+        let accelerations = [pull - x[0], -pull];
+        [
+            r[2] + g * accelerations[0],
+            r[3] + g * accelerations[1],
+            accelerations[0],
+            accelerations[1],
+        ]
     }
 }
 

@@ -6,7 +6,6 @@ mod pool;
 
 pub(crate) use growth::{Carried, motions, responses};
 pub(crate) use ladder::reference_step_s;
-pub(crate) use pool::{MOST_WAITING, ROWS_A_THREAD};
 pub(crate) use sweep_engine::{Engine, Watch};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

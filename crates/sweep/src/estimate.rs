@@ -8,7 +8,7 @@ use lane_ode::MAX_LANES;
 use washer_model::ModelKind;
 use washer_row::{Deviations, Ladder, Metric, Outcome};
 
-use crate::engine::{Engine, MOST_WAITING, ModelEngine, ROWS_A_THREAD, Watch};
+use crate::engine::{Engine, ModelEngine, Watch};
 use crate::plan::Plan;
 use sweep_engine::estimate::Estimate;
 use sweep_engine::method::{Integrator as _, Steps};
@@ -87,7 +87,7 @@ fn reckoned(plan: &Plan, threads: usize, whole: Duration) -> Result<Estimate, Er
         core_s_per_point,
         sampled_points: samples.iter().map(|sample| sample.points).sum(),
         sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
-        memory_bytes: memory_bytes(plan, threads),
+        memory_bytes: memory_bytes(&engine, threads),
         disk_bytes,
         result_bytes: disk_bytes + columns * RESULT_COLUMN_BYTES,
         method: method(plan, &engine.ladders()[0]),
@@ -217,24 +217,27 @@ fn busy_s() -> f64 {
 }
 
 /// Chunks in hand and on their way to the disk, then one row group of the result.
-fn memory_bytes(plan: &Plan, threads: usize) -> f64 {
+fn memory_bytes(engine: &ModelEngine<'_>, threads: usize) -> f64 {
+    let plan = engine.plan();
     let channels = plan.reliability.channels.len() as f64;
     let outcome = size_of::<Outcome>() as f64 + 2.0 * 8.0 * channels;
     let in_hand = (2 * threads + 1) as f64 * chunk_points(plan.points()) as f64 * outcome;
     let columns = Job::of(plan).layout.schema().fields().len() as f64;
     let row_group = sweep_engine::store::schema::ROW_GROUP_ROWS as f64;
     let joining = row_group.min(plan.points() as f64) * columns * (8.0 + CELL_BYTES);
-    BASE_BYTES + in_hand.max(joining) + turn_bytes(plan, threads)
+    BASE_BYTES + in_hand.max(joining) + turn_bytes(engine, threads)
 }
 
 /// Peaks by turn of the drum, both models', of the points that go through each thread's lanes
 /// together.
-fn turn_bytes(plan: &Plan, threads: usize) -> f64 {
+fn turn_bytes(engine: &ModelEngine<'_>, threads: usize) -> f64 {
+    let plan = engine.plan();
     if !plan.model.measures.wanted().turns {
         return 0.0;
     }
     let turns = plan.model.spin.turns_within(plan.window_s);
-    (MOST_WAITING + threads * ROWS_A_THREAD) as f64 * 2.0 * turns * size_of::<Deviations>() as f64
+    let rows = engine.most_on_their_way(threads) as f64;
+    rows * 2.0 * turns * size_of::<Deviations>() as f64
 }
 
 /// How the method goes about it, in words.

@@ -4,7 +4,7 @@
 //! Frame A is the shaft's before the spin (yaw q7, pitch q8), frame S spins with the shaft, frame E
 //! is S turned by q9, frame D by q10 more.
 
-pub(crate) mod bearings;
+pub(crate) mod ahead;
 pub(crate) mod coefficients;
 pub(crate) mod coupling;
 pub(crate) mod elements;

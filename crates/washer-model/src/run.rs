@@ -46,13 +46,21 @@ pub enum Method {
     Geared(Geared),
     /// Dormand-Prince 5(4).
     Dopri5(Tolerance),
-    /// Kennedy and Carpenter's additive method of order 5(4), the bearings implicit, for forces
-    /// with corners: its steps see these, and the bearings do not hold them short. The linear model
-    /// takes Dormand-Prince in its place.
+    /// Kennedy and Carpenter's additive method of order 5(4), bearings and hinge implicit, for
+    /// forces with corners: its steps see these, and neither bearings nor hinge hold them short. The
+    /// linear model takes Dormand-Prince in its place.
     Additive(Tolerance),
     /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others.
     /// One trajectory at a time.
     Rodas5p(Tolerance),
+}
+
+impl Method {
+    /// Whether trajectories side by side in lanes have steps of their own.
+    #[must_use]
+    pub const fn has_own_steps(&self) -> bool {
+        matches!(self, Self::Dopri5(_) | Self::Additive(_))
+    }
 }
 
 /// First step that an adaptive method tries.

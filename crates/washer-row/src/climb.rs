@@ -33,9 +33,10 @@ const ROUGHLY: f64 = 2.0;
 /// Two runs that differ by no more than this have one course.
 const COMMON_COURSE: f64 = 0.05;
 
-/// Fail times that differ by less than this share of the run are one. Where a trajectory fails for
-/// a step that is too long, the times at two steps differ by more: by 6e-4 was seen.
-const SAME_TIME: f64 = 1e-4;
+/// Fail times that differ by less than this share of the run are one, a fifth of what they may be
+/// off: they err by a step. Where a trajectory fails for a step that is too long, the times at two
+/// steps differ by more: by 6e-4 was seen.
+const SAME_TIME: f64 = 2e-5;
 
 /// Differences of metrics are shares of the greater of their value and this part of what they are
 /// measured against.
@@ -233,6 +234,11 @@ impl Climbs {
     pub fn last(&self, model: usize, ladder: &Ladder) -> Option<(&RungRun, usize, Option<f64>)> {
         let climb = &self.0[model];
         climb.run.as_ref().map(|run| (run, climb.rung, climb.error(ladder)))
+    }
+
+    /// Steps of a model's last run; none before it.
+    pub fn steps(&self, model: usize) -> u64 {
+        self.0[model].run.as_ref().map_or(0, |run| run.trajectory.steps)
     }
 
     /// What is to be done once every run that was asked for is there. `id` is what the outcome

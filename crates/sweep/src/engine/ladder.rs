@@ -16,7 +16,7 @@
 //! at 411 rad/s, and which caps detune: with bearings capped at 1300 rad/s and steps that see the
 //! corners, half of 120 rows of `sweeps/friction.toml` err by more than 5.6e-3, at 2600 rad/s by
 //! more than 1.7e-3. So the nonlinear model with corners climbs by the additive method: it takes
-//! the bearings implicitly, as they are, and its error estimate finds the corners.
+//! bearings and hinge implicitly, as they are, and its error estimate finds the corners.
 //!
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
@@ -113,12 +113,12 @@ const HARMONIC_OF_ACCURACY: f64 = 1e-2;
 /// How far the whirl is kept above the last harmonic that matters.
 const CLEAR_OF_HARMONIC: f64 = 16.0 / 15.0;
 
-/// The first one's relative error per step is the accuracy, but not more than this.
-const COARSEST_TOLERANCE: f64 = 1e-3;
+/// Relative errors per step of the additive method's rungs, in parts of the accuracy; the last is
+/// behind the reference.
+const SHARES_AT_CORNERS: [f64; 4] = [0.3, 0.03, 0.003, 0.0003];
 
-/// Those of all rungs of the additive method, as shares of the first one's; the last is behind the
-/// reference. Products, because powers may differ in a digit from one system to another.
-const SHARES_AT_CORNERS: [f64; 4] = [1.0, 0.1, 0.1 * 0.1, 0.1 * 0.1 * 0.1];
+/// For an accuracy coarser than this they are those of this one.
+const COARSEST_AT_CORNERS: f64 = 3e-3;
 
 /// Absolute error per step (m, rad, m/s, rad/s) over the relative one.
 const ABSOLUTE_TOLERANCE: f64 = 2e-2;
@@ -166,7 +166,7 @@ pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladd
 
 /// A rung for forces with corners.
 fn at_corners(share: f64, accuracy: f64) -> Rung {
-    let relative = accuracy.min(COARSEST_TOLERANCE) * share;
+    let relative = accuracy.min(COARSEST_AT_CORNERS) * share;
     let absolute = ABSOLUTE_TOLERANCE * relative;
     Rung {
         level: Level::Additive,

@@ -4,16 +4,18 @@
 //! A lane group costs the same with one trajectory as with eight. So runs of one rung and model
 //! wait for each other, whichever rows they belong to, and a thread takes a group as soon as there
 //! is a whole one, the highest rung first: rows that are nearly done leave. Only when nothing more
-//! can come are groups taken that are not full.
+//! can come are groups taken that are not full. Where every trajectory has steps of its own, groups
+//! are larger, the longest trajectories first: a lane that ends early takes up the next.
 //!
 //! What a lane computes does not depend on its company, so neither does a row.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::Duration;
 
 use lane_ode::MAX_LANES;
-use washer_model::Point;
+use washer_model::{Method, Point};
 use washer_row::{Climbs, Demand, Ladder, Next, Outcome, Rule, Status, Trajectory};
 
 use super::{ModelEngine, Watch, growth};
@@ -23,12 +25,20 @@ use sweep_files::panics::lock;
 /// Points that are made ready together.
 const FED: usize = MAX_LANES;
 
-/// Rows that are on their way at once, beside those in the hands of threads: less than a group of
-/// each kind.
-pub(crate) const MOST_WAITING: usize = 12 * FED;
+/// Kinds of runs, of which less than a group waits each.
+const KINDS: usize = 12;
 
-/// Rows on their way in a thread's hands.
-pub(crate) const ROWS_A_THREAD: usize = FED;
+/// How many runs by a method a thread takes at once.
+fn group(method: &Method) -> usize {
+    if method.has_own_steps() { 4 * MAX_LANES } else { MAX_LANES }
+}
+
+impl ModelEngine<'_> {
+    /// Rows that are on their way at once, at most, on so many threads.
+    pub(crate) fn most_on_their_way(&self, threads: usize) -> usize {
+        (KINDS + threads) * group(&self.ladders()[0].rungs[0].method)
+    }
+}
 
 /// A row that has seen so many others come after it waits no longer: the group is taken as it is,
 /// so that chunks become whole and an interrupt loses little.
@@ -121,7 +131,10 @@ impl Pool<'_> {
     pub(super) fn work(&self) {
         while !self.watch.stopped() {
             let mut state = self.lock();
-            match state.choose() {
+            match state.choose(&|(model, rung)| {
+                let ladders = self.engine.ladders_under(self.watch);
+                ladders.map_or(MAX_LANES, |ladders| group(ladders[model].method(rung)))
+            }) {
                 Work::End => break,
                 Work::Wait => drop(self.shared.changed.wait_timeout(state, LOOK_UP)),
                 Work::Feed => {
@@ -235,14 +248,13 @@ impl Pool<'_> {
 }
 
 impl PoolState {
-    fn choose(&mut self) -> Work {
-        let full = |waiting: &Vec<u64>| waiting.len() >= MAX_LANES;
-        let best = self.waiting.iter().filter(|(_, waiting)| full(waiting)).map(|(kind, _)| *kind);
-        if let Some(kind) = best.max_by_key(|&(model, rung)| (rung, model)) {
-            return self.take(kind);
-        }
-        if let Some(kind) = self.overdue() {
-            return self.take(kind);
+    /// `group` says how many runs of a kind are taken at once.
+    fn choose(&mut self, group: &dyn Fn(ModelRung) -> usize) -> Work {
+        let is_full = |(kind, waiting): &(&ModelRung, &Vec<u64>)| waiting.len() >= group(**kind);
+        let best = self.waiting.iter().filter(is_full).map(|(kind, _)| *kind);
+        let overdue = || self.overdue();
+        if let Some(kind) = best.max_by_key(|&(model, rung)| (rung, model)).or_else(overdue) {
+            return self.take(kind, group(kind));
         }
         if !self.is_dry {
             return Work::Feed;
@@ -253,7 +265,8 @@ impl PoolState {
         match lowest {
             // What is at work below may fill the group.
             Some((_, rung)) if self.at_work.iter().any(|&level| level < Some(rung)) => Work::Wait,
-            Some(kind) => self.take(kind),
+            // The rest is for other threads.
+            Some(kind) => self.take(kind, self.waiting[&kind].len().div_ceil(2).max(MAX_LANES)),
             None if self.at_work.is_empty() => Work::End,
             None => Work::Wait,
         }
@@ -268,10 +281,12 @@ impl PoolState {
         overdue.map(|(kind, _)| *kind).max_by_key(|&(model, rung)| (rung, model))
     }
 
-    /// Takes a group of what waits, the first come first.
-    fn take(&mut self, kind: ModelRung) -> Work {
+    /// Takes a group of what waits, the first come, of these the longest first.
+    fn take(&mut self, kind: ModelRung, most: usize) -> Work {
         let waiting = self.waiting.entry(kind).or_default();
-        let positions: Vec<u64> = waiting.drain(..waiting.len().min(MAX_LANES)).collect();
+        let mut positions: Vec<u64> = waiting.drain(..waiting.len().min(most)).collect();
+        let steps = |id: &u64| self.rows.get(id).map(|row| row.climbs.steps(kind.0));
+        positions.sort_by_key(|id| Reverse(steps(id)));
         let point =
             |position: &u64| Some((*position, self.rows.get(position)?.point.clone().ok()?));
         Work::Runs(kind, positions.iter().filter_map(point).collect())

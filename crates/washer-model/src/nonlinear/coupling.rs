@@ -229,7 +229,7 @@ pub(crate) fn mass_scaled_system<T: Real>(
 }
 
 #[inline(always)]
-fn mass_scaled_load<T: Real>(
+pub(crate) fn mass_scaled_load<T: Real>(
     b: &Bodies<T>,
     (cap_squared, speed_squared): (N<T>, N<T>),
     deflection: &Deflection<T>,

@@ -43,14 +43,6 @@ impl<T: Real, const R: usize> Floating<T, R> {
         (self.force, self.torque) = self.under(load);
     }
 
-    /// The same half at rest and under no force: what is left answers loads on the axis alone.
-    #[inline(always)]
-    pub(crate) fn free_of_load(&self) -> Self {
-        let zero = self.per_mass.lit(0.0);
-        let none = [zero; 2];
-        Self { force: none, drift: none, axis_drift: none, torque: [zero; R], ..*self }
-    }
-
     /// Adds a unit of generalised force on a coordinate: y, z, then the rotations.
     #[inline(always)]
     pub(crate) fn push(&mut self, coordinate: usize) {

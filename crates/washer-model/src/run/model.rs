@@ -8,7 +8,7 @@ use crate::linear::rotor_terms::Terms;
 use crate::linear::step::{self, RotorAt, StepConstants};
 use crate::machine::spin::{SpinLanes, SpinState, SpinStretch};
 use crate::nonlinear;
-use crate::nonlinear::bearings::{Bearings, Factored, accelerations_with_bearings};
+use crate::nonlinear::ahead::derivative_ahead;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Caps, Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
@@ -17,7 +17,7 @@ use crate::nonlinear::frame::Tilt;
 use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
 use crate::point::Point;
 use core::f64::consts::FRAC_PI_2;
-use lane_ode::{Lane, N, Sample, Split, System, Task, Tolerance, additive, dopri5};
+use lane_ode::{Lane, N, Sample, SemiImplicit, System, Task, Tolerance, additive, dopri5};
 
 /// Coordinates farther than this from equilibrium (m) have left the machine.
 const FARTHEST_M: f64 = 10.0;
@@ -122,35 +122,18 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
     }
 }
 
-/// The bearings, which must be springs, are the stiff part.
-impl<T: Lane> Split<T, STATES> for Nonlinear<T> {
-    type Stiff = Bearings<T>;
-    type Factored = Factored<T>;
-
+/// The springs of bearings and hinge, which must not be capped, are the stiff part.
+impl<T: Lane> SemiImplicit<T, STATES> for Nonlinear<T> {
     #[inline(always)]
-    fn derivative_and_stiff(
+    fn derivative_ahead(
         &self,
         spin: &SpinState<T>,
         x: &[N<T>; STATES],
-    ) -> ([N<T>; STATES], Bearings<T>) {
-        let (q, u) = split(x);
-        let (a, bearings) = accelerations_with_bearings(&self.machine, spin, &q, &u);
-        (joined(&u, &a), bearings)
-    }
-
-    #[inline(always)]
-    fn factored(&self, bearings: &Bearings<T>, g_s: N<T>) -> Factored<T> {
-        bearings.factored(g_s)
-    }
-
-    #[inline(always)]
-    fn solve(
-        &self,
-        bearings: &Bearings<T>,
-        factored: &Factored<T>,
         r: &[N<T>; STATES],
-    ) -> ([N<T>; STATES], [N<T>; STATES]) {
-        bearings.solve(factored, r)
+        g_s: N<T>,
+    ) -> [N<T>; STATES] {
+        let (q, u) = split(x);
+        derivative_ahead(&self.machine, spin, &q, &u, r, g_s)
     }
 }
 

@@ -120,7 +120,7 @@ fn held_against<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N] {
 fn val_histories_with_every_element_match_independent_ones() {
     for name in ["friction", "stops", "gasket_cubic", "second_unbalance", "all"] {
         let rk4 = |step_s| Method::Rk4 { step_s };
-        let tolerance = Tolerance { relative: 1e-6, absolute: 1e-8, max_steps: 10_000_000 };
+        let tolerance = Tolerance { relative: 1e-7, absolute: 1e-9, max_steps: 10_000_000 };
         let methods = [rk4(1e-4), rk4(5e-5), Method::Additive(tolerance)];
         let [coarse, fine, additive] = held_against(name, methods);
         eprintln!(
