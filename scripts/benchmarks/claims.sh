@@ -9,6 +9,15 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 parts=("$@")
 [ $# -gt 0 ] || parts=(kernels methods elements points build peers)
+for part in "${parts[@]}"; do
+  case $part in
+    kernels | methods | elements | points | build | peers) ;;
+    *)
+      echo "$part: no such part" >&2
+      exit 2
+      ;;
+  esac
+done
 if ! git diff --quiet HEAD; then
   echo "there are changes that no commit has: figures would say they are of none" >&2
   exit 1
@@ -25,9 +34,5 @@ for part in "${parts[@]}"; do
       scripts/tools/python.sh scripts/benchmarks/costs.py "$sweep" "$part"
       ;;
     peers) scripts/peers/run.sh ;;
-    *)
-      echo "$part: no such part" >&2
-      exit 2
-      ;;
   esac
 done

@@ -14,7 +14,7 @@ const RESERVE: f64 = 2.5;
 pub struct Convergence {
     /// The error left as a share of the difference.
     pub contraction: f64,
-    /// The same of what caps alone err in.
+    /// The same of what caps move more than the motion.
     pub of_caps: f64,
     /// Up to which difference that is so. Beyond, errors are not of first order, and the difference
     /// itself counts.
