@@ -47,8 +47,8 @@ pub enum Method {
     /// Dormand-Prince 5(4).
     Dopri5(Tolerance),
     /// Kennedy and Carpenter's additive method of order 5(4), bearings and hinge implicit, for
-    /// forces with corners: its steps see these, and neither bearings nor hinge hold them short. The
-    /// linear model takes Dormand-Prince in its place.
+    /// forces with corners: its steps see these, and neither bearings nor hinge hold them short.
+    /// The linear model takes Dormand-Prince in its place.
     Additive(Tolerance),
     /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others.
     /// One trajectory at a time.
