@@ -517,7 +517,7 @@ fn what_caps_move_more_than_the_motion_keeps_their_share_of_the_error() {
 
 #[test]
 fn a_clash_by_a_micrometre_is_not_settled_by_the_share_of_caps() {
-    // Two capped rungs differ by 2.4 ms in a time of 45 ms, and the second is off by 6.6 ms.
+    // Two capped rungs differ by 2.4 ms in a time of 45 ms, and the second is off by 5.5 ms.
     let plan = load(
         "name = \"touch\"\nmetrics = [\"clash_time\"]\n\
          [set]\nradial_clearance_m = 8.00250089946135e-5\ndrum_mass_kg = 4.534164646399942\n\
