@@ -3,7 +3,7 @@
 use washer_model::{Channel, ModelKind, Point, Swing};
 
 use crate::ladder::{Ladder, Rung};
-use crate::measures::{CREEPING_M_PER_S, Floor, Measured, Metric, TURN_FLOOR};
+use crate::measures::{CREEPING_M_PER_S, Floor, Metric, TURN_FLOOR};
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::run::{Rule, RungRun};
 use crate::twin::Departure;
@@ -390,13 +390,10 @@ fn difference(
 fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
     let share = |swing: &Swing| of_motion(&swing.channels, &run.trajectory, rule);
     let of_swings = of_ringing(rung, point, rule, |_| point.window_s(), share);
-    let metrics = rule.measures.of_model().zip(&run.trajectory.metrics);
-    let of_clash = metrics.filter(|(number, _)| number.metric == Metric::ClashTime);
-    let clash_s = of_clash.map(|(_, time)| *time);
-    let of_clash = clash_s
-        .zip(run.clash_doubt_s)
-        .map(|(time_s, doubt_s)| doubt_s / time_s.max(clash_floor_s(rule)));
-    of_clash.fold(of_swings, f64::max)
+    let of_clash = clash_s(&run.trajectory, rule).zip(run.clash_doubt_s);
+    of_clash.map_or(of_swings, |(time_s, doubt_s)| {
+        of_swings.max(doubt_s / time_s.max(clash_floor_s(rule)))
+    })
 }
 
 /// What caps make of the time of a clash that just happens, by its difference from the run before:
@@ -405,12 +402,9 @@ fn of_clash(before: &RungRun, run: &RungRun, rung: &Rung, rule: &Rule) -> f64 {
     if !rung.level.is_capped() {
         return 0.0;
     }
-    let metrics = before.trajectory.metrics.iter().zip(&run.trajectory.metrics);
-    let of_clash = |((a_s, b_s), number): ((&f64, &f64), Measured)| {
-        let is_clash = number.metric == Metric::ClashTime;
-        is_clash.then(|| CLASH_WEIGHT * (a_s - b_s).abs() / b_s.max(clash_floor_s(rule)))
-    };
-    metrics.zip(rule.measures.of_model()).filter_map(of_clash).fold(0.0, f64::max)
+    let times_s = clash_s(&before.trajectory, rule).zip(clash_s(&run.trajectory, rule));
+    times_s
+        .map_or(0.0, |(a_s, b_s)| CLASH_WEIGHT * (a_s - b_s).abs() / b_s.max(clash_floor_s(rule)))
 }
 
 /// What the gap rings where it may be least, as a share of the clearance. No motion amplifies it.
@@ -462,6 +456,12 @@ fn of_motion(deviations: &[f64; Channel::ALL.len()], numbers: &Trajectory, rule:
         channels().map(|channel| share(channel, turn[channel.index()].max(TURN_FLOOR)))
     });
     of_amplitudes.chain(of_turns).fold(0.0, f64::max)
+}
+
+/// The time of a clash, if the row has it.
+fn clash_s(numbers: &Trajectory, rule: &Rule) -> Option<f64> {
+    let mut metrics = rule.measures.of_model().zip(&numbers.metrics);
+    metrics.find(|(number, _)| number.metric == Metric::ClashTime).map(|(_, time_s)| *time_s)
 }
 
 /// A clash that just happens is a time that just is not zero: shorter ones are compared with this.

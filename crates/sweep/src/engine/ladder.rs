@@ -121,8 +121,9 @@ const SHARES_AT_CORNERS: [f64; 4] = [0.03, 0.003, 0.0003, 0.00003];
 /// Absolute error per step (m, rad, m/s, rad/s) over the relative one.
 const ABSOLUTE_TOLERANCE: f64 = 2e-2;
 
-/// Error of a rung of the additive method as a share of its difference from the one before: a tenth
-/// mostly, but two rungs may meet by chance, and 2.8 was seen.
+/// Error of a rung of the additive method as a share of its difference from the one before. Of 615
+/// pairs in `sweeps/friction.toml` half have less than 0.06 and 95 % less than 0.34, but two rungs
+/// may meet by chance: three have more than 2, and one 10.
 const CONTRACTION_AT_CORNERS: f64 = 2.0;
 
 /// A contraction better than this is not believed.
