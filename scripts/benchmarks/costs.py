@@ -106,7 +106,7 @@ def elements(sweep, folder):
         f"A row of `sweeps/friction.toml` takes {figure(ratio)} times as long as one of "
         f"`sweeps/fig12.toml` ({figure(per_row_ms['friction'])} and "
         f"{figure(per_row_ms['fig12'])} core-milliseconds, three runs of each in turns): "
-        "friction's corners take short steps. Core-seconds:",
+        "each hard hit of a stop amplifies errors, which takes short steps. Core-seconds:",
         table(["element", *(f"`{name}`" for name in commands)], rows),
         said(),
     )
