@@ -37,6 +37,12 @@ cargo bench --no-run
   echo "\`scripts/benchmarks/kernel_profile.py\`"
   echo
   python3 scripts/benchmarks/kernel_profile.py
+  echo
+  echo "## What a step misses"
+  echo
+  echo "\`scripts/benchmarks/cache_misses.py\`"
+  echo
+  python3 scripts/benchmarks/cache_misses.py
 } > "$out.partial"
 mv "$out.partial" "$out"
 echo "$out"
