@@ -151,10 +151,10 @@ pub(crate) fn tub<T: Lane>(
     let motion = tilt.motion(u[TUB_YAW], u[TUB_PITCH]);
     let [x, y, z] = motion.rate;
     let (force, moment) = machine.elements.on_tub(&TubMotion {
-        tilt: &tilt,
+        tilt,
         midpoint: [q[TUB_Y], q[TUB_Z]],
         midpoint_velocity: [u[TUB_Y], u[TUB_Z]],
-        rate: &motion.rate,
+        rate: motion.rate,
     });
     // y and z, cabinet axes.
     let force = [

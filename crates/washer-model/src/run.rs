@@ -1,6 +1,5 @@
 //! Trajectories: points run through the lanes of an integrator, and their records.
 
-mod cabinet_force;
 mod course;
 pub(crate) mod equations;
 pub(crate) mod extras;

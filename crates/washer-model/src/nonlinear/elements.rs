@@ -81,7 +81,7 @@ impl<T: Lane> Elements<T> {
     /// Force of all elements on the tub, and its moment about the bearing midpoint P_T; in tub
     /// axes, where their tub ends are fixed.
     #[inline(always)]
-    pub(crate) fn on_tub(&self, tub: &TubMotion<'_, T>) -> (Vec3<T>, Vec3<T>) {
+    pub(crate) fn on_tub(&self, tub: &TubMotion<T>) -> (Vec3<T>, Vec3<T>) {
         let zero = tub.midpoint[0].lit(0.0);
         let mut load = ([zero; 3], [zero; 3]);
         add(&mut load, &self.springs, tub, &());
@@ -89,10 +89,9 @@ impl<T: Lane> Elements<T> {
             add(&mut load, &self.dampers, tub, &tub.midpoint_velocity_in_tub());
         }
         if self.has_further.holds() {
-            // Copies: what is lent to a function must lie in memory, on every path.
+            // A copy: what is lent to a function must lie in memory, on every path.
             let mut whole = load;
-            let (tilt, rate) = (*tub.tilt, *tub.rate);
-            let motion = TubMotion { tilt: &tilt, rate: &rate, ..*tub };
+            let motion = *tub;
             zero.0.aside(Further { elements: self, tub: &motion, load: &mut whole });
             load = whole;
         }
@@ -103,7 +102,7 @@ impl<T: Lane> Elements<T> {
 impl<T: Lane> Elements<T> {
     /// How deep a stop's tub point is in it (m; below zero it is open), and its push (N).
     #[inline(always)]
-    pub(crate) fn stop(&self, number: usize, tub: &TubMotion<'_, T>) -> [N<T>; 2] {
+    pub(crate) fn stop(&self, number: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let stop = &self.stops[number];
         let point = tub.point(&stop.tub, &tub.midpoint_velocity_in_tub());
         [stop.depth(&point), stop.push(&point)]
@@ -111,10 +110,10 @@ impl<T: Lane> Elements<T> {
 
     /// The speed along a damper (m/s).
     #[inline(always)]
-    pub(crate) fn damper_speed(&self, number: usize, tub: &TubMotion<'_, T>) -> N<T> {
+    pub(crate) fn damper_speed(&self, number: usize, tub: &TubMotion<T>) -> N<T> {
         let ends = &self.dampers[number].ends;
-        let span = span(tub.tilt, &tub.midpoint, ends);
-        let velocity = plus_cross(&tub.midpoint_velocity_in_tub().0, tub.rate, &ends.tub);
+        let span = span(&tub.tilt, &tub.midpoint, ends);
+        let velocity = plus_cross(&tub.midpoint_velocity_in_tub().0, &tub.rate, &ends.tub);
         dot(&span, &velocity) / dot(&span, &span).sqrt()
     }
 }
@@ -123,7 +122,7 @@ impl<T: Lane> Elements<T> {
 /// zero, so that no machine's bits depend on those in the other lanes.
 struct Further<'a, T> {
     elements: &'a Elements<T>,
-    tub: &'a TubMotion<'a, T>,
+    tub: &'a TubMotion<T>,
     load: &'a mut (Vec3<T>, Vec3<T>),
 }
 
@@ -367,71 +366,59 @@ pub(crate) trait MovingLine<T>: Line<T> {
     fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T>;
 }
 
-/// An element between two points.
-pub(crate) trait Element<T> {
+/// The law of an element between two points: its force by the line between them.
+pub(crate) trait Law<T, L> {
     /// The points.
     fn ends(&self) -> &Ends<T>;
-}
-
-/// The law of an element: its force by a line.
-pub(crate) trait Law<T, L>: Element<T> {
     /// The force that drives the ends apart, in the line's measure.
     fn push(&self, line: &L) -> N<T>;
 }
 
-impl<T> Element<T> for SpringOf<T> {
+impl<T: Real, L: Line<T>> Law<T, L> for SpringOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
-}
 
-impl<T: Real, L: Line<T>> Law<T, L> for SpringOf<T> {
     #[inline(always)]
     fn push(&self, line: &L) -> N<T> {
         line.less_length(self.stiffness_times_free_length, self.stiffness)
     }
 }
 
-impl<T> Element<T> for DamperOf<T> {
+/// Eqs. 33 to 35: F = -C (v . n) n.
+impl<T: Real, L: MovingLine<T>> Law<T, L> for DamperOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
-}
 
-/// Eqs. 33 to 35: F = -C (v . n) n.
-impl<T: Real, L: MovingLine<T>> Law<T, L> for DamperOf<T> {
     #[inline(always)]
     fn push(&self, line: &L) -> N<T> {
         -line.times_rate(self.damping)
     }
 }
 
-impl<T> Element<T> for StiffeningOf<T> {
+/// F = -k_3 e^3, e the elongation.
+impl<T: Real, L: Line<T>> Law<T, L> for StiffeningOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
-}
 
-/// F = -k_3 e^3, e the elongation.
-impl<T: Real, L: Line<T>> Law<T, L> for StiffeningOf<T> {
     #[inline(always)]
     fn push(&self, line: &L) -> N<T> {
         -line.times_cube(self.cubic, self.free_length)
     }
 }
 
-impl<T> Element<T> for FrictionOf<T> {
+/// F = -F_f v / sqrt(v^2 + v_s^2), v the speed along the damper.
+impl<T: Real, L: MovingLine<T>> Law<T, L> for FrictionOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
-}
 
-/// F = -F_f v / sqrt(v^2 + v_s^2), v the speed along the damper.
-impl<T: Real, L: MovingLine<T>> Law<T, L> for FrictionOf<T> {
     #[inline(always)]
     fn push(&self, line: &L) -> N<T> {
         -line.times_sense(self.force, self.speed_squared)
@@ -440,20 +427,29 @@ impl<T: Real, L: MovingLine<T>> Law<T, L> for FrictionOf<T> {
 
 /// The tub at an instant.
 #[derive(Clone, Copy)]
-pub(crate) struct TubMotion<'a, T> {
-    pub(crate) tilt: &'a Tilt<T>,
+pub(crate) struct TubMotion<T> {
+    pub(crate) tilt: Tilt<T>,
     /// P_T along c2 and c3 (m), and its velocity.
     pub(crate) midpoint: [N<T>; 2],
     pub(crate) midpoint_velocity: [N<T>; 2],
     /// Angular velocity, tub axes.
-    pub(crate) rate: &'a Vec3<T>,
+    pub(crate) rate: Vec3<T>,
 }
 
-impl<T: Real> TubMotion<'_, T> {
+impl<T: Real> TubMotion<T> {
+    /// At the tub's coordinates (m, rad) and their speeds, both in the order of
+    /// [`TUB`](crate::coordinates::TUB).
+    #[inline(always)]
+    pub(crate) fn new(q: &[N<T>; 4], u: &[N<T>; 4]) -> Self {
+        let tilt = Tilt::new(q[2], q[3]);
+        let rate = tilt.motion(u[2], u[3]).rate;
+        Self { tilt, midpoint: [q[0], q[1]], midpoint_velocity: [u[0], u[1]], rate }
+    }
+
     #[inline(always)]
     fn midpoint_velocity_in_tub(&self) -> MidpointVelocity<T> {
         let [vy, vz] = self.midpoint_velocity;
-        let tilt = self.tilt;
+        let tilt = &self.tilt;
         MidpointVelocity([
             tilt.axis_c[1] * vy + tilt.axis_c[2] * vz,
             tilt.second_c[1] * vy + tilt.second_c[2] * vz,
@@ -467,7 +463,7 @@ impl<T: Real> TubMotion<'_, T> {
         let mut displacement = difference(self.tilt.in_cabinet_axes(tub), tub);
         displacement[1] += self.midpoint[0];
         displacement[2] += self.midpoint[1];
-        let velocity = self.tilt.in_cabinet_axes(&plus_cross(&velocity.0, self.rate, tub));
+        let velocity = self.tilt.in_cabinet_axes(&plus_cross(&velocity.0, &self.rate, tub));
         PointMotion { displacement, velocity }
     }
 }
@@ -558,15 +554,15 @@ impl<T: Real> MovingLine<T> for CabinetLine<T> {
 fn add<'a, T: Real, V, E: Law<T, TubLine<'a, T, V>>>(
     load: &mut (Vec3<T>, Vec3<T>),
     elements: &'a [E],
-    tub: &TubMotion<'a, T>,
+    tub: &'a TubMotion<T>,
     velocity: &'a V,
 ) {
     for element in elements {
         let ends = element.ends();
         let line = TubLine {
-            span: span(tub.tilt, &tub.midpoint, ends),
+            span: span(&tub.tilt, &tub.midpoint, ends),
             end: &ends.tub,
-            rate: tub.rate,
+            rate: &tub.rate,
             velocity,
         };
         let force = scaled(element.push(&line), line.span);

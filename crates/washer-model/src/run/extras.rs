@@ -3,7 +3,6 @@
 //! They are computed in the lanes, step by step, in a function of their own ([`Lane::aside`]), so
 //! that the loop over steps does not change where they are not in use.
 
-use super::cabinet_force::GreatestForce;
 use super::loads::{Loads, StopLoad};
 use super::snapshots::{Snapshot, Snapshots};
 use super::{Course, Method};
@@ -126,7 +125,6 @@ pub(crate) struct Extras<T> {
     wanted: Wanted,
     squares: SquareIntegrals<T, CHANNELS>,
     turns: PartPeaks<T, CHANNELS>,
-    force: Option<GreatestForce<T>>,
     loads: Option<Loads<T>>,
     /// With the clearance as it is; where modes are capped, also with less and more, by what
     /// ringing may add to the gap.
@@ -154,23 +152,12 @@ impl<T: Lane> Extras<T> {
             return None;
         }
         let Instants { parts, clearances } = instants;
-        let force = if wanted.cabinet_force {
-            Some(GreatestForce::new(zero, model, point, parts))
-        } else {
-            None
-        };
-        let loads = if wanted.stops || wanted.feet || wanted.damper_speeds {
-            Some(Loads::new(zero, model, point, parts, wanted.damper_speeds))
-        } else {
-            None
-        };
         let snapshots = if wanted.snapshots { Some(Snapshots::new(zero)) } else { None };
         Some(Self {
             wanted,
             squares: SquareIntegrals::new(zero),
             turns: PartPeaks::new(zero),
-            force,
-            loads,
+            loads: Loads::new(zero, wanted, model, point, parts),
             clash: [TimeAbove::new(zero); 3],
             clearances_squared: [zero; 3],
             clearances,
@@ -192,9 +179,6 @@ impl<T: Lane> Extras<T> {
         if self.wanted.turns {
             self.turns.reset(lane, &cuts_s(&point.stretches, point.window_s()));
         }
-        if let Some(force) = &mut self.force {
-            force.set_point(lane, point);
-        }
         if let Some(loads) = &mut self.loads {
             loads.set_point(lane, point);
         }
@@ -215,23 +199,19 @@ impl<T: Lane> Extras<T> {
         let mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let wanted = self.wanted;
         let [clash_s, longer_s, shorter_s] = self.clash.map(|clash| clash.lane(lane));
-        let loads = self.loads.as_ref();
-        self.found[index] = Extra {
-            stops: loads.map_or_else(Vec::new, |loads| loads.stops(lane)),
-            foot_loads_n: loads.map_or_else(Vec::new, |loads| loads.foot_loads_n(lane)),
-            slip_margin_n: loads.and_then(|loads| loads.slip_margin_n(lane)),
-            walk_margin_n: loads.and_then(|loads| loads.walk_margin_n(lane)),
-            damper_speeds_m_per_s: loads
-                .map_or_else(Vec::new, |loads| loads.damper_speeds_m_per_s(lane)),
+        let extra = &mut self.found[index];
+        *extra = Extra {
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),
             turns,
-            cabinet_force_n: self.force.as_ref().map(|force| force.lane_n(lane)),
             clash_time_s: wanted.clash_time.then_some(clash_s),
             clash_doubt_s: (wanted.clash_time && self.clearances > 1)
                 .then_some((longer_s - clash_s).max(clash_s - shorter_s)),
-            course: Course::new(),
             snapshots,
+            ..Extra::default()
         };
+        if let Some(loads) = &self.loads {
+            loads.finish(lane, point, extra);
+        }
     }
 }
 
@@ -266,9 +246,6 @@ impl<T: Lane> Aside for Seen<'_, T> {
                 Some((end_s, length_s)) => extras.turns.advance(end_s, length_s, channels, inside),
                 None => extras.turns.begin(channels, inside),
             }
-        }
-        if let Some(force) = &mut extras.force {
-            force.see(step, x, dx, inside);
         }
         if let Some(loads) = &mut extras.loads {
             loads.see(step, x, dx, inside);

@@ -1,9 +1,9 @@
 //! The steepest that a machine's elements can be: linear ones that bound the stiffness and damping
 //! of all elements, so that the choice of steps sees friction, stops and stiffening springs.
 
-use crate::coordinates::{COORDINATES, TUB_Y, TUB_Z};
+use crate::coordinates::{COORDINATES, TUB};
 use crate::nonlinear::elements::{Elements, MidpointVelocity, StopOf, TubMotion};
-use crate::nonlinear::frame::{Tilt, difference, dot};
+use crate::nonlinear::frame::{difference, dot};
 use lane_ode::N;
 
 /// How far tub points move from where they rest (m): more than any machine has room for.
@@ -20,15 +20,8 @@ impl Elements<f64> {
             return None;
         }
         let mut steepest = self.clone();
-        let q = q.map(N);
-        let still = [N(0.0); 3];
-        let tub = TubMotion {
-            tilt: &Tilt::of_tub(&q),
-            midpoint: [q[TUB_Y], q[TUB_Z]],
-            midpoint_velocity: [N(0.0); 2],
-            rate: &still,
-        };
-        let at_rest = MidpointVelocity(still);
+        let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
+        let at_rest = MidpointVelocity([N(0.0); 3]);
         for (spring, stiffening) in steepest.springs.iter_mut().zip(&mut steepest.stiffenings) {
             let ends = &spring.ends;
             let place = tub.point(&ends.tub, &at_rest).displacement;

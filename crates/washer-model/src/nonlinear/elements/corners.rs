@@ -14,7 +14,7 @@ lane_struct! {
 impl<T: Lane> Elements<T> {
     /// The motions, depth (m) and speed (m/s) of each; a friction's has no depth.
     #[inline(always)]
-    pub(crate) fn at_corners(&self, tub: &TubMotion<'_, T>) -> Vec<[N<T>; 2]> {
+    pub(crate) fn at_corners(&self, tub: &TubMotion<T>) -> Vec<[N<T>; 2]> {
         let mut motions = Vec::with_capacity(self.frictions.len() + self.stops.len());
         for number in 0..self.frictions.len() {
             motions.push([tub.midpoint[0].lit(0.0), self.damper_speed(number, tub)]);
