@@ -96,7 +96,7 @@ impl Lane for f64 {
     }
     #[inline(always)]
     fn aside<W: Aside>(self, work: W) -> W::Output {
-        Simd::aside(work)
+        Simd::one_lane(work)
     }
 }
 

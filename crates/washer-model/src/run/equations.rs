@@ -9,7 +9,7 @@ use crate::nonlinear::coupling::Coupling;
 use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::tangent::Tangent;
-use lane_ode::{Dual, N, Partials, ScalarKernel, Simd};
+use lane_ode::{Aside, Dual, N, Partials, Simd};
 use std::sync::Arc;
 
 /// Numbers of a state: the ten coordinates q1 to q10 (m, rad), then their speeds.
@@ -144,7 +144,7 @@ struct Derivative<'a, M> {
     x: &'a [f64; STATES],
 }
 
-impl<M: Model<f64>> ScalarKernel for Derivative<'_, M> {
+impl<M: Model<f64>> Aside for Derivative<'_, M> {
     type Output = [f64; STATES];
     #[inline(always)]
     fn run(self) -> [f64; STATES] {
@@ -159,7 +159,7 @@ struct Jacobian<'a, J> {
     x: &'a [f64; STATES],
 }
 
-impl<J: Model<Dual<f64>>> ScalarKernel for Jacobian<'_, J> {
+impl<J: Model<Dual<f64>>> Aside for Jacobian<'_, J> {
     type Output = Partials<COORDINATES>;
     #[inline(always)]
     fn run(self) -> Partials<COORDINATES> {
@@ -175,7 +175,7 @@ struct Outputs<'a, M> {
     x: &'a [f64; STATES],
 }
 
-impl<M: Model<f64>> ScalarKernel for Outputs<'_, M> {
+impl<M: Model<f64>> Aside for Outputs<'_, M> {
     type Output = ([f64; CHANNELS], [f64; CHANNELS]);
     #[inline(always)]
     fn run(self) -> Self::Output {

@@ -20,8 +20,8 @@ use crate::run::suspension::{Forces, forces};
 use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, first_step};
 use core::marker::PhantomData;
 use lane_ode::{
-    Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, ScalarKernel, Simd,
-    Step, Task, Tolerance, rodas,
+    Aside, Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, Simd, Step,
+    Task, Tolerance, rodas,
 };
 
 /// An instant this share of a step past its end is its end.
@@ -265,7 +265,7 @@ impl<F: Family, S: Stepper> Kernel for Sample<'_, F, S> {
     }
 }
 
-impl<F: Family, S: Stepper> ScalarKernel for Sample<'_, F, S> {
+impl<F: Family, S: Stepper> Aside for Sample<'_, F, S> {
     type Output = Vec<States>;
 
     #[inline(always)]
@@ -282,7 +282,7 @@ struct StiffSample<'a, F> {
     family: PhantomData<F>,
 }
 
-impl<F: Family> ScalarKernel for StiffSample<'_, F> {
+impl<F: Family> Aside for StiffSample<'_, F> {
     type Output = Vec<States>;
 
     #[inline(always)]

@@ -13,7 +13,7 @@ use crate::run::model::{Model, Nonlinear};
 use core::f64::consts::TAU;
 use faer::linalg::solvers::Solve as _;
 use faer::{Mat, Side};
-use lane_ode::{Kernel, Lane, N, ScalarKernel, Simd, System};
+use lane_ode::{Aside, Kernel, Lane, N, Simd, System};
 
 /// A stretch of time in which a run crosses a band of speeds.
 #[derive(Clone, Copy, Debug)]
@@ -206,7 +206,7 @@ struct Run<'a> {
     start: &'a [f64; STATES],
 }
 
-impl ScalarKernel for Run<'_> {
+impl Aside for Run<'_> {
     type Output = Followed;
 
     #[inline(always)]
