@@ -11,10 +11,10 @@ pub(crate) mod stepper;
 pub(crate) mod stiff;
 pub(crate) mod suspension;
 mod tangent;
+pub(crate) mod wanted;
 
-pub use extras::{Extra, Wanted};
-pub use loads::StopLoad;
 pub use snapshots::Snapshot;
+pub use wanted::{Extra, StopLoad, Wanted};
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};

@@ -3,8 +3,9 @@
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::kind::ModelKind;
-use crate::run::extras::{Extra, Extras, Instants, Wanted};
+use crate::run::extras::{Extras, Instants};
 use crate::run::model::Nonlinear;
+use crate::run::wanted::{Extra, Wanted};
 use crate::stability::orbit::{Row, Watched, clock, model};
 use crate::stability::turn::turn;
 use lane_ode::{Kernel, Lane, N, Simd, System as _};

@@ -149,7 +149,7 @@ impl<M: Model<f64>> Aside for Derivative<'_, M> {
     #[inline(always)]
     fn run(self) -> [f64; STATES] {
         let forcing = self.model.forcing(N(self.t_s));
-        plain(&self.model.derivative(&forcing, &numbers(self.x)))
+        self.model.derivative(&forcing, &self.x.map(N)).map(|N(rate)| rate)
     }
 }
 
@@ -164,7 +164,7 @@ impl<J: Model<Dual<f64>>> Aside for Jacobian<'_, J> {
     #[inline(always)]
     fn run(self) -> Partials<COORDINATES> {
         let mut partials = Partials::zero();
-        self.tangent.partials(self.t_s, &numbers(self.x), &mut partials);
+        self.tangent.partials(self.t_s, &self.x.map(N), &mut partials);
         partials
     }
 }
@@ -179,7 +179,7 @@ impl<M: Model<f64>> Aside for Outputs<'_, M> {
     type Output = ([f64; CHANNELS], [f64; CHANNELS]);
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let x = numbers(self.x);
+        let x = self.x.map(N);
         let forcing = self.model.forcing(N(self.t_s));
         let dx = self.model.derivative(&forcing, &x);
         let (mut values, mut rates) = ([0.0; CHANNELS], [0.0; CHANNELS]);
@@ -191,22 +191,4 @@ impl<M: Model<f64>> Aside for Outputs<'_, M> {
         }
         (values, rates)
     }
-}
-
-#[inline(always)]
-fn numbers(x: &[f64; STATES]) -> [N<f64>; STATES] {
-    let mut numbers = [N(0.0); STATES];
-    for i in 0..STATES {
-        numbers[i] = N(x[i]);
-    }
-    numbers
-}
-
-#[inline(always)]
-fn plain(x: &[N<f64>; STATES]) -> [f64; STATES] {
-    let mut plain = [0.0; STATES];
-    for i in 0..STATES {
-        plain[i] = x[i].0;
-    }
-    plain
 }

@@ -3,8 +3,8 @@
 //! The laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers for
 //! their rates; the linear model's are first order in its deviations from equilibrium.
 
-use super::extras::{Extra, Wanted};
-use super::suspension::forces;
+use super::suspension::{deviating, dual, forces, on_cabinet};
+use super::wanted::{Extra, StopLoad, Wanted};
 use crate::coordinates::{COORDINATES, STATES, TUB};
 use crate::kind::ModelKind;
 use crate::lanes::{Constant as _, InLanes as _};
@@ -13,15 +13,6 @@ use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::{Vec3, dot};
 use crate::point::Point;
 use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
-
-/// The record of one stop.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StopLoad {
-    /// Its greatest push (N).
-    pub push_n: f64,
-    /// How long it is closed (s).
-    pub contact_s: f64,
-}
 
 /// Least values are found as greatest distances below this (N), farther than any load.
 const FAR_N: f64 = 1_048_576.0;
@@ -33,56 +24,6 @@ const LEAST_SQUARED_N2: f64 = 1e-18;
 const SLIP: usize = FEET;
 /// The margin against walking, after that.
 const WALK: usize = FEET + 1;
-
-/// Force (N) and moment about O (N m) of the suspension on the cabinet, cabinet axes, from what is
-/// on the tub.
-#[inline(always)]
-fn on_cabinet<T: Lane>(tub: &TubMotion<T>, (force, moment): &(Vec3<T>, Vec3<T>)) -> [N<T>; LOAD] {
-    let [fx, fy, fz] = tub.tilt.in_cabinet_axes(force);
-    let [mx, my, mz] = tub.tilt.in_cabinet_axes(moment);
-    let [y, z] = tub.midpoint;
-    // What is on the tub, turned round; P_T is at (0, y, z).
-    [-fx, -fy, -fz, -(mx + (y * fz - z * fy)), -(my + z * fx), -(mz - y * fx)]
-}
-
-fn dual(value: f64, slope: f64) -> N<Dual<f64>> {
-    N(Dual { value, slope })
-}
-
-/// The tub at equilibrium, with its first-order deviation.
-fn deviating(point: &Point, deviations: &[f64; STATES]) -> TubMotion<Dual<f64>> {
-    TubMotion::new(
-        &TUB.map(|q| dual(point.equilibrium[q], deviations[q])),
-        &TUB.map(|q| dual(0.0, deviations[COORDINATES + q])),
-    )
-}
-
-/// What the suspension puts on the cabinet at a state: whole coordinates of the nonlinear model,
-/// deviations of the linear one.
-pub(crate) fn load_on_cabinet(
-    point: &Point,
-    model: ModelKind,
-    state: &[f64; STATES],
-) -> [f64; LOAD] {
-    let elements = &point.machine.elements;
-    let (elements, tub) = match model {
-        ModelKind::Nonlinear => {
-            let [q, u] = [0, COORDINATES].map(|first| TUB.map(|q| dual(state[first + q], 0.0)));
-            (elements.constant(), TubMotion::new(&q, &u))
-        }
-        ModelKind::Linear => (elements.with_viscous_friction().constant(), deviating(point, state)),
-    };
-    let load = on_cabinet(&tub, &elements.on_tub(&tub));
-    load.map(|N(first_order)| first_order.value + first_order.slope)
-}
-
-/// The speed along each damper (m/s) by the linear model, at deviations from equilibrium.
-pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -> Vec<f64> {
-    let elements = point.machine.elements.constant();
-    let tub = deviating(point, deviations);
-    let speed = |number| elements.damper_speed(number, &tub).0.slope;
-    (0..elements.dampers.len()).map(speed).collect()
-}
 
 /// First order of something in the tub's deviations from equilibrium.
 #[derive(Clone, Copy)]
@@ -389,26 +330,22 @@ impl<T: Lane> Loads<T> {
             }
         }
         if recorded.force {
-            see(&mut self.force_squared, step_s, squared, counts);
+            see(&mut self.force_squared, step_s, &[squared], counts);
         }
         if let Some(spread) = &self.spread {
-            let below = below(spread, &self.numbers);
-            match step_s {
-                Some(step_s) => self.below.advance_by_slopes(step_s, &below, counts),
-                None => self.below.begin(&below, counts),
-            }
+            see(&mut self.below, step_s, &below(spread, &self.numbers), counts);
         }
         let (of_stops, of_dampers) = self.numbers[LOAD..].split_at(2 * self.stops.len());
         for (stop, of_stop) in self.stops.iter_mut().zip(of_stops.chunks(2)) {
             let depth = sample(of_stop[0]);
-            see(&mut stop.push, step_s, sample(of_stop[1]), counts);
+            see(&mut stop.push, step_s, &[sample(of_stop[1])], counts);
             match step_s {
                 Some(step_s) => stop.contact.advance_by_slopes(step_s, &depth, counts),
                 None => stop.contact.begin(&depth),
             }
         }
         for (peaks, speed) in self.speeds.iter_mut().zip(of_dampers) {
-            see(peaks, step_s, sample(*speed), counts);
+            see(peaks, step_s, &[sample(*speed)], counts);
         }
     }
 }
@@ -437,12 +374,17 @@ fn below<T: Lane>(spread: &Spread<T>, load: &[N<Dual<T>>]) -> [Sample<T>; FEET +
     below
 }
 
-/// Shows a number to its peaks: after a step of a length (s), or where a leg begins.
+/// Shows numbers to their peaks: after a step of a length (s), or where a leg begins.
 #[inline(always)]
-fn see<T: Lane>(peaks: &mut Peaks<T, 1>, step_s: Option<N<T>>, sample: Sample<T>, counts: T::Mask) {
+fn see<T: Lane, const M: usize>(
+    peaks: &mut Peaks<T, M>,
+    step_s: Option<N<T>>,
+    samples: &[Sample<T>; M],
+    counts: T::Mask,
+) {
     match step_s {
-        Some(step_s) => peaks.advance_by_slopes(step_s, &[sample], counts),
-        None => peaks.begin(&[sample], counts),
+        Some(step_s) => peaks.advance_by_slopes(step_s, samples, counts),
+        None => peaks.begin(samples, counts),
     }
 }
 

@@ -12,7 +12,7 @@ use crate::fast::SUSPENSION_MODES;
 use crate::modes::modes;
 use crate::point::Point;
 use crate::run::model::{Model, Nonlinear};
-use crate::run::suspension::{Attachments, attachments};
+use crate::run::suspension::attachments;
 use core::f64::consts::TAU;
 use faer::Mat;
 
@@ -316,19 +316,18 @@ impl Look<'_> {
 /// What of the machine's geometry a motion passes.
 fn beyond(point: &Point, seen: &Seen) -> Option<Beyond> {
     let rest = attachments(point, point.equilibrium());
-    let is_past = |of: fn(&Attachments) -> &Vec<[f64; 3]>| {
+    let is_past = |kind: usize| {
         seen.states.iter().any(|state| {
-            let q = core::array::from_fn(|i| state[i]);
-            let now = attachments(point, &q);
-            of(&now).iter().zip(of(&rest)).any(|(now, rest)| {
+            let now = attachments(point, &core::array::from_fn(|i| state[i]));
+            now[kind].iter().zip(&rest[kind]).any(|(now, rest)| {
                 let along: f64 = now.iter().zip(rest).map(|(a, b)| a * b).sum();
                 along.is_nan() || along <= 0.0
             })
         })
     };
-    if is_past(|ends| &ends.springs) {
+    if is_past(0) {
         Some(Beyond::SpringHooks)
-    } else if is_past(|ends| &ends.dampers) {
+    } else if is_past(1) {
         Some(Beyond::DamperEnds)
     } else if seen.gap_m.is_nan() || seen.gap_m <= 0.0 {
         Some(Beyond::Clearance)
