@@ -89,8 +89,7 @@ impl<T: Real> Axes<T> {
         let of_tub = tub.motion(u[TUB_YAW], u[TUB_PITCH]);
         let shaft = Tilt::of_shaft(q);
         let of_shaft = shaft.motion(u[SHAFT_YAW], u[SHAFT_PITCH]);
-        let hinge = Hinge::new(q[HINGE_YAW], q[HINGE_PITCH]);
-        let (s9, c9) = hinge.first;
+        let (s9, c9) = q[HINGE_YAW].sin_cos();
 
         // Angular velocity and acceleration: shaft in S, then drum in E; as in `nonlinear::rotor`,
         // with u' now.
@@ -116,7 +115,7 @@ impl<T: Real> Axes<T> {
                 s9 * alpha_s[0] + c9 * alpha_s[2] + u9 * ex + a[HINGE_PITCH],
             ],
         ];
-        let (s10, c10) = hinge.second;
+        let (s10, c10) = q[HINGE_PITCH].sin_cos();
         let zero = s9.lit(0.0);
         Self {
             tub_turn: [of_tub.rate, angular_acceleration(&tub, &of_tub, a[TUB_YAW], a[TUB_PITCH])],
@@ -133,8 +132,8 @@ impl<T: Real> Axes<T> {
                 [a[SHAFT_YAW], a[SHAFT_PITCH]],
             ),
             drum: [
-                drum_course(&shaft, spin, &hinge, &turn, &[c10, s10, zero]),
-                drum_course(&shaft, spin, &hinge, &turn, &[-s10, c10, zero]),
+                drum_course(&shaft, spin, (s9, c9), &turn, &[c10, s10, zero]),
+                drum_course(&shaft, spin, (s9, c9), &turn, &[-s10, c10, zero]),
             ],
             tub,
         }
@@ -200,19 +199,6 @@ pub(crate) fn squared<T: Real>([y, z]: &[Sample<T>; RADIAL]) -> Sample<T> {
     )
 }
 
-/// Sines and cosines of the hinge's two angles.
-struct Hinge<T> {
-    first: (N<T>, N<T>),
-    second: (N<T>, N<T>),
-}
-
-impl<T: Real> Hinge<T> {
-    #[inline(always)]
-    fn new(first: N<T>, second: N<T>) -> Self {
-        Self { first: first.sin_cos(), second: second.sin_cos() }
-    }
-}
-
 #[inline(always)]
 fn sample<T>(value: N<T>, slope: N<T>, curvature: N<T>) -> Sample<T> {
     Sample { value, slope, curvature }
@@ -260,7 +246,7 @@ fn axis_course<T: Real>(
 fn drum_course<T: Real>(
     shaft: &Tilt<T>,
     spin: &SpinState<T>,
-    hinge: &Hinge<T>,
+    hinge: (N<T>, N<T>),
     turn: &[Vec3<T>; 2],
     v: &Vec3<T>,
 ) -> Course<T> {
@@ -280,10 +266,9 @@ fn drum_course<T: Real>(
 fn out_of_drum<T: Real>(
     shaft: &Tilt<T>,
     spin: &SpinState<T>,
-    hinge: &Hinge<T>,
+    (s9, c9): (N<T>, N<T>),
     v: &Vec3<T>,
 ) -> Vec3<T> {
-    let (s9, c9) = hinge.first;
     shaft.in_cabinet_axes(&out_of_spin(spin, &out_of_hinge(s9, c9, v)))
 }
 
