@@ -163,32 +163,8 @@ impl<T: Real> Constant for InAnyLane<T> {
 
 /// Declares a structure over a number `T` and implements [`InLanes`] and [`Constant`] for it.
 ///
-/// Fields are `N<T>` where no types are given. `Name of One { ... }` is filled from the fields of
-/// `One`, which are `f64`.
+/// Fields are `N<T>` where no types are given.
 macro_rules! lane_struct {
-    ($(#[$meta:meta])* $name:ident of $one:ident { $($field:ident),* $(,)? }) => {
-        $(#[$meta])*
-        pub(crate) struct $name<T> {
-            $($field: lane_ode::N<T>,)*
-        }
-
-        impl<T: lane_ode::Lane> $crate::lanes::InLanes for $name<T> {
-            type Number = lane_ode::N<T>;
-            type One = $one;
-            #[inline(always)]
-            fn splat(zero: lane_ode::N<T>, one: &$one) -> Self {
-                Self { $($field: zero.lit(one.$field),)* }
-            }
-            #[inline(always)]
-            fn set_lane(&mut self, lane: usize, one: &$one) {
-                $(self.$field.0.set(lane, one.$field);)*
-            }
-            #[inline(always)]
-            fn get_lane(&self, lane: usize) -> $one {
-                $one { $($field: self.$field.0.get(lane),)* }
-            }
-        }
-    };
     ($(#[$meta:meta])* $name:ident {
         $($(#[$field_meta:meta])* $field:ident),* $(,)?
     }) => {

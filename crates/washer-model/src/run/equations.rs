@@ -62,7 +62,7 @@ impl Equations {
     /// Times (s) at which the spin's acceleration, and so f, may jump: integrate from one to the
     /// next.
     pub fn kinks_s(&self) -> impl Iterator<Item = f64> + '_ {
-        self.stretches.iter().skip(1).map(|stretch| stretch.start_s)
+        self.stretches.iter().skip(1).map(|stretch| stretch.start_s.0)
     }
 
     /// f at time `t_s`, at a kink from its right.
@@ -111,7 +111,7 @@ impl Equations {
 
     /// Puts the stretch of the spin in place that holds at a time.
     fn move_to(&mut self, t_s: f64) {
-        let holds = |k: usize| self.stretches.get(k).is_none_or(|stretch| t_s < stretch.start_s);
+        let holds = |k: usize| self.stretches.get(k).is_none_or(|stretch| t_s < stretch.start_s.0);
         if holds(self.stretch + 1) && (self.stretch == 0 || !holds(self.stretch)) {
             return;
         }

@@ -14,18 +14,16 @@ use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::squared;
 use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::snapshots::share_of_step;
 use crate::run::stepper::{ByDopri5, ByRk4, Fixed, Stepper};
 use crate::run::stiff::{OnLeg, StiffTask};
 use crate::run::suspension::{Forces, forces};
-use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, first_step};
+use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, enter};
 use core::marker::PhantomData;
 use lane_ode::{
     Aside, Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, Simd, Step,
     Task, Tolerance, rodas,
 };
-
-/// An instant this share of a step past its end is its end.
-const SLACK: f64 = 1e-9;
 
 /// One trajectory at some instants.
 #[derive(Clone, Debug)]
@@ -363,12 +361,7 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
         }
         let leg = leg?;
         self.legs[lane] = Some(next);
-        let (step_s, caps) = first_step(method, leg);
-        self.model.set_spin(lane, &point.stretches[leg.stretch]);
-        if let Some(caps) = caps {
-            self.model.set_caps(lane, &caps);
-        }
-        Some(Leg { start_s: leg.start_s, end_s: leg.end_s, step_s })
+        Some(enter(&mut self.model, lane, method, point, leg))
     }
 
     #[inline(always)]
@@ -385,12 +378,11 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
                 let (end_s, length_s) = (step.end_s.0.get(lane), step.length_s.0.get(lane));
                 let next = asked.times_s.get(self.found[lane].states.len());
                 if let Some(time_s) = next
-                    && length_s != 0.0
                     && in_range >> lane & 1 == 1
-                    && *time_s <= end_s + SLACK * length_s
+                    && let Some(at) = share_of_step(*time_s, end_s, length_s)
                 {
                     reached[lane] = true;
-                    share.0.set(lane, (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0));
+                    share.0.set(lane, at);
                 }
             }
             if reached == [false; MAX_LANES] {

@@ -38,6 +38,9 @@ pub(crate) struct Row<'a> {
     pub(crate) caps: Option<Caps>,
 }
 
+/// What must be equal of rows that turn side by side.
+pub(crate) type Kind = (usize, usize, bool, bool);
+
 impl Row<'_> {
     /// The same at another speed close by, with the steps and caps of this one as shares of a turn.
     pub(super) fn beside(self, speed_rpm: f64) -> Self {
@@ -64,8 +67,7 @@ impl Row<'_> {
         self.point.machine.elements.are_nonsmooth()
     }
 
-    /// What must be equal of rows that turn side by side.
-    pub(crate) fn kind(&self) -> (usize, usize, bool, bool) {
+    pub(crate) fn kind(&self) -> Kind {
         (self.steps, self.instants, self.caps.is_some(), self.has_corners())
     }
 }
@@ -104,18 +106,27 @@ pub(super) struct Seen {
 /// others. Once `is_stopped` says so, some are missing.
 pub(super) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<Turned> {
     // Of a kind, what is seen comes first.
-    let kind = |k: usize| asked[k].row.kind();
-    let mut order: Vec<usize> = (0..asked.len()).collect();
-    order.sort_by_key(|&k| (kind(k), !asked[k].is_seen));
-    let mut turned: Vec<Option<Turned>> = asked.iter().map(|_| None).collect();
-    for places in order.chunk_by(|&a, &b| kind(a) == kind(b)) {
-        let together: Vec<Asked<'_>> = places.iter().map(|&k| asked[k]).collect();
-        let found = Simd::best().dispatch(Turns { asked: &together, is_stopped });
-        for (&k, found) in places.iter().zip(found) {
-            turned[k] = Some(found);
+    let kind = |asked: &Asked<'_>| (asked.row.kind(), !asked.is_seen);
+    by_kind(asked, kind, |asked| Simd::best().dispatch(Turns { asked, is_stopped }))
+}
+
+/// What is found of each: of those of a row's kind together, which come in the order of `kind`'s
+/// second part. What is missing of some is missing at the end.
+pub(crate) fn by_kind<A: Copy, R>(
+    all: &[A],
+    kind: impl Fn(&A) -> (Kind, bool),
+    find: impl Fn(&[A]) -> Vec<R>,
+) -> Vec<R> {
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    order.sort_by_key(|&k| kind(&all[k]));
+    let mut found: Vec<Option<R>> = all.iter().map(|_| None).collect();
+    for places in order.chunk_by(|&a, &b| kind(&all[a]).0 == kind(&all[b]).0) {
+        let together: Vec<A> = places.iter().map(|&k| all[k]).collect();
+        for (&k, one) in places.iter().zip(find(&together)) {
+            found[k] = Some(one);
         }
     }
-    turned.into_iter().flatten().collect()
+    found.into_iter().flatten().collect()
 }
 
 /// Turns of one kind.
@@ -275,17 +286,8 @@ pub(super) fn linear_responses(
 
 /// The same with friction taken at the points' speeds, in lanes, those of a kind together.
 pub(super) fn together(rows: &[Row<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<LinearResponse> {
-    let mut order: Vec<usize> = (0..rows.len()).collect();
-    order.sort_by_key(|&k| rows[k].kind());
-    let mut found: Vec<Option<LinearResponse>> = rows.iter().map(|_| None).collect();
-    for places in order.chunk_by(|&a, &b| rows[a].kind() == rows[b].kind()) {
-        let together: Vec<Row<'_>> = places.iter().map(|&k| rows[k]).collect();
-        let of_kind = Simd::dispatch_narrow(OfLinear { rows: &together, is_stopped });
-        for (&k, response) in places.iter().zip(of_kind) {
-            found[k] = Some(response);
-        }
-    }
-    found.into_iter().flatten().collect()
+    let find = |rows: &[Row<'_>]| Simd::dispatch_narrow(OfLinear { rows, is_stopped });
+    by_kind(rows, |row| (row.kind(), false), find)
 }
 
 /// Those of one kind. The map is affine, so that one linear solve finds what it returns to.
