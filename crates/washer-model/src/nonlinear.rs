@@ -150,12 +150,9 @@ pub(crate) fn tub<T: Lane>(
     let tilt = Tilt::of_tub(q);
     let motion = tilt.motion(u[TUB_YAW], u[TUB_PITCH]);
     let [x, y, z] = motion.rate;
-    let (force, moment) = machine.elements.on_tub(&TubMotion {
-        tilt,
-        midpoint: [q[TUB_Y], q[TUB_Z]],
-        midpoint_velocity: [u[TUB_Y], u[TUB_Z]],
-        rate: motion.rate,
-    });
+    let (midpoint, velocity) = ([q[TUB_Y], q[TUB_Z]], [u[TUB_Y], u[TUB_Z]]);
+    let tub = TubMotion::turning(tilt, motion.rate, midpoint, velocity);
+    let (force, moment) = machine.elements.on_tub(&tub);
     // y and z, cabinet axes.
     let force = [
         tilt.axis_c[1] * force[0] + tilt.second_c[1] * force[1],

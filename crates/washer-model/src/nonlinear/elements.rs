@@ -84,10 +84,8 @@ impl<T: Lane> Elements<T> {
     pub(crate) fn on_tub(&self, tub: &TubMotion<T>) -> (Vec3<T>, Vec3<T>) {
         let zero = tub.midpoint[0].lit(0.0);
         let mut load = ([zero; 3], [zero; 3]);
-        add(&mut load, &self.springs, tub, &());
-        if !self.dampers.is_empty() {
-            add(&mut load, &self.dampers, tub, &tub.midpoint_velocity_in_tub());
-        }
+        add(&mut load, &self.springs, tub);
+        add(&mut load, &self.dampers, tub);
         if self.has_further.holds() {
             // A copy: what is lent to a function must lie in memory, on every path.
             let mut whole = load;
@@ -104,7 +102,7 @@ impl<T: Lane> Elements<T> {
     #[inline(always)]
     pub(crate) fn stop(&self, number: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let stop = &self.stops[number];
-        let point = tub.point(&stop.tub, &tub.midpoint_velocity_in_tub());
+        let point = tub.point(&stop.tub);
         [stop.depth(&point), stop.push(&point)]
     }
 
@@ -113,7 +111,7 @@ impl<T: Lane> Elements<T> {
     pub(crate) fn damper_speed(&self, number: usize, tub: &TubMotion<T>) -> N<T> {
         let ends = &self.dampers[number].ends;
         let span = span(&tub.tilt, &tub.midpoint, ends);
-        let velocity = plus_cross(&tub.midpoint_velocity_in_tub().0, &tub.rate, &ends.tub);
+        let velocity = plus_cross(&tub.velocity, &tub.rate, &ends.tub);
         dot(&span, &velocity) / dot(&span, &span).sqrt()
     }
 }
@@ -132,20 +130,19 @@ impl<T: Lane> Aside for Further<'_, T> {
     #[inline(always)]
     fn run(self) {
         let Self { elements, tub, load } = self;
-        let velocity = tub.midpoint_velocity_in_tub();
         if elements.stiffens.holds() {
-            add(load, &elements.stiffenings, tub, &());
+            add(load, &elements.stiffenings, tub);
         }
         if elements.rubs.holds() {
-            add(load, &elements.frictions, tub, &velocity);
+            add(load, &elements.frictions, tub);
         }
         for stop in &elements.stops {
-            let point = tub.point(&stop.tub, &velocity);
+            let point = tub.point(&stop.tub);
             let push = stop.push(&point);
             add_force(load, &stop.tub, &tub.tilt.in_own_axes(&scaled(-push, stop.direction)));
         }
         for bushing in &elements.bushings {
-            let force = bushing.force(&tub.point(&bushing.tub, &velocity));
+            let force = bushing.force(&tub.point(&bushing.tub));
             add_force(load, &bushing.tub, &tub.tilt.in_own_axes(&force));
         }
     }
@@ -355,10 +352,6 @@ pub(crate) trait Line<T> {
     fn less_length(&self, force: N<T>, stiffness: N<T>) -> N<T>;
     /// `stiffness` (N/m^3) times the cube of the length less `free_length` (m).
     fn times_cube(&self, stiffness: N<T>, free_length: N<T>) -> N<T>;
-}
-
-/// A line that knows its rate.
-pub(crate) trait MovingLine<T>: Line<T> {
     /// `damping` (N s/m) times the rate at which the line grows.
     fn times_rate(&self, damping: N<T>) -> N<T>;
     /// `force` (N) times r / sqrt(r^2 + s^2), r the rate at which the line grows and s^2 the
@@ -367,60 +360,60 @@ pub(crate) trait MovingLine<T>: Line<T> {
 }
 
 /// The law of an element between two points: its force by the line between them.
-pub(crate) trait Law<T, L> {
+pub(crate) trait Law<T> {
     /// The points.
     fn ends(&self) -> &Ends<T>;
     /// The force that drives the ends apart, in the line's measure.
-    fn push(&self, line: &L) -> N<T>;
+    fn push<L: Line<T>>(&self, line: &L) -> N<T>;
 }
 
-impl<T: Real, L: Line<T>> Law<T, L> for SpringOf<T> {
+impl<T: Real> Law<T> for SpringOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
 
     #[inline(always)]
-    fn push(&self, line: &L) -> N<T> {
+    fn push<L: Line<T>>(&self, line: &L) -> N<T> {
         line.less_length(self.stiffness_times_free_length, self.stiffness)
     }
 }
 
 /// Eqs. 33 to 35: F = -C (v . n) n.
-impl<T: Real, L: MovingLine<T>> Law<T, L> for DamperOf<T> {
+impl<T: Real> Law<T> for DamperOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
 
     #[inline(always)]
-    fn push(&self, line: &L) -> N<T> {
+    fn push<L: Line<T>>(&self, line: &L) -> N<T> {
         -line.times_rate(self.damping)
     }
 }
 
 /// F = -k_3 e^3, e the elongation.
-impl<T: Real, L: Line<T>> Law<T, L> for StiffeningOf<T> {
+impl<T: Real> Law<T> for StiffeningOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
 
     #[inline(always)]
-    fn push(&self, line: &L) -> N<T> {
+    fn push<L: Line<T>>(&self, line: &L) -> N<T> {
         -line.times_cube(self.cubic, self.free_length)
     }
 }
 
 /// F = -F_f v / sqrt(v^2 + v_s^2), v the speed along the damper.
-impl<T: Real, L: MovingLine<T>> Law<T, L> for FrictionOf<T> {
+impl<T: Real> Law<T> for FrictionOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
 
     #[inline(always)]
-    fn push(&self, line: &L) -> N<T> {
+    fn push<L: Line<T>>(&self, line: &L) -> N<T> {
         -line.times_sense(self.force, self.speed_squared)
     }
 }
@@ -428,12 +421,13 @@ impl<T: Real, L: MovingLine<T>> Law<T, L> for FrictionOf<T> {
 /// The tub at an instant.
 #[derive(Clone, Copy)]
 pub(crate) struct TubMotion<T> {
-    pub(crate) tilt: Tilt<T>,
-    /// P_T along c2 and c3 (m), and its velocity.
+    tilt: Tilt<T>,
+    /// P_T along c2 and c3 (m).
     pub(crate) midpoint: [N<T>; 2],
-    pub(crate) midpoint_velocity: [N<T>; 2],
+    /// Velocity of P_T, tub axes.
+    velocity: Vec3<T>,
     /// Angular velocity, tub axes.
-    pub(crate) rate: Vec3<T>,
+    rate: Vec3<T>,
 }
 
 impl<T: Real> TubMotion<T> {
@@ -443,47 +437,60 @@ impl<T: Real> TubMotion<T> {
     pub(crate) fn new(q: &[N<T>; 4], u: &[N<T>; 4]) -> Self {
         let tilt = Tilt::new(q[2], q[3]);
         let rate = tilt.motion(u[2], u[3]).rate;
-        Self { tilt, midpoint: [q[0], q[1]], midpoint_velocity: [u[0], u[1]], rate }
+        Self::turning(tilt, rate, [q[0], q[1]], [u[0], u[1]])
     }
 
+    /// With a tilt and an angular velocity, at a midpoint (m) that moves along c2 and c3.
     #[inline(always)]
-    fn midpoint_velocity_in_tub(&self) -> MidpointVelocity<T> {
-        let [vy, vz] = self.midpoint_velocity;
-        let tilt = &self.tilt;
-        MidpointVelocity([
+    pub(crate) fn turning(
+        tilt: Tilt<T>,
+        rate: Vec3<T>,
+        midpoint: [N<T>; 2],
+        [vy, vz]: [N<T>; 2],
+    ) -> Self {
+        let velocity = [
             tilt.axis_c[1] * vy + tilt.axis_c[2] * vz,
             tilt.second_c[1] * vy + tilt.second_c[2] * vz,
             (tilt.cos_yaw * vz).v(),
-        ])
+        ];
+        Self { tilt, midpoint, velocity, rate }
+    }
+
+    /// A vector from tub axes to cabinet axes.
+    #[inline(always)]
+    pub(crate) fn in_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
+        self.tilt.in_cabinet_axes(v)
     }
 
     /// A point of the tub, given in its axes from P_T.
     #[inline(always)]
-    fn point(&self, tub: &Vec3<T>, velocity: &MidpointVelocity<T>) -> PointMotion<T> {
+    fn point(&self, tub: &Vec3<T>) -> PointMotion<T> {
         let mut displacement = difference(self.tilt.in_cabinet_axes(tub), tub);
         displacement[1] += self.midpoint[0];
         displacement[2] += self.midpoint[1];
-        let velocity = self.tilt.in_cabinet_axes(&plus_cross(&velocity.0, &self.rate, tub));
+        let velocity = self.tilt.in_cabinet_axes(&plus_cross(&self.velocity, &self.rate, tub));
         PointMotion { displacement, velocity }
     }
 }
 
-/// Velocity of P_T, tub axes.
-struct MidpointVelocity<T>(Vec3<T>);
-
-/// A line in tub axes; it measures forces in newtons per metre of its length. With the midpoint's
-/// velocity as `V` it knows its rate.
-struct TubLine<'a, T, V> {
+/// A line in tub axes; it measures forces in newtons per metre of its length.
+struct TubLine<'a, T> {
     /// From the cabinet end to the tub end.
     span: Vec3<T>,
     /// The tub end.
     end: &'a Vec3<T>,
-    /// Angular velocity of the tub.
-    rate: &'a Vec3<T>,
-    velocity: &'a V,
+    tub: &'a TubMotion<T>,
 }
 
-impl<T: Real, V> Line<T> for TubLine<'_, T, V> {
+impl<T: Real> TubLine<'_, T> {
+    /// The rate of the length, times the length.
+    #[inline(always)]
+    fn along(&self) -> N<T> {
+        dot(&self.span, &plus_cross(&self.tub.velocity, &self.tub.rate, self.end))
+    }
+}
+
+impl<T: Real> Line<T> for TubLine<'_, T> {
     #[inline(always)]
     fn less_length(&self, force: N<T>, stiffness: N<T>) -> N<T> {
         force / dot(&self.span, &self.span).sqrt() - stiffness
@@ -495,19 +502,15 @@ impl<T: Real, V> Line<T> for TubLine<'_, T, V> {
         let elongation = length - free_length;
         (stiffness * (elongation * elongation).v() * elongation).v() / length
     }
-}
 
-impl<T: Real> MovingLine<T> for TubLine<'_, T, MidpointVelocity<T>> {
     #[inline(always)]
     fn times_rate(&self, damping: N<T>) -> N<T> {
-        let velocity = plus_cross(&self.velocity.0, self.rate, self.end);
-        (damping * dot(&self.span, &velocity)).v() / dot(&self.span, &self.span)
+        (damping * self.along()).v() / dot(&self.span, &self.span)
     }
 
     #[inline(always)]
     fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T> {
-        let velocity = plus_cross(&self.velocity.0, self.rate, self.end);
-        let along = dot(&self.span, &velocity);
+        let along = self.along();
         let squared = dot(&self.span, &self.span);
         // With v = along / length, by one root.
         let root = (squared * (along * along + (speed_squared * squared).v())).v().sqrt();
@@ -535,9 +538,7 @@ impl<T: Real> Line<T> for CabinetLine<T> {
         let elongation = self.length - free_length;
         (stiffness * (elongation * elongation).v() * elongation).v()
     }
-}
 
-impl<T: Real> MovingLine<T> for CabinetLine<T> {
     #[inline(always)]
     fn times_rate(&self, damping: N<T>) -> N<T> {
         (damping * self.rate).v()
@@ -551,20 +552,10 @@ impl<T: Real> MovingLine<T> for CabinetLine<T> {
 
 /// Adds force and moment of elements of one law.
 #[inline(always)]
-fn add<'a, T: Real, V, E: Law<T, TubLine<'a, T, V>>>(
-    load: &mut (Vec3<T>, Vec3<T>),
-    elements: &'a [E],
-    tub: &'a TubMotion<T>,
-    velocity: &'a V,
-) {
+fn add<T: Real, E: Law<T>>(load: &mut (Vec3<T>, Vec3<T>), elements: &[E], tub: &TubMotion<T>) {
     for element in elements {
         let ends = element.ends();
-        let line = TubLine {
-            span: span(&tub.tilt, &tub.midpoint, ends),
-            end: &ends.tub,
-            rate: &tub.rate,
-            velocity,
-        };
+        let line = TubLine { span: span(&tub.tilt, &tub.midpoint, ends), end: &ends.tub, tub };
         let force = scaled(element.push(&line), line.span);
         add_force(load, &ends.tub, &force);
     }

@@ -12,6 +12,7 @@ use crate::machine::feet::{FEET, LOAD, Spread, turning_n};
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::{Vec3, dot};
 use crate::point::Point;
+use crate::run::model::tub_samples;
 use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
 
 /// Least values are found as greatest distances below this (N), farther than any load.
@@ -276,10 +277,7 @@ impl<T: Lane> Loads<T> {
         dx: &[N<T>; STATES],
         counts: T::Mask,
     ) {
-        let mut now = self.last;
-        for (sample, q) in now.iter_mut().zip(TUB) {
-            *sample = Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] };
-        }
+        let now = tub_samples(x, dx);
         let parts = if step.is_some() { self.parts } else { 1 };
         let share = 1.0 / f64::from(parts);
         // One loop, for one copy of the laws' code.

@@ -69,6 +69,12 @@ pub(crate) fn split<T: Copy>(x: &[N<T>; STATES]) -> ([N<T>; COORDINATES], [N<T>;
     (core::array::from_fn(|i| x[i]), core::array::from_fn(|i| x[COORDINATES + i]))
 }
 
+/// The tub's coordinates with two derivatives, likewise.
+#[inline(always)]
+pub(super) fn tub_samples<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> [Sample<T>; 4] {
+    TUB.map(|q| Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] })
+}
+
 #[inline(always)]
 fn joined<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) -> [N<T>; STATES] {
     core::array::from_fn(|i| if i < COORDINATES { u[i] } else { a[i - COORDINATES] })

@@ -5,6 +5,7 @@ use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES, TUB};
 use crate::kind::ModelKind;
 use crate::point::Point;
+use crate::run::model::tub_samples;
 use crate::run::suspension::forces;
 use lane_ode::{Lane, MAX_LANES, N, Sample};
 use std::sync::Arc;
@@ -84,10 +85,7 @@ impl<T: Lane> Snapshots<T> {
         (x, dx): (&[N<T>; STATES], &[N<T>; STATES]),
         channels: &[Sample<T>; CHANNELS],
     ) {
-        let mut tub = self.tub;
-        for (sample, q) in tub.iter_mut().zip(TUB) {
-            *sample = Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] };
-        }
+        let tub = tub_samples(x, dx);
         if let Some((end_s, length_s)) = step {
             for lane in 0..T::LANES {
                 let (end_s, length_s) = (end_s.0.get(lane), length_s.0.get(lane));

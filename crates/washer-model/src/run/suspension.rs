@@ -103,8 +103,8 @@ pub(super) fn on_cabinet<T: Lane>(
     tub: &TubMotion<T>,
     (force, moment): &(Vec3<T>, Vec3<T>),
 ) -> [N<T>; LOAD] {
-    let [fx, fy, fz] = tub.tilt.in_cabinet_axes(force);
-    let [mx, my, mz] = tub.tilt.in_cabinet_axes(moment);
+    let [fx, fy, fz] = tub.in_cabinet_axes(force);
+    let [mx, my, mz] = tub.in_cabinet_axes(moment);
     let [y, z] = tub.midpoint;
     // What is on the tub, turned round; P_T is at (0, y, z).
     [-fx, -fy, -fz, -(mx + (y * fz - z * fy)), -(my + z * fx), -(mz - y * fx)]
@@ -172,10 +172,7 @@ struct Tub {
 
 impl Tub {
     /// Tension of an element, and its line.
-    fn tension<E>(&self, element: &E) -> (N<Dual<f64>>, CabinetLine<Dual<f64>>)
-    where
-        E: Law<Dual<f64>, CabinetLine<Dual<f64>>>,
-    {
+    fn tension(&self, element: &impl Law<Dual<f64>>) -> (N<Dual<f64>>, CabinetLine<Dual<f64>>) {
         let ends = element.ends();
         let span = tub_from_cabinet(&self.displaced, ends);
         let moving = tub_from_cabinet(&self.moving, ends);

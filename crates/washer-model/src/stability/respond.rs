@@ -2,19 +2,19 @@
 //! them, and what becomes of disturbances there.
 
 use super::branch::{BEYOND, Curve, Guess};
+use super::monodromy::per_unit;
 use super::orbit::{Asked, LinearResponse, Row, Seen, linear_responses, together, turns};
 use super::participants::{named, shares, vector_of};
 use super::search::{Solve, finish, missing};
 use super::settings::{Case, Settings};
 use super::{Beyond, Dwell, Kind, NoAnswer, Response, rounded};
-use crate::coordinates::{COORDINATES, STATES};
+use crate::coordinates::COORDINATES;
 use crate::fast::SUSPENSION_MODES;
 use crate::modes::modes;
 use crate::point::Point;
 use crate::run::model::{Model, Nonlinear};
 use crate::run::suspension::attachments;
 use core::f64::consts::TAU;
-use faer::Mat;
 
 /// A motion is judged if the modes that are right have this share of its energy.
 const JUDGED_SHARE: f64 = 0.5;
@@ -270,9 +270,7 @@ impl Look<'_> {
         }
         let row = &self.case.row;
         let unit_per_s = row.unit_per_s();
-        let unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
-        let matrix =
-            Mat::from_fn(STATES, STATES, |i, j| seen.monodromy[i][j].0 * unit(j) / unit(i));
+        let matrix = per_unit(&seen.monodromy, unit_per_s);
         let mut multipliers = matrix.eigenvalues().map_err(|_| NoAnswer::Eigenvalues)?;
         if multipliers.iter().any(|mu| !mu.re.is_finite() || !mu.im.is_finite()) {
             return Err(NoAnswer::Eigenvalues);

@@ -2,7 +2,7 @@
 //! of all elements, so that the choice of steps sees friction, stops and stiffening springs.
 
 use crate::coordinates::{COORDINATES, TUB};
-use crate::nonlinear::elements::{Elements, MidpointVelocity, StopOf, TubMotion};
+use crate::nonlinear::elements::{Elements, StopOf, TubMotion};
 use crate::nonlinear::frame::{difference, dot};
 use lane_ode::N;
 
@@ -21,10 +21,9 @@ impl Elements<f64> {
         }
         let mut steepest = self.clone();
         let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
-        let at_rest = MidpointVelocity([N(0.0); 3]);
         for (spring, stiffening) in steepest.springs.iter_mut().zip(&mut steepest.stiffenings) {
             let ends = &spring.ends;
-            let place = tub.point(&ends.tub, &at_rest).displacement;
+            let place = tub.point(&ends.tub).displacement;
             let span = difference(place, &difference(ends.cabinet, &ends.tub));
             let length = dot(&span, &span).sqrt();
             let (elongation, cubic) = (length - stiffening.free_length, stiffening.cubic);
@@ -41,12 +40,12 @@ impl Elements<f64> {
             friction.force = N(0.0);
         }
         for stop in &mut steepest.stops {
-            let depth = stop.depth(&tub.point(&stop.tub, &at_rest));
+            let depth = stop.depth(&tub.point(&stop.tub));
             let StopOf { clearance, softness_squared, .. } = *stop;
             stop.clearance = clearance + depth - CLOSED * softness_squared.sqrt();
         }
         for bushing in &mut steepest.bushings {
-            let place = tub.point(&bushing.tub, &at_rest).displacement;
+            let place = tub.point(&bushing.tub).displacement;
             for i in 0..3 {
                 let farthest = place[i].abs() + TRAVEL_M;
                 bushing.stiffness[i] += 3.0 * (bushing.cubic[i] * farthest * farthest).v();

@@ -19,9 +19,8 @@ impl<T: Lane> Elements<T> {
         for number in 0..self.frictions.len() {
             motions.push([tub.midpoint[0].lit(0.0), self.damper_speed(number, tub)]);
         }
-        let velocity = tub.midpoint_velocity_in_tub();
         for stop in &self.stops {
-            let point = tub.point(&stop.tub, &velocity);
+            let point = tub.point(&stop.tub);
             motions.push([stop.depth(&point), stop.speed(&point)]);
         }
         motions
