@@ -21,10 +21,6 @@ lane_struct! {
     Elements {
         springs: Vec<SpringOf<T>>,
         dampers: Vec<DamperOf<T>>,
-        /// One per spring.
-        stiffenings: Vec<StiffeningOf<T>>,
-        /// One per damper.
-        frictions: Vec<FrictionOf<T>>,
         stops: Vec<StopOf<T>>,
         bushings: Vec<BushingOf<T>>,
         /// Whether some machine has more than springs and dampers that are linear along their
@@ -43,8 +39,6 @@ impl Elements<f64> {
         Self {
             springs: machine.springs.iter().map(SpringOf::new).collect(),
             dampers: machine.dampers.iter().map(DamperOf::new).collect(),
-            stiffenings: machine.springs.iter().map(StiffeningOf::new).collect(),
-            frictions: machine.dampers.iter().map(FrictionOf::new).collect(),
             stops: machine.stops.iter().map(StopOf::new).collect(),
             bushings: machine.bushings.iter().map(BushingOf::new).collect(),
             stiffens: InAnyLane::new(stiffens),
@@ -56,22 +50,22 @@ impl Elements<f64> {
     /// Whether its forces have corners that steps longer than they are wide do not see: friction
     /// and stops.
     pub(crate) fn are_nonsmooth(&self) -> bool {
-        !self.stops.is_empty() || self.frictions.iter().any(|friction| friction.force.0 != 0.0)
+        !self.stops.is_empty() || self.dampers.iter().any(|damper| damper.friction.0 != 0.0)
     }
 
     /// The linear model takes a damper's friction at another speed amplitude.
     pub(crate) fn take_friction_at(&mut self, damper: usize, speed_m_per_s: f64) {
-        let friction = &mut self.frictions[damper];
-        friction.viscous = N(viscous(friction.force.0, speed_m_per_s));
+        let damper = &mut self.dampers[damper];
+        damper.viscous = N(viscous(damper.friction.0, speed_m_per_s));
     }
 
     /// The elements of which the linear model is the first order: friction has become the viscous
     /// damping that takes as much energy out of a swing.
     pub(crate) fn with_viscous_friction(&self) -> Self {
         let mut elements = self.clone();
-        for (damper, friction) in elements.dampers.iter_mut().zip(&mut elements.frictions) {
-            damper.damping += friction.viscous;
-            friction.force = N(0.0);
+        for damper in &mut elements.dampers {
+            damper.damping += damper.viscous;
+            damper.friction = N(0.0);
         }
         elements
     }
@@ -84,8 +78,8 @@ impl<T: Lane> Elements<T> {
     pub(crate) fn on_tub(&self, tub: &TubMotion<T>) -> (Vec3<T>, Vec3<T>) {
         let zero = tub.midpoint[0].lit(0.0);
         let mut load = ([zero; 3], [zero; 3]);
-        add(&mut load, &self.springs, tub);
-        add(&mut load, &self.dampers, tub);
+        add(&mut load, &self.springs, tub, false);
+        add(&mut load, &self.dampers, tub, false);
         if self.has_further.holds() {
             // A copy: what is lent to a function must lie in memory, on every path.
             let mut whole = load;
@@ -131,10 +125,10 @@ impl<T: Lane> Aside for Further<'_, T> {
     fn run(self) {
         let Self { elements, tub, load } = self;
         if elements.stiffens.holds() {
-            add(load, &elements.stiffenings, tub);
+            add(load, &elements.springs, tub, true);
         }
         if elements.rubs.holds() {
-            add(load, &elements.frictions, tub);
+            add(load, &elements.dampers, tub, true);
         }
         for stop in &elements.stops {
             let point = tub.point(&stop.tub);
@@ -168,7 +162,14 @@ impl Ends<f64> {
 lane_struct! {
     /// A spring between cabinet and tub.
     #[derive(Clone, Copy, Debug)]
-    SpringOf { ends: Ends<T>, stiffness: N<T>, stiffness_times_free_length: N<T> }
+    SpringOf {
+        ends: Ends<T>,
+        stiffness: N<T>,
+        stiffness_times_free_length: N<T>,
+        /// k_3.
+        cubic: N<T>,
+        free_length: N<T>,
+    }
 }
 
 impl SpringOf<f64> {
@@ -178,36 +179,6 @@ impl SpringOf<f64> {
             ends: Ends::new(spring.cabinet_m, spring.tub_m),
             stiffness: N(spring.stiffness_n_per_m),
             stiffness_times_free_length: N(spring.stiffness_n_per_m * free_length_m),
-        }
-    }
-}
-
-lane_struct! {
-    /// A viscous damper between cabinet and tub.
-    #[derive(Clone, Copy, Debug)]
-    DamperOf { ends: Ends<T>, damping: N<T> }
-}
-
-impl DamperOf<f64> {
-    fn new(damper: &Damper) -> Self {
-        Self {
-            ends: Ends::new(damper.cabinet_m, damper.tub_m),
-            damping: N(damper.damping_n_s_per_m),
-        }
-    }
-}
-
-lane_struct! {
-    /// The part of a spring's force that grows with the cube of its elongation.
-    #[derive(Clone, Copy, Debug)]
-    StiffeningOf { ends: Ends<T>, cubic: N<T>, free_length: N<T> }
-}
-
-impl StiffeningOf<f64> {
-    fn new(spring: &Spring) -> Self {
-        let free_length_m = spring.free_length_m.unwrap_or_else(|| spring.given_length_m());
-        Self {
-            ends: Ends::new(spring.cabinet_m, spring.tub_m),
             cubic: N(spring.cubic_n_per_m3),
             free_length: N(free_length_m),
         }
@@ -215,14 +186,16 @@ impl StiffeningOf<f64> {
 }
 
 lane_struct! {
-    /// The friction of a damper.
+    /// A damper between cabinet and tub.
     #[derive(Clone, Copy, Debug)]
-    FrictionOf {
+    DamperOf {
         ends: Ends<T>,
-        force: N<T>,
+        damping: N<T>,
+        /// F_f.
+        friction: N<T>,
         /// v_s^2.
         speed_squared: N<T>,
-        /// What the linear model has in its place (N s/m).
+        /// What the linear model has in place of friction (N s/m).
         viscous: N<T>,
     }
 }
@@ -232,14 +205,15 @@ fn viscous(friction_n: f64, speed_m_per_s: f64) -> f64 {
     4.0 * friction_n / (PI * speed_m_per_s)
 }
 
-impl FrictionOf<f64> {
+impl DamperOf<f64> {
     fn new(damper: &Damper) -> Self {
         // An own speed is found later.
         let given = damper.friction_linear_speed_m_per_s;
         let speed_m_per_s = given.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S);
         Self {
             ends: Ends::new(damper.cabinet_m, damper.tub_m),
-            force: N(damper.friction_n),
+            damping: N(damper.damping_n_s_per_m),
+            friction: N(damper.friction_n),
             speed_squared: N(damper.friction_speed_m_per_s * damper.friction_speed_m_per_s),
             viscous: N(viscous(damper.friction_n, speed_m_per_s)),
         }
@@ -359,14 +333,18 @@ pub(crate) trait Line<T> {
     fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T>;
 }
 
-/// The law of an element between two points: its force by the line between them.
+/// The laws of an element between two points: forces that drive the ends apart, by the line between
+/// them and in its measure.
 pub(crate) trait Law<T> {
     /// The points.
     fn ends(&self) -> &Ends<T>;
-    /// The force that drives the ends apart, in the line's measure.
+    /// What every machine has.
     fn push<L: Line<T>>(&self, line: &L) -> N<T>;
+    /// What not every machine has.
+    fn push_further<L: Line<T>>(&self, line: &L) -> N<T>;
 }
 
+/// F = -k e, and further F = -k_3 e^3, e the elongation.
 impl<T: Real> Law<T> for SpringOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
@@ -377,9 +355,15 @@ impl<T: Real> Law<T> for SpringOf<T> {
     fn push<L: Line<T>>(&self, line: &L) -> N<T> {
         line.less_length(self.stiffness_times_free_length, self.stiffness)
     }
+
+    #[inline(always)]
+    fn push_further<L: Line<T>>(&self, line: &L) -> N<T> {
+        -line.times_cube(self.cubic, self.free_length)
+    }
 }
 
-/// Eqs. 33 to 35: F = -C (v . n) n.
+/// Eqs. 33 to 35: F = -C (v . n) n, and further F = -F_f v / sqrt(v^2 + v_s^2), v the speed along
+/// the damper.
 impl<T: Real> Law<T> for DamperOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
@@ -390,31 +374,10 @@ impl<T: Real> Law<T> for DamperOf<T> {
     fn push<L: Line<T>>(&self, line: &L) -> N<T> {
         -line.times_rate(self.damping)
     }
-}
-
-/// F = -k_3 e^3, e the elongation.
-impl<T: Real> Law<T> for StiffeningOf<T> {
-    #[inline(always)]
-    fn ends(&self) -> &Ends<T> {
-        &self.ends
-    }
 
     #[inline(always)]
-    fn push<L: Line<T>>(&self, line: &L) -> N<T> {
-        -line.times_cube(self.cubic, self.free_length)
-    }
-}
-
-/// F = -F_f v / sqrt(v^2 + v_s^2), v the speed along the damper.
-impl<T: Real> Law<T> for FrictionOf<T> {
-    #[inline(always)]
-    fn ends(&self) -> &Ends<T> {
-        &self.ends
-    }
-
-    #[inline(always)]
-    fn push<L: Line<T>>(&self, line: &L) -> N<T> {
-        -line.times_sense(self.force, self.speed_squared)
+    fn push_further<L: Line<T>>(&self, line: &L) -> N<T> {
+        -line.times_sense(self.friction, self.speed_squared)
     }
 }
 
@@ -550,14 +513,19 @@ impl<T: Real> Line<T> for CabinetLine<T> {
     }
 }
 
-/// Adds force and moment of elements of one law.
+/// Adds force and moment of elements, by their first law or by what not every machine has.
 #[inline(always)]
-fn add<T: Real, E: Law<T>>(load: &mut (Vec3<T>, Vec3<T>), elements: &[E], tub: &TubMotion<T>) {
+fn add<T: Real, E: Law<T>>(
+    load: &mut (Vec3<T>, Vec3<T>),
+    elements: &[E],
+    tub: &TubMotion<T>,
+    is_further: bool,
+) {
     for element in elements {
         let ends = element.ends();
         let line = TubLine { span: span(&tub.tilt, &tub.midpoint, ends), end: &ends.tub, tub };
-        let force = scaled(element.push(&line), line.span);
-        add_force(load, &ends.tub, &force);
+        let push = if is_further { element.push_further(&line) } else { element.push(&line) };
+        add_force(load, &ends.tub, &scaled(push, line.span));
     }
 }
 

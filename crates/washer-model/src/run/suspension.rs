@@ -53,18 +53,17 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     };
     let mut forces = Forces::default();
     // How the force is divided among the axes differs by a rounding: results on record have it so.
-    for (spring, stiffening) in elements.springs.iter().zip(&elements.stiffenings) {
+    for spring in &elements.springs {
         let (tension, line) = tub.tension(&spring.constant());
-        let tension = tension - stiffening.constant().push(&line);
         let share = tension / line.length;
         for k in 0..3 {
             forces.cabinet_n[k] += first_order(model, (share * line.span[k]).v());
         }
         forces.springs_n.push(first_order(model, tension));
     }
-    for (damper, friction) in elements.dampers.iter().zip(&elements.frictions) {
+    for damper in &elements.dampers {
         let (tension, line) = tub.tension(&damper.constant());
-        let tension = first_order(model, tension - friction.constant().push(&line));
+        let tension = first_order(model, tension);
         for k in 0..3 {
             forces.cabinet_n[k] += tension * line.span[k].0.value / line.length.0.value;
         }
@@ -178,7 +177,7 @@ impl Tub {
         let moving = tub_from_cabinet(&self.moving, ends);
         let rate = self.velocity(dot(&moving, &moving).sqrt());
         let line = CabinetLine { span, length: dot(&span, &span).sqrt(), rate };
-        (-element.push(&line), line)
+        (-element.push(&line) - element.push_further(&line), line)
     }
 
     /// A tub point's motion.

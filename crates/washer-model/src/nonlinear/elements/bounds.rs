@@ -21,23 +21,23 @@ impl Elements<f64> {
         }
         let mut steepest = self.clone();
         let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
-        for (spring, stiffening) in steepest.springs.iter_mut().zip(&mut steepest.stiffenings) {
+        for spring in &mut steepest.springs {
             let ends = &spring.ends;
             let place = tub.point(&ends.tub).displacement;
             let span = difference(place, &difference(ends.cabinet, &ends.tub));
             let length = dot(&span, &span).sqrt();
-            let (elongation, cubic) = (length - stiffening.free_length, stiffening.cubic);
+            let (elongation, cubic) = (length - spring.free_length, spring.cubic);
             let tension = spring.stiffness * length - spring.stiffness_times_free_length
                 + cubic * elongation * elongation * elongation;
             let farthest = elongation.abs() + TRAVEL_M;
             spring.stiffness += 3.0 * (cubic * farthest * farthest).v();
             // Its tension at rest stays, on which its stiffness across the line depends.
             spring.stiffness_times_free_length = spring.stiffness * length - tension;
-            stiffening.cubic = N(0.0);
+            spring.cubic = N(0.0);
         }
-        for (damper, friction) in steepest.dampers.iter_mut().zip(&mut steepest.frictions) {
-            damper.damping += friction.force / friction.speed_squared.sqrt();
-            friction.force = N(0.0);
+        for damper in &mut steepest.dampers {
+            damper.damping += damper.friction / damper.speed_squared.sqrt();
+            damper.friction = N(0.0);
         }
         for stop in &mut steepest.stops {
             let depth = stop.depth(&tub.point(&stop.tub));
