@@ -363,7 +363,7 @@ impl<T: Lane, M: Model<T>> Aside for Begin<'_, '_, T, M> {
 
 /// True in every lane.
 #[inline(always)]
-fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
+pub(crate) fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
     like.lit(0.0).0.less(like.lit(1.0).0)
 }
 

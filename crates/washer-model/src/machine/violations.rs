@@ -153,17 +153,19 @@ impl Violation {
             }
             Self::ZeroLength { element, number, .. } => ["tub", "cabinet"]
                 .into_iter()
-                .flat_map(|end| {
-                    ["x", "y", "z"].map(|axis| format!("{element}_{number}_{end}_{axis}_m"))
-                })
+                .flat_map(|end| components(&format!("{element}_{number}_{end}_"), "_m"))
                 .collect(),
             Self::NoDirection { number } => {
-                ["x", "y", "z"].map(|axis| format!("stop_{number}_direction_{axis}")).into()
+                components(&format!("stop_{number}_direction_"), "").into()
             }
             Self::OnAxis { number: 1 } => vec!["unbalance_radius_m".to_owned()],
             Self::OnAxis { number } => vec![format!("unbalance_{number}_radius_m")],
-            Self::Feet { count, .. } => (1..=*count).flat_map(places_of_foot).collect(),
-            Self::FootInTheAir { number, .. } => places_of_foot(*number).into(),
+            Self::Feet { count, .. } => {
+                (1..=*count).flat_map(|foot| components(&format!("foot_{foot}_"), "_m")).collect()
+            }
+            Self::FootInTheAir { number, .. } => {
+                components(&format!("foot_{number}_"), "_m").into()
+            }
             Self::FootOffTheFloor { number, .. } => vec![format!("foot_{number}_y_m")],
             Self::BearingsTogether { .. } => {
                 vec!["bearing_rear_x_m".to_owned(), "bearing_front_x_m".to_owned()]
@@ -232,9 +234,9 @@ fn of_table(times: usize, speeds: usize) -> String {
     }
 }
 
-/// Parameters of where a foot is.
-fn places_of_foot(number: usize) -> [String; 3] {
-    ["x", "y", "z"].map(|axis| format!("foot_{number}_{axis}_m"))
+/// Names of a vector's components.
+fn components(before: &str, after: &str) -> [String; 3] {
+    ["x", "y", "z"].map(|axis| format!("{before}{axis}{after}"))
 }
 
 /// A computed number for a message, without the last digits' rounding error.

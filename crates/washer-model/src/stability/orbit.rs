@@ -14,6 +14,7 @@ use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::outputs::squared;
 use crate::point::Point;
 use crate::ready::{MOST_MOTIONS, Search, own};
+use crate::run::everywhere;
 use crate::run::extras::{Extras, Seen as Recorded};
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::suspension::damper_speeds_m_per_s;
@@ -364,8 +365,6 @@ pub(crate) struct Watched<'m, T, M> {
     instants: usize,
     /// Whether to keep states at these.
     pub(crate) with_states: bool,
-    /// Above 0 in every lane.
-    windows: N<T>,
     pub(crate) peaks: Peaks<T, CHANNELS>,
     /// The greatest distance of the drum from the tub's axis, squared (m^2).
     pub(crate) radial_squared: N<T>,
@@ -383,14 +382,12 @@ pub(crate) struct Watched<'m, T, M> {
 impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
     #[inline(always)]
     pub(crate) fn new(zero: N<T>, model: &'m M, clock: &'m Clock<T>) -> Self {
-        let (windows, peaks) = (zero.lit(1.0), Peaks::new(zero));
         Self {
             model,
             clock,
             instants: INSTANTS,
             with_states: true,
-            windows,
-            peaks,
+            peaks: Peaks::new(zero),
             radial_squared: zero,
             states: Vec::new(),
             forces: Vec::new(),
@@ -435,7 +432,7 @@ impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
             x[0].0.aside(Cornered { model: self.model, x, forces: &mut self.forces });
             self.before = [*x, *dx];
         }
-        let everywhere = self.windows.lit(0.0).0.less(self.windows.0);
+        let everywhere = everywhere(x[0]);
         if let (radial, Some(channels)) = self.model.observe(forcing, x, dx, true) {
             if k == 0 {
                 self.peaks.begin(&channels, everywhere);
@@ -449,7 +446,7 @@ impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
                 } else {
                     Some((self.clock.time_s(k as f64), self.clock.step_s))
                 };
-                self.windows.0.aside(Recorded { extras, step, x, dx, radial, channels, inside });
+                x[0].0.aside(Recorded { extras, step, x, dx, radial, channels, inside });
             }
             let (most, here) = (self.radial_squared.0, squared(&radial).value.0);
             self.radial_squared = N(T::select(most.less(here), here, most));
