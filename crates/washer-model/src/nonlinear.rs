@@ -23,7 +23,7 @@ use crate::nonlinear::coefficients::{Bodies, Coefficients};
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::floating::{Factors, Floating};
-use crate::nonlinear::forces::{Deflection, Flexure};
+use crate::nonlinear::forces::{Deflection, flexure};
 use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
 use lane_ode::{Lane, N, Real};
 
@@ -304,12 +304,12 @@ pub(crate) fn rotor<T: Real>(
     let axial_arm = [w[2], -(tilt.cos_yaw * w[1]).v(), arm_9[0], arm_10[0]];
 
     // Generalised forces less inertia forces.
-    let flexure = Flexure::new(b.flexure_stiffness, s9, c9, s10, c10);
+    let [about_9, about_10] = flexure(b.flexure_stiffness, (s9, c9), (s10, c10));
     let about_centre = [
         -(tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]),
         -moment[2],
-        -(flexure.about_9 + drum_moment_e[1]),
-        -(flexure.about_10 + drum_moment_e[2]),
+        -(about_9 + drum_moment_e[1]),
+        -(about_10 + drum_moment_e[2]),
     ];
     let axial = (b.rotor_mass * drift[0]).v();
     let axis_drift = tilt.in_cabinet_axes(axis_acceleration);
