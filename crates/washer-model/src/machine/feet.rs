@@ -136,11 +136,10 @@ impl Feet {
             (machine.tub.mass_kg, machine.tub.centre_x_m),
             (machine.shaft.mass_kg, machine.shaft.centre_x_m),
             (machine.drum.mass_kg, machine.drum.centre_x_m),
-            (machine.unbalance.mass_kg, machine.unbalance.x_m),
         ];
-        let further = machine.further_unbalances.iter().map(|u| (u.mass_kg, u.x_m));
+        let unbalances = machine.unbalances().map(|u| (u.mass_kg, u.x_m));
         let (mut weight_n, mut moment_n_m) = (0.0, 0.0);
-        for (mass_kg, x_m) in bodies.into_iter().chain(further) {
+        for (mass_kg, x_m) in bodies.into_iter().chain(unbalances) {
             weight_n += machine.gravity_m_per_s2 * mass_kg;
             moment_n_m += machine.gravity_m_per_s2 * mass_kg * x_m;
         }

@@ -147,6 +147,15 @@ impl Target {
     pub const fn is_several(self) -> bool {
         matches!(self, Self::Bearings(_) | Self::Springs(_) | Self::Dampers(_))
     }
+
+    /// Whether machine and spin have it, for what is not one of numbered elements.
+    fn is_of(self, machine: &Machine, spin: &Spin) -> Result<(), UnknownParameter> {
+        match self {
+            Self::Spin if matches!(spin, Spin::Table { .. }) => Err(UnknownParameter::TableSpin),
+            Self::Cabinet if machine.cabinet.is_none() => Err(UnknownParameter::NoCabinet),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl fmt::Display for Source {
@@ -206,12 +215,7 @@ impl Parameter {
     /// one.
     #[must_use]
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
-        let tabled = matches!(spin, Spin::Table { .. });
-        let is_there = |row: &&Row| match row.target {
-            Target::Spin => !tabled,
-            Target::Cabinet => machine.cabinet.is_some(),
-            _ => true,
-        };
+        let is_there = |row: &&Row| row.target.is_of(machine, spin).is_ok();
         let single = TABLE.iter().filter(is_there).map(Self::single);
         let numbered = BLOCKS.iter().flat_map(|block| {
             (0..(block.count)(machine, spin))
@@ -226,13 +230,7 @@ impl Parameter {
     /// When the table has no such row, or this machine or spin no such number.
     pub fn find(name: &str, machine: &Machine, spin: &Spin) -> Result<Self, UnknownParameter> {
         if let Some(row) = TABLE.iter().find(|row| row.name == name) {
-            return match row.target {
-                Target::Spin if matches!(spin, Spin::Table { .. }) => {
-                    Err(UnknownParameter::TableSpin)
-                }
-                Target::Cabinet if machine.cabinet.is_none() => Err(UnknownParameter::NoCabinet),
-                _ => Ok(Self::single(row)),
-            };
+            return row.target.is_of(machine, spin).map(|()| Self::single(row));
         }
         for block in BLOCKS {
             if let Some((number, rest)) = numbered(name, block.element) {

@@ -312,8 +312,7 @@ impl Machine {
             None => {}
         }
         if !self.further_unbalances.is_empty() {
-            let unbalances = core::iter::once(&self.unbalance).chain(&self.further_unbalances);
-            for (k, unbalance) in unbalances.enumerate() {
+            for (k, unbalance) in self.unbalances().enumerate() {
                 if unbalance.mass_kg != 0.0 && unbalance.radius_m == 0.0 {
                     joint.push(Violation::OnAxis { number: k + 1 });
                 }

@@ -103,7 +103,7 @@ impl Ringing {
         let (mut moment_n_m, mut on_bearings_n) = (0.0, 0.0);
         let hinge_x_m = machine.drum.hinge_x_m;
         let mut hanging_kg_m = machine.drum.mass_kg * (machine.drum.centre_x_m - hinge_x_m);
-        for unbalance in core::iter::once(&machine.unbalance).chain(&machine.further_unbalances) {
+        for unbalance in machine.unbalances() {
             let load_n = unbalance.mass_kg * unbalance.radius_m.abs() * jumps_rad_per_s2;
             moment_n_m += load_n * (unbalance.x_m - hinge_x_m).abs();
             hanging_kg_m += unbalance.mass_kg * (unbalance.x_m - hinge_x_m);
