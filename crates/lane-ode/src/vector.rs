@@ -37,15 +37,13 @@ macro_rules! vector {
                 // invocation); likewise below.
                 Self(unsafe { $set1(value) })
             }
-            $(
-                #[inline(always)]
-                fn $op(self $(, $other: Self)*) -> Self {
-                    let $own = self.0;
-                    $(let $other = $other.0;)*
+            $crate::real::operations! {
+                $($op |$own $(, $other)*| {
+                    let ($own, $($other,)*) = ($own.0, $($other.0,)*);
                     // SAFETY: as in `lit`.
                     Self(unsafe { $result })
-                }
-            )+
+                },)+
+            }
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {
                 $crate::trig::sin_cos(self)
