@@ -9,9 +9,9 @@ use core::ffi::CStr;
 /// model takes it from (`point`: an entry of `outputs::Places` and its axis, `angle`: a
 /// coordinate); and which coordinates the linear model's output depends on. `turning` says that the
 /// output has harmonics of theta as well: the coordinates of the cosine's and of the sine's part,
-/// and which of the parts (0: steady, 1: cosine, 2: sine) are there at rest. The equilibrium has the
-/// unbalance up and the hinge bent in the vertical plane alone, so that nothing moves along c2 with
-/// the sine then.
+/// and which of the parts (0: steady, 1: cosine, 2: sine) are there at rest. The equilibrium has
+/// the unbalance up and the hinge bent in the vertical plane alone, so that nothing moves along c2
+/// with the sine then.
 macro_rules! channels {
     ($then:ident) => {
         $then! {

@@ -148,8 +148,8 @@ pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -
     (0..elements.dampers.len()).map(speed).collect()
 }
 
-/// From the cabinet end of each spring to its tub end (m), then of each damper, at some coordinates;
-/// in cabinet axes.
+/// From the cabinet end of each spring to its tub end (m), then of each damper, at some
+/// coordinates; in cabinet axes.
 pub(crate) fn attachments(point: &Point, q: &[f64; COORDINATES]) -> [Vec<[f64; 3]>; 2] {
     let q = along(q, &[0.0; COORDINATES]);
     let span = |ends: &Ends<f64>| tub_from_cabinet(&q, &ends.constant()).map(|x| x.0.value);

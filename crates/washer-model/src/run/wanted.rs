@@ -33,7 +33,8 @@ pub struct Wanted {
     pub damper_speeds: bool,
     /// The coordinates at the ends of legs ([`Timing::checkpoints`](crate::Timing)).
     pub course: bool,
-    /// All outputs at the point's own instants ([`Point::seen_at`](crate::Point::seen_at)), within the window.
+    /// All outputs at the point's own instants ([`Point::seen_at`](crate::Point::seen_at)), within
+    /// the window.
     pub snapshots: bool,
 }
 
