@@ -14,14 +14,20 @@ use core::arch::asm;
 
 vector!(
     F64x2, float64x2_t, 2, uint64x2_t, "neon", "Two lanes of NEON.",
-    set1 vdupq_n_f64, add vaddq_f64, sub vsubq_f64, mul vmulq_f64, div vdivq_f64,
-    sqrt vsqrtq_f64,
-    mul_add |a, b, c| vfmaq_f64(c, a, b),
-    // There is no a b - c, and -(c - a b) is -0 where the others give 0.
-    mul_sub |a, b, c| vfmaq_f64(vnegq_f64(c), a, b),
-    neg_mul_add |a, b, c| vfmsq_f64(c, a, b),
-    neg |a| vnegq_f64(a),
-    abs |a| vabsq_f64(a),
+    set1 vdupq_n_f64,
+    operations {
+        add |a, b| vaddq_f64(a, b),
+        sub |a, b| vsubq_f64(a, b),
+        mul |a, b| vmulq_f64(a, b),
+        div |a, b| vdivq_f64(a, b),
+        sqrt |a| vsqrtq_f64(a),
+        mul_add |a, b, c| vfmaq_f64(c, a, b),
+        // There is no a b - c, and -(c - a b) is -0 where the others give 0.
+        mul_sub |a, b, c| vfmaq_f64(vnegq_f64(c), a, b),
+        neg_mul_add |a, b, c| vfmsq_f64(c, a, b),
+        neg |a| vnegq_f64(a),
+        abs |a| vabsq_f64(a),
+    }
     round |a| vrndnq_f64(a),
     less |a, b| vcltq_f64(a, b),
     select |m, a, b| vbslq_f64(m, a, b),

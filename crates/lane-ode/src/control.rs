@@ -38,6 +38,20 @@ impl Tolerance {
     }
 }
 
+/// The matrix of a formula from its rows, which end where zeros follow.
+pub(crate) const fn padded<const ROWS: usize, const COLUMNS: usize>(
+    rows: [&[f64]; ROWS],
+) -> [[f64; COLUMNS]; ROWS] {
+    let mut matrix = [[0.0; COLUMNS]; ROWS];
+    let mut i = 0;
+    while i < ROWS {
+        let (row, _) = matrix[i].split_at_mut(rows[i].len());
+        row.copy_from_slice(rows[i]);
+        i += 1;
+    }
+    matrix
+}
+
 /// Whether a step counts.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verdict {

@@ -2,7 +2,7 @@
 
 use crate::lane::{Aside, Lane};
 use crate::num::N;
-use crate::real::Real;
+use crate::real::{Real, operations};
 
 /// A value and its derivative along one direction. Nest it for second derivatives.
 #[derive(Clone, Copy, Debug)]
@@ -37,59 +37,35 @@ impl<T: Real> Real for Dual<T> {
     fn lit(self, value: f64) -> Self {
         Self::constant(self.value.lit(value))
     }
-    #[inline(always)]
-    fn add(self, b: Self) -> Self {
-        Self { value: self.value.add(b.value), slope: self.slope.add(b.slope) }
-    }
-    #[inline(always)]
-    fn sub(self, b: Self) -> Self {
-        Self { value: self.value.sub(b.value), slope: self.slope.sub(b.slope) }
-    }
-    #[inline(always)]
-    fn mul(self, b: Self) -> Self {
-        Self {
-            value: self.value.mul(b.value),
-            slope: self.slope.mul_add(b.value, self.value.mul(b.slope)),
-        }
-    }
-    #[inline(always)]
-    fn div(self, b: Self) -> Self {
-        let value = self.value.div(b.value);
-        Self { value, slope: value.neg_mul_add(b.slope, self.slope).div(b.value) }
-    }
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self { value: self.value.neg(), slope: self.slope.neg() }
-    }
-    #[inline(always)]
-    fn mul_add(self, b: Self, c: Self) -> Self {
-        Self {
-            value: self.value.mul_add(b.value, c.value),
-            slope: self.slope.mul_add(b.value, self.value.mul_add(b.slope, c.slope)),
-        }
-    }
-    #[inline(always)]
-    fn mul_sub(self, b: Self, c: Self) -> Self {
-        Self {
-            value: self.value.mul_sub(b.value, c.value),
-            slope: self.slope.mul_add(b.value, self.value.mul_sub(b.slope, c.slope)),
-        }
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, b: Self, c: Self) -> Self {
-        Self {
-            value: self.value.neg_mul_add(b.value, c.value),
-            slope: self.slope.neg_mul_add(b.value, self.value.neg_mul_add(b.slope, c.slope)),
-        }
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        let value = self.value.sqrt();
-        Self { value, slope: self.slope.div(value.add(value)) }
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self::select(self.less(self.lit(0.0)), self.neg(), self)
+    operations! {
+        add |a, b| Self { value: a.value.add(b.value), slope: a.slope.add(b.slope) },
+        sub |a, b| Self { value: a.value.sub(b.value), slope: a.slope.sub(b.slope) },
+        mul |a, b| Self {
+            value: a.value.mul(b.value),
+            slope: a.slope.mul_add(b.value, a.value.mul(b.slope)),
+        },
+        div |a, b| {
+            let value = a.value.div(b.value);
+            Self { value, slope: value.neg_mul_add(b.slope, a.slope).div(b.value) }
+        },
+        neg |a| Self { value: a.value.neg(), slope: a.slope.neg() },
+        mul_add |a, b, c| Self {
+            value: a.value.mul_add(b.value, c.value),
+            slope: a.slope.mul_add(b.value, a.value.mul_add(b.slope, c.slope)),
+        },
+        mul_sub |a, b, c| Self {
+            value: a.value.mul_sub(b.value, c.value),
+            slope: a.slope.mul_add(b.value, a.value.mul_sub(b.slope, c.slope)),
+        },
+        neg_mul_add |a, b, c| Self {
+            value: a.value.neg_mul_add(b.value, c.value),
+            slope: a.slope.neg_mul_add(b.value, a.value.neg_mul_add(b.slope, c.slope)),
+        },
+        sqrt |a| {
+            let value = a.value.sqrt();
+            Self { value, slope: a.slope.div(value.add(value)) }
+        },
+        abs |a| Self::select(a.less(a.lit(0.0)), a.neg(), a),
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {

@@ -39,8 +39,9 @@ pub trait Lane: Real {
 }
 
 /// Work over lanes of one type that is compiled once, as a function of its own, not wherever it is
-/// called from: for what is long and runs seldom beside what surrounds it. [`Lane::aside`] runs it.
-/// The time that a function takes to compile grows faster than its length.
+/// called from: for what is long and runs seldom beside what surrounds it. [`Lane::aside`] runs it,
+/// and [`Simd::one_lane`](crate::Simd::one_lane) what comes singly. The time that a function takes
+/// to compile grows faster than its length.
 pub trait Aside {
     /// What the work gives.
     type Output;

@@ -153,7 +153,7 @@ pub use partials::Partials;
 pub use peaks::Peaks;
 pub use quintic::Sample;
 pub use real::Real;
-pub use simd::{Kernel, ScalarKernel, Simd, UnsupportedProcessor};
+pub use simd::{Kernel, Simd, UnsupportedProcessor};
 pub use squares::SquareIntegrals;
 pub use system::{Count, Ended, Failure, Forcing, Leg, SemiImplicit, Step, System, Task};
 pub use time_above::TimeAbove;

@@ -137,27 +137,20 @@ impl<T: Real> Neg for Product<T> {
         Self(self.0.neg(), self.1)
     }
 }
-impl<T: Real> AddAssign for N<T> {
-    #[inline(always)]
-    fn add_assign(&mut self, rhs: Self) {
-        *self = *self + rhs;
-    }
+
+/// One operator that changes a value.
+macro_rules! assign {
+    ($Op:ident :: $op:ident, $R:ty, $sign:tt) => {
+        impl<T: Real> $Op<$R> for N<T> {
+            #[inline(always)]
+            fn $op(&mut self, rhs: $R) {
+                *self = *self $sign rhs;
+            }
+        }
+    };
 }
-impl<T: Real> AddAssign<Product<T>> for N<T> {
-    #[inline(always)]
-    fn add_assign(&mut self, rhs: Product<T>) {
-        *self = *self + rhs;
-    }
-}
-impl<T: Real> SubAssign for N<T> {
-    #[inline(always)]
-    fn sub_assign(&mut self, rhs: Self) {
-        *self = *self - rhs;
-    }
-}
-impl<T: Real> SubAssign<Product<T>> for N<T> {
-    #[inline(always)]
-    fn sub_assign(&mut self, rhs: Product<T>) {
-        *self = *self - rhs;
-    }
-}
+
+assign!(AddAssign::add_assign, Self, +);
+assign!(AddAssign::add_assign, Product<T>, +);
+assign!(SubAssign::sub_assign, Self, -);
+assign!(SubAssign::sub_assign, Product<T>, -);

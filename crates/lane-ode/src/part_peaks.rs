@@ -3,8 +3,7 @@
 use crate::lane::{Lane, MAX_LANES};
 use crate::num::N;
 use crate::peaks::Peaks;
-use crate::quintic::Sample;
-use crate::quintic::{Quintic, within_step};
+use crate::quintic::{Quintic, Sample, within_step};
 
 /// Largest magnitude of `M` outputs in every part of each lane's trajectory, parts being divided by
 /// instants of the lane's own.

@@ -55,3 +55,17 @@ pub trait Real: Copy {
     /// Whether the mask holds in every lane.
     fn all(mask: Self::Mask) -> bool;
 }
+
+/// Operations of a [`Real`] as a table: name, operands, result.
+macro_rules! operations {
+    ($($op:ident |$own:ident $(, $other:ident)*| $result:expr,)+) => {
+        $(
+            #[inline(always)]
+            fn $op(self $(, $other: Self)*) -> Self {
+                let $own = self;
+                $result
+            }
+        )+
+    };
+}
+pub(crate) use operations;

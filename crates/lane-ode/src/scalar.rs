@@ -1,7 +1,7 @@
 //! `f64` as one lane.
 
 use crate::lane::{Aside, Lane};
-use crate::real::Real;
+use crate::real::{Real, operations};
 use crate::simd::Simd;
 use crate::trig;
 
@@ -11,50 +11,17 @@ impl Real for f64 {
     fn lit(self, value: f64) -> Self {
         value
     }
-    #[inline(always)]
-    fn add(self, b: Self) -> Self {
-        self + b
-    }
-    #[inline(always)]
-    fn sub(self, b: Self) -> Self {
-        self - b
-    }
-    #[inline(always)]
-    fn mul(self, b: Self) -> Self {
-        self * b
-    }
-    #[inline(always)]
-    fn div(self, b: Self) -> Self {
-        self / b
-    }
-    #[inline(always)]
-    fn neg(self) -> Self {
-        #[cfg(target_arch = "aarch64")]
-        {
-            crate::aarch64::negated(self)
-        }
-        #[cfg(not(target_arch = "aarch64"))]
-        -self
-    }
-    #[inline(always)]
-    fn mul_add(self, b: Self, c: Self) -> Self {
-        fused(self, b, c)
-    }
-    #[inline(always)]
-    fn mul_sub(self, b: Self, c: Self) -> Self {
-        fused(self, b, -c)
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, b: Self, c: Self) -> Self {
-        fused(-self, b, c)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        f64::sqrt(self)
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        f64::abs(self)
+    operations! {
+        add |a, b| a + b,
+        sub |a, b| a - b,
+        mul |a, b| a * b,
+        div |a, b| a / b,
+        neg |a| negated(a),
+        mul_add |a, b, c| fused(a, b, c),
+        mul_sub |a, b, c| fused(a, b, -c),
+        neg_mul_add |a, b, c| fused(-a, b, c),
+        sqrt |a| f64::sqrt(a),
+        abs |a| f64::abs(a),
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
@@ -96,8 +63,17 @@ impl Lane for f64 {
     }
     #[inline(always)]
     fn aside<W: Aside>(self, work: W) -> W::Output {
-        Simd::aside(work)
+        Simd::one_lane(work)
     }
+}
+
+#[cfg(target_arch = "aarch64")]
+use crate::aarch64::negated;
+
+#[cfg(not(target_arch = "aarch64"))]
+#[inline(always)]
+fn negated(x: f64) -> f64 {
+    -x
 }
 
 /// `a * b + c`, rounded once; twice where that is what lanes do.

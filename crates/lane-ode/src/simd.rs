@@ -3,8 +3,10 @@
 use core::fmt;
 
 #[cfg(not(target_arch = "x86_64"))]
-use crate::lane::out_of_line;
+use crate::lane::out_of_line as one_lane;
 use crate::lane::{Aside, Lane};
+#[cfg(target_arch = "x86_64")]
+use x86::one_lane;
 
 /// An instruction set the integrators can run on. Results are the same bits on all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -48,14 +50,6 @@ pub trait Kernel {
     /// Does the work over lanes of type `T`; `zero` is the first value, from which all constants
     /// are made.
     fn run<T: Lane>(self, zero: T) -> Self::Output;
-}
-
-/// Work on one lane, for what comes singly: compiled once, not for every width.
-pub trait ScalarKernel {
-    /// What the work gives.
-    type Output;
-    /// Does the work over `f64`. Mark it `#[inline(always)]` as [`Kernel::run`].
-    fn run(self) -> Self::Output;
 }
 
 impl Simd {
@@ -156,29 +150,14 @@ impl Simd {
         }
     }
 
-    /// Runs the work on one lane: the same bits as in any lane.
+    /// Runs work on one lane, for what comes singly: compiled once, not for every width. The same
+    /// bits as in any lane.
     ///
     /// # Panics
     /// As [`Self::dispatch`].
-    #[inline(never)]
-    pub fn one_lane<K: ScalarKernel>(kernel: K) -> K::Output {
-        #[cfg(target_arch = "x86_64")]
-        {
-            x86::one_lane(kernel)
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        kernel.run()
-    }
-
-    /// Runs work over `f64` as a function of its own.
     #[inline(always)]
-    pub(crate) fn aside<W: Aside>(work: W) -> W::Output {
-        #[cfg(target_arch = "x86_64")]
-        {
-            x86::aside(work)
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        out_of_line(work)
+    pub fn one_lane<W: Aside>(work: W) -> W::Output {
+        one_lane(work)
     }
 
     /// Runs a kernel that follows one trajectory and uses lanes for something else, on a few lanes.
@@ -209,65 +188,41 @@ impl Simd {
 /// An entry function with an instruction set, and a safe one around it that checks for it.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32"))]
 macro_rules! entry {
-    ($name:ident, $features:literal, $simd:expr, $first:expr) => {
-        pub(super) fn $name<K: Kernel>(kernel: K) -> K::Output {
+    ($name:ident, $Work:ident, $features:literal, $simd:ident, |$work:ident| $run:expr) => {
+        pub(super) fn $name<W: $Work>($work: W) -> W::Output {
+            #[inline(never)]
             #[target_feature(enable = $features)]
-            fn inner<K: Kernel>(kernel: K) -> K::Output {
-                kernel.run($first)
+            fn inner<W: $Work>($work: W) -> W::Output {
+                $run
             }
             assert!(
-                $simd.is_available(),
+                super::Simd::$simd.is_available(),
                 "dispatched to an instruction set that this processor lacks"
             );
             // WebAssembly's features make no call unsafe.
             #[allow(unused_unsafe)]
             // SAFETY: asserted above.
             unsafe {
-                inner(kernel)
+                inner($work)
             }
         }
     };
 }
 
+// SAFETY (of each `first` below): inside the entry function of its instruction set.
+
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod x86 {
-    use super::{Aside, Kernel, ScalarKernel};
+    use super::{Aside, Kernel};
     use crate::x86::{F64x4, F64x8};
 
-    // SAFETY (of the two `first`): inside the entry function of their instruction set.
-    entry!(avx512, "avx2,fma,avx512f,avx512dq,avx512vl", super::Simd::Avx512, unsafe {
-        F64x8::first(0.0)
+    entry!(avx512, Kernel, "avx2,fma,avx512f,avx512dq,avx512vl", Avx512, |kernel| {
+        kernel.run(unsafe { F64x8::first(0.0) })
     });
-    entry!(avx2, "avx2,fma", super::Simd::Avx2, unsafe { F64x4::first(0.0) });
-    entry!(scalar, "avx2,fma", super::Simd::Avx2, 0.0_f64);
-
-    pub(super) fn aside<W: Aside>(work: W) -> W::Output {
-        #[inline(never)]
-        #[target_feature(enable = "avx2,fma")]
-        fn inner<W: Aside>(work: W) -> W::Output {
-            work.run()
-        }
-        assert!(
-            super::Simd::Avx2.is_available(),
-            "dispatched to an instruction set that this processor lacks"
-        );
-        // SAFETY: asserted above.
-        unsafe { inner(work) }
-    }
-
-    pub(super) fn one_lane<K: ScalarKernel>(kernel: K) -> K::Output {
-        #[target_feature(enable = "avx2,fma")]
-        fn inner<K: ScalarKernel>(kernel: K) -> K::Output {
-            kernel.run()
-        }
-        assert!(
-            super::Simd::Avx2.is_available(),
-            "dispatched to an instruction set that this processor lacks"
-        );
-        // SAFETY: asserted above.
-        unsafe { inner(kernel) }
-    }
+    entry!(avx2, Kernel, "avx2,fma", Avx2, |kernel| kernel.run(unsafe { F64x4::first(0.0) }));
+    entry!(scalar, Kernel, "avx2,fma", Avx2, |kernel| kernel.run(0.0_f64));
+    entry!(one_lane, Aside, "avx2,fma", Avx2, |work| work.run());
 }
 
 #[cfg(target_arch = "aarch64")]
@@ -276,8 +231,7 @@ mod aarch64 {
     use super::Kernel;
     use crate::aarch64::F64x2;
 
-    // SAFETY (of `first`): inside the entry function of its instruction set.
-    entry!(neon, "neon", super::Simd::Neon, unsafe { F64x2::first(0.0) });
+    entry!(neon, Kernel, "neon", Neon, |kernel| kernel.run(unsafe { F64x2::first(0.0) }));
 }
 
 #[cfg(target_arch = "wasm32")]
@@ -286,6 +240,7 @@ mod wasm32 {
     use super::Kernel;
     use crate::wasm32::F64x2;
 
-    // SAFETY (of `first`): inside the entry function of its instruction set.
-    entry!(simd128, "simd128", super::Simd::Simd128, unsafe { F64x2::first(0.0) });
+    entry!(simd128, Kernel, "simd128", Simd128, |kernel| {
+        kernel.run(unsafe { F64x2::first(0.0) })
+    });
 }

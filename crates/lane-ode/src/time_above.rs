@@ -2,8 +2,7 @@
 
 use crate::lane::Lane;
 use crate::num::N;
-use crate::quintic::Quintic;
-use crate::quintic::Sample;
+use crate::quintic::{Quintic, Sample};
 
 /// Halvings that find where an output passes zero: to a millionth of a millionth of the step.
 const HALVINGS: usize = 40;

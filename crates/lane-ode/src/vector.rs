@@ -7,12 +7,9 @@
 /// with `$features`.
 macro_rules! vector {
     ($name:ident, $raw:ty, $lanes:literal, $mask:ty, $features:literal, $doc:literal,
-     set1 $set1:ident, add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident,
-     sqrt $sqrt:ident,
-     mul_add |$p1:ident, $p2:ident, $p3:ident| $mul_add:expr,
-     mul_sub |$q1:ident, $q2:ident, $q3:ident| $mul_sub:expr,
-     neg_mul_add |$o1:ident, $o2:ident, $o3:ident| $neg_mul_add:expr,
-     neg |$n:ident| $neg:expr, abs |$ab:ident| $abs:expr, round |$r:ident| $round:expr,
+     set1 $set1:ident,
+     operations { $($op:ident |$own:ident $(, $other:ident)*| $result:expr,)+ }
+     round |$r:ident| $round:expr,
      less |$l1:ident, $l2:ident| $less:expr, select |$m:ident, $s1:ident, $s2:ident| $select:expr,
      bits |$b:ident| $bits:expr) => {
         #[doc = $doc]
@@ -40,60 +37,12 @@ macro_rules! vector {
                 // invocation); likewise below.
                 Self(unsafe { $set1(value) })
             }
-            #[inline(always)]
-            fn add(self, b: Self) -> Self {
-                // SAFETY: as in `lit`.
-                Self(unsafe { $add(self.0, b.0) })
-            }
-            #[inline(always)]
-            fn sub(self, b: Self) -> Self {
-                // SAFETY: as in `lit`.
-                Self(unsafe { $sub(self.0, b.0) })
-            }
-            #[inline(always)]
-            fn mul(self, b: Self) -> Self {
-                // SAFETY: as in `lit`.
-                Self(unsafe { $mul(self.0, b.0) })
-            }
-            #[inline(always)]
-            fn div(self, b: Self) -> Self {
-                // SAFETY: as in `lit`.
-                Self(unsafe { $div(self.0, b.0) })
-            }
-            #[inline(always)]
-            fn neg(self) -> Self {
-                let $n = self.0;
-                // SAFETY: as in `lit`.
-                Self(unsafe { $neg })
-            }
-            #[inline(always)]
-            fn mul_add(self, b: Self, c: Self) -> Self {
-                let ($p1, $p2, $p3) = (self.0, b.0, c.0);
-                // SAFETY: as in `lit`.
-                Self(unsafe { $mul_add })
-            }
-            #[inline(always)]
-            fn mul_sub(self, b: Self, c: Self) -> Self {
-                let ($q1, $q2, $q3) = (self.0, b.0, c.0);
-                // SAFETY: as in `lit`.
-                Self(unsafe { $mul_sub })
-            }
-            #[inline(always)]
-            fn neg_mul_add(self, b: Self, c: Self) -> Self {
-                let ($o1, $o2, $o3) = (self.0, b.0, c.0);
-                // SAFETY: as in `lit`.
-                Self(unsafe { $neg_mul_add })
-            }
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                // SAFETY: as in `lit`.
-                Self(unsafe { $sqrt(self.0) })
-            }
-            #[inline(always)]
-            fn abs(self) -> Self {
-                let $ab = self.0;
-                // SAFETY: as in `lit`.
-                Self(unsafe { $abs })
+            $crate::real::operations! {
+                $($op |$own $(, $other)*| {
+                    let ($own, $($other,)*) = ($own.0, $($other.0,)*);
+                    // SAFETY: as in `lit`.
+                    Self(unsafe { $result })
+                },)+
             }
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {

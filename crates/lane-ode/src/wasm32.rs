@@ -17,13 +17,19 @@ use core::arch::wasm32::*;
 
 vector!(
     F64x2, v128, 2, v128, "simd128", "Two lanes of simd128.",
-    set1 f64x2_splat, add f64x2_add, sub f64x2_sub, mul f64x2_mul, div f64x2_div,
-    sqrt f64x2_sqrt,
-    mul_add |a, b, c| f64x2_add(f64x2_mul(a, b), c),
-    mul_sub |a, b, c| f64x2_sub(f64x2_mul(a, b), c),
-    neg_mul_add |a, b, c| f64x2_sub(c, f64x2_mul(a, b)),
-    neg |a| f64x2_neg(a),
-    abs |a| f64x2_abs(a),
+    set1 f64x2_splat,
+    operations {
+        add |a, b| f64x2_add(a, b),
+        sub |a, b| f64x2_sub(a, b),
+        mul |a, b| f64x2_mul(a, b),
+        div |a, b| f64x2_div(a, b),
+        sqrt |a| f64x2_sqrt(a),
+        mul_add |a, b, c| f64x2_add(f64x2_mul(a, b), c),
+        mul_sub |a, b, c| f64x2_sub(f64x2_mul(a, b), c),
+        neg_mul_add |a, b, c| f64x2_sub(c, f64x2_mul(a, b)),
+        neg |a| f64x2_neg(a),
+        abs |a| f64x2_abs(a),
+    }
     round |a| f64x2_nearest(a),
     less |a, b| f64x2_lt(a, b),
     select |m, a, b| v128_bitselect(a, b, m),

@@ -29,26 +29,14 @@ pub fn evaluate(
     caps: Option<Caps>,
     evaluations: u64,
 ) {
-    let subject = Subject { point, part, caps, evaluations };
+    let subject = (point, part, caps, evaluations);
     match model {
-        ModelKind::Nonlinear => {
-            simd.dispatch(Evaluate::<OfNonlinear> { subject, family: PhantomData })
-        }
-        ModelKind::Linear => simd.dispatch(Evaluate::<OfLinear> { subject, family: PhantomData }),
+        ModelKind::Nonlinear => simd.dispatch(Evaluate::<OfNonlinear>(subject, PhantomData)),
+        ModelKind::Linear => simd.dispatch(Evaluate::<OfLinear>(subject, PhantomData)),
     }
 }
 
-struct Subject<'a> {
-    point: &'a Point,
-    part: Part,
-    caps: Option<Caps>,
-    evaluations: u64,
-}
-
-struct Evaluate<'a, F> {
-    subject: Subject<'a>,
-    family: PhantomData<F>,
-}
+struct Evaluate<'a, F>((&'a Point, Part, Option<Caps>, u64), PhantomData<F>);
 
 impl<F: Family> Kernel for Evaluate<'_, F> {
     type Output = ();
@@ -56,7 +44,7 @@ impl<F: Family> Kernel for Evaluate<'_, F> {
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) {
         let zero = N(zero);
-        let Subject { point, part, caps, evaluations } = self.subject;
+        let (point, part, caps, evaluations) = self.0;
         let coupling = Coupling::new(zero, caps.as_ref());
         let model = <F::Over<T> as Model<T>>::splat(zero, point, coupling);
         let mut x = [zero; STATES];

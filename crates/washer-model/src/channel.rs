@@ -9,9 +9,9 @@ use core::ffi::CStr;
 /// model takes it from (`point`: an entry of `outputs::Places` and its axis, `angle`: a
 /// coordinate); and which coordinates the linear model's output depends on. `turning` says that the
 /// output has harmonics of theta as well: the coordinates of the cosine's and of the sine's part,
-/// and which of the three parts (steady, cosine, sine) are there at rest. The equilibrium has the
-/// unbalance up and the hinge bent in the vertical plane alone, so that nothing moves along c2 with
-/// the sine then.
+/// and which of the parts (0: steady, 1: cosine, 2: sine) are there at rest. The equilibrium has
+/// the unbalance up and the hinge bent in the vertical plane alone, so that nothing moves along c2
+/// with the sine then.
 macro_rules! channels {
     ($then:ident) => {
         $then! {
@@ -24,26 +24,26 @@ macro_rules! channels {
             /// P_DE along c2.
             DrumFrontY, "drum_front_y", "vertical motion of the drum's front centre",
                 DrumPoint, [point drum_front 1], steady [SHAFT_Y SHAFT_PITCH HINGE_PITCH],
-                turning cos [SHAFT_PITCH HINGE_PITCH] sin [HINGE_YAW] rest [true, true, false];
+                turning cos [SHAFT_PITCH HINGE_PITCH] sin [HINGE_YAW] rest [0 1];
             /// P_DE along c3.
             DrumFrontZ, "drum_front_z", "horizontal motion of the drum's front centre",
                 DrumPoint, [point drum_front 2],
                 steady [SHAFT_Z SHAFT_YAW SHAFT_PITCH HINGE_PITCH],
                 turning cos [SHAFT_YAW SHAFT_PITCH HINGE_YAW HINGE_PITCH]
-                    sin [SHAFT_YAW HINGE_YAW HINGE_PITCH] rest [true, true, true];
+                    sin [SHAFT_YAW HINGE_YAW HINGE_PITCH] rest [0 1 2];
             /// Mass centre of all three bodies along c2.
             TotalCentreY, "total_centre_y",
                 "vertical motion of the mass centre of tub, shaft and drum",
                 TubPoint, [point total_centre 1],
                 steady [TUB_Y SHAFT_Y TUB_PITCH SHAFT_PITCH HINGE_PITCH],
-                turning cos [SHAFT_PITCH HINGE_PITCH] sin [HINGE_YAW] rest [true, true, false];
+                turning cos [SHAFT_PITCH HINGE_PITCH] sin [HINGE_YAW] rest [0 1];
             /// Mass centre of all three bodies along c3.
             TotalCentreZ, "total_centre_z",
                 "horizontal motion of the mass centre of tub, shaft and drum",
                 TubPoint, [point total_centre 2],
                 steady [TUB_Z SHAFT_Z TUB_YAW TUB_PITCH SHAFT_YAW SHAFT_PITCH HINGE_PITCH],
                 turning cos [SHAFT_YAW SHAFT_PITCH HINGE_YAW HINGE_PITCH]
-                    sin [SHAFT_YAW HINGE_YAW HINGE_PITCH] rest [true, true, true];
+                    sin [SHAFT_YAW HINGE_YAW HINGE_PITCH] rest [0 1 2];
             /// q5.
             TubYaw, "tub_yaw", "rotation of the tub about the vertical (q5)",
                 TubAngle, [angle TUB_YAW], steady [TUB_YAW];

@@ -4,13 +4,11 @@ use core::marker::PhantomData;
 use lane_ode::{Dual, Lane, N, Real};
 
 /// A structure of lane values. `One` is the same structure of plain numbers, as one lane holds it.
-pub(crate) trait InLanes {
-    /// The number that the lanes share.
-    type Number: Copy;
+pub(crate) trait InLanes<T: Lane> {
     /// The structure of plain numbers.
     type One;
     /// The same numbers in every lane; `zero` is any value.
-    fn splat(zero: Self::Number, one: &Self::One) -> Self;
+    fn splat(zero: N<T>, one: &Self::One) -> Self;
     /// Overwrites lane `lane`.
     fn set_lane(&mut self, lane: usize, one: &Self::One);
     /// Reads lane `lane`.
@@ -25,8 +23,7 @@ pub(crate) trait Constant {
     fn constant(&self) -> Self::Dual;
 }
 
-impl<T: Lane> InLanes for N<T> {
-    type Number = Self;
+impl<T: Lane> InLanes<T> for N<T> {
     type One = N<f64>;
     #[inline(always)]
     fn splat(zero: Self, one: &N<f64>) -> Self {
@@ -50,11 +47,10 @@ impl<T: Real> Constant for N<T> {
     }
 }
 
-impl<A: InLanes + Copy, const K: usize> InLanes for [A; K] {
-    type Number = A::Number;
+impl<T: Lane, A: InLanes<T> + Copy, const K: usize> InLanes<T> for [A; K] {
     type One = [A::One; K];
     #[inline(always)]
-    fn splat(zero: A::Number, one: &[A::One; K]) -> Self {
+    fn splat(zero: N<T>, one: &[A::One; K]) -> Self {
         let mut array = [A::splat(zero, &one[0]); K];
         for i in 1..K {
             array[i] = A::splat(zero, &one[i]);
@@ -85,11 +81,10 @@ impl<A: Constant<Dual: Copy>, const K: usize> Constant for [A; K] {
 
 // Loops, not closures, where a vector type's first value is at hand: only what is inlined into an
 // instruction set's entry function is compiled for it.
-impl<A: InLanes> InLanes for Vec<A> {
-    type Number = A::Number;
+impl<T: Lane, A: InLanes<T>> InLanes<T> for Vec<A> {
     type One = Vec<A::One>;
     #[inline(always)]
-    fn splat(zero: A::Number, one: &Vec<A::One>) -> Self {
+    fn splat(zero: N<T>, one: &Vec<A::One>) -> Self {
         let mut list = Self::with_capacity(one.len());
         for item in one {
             list.push(A::splat(zero, item));
@@ -136,8 +131,7 @@ impl<T> InAnyLane<T> {
     }
 }
 
-impl<T: Lane> InLanes for InAnyLane<T> {
-    type Number = N<T>;
+impl<T: Lane> InLanes<T> for InAnyLane<T> {
     type One = InAnyLane<f64>;
     #[inline(always)]
     fn splat(_: N<T>, one: &InAnyLane<f64>) -> Self {
@@ -163,32 +157,8 @@ impl<T: Real> Constant for InAnyLane<T> {
 
 /// Declares a structure over a number `T` and implements [`InLanes`] and [`Constant`] for it.
 ///
-/// Fields are `N<T>` where no types are given. `Name of One { ... }` is filled from the fields of
-/// `One`, which are `f64`.
+/// Fields are `N<T>` where no types are given.
 macro_rules! lane_struct {
-    ($(#[$meta:meta])* $name:ident of $one:ident { $($field:ident),* $(,)? }) => {
-        $(#[$meta])*
-        pub(crate) struct $name<T> {
-            $($field: lane_ode::N<T>,)*
-        }
-
-        impl<T: lane_ode::Lane> $crate::lanes::InLanes for $name<T> {
-            type Number = lane_ode::N<T>;
-            type One = $one;
-            #[inline(always)]
-            fn splat(zero: lane_ode::N<T>, one: &$one) -> Self {
-                Self { $($field: zero.lit(one.$field),)* }
-            }
-            #[inline(always)]
-            fn set_lane(&mut self, lane: usize, one: &$one) {
-                $(self.$field.0.set(lane, one.$field);)*
-            }
-            #[inline(always)]
-            fn get_lane(&self, lane: usize) -> $one {
-                $one { $($field: self.$field.0.get(lane),)* }
-            }
-        }
-    };
     ($(#[$meta:meta])* $name:ident {
         $($(#[$field_meta:meta])* $field:ident),* $(,)?
     }) => {
@@ -204,8 +174,7 @@ macro_rules! lane_struct {
             $($(#[$field_meta])* pub(crate) $field: $type,)*
         }
 
-        impl<T: lane_ode::Lane> $crate::lanes::InLanes for $name<T> {
-            type Number = lane_ode::N<T>;
+        impl<T: lane_ode::Lane> $crate::lanes::InLanes<T> for $name<T> {
             type One = $name<f64>;
             #[inline(always)]
             fn splat(zero: lane_ode::N<T>, one: &$name<f64>) -> Self {

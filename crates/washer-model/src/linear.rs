@@ -263,14 +263,14 @@ impl LinearPoint {
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let c = &self.constants;
         let (inertia, e) = self.terms.at(&harmonics::functions(spin));
-        let rotor_arm = entry::arms(&e);
+        let tub = About { midpoint: [TUB_Y, TUB_Z], turns: TUB_TURNS, arm: c.tub_arm };
+        let rotor =
+            About { midpoint: [SHAFT_Y, SHAFT_Z], turns: ROTOR_TURNS, arm: entry::arms(&e) };
         let mut matrices = Matrices {
             mass: [[0.0; COORDINATES]; COORDINATES],
             damping: [[0.0; COORDINATES]; COORDINATES],
             stiffness: self.bearing_stiffness(bodies),
-            force: about_midpoint([SHAFT_Y, SHAFT_Z], &ROTOR_TURNS, &rotor_arm, |row| {
-                e[entry::force(row)]
-            }),
+            force: rotor.felt(|row| e[entry::force(row)]),
         };
         let mut add = |j: usize, stiffness: [f64; COORDINATES], damping: [f64; COORDINATES]| {
             for i in 0..COORDINATES {
@@ -279,86 +279,61 @@ impl LinearPoint {
             }
         };
         for column in 0..4 {
-            add(
-                TUB[column],
-                about_midpoint([TUB_Y, TUB_Z], &TUB_TURNS, &c.tub_arm, |row| {
-                    c.tub_stiffness[row][column]
-                }),
-                about_midpoint([TUB_Y, TUB_Z], &TUB_TURNS, &c.tub_arm, |row| {
-                    c.tub_damping[row][column]
-                }),
-            );
-            add(
-                ROTOR_TURNS[column],
-                about_midpoint([SHAFT_Y, SHAFT_Z], &ROTOR_TURNS, &rotor_arm, |row| {
-                    e[entry::stiffness(row, column)]
-                }),
-                about_midpoint([SHAFT_Y, SHAFT_Z], &ROTOR_TURNS, &rotor_arm, |row| {
-                    e[entry::damping(row, column)]
-                }),
-            );
+            let stiffness = tub.felt(|row| c.tub_stiffness[row][column]);
+            add(TUB[column], stiffness, tub.felt(|row| c.tub_damping[row][column]));
+            let stiffness = rotor.felt(|row| e[entry::stiffness(row, column)]);
+            add(ROTOR_TURNS[column], stiffness, rotor.felt(|row| e[entry::damping(row, column)]));
         }
-        fill_mass(
-            &mut matrices.mass,
-            [TUB_Y, TUB_Z],
-            &TUB_TURNS,
-            c.tub_per_mass,
-            &c.tub_arm,
-            |r, s| c.tub_inertia[r][s].0,
-        );
-        fill_mass(
-            &mut matrices.mass,
-            [SHAFT_Y, SHAFT_Z],
-            &ROTOR_TURNS,
-            c.rotor_per_mass,
-            &rotor_arm,
-            |r, s| inertia[entry::inertia(r, s)].0,
-        );
+        tub.fill(&mut matrices.mass, c.tub_per_mass, |r, s| c.tub_inertia[r][s]);
+        rotor.fill(&mut matrices.mass, c.rotor_per_mass, |r, s| inertia[entry::inertia(r, s)]);
         matrices
     }
 }
 
-/// Forces that the coordinates see, from a half's force (y, z) and torques about its mass centre:
-/// the inverse of `about_centre`.
-fn about_midpoint<const R: usize>(
+/// A half's coordinates, and how its mass centre moves with those that turn.
+struct About<const R: usize> {
     midpoint: [usize; 2],
-    turns: &[usize; R],
-    arm: &[[N<f64>; 2]; R],
-    rows: impl Fn(usize) -> N<f64>,
-) -> [f64; COORDINATES] {
-    let mut forces = [0.0; COORDINATES];
-    let force = [rows(0), rows(1)];
-    for i in 0..2 {
-        forces[midpoint[i]] = force[i].0;
-    }
-    for r in 0..R {
-        forces[turns[r]] = (rows(2 + r) + arm[r][0] * force[0] + arm[r][1] * force[1]).0;
-    }
-    forces
+    turns: [usize; R],
+    arm: [[N<f64>; 2]; R],
 }
 
-/// One block of the mass matrix: J^T M J of the transformation in `floating`.
-fn fill_mass<const R: usize>(
-    mass: &mut [[f64; COORDINATES]; COORDINATES],
-    midpoint: [usize; 2],
-    turns: &[usize; R],
-    per_mass: N<f64>,
-    arm: &[[N<f64>; 2]; R],
-    inertia: impl Fn(usize, usize) -> f64,
-) {
-    let m = 1.0 / per_mass.0;
-    for i in 0..2 {
-        mass[midpoint[i]][midpoint[i]] = m;
-        for r in 0..R {
-            mass[midpoint[i]][turns[r]] = m * arm[r][i].0;
-            mass[turns[r]][midpoint[i]] = m * arm[r][i].0;
+impl<const R: usize> About<R> {
+    /// Forces that the coordinates see, from the half's force (y, z) and torques about its mass
+    /// centre: the inverse of `about_centre`.
+    fn felt(&self, rows: impl Fn(usize) -> N<f64>) -> [f64; COORDINATES] {
+        let mut forces = [0.0; COORDINATES];
+        let force = [rows(0), rows(1)];
+        for i in 0..2 {
+            forces[self.midpoint[i]] = force[i].0;
         }
+        for (r, [y, z]) in self.arm.into_iter().enumerate() {
+            forces[self.turns[r]] = (rows(2 + r) + y * force[0] + z * force[1]).0;
+        }
+        forces
     }
-    for r in 0..R {
-        for s in 0..=r {
-            let entry = inertia(r, s) + m * (arm[r][0].0 * arm[s][0].0 + arm[r][1].0 * arm[s][1].0);
-            mass[turns[r]][turns[s]] = entry;
-            mass[turns[s]][turns[r]] = entry;
+
+    /// The half's block of the mass matrix: J^T M J of the transformation in `floating`.
+    fn fill(
+        &self,
+        mass: &mut [[f64; COORDINATES]; COORDINATES],
+        per_mass: N<f64>,
+        inertia: impl Fn(usize, usize) -> N<f64>,
+    ) {
+        let (m, arm, turns) = (1.0 / per_mass.0, &self.arm, &self.turns);
+        for (i, midpoint) in self.midpoint.into_iter().enumerate() {
+            mass[midpoint][midpoint] = m;
+            for r in 0..R {
+                mass[midpoint][turns[r]] = m * arm[r][i].0;
+                mass[turns[r]][midpoint] = m * arm[r][i].0;
+            }
+        }
+        for r in 0..R {
+            for s in 0..=r {
+                let of_arms = arm[r][0].0 * arm[s][0].0 + arm[r][1].0 * arm[s][1].0;
+                let entry = inertia(r, s).0 + m * of_arms;
+                mass[turns[r]][turns[s]] = entry;
+                mass[turns[s]][turns[r]] = entry;
+            }
         }
     }
 }

@@ -221,6 +221,11 @@ impl Damper {
 }
 
 impl Machine {
+    /// All unbalances, the one that every machine has first.
+    pub(crate) fn unbalances(&self) -> impl Iterator<Item = &Unbalance> {
+        core::iter::once(&self.unbalance).chain(&self.further_unbalances)
+    }
+
     /// Weight of tub, shaft, drum and unbalances (N).
     #[must_use]
     pub fn weight_n(&self) -> f64 {

@@ -131,7 +131,8 @@ pub(crate) fn modes_with_caps(
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
 ) -> Result<Modes, NoModes> {
-    let (system, mass) = first_order(point, &point.linear, theta_rad, speed_rad_per_s, caps)?;
+    let system = first_order(point, &point.linear, theta_rad, speed_rad_per_s, caps)?;
+    let mass = system.mass;
     let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
     let (values, vectors) = (decomposition.S().column_vector(), decomposition.U());
     let shape = |state: usize| unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, state)]));
@@ -152,7 +153,7 @@ pub(crate) fn motions(
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
 ) -> Result<[Motion; COORDINATES], NoModes> {
-    let (system, _) = first_order(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
+    let system = first_order(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
     let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
     if values.iter().filter(|s| s.im == 0.0).count() > 2 {
         // Which rates belong together is told by shapes.
@@ -249,7 +250,7 @@ pub(crate) fn highest_with_caps(
     let models = core::iter::once(&point.linear).chain(steepest);
     let angles = (0..ANGLES).map(|angle| TAU * angle as f64 / ANGLES as f64);
     for (model, theta) in models.flat_map(|model| angles.clone().map(move |theta| (model, theta))) {
-        let (system, _) = first_order(point, model, theta, speed_rad_per_s, caps)?;
+        let system = first_order(point, model, theta, speed_rad_per_s, caps)?;
         for s in system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)? {
             let magnitude = magnitude(s) * system.unit_per_s;
             if !magnitude.is_finite() {
@@ -290,6 +291,7 @@ struct FirstOrder {
     /// A rate (1/s) that brings all blocks of the matrix to one size. Eigenvalues are then as
     /// precise as the fastest of them, not as its square.
     unit_per_s: f64,
+    mass: [[f64; COORDINATES]; COORDINATES],
 }
 
 fn first_order(
@@ -298,7 +300,7 @@ fn first_order(
     theta_rad: f64,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
-) -> Result<(FirstOrder, [[f64; COORDINATES]; COORDINATES]), NoModes> {
+) -> Result<FirstOrder, NoModes> {
     let bodies = &point.machine.bodies;
     let spin = SpinState::new(N(theta_rad).sin_cos(), N(speed_rad_per_s), N(0.0));
     let mut matrices = model.matrices(bodies, &spin);
@@ -346,5 +348,5 @@ fn first_order(
             -damping[(i - COORDINATES, j - COORDINATES)] / unit_per_s
         }
     });
-    Ok((FirstOrder { matrix, unit_per_s }, matrices.mass))
+    Ok(FirstOrder { matrix, unit_per_s, mass: matrices.mass })
 }

@@ -23,7 +23,7 @@ use crate::nonlinear::coefficients::{Bodies, Coefficients};
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::floating::{Factors, Floating};
-use crate::nonlinear::forces::{Deflection, Flexure};
+use crate::nonlinear::forces::{Deflection, flexure};
 use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
 use lane_ode::{Lane, N, Real};
 
@@ -150,12 +150,9 @@ pub(crate) fn tub<T: Lane>(
     let tilt = Tilt::of_tub(q);
     let motion = tilt.motion(u[TUB_YAW], u[TUB_PITCH]);
     let [x, y, z] = motion.rate;
-    let (force, moment) = machine.elements.on_tub(&TubMotion {
-        tilt: &tilt,
-        midpoint: [q[TUB_Y], q[TUB_Z]],
-        midpoint_velocity: [u[TUB_Y], u[TUB_Z]],
-        rate: &motion.rate,
-    });
+    let (midpoint, velocity) = ([q[TUB_Y], q[TUB_Z]], [u[TUB_Y], u[TUB_Z]]);
+    let tub = TubMotion::turning(tilt, motion.rate, midpoint, velocity);
+    let (force, moment) = machine.elements.on_tub(&tub);
     // y and z, cabinet axes.
     let force = [
         tilt.axis_c[1] * force[0] + tilt.second_c[1] * force[1],
@@ -307,12 +304,12 @@ pub(crate) fn rotor<T: Real>(
     let axial_arm = [w[2], -(tilt.cos_yaw * w[1]).v(), arm_9[0], arm_10[0]];
 
     // Generalised forces less inertia forces.
-    let flexure = Flexure::new(b.flexure_stiffness, s9, c9, s10, c10);
+    let [about_9, about_10] = flexure(b.flexure_stiffness, (s9, c9), (s10, c10));
     let about_centre = [
         -(tilt.sin_pitch * moment[0] + tilt.cos_pitch * moment[1]),
         -moment[2],
-        -(flexure.about_9 + drum_moment_e[1]),
-        -(flexure.about_10 + drum_moment_e[2]),
+        -(about_9 + drum_moment_e[1]),
+        -(about_10 + drum_moment_e[2]),
     ];
     let axial = (b.rotor_mass * drift[0]).v();
     let axis_drift = tilt.in_cabinet_axes(axis_acceleration);

@@ -338,7 +338,7 @@ fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<Course> {
 /// The run cut at every kink.
 pub(crate) fn legs(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedLeg> {
     let [from, to] = timing.window_s;
-    let kinks = stretches.iter().map(|s| s.start_s).chain([0.0, from, to, timing.end_s]);
+    let kinks = stretches.iter().map(|s| s.start_s.0).chain([0.0, from, to, timing.end_s]);
     let parts = f64::from(timing.checkpoints);
     let kinks = kinks.chain((1..timing.checkpoints).map(|k| timing.end_s * (f64::from(k) / parts)));
     let mut times: Vec<f64> = kinks.filter(|t| (0.0..=timing.end_s).contains(t)).collect();

@@ -1,6 +1,5 @@
 //! Trajectories: points run through the lanes of an integrator, and their records.
 
-mod cabinet_force;
 mod course;
 pub(crate) mod equations;
 pub(crate) mod extras;
@@ -12,16 +11,16 @@ pub(crate) mod stepper;
 pub(crate) mod stiff;
 pub(crate) mod suspension;
 mod tangent;
+pub(crate) mod wanted;
 
-pub use extras::{Extra, Wanted};
-pub use loads::StopLoad;
 pub use snapshots::Snapshot;
+pub use wanted::{Extra, StopLoad, Wanted};
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
 use crate::fast::geared::{Formula, Geared};
 use crate::kind::ModelKind;
-use crate::nonlinear::coupling::{Caps, Coupling};
+use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::{RADIAL, squared};
 use crate::point::{PlannedLeg, Point};
 use crate::run::model::{Linear, Model, Nonlinear};
@@ -66,27 +65,32 @@ impl Method {
 /// First step that an adaptive method tries.
 const FIRST_STEP_S: f64 = 1e-5;
 
-/// The step that a leg starts with, and its caps if modes are capped.
-pub(crate) fn first_step(method: &Method, leg: &PlannedLeg) -> (f64, Option<Caps>) {
-    match method {
-        Method::Rk4 { step_s } => (*step_s, None),
+/// Starts a leg in a lane: with its spin, its step, and its caps if modes are capped.
+fn enter<T: Lane, M: Model<T>>(
+    model: &mut M,
+    lane: usize,
+    method: &Method,
+    point: &Point,
+    leg: &PlannedLeg,
+) -> Leg {
+    model.set_spin(lane, &point.stretches[leg.stretch]);
+    let step_s = match method {
+        Method::Rk4 { step_s } => *step_s,
         Method::Geared(geared) => {
             let gear = geared.gear(leg.fastest_rad_per_s);
-            (gear.step_s, Some(gear.caps))
+            model.set_caps(lane, &gear.caps);
+            gear.step_s
         }
-        Method::Dopri5(_) | Method::Additive(_) | Method::Rodas5p(_) => (FIRST_STEP_S, None),
-    }
+        Method::Dopri5(_) | Method::Additive(_) | Method::Rodas5p(_) => FIRST_STEP_S,
+    };
+    Leg { start_s: leg.start_s, end_s: leg.end_s, step_s }
 }
 
 /// How bearings and hinge act where a trajectory starts.
 #[inline(always)]
 pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
-    match method {
-        Method::Geared(geared) => Coupling::new(zero, Some(&geared.top().caps)),
-        Method::Rk4 { .. } | Method::Dopri5(_) | Method::Additive(_) | Method::Rodas5p(_) => {
-            Coupling::Springs
-        }
-    }
+    let Method::Geared(geared) = method else { return Coupling::Springs };
+    Coupling::new(zero, Some(&geared.top().caps))
 }
 
 /// Says whether to stop.
@@ -359,7 +363,7 @@ impl<T: Lane, M: Model<T>> Aside for Begin<'_, '_, T, M> {
 
 /// True in every lane.
 #[inline(always)]
-fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
+pub(crate) fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
     like.lit(0.0).0.less(like.lit(1.0).0)
 }
 
@@ -451,12 +455,7 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
         let state = &self.lanes[lane];
         let point = self.points[state.point];
         let leg = &point.legs[state.leg];
-        let (step_s, caps) = first_step(self.method, leg);
-        self.model.set_spin(lane, &point.stretches[leg.stretch]);
-        if let Some(caps) = caps {
-            self.model.set_caps(lane, &caps);
-        }
         self.windows.0.set(lane, f64::from(u8::from(leg.in_window)));
-        Leg { start_s: leg.start_s, end_s: leg.end_s, step_s }
+        enter(&mut self.model, lane, self.method, point, leg)
     }
 }

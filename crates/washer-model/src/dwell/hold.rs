@@ -3,9 +3,10 @@
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::kind::ModelKind;
-use crate::run::extras::{Extra, Extras, Instants, Wanted};
+use crate::run::extras::{Extras, Instants};
 use crate::run::model::Nonlinear;
-use crate::stability::orbit::{Row, Watched, clock, model};
+use crate::run::wanted::{Extra, Wanted};
+use crate::stability::orbit::{Row, Watched, by_kind, clock, model};
 use crate::stability::turn::turn;
 use lane_ode::{Kernel, Lane, N, Simd, System as _};
 
@@ -42,21 +43,13 @@ pub(super) fn recorded(
     turns: usize,
     wanted: Wanted,
 ) -> Vec<(Vec<Turn>, Extra)> {
-    let kind = |k: usize| held[k].row.kind();
-    let mut order: Vec<usize> = (0..held.len()).collect();
-    order.sort_by_key(|&k| kind(k));
-    let mut found: Vec<(Vec<Turn>, Extra)> = vec![Default::default(); held.len()];
-    for places in order.chunk_by(|&a, &b| kind(a) == kind(b)) {
-        for places in places.chunks(simd.lanes()) {
-            let together: Vec<Held<'_>> = places.iter().map(|&k| held[k]).collect();
-            let simd = narrowest(simd, together.len());
-            let turned = simd.dispatch(Hold { held: &together, turns, wanted });
-            for (&k, turned) in places.iter().zip(turned) {
-                found[k] = turned;
-            }
-        }
-    }
-    found
+    let find = |held: &[Held<'_>]| {
+        let groups = held.chunks(simd.lanes());
+        let group =
+            |held: &[Held<'_>]| narrowest(simd, held.len()).dispatch(Hold { held, turns, wanted });
+        groups.flat_map(group).collect()
+    };
+    by_kind(held, |held| (held.row.kind(), false), find)
 }
 
 /// The instruction set with the fewest lanes that hold so many, up to a widest.

@@ -12,6 +12,7 @@ use crate::linear::sparse::sparse_sums;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
 use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
+use core::array::from_fn;
 use lane_ode::{Aside, Lane, N, Real, Sample};
 
 /// Columns of an expansion: the slope along each coordinate, then the value at equilibrium.
@@ -41,11 +42,14 @@ const fn entry(output: usize, part: usize, turning: &[usize], outputs: usize) ->
 macro_rules! expand {
     ($($(#[$doc:meta])* $name:ident, $key:literal, $description:literal, $kind:ident, $from:tt,
         steady [$($steady:ident)+]
-        $(, turning cos [$($cos:ident)+] sin [$($sin:ident)+] rest $rest:tt)?;
+        $(, turning cos [$($cos:ident)+] sin [$($sin:ident)+] rest [$($part:literal)+])?;
     )+) => {
-        /// Which parts (steady, cosine, sine) of each channel there are at rest; none of those that
-        /// do not turn.
-        const RESTS: [Option<[bool; 3]>; CHANNELS] = [$(rest!($($rest)?)),+];
+        /// The channels that turn.
+        const TURNING: &[usize] = &[$($(turns!($name $($part)+),)?)+];
+
+        /// Entries of the channels that hold a part of order zero.
+        const CHANNELS_AT_REST: &[usize] =
+            &[$($($(channel_entry(Channel::$name, $part),)+)?)+];
 
         sparse_sums! {
             /// Coefficients of the channels.
@@ -58,70 +62,19 @@ macro_rules! expand {
         }
     };
 }
-macro_rules! rest {
-    () => {
-        None
-    };
-    ($rest:tt) => {
-        Some($rest)
+macro_rules! turns {
+    ($name:ident $($part:literal)+) => {
+        Channel::$name.index()
     };
 }
 channels!(expand);
-
-/// How many channels turn, and how many of their parts there are at rest.
-const COUNTS: [usize; 2] = {
-    let mut counts = [0; 2];
-    let mut channel = 0;
-    while channel < CHANNELS {
-        if let Some([steady, cos, sin]) = RESTS[channel] {
-            counts[0] += 1;
-            counts[1] += steady as usize + cos as usize + sin as usize;
-        }
-        channel += 1;
-    }
-    counts
-};
-
-/// The channels that turn.
-const TURNING: [usize; COUNTS[0]] = {
-    let mut turning = [0; COUNTS[0]];
-    let (mut channel, mut next) = (0, 0);
-    while channel < CHANNELS {
-        if RESTS[channel].is_some() {
-            turning[next] = channel;
-            next += 1;
-        }
-        channel += 1;
-    }
-    turning
-};
 
 /// Entries of the channels' terms.
 const CHANNEL_ENTRIES: usize = CHANNELS + 2 * TURNING.len();
 
 const fn channel_entry(channel: Channel, part: usize) -> usize {
-    entry(channel.index(), part, &TURNING, CHANNELS)
+    entry(channel.index(), part, TURNING, CHANNELS)
 }
-
-/// Entries of the channels that hold a part of order zero.
-const CHANNELS_AT_REST: [usize; COUNTS[1]] = {
-    let mut entries = [0; COUNTS[1]];
-    let (mut channel, mut next) = (0, 0);
-    while channel < CHANNELS {
-        if let Some(parts) = RESTS[channel] {
-            let mut part = 0;
-            while part < 3 {
-                if parts[part] {
-                    entries[next] = entry(channel, part, &TURNING, CHANNELS);
-                    next += 1;
-                }
-                part += 1;
-            }
-        }
-        channel += 1;
-    }
-    entries
-};
 
 /// Both components of the radial distance turn.
 const RADIAL_TURNING: [usize; RADIAL] = [0, 1];
@@ -163,8 +116,8 @@ impl<T: Lane> LinearOutputs<T> {
     pub(crate) fn channels(&self, of: &LinearMotion<T>) -> [Sample<T>; CHANNELS] {
         let mut sums = [[of.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
         self.channels.sum(&of.coordinates, &mut sums);
-        add_at_rest(&mut sums, &CHANNELS_AT_REST, &self.channels_at_rest);
-        of.turned::<CHANNEL_ENTRIES, CHANNELS>(sums, &TURNING)
+        add_at_rest(&mut sums, CHANNELS_AT_REST, &self.channels_at_rest);
+        of.turned::<CHANNEL_ENTRIES, CHANNELS>(sums, TURNING)
     }
 
     /// The drum's front centre from the tub axis, along t2 and t3.
@@ -182,7 +135,7 @@ impl<T: Lane> LinearOutputs<T> {
 #[inline(always)]
 fn add_at_rest<T: Real, const ENTRIES: usize, const K: usize>(
     sums: &mut [[N<T>; 3]; ENTRIES],
-    places: &[usize; K],
+    places: &[usize],
     at_rest: &[N<T>; K],
 ) {
     for i in 0..K {
@@ -303,7 +256,7 @@ fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64> {
                     let entry = radial_entry(output - CHANNELS, part);
                     (entry, &mut radial[..], &mut radial_at_rest[..])
                 } else if part == 0 || TURNING.contains(&output) {
-                    let entry = entry(output, part, &TURNING, CHANNELS);
+                    let entry = entry(output, part, TURNING, CHANNELS);
                     (entry, &mut channels[..], &mut channels_at_rest[..])
                 } else {
                     continue;
@@ -318,7 +271,7 @@ fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64> {
     }
     LinearOutputs {
         channels: ChannelTerms::gather(&channels),
-        channels_at_rest: CHANNELS_AT_REST.map(|entry| N(channels_at_rest[entry])),
+        channels_at_rest: from_fn(|k| N(channels_at_rest[CHANNELS_AT_REST[k]])),
         radial: RadialTerms::gather(&radial),
         radial_at_rest: RADIAL_AT_REST.map(|entry| N(radial_at_rest[entry])),
     }

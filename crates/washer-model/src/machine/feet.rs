@@ -3,6 +3,7 @@
 
 use lane_ode::{N, Real};
 
+use crate::lanes::lane_struct;
 use crate::machine::Machine;
 
 /// Most feet.
@@ -27,20 +28,29 @@ const IN_LINE: f64 = 1e-6;
 /// Three feet carry what statics says. Four are taken as equally stiff under a rigid cabinet: then
 /// the loads are the linear function of x and z that balances forces and moments. The horizontal
 /// force is taken by the feet together, at their mean height.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Feet {
     /// How many there are, 3 or 4.
     pub(crate) count: usize,
-    /// Vertical load of each by the cabinet's own weight (N).
-    pub(crate) own_n: [f64; FEET],
-    /// What each takes of a load on the cabinet.
-    pub(crate) shares: [[f64; LOAD]; FEET],
-    /// Where each is along c1 and c3 (m); beyond the last the first again, which carries nothing.
-    pub(crate) places_m: [[f64; 2]; FEET],
-    /// Coefficient of friction.
-    pub(crate) friction: f64,
-    /// Weight of the cabinet (N).
-    pub(crate) weight_n: f64,
+    pub(crate) spread: Spread<f64>,
+}
+
+lane_struct! {
+    /// The numbers by which loads spread. Beyond the last foot is the first again, which carries
+    /// nothing.
+    #[derive(Clone, Copy, Debug)]
+    Spread {
+        /// Vertical load of each foot by the cabinet's own weight (N).
+        own: [N<T>; FEET],
+        /// What each takes of a load on the cabinet.
+        shares: [[N<T>; LOAD]; FEET],
+        /// Where each is along c1 and c3 (m).
+        places: [[N<T>; 2]; FEET],
+        /// Coefficient of friction.
+        friction: N<T>,
+        /// Weight of the cabinet (N).
+        weight: N<T>,
+    }
 }
 
 impl Feet {
@@ -69,14 +79,14 @@ impl Feet {
         }
         let weight_n = cabinet.mass_kg * machine.gravity_m_per_s2;
         let [centre_x, _, centre_z] = cabinet.centre_m;
-        let (mut own_n, mut shares) = ([0.0; FEET], [[0.0; LOAD]; FEET]);
+        let (mut own, mut shares) = ([N(0.0); FEET], [[N(0.0); LOAD]; FEET]);
         for (k, [x, z]) in places.into_iter().enumerate() {
             // Of the sum of loads, and of their first moments about the feet's mean place.
             let of_sum = 1.0 / count as f64;
             let of_x = (zz * x - xz * z) / det;
             let of_z = (xx * z - xz * x) / det;
-            own_n[k] =
-                weight_n * (of_sum + of_x * (centre_x - mean_x) + of_z * (centre_z - mean_z));
+            own[k] =
+                N(weight_n * (of_sum + of_x * (centre_x - mean_x) + of_z * (centre_z - mean_z)));
             // The sum is -F_y, the moments of x and z are -M_z - y F_x and M_x - y F_z.
             shares[k] = [
                 -of_x * mean_y,
@@ -85,18 +95,20 @@ impl Feet {
                 of_z,
                 0.0,
                 -of_x,
-            ];
+            ]
+            .map(N);
         }
         let place = |k: usize| machine.feet[if k < count { k } else { 0 }].foot_m;
-        let places_m = core::array::from_fn(|k| [place(k)[0], place(k)[2]]);
-        Some(Self { count, own_n, shares, places_m, friction: cabinet.friction, weight_n })
+        let places = core::array::from_fn(|k| [place(k)[0], place(k)[2]].map(N));
+        let (friction, weight) = (N(cabinet.friction), N(weight_n));
+        Some(Self { count, spread: Spread { own, shares, places, friction, weight } })
     }
 
     /// The vertical loads of the feet (N) under a load on the cabinet.
     pub(crate) fn loads_n(&self, load: &[f64; LOAD]) -> Vec<f64> {
         let of_foot = |k: usize| {
-            let shared: f64 = self.shares[k].iter().zip(load).map(|(share, of)| share * of).sum();
-            self.own_n[k] + shared
+            let shares = self.spread.shares[k].iter().zip(load);
+            self.spread.own[k].0 + shares.map(|(share, of)| share.0 * of).sum::<f64>()
         };
         (0..self.count).map(of_foot).collect()
     }
@@ -104,7 +116,8 @@ impl Feet {
     /// The margin against slipping (N) under a load on the cabinet.
     pub(crate) fn slip_margin_n(&self, load: &[f64; LOAD]) -> f64 {
         let [along_x, along_y, along_z, ..] = *load;
-        self.friction * (self.weight_n - along_y) - (along_x * along_x + along_z * along_z).sqrt()
+        let Spread { friction: N(friction), weight: N(weight_n), .. } = self.spread;
+        friction * (weight_n - along_y) - (along_x * along_x + along_z * along_z).sqrt()
     }
 
     /// The margin against walking (N) under a load on the cabinet: against slipping, turning or
@@ -114,8 +127,7 @@ impl Feet {
         for (carried, load_n) in carried.iter_mut().zip(self.loads_n(load)) {
             *carried = N(load_n);
         }
-        let places = self.places_m.map(|place| place.map(N));
-        self.slip_margin_n(load) - turning_n(&places, &carried, &load.map(N)).0
+        self.slip_margin_n(load) - turning_n(&self.spread.places, &carried, &load.map(N)).0
     }
 
     /// The loads before the machine sags.
@@ -124,11 +136,10 @@ impl Feet {
             (machine.tub.mass_kg, machine.tub.centre_x_m),
             (machine.shaft.mass_kg, machine.shaft.centre_x_m),
             (machine.drum.mass_kg, machine.drum.centre_x_m),
-            (machine.unbalance.mass_kg, machine.unbalance.x_m),
         ];
-        let further = machine.further_unbalances.iter().map(|u| (u.mass_kg, u.x_m));
+        let unbalances = machine.unbalances().map(|u| (u.mass_kg, u.x_m));
         let (mut weight_n, mut moment_n_m) = (0.0, 0.0);
-        for (mass_kg, x_m) in bodies.into_iter().chain(further) {
+        for (mass_kg, x_m) in bodies.into_iter().chain(unbalances) {
             weight_n += machine.gravity_m_per_s2 * mass_kg;
             moment_n_m += machine.gravity_m_per_s2 * mass_kg * x_m;
         }
@@ -304,7 +315,7 @@ mod tests {
     #[test]
     fn feet_in_a_line_hold_nothing() {
         let line = [[0.0, -0.5, 0.0], [0.1, -0.5, 0.1], [0.3, -0.5, 0.3]];
-        assert_eq!(Feet::new(&on(&line)), None);
-        assert_eq!(Feet::new(&on(&CORNERS[..2])), None);
+        assert!(Feet::new(&on(&line)).is_none());
+        assert!(Feet::new(&on(&CORNERS[..2])).is_none());
     }
 }

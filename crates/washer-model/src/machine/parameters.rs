@@ -98,25 +98,45 @@ struct Row {
     source: Source,
     range: Range,
     target: Target,
-    get: fn(&Machine, &Spin, usize) -> Option<f64>,
-    set: fn(&mut Machine, &mut Spin, usize, f64),
+    get: Get,
+    set: Set,
 }
+
+/// Reads the number, of which element.
+type Get = fn(&Machine, &Spin, usize) -> Option<f64>;
+
+/// Writes it.
+type Set = fn(&mut Machine, &mut Spin, usize, f64);
 
 /// Rows of every element of a numbered kind.
 struct Block {
     /// What names begin with; the number and the row's name follow.
-    prefix: &'static str,
-    rows: &'static [Row],
+    element: &'static str,
+    rows: &'static [&'static [Row]],
     /// Number of the first element.
     first: usize,
     count: fn(&Machine, &Spin) -> usize,
-    /// The error for a number that no element has, by the count.
-    missing: fn(usize) -> UnknownParameter,
+    /// The error for a number that no element has, by the last one that there is.
+    missing: fn(&'static str, usize) -> UnknownParameter,
 }
 
 impl Block {
+    /// Of elements that are numbered from 1.
+    const fn new(
+        element: &'static str,
+        rows: &'static [&'static [Row]],
+        count: fn(&Machine, &Spin) -> usize,
+    ) -> Self {
+        let missing = |element, count| UnknownParameter::Number { element, count };
+        Self { element, rows, first: 1, count, missing }
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &'static Row> {
+        self.rows.iter().copied().flatten()
+    }
+
     fn parameter(&self, row: &'static Row, index: usize) -> Parameter {
-        let name = Cow::Owned(format!("{}{}_{}", self.prefix, index + self.first, row.name));
+        let name = Cow::Owned(format!("{}_{}_{}", self.element, index + self.first, row.name));
         Parameter { name, row, index }
     }
 }
@@ -126,6 +146,15 @@ impl Target {
     #[must_use]
     pub const fn is_several(self) -> bool {
         matches!(self, Self::Bearings(_) | Self::Springs(_) | Self::Dampers(_))
+    }
+
+    /// Whether machine and spin have it, for what is not one of numbered elements.
+    fn is_of(self, machine: &Machine, spin: &Spin) -> Result<(), UnknownParameter> {
+        match self {
+            Self::Spin if matches!(spin, Spin::Table { .. }) => Err(UnknownParameter::TableSpin),
+            Self::Cabinet if machine.cabinet.is_none() => Err(UnknownParameter::NoCabinet),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -186,16 +215,11 @@ impl Parameter {
     /// one.
     #[must_use]
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
-        let tabled = matches!(spin, Spin::Table { .. });
-        let is_there = |row: &&Row| match row.target {
-            Target::Spin => !tabled,
-            Target::Cabinet => machine.cabinet.is_some(),
-            _ => true,
-        };
+        let is_there = |row: &&Row| row.target.is_of(machine, spin).is_ok();
         let single = TABLE.iter().filter(is_there).map(Self::single);
         let numbered = BLOCKS.iter().flat_map(|block| {
             (0..(block.count)(machine, spin))
-                .flat_map(move |k| block.rows.iter().map(move |row| block.parameter(row, k)))
+                .flat_map(move |k| block.rows().map(move |row| block.parameter(row, k)))
         });
         single.chain(numbered).collect()
     }
@@ -206,22 +230,16 @@ impl Parameter {
     /// When the table has no such row, or this machine or spin no such number.
     pub fn find(name: &str, machine: &Machine, spin: &Spin) -> Result<Self, UnknownParameter> {
         if let Some(row) = TABLE.iter().find(|row| row.name == name) {
-            return match row.target {
-                Target::Spin if matches!(spin, Spin::Table { .. }) => {
-                    Err(UnknownParameter::TableSpin)
-                }
-                Target::Cabinet if machine.cabinet.is_none() => Err(UnknownParameter::NoCabinet),
-                _ => Ok(Self::single(row)),
-            };
+            return row.target.is_of(machine, spin).map(|()| Self::single(row));
         }
         for block in BLOCKS {
-            if let Some((number, rest)) = numbered(name, block.prefix) {
-                let row = block.rows.iter().find(|row| row.name == rest);
+            if let Some((number, rest)) = numbered(name, block.element) {
+                let row = block.rows().find(|row| row.name == rest);
                 let row = row.ok_or(UnknownParameter::Name)?;
                 let count = (block.count)(machine, spin);
                 return match number.checked_sub(block.first) {
                     Some(k) if k < count => Ok(block.parameter(row, k)),
-                    _ => Err((block.missing)(count)),
+                    _ => Err((block.missing)(block.element, block.first + count - 1)),
                 };
             }
         }
@@ -318,10 +336,10 @@ fn table_points(spin: &Spin) -> usize {
     }
 }
 
-/// `"spring_2_tub_x_m"` with `"spring_"` gives 2 and `"tub_x_m"`. Only the canonical
+/// `"spring_2_tub_x_m"` with `"spring"` gives 2 and `"tub_x_m"`. Only the canonical
 /// spelling counts (no `spring_02_`), so that one number has one name.
-fn numbered<'a>(name: &'a str, prefix: &str) -> Option<(usize, &'a str)> {
-    let (digits, rest) = name.strip_prefix(prefix)?.split_once('_')?;
+fn numbered<'a>(name: &'a str, element: &str) -> Option<(usize, &'a str)> {
+    let (digits, rest) = name.strip_prefix(element)?.strip_prefix('_')?.split_once('_')?;
     let canonical = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
     let number: usize = if canonical { digits.parse().ok()? } else { return None };
     Some((number, rest))

@@ -4,7 +4,7 @@ mod turns;
 
 pub(crate) use turns::cuts_s;
 
-use crate::lanes::{InLanes as _, lane_struct};
+use crate::lanes::lane_struct;
 use core::f64::consts::TAU;
 use lane_ode::{Lane, N, Real, trig};
 
@@ -67,38 +67,43 @@ impl<T: Real> SpinState<T> {
     }
 }
 
-/// A stretch of a spin profile over which one formula holds:
-/// turns = turns_at_start + a t + b t^2 + c (cos(2 pi f t) - 1), t from the stretch's start.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct SpinStretch {
-    /// Where it starts; it holds until the next one starts.
-    pub(crate) start_s: f64,
-    /// Turns made before, whole ones dropped.
-    turns_at_start: f64,
-    /// a
-    turns_per_s: f64,
-    /// b
-    turns_per_s2: f64,
-    /// c
-    wave_turns: f64,
-    /// f
-    wave_hz: f64,
+lane_struct! {
+    /// A stretch of a spin profile over which one formula holds:
+    /// turns = turns_at_start + a t + b t^2 + c (cos(2 pi f t) - 1), t from the stretch's start.
+    #[derive(Clone, Copy, Debug)]
+    SpinLanes {
+        /// Where it starts; it holds until the next one starts.
+        start_s,
+        /// Turns made before, whole ones dropped.
+        turns_at_start,
+        /// a
+        turns_per_s,
+        /// b
+        turns_per_s2,
+        /// c
+        wave_turns,
+        /// f
+        wave_hz,
+    }
 }
+
+/// That of one machine.
+pub(crate) type SpinStretch = SpinLanes<f64>;
 
 impl SpinStretch {
     /// A drum that turns at one speed, its unbalance up at time 0.
     pub(crate) fn steady(speed_rpm: f64) -> Self {
-        Self { turns_per_s: speed_rpm / 60.0, ..Self::at_rest(0.0, 0.0) }
+        Self { turns_per_s: N(speed_rpm / 60.0), ..Self::at_rest(0.0, 0.0) }
     }
 
     /// Acceleration at a time within the stretch.
     pub(crate) fn acceleration_rad_per_s2(&self, t_s: f64) -> f64 {
-        SpinLanes::splat(N(0.0), self).at(N(t_s)).acceleration.0
+        self.at(N(t_s)).acceleration.0
     }
 
     /// Speed at a time within the stretch.
     pub(crate) fn speed_rad_per_s(&self, t_s: f64) -> f64 {
-        SpinLanes::splat(N(0.0), self).at(N(t_s)).speed.0
+        self.at(N(t_s)).speed.0
     }
 }
 
@@ -111,16 +116,16 @@ impl Spin {
                 let peak = per_s(*peak_rpm);
                 // Eq. 42 integrated: theta = w (t^2 / 2T + T (cos(2 pi t / T) - 1) / 4 pi^2).
                 let up = SpinStretch {
-                    turns_per_s2: peak / (2.0 * ramp_s),
-                    wave_turns: peak * ramp_s / (TAU * TAU),
-                    wave_hz: 1.0 / ramp_s,
+                    turns_per_s2: N(peak / (2.0 * ramp_s)),
+                    wave_turns: N(peak * ramp_s / (TAU * TAU)),
+                    wave_hz: N(1.0 / ramp_s),
                     ..SpinStretch::at_rest(0.0, 0.0)
                 };
                 let level = SpinStretch {
-                    turns_per_s: peak,
+                    turns_per_s: N(peak),
                     ..SpinStretch::at_rest(
                         *ramp_s,
-                        up.turns_at_start + turns_of_ramp(0.0, peak, *ramp_s),
+                        up.turns_at_start.0 + turns_of_ramp(0.0, peak, *ramp_s),
                     )
                 };
                 vec![up, level]
@@ -142,7 +147,7 @@ impl Spin {
     /// The fastest speed from 0 to `end_s`, rad/s.
     #[must_use]
     pub fn greatest_speed_rad_per_s(&self, end_s: f64) -> f64 {
-        let starts: Vec<f64> = self.stretches().iter().map(|stretch| stretch.start_s).collect();
+        let starts: Vec<f64> = self.stretches().iter().map(|stretch| stretch.start_s.0).collect();
         let times_s = starts.into_iter().chain([end_s]).filter(|&t_s| t_s <= end_s);
         self.speeds_rpm(times_s).map(f64::abs).fold(0.0, f64::max) * TAU / 60.0
     }
@@ -159,16 +164,13 @@ impl Spin {
 
     fn at(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = SpinState<f64>> {
         let stretches = self.stretches();
-        times_s.into_iter().map(move |t_s| {
-            let stretch = &stretches[stretch_at(&stretches, t_s)];
-            SpinLanes::splat(N(0.0), stretch).at(N(t_s))
-        })
+        times_s.into_iter().map(move |t_s| stretches[stretch_at(&stretches, t_s)].at(N(t_s)))
     }
 }
 
 /// Which of these stretches, in order of time, holds at a time; before all of them, the first.
 pub(crate) fn stretch_at(stretches: &[SpinStretch], t_s: f64) -> usize {
-    stretches.partition_point(|stretch| stretch.start_s <= t_s).saturating_sub(1)
+    stretches.partition_point(|stretch| stretch.start_s.0 <= t_s).saturating_sub(1)
 }
 
 /// Turns, whole ones dropped, of a ramp between two speeds (1/s).
@@ -185,9 +187,9 @@ fn linear_stretches(points: &[(f64, f64)]) -> Vec<SpinStretch> {
     let mut stretches = Vec::with_capacity(points.len());
     for (i, &(start_s, speed)) in points.iter().enumerate() {
         let mut stretch =
-            SpinStretch { turns_per_s: speed, ..SpinStretch::at_rest(start_s, turns) };
+            SpinStretch { turns_per_s: N(speed), ..SpinStretch::at_rest(start_s, turns) };
         if let Some(&(end_s, end_speed)) = points.get(i + 1) {
-            stretch.turns_per_s2 = 0.5 * (end_speed - speed) / (end_s - start_s);
+            stretch.turns_per_s2 = N(0.5 * (end_speed - speed) / (end_s - start_s));
             turns += turns_of_ramp(speed, end_speed, end_s - start_s);
             turns -= turns.round_ties_even();
         }
@@ -198,27 +200,9 @@ fn linear_stretches(points: &[(f64, f64)]) -> Vec<SpinStretch> {
 
 impl SpinStretch {
     fn at_rest(start_s: f64, turns_at_start: f64) -> Self {
-        Self {
-            start_s,
-            turns_at_start,
-            turns_per_s: 0.0,
-            turns_per_s2: 0.0,
-            wave_turns: 0.0,
-            wave_hz: 0.0,
-        }
-    }
-}
-
-lane_struct! {
-    /// One stretch per lane.
-    #[derive(Clone, Copy, Debug)]
-    SpinLanes of SpinStretch {
-        start_s,
-        turns_at_start,
-        turns_per_s,
-        turns_per_s2,
-        wave_turns,
-        wave_hz,
+        let [turns_per_s, turns_per_s2, wave_turns, wave_hz] = [N(0.0); 4];
+        let [start_s, turns_at_start] = [start_s, turns_at_start].map(N);
+        Self { start_s, turns_at_start, turns_per_s, turns_per_s2, wave_turns, wave_hz }
     }
 }
 

@@ -1,8 +1,6 @@
 //! Checks of machines and spins: everything impossible about them, found in one pass and named by
 //! parameter, so that a report can point at each number where it was written.
 
-use std::fmt;
-
 use crate::machine::feet::{FEET, Feet};
 use crate::{Machine, Parameter, Range, Spin, decimal};
 
@@ -10,13 +8,15 @@ use crate::{Machine, Parameter, Range, Spin, decimal};
 /// angle.
 const SHORTEST_M: f64 = 1e-6;
 
-/// Greatest spin speed accepted of a table, as of `spin_peak_rpm`.
-const FASTEST_RPM: f64 = 1e5;
+/// Times and speeds (rpm) accepted of a spin table: as of `spin_peak_rpm`.
+const TIMES: Range = Range::NonNegative;
+const SPEEDS: Range = Range::Within(-1e5, 1e5);
 
 /// One reason why a machine or a spin is impossible.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Violation {
     /// A number outside its parameter's range, or not a finite number.
+    #[error("{} = {} is out of range", parameter.name(), decimal(*value))]
     OutOfRange {
         /// The parameter.
         parameter: Parameter,
@@ -24,6 +24,12 @@ pub enum Violation {
         value: f64,
     },
     /// Principal moments of inertia that no rigid body has: one exceeds the sum of the other two.
+    #[error(
+        "no rigid body has the {body}'s inertia: I{} = {} exceeds the other two's sum, {}",
+        11 * (greatest + 1),
+        decimal(moments_kg_m2[*greatest]),
+        rounded(moments_kg_m2.iter().sum::<f64>() - moments_kg_m2[*greatest])
+    )]
     Inertia {
         /// `"tub"`, `"shaft"` or `"drum"`.
         body: &'static str,
@@ -33,6 +39,10 @@ pub enum Violation {
         moments_kg_m2: [f64; 3],
     },
     /// A spring or damper whose ends coincide.
+    #[error(
+        "the ends of {element} {number} are {} m apart: it has no direction",
+        rounded(*length_m)
+    )]
     ZeroLength {
         /// `"spring"` or `"damper"`.
         element: &'static str,
@@ -42,17 +52,20 @@ pub enum Violation {
         length_m: f64,
     },
     /// A stop whose direction has no length.
+    #[error("stop {number} has no direction")]
     NoDirection {
         /// Which stop, from 1.
         number: usize,
     },
     /// An unbalance on the drum's axis, of a machine that has others.
+    #[error("unbalance {number} is on the drum's axis and unbalances nothing, beside others")]
     OnAxis {
         /// Which, from 1, the one that every machine has.
         number: usize,
     },
     /// A cabinet whose feet do not hold it: not three or four of them, all in a line, or feet
     /// without a cabinet.
+    #[error("{}", of_feet(*count, *has_cabinet))]
     Feet {
         /// How many.
         count: usize,
@@ -60,6 +73,11 @@ pub enum Violation {
         has_cabinet: bool,
     },
     /// A foot that does not stand as high as the first: a floor is even.
+    #[error(
+        "foot {number} stands {} m {} than foot 1",
+        rounded(higher_m.abs()),
+        if *higher_m > 0.0 { "higher" } else { "lower" }
+    )]
     FootOffTheFloor {
         /// Which, from 1.
         number: usize,
@@ -67,6 +85,7 @@ pub enum Violation {
         higher_m: f64,
     },
     /// A foot that carries nothing even at rest: the machine's mass centre is beyond the others.
+    #[error("foot {number} lifts at rest: it would carry {load_n:.1} N")]
     FootInTheAir {
         /// Which, from 1.
         number: usize,
@@ -74,13 +93,16 @@ pub enum Violation {
         load_n: f64,
     },
     /// Bearings at one place cannot hold the shaft's direction.
+    #[error("front and rear bearing are {} m apart and hold no angle", rounded(*distance_m))]
     BearingsTogether {
         /// Distance between them.
         distance_m: f64,
     },
     /// No spring carries the machine.
+    #[error("the machine has no springs: nothing carries it")]
     NoSprings,
     /// Times and speeds of a spin table do not pair up, or there are none.
+    #[error("{}", of_table(*times, *speeds))]
     TableLength {
         /// How many times.
         times: usize,
@@ -88,11 +110,13 @@ pub enum Violation {
         speeds: usize,
     },
     /// The first time of a spin table is not 0.
+    #[error("the spin table starts at {time_s} s")]
     TableStart {
         /// The first time.
         time_s: f64,
     },
     /// A time of a spin table that does not come after the one before it.
+    #[error("time {time_s} s of the spin table follows {before_s} s")]
     TableOrder {
         /// Index of the later time, from 0.
         index: usize,
@@ -102,6 +126,11 @@ pub enum Violation {
         time_s: f64,
     },
     /// An entry of a spin table that is out of range.
+    #[error(
+        "{column} = {} (entry {}) of the spin table is out of range",
+        decimal(*value),
+        index + 1
+    )]
     TableValue {
         /// `"time_s"` or `"speed_rpm"`.
         column: &'static str,
@@ -124,17 +153,19 @@ impl Violation {
             }
             Self::ZeroLength { element, number, .. } => ["tub", "cabinet"]
                 .into_iter()
-                .flat_map(|end| {
-                    ["x", "y", "z"].map(|axis| format!("{element}_{number}_{end}_{axis}_m"))
-                })
+                .flat_map(|end| components(&format!("{element}_{number}_{end}_"), "_m"))
                 .collect(),
             Self::NoDirection { number } => {
-                ["x", "y", "z"].map(|axis| format!("stop_{number}_direction_{axis}")).into()
+                components(&format!("stop_{number}_direction_"), "").into()
             }
             Self::OnAxis { number: 1 } => vec!["unbalance_radius_m".to_owned()],
             Self::OnAxis { number } => vec![format!("unbalance_{number}_radius_m")],
-            Self::Feet { count, .. } => (1..=*count).flat_map(places_of_foot).collect(),
-            Self::FootInTheAir { number, .. } => places_of_foot(*number).into(),
+            Self::Feet { count, .. } => {
+                (1..=*count).flat_map(|foot| components(&format!("foot_{foot}_"), "_m")).collect()
+            }
+            Self::FootInTheAir { number, .. } => {
+                components(&format!("foot_{number}_"), "_m").into()
+            }
             Self::FootOffTheFloor { number, .. } => vec![format!("foot_{number}_y_m")],
             Self::BearingsTogether { .. } => {
                 vec!["bearing_rear_x_m".to_owned(), "bearing_front_x_m".to_owned()]
@@ -180,87 +211,32 @@ impl Violation {
             Self::TableLength { .. } => "as many speeds as times, at least one of each".to_owned(),
             Self::TableStart { .. } => "a table that starts at time 0".to_owned(),
             Self::TableOrder { .. } => "times that increase".to_owned(),
-            Self::TableValue { column: "time_s", value, .. } => {
-                Range::NonNegative.instead_of(*value)
-            }
-            Self::TableValue { .. } => Range::Within(-FASTEST_RPM, FASTEST_RPM).to_string(),
+            Self::TableValue { column: "time_s", value, .. } => TIMES.instead_of(*value),
+            Self::TableValue { .. } => SPEEDS.to_string(),
         }
     }
 }
 
-impl fmt::Display for Violation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::OutOfRange { parameter, value } => {
-                write!(f, "{} = {} is out of range", parameter.name(), decimal(*value))
-            }
-            Self::Inertia { body, greatest, moments_kg_m2 } => {
-                let others = rounded(moments_kg_m2.iter().sum::<f64>() - moments_kg_m2[*greatest]);
-                let value = decimal(moments_kg_m2[*greatest]);
-                let ii = 11 * (greatest + 1);
-                write!(
-                    f,
-                    "no rigid body has the {body}'s inertia: I{ii} = {value} exceeds the other \
-                     two's sum, {others}"
-                )
-            }
-            Self::ZeroLength { element, number, length_m } => {
-                write!(
-                    f,
-                    "the ends of {element} {number} are {} m apart: it has no direction",
-                    rounded(*length_m)
-                )
-            }
-            Self::NoDirection { number } => write!(f, "stop {number} has no direction"),
-            Self::OnAxis { number } => write!(
-                f,
-                "unbalance {number} is on the drum's axis and unbalances nothing, beside others"
-            ),
-            Self::Feet { has_cabinet: false, .. } => f.write_str("feet without a cabinet"),
-            Self::Feet { count: count @ 3..=FEET, .. } => {
-                write!(f, "the cabinet's {count} feet are in a line and do not hold it")
-            }
-            Self::Feet { count, .. } => {
-                write!(f, "the cabinet stands on {count} feet, and loads are reckoned for 3 or 4")
-            }
-            Self::FootOffTheFloor { number, higher_m } => {
-                let way = if *higher_m > 0.0 { "higher" } else { "lower" };
-                write!(f, "foot {number} stands {} m {way} than foot 1", rounded(higher_m.abs()))
-            }
-            Self::FootInTheAir { number, load_n } => {
-                write!(f, "foot {number} lifts at rest: it would carry {load_n:.1} N")
-            }
-            Self::BearingsTogether { distance_m } => {
-                write!(
-                    f,
-                    "front and rear bearing are {} m apart and hold no angle",
-                    rounded(*distance_m)
-                )
-            }
-            Self::NoSprings => f.write_str("the machine has no springs: nothing carries it"),
-            Self::TableLength { times: 0, speeds: 0 } => f.write_str("the spin table is empty"),
-            Self::TableLength { times, speeds } => {
-                write!(f, "the spin table has {times} times but {speeds} speeds")
-            }
-            Self::TableStart { time_s } => write!(f, "the spin table starts at {time_s} s"),
-            Self::TableOrder { before_s, time_s, .. } => {
-                write!(f, "time {time_s} s of the spin table follows {before_s} s")
-            }
-            Self::TableValue { column, index, value } => {
-                write!(
-                    f,
-                    "{column} = {} (entry {}) of the spin table is out of range",
-                    decimal(*value),
-                    index + 1
-                )
-            }
-        }
+/// Why so many feet do not hold a cabinet, or that they have none to hold.
+fn of_feet(count: usize, has_cabinet: bool) -> String {
+    match count {
+        _ if !has_cabinet => "feet without a cabinet".to_owned(),
+        3..=FEET => format!("the cabinet's {count} feet are in a line and do not hold it"),
+        _ => format!("the cabinet stands on {count} feet, and loads are reckoned for 3 or 4"),
     }
 }
 
-/// Parameters of where a foot is.
-fn places_of_foot(number: usize) -> [String; 3] {
-    ["x", "y", "z"].map(|axis| format!("foot_{number}_{axis}_m"))
+/// What is wrong with so many entries of a spin table.
+fn of_table(times: usize, speeds: usize) -> String {
+    match (times, speeds) {
+        (0, 0) => "the spin table is empty".to_owned(),
+        _ => format!("the spin table has {times} times but {speeds} speeds"),
+    }
+}
+
+/// Names of a vector's components.
+fn components(before: &str, after: &str) -> [String; 3] {
+    ["x", "y", "z"].map(|axis| format!("{before}{axis}{after}"))
 }
 
 /// A computed number for a message, without the last digits' rounding error.
@@ -336,8 +312,7 @@ impl Machine {
             None => {}
         }
         if !self.further_unbalances.is_empty() {
-            let unbalances = core::iter::once(&self.unbalance).chain(&self.further_unbalances);
-            for (k, unbalance) in unbalances.enumerate() {
+            for (k, unbalance) in self.unbalances().enumerate() {
                 if unbalance.mass_kg != 0.0 && unbalance.radius_m == 0.0 {
                     joint.push(Violation::OnAxis { number: k + 1 });
                 }
@@ -385,30 +360,21 @@ impl Spin {
         if time_s.len() != speed_rpm.len() || time_s.is_empty() {
             found.push(Violation::TableLength { times: time_s.len(), speeds: speed_rpm.len() });
         }
-        let time_ok = |t: f64| Range::NonNegative.contains(t);
-        let speed_ok = |n: f64| Range::Within(-FASTEST_RPM, FASTEST_RPM).contains(n);
-        let bad_times = time_s.iter().enumerate().filter(|&(_, &t)| !time_ok(t));
-        found.extend(bad_times.map(|(index, &value)| Violation::TableValue {
-            column: "time_s",
-            index,
-            value,
-        }));
-        let bad_speeds = speed_rpm.iter().enumerate().filter(|&(_, &n)| !speed_ok(n));
-        found.extend(bad_speeds.map(|(index, &value)| Violation::TableValue {
-            column: "speed_rpm",
-            index,
-            value,
-        }));
-        match time_s.first() {
-            Some(&first) if time_ok(first) && first != 0.0 => {
-                found.push(Violation::TableStart { time_s: first })
-            }
-            _ => {}
+        for (column, values, range) in [("time_s", time_s, TIMES), ("speed_rpm", speed_rpm, SPEEDS)]
+        {
+            let bad = values.iter().enumerate().filter(|(_, value)| !range.contains(**value));
+            found.extend(bad.map(|(index, &value)| Violation::TableValue { column, index, value }));
+        }
+        if let Some(&time_s) = time_s.first()
+            && TIMES.contains(time_s)
+            && time_s != 0.0
+        {
+            found.push(Violation::TableStart { time_s });
         }
         for (k, pair) in time_s.windows(2).enumerate() {
             if let &[before_s, time_s] = pair
-                && time_ok(before_s)
-                && time_ok(time_s)
+                && TIMES.contains(before_s)
+                && TIMES.contains(time_s)
                 && time_s <= before_s
             {
                 found.push(Violation::TableOrder { index: k + 1, before_s, time_s });

@@ -185,59 +185,28 @@ fn over_turn(
     start: &Modes,
 ) -> Result<[ModeAtSpeed; COORDINATES], NoModes> {
     let speed = rad_per_s(speed_rpm);
-    let mut sums = start.modes.map(Turn::new);
-    let mut current = start.clone();
+    let mut turn = vec![start.clone()];
     for k in 1..ANGLES {
         let theta = |k: usize| TAU * k as f64 / ANGLES as f64;
-        current = follow(&current, theta(k - 1), theta(k), &|theta| modes(point, theta, speed))?;
-        for (sum, mode) in sums.iter_mut().zip(&current.modes) {
-            sum.add(mode);
-        }
+        let at = |theta| modes(point, theta, speed);
+        turn.push(follow(&turn[k - 1], theta(k - 1), theta(k), &at)?);
     }
-    Ok(sums.map(|sum| sum.mean()))
-}
-
-/// One mode, summed over the angles of a turn.
-struct Turn {
-    first: Mode,
-    re: f64,
-    im: f64,
-    magnitude: f64,
-    extremes: [f64; 2],
-}
-
-impl Turn {
-    fn new(mode: Mode) -> Self {
-        Self {
-            first: mode,
-            re: mode.re_per_s,
-            im: mode.im_rad_per_s,
-            magnitude: mode.magnitude_rad_per_s,
-            extremes: [mode.im_rad_per_s; 2],
-        }
-    }
-
-    fn add(&mut self, mode: &Mode) {
-        self.re += mode.re_per_s;
-        self.im += mode.im_rad_per_s;
-        self.magnitude += mode.magnitude_rad_per_s;
-        self.extremes =
-            [self.extremes[0].min(mode.im_rad_per_s), self.extremes[1].max(mode.im_rad_per_s)];
-    }
-
-    fn mean(&self) -> ModeAtSpeed {
-        let rpm = |rad_per_s: f64| rad_per_s * 60.0 / TAU;
-        let [re, im, magnitude] = [self.re, self.im, self.magnitude].map(|sum| sum / ANGLES as f64);
+    let rpm = |rad_per_s: f64| rad_per_s * 60.0 / TAU;
+    Ok(core::array::from_fn(|mode| {
+        let all = turn.iter().map(|modes| &modes.modes[mode]);
+        let mean = |of: fn(&Mode) -> f64| all.clone().map(of).sum::<f64>() / ANGLES as f64;
+        let frequencies = all.clone().map(|mode| mode.im_rad_per_s);
+        let (re_per_s, im_rad_per_s) = (mean(|mode| mode.re_per_s), mean(|mode| mode.im_rad_per_s));
         ModeAtSpeed {
-            re_per_s: re,
-            im_rad_per_s: im,
-            damping_ratio: -re / magnitude,
-            frequency_rpm: rpm(im),
-            least_rpm: rpm(self.extremes[0]),
-            greatest_rpm: rpm(self.extremes[1]),
-            shape: self.first.shape,
+            re_per_s,
+            im_rad_per_s,
+            damping_ratio: -re_per_s / mean(|mode| mode.magnitude_rad_per_s),
+            frequency_rpm: rpm(im_rad_per_s),
+            least_rpm: rpm(frequencies.clone().fold(f64::INFINITY, f64::min)),
+            greatest_rpm: rpm(frequencies.fold(f64::NEG_INFINITY, f64::max)),
+            shape: start.modes[mode].shape,
         }
-    }
+    }))
 }
 
 /// The speed between two at which the mode's frequency less the speed, of different sign at both,

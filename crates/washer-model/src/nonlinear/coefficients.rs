@@ -74,7 +74,7 @@ impl Bodies<f64> {
         let [mut x_d, mut e] = [drum.centre_x_m, 0.0];
         let [mut i11, mut i22, mut i33] = drum.inertia_kg_m2;
         let mut i12 = 0.0;
-        for unbalance in core::iter::once(&machine.unbalance).chain(&machine.further_unbalances) {
+        for unbalance in machine.unbalances() {
             let m_u = unbalance.mass_kg;
             let whole = m_d + m_u;
             let (dx, dr) = (unbalance.x_m - x_d, unbalance.radius_m - e);

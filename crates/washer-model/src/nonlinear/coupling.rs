@@ -7,7 +7,7 @@ use crate::coordinates::{
     COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH,
     TUB_Y, TUB_YAW, TUB_Z,
 };
-use crate::lanes::lane_struct;
+use crate::lanes::{InLanes as _, lane_struct};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
 use crate::nonlinear::floating::{Factors, Floating, Response};
@@ -73,22 +73,25 @@ pub struct Caps {
     pub hinge_rad_per_s: Option<f64>,
 }
 
-impl Caps {
-    /// The bearings' cap squared, and the reciprocal square of the hinge's: 0 if the hinge is not
-    /// capped.
-    fn squares(&self) -> [f64; 2] {
-        let hinge = self.hinge_rad_per_s.unwrap_or(f64::INFINITY);
-        [self.bearings_rad_per_s * self.bearings_rad_per_s, 1.0 / (hinge * hinge)]
+lane_struct! {
+    /// The caps as the equations use them.
+    #[derive(Clone, Copy)]
+    Scaling {
+        /// Square of the bearings' cap, rad^2/s^2.
+        bearings_squared,
+        /// Reciprocal square of the hinge's; 0 if the hinge is not capped.
+        per_hinge_squared,
     }
 }
 
-/// The caps as the equations use them.
-#[derive(Clone, Copy)]
-pub(crate) struct Scaling<T> {
-    /// Square of the bearings' cap, rad^2/s^2.
-    pub(crate) bearings_squared: N<T>,
-    /// Reciprocal square of the hinge's; 0 if the hinge is not capped.
-    per_hinge_squared: N<T>,
+impl Scaling<f64> {
+    fn new(caps: &Caps) -> Self {
+        let hinge = caps.hinge_rad_per_s.unwrap_or(f64::INFINITY);
+        Self {
+            bearings_squared: N(caps.bearings_rad_per_s * caps.bearings_rad_per_s),
+            per_hinge_squared: N(1.0 / (hinge * hinge)),
+        }
+    }
 }
 
 lane_struct! {
@@ -120,28 +123,19 @@ pub(crate) struct HingeMass<T> {
     pub(crate) torque_per_speed: N<T>,
 }
 
-impl<T: Real> Coupling<T> {
+impl<T: Lane> Coupling<T> {
     /// Springs, or mass scaled to these caps.
     #[inline(always)]
     pub(crate) fn new(zero: N<T>, caps: Option<&Caps>) -> Self {
-        let Some(caps) = caps else { return Self::Springs };
         // No closure: it would be compiled without the instruction set.
-        let [bearings_squared, per_hinge_squared] = caps.squares();
-        Self::MassScaled(Scaling {
-            bearings_squared: zero.lit(bearings_squared),
-            per_hinge_squared: zero.lit(per_hinge_squared),
-        })
+        let Some(caps) = caps else { return Self::Springs };
+        Self::MassScaled(Scaling::splat(zero, &Scaling::new(caps)))
     }
 
     /// Sets the caps of one lane. Bearings that are springs have none.
-    pub(crate) fn set_caps(&mut self, lane: usize, caps: &Caps)
-    where
-        T: Lane,
-    {
+    pub(crate) fn set_caps(&mut self, lane: usize, caps: &Caps) {
         if let Self::MassScaled(scaling) = self {
-            let [bearings_squared, per_hinge_squared] = caps.squares();
-            scaling.bearings_squared.0.set(lane, bearings_squared);
-            scaling.per_hinge_squared.0.set(lane, per_hinge_squared);
+            scaling.set_lane(lane, &Scaling::new(caps));
         }
     }
 

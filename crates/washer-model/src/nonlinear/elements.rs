@@ -21,10 +21,6 @@ lane_struct! {
     Elements {
         springs: Vec<SpringOf<T>>,
         dampers: Vec<DamperOf<T>>,
-        /// One per spring.
-        stiffenings: Vec<StiffeningOf<T>>,
-        /// One per damper.
-        frictions: Vec<FrictionOf<T>>,
         stops: Vec<StopOf<T>>,
         bushings: Vec<BushingOf<T>>,
         /// Whether some machine has more than springs and dampers that are linear along their
@@ -43,8 +39,6 @@ impl Elements<f64> {
         Self {
             springs: machine.springs.iter().map(SpringOf::new).collect(),
             dampers: machine.dampers.iter().map(DamperOf::new).collect(),
-            stiffenings: machine.springs.iter().map(StiffeningOf::new).collect(),
-            frictions: machine.dampers.iter().map(FrictionOf::new).collect(),
             stops: machine.stops.iter().map(StopOf::new).collect(),
             bushings: machine.bushings.iter().map(BushingOf::new).collect(),
             stiffens: InAnyLane::new(stiffens),
@@ -56,22 +50,22 @@ impl Elements<f64> {
     /// Whether its forces have corners that steps longer than they are wide do not see: friction
     /// and stops.
     pub(crate) fn are_nonsmooth(&self) -> bool {
-        !self.stops.is_empty() || self.frictions.iter().any(|friction| friction.force.0 != 0.0)
+        !self.stops.is_empty() || self.dampers.iter().any(|damper| damper.friction.0 != 0.0)
     }
 
     /// The linear model takes a damper's friction at another speed amplitude.
     pub(crate) fn take_friction_at(&mut self, damper: usize, speed_m_per_s: f64) {
-        let friction = &mut self.frictions[damper];
-        friction.viscous = N(viscous(friction.force.0, speed_m_per_s));
+        let damper = &mut self.dampers[damper];
+        damper.viscous = N(viscous(damper.friction.0, speed_m_per_s));
     }
 
     /// The elements of which the linear model is the first order: friction has become the viscous
     /// damping that takes as much energy out of a swing.
     pub(crate) fn with_viscous_friction(&self) -> Self {
         let mut elements = self.clone();
-        for (damper, friction) in elements.dampers.iter_mut().zip(&mut elements.frictions) {
-            damper.damping += friction.viscous;
-            friction.force = N(0.0);
+        for damper in &mut elements.dampers {
+            damper.damping += damper.viscous;
+            damper.friction = N(0.0);
         }
         elements
     }
@@ -81,18 +75,15 @@ impl<T: Lane> Elements<T> {
     /// Force of all elements on the tub, and its moment about the bearing midpoint P_T; in tub
     /// axes, where their tub ends are fixed.
     #[inline(always)]
-    pub(crate) fn on_tub(&self, tub: &TubMotion<'_, T>) -> (Vec3<T>, Vec3<T>) {
+    pub(crate) fn on_tub(&self, tub: &TubMotion<T>) -> (Vec3<T>, Vec3<T>) {
         let zero = tub.midpoint[0].lit(0.0);
         let mut load = ([zero; 3], [zero; 3]);
-        add(&mut load, &self.springs, tub, &());
-        if !self.dampers.is_empty() {
-            add(&mut load, &self.dampers, tub, &tub.midpoint_velocity_in_tub());
-        }
+        add(&mut load, &self.springs, tub, false);
+        add(&mut load, &self.dampers, tub, false);
         if self.has_further.holds() {
-            // Copies: what is lent to a function must lie in memory, on every path.
+            // A copy: what is lent to a function must lie in memory, on every path.
             let mut whole = load;
-            let (tilt, rate) = (*tub.tilt, *tub.rate);
-            let motion = TubMotion { tilt: &tilt, rate: &rate, ..*tub };
+            let motion = *tub;
             zero.0.aside(Further { elements: self, tub: &motion, load: &mut whole });
             load = whole;
         }
@@ -103,18 +94,18 @@ impl<T: Lane> Elements<T> {
 impl<T: Lane> Elements<T> {
     /// How deep a stop's tub point is in it (m; below zero it is open), and its push (N).
     #[inline(always)]
-    pub(crate) fn stop(&self, number: usize, tub: &TubMotion<'_, T>) -> [N<T>; 2] {
+    pub(crate) fn stop(&self, number: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let stop = &self.stops[number];
-        let point = tub.point(&stop.tub, &tub.midpoint_velocity_in_tub());
+        let point = tub.point(&stop.tub);
         [stop.depth(&point), stop.push(&point)]
     }
 
     /// The speed along a damper (m/s).
     #[inline(always)]
-    pub(crate) fn damper_speed(&self, number: usize, tub: &TubMotion<'_, T>) -> N<T> {
+    pub(crate) fn damper_speed(&self, number: usize, tub: &TubMotion<T>) -> N<T> {
         let ends = &self.dampers[number].ends;
-        let span = span(tub.tilt, &tub.midpoint, ends);
-        let velocity = plus_cross(&tub.midpoint_velocity_in_tub().0, tub.rate, &ends.tub);
+        let span = span(&tub.tilt, &tub.midpoint, ends);
+        let velocity = plus_cross(&tub.velocity, &tub.rate, &ends.tub);
         dot(&span, &velocity) / dot(&span, &span).sqrt()
     }
 }
@@ -123,7 +114,7 @@ impl<T: Lane> Elements<T> {
 /// zero, so that no machine's bits depend on those in the other lanes.
 struct Further<'a, T> {
     elements: &'a Elements<T>,
-    tub: &'a TubMotion<'a, T>,
+    tub: &'a TubMotion<T>,
     load: &'a mut (Vec3<T>, Vec3<T>),
 }
 
@@ -133,20 +124,19 @@ impl<T: Lane> Aside for Further<'_, T> {
     #[inline(always)]
     fn run(self) {
         let Self { elements, tub, load } = self;
-        let velocity = tub.midpoint_velocity_in_tub();
         if elements.stiffens.holds() {
-            add(load, &elements.stiffenings, tub, &());
+            add(load, &elements.springs, tub, true);
         }
         if elements.rubs.holds() {
-            add(load, &elements.frictions, tub, &velocity);
+            add(load, &elements.dampers, tub, true);
         }
         for stop in &elements.stops {
-            let point = tub.point(&stop.tub, &velocity);
+            let point = tub.point(&stop.tub);
             let push = stop.push(&point);
             add_force(load, &stop.tub, &tub.tilt.in_own_axes(&scaled(-push, stop.direction)));
         }
         for bushing in &elements.bushings {
-            let force = bushing.force(&tub.point(&bushing.tub, &velocity));
+            let force = bushing.force(&tub.point(&bushing.tub));
             add_force(load, &bushing.tub, &tub.tilt.in_own_axes(&force));
         }
     }
@@ -172,7 +162,14 @@ impl Ends<f64> {
 lane_struct! {
     /// A spring between cabinet and tub.
     #[derive(Clone, Copy, Debug)]
-    SpringOf { ends: Ends<T>, stiffness: N<T>, stiffness_times_free_length: N<T> }
+    SpringOf {
+        ends: Ends<T>,
+        stiffness: N<T>,
+        stiffness_times_free_length: N<T>,
+        /// k_3.
+        cubic: N<T>,
+        free_length: N<T>,
+    }
 }
 
 impl SpringOf<f64> {
@@ -182,36 +179,6 @@ impl SpringOf<f64> {
             ends: Ends::new(spring.cabinet_m, spring.tub_m),
             stiffness: N(spring.stiffness_n_per_m),
             stiffness_times_free_length: N(spring.stiffness_n_per_m * free_length_m),
-        }
-    }
-}
-
-lane_struct! {
-    /// A viscous damper between cabinet and tub.
-    #[derive(Clone, Copy, Debug)]
-    DamperOf { ends: Ends<T>, damping: N<T> }
-}
-
-impl DamperOf<f64> {
-    fn new(damper: &Damper) -> Self {
-        Self {
-            ends: Ends::new(damper.cabinet_m, damper.tub_m),
-            damping: N(damper.damping_n_s_per_m),
-        }
-    }
-}
-
-lane_struct! {
-    /// The part of a spring's force that grows with the cube of its elongation.
-    #[derive(Clone, Copy, Debug)]
-    StiffeningOf { ends: Ends<T>, cubic: N<T>, free_length: N<T> }
-}
-
-impl StiffeningOf<f64> {
-    fn new(spring: &Spring) -> Self {
-        let free_length_m = spring.free_length_m.unwrap_or_else(|| spring.given_length_m());
-        Self {
-            ends: Ends::new(spring.cabinet_m, spring.tub_m),
             cubic: N(spring.cubic_n_per_m3),
             free_length: N(free_length_m),
         }
@@ -219,14 +186,16 @@ impl StiffeningOf<f64> {
 }
 
 lane_struct! {
-    /// The friction of a damper.
+    /// A damper between cabinet and tub.
     #[derive(Clone, Copy, Debug)]
-    FrictionOf {
+    DamperOf {
         ends: Ends<T>,
-        force: N<T>,
+        damping: N<T>,
+        /// F_f.
+        friction: N<T>,
         /// v_s^2.
         speed_squared: N<T>,
-        /// What the linear model has in its place (N s/m).
+        /// What the linear model has in place of friction (N s/m).
         viscous: N<T>,
     }
 }
@@ -236,14 +205,15 @@ fn viscous(friction_n: f64, speed_m_per_s: f64) -> f64 {
     4.0 * friction_n / (PI * speed_m_per_s)
 }
 
-impl FrictionOf<f64> {
+impl DamperOf<f64> {
     fn new(damper: &Damper) -> Self {
         // An own speed is found later.
         let given = damper.friction_linear_speed_m_per_s;
         let speed_m_per_s = given.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S);
         Self {
             ends: Ends::new(damper.cabinet_m, damper.tub_m),
-            force: N(damper.friction_n),
+            damping: N(damper.damping_n_s_per_m),
+            friction: N(damper.friction_n),
             speed_squared: N(damper.friction_speed_m_per_s * damper.friction_speed_m_per_s),
             viscous: N(viscous(damper.friction_n, speed_m_per_s)),
         }
@@ -356,10 +326,6 @@ pub(crate) trait Line<T> {
     fn less_length(&self, force: N<T>, stiffness: N<T>) -> N<T>;
     /// `stiffness` (N/m^3) times the cube of the length less `free_length` (m).
     fn times_cube(&self, stiffness: N<T>, free_length: N<T>) -> N<T>;
-}
-
-/// A line that knows its rate.
-pub(crate) trait MovingLine<T>: Line<T> {
     /// `damping` (N s/m) times the rate at which the line grows.
     fn times_rate(&self, damping: N<T>) -> N<T>;
     /// `force` (N) times r / sqrt(r^2 + s^2), r the rate at which the line grows and s^2 the
@@ -367,127 +333,127 @@ pub(crate) trait MovingLine<T>: Line<T> {
     fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T>;
 }
 
-/// An element between two points.
-pub(crate) trait Element<T> {
+/// The laws of an element between two points: forces that drive the ends apart, by the line between
+/// them and in its measure.
+pub(crate) trait Law<T> {
     /// The points.
     fn ends(&self) -> &Ends<T>;
+    /// What every machine has.
+    fn push<L: Line<T>>(&self, line: &L) -> N<T>;
+    /// What not every machine has.
+    fn push_further<L: Line<T>>(&self, line: &L) -> N<T>;
 }
 
-/// The law of an element: its force by a line.
-pub(crate) trait Law<T, L>: Element<T> {
-    /// The force that drives the ends apart, in the line's measure.
-    fn push(&self, line: &L) -> N<T>;
-}
-
-impl<T> Element<T> for SpringOf<T> {
+/// F = -k e, and further F = -k_3 e^3, e the elongation.
+impl<T: Real> Law<T> for SpringOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
-}
 
-impl<T: Real, L: Line<T>> Law<T, L> for SpringOf<T> {
     #[inline(always)]
-    fn push(&self, line: &L) -> N<T> {
+    fn push<L: Line<T>>(&self, line: &L) -> N<T> {
         line.less_length(self.stiffness_times_free_length, self.stiffness)
     }
-}
 
-impl<T> Element<T> for DamperOf<T> {
     #[inline(always)]
-    fn ends(&self) -> &Ends<T> {
-        &self.ends
-    }
-}
-
-/// Eqs. 33 to 35: F = -C (v . n) n.
-impl<T: Real, L: MovingLine<T>> Law<T, L> for DamperOf<T> {
-    #[inline(always)]
-    fn push(&self, line: &L) -> N<T> {
-        -line.times_rate(self.damping)
-    }
-}
-
-impl<T> Element<T> for StiffeningOf<T> {
-    #[inline(always)]
-    fn ends(&self) -> &Ends<T> {
-        &self.ends
-    }
-}
-
-/// F = -k_3 e^3, e the elongation.
-impl<T: Real, L: Line<T>> Law<T, L> for StiffeningOf<T> {
-    #[inline(always)]
-    fn push(&self, line: &L) -> N<T> {
+    fn push_further<L: Line<T>>(&self, line: &L) -> N<T> {
         -line.times_cube(self.cubic, self.free_length)
     }
 }
 
-impl<T> Element<T> for FrictionOf<T> {
+/// Eqs. 33 to 35: F = -C (v . n) n, and further F = -F_f v / sqrt(v^2 + v_s^2), v the speed along
+/// the damper.
+impl<T: Real> Law<T> for DamperOf<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
-}
 
-/// F = -F_f v / sqrt(v^2 + v_s^2), v the speed along the damper.
-impl<T: Real, L: MovingLine<T>> Law<T, L> for FrictionOf<T> {
     #[inline(always)]
-    fn push(&self, line: &L) -> N<T> {
-        -line.times_sense(self.force, self.speed_squared)
+    fn push<L: Line<T>>(&self, line: &L) -> N<T> {
+        -line.times_rate(self.damping)
+    }
+
+    #[inline(always)]
+    fn push_further<L: Line<T>>(&self, line: &L) -> N<T> {
+        -line.times_sense(self.friction, self.speed_squared)
     }
 }
 
 /// The tub at an instant.
 #[derive(Clone, Copy)]
-pub(crate) struct TubMotion<'a, T> {
-    pub(crate) tilt: &'a Tilt<T>,
-    /// P_T along c2 and c3 (m), and its velocity.
+pub(crate) struct TubMotion<T> {
+    tilt: Tilt<T>,
+    /// P_T along c2 and c3 (m).
     pub(crate) midpoint: [N<T>; 2],
-    pub(crate) midpoint_velocity: [N<T>; 2],
+    /// Velocity of P_T, tub axes.
+    velocity: Vec3<T>,
     /// Angular velocity, tub axes.
-    pub(crate) rate: &'a Vec3<T>,
+    rate: Vec3<T>,
 }
 
-impl<T: Real> TubMotion<'_, T> {
+impl<T: Real> TubMotion<T> {
+    /// At the tub's coordinates (m, rad) and their speeds, both in the order of
+    /// [`TUB`](crate::coordinates::TUB).
     #[inline(always)]
-    fn midpoint_velocity_in_tub(&self) -> MidpointVelocity<T> {
-        let [vy, vz] = self.midpoint_velocity;
-        let tilt = self.tilt;
-        MidpointVelocity([
+    pub(crate) fn new(q: &[N<T>; 4], u: &[N<T>; 4]) -> Self {
+        let tilt = Tilt::new(q[2], q[3]);
+        let rate = tilt.motion(u[2], u[3]).rate;
+        Self::turning(tilt, rate, [q[0], q[1]], [u[0], u[1]])
+    }
+
+    /// With a tilt and an angular velocity, at a midpoint (m) that moves along c2 and c3.
+    #[inline(always)]
+    pub(crate) fn turning(
+        tilt: Tilt<T>,
+        rate: Vec3<T>,
+        midpoint: [N<T>; 2],
+        [vy, vz]: [N<T>; 2],
+    ) -> Self {
+        let velocity = [
             tilt.axis_c[1] * vy + tilt.axis_c[2] * vz,
             tilt.second_c[1] * vy + tilt.second_c[2] * vz,
             (tilt.cos_yaw * vz).v(),
-        ])
+        ];
+        Self { tilt, midpoint, velocity, rate }
+    }
+
+    /// A vector from tub axes to cabinet axes.
+    #[inline(always)]
+    pub(crate) fn in_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
+        self.tilt.in_cabinet_axes(v)
     }
 
     /// A point of the tub, given in its axes from P_T.
     #[inline(always)]
-    fn point(&self, tub: &Vec3<T>, velocity: &MidpointVelocity<T>) -> PointMotion<T> {
+    fn point(&self, tub: &Vec3<T>) -> PointMotion<T> {
         let mut displacement = difference(self.tilt.in_cabinet_axes(tub), tub);
         displacement[1] += self.midpoint[0];
         displacement[2] += self.midpoint[1];
-        let velocity = self.tilt.in_cabinet_axes(&plus_cross(&velocity.0, self.rate, tub));
+        let velocity = self.tilt.in_cabinet_axes(&plus_cross(&self.velocity, &self.rate, tub));
         PointMotion { displacement, velocity }
     }
 }
 
-/// Velocity of P_T, tub axes.
-struct MidpointVelocity<T>(Vec3<T>);
-
-/// A line in tub axes; it measures forces in newtons per metre of its length. With the midpoint's
-/// velocity as `V` it knows its rate.
-struct TubLine<'a, T, V> {
+/// A line in tub axes; it measures forces in newtons per metre of its length.
+struct TubLine<'a, T> {
     /// From the cabinet end to the tub end.
     span: Vec3<T>,
     /// The tub end.
     end: &'a Vec3<T>,
-    /// Angular velocity of the tub.
-    rate: &'a Vec3<T>,
-    velocity: &'a V,
+    tub: &'a TubMotion<T>,
 }
 
-impl<T: Real, V> Line<T> for TubLine<'_, T, V> {
+impl<T: Real> TubLine<'_, T> {
+    /// The rate of the length, times the length.
+    #[inline(always)]
+    fn along(&self) -> N<T> {
+        dot(&self.span, &plus_cross(&self.tub.velocity, &self.tub.rate, self.end))
+    }
+}
+
+impl<T: Real> Line<T> for TubLine<'_, T> {
     #[inline(always)]
     fn less_length(&self, force: N<T>, stiffness: N<T>) -> N<T> {
         force / dot(&self.span, &self.span).sqrt() - stiffness
@@ -499,19 +465,15 @@ impl<T: Real, V> Line<T> for TubLine<'_, T, V> {
         let elongation = length - free_length;
         (stiffness * (elongation * elongation).v() * elongation).v() / length
     }
-}
 
-impl<T: Real> MovingLine<T> for TubLine<'_, T, MidpointVelocity<T>> {
     #[inline(always)]
     fn times_rate(&self, damping: N<T>) -> N<T> {
-        let velocity = plus_cross(&self.velocity.0, self.rate, self.end);
-        (damping * dot(&self.span, &velocity)).v() / dot(&self.span, &self.span)
+        (damping * self.along()).v() / dot(&self.span, &self.span)
     }
 
     #[inline(always)]
     fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T> {
-        let velocity = plus_cross(&self.velocity.0, self.rate, self.end);
-        let along = dot(&self.span, &velocity);
+        let along = self.along();
         let squared = dot(&self.span, &self.span);
         // With v = along / length, by one root.
         let root = (squared * (along * along + (speed_squared * squared).v())).v().sqrt();
@@ -539,9 +501,7 @@ impl<T: Real> Line<T> for CabinetLine<T> {
         let elongation = self.length - free_length;
         (stiffness * (elongation * elongation).v() * elongation).v()
     }
-}
 
-impl<T: Real> MovingLine<T> for CabinetLine<T> {
     #[inline(always)]
     fn times_rate(&self, damping: N<T>) -> N<T> {
         (damping * self.rate).v()
@@ -553,24 +513,19 @@ impl<T: Real> MovingLine<T> for CabinetLine<T> {
     }
 }
 
-/// Adds force and moment of elements of one law.
+/// Adds force and moment of elements, by their first law or by what not every machine has.
 #[inline(always)]
-fn add<'a, T: Real, V, E: Law<T, TubLine<'a, T, V>>>(
+fn add<T: Real, E: Law<T>>(
     load: &mut (Vec3<T>, Vec3<T>),
-    elements: &'a [E],
-    tub: &TubMotion<'a, T>,
-    velocity: &'a V,
+    elements: &[E],
+    tub: &TubMotion<T>,
+    is_further: bool,
 ) {
     for element in elements {
         let ends = element.ends();
-        let line = TubLine {
-            span: span(tub.tilt, &tub.midpoint, ends),
-            end: &ends.tub,
-            rate: tub.rate,
-            velocity,
-        };
-        let force = scaled(element.push(&line), line.span);
-        add_force(load, &ends.tub, &force);
+        let line = TubLine { span: span(&tub.tilt, &tub.midpoint, ends), end: &ends.tub, tub };
+        let push = if is_further { element.push_further(&line) } else { element.push(&line) };
+        add_force(load, &ends.tub, &scaled(push, line.span));
     }
 }
 

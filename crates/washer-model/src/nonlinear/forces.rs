@@ -51,20 +51,18 @@ impl<T: Real> Deflection<T> {
     }
 }
 
-/// The drum shaft's flexure: derivatives of K_D phi^2 / 2 with cos phi = cos q9 cos q10.
-pub(crate) struct Flexure<T> {
-    pub(crate) about_9: N<T>,
-    pub(crate) about_10: N<T>,
-}
-
-impl<T: Real> Flexure<T> {
-    #[inline(always)]
-    pub(crate) fn new(stiffness: N<T>, s9: N<T>, c9: N<T>, s10: N<T>, c10: N<T>) -> Self {
-        // sin^2 phi without cancellation.
-        let sin_squared = s9 * s9 + (c9 * c9) * (s10 * s10);
-        let factor = (stiffness * phi_over_sin(sin_squared, (c9 * c10).v())).v();
-        Self { about_9: (factor * (s9 * c10)).v(), about_10: (factor * (c9 * s10)).v() }
-    }
+/// Moments of the drum shaft's flexure about q9 and q10, by their sines and cosines: derivatives of
+/// K_D phi^2 / 2 with cos phi = cos q9 cos q10.
+#[inline(always)]
+pub(crate) fn flexure<T: Real>(
+    stiffness: N<T>,
+    (s9, c9): (N<T>, N<T>),
+    (s10, c10): (N<T>, N<T>),
+) -> [N<T>; 2] {
+    // sin^2 phi without cancellation.
+    let sin_squared = s9 * s9 + (c9 * c9) * (s10 * s10);
+    let factor = (stiffness * phi_over_sin(sin_squared, (c9 * c10).v())).v();
+    [(factor * (s9 * c10)).v(), (factor * (c9 * s10)).v()]
 }
 
 /// Coefficients of asin(x)/x in powers of x^2: c_k = c_{k-1} (2k - 1)^2 / (2k (2k + 1)).

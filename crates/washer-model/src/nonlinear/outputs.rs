@@ -89,8 +89,7 @@ impl<T: Real> Axes<T> {
         let of_tub = tub.motion(u[TUB_YAW], u[TUB_PITCH]);
         let shaft = Tilt::of_shaft(q);
         let of_shaft = shaft.motion(u[SHAFT_YAW], u[SHAFT_PITCH]);
-        let hinge = Hinge::new(q[HINGE_YAW], q[HINGE_PITCH]);
-        let (s9, c9) = hinge.first;
+        let (s9, c9) = q[HINGE_YAW].sin_cos();
 
         // Angular velocity and acceleration: shaft in S, then drum in E; as in `nonlinear::rotor`,
         // with u' now.
@@ -99,10 +98,8 @@ impl<T: Real> Axes<T> {
             [x + spin.speed, y, z]
         };
         let alpha_s = {
-            let [x, y, z] = into_spin(
-                spin,
-                &angular_acceleration(&shaft, &of_shaft, a[SHAFT_YAW], a[SHAFT_PITCH]),
-            );
+            let alpha = angular_acceleration(&shaft, &of_shaft, motion, SHAFT_YAW);
+            let [x, y, z] = into_spin(spin, &alpha);
             [x + spin.acceleration, y + spin.speed * omega_s[2], z - spin.speed * omega_s[1]]
         };
         let (u9, u10) = (u[HINGE_YAW], u[HINGE_PITCH]);
@@ -116,25 +113,15 @@ impl<T: Real> Axes<T> {
                 s9 * alpha_s[0] + c9 * alpha_s[2] + u9 * ex + a[HINGE_PITCH],
             ],
         ];
-        let (s10, c10) = hinge.second;
+        let (s10, c10) = q[HINGE_PITCH].sin_cos();
         let zero = s9.lit(0.0);
         Self {
-            tub_turn: [of_tub.rate, angular_acceleration(&tub, &of_tub, a[TUB_YAW], a[TUB_PITCH])],
-            tub_axis: axis_course(
-                &tub,
-                &of_tub,
-                [u[TUB_YAW], u[TUB_PITCH]],
-                [a[TUB_YAW], a[TUB_PITCH]],
-            ),
-            shaft_axis: axis_course(
-                &shaft,
-                &of_shaft,
-                [u[SHAFT_YAW], u[SHAFT_PITCH]],
-                [a[SHAFT_YAW], a[SHAFT_PITCH]],
-            ),
+            tub_turn: [of_tub.rate, angular_acceleration(&tub, &of_tub, motion, TUB_YAW)],
+            tub_axis: axis_course(&tub, &of_tub, motion, TUB_YAW),
+            shaft_axis: axis_course(&shaft, &of_shaft, motion, SHAFT_YAW),
             drum: [
-                drum_course(&shaft, spin, &hinge, &turn, &[c10, s10, zero]),
-                drum_course(&shaft, spin, &hinge, &turn, &[-s10, c10, zero]),
+                drum_course(&shaft, spin, (s9, c9), &turn, &[c10, s10, zero]),
+                drum_course(&shaft, spin, (s9, c9), &turn, &[-s10, c10, zero]),
             ],
             tub,
         }
@@ -200,19 +187,6 @@ pub(crate) fn squared<T: Real>([y, z]: &[Sample<T>; RADIAL]) -> Sample<T> {
     )
 }
 
-/// Sines and cosines of the hinge's two angles.
-struct Hinge<T> {
-    first: (N<T>, N<T>),
-    second: (N<T>, N<T>),
-}
-
-impl<T: Real> Hinge<T> {
-    #[inline(always)]
-    fn new(first: N<T>, second: N<T>) -> Self {
-        Self { first: first.sin_cos(), second: second.sin_cos() }
-    }
-}
-
 #[inline(always)]
 fn sample<T>(value: N<T>, slope: N<T>, curvature: N<T>) -> Sample<T> {
     Sample { value, slope, curvature }
@@ -223,25 +197,27 @@ fn component<T: Real>(course: &Course<T>, i: usize) -> Sample<T> {
     sample(course.value[i], course.rate[i], course.second[i])
 }
 
-/// Angular acceleration of a tilted frame, in its axes.
+/// Angular acceleration of a frame tilted by coordinate `yaw` and the next, in its axes.
 #[inline(always)]
 fn angular_acceleration<T: Real>(
     tilt: &Tilt<T>,
     at: &TiltMotion<T>,
-    yaw: N<T>,
-    pitch: N<T>,
+    motion: &Motion<T>,
+    yaw: usize,
 ) -> Vec3<T> {
+    let [yaw, pitch] = [motion.a[yaw], motion.a[yaw + 1]];
     [at.acceleration_x + yaw * tilt.sin_pitch, at.acceleration_y + yaw * tilt.cos_pitch, pitch]
 }
 
-/// The axis of a tilted frame.
+/// The axis of such a frame.
 #[inline(always)]
 fn axis_course<T: Real>(
     tilt: &Tilt<T>,
     at: &TiltMotion<T>,
-    rates: [N<T>; 2],
-    seconds: [N<T>; 2],
+    Motion { u, a, .. }: &Motion<T>,
+    yaw: usize,
 ) -> Course<T> {
+    let (rates, seconds) = ([u[yaw], u[yaw + 1]], [a[yaw], a[yaw + 1]]);
     let zero = rates[0].lit(0.0);
     let by_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
     let by_pitch = &tilt.second_c;
@@ -260,7 +236,7 @@ fn axis_course<T: Real>(
 fn drum_course<T: Real>(
     shaft: &Tilt<T>,
     spin: &SpinState<T>,
-    hinge: &Hinge<T>,
+    hinge: (N<T>, N<T>),
     turn: &[Vec3<T>; 2],
     v: &Vec3<T>,
 ) -> Course<T> {
@@ -280,10 +256,9 @@ fn drum_course<T: Real>(
 fn out_of_drum<T: Real>(
     shaft: &Tilt<T>,
     spin: &SpinState<T>,
-    hinge: &Hinge<T>,
+    (s9, c9): (N<T>, N<T>),
     v: &Vec3<T>,
 ) -> Vec3<T> {
-    let (s9, c9) = hinge.first;
     shaft.in_cabinet_axes(&out_of_spin(spin, &out_of_hinge(s9, c9, v)))
 }
 

@@ -45,15 +45,16 @@ pub(crate) struct Jump {
 pub(crate) fn jumps(stretches: &[SpinStretch], end_s: f64) -> Vec<Jump> {
     let mut before = 0.0;
     let mut jumps = Vec::new();
-    for (i, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s < end_s)
+    for (i, stretch) in
+        stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s.0 < end_s)
     {
-        let at_s = stretch.start_s;
+        let at_s = stretch.start_s.0;
         let by_rad_per_s2 = (stretch.acceleration_rad_per_s2(at_s) - before).abs();
         if by_rad_per_s2 != 0.0 {
             jumps.push(Jump { at_s, by_rad_per_s2 });
         }
         if let Some(next) = stretches.get(i + 1) {
-            before = stretch.acceleration_rad_per_s2(next.start_s);
+            before = stretch.acceleration_rad_per_s2(next.start_s.0);
         }
     }
     jumps
@@ -102,7 +103,7 @@ impl Ringing {
         let (mut moment_n_m, mut on_bearings_n) = (0.0, 0.0);
         let hinge_x_m = machine.drum.hinge_x_m;
         let mut hanging_kg_m = machine.drum.mass_kg * (machine.drum.centre_x_m - hinge_x_m);
-        for unbalance in core::iter::once(&machine.unbalance).chain(&machine.further_unbalances) {
+        for unbalance in machine.unbalances() {
             let load_n = unbalance.mass_kg * unbalance.radius_m.abs() * jumps_rad_per_s2;
             moment_n_m += load_n * (unbalance.x_m - hinge_x_m).abs();
             hanging_kg_m += unbalance.mass_kg * (unbalance.x_m - hinge_x_m);

@@ -9,7 +9,7 @@ use crate::nonlinear::coupling::Coupling;
 use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::tangent::Tangent;
-use lane_ode::{Dual, N, Partials, ScalarKernel, Simd};
+use lane_ode::{Aside, Dual, N, Partials, Simd};
 use std::sync::Arc;
 
 /// Numbers of a state: the ten coordinates q1 to q10 (m, rad), then their speeds.
@@ -62,7 +62,7 @@ impl Equations {
     /// Times (s) at which the spin's acceleration, and so f, may jump: integrate from one to the
     /// next.
     pub fn kinks_s(&self) -> impl Iterator<Item = f64> + '_ {
-        self.stretches.iter().skip(1).map(|stretch| stretch.start_s)
+        self.stretches.iter().skip(1).map(|stretch| stretch.start_s.0)
     }
 
     /// f at time `t_s`, at a kink from its right.
@@ -111,7 +111,7 @@ impl Equations {
 
     /// Puts the stretch of the spin in place that holds at a time.
     fn move_to(&mut self, t_s: f64) {
-        let holds = |k: usize| self.stretches.get(k).is_none_or(|stretch| t_s < stretch.start_s);
+        let holds = |k: usize| self.stretches.get(k).is_none_or(|stretch| t_s < stretch.start_s.0);
         if holds(self.stretch + 1) && (self.stretch == 0 || !holds(self.stretch)) {
             return;
         }
@@ -144,12 +144,12 @@ struct Derivative<'a, M> {
     x: &'a [f64; STATES],
 }
 
-impl<M: Model<f64>> ScalarKernel for Derivative<'_, M> {
+impl<M: Model<f64>> Aside for Derivative<'_, M> {
     type Output = [f64; STATES];
     #[inline(always)]
     fn run(self) -> [f64; STATES] {
         let forcing = self.model.forcing(N(self.t_s));
-        plain(&self.model.derivative(&forcing, &numbers(self.x)))
+        self.model.derivative(&forcing, &self.x.map(N)).map(|N(rate)| rate)
     }
 }
 
@@ -159,12 +159,12 @@ struct Jacobian<'a, J> {
     x: &'a [f64; STATES],
 }
 
-impl<J: Model<Dual<f64>>> ScalarKernel for Jacobian<'_, J> {
+impl<J: Model<Dual<f64>>> Aside for Jacobian<'_, J> {
     type Output = Partials<COORDINATES>;
     #[inline(always)]
     fn run(self) -> Partials<COORDINATES> {
         let mut partials = Partials::zero();
-        self.tangent.partials(self.t_s, &numbers(self.x), &mut partials);
+        self.tangent.partials(self.t_s, &self.x.map(N), &mut partials);
         partials
     }
 }
@@ -175,11 +175,11 @@ struct Outputs<'a, M> {
     x: &'a [f64; STATES],
 }
 
-impl<M: Model<f64>> ScalarKernel for Outputs<'_, M> {
+impl<M: Model<f64>> Aside for Outputs<'_, M> {
     type Output = ([f64; CHANNELS], [f64; CHANNELS]);
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let x = numbers(self.x);
+        let x = self.x.map(N);
         let forcing = self.model.forcing(N(self.t_s));
         let dx = self.model.derivative(&forcing, &x);
         let (mut values, mut rates) = ([0.0; CHANNELS], [0.0; CHANNELS]);
@@ -191,22 +191,4 @@ impl<M: Model<f64>> ScalarKernel for Outputs<'_, M> {
         }
         (values, rates)
     }
-}
-
-#[inline(always)]
-fn numbers(x: &[f64; STATES]) -> [N<f64>; STATES] {
-    let mut numbers = [N(0.0); STATES];
-    for i in 0..STATES {
-        numbers[i] = N(x[i]);
-    }
-    numbers
-}
-
-#[inline(always)]
-fn plain(x: &[N<f64>; STATES]) -> [f64; STATES] {
-    let mut plain = [0.0; STATES];
-    for i in 0..STATES {
-        plain[i] = x[i].0;
-    }
-    plain
 }

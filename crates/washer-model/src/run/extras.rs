@@ -3,10 +3,10 @@
 //! They are computed in the lanes, step by step, in a function of their own ([`Lane::aside`]), so
 //! that the loop over steps does not change where they are not in use.
 
-use super::cabinet_force::GreatestForce;
-use super::loads::{Loads, StopLoad};
-use super::snapshots::{Snapshot, Snapshots};
-use super::{Course, Method};
+use super::Method;
+use super::loads::Loads;
+use super::snapshots::Snapshots;
+use super::wanted::{Extra, Wanted};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::kind::ModelKind;
@@ -20,78 +20,6 @@ const PARTS_OF_A_LONG_STEP: u32 = 4;
 
 /// Parts of steps with capped modes need be no shorter than this (s).
 const SHORTEST_PART_S: f64 = 1e-3;
-
-/// Records to make beyond a [`Record`](super::Record); none by default.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Wanted {
-    /// Root mean squares of the channels.
-    pub root_mean_squares: bool,
-    /// Largest deviations of the channels in every turn of the drum.
-    pub turns: bool,
-    /// The greatest force that springs and dampers together put on the cabinet.
-    pub cabinet_force: bool,
-    /// How long drum and tub overlap.
-    pub clash_time: bool,
-    /// The greatest push of each stop, and how long it is closed.
-    pub stops: bool,
-    /// The least load of each foot of the cabinet, and the least margins against slipping and
-    /// walking.
-    pub feet: bool,
-    /// The greatest speed of each damper.
-    pub damper_speeds: bool,
-    /// The coordinates at the ends of legs ([`Timing::checkpoints`](crate::Timing)).
-    pub course: bool,
-    /// All outputs at the point's own instants ([`Point::seen_at`]), within the window.
-    pub snapshots: bool,
-}
-
-/// The records that [`Wanted`] asks for, of one trajectory, within the window.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Extra {
-    /// Root mean square of each channel's deviation from equilibrium, in the order of
-    /// `Channel::ALL` (m, rad).
-    pub root_mean_squares: Option<[f64; CHANNELS]>,
-    /// Per turn of the drum, each channel's largest deviation from equilibrium (m, rad). Turns are
-    /// counted from the start of the run by the angle that the drum travels; parts of turns at the
-    /// window's ends belong to the whole turn beside them, and a window without whole turns counts
-    /// as one. Empty unless asked for.
-    pub turns: Vec<[f64; CHANNELS]>,
-    /// The greatest magnitude of the sum of all forces of springs and dampers on the cabinet (N);
-    /// at rest it is the weight.
-    pub cabinet_force_n: Option<f64>,
-    /// Time with a gap below zero (s).
-    pub clash_time_s: Option<f64>,
-    /// By how much more or less that would be, with the gap off by as much as ringing can make it
-    /// (s). Where drum and tub only just touch, it is much of the time itself. Absent where modes
-    /// are not capped, because such runs follow the ringing.
-    pub clash_doubt_s: Option<f64>,
-    /// Of each stop, in the machine's order.
-    pub stops: Vec<StopLoad>,
-    /// The least vertical load of each foot (N), below zero where it would lift, in the machine's
-    /// order; empty if it has no cabinet.
-    pub foot_loads_n: Vec<f64>,
-    /// The least margin against slipping (N): friction on all feet together less the horizontal
-    /// force; below zero the cabinet slips. Absent if the machine has no cabinet.
-    pub slip_margin_n: Option<f64>,
-    /// The least margin against walking (N): that against slipping less what turning takes of it.
-    /// Absent if the machine has no cabinet.
-    pub walk_margin_n: Option<f64>,
-    /// The greatest speed of each damper along it (m/s), in the machine's order; empty unless asked
-    /// for.
-    pub damper_speeds_m_per_s: Vec<f64>,
-    /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed.
-    /// Empty unless asked for.
-    pub course: Course,
-    /// All outputs at the point's own instants. Empty unless asked for.
-    pub snapshots: Vec<Snapshot>,
-}
-
-impl Wanted {
-    /// Whether any record needs more than the ends of legs.
-    pub(crate) fn anything(self) -> bool {
-        Self { course: false, ..self } != Self::default()
-    }
-}
 
 /// Where recorders look between the ends of steps.
 #[derive(Clone, Copy)]
@@ -126,7 +54,6 @@ pub(crate) struct Extras<T> {
     wanted: Wanted,
     squares: SquareIntegrals<T, CHANNELS>,
     turns: PartPeaks<T, CHANNELS>,
-    force: Option<GreatestForce<T>>,
     loads: Option<Loads<T>>,
     /// With the clearance as it is; where modes are capped, also with less and more, by what
     /// ringing may add to the gap.
@@ -154,23 +81,12 @@ impl<T: Lane> Extras<T> {
             return None;
         }
         let Instants { parts, clearances } = instants;
-        let force = if wanted.cabinet_force {
-            Some(GreatestForce::new(zero, model, point, parts))
-        } else {
-            None
-        };
-        let loads = if wanted.stops || wanted.feet || wanted.damper_speeds {
-            Some(Loads::new(zero, model, point, parts, wanted.damper_speeds))
-        } else {
-            None
-        };
         let snapshots = if wanted.snapshots { Some(Snapshots::new(zero)) } else { None };
         Some(Self {
             wanted,
             squares: SquareIntegrals::new(zero),
             turns: PartPeaks::new(zero),
-            force,
-            loads,
+            loads: Loads::new(zero, wanted, model, point, parts),
             clash: [TimeAbove::new(zero); 3],
             clearances_squared: [zero; 3],
             clearances,
@@ -192,9 +108,6 @@ impl<T: Lane> Extras<T> {
         if self.wanted.turns {
             self.turns.reset(lane, &cuts_s(&point.stretches, point.window_s()));
         }
-        if let Some(force) = &mut self.force {
-            force.set_point(lane, point);
-        }
         if let Some(loads) = &mut self.loads {
             loads.set_point(lane, point);
         }
@@ -215,23 +128,19 @@ impl<T: Lane> Extras<T> {
         let mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let wanted = self.wanted;
         let [clash_s, longer_s, shorter_s] = self.clash.map(|clash| clash.lane(lane));
-        let loads = self.loads.as_ref();
-        self.found[index] = Extra {
-            stops: loads.map_or_else(Vec::new, |loads| loads.stops(lane)),
-            foot_loads_n: loads.map_or_else(Vec::new, |loads| loads.foot_loads_n(lane)),
-            slip_margin_n: loads.and_then(|loads| loads.slip_margin_n(lane)),
-            walk_margin_n: loads.and_then(|loads| loads.walk_margin_n(lane)),
-            damper_speeds_m_per_s: loads
-                .map_or_else(Vec::new, |loads| loads.damper_speeds_m_per_s(lane)),
+        let extra = &mut self.found[index];
+        *extra = Extra {
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),
             turns,
-            cabinet_force_n: self.force.as_ref().map(|force| force.lane_n(lane)),
             clash_time_s: wanted.clash_time.then_some(clash_s),
             clash_doubt_s: (wanted.clash_time && self.clearances > 1)
                 .then_some((longer_s - clash_s).max(clash_s - shorter_s)),
-            course: Course::new(),
             snapshots,
+            ..Extra::default()
         };
+        if let Some(loads) = &self.loads {
+            loads.finish(lane, point, extra);
+        }
     }
 }
 
@@ -266,9 +175,6 @@ impl<T: Lane> Aside for Seen<'_, T> {
                 Some((end_s, length_s)) => extras.turns.advance(end_s, length_s, channels, inside),
                 None => extras.turns.begin(channels, inside),
             }
-        }
-        if let Some(force) = &mut extras.force {
-            force.see(step, x, dx, inside);
         }
         if let Some(loads) = &mut extras.loads {
             loads.see(step, x, dx, inside);

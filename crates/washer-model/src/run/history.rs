@@ -14,18 +14,16 @@ use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::squared;
 use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::snapshots::share_of_step;
 use crate::run::stepper::{ByDopri5, ByRk4, Fixed, Stepper};
 use crate::run::stiff::{OnLeg, StiffTask};
 use crate::run::suspension::{Forces, forces};
-use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, first_step};
+use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, enter};
 use core::marker::PhantomData;
 use lane_ode::{
-    Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, ScalarKernel, Simd,
-    Step, Task, Tolerance, rodas,
+    Aside, Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, Simd, Step,
+    Task, Tolerance, rodas,
 };
-
-/// An instant this share of a step past its end is its end.
-const SLACK: f64 = 1e-9;
 
 /// One trajectory at some instants.
 #[derive(Clone, Debug)]
@@ -90,8 +88,10 @@ pub fn history_until<'a>(
 ) -> History<'a> {
     let end_s = point.legs.last().map_or(0.0, |leg| leg.end_s);
     let times_s = (0..instants(end_s, every_s)).map(|k| k as f64 * every_s).collect();
-    let [history] = sample(model, [Asked { point, method: *method, start: *start, times_s }], stop);
-    history
+    let asked = [Asked { point, method: *method, start: *start, times_s }];
+    let sampled = sample(model, &asked, stop).pop().unwrap_or_default();
+    let [asked] = asked;
+    of(model, asked, sampled)
 }
 
 /// How many instants there are from 0 to an end, so far apart.
@@ -119,15 +119,16 @@ pub struct Asked<'a> {
 #[must_use]
 pub fn histories<'a>(model: ModelKind, asked: Vec<Asked<'a>>, stop: Stop<'_>) -> Vec<History<'a>> {
     let is_plain = asked.iter().all(|one| matches!(one.method, Method::Rk4 { .. }));
+    let at_once = if is_plain { together() } else { 1 };
     let mut asked = asked.into_iter();
     let mut found = Vec::with_capacity(asked.len());
     loop {
-        let some: Vec<Asked<'a>> = asked.by_ref().take(together()).collect();
-        match some.len() {
-            0 => return found,
-            2.. if is_plain => found.extend(side_by_side(model, some, stop)),
-            _ => found.extend(some.into_iter().flat_map(|one| sample(model, [one], stop))),
+        let some: Vec<Asked<'a>> = asked.by_ref().take(at_once).collect();
+        if some.is_empty() {
+            return found;
         }
+        let sampled = sample(model, &some, stop);
+        found.extend(some.into_iter().zip(sampled).map(|(one, states)| of(model, one, states)));
     }
 }
 
@@ -137,17 +138,19 @@ pub fn together() -> usize {
     Simd::narrow().lanes()
 }
 
-fn sample<'a>(model: ModelKind, asked: [Asked<'a>; 1], stop: Stop<'_>) -> [History<'a>; 1] {
-    let sampled = match model {
-        ModelKind::Nonlinear => one_lane::<OfNonlinear>(&asked, stop),
-        ModelKind::Linear => one_lane::<OfLinear>(&asked, stop),
-    };
-    let mut sampled = sampled.into_iter();
-    asked.map(|asked| of(model, asked, sampled.next().unwrap_or_default()))
+fn sample(model: ModelKind, asked: &[Asked<'_>], stop: Stop<'_>) -> Vec<States> {
+    match model {
+        ModelKind::Nonlinear => sample_by::<OfNonlinear>(asked, stop),
+        ModelKind::Linear => sample_by::<OfLinear>(asked, stop),
+    }
 }
 
-fn one_lane<F: Family>(asked: &[Asked<'_>; 1], stop: Stop<'_>) -> Vec<States> {
+/// One in one lane; several, by plain Runge-Kutta, side by side.
+fn sample_by<F: Family>(asked: &[Asked<'_>], stop: Stop<'_>) -> Vec<States> {
     match asked[0].method {
+        Method::Rk4 { .. } if asked.len() > 1 => {
+            Simd::dispatch_narrow(by::<F, _>(asked, stop, ByRk4))
+        }
         Method::Rk4 { .. } => Simd::one_lane(by::<F, _>(asked, stop, ByRk4)),
         Method::Geared(_) => Simd::one_lane(by::<F, _>(asked, stop, F::Geared::NEW)),
         Method::Dopri5(tolerance) => Simd::one_lane(by::<F, _>(asked, stop, ByDopri5(tolerance))),
@@ -158,14 +161,6 @@ fn one_lane<F: Family>(asked: &[Asked<'_>; 1], stop: Stop<'_>) -> Vec<States> {
             Simd::one_lane(StiffSample::<F> { asked, stop, tolerance, family: PhantomData })
         }
     }
-}
-
-fn side_by_side<'a>(model: ModelKind, asked: Vec<Asked<'a>>, stop: Stop<'_>) -> Vec<History<'a>> {
-    let sampled = match model {
-        ModelKind::Nonlinear => Simd::dispatch_narrow(by::<OfNonlinear, _>(&asked, stop, ByRk4)),
-        ModelKind::Linear => Simd::dispatch_narrow(by::<OfLinear, _>(&asked, stop, ByRk4)),
-    };
-    asked.into_iter().zip(sampled).map(|(asked, sampled)| of(model, asked, sampled)).collect()
 }
 
 fn of(model: ModelKind, asked: Asked<'_>, sampled: States) -> History<'_> {
@@ -265,7 +260,7 @@ impl<F: Family, S: Stepper> Kernel for Sample<'_, F, S> {
     }
 }
 
-impl<F: Family, S: Stepper> ScalarKernel for Sample<'_, F, S> {
+impl<F: Family, S: Stepper> Aside for Sample<'_, F, S> {
     type Output = Vec<States>;
 
     #[inline(always)]
@@ -276,13 +271,13 @@ impl<F: Family, S: Stepper> ScalarKernel for Sample<'_, F, S> {
 
 /// The same by the stiff method, which wants derivatives.
 struct StiffSample<'a, F> {
-    asked: &'a [Asked<'a>; 1],
+    asked: &'a [Asked<'a>],
     stop: Stop<'a>,
     tolerance: Tolerance,
     family: PhantomData<F>,
 }
 
-impl<F: Family> ScalarKernel for StiffSample<'_, F> {
+impl<F: Family> Aside for StiffSample<'_, F> {
     type Output = Vec<States>;
 
     #[inline(always)]
@@ -363,12 +358,7 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
         }
         let leg = leg?;
         self.legs[lane] = Some(next);
-        let (step_s, caps) = first_step(method, leg);
-        self.model.set_spin(lane, &point.stretches[leg.stretch]);
-        if let Some(caps) = caps {
-            self.model.set_caps(lane, &caps);
-        }
-        Some(Leg { start_s: leg.start_s, end_s: leg.end_s, step_s })
+        Some(enter(&mut self.model, lane, method, point, leg))
     }
 
     #[inline(always)]
@@ -385,12 +375,11 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
                 let (end_s, length_s) = (step.end_s.0.get(lane), step.length_s.0.get(lane));
                 let next = asked.times_s.get(self.found[lane].states.len());
                 if let Some(time_s) = next
-                    && length_s != 0.0
                     && in_range >> lane & 1 == 1
-                    && *time_s <= end_s + SLACK * length_s
+                    && let Some(at) = share_of_step(*time_s, end_s, length_s)
                 {
                     reached[lane] = true;
-                    share.0.set(lane, (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0));
+                    share.0.set(lane, at);
                 }
             }
             if reached == [false; MAX_LANES] {

@@ -1,25 +1,19 @@
-//! Loads of stops and of the cabinet's feet, and the speeds of dampers, over lanes.
+//! Loads of the cabinet, of its feet and of stops, and the speeds of dampers, over lanes.
 //!
 //! The laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers for
 //! their rates; the linear model's are first order in its deviations from equilibrium.
 
+use super::suspension::{deviating, dual, forces, on_cabinet};
+use super::wanted::{Extra, StopLoad, Wanted};
 use crate::coordinates::{COORDINATES, STATES, TUB};
 use crate::kind::ModelKind;
 use crate::lanes::{Constant as _, InLanes as _};
-use crate::machine::feet::{FEET, LOAD, turning_n};
+use crate::machine::feet::{FEET, LOAD, Spread, turning_n};
 use crate::nonlinear::elements::{Elements, TubMotion};
-use crate::nonlinear::frame::Tilt;
+use crate::nonlinear::frame::{Vec3, dot};
 use crate::point::Point;
+use crate::run::model::tub_samples;
 use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
-
-/// The record of one stop.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StopLoad {
-    /// Its greatest push (N).
-    pub push_n: f64,
-    /// How long it is closed (s).
-    pub contact_s: f64,
-}
 
 /// Least values are found as greatest distances below this (N), farther than any load.
 const FAR_N: f64 = 1_048_576.0;
@@ -31,75 +25,6 @@ const LEAST_SQUARED_N2: f64 = 1e-18;
 const SLIP: usize = FEET;
 /// The margin against walking, after that.
 const WALK: usize = FEET + 1;
-
-/// Coordinates of the tub and their speeds, in the order of [`TUB`].
-struct TubState<T> {
-    q: [N<T>; 4],
-    u: [N<T>; 4],
-}
-
-/// Calls `$use` with the motion of the tub in a state.
-macro_rules! with_motion {
-    ($state:expr, $motion:ident => $use:expr) => {{
-        let TubState { q, u } = $state;
-        let tilt = Tilt::new(q[2], q[3]);
-        let rate = tilt.motion(u[2], u[3]).rate;
-        let $motion = TubMotion {
-            tilt: &tilt,
-            midpoint: [q[0], q[1]],
-            midpoint_velocity: [u[0], u[1]],
-            rate: &rate,
-        };
-        $use
-    }};
-}
-
-/// Force (N) and moment about O (N m) of the suspension on the cabinet, cabinet axes.
-#[inline(always)]
-fn on_cabinet<T: Lane>(elements: &Elements<T>, tub: &TubMotion<'_, T>) -> [N<T>; LOAD] {
-    let (force, moment) = elements.on_tub(tub);
-    let [fx, fy, fz] = tub.tilt.in_cabinet_axes(&force);
-    let [mx, my, mz] = tub.tilt.in_cabinet_axes(&moment);
-    let [y, z] = tub.midpoint;
-    // What is on the tub, turned round; P_T is at (0, y, z).
-    [-fx, -fy, -fz, -(mx + (y * fz - z * fy)), -(my + z * fx), -(mz - y * fx)]
-}
-
-/// The same as a number, at a state: whole coordinates of the nonlinear model, deviations of the
-/// linear one.
-pub(crate) fn load_on_cabinet(
-    point: &Point,
-    model: ModelKind,
-    state: &[f64; STATES],
-) -> [f64; LOAD] {
-    let elements = &point.machine.elements;
-    let elements = match model {
-        ModelKind::Nonlinear => elements.constant(),
-        ModelKind::Linear => elements.with_viscous_friction().constant(),
-    };
-    let dual = |at_rest: f64, number: f64| match model {
-        ModelKind::Nonlinear => N(Dual { value: number, slope: 0.0 }),
-        ModelKind::Linear => N(Dual { value: at_rest, slope: number }),
-    };
-    let tub = TubState {
-        q: TUB.map(|q| dual(point.equilibrium[q], state[q])),
-        u: TUB.map(|q| dual(0.0, state[COORDINATES + q])),
-    };
-    let load = with_motion!(&tub, motion => on_cabinet(&elements, &motion));
-    load.map(|N(first_order)| first_order.value + first_order.slope)
-}
-
-/// The speed along each damper (m/s) by the linear model, at deviations from equilibrium.
-pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -> Vec<f64> {
-    let elements = point.machine.elements.constant();
-    let dual = |value: f64, slope: f64| N(Dual { value, slope });
-    let tub = TubState {
-        q: TUB.map(|q| dual(point.equilibrium[q], deviations[q])),
-        u: TUB.map(|q| dual(0.0, deviations[COORDINATES + q])),
-    };
-    let speed = |number| with_motion!(&tub, motion => elements.damper_speed(number, &motion));
-    (0..elements.dampers.len()).map(|number| speed(number).0.slope).collect()
-}
 
 /// First order of something in the tub's deviations from equilibrium.
 #[derive(Clone, Copy)]
@@ -135,60 +60,84 @@ impl<T: Lane> FirstOrder<T> {
     }
 }
 
-/// One of the two models' loads.
+/// What is recorded of a machine.
+#[derive(Clone, Copy)]
+struct Recorded {
+    /// The force on the cabinet.
+    force: bool,
+    /// Loads of the feet, and margins.
+    feet: bool,
+    stops: usize,
+    dampers: usize,
+}
+
+impl Recorded {
+    /// How many numbers it is taken from: the load on the cabinet, depth and push of each stop, the
+    /// speed of each damper.
+    fn numbers(self) -> usize {
+        LOAD + 2 * self.stops + self.dampers
+    }
+
+    /// These numbers by the elements' laws; gives the force on the tub.
+    #[inline(always)]
+    fn evaluate<T: Lane>(
+        self,
+        elements: &Elements<T>,
+        tub: &TubMotion<T>,
+        numbers: &mut [N<T>],
+    ) -> Vec3<T> {
+        let nothing = [tub.midpoint[0].lit(0.0); 3];
+        let mut on_tub = (nothing, nothing);
+        if self.force || self.feet {
+            on_tub = elements.on_tub(tub);
+        }
+        if self.feet {
+            numbers[..LOAD].copy_from_slice(&on_cabinet(tub, &on_tub));
+        }
+        for k in 0..self.stops {
+            [numbers[LOAD + 2 * k], numbers[LOAD + 2 * k + 1]] = elements.stop(k, tub);
+        }
+        for k in 0..self.dampers {
+            numbers[LOAD + 2 * self.stops + k] = elements.damper_speed(k, tub);
+        }
+        on_tub.0
+    }
+}
+
+/// One of the two models' laws.
 enum Laws<T> {
     /// Of the machine's elements, over duals for rates.
     Nonlinear(Elements<Dual<T>>),
-    /// Loads on the cabinet; of each stop depth and push; the speed of each damper.
-    Linear {
-        load: [FirstOrder<T>; LOAD],
-        stops: Vec<[FirstOrder<T>; 2]>,
-        speeds: Vec<FirstOrder<T>>,
-    },
+    /// Of the force on the cabinet, and of the recorded numbers.
+    Linear { force: [FirstOrder<T>; 3], numbers: Vec<FirstOrder<T>> },
 }
 
 impl<T: Lane> Laws<T> {
     /// Puts a point into one lane.
-    fn set_point(&mut self, lane: usize, point: &Point) {
-        match self {
-            Self::Nonlinear(elements) => elements.set_lane(lane, &point.machine.elements),
-            Self::Linear { load, stops, speeds } => {
-                let elements = point.machine.elements.with_viscous_friction().constant();
-                let rest = TUB.map(|q| point.equilibrium[q]);
-                for k in 0..4 {
-                    let of_place = |by: f64| {
-                        let q = core::array::from_fn(|i| {
-                            N(Dual { value: rest[i], slope: if i == k { by } else { 0.0 } })
-                        });
-                        let u = core::array::from_fn(|i| {
-                            let by = if i == k { 1.0 - by } else { 0.0 };
-                            N(Dual { value: 0.0, slope: by })
-                        });
-                        TubState { q, u }
-                    };
-                    let [place, speed] = [of_place(1.0), of_place(0.0)];
-                    let by_place = with_motion!(&place, tub => on_cabinet(&elements, &tub));
-                    let by_speed = with_motion!(&speed, tub => on_cabinet(&elements, &tub));
-                    for (i, load) in load.iter_mut().enumerate() {
-                        let (place, speed) = (by_place[i].0, by_speed[i].0);
-                        load.set(lane, place.value, k, place.slope, speed.slope);
-                    }
-                    for (number, stop) in stops.iter_mut().enumerate() {
-                        let by_place = with_motion!(&place, tub => elements.stop(number, &tub));
-                        let by_speed = with_motion!(&speed, tub => elements.stop(number, &tub));
-                        for (i, stop) in stop.iter_mut().enumerate() {
-                            let (place, speed) = (by_place[i].0, by_speed[i].0);
-                            stop.set(lane, place.value, k, place.slope, speed.slope);
-                        }
-                    }
-                    for (number, first_order) in speeds.iter_mut().enumerate() {
-                        let of_place =
-                            with_motion!(&place, tub => elements.damper_speed(number, &tub)).0;
-                        let of_speed =
-                            with_motion!(&speed, tub => elements.damper_speed(number, &tub)).0;
-                        let rest = of_place.value;
-                        first_order.set(lane, rest, k, of_place.slope, of_speed.slope);
-                    }
+    fn set_point(&mut self, lane: usize, point: &Point, recorded: Recorded) {
+        let (force, numbers) = match self {
+            Self::Nonlinear(elements) => return elements.set_lane(lane, &point.machine.elements),
+            Self::Linear { force, numbers } => (force, numbers),
+        };
+        let elements = point.machine.elements.with_viscous_friction().constant();
+        let unit = |of: usize| core::array::from_fn(|i| f64::from(u8::from(i == of)));
+        let evaluated = |of: usize| {
+            let mut numbers = vec![dual(0.0, 0.0); recorded.numbers()];
+            recorded.evaluate(&elements, &deviating(point, &unit(of)), &mut numbers);
+            numbers
+        };
+        let force_at = |state: &[f64; STATES]| forces(point, ModelKind::Linear, state).cabinet_n;
+        for k in 0..4 {
+            let [place, speed] = [TUB[k], COORDINATES + TUB[k]];
+            let by = evaluated(place).into_iter().zip(evaluated(speed));
+            for (number, (N(by_place), N(by_speed))) in numbers.iter_mut().zip(by) {
+                number.set(lane, by_place.value, k, by_place.slope, by_speed.slope);
+            }
+            if recorded.force {
+                let rest = force_at(&[0.0; STATES]);
+                let [by_place, by_speed] = [place, speed].map(|of| force_at(&unit(of)));
+                for i in 0..3 {
+                    force[i].set(lane, rest[i], k, by_place[i] - rest[i], by_speed[i] - rest[i]);
                 }
             }
         }
@@ -207,15 +156,15 @@ struct SeenStop<T> {
 /// They have no second derivative here. So the motion between the ends of a long step is
 /// interpolated first, and the loads evaluated at a few places of it.
 pub(crate) struct Loads<T> {
+    recorded: Recorded,
     laws: Laws<T>,
+    /// Those of [`Recorded`] at the present instant.
+    numbers: Vec<N<Dual<T>>>,
+    /// The square of the force on the cabinet.
+    force_squared: Peaks<T, 1>,
     /// How far the loads of the feet are below [`FAR_N`], and then the two margins.
     below: Peaks<T, { FEET + 2 }>,
-    own: [N<T>; FEET],
-    shares: [[N<T>; LOAD]; FEET],
-    places: [[N<T>; 2]; FEET],
-    friction: N<T>,
-    weight: N<T>,
-    feet: usize,
+    spread: Option<Spread<T>>,
     stops: Vec<SeenStop<T>>,
     /// The speed of each damper; none unless asked for.
     speeds: Vec<Peaks<T, 1>>,
@@ -226,61 +175,64 @@ pub(crate) struct Loads<T> {
 }
 
 impl<T: Lane> Loads<T> {
-    /// Nothing seen yet, with the same point in every lane; the speeds of dampers only
-    /// `with_speeds`.
+    /// Nothing seen yet, with the same point in every lane; `None` if none of it is wanted.
     #[inline(always)]
     pub(crate) fn new(
         zero: N<T>,
+        wanted: Wanted,
         model: ModelKind,
         point: &Point,
         parts: u32,
-        with_speeds: bool,
-    ) -> Self {
+    ) -> Option<Self> {
+        let with_elements = wanted.stops || wanted.feet || wanted.damper_speeds;
+        if !with_elements && !wanted.cabinet_force {
+            return None;
+        }
         let elements = &point.machine.elements;
-        let number = elements.stops.len();
-        let dampers = if with_speeds { elements.dampers.len() } else { 0 };
+        let recorded = Recorded {
+            force: wanted.cabinet_force,
+            feet: with_elements && point.feet.is_some(),
+            stops: if with_elements { elements.stops.len() } else { 0 },
+            dampers: if wanted.damper_speeds { elements.dampers.len() } else { 0 },
+        };
+        // No closures: they would be compiled without the instruction set.
         let laws = match model {
             ModelKind::Nonlinear => Laws::Nonlinear(Elements::splat(zero.constant(), elements)),
             ModelKind::Linear => {
                 let none = FirstOrder::new(zero);
-                Laws::Linear {
-                    load: [none; LOAD],
-                    stops: vec![[none; 2]; number],
-                    speeds: vec![none; dampers],
-                }
+                Laws::Linear { force: [none; 3], numbers: vec![none; recorded.numbers()] }
             }
         };
-        let mut stops = Vec::with_capacity(number);
-        for _ in 0..number {
+        let mut stops = Vec::with_capacity(recorded.stops);
+        for _ in 0..recorded.stops {
             stops.push(SeenStop { push: Peaks::new(zero), contact: TimeAbove::new(zero) });
         }
-        let mut speeds = Vec::with_capacity(dampers);
-        for _ in 0..dampers {
-            speeds.push(Peaks::new(zero));
-        }
+        let spread = match &point.feet {
+            Some(feet) if recorded.feet => Some(Spread::splat(zero, &feet.spread)),
+            _ => None,
+        };
         let mut loads = Self {
+            recorded,
             laws,
+            numbers: vec![zero.constant(); recorded.numbers()],
+            force_squared: Peaks::new(zero),
             below: Peaks::new(zero),
-            own: [zero; FEET],
-            shares: [[zero; LOAD]; FEET],
-            places: [[zero; 2]; FEET],
-            friction: zero,
-            weight: zero,
-            feet: 0,
+            spread,
             stops,
-            speeds,
+            speeds: vec![Peaks::new(zero); recorded.dampers],
             last: [Sample::still(zero, zero); 4],
             parts,
         };
         for lane in 0..T::LANES {
             loads.set_point(lane, point);
         }
-        loads
+        Some(loads)
     }
 
     /// Begins a point's trajectory in one lane.
     pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
-        self.laws.set_point(lane, point);
+        self.laws.set_point(lane, point, self.recorded);
+        self.force_squared.reset(lane);
         self.below.reset(lane);
         for stop in &mut self.stops {
             stop.push.reset(lane);
@@ -289,53 +241,30 @@ impl<T: Lane> Loads<T> {
         for speed in &mut self.speeds {
             speed.reset(lane);
         }
-        if let Some(feet) = &point.feet {
-            self.feet = feet.count;
-            for k in 0..FEET {
-                self.own[k].0.set(lane, feet.own_n[k]);
-                for i in 0..LOAD {
-                    self.shares[k][i].0.set(lane, feet.shares[k][i]);
-                }
-                for i in 0..2 {
-                    self.places[k][i].0.set(lane, feet.places_m[k][i]);
-                }
-            }
-            self.friction.0.set(lane, feet.friction);
-            self.weight.0.set(lane, feet.weight_n);
+        if let (Some(spread), Some(feet)) = (&mut self.spread, &point.feet) {
+            spread.set_lane(lane, &feet.spread);
         }
     }
 
-    /// The least load of each foot of one lane (N); empty without feet.
-    pub(crate) fn foot_loads_n(&self, lane: usize) -> Vec<f64> {
-        self.below.lane(lane)[..self.feet].iter().map(|below| FAR_N - below).collect()
-    }
-
-    /// The least margin against slipping of one lane (N); none without feet.
-    pub(crate) fn slip_margin_n(&self, lane: usize) -> Option<f64> {
-        (self.feet > 0).then(|| FAR_N - self.below.lane(lane)[SLIP])
-    }
-
-    /// The least margin against walking of one lane (N); none without feet.
-    pub(crate) fn walk_margin_n(&self, lane: usize) -> Option<f64> {
-        (self.feet > 0).then(|| FAR_N - self.below.lane(lane)[WALK])
-    }
-
-    /// What one lane has seen of each stop; empty without stops.
-    pub(crate) fn stops(&self, lane: usize) -> Vec<StopLoad> {
+    /// The records of one lane, that of a point.
+    pub(crate) fn finish(&self, lane: usize, point: &Point, extra: &mut Extra) {
+        if self.recorded.force {
+            let [squared] = self.force_squared.lane(lane);
+            extra.cabinet_force_n = Some(squared.sqrt());
+        }
+        if let (Some(_), Some(feet)) = (&self.spread, &point.feet) {
+            let least_n = self.below.lane(lane).map(|below_n| FAR_N - below_n);
+            extra.foot_loads_n = least_n[..feet.count].to_vec();
+            extra.slip_margin_n = Some(least_n[SLIP]);
+            extra.walk_margin_n = Some(least_n[WALK]);
+        }
         let of_stop = |stop: &SeenStop<T>| {
             let [push_n] = stop.push.lane(lane);
             StopLoad { push_n, contact_s: stop.contact.lane(lane) }
         };
-        self.stops.iter().map(of_stop).collect()
-    }
-
-    /// The greatest speed of each damper of one lane (m/s); empty unless asked for.
-    pub(crate) fn damper_speeds_m_per_s(&self, lane: usize) -> Vec<f64> {
-        let of_damper = |speed: &Peaks<T, 1>| {
-            let [speed_m_per_s] = speed.lane(lane);
-            speed_m_per_s
-        };
-        self.speeds.iter().map(of_damper).collect()
+        extra.stops = self.stops.iter().map(of_stop).collect();
+        let speeds = self.speeds.iter().flat_map(|speed| speed.lane(lane));
+        extra.damper_speeds_m_per_s = speeds.collect();
     }
 
     /// A state whose derivative is `dx`: at the end of a step, of which end and length (s) are
@@ -348,10 +277,7 @@ impl<T: Lane> Loads<T> {
         dx: &[N<T>; STATES],
         counts: T::Mask,
     ) {
-        let mut now = self.last;
-        for (sample, q) in now.iter_mut().zip(TUB) {
-            *sample = Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] };
-        }
+        let now = tub_samples(x, dx);
         let parts = if step.is_some() { self.parts } else { 1 };
         let share = 1.0 / f64::from(parts);
         // One loop, for one copy of the laws' code.
@@ -374,97 +300,89 @@ impl<T: Lane> Loads<T> {
 
     #[inline(always)]
     fn see_instant(&mut self, step_s: Option<N<T>>, tub: &[Sample<T>; 4], counts: T::Mask) {
-        let mut q = [tub[0].value.constant(); 4];
-        let mut u = q;
-        for k in 0..4 {
-            q[k] = N(Dual { value: tub[k].value.0, slope: tub[k].slope.0 });
-            u[k] = N(Dual { value: tub[k].slope.0, slope: tub[k].curvature.0 });
-        }
-        let state = TubState { q, u };
-        if self.feet > 0 {
-            let mut load = [q[0]; LOAD];
-            match &self.laws {
-                Laws::Nonlinear(elements) => {
-                    load = with_motion!(&state, motion => on_cabinet(elements, &motion));
+        let Self { recorded, laws, numbers, .. } = self;
+        let zero = tub[0].value.lit(0.0);
+        let mut squared = Sample::still(zero, zero);
+        match laws {
+            Laws::Nonlinear(elements) => {
+                let mut q = [tub[0].value.constant(); 4];
+                let mut u = q;
+                for k in 0..4 {
+                    q[k] = N(Dual { value: tub[k].value.0, slope: tub[k].slope.0 });
+                    u[k] = N(Dual { value: tub[k].slope.0, slope: tub[k].curvature.0 });
                 }
-                Laws::Linear { load: first_order, .. } => {
-                    for i in 0..LOAD {
-                        load[i] = first_order[i].at(tub);
-                    }
+                // On the tub and in its axes: as large as on the cabinet.
+                let force = recorded.evaluate(elements, &TubMotion::new(&q, &u), numbers);
+                squared = sample(dot(&force, &force));
+            }
+            Laws::Linear { force, numbers: laws } => {
+                for component in force {
+                    let N(force) = component.at(tub);
+                    let (force, rate) = (N(force.value), N(force.slope));
+                    squared.value += force * force;
+                    squared.slope += (2.0 * force).v() * rate;
+                }
+                for (number, law) in numbers.iter_mut().zip(laws) {
+                    *number = law.at(tub);
                 }
             }
-            self.see_feet(step_s, &load, counts);
         }
-        for k in 0..self.stops.len() {
-            let [depth, push] = match &self.laws {
-                Laws::Nonlinear(elements) => {
-                    with_motion!(&state, motion => elements.stop(k, &motion))
-                }
-                Laws::Linear { stops, .. } => [stops[k][0].at(tub), stops[k][1].at(tub)],
-            };
-            self.see_stop(k, step_s, &sample(depth), &sample(push), counts);
+        if recorded.force {
+            see(&mut self.force_squared, step_s, &[squared], counts);
         }
-        for k in 0..self.speeds.len() {
-            let speed = match &self.laws {
-                Laws::Nonlinear(elements) => {
-                    with_motion!(&state, motion => elements.damper_speed(k, &motion))
-                }
-                Laws::Linear { speeds, .. } => speeds[k].at(tub),
-            };
+        if let Some(spread) = &self.spread {
+            see(&mut self.below, step_s, &below(spread, &self.numbers), counts);
+        }
+        let (of_stops, of_dampers) = self.numbers[LOAD..].split_at(2 * self.stops.len());
+        for (stop, of_stop) in self.stops.iter_mut().zip(of_stops.chunks(2)) {
+            let depth = sample(of_stop[0]);
+            see(&mut stop.push, step_s, &[sample(of_stop[1])], counts);
             match step_s {
-                Some(step_s) => self.speeds[k].advance_by_slopes(step_s, &[sample(speed)], counts),
-                None => self.speeds[k].begin(&[sample(speed)], counts),
+                Some(step_s) => stop.contact.advance_by_slopes(step_s, &depth, counts),
+                None => stop.contact.begin(&depth),
             }
+        }
+        for (peaks, speed) in self.speeds.iter_mut().zip(of_dampers) {
+            see(peaks, step_s, &[sample(*speed)], counts);
         }
     }
+}
 
-    #[inline(always)]
-    fn see_feet(&mut self, step_s: Option<N<T>>, load: &[N<Dual<T>>; LOAD], counts: T::Mask) {
-        let far = load[0].lit(FAR_N);
-        let mut below = [sample(far); FEET + 2];
-        let (mut loads, mut places) = ([far; FEET], [[far; 2]; FEET]);
-        for k in 0..FEET {
-            let mut carried = self.own[k].constant();
-            for i in 0..LOAD {
-                carried += self.shares[k][i].constant() * load[i];
-            }
-            below[k] = sample(far - carried);
-            loads[k] = carried;
-            for i in 0..2 {
-                places[k][i] = self.places[k][i].constant();
-            }
+/// Of each foot how far its load is below [`FAR_N`], then of both margins, by the load on the
+/// cabinet.
+#[inline(always)]
+fn below<T: Lane>(spread: &Spread<T>, load: &[N<Dual<T>>]) -> [Sample<T>; FEET + 2] {
+    let spread = spread.constant();
+    let far = load[0].lit(FAR_N);
+    let mut cabinet = [far; LOAD];
+    cabinet.copy_from_slice(&load[..LOAD]);
+    let load = &cabinet;
+    let mut below = [sample(far); FEET + 2];
+    let mut loads = spread.own;
+    for k in 0..FEET {
+        for i in 0..LOAD {
+            loads[k] += spread.shares[k][i] * load[i];
         }
-        let squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(LEAST_SQUARED_N2);
-        let margin = self.friction.constant() * (self.weight.constant() - load[1]);
-        let margin = margin - squared.sqrt();
-        below[SLIP] = sample(far - margin);
-        below[WALK] = sample(far - (margin - turning_n(&places, &loads, load)));
-        match step_s {
-            Some(step_s) => self.below.advance_by_slopes(step_s, &below, counts),
-            None => self.below.begin(&below, counts),
-        }
+        below[k] = sample(far - loads[k]);
     }
+    let squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(LEAST_SQUARED_N2);
+    let margin = spread.friction * (spread.weight - load[1]) - squared.sqrt();
+    below[SLIP] = sample(far - margin);
+    below[WALK] = sample(far - (margin - turning_n(&spread.places, &loads, load)));
+    below
+}
 
-    #[inline(always)]
-    fn see_stop(
-        &mut self,
-        k: usize,
-        step_s: Option<N<T>>,
-        depth: &Sample<T>,
-        push: &Sample<T>,
-        counts: T::Mask,
-    ) {
-        let stop = &mut self.stops[k];
-        match step_s {
-            Some(step_s) => {
-                stop.push.advance_by_slopes(step_s, &[*push], counts);
-                stop.contact.advance_by_slopes(step_s, depth, counts);
-            }
-            None => {
-                stop.push.begin(&[*push], counts);
-                stop.contact.begin(depth);
-            }
-        }
+/// Shows numbers to their peaks: after a step of a length (s), or where a leg begins.
+#[inline(always)]
+fn see<T: Lane, const M: usize>(
+    peaks: &mut Peaks<T, M>,
+    step_s: Option<N<T>>,
+    samples: &[Sample<T>; M],
+    counts: T::Mask,
+) {
+    match step_s {
+        Some(step_s) => peaks.advance_by_slopes(step_s, samples, counts),
+        None => peaks.begin(samples, counts),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The two models as systems over lanes, and what they have in common.
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, FIRST_ANGLE, STATES, TUB, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z};
+use crate::coordinates::{COORDINATES, FIRST_ANGLE, STATES, TUB};
 use crate::lanes::InLanes;
 use crate::linear::outputs::{LinearMotion, LinearOutputs};
 use crate::linear::rotor_terms::Terms;
@@ -13,7 +13,6 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Caps, Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::elements::corners::CornerForce;
-use crate::nonlinear::frame::Tilt;
 use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
 use crate::point::Point;
 use core::f64::consts::FRAC_PI_2;
@@ -68,6 +67,12 @@ fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> Motion<T> {
 #[inline(always)]
 pub(crate) fn split<T: Copy>(x: &[N<T>; STATES]) -> ([N<T>; COORDINATES], [N<T>; COORDINATES]) {
     (core::array::from_fn(|i| x[i]), core::array::from_fn(|i| x[COORDINATES + i]))
+}
+
+/// The tub's coordinates with two derivatives, likewise.
+#[inline(always)]
+pub(super) fn tub_samples<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> [Sample<T>; 4] {
+    TUB.map(|q| Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] })
 }
 
 #[inline(always)]
@@ -141,15 +146,8 @@ impl<T: Lane> Nonlinear<T> {
     /// The motions that forces with corners hang on, depth (m) and speed (m/s) of each.
     #[inline(always)]
     pub(crate) fn at_corners(&self, x: &[N<T>; STATES]) -> Vec<[N<T>; 2]> {
-        let (q, u) = split(x);
-        let tilt = Tilt::of_tub(&q);
-        let rate = tilt.motion(u[TUB_YAW], u[TUB_PITCH]).rate;
-        self.machine.elements.at_corners(&TubMotion {
-            tilt: &tilt,
-            midpoint: [q[TUB_Y], q[TUB_Z]],
-            midpoint_velocity: [u[TUB_Y], u[TUB_Z]],
-            rate: &rate,
-        })
+        let tub = TubMotion::new(&TUB.map(|i| x[i]), &TUB.map(|i| x[COORDINATES + i]));
+        self.machine.elements.at_corners(&tub)
     }
 
     /// What a unit of generalised force on each of the tub's coordinates adds to the accelerations.

@@ -5,12 +5,20 @@ use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES, TUB};
 use crate::kind::ModelKind;
 use crate::point::Point;
+use crate::run::model::tub_samples;
 use crate::run::suspension::forces;
 use lane_ode::{Lane, MAX_LANES, N, Sample};
 use std::sync::Arc;
 
 /// An instant this share of a step past its end is its end.
 const SLACK: f64 = 1e-9;
+
+/// Which share of a lane's step an instant (s) is at, if the step leads so far.
+pub(super) fn share_of_step(time_s: f64, end_s: f64, length_s: f64) -> Option<f64> {
+    // An idle lane's step has no length, nor does its time go on.
+    let is_reached = length_s != 0.0 && time_s <= end_s + SLACK * length_s;
+    is_reached.then(|| (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0))
+}
 
 /// What a trajectory shows at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,20 +85,14 @@ impl<T: Lane> Snapshots<T> {
         (x, dx): (&[N<T>; STATES], &[N<T>; STATES]),
         channels: &[Sample<T>; CHANNELS],
     ) {
-        let mut tub = self.tub;
-        for (sample, q) in tub.iter_mut().zip(TUB) {
-            *sample = Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] };
-        }
+        let tub = tub_samples(x, dx);
         if let Some((end_s, length_s)) = step {
             for lane in 0..T::LANES {
                 let (end_s, length_s) = (end_s.0.get(lane), length_s.0.get(lane));
                 let album = &mut self.albums[lane];
-                while let Some(&time_s) = album.instants_s.get(album.seen.len()) {
-                    // An idle lane's step has no length, nor does its time go on.
-                    if length_s == 0.0 || time_s > end_s + SLACK * length_s {
-                        break;
-                    }
-                    let share = (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0);
+                while let Some(&time_s) = album.instants_s.get(album.seen.len())
+                    && let Some(share) = share_of_step(time_s, end_s, length_s)
+                {
                     let mut seen = Snapshot { channels: [[0.0; 3]; CHANNELS], tub: [[0.0; 2]; 4] };
                     for i in 0..CHANNELS {
                         let at = between(&self.channels[i], &channels[i], lane, length_s, share);

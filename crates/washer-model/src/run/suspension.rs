@@ -4,18 +4,18 @@
 //! The laws are those of the equations (`nonlinear/elements.rs`). The linear model's forces are
 //! first order in its deviations, by automatic differentiation at the equilibrium.
 
-use crate::coordinates::{COORDINATES, STATES, TUB_Y, TUB_Z};
+use crate::coordinates::{COORDINATES, STATES, TUB, TUB_Y, TUB_Z};
 use crate::kind::ModelKind;
 use crate::lanes::Constant as _;
-use crate::nonlinear::elements::{CabinetLine, Ends, Law, PointMotion};
+use crate::machine::feet::LOAD;
+use crate::nonlinear::elements::{CabinetLine, Ends, Law, PointMotion, TubMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
 use crate::point::Point;
-use crate::run::loads::load_on_cabinet;
-use lane_ode::{Dual, N};
+use lane_ode::{Dual, Lane, N};
 use std::borrow::Cow;
 
 /// Forces of the suspension at one instant.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Forces {
     /// Tension of each spring (N); below zero it pushes.
     pub springs_n: Vec<f64>,
@@ -51,29 +51,19 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
         moving: along(&q, &u),
         displaced: along(&q, &core::array::from_fn(|i| state[i])),
     };
-    let mut forces = Forces {
-        springs_n: Vec::new(),
-        dampers_n: Vec::new(),
-        stops_n: Vec::new(),
-        bushings_n: Vec::new(),
-        cabinet_n: [0.0; 3],
-        feet_n: Vec::new(),
-        slip_margin_n: None,
-        walk_margin_n: None,
-    };
+    let mut forces = Forces::default();
     // How the force is divided among the axes differs by a rounding: results on record have it so.
-    for (spring, stiffening) in elements.springs.iter().zip(&elements.stiffenings) {
+    for spring in &elements.springs {
         let (tension, line) = tub.tension(&spring.constant());
-        let tension = tension - stiffening.constant().push(&line);
         let share = tension / line.length;
         for k in 0..3 {
             forces.cabinet_n[k] += first_order(model, (share * line.span[k]).v());
         }
         forces.springs_n.push(first_order(model, tension));
     }
-    for (damper, friction) in elements.dampers.iter().zip(&elements.frictions) {
+    for damper in &elements.dampers {
         let (tension, line) = tub.tension(&damper.constant());
-        let tension = first_order(model, tension - friction.constant().push(&line));
+        let tension = first_order(model, tension);
         for k in 0..3 {
             forces.cabinet_n[k] += tension * line.span[k].0.value / line.length.0.value;
         }
@@ -105,21 +95,69 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     forces
 }
 
-/// From the cabinet end of each spring and damper to its tub end (m), in cabinet axes.
-pub(crate) struct Attachments {
-    pub(crate) springs: Vec<[f64; 3]>,
-    pub(crate) dampers: Vec<[f64; 3]>,
+/// Force (N) and moment about O (N m) of the suspension on the cabinet, cabinet axes, from what is
+/// on the tub.
+#[inline(always)]
+pub(super) fn on_cabinet<T: Lane>(
+    tub: &TubMotion<T>,
+    (force, moment): &(Vec3<T>, Vec3<T>),
+) -> [N<T>; LOAD] {
+    let [fx, fy, fz] = tub.in_cabinet_axes(force);
+    let [mx, my, mz] = tub.in_cabinet_axes(moment);
+    let [y, z] = tub.midpoint;
+    // What is on the tub, turned round; P_T is at (0, y, z).
+    [-fx, -fy, -fz, -(mx + (y * fz - z * fy)), -(my + z * fx), -(mz - y * fx)]
 }
 
-/// Those at some coordinates.
-pub(crate) fn attachments(point: &Point, q: &[f64; COORDINATES]) -> Attachments {
-    let q = along(q, &[0.0; COORDINATES]);
-    let span = |ends: &Ends<Dual<f64>>| tub_from_cabinet(&q, ends).map(|x| x.0.value);
+pub(super) fn dual(value: f64, slope: f64) -> N<Dual<f64>> {
+    N(Dual { value, slope })
+}
+
+/// The tub at equilibrium, with its first-order deviation.
+pub(super) fn deviating(point: &Point, deviations: &[f64; STATES]) -> TubMotion<Dual<f64>> {
+    TubMotion::new(
+        &TUB.map(|q| dual(point.equilibrium[q], deviations[q])),
+        &TUB.map(|q| dual(0.0, deviations[COORDINATES + q])),
+    )
+}
+
+/// What the suspension puts on the cabinet at a state: whole coordinates of the nonlinear model,
+/// deviations of the linear one.
+pub(crate) fn load_on_cabinet(
+    point: &Point,
+    model: ModelKind,
+    state: &[f64; STATES],
+) -> [f64; LOAD] {
     let elements = &point.machine.elements;
-    Attachments {
-        springs: elements.springs.iter().map(|spring| span(&spring.constant().ends)).collect(),
-        dampers: elements.dampers.iter().map(|damper| span(&damper.constant().ends)).collect(),
-    }
+    let (elements, tub) = match model {
+        ModelKind::Nonlinear => {
+            let [q, u] = [0, COORDINATES].map(|first| TUB.map(|q| dual(state[first + q], 0.0)));
+            (elements.constant(), TubMotion::new(&q, &u))
+        }
+        ModelKind::Linear => (elements.with_viscous_friction().constant(), deviating(point, state)),
+    };
+    let load = on_cabinet(&tub, &elements.on_tub(&tub));
+    load.map(|N(first_order)| first_order.value + first_order.slope)
+}
+
+/// The speed along each damper (m/s) by the linear model, at deviations from equilibrium.
+pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -> Vec<f64> {
+    let elements = point.machine.elements.constant();
+    let tub = deviating(point, deviations);
+    let speed = |number| elements.damper_speed(number, &tub).0.slope;
+    (0..elements.dampers.len()).map(speed).collect()
+}
+
+/// From the cabinet end of each spring to its tub end (m), then of each damper, at some
+/// coordinates; in cabinet axes.
+pub(crate) fn attachments(point: &Point, q: &[f64; COORDINATES]) -> [Vec<[f64; 3]>; 2] {
+    let q = along(q, &[0.0; COORDINATES]);
+    let span = |ends: &Ends<f64>| tub_from_cabinet(&q, &ends.constant()).map(|x| x.0.value);
+    let elements = &point.machine.elements;
+    [
+        elements.springs.iter().map(|spring| span(&spring.ends)).collect(),
+        elements.dampers.iter().map(|damper| span(&damper.ends)).collect(),
+    ]
 }
 
 /// The tub at a state.
@@ -133,16 +171,13 @@ struct Tub {
 
 impl Tub {
     /// Tension of an element, and its line.
-    fn tension<E>(&self, element: &E) -> (N<Dual<f64>>, CabinetLine<Dual<f64>>)
-    where
-        E: Law<Dual<f64>, CabinetLine<Dual<f64>>>,
-    {
+    fn tension(&self, element: &impl Law<Dual<f64>>) -> (N<Dual<f64>>, CabinetLine<Dual<f64>>) {
         let ends = element.ends();
         let span = tub_from_cabinet(&self.displaced, ends);
         let moving = tub_from_cabinet(&self.moving, ends);
         let rate = self.velocity(dot(&moving, &moving).sqrt());
         let line = CabinetLine { span, length: dot(&span, &span).sqrt(), rate };
-        (-element.push(&line), line)
+        (-element.push(&line) - element.push_further(&line), line)
     }
 
     /// A tub point's motion.

@@ -5,15 +5,14 @@ use super::Response;
 use super::turn::step;
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
-use crate::lanes::InLanes as _;
-use crate::machine::spin::{SpinLanes, SpinStretch, stretch_at};
+use crate::machine::spin::{SpinStretch, stretch_at};
 use crate::nonlinear::coupling::Coupling;
 use crate::point::Point;
 use crate::run::model::{Model, Nonlinear};
 use core::f64::consts::TAU;
 use faer::linalg::solvers::Solve as _;
 use faer::{Mat, Side};
-use lane_ode::{Kernel, Lane, N, ScalarKernel, Simd, System};
+use lane_ode::{Aside, Kernel, Lane, N, Simd, System};
 
 /// A stretch of time in which a run crosses a band of speeds.
 #[derive(Clone, Copy, Debug)]
@@ -170,7 +169,7 @@ impl Leg {
 
 /// The time from `from_s` to `to_s`, cut where the spin has a kink.
 fn legs(point: &Point, step_s: f64, [from_s, to_s]: [f64; 2]) -> Vec<Leg> {
-    let kinks = point.stretches.iter().map(|stretch| stretch.start_s);
+    let kinks = point.stretches.iter().map(|stretch| stretch.start_s.0);
     let inside = kinks.filter(|&kink_s| kink_s > from_s && kink_s < to_s);
     let mut start_s = from_s;
     let mut legs = Vec::new();
@@ -206,7 +205,7 @@ struct Run<'a> {
     start: &'a [f64; STATES],
 }
 
-impl ScalarKernel for Run<'_> {
+impl Aside for Run<'_> {
     type Output = Followed;
 
     #[inline(always)]
@@ -315,8 +314,7 @@ fn response_at(point: &Point, step_s: f64, response: &Response, at_s: f64) -> [f
 
 /// The drum's angle (rad) at a time, up to whole turns.
 fn theta_rad(point: &Point, at_s: f64) -> f64 {
-    let stretch = &point.stretches[stretch_at(&point.stretches, at_s)];
-    let spin = SpinLanes::splat(N(0.0), stretch).at(N(at_s));
+    let spin = point.stretches[stretch_at(&point.stretches, at_s)].at(N(at_s));
     libm::atan2(spin.sin.0, spin.cos.0)
 }
 

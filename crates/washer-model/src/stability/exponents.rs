@@ -1,7 +1,7 @@
 //! The linear model exactly: it is periodic in theta, and its Floquet exponents are its true
 //! frequencies and dampings, where modal analysis freezes theta.
 
-use super::monodromy::{INSTANTS, Square};
+use super::monodromy::{INSTANTS, Square, per_unit};
 use super::orbit::{Row, model};
 use super::participants::energies;
 use super::turn::{Clock, Unwatched, turn};
@@ -62,8 +62,7 @@ pub fn exact_motions(point: &Point, speed_rpm: f64) -> Result<Vec<Exact>, NoAnsw
     let steps = (highest * 60.0 / speed_rpm / STEP_PHASE).ceil().max(LEAST_STEPS);
     let row = Row { point, speed_rpm, steps: steps as usize, instants: INSTANTS, caps: None };
     let unit_per_s = row.unit_per_s();
-    let matrix = Simd::dispatch_narrow(OfTurn(row));
-    let matrix = Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0);
+    let matrix = per_unit(&Simd::dispatch_narrow(OfTurn(row)), unit_per_s);
     let decomposition = matrix.eigen().map_err(|_| NoAnswer::Eigenvalues)?;
     let (values, vectors) = (decomposition.S().column_vector(), decomposition.U());
     let frozen = modes(point, 0.0, speed).map_err(|_| NoAnswer::Eigenvalues)?;
@@ -125,7 +124,7 @@ fn exponent(frozen: &Mode, mu: c64, speed_rpm: f64) -> Exact {
 struct OfTurn<'a>(Row<'a>);
 
 impl Kernel for OfTurn<'_> {
-    /// What it does to disturbances; speeds per [`Row::unit_per_s`].
+    /// What it does to disturbances.
     type Output = Square;
 
     #[inline(always)]
@@ -139,12 +138,11 @@ impl Kernel for OfTurn<'_> {
             groups[1 + j / T::LANES][j].0.set(j % T::LANES, 1.0);
         }
         turn(&linear, &clock, &mut groups, None::<&mut Unwatched>);
-        let unit = |i: usize| if i < COORDINATES { 1.0 } else { row.unit_per_s() };
         let mut matrix = [[N(0.0); STATES]; STATES];
         for i in 0..STATES {
             for j in 0..STATES {
                 let moved = groups[1 + j / T::LANES][i] - groups[0][i];
-                matrix[i][j] = N(moved.0.get(j % T::LANES) * unit(j) / unit(i));
+                matrix[i][j] = N(moved.0.get(j % T::LANES));
             }
         }
         matrix

@@ -12,6 +12,7 @@ use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::InLanes as _;
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::run::model::Nonlinear;
+use faer::Mat;
 use lane_ode::{Aside, Dual, Lane, MAX_LANES, N, System, trig};
 
 /// Instants a turn at which the derivatives are taken, at most: harmonics of the turn up to the
@@ -23,6 +24,12 @@ pub(super) const INSTANTS_AT_CORNERS: usize = 32;
 
 /// Rows and columns of a state's disturbance.
 pub(super) type Square = [[N<f64>; STATES]; STATES];
+
+/// The matrix of disturbances whose speeds count per a unit (1/s).
+pub(super) fn per_unit(matrix: &Square, unit_per_s: f64) -> Mat<f64> {
+    let unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
+    Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0 * unit(j) / unit(i))
+}
 
 /// Lanes of disturbances taken through a step at once, so that they stay in the nearest cache; the
 /// same for wide lanes, of which so many are enough.

@@ -14,9 +14,10 @@ use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::outputs::squared;
 use crate::point::Point;
 use crate::ready::{MOST_MOTIONS, Search, own};
+use crate::run::everywhere;
 use crate::run::extras::{Extras, Seen as Recorded};
-use crate::run::loads::damper_speeds_m_per_s;
 use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::suspension::damper_speeds_m_per_s;
 use core::array::from_fn;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use lane_ode::{Aside, Kernel, Lane, Lu, N, Peaks, Simd};
@@ -37,6 +38,9 @@ pub(crate) struct Row<'a> {
     /// On the modes of bearings and hinge; none if the steps follow these.
     pub(crate) caps: Option<Caps>,
 }
+
+/// What must be equal of rows that turn side by side.
+pub(crate) type Kind = (usize, usize, bool, bool);
 
 impl Row<'_> {
     /// The same at another speed close by, with the steps and caps of this one as shares of a turn.
@@ -64,8 +68,7 @@ impl Row<'_> {
         self.point.machine.elements.are_nonsmooth()
     }
 
-    /// What must be equal of rows that turn side by side.
-    pub(crate) fn kind(&self) -> (usize, usize, bool, bool) {
+    pub(crate) fn kind(&self) -> Kind {
         (self.steps, self.instants, self.caps.is_some(), self.has_corners())
     }
 }
@@ -104,18 +107,27 @@ pub(super) struct Seen {
 /// others. Once `is_stopped` says so, some are missing.
 pub(super) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<Turned> {
     // Of a kind, what is seen comes first.
-    let kind = |k: usize| asked[k].row.kind();
-    let mut order: Vec<usize> = (0..asked.len()).collect();
-    order.sort_by_key(|&k| (kind(k), !asked[k].is_seen));
-    let mut turned: Vec<Option<Turned>> = asked.iter().map(|_| None).collect();
-    for places in order.chunk_by(|&a, &b| kind(a) == kind(b)) {
-        let together: Vec<Asked<'_>> = places.iter().map(|&k| asked[k]).collect();
-        let found = Simd::best().dispatch(Turns { asked: &together, is_stopped });
-        for (&k, found) in places.iter().zip(found) {
-            turned[k] = Some(found);
+    let kind = |asked: &Asked<'_>| (asked.row.kind(), !asked.is_seen);
+    by_kind(asked, kind, |asked| Simd::best().dispatch(Turns { asked, is_stopped }))
+}
+
+/// What is found of each: of those of a row's kind together, which come in the order of `kind`'s
+/// second part. What is missing of some is missing at the end.
+pub(crate) fn by_kind<A: Copy, R>(
+    all: &[A],
+    kind: impl Fn(&A) -> (Kind, bool),
+    find: impl Fn(&[A]) -> Vec<R>,
+) -> Vec<R> {
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    order.sort_by_key(|&k| kind(&all[k]));
+    let mut found: Vec<Option<R>> = all.iter().map(|_| None).collect();
+    for places in order.chunk_by(|&a, &b| kind(&all[a]).0 == kind(&all[b]).0) {
+        let together: Vec<A> = places.iter().map(|&k| all[k]).collect();
+        for (&k, one) in places.iter().zip(find(&together)) {
+            found[k] = Some(one);
         }
     }
-    turned.into_iter().flatten().collect()
+    found.into_iter().flatten().collect()
 }
 
 /// Turns of one kind.
@@ -275,17 +287,8 @@ pub(super) fn linear_responses(
 
 /// The same with friction taken at the points' speeds, in lanes, those of a kind together.
 pub(super) fn together(rows: &[Row<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<LinearResponse> {
-    let mut order: Vec<usize> = (0..rows.len()).collect();
-    order.sort_by_key(|&k| rows[k].kind());
-    let mut found: Vec<Option<LinearResponse>> = rows.iter().map(|_| None).collect();
-    for places in order.chunk_by(|&a, &b| rows[a].kind() == rows[b].kind()) {
-        let together: Vec<Row<'_>> = places.iter().map(|&k| rows[k]).collect();
-        let of_kind = Simd::dispatch_narrow(OfLinear { rows: &together, is_stopped });
-        for (&k, response) in places.iter().zip(of_kind) {
-            found[k] = Some(response);
-        }
-    }
-    found.into_iter().flatten().collect()
+    let find = |rows: &[Row<'_>]| Simd::dispatch_narrow(OfLinear { rows, is_stopped });
+    by_kind(rows, |row| (row.kind(), false), find)
 }
 
 /// Those of one kind. The map is affine, so that one linear solve finds what it returns to.
@@ -362,8 +365,6 @@ pub(crate) struct Watched<'m, T, M> {
     instants: usize,
     /// Whether to keep states at these.
     pub(crate) with_states: bool,
-    /// Above 0 in every lane.
-    windows: N<T>,
     pub(crate) peaks: Peaks<T, CHANNELS>,
     /// The greatest distance of the drum from the tub's axis, squared (m^2).
     pub(crate) radial_squared: N<T>,
@@ -381,14 +382,12 @@ pub(crate) struct Watched<'m, T, M> {
 impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
     #[inline(always)]
     pub(crate) fn new(zero: N<T>, model: &'m M, clock: &'m Clock<T>) -> Self {
-        let (windows, peaks) = (zero.lit(1.0), Peaks::new(zero));
         Self {
             model,
             clock,
             instants: INSTANTS,
             with_states: true,
-            windows,
-            peaks,
+            peaks: Peaks::new(zero),
             radial_squared: zero,
             states: Vec::new(),
             forces: Vec::new(),
@@ -433,7 +432,7 @@ impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
             x[0].0.aside(Cornered { model: self.model, x, forces: &mut self.forces });
             self.before = [*x, *dx];
         }
-        let everywhere = self.windows.lit(0.0).0.less(self.windows.0);
+        let everywhere = everywhere(x[0]);
         if let (radial, Some(channels)) = self.model.observe(forcing, x, dx, true) {
             if k == 0 {
                 self.peaks.begin(&channels, everywhere);
@@ -447,7 +446,7 @@ impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
                 } else {
                     Some((self.clock.time_s(k as f64), self.clock.step_s))
                 };
-                self.windows.0.aside(Recorded { extras, step, x, dx, radial, channels, inside });
+                x[0].0.aside(Recorded { extras, step, x, dx, radial, channels, inside });
             }
             let (most, here) = (self.radial_squared.0, squared(&radial).value.0);
             self.radial_squared = N(T::select(most.less(here), here, most));

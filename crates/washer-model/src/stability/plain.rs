@@ -8,7 +8,7 @@ use crate::coordinates::STATES;
 use crate::modes::{NoModes, highest_frequency_rad_per_s};
 use crate::run::model::Nonlinear;
 use core::f64::consts::TAU;
-use lane_ode::{Dual, Lu, N, ScalarKernel, System as _};
+use lane_ode::{Aside, Dual, Lu, N, System as _};
 
 /// Step times the greatest frequency.
 const STEP_PHASE: f64 = 1.0;
@@ -39,7 +39,7 @@ impl<'a> Plain<'a> {
     }
 }
 
-impl ScalarKernel for Plain<'_> {
+impl Aside for Plain<'_> {
     /// Nothing where Newton's method finds no response.
     type Output = Option<Square>;
 
@@ -134,7 +134,7 @@ impl Watch<Dual<f64>, Nonlinear<Dual<f64>>> for Diagonal<'_> {
     }
 }
 
-impl ScalarKernel for Trace<'_> {
+impl Aside for Trace<'_> {
     type Output = f64;
 
     #[inline(always)]

@@ -2,19 +2,19 @@
 //! them, and what becomes of disturbances there.
 
 use super::branch::{BEYOND, Curve, Guess};
+use super::monodromy::per_unit;
 use super::orbit::{Asked, LinearResponse, Row, Seen, linear_responses, together, turns};
 use super::participants::{named, shares, vector_of};
 use super::search::{Solve, finish, missing};
 use super::settings::{Case, Settings};
 use super::{Beyond, Dwell, Kind, NoAnswer, Response, rounded};
-use crate::coordinates::{COORDINATES, STATES};
+use crate::coordinates::COORDINATES;
 use crate::fast::SUSPENSION_MODES;
 use crate::modes::modes;
 use crate::point::Point;
 use crate::run::model::{Model, Nonlinear};
-use crate::run::suspension::{Attachments, attachments};
+use crate::run::suspension::attachments;
 use core::f64::consts::TAU;
-use faer::Mat;
 
 /// A motion is judged if the modes that are right have this share of its energy.
 const JUDGED_SHARE: f64 = 0.5;
@@ -270,9 +270,7 @@ impl Look<'_> {
         }
         let row = &self.case.row;
         let unit_per_s = row.unit_per_s();
-        let unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
-        let matrix =
-            Mat::from_fn(STATES, STATES, |i, j| seen.monodromy[i][j].0 * unit(j) / unit(i));
+        let matrix = per_unit(&seen.monodromy, unit_per_s);
         let mut multipliers = matrix.eigenvalues().map_err(|_| NoAnswer::Eigenvalues)?;
         if multipliers.iter().any(|mu| !mu.re.is_finite() || !mu.im.is_finite()) {
             return Err(NoAnswer::Eigenvalues);
@@ -316,19 +314,18 @@ impl Look<'_> {
 /// What of the machine's geometry a motion passes.
 fn beyond(point: &Point, seen: &Seen) -> Option<Beyond> {
     let rest = attachments(point, point.equilibrium());
-    let is_past = |of: fn(&Attachments) -> &Vec<[f64; 3]>| {
+    let is_past = |kind: usize| {
         seen.states.iter().any(|state| {
-            let q = core::array::from_fn(|i| state[i]);
-            let now = attachments(point, &q);
-            of(&now).iter().zip(of(&rest)).any(|(now, rest)| {
+            let now = attachments(point, &core::array::from_fn(|i| state[i]));
+            now[kind].iter().zip(&rest[kind]).any(|(now, rest)| {
                 let along: f64 = now.iter().zip(rest).map(|(a, b)| a * b).sum();
                 along.is_nan() || along <= 0.0
             })
         })
     };
-    if is_past(|ends| &ends.springs) {
+    if is_past(0) {
         Some(Beyond::SpringHooks)
-    } else if is_past(|ends| &ends.dampers) {
+    } else if is_past(1) {
         Some(Beyond::DamperEnds)
     } else if seen.gap_m.is_nan() || seen.gap_m <= 0.0 {
         Some(Beyond::Clearance)

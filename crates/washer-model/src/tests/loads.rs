@@ -118,7 +118,7 @@ fn they_are_what_a_densely_sampled_history_shows() {
         let loads_n = feet.loads_n(&load);
         all_close("a history's load of foot", &forces.feet_n, &loads_n, 1e-9);
         let horizontal_n = (load[0] * load[0] + load[2] * load[2]).sqrt();
-        let margin_now_n = 0.4 * (feet.weight_n - load[1]) - horizontal_n;
+        let margin_now_n = 0.4 * (feet.spread.weight.0 - load[1]) - horizontal_n;
         assert!((forces.slip_margin_n.unwrap() - margin_now_n).abs() < 1e-9);
         margin_n = margin_n.min(margin_now_n);
         // The feet are the corners of a rectangle: the moment about the centre of their loads.

@@ -43,13 +43,14 @@ fn every_leg_has_the_stretch_that_holds_on_it() {
     for window_s in [[0.0, 1.0], [0.5, 2.3], [1.01, 4.0]] {
         let point = &points(std::slice::from_ref(&spin), &timing(4.0, window_s))[0];
         for leg in point.legs.iter() {
-            let holds = point.stretches.iter().rposition(|stretch| stretch.start_s <= leg.start_s);
+            let holds =
+                point.stretches.iter().rposition(|stretch| stretch.start_s.0 <= leg.start_s);
             assert_eq!(Some(leg.stretch), holds, "{leg:?}");
             let next = point.stretches.get(leg.stretch + 1);
-            assert!(next.is_none_or(|next| leg.end_s <= next.start_s));
+            assert!(next.is_none_or(|next| leg.end_s <= next.start_s.0));
         }
         for t_s in [0.0, 0.3, 0.5, 2.3, 5.0] {
-            let stretch = point.stretches.iter().rev().find(|stretch| stretch.start_s <= t_s);
+            let stretch = point.stretches.iter().rev().find(|stretch| stretch.start_s.0 <= t_s);
             let speed_rad_per_s = stretch.unwrap().speed_rad_per_s(t_s);
             let speed_rpm = speed_rad_per_s * 60.0 / core::f64::consts::TAU;
             assert_eq!(spin.speeds_rpm([t_s]).next(), Some(speed_rpm), "{t_s}");

@@ -2,75 +2,108 @@
 
 use super::Range::{Any, Negative, NonNegative, Positive, Within};
 use super::Source::{Assumed, Convention, Derived, Grid, Paper, Time};
-use super::{Block, Range, Row, Source, Target, UnknownParameter, common, table_points};
+use super::{Block, Get, Range, Row, Set, Source, Target, UnknownParameter, common, table_points};
 use crate::{Damper, Machine, Spin};
+
+/// What a row writes, how it reads it and how it writes it.
+type Access = (Target, Get, Set);
 
 /// A row: name, unit, range, source, description, and at last what it reads and writes.
 macro_rules! row {
-    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal,
-        $target:expr, get $get:expr, set $set:expr) => {
+    ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr, $($access:tt)+) => {{
+        let (target, get, set): Access = access!($($access)+);
         Row {
             name: $name,
             unit: $unit,
             range: $range,
             source: $source,
             description: $description,
-            target: $target,
-            get: $get,
-            set: $set,
+            target,
+            get,
+            set,
         }
+    }};
+}
+
+/// The last part of a row.
+macro_rules! access {
+    (machine $($field:tt)+) => {
+        (Target::Machine, |m, _, _| Some(m.$($field)+), |m, _, _, v| m.$($field)+ = v)
     };
-    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal,
-        machine $($field:tt)+) => {
-        row!($name, $unit, $range, $source, $description, Target::Machine,
-            get |m, _, _| Some(m.$($field)+), set |m, _, _, v| m.$($field)+ = v)
+    (cabinet $($field:tt)+) => {
+        (
+            Target::Cabinet,
+            |m, _, _| m.cabinet.as_ref().map(|cabinet| cabinet.$($field)+),
+            |m, _, _, v| if let Some(cabinet) = &mut m.cabinet { cabinet.$($field)+ = v },
+        )
     };
-    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal,
-        cabinet $($field:tt)+) => {
-        row!($name, $unit, $range, $source, $description, Target::Cabinet,
-            get |m, _, _| m.cabinet.as_ref().map(|cabinet| cabinet.$($field)+),
-            set |m, _, _, v| if let Some(cabinet) = &mut m.cabinet { cabinet.$($field)+ = v })
+    (of $list:ident $($field:tt)+) => {
+        (
+            Target::Machine,
+            |m, _, k| m.$list.get(k).map(|item| item.$($field)+),
+            |m, _, k, v| if let Some(item) = m.$list.get_mut(k) { item.$($field)+ = v },
+        )
     };
-    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal,
-        of $list:ident $($field:tt)+) => {
-        row!($name, $unit, $range, $source, $description, Target::Machine,
-            get |m, _, k| m.$list.get(k).map(|item| item.$($field)+),
-            set |m, _, k, v| if let Some(item) = m.$list.get_mut(k) { item.$($field)+ = v })
+    (every $list:ident $Target:ident $field:ident) => {
+        (
+            Target::$Target(stringify!($field)),
+            |m, _, _| common(&m.$list, |item| item.$field),
+            |m, _, _, v| m.$list.iter_mut().for_each(|item| item.$field = v),
+        )
     };
-    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal,
-        spin $field:ident) => {
-        row!($name, $unit, $range, $source, $description, Target::Spin,
-            get |_, spin, _| match spin {
+    (spin $field:ident) => {
+        (
+            Target::Spin,
+            |_, spin, _| match spin {
                 Spin::Cycloidal { $field, .. }
                 | Spin::Triangular { $field, .. }
                 | Spin::Ramp { $field, .. } => Some(*$field),
                 Spin::Table { .. } => None,
             },
-            set |_, spin, _, v| match spin {
+            |_, spin, _, v| match spin {
                 Spin::Cycloidal { $field, .. }
                 | Spin::Triangular { $field, .. }
                 | Spin::Ramp { $field, .. } => *$field = v,
                 Spin::Table { .. } => {}
-            })
+            },
+        )
     };
-    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal,
-        window $edge:literal) => {
-        row!($name, $unit, $range, $source, $description, Target::Window($edge),
-            get |_, _, _| None, set |_, _, _, _| ())
+    (window $edge:literal) => {
+        (Target::Window($edge), |_, _, _| None, |_, _, _, _| ())
     };
-    ($name:literal, $unit:literal, $range:expr, $source:expr, $description:literal,
-        table $field:ident) => {
-        row!($name, $unit, $range, $source, $description, Target::Spin,
-            get |_, spin, k| {
+    (table $field:ident) => {
+        (
+            Target::Spin,
+            |_, spin, k| {
                 if let Spin::Table { $field, .. } = spin { $field.get(k).copied() } else { None }
             },
-            set |_, spin, k, v| {
+            |_, spin, k, v| {
                 if let Spin::Table { $field, .. } = spin
                     && let Some(entry) = $field.get_mut(k)
                 {
                     *entry = v;
                 }
-            })
+            },
+        )
+    };
+    ($target:expr, get $get:expr, set $set:expr) => {
+        ($target, $get, $set)
+    };
+}
+
+/// Rows of the three components of a vector: what their names have before and after the axis, then
+/// as [`row!`]. Descriptions end with the way along the axis.
+macro_rules! axes {
+    ($before:literal $after:literal, $unit:literal, $range:expr, $source:expr, $what:literal,
+        $($vector:tt)+) => {
+        &[
+            row!(concat!($before, "x", $after), $unit, $range, $source,
+                concat!($what, "towards the door"), $($vector)+[0]),
+            row!(concat!($before, "y", $after), $unit, $range, $source,
+                concat!($what, "upwards"), $($vector)+[1]),
+            row!(concat!($before, "z", $after), $unit, $range, $source,
+                concat!($what, "sideways"), $($vector)+[2]),
+        ]
     };
 }
 
@@ -154,22 +187,17 @@ pub(super) static TABLE: &[Row] = &[
     row!("bearing_rear_stiffness_n_per_m", "N/m", Positive, SECTION_3_1,
         "radial stiffness of the rear bearing (K_rb)", machine bearings.rear_stiffness_n_per_m),
     row!("spring_stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1,
-        "stiffness of all springs (K_k)", Target::Springs("stiffness_n_per_m"),
-        get |m, _, _| common(&m.springs, |s| s.stiffness_n_per_m),
-        set |m, _, _, v| m.springs.iter_mut().for_each(|s| s.stiffness_n_per_m = v)),
+        "stiffness of all springs (K_k)",
+        every springs Springs stiffness_n_per_m),
     row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1,
-        "damping of all dampers (C)", Target::Dampers("damping_n_s_per_m"),
-        get |m, _, _| common(&m.dampers, |d| d.damping_n_s_per_m),
-        set |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = v)),
+        "damping of all dampers (C)",
+        every dampers Dampers damping_n_s_per_m),
     row!("friction_n", "N", NonNegative, NONE,
-        "friction of all dampers (F_f)", Target::Dampers("friction_n"),
-        get |m, _, _| common(&m.dampers, |d| d.friction_n),
-        set |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.friction_n = v)),
+        "friction of all dampers (F_f)",
+        every dampers Dampers friction_n),
     row!("friction_speed_m_per_s", "m/s", SPEED, USUAL_SPEED,
         "speed below which the friction of all dampers fades (v_s)",
-        Target::Dampers("friction_speed_m_per_s"),
-        get |m, _, _| common(&m.dampers, |d| d.friction_speed_m_per_s),
-        set |m, _, _, v| m.dampers.iter_mut().for_each(|d| d.friction_speed_m_per_s = v)),
+        every dampers Dampers friction_speed_m_per_s),
     row!("friction_linear_speed_m_per_s", "m/s", SPEED, OWN_SPEED,
         "speed amplitude at which the linear model takes the friction of all dampers (V)",
         Target::Dampers("friction_linear_speed_m_per_s"),
@@ -204,120 +232,85 @@ pub(super) static TABLE: &[Row] = &[
 
 /// Rows of each spring, after `spring_1_`.
 #[rustfmt::skip]
-static SPRING: &[Row] = &[
-    row!("stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1,
-        "stiffness of this spring", of springs stiffness_n_per_m),
-    row!("free_length_m", "m", NonNegative, Assumed("the distance between the ends as given"),
-        "length of this spring without force", Target::Machine,
-        get |m, _, k| {
-            m.springs.get(k).map(|s| s.free_length_m.unwrap_or_else(|| s.given_length_m()))
-        },
-        set |m, _, k, v| if let Some(s) = m.springs.get_mut(k) { s.free_length_m = Some(v) }),
-    row!("cubic_n_per_m3", "N/m^3", NonNegative, NONE,
-        "tension of this spring per cube of its elongation", of springs cubic_n_per_m3),
-    row!("cabinet_x_m", "m", Any, TABLE_4,
-        "cabinet end of this spring, towards the door", of springs cabinet_m[0]),
-    row!("cabinet_y_m", "m", Any, TABLE_4,
-        "cabinet end of this spring, upwards", of springs cabinet_m[1]),
-    row!("cabinet_z_m", "m", Any, TABLE_4,
-        "cabinet end of this spring, sideways", of springs cabinet_m[2]),
-    row!("tub_x_m", "m", Any, TABLE_4,
-        "tub end of this spring, towards the door", of springs tub_m[0]),
-    row!("tub_y_m", "m", Any, TABLE_4,
-        "tub end of this spring, upwards", of springs tub_m[1]),
-    row!("tub_z_m", "m", Any, TABLE_4,
-        "tub end of this spring, sideways", of springs tub_m[2]),
+static SPRING: &[&[Row]] = &[
+    &[
+        row!("stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1,
+            "stiffness of this spring", of springs stiffness_n_per_m),
+        row!("free_length_m", "m", NonNegative, Assumed("the distance between the ends as given"),
+            "length of this spring without force", Target::Machine,
+            get |m, _, k| {
+                m.springs.get(k).map(|s| s.free_length_m.unwrap_or_else(|| s.given_length_m()))
+            },
+            set |m, _, k, v| if let Some(s) = m.springs.get_mut(k) { s.free_length_m = Some(v) }),
+        row!("cubic_n_per_m3", "N/m^3", NonNegative, NONE,
+            "tension of this spring per cube of its elongation", of springs cubic_n_per_m3),
+    ],
+    axes!("cabinet_" "_m", "m", Any, TABLE_4, "cabinet end of this spring, ", of springs cabinet_m),
+    axes!("tub_" "_m", "m", Any, TABLE_4, "tub end of this spring, ", of springs tub_m),
 ];
 
 /// Rows of each damper, after `damper_1_`.
 #[rustfmt::skip]
-static DAMPER: &[Row] = &[
-    row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1,
-        "damping of this damper", of dampers damping_n_s_per_m),
-    row!("friction_n", "N", NonNegative, NONE,
-        "friction of this damper (F_f)", of dampers friction_n),
-    row!("friction_speed_m_per_s", "m/s", SPEED, USUAL_SPEED,
-        "speed below which the friction of this damper fades (v_s)",
-        of dampers friction_speed_m_per_s),
-    row!("friction_linear_speed_m_per_s", "m/s", SPEED, OWN_SPEED,
-        "speed amplitude at which the linear model takes the friction of this damper (V)",
-        Target::Machine,
-        get |m, _, k| m.dampers.get(k)?.friction_linear_speed_m_per_s,
-        set |m, _, k, v| if let Some(d) = m.dampers.get_mut(k) {
-            d.friction_linear_speed_m_per_s = Some(v)
-        }),
-    row!("cabinet_x_m", "m", Any, TABLE_4,
-        "cabinet end of this damper, towards the door", of dampers cabinet_m[0]),
-    row!("cabinet_y_m", "m", Any, TABLE_4,
-        "cabinet end of this damper, upwards", of dampers cabinet_m[1]),
-    row!("cabinet_z_m", "m", Any, TABLE_4,
-        "cabinet end of this damper, sideways", of dampers cabinet_m[2]),
-    row!("tub_x_m", "m", Any, TABLE_4,
-        "tub end of this damper, towards the door", of dampers tub_m[0]),
-    row!("tub_y_m", "m", Any, TABLE_4,
-        "tub end of this damper, upwards", of dampers tub_m[1]),
-    row!("tub_z_m", "m", Any, TABLE_4,
-        "tub end of this damper, sideways", of dampers tub_m[2]),
+static DAMPER: &[&[Row]] = &[
+    &[
+        row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1,
+            "damping of this damper", of dampers damping_n_s_per_m),
+        row!("friction_n", "N", NonNegative, NONE,
+            "friction of this damper (F_f)", of dampers friction_n),
+        row!("friction_speed_m_per_s", "m/s", SPEED, USUAL_SPEED,
+            "speed below which the friction of this damper fades (v_s)",
+            of dampers friction_speed_m_per_s),
+        row!("friction_linear_speed_m_per_s", "m/s", SPEED, OWN_SPEED,
+            "speed amplitude at which the linear model takes the friction of this damper (V)",
+            Target::Machine,
+            get |m, _, k| m.dampers.get(k)?.friction_linear_speed_m_per_s,
+            set |m, _, k, v| if let Some(d) = m.dampers.get_mut(k) {
+                d.friction_linear_speed_m_per_s = Some(v)
+            }),
+    ],
+    axes!("cabinet_" "_m", "m", Any, TABLE_4, "cabinet end of this damper, ", of dampers cabinet_m),
+    axes!("tub_" "_m", "m", Any, TABLE_4, "tub end of this damper, ", of dampers tub_m),
 ];
 
 /// Rows of each stop, after `stop_1_`.
 #[rustfmt::skip]
-static STOP: &[Row] = &[
-    row!("clearance_m", "m", Any, NONE,
-        "how far the tub may move before it meets this stop", of stops clearance_m),
-    row!("stiffness_n_per_m", "N/m", NonNegative, NONE,
-        "stiffness of this stop in contact", of stops stiffness_n_per_m),
-    row!("damping_n_s_per_m", "N s/m", NonNegative, NONE,
-        "damping of this stop in contact", of stops damping_n_s_per_m),
-    row!("softness_m", "m", Within(1e-9, 1.0), Assumed("a tenth of a millimetre"),
-        "depth over which contact with this stop sets in", of stops softness_m),
-    row!("tub_x_m", "m", Any, NONE,
-        "tub point of this stop, towards the door", of stops tub_m[0]),
-    row!("tub_y_m", "m", Any, NONE,
-        "tub point of this stop, upwards", of stops tub_m[1]),
-    row!("tub_z_m", "m", Any, NONE,
-        "tub point of this stop, sideways", of stops tub_m[2]),
-    row!("direction_x", "", Any, NONE,
-        "way from the tub to this stop, towards the door", of stops direction[0]),
-    row!("direction_y", "", Any, NONE,
-        "way from the tub to this stop, upwards", of stops direction[1]),
-    row!("direction_z", "", Any, NONE,
-        "way from the tub to this stop, sideways", of stops direction[2]),
+static STOP: &[&[Row]] = &[
+    &[
+        row!("clearance_m", "m", Any, NONE,
+            "how far the tub may move before it meets this stop", of stops clearance_m),
+        row!("stiffness_n_per_m", "N/m", NonNegative, NONE,
+            "stiffness of this stop in contact", of stops stiffness_n_per_m),
+        row!("damping_n_s_per_m", "N s/m", NonNegative, NONE,
+            "damping of this stop in contact", of stops damping_n_s_per_m),
+        row!("softness_m", "m", Within(1e-9, 1.0), Assumed("a tenth of a millimetre"),
+            "depth over which contact with this stop sets in", of stops softness_m),
+    ],
+    axes!("tub_" "_m", "m", Any, NONE, "tub point of this stop, ", of stops tub_m),
+    axes!("direction_" "", "", Any, NONE, "way from the tub to this stop, ", of stops direction),
 ];
 
 /// Rows of each bushing, after `bushing_1_`.
 #[rustfmt::skip]
-static BUSHING: &[Row] = &[
-    row!("tub_x_m", "m", Any, NONE,
-        "tub point of this bushing, towards the door", of bushings tub_m[0]),
-    row!("tub_y_m", "m", Any, NONE,
-        "tub point of this bushing, upwards", of bushings tub_m[1]),
-    row!("tub_z_m", "m", Any, NONE,
-        "tub point of this bushing, sideways", of bushings tub_m[2]),
-    row!("stiffness_x_n_per_m", "N/m", NonNegative, NONE,
-        "stiffness of this bushing towards the door", of bushings stiffness_n_per_m[0]),
-    row!("stiffness_y_n_per_m", "N/m", NonNegative, NONE,
-        "stiffness of this bushing upwards", of bushings stiffness_n_per_m[1]),
-    row!("stiffness_z_n_per_m", "N/m", NonNegative, NONE,
-        "stiffness of this bushing sideways", of bushings stiffness_n_per_m[2]),
-    row!("cubic_x_n_per_m3", "N/m^3", NonNegative, NONE,
-        "force of this bushing per cube of its displacement towards the door",
-        of bushings cubic_n_per_m3[0]),
-    row!("cubic_y_n_per_m3", "N/m^3", NonNegative, NONE,
-        "the same upwards", of bushings cubic_n_per_m3[1]),
-    row!("cubic_z_n_per_m3", "N/m^3", NonNegative, NONE,
-        "the same sideways", of bushings cubic_n_per_m3[2]),
-    row!("damping_x_n_s_per_m", "N s/m", NonNegative, NONE,
-        "damping of this bushing towards the door", of bushings damping_n_s_per_m[0]),
-    row!("damping_y_n_s_per_m", "N s/m", NonNegative, NONE,
-        "damping of this bushing upwards", of bushings damping_n_s_per_m[1]),
-    row!("damping_z_n_s_per_m", "N s/m", NonNegative, NONE,
-        "damping of this bushing sideways", of bushings damping_n_s_per_m[2]),
+static BUSHING: &[&[Row]] = &[
+    axes!("tub_" "_m", "m", Any, NONE, "tub point of this bushing, ", of bushings tub_m),
+    axes!("stiffness_" "_n_per_m", "N/m", NonNegative, NONE, "stiffness of this bushing ",
+        of bushings stiffness_n_per_m),
+    &[
+        row!("cubic_x_n_per_m3", "N/m^3", NonNegative, NONE,
+            "force of this bushing per cube of its displacement towards the door",
+            of bushings cubic_n_per_m3[0]),
+        row!("cubic_y_n_per_m3", "N/m^3", NonNegative, NONE,
+            "the same upwards", of bushings cubic_n_per_m3[1]),
+        row!("cubic_z_n_per_m3", "N/m^3", NonNegative, NONE,
+            "the same sideways", of bushings cubic_n_per_m3[2]),
+    ],
+    axes!("damping_" "_n_s_per_m", "N s/m", NonNegative, NONE, "damping of this bushing ",
+        of bushings damping_n_s_per_m),
 ];
 
 /// Rows of each further unbalance, after `unbalance_2_`.
 #[rustfmt::skip]
-static FURTHER_UNBALANCE: &[Row] = &[
+static UNBALANCE: &[&[Row]] = &[&[
     row!("mass_kg", "kg", NonNegative, NONE,
         "mass of this further unbalance", of further_unbalances mass_kg),
     row!("x_m", "m", Any, NONE,
@@ -325,75 +318,36 @@ static FURTHER_UNBALANCE: &[Row] = &[
     row!("radius_m", "m", Any, NONE,
         "distance of this further unbalance from the axis; negative opposite the first",
         of further_unbalances radius_m),
-];
+]];
 
 /// Rows of each foot, after `foot_1_`.
 #[rustfmt::skip]
-static FOOT: &[Row] = &[
-    row!("x_m", "m", Any, NONE, "place of this foot, towards the door", of feet foot_m[0]),
-    row!("y_m", "m", Any, NONE, "place of this foot, upwards", of feet foot_m[1]),
-    row!("z_m", "m", Any, NONE, "place of this foot, sideways", of feet foot_m[2]),
-];
+static FOOT: &[&[Row]] =
+    &[axes!("" "_m", "m", Any, NONE, "place of this foot, ", of feet foot_m)];
 
 /// Rows of each point of a spin's table, after `spin_table_1_`.
 #[rustfmt::skip]
-static SPIN_POINT: &[Row] = &[
+static SPIN_POINT: &[&[Row]] = &[&[
     row!("time_s", "s", NonNegative, Grid,
         "time of this point of the spin's table; the first is 0", table time_s),
     row!("speed_rpm", "rpm", Range::Within(-1e5, 1e5), Grid,
         "speed at this point of the spin's table", table speed_rpm),
-];
+]];
 
 /// Rows of numbered elements.
 pub(super) static BLOCKS: &[Block] = &[
+    Block::new("spring", SPRING, |machine, _| machine.springs.len()),
+    Block::new("damper", DAMPER, |machine, _| machine.dampers.len()),
+    Block::new("stop", STOP, |machine, _| machine.stops.len()),
+    Block::new("bushing", BUSHING, |machine, _| machine.bushings.len()),
+    // The first is that of every machine.
     Block {
-        prefix: "spring_",
-        rows: SPRING,
-        first: 1,
-        count: |machine, _| machine.springs.len(),
-        missing: |count| UnknownParameter::Number { element: "spring", count },
-    },
-    Block {
-        prefix: "damper_",
-        rows: DAMPER,
-        first: 1,
-        count: |machine, _| machine.dampers.len(),
-        missing: |count| UnknownParameter::Number { element: "damper", count },
-    },
-    Block {
-        prefix: "stop_",
-        rows: STOP,
-        first: 1,
-        count: |machine, _| machine.stops.len(),
-        missing: |count| UnknownParameter::Number { element: "stop", count },
-    },
-    Block {
-        prefix: "bushing_",
-        rows: BUSHING,
-        first: 1,
-        count: |machine, _| machine.bushings.len(),
-        missing: |count| UnknownParameter::Number { element: "bushing", count },
-    },
-    Block {
-        prefix: "unbalance_",
-        rows: FURTHER_UNBALANCE,
-        // The first is that of every machine.
         first: 2,
-        count: |machine, _| machine.further_unbalances.len(),
-        missing: |count| UnknownParameter::Number { element: "unbalance", count: count + 1 },
+        ..Block::new("unbalance", UNBALANCE, |machine, _| machine.further_unbalances.len())
     },
+    Block::new("foot", FOOT, |machine, _| machine.feet.len()),
     Block {
-        prefix: "foot_",
-        rows: FOOT,
-        first: 1,
-        count: |machine, _| machine.feet.len(),
-        missing: |count| UnknownParameter::Number { element: "foot", count },
-    },
-    Block {
-        prefix: "spin_table_",
-        rows: SPIN_POINT,
-        first: 1,
-        count: |_, spin| table_points(spin),
-        missing: |count| UnknownParameter::TablePoint { count },
+        missing: |_, count| UnknownParameter::TablePoint { count },
+        ..Block::new("spin_table", SPIN_POINT, |_, spin| table_points(spin))
     },
 ];

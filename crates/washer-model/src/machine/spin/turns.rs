@@ -56,7 +56,7 @@ fn whole_turns_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
             let mut earliest = piece.from;
             while next <= after {
                 earliest = piece.when(next - travelled, earliest);
-                times.push((piece.stretch.start_s + earliest).clamp(window_s[0], window_s[1]));
+                times.push((piece.stretch.start_s.0 + earliest).clamp(window_s[0], window_s[1]));
                 next += 1.0;
             }
         }
@@ -68,19 +68,20 @@ fn whole_turns_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
 /// The run to the window's end, cut where the window begins and where the drum reverses.
 fn pieces(stretches: &[SpinStretch], [from_s, to_s]: [f64; 2]) -> Vec<Piece<'_>> {
     let mut pieces = Vec::new();
-    for (k, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s < to_s) {
-        let end_s = stretches.get(k + 1).map_or(to_s, |next| next.start_s.min(to_s));
-        let length = end_s - stretch.start_s;
+    for (k, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s.0 < to_s)
+    {
+        let end_s = stretches.get(k + 1).map_or(to_s, |next| next.start_s.0.min(to_s));
+        let length = end_s - stretch.start_s.0;
         let mut edges = vec![0.0, length];
         let mut cut = |at: f64| {
             if 0.0 < at && at < length {
                 edges.push(at);
             }
         };
-        cut(from_s - stretch.start_s);
+        cut(from_s - stretch.start_s.0);
         // A cycloidal ramp turns one way.
-        if stretch.wave_turns == 0.0 {
-            cut(-stretch.turns_per_s / (2.0 * stretch.turns_per_s2));
+        if stretch.wave_turns.0 == 0.0 {
+            cut(-stretch.turns_per_s.0 / (2.0 * stretch.turns_per_s2.0));
         }
         edges.sort_by(f64::total_cmp);
         pieces.extend(edges.windows(2).map(|edge| Piece { stretch, from: edge[0], to: edge[1] }));
@@ -91,7 +92,7 @@ fn pieces(stretches: &[SpinStretch], [from_s, to_s]: [f64; 2]) -> Vec<Piece<'_>>
 impl Piece<'_> {
     /// When it begins, from the start of the run.
     fn start_s(&self) -> f64 {
-        self.stretch.start_s + self.from
+        self.stretch.start_s.0 + self.from
     }
 
     /// Turns made in it.
@@ -107,11 +108,11 @@ impl Piece<'_> {
     /// The time at which so many turns have been made in it; not before `earliest`.
     fn when(&self, turns: f64, earliest: f64) -> f64 {
         let stretch = self.stretch;
-        if stretch.wave_turns == 0.0 {
+        if stretch.wave_turns.0 == 0.0 {
             let way = if stretch.turns(self.to) < stretch.turns(self.from) { -1.0 } else { 1.0 };
             let rate = way * stretch.rate(self.from);
             // The root of turns = rate t + way b t^2 that does not cancel.
-            let root = (rate * rate + 4.0 * way * stretch.turns_per_s2 * turns).max(0.0).sqrt();
+            let root = (rate * rate + 4.0 * way * stretch.turns_per_s2.0 * turns).max(0.0).sqrt();
             let after = if turns > 0.0 { 2.0 * turns / (rate + root) } else { 0.0 };
             return (self.from + after).clamp(earliest, self.to);
         }
@@ -138,29 +139,27 @@ impl Piece<'_> {
 impl SpinStretch {
     /// Turns made `t` after its start, whole ones included; below zero backwards.
     fn turns(&self, t: f64) -> f64 {
-        let (_, cos) = trig::sin_cos_turns(N(self.wave_hz * t));
-        t * (self.turns_per_s + self.turns_per_s2 * t) + self.wave_turns * (cos.0 - 1.0)
+        let (_, cos) = trig::sin_cos_turns(N(self.wave_hz.0 * t));
+        t * (self.turns_per_s.0 + self.turns_per_s2.0 * t) + self.wave_turns.0 * (cos.0 - 1.0)
     }
 
     /// Turns per second there.
     fn rate(&self, t: f64) -> f64 {
-        let (sin, _) = trig::sin_cos_turns(N(self.wave_hz * t));
-        self.turns_per_s + 2.0 * self.turns_per_s2 * t
-            - TAU * self.wave_hz * self.wave_turns * sin.0
+        let (sin, _) = trig::sin_cos_turns(N(self.wave_hz.0 * t));
+        self.turns_per_s.0 + 2.0 * self.turns_per_s2.0 * t
+            - TAU * self.wave_hz.0 * self.wave_turns.0 * sin.0
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::InLanes as _;
-    use crate::machine::spin::SpinLanes;
 
     /// The angle in turns, whole ones dropped, as the equations of motion see it.
     fn phase(spin: &Spin, t_s: f64) -> f64 {
         let stretches = spin.stretches();
-        let stretch = stretches.iter().rev().find(|stretch| stretch.start_s <= t_s).unwrap();
-        let state = SpinLanes::splat(N(0.0), stretch).at(N(t_s));
+        let stretch = stretches.iter().rev().find(|stretch| stretch.start_s.0 <= t_s).unwrap();
+        let state = stretch.at(N(t_s));
         state.sin.0.atan2(state.cos.0) / TAU
     }
 

@@ -1,9 +1,9 @@
 //! The steepest that a machine's elements can be: linear ones that bound the stiffness and damping
 //! of all elements, so that the choice of steps sees friction, stops and stiffening springs.
 
-use crate::coordinates::{COORDINATES, TUB_Y, TUB_Z};
-use crate::nonlinear::elements::{Elements, MidpointVelocity, StopOf, TubMotion};
-use crate::nonlinear::frame::{Tilt, difference, dot};
+use crate::coordinates::{COORDINATES, TUB};
+use crate::nonlinear::elements::{Elements, StopOf, TubMotion};
+use crate::nonlinear::frame::{difference, dot};
 use lane_ode::N;
 
 /// How far tub points move from where they rest (m): more than any machine has room for.
@@ -20,40 +20,32 @@ impl Elements<f64> {
             return None;
         }
         let mut steepest = self.clone();
-        let q = q.map(N);
-        let still = [N(0.0); 3];
-        let tub = TubMotion {
-            tilt: &Tilt::of_tub(&q),
-            midpoint: [q[TUB_Y], q[TUB_Z]],
-            midpoint_velocity: [N(0.0); 2],
-            rate: &still,
-        };
-        let at_rest = MidpointVelocity(still);
-        for (spring, stiffening) in steepest.springs.iter_mut().zip(&mut steepest.stiffenings) {
+        let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
+        for spring in &mut steepest.springs {
             let ends = &spring.ends;
-            let place = tub.point(&ends.tub, &at_rest).displacement;
+            let place = tub.point(&ends.tub).displacement;
             let span = difference(place, &difference(ends.cabinet, &ends.tub));
             let length = dot(&span, &span).sqrt();
-            let (elongation, cubic) = (length - stiffening.free_length, stiffening.cubic);
+            let (elongation, cubic) = (length - spring.free_length, spring.cubic);
             let tension = spring.stiffness * length - spring.stiffness_times_free_length
                 + cubic * elongation * elongation * elongation;
             let farthest = elongation.abs() + TRAVEL_M;
             spring.stiffness += 3.0 * (cubic * farthest * farthest).v();
             // Its tension at rest stays, on which its stiffness across the line depends.
             spring.stiffness_times_free_length = spring.stiffness * length - tension;
-            stiffening.cubic = N(0.0);
+            spring.cubic = N(0.0);
         }
-        for (damper, friction) in steepest.dampers.iter_mut().zip(&mut steepest.frictions) {
-            damper.damping += friction.force / friction.speed_squared.sqrt();
-            friction.force = N(0.0);
+        for damper in &mut steepest.dampers {
+            damper.damping += damper.friction / damper.speed_squared.sqrt();
+            damper.friction = N(0.0);
         }
         for stop in &mut steepest.stops {
-            let depth = stop.depth(&tub.point(&stop.tub, &at_rest));
+            let depth = stop.depth(&tub.point(&stop.tub));
             let StopOf { clearance, softness_squared, .. } = *stop;
             stop.clearance = clearance + depth - CLOSED * softness_squared.sqrt();
         }
         for bushing in &mut steepest.bushings {
-            let place = tub.point(&bushing.tub, &at_rest).displacement;
+            let place = tub.point(&bushing.tub).displacement;
             for i in 0..3 {
                 let farthest = place[i].abs() + TRAVEL_M;
                 bushing.stiffness[i] += 3.0 * (bushing.cubic[i] * farthest * farthest).v();

@@ -14,14 +14,13 @@ lane_struct! {
 impl<T: Lane> Elements<T> {
     /// The motions, depth (m) and speed (m/s) of each; a friction's has no depth.
     #[inline(always)]
-    pub(crate) fn at_corners(&self, tub: &TubMotion<'_, T>) -> Vec<[N<T>; 2]> {
-        let mut motions = Vec::with_capacity(self.frictions.len() + self.stops.len());
-        for number in 0..self.frictions.len() {
+    pub(crate) fn at_corners(&self, tub: &TubMotion<T>) -> Vec<[N<T>; 2]> {
+        let mut motions = Vec::with_capacity(self.dampers.len() + self.stops.len());
+        for number in 0..self.dampers.len() {
             motions.push([tub.midpoint[0].lit(0.0), self.damper_speed(number, tub)]);
         }
-        let velocity = tub.midpoint_velocity_in_tub();
         for stop in &self.stops {
-            let point = tub.point(&stop.tub, &velocity);
+            let point = tub.point(&stop.tub);
             motions.push([stop.depth(&point), stop.speed(&point)]);
         }
         motions
@@ -30,12 +29,12 @@ impl<T: Lane> Elements<T> {
     /// Adds the forces along such motions to a list.
     #[inline(always)]
     pub(crate) fn corner_forces(&self, motions: &[[N<T>; 2]], forces: &mut Vec<CornerForce<T>>) {
-        let (of_frictions, of_stops) = motions.split_at(self.frictions.len());
-        for (friction, [zero, speed]) in self.frictions.iter().zip(of_frictions) {
+        let (of_dampers, of_stops) = motions.split_at(self.dampers.len());
+        for (damper, [zero, speed]) in self.dampers.iter().zip(of_dampers) {
             let (still, mut rate) = (zero.constant(), speed.constant());
             rate.0.slope = zero.lit(1.0).0;
             let line = CabinetLine { span: [still; 3], length: still, rate };
-            let N(force) = friction.constant().push(&line);
+            let N(force) = damper.constant().push_further(&line);
             let [force, by_speed] = [N(force.value), N(force.slope)];
             forces.push(CornerForce { force, by_depth: *zero, by_speed });
         }
