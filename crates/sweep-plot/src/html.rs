@@ -19,7 +19,7 @@ use super::chart::{Chart, ChartPanel, DOT, Series, Style, stroke, x_scale, y_sca
 use super::colour::{BOTH, FAILED, LEVELS, SHADE};
 use super::contour::MOST_POINTS;
 use super::cuts::Cuts;
-use super::error::PlotError;
+use super::error::Result;
 use super::figures;
 use super::frame::{Sign, failed_hatch};
 use super::gather::{Counts, Map};
@@ -76,15 +76,15 @@ pub(crate) fn most_cells(columns: usize) -> usize {
 /// histories.
 ///
 /// # Errors
-/// [`PlotError::Unfit`] for options that the file does not have, and any that reading the traces
+/// [`crate::PlotError::Unfit`] for options that the file does not have, and any that reading the traces
 /// brings.
-pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<String, PlotError> {
+pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<String> {
     let source = &map.table.source;
     let first = layer::chosen(source, options)?;
     let all = layer::all(source);
     let room = MOST_POINTS / all.len();
     let layers = all.iter().map(|shown| Ok(layer_json(map, shown, shown.layer(map)?, room)));
-    let layers = layers.collect::<Result<Vec<Value>, PlotError>>()?;
+    let layers = layers.collect::<Result<Vec<Value>>>()?;
     let traces = match &options.traces {
         Some(folder) => histories::read(folder, map)?,
         None => Value::Null,
@@ -194,13 +194,12 @@ pub fn table(title: &str, heads: &[&str], rows: &[Vec<String>]) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    let row = |cells: &[String], cell: &str| {
-        let cells = cells.iter().map(|text| format!("<{cell}>{}</{cell}>", escape(text)));
+    fn row<T: AsRef<str>>(cells: &[T], cell: &str) -> String {
+        let cells = cells.iter().map(|text| format!("<{cell}>{}</{cell}>", escape(text.as_ref())));
         format!("<tr>{}</tr>\n", cells.collect::<String>())
-    };
-    let heads: Vec<String> = heads.iter().map(|head| (*head).to_owned()).collect();
+    }
     let all: String = rows.iter().map(|cells| row(cells, "td")).collect();
-    let head = if heads.iter().all(String::is_empty) { String::new() } else { row(&heads, "th") };
+    let head = if heads.iter().all(|head| head.is_empty()) { "" } else { &row(heads, "th") };
     format!(
         "<h2>{}</h2>\n<table><thead>{head}</thead><tbody>\n{all}</tbody></table>\n",
         escape(title)
@@ -360,9 +359,9 @@ fn layer_json(map: &Map, shown: &Shown, layer: Layer, room: usize) -> Value {
         "nonlinear": layer.nonlinear,
         "lines": layer.level.as_ref().map(|level| level_json(map, &layer, level, room)),
     });
-    if let Some([both, undefined]) = layer.mixed() {
-        data["both"] = json!(embed::bits(both));
-        data["undefined"] = json!(embed::bits(undefined));
+    if let Some(sides) = &layer.divided {
+        data["both"] = json!(embed::bits(&sides.both));
+        data["undefined"] = json!(embed::bits(&sides.undefined));
     }
     data["legend"] = legend_json(&figures::map::legend(map, Some(layer)));
     data

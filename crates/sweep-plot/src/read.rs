@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use arrow_schema::Schema;
 use serde_json::Value;
 
-use super::error::PlotError;
+use super::error::{PlotError, Result};
 use super::label;
 use sweep_files::{self as files, ParquetFile};
 
@@ -88,7 +88,7 @@ impl Source {
     /// # Errors
     /// [`PlotError::File`], or [`PlotError::Undrawable`] when the columns are not those of a file
     /// of ours.
-    pub(crate) fn open(path: &Path) -> Result<Self, PlotError> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = ParquetFile::open(path)?;
         let rows = usize::try_from(file.rows()).unwrap_or(usize::MAX);
         let provenance: Vec<(String, Value)> = file
@@ -122,8 +122,8 @@ impl Source {
     pub(crate) fn each_row(
         &self,
         names: &[&str],
-        mut take: impl FnMut(Row<'_>) -> Result<(), PlotError>,
-    ) -> Result<(), PlotError> {
+        mut take: impl FnMut(Row<'_>) -> Result<()>,
+    ) -> Result<()> {
         self.file.each_row(names, |row| take(Row(row)))
     }
 
@@ -179,7 +179,7 @@ impl Source {
     ///
     /// # Errors
     /// [`PlotError::Unfit`], which says what writes such a file.
-    pub(crate) fn expect(&self, kind: Kind, option: &str, hint: &str) -> Result<(), PlotError> {
+    pub(crate) fn expect(&self, kind: Kind, option: &str, hint: &str) -> Result<()> {
         if self.kind == kind {
             return Ok(());
         }
@@ -244,11 +244,23 @@ impl Source {
         })
     }
 
+    /// Up to where a column is good, in its unit: its own limit, or the run's of ratios. Two files
+    /// may have two.
+    pub(crate) fn limit(&self, column: &ColumnFacts) -> Option<f64> {
+        let is_of_run = is_ratio(column) && self.kind != Kind::Differences;
+        column.limit.or_else(|| is_of_run.then(|| self.ratio_limit()))
+    }
+
     /// The ratio from which on a point is unreliable: the run's limit, or else the paper's, 2.
     pub(crate) fn ratio_limit(&self) -> f64 {
         let limit = self.find("ratio_limit").and_then(Value::as_f64).map(drawable);
         limit.filter(|limit| *limit > 0.0).unwrap_or(2.0)
     }
+}
+
+/// Whether a column's numbers are ratios of both models.
+pub(crate) fn is_ratio(column: &ColumnFacts) -> bool {
+    column.name.starts_with("ratio_") && column.name != "ratio_change"
 }
 
 /// The names of what there is.

@@ -8,7 +8,7 @@ use std::path::Path;
 use serde_json::Value;
 use sweep_files::{Step, dotted, key, leaves};
 
-use crate::error::PlotError;
+use crate::error::{PlotError, Result};
 use crate::read::Source;
 
 /// What histories, and gaps over them, follow from.
@@ -56,7 +56,7 @@ pub(crate) fn agree(
     path: &Path,
     files: [(&Source, &At); 2],
     parts: &[&str],
-) -> Result<(), PlotError> {
+) -> Result<()> {
     let found = parted(files, parts);
     if found.is_empty() {
         return Ok(());

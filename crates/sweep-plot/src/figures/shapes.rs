@@ -5,7 +5,7 @@ use sweep_files::key;
 
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
-use crate::error::PlotError;
+use crate::error::Result;
 use crate::label::{self, Label};
 use crate::table::Table;
 
@@ -31,8 +31,8 @@ type Line = [Vec<Phasor>; 2];
 /// are from rest when the greatest deflection is at its farthest, and a quarter of a period later.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] where the file holds no machine or no resonances.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+/// [`crate::PlotError::Undrawable`] where the file holds no machine or no resonances.
+pub(crate) fn chart(table: &Table) -> Result<Chart> {
     let places = places(table)
         .ok_or_else(|| table.source.empty("the file does not say where the machine's parts are"))?;
     let mut panels = Vec::new();

@@ -7,7 +7,7 @@ use crate::PlotOptions;
 use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
 use crate::colour::{LINEAR, NONLINEAR};
-use crate::error::PlotError;
+use crate::error::{PlotError, Result};
 use crate::figures::machine::machine;
 use crate::figures::{campbell, stability};
 use crate::label::{self, Label};
@@ -21,7 +21,7 @@ use crate::together::{self, At};
 /// # Errors
 /// [`PlotError::Undrawable`] without time, [`PlotError::Unfit`] for an unknown channel, and as
 /// [`campbell::resonances`] for the modes file that gives the resonance speeds.
-pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
+pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
     let time = Rc::new(table.numbers("time_s")?.to_vec());
     if time.len() < 2 {
         return Err(table.source.empty("a trace needs at least two instants"));
@@ -187,7 +187,7 @@ fn difference(panels: &[ChartPanel]) -> Option<f64> {
 }
 
 /// The trace whose nonlinear model is drawn in place of the linear one.
-pub(super) fn other_trace(path: &Path) -> Result<Table, PlotError> {
+pub(super) fn other_trace(path: &Path) -> Result<Table> {
     let table = Table::open(path)?;
     table.source.expect(Kind::Trace, "--against", "`sweep trace` writes a trace")?;
     Ok(table)
@@ -263,10 +263,7 @@ pub(super) fn subtitle(
 }
 
 /// The ranges of unstable speeds that the options name, rpm.
-pub(super) fn unstable_speeds(
-    table: &Table,
-    options: &PlotOptions,
-) -> Result<Vec<[f64; 2]>, PlotError> {
+pub(super) fn unstable_speeds(table: &Table, options: &PlotOptions) -> Result<Vec<[f64; 2]>> {
     match &options.stability {
         Some(path) => Ok(stability::unstable_of(table, path)?.speeds),
         None => Ok(Vec::new()),
@@ -276,10 +273,7 @@ pub(super) fn unstable_speeds(
 /// The resonance speeds that the options name, rpm, and for the subtitle where the machine whose
 /// modes they are is another one. Resonances hardly move with unbalance and damping, so the modes
 /// of a machine serve all its points.
-pub(super) fn resonances(
-    table: &Table,
-    options: &PlotOptions,
-) -> Result<(Vec<f64>, String), PlotError> {
+pub(super) fn resonances(table: &Table, options: &PlotOptions) -> Result<(Vec<f64>, String)> {
     let mut speeds = options.resonances_rpm.clone();
     let mut note = String::new();
     if let Some(path) = &options.modes {

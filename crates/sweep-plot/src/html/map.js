@@ -416,7 +416,6 @@ function createMap(host, data, panel) {
     // The point that is kept, or the one under the pointer.
     chosen: () => pinned ?? hovered,
     index: pointAt,
-    coordinates,
     // What a link holds, and back.
     state: () => ({ show: quantity.value, rest, view: view.flat(), pinned }),
     restore(state) {
