@@ -12,7 +12,7 @@ use sweep_files::FileKind;
 pub use boundary::{Crossing, Moved};
 pub use plans::PlanChange;
 
-use crate::error::ResultsError;
+use crate::error::{Result, ResultsError};
 use side::Side;
 use sweep_files::{Cell, ResultTable, ratio_limits};
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::condition::{Condition, Context, Folded, each_row};
-use crate::error::ResultsError;
+use crate::error::{Result, ResultsError};
 use crate::top::Worst;
 use sweep_files::{Cell, ResultTable};
 

@@ -1,7 +1,7 @@
 //! One of two files, in memory.
 
 use super::{Flip, SharedRow};
-use crate::error::ResultsError;
+use crate::error::{Result, ResultsError};
 use sweep_files::{Cell, Column, ResultTable, Rows};
 
 /// Most cells of a file that are kept: two files of so many take some gigabytes.
@@ -33,7 +33,7 @@ pub(super) fn keys(table: &ResultTable, is_boundary: bool) -> Vec<String> {
 }
 
 /// The value of a column that has one in all rows.
-pub(super) fn only_value(table: &ResultTable, name: &str) -> Result<Option<f64>, ResultsError> {
+pub(super) fn only_value(table: &ResultTable, name: &str) -> Result<Option<f64>> {
     let mut value = None;
     for rows in table.file().read(&[name])? {
         let rows = rows?;
@@ -53,11 +53,7 @@ impl Side {
     ///
     /// # Errors
     /// [`ResultsError::Refused`], [`ResultsError::File`].
-    pub(super) fn read(
-        table: &ResultTable,
-        other: &ResultTable,
-        keys: &[String],
-    ) -> Result<Self, ResultsError> {
+    pub(super) fn read(table: &ResultTable, other: &ResultTable, keys: &[String]) -> Result<Self> {
         let in_both = |column: &Column| {
             let beside = other.column(&column.name);
             let is_same = beside.is_some_and(|beside| beside.kind == column.kind);
