@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 /// A node of the grid: its places along x and y.
 type Node = (usize, usize);
 
-/// An edge of the grid on which a line can cross: a side of a square or one of its diagonals. Of its
-/// nodes the one farther left comes first, or else the lower one. The second is kept as (y, x), so
-/// that the edges of a node come in order: along x, along y, and up to the right.
+/// An edge of the grid on which a line can cross: a side of a square or one of its diagonals. Of
+/// its nodes the one farther left comes first, or else the lower one. The second is kept as (y, x),
+/// so that the edges of a node come in order: along x, along y, and up to the right.
 type Edge = (Node, (usize, usize));
 
 /// The edge between two nodes.

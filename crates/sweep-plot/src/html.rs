@@ -76,8 +76,8 @@ pub(crate) fn most_cells(columns: usize) -> usize {
 /// histories.
 ///
 /// # Errors
-/// [`crate::PlotError::Unfit`] for options that the file does not have, and any that reading the traces
-/// brings.
+/// [`crate::PlotError::Unfit`] for options that the file does not have, and any that reading the
+/// traces brings.
 pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<String> {
     let source = &map.table.source;
     let first = layer::chosen(source, options)?;
@@ -161,16 +161,15 @@ fn provenance(source: &Source) -> String {
 const MOST_PROVENANCE: usize = 100_000;
 
 /// The page of a chart: every panel, those that a picture shows at first. It may compute, along
-/// an axis of this name.
-pub(crate) fn chart_page(source: &Source, chart: &Chart, live: Option<(&Live, &str)>) -> String {
+/// what can be moved first.
+pub(crate) fn chart_page(source: &Source, chart: &Chart, live: Option<&Live>) -> String {
     let mut data = json!({
         "kind": "chart",
         "title": chart.title,
         "subtitle": chart.subtitle,
         "chart": chart_json(chart, curve),
     });
-    let axis = live.map_or("", |(_, axis)| axis);
-    let live = live.map(|(live, _)| live);
+    let axis = live.and_then(|live| live.sliders.first()).map_or("", |axis| &axis.name);
     let computing = computing(&mut data, live, &[(axis, chart.x_log)]);
     let told = live.map_or_else(String::new, |live| report::told(source, Some(live)));
     let scripts = [&[CORE, CHART][..], computing, &[START]].concat();

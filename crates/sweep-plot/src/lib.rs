@@ -311,13 +311,8 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>>
     let grid = Grid::new(&axes, &cuts.picks, most);
     let map = Map::read(source, grid, &columns)?;
     if axes.len() == 1 {
-        let (source, chart) = (&map.table.source, figures::curves::chart(&map, options)?);
-        return match &options.live {
-            Some(live) if format == Format::Html => {
-                Ok(html::chart_page(source, &chart, Some((live, &axes[0].name))).into_bytes())
-            }
-            _ => written(source, &chart, format),
-        };
+        let chart = figures::curves::chart(&map, options)?;
+        return written((&map.table.source, &chart), options, format);
     }
     Ok(html::map_page(&map, &cuts, options)?.into_bytes())
 }
@@ -358,7 +353,7 @@ fn curves(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u
         _ => None,
     };
     if let Some(chart) = of_rows {
-        return written(&source, &chart, format);
+        return written((&source, &chart), options, format);
     }
     let table = &Table::read(source)?;
     let chart = match (table.source.kind, options.view) {
@@ -371,12 +366,16 @@ fn curves(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u
         (Kind::Modes, _) => campbell::chart(table, options)?,
         _ => boundary::chart(table)?,
     };
-    written(&table.source, &chart, format)
+    written((&table.source, &chart), options, format)
 }
 
-fn written(source: &Source, chart: &Chart, format: Format) -> Result<Vec<u8>> {
+fn written(
+    (source, chart): (&Source, &Chart),
+    options: &PlotOptions,
+    format: Format,
+) -> Result<Vec<u8>> {
     match format {
-        Format::Html => Ok(html::chart_page(source, chart, None).into_bytes()),
+        Format::Html => Ok(html::chart_page(source, chart, options.live.as_ref()).into_bytes()),
         _ => image(&chart::draw(chart), format),
     }
 }

@@ -75,7 +75,7 @@ pub(crate) struct Source {
     /// Number of rows.
     pub(crate) rows: usize,
     /// Name of the run with what its command line set, if the file says them.
-    named: Option<String>,
+    pub(crate) run_name: Option<String>,
     file: ParquetFile,
 }
 
@@ -111,8 +111,8 @@ impl Source {
                 names.join(", ")
             ),
         })?;
-        let named = named(&provenance);
-        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, named, file })
+        let run_name = run_name(&provenance);
+        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, run_name, file })
     }
 
     /// Calls `take` for each row, with the columns of these names. One that the file lacks is null.
@@ -198,19 +198,14 @@ impl Source {
         find_in(&self.provenance, key)
     }
 
-    /// Name of the run, if the file says it, with what its command line set.
-    pub(crate) fn run_name(&self) -> Option<&str> {
-        self.named.as_deref()
-    }
-
     /// The run's name, if the file says it, and these notes.
     pub(crate) fn notes(&self, further: impl IntoIterator<Item = String>) -> Vec<String> {
-        self.named.iter().cloned().chain(further).collect()
+        self.run_name.iter().cloned().chain(further).collect()
     }
 
     /// The run's name, if the file says it, and `rest` as a figure's subtitle.
     pub(crate) fn subtitle(&self, rest: &str) -> String {
-        self.run_name().map_or_else(|| rest.to_owned(), |name| format!("{name} · {rest}"))
+        self.notes([rest.to_owned()]).join(" · ")
     }
 
     /// What its ratios compare, by the run's criterion.
@@ -317,7 +312,7 @@ fn find_in<'a>(provenance: &'a [(String, Value)], key: &str) -> Option<&'a Value
 }
 
 /// As in "fig12, tub_mass_kg = 20".
-fn named(provenance: &[(String, Value)]) -> Option<String> {
+fn run_name(provenance: &[(String, Value)]) -> Option<String> {
     let mut named = find_in(provenance, "name")?.as_str()?.to_owned();
     let sets = find_in(provenance, "set").and_then(Value::as_object);
     for (name, value) in sets.into_iter().flatten() {

@@ -126,8 +126,8 @@ impl Table {
     /// cut into stretches, as [`Table::read_thinned`] does.
     ///
     /// # Errors
-    /// As [`Source::each_row`]; [`crate::PlotError::Undrawable`] for modes and boundaries beyond what a
-    /// figure keeps.
+    /// As [`Source::each_row`]; [`crate::PlotError::Undrawable`] for modes and boundaries beyond
+    /// what a figure keeps.
     pub(crate) fn read(source: Source) -> Result<Self> {
         let most = MOST_NUMBERS / source.numeric().count().max(1);
         if source.rows > most {

@@ -30,9 +30,7 @@ pub(crate) fn at(source: &Source) -> At {
 
 /// Where the plans of two files part, each at a point, in words.
 pub(crate) fn parted(files: [(&Source, &At); 2], parts: &[&str]) -> Vec<String> {
-    let plans = files.map(|(source, _)| {
-        source.provenance.iter().find(|(name, _)| name == key::PLAN).map(|(_, plan)| plan)
-    });
+    let plans = files.map(|(source, _)| source.find(key::PLAN));
     let [Some(first), Some(second)] = plans else { return Vec::new() };
     let mut found = Vec::new();
     for part in parts {

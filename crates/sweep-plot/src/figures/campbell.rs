@@ -81,8 +81,8 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
 /// speed.
 ///
 /// # Errors
-/// [`crate::PlotError::Unfit`] when the file is not a modes file, [`crate::PlotError::Undrawable`] when it lacks
-/// a column.
+/// [`crate::PlotError::Unfit`] when the file is not a modes file,
+/// [`crate::PlotError::Undrawable`] when it lacks a column.
 pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>> {
     table.source.expect(Kind::Modes, "--modes", "`sweep modes --out FILE` writes a modes file")?;
     let mut speeds: Vec<f64> = modes(table)?.iter().flat_map(crossings).collect();

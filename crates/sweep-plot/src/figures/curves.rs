@@ -38,11 +38,10 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart> {
     let ratios_asked: Vec<&Shown> =
         asked.iter().filter(|shown| shown.group == Group::Ratio).collect();
     let wanted = |name: &str| {
-        ratios_asked.iter().any(|shown| shown.channel.as_deref().is_none_or(|of| of == name))
+        let mut channels = ratios_asked.iter().map(|shown| shown.channel.as_deref());
+        ratios_asked.is_empty() || channels.any(|channel| channel.is_none_or(|of| of == name))
     };
-    let mut panels = vec![ratios(map, !ratios_asked.is_empty(), &line, &|name| {
-        ratios_asked.is_empty() || wanted(name)
-    })];
+    let mut panels = vec![ratios(map, !ratios_asked.is_empty(), &line, &wanted)];
     // A panel of both models' columns.
     let panel = |family: layer::Family<'_>| {
         let columns = &family.columns;

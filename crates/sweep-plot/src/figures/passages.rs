@@ -27,8 +27,8 @@ struct Way {
 /// The chart of a trace file.
 ///
 /// # Errors
-/// As [`trace::chart`]; besides [`crate::PlotError::Undrawable`] without the speed, or where the drum
-/// makes no whole turn while its speed changes.
+/// As [`trace::chart`]; besides [`crate::PlotError::Undrawable`] without the speed, or where the
+/// drum makes no whole turn while its speed changes.
 pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
     let mut chart = trace::chart(table, options)?;
     let time = table.numbers("time_s")?;

@@ -47,12 +47,9 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
         None => sides.map(said_of),
     };
     // The second curve lies in front; where it hides the first one, this must shine through.
-    let front = LINEAR.with_alpha(165);
-    let drawn = match &other {
-        Some(other) => (other, Rc::new(other.numbers("time_s")?.to_vec()), front),
-        None => (table, Rc::clone(&time), front),
-    };
-    let drawn = [(table, Rc::clone(&time), NONLINEAR), drawn];
+    let front = other.as_ref().unwrap_or(table);
+    let its_time = Rc::new(front.numbers("time_s")?.to_vec());
+    let drawn = [(table, Rc::clone(&time), NONLINEAR), (front, its_time, LINEAR.with_alpha(165))];
     let pair = |columns: &[String; 2], factor: f64| -> Vec<Series> {
         let curve = |k: usize| {
             let ((table, time, colour), name) = (&drawn[k], names[k].clone());
@@ -202,8 +199,7 @@ fn stem(table: &Table) -> String {
 /// says otherwise of them, or else by their files.
 fn told_apart(one: &Table, other: &Table) -> [String; 2] {
     let tables = [one, other];
-    let names =
-        tables.map(|table| table.source.run_name().map_or_else(|| stem(table), str::to_owned));
+    let names = tables.map(|table| table.source.run_name.clone().unwrap_or_else(|| stem(table)));
     if names[0] != names[1] {
         return names;
     }
