@@ -250,14 +250,13 @@ fn tick_json(tick: Tick) -> Value {
 /// models and their ratio.
 fn rows_json(source: &Source) -> Value {
     let row = |family: layer::Family<'_>| {
-        let mut columns = family.columns.iter().map(|(_, facts)| Some(facts.name.clone()));
-        let [nonlinear, linear] = [0, 1].map(|_| columns.next().flatten());
+        let column = |k: usize| family.columns.get(k).map(|(_, facts)| &facts.name);
         let ratio = family.is_channel.then(|| format!("ratio_{}", family.name));
         json!({
             "name": family.name,
             "words": family.words,
             "unit": label::shown(&family.columns[0].1.unit).0,
-            "columns": [nonlinear, linear, ratio],
+            "columns": [column(0), column(1), ratio.as_ref()],
         })
     };
     layer::families(source).into_iter().map(row).collect()
