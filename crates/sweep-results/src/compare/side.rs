@@ -12,7 +12,8 @@ const MOST_CELLS: u64 = 100_000_000;
 pub(super) struct Side {
     /// The keys' columns first.
     parts: Vec<Rows>,
-    rows: usize,
+    /// How many rows it has.
+    pub(super) rows: usize,
     keys: usize,
     columns: Vec<Column>,
 }
@@ -73,11 +74,6 @@ impl Side {
         let parts = table.file().read(&names)?.collect::<Result<Vec<Rows>, _>>()?;
         let rows = parts.iter().map(|part| part.count).sum();
         Ok(Self { parts, rows, keys: keys.len(), columns })
-    }
-
-    /// How many rows it has.
-    pub(super) fn rows(&self) -> usize {
-        self.rows
     }
 
     /// The columns, each with its place in [`Side::cell`].
