@@ -2,18 +2,18 @@
 
 use std::collections::BTreeMap;
 
-/// An edge of the grid on which a line can cross: lower left node, and whether it runs along x,
-/// along y, or is one of the diagonals of the square above and right of the node.
-type Edge = (usize, usize, Run);
+/// A node of the grid: its places along x and y.
+type Node = (usize, usize);
 
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Run {
-    AlongX,
-    AlongY,
-    /// From the lower left to the upper right node.
-    Rising,
-    /// From the upper left to the lower right node.
-    Falling,
+/// An edge of the grid on which a line can cross: a side of a square or one of its diagonals. Of
+/// its nodes the one farther left comes first, or else the lower one. The second is kept as (y, x),
+/// so that the edges of a node come in order: along x, along y, and up to the right.
+type Edge = (Node, (usize, usize));
+
+/// The edge between two nodes.
+fn edge(a: Node, b: Node) -> Edge {
+    let (first, (x, y)) = (a.min(b), a.max(b));
+    (first, (y, x))
 }
 
 /// Lines on which `value` is zero, as points `[x, y]`; a closed line ends where it starts.
@@ -46,66 +46,38 @@ pub fn zero_lines(
 
 /// The pieces of line within one square, each from edge to edge.
 fn square(i: usize, j: usize, value: &impl Fn(usize, usize) -> f64) -> Vec<(Edge, Edge)> {
-    // Corners counter-clockwise from the lower left, and the edge from each to the next.
-    let corners = [value(i, j), value(i + 1, j), value(i + 1, j + 1), value(i, j + 1)];
-    let edges = [
-        (i, j, Run::AlongX),
-        (i + 1, j, Run::AlongY),
-        (i, j + 1, Run::AlongX),
-        (i, j, Run::AlongY),
-    ];
+    // Counter-clockwise from the lower left.
+    let nodes = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
+    let corners = nodes.map(|(i, j)| value(i, j));
     let above = corners.map(|corner| corner >= 0.0);
-    let unknown: Vec<usize> = (0..4).filter(|&k| !corners[k].is_finite()).collect();
-    match unknown[..] {
-        [] => {
-            let crossed: Vec<usize> = (0..4).filter(|&k| above[k] != above[(k + 1) % 4]).collect();
-            match crossed[..] {
-                [from, to] => vec![(edges[from], edges[to])],
-                [_, _, _, _] => {
-                    // A saddle: the middle tells which pair of opposite corners is joined; the
-                    // others are cut off.
-                    let middle_above = corners.iter().sum::<f64>() >= 0.0;
-                    if above[0] == middle_above {
-                        vec![(edges[0], edges[1]), (edges[2], edges[3])]
-                    } else {
-                        vec![(edges[3], edges[0]), (edges[1], edges[2])]
-                    }
-                }
-                _ => Vec::new(),
-            }
-        }
-        [missing] => {
-            let diagonal =
-                if missing % 2 == 0 { (i, j, Run::Falling) } else { (i, j, Run::Rising) };
-            let [next, opposite, last] = [1, 2, 3].map(|step| (missing + step) % 4);
-            let sides = [(next, opposite, edges[next]), (opposite, last, edges[opposite])];
-            let sides = sides.into_iter().chain([(last, next, diagonal)]);
-            let crossed = sides.filter(|(from, to, _)| above[*from] != above[*to]);
-            let crossed: Vec<Edge> = crossed.map(|(.., edge)| edge).collect();
-            match crossed[..] {
-                [from, to] => vec![(from, to)],
-                _ => Vec::new(),
-            }
+    let known: Vec<usize> = (0..4).filter(|&k| corners[k].is_finite()).collect();
+    if known.len() < 3 {
+        return Vec::new();
+    }
+    let sides = (0..known.len()).map(|k| (known[k], known[(k + 1) % known.len()]));
+    let crossed = sides.filter(|&(from, to)| above[from] != above[to]);
+    let crossed: Vec<Edge> = crossed.map(|(from, to)| edge(nodes[from], nodes[to])).collect();
+    match crossed[..] {
+        [from, to] => vec![(from, to)],
+        [a, b, c, d] => {
+            // A saddle: the middle tells which pair of opposite corners is joined; the others are
+            // cut off.
+            let middle_above = corners.iter().sum::<f64>() >= 0.0;
+            if above[0] == middle_above { vec![(a, b), (c, d)] } else { vec![(d, a), (b, c)] }
         }
         _ => Vec::new(),
     }
 }
 
 fn crossing(
-    (i, j, run): Edge,
+    (from, (y, x)): Edge,
     xs: &[f64],
     ys: &[f64],
     value: &impl Fn(usize, usize) -> f64,
 ) -> [f64; 2] {
-    let [from, to] = match run {
-        Run::AlongX => [(i, j), (i + 1, j)],
-        Run::AlongY => [(i, j), (i, j + 1)],
-        Run::Rising => [(i, j), (i + 1, j + 1)],
-        Run::Falling => [(i, j + 1), (i + 1, j)],
-    };
-    let (start, end) = (value(from.0, from.1), value(to.0, to.1));
+    let (start, end) = (value(from.0, from.1), value(x, y));
     let part = start / (start - end);
-    [xs[from.0] + part * (xs[to.0] - xs[from.0]), ys[from.1] + part * (ys[to.1] - ys[from.1])]
+    [xs[from.0] + part * (xs[x] - xs[from.0]), ys[from.1] + part * (ys[y] - ys[from.1])]
 }
 
 /// Chains pieces into lines, open ones from their ends first.

@@ -1,6 +1,6 @@
 //! Where a map of three or more axes is cut: which values of the axes beyond the second are shown.
 
-use super::error::PlotError;
+use super::error::{PlotError, Result};
 use super::label;
 use super::read::{Source, some_of};
 use super::swept::SweptAxis;
@@ -41,20 +41,16 @@ impl Cuts {
     ///
     /// # Errors
     /// As [`pins`].
-    pub(crate) fn of_picture(
-        source: &Source,
-        axes: &[SweptAxis],
-        at: &At,
-    ) -> Result<Self, PlotError> {
+    pub(crate) fn of_picture(source: &Source, axes: &[SweptAxis], at: &At) -> Result<Self> {
         let extra = axes.get(2..).unwrap_or_default();
         let pins = pins(source, extra, at)?;
         // The third axis becomes panels unless it is pinned.
         let is_free = pins.first() == Some(&None);
-        let pick = |(k, (axis, pin)): (usize, (&SweptAxis, &Option<usize>))| match pin {
-            None if k == 0 => evenly(axis.values.len(), axis.values.len().min(MOST_PANELS)),
-            pin => vec![pin.unwrap_or(0)],
-        };
-        let picks: Vec<Vec<usize>> = extra.iter().zip(&pins).enumerate().map(pick).collect();
+        let mut counts = vec![1; extra.len()];
+        if let Some(axis) = extra.first().filter(|_| is_free) {
+            counts[0] = axis.values.len().min(MOST_PANELS);
+        }
+        let picks = picks(extra, &pins, &counts);
         let fixed = extra.iter().zip(&picks).skip(usize::from(is_free));
         let mut notes: Vec<String> =
             fixed.map(|(axis, pick)| axis.said(axis.values[pick[0]])).collect();
@@ -84,7 +80,7 @@ impl Cuts {
         axes: &[SweptAxis],
         at: &At,
         most: usize,
-    ) -> Result<Self, PlotError> {
+    ) -> Result<Self> {
         let extra = axes.get(2..).unwrap_or_default();
         let pins = pins(source, extra, at)?;
         let side = |axis: &SweptAxis| axis.values.len().min(LEAST_SIDE);
@@ -103,24 +99,25 @@ impl Cuts {
             let Some(greatest) = counts.iter_mut().max().filter(|count| **count > 1) else { break };
             *greatest -= 1;
         }
-        let mut notes = Vec::new();
-        let mut picks = Vec::new();
-        let mut first = Vec::new();
-        for ((axis, pin), count) in extra.iter().zip(&pins).zip(counts) {
-            let all = count == axis.values.len();
-            let pick = match pin {
-                Some(pin) if !all => vec![*pin],
-                _ => evenly(axis.values.len(), count),
-            };
-            if !all {
-                notes.push(left_out(axis, count));
-            }
-            let place = pin.and_then(|pin| pick.iter().position(|known| *known == pin));
-            first.push(place.unwrap_or(0));
-            picks.push(pick);
-        }
-        Ok(Self { picks, cuts: vec![Cut { rest: first, name: None }], notes })
+        let picks = picks(extra, &pins, &counts);
+        let some = extra.iter().zip(&picks).filter(|(axis, pick)| pick.len() < axis.values.len());
+        let notes = some.map(|(axis, pick)| left_out(axis, pick.len())).collect();
+        let place = |(pick, pin): (&Vec<usize>, &Option<usize>)| {
+            pin.and_then(|pin| pick.iter().position(|known| *known == pin)).unwrap_or(0)
+        };
+        let rest = picks.iter().zip(&pins).map(place).collect();
+        Ok(Self { picks, cuts: vec![Cut { rest, name: None }], notes })
     }
+}
+
+/// So many values of each axis by their places: the pinned one where they are not all, or else
+/// some picked evenly.
+fn picks(extra: &[SweptAxis], pins: &[Option<usize>], counts: &[usize]) -> Vec<Vec<usize>> {
+    let pick = |((axis, pin), &count): ((&SweptAxis, &Option<usize>), &usize)| match pin {
+        Some(pin) if count < axis.values.len() => vec![*pin],
+        _ => evenly(axis.values.len(), count),
+    };
+    extra.iter().zip(pins).zip(counts).map(pick).collect()
 }
 
 /// `count` places out of `all`, spread evenly from the first to the last.
@@ -138,7 +135,7 @@ fn left_out(axis: &SweptAxis, shown: usize) -> String {
 /// # Errors
 /// [`PlotError::Unfit`] when `--at` names no axis beyond the second, or a value that its axis
 /// does not have; [`PlotError::NotAGrid`] for an axis of more values than are kept.
-fn pins(source: &Source, extra: &[SweptAxis], at: &At) -> Result<Vec<Option<usize>>, PlotError> {
+fn pins(source: &Source, extra: &[SweptAxis], at: &At) -> Result<Vec<Option<usize>>> {
     if let Some(endless) = extra.iter().find(|axis| !axis.complete) {
         let reason = format!("axis `{}` has too many values to choose from", endless.name);
         return Err(PlotError::NotAGrid { path: source.path.clone(), reason });

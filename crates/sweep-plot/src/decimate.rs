@@ -14,32 +14,24 @@ pub(crate) fn envelope(xs: &[f64], ys: &[f64], from: f64, to: f64, buckets: usiz
         (((xs[index] - from) / (to - from) * buckets as f64) as usize).min(buckets - 1)
     };
     let mut kept = Vec::with_capacity(2 * buckets + 2);
-    let mut start = 0;
-    while start < xs.len() {
-        let finite = ys[start].is_finite();
-        let here = bucket(start);
-        let mut end = start;
-        let (mut least, mut greatest) = (start, start);
-        while end < xs.len() && ys[end].is_finite() == finite && (!finite || bucket(end) == here) {
-            if ys[end] < ys[least] {
-                least = end;
-            }
-            if ys[end] > ys[greatest] {
-                greatest = end;
-            }
-            end += 1;
+    let finite = |index: usize| ys[index].is_finite();
+    let all: Vec<usize> = (0..xs.len()).collect();
+    for run in
+        all.chunk_by(|&a, &b| finite(a) == finite(b) && (!finite(a) || bucket(a) == bucket(b)))
+    {
+        let (start, end) = (run[0], run[run.len() - 1]);
+        if !finite(start) {
+            kept.push(start);
+            continue;
         }
-        let mut marks = if finite { vec![least, greatest] } else { vec![start] };
-        if finite && (start == 0 || !ys[start - 1].is_finite()) {
-            marks.push(start);
-        }
-        if finite && (end == xs.len() || !ys[end].is_finite()) {
-            marks.push(end - 1);
-        }
+        let least = run.iter().fold(start, |least, &k| if ys[k] < ys[least] { k } else { least });
+        let greatest = run.iter().fold(start, |most, &k| if ys[k] > ys[most] { k } else { most });
+        let mut marks = vec![least, greatest];
+        marks.extend((start == 0 || !finite(start - 1)).then_some(start));
+        marks.extend((end + 1 == xs.len() || !finite(end + 1)).then_some(end));
         marks.sort_unstable();
         marks.dedup();
         kept.extend(marks);
-        start = end;
     }
     kept
 }

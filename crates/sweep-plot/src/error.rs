@@ -44,3 +44,6 @@ impl PlotError {
         }
     }
 }
+
+/// What there is unless the figure could not be made.
+pub(crate) type Result<T, E = PlotError> = std::result::Result<T, E>;

@@ -7,9 +7,9 @@
 
 use std::collections::BTreeMap;
 
-use super::error::PlotError;
+use super::error::{PlotError, Result};
 use super::grid::Grid;
-use super::read::{ColumnFacts, Row, Source};
+use super::read::{ColumnFacts, Row, Source, is_ratio};
 use super::table::{Column, NONE, SEVERAL, Table, Values, Words};
 use sweep_parameter::Worse;
 
@@ -51,15 +51,6 @@ pub(crate) struct Counts {
     pub(crate) sensitive: u32,
 }
 
-/// A level that divides a column's values, and how distances from it are measured.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Divide {
-    /// In the column's own unit.
-    pub(crate) value: f64,
-    /// Whether the axis is logarithmic.
-    pub(crate) log: bool,
-}
-
 /// Where a cell's points lie about a level.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Sides {
@@ -80,11 +71,9 @@ pub(crate) struct Map {
     pub(crate) grid: Grid,
     /// How many points of each cell are what.
     pub(crate) counts: Vec<Counts>,
-    /// The range of each column of numbers.
-    pub(crate) extents: BTreeMap<String, Extent>,
-    /// The sides of its limit on which the points of a cell lie, by column. Columns without a limit
-    /// are left out, and so are all where each cell is one point.
-    pub(crate) sides: BTreeMap<String, Sides>,
+    /// Of each column the range of its numbers, and the sides of its limit on which the points of a
+    /// cell lie; none without a limit, or where each cell is one point.
+    pub(crate) seen: BTreeMap<String, (Extent, Option<Sides>)>,
     /// Rows of the whole file by their status.
     pub(crate) statuses: BTreeMap<String, usize>,
 }
@@ -95,42 +84,29 @@ const UNKNOWN: &str = "unknown";
 pub(crate) const OK: &str = "ok";
 
 impl Map {
-    /// Reads the named columns of a map file into the cells of a grid. Some columns have levels.
+    /// Reads the named columns of a map file into the cells of a grid.
     ///
     /// # Errors
     /// As [`Source::each_row`]; [`PlotError::NotAGrid`] for two rows at one point.
-    pub(crate) fn read(
-        source: Source,
-        grid: Grid,
-        columns: &[String],
-        levels: &BTreeMap<String, Divide>,
-    ) -> Result<Self, PlotError> {
+    pub(crate) fn read(source: Source, grid: Grid, columns: &[String]) -> Result<Self> {
         let names = grid.axes.iter().map(|axis| axis.swept.name.as_str());
         let names = names.chain(["status", "reliable", "sensitive", "ratio_max"]);
         let own: Vec<&ColumnFacts> =
             source.columns.iter().filter(|column| columns.contains(&column.name)).collect();
         let names: Vec<&str> = names.chain(own.iter().map(|facts| facts.name.as_str())).collect();
-        let mut gather = Gather::new(&source, &grid, &own, levels);
+        let mut gather = Gather::new(&source, &grid, &own);
         source.each_row(&names, |row| gather.take(row))?;
         let Gather { columns, counts, statuses, .. } = gather;
-        let (mut extents, mut sides) = (BTreeMap::new(), BTreeMap::new());
-        let mut kept = Vec::with_capacity(columns.len());
-        for column in columns {
-            let name = column.facts.name.clone();
-            if column.facts.is_number() {
-                extents.insert(name.clone(), column.extent);
-            }
-            if let Some(dividing) = column.dividing {
-                sides.insert(name, dividing.sides());
-            }
-            let mut values = column.values;
+        let (mut seen, mut kept) = (BTreeMap::new(), Vec::with_capacity(columns.len()));
+        for Gathered { facts, mut values, extent, dividing, .. } in columns {
             if let Values::Words(words) = &mut values {
                 words.sort();
             }
-            kept.push(Column { facts: column.facts.clone(), values });
+            seen.insert(facts.name.clone(), (extent, dividing.map(Dividing::sides)));
+            kept.push(Column { facts: facts.clone(), values });
         }
         let table = Table { rows: grid.cells(), columns: kept, source, stretch: None };
-        Ok(Self { table, grid, counts, extents, sides, statuses })
+        Ok(Self { table, grid, counts, seen, statuses })
     }
 
     /// The cell at `x` on the first axis, `y` on the second, and `rest` on those after, if the file
@@ -192,7 +168,10 @@ struct Gathered<'a> {
 
 /// Cells on their way to [`Sides`].
 struct Dividing {
-    divide: Divide,
+    /// In the column's own unit.
+    level: f64,
+    /// Whether distances from it are taken by the logarithm.
+    log: bool,
     /// Whether a cell has points below the level, and at it or above.
     sides: Vec<[bool; 2]>,
     undefined: Vec<bool>,
@@ -201,15 +180,15 @@ struct Dividing {
 }
 
 impl Dividing {
-    fn new(divide: Divide, cells: usize) -> Self {
+    fn new(level: f64, log: bool, cells: usize) -> Self {
         let (sides, undefined) = (vec![[false; 2]; cells], vec![false; cells]);
-        Self { divide, sides, undefined, sums: vec![(0.0, 0); cells] }
+        Self { level, log, sides, undefined, sums: vec![(0.0, 0); cells] }
     }
 
     fn take(&mut self, cell: usize, value: f64, failed: bool) {
-        let even = if self.divide.log { value.ln() } else { value };
+        let even = if self.log { value.ln() } else { value };
         if even.is_finite() {
-            self.sides[cell][usize::from(value >= self.divide.value)] = true;
+            self.sides[cell][usize::from(value >= self.level)] = true;
             let (sum, count) = self.sums[cell];
             self.sums[cell] = (sum + even, count + 1);
         } else if !failed {
@@ -220,7 +199,7 @@ impl Dividing {
     fn sides(self) -> Sides {
         let mean = |(sum, count): (f64, u32)| {
             let mean = sum / f64::from(count);
-            if self.divide.log { mean.exp() } else { mean }
+            if self.log { mean.exp() } else { mean }
         };
         Sides {
             both: self.sides.into_iter().map(|sides| sides == [true; 2]).collect(),
@@ -249,12 +228,7 @@ struct Gather<'a> {
 }
 
 impl<'a> Gather<'a> {
-    fn new(
-        source: &'a Source,
-        grid: &'a Grid,
-        columns: &[&'a ColumnFacts],
-        levels: &BTreeMap<String, Divide>,
-    ) -> Self {
+    fn new(source: &'a Source, grid: &'a Grid, columns: &[&'a ColumnFacts]) -> Self {
         let cells = grid.cells();
         let columns = columns.iter().map(|&facts| Gathered {
             rule: Rule::of(facts),
@@ -264,10 +238,9 @@ impl<'a> Gather<'a> {
             },
             extent: Extent::NONE,
             // A cell of one point lies on one side, and its value is its mean.
-            dividing: levels
-                .get(&facts.name)
+            dividing: { source.limit(facts) }
                 .filter(|_| grid.merged())
-                .map(|divide| Dividing::new(*divide, cells)),
+                .map(|level| Dividing::new(level, is_ratio(facts), cells)),
             facts,
         });
         Self {
@@ -284,7 +257,7 @@ impl<'a> Gather<'a> {
     }
 
     /// Takes a row: the values of the axes, what became of the point, and the columns.
-    fn take(&mut self, row: Row<'_>) -> Result<(), PlotError> {
+    fn take(&mut self, row: Row<'_>) -> Result<()> {
         let mut cell = Some(0);
         for (column, (axis, last)) in self.grid.axes.iter().zip(&mut self.last).enumerate() {
             let value = row.number(column);
@@ -309,7 +282,7 @@ impl<'a> Gather<'a> {
     }
 
     /// Counts what a row is; gives whether it has the greatest ratio of its cell so far.
-    fn count(&mut self, cell: usize, row: Row<'_>, failed: bool) -> Result<bool, PlotError> {
+    fn count(&mut self, cell: usize, row: Row<'_>, failed: bool) -> Result<bool> {
         let own = self.last.len();
         let counts = &mut self.counts[cell];
         let is_full = |points| counts.points as usize >= points;

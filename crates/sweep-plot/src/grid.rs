@@ -39,27 +39,26 @@ impl GridAxis {
         let even = axis.evened(&axis.values);
         let last = even.len() - 1;
         let starts = (0..even.len()).step_by(size);
-        let mut borders: Vec<f64> =
-            starts.clone().skip(1).map(|start| (even[start - 1] + even[start]) / 2.0).collect();
+        let blocks: Vec<_> = starts.map(|start| [start, (start + size - 1).min(last)]).collect();
+        let middle = |[from, to]: [usize; 2]| (even[from] + even[to]) / 2.0;
         let (first_half, last_half) = if last == 0 {
             // A lone value gets a cell of its own size, so that there is something to see.
             let half = if axis.log || even[0] == 0.0 { 0.5 } else { 0.05 * even[0].abs() };
             (half, half)
         } else {
-            ((even[0] + even[1]) / 2.0 - even[0], even[last] - (even[last - 1] + even[last]) / 2.0)
+            (middle([0, 1]) - even[0], even[last] - middle([last - 1, last]))
         };
-        borders.insert(0, even[0] - first_half);
+        let mut borders = vec![even[0] - first_half];
+        borders.extend(blocks.windows(2).map(|pair| middle([pair[0][1], pair[1][0]])));
         borders.push(even[last] + last_half);
-        let ends = |start: usize| [start, (start + size - 1).min(last)];
-        let (values, spans) = if size == 1 {
-            (axis.values.clone(), None)
-        } else {
-            let middle = |[from, to]: [usize; 2]| axis.un_even((even[from] + even[to]) / 2.0);
-            let spans = starts.clone().map(|start| ends(start).map(|end| axis.values[end]));
-            (starts.clone().map(|start| middle(ends(start))).collect(), Some(spans.collect()))
-        };
         let borders = borders.into_iter().map(|border| axis.un_even(border)).collect();
-        Self { spans, places: Places::Blocks(size), ..Self::new(axis, values, borders) }
+        let places = Places::Blocks(size);
+        if size == 1 {
+            return Self { places, ..Self::new(axis, axis.values.clone(), borders) };
+        }
+        let values = blocks.iter().map(|block| axis.un_even(middle(*block))).collect();
+        let spans = blocks.iter().map(|block| block.map(|end| axis.values[end])).collect();
+        Self { spans: Some(spans), places, ..Self::new(axis, values, borders) }
     }
 
     /// An axis known by its range alone, in `count` equal parts.

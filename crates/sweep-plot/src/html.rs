@@ -19,7 +19,7 @@ use super::chart::{Chart, ChartPanel, DOT, Series, Style, stroke, x_scale, y_sca
 use super::colour::{BOTH, FAILED, LEVELS, SHADE};
 use super::contour::MOST_POINTS;
 use super::cuts::Cuts;
-use super::error::PlotError;
+use super::error::Result;
 use super::figures;
 use super::frame::{Sign, failed_hatch};
 use super::gather::{Counts, Map};
@@ -76,15 +76,15 @@ pub(crate) fn most_cells(columns: usize) -> usize {
 /// histories.
 ///
 /// # Errors
-/// [`PlotError::Unfit`] for options that the file does not have, and any that reading the traces
-/// brings.
-pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<String, PlotError> {
+/// [`crate::PlotError::Unfit`] for options that the file does not have, and any that reading the
+/// traces brings.
+pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<String> {
     let source = &map.table.source;
     let first = layer::chosen(source, options)?;
     let all = layer::all(source);
     let room = MOST_POINTS / all.len();
     let layers = all.iter().map(|shown| Ok(layer_json(map, shown, shown.layer(map)?, room)));
-    let layers = layers.collect::<Result<Vec<Value>, PlotError>>()?;
+    let layers = layers.collect::<Result<Vec<Value>>>()?;
     let traces = match &options.traces {
         Some(folder) => histories::read(folder, map)?,
         None => Value::Null,
@@ -161,16 +161,15 @@ fn provenance(source: &Source) -> String {
 const MOST_PROVENANCE: usize = 100_000;
 
 /// The page of a chart: every panel, those that a picture shows at first. It may compute, along
-/// an axis of this name.
-pub(crate) fn chart_page(source: &Source, chart: &Chart, live: Option<(&Live, &str)>) -> String {
+/// what can be moved first.
+pub(crate) fn chart_page(source: &Source, chart: &Chart, live: Option<&Live>) -> String {
     let mut data = json!({
         "kind": "chart",
         "title": chart.title,
         "subtitle": chart.subtitle,
         "chart": chart_json(chart, curve),
     });
-    let axis = live.map_or("", |(_, axis)| axis);
-    let live = live.map(|(live, _)| live);
+    let axis = live.and_then(|live| live.sliders.first()).map_or("", |axis| &axis.name);
     let computing = computing(&mut data, live, &[(axis, chart.x_log)]);
     let told = live.map_or_else(String::new, |live| report::told(source, Some(live)));
     let scripts = [&[CORE, CHART][..], computing, &[START]].concat();
@@ -194,13 +193,12 @@ pub fn table(title: &str, heads: &[&str], rows: &[Vec<String>]) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    let row = |cells: &[String], cell: &str| {
-        let cells = cells.iter().map(|text| format!("<{cell}>{}</{cell}>", escape(text)));
+    fn row<T: AsRef<str>>(cells: &[T], cell: &str) -> String {
+        let cells = cells.iter().map(|text| format!("<{cell}>{}</{cell}>", escape(text.as_ref())));
         format!("<tr>{}</tr>\n", cells.collect::<String>())
-    };
-    let heads: Vec<String> = heads.iter().map(|head| (*head).to_owned()).collect();
+    }
     let all: String = rows.iter().map(|cells| row(cells, "td")).collect();
-    let head = if heads.iter().all(String::is_empty) { String::new() } else { row(&heads, "th") };
+    let head = if heads.iter().all(|head| head.is_empty()) { "" } else { &row(heads, "th") };
     format!(
         "<h2>{}</h2>\n<table><thead>{head}</thead><tbody>\n{all}</tbody></table>\n",
         escape(title)
@@ -252,14 +250,13 @@ fn tick_json(tick: Tick) -> Value {
 /// models and their ratio.
 fn rows_json(source: &Source) -> Value {
     let row = |family: layer::Family<'_>| {
-        let mut columns = family.columns.iter().map(|(_, facts)| Some(facts.name.clone()));
-        let [nonlinear, linear] = [0, 1].map(|_| columns.next().flatten());
+        let column = |k: usize| family.columns.get(k).map(|(_, facts)| &facts.name);
         let ratio = family.is_channel.then(|| format!("ratio_{}", family.name));
         json!({
             "name": family.name,
             "words": family.words,
             "unit": label::shown(&family.columns[0].1.unit).0,
-            "columns": [nonlinear, linear, ratio],
+            "columns": [column(0), column(1), ratio.as_ref()],
         })
     };
     layer::families(source).into_iter().map(row).collect()
@@ -360,9 +357,9 @@ fn layer_json(map: &Map, shown: &Shown, layer: Layer, room: usize) -> Value {
         "nonlinear": layer.nonlinear,
         "lines": layer.level.as_ref().map(|level| level_json(map, &layer, level, room)),
     });
-    if let Some([both, undefined]) = layer.mixed() {
-        data["both"] = json!(embed::bits(both));
-        data["undefined"] = json!(embed::bits(undefined));
+    if let Some(sides) = &layer.divided {
+        data["both"] = json!(embed::bits(&sides.both));
+        data["undefined"] = json!(embed::bits(&sides.undefined));
     }
     data["legend"] = legend_json(&figures::map::legend(map, Some(layer)));
     data

@@ -4,8 +4,8 @@ use sweep_parameter::Worse;
 
 use super::PlotOptions;
 use super::colour::ColourScale;
-use super::error::PlotError;
-use super::gather::{Divide, Map, Sides};
+use super::error::{PlotError, Result};
+use super::gather::{Map, Sides};
 use super::label::{self, capitalised};
 use super::read::{ColumnFacts, Kind, Source};
 
@@ -67,8 +67,8 @@ pub(crate) struct Layer {
     pub(crate) nonlinear: bool,
     /// The level whose line is drawn, if one has a meaning.
     pub(crate) level: Option<Level>,
-    /// The value that the line follows, in cells of several points.
-    divided: Option<Sides>,
+    /// Where points lie about the level, in cells of several points.
+    pub(crate) divided: Option<Sides>,
 }
 
 /// A level that divides the map.
@@ -106,12 +106,6 @@ impl Layer {
     /// Whether a cell of several points has some that did not fail and yet have no value.
     pub(crate) fn undefined(&self, cell: usize) -> bool {
         self.divided.as_ref().is_some_and(|divided| divided.undefined[cell])
-    }
-
-    /// The cells with points on both sides of the level, and those with points without a value, if
-    /// cells hold more than one point.
-    pub(crate) fn mixed(&self) -> Option<[&[bool]; 2]> {
-        self.divided.as_ref().map(|divided| [&divided.both[..], &divided.undefined[..]])
     }
 
     /// The value that the level's line follows: the mean of the cell's points.
@@ -157,7 +151,7 @@ pub(crate) fn families(source: &Source) -> Vec<Family<'_>> {
 ///
 /// # Errors
 /// As [`asked`]; [`PlotError::Unfit`] for several.
-pub(crate) fn chosen(source: &Source, options: &PlotOptions) -> Result<Option<Shown>, PlotError> {
+pub(crate) fn chosen(source: &Source, options: &PlotOptions) -> Result<Option<Shown>> {
     let mut asked = asked(source, options)?;
     match asked.len() {
         0 | 1 => Ok(asked.pop().flatten()),
@@ -172,10 +166,7 @@ pub(crate) fn chosen(source: &Source, options: &PlotOptions) -> Result<Option<Sh
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for a column that the file does not have.
-pub(crate) fn asked(
-    source: &Source,
-    options: &PlotOptions,
-) -> Result<Vec<Option<Shown>>, PlotError> {
+pub(crate) fn asked(source: &Source, options: &PlotOptions) -> Result<Vec<Option<Shown>>> {
     let mut all = all(source);
     if options.quantity.is_empty() {
         all.truncate(1);
@@ -209,13 +200,6 @@ pub(crate) fn all(source: &Source) -> Vec<Shown> {
     all
 }
 
-/// The level of a column that has one.
-pub(crate) fn divide(source: &Source, column: &ColumnFacts) -> Option<Divide> {
-    let shown = Shown::new(column);
-    let (value, log) = (shown.limit(source)?, shown.group == Group::Ratio);
-    Some(Divide { value, log })
-}
-
 impl Shown {
     fn new(facts: &ColumnFacts) -> Self {
         let name = facts.name.as_str();
@@ -245,23 +229,15 @@ impl Shown {
         self.column() == "ratio_max" && source.column("ratio_min").is_none()
     }
 
-    /// Up to where it is good, in the column's unit: its own limit, or the run's of ratios. Two
-    /// files may have two.
-    fn limit(&self, source: &Source) -> Option<f64> {
-        let is_of_run = self.group == Group::Ratio && source.kind != Kind::Differences;
-        let of_run = || is_of_run.then(|| source.ratio_limit());
-        self.facts.limit.or_else(of_run)
-    }
-
     /// The values of a map that was read with this column.
     ///
     /// # Errors
     /// [`PlotError::Undrawable`] if it was not, because the file does not have it.
-    pub(crate) fn layer(&self, map: &Map) -> Result<Layer, PlotError> {
+    pub(crate) fn layer(&self, map: &Map) -> Result<Layer> {
         let numbers = map.table.numbers(self.column())?;
         let (unit, factor) = label::shown(&self.facts.unit);
-        let extent = map.extents.get(self.column()).into_iter().flat_map(|extent| extent.values());
-        let extent = extent.map(|value| value * factor);
+        let (extent, sides) = &map.seen[self.column()];
+        let extent = extent.values().map(|value| value * factor);
         let source = &map.table.source;
         let ratio = self.group == Group::Ratio;
         // No excitation can leave an infinite ratio, which has no place on any scale.
@@ -269,7 +245,7 @@ impl Shown {
             if ratio && !(value > 0.0 && value.is_finite()) { f64::NAN } else { value }
         };
         let is_less_worse = self.worse() == Some(Worse::Less);
-        let scale = match (source.kind, self.limit(source)) {
+        let scale = match (source.kind, source.limit(&self.facts)) {
             (Kind::Differences, _) if self.column() == "ratio_change" => {
                 ColourScale::factor(extent)
             }
@@ -287,7 +263,7 @@ impl Shown {
             values: numbers.iter().map(|number| value(number * factor)).collect(),
             level: level.filter(|_| scale.centre.is_some()),
             scale,
-            divided: map.sides.get(self.column()).map(|sides| Sides {
+            divided: sides.as_ref().map(|sides| Sides {
                 mean: sides.mean.iter().map(|mean| mean * factor).collect(),
                 ..sides.clone()
             }),
@@ -344,7 +320,7 @@ impl Shown {
 
     /// The level that divides its values, if one does.
     pub(crate) fn level(&self, source: &Source) -> Option<Level> {
-        let (limit, worse) = (self.limit(source)?, self.worse().unwrap_or(Worse::Greater));
+        let (limit, worse) = (source.limit(&self.facts)?, self.worse().unwrap_or(Worse::Greater));
         let (unit, factor) = label::shown(&self.facts.unit);
         let (value, log) = (limit * factor, self.group == Group::Ratio);
         let said = label::valued("", value, unit);

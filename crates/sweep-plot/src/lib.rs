@@ -37,7 +37,6 @@ mod tests;
 mod thin;
 mod together;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub use error::PlotError;
@@ -48,10 +47,11 @@ pub use svg::escape;
 
 use chart::Chart;
 use cuts::Cuts;
+use error::Result;
 use figures::boundary::Overlay;
-use gather::{Divide, Map};
+use gather::Map;
 use grid::Grid;
-use read::{ColumnFacts, Kind, Source};
+use read::{Kind, Source};
 use scatter::Scatter;
 use scene::Scene;
 use swept::SweptAxis;
@@ -164,10 +164,8 @@ pub struct Live {
     /// The columns of each model's metrics in the module's records, in their order.
     pub metrics: Vec<[String; 2]>,
     /// Whether the map has the static sag.
-    #[serde(rename = "staticSag")]
     pub has_static_sag: bool,
     /// The constant speeds (rpm) that the map's growth is about; none if it has none.
-    #[serde(rename = "growthSpeeds")]
     pub growth_speeds_rpm: Vec<f64>,
     /// Whether a constant speed takes long: with friction or stops.
     pub has_slow_growth: bool,
@@ -211,7 +209,7 @@ pub struct Slider {
 /// How a figure is written, and what it may be written over.
 type Format = files::FileKind<'static>;
 
-fn format_of(path: &Path) -> Result<Format, PlotError> {
+fn format_of(path: &Path) -> Result<Format> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     match ending.to_ascii_lowercase().as_str() {
         "svg" => Ok(Format::Svg),
@@ -251,7 +249,7 @@ pub fn described(input: &Path) -> Result<(String, String), PlotError> {
     Ok((html::picture(&svg), html::told(&Source::open(input)?, None)))
 }
 
-fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>> {
     let mut source = Source::open(input)?;
     if is_scattered(&source, options)? {
         source.kind = Kind::Design;
@@ -267,7 +265,7 @@ fn figure(input: &Path, options: &PlotOptions, format: Format) -> Result<Vec<u8>
 
 /// Whether a map file's points are a design's. One that lists a whole grid, or spreads points over
 /// a single parameter, has a map or curves unless a figure of designs is asked for.
-fn is_scattered(source: &Source, options: &PlotOptions) -> Result<bool, PlotError> {
+fn is_scattered(source: &Source, options: &PlotOptions) -> Result<bool> {
     if source.kind != Kind::Map || source.design_method().is_none() {
         return Ok(false);
     }
@@ -277,7 +275,7 @@ fn is_scattered(source: &Source, options: &PlotOptions) -> Result<bool, PlotErro
     }
 }
 
-fn design(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+fn design(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>> {
     let scatter = Scatter::read(source, options)?;
     if format == Format::Html {
         return Ok(html::design_page(&scatter, options).into_bytes());
@@ -293,17 +291,15 @@ fn design(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u
 /// Most cells of a picture: two pixels or three to each.
 const PICTURE_CELLS: usize = 1 << 17;
 
-fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>> {
     let axes = swept::axes(&source)?;
-    let level = |column: &ColumnFacts| Some((column.name.clone(), layer::divide(&source, column)?));
-    let levels: BTreeMap<String, Divide> = source.columns.iter().filter_map(level).collect();
     if format != Format::Html && axes.len() > 1 {
         let shown = layer::chosen(&source, options)?;
         let columns = shown.iter().map(|shown| shown.column()).chain([layer::STATUS]);
         let columns: Vec<String> = columns.map(str::to_owned).collect();
         let cuts = Cuts::of_picture(&source, &axes, &options.at)?;
         let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
-        let map = Map::read(source, grid, &columns, &levels)?;
+        let map = Map::read(source, grid, &columns)?;
         let overlay = options.boundary.as_ref();
         let overlay = overlay.map(|path| overlay_of(path, &axes, &map.table.source)).transpose()?;
         let scene = figures::map::draw(&map, &cuts, shown.as_ref(), overlay.as_ref())?;
@@ -313,21 +309,16 @@ fn map(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>,
     let most = html::most_cells(columns.len());
     let cuts = Cuts::of_page(&source, &axes, &options.at, most)?;
     let grid = Grid::new(&axes, &cuts.picks, most);
-    let map = Map::read(source, grid, &columns, &levels)?;
+    let map = Map::read(source, grid, &columns)?;
     if axes.len() == 1 {
-        let (source, chart) = (&map.table.source, figures::curves::chart(&map, options)?);
-        return match &options.live {
-            Some(live) if format == Format::Html => {
-                Ok(html::chart_page(source, &chart, Some((live, &axes[0].name))).into_bytes())
-            }
-            _ => written(source, &chart, format),
-        };
+        let chart = figures::curves::chart(&map, options)?;
+        return written((&map.table.source, &chart), options, format);
     }
     Ok(html::map_page(&map, &cuts, options)?.into_bytes())
 }
 
 /// The boundary file beside a map of these axes.
-fn overlay_of(path: &Path, axes: &[SweptAxis], map: &Source) -> Result<Overlay, PlotError> {
+fn overlay_of(path: &Path, axes: &[SweptAxis], map: &Source) -> Result<Overlay> {
     let source = Source::open(path)?;
     source.expect(Kind::Boundary, "--boundary", "`sweep boundary` writes a boundary file")?;
     let table = Table::read(source)?;
@@ -339,11 +330,7 @@ fn overlay_of(path: &Path, axes: &[SweptAxis], map: &Source) -> Result<Overlay, 
 }
 
 /// A picture of what differs between two maps.
-fn differences(
-    source: Source,
-    options: &PlotOptions,
-    format: Format,
-) -> Result<Vec<u8>, PlotError> {
+fn differences(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>> {
     if format == Format::Html || swept::axes(&source)?.len() < 2 {
         let path = source.path.display();
         return Err(PlotError::Unfit(format!(
@@ -354,7 +341,7 @@ fn differences(
 }
 
 /// A file's curves.
-fn curves(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>, PlotError> {
+fn curves(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u8>> {
     use figures::{boundary, campbell, dwell, optimise, passages, profiles};
     use figures::{shapes, spectrum, stability, trace, turn};
     let of_rows = match (source.kind, options.view) {
@@ -366,7 +353,7 @@ fn curves(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u
         _ => None,
     };
     if let Some(chart) = of_rows {
-        return written(&source, &chart, format);
+        return written((&source, &chart), options, format);
     }
     let table = &Table::read(source)?;
     let chart = match (table.source.kind, options.view) {
@@ -379,17 +366,21 @@ fn curves(source: Source, options: &PlotOptions, format: Format) -> Result<Vec<u
         (Kind::Modes, _) => campbell::chart(table, options)?,
         _ => boundary::chart(table)?,
     };
-    written(&table.source, &chart, format)
+    written((&table.source, &chart), options, format)
 }
 
-fn written(source: &Source, chart: &Chart, format: Format) -> Result<Vec<u8>, PlotError> {
+fn written(
+    (source, chart): (&Source, &Chart),
+    options: &PlotOptions,
+    format: Format,
+) -> Result<Vec<u8>> {
     match format {
-        Format::Html => Ok(html::chart_page(source, chart, None).into_bytes()),
+        Format::Html => Ok(html::chart_page(source, chart, options.live.as_ref()).into_bytes()),
         _ => image(&chart::draw(chart), format),
     }
 }
 
-fn image(scene: &Scene, format: Format) -> Result<Vec<u8>, PlotError> {
+fn image(scene: &Scene, format: Format) -> Result<Vec<u8>> {
     match format {
         Format::Png => raster::write(scene, PNG_SCALE),
         _ => Ok(svg::write(scene).into_bytes()),
@@ -397,7 +388,7 @@ fn image(scene: &Scene, format: Format) -> Result<Vec<u8>, PlotError> {
 }
 
 /// Refuses options that the file's kind or the output's format would leave without effect.
-fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Result<(), PlotError> {
+fn check_options(source: &Source, options: &PlotOptions, format: Format) -> Result<()> {
     let refuse = |option: &str, given: bool, fits: bool, for_what: &str| {
         if !given || fits {
             return Ok(());

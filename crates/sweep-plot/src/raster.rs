@@ -7,7 +7,7 @@ use tiny_skia::{
 };
 use ttf_parser::{Face, OutlineBuilder};
 
-use super::error::PlotError;
+use super::error::{PlotError, Result};
 use super::scene::{Anchor, Colour, Item, Outline, Scene, Segment, Stroke, Text};
 use super::svg::halo_width;
 
@@ -38,7 +38,7 @@ fn advance(face: &Face<'_>, letter: char) -> u16 {
 ///
 /// # Errors
 /// [`PlotError::Drawing`] if the image would be too large to hold.
-pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>, PlotError> {
+pub(crate) fn write(scene: &Scene, scale: f64) -> Result<Vec<u8>> {
     let size = [(scene.width * scale).ceil() as u32, (scene.height * scale).ceil() as u32];
     let too_large =
         || PlotError::Drawing(format!("no room for an image of {} by {} pixels", size[0], size[1]));
@@ -76,14 +76,8 @@ struct Canvas {
 impl Canvas {
     fn fill(&mut self, outline: &Outline, colour: Colour, anti_alias: bool) {
         if let Some(path) = path(outline) {
-            let paint = paint(colour, anti_alias);
-            self.pixmap.fill_path(
-                &path,
-                &paint,
-                FillRule::Winding,
-                self.transform,
-                self.clips.last(),
-            );
+            let (paint, clip) = (paint(colour, anti_alias), self.clips.last());
+            self.pixmap.fill_path(&path, &paint, FillRule::Winding, self.transform, clip);
         }
     }
 

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use arrow_schema::Schema;
 use serde_json::Value;
 
-use super::error::PlotError;
+use super::error::{PlotError, Result};
 use super::label;
 use sweep_files::{self as files, ParquetFile};
 
@@ -75,7 +75,7 @@ pub(crate) struct Source {
     /// Number of rows.
     pub(crate) rows: usize,
     /// Name of the run with what its command line set, if the file says them.
-    named: Option<String>,
+    pub(crate) run_name: Option<String>,
     file: ParquetFile,
 }
 
@@ -88,7 +88,7 @@ impl Source {
     /// # Errors
     /// [`PlotError::File`], or [`PlotError::Undrawable`] when the columns are not those of a file
     /// of ours.
-    pub(crate) fn open(path: &Path) -> Result<Self, PlotError> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = ParquetFile::open(path)?;
         let rows = usize::try_from(file.rows()).unwrap_or(usize::MAX);
         let provenance: Vec<(String, Value)> = file
@@ -111,8 +111,8 @@ impl Source {
                 names.join(", ")
             ),
         })?;
-        let named = named(&provenance);
-        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, named, file })
+        let run_name = run_name(&provenance);
+        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, run_name, file })
     }
 
     /// Calls `take` for each row, with the columns of these names. One that the file lacks is null.
@@ -122,8 +122,8 @@ impl Source {
     pub(crate) fn each_row(
         &self,
         names: &[&str],
-        mut take: impl FnMut(Row<'_>) -> Result<(), PlotError>,
-    ) -> Result<(), PlotError> {
+        mut take: impl FnMut(Row<'_>) -> Result<()>,
+    ) -> Result<()> {
         self.file.each_row(names, |row| take(Row(row)))
     }
 
@@ -179,7 +179,7 @@ impl Source {
     ///
     /// # Errors
     /// [`PlotError::Unfit`], which says what writes such a file.
-    pub(crate) fn expect(&self, kind: Kind, option: &str, hint: &str) -> Result<(), PlotError> {
+    pub(crate) fn expect(&self, kind: Kind, option: &str, hint: &str) -> Result<()> {
         if self.kind == kind {
             return Ok(());
         }
@@ -198,19 +198,14 @@ impl Source {
         find_in(&self.provenance, key)
     }
 
-    /// Name of the run, if the file says it, with what its command line set.
-    pub(crate) fn run_name(&self) -> Option<&str> {
-        self.named.as_deref()
-    }
-
     /// The run's name, if the file says it, and these notes.
     pub(crate) fn notes(&self, further: impl IntoIterator<Item = String>) -> Vec<String> {
-        self.named.iter().cloned().chain(further).collect()
+        self.run_name.iter().cloned().chain(further).collect()
     }
 
     /// The run's name, if the file says it, and `rest` as a figure's subtitle.
     pub(crate) fn subtitle(&self, rest: &str) -> String {
-        self.run_name().map_or_else(|| rest.to_owned(), |name| format!("{name} · {rest}"))
+        self.notes([rest.to_owned()]).join(" · ")
     }
 
     /// What its ratios compare, by the run's criterion.
@@ -244,11 +239,23 @@ impl Source {
         })
     }
 
+    /// Up to where a column is good, in its unit: its own limit, or the run's of ratios. Two files
+    /// may have two.
+    pub(crate) fn limit(&self, column: &ColumnFacts) -> Option<f64> {
+        let is_of_run = is_ratio(column) && self.kind != Kind::Differences;
+        column.limit.or_else(|| is_of_run.then(|| self.ratio_limit()))
+    }
+
     /// The ratio from which on a point is unreliable: the run's limit, or else the paper's, 2.
     pub(crate) fn ratio_limit(&self) -> f64 {
         let limit = self.find("ratio_limit").and_then(Value::as_f64).map(drawable);
         limit.filter(|limit| *limit > 0.0).unwrap_or(2.0)
     }
+}
+
+/// Whether a column's numbers are ratios of both models.
+pub(crate) fn is_ratio(column: &ColumnFacts) -> bool {
+    column.name.starts_with("ratio_") && column.name != "ratio_change"
 }
 
 /// The names of what there is.
@@ -305,7 +312,7 @@ fn find_in<'a>(provenance: &'a [(String, Value)], key: &str) -> Option<&'a Value
 }
 
 /// As in "fig12, tub_mass_kg = 20".
-fn named(provenance: &[(String, Value)]) -> Option<String> {
+fn run_name(provenance: &[(String, Value)]) -> Option<String> {
     let mut named = find_in(provenance, "name")?.as_str()?.to_owned();
     let sets = find_in(provenance, "set").and_then(Value::as_object);
     for (name, value) in sets.into_iter().flatten() {

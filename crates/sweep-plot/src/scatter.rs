@@ -1,7 +1,7 @@
 //! Points that are scattered rather than on a grid: what a design's figures need of its file.
 
 use super::PlotOptions;
-use super::error::PlotError;
+use super::error::{PlotError, Result};
 use super::influence::Influence;
 use super::label::{self, Label};
 use super::layer::{self, Group, Level};
@@ -97,7 +97,7 @@ impl Scatter {
     /// # Errors
     /// As [`Source::each_row`] and [`layer::chosen`]; [`PlotError::Undrawable`] without points or
     /// parameters that vary; [`PlotError::Unfit`] for a quantity that is no number.
-    pub(crate) fn read(source: Source, options: &PlotOptions) -> Result<Self, PlotError> {
+    pub(crate) fn read(source: Source, options: &PlotOptions) -> Result<Self> {
         let Some(shown) = layer::chosen(&source, options)? else {
             return Err(PlotError::Unfit(
                 "status is no number, and figures of designs mark failed points in any case"

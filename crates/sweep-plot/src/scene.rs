@@ -1,6 +1,8 @@
 //! What a figure is made of, in pixels from the top left corner: drawn once, written as SVG or as
 //! PNG.
 
+use super::axis::extremes;
+
 /// An opaque or translucent colour, sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Colour {
@@ -338,28 +340,23 @@ impl Scene {
     /// Fills `outline` with slanted lines.
     pub(crate) fn hatch(&mut self, outline: Outline, hatch: &Hatch) {
         let spacing = hatch.spacing;
-        let points = outline.0.iter().filter_map(|segment| match *segment {
-            Segment::Move(point) | Segment::Line(point) => Some(point),
-            Segment::Close => None,
-        });
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for point in points {
-            for k in 0..2 {
-                low[k] = low[k].min(point[k]);
-                high[k] = high[k].max(point[k]);
-            }
-        }
-        if !(low[0] < high[0] && low[1] < high[1]) {
+        let extent = |k: usize| {
+            extremes(outline.0.iter().filter_map(|segment| match *segment {
+                Segment::Move(point) | Segment::Line(point) => Some(point[k]),
+                Segment::Close => None,
+            }))
+        };
+        let Some(((left, right), (top, bottom))) = extent(0).zip(extent(1)) else { return };
+        if left >= right || top >= bottom {
             return;
         }
-        let height = high[1] - low[1];
+        let height = bottom - top;
         let mut lines = Outline::default();
         // Lines lie on multiples of the spacing of x + y, or of x - y, so that the hatching runs on
         // from shape to shape.
-        let (from, to, sign) =
-            if hatch.falling { (high[1], low[1], -1.0) } else { (low[1], high[1], 1.0) };
-        let mut along = ((low[0] + sign * from) / spacing).ceil() * spacing - sign * from;
-        while along < high[0] + height {
+        let (from, to, sign) = if hatch.falling { (bottom, top, -1.0) } else { (top, bottom, 1.0) };
+        let mut along = ((left + sign * from) / spacing).ceil() * spacing - sign * from;
+        while along < right + height {
             lines.add_line(&[[along, from], [along - height, to]]);
             along += spacing;
         }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::axis::evenly_by_log;
-use super::error::PlotError;
+use super::error::{PlotError, Result};
 use super::label;
 use super::read::{ColumnFacts, Source};
 
@@ -111,7 +111,7 @@ pub(crate) fn columns(source: &Source) -> Vec<&ColumnFacts> {
 ///
 /// # Errors
 /// As [`axes`], but for rows that do not lie on a grid.
-pub(crate) fn is_whole(source: &Source) -> Result<bool, PlotError> {
+pub(crate) fn is_whole(source: &Source) -> Result<bool> {
     let axes = match axes(source) {
         Ok(axes) => axes,
         Err(PlotError::NotAGrid { .. }) => return Ok(false),
@@ -129,7 +129,7 @@ pub(crate) fn is_whole(source: &Source) -> Result<bool, PlotError> {
 /// As [`Source::each_row`]; [`PlotError::Undrawable`] without rows or axes;
 /// [`PlotError::NotAGrid`] for an axis value that is not a number, or rows that do not lie on a
 /// grid.
-pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>, PlotError> {
+pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>> {
     if source.rows == 0 {
         return Err(source.empty("the map has no rows"));
     }

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use super::error::PlotError;
+use super::error::Result;
 use super::label::{self, Label};
 use super::read::{ColumnFacts, Kind, Source};
 use super::thin::{Keep, Stretches, Thinner};
@@ -126,9 +126,9 @@ impl Table {
     /// cut into stretches, as [`Table::read_thinned`] does.
     ///
     /// # Errors
-    /// As [`Source::each_row`]; [`PlotError::Undrawable`] for modes and boundaries beyond what a
-    /// figure keeps.
-    pub(crate) fn read(source: Source) -> Result<Self, PlotError> {
+    /// As [`Source::each_row`]; [`crate::PlotError::Undrawable`] for modes and boundaries beyond
+    /// what a figure keeps.
+    pub(crate) fn read(source: Source) -> Result<Self> {
         let most = MOST_NUMBERS / source.numeric().count().max(1);
         if source.rows > most {
             if source.kind == Kind::Trace {
@@ -172,7 +172,7 @@ impl Table {
     ///
     /// # Errors
     /// As [`Source::each_row`].
-    pub(crate) fn read_thinned(source: Source, count: usize) -> Result<Self, PlotError> {
+    pub(crate) fn read_thinned(source: Source, count: usize) -> Result<Self> {
         let stretches = Stretches::new(source.rows, count);
         let names: Vec<&str> = source.numeric().map(|column| column.name.as_str()).collect();
         let keep = |name: &str| if name == "time_s" { Keep::Instants } else { Keep::Extremes };
@@ -195,7 +195,7 @@ impl Table {
     ///
     /// # Errors
     /// As [`Source::open`] and [`Table::read`].
-    pub(crate) fn open(path: &Path) -> Result<Self, PlotError> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         Self::read(Source::open(path)?)
     }
 
@@ -207,8 +207,8 @@ impl Table {
     /// The numbers of a column that this kind of file must have.
     ///
     /// # Errors
-    /// [`PlotError::Undrawable`].
-    pub(crate) fn numbers(&self, name: &str) -> Result<&[f64], PlotError> {
+    /// [`crate::PlotError::Undrawable`].
+    pub(crate) fn numbers(&self, name: &str) -> Result<&[f64]> {
         let numbers = self.column(name).and_then(Column::numbers);
         numbers.ok_or_else(|| self.source.lacks(name, "numeric"))
     }

@@ -99,7 +99,10 @@ fn columns_come_with_units_words_and_provenance() {
     let diverged =
         (0..table.rows).filter(|&row| words("status").get(row) == Some("diverged")).count();
     assert_eq!(diverged, 1);
-    assert_eq!((table.source.ratio_limit(), table.source.run_name()), (3.0, Some("sample")));
+    assert_eq!(
+        (table.source.ratio_limit(), table.source.run_name.as_deref()),
+        (3.0, Some("sample"))
+    );
     let undefined =
         table.numbers("ratio_max").unwrap().iter().filter(|ratio| ratio.is_nan()).count();
     assert_eq!(undefined, 2);

@@ -8,7 +8,7 @@ use std::path::Path;
 use serde_json::Value;
 use sweep_files::{Step, dotted, key, leaves};
 
-use crate::error::PlotError;
+use crate::error::{PlotError, Result};
 use crate::read::Source;
 
 /// What histories, and gaps over them, follow from.
@@ -30,9 +30,7 @@ pub(crate) fn at(source: &Source) -> At {
 
 /// Where the plans of two files part, each at a point, in words.
 pub(crate) fn parted(files: [(&Source, &At); 2], parts: &[&str]) -> Vec<String> {
-    let plans = files.map(|(source, _)| {
-        source.provenance.iter().find(|(name, _)| name == key::PLAN).map(|(_, plan)| plan)
-    });
+    let plans = files.map(|(source, _)| source.find(key::PLAN));
     let [Some(first), Some(second)] = plans else { return Vec::new() };
     let mut found = Vec::new();
     for part in parts {
@@ -56,7 +54,7 @@ pub(crate) fn agree(
     path: &Path,
     files: [(&Source, &At); 2],
     parts: &[&str],
-) -> Result<(), PlotError> {
+) -> Result<()> {
     let found = parted(files, parts);
     if found.is_empty() {
         return Ok(());

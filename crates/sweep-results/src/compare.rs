@@ -12,7 +12,7 @@ use sweep_files::FileKind;
 pub use boundary::{Crossing, Moved};
 pub use plans::PlanChange;
 
-use crate::error::ResultsError;
+use crate::error::{Result, ResultsError};
 use side::Side;
 use sweep_files::{Cell, ResultTable, ratio_limits};
 
@@ -225,7 +225,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     });
     let sides = [Side::read(first, second, &keys)?, Side::read(second, first, &keys)?];
     let pairs = matched(&sides);
-    if pairs.is_empty() && sides.iter().any(|side| side.rows() > 0) {
+    if pairs.is_empty() && sides.iter().any(|side| side.rows > 0) {
         let keys = if keys.is_empty() { "rows".to_owned() } else { keys.join(", ") };
         return Err(refuse(format!("they share no row: no values of {keys} are in both")));
     }
@@ -242,7 +242,7 @@ pub fn compare(first: &ResultTable, second: &ResultTable) -> Result<Comparison, 
     let both_have = |name: &str| tables.iter().all(|table| table.column(name).is_some());
     Ok(Comparison {
         plan: plans::changes(first.file(), second.file()),
-        alone: [0, 1].map(|place| (sides[place].rows() - pairs.len()) as u64),
+        alone: [0, 1].map(|place| (sides[place].rows - pairs.len()) as u64),
         has_verdicts: both_have("reliable"),
         over_estimated: over_estimated(tables, &shared),
         has_ratios: both_have("ratio_max"),
@@ -272,9 +272,9 @@ fn over_estimated(tables: [&ResultTable; 2], shared: &[SharedRow]) -> Option<[us
 fn matched(sides: &[Side; 2]) -> Vec<[usize; 2]> {
     let mut seen = HashMap::new();
     let known: HashMap<_, usize> =
-        (0..sides[1].rows()).map(|row| (numbered(&sides[1], row, &mut seen), row)).collect();
+        (0..sides[1].rows).map(|row| (numbered(&sides[1], row, &mut seen), row)).collect();
     seen.clear();
-    (0..sides[0].rows())
+    (0..sides[0].rows)
         .filter_map(|row| Some([row, *known.get(&numbered(&sides[0], row, &mut seen))?]))
         .collect()
 }

@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 use std::ops::Range;
 
-use crate::error::ResultsError;
+use crate::error::Result;
 use sweep_files::{Cell, ResultTable, Row};
 
 /// A mistake in the text of a condition.
@@ -20,10 +20,9 @@ pub struct Mistake {
     pub candidates: Option<(String, Vec<String>)>,
 }
 
-/// Which orders of two values keep a comparison: the first one less, both equal, the first one
-/// greater.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Comparison(pub(crate) [bool; 3]);
+/// Which orders of two values keep a comparison.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Comparison(pub(crate) fn(Ordering) -> bool);
 
 /// How all rows become one number.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,16 +115,8 @@ impl Node {
     pub(crate) fn truth(&self, at: &Context<'_>) -> Option<bool> {
         match self {
             Self::Not(node) => node.truth(at).map(|truth| !truth),
-            Self::And(left, right) => match (left.truth(at), right.truth(at)) {
-                (Some(false), _) | (_, Some(false)) => Some(false),
-                (Some(true), Some(true)) => Some(true),
-                _ => None,
-            },
-            Self::Or(left, right) => match (left.truth(at), right.truth(at)) {
-                (Some(true), _) | (_, Some(true)) => Some(true),
-                (Some(false), Some(false)) => Some(false),
-                _ => None,
-            },
+            Self::And(left, right) => joined([left.truth(at), right.truth(at)], true),
+            Self::Or(left, right) => joined([left.truth(at), right.truth(at)], false),
             Self::IsNull(node) => Some(node.value(at) == Cell::Null),
             Self::Compare(comparison, left, right) => {
                 comparison.of(&left.value(at), &right.value(at))
@@ -133,6 +124,14 @@ impl Node {
             other => other.value(at).flag(),
         }
     }
+}
+
+/// What two parts make together: `common` if both are so, and its opposite as soon as one is.
+fn joined(parts: [Option<bool>; 2], common: bool) -> Option<bool> {
+    if parts.contains(&Some(!common)) {
+        return Some(!common);
+    }
+    parts[0].and(parts[1])
 }
 
 /// A result that is no number has no value.
@@ -143,11 +142,11 @@ fn number(number: Option<f64>) -> Cell {
 impl Comparison {
     /// How far two numbers are from keeping it; 0 where they do.
     pub(crate) fn excess(self, left: f64, right: f64) -> f64 {
-        match self.0 {
-            [true, _, true] => 1.0,
-            [true, ..] => (left - right).max(0.0),
-            [.., true] => (right - left).max(0.0),
-            _ => (left - right).abs(),
+        match [Ordering::Less, Ordering::Greater].map(self.0) {
+            [true, true] => 1.0,
+            [true, false] => (left - right).max(0.0),
+            [false, true] => (right - left).max(0.0),
+            [false, false] => (left - right).abs(),
         }
     }
 
@@ -158,12 +157,7 @@ impl Comparison {
             (Cell::Flag(left), Cell::Flag(right)) => left.cmp(right),
             _ => return None,
         };
-        let [less, equal, greater] = self.0;
-        Some(match order {
-            Ordering::Less => less,
-            Ordering::Equal => equal,
-            Ordering::Greater => greater,
-        })
+        Some((self.0)(order))
     }
 }
 
@@ -183,7 +177,7 @@ pub(crate) struct Folded {
 pub(crate) struct Folding {
     rows: u64,
     over: u64,
-    counted: u64,
+    /// Where conditions are counted, how many are true.
     sum: f64,
     least: Option<f64>,
     greatest: Option<f64>,
@@ -195,12 +189,12 @@ impl Condition {
     /// Folds all rows that `keep` takes.
     ///
     /// # Errors
-    /// [`ResultsError::File`].
+    /// [`crate::ResultsError::File`].
     pub(crate) fn fold(
         &self,
         table: &ResultTable,
         keep: Option<&Condition>,
-    ) -> Result<Vec<Folded>, ResultsError> {
+    ) -> Result<Vec<Folded>> {
         if self.folds.is_empty() {
             return Ok(Vec::new());
         }
@@ -219,13 +213,11 @@ impl Condition {
 impl Folding {
     pub(crate) fn add(&mut self, fold: Fold, node: &Node, at: &Context<'_>) {
         self.rows += 1;
-        if let Fold::Count | Fold::Share = fold {
-            let Some(truth) = node.truth(at) else { return };
-            self.over += 1;
-            self.counted += u64::from(truth);
-            return;
-        }
-        let Some(number) = node.number(at) else { return };
+        let number = match fold {
+            Fold::Count | Fold::Share => node.truth(at).map(|truth| f64::from(u8::from(truth))),
+            _ => node.number(at),
+        };
+        let Some(number) = number else { return };
         self.over += 1;
         self.sum += number;
         self.least = Some(self.least.map_or(number, |least| least.min(number)));
@@ -237,8 +229,8 @@ impl Folding {
 
     pub(crate) fn finish(self, fold: Fold) -> Folded {
         let value = match fold {
-            Fold::Count => Some(self.counted as f64),
-            Fold::Share => Some(self.counted as f64 / self.rows as f64),
+            Fold::Count => Some(self.sum),
+            Fold::Share => Some(self.sum / self.rows as f64),
             Fold::Least => self.least,
             Fold::Greatest => self.greatest,
             Fold::Mean => Some(self.sum / self.over as f64),
@@ -259,13 +251,13 @@ fn quantile(mut numbers: Vec<f64>, part: f64) -> Option<f64> {
 /// Calls `work` for each row that `keep` takes, with the columns of these names.
 ///
 /// # Errors
-/// [`ResultsError::File`], and whatever `work` says.
+/// [`crate::ResultsError::File`], and whatever `work` says.
 pub(crate) fn each_row(
     table: &ResultTable,
     names: &[&str],
     keep: Option<&Condition>,
-    mut work: impl FnMut(&Context<'_>) -> Result<(), ResultsError>,
-) -> Result<(), ResultsError> {
+    mut work: impl FnMut(&Context<'_>) -> Result<()>,
+) -> Result<()> {
     let first = names.len();
     let names = [names, &keep.map_or_else(Vec::new, Condition::names)].concat();
     table.file().each_row(&names, |row| {

@@ -19,3 +19,6 @@ impl ResultsError {
         !matches!(self, Self::File(_))
     }
 }
+
+/// An answer, unless there is none.
+pub(crate) type Result<T, E = ResultsError> = std::result::Result<T, E>;

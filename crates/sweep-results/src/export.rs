@@ -7,7 +7,7 @@ use std::path::Path;
 
 use sweep_files::{FileKind, Output};
 
-use crate::error::ResultsError;
+use crate::error::{Result, ResultsError};
 use sweep_files::ResultTable;
 
 /// A format, known by a file's ending.

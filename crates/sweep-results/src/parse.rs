@@ -13,6 +13,7 @@
 //!             | 'quantile' '(' sum ',' NUMBER ')'
 //! ```
 
+use std::cmp::Ordering;
 use std::ops::Range;
 
 use crate::condition::{Comparison, Condition, Fold, Mistake, Node};
@@ -63,12 +64,12 @@ struct Typed {
 type Parsed = Result<Typed, Mistake>;
 
 const COMPARISONS: [(&str, Comparison); 6] = [
-    ("<", Comparison([true, false, false])),
-    ("<=", Comparison([true, true, false])),
-    (">", Comparison([false, false, true])),
-    (">=", Comparison([false, true, true])),
-    ("==", Comparison([false, true, false])),
-    ("!=", Comparison([true, false, true])),
+    ("<", Comparison(Ordering::is_lt)),
+    ("<=", Comparison(Ordering::is_le)),
+    (">", Comparison(Ordering::is_gt)),
+    (">=", Comparison(Ordering::is_ge)),
+    ("==", Comparison(Ordering::is_eq)),
+    ("!=", Comparison(Ordering::is_ne)),
 ];
 
 /// How two parts become one.

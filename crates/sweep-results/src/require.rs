@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::condition::{Condition, Context, Folded, each_row};
-use crate::error::ResultsError;
+use crate::error::{Result, ResultsError};
 use crate::top::Worst;
 use sweep_files::{Cell, ResultTable};
 
@@ -92,11 +92,9 @@ pub fn check(
         let value = by.and_then(|(column, _)| at.row.cell(column).number());
         offenders.take(value, || {
             let own = condition.columns.len();
-            let placed = places.iter().enumerate().map(|(k, name)| (*name, own + k));
-            let read = condition.columns.iter().enumerate().map(|(k, name)| (name.as_str(), k));
-            let read = read.filter(|(name, _)| !places.contains(name));
-            let cells = placed.chain(read);
-            let cells = cells.map(|(name, column)| (name.to_owned(), at.row.cell(column)));
+            let read = (0..own).filter(|&column| !places.contains(&names[column]));
+            let cells = (own..names.len()).chain(read);
+            let cells = cells.map(|column| (names[column].to_owned(), at.row.cell(column)));
             Offender { row: at.row.index(), undefined: truth.is_none(), cells: cells.collect() }
         });
         Ok(())

@@ -1,7 +1,7 @@
 //! The rows that come first in an order.
 
 use crate::condition::{Condition, each_row};
-use crate::error::ResultsError;
+use crate::error::{Result, ResultsError};
 use crate::nearest::nearest;
 use sweep_files::CellKind;
 use sweep_files::{Cell, ResultTable};
@@ -22,8 +22,8 @@ pub fn top(
     count: usize,
 ) -> Result<Vec<Vec<Cell>>, ResultsError> {
     let path = table.path().display();
-    let mut asked = columns.iter().copied().chain(by.map(|(name, _)| name));
-    if let Some(name) = asked.find(|name| table.column(name).is_none()) {
+    let read: Vec<&str> = columns.iter().copied().chain(by.map(|(name, _)| name)).collect();
+    if let Some(name) = read.iter().find(|name| table.column(name).is_none()) {
         let near = nearest(name, table.columns.iter().map(|column| column.name.as_str()));
         let meant = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
         return Err(ResultsError::Refused(format!("{path} has no column `{name}`{meant}")));
@@ -35,7 +35,6 @@ pub fn top(
             "`{name}` of {path} holds no numbers, so it has no order"
         )));
     }
-    let read: Vec<&str> = columns.iter().copied().chain(by.map(|(name, _)| name)).collect();
     let mut found = Worst::new(by.map(|(_, worse)| worse), count);
     each_row(table, &read, keep, |at| {
         let value = by.and_then(|_| match at.row.cell(columns.len()) {

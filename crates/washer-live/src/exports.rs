@@ -15,7 +15,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use lane_ode::{Failure, Simd};
-use washer_model::{Channel, ModelKind};
+use washer_model::{Channel, ModelKind, instants};
 use washer_row::{Status, Trajectory};
 
 use crate::point::{Answer, NoPoint, Scenario, check, motion};
@@ -65,27 +65,31 @@ pub extern "C" fn setup() -> usize {
     usize::from(state.setup.is_some())
 }
 
+/// Answers by the setup and the input; without a setup there is no answer.
+fn answer(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize {
+    let State { input, output, setup } = &mut *state();
+    output.clear();
+    if let Some(setup) = setup {
+        write(setup, input, output);
+    }
+    output.len()
+}
+
 /// Both models by the quick rung at points of so many values each: an answer for each point.
 #[unsafe(no_mangle)]
 pub extern "C" fn quick(values: usize) -> usize {
-    let state = &mut *state();
-    let Some(setup) = &state.setup else { return 0 };
-    let points: Vec<&[f64]> = state.input.chunks_exact(values.max(1)).collect();
-    state.output.clear();
-    for found in crate::quick(setup, &points) {
-        write_answer(&mut state.output, &found, setup);
-    }
-    state.output.len()
+    answer(|setup, input, output| {
+        let points: Vec<&[f64]> = input.chunks_exact(values.max(1)).collect();
+        for found in crate::quick(setup, &points) {
+            write_answer(output, &found, setup);
+        }
+    })
 }
 
 /// One checked point: its answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn checked() -> usize {
-    let state = &mut *state();
-    let Some(setup) = &state.setup else { return 0 };
-    state.output.clear();
-    write_answer(&mut state.output, &check(setup, &state.input), setup);
-    state.output.len()
+    answer(|setup, input, output| write_answer(output, &check(setup, input), setup))
 }
 
 /// The motion of a model (0 nonlinear, 1 linear) at a point by a rung, or by the quick one if there
@@ -93,22 +97,18 @@ pub extern "C" fn checked() -> usize {
 /// each, the channels and the gap.
 #[unsafe(no_mangle)]
 pub extern "C" fn history(model: usize, rung: usize, every_s: f64) -> usize {
-    let state = &mut *state();
-    let Some(setup) = &state.setup else { return 0 };
     let model = if model == 0 { ModelKind::Nonlinear } else { ModelKind::Linear };
-    state.output.clear();
-    match motion(setup, &state.input, model, Some(rung), every_s) {
-        Err(why) => state.output.push(code(Some(&why))),
+    answer(|setup, input, output| match motion(setup, input, model, Some(rung), every_s) {
+        Err(why) => output.push(code(Some(&why))),
         Ok(motion) => {
-            let (failure, time_s) = failure(motion.failure);
-            state.output.extend([1.0, failure, time_s, motion.gaps_m.len() as f64]);
+            let [failure, time_s] = failure(motion.failure);
+            output.extend([1.0, failure, time_s, motion.gaps_m.len() as f64]);
             for (channels, gap_m) in motion.channels.iter().zip(&motion.gaps_m) {
-                state.output.extend(channels);
-                state.output.push(*gap_m);
+                output.extend(channels);
+                output.push(*gap_m);
             }
         }
-    }
-    state.output.len()
+    })
 }
 
 /// How disturbances grow at a point of so many values while the drum turns at the constant speeds
@@ -117,32 +117,28 @@ pub extern "C" fn history(model: usize, rung: usize, every_s: f64) -> usize {
 /// place among [`washer_model::Kind::ALL`].
 #[unsafe(no_mangle)]
 pub extern "C" fn growth(values: usize) -> usize {
-    let state = &mut *state();
-    let Some(setup) = &state.setup else { return 0 };
-    let Some((values, speeds_rpm)) = state.input.split_at_checked(values) else { return 0 };
-    state.output.clear();
-    let found = crate::growth(setup, values, speeds_rpm);
-    state.output.push(code(found.as_ref().err()));
-    for disturbance in found.unwrap_or_default() {
-        state.output.extend(disturbance.map_or([f64::NAN; 3], |of| {
-            [of.growth_per_s(), of.frequency_cpm(), f64::from(of.kind() as u8)]
-        }));
-    }
-    state.output.len()
+    answer(|setup, input, output| {
+        let Some((values, speeds_rpm)) = input.split_at_checked(values) else { return };
+        let found = crate::growth(setup, values, speeds_rpm);
+        output.push(code(found.as_ref().err()));
+        for disturbance in found.unwrap_or_default() {
+            output.extend(disturbance.map_or([f64::NAN; 3], |of| {
+                [of.growth_per_s(), of.frequency_cpm(), f64::from(of.kind() as u8)]
+            }));
+        }
+    })
 }
 
 /// Speeds (rpm) at a point, every `every_s` from 0 to the end.
 #[unsafe(no_mangle)]
 pub extern "C" fn speeds(every_s: f64) -> usize {
-    let state = &mut *state();
-    let Some(setup) = &state.setup else { return 0 };
-    state.output.clear();
-    if let Ok(scenario) = Scenario::new(setup, &state.input) {
-        let instants = 1 + (setup.rule.end_s / every_s * (1.0 + 1e-12)) as usize;
-        let times_s = (0..instants).map(|k| k as f64 * every_s);
-        state.output.extend(scenario.spin.speeds_rpm(times_s));
-    }
-    state.output.len()
+    answer(|setup, input, output| {
+        if let Ok(scenario) = Scenario::new(setup, input) {
+            let places = 0..instants(setup.rule.end_s, every_s);
+            let times_s = places.map(|k| k as f64 * every_s);
+            output.extend(scenario.spin.speeds_rpm(times_s));
+        }
+    })
 }
 
 fn code(why: Option<&NoPoint>) -> f64 {
@@ -153,13 +149,9 @@ fn code(why: Option<&NoPoint>) -> f64 {
     }
 }
 
-fn failure(failure: Option<(Failure, f64)>) -> (f64, f64) {
-    match failure {
-        None => (0.0, f64::NAN),
-        Some((Failure::Diverged, time_s)) => (1.0, time_s),
-        Some((Failure::StepTooSmall, time_s)) => (2.0, time_s),
-        Some((Failure::StepLimit, time_s)) => (3.0, time_s),
-    }
+/// Why and when (s) a run failed; the reasons in the order of [`Failure`].
+fn failure(failure: Option<(Failure, f64)>) -> [f64; 2] {
+    failure.map_or([0.0, f64::NAN], |(why, time_s)| [1.0 + f64::from(why as u8), time_s])
 }
 
 fn write_answer(output: &mut Vec<f64>, found: &Result<Answer, NoPoint>, setup: &Setup) {
@@ -177,12 +169,8 @@ fn write_answer(output: &mut Vec<f64>, found: &Result<Answer, NoPoint>, setup: &
         let error = errors[model].unwrap_or(f64::NAN);
         output.extend([rungs[model] as f64, f64::from(levels[model] as u8), error]);
         let Trajectory { status, fail_time_s, steps, min_gap_m, metrics: found, .. } = run;
-        let failure = match status {
-            Status::Ok => 0.0,
-            Status::Diverged => 1.0,
-            Status::StepTooSmall => 2.0,
-            _ => 3.0,
-        };
+        // Those of runs come first, in the order of `Failure`.
+        let failure = f64::from((*status as u8).min(Status::StepLimit as u8));
         let or_none = |value: &Option<f64>| value.unwrap_or(f64::NAN);
         output.extend([failure, or_none(fail_time_s), *steps as f64, or_none(min_gap_m)]);
         output.extend(amplitudes[model]);

@@ -125,46 +125,38 @@ fn ladders<'a>(setup: &'a Setup, values: &[f64]) -> &'a [Ladder; 2] {
 ///
 /// # Errors
 /// [`NoPoint`].
-fn ready(setup: &Setup, values: &[f64]) -> Result<(Scenario, Point), NoPoint> {
+fn ready(setup: &Setup, values: &[f64]) -> Result<Point, NoPoint> {
     let scenario = Scenario::new(setup, values)?;
-    let machines = [(scenario.machine.clone(), scenario.spin.clone())];
-    let mut points = prepare(Simd::Scalar, &machines, &scenario.timing(setup));
-    match points.pop() {
-        Some(Ok(point)) => Ok((scenario, point)),
-        _ => Err(NoPoint::NoEquilibrium),
-    }
+    let timing = scenario.timing(setup);
+    let mut points = prepare(Simd::Scalar, &[(scenario.machine, scenario.spin)], &timing);
+    points.pop().and_then(Result::ok).ok_or(NoPoint::NoEquilibrium)
 }
 
 /// Both models at points by the quick rung, in lanes. Nothing is compared with these runs.
 pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
-    let ready: Vec<_> = points.iter().map(|values| self::ready(setup, values)).collect();
+    let ready = points.iter().map(|values| (ladders(setup, values), ready(setup, values)));
+    let ready: Vec<_> = ready.collect();
     let rule = Rule { accuracy: f64::INFINITY, ..setup.rule.clone() };
     let mut found: Vec<Result<Answer, NoPoint>> = Vec::with_capacity(points.len());
     // Runs of the same rungs go through the lanes together.
-    let is_alike = |a: &usize, b: &usize| {
-        core::ptr::eq(ladders(setup, points[*a]), ladders(setup, points[*b]))
-    };
-    let places: Vec<usize> = (0..points.len()).collect();
-    for alike in places.chunk_by(is_alike) {
-        let ladders = ladders(setup, points[alike[0]]);
-        let ready_ones: Vec<&Point> =
-            alike.iter().filter_map(|&k| ready[k].as_ref().ok()).map(|(_, point)| point).collect();
+    for alike in ready.chunk_by(|(a, _), (b, _)| core::ptr::eq(*a, *b)) {
+        let ladders = alike[0].0;
+        let sound: Vec<&Point> =
+            alike.iter().filter_map(|(_, ready)| ready.as_ref().ok()).collect();
         let rungs = [0, 1].map(|model| quick_rung(&ladders[model]));
         let [nonlinear, linear] = [0, 1]
-            .map(|model| by_method(model, ladders[model].method(rungs[model]), &ready_ones, &rule));
+            .map(|model| by_method(model, ladders[model].method(rungs[model]), &sound, &rule));
         let mut pairs = nonlinear.into_iter().zip(linear);
-        for &k in alike {
-            let answer = |(nonlinear, linear): (RungRun, RungRun)| {
-                let amplitudes = [nonlinear.amplitudes, linear.amplitudes];
-                let mut outcome = Outcome::new(0, nonlinear.trajectory, linear.trajectory);
-                outcome.compare_turns(&rule.channels);
-                Answer::new(outcome, amplitudes, rungs, ladders, rule.limits)
-            };
-            found.push(match &ready[k] {
-                Ok(_) => pairs.next().map(answer).ok_or(NoPoint::NoEquilibrium),
-                Err(why) => Err(*why),
-            });
-        }
+        let answer = |(nonlinear, linear): (RungRun, RungRun)| {
+            let amplitudes = [nonlinear.amplitudes, linear.amplitudes];
+            let mut outcome = Outcome::new(0, nonlinear.trajectory, linear.trajectory);
+            outcome.compare_turns(&rule.channels);
+            Answer::new(outcome, amplitudes, rungs, ladders, rule.limits)
+        };
+        found.extend(alike.iter().map(|(_, ready)| match ready {
+            Ok(_) => pairs.next().map(answer).ok_or(NoPoint::NoEquilibrium),
+            Err(why) => Err(*why),
+        }));
     }
     found
 }
@@ -174,7 +166,7 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
 /// # Errors
 /// [`NoPoint`].
 pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
-    let (_, point) = ready(setup, values)?;
+    let point = ready(setup, values)?;
     let (ladders, rule) = (ladders(setup, values), &setup.rule);
     let mut climbs = Climbs::default();
     let outcome = loop {
@@ -223,7 +215,7 @@ pub fn motion(
     rung: Option<usize>,
     every_s: f64,
 ) -> Result<Motion, NoPoint> {
-    let (_, point) = ready(setup, values)?;
+    let point = ready(setup, values)?;
     let ladder = &ladders(setup, values)[model as usize];
     let rung = rung.and_then(|rung| ladder.rungs.get(rung));
     let rung = rung.unwrap_or(&ladder.rungs[quick_rung(ladder)]);
@@ -243,7 +235,7 @@ pub fn growth(
     values: &[f64],
     speeds_rpm: &[f64],
 ) -> Result<Vec<Option<Disturbance>>, NoPoint> {
-    let (_, point) = ready(setup, values)?;
+    let point = ready(setup, values)?;
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
     Ok(respond(&dwells, &|| false)

@@ -7,7 +7,7 @@ use sweep_parameter::Worse;
 use crate::axis::evenly_by_log;
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
-use crate::error::PlotError;
+use crate::error::{PlotError, Result};
 use crate::label;
 use crate::read::bracket;
 use crate::table::{Column, Table};
@@ -31,7 +31,7 @@ struct Place {
 ///
 /// # Errors
 /// [`PlotError::Undrawable`] with fewer than two points.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+pub(crate) fn chart(table: &Table) -> Result<Chart> {
     let columns: Vec<&Column> =
         table.columns.iter().filter(|column| column.numbers().is_some()).collect();
     let names: Vec<&str> = columns.iter().map(|column| column.facts.name.as_str()).collect();
@@ -78,23 +78,18 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         }));
     }
     let side = far_side(&curves, side_words(table));
+    let words = x.label().words.to_lowercase();
+    let panel = ChartPanel::new("boundary", y.label(), series);
     Ok(Chart {
         title: match quantity(table) {
             growth if is_growth(growth) => "Where the machine may dwell at any speed".to_owned(),
             ratio if is_ratio(ratio) => "Boundary of the linear model's reliability".to_owned(),
             other => format!("Limit of the {}", in_words(other)),
         },
-        subtitle: table.source.subtitle(&format!(
-            "{} values of {}{side}",
-            grid.len(),
-            x.label().words.to_lowercase()
-        )),
+        subtitle: table.source.subtitle(&format!("{} values of {words}{side}", grid.len())),
         x_label: x.label(),
         x_log: evenly_by_log(&grid),
-        panels: vec![ChartPanel {
-            height: 440.0,
-            ..ChartPanel::new("boundary", y.label(), series)
-        }],
+        panels: vec![ChartPanel { height: 440.0, ..panel }],
         ..Chart::default()
     })
 }
@@ -173,7 +168,7 @@ pub(crate) struct Overlay {
 ///
 /// # Errors
 /// [`PlotError::Unfit`] if it has others, or further ones; otherwise as [`chart`].
-pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay, PlotError> {
+pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay> {
     let names: Vec<&str> = table.source.planned_axes().collect();
     if names != axes {
         return Err(PlotError::Unfit(format!(

@@ -4,7 +4,7 @@ use crate::PlotOptions;
 use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
-use crate::error::PlotError;
+use crate::error::Result;
 use crate::figures::stability::{self, Unstable};
 use crate::label::Label;
 use crate::read::Kind;
@@ -25,9 +25,9 @@ pub(super) struct Mode {
 /// drawn too, with a star where such a sum is the speed.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] without a column or two speeds; as
+/// [`crate::PlotError::Undrawable`] without a column or two speeds; as
 /// [`stability::unstable_of`].
-pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
+pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
     let unstable = options.stability.as_ref();
     let unstable = unstable.map(|path| stability::unstable_of(table, path)).transpose()?;
     let modes = modes(table)?;
@@ -64,20 +64,13 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         let lie = if far.len() == 1 { "mode lies" } else { "modes lie" };
         notes.push(format!("{} {lie} above", far.len()));
     }
+    let label = Label::new("Damped natural frequency", "cycles per minute");
+    let panel = ChartPanel::new("frequency", label, series);
     Ok(Chart {
         title: "Natural frequencies over spin speed".to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Spin speed", "rpm"),
-        panels: vec![ChartPanel {
-            range: Some(range),
-            height: 500.0,
-            stars,
-            ..ChartPanel::new(
-                "frequency",
-                Label::new("Damped natural frequency", "cycles per minute"),
-                series,
-            )
-        }],
+        panels: vec![ChartPanel { range: Some(range), height: 500.0, stars, ..panel }],
         shades: unstable.map_or_else(Vec::new, |unstable| unstable.speeds),
         shade_meaning: stability::UNSTABLE.to_owned(),
         ..Chart::default()
@@ -88,9 +81,9 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
 /// speed.
 ///
 /// # Errors
-/// [`PlotError::Unfit`] when the file is not a modes file, [`PlotError::Undrawable`] when it lacks
-/// a column.
-pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
+/// [`crate::PlotError::Unfit`] when the file is not a modes file,
+/// [`crate::PlotError::Undrawable`] when it lacks a column.
+pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>> {
     table.source.expect(Kind::Modes, "--modes", "`sweep modes --out FILE` writes a modes file")?;
     let mut speeds: Vec<f64> = modes(table)?.iter().flat_map(crossings).collect();
     speeds.sort_by(f64::total_cmp);
@@ -158,7 +151,7 @@ pub(super) fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
 }
 
 /// Every mode of a file, by number.
-pub(super) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
+pub(super) fn modes(table: &Table) -> Result<Vec<Mode>> {
     let speed = table.numbers("speed_rpm")?;
     let number = table.numbers("mode")?;
     let frequency = table.numbers("frequency_rpm")?;

@@ -3,7 +3,7 @@
 use crate::PlotOptions;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style, spans_decades};
 use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
-use crate::error::PlotError;
+use crate::error::{PlotError, Result};
 use crate::gather::Map;
 use crate::label::{self, Label};
 use crate::layer::{self, Group, Shown};
@@ -18,7 +18,7 @@ const MOST_MARKS: usize = 400;
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for a column that the file does not have, or that is not a curve.
-pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError> {
+pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart> {
     let (axis, table) = (&map.grid.axes[0], &map.table);
     let source = &table.source;
     let asked: Option<Vec<Shown>> = layer::asked(source, options)?.into_iter().collect();
@@ -38,11 +38,10 @@ pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart, PlotError
     let ratios_asked: Vec<&Shown> =
         asked.iter().filter(|shown| shown.group == Group::Ratio).collect();
     let wanted = |name: &str| {
-        ratios_asked.iter().any(|shown| shown.channel.as_deref().is_none_or(|of| of == name))
+        let mut channels = ratios_asked.iter().map(|shown| shown.channel.as_deref());
+        ratios_asked.is_empty() || channels.any(|channel| channel.is_none_or(|of| of == name))
     };
-    let mut panels = vec![ratios(map, !ratios_asked.is_empty(), &line, &|name| {
-        ratios_asked.is_empty() || wanted(name)
-    })];
+    let mut panels = vec![ratios(map, !ratios_asked.is_empty(), &line, &wanted)];
     // A panel of both models' columns.
     let panel = |family: layer::Family<'_>| {
         let columns = &family.columns;

@@ -7,7 +7,7 @@ use crate::PlotOptions;
 use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, NONLINEAR};
-use crate::error::PlotError;
+use crate::error::Result;
 use crate::figures::stability::{
     Held, UNSTABLE, channels_of, columns_of, panel, response, shown, unstable,
 };
@@ -46,7 +46,7 @@ type Motion = (f64, usize, Vec<f64>);
 ///
 /// # Errors
 /// As [`Held::one`] and [`shown`].
-pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
+pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart> {
     let channels = channels_of(source, "periodic");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
@@ -98,8 +98,8 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart, Plo
 /// The chart of how far a run goes in each turn that passes over these speeds.
 ///
 /// # Errors
-/// [`PlotError::Unfit`] for a file that is no trace or of another machine.
-fn passing(source: &Source, held: &Held<'_>, path: &Path) -> Result<Chart, PlotError> {
+/// [`crate::PlotError::Unfit`] for a file that is no trace or of another machine.
+fn passing(source: &Source, held: &Held<'_>, path: &Path) -> Result<Chart> {
     let trace = trace::other_trace(path)?;
     let files = [(&trace.source, &together::at(&trace.source)), (source, &held.values())];
     together::agree("--against", path, files, together::MACHINE)?;
@@ -111,7 +111,7 @@ fn motions(
     source: &Source,
     held: &Held<'_>,
     channels: &[(&str, &ColumnFacts)],
-) -> Result<Vec<Motion>, PlotError> {
+) -> Result<Vec<Motion>> {
     let mut columns = columns_of(channels, ["nonlinear"]);
     columns.push(TURN.to_owned());
     let has_turns = source.column(TURN).is_some();
@@ -135,8 +135,8 @@ fn place_of(kind: Option<&str>) -> usize {
 /// each speed in a panel.
 ///
 /// # Errors
-/// As [`Held::one`]; [`PlotError::Undrawable`] where no states were kept.
-pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
+/// As [`Held::one`]; [`crate::PlotError::Undrawable`] where no states were kept.
+pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart> {
     let held = Held::one(source, &options.at, "--at")?;
     let columns = ["motion", YAW, PITCH];
     if let Some(name) = columns.into_iter().find(|name| source.column(name).is_none()) {

@@ -19,36 +19,13 @@ const BAR: f64 = 20.0;
 const BELOW: f64 = 64.0;
 
 /// Most parameters that are shown, the most influential ones.
-pub(crate) const MOST_PARAMETERS: usize = 24;
+const MOST_PARAMETERS: usize = 24;
 
-/// What the length of a bar means.
-pub(crate) const MEASURE: &str = "Rank correlation (Spearman)";
-/// What its outline means.
-pub(crate) const ANY: &str = "rising and falling alike (root of the correlation ratio)";
-/// What lies in the grey.
-pub(crate) const CHANCE: &str = "may be chance (95 %)";
+/// What the outline of a bar means.
+const ANY: &str = "rising and falling alike (root of the correlation ratio)";
 
 /// The colour of what lies in the grey.
 const GREY: Colour = FAILED.with_alpha(110);
-
-/// The title: of what.
-pub(crate) fn title(scatter: &Scatter) -> String {
-    format!("What it depends on: {}", scatter.label.words.to_lowercase())
-}
-
-/// How many points it rests on, and what is left out.
-pub(crate) fn subtitle(scatter: &Scatter) -> String {
-    let mut notes = Vec::new();
-    let valued = scatter.valued();
-    if valued < scatter.points.len() {
-        notes.push(format!("{valued} with a value"));
-    }
-    let all = scatter.parameters.len();
-    if all > MOST_PARAMETERS {
-        notes.push(format!("the {MOST_PARAMETERS} most influential of {all} parameters"));
-    }
-    scatter.subtitle(&notes)
-}
 
 /// Draws a bar for each parameter, the most influential on top.
 pub(crate) fn draw(scatter: &Scatter) -> Scene {
@@ -60,13 +37,22 @@ pub(crate) fn draw(scatter: &Scatter) -> Scene {
     let entries = [
         (Sign::Area(CALM), "rank correlation".to_owned()),
         (Sign::Line(Stroke::solid(INK, 1.6)), ANY.to_owned()),
-        (Sign::Area(GREY), CHANCE.to_owned()),
+        (Sign::Area(GREY), "may be chance (95 %)".to_owned()),
     ];
     let room = WIDTH - left - RIGHT;
     let of_legend = legend_height(&entries, WIDTH - 60.0);
     let height = ROW * places.len() as f64 + 12.0;
     let total = HEADING_HEIGHT + height + BELOW + of_legend + 8.0;
-    let (title, subtitle) = (title(scatter), subtitle(scatter));
+    let title = format!("What it depends on: {}", scatter.label.words.to_lowercase());
+    let (valued, all) = (scatter.valued(), scatter.parameters.len());
+    let mut notes = Vec::new();
+    if valued < scatter.points.len() {
+        notes.push(format!("{valued} with a value"));
+    }
+    if all > MOST_PARAMETERS {
+        notes.push(format!("the {MOST_PARAMETERS} most influential of {all} parameters"));
+    }
+    let subtitle = scatter.subtitle(&notes);
     let mut scene = Scene::new(WIDTH, total, format!("{title}. {subtitle}"));
     heading(&mut scene, &title, &subtitle);
     let panel = Panel {
@@ -83,7 +69,7 @@ pub(crate) fn draw(scatter: &Scatter) -> Scene {
         let [from, to] = [from.min(to), from.max(to)].map(|x| panel.at_x(x));
         scene.fill(Outline::rectangle(from, y, to - from, height), colour);
     };
-    let noise = chance(scatter.valued());
+    let noise = chance(valued);
     span(&mut scene, -noise, noise, panel.y, height, GREY);
     let middle = panel.at_x(0.0);
     let axis = Outline::line(&[[middle, panel.y], [middle, panel.y + height]]);
@@ -105,7 +91,7 @@ pub(crate) fn draw(scatter: &Scatter) -> Scene {
         scene.text(Text::new(said, at, TICK_SIZE));
     }
     panel.frame(&mut scene, true, false);
-    panel.x_label(&mut scene, MEASURE);
+    panel.x_label(&mut scene, "Rank correlation (Spearman)");
     let y = panel.y + height + BELOW;
     legend(&mut scene, &entries, 40.0, y, WIDTH - 60.0);
     scene

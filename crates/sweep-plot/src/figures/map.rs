@@ -6,7 +6,7 @@ use crate::axis::Scale;
 use crate::colour::{BOTH, DISTINCT, LEVELS};
 use crate::contour::{MOST_POINTS, leave_out_shortest, zero_lines};
 use crate::cuts::Cuts;
-use crate::error::PlotError;
+use crate::error::Result;
 use crate::figures::boundary::Overlay;
 use crate::frame::{
     self, HEADING_HEIGHT, LABEL_SIZE, Panel, Sign, TICK_SIZE, failed, failed_hatch, heading,
@@ -41,7 +41,7 @@ pub(crate) fn draw(
     cuts: &Cuts,
     shown: Option<&Shown>,
     overlay: Option<&Overlay>,
-) -> Result<Scene, PlotError> {
+) -> Result<Scene> {
     let mut cells = match shown {
         Some(shown) => Cells::by_value(map, shown.layer(map)?),
         None => Cells::by_status(map),

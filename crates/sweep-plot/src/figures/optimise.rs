@@ -3,7 +3,7 @@
 
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, NONLINEAR};
-use crate::error::PlotError;
+use crate::error::Result;
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Source};
 
@@ -19,7 +19,7 @@ fn in_words(column: &ColumnFacts) -> (&ColumnFacts, String) {
 ///
 /// # Errors
 /// A file without objectives.
-pub(crate) fn chart(source: &Source) -> Result<Chart, PlotError> {
+pub(crate) fn chart(source: &Source) -> Result<Chart> {
     // In the study's own words: a name says no quantile.
     let objectives: Vec<(&ColumnFacts, String)> = source
         .list("objective")

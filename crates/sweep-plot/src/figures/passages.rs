@@ -4,7 +4,7 @@
 use crate::PlotOptions;
 use crate::chart::{Chart, Mark, Series, Style};
 use crate::colour::DISTINCT;
-use crate::error::PlotError;
+use crate::error::Result;
 use crate::figures::trace;
 use crate::label::Label;
 use crate::table::Table;
@@ -27,9 +27,9 @@ struct Way {
 /// The chart of a trace file.
 ///
 /// # Errors
-/// As [`trace::chart`]; besides [`PlotError::Undrawable`] without the speed, or where the drum
-/// makes no whole turn while its speed changes.
-pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
+/// As [`trace::chart`]; besides [`crate::PlotError::Undrawable`] without the speed, or where the
+/// drum makes no whole turn while its speed changes.
+pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
     let mut chart = trace::chart(table, options)?;
     let time = table.numbers("time_s")?;
     let speed: Vec<f64> = table.numbers("speed_rpm")?.iter().map(|speed| speed.abs()).collect();

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
-use crate::error::PlotError;
+use crate::error::Result;
 use crate::label::{self, Label};
 use crate::scene::MUTED;
 use crate::table::Table;
@@ -15,8 +15,8 @@ const AT_95: f64 = 3.84;
 /// The chart of a fit's curves.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] for a file that has no profiles.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+/// [`crate::PlotError::Undrawable`] for a file that has no profiles.
+pub(crate) fn chart(table: &Table) -> Result<Chart> {
     let empty = || {
         table.source.empty(
             "it has no profiles: they are in the curves of `sweep fit`, if the model follows",

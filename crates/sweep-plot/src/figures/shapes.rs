@@ -5,7 +5,7 @@ use sweep_files::key;
 
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
-use crate::error::PlotError;
+use crate::error::Result;
 use crate::label::{self, Label};
 use crate::table::Table;
 
@@ -18,10 +18,10 @@ type Phasor = [f64; 2];
 
 /// Places along the axis, from O towards the door (m).
 struct Places {
-    rear: f64,
-    hinge: f64,
-    tub_front: f64,
-    drum_front: f64,
+    /// Rear and front of the tub.
+    tub: [f64; 2],
+    /// Rear, hinge and front of the drum.
+    drum: [f64; 3],
 }
 
 /// Deflections of an axis along c2 and c3 at some places.
@@ -31,8 +31,8 @@ type Line = [Vec<Phasor>; 2];
 /// are from rest when the greatest deflection is at its farthest, and a quarter of a period later.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] where the file holds no machine or no resonances.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+/// [`crate::PlotError::Undrawable`] where the file holds no machine or no resonances.
+pub(crate) fn chart(table: &Table) -> Result<Chart> {
     let places = places(table)
         .ok_or_else(|| table.source.empty("the file does not say where the machine's parts are"))?;
     let mut panels = Vec::new();
@@ -73,12 +73,10 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
 fn places(table: &Table) -> Option<Places> {
     let machine = table.source.find("machine")?;
     let number = |path: &str| machine.pointer(path).and_then(Value::as_f64);
-    Some(Places {
-        rear: number("/bearings/rear_x_m")?,
-        hinge: number("/drum/hinge_x_m")?,
-        tub_front: number("/tub/front_x_m")?,
-        drum_front: number("/drum/front_x_m")?,
-    })
+    let rear = number("/bearings/rear_x_m")?;
+    let tub = [rear, number("/tub/front_x_m")?];
+    let drum = [rear, number("/drum/hinge_x_m")?, number("/drum/front_x_m")?];
+    Some(Places { tub, drum })
 }
 
 /// Coordinates of a shape: `q1` to `q10` of a modes file.
@@ -98,13 +96,11 @@ fn lines(places: &Places, q: &[Phasor]) -> [Line; 2] {
     let straight = |start: Phasor, slope: Phasor, sign: f64, xs: &[f64]| -> Vec<Phasor> {
         xs.iter().map(|x| plus(start, sign * x, slope)).collect()
     };
-    let tub_places = [places.rear, places.tub_front];
-    let tub = [straight(q[0], q[5], 1.0, &tub_places), straight(q[1], q[4], -1.0, &tub_places)];
-    let shaft_places = [places.rear, places.hinge, places.drum_front];
-    let mut drum =
-        [straight(q[2], q[7], 1.0, &shaft_places), straight(q[3], q[6], -1.0, &shaft_places)];
+    let Places { tub, drum } = places;
+    let tub = [straight(q[0], q[5], 1.0, tub), straight(q[1], q[4], -1.0, tub)];
+    let mut drum = [straight(q[2], q[7], 1.0, drum), straight(q[3], q[6], -1.0, drum)];
     // Beyond the hinge the drum bends away; at theta = 0 its angles are about c2 and c3 too.
-    let beyond = places.drum_front - places.hinge;
+    let beyond = places.drum[2] - places.drum[1];
     drum[0][2] = plus(drum[0][2], beyond, q[9]);
     drum[1][2] = plus(drum[1][2], -beyond, q[8]);
     [tub, drum]
@@ -139,10 +135,9 @@ fn series(places: &Places, q: &[Phasor]) -> Vec<Series> {
                 series.push(Series::new(name, DISTINCT[colour], x.to_vec(), y, style));
             }
         };
-        add("", &[places.rear, places.tub_front], &tub_line, k);
+        add("", &places.tub, &tub_line, k);
         if apart(places, &tub_line, &drum_line) > TOGETHER {
-            let along = [places.rear, places.hinge, places.drum_front];
-            add("drum, ", &along, &drum_line, k + 2);
+            add("drum, ", &places.drum, &drum_line, k + 2);
         }
     }
     series
@@ -151,10 +146,10 @@ fn series(places: &Places, q: &[Phasor]) -> Vec<Series> {
 /// How far the drum's axis is from the tub's, at most.
 fn apart(places: &Places, tub: &[Phasor], drum: &[Phasor]) -> f64 {
     let on_tub = |x: f64| {
-        let part = (x - places.rear) / (places.tub_front - places.rear);
+        let part = (x - places.tub[0]) / (places.tub[1] - places.tub[0]);
         [0, 1].map(|k| tub[0][k] + part * (tub[1][k] - tub[0][k]))
     };
-    let points = [places.rear, places.hinge, places.drum_front].into_iter().zip(drum);
+    let points = places.drum.into_iter().zip(drum);
     let apart = points.map(|(x, at)| (at[0] - on_tub(x)[0]).hypot(at[1] - on_tub(x)[1]));
     apart.fold(0.0, f64::max)
 }
@@ -163,7 +158,7 @@ fn apart(places: &Places, tub: &[Phasor], drum: &[Phasor]) -> f64 {
 mod tests {
     use super::*;
 
-    const PLACES: Places = Places { rear: -0.05, hinge: 0.15, tub_front: 0.45, drum_front: 0.45 };
+    const PLACES: Places = Places { tub: [-0.05, 0.45], drum: [-0.05, 0.15, 0.45] };
 
     #[test]
     fn a_pitch_is_a_vertical_tilt_and_a_yaw_a_horizontal_one_against_its_sign() {

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::profiles::numbers;
 use crate::chart::{Chart, ChartPanel, Series, Style};
-use crate::error::PlotError;
+use crate::error::Result;
 use crate::label::{self, Label};
 use crate::scene::{INK, MUTED};
 use crate::table::Table;
@@ -12,8 +12,8 @@ use crate::table::Table;
 /// The chart of a fit's curves.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] for a file that has no spectra.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+/// [`crate::PlotError::Undrawable`] for a file that has no spectra.
+pub(crate) fn chart(table: &Table) -> Result<Chart> {
     let spectra = table.source.find("spectra").ok_or_else(|| {
         table.source.empty("it has no spectra: they are in the curves of `sweep fit`")
     })?;

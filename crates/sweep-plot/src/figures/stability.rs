@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::PlotOptions;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
 use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
-use crate::error::PlotError;
+use crate::error::{PlotError, Result};
 use crate::figures::machine::machine;
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Kind, Source, some_of};
@@ -40,7 +40,7 @@ pub(super) struct Swept {
 ///
 /// # Errors
 /// As [`Held::at`], [`Held::read`].
-pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
+pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart> {
     let mut held = Held::at(source, &options.at, "--at")?;
     let count = held.points.len();
     if count > MOST_CURVES {
@@ -64,14 +64,9 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
     if shown.len() < count {
         notes.push(format!("{} of {count} points", shown.len()));
     }
-    let panel = ChartPanel {
-        levels: vec![(0.0, "unstable above".to_owned())],
-        ..ChartPanel::new(
-            "growth",
-            Label::new("Growth of a small disturbance", "1/s"),
-            series.collect(),
-        )
-    };
+    let label = Label::new("Growth of a small disturbance", "1/s");
+    let levels = vec![(0.0, "unstable above".to_owned())];
+    let panel = ChartPanel { levels, ..ChartPanel::new("growth", label, series.collect()) };
     let alone = match &swept[..] {
         [one] => unstable(&one.speed, &one.growth),
         _ => Vec::new(),
@@ -96,7 +91,7 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart, Pl
 ///
 /// # Errors
 /// As [`Held::one`]; [`PlotError::Unfit`] for an unknown channel.
-pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart, PlotError> {
+pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart> {
     let channels = channels_of(source, "linear");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
@@ -173,11 +168,7 @@ fn part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for an unknown channel.
-pub(super) fn shown(
-    source: &Source,
-    names: &[&str],
-    asked: &[String],
-) -> Result<Vec<bool>, PlotError> {
+pub(super) fn shown(source: &Source, names: &[&str], asked: &[String]) -> Result<Vec<bool>> {
     if let Some(unknown) = asked.iter().find(|asked| !names.contains(&asked.as_str())) {
         return Err(source.not_there("--channel", unknown, "channel", names.join(", ")));
     }
@@ -204,7 +195,7 @@ pub(super) struct Unstable {
 /// # Errors
 /// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] where the stability file does
 /// not have this machine.
-pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
+pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable> {
     let source = Source::open(path)?;
     source.expect(Kind::Stability, "--stability", "`sweep stability` writes a stability file")?;
     let mut at: At =
@@ -262,7 +253,7 @@ impl<'a> Held<'a> {
     /// # Errors
     /// As [`Source::each_row`]; [`PlotError::Unfit`] for what is no axis, or no value of it;
     /// [`PlotError::Undrawable`] without rows.
-    fn at(source: &'a Source, at: &At, option: &str) -> Result<Self, PlotError> {
+    fn at(source: &'a Source, at: &At, option: &str) -> Result<Self> {
         let mut held = Self { source, axes: swept::columns(source), points: Vec::new() };
         let place = |name: &str| {
             let names = || held.axes.iter().map(|axis| axis.name.as_str());
@@ -270,7 +261,7 @@ impl<'a> Held<'a> {
             place.ok_or_else(|| source.not_there(option, name, "axis", some_of(names())))
         };
         let pins = at.iter().map(|(name, value)| Ok((place(name)?, *value)));
-        let pins = pins.collect::<Result<Vec<_>, PlotError>>()?;
+        let pins = pins.collect::<Result<Vec<_>>>()?;
         let mut points: Vec<Vec<f64>> = Vec::new();
         let mut seen_rows = false;
         held.each_row_of_all(&[""; 0], |row| {
@@ -298,7 +289,7 @@ impl<'a> Held<'a> {
     ///
     /// # Errors
     /// As [`Self::at`]; [`PlotError::Unfit`] where there are several.
-    pub(super) fn one(source: &'a Source, at: &At, option: &str) -> Result<Self, PlotError> {
+    pub(super) fn one(source: &'a Source, at: &At, option: &str) -> Result<Self> {
         let held = Self::at(source, at, option)?;
         if held.points.len() > 1 {
             let free = held.axes.iter().map(|axis| axis.name.as_str());
@@ -334,7 +325,7 @@ impl<'a> Held<'a> {
         &self,
         columns: &[S],
         mut take: impl FnMut(usize, Row<'_>),
-    ) -> Result<(), PlotError> {
+    ) -> Result<()> {
         self.each_row_of_all(columns, |row| {
             if let Some(place) = self.points.iter().position(|point| *point == row.point) {
                 take(place, row);
@@ -346,7 +337,7 @@ impl<'a> Held<'a> {
         &self,
         columns: &[S],
         mut take: impl FnMut(Row<'_>),
-    ) -> Result<(), PlotError> {
+    ) -> Result<()> {
         let names = self.axes.iter().map(|axis| axis.name.as_str());
         let names = names.chain(["speed_rpm", "growth_per_s", "kind"]);
         let names: Vec<&str> = names.chain(columns.iter().map(S::as_ref)).collect();
@@ -367,7 +358,7 @@ impl<'a> Held<'a> {
     ///
     /// # Errors
     /// As [`Source::each_row`].
-    pub(super) fn read(&self, columns: &[String]) -> Result<Vec<Swept>, PlotError> {
+    pub(super) fn read(&self, columns: &[String]) -> Result<Vec<Swept>> {
         let empty = Swept { columns: vec![Vec::new(); columns.len()], ..Swept::default() };
         let mut swept = vec![empty; self.points.len()];
         self.each_row(columns, |place, row| {

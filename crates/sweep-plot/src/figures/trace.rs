@@ -7,7 +7,7 @@ use crate::PlotOptions;
 use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
 use crate::colour::{LINEAR, NONLINEAR};
-use crate::error::PlotError;
+use crate::error::{PlotError, Result};
 use crate::figures::machine::machine;
 use crate::figures::{campbell, stability};
 use crate::label::{self, Label};
@@ -21,7 +21,7 @@ use crate::together::{self, At};
 /// # Errors
 /// [`PlotError::Undrawable`] without time, [`PlotError::Unfit`] for an unknown channel, and as
 /// [`campbell::resonances`] for the modes file that gives the resonance speeds.
-pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotError> {
+pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
     let time = Rc::new(table.numbers("time_s")?.to_vec());
     if time.len() < 2 {
         return Err(table.source.empty("a trace needs at least two instants"));
@@ -47,12 +47,9 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart, PlotE
         None => sides.map(said_of),
     };
     // The second curve lies in front; where it hides the first one, this must shine through.
-    let front = LINEAR.with_alpha(165);
-    let drawn = match &other {
-        Some(other) => (other, Rc::new(other.numbers("time_s")?.to_vec()), front),
-        None => (table, Rc::clone(&time), front),
-    };
-    let drawn = [(table, Rc::clone(&time), NONLINEAR), drawn];
+    let front = other.as_ref().unwrap_or(table);
+    let its_time = Rc::new(front.numbers("time_s")?.to_vec());
+    let drawn = [(table, Rc::clone(&time), NONLINEAR), (front, its_time, LINEAR.with_alpha(165))];
     let pair = |columns: &[String; 2], factor: f64| -> Vec<Series> {
         let curve = |k: usize| {
             let ((table, time, colour), name) = (&drawn[k], names[k].clone());
@@ -187,7 +184,7 @@ fn difference(panels: &[ChartPanel]) -> Option<f64> {
 }
 
 /// The trace whose nonlinear model is drawn in place of the linear one.
-pub(super) fn other_trace(path: &Path) -> Result<Table, PlotError> {
+pub(super) fn other_trace(path: &Path) -> Result<Table> {
     let table = Table::open(path)?;
     table.source.expect(Kind::Trace, "--against", "`sweep trace` writes a trace")?;
     Ok(table)
@@ -202,8 +199,7 @@ fn stem(table: &Table) -> String {
 /// says otherwise of them, or else by their files.
 fn told_apart(one: &Table, other: &Table) -> [String; 2] {
     let tables = [one, other];
-    let names =
-        tables.map(|table| table.source.run_name().map_or_else(|| stem(table), str::to_owned));
+    let names = tables.map(|table| table.source.run_name.clone().unwrap_or_else(|| stem(table)));
     if names[0] != names[1] {
         return names;
     }
@@ -263,10 +259,7 @@ pub(super) fn subtitle(
 }
 
 /// The ranges of unstable speeds that the options name, rpm.
-pub(super) fn unstable_speeds(
-    table: &Table,
-    options: &PlotOptions,
-) -> Result<Vec<[f64; 2]>, PlotError> {
+pub(super) fn unstable_speeds(table: &Table, options: &PlotOptions) -> Result<Vec<[f64; 2]>> {
     match &options.stability {
         Some(path) => Ok(stability::unstable_of(table, path)?.speeds),
         None => Ok(Vec::new()),
@@ -276,10 +269,7 @@ pub(super) fn unstable_speeds(
 /// The resonance speeds that the options name, rpm, and for the subtitle where the machine whose
 /// modes they are is another one. Resonances hardly move with unbalance and damping, so the modes
 /// of a machine serve all its points.
-pub(super) fn resonances(
-    table: &Table,
-    options: &PlotOptions,
-) -> Result<(Vec<f64>, String), PlotError> {
+pub(super) fn resonances(table: &Table, options: &PlotOptions) -> Result<(Vec<f64>, String)> {
     let mut speeds = options.resonances_rpm.clone();
     let mut note = String::new();
     if let Some(path) = &options.modes {

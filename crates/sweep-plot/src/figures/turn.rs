@@ -2,7 +2,7 @@
 
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
-use crate::error::PlotError;
+use crate::error::Result;
 use crate::figures::campbell::{between, crossings, modes};
 use crate::label::Label;
 use crate::table::Table;
@@ -11,8 +11,8 @@ use crate::table::Table;
 /// to its greatest frequency over a turn, as a share of the mean.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] without a column, or where no mode has a resonance.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+/// [`crate::PlotError::Undrawable`] without a column, or where no mode has a resonance.
+pub(crate) fn chart(table: &Table) -> Result<Chart> {
     table.numbers("frequency_min_rpm")?;
     table.numbers("frequency_max_rpm")?;
     let mut series = Vec::new();
@@ -33,18 +33,12 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     if series.is_empty() {
         return Err(table.source.empty("no mode's frequency meets the spin speed"));
     }
+    let label = Label::new("Variation over a turn", "± % of the mean");
     Ok(Chart {
         title: "Natural frequencies over a turn of the drum".to_owned(),
         subtitle: table.source.subtitle("half the distance from least to greatest"),
         x_label: Label::new("Spin speed", "rpm"),
-        panels: vec![ChartPanel {
-            stars,
-            ..ChartPanel::new(
-                "variation",
-                Label::new("Variation over a turn", "± % of the mean"),
-                series,
-            )
-        }],
+        panels: vec![ChartPanel { stars, ..ChartPanel::new("variation", label, series) }],
         ..Chart::default()
     })
 }

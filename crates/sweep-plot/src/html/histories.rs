@@ -7,7 +7,7 @@ use serde_json::{Map as Object, Value, json};
 
 use super::{chart_json, embed};
 use crate::PlotOptions;
-use crate::error::PlotError;
+use crate::error::{PlotError, Result};
 use crate::figures::trace;
 use crate::gather::Map;
 use crate::read::{Kind, Source};
@@ -28,7 +28,7 @@ const STRETCHES: usize = 500;
 /// # Errors
 /// [`PlotError::File`] for the folder; as [`Table::open`] for its files; [`PlotError::Unfit`] for a
 /// file that is not a trace or belongs to no point of the grid, and for a folder without any.
-pub(crate) fn read(folder: &Path, map: &Map) -> Result<Value, PlotError> {
+pub(crate) fn read(folder: &Path, map: &Map) -> Result<Value> {
     let names = regular::names(folder).map_err(FileError::io("list", folder))?;
     let mut files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     files.retain(|file| file.extension().is_some_and(|ending| ending == "parquet"));
@@ -93,7 +93,7 @@ fn point(at: &At, cell: usize, map: &Map) -> At {
 }
 
 /// The figure of one point's trace, in its page's form.
-fn history(table: &Table) -> Result<Value, PlotError> {
+fn history(table: &Table) -> Result<Value> {
     let chart = trace::chart(table, &PlotOptions::default())?;
     Ok(chart_json(&chart, |values| json!(embed::quantised(values))))
 }

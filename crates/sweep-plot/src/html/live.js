@@ -136,7 +136,7 @@ function createLive(host, data) {
       const speeds = (await asked).numbers;
       if (of === latest) {
         curves.show(found.map((one) => one.numbers), speeds);
-        if (live.growthSpeeds.length) tellGrowth(of).catch(tellError);
+        if (live.growthSpeedsRpm.length) tellGrowth(of).catch(tellError);
         growth?.rested([...values], speeds.reduce((most, speed) => Math.max(most, speed)));
       }
     } catch (error) {
@@ -148,14 +148,14 @@ function createLive(host, data) {
   async function tellGrowth(of) {
     const line = element("p", { id: "growth-metric" }, "Growth at constant speeds: computing.");
     told.append(line);
-    const found = await growthAt(pool, "check", values, live.growthSpeeds);
+    const found = await growthAt(pool, "check", values, live.growthSpeedsRpm);
     if (of !== latest) return;
     const growth = found.map((one) => one[0]);
     const most = Math.max(...growth.filter(Number.isFinite));
     line.dataset.growth = most;
     line.textContent = Number.isFinite(most) ? `Growth at most ${significant(most, 3)} /s, at `
-      + `${significant(live.growthSpeeds[growth.indexOf(most)])} rpm of ${growth.length} constant `
-      + "speeds" : "No response at any of the map's constant speeds";
+      + `${significant(live.growthSpeedsRpm[growth.indexOf(most)])} rpm of ${growth.length} `
+      + "constant speeds" : "No response at any of the map's constant speeds";
   }
 
   // Work that was let go fails without an error.
@@ -202,7 +202,7 @@ function createLive(host, data) {
     rows.push(row("Least gap, whole run", "mm", (record) => record.gap * 1e3));
     live.metrics.forEach((metric, k) => rows.push(row(metric.words, metric.unit,
       (record) => record.metrics[k] * metric.factor)));
-    const sag = live.staticSag
+    const sag = live.hasStaticSag
       ? [element("p", {}, `Static sag of the tub ${significant(answer.sag * 1e3)} mm`)] : [];
     const largest = channel !== undefined && `Largest ratio ${significant(greatest)} `
       + `(${live.channels[channel].words}), the limit is ${live.ratioLimit}`;

@@ -14,8 +14,8 @@ function createMap(host, data, panel) {
   const { columns, codes, word, counts, wordsOf, bit, filled, failed, hasValue, partlyLost,
     placesOf, sensitive, valuesOf, verdict } = createCells(data);
 
-  const evenOf = (axis) => (axis.log ? Math.log : (value) => value);
-  const [evenX, evenY] = [evenOf(xAxis), evenOf(yAxis)];
+  const evens = data.axes.map((axis) => (axis.log ? Math.log : (value) => value));
+  const [evenX, evenY] = evens;
   const borders = [xAxis.borders.map(evenX), yAxis.borders.map(evenY)];
   const full = borders.map((list) => [list[0], list[list.length - 1]]);
   let view = full.map((range) => [...range]);
@@ -386,7 +386,6 @@ function createMap(host, data, panel) {
   zoomButtons.lastChild.id = "reset";
   controls.append(zoomButtons);
   changed();
-  const evens = data.axes.map(evenOf);
   // What a panel needs of the map: where its axes are among the sliders, and how to redraw.
   panel?.connect({
     sliders: data.axes.map(({ name }) => data.live.sliders.findIndex((one) => one.name === name)),
@@ -416,7 +415,6 @@ function createMap(host, data, panel) {
     // The point that is kept, or the one under the pointer.
     chosen: () => pinned ?? hovered,
     index: pointAt,
-    coordinates,
     // What a link holds, and back.
     state: () => ({ show: quantity.value, rest, view: view.flat(), pinned }),
     restore(state) {

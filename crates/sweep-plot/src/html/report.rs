@@ -9,23 +9,21 @@ use crate::label::{significant, unit_of_name, words};
 use crate::read::Source;
 use sweep_files::key;
 
-/// Title and text of what was run, from the plan in the file; empty if it carries none.
-fn about(source: &Source) -> Vec<(&'static str, String)> {
-    let Some(plan) = source.find(key::PLAN) else { return Vec::new() };
-    let lines = [
-        ("Machine", machine(&plan["machine"])),
-        ("Spin", spin(&plan["spin"])),
-        ("Time", time(&plan["time"])),
-        ("Method", method(&plan["integrator"])),
-        ("Verdict", verdict(&plan["reliability"])),
-    ];
-    lines.into_iter().filter_map(|(title, text)| Some((title, text?))).collect()
-}
-
-/// The run as HTML: what was run, and what a live page knows of the machine's resonances.
+/// The run as HTML: what was run, from the plan in the file if it carries one, and what a live page
+/// knows of the machine's resonances.
 pub(crate) fn told(source: &Source, live: Option<&Live>) -> String {
+    let of_plan = |plan: &Value| {
+        [
+            ("Machine", machine(&plan["machine"])),
+            ("Spin", spin(&plan["spin"])),
+            ("Time", time(&plan["time"])),
+            ("Method", method(&plan["integrator"])),
+            ("Verdict", verdict(&plan["reliability"])),
+        ]
+    };
+    let lines = source.find(key::PLAN).map(of_plan).into_iter().flatten();
     let run: Vec<_> =
-        about(source).into_iter().map(|(title, text)| vec![title.to_owned(), text]).collect();
+        lines.filter_map(|(title, text)| Some(vec![title.to_owned(), text?])).collect();
     let resonances: Vec<_> =
         live.into_iter().flat_map(|live| live.resonances.iter().cloned().map(Vec::from)).collect();
     let heads = ["Motion", "Resonance", "Damping ratio"];

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::SharedRow;
-use crate::error::ResultsError;
+use crate::error::{Result, ResultsError};
 use sweep_files::ResultTable;
 
 /// One change of side along the second axis, in both files.
@@ -111,10 +111,7 @@ fn ordered(place: &[f64]) -> Vec<u64> {
 }
 
 /// From two boundary files.
-pub(super) fn of_boundaries(
-    first: &ResultTable,
-    second: &ResultTable,
-) -> Result<Option<Moved>, ResultsError> {
+pub(super) fn of_boundaries(first: &ResultTable, second: &ResultTable) -> Result<Option<Moved>> {
     let (names, others) = (first.axes(), second.axes());
     let [_, axis, ..] = names[..] else { return Ok(None) };
     let keys: Vec<&str> =
@@ -153,18 +150,17 @@ pub(super) fn of_maps(first: &ResultTable, keys: &[String], shared: &[SharedRow]
     if keys.len() < 2 || first.plan.as_ref()?.get("design").is_some() {
         return None;
     }
-    let axis = &keys[1];
-    let mut rows: BTreeMap<Vec<u64>, Vec<&SharedRow>> = BTreeMap::new();
+    let mut others = keys.to_vec();
+    let axis = others.remove(1);
+    let mut rows: BTreeMap<Vec<u64>, (Vec<f64>, Vec<&SharedRow>)> = BTreeMap::new();
     for row in shared {
         let mut place = row.place.clone();
         place.remove(1);
-        rows.entry(ordered(&place)).or_default().push(row);
+        rows.entry(ordered(&place)).or_insert_with(|| (place, Vec::new())).1.push(row);
     }
     let mut lines = Lines::new();
-    for (key, mut line) in rows {
+    for (key, (place, mut line)) in rows {
         line.sort_by(|a, b| a.place[1].total_cmp(&b.place[1]));
-        let mut place = line.first()?.place.clone();
-        place.remove(1);
         let crossings = [0, 1].map(|side| {
             line.windows(2)
                 .filter_map(|pair| {
@@ -179,6 +175,5 @@ pub(super) fn of_maps(first: &ResultTable, keys: &[String], shared: &[SharedRow]
         });
         lines.insert(key, (place, crossings));
     }
-    let others = keys.iter().enumerate().filter(|(k, _)| *k != 1).map(|(_, key)| key.clone());
-    Some(moved(first, axis, others.collect(), lines))
+    Some(moved(first, &axis, others, lines))
 }

@@ -1,7 +1,7 @@
 //! One of two files, in memory.
 
 use super::{Flip, SharedRow};
-use crate::error::ResultsError;
+use crate::error::{Result, ResultsError};
 use sweep_files::{Cell, Column, ResultTable, Rows};
 
 /// Most cells of a file that are kept: two files of so many take some gigabytes.
@@ -12,7 +12,8 @@ const MOST_CELLS: u64 = 100_000_000;
 pub(super) struct Side {
     /// The keys' columns first.
     parts: Vec<Rows>,
-    rows: usize,
+    /// How many rows it has.
+    pub(super) rows: usize,
     keys: usize,
     columns: Vec<Column>,
 }
@@ -33,7 +34,7 @@ pub(super) fn keys(table: &ResultTable, is_boundary: bool) -> Vec<String> {
 }
 
 /// The value of a column that has one in all rows.
-pub(super) fn only_value(table: &ResultTable, name: &str) -> Result<Option<f64>, ResultsError> {
+pub(super) fn only_value(table: &ResultTable, name: &str) -> Result<Option<f64>> {
     let mut value = None;
     for rows in table.file().read(&[name])? {
         let rows = rows?;
@@ -53,11 +54,7 @@ impl Side {
     ///
     /// # Errors
     /// [`ResultsError::Refused`], [`ResultsError::File`].
-    pub(super) fn read(
-        table: &ResultTable,
-        other: &ResultTable,
-        keys: &[String],
-    ) -> Result<Self, ResultsError> {
+    pub(super) fn read(table: &ResultTable, other: &ResultTable, keys: &[String]) -> Result<Self> {
         let in_both = |column: &Column| {
             let beside = other.column(&column.name);
             let is_same = beside.is_some_and(|beside| beside.kind == column.kind);
@@ -77,11 +74,6 @@ impl Side {
         let parts = table.file().read(&names)?.collect::<Result<Vec<Rows>, _>>()?;
         let rows = parts.iter().map(|part| part.count).sum();
         Ok(Self { parts, rows, keys: keys.len(), columns })
-    }
-
-    /// How many rows it has.
-    pub(super) fn rows(&self) -> usize {
-        self.rows
     }
 
     /// The columns, each with its place in [`Side::cell`].

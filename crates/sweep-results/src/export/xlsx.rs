@@ -7,7 +7,7 @@ use serde_json::Value;
 use sweep_files::{dotted, key, leaves};
 
 use super::{Format, names, no_room};
-use crate::error::ResultsError;
+use crate::error::{Result, ResultsError};
 use sweep_files::{Cell, Column, ResultTable};
 
 /// Rows of a sheet, less the two of headings.
@@ -21,7 +21,7 @@ const WIDTHS: [usize; 2] = [12, 60];
 /// What a filter's button takes of a heading (characters).
 const BUTTON: usize = 3;
 
-pub(super) fn bytes(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
+pub(super) fn bytes(table: &ResultTable) -> Result<Vec<u8>> {
     let no_room = |reason: String| no_room(table, Format::Xlsx, &reason);
     if table.rows() > MOST_ROWS {
         let reason = format!("{} rows, and a sheet has room for {MOST_ROWS}", table.rows());
@@ -102,7 +102,7 @@ fn fill(
     sheet: &mut Sheet<'_>,
     table: &ResultTable,
     refused: impl Fn(XlsxError) -> ResultsError + Copy,
-) -> Result<(), ResultsError> {
+) -> Result<()> {
     let names = names(table);
     sheet.widths(names.iter().copied()).map_err(refused)?;
     sheet.row(names.iter().map(|name| text(name))).map_err(refused)?;
