@@ -1,7 +1,7 @@
 //! How the program ends, and why it could not go on.
 
 use std::borrow::Cow;
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -84,16 +84,6 @@ pub enum Error {
     /// A model that cannot do what was asked.
     #[error(transparent)]
     Model(Box<dyn std::error::Error + Send + Sync>),
-    /// An option whose value makes no sense here.
-    #[error("`{option} {given}`: expected {expected}")]
-    Option {
-        /// `"--every"`.
-        option: &'static str,
-        /// As typed.
-        given: String,
-        /// What it should have been.
-        expected: String,
-    },
     /// A file of this program's.
     #[error(transparent)]
     Files(#[from] FileError),
@@ -116,9 +106,9 @@ pub enum Error {
 }
 
 impl Error {
-    /// An option whose value makes no sense here.
-    pub fn option(option: &'static str, given: impl ToString, expected: impl Into<String>) -> Self {
-        Self::Option { option, given: given.to_string(), expected: expected.into() }
+    /// An option (`"--every"`) whose value, as typed, makes no sense here.
+    pub fn option(option: &str, given: impl Display, expected: impl Display) -> Self {
+        Self::Refused(format!("`{option} {given}`: expected {expected}"))
     }
 
     /// The process cannot listen to signals.
@@ -134,7 +124,7 @@ impl Error {
     /// The exit code it ends with.
     pub fn exit(&self) -> Exit {
         let is_refusal = match self {
-            Self::Input(_) | Self::Model(_) | Self::Option { .. } | Self::Refused(_) => true,
+            Self::Input(_) | Self::Model(_) | Self::Refused(_) => true,
             Self::Store(StoreError::Busy { .. }) => return Exit::Busy,
             Self::Store(error) => error.is_refusal(),
             Self::Files(error) => error.is_refusal(),
