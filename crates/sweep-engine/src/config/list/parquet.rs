@@ -96,14 +96,7 @@ fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Resu
 
 /// What the features of `parquet` in the workspace's Cargo.toml are for.
 const fn is_readable(codec: Compression) -> bool {
-    match codec {
-        Compression::UNCOMPRESSED
-        | Compression::SNAPPY
-        | Compression::ZSTD(_)
-        | Compression::GZIP(_)
-        | Compression::LZ4_RAW => true,
-        Compression::BROTLI(_) | Compression::LZ4 | Compression::LZO => false,
-    }
+    !matches!(codec, Compression::BROTLI(_) | Compression::LZ4 | Compression::LZO)
 }
 
 fn refused(refused: Refused) -> Unreadable {
