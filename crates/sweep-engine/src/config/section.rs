@@ -323,11 +323,10 @@ impl<'a> Section<'a> {
 }
 
 /// The mistake of a number that is written twice.
-pub fn twice(second: &Located<&str>, first: &Located<&str>) -> Diagnostic {
-    let title = if second.value == first.value {
-        format!("`{}` is given twice", second.value)
-    } else {
-        format!("`{}` and `{}` write the same number", first.value, second.value)
+pub fn twice(second: &Located<impl AsRef<str>>, first: &Located<impl AsRef<str>>) -> Diagnostic {
+    let title = match (second.value.as_ref(), first.value.as_ref()) {
+        (name, other) if name == other => format!("`{name}` is given twice"),
+        (name, other) => format!("`{other}` and `{name}` write the same number"),
     };
     Diagnostic::new(title)
         .at(&second.at, "expected each number once")
