@@ -19,6 +19,20 @@ pub enum Stopped {
     Failed(StoreError),
 }
 
+impl Stopped {
+    /// What a search has found; `None` where the interrupt stopped it.
+    ///
+    /// # Errors
+    /// An answer could not be kept.
+    pub fn found<T>(found: Result<T, Self>) -> Result<Option<T>, StoreError> {
+        match found {
+            Ok(found) => Ok(Some(found)),
+            Err(Self::Interrupted) => Ok(None),
+            Err(Self::Failed(error)) => Err(error),
+        }
+    }
+}
+
 /// The answer to a question: a number for each of its keys, `None` where it is null.
 pub type Answer = Vec<Option<f64>>;
 
