@@ -3,6 +3,7 @@
 use sweep_parameter::{Parameter as _, Range};
 
 use super::draft::{Claimed, Constant, Draft};
+use super::written::name_of;
 use super::{
     Diagnostic, Located, NamedValues, Read, Section, Written, quoted, sections::described,
 };
@@ -49,9 +50,7 @@ pub fn constants<M: Read>(
 /// more.
 pub fn point<M: Read>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
     let constants = arguments("--at", at, draft);
-    let named = |name: &str| {
-        at.iter().any(|argument| argument.split('=').next().is_some_and(|n| n.trim() == name))
-    };
+    let named = |name: &str| at.iter().any(|argument| name_of(argument) == name);
     for (k, axis) in std::mem::take(&mut draft.plan.axes).into_iter().enumerate() {
         if named(axis.parameter.name()) {
             continue;
