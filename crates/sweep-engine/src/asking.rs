@@ -1,12 +1,12 @@
 //! What a search asks of an engine, round by round, with a memory of the answers.
 
-use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::ThreadPool;
 
 use crate::store::{Done, Key, Trials};
+use crate::watch::Parts;
 use crate::{Engine, Interrupt, StoreError, ThreadsError, Watch, threads};
 use sweep_files::panics::{lock, unlocked};
 
@@ -17,6 +17,20 @@ pub enum Stopped {
     Interrupted,
     /// An answer could not be kept.
     Failed(StoreError),
+}
+
+impl Stopped {
+    /// What a search has found; `None` where the interrupt stopped it.
+    ///
+    /// # Errors
+    /// An answer could not be kept.
+    pub fn found<T>(found: Result<T, Self>) -> Result<Option<T>, StoreError> {
+        match found {
+            Ok(found) => Ok(Some(found)),
+            Err(Self::Interrupted) => Ok(None),
+            Err(Self::Failed(error)) => Err(error),
+        }
+    }
 }
 
 /// The answer to a question: a number for each of its keys, `None` where it is null.
@@ -78,17 +92,11 @@ impl<'a> Asking<'a> {
             Some((k as u64 * rows + row, values(k, row)))
         };
         let (answers, failure) = (Mutex::new(known), Mutex::new(None));
-        let parts = Mutex::new(BTreeMap::<usize, Vec<Done>>::new());
+        let parts = Parts::default();
         let keep = |done: Done| {
-            let k = (done.point / rows) as usize;
-            let whole = {
-                let mut parts = lock(&parts);
-                let part = parts.entry(k).or_default();
-                part.push(done);
-                if (part.len() as u64) < rows { None } else { parts.remove(&k) }
-            };
-            let Some(mut whole) = whole else { return };
-            whole.sort_by_key(|done| done.point);
+            let question = done.point / rows;
+            let Some(whole) = parts.add(question, rows, done) else { return };
+            let k = question as usize;
             let kept = answer(k, whole).and_then(|found| {
                 self.keep(&keys[k], &found)?;
                 Ok(found)

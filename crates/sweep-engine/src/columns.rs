@@ -219,14 +219,9 @@ pub fn run_columns<R: AsRef<Compared>>(statuses: Vec<&'static str>) -> Vec<Resul
     for (name, kind, count) in counts {
         for (k, model) in MODELS.into_iter().enumerate() {
             let text = format!("{kind} integration steps, {model} model");
+            let name = format!("{name}_{model}");
             let cell = move |row: &R| Some(count(row.as_ref())[k]);
-            columns.push(ResultColumn::new(
-                format!("{name}_{model}"),
-                "1",
-                text,
-                Kind::Count,
-                cell,
-            ));
+            columns.push(ResultColumn::new(name, "1", text, Kind::Count, cell));
         }
     }
     columns

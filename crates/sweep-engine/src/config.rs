@@ -147,17 +147,3 @@ fn resolve<M: Read, T>(
     plan.written = WrittenIn(report.written());
     report.finish((plan, finished))
 }
-
-/// Mistakes in expressions that an option or argument takes, each with its text.
-pub fn mistakes_in_expressions<'a>(
-    option: &str,
-    mistakes: impl IntoIterator<Item = (&'a str, sweep_results::Mistake)>,
-) -> Diagnostics {
-    let report = Report::default();
-    for (text, mistake) in mistakes {
-        let source = report.add(option, text);
-        let at = Location::new(source, mistake.span.clone());
-        report.push(Diagnostic::of_expression(mistake, &at));
-    }
-    report.into_diagnostics()
-}

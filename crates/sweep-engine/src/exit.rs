@@ -1,7 +1,6 @@
 //! How the program ends, and why it could not go on.
 
-use std::borrow::Cow;
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -84,16 +83,6 @@ pub enum Error {
     /// A model that cannot do what was asked.
     #[error(transparent)]
     Model(Box<dyn std::error::Error + Send + Sync>),
-    /// An option whose value makes no sense here.
-    #[error("`{option} {given}`: expected {expected}")]
-    Option {
-        /// `"--every"`.
-        option: &'static str,
-        /// As typed.
-        given: String,
-        /// What it should have been.
-        expected: String,
-    },
     /// A file of this program's.
     #[error(transparent)]
     Files(#[from] FileError),
@@ -116,9 +105,9 @@ pub enum Error {
 }
 
 impl Error {
-    /// An option whose value makes no sense here.
-    pub fn option(option: &'static str, given: impl ToString, expected: impl Into<String>) -> Self {
-        Self::Option { option, given: given.to_string(), expected: expected.into() }
+    /// An option (`"--every"`) whose value, as typed, makes no sense here.
+    pub fn option(option: &str, given: impl Display, expected: impl Display) -> Self {
+        Self::Refused(format!("`{option} {given}`: expected {expected}"))
     }
 
     /// The process cannot listen to signals.
@@ -134,7 +123,7 @@ impl Error {
     /// The exit code it ends with.
     pub fn exit(&self) -> Exit {
         let is_refusal = match self {
-            Self::Input(_) | Self::Model(_) | Self::Option { .. } | Self::Refused(_) => true,
+            Self::Input(_) | Self::Model(_) | Self::Refused(_) => true,
             Self::Store(StoreError::Busy { .. }) => return Exit::Busy,
             Self::Store(error) => error.is_refusal(),
             Self::Files(error) => error.is_refusal(),
@@ -178,10 +167,7 @@ fn is_unsafe(c: char) -> bool {
 }
 
 /// A text with some characters written as `\u001b`, which is their form in JSON too.
-fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> Cow<'_, str> {
-    if !text.contains(&is_bad) {
-        return Cow::Borrowed(text);
-    }
+fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         if is_bad(c) {
@@ -191,7 +177,7 @@ fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> Cow<'_, str> {
             safe.push(c);
         }
     }
-    Cow::Owned(safe)
+    safe
 }
 
 /// Writes what people read, or JSON, to standard output. What a file has put into it that is no
@@ -241,7 +227,7 @@ mod tests {
         let json = serde_json::json!({ "host": "a\u{9b}\x07b" }).to_string();
         let back: serde_json::Value = serde_json::from_str(&escaped(&json, is_unsafe)).unwrap();
         assert_eq!(back["host"], "a\u{9b}\x07b");
-        assert!(matches!(escaped("plain", is_unsafe), Cow::Borrowed("plain")));
+        assert_eq!(escaped("plain", is_unsafe), "plain");
     }
 
     #[test]

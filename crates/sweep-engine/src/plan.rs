@@ -124,27 +124,20 @@ impl AxisValues {
     /// # Panics
     /// If there are no values.
     pub fn value(&self, i: u64) -> f64 {
-        let at = |from: f64, to: f64, count: u64, between: &dyn Fn(f64, f64) -> f64| {
-            if i == 0 {
-                from
-            } else if i + 1 >= count {
-                to
-            } else {
-                between(i as f64, (count - 1) as f64)
-            }
-        };
-        match *self {
+        let (from, to, count) = match *self {
             Self::List(ref values) => {
                 let last = values.len() - 1;
-                values[usize::try_from(i).map_or(last, |i| i.min(last))]
+                return values[usize::try_from(i).map_or(last, |i| i.min(last))];
             }
-            Self::Linear { from, to, count } => {
-                at(from, to, count, &|i, last| i * ((to - from) / last) + from)
-            }
-            Self::Distributed(Distribution { from, to, .. }) => at(from, to, 2, &|_, _| to),
-            Self::Log { from, to, count } => at(from, to, count, &|i, last| {
-                from * libm::exp10(i * (libm::log10(to / from) / last))
-            }),
+            Self::Linear { from, to, count } | Self::Log { from, to, count } => (from, to, count),
+            Self::Distributed(Distribution { from, to, .. }) => (from, to, 2),
+        };
+        let (step, last) = (i as f64, (count - 1) as f64);
+        match self {
+            _ if i == 0 => from,
+            _ if i + 1 >= count => to,
+            Self::Log { .. } => from * libm::exp10(step * (libm::log10(to / from) / last)),
+            _ => step * ((to - from) / last) + from,
         }
     }
 

@@ -37,17 +37,19 @@ enum Shown {
 impl Progress {
     /// The progress of a run.
     pub fn new(mode: ProgressMode, total: u64, start: u64) -> Self {
-        Self::shown(mode, BAR, total, start, start)
+        let progress = Self::shown(mode, BAR, total, start);
+        progress.show(start);
+        progress
     }
 
     /// The progress of a search, whose points nobody can count beforehand. It counts rows up to
     /// this total, if there are rows. `start` points were there at the start.
     pub fn of_search(mode: ProgressMode, rows: u64, start: u64) -> Self {
         let template = if rows == 0 { POINTS } else { ROWS };
-        Self::shown(mode, template, rows, 0, start)
+        Self::shown(mode, template, rows, start)
     }
 
-    fn shown(mode: ProgressMode, template: &str, total: u64, position: u64, start: u64) -> Self {
+    fn shown(mode: ProgressMode, template: &str, total: u64, start: u64) -> Self {
         let lines = |seconds| {
             let every = Duration::from_secs(seconds);
             Shown::Lines { every, next: Instant::now() + every }
@@ -56,15 +58,13 @@ impl Progress {
             ProgressMode::None => Shown::Nothing,
             ProgressMode::Plain => lines(5),
             ProgressMode::Auto if std::io::stderr().is_terminal() => {
-                Shown::Bar(bar(template, total, position))
+                let target = ProgressDrawTarget::stderr_with_hz(8);
+                let bar = ProgressBar::with_draw_target(Some(total), target);
+                Shown::Bar(bar.with_style(style(template)))
             }
             ProgressMode::Auto => lines(60),
         };
-        let progress = Self { shown: Mutex::new(shown), total, start, began: Instant::now() };
-        if template == BAR {
-            progress.show(start);
-        }
-        progress
+        Self { shown: Mutex::new(shown), total, start, began: Instant::now() }
     }
 
     /// Shows that `done` points of the total are there.
@@ -150,14 +150,6 @@ const POINTS: &str = "{spinner} {msg}";
 
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
-}
-
-fn bar(template: &str, total: u64, start: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(8));
-    bar.set_style(style(template));
-    bar.set_position(start);
-    bar.reset_eta();
-    bar
 }
 
 /// A duration as people say it: `0.42 s`, `12 s`, `3 min 20 s`, `5 h 02 min`.

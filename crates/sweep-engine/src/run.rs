@@ -6,7 +6,7 @@
 //! their way to the disk, then about 40 MB for the join; nothing grows with the number of points
 //! but one set entry a chunk.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -18,8 +18,9 @@ use crate::interrupt::Interrupt;
 use crate::store::provenance::{self, Session};
 use crate::store::{Done, OpenOptions, OpenRun, Opened, ResultFile, Shard, ShardRequest, Tally};
 use crate::threads::{self};
-use crate::{Engine, Environment, Job, Progress, ProgressMode, StoreError, ThreadsError, Watch};
-use sweep_files::panics::{self, lock};
+use crate::watch::Parts;
+use crate::{Engine, Environment, Job, Progress, ProgressMode, StoreError, Watch};
+use sweep_files::panics::{self, lock, unlocked};
 
 /// How to run.
 #[derive(Clone, Copy)]
@@ -100,7 +101,8 @@ pub fn run(
     }
     let (began, started_unix_s) = (Instant::now(), provenance::now_unix_s());
     let progress = Progress::new(options.progress, points, there);
-    let result = compute_and_join(engine, job, &mut run, threads, &progress, interrupt);
+    let work = Work { engine, job, threads, progress: &progress, interrupt };
+    let result = work.compute_and_join(&mut run);
     progress.finish();
     let wall_s = began.elapsed().as_secs_f64();
     let computed = run.own_points().1.saturating_sub(there);
@@ -145,131 +147,124 @@ pub fn run(
     }
 }
 
-/// Computes what is missing and joins the whole; `None` for a shard, or when a signal stopped it.
-fn compute_and_join(
-    engine: &dyn Engine,
-    job: &Job<'_>,
-    run: &mut OpenRun,
+/// What works on a run, and for whom.
+struct Work<'a> {
+    engine: &'a dyn Engine,
+    job: &'a Job<'a>,
     threads: usize,
-    progress: &Progress,
-    interrupt: &Interrupt,
-) -> Result<Option<Tally>, StoreError> {
-    let mut attempts_left = 2;
-    loop {
-        compute(engine, job, run, threads, progress, interrupt)?;
-        if interrupt.stopped() || run.shard().is_some() {
-            return Ok(None);
-        }
-        progress.joining();
-        match run.join(job, &|| interrupt.stopped()) {
-            // A chunk that was whole a moment ago is not any more: compute it again, but not for
-            // ever.
-            Err(StoreError::Incomplete { .. }) if attempts_left > 0 => attempts_left -= 1,
-            result => return result,
-        }
-    }
+    progress: &'a Progress,
+    interrupt: &'a Interrupt,
 }
 
-/// Computes and keeps every missing chunk of this process's part, or as many as a signal or an
-/// error lets.
-fn compute(
-    engine: &dyn Engine,
-    job: &Job<'_>,
-    run: &OpenRun,
-    threads: usize,
-    progress: &Progress,
-    interrupt: &Interrupt,
-) -> Result<(), StoreError> {
-    let pool = threads::pool(threads)?;
-    let watch = Watch::new(interrupt);
-    let (_, start) = run.own_points();
-    // Bounded, so that a disk slower than the engine holds the engine up instead of filling memory.
-    let (sender, receiver) = sync_channel(threads);
-    let hand = Hand::new(run, sender);
-    let mut result = Ok(());
-    std::thread::scope(|scope| {
-        let (watch, pool) = (&watch, &pool);
-        let work = move || pool.install(|| hand.fill(engine, job, watch));
-        // Where it cannot be started, the sender goes with it, and the loop below ends.
-        let work = match std::thread::Builder::new().spawn_scoped(scope, work) {
-            Ok(work) => Some(work),
-            Err(error) => {
-                result = Err(ThreadsError::start(threads + 1)(&error).into());
-                None
-            }
-        };
+impl Work<'_> {
+    /// Computes what is missing and joins the whole; `None` for a shard, or when a signal stopped
+    /// it.
+    fn compute_and_join(&self, run: &mut OpenRun) -> Result<Option<Tally>, StoreError> {
+        let stopped = || self.interrupt.stopped();
+        let mut attempts_left = 2;
         loop {
-            match receiver.recv_timeout(Duration::from_millis(100)) {
-                Ok((chunk, outcomes)) => {
-                    if let Err(error) = run.write_chunk(chunk, outcomes) {
-                        // A chunk that makes no sense costs itself; a disk that fails would cost
-                        // them all.
-                        if !matches!(error, StoreError::Engine { .. }) {
-                            watch.abort();
-                        }
-                        result = std::mem::replace(&mut result, Ok(())).and(Err(error));
-                    }
-                }
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break,
+            self.compute(run)?;
+            if stopped() || run.shard().is_some() {
+                return Ok(None);
             }
-            progress.show(start + watch.points_done());
+            self.progress.joining();
+            match run.join(self.job, &stopped) {
+                // A chunk that was whole a moment ago is not any more: compute it again, but not
+                // for ever.
+                Err(StoreError::Incomplete { .. }) if attempts_left > 0 => attempts_left -= 1,
+                result => return result,
+            }
         }
-        if let Some(Ok(Err(error))) = work.map(std::thread::ScopedJoinHandle::join) {
-            result = std::mem::replace(&mut result, Ok(())).and(Err(error));
-        }
-    });
-    result
+    }
+
+    /// Computes and keeps every missing chunk of this process's part, or as many as a signal or an
+    /// error lets.
+    fn compute(&self, run: &OpenRun) -> Result<(), StoreError> {
+        let pool = threads::pool(self.threads)?;
+        let watch = Watch::new(self.interrupt);
+        let (_, start) = run.own_points();
+        // Bounded, so that a disk slower than the engine holds the engine up instead of filling
+        // memory.
+        let (sender, receiver) = sync_channel(self.threads);
+        let hand = Hand::new(self, run, &watch, sender);
+        let filled = Mutex::new(Ok(()));
+        let kept = pool.in_place_scope(|scope| {
+            scope.spawn(|_| *lock(&filled) = hand.fill());
+            let mut kept = Ok(());
+            loop {
+                match receiver.recv_timeout(Duration::from_millis(100)) {
+                    Ok((chunk, outcomes)) => {
+                        if let Err(error) = run.write_chunk(chunk, outcomes) {
+                            // A chunk that makes no sense costs itself; a disk that fails would
+                            // cost them all.
+                            if !matches!(error, StoreError::Engine { .. }) {
+                                watch.abort();
+                            }
+                            kept = kept.and(Err(error));
+                        }
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => return kept,
+                }
+                self.progress.show(start + watch.points_done());
+            }
+        });
+        kept.and(unlocked(filled))
+    }
 }
 
 /// Chunks in hand: points go out one by one, outcomes come back in any order, whole chunks go on.
 struct Hand<'a> {
+    work: &'a Work<'a>,
     run: &'a OpenRun,
+    watch: &'a Watch<'a>,
     /// Points of missing chunks that have not gone out.
     left: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
     /// Outcomes of chunks that are not whole, those of an interrupted process among them.
-    parts: Mutex<BTreeMap<u64, Vec<Done>>>,
+    parts: Parts,
     whole: SyncSender<(u64, Vec<Done>)>,
 }
 
 impl<'a> Hand<'a> {
-    fn new(run: &'a OpenRun, whole: SyncSender<(u64, Vec<Done>)>) -> Self {
+    fn new(
+        work: &'a Work<'a>,
+        run: &'a OpenRun,
+        watch: &'a Watch<'a>,
+        whole: SyncSender<(u64, Vec<Done>)>,
+    ) -> Self {
         let parts = run.take_parts();
         let there: BTreeSet<u64> = parts.values().flatten().map(|outcome| outcome.point).collect();
         let missing = (0..run.chunks()).filter(|&chunk| run.is_missing(chunk));
         let left = missing.flat_map(|chunk| run.chunk_range(chunk));
         let left = left.filter(move |point| !there.contains(point));
-        Self { run, left: Mutex::new(Box::new(left)), parts: Mutex::new(parts), whole }
+        let (left, parts) = (Mutex::new(Box::new(left) as Box<_>), Parts(Mutex::new(parts)));
+        Self { work, run, watch, left, parts, whole }
     }
 
     /// Has the engine evaluate everything that is missing, and keeps what there is of chunks that
     /// did not become whole.
-    fn fill(self, engine: &dyn Engine, job: &Job<'_>, watch: &Watch<'_>) -> Result<(), StoreError> {
-        let evaluated = self.evaluate(engine, job, watch);
-        let parts = std::mem::take(&mut *lock(&self.parts));
+    fn fill(self) -> Result<(), StoreError> {
+        let evaluated = self.evaluate();
         // A part that makes no sense costs itself.
+        let parts = std::mem::take(&mut *lock(&self.parts.0));
         let kept = parts.into_iter().map(|(chunk, part)| self.run.write_chunk(chunk, part));
         kept.fold(evaluated, Result::and)
     }
 
-    fn evaluate(
-        &self,
-        engine: &dyn Engine,
-        job: &Job<'_>,
-        watch: &Watch<'_>,
-    ) -> Result<(), StoreError> {
+    fn evaluate(&self) -> Result<(), StoreError> {
+        let Work { engine, job, .. } = self.work;
         let next = || {
-            let point = if watch.stopped() { None } else { lock(&self.left).next() }?;
+            let point = if self.watch.stopped() { None } else { lock(&self.left).next() }?;
             Some((point, (job.axis_values)(point)))
         };
-        let keep = |outcome| self.keep(outcome, watch);
-        let panic = catch_unwind(AssertUnwindSafe(|| engine.evaluate(&next, &keep, watch))).err();
-        let reason = match panic {
-            Some(panic) => format!("the engine panicked: {}", panics::text(panic.as_ref())),
-            None if watch.stopped() => return Ok(()),
-            None => "the engine put its work down unasked".to_owned(),
+        let keep = |outcome| self.keep(outcome);
+        let evaluate = || engine.evaluate(&next, &keep, self.watch);
+        let reason = match catch_unwind(AssertUnwindSafe(evaluate)) {
+            Err(panic) => format!("the engine panicked: {}", panics::text(panic.as_ref())),
+            Ok(()) if self.watch.stopped() => return Ok(()),
+            Ok(()) => "the engine put its work down unasked".to_owned(),
         };
-        let parts = lock(&self.parts);
+        let parts = lock(&self.parts.0);
         let unfinished = parts.keys().next().map(|&chunk| self.run.chunk_range(chunk));
         let untouched = lock(&self.left).next().map(|point| point..point + 1);
         match unfinished.or(untouched) {
@@ -280,21 +275,14 @@ impl<'a> Hand<'a> {
         }
     }
 
-    fn keep(&self, outcome: Done, watch: &Watch<'_>) {
-        watch.done(1);
+    fn keep(&self, outcome: Done) {
+        self.watch.done(1);
         let chunk = self.run.chunk_of(outcome.point);
         let points = self.run.chunk_range(chunk);
-        let mut parts = lock(&self.parts);
-        let part = parts.entry(chunk).or_default();
-        part.push(outcome);
-        if (part.len() as u64) < points.end - points.start {
-            return;
+        if let Some(outcomes) = self.parts.add(chunk, points.end - points.start, outcome) {
+            // The receiver outlives the engine's work.
+            let _ = self.whole.send((chunk, outcomes));
         }
-        let mut outcomes = parts.remove(&chunk).unwrap_or_default();
-        drop(parts);
-        outcomes.sort_by_key(|outcome| outcome.point);
-        // The receiver outlives the engine's work.
-        let _ = self.whole.send((chunk, outcomes));
     }
 }
 

@@ -48,11 +48,6 @@ pub enum ThreadsError {
 }
 
 impl ThreadsError {
-    /// How the system refuses so many.
-    pub fn start(threads: usize) -> impl Fn(&dyn std::fmt::Display) -> Self {
-        move |reason| Self::Start { threads, reason: reason.to_string() }
-    }
-
     /// Whether the number asked for, or the scheduler's variable, is wrong.
     pub fn is_refusal(&self) -> bool {
         matches!(self, Self::Scheduler { .. } | Self::Asked { .. })
@@ -106,7 +101,7 @@ pub fn pool(threads: usize) -> Result<ThreadPool, ThreadsError> {
         .num_threads(threads)
         .thread_name(|i| format!("sweep-{i}"))
         .build()
-        .map_err(|error| ThreadsError::start(threads)(&error))
+        .map_err(|error| ThreadsError::Start { threads, reason: error.to_string() })
 }
 
 #[cfg(test)]

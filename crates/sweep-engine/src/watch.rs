@@ -1,9 +1,12 @@
 //! What passes between the engine and its caller: whether to stop, and how many points are done.
 
+use std::collections::BTreeMap;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::interrupt::Interrupt;
 use crate::store::Done;
+use sweep_files::panics::lock;
 
 /// Gives a row: what it is known by, and the values of the plan's axes there.
 pub type NextRow<'a> = dyn Fn() -> Option<(u64, Vec<f64>)> + Sync + 'a;
@@ -58,5 +61,25 @@ impl<'a> Watch<'a> {
     /// Whether the engine is to stop.
     pub fn stopped(&self) -> bool {
         self.interrupt.stopped() || self.abort.load(Ordering::Relaxed)
+    }
+}
+
+/// Outcomes in groups that are not whole, by the group's number.
+#[derive(Debug, Default)]
+pub struct Parts(pub Mutex<BTreeMap<u64, Vec<Done>>>);
+
+impl Parts {
+    /// Adds an outcome to its group; where that makes it whole, of so many, all of them in order.
+    pub fn add(&self, group: u64, whole: u64, outcome: Done) -> Option<Vec<Done>> {
+        let mut parts = lock(&self.0);
+        let part = parts.entry(group).or_default();
+        part.push(outcome);
+        if (part.len() as u64) < whole {
+            return None;
+        }
+        let mut outcomes = parts.remove(&group)?;
+        drop(parts);
+        outcomes.sort_by_key(|outcome| outcome.point);
+        Some(outcomes)
     }
 }

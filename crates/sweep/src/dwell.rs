@@ -122,7 +122,7 @@ impl Search {
     /// Refuses what is out of bounds.
     ///
     /// # Errors
-    /// [`Error::Option`].
+    /// [`Error::Refused`].
     pub(crate) fn check(&self) -> Result<(), Error> {
         if !(1..=Self::MOST_STARTS).contains(&self.starts) {
             return Err(Error::option("starts", self.starts, "a number from 1 to 1024"));

@@ -28,7 +28,7 @@ const AT_ONCE: [u64; 2] = [32, 2048];
 /// is what gave the speeds.
 ///
 /// # Errors
-/// [`Error::Option`].
+/// [`Error::Refused`].
 pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<(), Error> {
     let refuse = |expected: String| Err(Error::option(option, given, expected));
     for axis in &plan.axes {

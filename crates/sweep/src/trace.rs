@@ -102,7 +102,7 @@ pub(crate) fn start_of(values: &[StartValue]) -> Start {
 /// points of a plan.
 ///
 /// # Errors
-/// [`Error::Option`].
+/// [`Error::Refused`].
 pub(crate) fn every(every_s: Option<f64>, plan: &Plan) -> Result<Option<f64>, Error> {
     let points = plan.points();
     let Some(every_s) = every_s else {

@@ -78,18 +78,14 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let began = Instant::now();
     let effort = args.effort.with(&interrupt);
     let (found, trials) = search(&task, Some(trials), effort)?;
-    let found = match found {
-        Ok(found) => found,
-        Err(Stopped::Failed(error)) => return Err(error.into()),
-        Err(Stopped::Interrupted) => {
-            let kept = trials.map_or(0, |trials| trials.count());
-            let wall = duration(began.elapsed().as_secs_f64());
-            let mut text =
-                format!("{}: interrupted with {kept} points kept, after {wall}\n", plan.name);
-            text.line("go on", "the same command");
-            tell(text.trim_end());
-            return Ok(Exit::interrupted(interrupt.signal()));
-        }
+    let Some(found) = found else {
+        let kept = trials.map_or(0, |trials| trials.count());
+        let wall = duration(began.elapsed().as_secs_f64());
+        let mut text =
+            format!("{}: interrupted with {kept} points kept, after {wall}\n", plan.name);
+        text.line("go on", "the same command");
+        tell(text.trim_end());
+        return Ok(Exit::interrupted(interrupt.signal()));
     };
     let bytes = task.table(&found).into_bytes();
     file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;
@@ -165,15 +161,16 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
     text
 }
 
-/// Searches, with a memory of trials if there is one, and gives it back.
+/// Searches, with a memory of trials if there is one, and gives it back; nothing is found where the
+/// interrupt was raised.
 ///
 /// # Errors
-/// No threads; `SWEEP_SIMD` naming nothing this machine has.
+/// No threads; `SWEEP_SIMD` naming nothing this machine has; trials that could not be kept.
 pub fn search<M: Swept>(
     task: &BoundaryTask<M>,
     trials: Option<Trials>,
     effort: Effort<'_>,
-) -> Result<(Result<Traced, Stopped>, Option<Trials>), Error> {
+) -> Result<(Option<Traced>, Option<Trials>), Error> {
     let there = trials.as_ref().map_or(0, |trials| trials.count() as u64);
     let rows = (task.firsts.len() * task.curves) as u64;
     let rows_done = AtomicU64::new(0);
@@ -186,5 +183,5 @@ pub fn search<M: Swept>(
     let mut standing = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
     let found = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
     progress.finish();
-    Ok((found, models.asking.into_trials()))
+    Ok((Stopped::found(found)?, models.asking.into_trials()))
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{GridArgs, short};
+use crate::config::section::counted;
 use crate::design::{Design, Distribution};
 use crate::estimate::size;
 use crate::{Axis, AxisValues, Error, Estimate, Exit, Plan, Swept, duration, show, tell, threads};
@@ -65,8 +66,8 @@ fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
     line("verdict", format!("reliable where every ratio is below {most}{least}{criterion}"));
     line("output", format!("results/{}.parquet", plan.name));
     let Estimate { threads, simd, .. } = estimate;
-    let plural = plural(*threads as u64);
-    line("runs on", format!("{threads} thread{plural}, instruction set {simd}"));
+    let threads = counted(*threads, "thread");
+    line("runs on", format!("{threads}, instruction set {simd}"));
     line("takes", took(plan, estimate));
     let [memory, disk, result] =
         [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(size);
@@ -77,18 +78,13 @@ fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
 
 /// The time, and what it was reckoned from.
 fn took<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
-    let (points, whole) = (estimate.sampled_points, estimate.sampled_s >= plan.end_s);
-    let part =
-        if whole { String::new() } else { format!(", the first {} s each", estimate.sampled_s) };
+    let part = match estimate.sampled_s {
+        whole if whole >= plan.end_s => String::new(),
+        part => format!(", the first {part} s each"),
+    };
+    let points = counted(estimate.sampled_points as usize, "point");
     let about = duration(estimate.wall_s);
-    format!(
-        "about {about}: an estimate, from {points} point{} integrated just now{part}",
-        plural(points)
-    )
-}
-
-fn plural(count: u64) -> &'static str {
-    if count == 1 { "" } else { "s" }
+    format!("about {about}: an estimate, from {points} integrated just now{part}")
 }
 
 fn describe<M: Swept>(axis: &Axis<M>, design: Option<&Design>) -> String {

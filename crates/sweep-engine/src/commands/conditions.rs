@@ -1,6 +1,6 @@
 //! Conditions as several subcommands take them.
 
-use crate::config::{self, Diagnostics};
+use crate::config::{Diagnostic, Diagnostics, Location, Report};
 use crate::exit::Error;
 use sweep_results::{Condition, ResultTable};
 
@@ -13,19 +13,23 @@ pub fn parse(
     texts: &[String],
     table: &ResultTable,
 ) -> Result<Vec<Condition>, Diagnostics> {
-    let parsed: Vec<_> = texts.iter().map(|text| Condition::parse(text, table)).collect();
-    if parsed.iter().all(Result::is_ok) {
-        return Ok(parsed.into_iter().flatten().collect());
-    }
-    let wrong = texts.iter().zip(parsed);
-    let mistakes = wrong.filter_map(|(text, parsed)| Some((text.as_str(), parsed.err()?)));
-    Err(config::mistakes_in_expressions(option, mistakes))
+    let report = Report::default();
+    let parse = |text: &String| match Condition::parse(text, table) {
+        Ok(condition) => Some(condition),
+        Err(mistake) => {
+            let at = Location::new(report.add(option, text.as_str()), mistake.span.clone());
+            report.push(Diagnostic::of_expression(mistake, &at));
+            None
+        }
+    };
+    let parsed = texts.iter().filter_map(parse).collect();
+    report.finish(parsed)
 }
 
 /// The condition of `--where`, which chooses rows.
 ///
 /// # Errors
-/// Mistakes in it; [`Error::Option`] for one of the file as a whole.
+/// Mistakes in it; [`Error::Refused`] for one of the file as a whole.
 pub fn of_rows(text: Option<&String>, table: &ResultTable) -> Result<Option<Condition>, Error> {
     let condition = parse("--where", text.map_or(&[], std::slice::from_ref), table)?.pop();
     if let Some(Condition { text, .. }) = condition.as_ref().filter(|one| one.has_folds()) {

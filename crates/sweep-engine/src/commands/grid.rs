@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::config::written::name_of;
 use crate::config::{self, NamedValues};
 use crate::{Diagnostics, GridInput, Plan, Read, program, tell};
 
@@ -64,8 +65,7 @@ impl GridArgs {
 
     /// Says so where `--set end_s` leaves the window's end where the grid file puts it.
     fn tell_window<M: Read>(&self, plan: &Plan<M>) {
-        let is_set =
-            |name| self.sets.iter().any(|set| set.split('=').next().map(str::trim) == Some(name));
+        let is_set = |name| self.sets.iter().any(|set| name_of(set) == name);
         let ([from, to], end_s) = (plan.window_s, plan.end_s);
         if is_set("end_s") && !is_set("window_to_s") && to < end_s {
             tell(&format!(

@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use super::cells::table as text_table;
 use super::{Lines as _, installed, word};
-use crate::asking::Stopped;
 use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
@@ -77,14 +76,10 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let effort = args.effort.with(&interrupt);
     let (tried, trials) = search(&study, Some(trials), effort)?;
     let wall_s = began.elapsed().as_secs_f64();
-    let tried = match tried {
-        Ok(tried) => tried,
-        Err(Stopped::Failed(error)) => return Err(error.into()),
-        Err(Stopped::Interrupted) => {
-            let wall = duration(wall_s);
-            tell(&format!("{}: interrupted after {wall}; the same command goes on", study.name));
-            return Ok(Exit::interrupted(interrupt.signal()));
-        }
+    let Some(tried) = tried else {
+        let wall = duration(wall_s);
+        tell(&format!("{}: interrupted after {wall}; the same command goes on", study.name));
+        return Ok(Exit::interrupted(interrupt.signal()));
     };
     let bytes = table(&study, &tried).into_bytes();
     file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;

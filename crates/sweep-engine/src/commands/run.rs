@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{Lines as _, ResultArgs, short};
+use crate::config::section::counted;
 use crate::progress::per_second;
 use crate::run::{self as runner, Ended, RunOptions, RunReport};
 use crate::store::read::{DwellCounts, FAR_OFF, failed, failures};
@@ -199,8 +200,8 @@ impl RunCommand<'_> {
 fn work(session: &Session) -> String {
     let Session { points, threads, simd, .. } = session;
     let (wall, rate) = (duration(session.wall_s), per_second(session.points_per_s));
-    let plural = if *threads == 1 { "" } else { "s" };
-    format!("{points} points in {wall}, {rate} on {threads} thread{plural} ({simd})")
+    let threads = counted(*threads, "thread");
+    format!("{points} points in {wall}, {rate} on {threads} ({simd})")
 }
 
 /// A result's rows: verdicts, failures, extremes. At most six lines.

@@ -1,33 +1,26 @@
 //! Axes: parameters with the values that a grid, a design or a list gives them.
 
-use std::borrow::Cow;
-use std::collections::BTreeMap;
-
 use sweep_parameter::{Parameter as _, Range, decimal};
 
+use super::draft::Claimed;
 use super::list::{self, List};
 use super::parameters::find;
 use super::report::{Diagnostic, Report};
-use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number, twice};
+use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number};
 use crate::design::{MOST_AXES, REACH, Rule, Shape};
 use crate::plan::MOST_POINTS;
 use crate::{Axis, AxisValues, Design, Distribution};
-
-/// What axes write so far, by the single numbers.
-type Swept = BTreeMap<Cow<'static, str>, Located<String>>;
 
 /// Takes note that an axis writes this parameter's numbers; not if another one does.
 fn claim<M: Read>(
     name: &Located<&str>,
     parameter: &M::Parameter,
-    swept: &mut Swept,
+    swept: &mut Claimed,
     draft: &Draft<'_, M>,
 ) -> bool {
     let report = draft.report;
     let parts = draft.plan.model.parts(parameter);
-    if let Some(first) = parts.iter().find_map(|part| swept.get(part)) {
-        let first = Located { value: first.value.as_str(), at: first.at.clone() };
-        report.push(twice(name, &first));
+    if !swept.claim(name, parts.clone(), report) {
         return false;
     }
     for constant in &draft.constants {
@@ -41,8 +34,6 @@ fn claim<M: Read>(
             report.push(diagnostic.at(&name.at, "swept here"));
         }
     }
-    let own = Located { value: name.value.to_owned(), at: name.at.clone() };
-    swept.extend(parts.into_iter().map(|part| (part, own.clone())));
     true
 }
 
@@ -56,7 +47,7 @@ fn is_fixed<M: Read>(parameter: &M::Parameter, draft: &Draft<'_, M>) -> bool {
 /// Reads every `[[axis]]`: of a grid, or of a design that fills a box: a range each, without a
 /// count.
 pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Draft<'_, M>) {
-    let (report, mut swept) = (root.report, Swept::new());
+    let (report, mut swept) = (root.report, Claimed::default());
     let sections = root.tables("axis");
     if let (Some(design), Some(at)) = (&design, report.place("design")) {
         let most = if matches!(design, Design::Spread { rule: Rule::Sobol, .. }) {
@@ -124,7 +115,7 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
         let expected = "the columns of the list are the axes; remove this";
         report.refuse::<()>(section.at(), "an [[axis]] beside a list of points", expected);
     }
-    let mut swept = Swept::new();
+    let mut swept = Claimed::default();
     for (k, column) in std::mem::take(&mut list.table.columns).into_iter().enumerate() {
         let name = Located { value: column.name.value.as_str(), at: column.name.at.clone() };
         if name.value == list::ID {

@@ -5,6 +5,7 @@ use super::keys::Options;
 use super::sections::{described, sections, walk};
 use super::source::{Location, is_blank};
 use super::syntax::{self, parse};
+use super::written::name_of;
 use super::{
     Diagnostic, Field, GridInput, Keys, Read, Report, Section, Walk, axes, design, list, parameters,
 };
@@ -34,7 +35,7 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
     sections(&mut draft.plan, &mut keys, Some(input));
     let names = described::<M>().set;
     let (options, sets): (Vec<&String>, _) =
-        sets.iter().partition(|argument| is_of(argument, &names));
+        sets.iter().partition(|set| set.contains('=') && names.contains(&name_of(set)));
     parameters::constants(keys.section()?, sets, at, &mut draft);
     let written = design::walk(&mut draft.plan.design, &mut keys);
     let root = keys.section()?;
@@ -52,9 +53,4 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
     walk(&mut draft.plan, &mut Keys::new(Walk::Set(&options)));
     draft.plan.set.extend(options.changed.into_inner());
     Some(draft)
-}
-
-/// Whether an argument NAME=VALUE has one of these names.
-fn is_of(argument: &str, names: &[&str]) -> bool {
-    argument.split_once('=').is_some_and(|(name, _)| names.contains(&name.trim()))
 }

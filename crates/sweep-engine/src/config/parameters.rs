@@ -1,26 +1,17 @@
 //! Constants (`[set]`, `--set`, `--at`): names from the parameter table with a value each.
 
-use std::borrow::Cow;
-use std::collections::BTreeMap;
-
 use sweep_parameter::{Parameter as _, Range};
 
-use super::draft::{Draft, WrittenConstant};
+use super::draft::{Claimed, Constant, Draft};
+use super::written::name_of;
 use super::{
-    Diagnostic, Located, NamedValues, Read, Section, Written, quoted, sections::described, twice,
+    Diagnostic, Located, NamedValues, Read, Section, Written, quoted, sections::described,
 };
 use crate::{Plan, UnknownParameter, program};
 
 /// Names offered as the nearest one; a machine of thousands of springs has more than a reader wants
 /// compared.
 const COMPARED: usize = 400;
-
-/// A name with its value, and the numbers it writes.
-struct Constant<'a, M: Read> {
-    name: Located<&'a str>,
-    parameter: M::Parameter,
-    value: Located<f64>,
-}
 
 /// Reads `[set]`, then `--set` and `--at`, which override it, and writes all into the plan.
 pub fn constants<M: Read>(
@@ -34,16 +25,16 @@ pub fn constants<M: Read>(
         let section = section.value;
         for name in section.names() {
             let number = |range: Range| section.number_named(name.value, range);
-            constants.extend(constant(name.clone(), number, draft));
+            constants.extend(constant(name.clone(), number, false, draft));
         }
-        apply(&constants, false, draft);
+        apply(&constants, draft);
     }
     let mut constants = arguments("--set", sets, draft);
     constants.extend(arguments("--at", at, draft));
     let before = draft.plan.clone();
-    apply(&constants, true, draft);
+    apply(&constants, draft);
     // What is set to what it was leaves the plan as it was.
-    let changes = |constant: &&Constant<'_, M>| {
+    let changes = |constant: &&Constant<M>| {
         let mut after = before.clone();
         write(&constant.parameter, &mut after, constant.value.value);
         after != before
@@ -51,7 +42,7 @@ pub fn constants<M: Read>(
     draft.plan.set = constants
         .iter()
         .filter(changes)
-        .map(|constant| (constant.name.value.to_owned(), constant.value.value.into()))
+        .map(|constant| (constant.name.value.clone(), constant.value.value.into()))
         .collect();
 }
 
@@ -59,9 +50,7 @@ pub fn constants<M: Read>(
 /// more.
 pub fn point<M: Read>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
     let constants = arguments("--at", at, draft);
-    let named = |name: &str| {
-        at.iter().any(|argument| argument.split('=').next().is_some_and(|n| n.trim() == name))
-    };
+    let named = |name: &str| at.iter().any(|argument| name_of(argument) == name);
     for (k, axis) in std::mem::take(&mut draft.plan.axes).into_iter().enumerate() {
         if named(axis.parameter.name()) {
             continue;
@@ -71,18 +60,13 @@ pub fn point<M: Read>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
         } else if let Some(place) = draft.report.place(&format!("axis[{k}]")) {
             let name = axis.parameter.name();
             let title = format!("a point of the grid needs a value of `{name}`");
-            draft.report.push(
-                Diagnostic::new(title)
-                    .at(&place, format!("expected --at {name}=VALUE for this axis")),
-            );
+            let expected = format!("expected --at {name}=VALUE for this axis");
+            draft.report.refuse::<()>(&place, title, expected);
         }
     }
     draft.plan.design = None;
-    apply(&constants, true, draft);
-    constants
-        .iter()
-        .map(|constant| (constant.name.value.to_owned(), constant.value.value))
-        .collect()
+    apply(&constants, draft);
+    constants.into_iter().map(|constant| (constant.name.value, constant.value.value)).collect()
 }
 
 /// Reads NAME=VALUE arguments.
@@ -90,31 +74,30 @@ fn arguments<'a, M: Read>(
     option: &str,
     arguments: impl IntoIterator<Item = &'a String>,
     draft: &Draft<'a, M>,
-) -> Vec<Constant<'a, M>> {
+) -> Vec<Constant<M>> {
     let written = arguments.into_iter().filter_map(|one| Written::read(option, one, draft.report));
-    let constant = |one: Written<'a>| constant(one.name.clone(), |range| one.number(range), draft);
+    let constant =
+        |one: Written<'a>| constant(one.name.clone(), |range| one.number(range), true, draft);
     written.filter_map(constant).collect()
 }
 
 /// A constant if its name is right and `number` has one in the parameter's range.
-fn constant<'a, M: Read>(
-    name: Located<&'a str>,
+fn constant<M: Read>(
+    name: Located<&str>,
     number: impl FnOnce(Range) -> Option<Located<f64>>,
+    is_over_file: bool,
     draft: &Draft<'_, M>,
-) -> Option<Constant<'a, M>> {
+) -> Option<Constant<M>> {
     let parameter = find(&name, draft)?;
-    let value = number(parameter.range())?;
-    Some(Constant { name, parameter, value })
+    let (value, parts) = (number(parameter.range())?, draft.plan.model.parts(&parameter));
+    let name = Located { value: name.value.to_owned(), at: name.at };
+    Some(Constant { name, parameter, value, parts, is_over_file })
 }
 
 /// The parameter of this name.
 pub fn find<M: Read>(name: &Located<&str>, draft: &Draft<'_, M>) -> Option<M::Parameter> {
-    let error = match draft.plan.model.find(name.value) {
-        Ok(parameter) => return Some(parameter),
-        Err(error) => error,
-    };
-    draft.report.push_with(|_| unknown(name, &error, &draft.plan.model));
-    None
+    let refuse = |error| draft.report.push_with(|_| unknown(name, &error, &draft.plan.model));
+    draft.plan.model.find(name.value).map_err(refuse).ok()
 }
 
 /// The mistake of a name that is no parameter.
@@ -145,24 +128,16 @@ pub fn unknown<M: Read>(
     }
 }
 
-/// Writes constants of equal rank; no number may be written twice, as nothing says which comes
-/// last.
-fn apply<M: Read>(constants: &[Constant<'_, M>], is_over_file: bool, draft: &mut Draft<'_, M>) {
-    let mut written: BTreeMap<Cow<'static, str>, &Constant<'_, M>> = BTreeMap::new();
+/// Writes constants of equal rank.
+fn apply<M: Read>(constants: &[Constant<M>], draft: &mut Draft<'_, M>) {
+    let mut claimed = Claimed::default();
     for constant in constants {
-        let parts = draft.plan.model.parts(&constant.parameter);
-        match parts.iter().find_map(|part| written.get(part)) {
-            Some(first) => draft.report.push(twice(&constant.name, &first.name)),
-            None => {
-                write(&constant.parameter, &mut draft.plan, constant.value.value);
-                for part in &parts {
-                    draft.report.put(part.clone().into_owned(), constant.value.at.clone());
-                    written.insert(part.clone(), constant);
-                }
-                let name =
-                    Located { value: constant.name.value.to_owned(), at: constant.name.at.clone() };
-                draft.constants.push(WrittenConstant { name, parts, is_over_file });
+        if claimed.claim(&constant.name, constant.parts.clone(), draft.report) {
+            write(&constant.parameter, &mut draft.plan, constant.value.value);
+            for part in &constant.parts {
+                draft.report.put(part.clone(), constant.value.at.clone());
             }
+            draft.constants.push(constant.clone());
         }
     }
 }

@@ -6,6 +6,7 @@ use std::ops::Range;
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 
 use super::report::{Diagnostic, Diagnostics};
+use super::section::counted;
 use super::source::{Line, Location, Sources, floor_char_boundary};
 
 /// Lines longer than this are shown only around the place that matters.
@@ -79,7 +80,7 @@ fn window(line: &Line<'_>) -> Range<usize> {
 
 /// The last line.
 fn summary(count: usize, beyond: usize, colour: bool) -> String {
-    let mistakes = if count == 1 { "1 mistake".to_owned() } else { format!("{count} mistakes") };
+    let mistakes = counted(count, "mistake");
     let shown = if beyond == 0 { String::new() } else { format!(" ({} shown)", count - beyond) };
     let title = format!("{mistakes}{shown}, nothing was done");
     renderer(colour).render(&[Group::with_title(Level::ERROR.primary_title(title))])

@@ -240,7 +240,19 @@ impl Diagnostics {
 
     /// Each mistake that is kept, in the order of the text.
     pub fn mistakes(&self) -> Vec<Mistake> {
-        self.found.iter().map(|diagnostic| Mistake::of(diagnostic, &self.sources)).collect()
+        let mistake = |Diagnostic { title, places, help }: &Diagnostic| {
+            let place = places.first();
+            let line = place.map(|(at, _)| self.sources.line(at));
+            Mistake {
+                file: place.map(|(at, _)| self.sources.name(at.source).to_owned()),
+                line: line.as_ref().map(|line| line.number),
+                column: line.map(|line| line.text[..line.span.start].chars().count() + 1),
+                message: title.clone(),
+                expected: place.map(|(_, expected)| expected.clone()),
+                hints: help.clone(),
+            }
+        };
+        self.found.iter().map(mistake).collect()
     }
 }
 
@@ -259,21 +271,6 @@ pub struct Mistake {
     pub expected: Option<String>,
     /// What to do, a line each.
     pub hints: Vec<String>,
-}
-
-impl Mistake {
-    fn of(diagnostic: &Diagnostic, sources: &Sources) -> Self {
-        let place = diagnostic.places.first();
-        let line = place.map(|(at, _)| sources.line(at));
-        Self {
-            file: place.map(|(at, _)| sources.name(at.source).to_owned()),
-            line: line.as_ref().map(|line| line.number),
-            column: line.map(|line| line.text[..line.span.start].chars().count() + 1),
-            message: diagnostic.title.clone(),
-            expected: place.map(|(_, expected)| expected.clone()),
-            hints: diagnostic.help.clone(),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -152,7 +152,21 @@ impl<'a> Section<'a> {
 
     /// Reports a value of the wrong type.
     fn wrong<T>(&self, what: &str, value: &Value<'_>, expected: &str) -> Option<T> {
-        self.report.push(wrong_kind(what, &self.place(value.span()), expected, value.get_ref()));
+        let found = match value.get_ref() {
+            DeValue::String(_) => "a string",
+            DeValue::Integer(_) => "a whole number",
+            DeValue::Float(_) => "a decimal number",
+            DeValue::Boolean(_) => "true or false",
+            DeValue::Datetime(_) => "a date or time",
+            DeValue::Array(_) => "an array",
+            DeValue::Table(_) => "a table",
+        };
+        let text = value.get_ref().as_str().filter(|_| expected.contains("number"));
+        let is_number = text.is_some_and(|text| text.parse::<f64>().is_ok());
+        let help = is_number.then_some("write the number without quotes");
+        let refusal = Diagnostic::new(format!("{what} has the wrong type"))
+            .at(&self.place(value.span()), format!("expected {expected}, found {found}"));
+        self.report.push(help.into_iter().fold(refusal, Diagnostic::help));
         None
     }
 
@@ -323,11 +337,10 @@ impl<'a> Section<'a> {
 }
 
 /// The mistake of a number that is written twice.
-pub fn twice(second: &Located<&str>, first: &Located<&str>) -> Diagnostic {
-    let title = if second.value == first.value {
-        format!("`{}` is given twice", second.value)
-    } else {
-        format!("`{}` and `{}` write the same number", first.value, second.value)
+pub fn twice(second: &Located<impl AsRef<str>>, first: &Located<impl AsRef<str>>) -> Diagnostic {
+    let title = match (second.value.as_ref(), first.value.as_ref()) {
+        (name, other) if name == other => format!("`{name}` is given twice"),
+        (name, other) => format!("`{other}` and `{name}` write the same number"),
     };
     Diagnostic::new(title)
         .at(&second.at, "expected each number once")
@@ -349,6 +362,11 @@ pub fn listed(choices: &[&str]) -> String {
         [first, second] => format!("`{first}` or `{second}`"),
         many => format!("one of `{}`", many.join("`, `")),
     }
+}
+
+/// So many of something, whose plural ends in s.
+pub fn counted(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
 /// A key as messages call it.
@@ -399,24 +417,4 @@ pub fn refused_number(what: &str, value: f64, at: &Location, range: Range) -> Di
         format!("{what} = {} is out of range", decimal(value))
     };
     Diagnostic::new(title).at(at, format!("expected {}", range.instead_of(value)))
-}
-
-fn wrong_kind(what: &str, at: &Location, expected: &str, found: &DeValue<'_>) -> Diagnostic {
-    let kind = match found {
-        DeValue::String(_) => "a string",
-        DeValue::Integer(_) => "a whole number",
-        DeValue::Float(_) => "a decimal number",
-        DeValue::Boolean(_) => "true or false",
-        DeValue::Datetime(_) => "a date or time",
-        DeValue::Array(_) => "an array",
-        DeValue::Table(_) => "a table",
-    };
-    let diagnostic = Diagnostic::new(format!("{what} has the wrong type"))
-        .at(at, format!("expected {expected}, found {kind}"));
-    match found {
-        DeValue::String(text) if expected.contains("number") && text.parse::<f64>().is_ok() => {
-            diagnostic.help("write the number without quotes")
-        }
-        _ => diagnostic,
-    }
 }

@@ -1,6 +1,7 @@
 //! Texts a user wrote (files and command-line arguments), and places in them.
 
-use std::io::Read;
+use std::fs::File;
+use std::io::{self, Read as _};
 use std::ops::Range;
 use std::path::Path;
 
@@ -50,44 +51,32 @@ struct Source {
     text: String,
 }
 
-/// Why a file's text could not be had.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadError {
-    /// What the system said.
-    #[error(transparent)]
-    Io(#[from] std::io::Error),
-    /// Longer than any file of ours.
-    #[error(
-        "it is longer than {} KiB: give values as a range, or points as a list in a file of their \
-         own",
-        LONGEST_BYTES >> 10
-    )]
-    TooLong,
-    /// A result, which begins as Parquet files do.
-    #[error("it is a Parquet file, not text: `sweep show` reads it")]
-    Parquet,
-    /// UTF-16.
-    #[error("it is UTF-16, not UTF-8: save it as UTF-8")]
-    Utf16,
-    /// No text: the first bad byte, from 0.
-    #[error("it is not UTF-8 text: the first bad byte is number {}", .0 + 1)]
-    NotUtf8(usize),
-}
-
-/// Reads a whole file, of bounded length. Pipes work as well as plain files.
-pub fn read(path: &Path) -> Result<String, ReadError> {
+/// Reads a whole file of text, of bounded length. Pipes work as well as plain files.
+///
+/// # Errors
+/// What the system said, or why this is no file of ours.
+pub fn read(path: &Path) -> io::Result<String> {
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path)?;
-    file.take(LONGEST_BYTES + 1).read_to_end(&mut bytes)?;
+    File::open(path)?.take(LONGEST_BYTES + 1).read_to_end(&mut bytes)?;
+    let refused = |why: String| Err(io::Error::other(why));
     if bytes.starts_with(b"PAR1") {
-        return Err(ReadError::Parquet);
+        return refused("it is a Parquet file, not text: `sweep show` reads it".to_owned());
     }
     if bytes.len() as u64 > LONGEST_BYTES {
-        return Err(ReadError::TooLong);
+        return refused(format!(
+            "it is longer than {} KiB: give values as a range, or points as a list in a file of \
+             their own",
+            LONGEST_BYTES >> 10
+        ));
     }
-    String::from_utf8(bytes).map_err(|error| match error.as_bytes() {
-        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => ReadError::Utf16,
-        _ => ReadError::NotUtf8(error.utf8_error().valid_up_to()),
+    String::from_utf8(bytes).or_else(|error| match error.as_bytes() {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => {
+            refused("it is UTF-16, not UTF-8: save it as UTF-8".to_owned())
+        }
+        _ => {
+            let byte = error.utf8_error().valid_up_to() + 1;
+            refused(format!("it is not UTF-8 text: the first bad byte is number {byte}"))
+        }
     })
 }
 
@@ -187,11 +176,13 @@ mod tests {
             read(&path)
         };
         assert_eq!(file(b"name = 1").unwrap(), "name = 1");
-        assert!(matches!(file(b"ab\xffc"), Err(ReadError::NotUtf8(2))));
-        assert!(matches!(file(b"\xff\xfen\0"), Err(ReadError::Utf16)));
-        assert!(matches!(file(b"PAR1\xff"), Err(ReadError::Parquet)));
-        assert!(matches!(file(&vec![b' '; LONGEST_BYTES as usize + 1]), Err(ReadError::TooLong)));
-        assert!(file(&vec![b' '; LONGEST_BYTES as usize]).is_ok());
-        assert!(matches!(read(folder.path()), Err(ReadError::Io(_))));
+        let refusal = |bytes: &[u8]| file(bytes).unwrap_err().to_string();
+        assert!(refusal(b"ab\xffc").ends_with("the first bad byte is number 3"));
+        assert!(refusal(b"\xff\xfen\0").starts_with("it is UTF-16"));
+        assert!(refusal(b"PAR1\xff").starts_with("it is a Parquet file"));
+        let longest = vec![b' '; LONGEST_BYTES as usize];
+        assert!(refusal(&[&longest[..], b" "].concat()).starts_with("it is longer than 896 KiB"));
+        assert!(file(&longest).is_ok());
+        assert!(read(folder.path()).is_err());
     }
 }

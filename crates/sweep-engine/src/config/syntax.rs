@@ -6,7 +6,7 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, Error};
 
-use super::source::{ReadError, read};
+use super::source::read;
 use super::{Diagnostic, Location, Report, SourceId, quoted};
 
 /// The text of a file that is named in words, kept under its path; none where it cannot be read,
@@ -25,7 +25,7 @@ pub fn text(
         }
         Err(error) => error,
     };
-    let is_missing = matches!(&error, ReadError::Io(error) if error.kind() == ErrorKind::NotFound);
+    let is_missing = error.kind() == ErrorKind::NotFound;
     let refusal = Diagnostic::new(format!("cannot read the {what} file {shown}: {error}"));
     report.push(to_start.filter(|_| is_missing).into_iter().fold(refusal, Diagnostic::help));
     None

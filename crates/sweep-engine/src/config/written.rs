@@ -79,6 +79,11 @@ impl<'a> Written<'a> {
     }
 }
 
+/// What an argument NAME=VALUE names.
+pub fn name_of(argument: &str) -> &str {
+    argument.split('=').next().unwrap_or_default().trim()
+}
+
 /// A finite number of the command line.
 ///
 /// # Errors

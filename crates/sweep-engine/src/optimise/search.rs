@@ -8,15 +8,16 @@ use crate::store::{Done, Key, Layout, ResultRows, Row, Trials};
 use crate::{Effort, Error, Progress, StoreError, Swept};
 use sweep_results::Goal;
 
-/// Everything that a study tries, with a memory of trials if there is one, which it gives back.
+/// Everything that a study tries, with a memory of trials if there is one, which it gives back;
+/// nothing where the interrupt was raised.
 ///
 /// # Errors
-/// No engine, no threads.
+/// No engine, no threads; trials that could not be kept.
 pub fn search<M: Swept>(
     study: &Study<M>,
     trials: Option<Trials>,
     effort: Effort<'_>,
-) -> Result<(Result<Vec<Candidate>, Stopped>, Option<Trials>), Error> {
+) -> Result<(Option<Vec<Candidate>>, Option<Trials>), Error> {
     let there = trials.as_ref().map_or(0, |trials| trials.count() / study.answers()) as u64;
     let progress = Progress::new(effort.progress, study.evolution.candidates, there);
     let shown = |candidates| progress.show(candidates);
@@ -38,7 +39,7 @@ pub fn search<M: Swept>(
         Ok(found.into_iter().map(|numbers| numbers.into_iter().collect()).collect())
     });
     progress.finish();
-    Ok((found, asking.into_trials()))
+    Ok((Stopped::found(found)?, asking.into_trials()))
 }
 
 /// The objectives of a candidate as they are minimised, then its excesses, by its points.

@@ -16,7 +16,7 @@ const PARTS: usize = 1000;
 /// Lowest and fastest speed (rpm) up to the run's end.
 ///
 /// # Errors
-/// [`Error::Option`] where the drum turns backwards.
+/// [`Error::Refused`] where the drum turns backwards.
 pub(super) fn range(spin: &Spin, end_s: f64) -> Result<[f64; 2], Error> {
     let times = instants_s(spin, end_s);
     let speeds = spin.speeds_rpm(times.iter().copied());

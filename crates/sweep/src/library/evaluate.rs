@@ -15,6 +15,7 @@ use crate::engine::{Engine, ModelEngine, Watch};
 use crate::plan::Plan;
 use sweep_engine::progress::Progress;
 use sweep_engine::store::{BATCH_ROWS, Done, Layout, ResultRows};
+use sweep_engine::watch::Parts;
 use sweep_engine::{Error, Job, StoreError, threads};
 use sweep_files::panics::{self, lock};
 use washer_row::Ladder;
@@ -118,26 +119,21 @@ struct Gathered<'a> {
     job: &'a Job<'a>,
     /// The schema of every batch.
     schema: SchemaRef,
-    parts: Mutex<BTreeMap<u64, Vec<Done>>>,
+    parts: Parts,
     batches: Mutex<BTreeMap<u64, Result<RecordBatch, ArrowError>>>,
 }
 
 impl<'a> Gathered<'a> {
     fn new(job: &'a Job<'a>) -> Self {
         let schema = job.layout.schema();
-        Self { job, schema, parts: Mutex::default(), batches: Mutex::default() }
+        Self { job, schema, parts: Parts::default(), batches: Mutex::default() }
     }
 
     fn keep(&self, outcome: Done, watch: &Watch<'_>) {
         const ROWS: u64 = BATCH_ROWS as u64;
         let place = outcome.point / ROWS;
         let wanted = ROWS.min(self.job.points - place * ROWS);
-        let mut parts = lock(&self.parts);
-        let part = parts.entry(place).or_default();
-        part.push(outcome);
-        if part.len() as u64 == wanted {
-            let outcomes = parts.remove(&place).unwrap_or_default();
-            drop(parts);
+        if let Some(outcomes) = self.parts.add(place, wanted, outcome) {
             let batch = self.batch(outcomes);
             lock(&self.batches).insert(place, batch);
         }
@@ -158,7 +154,7 @@ impl<'a> Gathered<'a> {
 
     /// All batches in order, of what is there.
     fn into_batches(self) -> Result<Vec<RecordBatch>, ArrowError> {
-        let parts = std::mem::take(&mut *lock(&self.parts));
+        let parts = std::mem::take(&mut *lock(&self.parts.0));
         let mut batches = std::mem::take(&mut *lock(&self.batches));
         for (place, outcomes) in parts {
             batches.insert(place, self.batch(outcomes));

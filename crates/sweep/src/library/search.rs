@@ -6,7 +6,6 @@ use super::Effort;
 use super::result::ResultTable;
 use crate::model::Washer;
 use crate::plan::Plan;
-use sweep_engine::asking::Stopped;
 pub use sweep_engine::boundary::BoundaryOptions;
 use sweep_engine::boundary::BoundaryTask;
 use sweep_engine::commands::boundary::search as trace;
@@ -68,7 +67,7 @@ pub fn optimise_study(
 fn found<T>(
     (job, kind): (&Job<'_>, FileKind<'static>),
     (output, fresh): (Option<&Path>, bool),
-    search: impl FnOnce(Option<Trials>) -> Result<(Result<T, Stopped>, Option<Trials>), Error>,
+    search: impl FnOnce(Option<Trials>) -> Result<(Option<T>, Option<Trials>), Error>,
     table: impl FnOnce(&T) -> Table,
 ) -> Result<Option<ResultTable>, Error> {
     let file = output.map(|path| Output::begin(path, kind)).transpose()?;
@@ -78,11 +77,7 @@ fn found<T>(
         None => None,
     };
     let (found, trials) = search(trials)?;
-    let found = match found {
-        Ok(found) => found,
-        Err(Stopped::Failed(error)) => return Err(error.into()),
-        Err(Stopped::Interrupted) => return Ok(None),
-    };
+    let Some(found) = found else { return Ok(None) };
     let found = ResultTable::of_table(kind, table(&found))?;
     if let Some(file) = file {
         found.finish(file)?;

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::super::report::{Diagnostic, Report};
-use super::super::section::short;
+use super::super::section::{counted, short};
 use super::super::source::{Located, Location, SourceId};
 use super::{ID, ListColumn, Unreadable, fits};
 
@@ -47,12 +47,8 @@ pub(super) fn read(
             sound = false;
             report.push_with(|_| {
                 let at = Location::new(source, offset..offset + line.len());
-                let of = |count, what| {
-                    let plural = if count == 1 { "" } else { "s" };
-                    format!("{count} {what}{plural}")
-                };
-                let (names, numbers) = (of(columns.len(), "name"), of(columns.len(), "number"));
-                let title = format!("a row of {} under {names}", of(count, "number"));
+                let [names, numbers] = ["name", "number"].map(|what| counted(columns.len(), what));
+                let title = format!("a row of {} under {names}", counted(count, "number"));
                 let by = match separator {
                     ';' => "semicolons",
                     '\t' => "tabs",
