@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use lane_ode::MAX_LANES;
 use washer_model::{Method, Point};
-use washer_row::{Climbs, Demand, Ladder, Next, Outcome, Rule, Status, Trajectory};
+use washer_row::{Climbs, Next, Outcome, Status, Terms};
 
 use super::{ModelEngine, Watch, growth};
 use crate::plan::Scenario;
@@ -70,18 +70,13 @@ struct Climber {
 }
 
 impl Climber {
-    fn new(id: u64, point: Result<Arc<Point>, Status>) -> Self {
-        Self { id, point, climbs: Climbs::default(), pending: 0, came_as: 0 }
-    }
-
     /// What is to be done once nothing is pending.
-    fn next(&self, ladders: &[Ladder; 2], demand: Demand, rule: &Rule) -> Next {
+    fn next(&self, terms: Terms<'_>) -> Next {
         match &self.point {
-            Ok(point) => self.climbs.next(self.id, point, ladders, demand, rule),
+            Ok(point) => self.climbs.next(self.id, point, terms),
             Err(status) => {
-                let none = || Trajectory::failed(*status);
-                let method = ladders[0].rungs[0].level;
-                Next::Done(Box::new(Outcome { method, ..Outcome::new(self.id, none(), none()) }))
+                let method = terms.ladders[0].rungs[0].level;
+                Next::Done(Box::new(Outcome { method, ..Outcome::failed(self.id, *status) }))
             }
         }
     }
@@ -89,7 +84,7 @@ impl Climber {
 
 /// Rows and the runs that they wait for.
 #[derive(Default)]
-struct PoolState {
+pub(super) struct PoolState {
     /// Rows on their way, by what the caller knows them by.
     rows: BTreeMap<u64, Climber>,
     /// Points that the feed has given.
@@ -116,14 +111,8 @@ pub(super) struct Pool<'a> {
     pub(super) feed: &'a Feed<'a>,
     pub(super) keep: &'a Keep<'a>,
     pub(super) watch: &'a Watch<'a>,
-    pub(super) shared: Shared,
-}
-
-/// What the threads of a pool share.
-#[derive(Default)]
-pub(super) struct Shared {
-    state: Mutex<PoolState>,
-    changed: Condvar,
+    pub(super) state: Mutex<PoolState>,
+    pub(super) changed: Condvar,
 }
 
 impl Pool<'_> {
@@ -132,11 +121,11 @@ impl Pool<'_> {
         while !self.watch.stopped() {
             let mut state = self.lock();
             match state.choose(&|(model, rung)| {
-                let ladders = self.engine.ladders_under(self.watch);
-                ladders.map_or(MAX_LANES, |ladders| group(ladders[model].method(rung)))
+                let method = |terms: Terms<'_>| group(terms.ladders[model].method(rung));
+                self.terms().map_or(MAX_LANES, method)
             }) {
                 Work::End => break,
-                Work::Wait => drop(self.shared.changed.wait_timeout(state, LOOK_UP)),
+                Work::Wait => drop(self.changed.wait_timeout(state, LOOK_UP)),
                 Work::Feed => {
                     state.at_work.push(None);
                     drop(state);
@@ -152,8 +141,8 @@ impl Pool<'_> {
                 Work::Runs((model, rung), taken) => {
                     state.at_work.push(Some(rung));
                     drop(state);
-                    let Some(ladders) = self.engine.ladders_under(self.watch) else { break };
-                    let ladder = &ladders[model];
+                    let Some(terms) = self.terms() else { break };
+                    let ladder = &terms.ladders[model];
                     let points = || taken.iter().map(|(_, point)| point.as_ref());
                     let twins: Vec<Point> = match rung == ladder.twin() {
                         true => points().map(Point::nudged).collect(),
@@ -172,7 +161,7 @@ impl Pool<'_> {
                         let Some(mut row) = state.rows.remove(position) else { continue };
                         row.pending -= 1;
                         if let Ok(point) = &row.point {
-                            row.climbs.take((model, rung), run, ladder, point, &self.engine.rule);
+                            row.climbs.take((model, rung), run, point, terms);
                         }
                         rows.push(row);
                     }
@@ -180,21 +169,29 @@ impl Pool<'_> {
                 }
             }
         }
-        self.shared.changed.notify_all();
+        self.changed.notify_all();
+    }
+
+    /// What rows are judged by; `None` once the watch has stopped the work before it was found.
+    fn terms(&self) -> Option<Terms<'_>> {
+        let ModelEngine { demand, rule, .. } = self.engine;
+        let ladders = self.engine.ladders_under(self.watch)?;
+        Some(Terms { ladders, demand: *demand, rule })
     }
 
     fn lock(&self) -> MutexGuard<'_, PoolState> {
-        lock(&self.shared.state)
+        lock(&self.state)
     }
 
     /// New rows from the feed; none at its end.
     fn fed(&self) -> Vec<Climber> {
         let (ids, scenarios): (Vec<u64>, Vec<Scenario>) = (self.feed)(FED).into_iter().unzip();
         let points = self.engine.prepare(&scenarios);
-        ids.into_iter()
-            .zip(points)
-            .map(|(id, point)| Climber::new(id, point.map(Arc::new)))
-            .collect()
+        let row = |(id, point): (u64, Result<Point, Status>)| {
+            let point = point.map(Arc::new);
+            Climber { id, point, climbs: Climbs::default(), pending: 0, came_as: 0 }
+        };
+        ids.into_iter().zip(points).map(row).collect()
     }
 
     /// Asks for what rows need next, and hands over those that need nothing.
@@ -210,8 +207,8 @@ impl Pool<'_> {
                 Next::Runs(Vec::new())
             } else {
                 // Nothing is kept of what is put down.
-                let Some(ladders) = self.engine.ladders_under(self.watch) else { break };
-                row.next(ladders, self.engine.demand, &self.engine.rule)
+                let Some(terms) = self.terms() else { break };
+                row.next(terms)
             };
             match next {
                 Next::Runs(kinds) => {
@@ -229,7 +226,7 @@ impl Pool<'_> {
             state.at_work.swap_remove(at);
         }
         drop(state);
-        self.shared.changed.notify_all();
+        self.changed.notify_all();
         done.iter_mut().for_each(|(outcome, _)| outcome.forget_turns());
         let model = &self.engine.plan.model;
         if let Some(speeds) = &model.held_speeds {
