@@ -420,7 +420,7 @@ impl Tongue {
             for damper in &mut scenario.model.machine.dampers {
                 damper.damping_n_s_per_m *= factor;
             }
-            ready(asker.simd, asker.plan, &scenario).ok()
+            ready(asker.plan, &scenario).ok()
         };
         let points: Vec<Option<Point>> = factors.iter().map(|&factor| machine(factor)).collect();
         let about = self.about_rpm();

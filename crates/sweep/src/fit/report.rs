@@ -3,23 +3,22 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use lane_ode::Simd;
 use serde::Serialize;
 use serde_json::Value;
-use washer_model::{Dwell, Method, prepare};
+use washer_model::{Dwell, Method};
 use washer_row::{Outcome, Verdict as RowVerdict};
 
 use super::algebra::{centred, dot, quantile};
 use super::iso18571::{Rating, rate};
 use super::model::{Against, Problem};
 use super::search::Descent;
+use super::speed::Smoothed;
 use super::statistics::Statistics;
 use crate::config;
-use crate::engine::{ModelEngine, responses};
-use crate::plan::{Axis, AxisValues, Plan, timing};
+use crate::engine::{ModelEngine, fastest, responses};
+use crate::plan::{Axis, AxisValues, Plan, between, ready, timing};
 use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, table};
-use sweep_engine::threads::Stop;
 
 /// Standard errors to either end of a 95 % interval.
 const REACH: f64 = 1.959_964;
@@ -95,18 +94,11 @@ pub(crate) struct OfFile {
     pub(crate) widening: ByColumn<f64>,
     pub(crate) iso18571: ByColumn<Rating>,
     /// Noise (rpm) and knots of the measured spin.
-    pub(crate) spin: Option<SpinFit>,
+    pub(crate) spin: Option<Smoothed>,
     pub(crate) gaps_s: Vec<[f64; 2]>,
     /// The fitted machine, as a machine file has it.
     pub(crate) machine: Value,
     pub(crate) verdict: Option<Verdict>,
-}
-
-/// The spline through a measured spin.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct SpinFit {
-    pub(crate) noise_rpm: f64,
-    pub(crate) knots: usize,
 }
 
 /// The map's row at the fitted machine.
@@ -138,7 +130,7 @@ pub(crate) struct Minimum {
 
 /// What a report is made of.
 pub(super) struct Found<'a> {
-    pub(super) problem: &'a Problem,
+    pub(super) problem: &'a Problem<'a>,
     pub(super) minima: &'a [Descent],
     pub(super) against: &'a [Against],
     pub(super) at_start: &'a [Against],
@@ -148,7 +140,6 @@ pub(super) struct Found<'a> {
     pub(super) repeated: Option<&'a [Vec<f64>]>,
     /// Rows of the map over the fitted distribution.
     pub(super) draws: u64,
-    pub(super) stop: Stop<'a>,
 }
 
 impl Found<'_> {
@@ -235,7 +226,6 @@ impl Found<'_> {
         };
         let rms =
             |one: &Against| (dot(&one.residual, &one.residual) / one.residual.len() as f64).sqrt();
-        let smoothed = problem.cases[case].smoothed.as_ref();
         Ok(OfFile {
             file: measured.name.clone(),
             samples: measured.count(),
@@ -252,7 +242,7 @@ impl Found<'_> {
                     (it.quantity.column(), rate(&measured, &model))
                 })
                 .collect(),
-            spin: smoothed.map(|it| SpinFit { noise_rpm: it.noise_rpm, knots: it.knots }),
+            spin: problem.cases[case].smoothed.clone(),
             gaps_s: measured.gaps_s.clone(),
             machine: config::machine_json(&problem.machine(case, x).0),
             verdict: (self.draws > 0).then(|| self.verdict(case, follows)).transpose()?,
@@ -276,16 +266,16 @@ impl Found<'_> {
             let values = || sets.iter().map(|set| set[k]);
             let from = values().fold(f64::INFINITY, f64::min);
             let to = values().fold(f64::NEG_INFINITY, f64::max);
-            let values = match from < to {
-                true => AxisValues::Linear { from, to, count: 2 },
-                false => AxisValues::List(vec![from]),
-            };
-            plan.axes.push(Axis { parameter: problem.free[k].parameter.clone(), values });
+            let parameter = problem.free[k].parameter.clone();
+            plan.axes.push(match from < to {
+                true => between(parameter, from, to),
+                false => Axis { parameter, values: AxisValues::List(vec![from]) },
+            });
         }
         let points: Vec<Vec<f64>> =
             sets.iter().map(|set| own.iter().map(|&k| set[k]).collect()).collect();
         let engine = ModelEngine::new(&plan)?;
-        let outcomes = if (self.stop)() { Vec::new() } else { engine.evaluate_at(&points) };
+        let outcomes = if (problem.stop)() { Vec::new() } else { engine.evaluate_at(&points) };
         let (channels, limits) = (plan.reliability.channels.len(), plan.reliability.limits);
         let verdict = |outcome: &Outcome| RowVerdict::new(outcome, channels, limits);
         let verdicts: Vec<RowVerdict> = outcomes.iter().map(verdict).collect();
@@ -309,18 +299,16 @@ impl Found<'_> {
     /// growth (1/s), and where (rpm).
     fn growth(&self, case: usize, plan: &Plan) -> Option<[f64; 2]> {
         let (machine, spin) = self.problem.machine(case, &self.minima[0].x);
-        let fastest = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
-        let point = prepare(Simd::Scalar, &[(machine, spin)], &timing(plan)).remove(0).ok()?;
+        let most_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
+        let point = ready(machine, spin, &timing(plan)).ok()?;
         let speeds: Vec<f64> = (SPEEDS / 5..=SPEEDS)
-            .map(|k| fastest * f64::from(k) / f64::from(SPEEDS))
+            .map(|k| most_rpm * f64::from(k) / f64::from(SPEEDS))
             .filter(|speed| *speed > 0.0)
             .collect();
         let dwell = |&speed_rpm: &f64| Dwell { point: &point, speed_rpm };
-        let found = responses(&speeds.iter().map(dwell).collect::<Vec<_>>(), &|| (self.stop)());
-        let there = found.iter().flatten().filter_map(|responses| responses.first());
-        there
-            .map(|response| [response.growth_per_s(), response.speed_rpm])
-            .reduce(|most, next| if next[0] > most[0] { next } else { most })
+        let found =
+            responses(&speeds.iter().map(dwell).collect::<Vec<_>>(), &|| (self.problem.stop)());
+        fastest(&found).map(|response| [response.growth_per_s(), response.speed_rpm])
     }
 
     /// What else a reader should know.
