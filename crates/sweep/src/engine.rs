@@ -133,14 +133,10 @@ impl<'a> ModelEngine<'a> {
     }
 
     fn find_ladders(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
-        match self.plan.integrator.direct() {
-            Some((level, method)) => MODELS.map(|_| Ladder::direct(level, method)),
-            None => self.checked(is_stopped),
+        if let Some((level, method)) = self.plan.integrator.direct() {
+            return MODELS.map(|_| Ladder::direct(level, method));
         }
-    }
-
-    /// The fast method's ladders, by the corners of the grid.
-    fn checked(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
+        // The fast method's, by the corners of the grid.
         let scenarios: Vec<_> =
             self.plan.some_corners().iter().map(|at| self.plan.scenario_at(at)).collect();
         let prepared = self.prepare(&scenarios);

@@ -53,7 +53,7 @@ pub(super) type Keep<'a> = dyn Fn(Outcome) + Sync + 'a;
 /// How long a thread that waits for others goes without a look at the stop flag.
 const LOOK_UP: Duration = Duration::from_millis(50);
 
-/// Runs of one rung of one model: positions in `MODELS` and on its ladder, behind it for twins.
+/// Runs of one rung of one model: positions on its ladder, behind it for twins, and in `MODELS`.
 type ModelRung = (usize, usize);
 
 /// A point's row on its way.
@@ -120,7 +120,7 @@ impl Pool<'_> {
     pub(super) fn work(&self) {
         while !self.watch.stopped() {
             let mut state = self.lock();
-            match state.choose(&|(model, rung)| {
+            match state.choose(&|(rung, model)| {
                 let method = |terms: Terms<'_>| group(terms.ladders[model].method(rung));
                 self.terms().map_or(MAX_LANES, method)
             }) {
@@ -138,7 +138,7 @@ impl Pool<'_> {
                     }
                     self.advance(state, rows, None);
                 }
-                Work::Runs((model, rung), taken) => {
+                Work::Runs((rung, model), taken) => {
                     state.at_work.push(Some(rung));
                     drop(state);
                     let Some(terms) = self.terms() else { break };
@@ -214,8 +214,8 @@ impl Pool<'_> {
                 Next::Runs(kinds) => {
                     let position = row.id;
                     row.pending += kinds.len();
-                    for kind in kinds {
-                        state.waiting.entry(kind).or_default().push(position);
+                    for (model, rung) in kinds {
+                        state.waiting.entry((rung, model)).or_default().push(position);
                     }
                     state.rows.insert(position, row);
                 }
@@ -248,22 +248,19 @@ impl PoolState {
     /// `group` says how many runs of a kind are taken at once.
     fn choose(&mut self, group: &dyn Fn(ModelRung) -> usize) -> Work {
         let is_full = |(kind, waiting): &(&ModelRung, &Vec<u64>)| waiting.len() >= group(**kind);
-        let best = self.waiting.iter().filter(is_full).map(|(kind, _)| *kind);
-        let overdue = || self.overdue();
-        if let Some(kind) = best.max_by_key(|&(model, rung)| (rung, model)).or_else(overdue) {
+        let highest = self.waiting.iter().rfind(is_full).map(|(kind, _)| *kind);
+        if let Some(kind) = highest.or_else(|| self.overdue()) {
             return self.take(kind, group(kind));
         }
         if !self.is_dry {
             return Work::Feed;
         }
-        let lowest =
-            self.waiting.iter().filter(|(_, waiting)| !waiting.is_empty()).map(|(kind, _)| *kind);
-        let lowest = lowest.min_by_key(|&(model, rung)| (rung, model));
-        match lowest {
+        let lowest = self.waiting.iter().find(|(_, waiting)| !waiting.is_empty());
+        match lowest.map(|(kind, waiting)| (*kind, waiting.len())) {
             // What is at work below may fill the group.
-            Some((_, rung)) if self.at_work.iter().any(|&level| level < Some(rung)) => Work::Wait,
+            Some(((rung, _), _)) if self.at_work.iter().any(|&at| at < Some(rung)) => Work::Wait,
             // The rest is for other threads.
-            Some(kind) => self.take(kind, self.waiting[&kind].len().div_ceil(2).max(MAX_LANES)),
+            Some((kind, count)) => self.take(kind, count.div_ceil(2).max(MAX_LANES)),
             None if self.at_work.is_empty() => Work::End,
             None => Work::Wait,
         }
@@ -273,16 +270,16 @@ impl PoolState {
     fn overdue(&self) -> Option<ModelRung> {
         let latest = self.fed.checked_sub(PATIENCE)?;
         let is_overdue = |id: &u64| self.rows.get(id).is_some_and(|row| row.came_as < latest);
-        let overdue =
-            self.waiting.iter().filter(|(_, waiting)| waiting.first().is_some_and(is_overdue));
-        overdue.map(|(kind, _)| *kind).max_by_key(|&(model, rung)| (rung, model))
+        let mut waiting = self.waiting.iter();
+        let highest = waiting.rfind(|(_, waiting)| waiting.first().is_some_and(is_overdue));
+        highest.map(|(kind, _)| *kind)
     }
 
     /// Takes a group of what waits, the first come, of these the longest first.
     fn take(&mut self, kind: ModelRung, most: usize) -> Work {
         let waiting = self.waiting.entry(kind).or_default();
         let mut positions: Vec<u64> = waiting.drain(..waiting.len().min(most)).collect();
-        let steps = |id: &u64| self.rows.get(id).map(|row| row.climbs.steps(kind.0));
+        let steps = |id: &u64| self.rows.get(id).map(|row| row.climbs.steps(kind.1));
         positions.sort_by_key(|id| Reverse(steps(id)));
         let point =
             |position: &u64| Some((*position, self.rows.get(position)?.point.clone().ok()?));
