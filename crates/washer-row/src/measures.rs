@@ -113,8 +113,8 @@ impl Metric {
         match self {
             Self::CabinetForce => Facts {
                 unit: "N",
-                description: "greatest magnitude in the window of the sum of all spring and damper forces \
-                              on the cabinet (at rest the weight)",
+                description: "greatest magnitude in the window of the sum of all spring and damper \
+                              forces on the cabinet (at rest the weight)",
                 record: |wanted| wanted.cabinet_force = true,
                 of: Some(|extra| extra.cabinet_force_n.into_iter().collect()),
                 ..PLAIN
@@ -131,14 +131,15 @@ impl Metric {
             },
             Self::StaticSag => Facts {
                 unit: "m",
-                description: "how far the tub's mass centre sinks from where the machine file draws it to \
-                              the static equilibrium; null if there is none",
+                description: "how far the tub's mass centre sinks from where the machine file \
+                              draws it to the static equilibrium; null if there is none",
                 ..PLAIN
             },
             Self::StopForce => Facts {
                 unit: "N",
-                description: "greatest push of any stop in the window; the linear model has the tangents \
-                              of the stops at equilibrium, next to nothing while they are open",
+                description: "greatest push of any stop in the window; the linear model has the \
+                              tangents of the stops at equilibrium, next to nothing while they are \
+                              open",
                 part: Some(Part::Stop),
                 of_each: Some([
                     "force",
@@ -162,49 +163,35 @@ impl Metric {
             },
             Self::FootLoad => Facts {
                 unit: "N",
-                description: "least vertical load of any foot of the cabinet in the window, by statics; \
-                              below zero it would lift",
-                part: Some(Part::Foot),
+                description: "least vertical load of any foot of the cabinet in the window, by \
+                              statics; below zero it would lift",
                 of_each: Some([
                     "load",
-                    "least vertical load of the foot in the window, by statics; below zero it would lift",
+                    "least vertical load of the foot in the window, by statics; below zero it \
+                     would lift",
                 ]),
-                floor: Floor::Weight,
-                record: |wanted| wanted.feet = true,
                 of: Some(|extra| extra.foot_loads_n.clone()),
-                worse: Worse::Less,
-                limit: Some(Limit { value: 0.0, scale: 100.0 }),
-                ..PLAIN
+                ..OF_FEET
             },
             Self::SlipMargin => Facts {
                 unit: "N",
-                description: "least margin of the cabinet against slipping in the window: friction on all \
-                              feet together less the horizontal force",
-                part: Some(Part::Foot),
-                floor: Floor::Weight,
-                record: |wanted| wanted.feet = true,
+                description: "least margin of the cabinet against slipping in the window: friction \
+                              on all feet together less the horizontal force",
                 of: Some(|extra| extra.slip_margin_n.into_iter().collect()),
-                worse: Worse::Less,
-                limit: Some(Limit { value: 0.0, scale: 100.0 }),
-                ..PLAIN
+                ..OF_FEET
             },
             Self::WalkMargin => Facts {
                 unit: "N",
                 description: "least margin of the cabinet against slipping, turning or both in the \
-                              window: the margin against slipping less what the moment about the vertical \
-                              takes of it",
-                part: Some(Part::Foot),
-                floor: Floor::Weight,
-                record: |wanted| wanted.feet = true,
+                              window: the margin against slipping less what the moment about the \
+                              vertical takes of it",
                 of: Some(|extra| extra.walk_margin_n.into_iter().collect()),
-                worse: Worse::Less,
-                limit: Some(Limit { value: 0.0, scale: 100.0 }),
-                ..PLAIN
+                ..OF_FEET
             },
             Self::Growth => Facts {
                 unit: "1/s",
-                description: "how fast the fastest growing disturbance of the nonlinear response grows, \
-                              at that of the speeds of [stability] at which it is greatest",
+                description: "how fast the fastest growing disturbance of the nonlinear response \
+                              grows, at that of the speeds of [stability] at which it is greatest",
                 limit: Some(Limit { value: 0.0, scale: 1.0 }),
                 ..PLAIN
             },
@@ -215,8 +202,8 @@ impl Metric {
                 part: Some(Part::Damper),
                 of_each: Some(["speed", "greatest speed along the damper in the window"]),
                 floor: Floor::Creeping,
-                // What capped modes ring is more of a speed than of a motion, by their frequency over the
-                // drum's.
+                // What capped modes ring is more of a speed than of a motion, by their frequency
+                // over the drum's.
                 is_of_caps: true,
                 record: |wanted| wanted.damper_speeds = true,
                 of: Some(|extra| extra.damper_speeds_m_per_s.clone()),
@@ -224,8 +211,8 @@ impl Metric {
             },
             // Each channel has a column of its own, in its unit.
             Self::Dwell => Facts {
-                description: "largest deviation of any motion that the drum held at any of the speeds of \
-                              [stability] ends in (`sweep dwell`)",
+                description: "largest deviation of any motion that the drum held at any of the \
+                              speeds of [stability] ends in (`sweep dwell`)",
                 ..PLAIN
             },
         }
@@ -302,6 +289,16 @@ const PLAIN: Facts = Facts {
     of: None,
     worse: Worse::Greater,
     limit: None,
+};
+
+/// What the metrics of the cabinet's stand have in common.
+const OF_FEET: Facts = Facts {
+    part: Some(Part::Foot),
+    floor: Floor::Weight,
+    record: |wanted| wanted.feet = true,
+    worse: Worse::Less,
+    limit: Some(Limit { value: 0.0, scale: 100.0 }),
+    ..PLAIN
 };
 
 /// A number that each model has of its own: a metric of the whole machine, or what one stop or foot
