@@ -77,6 +77,14 @@ pub(crate) struct Fit {
     pub(crate) at_bound: bool,
 }
 
+impl Fit {
+    /// Its name; of a file's own, with the file.
+    fn label(&self) -> String {
+        let file = self.file.iter().map(|file| format!(" ({file})"));
+        std::iter::once(self.name.clone()).chain(file).collect()
+    }
+}
+
 /// What is said of one measurement.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct OfFile {
@@ -160,21 +168,22 @@ impl Found<'_> {
         let correlations = |i: usize| (0..free).map(|j| correlation(i, j)).collect();
         let files = (0..problem.cases.len()).map(|case| self.of_file(case, follows));
         let files = files.collect::<Result<Vec<OfFile>, Error>>()?;
-        let name = |k: usize| self.name(k);
+        let parameters: Vec<Fit> =
+            (0..free).map(|k| self.parameter(k, error(k), follows)).collect();
         let minimum = |descent: &Descent| Minimum {
-            values: (0..free).map(|k| (name(k), descent.x[k])).collect(),
+            values: parameters.iter().map(Fit::label).zip(descent.x.iter().copied()).collect(),
             cost_above: descent.summary.cost - best.summary.cost,
             evaluations: descent.evaluations,
         };
         Ok(Report {
             follows,
             objection,
-            parameters: (0..free).map(|k| self.parameter(k, error(k), follows)).collect(),
             correlations: (0..free).map(correlations).collect(),
             untold: statistics.untold(problem, &best.x),
             first: files[0].clone(),
             files,
             minima: self.minima.iter().map(minimum).collect(),
+            parameters,
             settled: best.is_settled,
             evaluations: self.evaluations,
             step_s: match problem.method {
@@ -184,16 +193,6 @@ impl Found<'_> {
             step_effect: self.step_effect,
             notes: self.notes(),
         })
-    }
-
-    /// A free number's name; of a file's own, with the file.
-    fn name(&self, k: usize) -> String {
-        let free = &self.problem.free[k];
-        let name = free.parameter.name();
-        free.case.map_or_else(
-            || name.to_owned(),
-            |case| format!("{name} ({})", self.problem.cases[case].measured.name),
-        )
     }
 
     fn parameter(&self, k: usize, error: f64, follows: bool) -> Fit {
@@ -383,12 +382,10 @@ impl Report {
         };
         let interval = |[from, to]: [f64; 2]| format!("{} to {}", short(from), short(to));
         let row = |fit: &Fit| {
-            let file = fit.file.as_ref().map_or_else(String::new, |file| format!(" ({file})"));
             let unknown = if fit.at_bound { "at its bound" } else { "not known" };
             let known = fit.interval_95.map_or_else(|| unknown.to_owned(), interval);
             let error = fit.standard_error.map_or_else(|| "-".to_owned(), short);
-            let name = format!("{}{file}", fit.name);
-            let mut row = vec![name, fit.unit.clone(), short(fit.value), error, known];
+            let mut row = vec![fit.label(), fit.unit.clone(), short(fit.value), error, known];
             row.extend(fit.bootstrap_95.map(interval));
             row
         };
