@@ -264,7 +264,7 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
         columns.push(if is_growth { judged(Metric::Growth, column) } else { column });
     }
     let kind = |row: &ResultRow| Some(growth(row)?.fastest.kind());
-    let place = move |row: &ResultRow| Kind::ALL.iter().position(|it| Some(*it) == kind(row));
+    let place = move |row: &ResultRow| Some(kind(row)? as usize);
     let text =
         "what a disturbance turns the response into: stable, period_doubling, quasi_periodic, fold";
     let names = Kind::ALL.map(Kind::name).to_vec();
@@ -305,10 +305,7 @@ fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
     };
     let passed = "what of the machine's geometry the response passes, and so is no motion of the \
                   machine: spring_hooks, damper_ends, clearance; null where nothing";
-    let beyond = |row: &ResultRow| {
-        let beyond = growth(row)?.beyond?;
-        Beyond::ALL.iter().position(|known| *known == beyond)
-    };
+    let beyond = |row: &ResultRow| Some(growth(row)?.beyond? as usize);
     let names = Beyond::ALL.map(Beyond::name).to_vec();
     [
         ResultColumn::new(format!("{prefix}branch"), "1", folds, kind, branch),
