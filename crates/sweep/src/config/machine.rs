@@ -24,17 +24,24 @@ pub(super) struct Part {
     /// What its parameters' names begin with; completed by the element's number where there may be
     /// any number of them.
     pub(super) prefix: &'static str,
-    /// The number of the first element where any number of them may stand in a file, as an array of
-    /// tables.
-    pub(super) first: Option<usize>,
-    /// What a file needs one for, if it does.
-    needed: Option<&'static str>,
+    /// How often it may stand in a file.
+    pub(super) times: Times,
     /// What may be left out.
     optional: &'static [(&'static str, LeftOut)],
     /// How many a machine has.
     count: fn(&Machine) -> usize,
     /// Gives a machine so many, each with what may be left out left out.
     fill: fn(&mut Machine, usize),
+}
+
+/// How often a section may stand in a file.
+#[derive(Clone, Copy)]
+pub(super) enum Times {
+    Once,
+    AtMostOnce,
+    /// As an array of tables; with the number of the first element, and what a machine needs one
+    /// for, if it does.
+    Many(usize, Option<&'static str>),
 }
 
 /// A key of a section: a number, or three in an array.
@@ -112,17 +119,17 @@ impl Part {
 
     /// What the parameters of an element begin with.
     fn prefix(&self, k: usize) -> String {
-        match self.first {
-            Some(first) => format!("{}{}_", self.prefix, k + first),
-            None => self.prefix.to_owned(),
+        match self.times {
+            Times::Many(first, _) => format!("{}{}_", self.prefix, k + first),
+            Times::Once | Times::AtMostOnce => self.prefix.to_owned(),
         }
     }
 
     /// As it stands in a file.
     fn header(&self) -> String {
-        match self.first {
-            Some(_) => format!("[[{}]]", self.section),
-            None => format!("[{}]", self.section),
+        match self.times {
+            Times::Many(..) => format!("[[{}]]", self.section),
+            Times::Once | Times::AtMostOnce => format!("[{}]", self.section),
         }
     }
 }
@@ -155,18 +162,9 @@ impl Key {
 }
 
 /// A section that every file has once.
-macro_rules! once {
-    ($section:literal, $prefix:literal) => {
-        Part {
-            section: $section,
-            prefix: $prefix,
-            first: None,
-            needed: Some(concat!("a section [", $section, "]")),
-            optional: &[],
-            count: |_| 1,
-            fill: |_, _| (),
-        }
-    };
+const fn once(section: &'static str, prefix: &'static str) -> Part {
+    let (count, fill): (fn(&Machine) -> usize, fn(&mut Machine, usize)) = (|_| 1, |_, _| ());
+    Part { section, prefix, times: Times::Once, optional: &[], count, fill }
 }
 
 /// A list of the machine as an array of tables, each like this one; with the prefix of parameters,
@@ -177,8 +175,7 @@ macro_rules! many {
         Part {
             section: stringify!($list),
             prefix: $prefix,
-            first: Some($first),
-            needed: $needed,
+            times: Times::Many($first, $needed),
             optional: &[$($optional),*],
             count: |machine| machine.$list.len(),
             fill: |machine, count| machine.$list = vec![$like; count],
@@ -191,18 +188,17 @@ const FREE_LENGTH: &str = "free_length_m";
 
 /// Every section of a machine file.
 pub(super) const PARTS: [Part; 14] = [
-    once!("", ""),
-    once!("tub", "tub_"),
-    once!("shaft", "shaft_"),
-    once!("drum", "drum_"),
-    once!("unbalance", "unbalance_"),
-    once!("flexure", "flexure_"),
-    once!("bearings", "bearing_"),
+    once("", ""),
+    once("tub", "tub_"),
+    once("shaft", "shaft_"),
+    once("drum", "drum_"),
+    once("unbalance", "unbalance_"),
+    once("flexure", "flexure_"),
+    once("bearings", "bearing_"),
     Part {
         section: "cabinet",
         prefix: "cabinet_",
-        first: None,
-        needed: None,
+        times: Times::AtMostOnce,
         optional: &[],
         count: |machine| usize::from(machine.cabinet.is_some()),
         fill: |machine, count| machine.cabinet = (count > 0).then(Cabinet::default),
@@ -282,26 +278,27 @@ pub(crate) fn to_json(machine: &Machine) -> Value {
 fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
     for (part, own) in PARTS.iter().zip(&*KEYS) {
         let table = keys::Key::new(part.section, "");
-        let table = part.needed.map_or(table, |needed| table.needed(needed));
-        match part.first {
+        match part.times {
             _ if part.section.is_empty() => part.walk(own, 0, machine, keys),
-            None => {
-                let field = keys.table(table, |keys| {
-                    if keys.section().is_some() {
-                        (part.fill)(machine, 1);
-                    }
-                    (0..(part.count)(machine)).for_each(|k| part.walk(own, k, machine, keys));
-                });
-                let is_missing = part.needed.is_some() && field.given().is_none();
-                if let Some(root) = keys.section().filter(|_| is_missing) {
-                    own.iter().for_each(|key| doubt(key.names(part.prefix), root.report));
+            Times::Once => {
+                let expected = format!("a section {}", part.header());
+                let table = table.needed(&expected);
+                let field = keys.table(table, |keys| part.walk(own, 0, machine, keys));
+                if let (None, Some(report)) = (field.given(), keys.section().map(|it| it.report)) {
+                    own.iter().for_each(|key| doubt(key.names(part.prefix), report));
                 }
             }
-            Some(_) => {
+            Times::AtMostOnce => drop(keys.table(table, |keys| {
+                if keys.section().is_some() {
+                    (part.fill)(machine, 1);
+                }
+                (0..(part.count)(machine)).for_each(|k| part.walk(own, k, machine, keys));
+            })),
+            Times::Many(_, needed) => {
                 let mut sections = Vec::new();
                 if let Some(root) = keys.section() {
                     sections = elements(part, root);
-                    if let (true, Some(expected)) = (sections.is_empty(), part.needed) {
+                    if let (true, Some(expected)) = (sections.is_empty(), needed) {
                         // The paper's stand in.
                         root.missing(part.section, expected);
                         continue;
@@ -311,6 +308,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                 // The two that machines have always had are written even where there are none.
                 let count = (part.count)(machine);
                 if count > 0 || ["springs", "dampers"].contains(&part.section) {
+                    let table = needed.map_or(table, |needed| table.needed(needed));
                     keys.tables(table, sections, count, |keys, k| part.walk(own, k, machine, keys));
                 }
             }

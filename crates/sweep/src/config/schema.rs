@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 use sweep_engine::config::schema::{of, set as set_schema};
 use washer_model::{Parameter, Spin};
 
-use super::machine::{PARTS, with_one_of_each};
+use super::machine::{PARTS, Times, with_one_of_each};
 
 /// `[set]`: names of the table as properties; those of numbered elements as patterns.
 pub(super) fn set() -> Value {
@@ -16,7 +16,10 @@ pub(super) fn set() -> Value {
     let (mut single, mut patterns) = (Vec::new(), Map::new());
     for parameter in &all {
         let name = parameter.name();
-        let lists = PARTS.iter().filter_map(|part| Some((part.prefix, part.first?)));
+        let lists = PARTS.iter().filter_map(|part| match part.times {
+            Times::Many(first, _) => Some((part.prefix, first)),
+            Times::Once | Times::AtMostOnce => None,
+        });
         let mut lists = lists.chain([("spin_table_", 1)]);
         match lists.find_map(|(prefix, first)| Some((prefix, first, name.strip_prefix(prefix)?))) {
             Some((prefix, first, rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => {
