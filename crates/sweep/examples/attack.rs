@@ -298,7 +298,7 @@ fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
     let metrics = models.iter().flat_map(|(model, a, b)| {
         plan.model.measures.of_model().zip(a.metrics.iter().zip(&b.metrics)).map(
             |(number, (a, b))| {
-                let least = match number.metric.floor() {
+                let least = match number.metric.facts().floor {
                     Floor::None => 0.0,
                     Floor::PartOfWindow => CLASH_FLOOR * (to_s - from_s),
                     Floor::Weight => weight_n,

@@ -11,7 +11,7 @@ use sweep_engine::store::{Column, Done, Layout, Rows, axis_columns};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, Motion};
 use washer_row::{
-    Dwelt, GrowingMode, Growth, Level, Measures, Metric, Outcome, ROW_STATUSES, Trajectory,
+    Dwelt, Facts, GrowingMode, Growth, Level, Measures, Metric, Outcome, ROW_STATUSES, Trajectory,
     Verdict, row_status,
 };
 
@@ -141,7 +141,8 @@ fn metric_columns(channels: &[Channel], measures: &Measures) -> Vec<WasherColumn
             Metric::Dwell => columns.extend(dwelt_columns(channels)),
             Metric::StaticSag => {
                 let of = |row: &ResultRow| row.outcome.static_sag_m;
-                columns.push(of_metric(metric, metric.column(""), metric.description(), of));
+                let text = metric.facts().description;
+                columns.push(of_metric(metric, metric.column(""), text, of));
             }
             _ => {
                 for number in measures.numbers_of(metric) {
@@ -167,13 +168,14 @@ fn of_metric(
     text: impl Into<String>,
     of: impl Fn(&ResultRow) -> Option<f64> + Send + Sync + 'static,
 ) -> WasherColumn {
-    judged(metric, ResultColumn::measured(name, metric.unit(), text, of))
+    judged(metric, ResultColumn::measured(name, metric.facts().unit, text, of))
 }
 
 /// The column, with which way the metric is bad.
 fn judged(metric: Metric, column: WasherColumn) -> WasherColumn {
-    let column = column.worse(metric.worse());
-    match metric.limit() {
+    let Facts { worse, limit, .. } = metric.facts();
+    let column = column.worse(worse);
+    match limit {
         Some(Limit { value, scale }) => column.limit(value, scale),
         None => column,
     }
@@ -184,7 +186,7 @@ fn dwelt_columns(channels: &[Channel]) -> Vec<WasherColumn> {
     let dwelt = |row: &ResultRow| -> Option<Dwelt> { row.outcome.dwelt };
     let mut columns = Vec::new();
     for &channel in channels {
-        let text = format!("{}: {}", channel.description(), Metric::Dwell.description());
+        let text = format!("{}: {}", channel.description(), Metric::Dwell.facts().description);
         let name = format!("dwell_{}", channel.name());
         let of = move |row: &ResultRow| Some(dwelt(row)?.deviations[channel.index()]);
         let column = ResultColumn::measured(name, channel.unit(), text, of);
@@ -258,11 +260,11 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
         let name =
             if name.starts_with(prefix) { name.to_owned() } else { format!("{prefix}{name}") };
         let column = ResultColumn::measured(name, unit, text, of);
-        let is_growth = unit == Metric::Growth.unit();
+        let is_growth = unit == Metric::Growth.facts().unit;
         columns.push(if is_growth { judged(Metric::Growth, column) } else { column });
     }
     let kind = |row: &ResultRow| Some(growth(row)?.fastest.kind());
-    let place = move |row: &ResultRow| Kind::ALL.iter().position(|it| Some(*it) == kind(row));
+    let place = move |row: &ResultRow| Some(kind(row)? as usize);
     let text =
         "what a disturbance turns the response into: stable, period_doubling, quasi_periodic, fold";
     let names = Kind::ALL.map(Kind::name).to_vec();
@@ -303,10 +305,7 @@ fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
     };
     let passed = "what of the machine's geometry the response passes, and so is no motion of the \
                   machine: spring_hooks, damper_ends, clearance; null where nothing";
-    let beyond = |row: &ResultRow| {
-        let beyond = growth(row)?.beyond?;
-        Beyond::ALL.iter().position(|known| *known == beyond)
-    };
+    let beyond = |row: &ResultRow| Some(growth(row)?.beyond? as usize);
     let names = Beyond::ALL.map(Beyond::name).to_vec();
     [
         ResultColumn::new(format!("{prefix}branch"), "1", folds, kind, branch),

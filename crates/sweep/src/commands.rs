@@ -1,7 +1,6 @@
 //! The command line: one module a subcommand, each with its arguments and `run`.
 
 mod completions;
-mod dwell;
 mod explain;
 mod fit;
 mod held;
@@ -16,13 +15,13 @@ mod run;
 mod schema;
 mod show;
 mod slurm;
-mod stability;
 mod status;
 mod trace;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
+use crate::dwell::Search;
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::{
     boundary, check, compare, examples, export, optimise, parameters, report, require,
@@ -73,9 +72,14 @@ pub enum Command {
     /// Find resonance speeds, mode shapes and frequencies over speed
     Modes(modes::Args),
     /// Find periodic responses at constant speeds, and unstable ones
-    Stability(stability::Args),
+    #[command(after_long_help = held::RESPONSES_LONG)]
+    #[command(mut_arg("out", |out| out.help(out_of("stability"))))]
+    #[command(mut_arg("fail_on_error", |flag| flag.help("Exit with 3 if any row has no response")))]
+    Stability(held::Args<held::Responses>),
     /// Find the motions that held speeds end in
-    Dwell(dwell::Args),
+    #[command(after_long_help = held::MOTIONS_LONG)]
+    #[command(mut_arg("out", |out| out.help(out_of("dwell"))))]
+    Dwell(held::Args<Search>),
     /// Explain why the linear model fails at one point
     Explain(explain::Args),
     /// Find the numbers of a machine from measured run-ups
@@ -110,6 +114,11 @@ pub enum Command {
     Man(man::Args),
     /// Print shell completions
     Completions(completions::Args),
+}
+
+/// Where the result of a command about held speeds goes, which is not where a run's goes.
+fn out_of(verb: &str) -> String {
+    format!("Result file [default: results/NAME-{verb}.parquet]")
 }
 
 /// The examples of a subcommand; of the program, by its name.
@@ -205,15 +214,15 @@ impl Command {
             Self::Merge(args) => merge::run(args),
             Self::Status(args) => status::run(args),
             Self::Slurm(args) => slurm::run(args),
-            Self::Show(args) => show::run(args),
+            Self::Show(args) => show_engine::run(args, &show::FURTHER),
             Self::Report(args) => report::run(args, &show::FURTHER, &crate::live::resonances),
             Self::Require(args) => require::run(args),
             Self::Compare(args) => compare::run(args, crate::identity::BUILD),
             Self::Export(args) => export::run(args),
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
-            Self::Stability(args) => stability::run(args),
-            Self::Dwell(args) => dwell::run(args),
+            Self::Stability(args) => args.run(),
+            Self::Dwell(args) => args.run(),
             Self::Explain(args) => explain::run(args),
             Self::Fit(args) => fit::run(args),
             Self::Boundary(args) => boundary::run::<crate::Washer>(args),

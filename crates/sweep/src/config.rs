@@ -18,11 +18,10 @@ mod validate;
 
 use std::path::Path;
 
-use washer_model::Machine;
-
 use crate::model::Washer;
 use crate::plan::Plan;
 
+pub(crate) use machine::{to_json as machine_json, to_toml as machine_file};
 pub use sweep_engine::config::{Diagnostics, Mistake};
 pub(crate) use sweep_engine::config::{check_columns, not_numbers, other_length};
 
@@ -36,14 +35,4 @@ pub type GridInput = sweep_engine::GridInput<Washer>;
 /// Every mistake found, in one pass.
 pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
     GridInput::file(path.to_owned(), sets.to_vec()).load()
-}
-
-/// A machine in full, as a result file carries it.
-pub(crate) fn machine_json(machine: &Machine) -> serde_json::Value {
-    machine::to_json(machine)
-}
-
-/// A machine as the text of a machine file: loading it gives the same machine, bit for bit.
-pub(crate) fn machine_file(machine: &Machine) -> String {
-    machine::to_toml(machine)
 }

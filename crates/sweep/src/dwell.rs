@@ -11,7 +11,7 @@ use std::sync::Arc;
 use lane_ode::Simd;
 use serde_json::{Value, json};
 use washer_model::{Dwell, Endings, Starts, State, Wanted, decimal};
-use washer_row::Status;
+use washer_row::{Status, named};
 
 use crate::engine::{Carried, motions as motions_of};
 use crate::plan::Plan;
@@ -25,33 +25,22 @@ use sweep_engine::store::{Column, Done};
 const MOST_AT_ONCE: u64 = 16;
 const STARTS_AT_ONCE: u64 = 128;
 
-/// Which way the last motion is taken along from speed to speed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Carry {
-    /// From the lowest speed up.
-    Up,
-    /// From the highest speed down.
-    Down,
+named! {
+    /// Which way the last motion is taken along from speed to speed.
+    pub enum Carry {
+        /// From the lowest speed up.
+        Up = "up",
+        /// From the highest speed down.
+        Down = "down",
+    }
 }
 
 impl FromStr for Carry {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "up" => Ok(Self::Up),
-            "down" => Ok(Self::Down),
-            _ => Err("expected up or down".to_owned()),
-        }
-    }
-}
-
-impl Carry {
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Up => "up",
-            Self::Down => "down",
-        }
+        let named = Self::ALL.into_iter().find(|way| way.name() == text);
+        named.ok_or_else(|| "expected up or down".to_owned())
     }
 }
 

@@ -4,17 +4,17 @@ mod growth;
 mod ladder;
 mod pool;
 
-pub(crate) use growth::{Carried, motions, responses};
+pub(crate) use growth::{Carried, fastest, motions, responses};
 pub(crate) use ladder::reference_step_s;
 pub(crate) use sweep_engine::{Engine, Watch};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Mutex;
+use std::sync::{Arc, Condvar, Mutex};
 
 use ladder::ladder;
 use lane_ode::Simd;
 use once_cell::sync::OnceCell;
-use pool::{Feed, Keep, Pool, Shared};
+use pool::{Feed, Keep, Pool};
 use washer_model::{Cases, Machine, Method, Point, Spin, Timing, prepare};
 use washer_row::{Demand, Ladder, Level, MODELS, Outcome, Rule, RungRun, Status, runs};
 
@@ -47,7 +47,7 @@ pub struct ModelEngine<'a> {
     timing: Timing,
     rule: Rule,
     /// The ladders of both models; found when first asked for.
-    pub(crate) ladders: OnceCell<[Ladder; 2]>,
+    pub(crate) ladders: Arc<OnceCell<[Ladder; 2]>>,
 }
 
 /// The instruction set that `SWEEP_SIMD` asks for, else the best.
@@ -90,22 +90,14 @@ impl<'a> ModelEngine<'a> {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
-        let (demand, ladders) = (Demand::Row, OnceCell::new());
+        let (demand, ladders) = (Demand::Row, Arc::default());
         Self { plan, demand, forced, timing, rule: rule(plan), ladders }
     }
 
     /// An engine for another plan, with the instruction set and the rungs of this one.
     pub(crate) fn over<'b>(&self, plan: &'b Plan) -> ModelEngine<'b> {
-        let ladders = OnceCell::with_value(self.ladders().clone());
-        ModelEngine { ladders, ..ModelEngine::on(self.forced, plan) }
-    }
-
-    /// As [`Self::new`], with the rungs of another engine.
-    ///
-    /// # Errors
-    /// As there.
-    pub(crate) fn with_ladders(plan: &'a Plan, ladders: [Ladder; 2]) -> Result<Self, Error> {
-        Ok(Self { ladders: OnceCell::with_value(ladders), ..Self::new(plan)? })
+        self.ladders();
+        ModelEngine { ladders: Arc::clone(&self.ladders), ..ModelEngine::on(self.forced, plan) }
     }
 
     /// What it computes.
@@ -141,14 +133,10 @@ impl<'a> ModelEngine<'a> {
     }
 
     fn find_ladders(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
-        match self.plan.integrator.direct() {
-            Some((level, method)) => MODELS.map(|_| Ladder::direct(level, method)),
-            None => self.checked(is_stopped),
+        if let Some((level, method)) = self.plan.integrator.direct() {
+            return MODELS.map(|_| Ladder::direct(level, method));
         }
-    }
-
-    /// The fast method's ladders, by the corners of the grid.
-    fn checked(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
+        // The fast method's, by the corners of the grid.
         let scenarios: Vec<_> =
             self.plan.some_corners().iter().map(|at| self.plan.scenario_at(at)).collect();
         let prepared = self.prepare(&scenarios);
@@ -193,7 +181,8 @@ impl<'a> ModelEngine<'a> {
 
     /// Rows from a feed to a keeper, on all threads of the rayon pool this is called in.
     fn through_lanes(&self, feed: &Feed<'_>, keep: &Keep<'_>, watch: &Watch<'_>) {
-        let pool = Pool { engine: self, feed, keep, watch, shared: Shared::default() };
+        let (state, changed) = (Mutex::default(), Condvar::new());
+        let pool = Pool { engine: self, feed, keep, watch, state, changed };
         match rayon::current_thread_index() {
             Some(_) => drop(rayon::broadcast(|_| pool.work())),
             // An estimate is of one thread.

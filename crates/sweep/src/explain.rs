@@ -10,11 +10,11 @@ use lane_ode::Simd;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use washer_model::{
     Cases, Channel, Crossed, Crossing, LeftRange, NoEquilibrium, Point, Response, Timing, cross,
-    modes, peaks_without_departures, prepare,
+    modes, peaks_without_departures,
 };
 
 use crate::engine::{ModelEngine, Watch, reference_step_s};
-use crate::plan::{Plan, Scenario};
+use crate::plan::{self, Plan, Scenario};
 use crate::speeds::Speeds;
 use sweep_engine::config::NamedValues;
 use sweep_engine::{Error, Interrupt};
@@ -22,7 +22,7 @@ use sweep_engine::{Error, Interrupt};
 use sweep_parameter::RatioLimits;
 use tongue::{Asker, Seen, tongues};
 pub(crate) use tongue::{Closing, End, Resonance, Tongue};
-use washer_row::{Outcome, ROW_STATUSES, Status, Trajectory, Verdict, row_status};
+use washer_row::{Outcome, ROW_STATUSES, Status, Verdict, row_status};
 
 /// Distance between the speeds that are looked at (rpm), unless `--speed` says another.
 const STEP_RPM: f64 = 1.0;
@@ -106,7 +106,7 @@ pub(crate) fn explain(
 ) -> Result<Explanation, Error> {
     let scenario = plan.scenario(0);
     let profile_rpm = profile::range(&scenario.model.spin, plan.end_s)?;
-    let point = ready(simd, plan, &scenario).map_err(Error::model)?;
+    let point = ready(plan, &scenario).map_err(Error::model)?;
     let looked = match speeds {
         Some(speeds) => speeds,
         None => looked(&point, profile_rpm[1])?,
@@ -137,10 +137,9 @@ pub(crate) fn explain(
 }
 
 /// A machine with its spin, ready to be integrated.
-fn ready(simd: Simd, plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilibrium> {
-    let timing = Timing { end_s: plan.end_s, window_s: scenario.window_s, checkpoints: 0 };
-    prepare(simd, &[(scenario.model.machine.clone(), scenario.model.spin.clone())], &timing)
-        .remove(0)
+fn ready(plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilibrium> {
+    let timing = Timing { window_s: scenario.window_s, ..plan::timing(plan) };
+    plan::ready(scenario.model.machine.clone(), scenario.model.spin.clone(), &timing)
 }
 
 /// The profile's speeds from half of the slowest mode's frequency up.
@@ -162,10 +161,9 @@ fn swept(plan: &Plan, interrupt: &Interrupt) -> Result<Swept, Error> {
     let channels = plan.reliability.channels.clone();
     let (engine, watch) = (ModelEngine::new(plan)?, Watch::new(interrupt));
     let outcomes = engine.evaluate_under(&[Vec::new()], &watch);
-    // Where it was stopped: nothing.
-    let none = || Trajectory::failed(Status::Panicked);
     let outcome = outcomes.and_then(|mut outcomes| outcomes.pop());
-    let outcome = outcome.unwrap_or_else(|| Outcome::new(0, none(), none()));
+    // Where it was stopped: nothing.
+    let outcome = outcome.unwrap_or_else(|| Outcome::failed(0, Status::Panicked));
     let (status, fail_time_s) = row_status(&outcome);
     let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.limits);
     Ok(Swept {

@@ -89,8 +89,8 @@ const NONLINEAR: &str = "nonlinear";
 const LINEAR: &str = "linear";
 
 /// A fit that was made.
-pub(crate) struct Fitted {
-    pub(crate) problem: Problem,
+pub(crate) struct Fitted<'a> {
+    pub(crate) problem: Problem<'a>,
     pub(crate) x: Vec<f64>,
     against: Vec<Against>,
     pub(crate) report: Report,
@@ -212,11 +212,11 @@ fn free_number(
 ///
 /// # Errors
 /// Mistakes in the options; data that cannot tell; a model that does not get through.
-pub(crate) fn fit(
+pub(crate) fn fit<'a>(
     cases: Vec<Case>,
     options: &FitOptions,
-    work: &Work<'_>,
-) -> Result<Option<Fitted>, Error> {
+    work: &Work<'a>,
+) -> Result<Option<Fitted<'a>>, Error> {
     match fitted(cases, options, work) {
         Ok(fitted) => Ok(Some(fitted)),
         Err(Ended::Stopped) => Ok(None),
@@ -224,13 +224,17 @@ pub(crate) fn fit(
     }
 }
 
-fn fitted(cases: Vec<Case>, options: &FitOptions, work: &Work<'_>) -> Result<Fitted, Ended> {
+fn fitted<'a>(
+    cases: Vec<Case>,
+    options: &FitOptions,
+    work: &Work<'a>,
+) -> Result<Fitted<'a>, Ended> {
     let free = free(options, &cases)?;
     let method = Problem::method(&cases).map_err(Error::model)?;
     let model = if options.model == LINEAR { ModelKind::Linear } else { ModelKind::Nonlinear };
     let simd = simd_from_environment()?;
-    let with_shift = !options.no_shift;
-    let mut problem = Problem { cases, free, model, with_shift, method, simd };
+    let (with_shift, stop) = (!options.no_shift, work.stop);
+    let mut problem = Problem { cases, free, model, with_shift, method, simd, stop };
     let samples: usize = problem.cases.iter().map(|case| case.measured.count()).sum();
     let unknowns = problem.unknowns() + problem.signals().count();
     if unknowns >= samples {
@@ -260,9 +264,9 @@ fn fitted(cases: Vec<Case>, options: &FitOptions, work: &Work<'_>) -> Result<Fit
         if !best.is_settled {
             break;
         }
-        let against = problem.against(&best.x, work.stop).ok_or(Ended::Stopped)?;
+        let against = problem.against(&best.x).ok_or(Ended::Stopped)?;
         problem.method = Method::Rk4 { step_s: 0.5 * step_s };
-        let finer = problem.against(&best.x, work.stop).ok_or(Ended::Stopped)?;
+        let finer = problem.against(&best.x).ok_or(Ended::Stopped)?;
         let bread = algebra::inverse(&best.summary.normal);
         let moved = effect(&bread, &best.summary, &against, &finer);
         let moved = moved.into_iter().fold(0.0, f64::max);
@@ -276,18 +280,17 @@ fn fitted(cases: Vec<Case>, options: &FitOptions, work: &Work<'_>) -> Result<Fit
         minima[0] = best.clone();
     }
     let evaluations = made.load(Ordering::Relaxed);
-    let against = problem.against(&best.x, work.stop).ok_or(Ended::Stopped)?;
+    let against = problem.against(&best.x).ok_or(Ended::Stopped)?;
     // A wrong unit may lead numbers so far away that only the start shows it.
-    let at_start = problem.against(&problem.start(), work.stop);
-    let at_start = at_start.unwrap_or_else(|| against.clone());
+    let at_start = problem.against(&problem.start()).unwrap_or_else(|| against.clone());
     let mut statistics = Statistics::of(&problem, &against, &best.summary);
-    let further = by_tachometer(&problem, &best, &against, work.stop);
+    let further = by_tachometer(&problem, &best, &against);
     statistics::add(&mut statistics.covariance, &further, 1.0);
     if problem.model == ModelKind::Linear {
         // What the linear model does not have may hide in the numbers and leave no residual.
         problem.model = ModelKind::Nonlinear;
         statistics.bias = problem
-            .against(&best.x, work.stop)
+            .against(&best.x)
             .map(|nonlinear| effect(&statistics.covariance, &best.summary, &against, &nonlinear));
         problem.model = ModelKind::Linear;
     }
@@ -305,10 +308,9 @@ fn fitted(cases: Vec<Case>, options: &FitOptions, work: &Work<'_>) -> Result<Fit
         step_effect,
         repeated: repeated.as_deref(),
         draws: options.draws.into(),
-        stop: work.stop,
     };
     let report = found.report()?;
-    if (work.stop)() {
+    if stop() {
         return Err(Ended::Stopped);
     }
     if let Some(journal) = journal {
@@ -324,7 +326,7 @@ fn no_answer() -> Error {
 }
 
 /// The journal of a problem.
-fn open(path: &Path, problem: &Problem) -> Result<Journal, Error> {
+fn open(path: &Path, problem: &Problem<'_>) -> Result<Journal, Error> {
     let mut hasher = blake3::Hasher::new();
     for case in &problem.cases {
         hasher.update(case.plan.to_json().to_string().as_bytes());
@@ -375,17 +377,12 @@ fn effect(
 }
 
 /// The covariance that noise of the tachometers gives the unknowns.
-fn by_tachometer(
-    problem: &Problem,
-    best: &Descent,
-    against: &[Against],
-    stop: Stop<'_>,
-) -> Vec<Vec<f64>> {
+fn by_tachometer(problem: &Problem<'_>, best: &Descent, against: &[Against]) -> Vec<Vec<f64>> {
     let n = problem.unknowns();
     let bread = algebra::inverse(&best.summary.normal);
     let mut covariance = vec![vec![0.0; n]; n];
     for case in 0..problem.cases.len() {
-        let drawn = problem.by_spin(case, &best.x, against, stop);
+        let drawn = problem.by_spin(case, &best.x, against);
         for signals in &drawn {
             let own = against.iter().zip(&best.summary.sigma).filter(|(one, _)| one.case == case);
             let apart = own.zip(signals).map(|((one, sigma), apart)| (one, *sigma, apart.clone()));
@@ -402,7 +399,7 @@ fn by_tachometer(
 /// The fit again and again, with its residuals resampled in blocks longer than they are correlated:
 /// the free numbers of each.
 fn bootstrap(
-    problem: &mut Problem,
+    problem: &mut Problem<'_>,
     x: &[f64],
     against: &[Against],
     count: u32,
@@ -440,7 +437,7 @@ fn bootstrap(
 
 /// A search for the least cost of a problem.
 struct Search<'a> {
-    problem: &'a Problem,
+    problem: &'a Problem<'a>,
     journal: Option<&'a Journal>,
     work: &'a Work<'a>,
     /// How many evaluations were made.
@@ -450,8 +447,8 @@ struct Search<'a> {
 impl Search<'_> {
     fn evaluate(&self, x: &[f64]) -> Result<Option<Summary>, Ended> {
         let find = || {
-            let found = self.problem.against(x, self.work.stop);
-            if (self.work.stop)() {
+            let found = self.problem.against(x);
+            if (self.problem.stop)() {
                 return Err(Ended::Stopped);
             }
             Ok(found.map(|against| self.problem.summary(&against)))
@@ -505,7 +502,7 @@ impl Search<'_> {
                     x
                 })
                 .collect();
-            let costs = self.problem.costs(&sets, self.work.stop);
+            let costs = self.problem.costs(&sets);
             let mut order: Vec<usize> = (0..sets.len()).filter(|&k| costs[k].is_finite()).collect();
             order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
             chosen.extend(order.into_iter().take(DESCENTS - 1).map(|k| sets[k].clone()));
@@ -549,7 +546,7 @@ fn evenly(count: u64) -> impl Fn(u64, usize) -> f64 {
 }
 
 /// Free numbers drawn from the fitted distribution, evenly spread, each within its range.
-fn draws(problem: &Problem, x: &[f64], covariance: &[Vec<f64>], count: u64) -> Vec<Vec<f64>> {
+fn draws(problem: &Problem<'_>, x: &[f64], covariance: &[Vec<f64>], count: u64) -> Vec<Vec<f64>> {
     let normal = evenly(count);
     let (unit, scale) = algebra::scaled(covariance);
     let eigen = Symmetric::of(&unit);

@@ -66,9 +66,9 @@ pub use engine::ModelEngine;
 pub use fit::FitOptions;
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use library::{
-    BoundaryOptions, Effort, Evaluator, Explained, PointTable, RanToFile, ResultTable,
-    TraceOptions, explain_point, find_boundary, find_held, find_modes, fit_tables, held_to_file,
-    list_parameters, optimise_study, run_to_file, trace_point,
+    BoundaryOptions, Effort, Evaluator, Explained, PointTable, RanToFile, ResultTable, Task,
+    TraceOptions, explain_point, find_boundary, find_modes, fit_tables, held, list_parameters,
+    optimise_study, trace_point,
 };
 pub use method::Integrator;
 pub use model::Washer;

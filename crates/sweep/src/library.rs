@@ -20,9 +20,9 @@ pub use fit::fit_tables;
 pub use modes::find_modes;
 pub use points::PointTable;
 pub use result::ResultTable;
-pub use run::{RanToFile, run_to_file};
+pub use run::{RanToFile, Task};
 pub use search::{BoundaryOptions, find_boundary, optimise_study};
-pub use stability::{find_held, held_to_file};
+pub use stability::held;
 pub use trace::{TraceOptions, trace_point};
 
 use sweep_engine::commands::parameters::as_json;

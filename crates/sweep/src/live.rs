@@ -3,18 +3,17 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use lane_ode::Simd;
 use sweep_files::{ParquetFile, key};
 use sweep_plot::{Live, Slider};
 use washer_live::{Setup, Sliders};
-use washer_model::{Channel, Kind, ModeOverSpeed, ModelKind, Parameter, campbell, prepare};
+use washer_model::{Channel, Kind, ModeOverSpeed, ModelKind, Parameter, campbell};
 use washer_row::{Level, Measured, Metric};
 
 use crate::config::GridInput;
 use crate::engine::{CHECKPOINTS, ModelEngine, rule};
 use crate::method::Integrator;
 use crate::model::Washer;
-use crate::plan::{Axis, AxisValues, Plan, corners_of_forces, timing};
+use crate::plan::{Axis, Plan, between, corners_of_forces, ready, timing};
 use sweep_engine::Error;
 use sweep_engine::method::ACCURACY;
 use sweep_engine::store::read::overview;
@@ -93,20 +92,16 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         _ => chosen(&plan, ranges)?,
     };
     let (setup, words) = setup(&plan, &sliders)?;
-    let axis = |axis: &Axis| {
-        let [least, greatest] = axis.values.extremes().map(|at| axis.values.value(at));
-        slider(&axis.parameter, least, greatest, None)
-    };
+    let axes = plan.axes.iter().map(|axis| slider(axis, None));
+    let Washer { machine, spin, .. } = &plan.model;
+    let further = sliders.iter().map(|axis| slider(axis, axis.parameter.get(machine, spin)));
     let columns = |number: Measured| ["nonlinear", "linear"].map(|model| number.column(model));
-    let further = sliders.iter().map(|(parameter, from, to)| {
-        slider(parameter, *from, *to, parameter.get(&plan.model.machine, &plan.model.spin))
-    });
     let criterion = plan.model.measures.criterion;
     // What a column has where there is no ratio is not a page's.
     let ratio = criterion.ratio().split(';').next().unwrap_or_default();
     Ok(Live {
         setup: setup.to_numbers(),
-        sliders: plan.axes.iter().map(axis).chain(further).collect(),
+        sliders: axes.chain(further).collect(),
         every_s: EVERY_S.max(plan.end_s / MOST_INSTANTS),
         end_s: plan.end_s,
         window_s: plan.window_s,
@@ -132,12 +127,11 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
 /// Resonances of the plan's own machine, before the axes, up to its greatest speed; none where it
 /// has no modes.
 pub(crate) fn resonances(plan: &Plan) -> Vec<[String; 3]> {
-    let machines = [(plan.model.machine.clone(), plan.model.spin.clone())];
-    let greatest_rpm = plan.model.spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
+    let (machine, spin) = (plan.model.machine.clone(), plan.model.spin.clone());
+    let greatest_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
     let count = (greatest_rpm / MODES_EVERY_RPM).ceil() as u32;
     let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODES_EVERY_RPM * f64::from(k)).collect();
-    let points = prepare(Simd::Scalar, &machines, &timing(plan));
-    let Some(Ok(point)) = points.into_iter().next() else { return Vec::new() };
+    let Ok(point) = ready(machine, spin, &timing(plan)) else { return Vec::new() };
     let modes = campbell(&point, &speeds_rpm).unwrap_or_default();
     let of_mode = |mode: ModeOverSpeed| {
         let motion = mode.motion.to_string();
@@ -150,7 +144,8 @@ pub(crate) fn resonances(plan: &Plan) -> Vec<[String; 3]> {
     modes.into_iter().flat_map(of_mode).collect()
 }
 
-fn slider(parameter: &Parameter, from: f64, to: f64, value: Option<f64>) -> Slider {
+fn slider(Axis { parameter, values }: &Axis, value: Option<f64>) -> Slider {
+    let [from, to] = values.extremes().map(|at| values.value(at));
     let (name, description) = (parameter.name().to_owned(), parameter.description().to_owned());
     Slider { name, description, from, to, value }
 }
@@ -177,8 +172,7 @@ fn plan_of(file: &Path) -> Result<Plan, Error> {
         let [from, to] = ["from", "to"].map(|end| axis["range"][end].as_f64());
         let in_file = || columns.iter().find(|column| column.name == name)?.range;
         if let (Ok(parameter), Some((from, to))) = (parameter, from.zip(to).or_else(in_file)) {
-            let values = AxisValues::Linear { from, to, count: 2 };
-            plan.axes.push(Axis { parameter, values });
+            plan.axes.push(between(parameter, from, to));
         }
     }
     Ok(plan)
@@ -194,10 +188,8 @@ fn take_growth(plan: &mut Plan) -> Vec<f64> {
     speeds.map_or_else(Vec::new, |speeds| speeds.values().to_vec())
 }
 
-type Range = (Parameter, f64, f64);
-
 /// The usual sliders: about the plan's values, as far as machines can be.
-fn usual(plan: &Plan) -> Vec<Range> {
+fn usual(plan: &Plan) -> Vec<Axis> {
     let is_axis = |name: &str| plan.axes.iter().any(|axis| axis.parameter.name() == name);
     let offered = OFFERED.into_iter().filter(|name| !is_axis(name));
     let Washer { machine, spin, .. } = &plan.model;
@@ -206,26 +198,25 @@ fn usual(plan: &Plan) -> Vec<Range> {
         let value = parameter.get(machine, spin).filter(|value| *value != 0.0)?;
         let ends = [(1.0 - SPREAD) * value, (1.0 + SPREAD) * value];
         let [from, to] = if value > 0.0 { ends } else { [ends[1], ends[0]] };
-        let range = (parameter, from, to);
+        let range = between(parameter, from, to);
         is_sound(plan, std::slice::from_ref(&range)).then_some(range)
     };
     offered.filter_map(range).collect()
 }
 
 /// The sliders that `--slider` asks for.
-fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Range>, Error> {
-    let mut found: Vec<Range> = Vec::new();
+fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, Error> {
+    let mut found: Vec<Axis> = Vec::new();
     for SliderRange { name, from, to } in ranges {
         let refused =
             |expected: String| Error::option("--slider", format!("{name}={from}:{to}"), expected);
         let parameter = Parameter::find(name, &plan.model.machine, &plan.model.spin)
             .map_err(|why| refused(format!("a name of `sweep parameters`: {why}")))?;
-        let has_slider = plan.axes.iter().any(|axis| axis.parameter == parameter)
-            || found.iter().any(|(other, ..)| *other == parameter);
+        let has_slider = plan.axes.iter().chain(&found).any(|axis| axis.parameter == parameter);
         let is_spread = parameter.get(&plan.model.machine, &plan.model.spin).is_none();
         let range = parameter.range();
         let beyond = [*from, *to].into_iter().find(|end| !range.contains(*end));
-        found.push((parameter, *from, *to));
+        found.push(between(parameter, *from, *to));
         let expected = match beyond {
             _ if has_slider => "a parameter that has no slider yet".to_owned(),
             _ if is_spread => "a parameter that has one value in this map".to_owned(),
@@ -240,7 +231,7 @@ fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Range>, Error> {
 }
 
 /// Whether machines and spins can be everywhere within these ranges.
-fn is_sound(plan: &Plan, sliders: &[Range]) -> bool {
+fn is_sound(plan: &Plan, sliders: &[Axis]) -> bool {
     let wide = widened(plan, sliders);
     wide.some_corners().iter().all(|corner| {
         let scenario = wide.scenario_at(corner);
@@ -250,17 +241,12 @@ fn is_sound(plan: &Plan, sliders: &[Range]) -> bool {
 }
 
 /// The plan with the sliders as further axes.
-fn widened(plan: &Plan, sliders: &[Range]) -> Plan {
-    let axis = |(parameter, from, to): &Range| {
-        let values = AxisValues::Linear { from: *from, to: *to, count: 2 };
-        Axis { parameter: parameter.clone(), values }
-    };
-    let axes = plan.axes.iter().cloned().chain(sliders.iter().map(axis)).collect();
-    Plan { axes, ..plan.clone() }
+fn widened(plan: &Plan, sliders: &[Axis]) -> Plan {
+    Plan { axes: [&plan.axes, sliders].concat(), ..plan.clone() }
 }
 
 /// The setup, and the rungs of both models in words.
-fn setup(plan: &Plan, sliders: &[Range]) -> Result<(Setup, [Vec<String>; 2]), Error> {
+fn setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Error> {
     // By the fast method, whatever the map's; as accurate as that, or as usual.
     let own = rule(plan).accuracy;
     let accuracy = if own.is_finite() { own } else { ACCURACY.default };

@@ -1,7 +1,8 @@
 //! The engine's plan, of a washing machine.
 
+use lane_ode::Simd;
 use serde_json::{Map, Value};
-use washer_model::{Point, Timing};
+use washer_model::{Machine, NoEquilibrium, Parameter, Point, Spin, Timing, prepare};
 
 use crate::model::Washer;
 
@@ -19,6 +20,19 @@ pub(crate) type Scenario = sweep_engine::Scenario<Washer>;
 /// When a plan's run ends, and its window.
 pub(crate) fn timing(plan: &Plan) -> Timing {
     Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 }
+}
+
+/// An axis from one value to another.
+pub(crate) fn between(parameter: Parameter, from: f64, to: f64) -> Axis {
+    Axis { parameter, values: AxisValues::Linear { from, to, count: 2 } }
+}
+
+/// One machine with its spin, ready to be integrated.
+///
+/// # Errors
+/// [`NoEquilibrium`].
+pub(crate) fn ready(machine: Machine, spin: Spin, timing: &Timing) -> Result<Point, NoEquilibrium> {
+    prepare(Simd::Scalar, &[(machine, spin)], timing).remove(0)
 }
 
 /// At which speeds (m/s) a point's linear model takes the friction of its dampers, by name.

@@ -129,12 +129,11 @@ impl<'a> Held<'a> {
     /// # Errors
     /// An instruction set that is not there.
     pub(crate) fn engine(&self) -> Result<DwellEngine<'a>, Error> {
-        let Self { plan, speeds_rpm, search } = *self;
-        let asked = match search {
-            Some(search) => Asked::Motions(Motions::new(plan, search)),
-            None => Asked::Responses(Columns::of_dwells(plan)),
+        let asked = match self.search {
+            Some(search) => Asked::Motions(Motions::new(self.plan, search)),
+            None => Asked::Responses(Columns::of_dwells(self.plan)),
         };
-        Ok(DwellEngine { plan, speeds_rpm, simd: simd_from_environment()?, asked })
+        Ok(DwellEngine { held: *self, simd: simd_from_environment()?, asked })
     }
 }
 
@@ -149,8 +148,7 @@ enum Asked {
 /// What is asked of a plan's points at constant speeds. Row r is the point r / speeds at the speed
 /// r % speeds.
 pub(crate) struct DwellEngine<'a> {
-    plan: &'a Plan,
-    speeds_rpm: &'a [f64],
+    held: Held<'a>,
     simd: Simd,
     asked: Asked,
 }
@@ -159,18 +157,18 @@ impl DwellEngine<'_> {
     /// These rows, those of neighbouring points and speeds in lanes together. Once `is_stopped`
     /// says so, what comes means nothing.
     fn rows(&self, rows: &[u64], is_stopped: &dyn Fn() -> bool) -> Vec<Done> {
-        let speeds = self.speeds_rpm.len() as u64;
+        let speeds = self.held.speeds_rpm.len() as u64;
         let mut wanted: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
         wanted.dedup();
         let points: BTreeMap<u64, Result<Point, Status>> =
             wanted.iter().copied().zip(self.ready(&wanted)).collect();
         let (mut done, mut asked) = (Vec::with_capacity(rows.len()), Vec::new());
         for &row in rows {
-            let speed_rpm = self.speeds_rpm[(row % speeds) as usize];
+            let speed_rpm = self.held.speeds_rpm[(row % speeds) as usize];
             match &points[&(row / speeds)] {
                 Ok(point) => asked.push((row, Dwell { point, speed_rpm })),
                 Err(status) => done.push(match &self.asked {
-                    Asked::Responses(columns) => columns.done(failed(row, *status)),
+                    Asked::Responses(columns) => columns.done(Outcome::failed(row, *status)),
                     Asked::Motions(motions) => motions.failed(row, *status),
                 }),
             }
@@ -179,24 +177,24 @@ impl DwellEngine<'_> {
             Asked::Responses(columns) => {
                 let dwells: Vec<Dwell<'_>> = asked.iter().map(|(_, dwell)| *dwell).collect();
                 for ((row, _), found) in asked.iter().zip(responses(&dwells, is_stopped)) {
-                    let none = |status| failed(*row, status);
+                    let none = |status| Outcome::failed(*row, status);
                     let outcome = found.map_or_else(none, |found| self.outcome(*row, &found));
                     done.push(columns.done(outcome));
                 }
             }
             Asked::Motions(motions) => {
-                done.extend(motions.find(self.simd, self.speeds_rpm, &asked, is_stopped));
+                done.extend(motions.find(self.simd, self.held.speeds_rpm, &asked, is_stopped));
             }
         }
         done
     }
 
     fn ready(&self, points: &[u64]) -> Vec<Result<Point, Status>> {
-        let scenarios = points.iter().map(|&point| self.plan.scenario(point));
+        let scenarios = points.iter().map(|&point| self.held.plan.scenario(point));
         let machines: Vec<(Machine, Spin)> =
             scenarios.map(|scenario| (scenario.model.machine, scenario.model.spin)).collect();
         let together = |machines: &[(Machine, Spin)]| {
-            let ready = prepare(self.simd, machines, &timing(self.plan)).into_iter();
+            let ready = prepare(self.simd, machines, &timing(self.held.plan)).into_iter();
             ready.map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
         };
         together_or_alone(&machines, together, || Err(Status::Panicked))
@@ -204,30 +202,27 @@ impl DwellEngine<'_> {
 
     fn outcome(&self, row: u64, responses: &[Response]) -> Outcome {
         let mut outcomes = responses.iter().map(|response| self.outcome_of(row, response));
-        let first = outcomes.next().unwrap_or_else(|| failed(row, Status::NoResponse));
+        let first = outcomes.next().unwrap_or_else(|| Outcome::failed(row, Status::NoResponse));
         Outcome { coexisting: outcomes.collect(), ..first }
     }
 
     fn outcome_of(&self, row: u64, response: &Response) -> Outcome {
-        let channels = &self.plan.reliability.channels;
+        let channels = &self.held.plan.reliability.channels;
         let of_model = |amplitudes: &[f64]| Trajectory {
             amplitudes: channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
-            ..Trajectory::failed(Status::Ok)
+            ..Trajectory::default()
         };
         let (nonlinear, linear) = (of_model(&response.nonlinear), of_model(&response.linear));
         Outcome { growth: Some(Growth::from(response)), ..Outcome::new(row, nonlinear, linear) }
     }
 }
 
-fn failed(row: u64, status: Status) -> Outcome {
-    Outcome::new(row, Trajectory::failed(status), Trajectory::failed(status))
-}
-
 impl Engine for DwellEngine<'_> {
     fn evaluate(&self, next: &NextRow<'_>, keep: &KeepRow<'_>, watch: &Watch<'_>) {
-        let speeds = self.speeds_rpm.len() as u64;
+        let speeds = self.held.speeds_rpm.len() as u64;
         // All threads have some of few rows.
-        let share = self.plan.points().saturating_mul(speeds) / rayon::current_num_threads() as u64;
+        let share =
+            self.held.plan.points().saturating_mul(speeds) / rayon::current_num_threads() as u64;
         let at_once = match &self.asked {
             Asked::Responses(_) => share.min(POINTS_AT_ONCE * speeds).clamp(AT_ONCE[0], AT_ONCE[1]),
             Asked::Motions(motions) => motions.at_once(share, speeds),

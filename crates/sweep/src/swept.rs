@@ -61,38 +61,33 @@ impl Swept for Washer {
     }
 
     fn listed(plan: Option<&Plan>) -> Vec<Listed> {
-        listed(plan)
+        // The spin's parameters exist without a grid, but have no value.
+        let (paper, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
+        let (machine, spin) =
+            plan.map_or((&paper, &spin), |plan| (&plan.model.machine, &plan.model.spin));
+        let row = |parameter: Parameter| {
+            let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
+            let value = match parameter.target() {
+                Target::Window(edge) => plan.map(|plan| plan.window_s[edge]),
+                _ => parameter.get(machine, spin).filter(|_| plan.is_some() || !of_grid),
+            };
+            // A parameter of several numbers: each may have been written elsewhere.
+            let place = |part: Cow<'_, str>| plan?.written.0.get(part.as_ref()).map(String::as_str);
+            let mut places: Vec<&str> =
+                parameter.parts(machine).into_iter().filter_map(place).collect();
+            places.dedup();
+            let source = match of_grid || places.is_empty() {
+                true => parameter.source().to_string(),
+                false => format!("given: {}", places.join(", ")),
+            };
+            Listed { parameter, value, source }
+        };
+        Parameter::all(machine, spin).into_iter().map(row).collect()
     }
 }
 
 /// A line of the listing.
 pub(crate) type Listed = sweep_engine::Listed<Washer>;
-
-/// Every parameter with its value.
-fn listed(plan: Option<&Plan>) -> Vec<Listed> {
-    // The spin's parameters exist without a grid, but have no value.
-    let (paper, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
-    let (machine, spin) =
-        plan.map_or((&paper, &spin), |plan| (&plan.model.machine, &plan.model.spin));
-    let row = |parameter: Parameter| {
-        let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
-        let value = match parameter.target() {
-            Target::Window(edge) => plan.map(|plan| plan.window_s[edge]),
-            _ => parameter.get(machine, spin).filter(|_| plan.is_some() || !of_grid),
-        };
-        // A parameter of several numbers: each may have been written elsewhere.
-        let place = |part: Cow<'_, str>| plan?.written.0.get(part.as_ref()).map(String::as_str);
-        let mut places: Vec<&str> =
-            parameter.parts(machine).into_iter().filter_map(place).collect();
-        places.dedup();
-        let source = match of_grid || places.is_empty() {
-            true => parameter.source().to_string(),
-            false => format!("given: {}", places.join(", ")),
-        };
-        Listed { parameter, value, source }
-    };
-    Parameter::all(machine, spin).into_iter().map(row).collect()
-}
 
 #[cfg(test)]
 mod tests {
@@ -104,7 +99,7 @@ mod tests {
     #[test]
     fn json_holds_every_parameter() {
         let spin = Spin::Ramp { peak_rpm: 120.0, ramp_s: 2.0 };
-        let json: Value = serde_json::from_str(&as_json(&listed(None))).unwrap();
+        let json: Value = serde_json::from_str(&as_json(&Washer::listed(None))).unwrap();
         assert_eq!(
             json.as_array().map(Vec::len),
             Some(Parameter::all(&Machine::paper(), &spin).len())
@@ -125,7 +120,7 @@ mod tests {
             let sets: Vec<String> = sets.iter().copied().map(str::to_owned).collect();
             let plan = crate::config::load(&grid, &sets).unwrap();
             move |name: &str| {
-                let rows = listed(Some(&plan));
+                let rows = Washer::listed(Some(&plan));
                 rows.iter().find(|row| row.parameter.name() == name).unwrap().source.clone()
             }
         };

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::iter::repeat_n;
 use std::path::Path;
 
-use lane_ode::{Failure, Simd};
+use lane_ode::Failure;
 use rayon::iter::{
     IndexedParallelIterator as _, IntoParallelIterator as _, IntoParallelRefIterator as _,
     ParallelIterator as _,
@@ -13,13 +13,13 @@ use rayon::iter::{
 use serde_json::{Value, json};
 use washer_model::{
     Asked, COORDINATES, Cases, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium,
-    Point, Spin, Start, Timing, histories, instants, prepare, together,
+    Point, Spin, Start, Timing, histories, instants, together,
 };
 
 use crate::engine::{ModelEngine, Quick, reference_step_s};
 use crate::method::Integrator;
 use crate::model::Washer;
-use crate::plan::{Plan, Scenario, friction_speeds};
+use crate::plan::{Plan, Scenario, friction_speeds, ready};
 use sweep_engine::config::NamedValues;
 use sweep_engine::method::Integrator as _;
 use sweep_engine::store::read;
@@ -282,7 +282,7 @@ impl Run {
         let Scenario { model: Washer { machine, spin, .. }, window_s } = scenario;
         let checkpoints = view.quick.map_or(0, |quick| quick.checkpoints);
         let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
-        let point = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing).remove(0)?;
+        let point = ready(machine, spin.clone(), &timing)?;
         let (methods, method_json) = methods(plan, &point, &spin, view.quick);
         let times_s = match view.every_s {
             Some(every_s) => {

@@ -7,7 +7,7 @@ use washer_model::{
     Timing, history, prepare, respond,
 };
 use washer_row::{
-    Climbs, Demand, Deviations, Ladder, Level, MODELS, Next, Outcome, Rule, RungRun, Status,
+    Climbs, Demand, Deviations, Ladder, Level, MODELS, Next, Outcome, Rule, RungRun, Status, Terms,
     Trajectory, Verdict, runs,
 };
 
@@ -168,9 +168,10 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
 pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
     let point = ready(setup, values)?;
     let (ladders, rule) = (ladders(setup, values), &setup.rule);
+    let terms = Terms { ladders, demand: Demand::Row, rule };
     let mut climbs = Climbs::default();
     let outcome = loop {
-        match climbs.next(0, &point, ladders, Demand::Row, rule) {
+        match climbs.next(0, &point, terms) {
             Next::Done(outcome) => break *outcome,
             Next::Runs(wanted) => {
                 for (model, rung) in wanted {
@@ -178,7 +179,7 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
                     let twin = (rung == ladder.twin()).then(|| point.nudged());
                     let started = twin.as_ref().unwrap_or(&point);
                     for run in by_method(model, ladder.method(rung), &[started], rule) {
-                        climbs.take((model, rung), run, ladder, &point, rule);
+                        climbs.take((model, rung), run, &point, terms);
                     }
                 }
             }

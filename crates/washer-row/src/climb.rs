@@ -4,7 +4,7 @@ use washer_model::{Channel, ModelKind, Point, Swing};
 
 use crate::ladder::{Ladder, Rung};
 use crate::measures::{CREEPING_M_PER_S, Floor, Metric, TURN_FLOOR};
-use crate::outcome::{Outcome, Status, Trajectory};
+use crate::outcome::{Deviations, Outcome, Status, Trajectory};
 use crate::run::{Rule, RungRun};
 use crate::twin::Departure;
 use crate::verdict::Verdict;
@@ -89,34 +89,53 @@ struct Twin {
     spread: Option<f64>,
 }
 
+/// By what rows are judged, all alike.
+#[derive(Clone, Copy, Debug)]
+pub struct Terms<'a> {
+    /// Of both models, in the order of [`MODELS`].
+    pub ladders: &'a [Ladder; 2],
+    /// What outcomes must be good for.
+    pub demand: Demand,
+    /// What rows take from trajectories.
+    pub rule: &'a Rule,
+}
+
+impl<'a> Terms<'a> {
+    fn of(self, model: usize, point: &'a Point) -> Judge<'a> {
+        let (ladder, model) = (&self.ladders[model], MODELS[model]);
+        Judge { ladder, point, model, rule: self.rule }
+    }
+}
+
+/// What one model's runs at a point are judged by.
+#[derive(Clone, Copy)]
+struct Judge<'a> {
+    ladder: &'a Ladder,
+    point: &'a Point,
+    model: ModelKind,
+    rule: &'a Rule,
+}
+
 impl Climb {
-    fn take(
-        &mut self,
-        rung: usize,
-        now: RungRun,
-        ladder: &Ladder,
-        point: &Point,
-        model: ModelKind,
-        rule: &Rule,
-    ) {
+    fn take(&mut self, rung: usize, now: RungRun, by: Judge<'_>) {
         let Some(before) = self.run.take() else {
             (self.rung, self.run) = (rung, Some(now));
             return;
         };
-        let found = difference(&before, &now, point, model, rule);
-        if rung == ladder.twin() {
-            let departure = Departure::new(&point.departure(&before.course, &now.course));
+        let found = by.difference(&before, &now);
+        if rung == by.ladder.twin() {
+            let departure = Departure::new(&by.point.departure(&before.course, &now.course));
             let spread = found.map(|found| found.of_numbers);
             self.twin = Some(Twin { is_chaotic: departure.is_exponential(), spread });
             self.run = Some(before);
             return;
         }
-        let levels = [self.rung, rung].map(|rung| ladder.rungs[rung].level.is_capped());
-        self.is_beside_what_rings = levels == [true, false] && self.unseen > rule.accuracy;
-        self.unseen = unseen(&now, &ladder.rungs[rung], point, rule);
-        let of_sag = of_sag(&now, &ladder.rungs[rung], point, rule);
-        let of_clash = of_clash(&before, &now, &ladder.rungs[rung], rule);
-        self.besides = of_sag.max(of_clash).max(of_gap(&now, &ladder.rungs[rung], point, rule));
+        let [was, is] = [self.rung, rung].map(|rung| &by.ladder.rungs[rung]);
+        self.is_beside_what_rings =
+            was.level.is_capped() && !is.level.is_capped() && self.unseen > by.rule.accuracy;
+        self.unseen = by.unseen(&now, is);
+        let of_clash = by.of_clash(&before, &now, is);
+        self.besides = by.of_sag(&now, is).max(of_clash).max(by.of_gap(&now, is));
         self.difference = found;
         (self.rung, self.run) = (rung, Some(now));
     }
@@ -171,17 +190,11 @@ impl Climb {
 
     /// The run to ask for next for an error of at most `tolerance`; none if it is there, or if no
     /// further run would help.
-    fn higher(
-        &self,
-        ladder: &Ladder,
-        point: &Point,
-        model: ModelKind,
-        rule: &Rule,
-    ) -> Option<usize> {
+    fn higher(&self, by: Judge<'_>) -> Option<usize> {
         if self.run.is_none() {
-            return Some(first(ladder, point, rule));
+            return Some(by.first());
         }
-        let tolerance = rule.accuracy;
+        let (ladder, tolerance) = (by.ladder, by.rule.accuracy);
         let reference = ladder.reference()?;
         if self.failed() && self.rung + 1 < reference {
             // It may be the caps that do not hold: RK4 has the word, and at both steps.
@@ -194,7 +207,7 @@ impl Climb {
         if self.rung >= ladder.judge().unwrap_or(reference) {
             // What two steps of plain RK4 leave in doubt may be chaos, which no step settles.
             let is_in_doubt = !is_settled(self.error_with(ladder, 0.0));
-            let may_be_chaos = is_in_doubt && model == ModelKind::Nonlinear;
+            let may_be_chaos = is_in_doubt && by.model == ModelKind::Nonlinear;
             if may_be_chaos && self.twin.is_none() && Some(self.rung) == ladder.judge() {
                 return Some(ladder.twin());
             }
@@ -223,15 +236,9 @@ pub enum Next {
 
 impl Climbs {
     /// A run of a model that was asked for.
-    pub fn take(
-        &mut self,
-        (model, rung): (usize, usize),
-        run: RungRun,
-        ladder: &Ladder,
-        point: &Point,
-        rule: &Rule,
-    ) {
-        self.0[model].take(rung, run, ladder, point, MODELS[model], rule);
+    pub fn take(&mut self, kind: (usize, usize), run: RungRun, point: &Point, terms: Terms<'_>) {
+        let (model, rung) = kind;
+        self.0[model].take(rung, run, terms.of(model, point));
     }
 
     /// The last run of a model with its rung and the error left in it, once there is one. The error
@@ -248,19 +255,12 @@ impl Climbs {
 
     /// What is to be done once every run that was asked for is there. `id` is what the outcome
     /// calls the point.
-    pub fn next(
-        &self,
-        id: u64,
-        point: &Point,
-        ladders: &[Ladder; 2],
-        demand: Demand,
-        rule: &Rule,
-    ) -> Next {
+    pub fn next(&self, id: u64, point: &Point, terms: Terms<'_>) -> Next {
+        let Terms { ladders, demand, rule } = terms;
         if demand == Demand::Growth {
-            let none = || Trajectory::failed(Status::Ok);
-            return Next::Done(Box::new(Outcome::new(id, none(), none())));
+            return Next::Done(Box::new(Outcome::failed(id, Status::Ok)));
         }
-        let outcome = self.outcome(id, point, ladders, rule);
+        let outcome = self.outcome(id, point, terms);
         let margin = outcome.as_ref().and_then(|outcome| margin(outcome, rule));
         let is_sure = |climb: &Climb, ladder: &Ladder| match (demand, margin) {
             (Demand::Side, Some(margin)) => {
@@ -269,9 +269,8 @@ impl Climbs {
             _ => false,
         };
         let higher = |(model, climb): (usize, &Climb)| {
-            let ladder = &ladders[model];
-            let rung = climb.higher(ladder, point, MODELS[model], rule)?;
-            (!is_sure(climb, ladder)).then_some((model, rung))
+            let rung = climb.higher(terms.of(model, point))?;
+            (!is_sure(climb, &ladders[model])).then_some((model, rung))
         };
         let mut runs: Vec<_> = self.0.iter().enumerate().filter_map(higher).collect();
         let Some(outcome) = outcome.filter(|_| runs.is_empty()) else { return Next::Runs(runs) };
@@ -300,13 +299,8 @@ impl Climbs {
     }
 
     /// The row as it is now, once both models have run.
-    fn outcome(
-        &self,
-        id: u64,
-        point: &Point,
-        ladders: &[Ladder; 2],
-        rule: &Rule,
-    ) -> Option<Outcome> {
+    fn outcome(&self, id: u64, point: &Point, terms: Terms<'_>) -> Option<Outcome> {
+        let Terms { ladders, rule, .. } = terms;
         let [nonlinear, linear] = &self.0;
         let trajectory = |climb: &Climb| climb.run.as_ref().map(|run| run.trajectory.clone());
         let mut outcome = Outcome::new(id, trajectory(nonlinear)?, trajectory(linear)?);
@@ -328,17 +322,6 @@ impl Climbs {
     }
 }
 
-/// The rung to begin with: the reference's longer step where the first rung leaves out more of what
-/// the gap rings than it may err, even at the end of the run.
-fn first(ladder: &Ladder, point: &Point, rule: &Rule) -> usize {
-    let share = |swing: &Swing| swing.gap_m / point.clearance_m();
-    let of_gap = |rung| of_ringing(rung, point, rule, |_| [rule.end_s; 2], share);
-    match ladder.reference() {
-        Some(reference) if of_gap(&ladder.rungs[0]) > rule.accuracy => reference - 1,
-        _ => 0,
-    }
-}
-
 /// How far the ratios are from a limit, as a share of the limit.
 fn margin(outcome: &Outcome, rule: &Rule) -> Option<f64> {
     let Verdict { least, greatest, .. } = Verdict::new(outcome, rule.channels.len(), rule.limits);
@@ -346,7 +329,7 @@ fn margin(outcome: &Outcome, rule: &Rule) -> Option<f64> {
 }
 
 /// How far two runs are apart, relative.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Difference {
     /// Over the course of the motion.
     of_course: f64,
@@ -357,153 +340,161 @@ struct Difference {
 }
 
 impl Difference {
-    const NONE: Self = Self { of_course: 0.0, of_numbers: 0.0, of_caps: 0.0 };
-
     fn greatest(self) -> f64 {
         self.of_course.max(self.of_numbers)
     }
 }
 
-/// How far two runs are apart; `None` if one of them failed, or both at different times.
-fn difference(
-    a: &RungRun,
-    b: &RungRun,
-    point: &Point,
-    model: ModelKind,
-    rule: &Rule,
-) -> Option<Difference> {
-    let (of_a, of_b) = (&a.trajectory, &b.trajectory);
-    if of_a.status != of_b.status {
-        return None;
-    }
-    if of_b.status != Status::Ok {
-        let (a_s, b_s) = of_a.fail_time_s.zip(of_b.fail_time_s)?;
-        return ((a_s - b_s).abs() <= SAME_TIME * rule.end_s).then_some(Difference::NONE);
-    }
-    let of_course = point.course_difference(model, &a.course, &b.course);
-    let [of_motion, of_caps] = of_numbers(of_a, of_b, point, rule);
-    Some(Difference { of_course, of_numbers: of_motion.max(of_caps), of_caps })
-}
-
-/// The error that this rung has in common with others, so that no comparison shows it: what
-/// bearings and hinge swing after jumps.
-fn unseen(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
-    let share = |swing: &Swing| of_motion(&swing.channels, &run.trajectory, rule);
-    let of_swings = of_ringing(rung, point, rule, |_| point.window_s(), share);
-    let of_clash = clash_s(&run.trajectory, rule).zip(run.clash_doubt_s);
-    of_clash.map_or(of_swings, |(time_s, doubt_s)| {
-        of_swings.max(doubt_s / time_s.max(clash_floor_s(rule)))
-    })
-}
-
-/// What caps make of the time of a clash that just happens, by its difference from the run before:
-/// it is as the root of the depth, and has no first order.
-fn of_clash(before: &RungRun, run: &RungRun, rung: &Rung, rule: &Rule) -> f64 {
-    if !rung.level.is_capped() {
-        return 0.0;
-    }
-    let times_s = clash_s(&before.trajectory, rule).zip(clash_s(&run.trajectory, rule));
-    times_s
-        .map_or(0.0, |(a_s, b_s)| CLASH_WEIGHT * (a_s - b_s).abs() / b_s.max(clash_floor_s(rule)))
-}
-
-/// What the gap rings where it may be least, as a share of the clearance. No motion amplifies it.
-fn of_gap(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
-    let Some(gap_m) = run.trajectory.min_gap_m else { return 0.0 };
-    let least_m = gap_m.abs().max(point.clearance_m());
-    let within_s = |bound: &Swing| [point.gap_least_from_s(&run.course, bound.gap_m), rule.end_s];
-    of_ringing(rung, point, rule, within_s, |swing| swing.gap_m / least_m)
-}
-
-/// What a rung leaves out of ringing, in parts of the motion by `share`: by a bound, and where that
-/// is not enough, by modes and what is left of them in an interval.
-fn of_ringing(
-    rung: &Rung,
-    point: &Point,
-    rule: &Rule,
-    within_s: impl Fn(&Swing) -> [f64; 2],
-    share: impl Fn(&Swing) -> f64,
-) -> f64 {
-    if rung.follows_bearings {
-        return 0.0;
-    }
-    let follows_hinge = !rung.level.is_capped();
-    let bound = point.ringing(follows_hinge);
-    match share(&bound) > FREE_OF_MODES * rule.accuracy {
-        true => share(&point.ringing_left(follows_hinge, within_s(&bound))),
-        false => share(&bound),
-    }
-}
-
-/// What caps make of the hinge's bend under gravity. No motion amplifies that.
-fn of_sag(run: &RungRun, rung: &Rung, point: &Point, rule: &Rule) -> f64 {
-    if !rung.level.is_capped() {
-        return 0.0;
-    }
-    let sags = point.hinge_sag().map(|sag| SAGS * rule.accuracy * sag);
-    of_motion(&sags, &run.trajectory, rule)
-}
-
-/// The greatest of these deviations (m, rad) as a share of the motion's in the same channel.
-fn of_motion(deviations: &[f64; Channel::ALL.len()], numbers: &Trajectory, rule: &Rule) -> f64 {
-    let share = |channel: &Channel, of: f64| match deviations[channel.index()] {
-        0.0 => 0.0,
-        deviation => deviation / of,
-    };
-    let channels = || rule.channels.iter();
-    let of_amplitudes = channels().zip(&numbers.amplitudes).map(|(of, most)| share(of, *most));
-    let of_turns = numbers.turns.iter().flat_map(|turn| {
-        channels().map(|channel| share(channel, turn[channel.index()].max(TURN_FLOOR)))
-    });
-    of_amplitudes.chain(of_turns).fold(0.0, f64::max)
-}
-
-/// The time of a clash, if the row has it.
-fn clash_s(numbers: &Trajectory, rule: &Rule) -> Option<f64> {
-    let mut metrics = rule.measures.of_model().zip(&numbers.metrics);
-    metrics.find(|(number, _)| number.metric == Metric::ClashTime).map(|(_, time_s)| *time_s)
-}
-
-/// A clash that just happens is a time that just is not zero: shorter ones are compared with this.
-fn clash_floor_s(rule: &Rule) -> f64 {
-    let [from_s, to_s] = rule.window_s;
-    METRIC_FLOOR * (to_s - from_s)
-}
-
-/// The greatest relative differences of what a row takes from two trajectories: of the motion, and
-/// of what caps move more.
-fn of_numbers(a: &Trajectory, b: &Trajectory, point: &Point, rule: &Rule) -> [f64; 2] {
-    let mut greatest = [0.0_f64; 2];
-    let mut compare = |is_of_caps: bool, a: f64, b: f64, least: f64| {
-        if a != b {
-            // A quotient that is no number must not pass for none.
-            let share = (a - b).abs() / b.abs().max(least);
-            let greatest = &mut greatest[usize::from(is_of_caps)];
-            *greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
+impl Judge<'_> {
+    /// The rung to begin with: the reference's longer step where the first rung leaves out more of
+    /// what the gap rings than it may err, even at the end of the run.
+    fn first(&self) -> usize {
+        let share = |swing: &Swing| swing.gap_m / self.point.clearance_m();
+        let of_gap = |rung| self.of_ringing(rung, |_| [self.rule.end_s; 2], share);
+        match self.ladder.reference() {
+            Some(reference) if of_gap(&self.ladder.rungs[0]) > self.rule.accuracy => reference - 1,
+            _ => 0,
         }
-    };
-    for (a, b) in a.amplitudes.iter().zip(&b.amplitudes) {
-        compare(false, *a, *b, 0.0);
     }
-    if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
-        compare(true, a, b, point.clearance_m());
+
+    /// How far two runs are apart; `None` if one of them failed, or both at different times.
+    fn difference(&self, a: &RungRun, b: &RungRun) -> Option<Difference> {
+        let (of_a, of_b) = (&a.trajectory, &b.trajectory);
+        if of_a.status != of_b.status {
+            return None;
+        }
+        if of_b.status != Status::Ok {
+            let (a_s, b_s) = of_a.fail_time_s.zip(of_b.fail_time_s)?;
+            let is_one = (a_s - b_s).abs() <= SAME_TIME * self.rule.end_s;
+            return is_one.then_some(Difference::default());
+        }
+        let of_course = self.point.course_difference(self.model, &a.course, &b.course);
+        let [of_motion, of_caps] = self.of_numbers(of_a, of_b);
+        Some(Difference { of_course, of_numbers: of_motion.max(of_caps), of_caps })
     }
-    for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(rule.measures.of_model()) {
-        let least = match number.metric.floor() {
-            Floor::None => 0.0,
-            Floor::PartOfWindow => clash_floor_s(rule),
-            Floor::Weight => point.weight_n(),
-            Floor::PartOfWeight => METRIC_FLOOR * point.weight_n(),
-            Floor::Creeping => CREEPING_M_PER_S,
+
+    /// The error that this rung has in common with others, so that no comparison shows it: what
+    /// bearings and hinge swing after jumps.
+    fn unseen(&self, run: &RungRun, rung: &Rung) -> f64 {
+        let share = |swing: &Swing| self.of_motion(&swing.channels, &run.trajectory);
+        let of_swings = self.of_ringing(rung, |_| self.point.window_s(), share);
+        let of_clash = self.clash_s(run).zip(run.clash_doubt_s);
+        of_clash.map_or(of_swings, |(time_s, doubt_s)| {
+            of_swings.max(doubt_s / time_s.max(self.clash_floor_s()))
+        })
+    }
+
+    /// What caps make of the time of a clash that just happens, by its difference from the run
+    /// before: it is as the root of the depth, and has no first order.
+    fn of_clash(&self, before: &RungRun, run: &RungRun, rung: &Rung) -> f64 {
+        let times_s = self.clash_s(before).zip(self.clash_s(run));
+        times_s.filter(|_| rung.level.is_capped()).map_or(0.0, |(a_s, b_s)| {
+            CLASH_WEIGHT * (a_s - b_s).abs() / b_s.max(self.clash_floor_s())
+        })
+    }
+
+    /// What the gap rings where it may be least, as a share of the clearance. No motion amplifies
+    /// it.
+    fn of_gap(&self, run: &RungRun, rung: &Rung) -> f64 {
+        let Some(gap_m) = run.trajectory.min_gap_m else { return 0.0 };
+        let least_m = gap_m.abs().max(self.point.clearance_m());
+        let from_s = |bound: &Swing| self.point.gap_least_from_s(&run.course, bound.gap_m);
+        let within_s = |bound: &Swing| [from_s(bound), self.rule.end_s];
+        self.of_ringing(rung, within_s, |swing| swing.gap_m / least_m)
+    }
+
+    /// What a rung leaves out of ringing, in parts of the motion by `share`: by a bound, and where
+    /// that is not enough, by modes and what is left of them in an interval.
+    fn of_ringing(
+        &self,
+        rung: &Rung,
+        within_s: impl Fn(&Swing) -> [f64; 2],
+        share: impl Fn(&Swing) -> f64,
+    ) -> f64 {
+        if rung.follows_bearings {
+            return 0.0;
+        }
+        let follows_hinge = !rung.level.is_capped();
+        let bound = self.point.ringing(follows_hinge);
+        match share(&bound) > FREE_OF_MODES * self.rule.accuracy {
+            true => share(&self.point.ringing_left(follows_hinge, within_s(&bound))),
+            false => share(&bound),
+        }
+    }
+
+    /// What caps make of the hinge's bend under gravity. No motion amplifies that.
+    fn of_sag(&self, run: &RungRun, rung: &Rung) -> f64 {
+        if !rung.level.is_capped() {
+            return 0.0;
+        }
+        let sags = self.point.hinge_sag().map(|sag| SAGS * self.rule.accuracy * sag);
+        self.of_motion(&sags, &run.trajectory)
+    }
+
+    /// The greatest of these deviations (m, rad) as a share of the motion's in the same channel.
+    fn of_motion(&self, deviations: &Deviations, numbers: &Trajectory) -> f64 {
+        let share = |channel: &Channel, of: f64| match deviations[channel.index()] {
+            0.0 => 0.0,
+            deviation => deviation / of,
         };
-        compare(number.metric.is_of_caps(), *a, *b, least);
+        let channels = || self.rule.channels.iter();
+        let of_amplitudes = channels().zip(&numbers.amplitudes).map(|(of, most)| share(of, *most));
+        let of_turns = numbers.turns.iter().flat_map(|turn| {
+            channels().map(|channel| share(channel, turn[channel.index()].max(TURN_FLOOR)))
+        });
+        of_amplitudes.chain(of_turns).fold(0.0, f64::max)
     }
-    for (a, b) in a.turns.iter().zip(&b.turns) {
-        for channel in &rule.channels {
-            let i = channel.index();
-            let (a, b) = (a[i].max(TURN_FLOOR), b[i].max(TURN_FLOOR));
-            compare(false, b + TURN_WEIGHT * (a - b), b, 0.0);
+
+    /// The time of a clash, if the row has it.
+    fn clash_s(&self, run: &RungRun) -> Option<f64> {
+        let mut metrics = self.rule.measures.of_model().zip(&run.trajectory.metrics);
+        metrics.find(|(number, _)| number.metric == Metric::ClashTime).map(|(_, time_s)| *time_s)
+    }
+
+    /// A clash that just happens is a time that just is not zero: shorter ones are compared with
+    /// this.
+    fn clash_floor_s(&self) -> f64 {
+        let [from_s, to_s] = self.rule.window_s;
+        METRIC_FLOOR * (to_s - from_s)
+    }
+
+    /// The greatest relative differences of what a row takes from two trajectories: of the motion,
+    /// and of what caps move more.
+    fn of_numbers(&self, a: &Trajectory, b: &Trajectory) -> [f64; 2] {
+        let Self { point, rule, .. } = self;
+        let mut greatest = [0.0_f64; 2];
+        let mut compare = |is_of_caps: bool, a: f64, b: f64, least: f64| {
+            if a != b {
+                // A quotient that is no number must not pass for none.
+                let share = (a - b).abs() / b.abs().max(least);
+                let greatest = &mut greatest[usize::from(is_of_caps)];
+                *greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
+            }
+        };
+        for (a, b) in a.amplitudes.iter().zip(&b.amplitudes) {
+            compare(false, *a, *b, 0.0);
         }
+        if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
+            compare(true, a, b, point.clearance_m());
+        }
+        for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(rule.measures.of_model()) {
+            let facts = number.metric.facts();
+            let least = match facts.floor {
+                Floor::None => 0.0,
+                Floor::PartOfWindow => self.clash_floor_s(),
+                Floor::Weight => point.weight_n(),
+                Floor::PartOfWeight => METRIC_FLOOR * point.weight_n(),
+                Floor::Creeping => CREEPING_M_PER_S,
+            };
+            compare(facts.is_of_caps, *a, *b, least);
+        }
+        for (a, b) in a.turns.iter().zip(&b.turns) {
+            for channel in &rule.channels {
+                let i = channel.index();
+                let (a, b) = (a[i].max(TURN_FLOOR), b[i].max(TURN_FLOOR));
+                compare(false, b + TURN_WEIGHT * (a - b), b, 0.0);
+            }
+        }
+        greatest
     }
-    greatest
 }

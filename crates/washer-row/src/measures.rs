@@ -3,6 +3,7 @@
 use sweep_parameter::{Limit, Worse};
 use washer_model::{Channel, Extra, Wanted};
 
+use crate::named;
 use crate::outcome::{Deviations, Outcome};
 
 /// Deviations below this count as this (m, rad) where turns are compared: neither 0 over 0 nor what
@@ -13,31 +14,21 @@ pub(crate) const TURN_FLOOR: f64 = 1e-5;
 /// ones.
 pub const CREEPING_M_PER_S: f64 = 0.01;
 
-/// What counts as the amplitude of a motion, and so as a ratio of two.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Criterion {
-    /// The largest deviation from equilibrium in the window.
-    #[default]
-    Peak,
-    /// The same in every turn of the drum; of the ratios by turn the largest.
-    Envelope,
-    /// The root mean square of the deviation from equilibrium over the window.
-    Rms,
+named! {
+    /// What counts as the amplitude of a motion, and so as a ratio of two.
+    #[derive(Default)]
+    pub enum Criterion {
+        /// The largest deviation from equilibrium in the window.
+        #[default]
+        Peak = "peak",
+        /// The same in every turn of the drum; of the ratios by turn the largest.
+        Envelope = "envelope",
+        /// The root mean square of the deviation from equilibrium over the window.
+        Rms = "rms",
+    }
 }
 
 impl Criterion {
-    /// Every criterion.
-    pub const ALL: [Self; 3] = [Self::Peak, Self::Envelope, Self::Rms];
-
-    /// Name in grid files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Peak => "peak",
-            Self::Envelope => "envelope",
-            Self::Rms => "rms",
-        }
-    }
-
     /// What a channel's column of one model holds.
     pub const fn amplitude(self) -> &'static str {
         match self {
@@ -67,58 +58,35 @@ impl Criterion {
     }
 }
 
-/// A number beside the amplitudes, in columns of its own when asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Metric {
-    /// The greatest force on the cabinet.
-    CabinetForce,
-    /// How long drum and tub overlap.
-    ClashTime,
-    /// How far the machine sinks under its weight.
-    StaticSag,
-    /// The greatest push of a stop.
-    StopForce,
-    /// How long a stop is closed.
-    StopContact,
-    /// The least load of a foot of the cabinet.
-    FootLoad,
-    /// The least margin of the cabinet against slipping.
-    SlipMargin,
-    /// The least margin of the cabinet against slipping, turning or both.
-    WalkMargin,
-    /// How fast disturbances grow at constant speeds.
-    Growth,
-    /// The greatest speed of a damper.
-    DamperSpeed,
-    /// How far the motions go that constant speeds end in.
-    Dwell,
+named! {
+    /// A number beside the amplitudes, in columns of its own when asked for.
+    pub enum Metric {
+        /// The greatest force on the cabinet.
+        CabinetForce = "cabinet_force",
+        /// How long drum and tub overlap.
+        ClashTime = "clash_time",
+        /// How far the machine sinks under its weight.
+        StaticSag = "static_sag",
+        /// The greatest push of a stop.
+        StopForce = "stop_force",
+        /// How long a stop is closed.
+        StopContact = "stop_contact",
+        /// The least load of a foot of the cabinet.
+        FootLoad = "foot_load",
+        /// The least margin of the cabinet against slipping.
+        SlipMargin = "slip_margin",
+        /// The least margin of the cabinet against slipping, turning or both.
+        WalkMargin = "walk_margin",
+        /// How fast disturbances grow at constant speeds.
+        Growth = "growth",
+        /// The greatest speed of a damper.
+        DamperSpeed = "damper_speed",
+        /// How far the motions go that constant speeds end in.
+        Dwell = "dwell",
+    }
 }
 
 impl Metric {
-    /// Every metric.
-    pub const ALL: [Self; 11] = [
-        Self::CabinetForce,
-        Self::ClashTime,
-        Self::StaticSag,
-        Self::StopForce,
-        Self::StopContact,
-        Self::FootLoad,
-        Self::SlipMargin,
-        Self::WalkMargin,
-        Self::Growth,
-        Self::DamperSpeed,
-        Self::Dwell,
-    ];
-
-    const fn facts(self) -> &'static Facts {
-        &METRICS[self as usize]
-    }
-
-    /// Name in grid files.
-    pub const fn name(self) -> &'static str {
-        self.facts().name
-    }
-
     /// Whether each model has its own; else it belongs to the machine.
     pub const fn is_of_model(self) -> bool {
         self.facts().of.is_some()
@@ -135,44 +103,119 @@ impl Metric {
         self.is_of_model() && !matches!(self, Self::ClashTime | Self::StopContact)
     }
 
-    /// What the machine must have.
-    pub const fn part(self) -> Option<Part> {
-        self.facts().part
-    }
-
-    /// What differences of it are compared with where it is less.
-    pub const fn floor(self) -> Floor {
-        self.facts().floor
-    }
-
-    /// Whether caps move it more than the motion, so that their share of an error is what is left.
-    pub(crate) const fn is_of_caps(self) -> bool {
-        self.facts().is_of_caps
-    }
-
-    /// Unit.
-    pub const fn unit(self) -> &'static str {
-        self.facts().unit
-    }
-
-    /// Which way it is bad.
-    pub const fn worse(self) -> Worse {
-        self.facts().worse
-    }
-
-    /// Up to where it is good, if that has a meaning of its own.
-    pub const fn limit(self) -> Option<Limit> {
-        self.facts().limit
-    }
-
     /// The column's name; `model` only if each has its own.
     pub fn column(self, model: &str) -> String {
-        column(self.name(), if self.is_of_model() { model } else { "" }, self.unit())
+        column(self.name(), if self.is_of_model() { model } else { "" }, self.facts().unit)
     }
 
-    /// One line for column dictionaries and docs.
-    pub const fn description(self) -> &'static str {
-        self.facts().description
+    /// What there is to say of it.
+    pub const fn facts(self) -> Facts {
+        match self {
+            Self::CabinetForce => Facts {
+                unit: "N",
+                description: "greatest magnitude in the window of the sum of all spring and damper \
+                              forces on the cabinet (at rest the weight)",
+                record: |wanted| wanted.cabinet_force = true,
+                of: Some(|extra| extra.cabinet_force_n.into_iter().collect()),
+                ..PLAIN
+            },
+            Self::ClashTime => Facts {
+                unit: "s",
+                description: "time in the window with a gap between drum and tub below zero",
+                floor: Floor::PartOfWindow,
+                // Of the gap, which the hinge bends.
+                is_of_caps: true,
+                record: |wanted| wanted.clash_time = true,
+                of: Some(|extra| extra.clash_time_s.into_iter().collect()),
+                ..PLAIN
+            },
+            Self::StaticSag => Facts {
+                unit: "m",
+                description: "how far the tub's mass centre sinks from where the machine file \
+                              draws it to the static equilibrium; null if there is none",
+                ..PLAIN
+            },
+            Self::StopForce => Facts {
+                unit: "N",
+                description: "greatest push of any stop in the window; the linear model has the \
+                              tangents of the stops at equilibrium, next to nothing while they are \
+                              open",
+                part: Some(Part::Stop),
+                of_each: Some([
+                    "force",
+                    "greatest push of the stop in the window; the linear model has its tangent at \
+                     equilibrium, next to nothing while it is open",
+                ]),
+                floor: Floor::PartOfWeight,
+                record: |wanted| wanted.stops = true,
+                of: Some(|extra| extra.stops.iter().map(|stop| stop.push_n).collect()),
+                ..PLAIN
+            },
+            Self::StopContact => Facts {
+                unit: "s",
+                description: "longest time in the window for which any one stop is closed",
+                part: Some(Part::Stop),
+                of_each: Some(["contact", "time in the window for which the stop is closed"]),
+                floor: Floor::PartOfWindow,
+                record: |wanted| wanted.stops = true,
+                of: Some(|extra| extra.stops.iter().map(|stop| stop.contact_s).collect()),
+                ..PLAIN
+            },
+            Self::FootLoad => Facts {
+                unit: "N",
+                description: "least vertical load of any foot of the cabinet in the window, by \
+                              statics; below zero it would lift",
+                of_each: Some([
+                    "load",
+                    "least vertical load of the foot in the window, by statics; below zero it \
+                     would lift",
+                ]),
+                of: Some(|extra| extra.foot_loads_n.clone()),
+                ..OF_FEET
+            },
+            Self::SlipMargin => Facts {
+                unit: "N",
+                description: "least margin of the cabinet against slipping in the window: friction \
+                              on all feet together less the horizontal force",
+                of: Some(|extra| extra.slip_margin_n.into_iter().collect()),
+                ..OF_FEET
+            },
+            Self::WalkMargin => Facts {
+                unit: "N",
+                description: "least margin of the cabinet against slipping, turning or both in the \
+                              window: the margin against slipping less what the moment about the \
+                              vertical takes of it",
+                of: Some(|extra| extra.walk_margin_n.into_iter().collect()),
+                ..OF_FEET
+            },
+            Self::Growth => Facts {
+                unit: "1/s",
+                description: "how fast the fastest growing disturbance of the nonlinear response \
+                              grows, at that of the speeds of [stability] at which it is greatest",
+                limit: Some(Limit { value: 0.0, scale: 1.0 }),
+                ..PLAIN
+            },
+            Self::DamperSpeed => Facts {
+                unit: "m/s",
+                description: "greatest speed along any damper in the window: what \
+                              `friction_linear_speed_m_per_s` should be near",
+                part: Some(Part::Damper),
+                of_each: Some(["speed", "greatest speed along the damper in the window"]),
+                floor: Floor::Creeping,
+                // What capped modes ring is more of a speed than of a motion, by their frequency
+                // over the drum's.
+                is_of_caps: true,
+                record: |wanted| wanted.damper_speeds = true,
+                of: Some(|extra| extra.damper_speeds_m_per_s.clone()),
+                ..PLAIN
+            },
+            // Each channel has a column of its own, in its unit.
+            Self::Dwell => Facts {
+                description: "largest deviation of any motion that the drum held at any of the \
+                              speeds of [stability] ends in (`sweep dwell`)",
+                ..PLAIN
+            },
+        }
     }
 }
 
@@ -182,24 +225,15 @@ fn column(what: &str, model: &str, unit: &str) -> String {
     [what, model, &unit].into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
 }
 
-/// A part that a machine may have several of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// A stop.
-    Stop,
-    /// A foot of the cabinet.
-    Foot,
-    /// A damper.
-    Damper,
-}
-
-impl Part {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Stop => "stop",
-            Self::Foot => "foot",
-            Self::Damper => "damper",
-        }
+named! {
+    /// A part that a machine may have several of.
+    pub enum Part {
+        /// A stop.
+        Stop = "stop",
+        /// A foot of the cabinet.
+        Foot = "foot",
+        /// A damper.
+        Damper = "damper",
     }
 }
 
@@ -220,30 +254,31 @@ pub enum Floor {
 }
 
 /// What there is to say of a metric, once.
-struct Facts {
-    name: &'static str,
-    unit: &'static str,
-    description: &'static str,
-    /// What a machine must have.
-    part: Option<Part>,
+pub struct Facts {
+    /// Unit.
+    pub unit: &'static str,
+    /// One line for column dictionaries and docs.
+    pub description: &'static str,
+    /// What the machine must have.
+    pub part: Option<Part>,
     /// In the column of one part, and what that holds; none if parts have no columns.
     of_each: Option<[&'static str; 2]>,
-    floor: Floor,
-    /// Whether caps move it more than the motion.
-    is_of_caps: bool,
+    /// What differences of it are compared with where it is less.
+    pub floor: Floor,
+    /// Whether caps move it more than the motion, so that their share of an error is what is left.
+    pub(crate) is_of_caps: bool,
     /// What trajectories must record.
     record: fn(&mut Wanted),
     /// Its values in such a record, of each part or the only one; none if it is the machine's own.
     of: Option<fn(&Extra) -> Vec<f64>>,
     /// Which way it is bad: of several parts, the worst stands for all.
-    worse: Worse,
+    pub worse: Worse,
     /// Up to where it is good, if that has a meaning of its own.
-    limit: Option<Limit>,
+    pub limit: Option<Limit>,
 }
 
 /// The facts of a metric of the whole machine that is always known.
 const PLAIN: Facts = Facts {
-    name: "",
     unit: "",
     description: "",
     part: None,
@@ -256,137 +291,15 @@ const PLAIN: Facts = Facts {
     limit: None,
 };
 
-/// Every metric, in the order of [`Metric::ALL`].
-const METRICS: [Facts; Metric::ALL.len()] = [
-    Facts {
-        name: "cabinet_force",
-        unit: "N",
-        description: "greatest magnitude in the window of the sum of all spring and damper forces \
-                      on the cabinet (at rest the weight)",
-        record: |wanted| wanted.cabinet_force = true,
-        of: Some(|extra| extra.cabinet_force_n.into_iter().collect()),
-        ..PLAIN
-    },
-    Facts {
-        name: "clash_time",
-        unit: "s",
-        description: "time in the window with a gap between drum and tub below zero",
-        floor: Floor::PartOfWindow,
-        // Of the gap, which the hinge bends.
-        is_of_caps: true,
-        record: |wanted| wanted.clash_time = true,
-        of: Some(|extra| extra.clash_time_s.into_iter().collect()),
-        ..PLAIN
-    },
-    Facts {
-        name: "static_sag",
-        unit: "m",
-        description: "how far the tub's mass centre sinks from where the machine file draws it to \
-                      the static equilibrium; null if there is none",
-        ..PLAIN
-    },
-    Facts {
-        name: "stop_force",
-        unit: "N",
-        description: "greatest push of any stop in the window; the linear model has the tangents \
-                      of the stops at equilibrium, next to nothing while they are open",
-        part: Some(Part::Stop),
-        of_each: Some([
-            "force",
-            "greatest push of the stop in the window; the linear model has its tangent at \
-             equilibrium, next to nothing while it is open",
-        ]),
-        floor: Floor::PartOfWeight,
-        record: |wanted| wanted.stops = true,
-        of: Some(|extra| extra.stops.iter().map(|stop| stop.push_n).collect()),
-        ..PLAIN
-    },
-    Facts {
-        name: "stop_contact",
-        unit: "s",
-        description: "longest time in the window for which any one stop is closed",
-        part: Some(Part::Stop),
-        of_each: Some(["contact", "time in the window for which the stop is closed"]),
-        floor: Floor::PartOfWindow,
-        record: |wanted| wanted.stops = true,
-        of: Some(|extra| extra.stops.iter().map(|stop| stop.contact_s).collect()),
-        ..PLAIN
-    },
-    Facts {
-        name: "foot_load",
-        unit: "N",
-        description: "least vertical load of any foot of the cabinet in the window, by statics; \
-                      below zero it would lift",
-        part: Some(Part::Foot),
-        of_each: Some([
-            "load",
-            "least vertical load of the foot in the window, by statics; below zero it would lift",
-        ]),
-        floor: Floor::Weight,
-        record: |wanted| wanted.feet = true,
-        of: Some(|extra| extra.foot_loads_n.clone()),
-        worse: Worse::Less,
-        limit: Some(Limit { value: 0.0, scale: 100.0 }),
-        ..PLAIN
-    },
-    Facts {
-        name: "slip_margin",
-        unit: "N",
-        description: "least margin of the cabinet against slipping in the window: friction on all \
-                      feet together less the horizontal force",
-        part: Some(Part::Foot),
-        floor: Floor::Weight,
-        record: |wanted| wanted.feet = true,
-        of: Some(|extra| extra.slip_margin_n.into_iter().collect()),
-        worse: Worse::Less,
-        limit: Some(Limit { value: 0.0, scale: 100.0 }),
-        ..PLAIN
-    },
-    Facts {
-        name: "walk_margin",
-        unit: "N",
-        description: "least margin of the cabinet against slipping, turning or both in the \
-                      window: the margin against slipping less what the moment about the vertical \
-                      takes of it",
-        part: Some(Part::Foot),
-        floor: Floor::Weight,
-        record: |wanted| wanted.feet = true,
-        of: Some(|extra| extra.walk_margin_n.into_iter().collect()),
-        worse: Worse::Less,
-        limit: Some(Limit { value: 0.0, scale: 100.0 }),
-        ..PLAIN
-    },
-    Facts {
-        name: "growth",
-        unit: "1/s",
-        description: "how fast the fastest growing disturbance of the nonlinear response grows, \
-                      at that of the speeds of [stability] at which it is greatest",
-        limit: Some(Limit { value: 0.0, scale: 1.0 }),
-        ..PLAIN
-    },
-    Facts {
-        name: "damper_speed",
-        unit: "m/s",
-        description: "greatest speed along any damper in the window: what \
-                      `friction_linear_speed_m_per_s` should be near",
-        part: Some(Part::Damper),
-        of_each: Some(["speed", "greatest speed along the damper in the window"]),
-        floor: Floor::Creeping,
-        // What capped modes ring is more of a speed than of a motion, by their frequency over the
-        // drum's.
-        is_of_caps: true,
-        record: |wanted| wanted.damper_speeds = true,
-        of: Some(|extra| extra.damper_speeds_m_per_s.clone()),
-        ..PLAIN
-    },
-    // Each channel has a column of its own, in its unit.
-    Facts {
-        name: "dwell",
-        description: "largest deviation of any motion that the drum held at any of the speeds of \
-                      [stability] ends in (`sweep dwell`)",
-        ..PLAIN
-    },
-];
+/// What the metrics of the cabinet's stand have in common.
+const OF_FEET: Facts = Facts {
+    part: Some(Part::Foot),
+    floor: Floor::Weight,
+    record: |wanted| wanted.feet = true,
+    worse: Worse::Less,
+    limit: Some(Limit { value: 0.0, scale: 100.0 }),
+    ..PLAIN
+};
 
 /// A number that each model has of its own: a metric of the whole machine, or what one stop or foot
 /// has of it.
@@ -400,32 +313,34 @@ pub struct Measured {
 
 impl Measured {
     /// In the column's name and what it holds, of one part.
-    fn of_part(self) -> Option<(&'static [&'static str; 2], String)> {
+    fn of_part(self) -> Option<([&'static str; 2], String)> {
         let Facts { part, of_each, .. } = self.metric.facts();
-        let part = format!("{}_{}", (*part)?.name(), self.part? + 1);
-        Some((of_each.as_ref()?, part))
+        let part = format!("{}_{}", part?.name(), self.part? + 1);
+        Some((of_each?, part))
     }
 
     /// The column's name.
     pub fn column(self, model: &str) -> String {
         match self.of_part() {
-            Some(([what, _], part)) => column(&format!("{part}_{what}"), model, self.metric.unit()),
+            Some(([what, _], part)) => {
+                column(&format!("{part}_{what}"), model, self.metric.facts().unit)
+            }
             None => self.metric.column(model),
         }
     }
 
     /// One line for column dictionaries and docs.
     pub fn description(self) -> &'static str {
-        self.of_part().map_or(self.metric.description(), |([_, description], _)| description)
+        self.of_part().map_or(self.metric.facts().description, |([_, of_one], _)| of_one)
     }
 
     /// Its value in a trajectory's records, if it was recorded.
     pub fn of(self, extra: &Extra) -> Option<f64> {
         let Facts { of, worse, .. } = self.metric.facts();
-        let values = (*of)?(extra);
+        let values = of?(extra);
         match self.part {
             Some(part) => values.get(part).copied(),
-            None if *worse == Worse::Less => values.into_iter().reduce(f64::min),
+            None if worse == Worse::Less => values.into_iter().reduce(f64::min),
             None => values.into_iter().reduce(f64::max),
         }
     }
@@ -458,7 +373,7 @@ impl Measures {
     /// The numbers of a metric that each model has its own of: of all parts, then of each if there
     /// are several.
     pub fn numbers_of(&self, metric: Metric) -> impl Iterator<Item = Measured> + use<> {
-        let parts = match metric.facts().of_each.and(metric.part()) {
+        let parts = match metric.facts().of_each.and(metric.facts().part) {
             Some(Part::Stop) => self.stops,
             Some(Part::Foot) => self.feet,
             Some(Part::Damper) => self.dampers,

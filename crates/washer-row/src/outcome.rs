@@ -4,10 +4,11 @@ use washer_model::{Beyond, Channel, Disturbance, Ending, NoAnswer, Response};
 
 use crate::level::Level;
 
-/// Why a trajectory ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// Why a trajectory ended. The position is its code in chunk files, so new ones go to the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Status {
     /// Reached the end.
+    #[default]
     Ok,
     /// A state left the range in which the model means anything, or became non-finite.
     Diverged,
@@ -27,21 +28,6 @@ pub enum Status {
     TooSlow,
 }
 
-impl Status {
-    /// Every status; the position is its code in chunk files, so new ones go to the end.
-    pub const ALL: [Self; 9] = [
-        Self::Ok,
-        Self::Diverged,
-        Self::StepTooSmall,
-        Self::StepLimit,
-        Self::NoEquilibrium,
-        Self::Panicked,
-        Self::NoResponse,
-        Self::NoMultipliers,
-        Self::TooSlow,
-    ];
-}
-
 impl From<NoAnswer> for Status {
     fn from(none: NoAnswer) -> Self {
         match none {
@@ -53,7 +39,7 @@ impl From<NoAnswer> for Status {
 }
 
 /// One model's trajectory at one grid point.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
     /// How it ended.
     pub status: Status,
@@ -83,18 +69,8 @@ pub type Deviations = [f64; Channel::ALL.len()];
 
 impl Trajectory {
     /// Nothing but a status.
-    pub const fn failed(status: Status) -> Self {
-        Self {
-            status,
-            fail_time_s: None,
-            amplitudes: Vec::new(),
-            min_gap_m: None,
-            steps: 0,
-            rejected: 0,
-            metrics: Vec::new(),
-            friction_speed_off: None,
-            turns: Vec::new(),
-        }
+    pub fn failed(status: Status) -> Self {
+        Self { status, ..Self::default() }
     }
 }
 
@@ -182,7 +158,7 @@ impl Dwelt {
 }
 
 /// Both models at one grid point.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outcome {
     /// Index in grid order.
     pub point: u64,
@@ -216,29 +192,16 @@ pub struct Outcome {
 
 impl Outcome {
     /// Both models' trajectories, not yet assessed together.
-    pub const fn new(point: u64, nonlinear: Trajectory, linear: Trajectory) -> Self {
-        Self {
-            point,
-            nonlinear,
-            linear,
-            method: Level::Rk4,
-            error: None,
-            converged: None,
-            sensitive: None,
-            turn_ratios: Vec::new(),
-            static_sag_m: None,
-            growth: None,
-            dwelt: None,
-            coexisting: Vec::new(),
-        }
+    pub fn new(point: u64, nonlinear: Trajectory, linear: Trajectory) -> Self {
+        Self { point, nonlinear, linear, ..Self::default() }
     }
 
-    /// It, then the others at the same point and speed.
-    pub fn rows(&self) -> impl Iterator<Item = &Self> {
-        core::iter::once(self).chain(&self.coexisting)
+    /// Nothing but a status, of both models.
+    pub fn failed(point: u64, status: Status) -> Self {
+        Self::new(point, Trajectory::failed(status), Trajectory::failed(status))
     }
 
-    /// As [`Self::rows`], apart.
+    /// It, then the others at the same point and speed, apart.
     pub fn into_rows(mut self) -> impl Iterator<Item = Self> {
         let coexisting = core::mem::take(&mut self.coexisting);
         core::iter::once(self).chain(coexisting)

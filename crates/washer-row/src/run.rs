@@ -34,7 +34,7 @@ impl Rule {
 }
 
 /// A trajectory as a rung gave it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct RungRun {
     /// What a row takes from it.
     pub trajectory: Trajectory,
@@ -48,13 +48,8 @@ pub struct RungRun {
 
 impl RungRun {
     /// Nothing but a status.
-    pub const fn failed(status: Status) -> Self {
-        Self {
-            trajectory: Trajectory::failed(status),
-            amplitudes: [0.0; Channel::ALL.len()],
-            course: Course::new(),
-            clash_doubt_s: None,
-        }
+    pub fn failed(status: Status) -> Self {
+        Self { trajectory: Trajectory::failed(status), ..Self::default() }
     }
 
     fn new(record: &Record, mut extra: Extra, rule: &Rule) -> Self {
@@ -114,14 +109,12 @@ fn trajectory(record: &Record, extra: Extra, amplitudes: &Deviations, rule: &Rul
     }
     let metrics = rule.measures.of_model().filter_map(|number| number.of(&extra));
     Trajectory {
-        status: Status::Ok,
-        fail_time_s: None,
         amplitudes: rule.channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
         min_gap_m: Some(record.min_gap_m),
         steps,
         rejected,
         metrics: metrics.collect(),
-        friction_speed_off: None,
         turns: extra.turns,
+        ..Trajectory::default()
     }
 }

@@ -1,10 +1,10 @@
 //! How a work ended: rows, a file, or Ctrl-C with what is there.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sweep::{Effort, Error, RanToFile, ResultTable};
+use sweep::{Error, RanToFile, ResultTable, Task};
 
 use crate::errors;
 use crate::result::PyResultTable;
@@ -23,18 +23,21 @@ pub(crate) fn rows(py: Python<'_>, evaluated: Attended<ResultTable>) -> PyResult
     Ok(PyResultTable::new(table))
 }
 
-/// The rows of a work that keeps them in memory or, if there is one, in a file; if it is shown, it
-/// says beforehand what matters. Of a file that Ctrl-C leaves unfinished, the same call goes on.
+/// The rows of a task that keeps them in memory or, if there is one, in a file, perhaps afresh; if
+/// it is shown, it says beforehand what matters. Of a file that Ctrl-C leaves unfinished, the same
+/// call goes on.
 pub(crate) fn rows_or_file(
     py: Python<'_>,
-    out: Option<&PathBuf>,
+    task: Result<Task<'_>, Error>,
+    (out, fresh): (Option<PathBuf>, bool),
     how: How,
-    in_memory: impl FnOnce(Effort<'_>) -> Result<ResultTable, Error> + Send,
-    to_file: impl FnOnce(&Path, &dyn Fn(&str), Effort<'_>) -> Result<RanToFile, Error> + Send,
 ) -> PyResult<PyResultTable> {
-    let Some(out) = out else { return rows(py, attended(py, how, in_memory)?) };
+    let task = &task.map_err(|error| errors::error(py, &error))?;
+    let Some(out) = out else {
+        return rows(py, attended(py, how, |effort| task.in_memory(effort))?);
+    };
     let tell: fn(&str) = if how.progress { sweep::tell } else { |_| () };
-    let ran = attended(py, how, |effort| to_file(out, &tell, effort))?;
+    let ran = attended(py, how, |effort| task.to_file(&out, fresh, &tell, effort))?;
     let ran = ran.or_raise(py, |ran| match ran {
         Err(error) => errors::error(py, &error),
         Ok(RanToFile::Whole(table)) => {

@@ -81,21 +81,13 @@ fn held(
     plan: &Bound<'_, PyPlan>,
     speeds_rpm: &Bound<'_, PyAny>,
     search: Option<Search>,
-    (out, fresh): (Option<PathBuf>, bool),
+    into: (Option<PathBuf>, bool),
     how: How,
 ) -> PyResult<PyResultTable> {
     let py = plan.py();
     let speeds_rpm = &numbers(speeds_rpm)?;
-    let plan = plan.get().evaluator.plan();
-    ended::rows_or_file(
-        py,
-        out.as_ref(),
-        how,
-        |effort| sweep::find_held(plan, speeds_rpm, search, effort),
-        |out, tell, effort| {
-            sweep::held_to_file(plan, (speeds_rpm, search), out, fresh, tell, effort)
-        },
-    )
+    let task = sweep::held(plan.get().evaluator.plan(), speeds_rpm, search);
+    ended::rows_or_file(py, task, into, how)
 }
 
 /// Candidates of a study.

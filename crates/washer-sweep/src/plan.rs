@@ -81,13 +81,7 @@ impl PyPlan {
         progress: bool,
         fresh: bool,
     ) -> PyResult<PyResultTable> {
-        ended::rows_or_file(
-            py,
-            out.as_ref(),
-            How { threads, progress },
-            |effort| self.evaluator.run(effort),
-            |out, tell, effort| sweep::run_to_file(self.evaluator.plan(), out, fresh, tell, effort),
-        )
+        ended::rows_or_file(py, self.evaluator.whole(), (out, fresh), How { threads, progress })
     }
 
     /// Time histories of both models at one point, or at every one.

@@ -106,7 +106,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         tell(&format!("wrote {}", path.display()));
     }
     for (case, path) in curves.iter().enumerate() {
-        let bytes = fitted.curves(case, &stop).into_bytes();
+        let bytes = fitted.curves(case).into_bytes();
         let bytes = bytes.map_err(StoreError::parquet("write", path))?;
         files::write(path, FileKind::Fit, &bytes)?;
         tell(&format!("wrote {0}; next: sweep plot {0}", path.display()));

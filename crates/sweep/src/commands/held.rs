@@ -13,33 +13,75 @@ use sweep_engine::commands::run::{RunCommand, WorkArgs, exit, installed};
 use sweep_engine::{Error, Exit, Job};
 use sweep_files::ParquetFile;
 
-/// Speeds that the drum holds.
-#[derive(Clone, Debug, clap::Args)]
-pub(super) struct SpeedArgs {
+/// Arguments of a command about held speeds, with what it asks for there.
+#[derive(Debug, clap::Args)]
+pub struct Args<Asked: clap::Args> {
+    /// The grid, and the file.
+    #[command(flatten)]
+    target: ResultArgs,
     /// Constant spin speeds in rpm, above 0: one, several with commas, FROM:TO:STEP
     #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
     speed: SpeedList,
+    /// What is asked for.
+    #[command(flatten)]
+    asked: Asked,
+    /// How it is done.
+    #[command(flatten)]
+    work: WorkArgs,
+    /// Exit with 3 if any row is not ok
+    #[arg(long)]
+    fail_on_error: bool,
 }
 
-impl SpeedArgs {
+/// The periodic responses are asked for, of which nothing more can be said.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct Responses {}
+
+impl From<Responses> for Option<Search> {
+    fn from(_: Responses) -> Self {
+        None
+    }
+}
+
+/// What `sweep stability --help` adds.
+pub(super) const RESPONSES_LONG: &str = "\
+A row for every point of the grid and every speed: the periodic response of both models while the \
+drum turns at that speed for ever, and how fast a small disturbance of the nonlinear one grows. \
+The spin profile, the window and the integrator of the grid file do not matter here, but that the \
+modes of a machine with friction are named as in that run. The result is written to \
+results/NAME-stability.parquet unless --out names a file.
+
+The file is a pure function of its input, whatever the number of threads, shards and \
+interruptions. What an interrupted command has computed stays in FILE.partial, and the same \
+command goes on from there.";
+
+/// What `sweep dwell --help` adds.
+pub(super) const MOTIONS_LONG: &str = "\
+A row for every point of the grid, every speed and every motion that was found there while the \
+drum turns at that speed. Trajectories start from the periodic response, slightly disturbed, and \
+from kicks in the two modes that rock most, one by one and together, each a third of a decade \
+harder. They are followed until their largest deviations no longer change. It is a search, not a \
+proof: a motion that no start leads to is not found.
+
+The result is written to results/NAME-dwell.parquet unless --out names a file. The file is a pure \
+function of its input, whatever the number of threads, shards and interruptions. What an \
+interrupted command has computed stays in FILE.partial, and the same command goes on from there.";
+
+impl<Asked: clap::Args + Copy + Into<Option<Search>>> Args<Asked> {
     /// Does what a search asks at these speeds, or finds the periodic responses there; says what
     /// came of it, and how the program ends.
     ///
     /// # Errors
     /// Mistakes in the grid file or the options, and whatever keeps the file from being written;
     /// finished chunks are kept.
-    pub(super) fn run(
-        &self,
-        search: Option<Search>,
-        target: &ResultArgs,
-        work: &WorkArgs,
-        fail_on_error: bool,
-    ) -> Result<Exit, Error> {
+    pub(super) fn run(&self) -> Result<Exit, Error> {
+        let Self { target, speed, asked, work, fail_on_error } = self;
+        let search: Option<Search> = (*asked).into();
         let plan: Plan = target.grid.load()?;
-        check(&plan, "--speed", &self.speed.to_string())?;
-        let held = Held { plan: &plan, speeds_rpm: self.speed.values(), search };
+        check(&plan, "--speed", &speed.to_string())?;
+        let held = Held { plan: &plan, speeds_rpm: speed.values(), search };
         let (job, output) = (held.job(), held.output(target.out.as_deref()));
-        let options = options(&self.speed, search);
+        let options = options(speed, search);
         let of_merge = if search.is_some() { " --dwell" } else { "" };
         let command = RunCommand {
             name: &plan.name,
@@ -58,7 +100,7 @@ impl SpeedArgs {
             Ok(())
         };
         let report = command.execute(&held.engine()?, &job, &output, &installed()?, &finished)?;
-        Ok(exit(fail_on_error, &report))
+        Ok(exit(*fail_on_error, &report))
     }
 }
 

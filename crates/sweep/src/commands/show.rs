@@ -2,19 +2,10 @@
 
 use crate::dwell;
 use crate::stability::tongues;
-use sweep_engine::commands::show;
-use sweep_engine::commands::show::{Args, Further};
-use sweep_engine::{Error, Exit};
+use sweep_engine::Error;
+use sweep_engine::commands::show::Further;
 use sweep_files::{FileKind, ParquetFile};
 use washer_row::Metric;
-
-/// Shows a file's content in short, or some of its rows.
-///
-/// # Errors
-/// As the engine's command.
-pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    show::run(args, &FURTHER)
-}
 
 /// What is said beside what all models' files say.
 pub(super) const FURTHER: Further<'static> = Further { lines: &lines, is_of_a_metric };

@@ -124,7 +124,7 @@ pub(super) fn stability(
 
 /// What a machine has not got and this metric is of.
 pub(crate) fn lacking(metric: Metric, machine: &Machine) -> Option<&'static str> {
-    let (is_there, what) = match metric.part()? {
+    let (is_there, what) = match metric.facts().part? {
         Part::Stop => (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file"),
         Part::Foot => (
             machine.cabinet.is_some(),

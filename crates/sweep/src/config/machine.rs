@@ -268,8 +268,8 @@ pub(crate) fn schema() -> Value {
     document("Machine file of sweep", told.finish())
 }
 
-/// The machine as a machine file's tables hold it; every number as its shortest decimal that reads
-/// back the same.
+/// The machine as a machine file's tables hold it, and as a result file carries it; every number as
+/// its shortest decimal that reads back the same.
 pub(crate) fn to_json(machine: &Machine) -> Value {
     Keys::told(false, |keys| walk(&mut machine.clone(), keys)).finish()
 }
@@ -410,7 +410,8 @@ fn value(name: &str, machine: &Machine) -> Option<f64> {
     find(name, machine)?.get(machine, &no_spin())
 }
 
-/// The machine as the text of a machine file, each number with its meaning and source.
+/// The machine as the text of a machine file, each number with its meaning and source: loading it
+/// gives the same machine, bit for bit.
 pub(crate) fn to_toml(machine: &Machine) -> String {
     let mut text = "# A machine in full, in SI units. Lengths in m from O, midway between the \
                     bearings before loading: x along the\n\

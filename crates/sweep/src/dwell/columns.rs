@@ -146,7 +146,7 @@ pub(super) fn columns(plan: &Plan, with_sections: bool) -> Vec<DwellColumn> {
     let of_turns = |number: &Measured| number.metric.is_of_turns();
     for number in plan.model.measures.of_model().filter(of_turns) {
         let text = format!("{}, over 128 further turns of the motion", number.description());
-        let (name, unit) = (number.column(MODELS[0]), number.metric.unit());
+        let (name, unit) = (number.column(MODELS[0]), number.metric.facts().unit);
         let of = move |row: &RowOf| number.of(&row.within()?.extra);
         columns.push(ResultColumn::measured(name, unit, text.replace(" in the window", ""), of));
     }

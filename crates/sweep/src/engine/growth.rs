@@ -22,6 +22,13 @@ pub(crate) fn responses(
     together_or_alone(dwells, together, || Err(Status::Panicked))
 }
 
+/// The response of a machine that runs up whose disturbances grow fastest, of those at some speeds;
+/// the first of equals.
+pub(crate) fn fastest(found: &[Result<Vec<Response>, Status>]) -> Option<&Response> {
+    let there = found.iter().flatten().filter_map(|responses| responses.first());
+    there.reduce(|most, next| if next.growth_per_s() > most.growth_per_s() { next } else { most })
+}
+
 /// The motions that points end in at constant speeds, or why there are none. Once `is_stopped` says
 /// so, what comes means nothing.
 pub(crate) fn motions(
@@ -53,15 +60,9 @@ pub(super) fn add(
     if metrics.contains(&Metric::Growth) {
         let found = responses(&dwells, is_stopped);
         for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
-            let there = || found.iter().flatten().filter_map(|responses| responses.first());
-            let fastest =
-                there().reduce(
-                    |most, next| {
-                        if next.growth_per_s() > most.growth_per_s() { next } else { most }
-                    },
-                );
-            outcome.growth = fastest.map(|fastest| {
-                let others = || there().find_map(|response| response.beyond);
+            outcome.growth = fastest(found).map(|fastest| {
+                let there = found.iter().flatten().filter_map(|responses| responses.first());
+                let others = || there.clone().find_map(|response| response.beyond);
                 Growth { beyond: fastest.beyond.or_else(others), ..Growth::from(fastest) }
             });
         }

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use lane_ode::MAX_LANES;
 use washer_model::{Method, Point};
-use washer_row::{Climbs, Demand, Ladder, Next, Outcome, Rule, Status, Trajectory};
+use washer_row::{Climbs, Next, Outcome, Status, Terms};
 
 use super::{ModelEngine, Watch, growth};
 use crate::plan::Scenario;
@@ -53,7 +53,7 @@ pub(super) type Keep<'a> = dyn Fn(Outcome) + Sync + 'a;
 /// How long a thread that waits for others goes without a look at the stop flag.
 const LOOK_UP: Duration = Duration::from_millis(50);
 
-/// Runs of one rung of one model: positions in `MODELS` and on its ladder, behind it for twins.
+/// Runs of one rung of one model: positions on its ladder, behind it for twins, and in `MODELS`.
 type ModelRung = (usize, usize);
 
 /// A point's row on its way.
@@ -70,18 +70,13 @@ struct Climber {
 }
 
 impl Climber {
-    fn new(id: u64, point: Result<Arc<Point>, Status>) -> Self {
-        Self { id, point, climbs: Climbs::default(), pending: 0, came_as: 0 }
-    }
-
     /// What is to be done once nothing is pending.
-    fn next(&self, ladders: &[Ladder; 2], demand: Demand, rule: &Rule) -> Next {
+    fn next(&self, terms: Terms<'_>) -> Next {
         match &self.point {
-            Ok(point) => self.climbs.next(self.id, point, ladders, demand, rule),
+            Ok(point) => self.climbs.next(self.id, point, terms),
             Err(status) => {
-                let none = || Trajectory::failed(*status);
-                let method = ladders[0].rungs[0].level;
-                Next::Done(Box::new(Outcome { method, ..Outcome::new(self.id, none(), none()) }))
+                let method = terms.ladders[0].rungs[0].level;
+                Next::Done(Box::new(Outcome { method, ..Outcome::failed(self.id, *status) }))
             }
         }
     }
@@ -89,7 +84,7 @@ impl Climber {
 
 /// Rows and the runs that they wait for.
 #[derive(Default)]
-struct PoolState {
+pub(super) struct PoolState {
     /// Rows on their way, by what the caller knows them by.
     rows: BTreeMap<u64, Climber>,
     /// Points that the feed has given.
@@ -116,14 +111,8 @@ pub(super) struct Pool<'a> {
     pub(super) feed: &'a Feed<'a>,
     pub(super) keep: &'a Keep<'a>,
     pub(super) watch: &'a Watch<'a>,
-    pub(super) shared: Shared,
-}
-
-/// What the threads of a pool share.
-#[derive(Default)]
-pub(super) struct Shared {
-    state: Mutex<PoolState>,
-    changed: Condvar,
+    pub(super) state: Mutex<PoolState>,
+    pub(super) changed: Condvar,
 }
 
 impl Pool<'_> {
@@ -131,12 +120,12 @@ impl Pool<'_> {
     pub(super) fn work(&self) {
         while !self.watch.stopped() {
             let mut state = self.lock();
-            match state.choose(&|(model, rung)| {
-                let ladders = self.engine.ladders_under(self.watch);
-                ladders.map_or(MAX_LANES, |ladders| group(ladders[model].method(rung)))
+            match state.choose(&|(rung, model)| {
+                let method = |terms: Terms<'_>| group(terms.ladders[model].method(rung));
+                self.terms().map_or(MAX_LANES, method)
             }) {
                 Work::End => break,
-                Work::Wait => drop(self.shared.changed.wait_timeout(state, LOOK_UP)),
+                Work::Wait => drop(self.changed.wait_timeout(state, LOOK_UP)),
                 Work::Feed => {
                     state.at_work.push(None);
                     drop(state);
@@ -149,11 +138,11 @@ impl Pool<'_> {
                     }
                     self.advance(state, rows, None);
                 }
-                Work::Runs((model, rung), taken) => {
+                Work::Runs((rung, model), taken) => {
                     state.at_work.push(Some(rung));
                     drop(state);
-                    let Some(ladders) = self.engine.ladders_under(self.watch) else { break };
-                    let ladder = &ladders[model];
+                    let Some(terms) = self.terms() else { break };
+                    let ladder = &terms.ladders[model];
                     let points = || taken.iter().map(|(_, point)| point.as_ref());
                     let twins: Vec<Point> = match rung == ladder.twin() {
                         true => points().map(Point::nudged).collect(),
@@ -172,7 +161,7 @@ impl Pool<'_> {
                         let Some(mut row) = state.rows.remove(position) else { continue };
                         row.pending -= 1;
                         if let Ok(point) = &row.point {
-                            row.climbs.take((model, rung), run, ladder, point, &self.engine.rule);
+                            row.climbs.take((model, rung), run, point, terms);
                         }
                         rows.push(row);
                     }
@@ -180,21 +169,29 @@ impl Pool<'_> {
                 }
             }
         }
-        self.shared.changed.notify_all();
+        self.changed.notify_all();
+    }
+
+    /// What rows are judged by; `None` once the watch has stopped the work before it was found.
+    fn terms(&self) -> Option<Terms<'_>> {
+        let ModelEngine { demand, rule, .. } = self.engine;
+        let ladders = self.engine.ladders_under(self.watch)?;
+        Some(Terms { ladders, demand: *demand, rule })
     }
 
     fn lock(&self) -> MutexGuard<'_, PoolState> {
-        lock(&self.shared.state)
+        lock(&self.state)
     }
 
     /// New rows from the feed; none at its end.
     fn fed(&self) -> Vec<Climber> {
         let (ids, scenarios): (Vec<u64>, Vec<Scenario>) = (self.feed)(FED).into_iter().unzip();
         let points = self.engine.prepare(&scenarios);
-        ids.into_iter()
-            .zip(points)
-            .map(|(id, point)| Climber::new(id, point.map(Arc::new)))
-            .collect()
+        let row = |(id, point): (u64, Result<Point, Status>)| {
+            let point = point.map(Arc::new);
+            Climber { id, point, climbs: Climbs::default(), pending: 0, came_as: 0 }
+        };
+        ids.into_iter().zip(points).map(row).collect()
     }
 
     /// Asks for what rows need next, and hands over those that need nothing.
@@ -210,15 +207,15 @@ impl Pool<'_> {
                 Next::Runs(Vec::new())
             } else {
                 // Nothing is kept of what is put down.
-                let Some(ladders) = self.engine.ladders_under(self.watch) else { break };
-                row.next(ladders, self.engine.demand, &self.engine.rule)
+                let Some(terms) = self.terms() else { break };
+                row.next(terms)
             };
             match next {
                 Next::Runs(kinds) => {
                     let position = row.id;
                     row.pending += kinds.len();
-                    for kind in kinds {
-                        state.waiting.entry(kind).or_default().push(position);
+                    for (model, rung) in kinds {
+                        state.waiting.entry((rung, model)).or_default().push(position);
                     }
                     state.rows.insert(position, row);
                 }
@@ -229,7 +226,7 @@ impl Pool<'_> {
             state.at_work.swap_remove(at);
         }
         drop(state);
-        self.shared.changed.notify_all();
+        self.changed.notify_all();
         done.iter_mut().for_each(|(outcome, _)| outcome.forget_turns());
         let model = &self.engine.plan.model;
         if let Some(speeds) = &model.held_speeds {
@@ -251,22 +248,19 @@ impl PoolState {
     /// `group` says how many runs of a kind are taken at once.
     fn choose(&mut self, group: &dyn Fn(ModelRung) -> usize) -> Work {
         let is_full = |(kind, waiting): &(&ModelRung, &Vec<u64>)| waiting.len() >= group(**kind);
-        let best = self.waiting.iter().filter(is_full).map(|(kind, _)| *kind);
-        let overdue = || self.overdue();
-        if let Some(kind) = best.max_by_key(|&(model, rung)| (rung, model)).or_else(overdue) {
+        let highest = self.waiting.iter().rfind(is_full).map(|(kind, _)| *kind);
+        if let Some(kind) = highest.or_else(|| self.overdue()) {
             return self.take(kind, group(kind));
         }
         if !self.is_dry {
             return Work::Feed;
         }
-        let lowest =
-            self.waiting.iter().filter(|(_, waiting)| !waiting.is_empty()).map(|(kind, _)| *kind);
-        let lowest = lowest.min_by_key(|&(model, rung)| (rung, model));
-        match lowest {
+        let lowest = self.waiting.iter().find(|(_, waiting)| !waiting.is_empty());
+        match lowest.map(|(kind, waiting)| (*kind, waiting.len())) {
             // What is at work below may fill the group.
-            Some((_, rung)) if self.at_work.iter().any(|&level| level < Some(rung)) => Work::Wait,
+            Some(((rung, _), _)) if self.at_work.iter().any(|&at| at < Some(rung)) => Work::Wait,
             // The rest is for other threads.
-            Some(kind) => self.take(kind, self.waiting[&kind].len().div_ceil(2).max(MAX_LANES)),
+            Some((kind, count)) => self.take(kind, count.div_ceil(2).max(MAX_LANES)),
             None if self.at_work.is_empty() => Work::End,
             None => Work::Wait,
         }
@@ -276,16 +270,16 @@ impl PoolState {
     fn overdue(&self) -> Option<ModelRung> {
         let latest = self.fed.checked_sub(PATIENCE)?;
         let is_overdue = |id: &u64| self.rows.get(id).is_some_and(|row| row.came_as < latest);
-        let overdue =
-            self.waiting.iter().filter(|(_, waiting)| waiting.first().is_some_and(is_overdue));
-        overdue.map(|(kind, _)| *kind).max_by_key(|&(model, rung)| (rung, model))
+        let mut waiting = self.waiting.iter();
+        let highest = waiting.rfind(|(_, waiting)| waiting.first().is_some_and(is_overdue));
+        highest.map(|(kind, _)| *kind)
     }
 
     /// Takes a group of what waits, the first come, of these the longest first.
     fn take(&mut self, kind: ModelRung, most: usize) -> Work {
         let waiting = self.waiting.entry(kind).or_default();
         let mut positions: Vec<u64> = waiting.drain(..waiting.len().min(most)).collect();
-        let steps = |id: &u64| self.rows.get(id).map(|row| row.climbs.steps(kind.0));
+        let steps = |id: &u64| self.rows.get(id).map(|row| row.climbs.steps(kind.1));
         positions.sort_by_key(|id| Reverse(steps(id)));
         let point =
             |position: &u64| Some((*position, self.rows.get(position)?.point.clone().ok()?));

@@ -184,32 +184,25 @@ pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> (Vec<Tongue>, Seen) 
     let ends = there().filter_map(|response| response.between_rpm[1]);
     let mut jumps_rpm: Vec<f64> = ends.filter(|&rpm| rpm <= looked.to).collect();
     jumps_rpm.dedup();
-    let kind = |k: usize| responses[k].as_ref().map(Response::kind);
+    let kind = |response: &Option<Response>| response.as_ref().map(Response::kind);
     let mut tongues = Vec::new();
-    let mut first = 0;
-    while first < speeds.len() {
-        let Some(of_run) = kind(first).filter(|kind| *kind != Kind::Stable) else {
-            first += 1;
-            continue;
-        };
-        let last = (first..speeds.len()).take_while(|&k| kind(k) == Some(of_run)).last();
-        let last = last.unwrap_or(first);
-        let run: Vec<&Response> = responses[first..=last].iter().flatten().collect();
-        let beyond = [first.checked_sub(1), Some(last + 1).filter(|&next| next < speeds.len())];
-        let edge = |side: usize, inside: &Response| match beyond[side] {
+    let mut next = 0_usize;
+    for alike in responses.chunk_by(|a, b| kind(a) == kind(b)) {
+        let before = next.checked_sub(1).map(|last| &responses[last]);
+        next += alike.len();
+        let Some(of_run) = kind(&alike[0]).filter(|kind| *kind != Kind::Stable) else { continue };
+        let run: Vec<&Response> = alike.iter().flatten().collect();
+        let edge = |inside: &Response, beyond: Option<&Option<Response>>| match beyond {
             None => (inside.speed_rpm, End::Range),
-            Some(k) => match &responses[k] {
-                None => (inside.speed_rpm, End::NoResponse),
-                Some(other) => {
-                    let is_stable = other.kind() == Kind::Stable;
-                    let rpm = edge_rpm(asker, of_run, at(inside), at(other));
-                    (rpm, if is_stable { End::Edge } else { End::OtherKind })
-                }
-            },
+            Some(None) => (inside.speed_rpm, End::NoResponse),
+            Some(Some(other)) => {
+                let is_stable = other.kind() == Kind::Stable;
+                let rpm = edge_rpm(asker, of_run, at(inside), at(other));
+                (rpm, if is_stable { End::Edge } else { End::OtherKind })
+            }
         };
-        let (from, to) = (edge(0, run[0]), edge(1, run[run.len() - 1]));
+        let (from, to) = (edge(run[0], before), edge(run[run.len() - 1], responses.get(next)));
         tongues.push(tongue(asker, of_run, &run, [from, to]));
-        first = last + 1;
     }
     let without_response = responses.iter().filter(|response| response.is_none()).count();
     let beyond = there().filter_map(|it| Some((it.speed_rpm, it.beyond?))).collect();
@@ -420,7 +413,7 @@ impl Tongue {
             for damper in &mut scenario.model.machine.dampers {
                 damper.damping_n_s_per_m *= factor;
             }
-            ready(asker.simd, asker.plan, &scenario).ok()
+            ready(asker.plan, &scenario).ok()
         };
         let points: Vec<Option<Point>> = factors.iter().map(|&factor| machine(factor)).collect();
         let about = self.about_rpm();

@@ -12,39 +12,28 @@ const WIDTH: usize = 96;
 /// Width of the names before the text.
 const MARGIN: usize = 10;
 
-/// A text of lines with a name each; what follows in a paragraph is put beneath its start.
-#[derive(Default)]
-struct Text(String);
-
-impl Text {
-    fn line(&mut self, name: &str, words: impl AsRef<str>) {
-        let mut line = format!("{name:>MARGIN$} ");
-        let mut is_empty = true;
-        for word in words.as_ref().split_whitespace() {
-            if !is_empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
-                self.end(&line);
-                line = " ".repeat(MARGIN + 1);
-            }
-            line.push(' ');
-            line.push_str(word);
-            is_empty = false;
+/// Adds a line with a name; what follows in a paragraph is put beneath its start.
+fn line(text: &mut String, name: &str, words: impl AsRef<str>) {
+    let mut line = format!("{name:>MARGIN$} ");
+    for word in words.as_ref().split_whitespace() {
+        if line.chars().count() + 1 + word.chars().count() > WIDTH {
+            *text += &(line + "\n");
+            line = " ".repeat(MARGIN + 1);
         }
-        self.end(&line);
+        line.push(' ');
+        line.push_str(word);
     }
-
-    fn end(&mut self, line: &str) {
-        self.0.push_str(line.trim_end());
-        self.0.push('\n');
-    }
+    *text += &(line + "\n");
 }
 
 /// All of it.
 pub(crate) fn of(found: &Explanation) -> String {
-    let mut text = Text::default();
+    let mut text = String::new();
     let at: Vec<String> =
         found.at.iter().map(|(name, value)| format!("{name} {}", decimal(*value))).collect();
     let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
-    text.end(&format!("{}{place}", found.name));
+    text += format!("{}{place}", found.name).trim_end();
+    text.push('\n');
     verdict(&mut text, &found.swept);
     let [from, to] = [found.seen.looked.from, found.seen.looked.to].map(decimal);
     if found.tongues.is_empty() {
@@ -52,18 +41,18 @@ pub(crate) fn of(found: &Explanation) -> String {
             "the periodic response is stable at every speed from {from} to {to} rpm, where \
              there is one"
         );
-        text.line("dwells", words);
+        line(&mut text, "dwells", words);
     } else {
         let unstable = bands(found.tongues.iter().map(|(tongue, _)| tongue.ends));
         let words =
             format!("the periodic response is unstable in {unstable} from {from} to {to} rpm:");
-        text.line("dwells", words);
+        line(&mut text, "dwells", words);
     }
     for rpm in &found.seen.jumps_rpm {
         let words = format!(
             "at {rpm:.2} rpm the response folds back: a machine that runs up jumps to another there"
         );
-        text.line("jump", words);
+        line(&mut text, "jump", words);
     }
     if let (Some((from, what)), Some((to, _))) =
         (found.seen.beyond.first(), found.seen.beyond.last())
@@ -76,16 +65,16 @@ pub(crate) fn of(found: &Explanation) -> String {
             decimal(*to),
             what.name().replace('_', " ")
         );
-        text.line("beyond", words);
+        line(&mut text, "beyond", words);
     }
     for (tongue, passages) in &found.tongues {
-        text.end("");
+        text.push('\n');
         of_tongue(&mut text, found, tongue, passages);
     }
-    text.end("");
+    text.push('\n');
     judgement(&mut text, found);
     limits(&mut text, found);
-    text.0
+    text
 }
 
 /// How many bands of speed there are, and tongues in them. Where a tongue ends because the motion
@@ -114,7 +103,7 @@ fn significant(value: f64) -> String {
     format!("{value:.*}", (2.0 - magnitude).max(0.0) as usize)
 }
 
-fn verdict(text: &mut Text, swept: &Swept) {
+fn verdict(text: &mut String, swept: &Swept) {
     let [from, to] = swept.window_s.map(decimal);
     let Some((place, ratio)) = swept.verdict.greatest else {
         let when = swept.fail_time_s.map_or(String::new(), |at| format!(" at {at:.3} s"));
@@ -122,7 +111,7 @@ fn verdict(text: &mut Text, swept: &Swept) {
             "ok" => "every linear amplitude is zero".to_owned(),
             status => format!("the run ends as `{status}`{when}"),
         };
-        text.line("swept", format!("no ratio is defined: {why}"));
+        line(text, "swept", format!("no ratio is defined: {why}"));
         return;
     };
     let channel = swept.channels[place];
@@ -140,7 +129,7 @@ fn verdict(text: &mut Text, swept: &Swept) {
         amplitudes.join(" against "),
         decimal(swept.limits.most)
     );
-    text.line("swept", words);
+    line(text, "swept", words);
     let others: Vec<String> = swept
         .channels
         .iter()
@@ -152,11 +141,11 @@ fn verdict(text: &mut Text, swept: &Swept) {
         })
         .collect();
     if !others.is_empty() {
-        text.line("ratios", others.join(", "));
+        line(text, "ratios", others.join(", "));
     }
 }
 
-fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[Passage]) {
+fn of_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages: &[Passage]) {
     let at = &tongue.at;
     let kind = match at.kind() {
         Kind::PeriodDoubling => "its period doubles",
@@ -171,7 +160,7 @@ fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[
         at.speed_rpm,
         ends(tongue)
     );
-    text.line("tongue", words);
+    line(text, "tongue", words);
     let (low, high) = (at.frequency_cpm(), at.speed_rpm - at.frequency_cpm());
     let lines = match at.kind() {
         Kind::PeriodDoubling => format!("at half the speed, {low:.2} per minute"),
@@ -180,7 +169,7 @@ fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[
             format!("at {low:.2} and {high:.2} per minute, which add up to the speed")
         }
     };
-    text.line("lines", lines);
+    line(text, "lines", lines);
     for mode in &at.participants {
         let words = format!(
             "{}, {}: {:.2} per minute at this speed; {:.0} % of the energy",
@@ -189,7 +178,7 @@ fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[
             mode.frequency_cpm,
             100.0 * mode.share
         );
-        text.line("mode", words);
+        line(text, "mode", words);
     }
     let words = match &tongue.resonance {
         Some(resonance) => meeting(resonance, at.speed_rpm),
@@ -197,14 +186,14 @@ fn of_tongue(text: &mut Text, found: &Explanation, tongue: &Tongue, passages: &[
                  the speed: what feeds this is not explained"
             .to_owned(),
     };
-    text.line("meeting", words);
+    line(text, "meeting", words);
     if let Some(ends_in) = &tongue.ends_in {
-        text.line("ends in", end(ends_in));
+        line(text, "ends in", end(ends_in));
     }
     if passages.is_empty() {
         let [least, most] = found.profile_rpm.map(decimal);
         let words = format!("never: the profile stays between {least} and {most} rpm in this run");
-        text.line("crossed", words);
+        line(text, "crossed", words);
     }
     for passage in passages {
         crossed(text, passage);
@@ -271,7 +260,7 @@ fn meeting(resonance: &Resonance, speed_rpm: f64) -> String {
     )
 }
 
-fn crossed(text: &mut Text, passage: &Passage) {
+fn crossed(text: &mut String, passage: &Passage) {
     let [from, to] = passage.from_to_s;
     let cut = if passage.is_cut { ", where the run ends" } else { "" };
     let mut words = format!(
@@ -301,10 +290,10 @@ fn crossed(text: &mut Text, passage: &Passage) {
             }
         }
     }
-    text.line("crossed", words);
+    line(text, "crossed", words);
 }
 
-fn closes(text: &mut Text, tongue: &Tongue) {
+fn closes(text: &mut String, tongue: &Tongue) {
     let words = match tongue.closing {
         Some(Closing::Factor { factor, damping_n_s_per_m, looked_rpm: [from, to] }) => {
             let dampers = match damping_n_s_per_m {
@@ -318,14 +307,14 @@ fn closes(text: &mut Text, tongue: &Tongue) {
         }
         Some(Closing::NoDampers) | None => "the machine has no damping to raise".to_owned(),
     };
-    text.line("remedy", words);
+    line(text, "remedy", words);
 }
 
 /// What the tongues have to do with the swept verdict.
-fn judgement(text: &mut Text, found: &Explanation) {
+fn judgement(text: &mut String, found: &Explanation) {
     let swept = &found.swept;
     let Some(reliable) = swept.verdict.reliable else {
-        text.line("so", "there is no verdict to explain");
+        line(text, "so", "there is no verdict to explain");
         return;
     };
     let words = match &found.without_departures {
@@ -371,10 +360,10 @@ fn judgement(text: &mut Text, found: &Explanation) {
             }
         },
     };
-    text.line("so", words);
+    line(text, "so", words);
 }
 
-fn limits(text: &mut Text, found: &Explanation) {
+fn limits(text: &mut String, found: &Explanation) {
     let mut words = format!(
         "a tongue narrower than {} rpm may be missed. E-folds hold the speed still at each \
          instant; equal e-folds do not mean equal ratios, and a map's boundary is not the edge of \
@@ -388,7 +377,7 @@ fn limits(text: &mut Text, found: &Explanation) {
             found.seen.without_response
         );
     }
-    text.line("limits", words);
+    line(text, "limits", words);
 }
 
 #[cfg(test)]
@@ -403,9 +392,9 @@ mod tests {
 
     #[test]
     fn long_lines_are_folded_beneath_their_start() {
-        let mut text = Text::default();
-        text.line("name", "word ".repeat(40));
-        let lines: Vec<&str> = text.0.lines().collect();
+        let mut text = String::new();
+        line(&mut text, "name", "word ".repeat(40));
+        let lines: Vec<&str> = text.lines().collect();
         assert!(lines.len() > 1 && lines.iter().all(|line| line.chars().count() <= WIDTH));
         assert!(lines[0].starts_with("      name  word"), "{}", lines[0]);
         assert!(lines[1].starts_with("            word"), "{}", lines[1]);

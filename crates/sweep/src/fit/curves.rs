@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 use sweep_engine::Table;
-use sweep_engine::threads::Stop;
 use sweep_files::key;
 
 use super::algebra::inverse;
@@ -14,10 +13,10 @@ use super::{Fitted, Problem};
 /// Half standard errors to which profiles reach on both sides.
 const REACH: i32 = 6;
 
-impl Fitted {
+impl Fitted<'_> {
     /// How the cost rises beside each free number, the others fitted again as far as they go along
     /// straight lines.
-    fn profiles(&self, stop: Stop<'_>) -> Value {
+    fn profiles(&self) -> Value {
         let Problem { free, .. } = &self.problem;
         let summary = self.problem.summary(&self.against);
         let bread = inverse(&summary.normal);
@@ -35,7 +34,7 @@ impl Fitted {
             .flat_map(|k| deviations.iter().map(move |deviation| (k, *deviation)))
             .map(|(k, deviation)| set(k, deviation))
             .collect();
-        let costs = self.problem.costs(&sets, stop);
+        let costs = self.problem.costs(&sets);
         let of = |k: usize| {
             let own = k * deviations.len()..(k + 1) * deviations.len();
             json!({
@@ -76,7 +75,7 @@ impl Fitted {
     }
 
     /// The curves of one case.
-    pub(crate) fn curves(&self, case: usize, stop: Stop<'_>) -> Table {
+    pub(crate) fn curves(&self, case: usize) -> Table {
         let at = &self.problem.cases[case];
         let measured = &at.measured;
         let mut table = Table::new(crate::identity::BUILD);
@@ -109,7 +108,7 @@ impl Fitted {
         table.metadata(key::PLAN, &plan.to_json());
         let mut found = json!({ "report": self.report, "spectra": self.spectra(case) });
         if self.report.follows {
-            found["profiles"] = self.profiles(stop);
+            found["profiles"] = self.profiles();
         }
         table.metadata(key::FIT, &found);
         table

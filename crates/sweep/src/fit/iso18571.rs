@@ -3,6 +3,8 @@
 
 use serde::Serialize;
 
+use super::algebra::dot;
+
 /// Half widths of the inner and the outer corridor, in parts of the measured peak.
 const CORRIDORS: [f64; 2] = [0.05, 0.5];
 /// The farthest shift in time, and the farthest warp, in parts of the record.
@@ -58,8 +60,7 @@ fn phase(measured: &[f64], model: &[f64]) -> (isize, f64) {
     let farthest = (FARTHEST_SHIFT * measured.len() as f64) as isize;
     let correlation = |shift: isize| {
         let [a, b] = overlap(measured, model, shift);
-        let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        sum(a, b) / (sum(a, a) * sum(b, b)).sqrt()
+        dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
     };
     // The least shift wins a tie.
     let tried = (0..=farthest).flat_map(|shift| [shift, -shift]);

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use lane_ode::Simd;
-use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
+use rayon::slice::ParallelSlice as _;
 use serde::{Deserialize, Serialize};
 use washer_model::{
     Cases, Machine, Method, ModelKind, Parameter, Point, Snapshot, Spin, Timing, Wanted, prepare,
@@ -16,7 +17,7 @@ use super::algebra::{centred, dot};
 use super::measured::{Measured, Quantity, Signal};
 use super::speed::Smoothed;
 use crate::engine::reference_step_s;
-use crate::plan::Plan;
+use crate::plan::{Plan, ready};
 use sweep_engine::threads::Stop;
 
 /// Neighbours are this share of a number away from it.
@@ -83,14 +84,19 @@ impl Free {
 
 /// The fit's question. Its unknowns are the free numbers, then the shift of each case's clock if
 /// those are wanted. The offsets of signals are no unknowns: means are taken off.
-pub(crate) struct Problem {
+pub(crate) struct Problem<'a> {
     pub(crate) cases: Vec<Case>,
     pub(crate) free: Vec<Free>,
     pub(crate) model: ModelKind,
     pub(crate) with_shift: bool,
     pub(crate) method: Method,
     pub(crate) simd: Simd,
+    /// Ends the work early; what comes then means nothing.
+    pub(crate) stop: Stop<'a>,
 }
+
+/// A machine, its spin, and the shift of the clock that it is seen by (s).
+type Run = (Machine, Spin, f64);
 
 /// One signal against the model.
 #[derive(Clone, Debug)]
@@ -119,7 +125,7 @@ pub(crate) struct Summary {
     pub(crate) pull: Vec<f64>,
 }
 
-impl Problem {
+impl Problem<'_> {
     /// How the model is integrated: by the grid's method where that is one, else by the reference's
     /// step, which depends on the machine at the start alone.
     pub(crate) fn method(cases: &[Case]) -> Result<Method, washer_model::NoEquilibrium> {
@@ -130,8 +136,7 @@ impl Problem {
         for case in cases {
             let (end_s, machine) = (case.end_s(), case.plan.model.machine.clone());
             let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
-            let point =
-                prepare(Simd::Scalar, &[(machine, case.spin().clone())], &timing).remove(0)?;
+            let point = ready(machine, case.spin().clone(), &timing)?;
             step_s = step_s.min(reference_step_s(&Cases::new([(&point, case.spin())], end_s)));
         }
         Ok(Method::Rk4 { step_s })
@@ -193,53 +198,59 @@ impl Problem {
         if x[unknown] + step > self.range(unknown)[1] { -step } else { step }
     }
 
-    /// Every signal at several sets of unknowns; `None` of one whose machine is none, or whose
-    /// trajectory fails, and of all once `stop` says so.
-    fn seen(&self, case: usize, sets: &[Vec<f64>], stop: Stop<'_>) -> Vec<Option<Vec<Vec<f64>>>> {
-        let machines: Vec<_> = sets.iter().map(|x| self.machine(case, x)).collect();
-        self.seen_of(case, sets, &machines, stop)
+    /// The run of a case at some unknowns.
+    fn run(&self, case: usize, x: &[f64]) -> Run {
+        let (machine, spin) = self.machine(case, x);
+        (machine, spin, self.shift_s(case, x))
     }
 
-    /// The same of machines and spins that are there; of the unknowns, the clock's shift counts.
-    fn seen_of(
+    /// What `of` makes of every signal of a case by each of so many runs; `None` of one whose
+    /// machine is none, or whose trajectory fails, and of all once the work is stopped. In lanes,
+    /// on all threads of the rayon pool it is called in.
+    fn seen<T: Send>(
         &self,
         case: usize,
-        sets: &[Vec<f64>],
-        machines: &[(Machine, Spin)],
-        stop: Stop<'_>,
-    ) -> Vec<Option<Vec<Vec<f64>>>> {
-        let mut found = vec![None; sets.len()];
+        count: usize,
+        run: impl Fn(usize) -> Run + Sync,
+        of: impl Fn(Vec<Vec<f64>>) -> T + Sync,
+    ) -> Vec<Option<T>> {
         let (measured, end_s) = (&self.cases[case].measured, self.cases[case].end_s());
-        let sound: Vec<usize> =
-            (0..sets.len()).filter(|&k| machines[k].0.violations().is_empty()).collect();
-        let chosen: Vec<(Machine, Spin)> = sound.iter().map(|&k| machines[k].clone()).collect();
         let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
-        let points: Vec<(usize, Point)> = sound
-            .iter()
-            .zip(prepare(self.simd, &chosen, &timing))
-            .filter_map(|(&k, point)| {
-                let shift_s = self.shift_s(case, &sets[k]);
-                let instants: Arc<[f64]> =
-                    measured.time_s.iter().map(|time| (time + shift_s).max(0.0)).collect();
-                Some((k, point.ok()?.seen_at(instants)))
-            })
-            .collect();
-        let all: Vec<&Point> = points.iter().map(|(_, point)| point).collect();
         let wanted = Wanted { snapshots: true, ..Wanted::default() };
-        let runs = simulate_until(self.simd, self.model, &self.method, &all, wanted, &|| stop());
-        let Some((_, extras)) = runs else { return found };
-        for ((k, point), extra) in points.iter().zip(extras) {
-            let shots = &extra.snapshots;
-            if shots.len() < measured.time_s.len() {
-                continue;
+        let of_group = |group: &[usize]| {
+            let runs = group.iter().map(|&k| run(k)).enumerate();
+            let sound = runs.filter(|(_, (machine, ..))| machine.violations().is_empty());
+            let (shifts, machines): (Vec<(usize, f64)>, Vec<(Machine, Spin)>) = sound
+                .map(|(place, (machine, spin, shift_s))| ((place, shift_s), (machine, spin)))
+                .unzip();
+            let points: Vec<(usize, Point)> = shifts
+                .into_iter()
+                .zip(prepare(self.simd, &machines, &timing))
+                .filter_map(|((place, shift_s), point)| {
+                    let instants: Arc<[f64]> =
+                        measured.time_s.iter().map(|time| (time + shift_s).max(0.0)).collect();
+                    Some((place, point.ok()?.seen_at(instants)))
+                })
+                .collect();
+            let all: Vec<&Point> = points.iter().map(|(_, point)| point).collect();
+            let (model, stop) = (self.model, || (self.stop)());
+            let ended = simulate_until(self.simd, model, &self.method, &all, wanted, &stop);
+            let extras = ended.map_or_else(Vec::new, |(_, extras)| extras);
+            let mut found: Vec<Option<T>> = group.iter().map(|_| None).collect();
+            for ((place, point), extra) in points.iter().zip(extras) {
+                let shots = extra.snapshots;
+                if shots.len() < measured.time_s.len() {
+                    continue;
+                }
+                let values = |signal: &Signal| -> Vec<f64> {
+                    shots.iter().map(|shot| self.value(shot, signal, point)).collect()
+                };
+                found[*place] = Some(of(measured.signals.iter().map(values).collect()));
             }
-            let values = |signal: &Signal| -> Vec<f64> {
-                shots.iter().map(|shot| self.value(shot, signal, point)).collect()
-            };
-            let values = measured.signals.iter().map(values);
-            found[*k] = Some(values.collect());
-        }
-        found
+            found
+        };
+        let places: Vec<usize> = (0..count).collect();
+        places.par_chunks(self.simd.lanes().max(2)).flat_map_iter(of_group).collect()
     }
 
     fn value(&self, shot: &Snapshot, signal: &Signal, point: &Point) -> f64 {
@@ -250,51 +261,44 @@ impl Problem {
     }
 
     /// Every signal against the model. On all threads of the rayon pool it is called in.
-    pub(crate) fn against(&self, x: &[f64], stop: Stop<'_>) -> Option<Vec<Against>> {
+    pub(crate) fn against(&self, x: &[f64]) -> Option<Vec<Against>> {
         let unknowns = self.unknowns();
         let nudges: Vec<f64> = (0..unknowns).map(|k| self.nudge(k, x)).collect();
-        // The point, then a neighbour along each unknown that matters to the case.
-        let work: Vec<(usize, Vec<Option<usize>>)> = (0..self.cases.len())
-            .flat_map(|case| {
-                let near = (0..unknowns).filter(|&k| self.matters(k, case)).map(Some);
-                let all: Vec<_> = std::iter::once(None).chain(near).collect();
-                let lanes = self.simd.lanes().max(2);
-                all.chunks(lanes).map(|some| (case, some.to_vec())).collect::<Vec<_>>()
-            })
-            .collect();
-        let seen: Vec<Vec<Option<Vec<Vec<f64>>>>> = work
-            .par_iter()
-            .map(|(case, which)| {
-                let set = |unknown: &Option<usize>| {
-                    let mut x = x.to_vec();
-                    if let Some(k) = unknown {
-                        x[*k] += nudges[*k];
-                    }
-                    x
-                };
-                let sets: Vec<Vec<f64>> = which.iter().map(set).collect();
-                self.seen(*case, &sets, stop)
-            })
-            .collect();
-        let mut values = vec![vec![None; unknowns + 1]; self.cases.len()];
-        for ((case, which), seen) in work.iter().zip(seen) {
-            for (unknown, seen) in which.iter().zip(seen) {
-                values[*case][unknown.map_or(unknowns, |k| k)] = Some(seen?);
+        // The point, and a neighbour along each unknown that matters to the case.
+        let of_case = |case: usize| {
+            let near: Vec<usize> = (0..unknowns).filter(|&k| self.matters(k, case)).collect();
+            let run = |place: usize| {
+                let mut x = x.to_vec();
+                if let Some(&k) = near.get(place) {
+                    x[k] += nudges[k];
+                }
+                self.run(case, &x)
+            };
+            let mut seen = self.seen(case, near.len() + 1, run, |values| values);
+            let here = seen.pop()??;
+            let mut beside = vec![None; unknowns];
+            for (&k, values) in near.iter().zip(seen) {
+                beside[k] = Some(values?);
             }
-        }
+            Some((here, beside))
+        };
+        let seen = (0..self.cases.len()).into_par_iter().map(of_case);
+        let seen: Vec<_> = seen.collect::<Option<_>>()?;
         let of = |(case, s, signal): (usize, usize, &Signal)| {
-            let model = values[case][unknowns].as_ref()?[s].clone();
-            let slope = |k: usize| -> Vec<f64> {
-                let Some(near) = &values[case][k] else { return Vec::new() };
-                let by = |(row, _)| (near[s][row] - model[row]) / nudges[k];
+            let (here, beside) = &seen[case];
+            let model = here[s].clone();
+            let slope = |near: &Option<Vec<Vec<f64>>>, nudge: f64| -> Vec<f64> {
+                let Some(near) = near else { return Vec::new() };
+                let by = |(row, _)| (near[s][row] - model[row]) / nudge;
                 centred(signal.samples().map(by).collect()).0
             };
-            let slopes = (0..unknowns).map(slope).collect();
+            let slopes = beside.iter().zip(&nudges).map(|(near, nudge)| slope(near, *nudge));
+            let slopes = slopes.collect();
             let apart = signal.samples().map(|(row, measured)| measured - model[row]).collect();
             let (residual, offset) = centred(apart);
-            Some(Against { case, signal: s, model, offset, residual, slopes })
+            Against { case, signal: s, model, offset, residual, slopes }
         };
-        self.signals().map(of).collect()
+        Some(self.signals().map(of).collect())
     }
 
     /// By how much each signal of a case would differ with each spin that noise of the tachometer
@@ -304,17 +308,10 @@ impl Problem {
         case: usize,
         x: &[f64],
         against: &[Against],
-        stop: Stop<'_>,
     ) -> Vec<Vec<Vec<f64>>> {
         let drawn = self.cases[case].smoothed.as_ref().map(|it| &it.drawn[..]).unwrap_or_default();
-        let (machine, _) = self.machine(case, x);
-        let of_group = |spins: &[Spin]| {
-            let machines: Vec<_> =
-                spins.iter().map(|spin| (machine.clone(), spin.clone())).collect();
-            self.seen_of(case, &vec![x.to_vec(); spins.len()], &machines, stop)
-        };
-        let groups: Vec<&[Spin]> = drawn.chunks(self.simd.lanes().max(2)).collect();
-        let found: Vec<_> = groups.par_iter().map(|spins| of_group(spins)).collect();
+        let (machine, _, shift_s) = self.run(case, x);
+        let run = |k: usize| (machine.clone(), drawn[k].clone(), shift_s);
         let signals = || against.iter().filter(|one| one.case == case);
         let apart = |values: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
             let of = |(values, one): (&Vec<f64>, &Against)| -> Vec<f64> {
@@ -323,37 +320,29 @@ impl Problem {
             };
             values.iter().zip(signals()).map(of).collect()
         };
-        found.into_iter().flatten().flatten().map(apart).collect()
+        self.seen(case, drawn.len(), run, apart).into_iter().flatten().collect()
     }
 
     /// The cost of many sets of unknowns, without derivatives; infinite where there is no answer.
-    pub(crate) fn costs(&self, sets: &[Vec<f64>], stop: Stop<'_>) -> Vec<f64> {
-        let groups: Vec<&[Vec<f64>]> = sets.chunks(self.simd.lanes().max(2)).collect();
-        let work: Vec<(usize, &[Vec<f64>])> = groups
-            .iter()
-            .flat_map(|group| (0..self.cases.len()).map(move |case| (case, *group)))
-            .collect();
-        let parts: Vec<Vec<f64>> = work
-            .par_iter()
-            .map(|&(case, group)| {
-                let seen = self.seen(case, group, stop);
-                let cost = |seen: Option<Vec<Vec<f64>>>| {
-                    let Some(models) = seen else { return f64::INFINITY };
-                    let signals = self.cases[case].measured.signals.iter().zip(models);
-                    let of = |(signal, model): (&Signal, Vec<f64>)| {
-                        let apart = signal.samples().map(|(row, value)| value - model[row]);
-                        let (residual, _) = centred(apart.collect());
-                        likelihood(&residual, signal).0
-                    };
-                    signals.map(of).sum()
+    pub(crate) fn costs(&self, sets: &[Vec<f64>]) -> Vec<f64> {
+        let of_case = |case: usize| {
+            let cost = |models: Vec<Vec<f64>>| -> f64 {
+                let signals = self.cases[case].measured.signals.iter().zip(models);
+                let of = |(signal, model): (&Signal, Vec<f64>)| {
+                    let apart = signal.samples().map(|(row, value)| value - model[row]);
+                    let (residual, _) = centred(apart.collect());
+                    likelihood(&residual, signal).0
                 };
-                seen.into_iter().map(cost).collect()
-            })
-            .collect();
+                signals.map(of).sum()
+            };
+            self.seen(case, sets.len(), |k| self.run(case, &sets[k]), cost)
+        };
+        let parts: Vec<_> = (0..self.cases.len()).into_par_iter().map(of_case).collect();
         let mut costs = vec![0.0; sets.len()];
-        for (place, part) in parts.iter().enumerate() {
-            let first = place / self.cases.len() * self.simd.lanes().max(2);
-            part.iter().enumerate().for_each(|(k, cost)| costs[first + k] += cost);
+        for part in parts {
+            for (sum, cost) in costs.iter_mut().zip(part) {
+                *sum += cost.unwrap_or(f64::INFINITY);
+            }
         }
         costs
     }

@@ -3,23 +3,22 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use lane_ode::Simd;
 use serde::Serialize;
 use serde_json::Value;
-use washer_model::{Dwell, Method, prepare};
+use washer_model::{Dwell, Method};
 use washer_row::{Outcome, Verdict as RowVerdict};
 
 use super::algebra::{centred, dot, quantile};
 use super::iso18571::{Rating, rate};
 use super::model::{Against, Problem};
 use super::search::Descent;
+use super::speed::Smoothed;
 use super::statistics::Statistics;
 use crate::config;
-use crate::engine::{ModelEngine, responses};
-use crate::plan::{Axis, AxisValues, Plan, timing};
+use crate::engine::{ModelEngine, fastest, responses};
+use crate::plan::{Axis, AxisValues, Plan, between, ready, timing};
 use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, table};
-use sweep_engine::threads::Stop;
 
 /// Standard errors to either end of a 95 % interval.
 const REACH: f64 = 1.959_964;
@@ -78,6 +77,14 @@ pub(crate) struct Fit {
     pub(crate) at_bound: bool,
 }
 
+impl Fit {
+    /// Its name; of a file's own, with the file.
+    fn label(&self) -> String {
+        let file = self.file.iter().map(|file| format!(" ({file})"));
+        std::iter::once(self.name.clone()).chain(file).collect()
+    }
+}
+
 /// What is said of one measurement.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct OfFile {
@@ -95,18 +102,11 @@ pub(crate) struct OfFile {
     pub(crate) widening: ByColumn<f64>,
     pub(crate) iso18571: ByColumn<Rating>,
     /// Noise (rpm) and knots of the measured spin.
-    pub(crate) spin: Option<SpinFit>,
+    pub(crate) spin: Option<Smoothed>,
     pub(crate) gaps_s: Vec<[f64; 2]>,
     /// The fitted machine, as a machine file has it.
     pub(crate) machine: Value,
     pub(crate) verdict: Option<Verdict>,
-}
-
-/// The spline through a measured spin.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct SpinFit {
-    pub(crate) noise_rpm: f64,
-    pub(crate) knots: usize,
 }
 
 /// The map's row at the fitted machine.
@@ -138,7 +138,7 @@ pub(crate) struct Minimum {
 
 /// What a report is made of.
 pub(super) struct Found<'a> {
-    pub(super) problem: &'a Problem,
+    pub(super) problem: &'a Problem<'a>,
     pub(super) minima: &'a [Descent],
     pub(super) against: &'a [Against],
     pub(super) at_start: &'a [Against],
@@ -148,7 +148,6 @@ pub(super) struct Found<'a> {
     pub(super) repeated: Option<&'a [Vec<f64>]>,
     /// Rows of the map over the fitted distribution.
     pub(super) draws: u64,
-    pub(super) stop: Stop<'a>,
 }
 
 impl Found<'_> {
@@ -169,21 +168,22 @@ impl Found<'_> {
         let correlations = |i: usize| (0..free).map(|j| correlation(i, j)).collect();
         let files = (0..problem.cases.len()).map(|case| self.of_file(case, follows));
         let files = files.collect::<Result<Vec<OfFile>, Error>>()?;
-        let name = |k: usize| self.name(k);
+        let parameters: Vec<Fit> =
+            (0..free).map(|k| self.parameter(k, error(k), follows)).collect();
         let minimum = |descent: &Descent| Minimum {
-            values: (0..free).map(|k| (name(k), descent.x[k])).collect(),
+            values: parameters.iter().map(Fit::label).zip(descent.x.iter().copied()).collect(),
             cost_above: descent.summary.cost - best.summary.cost,
             evaluations: descent.evaluations,
         };
         Ok(Report {
             follows,
             objection,
-            parameters: (0..free).map(|k| self.parameter(k, error(k), follows)).collect(),
             correlations: (0..free).map(correlations).collect(),
             untold: statistics.untold(problem, &best.x),
             first: files[0].clone(),
             files,
             minima: self.minima.iter().map(minimum).collect(),
+            parameters,
             settled: best.is_settled,
             evaluations: self.evaluations,
             step_s: match problem.method {
@@ -193,16 +193,6 @@ impl Found<'_> {
             step_effect: self.step_effect,
             notes: self.notes(),
         })
-    }
-
-    /// A free number's name; of a file's own, with the file.
-    fn name(&self, k: usize) -> String {
-        let free = &self.problem.free[k];
-        let name = free.parameter.name();
-        free.case.map_or_else(
-            || name.to_owned(),
-            |case| format!("{name} ({})", self.problem.cases[case].measured.name),
-        )
     }
 
     fn parameter(&self, k: usize, error: f64, follows: bool) -> Fit {
@@ -235,7 +225,6 @@ impl Found<'_> {
         };
         let rms =
             |one: &Against| (dot(&one.residual, &one.residual) / one.residual.len() as f64).sqrt();
-        let smoothed = problem.cases[case].smoothed.as_ref();
         Ok(OfFile {
             file: measured.name.clone(),
             samples: measured.count(),
@@ -252,7 +241,7 @@ impl Found<'_> {
                     (it.quantity.column(), rate(&measured, &model))
                 })
                 .collect(),
-            spin: smoothed.map(|it| SpinFit { noise_rpm: it.noise_rpm, knots: it.knots }),
+            spin: problem.cases[case].smoothed.clone(),
             gaps_s: measured.gaps_s.clone(),
             machine: config::machine_json(&problem.machine(case, x).0),
             verdict: (self.draws > 0).then(|| self.verdict(case, follows)).transpose()?,
@@ -276,16 +265,16 @@ impl Found<'_> {
             let values = || sets.iter().map(|set| set[k]);
             let from = values().fold(f64::INFINITY, f64::min);
             let to = values().fold(f64::NEG_INFINITY, f64::max);
-            let values = match from < to {
-                true => AxisValues::Linear { from, to, count: 2 },
-                false => AxisValues::List(vec![from]),
-            };
-            plan.axes.push(Axis { parameter: problem.free[k].parameter.clone(), values });
+            let parameter = problem.free[k].parameter.clone();
+            plan.axes.push(match from < to {
+                true => between(parameter, from, to),
+                false => Axis { parameter, values: AxisValues::List(vec![from]) },
+            });
         }
         let points: Vec<Vec<f64>> =
             sets.iter().map(|set| own.iter().map(|&k| set[k]).collect()).collect();
         let engine = ModelEngine::new(&plan)?;
-        let outcomes = if (self.stop)() { Vec::new() } else { engine.evaluate_at(&points) };
+        let outcomes = if (problem.stop)() { Vec::new() } else { engine.evaluate_at(&points) };
         let (channels, limits) = (plan.reliability.channels.len(), plan.reliability.limits);
         let verdict = |outcome: &Outcome| RowVerdict::new(outcome, channels, limits);
         let verdicts: Vec<RowVerdict> = outcomes.iter().map(verdict).collect();
@@ -309,18 +298,16 @@ impl Found<'_> {
     /// growth (1/s), and where (rpm).
     fn growth(&self, case: usize, plan: &Plan) -> Option<[f64; 2]> {
         let (machine, spin) = self.problem.machine(case, &self.minima[0].x);
-        let fastest = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
-        let point = prepare(Simd::Scalar, &[(machine, spin)], &timing(plan)).remove(0).ok()?;
+        let most_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
+        let point = ready(machine, spin, &timing(plan)).ok()?;
         let speeds: Vec<f64> = (SPEEDS / 5..=SPEEDS)
-            .map(|k| fastest * f64::from(k) / f64::from(SPEEDS))
+            .map(|k| most_rpm * f64::from(k) / f64::from(SPEEDS))
             .filter(|speed| *speed > 0.0)
             .collect();
         let dwell = |&speed_rpm: &f64| Dwell { point: &point, speed_rpm };
-        let found = responses(&speeds.iter().map(dwell).collect::<Vec<_>>(), &|| (self.stop)());
-        let there = found.iter().flatten().filter_map(|responses| responses.first());
-        there
-            .map(|response| [response.growth_per_s(), response.speed_rpm])
-            .reduce(|most, next| if next[0] > most[0] { next } else { most })
+        let found =
+            responses(&speeds.iter().map(dwell).collect::<Vec<_>>(), &|| (self.problem.stop)());
+        fastest(&found).map(|response| [response.growth_per_s(), response.speed_rpm])
     }
 
     /// What else a reader should know.
@@ -395,12 +382,10 @@ impl Report {
         };
         let interval = |[from, to]: [f64; 2]| format!("{} to {}", short(from), short(to));
         let row = |fit: &Fit| {
-            let file = fit.file.as_ref().map_or_else(String::new, |file| format!(" ({file})"));
             let unknown = if fit.at_bound { "at its bound" } else { "not known" };
             let known = fit.interval_95.map_or_else(|| unknown.to_owned(), interval);
             let error = fit.standard_error.map_or_else(|| "-".to_owned(), short);
-            let name = format!("{}{file}", fit.name);
-            let mut row = vec![name, fit.unit.clone(), short(fit.value), error, known];
+            let mut row = vec![fit.label(), fit.unit.clone(), short(fit.value), error, known];
             row.extend(fit.bootstrap_95.map(interval));
             row
         };

@@ -1,5 +1,6 @@
 //! The spin from a tachometer: a spline of first degree, which is a table of the spin's.
 
+use serde::Serialize;
 use washer_model::Spin;
 
 use super::algebra::quantile;
@@ -15,14 +16,16 @@ const DRAWN: u64 = 16;
 const MOST_KNOTS: usize = 1000;
 
 /// A smoothed measurement of the spin.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Smoothed {
+    #[serde(skip)]
     pub(crate) spin: Spin,
     /// Its noise, from second differences (rpm).
     pub(crate) noise_rpm: f64,
     /// Of the spline.
     pub(crate) knots: usize,
     /// Splines that noise might have made as well.
+    #[serde(skip)]
     pub(crate) drawn: Vec<Spin>,
 }
 

@@ -47,7 +47,7 @@ pub(crate) struct Statistics {
 
 impl Statistics {
     /// At the end of a descent.
-    pub(crate) fn of(problem: &Problem, against: &[Against], summary: &Summary) -> Self {
+    pub(crate) fn of(problem: &Problem<'_>, against: &[Against], summary: &Summary) -> Self {
         let n = problem.unknowns();
         let bread = inverse(&summary.normal);
         let mut meat = vec![vec![0.0; n]; n];
@@ -114,7 +114,7 @@ impl Statistics {
     }
 
     /// Why the model does not follow, if it does not.
-    pub(crate) fn objection(&self, problem: &Problem) -> Option<String> {
+    pub(crate) fn objection(&self, problem: &Problem<'_>) -> Option<String> {
         let mut reasons = Vec::new();
         let named = |k: usize| {
             problem.signals().nth(k).map_or_else(String::new, |(.., it)| it.quantity.column())
@@ -153,13 +153,13 @@ impl Statistics {
     }
 
     /// The covariance of the free numbers.
-    pub(crate) fn of_free(&self, problem: &Problem) -> Vec<Vec<f64>> {
+    pub(crate) fn of_free(&self, problem: &Problem<'_>) -> Vec<Vec<f64>> {
         let free = problem.free.len();
         self.covariance[..free].iter().map(|row| row[..free].to_vec()).collect()
     }
 
     /// What the data cannot tell, in words.
-    pub(crate) fn untold(&self, problem: &Problem, x: &[f64]) -> Vec<String> {
+    pub(crate) fn untold(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<String> {
         let covariance = self.of_free(problem);
         let names: Vec<&str> = problem.free.iter().map(|free| free.parameter.name()).collect();
         // Of a number that is 0 nothing is relative.

@@ -88,8 +88,9 @@ fn the_model_at_the_truth_is_the_exact_record() {
         let method = Problem::method(&cases).unwrap();
         let (model, simd) = (ModelKind::Nonlinear, simd_from_environment().unwrap());
         let free = Vec::new();
-        let problem = Problem { cases, free, model, with_shift: false, method, simd };
-        for one in problem.against(&[], &|| false).unwrap() {
+        let with_shift = false;
+        let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
+        for one in problem.against(&[]).unwrap() {
             let values = &problem.cases[0].measured.signals[one.signal].values;
             let largest =
                 |values: &[f64]| values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
@@ -178,8 +179,9 @@ fn intervals_know_that_noise_is_correlated() {
         let method = Problem::method(&cases).unwrap();
         let (model, simd) = (ModelKind::Nonlinear, simd_from_environment().unwrap());
         let free = free(&options(&names), &cases).unwrap();
-        let problem = Problem { cases, free, model, with_shift: true, method, simd };
-        let exact = problem.against(&problem.start(), &|| false).unwrap();
+        let with_shift = true;
+        let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
+        let exact = problem.against(&problem.start()).unwrap();
         for correlation in [0.0, 0.6, 0.9] {
             let mut held = vec![0; truth.len()];
             for draw in 0..DRAWS {

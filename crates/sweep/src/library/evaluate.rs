@@ -2,16 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Arc, Mutex};
 
 use arrow_array::RecordBatch;
 use arrow_schema::{ArrowError, SchemaRef};
+use once_cell::sync::OnceCell;
 use serde_json::json;
 
 use super::Effort;
 use super::points::PointTable;
 use super::result::ResultTable;
-use crate::engine::{Engine, ModelEngine, Watch};
+use super::run::Task;
+use crate::engine::{ModelEngine, Watch};
 use crate::plan::Plan;
 use sweep_engine::progress::Progress;
 use sweep_engine::store::{BATCH_ROWS, Done, Layout, ResultRows};
@@ -23,13 +25,13 @@ use washer_row::Ladder;
 /// A plan that is evaluated any number of times. The steps of its method are found once.
 pub struct Evaluator {
     plan: Plan,
-    ladders: OnceLock<[Ladder; 2]>,
+    ladders: Arc<OnceCell<[Ladder; 2]>>,
 }
 
 impl Evaluator {
     /// An evaluator of this plan.
     pub fn new(plan: Plan) -> Self {
-        Self { plan, ladders: OnceLock::new() }
+        Self { plan, ladders: Arc::default() }
     }
 
     /// The plan.
@@ -53,65 +55,57 @@ impl Evaluator {
             "method": "table", "points": job.points, "hash": points.hash(),
         });
         job.axis_values = Box::new(|point| points.axis_values(point));
-        self.rows(&job, effort)
+        self.task(job)?.in_memory(effort)
     }
 
-    /// Evaluates every point of the plan, in memory.
+    /// Every point of the plan.
     ///
     /// # Errors
-    /// As [`Self::evaluate`].
-    pub fn run(&self, effort: Effort<'_>) -> Result<ResultTable, Error> {
-        self.rows(&Job::of(&self.plan), effort)
+    /// `SWEEP_SIMD` naming nothing this machine has.
+    pub fn whole(&self) -> Result<Task<'_>, Error> {
+        self.task(Job::of(&self.plan))
     }
 
-    fn rows(&self, job: &Job<'_>, effort: Effort<'_>) -> Result<ResultTable, Error> {
-        let engine = match self.ladders.get() {
-            Some(ladders) => ModelEngine::with_ladders(&self.plan, ladders.clone())?,
-            None => ModelEngine::new(&self.plan)?,
-        };
-        let evaluated = in_memory(job, effort, &engine)?;
-        if let Some(found) = engine.ladders.get() {
-            // Another call may have found the same.
-            let _ = self.ladders.set(found.clone());
-        }
-        Ok(evaluated)
+    fn task<'a>(&'a self, job: Job<'a>) -> Result<Task<'a>, Error> {
+        let mut engine = ModelEngine::new(&self.plan)?;
+        engine.ladders = Arc::clone(&self.ladders);
+        Ok(Task { job, engine: Box::new(engine) })
     }
 }
 
-/// Every row of a job, in memory.
-///
-/// # Errors
-/// No threads, and a panic of the engine.
-pub(super) fn in_memory(
-    job: &Job<'_>,
-    effort: Effort<'_>,
-    engine: &dyn Engine,
-) -> Result<ResultTable, Error> {
-    let pool = threads::pool(effort.threads()?)?;
-    let watch = Watch::new(effort.interrupt);
-    let rows = Mutex::new(0..job.points);
-    let next = || {
-        let row = if watch.stopped() { None } else { lock(&rows).next() }?;
-        Some((row, (job.axis_values)(row)))
-    };
-    // Of this program.
-    let last = job.points.saturating_sub(1);
-    let defect = |reason| StoreError::Engine { first: 0, last, reason };
-    let gathered = Gathered::new(job);
-    let progress = Progress::new(effort.progress, job.points, 0);
-    let keep = |outcome| {
-        gathered.keep(outcome, &watch);
-        progress.show(watch.points_done());
-    };
-    let evaluate = || pool.install(|| engine.evaluate(&next, &keep, &watch));
-    let evaluated = catch_unwind(AssertUnwindSafe(evaluate));
-    progress.finish();
-    evaluated.map_err(|panic| {
-        defect(format!("the engine panicked: {}", panics::text(panic.as_ref())))
-    })?;
-    let is_whole = watch.points_done() == job.points;
-    let batches = gathered.into_batches().map_err(|error| defect(error.to_string()))?;
-    Ok(ResultTable::of_rows(job, batches, is_whole))
+impl Task<'_> {
+    /// Every row, in memory.
+    ///
+    /// # Errors
+    /// No threads, and a panic of the engine.
+    pub fn in_memory(&self, effort: Effort<'_>) -> Result<ResultTable, Error> {
+        let Self { job, engine } = self;
+        let pool = threads::pool(effort.threads()?)?;
+        let watch = Watch::new(effort.interrupt);
+        let rows = Mutex::new(0..job.points);
+        let next = || {
+            let row = if watch.stopped() { None } else { lock(&rows).next() }?;
+            Some((row, (job.axis_values)(row)))
+        };
+        // Of this program.
+        let last = job.points.saturating_sub(1);
+        let defect = |reason| StoreError::Engine { first: 0, last, reason };
+        let gathered = Gathered::new(job);
+        let progress = Progress::new(effort.progress, job.points, 0);
+        let keep = |outcome| {
+            gathered.keep(outcome, &watch);
+            progress.show(watch.points_done());
+        };
+        let evaluate = || pool.install(|| engine.evaluate(&next, &keep, &watch));
+        let evaluated = catch_unwind(AssertUnwindSafe(evaluate));
+        progress.finish();
+        evaluated.map_err(|panic| {
+            defect(format!("the engine panicked: {}", panics::text(panic.as_ref())))
+        })?;
+        let is_whole = watch.points_done() == job.points;
+        let batches = gathered.into_batches().map_err(|error| defect(error.to_string()))?;
+        Ok(ResultTable::of_rows(job, batches, is_whole))
+    }
 }
 
 /// Outcomes as they come, and the batches that are whole.
@@ -165,8 +159,6 @@ impl<'a> Gathered<'a> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
     use crate::config::GridInput;
     use sweep_engine::interrupt::Interrupt;
@@ -183,7 +175,7 @@ mod tests {
         let interrupt = Interrupt::new();
         let effort =
             Effort { threads: Some(2), progress: ProgressMode::None, interrupt: &interrupt };
-        let found = evaluator.run(effort).unwrap();
+        let found = evaluator.whole().unwrap().in_memory(effort).unwrap();
         let [first, second] = found.batches() else { panic!("{found:?}") };
         assert_eq!([first.num_rows(), second.num_rows()], [BATCH_ROWS, 1]);
         assert!(Arc::ptr_eq(&first.schema(), &second.schema()));

@@ -1,17 +1,16 @@
 //! The modes of a machine over spin speed, as a table.
 
-use lane_ode::Simd;
 use serde_json::{Map, Value, json};
 use washer_model::{
     COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Spin, Stop, Timing,
-    campbell_until, exact_motions, prepare,
+    campbell_until, exact_motions,
 };
 
 use super::check_speeds;
 use super::result::ResultTable;
 use crate::config::{self, Diagnostics, GridInput};
 use crate::model::Washer;
-use crate::plan::{friction_speeds, timing};
+use crate::plan::{friction_speeds, ready, timing};
 use sweep_engine::{Error, Interrupt, Table};
 use sweep_files::{FileKind, key};
 
@@ -89,8 +88,7 @@ impl Analysis {
         is_exact: bool,
         stop: Stop<'_>,
     ) -> Result<Option<Self>, Error> {
-        let machines = [(asked.machine.clone(), asked.spin.clone())];
-        let point = prepare(Simd::Scalar, &machines, &asked.timing).remove(0);
+        let point = ready(asked.machine.clone(), asked.spin.clone(), &asked.timing);
         let point = point.map_err(Error::model)?;
         let modes = campbell_until(&point, speeds_rpm, stop).map_err(Error::model)?;
         let Some(modes) = modes else { return Ok(None) };

@@ -53,7 +53,7 @@ pub(crate) struct Summary {
     coexisting: u64,
     tongues: Vec<Tongue>,
     /// Points and speeds (rpm) at which a machine that runs up comes to the end of its branch.
-    jumps: Vec<(Row, f64)>,
+    jumps: Vec<Row>,
     last: Option<Row>,
 }
 
@@ -68,10 +68,9 @@ impl Summary {
             return;
         }
         self.rows += 1;
-        if let Some(to_rpm) = row.branch_to_rpm
-            && !self.jumps.last().is_some_and(|(of, rpm)| (of.point, *rpm) == (row.point, to_rpm))
-        {
-            self.jumps.push((row.clone(), to_rpm));
+        let end = |row: &Row| (row.point, row.branch_to_rpm);
+        if row.branch_to_rpm.is_some() && self.jumps.last().map(end) != Some(end(&row)) {
+            self.jumps.push(row.clone());
         }
         let follows = same_point && self.last.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
         self.points += u64::from(!same_point);
@@ -87,9 +86,9 @@ impl Summary {
                         tongue.at = row.clone();
                     }
                 }
-                _ => self
-                    .tongues
-                    .push(Tongue { at: row.clone(), from_to_rpm: [row.speed_rpm, row.speed_rpm] }),
+                _ => {
+                    self.tongues.push(Tongue { at: row.clone(), from_to_rpm: [row.speed_rpm; 2] });
+                }
             }
         }
         self.last = Some(row);
@@ -116,14 +115,12 @@ impl Summary {
             let words = "further rows: other responses at the same speeds (column branch)";
             lines.push(("others", format!("{} {words}", self.coexisting)));
         }
-        for (row, rpm) in self.jumps.iter().take(MOST_LISTED) {
-            let of_point = self.of_point(row);
+        for row in self.jumps.iter().take(MOST_LISTED) {
+            let (of_point, rpm) = (self.of_point(row), row.branch_to_rpm.unwrap_or_default());
             let words = "running up, the response folds back and the motion jumps";
             lines.push(("jump", format!("{of_point}at {rpm:.2} rpm, {words}")));
         }
-        if self.jumps.len() > MOST_LISTED {
-            lines.push(("", format!("and {} more jumps", self.jumps.len() - MOST_LISTED)));
-        }
+        lines.extend(more(self.jumps.len(), "jumps"));
         // All of one point; else the worst.
         let mut listed: Vec<&Tongue> = self.tongues.iter().collect();
         if self.points > 1 {
@@ -132,9 +129,7 @@ impl Summary {
         for tongue in listed.iter().take(MOST_LISTED) {
             lines.push(("unstable", self.words(tongue)));
         }
-        if listed.len() > MOST_LISTED {
-            lines.push(("", format!("and {} more tongues", listed.len() - MOST_LISTED)));
-        }
+        lines.extend(more(listed.len(), "tongues"));
         lines
     }
 
@@ -165,6 +160,12 @@ impl Summary {
         }
         text
     }
+}
+
+/// Says how many of these are left out, if any are.
+fn more(count: usize, what: &str) -> Option<(&'static str, String)> {
+    let left = count.checked_sub(MOST_LISTED).filter(|left| *left > 0)?;
+    Some(("", format!("and {left} more {what}")))
 }
 
 /// Reads through a stability file.
