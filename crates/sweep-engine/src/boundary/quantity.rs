@@ -24,7 +24,7 @@ pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
     let mut least = plan.clone();
     least.reliability.limits.least = Some(plan.reliability.limits.over_estimate());
     let further = [plan.clone(), least].into_iter().chain(M::variants(plan));
-    let plans = M::Channel::every().iter().map(of_one).chain(further.map(|plan| (plan, None)));
+    let plans = M::channels().iter().map(of_one).chain(further.map(|plan| (plan, None)));
     let mut offered: Vec<(Column, Plan<M>)> = Vec::new();
     for (plan, only) in plans {
         for column in M::layout(&plan).columns {
@@ -61,7 +61,7 @@ pub fn traced<M: Swept>(
         let meant = nearest(name, names());
         let meant = meant.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
         let of_channels: Vec<String> =
-            M::Channel::every().iter().flat_map(|channel| of_channel(channel.name())).collect();
+            M::channels().iter().flat_map(|channel| of_channel(channel.name())).collect();
         let is_of_channel = |name: &&str| of_channels.iter().any(|known| known == name);
         let names: Vec<&str> = names().filter(|name| !is_of_channel(name)).collect();
         let [ratio, nonlinear, linear] = of_channel("CHANNEL");
