@@ -100,7 +100,8 @@ pub fn run(
     }
     let (began, started_unix_s) = (Instant::now(), provenance::now_unix_s());
     let progress = Progress::new(options.progress, points, there);
-    let result = compute_and_join(engine, job, &mut run, threads, &progress, interrupt);
+    let work = Work { engine, job, threads, progress: &progress, interrupt };
+    let result = work.compute_and_join(&mut run);
     progress.finish();
     let wall_s = began.elapsed().as_secs_f64();
     let computed = run.own_points().1.saturating_sub(there);
@@ -120,9 +121,9 @@ pub fn run(
     };
     match result {
         Ok(Some(tally)) => {
-            let joined = run.complete(job, tally, Some(session.clone()))?;
-            let ended = Ended::Finished(Box::new(joined.tally));
-            Ok(RunReport { ended, session: Some(session), notes: joined.notes })
+            let notes = run.complete(job, &tally, Some(session.clone()))?;
+            let ended = Ended::Finished(Box::new(tally));
+            Ok(RunReport { ended, session: Some(session), notes })
         }
         Ok(None) => {
             let mut notes = run.take_notes();
@@ -145,85 +146,85 @@ pub fn run(
     }
 }
 
-/// Computes what is missing and joins the whole; `None` for a shard, or when a signal stopped it.
-fn compute_and_join(
-    engine: &dyn Engine,
-    job: &Job<'_>,
-    run: &mut OpenRun,
+/// The work on a run.
+struct Work<'a> {
+    engine: &'a dyn Engine,
+    job: &'a Job<'a>,
     threads: usize,
-    progress: &Progress,
-    interrupt: &Interrupt,
-) -> Result<Option<Tally>, StoreError> {
-    let mut attempts_left = 2;
-    loop {
-        compute(engine, job, run, threads, progress, interrupt)?;
-        if interrupt.stopped() || run.shard().is_some() {
-            return Ok(None);
-        }
-        progress.joining();
-        match run.join(job, &|| interrupt.stopped()) {
-            // A chunk that was whole a moment ago is not any more: compute it again, but not for
-            // ever.
-            Err(StoreError::Incomplete { .. }) if attempts_left > 0 => attempts_left -= 1,
-            result => return result,
-        }
-    }
+    progress: &'a Progress,
+    interrupt: &'a Interrupt,
 }
 
-/// Computes and keeps every missing chunk of this process's part, or as many as a signal or an
-/// error lets.
-fn compute(
-    engine: &dyn Engine,
-    job: &Job<'_>,
-    run: &OpenRun,
-    threads: usize,
-    progress: &Progress,
-    interrupt: &Interrupt,
-) -> Result<(), StoreError> {
-    let pool = threads::pool(threads)?;
-    let watch = Watch::new(interrupt);
-    let (_, start) = run.own_points();
-    // Bounded, so that a disk slower than the engine holds the engine up instead of filling memory.
-    let (sender, receiver) = sync_channel(threads);
-    let hand = Hand::new(run, sender);
-    let mut result = Ok(());
-    std::thread::scope(|scope| {
-        let (watch, pool) = (&watch, &pool);
-        let work = move || pool.install(|| hand.fill(engine, job, watch));
-        // Where it cannot be started, the sender goes with it, and the loop below ends.
-        let work = match std::thread::Builder::new().spawn_scoped(scope, work) {
-            Ok(work) => Some(work),
-            Err(error) => {
-                result = Err(ThreadsError::start(threads + 1)(&error).into());
-                None
-            }
-        };
+impl Work<'_> {
+    /// Computes what is missing and joins the whole; `None` for a shard, or when a signal stopped
+    /// it.
+    fn compute_and_join(&self, run: &mut OpenRun) -> Result<Option<Tally>, StoreError> {
+        let mut attempts_left = 2;
         loop {
-            match receiver.recv_timeout(Duration::from_millis(100)) {
-                Ok((chunk, outcomes)) => {
-                    if let Err(error) = run.write_chunk(chunk, outcomes) {
-                        // A chunk that makes no sense costs itself; a disk that fails would cost
-                        // them all.
-                        if !matches!(error, StoreError::Engine { .. }) {
-                            watch.abort();
-                        }
-                        result = std::mem::replace(&mut result, Ok(())).and(Err(error));
-                    }
-                }
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break,
+            self.compute(run)?;
+            if self.interrupt.stopped() || run.shard().is_some() {
+                return Ok(None);
             }
-            progress.show(start + watch.points_done());
+            self.progress.joining();
+            match run.join(self.job, &|| self.interrupt.stopped()) {
+                // A chunk that was whole a moment ago is not any more: compute it again, but not
+                // for ever.
+                Err(StoreError::Incomplete { .. }) if attempts_left > 0 => attempts_left -= 1,
+                result => return result,
+            }
         }
-        if let Some(Ok(Err(error))) = work.map(std::thread::ScopedJoinHandle::join) {
-            result = std::mem::replace(&mut result, Ok(())).and(Err(error));
-        }
-    });
-    result
+    }
+
+    /// Computes and keeps every missing chunk of this process's part, or as many as a signal or an
+    /// error lets.
+    fn compute(&self, run: &OpenRun) -> Result<(), StoreError> {
+        let pool = threads::pool(self.threads)?;
+        let watch = Watch::new(self.interrupt);
+        let (_, start) = run.own_points();
+        // Bounded, so that a disk slower than the engine holds the engine up instead of filling
+        // memory.
+        let (sender, receiver) = sync_channel(self.threads);
+        let hand = Hand::new(self, run, sender);
+        let mut result = Ok(());
+        std::thread::scope(|scope| {
+            let (watch, pool) = (&watch, &pool);
+            let work = move || pool.install(|| hand.fill(watch));
+            // Where it cannot be started, the sender goes with it, and the loop below ends.
+            let work = match std::thread::Builder::new().spawn_scoped(scope, work) {
+                Ok(work) => Some(work),
+                Err(error) => {
+                    result = Err(ThreadsError::start(self.threads + 1)(&error).into());
+                    None
+                }
+            };
+            loop {
+                match receiver.recv_timeout(Duration::from_millis(100)) {
+                    Ok((chunk, outcomes)) => {
+                        if let Err(error) = run.write_chunk(chunk, outcomes) {
+                            // A chunk that makes no sense costs itself; a disk that fails would
+                            // cost them all.
+                            if !matches!(error, StoreError::Engine { .. }) {
+                                watch.abort();
+                            }
+                            result = std::mem::replace(&mut result, Ok(())).and(Err(error));
+                        }
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => break,
+                }
+                self.progress.show(start + watch.points_done());
+            }
+            if let Some(Ok(Err(error))) = work.map(std::thread::ScopedJoinHandle::join) {
+                result = std::mem::replace(&mut result, Ok(())).and(Err(error));
+            }
+        });
+        result
+    }
 }
 
 /// Chunks in hand: points go out one by one, outcomes come back in any order, whole chunks go on.
 struct Hand<'a> {
+    work: &'a Work<'a>,
     run: &'a OpenRun,
     /// Points of missing chunks that have not gone out.
     left: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
@@ -233,31 +234,27 @@ struct Hand<'a> {
 }
 
 impl<'a> Hand<'a> {
-    fn new(run: &'a OpenRun, whole: SyncSender<(u64, Vec<Done>)>) -> Self {
+    fn new(work: &'a Work<'_>, run: &'a OpenRun, whole: SyncSender<(u64, Vec<Done>)>) -> Self {
         let parts = run.take_parts();
         let there: BTreeSet<u64> = parts.values().flatten().map(|outcome| outcome.point).collect();
         let missing = (0..run.chunks()).filter(|&chunk| run.is_missing(chunk));
         let left = missing.flat_map(|chunk| run.chunk_range(chunk));
         let left = left.filter(move |point| !there.contains(point));
-        Self { run, left: Mutex::new(Box::new(left)), parts: Mutex::new(parts), whole }
+        Self { work, run, left: Mutex::new(Box::new(left)), parts: Mutex::new(parts), whole }
     }
 
     /// Has the engine evaluate everything that is missing, and keeps what there is of chunks that
     /// did not become whole.
-    fn fill(self, engine: &dyn Engine, job: &Job<'_>, watch: &Watch<'_>) -> Result<(), StoreError> {
-        let evaluated = self.evaluate(engine, job, watch);
+    fn fill(self, watch: &Watch<'_>) -> Result<(), StoreError> {
+        let evaluated = self.evaluate(watch);
         let parts = std::mem::take(&mut *lock(&self.parts));
         // A part that makes no sense costs itself.
         let kept = parts.into_iter().map(|(chunk, part)| self.run.write_chunk(chunk, part));
         kept.fold(evaluated, Result::and)
     }
 
-    fn evaluate(
-        &self,
-        engine: &dyn Engine,
-        job: &Job<'_>,
-        watch: &Watch<'_>,
-    ) -> Result<(), StoreError> {
+    fn evaluate(&self, watch: &Watch<'_>) -> Result<(), StoreError> {
+        let Work { engine, job, .. } = self.work;
         let next = || {
             let point = if watch.stopped() { None } else { lock(&self.left).next() }?;
             Some((point, (job.axis_values)(point)))

@@ -56,12 +56,9 @@ impl Lock {
             match taken {
                 Ok(()) if !atomic::is_named(&file, &path) => continue,
                 Ok(()) => {
-                    if shard.is_none() {
-                        sign(&mut file, &path)?;
-                    }
                     let shard = match shard {
                         Some(shard) => take_shard(folder, shard)?,
-                        None => None,
+                        None => sign(&mut file, &path).map(|()| None)?,
                     };
                     return Ok(Self { _run: Some(file), _shard: shard, path, missing: false });
                 }

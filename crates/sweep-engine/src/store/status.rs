@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::open::{self, ChunkFile, chunks_there, read_chunk};
+use super::open::{self, chunks_there, read_chunk};
 use super::plan_file::{Found, PlanFile};
 use super::read::{NameCounts, add, failed};
 use super::shard::{self, Dealing};
@@ -97,16 +97,16 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     for chunk in chunks_there(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
         let place = place(chunk);
         match read_chunk(&folder, &place)? {
-            ChunkFile::There(points) => {
+            Some(Ok(points)) => {
                 if points.len() as u64 == place.count {
                     present.insert(chunk);
                 }
                 status.points_done += points.len() as u64;
                 points.iter().filter_map(name).for_each(|name| add(&mut status.by_status, name));
             }
-            ChunkFile::Damaged(_) => status.chunks_damaged.push(chunk),
+            Some(Err(_)) => status.chunks_damaged.push(chunk),
             // The run was finished, or the chunk set aside, a moment ago.
-            ChunkFile::Absent => {}
+            None => {}
         }
     }
     status.chunks_done = present.len() as u64;
