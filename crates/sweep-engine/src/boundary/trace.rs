@@ -184,11 +184,9 @@ impl<'a> Block<'a> {
                 if !heard.iter().flatten().all(|rank| slots[*rank].is_placed) {
                     continue;
                 }
-                let [left, right] = [0, 1].map(|side| {
-                    let ranks: &[usize] = &heard[side];
-                    let seen = |rank: &usize| neighbour(slots, &self.order, *rank);
-                    ranks.iter().map(seen).collect::<Vec<_>>()
-                });
+                let seen = |rank: &usize| neighbour(slots, &self.order, *rank);
+                let [left, right] =
+                    heard.each_ref().map(|ranks| ranks.iter().map(seen).collect::<Vec<_>>());
                 let mut row = warm::start(*at, &left, &right, &self.span);
                 let of_row = row.wants(&self.span);
                 ready.push(((curve, rank), row, of_row));

@@ -106,13 +106,7 @@ pub(super) fn pretty(value: &Value) -> Vec<u8> {
 
 /// Hash of the build that runs and the plan it runs.
 pub(super) fn plan_hash(version: &str, numerics: u32, plan: &Value) -> blake3::Hash {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(version.as_bytes());
-    hasher.update(b"\n");
-    hasher.update(numerics.to_string().as_bytes());
-    hasher.update(b"\n");
-    hasher.update(plan.to_string().as_bytes());
-    hasher.finalize()
+    blake3::hash(format!("{version}\n{numerics}\n{plan}").as_bytes())
 }
 
 /// The plan with the facts beside it, for showing differences of either by path.
