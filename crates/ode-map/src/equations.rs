@@ -3,16 +3,22 @@
 
 use std::marker::PhantomData;
 
-use lane_ode::{Dual, Lane, Lu, N, Real};
+use lane_ode::{Dual, Lane, Lu, N, Partials, System};
 
 use crate::Oscillator;
 
-/// The tangent of the free motion at an equilibrium: q'' is `by_coordinate` times the deviation and
-/// `by_speed` times the speeds.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Tangent<T, const C: usize> {
-    by_coordinate: [[N<T>; C]; C],
-    by_speed: [[N<T>; C]; C],
+/// Newton steps to the equilibrium, from all coordinates at zero.
+const MOST_STEPS: usize = 50;
+/// Coordinates beyond this have diverged.
+const FARTHEST: f64 = 1e12;
+
+/// Both models, in the order of columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Model {
+    /// The equations as they are.
+    Nonlinear,
+    /// The tangent at the equilibrium.
+    Linear,
 }
 
 /// A point made ready once.
@@ -21,11 +27,9 @@ pub(crate) struct Case<const C: usize, const P: usize> {
     pub(crate) p: [f64; P],
     pub(crate) window_s: [f64; 2],
     equilibrium: [f64; C],
-    tangent: Tangent<f64, C>,
+    /// Of the free motion at the equilibrium.
+    tangent: Partials<C>,
 }
-
-/// Newton steps to the equilibrium, from all coordinates at zero.
-const MOST_STEPS: usize = 50;
 
 impl<const C: usize, const P: usize> Case<C, P> {
     /// The point at these parameters; none without an equilibrium near zero.
@@ -33,12 +37,13 @@ impl<const C: usize, const P: usize> Case<C, P> {
         p: [f64; P],
         window_s: [f64; 2],
     ) -> Option<Self> {
-        let mut equilibrium = [0.0; C];
+        let still = [0.0; C];
+        let (mut equilibrium, mut tangent) = (still, tangent::<O, C, D, P>(&p, &still, &still));
+        // Rounding may keep it from standing still.
         for _ in 0..MOST_STEPS {
-            let tangent = tangent::<O, C, D, P>(&p, &equilibrium, &[0.0; C]);
-            let rest = O::accelerations(&p.map(N), &equilibrium.map(N), &[N(0.0); C]);
+            let rest = O::accelerations(&p.map(N), &equilibrium.map(N), &still.map(N));
             if rest.iter().all(|a| a.0 == 0.0) {
-                return Some(Self { p, window_s, equilibrium, tangent });
+                break;
             }
             let step = Lu::new(tangent.by_coordinate)?.solve(&rest);
             let before = equilibrium;
@@ -49,11 +54,10 @@ impl<const C: usize, const P: usize> Case<C, P> {
                 return None;
             }
             if before == equilibrium {
-                return Some(Self { p, window_s, equilibrium, tangent });
+                break;
             }
+            tangent = self::tangent::<O, C, D, P>(&p, &equilibrium, &still);
         }
-        // Rounding keeps it from standing still.
-        let tangent = tangent::<O, C, D, P>(&p, &equilibrium, &[0.0; C]);
         Some(Self { p, window_s, equilibrium, tangent })
     }
 
@@ -67,18 +71,17 @@ impl<const C: usize, const P: usize> Case<C, P> {
     }
 }
 
-/// The derivatives of the free motion at a state, by dual numbers.
+/// The derivatives of the free motion at a state, by dual numbers; none by time.
 fn tangent<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
     p: &[f64; P],
     q: &[f64; C],
     u: &[f64; C],
-) -> Tangent<f64, C> {
-    let constant = |value: &f64| N(*value).constant();
-    let mut found = Tangent { by_coordinate: [[N(0.0); C]; C], by_speed: [[N(0.0); C]; C] };
-    let p = std::array::from_fn(|k| constant(&p[k]));
+) -> Partials<C> {
+    let constant = |value: f64| N(value).constant();
+    let mut found = Partials::zero();
+    let p = p.map(constant);
     for j in 0..C {
-        let [mut q, mut u]: [[N<Dual<f64>>; C]; 2] =
-            [q, u].map(|state| std::array::from_fn(|i| constant(&state[i])));
+        let [mut q, mut u]: [[N<Dual<f64>>; C]; 2] = [q, u].map(|state| state.map(constant));
         q[j].0.slope = 1.0;
         let by_coordinate = O::accelerations(&p, &q, &u);
         q[j].0.slope = 0.0;
@@ -92,144 +95,119 @@ fn tangent<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usiz
     found
 }
 
-/// One of the two models, in lanes that hold a point each. States are deviations from equilibrium.
-pub(crate) trait Side<T: Real, const C: usize, const P: usize>: Sized {
-    /// Lanes without points.
-    fn new(zero: N<T>) -> Self;
-    /// Gives a lane a point.
-    fn take(&mut self, lane: usize, case: &Case<C, P>)
-    where
-        T: Lane;
-    /// What drives it.
-    fn forcing(&self, t: N<T>) -> [N<T>; C];
-    /// The free motion.
-    fn accelerations(&self, q: &[N<T>; C], u: &[N<T>; C]) -> [N<T>; C];
-    /// The derivatives of the free motion of a point at a state.
-    fn tangent(case: &Case<C, P>, q: &[f64; C], u: &[f64; C]) -> Tangent<f64, C>;
-    /// How fast what drives a point changes.
-    fn forcing_slope(case: &Case<C, P>, t_s: f64) -> [N<f64>; C];
-}
-
-impl<const C: usize> Tangent<f64, C> {
-    /// The derivatives by coordinates, and those by speeds.
-    pub(crate) const fn parts(self) -> [[[N<f64>; C]; C]; 2] {
-        [self.by_coordinate, self.by_speed]
-    }
-}
-
-/// The equations as they are.
-pub(crate) struct Nonlinear<O, T, const C: usize, const D: usize, const P: usize> {
+/// One of the models as a first-order system, in lanes that hold a point each. States are
+/// deviations from equilibrium.
+pub(crate) struct Equations<O, T, const C: usize, const D: usize, const P: usize> {
+    model: Model,
     p: [N<T>; P],
     equilibrium: [N<T>; C],
+    by_coordinate: [[N<T>; C]; C],
+    by_speed: [[N<T>; C]; C],
+    farthest: N<T>,
     of: PhantomData<O>,
 }
 
-impl<T: Real, O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Side<T, C, P>
-    for Nonlinear<O, T, C, D, P>
+impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: usize>
+    Equations<O, T, C, D, P>
 {
-    fn new(zero: N<T>) -> Self {
-        Self { p: [zero; P], equilibrium: [zero; C], of: PhantomData }
-    }
-
-    fn take(&mut self, lane: usize, case: &Case<C, P>)
-    where
-        T: Lane,
-    {
-        set(&mut self.p, lane, &case.p);
-        set(&mut self.equilibrium, lane, &case.equilibrium);
-    }
-
-    #[inline(always)]
-    fn forcing(&self, t: N<T>) -> [N<T>; C] {
-        O::forcing(&self.p, t)
-    }
-
-    #[inline(always)]
-    fn accelerations(&self, q: &[N<T>; C], u: &[N<T>; C]) -> [N<T>; C] {
-        let mut place = *q;
-        for i in 0..C {
-            place[i] = q[i] + self.equilibrium[i];
+    /// Lanes without points.
+    pub(crate) fn new(model: Model, zero: N<T>) -> Self {
+        Self {
+            model,
+            p: [zero; P],
+            equilibrium: [zero; C],
+            by_coordinate: [[zero; C]; C],
+            by_speed: [[zero; C]; C],
+            farthest: zero.lit(FARTHEST),
+            of: PhantomData,
         }
-        O::accelerations(&self.p, &place, u)
     }
 
-    fn tangent(case: &Case<C, P>, q: &[f64; C], u: &[f64; C]) -> Tangent<f64, C> {
-        let place = std::array::from_fn(|i| q[i] + case.equilibrium[i]);
-        tangent::<O, C, D, P>(&case.p, &place, u)
+    /// Gives a lane a point.
+    pub(crate) fn take(&mut self, lane: usize, case: &Case<C, P>) {
+        set(&mut self.p, lane, &case.p.map(N));
+        set(&mut self.equilibrium, lane, &case.equilibrium.map(N));
+        let Partials { by_coordinate, by_speed, .. } = &case.tangent;
+        set(self.by_coordinate.as_flattened_mut(), lane, by_coordinate.as_flattened());
+        set(self.by_speed.as_flattened_mut(), lane, by_speed.as_flattened());
     }
 
-    fn forcing_slope(case: &Case<C, P>, t_s: f64) -> [N<f64>; C] {
-        forcing_slope::<O, C, D, P>(case, t_s)
+    /// The derivatives of a point's accelerations at a time and a state.
+    pub(crate) fn partials(&self, case: &Case<C, P>, t_s: f64, x: &[N<f64>; D]) -> Partials<C> {
+        let p = case.p.map(|value| N(value).constant());
+        let driven = O::forcing(&p, N(Dual { value: t_s, slope: 1.0 }));
+        let free = match self.model {
+            Model::Nonlinear => {
+                let (q, u) = halves(&x.map(|value| value.0));
+                let place = std::array::from_fn(|i| q[i] + case.equilibrium[i]);
+                tangent::<O, C, D, P>(&case.p, &place, &u)
+            }
+            Model::Linear => case.tangent.clone(),
+        };
+        Partials { by_time: driven.map(|driven| N(driven.0.slope)), ..free }
     }
 }
 
-/// The tangent at the equilibrium.
-pub(crate) struct Linear<O, T, const C: usize, const D: usize, const P: usize> {
-    p: [N<T>; P],
-    tangent: Tangent<T, C>,
-    of: PhantomData<O>,
-}
-
-impl<T: Real, O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Side<T, C, P>
-    for Linear<O, T, C, D, P>
+impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: usize> System<T, D>
+    for Equations<O, T, C, D, P>
 {
-    fn new(zero: N<T>) -> Self {
-        let tangent = Tangent { by_coordinate: [[zero; C]; C], by_speed: [[zero; C]; C] };
-        Self { p: [zero; P], tangent, of: PhantomData }
+    type Forcing = [N<T>; C];
+
+    #[inline(always)]
+    fn forcing(&self, t_s: N<T>) -> [N<T>; C] {
+        O::forcing(&self.p, t_s)
     }
 
-    fn take(&mut self, lane: usize, case: &Case<C, P>)
-    where
-        T: Lane,
-    {
-        set(&mut self.p, lane, &case.p);
-        for i in 0..C {
-            for j in 0..C {
-                let Tangent { by_coordinate, by_speed } = &mut self.tangent;
-                by_coordinate[i][j].0.set(lane, case.tangent.by_coordinate[i][j].0);
-                by_speed[i][j].0.set(lane, case.tangent.by_speed[i][j].0);
+    #[inline(always)]
+    fn derivative(&self, forcing: &[N<T>; C], x: &[N<T>; D]) -> [N<T>; D] {
+        let (q, u): ([N<T>; C], [N<T>; C]) = halves(x);
+        let mut free = q;
+        match self.model {
+            Model::Nonlinear => {
+                let mut place = q;
+                for i in 0..C {
+                    place[i] = q[i] + self.equilibrium[i];
+                }
+                free = O::accelerations(&self.p, &place, &u);
+            }
+            Model::Linear => {
+                for i in 0..C {
+                    let mut sum = q[i].lit(0.0);
+                    for j in 0..C {
+                        sum = self.by_coordinate[i][j] * q[j] + sum;
+                        sum = self.by_speed[i][j] * u[j] + sum;
+                    }
+                    free[i] = sum;
+                }
             }
         }
-    }
-
-    #[inline(always)]
-    fn forcing(&self, t: N<T>) -> [N<T>; C] {
-        O::forcing(&self.p, t)
-    }
-
-    #[inline(always)]
-    fn accelerations(&self, q: &[N<T>; C], u: &[N<T>; C]) -> [N<T>; C] {
-        let mut sums = *q;
+        let mut slopes = *x;
         for i in 0..C {
-            let mut sum = q[i].lit(0.0);
-            for j in 0..C {
-                sum = self.tangent.by_coordinate[i][j] * q[j] + sum;
-                sum = self.tangent.by_speed[i][j] * u[j] + sum;
-            }
-            sums[i] = sum;
+            slopes[i] = u[i];
+            slopes[C + i] = free[i] + forcing[i];
         }
-        sums
+        slopes
     }
 
-    fn tangent(case: &Case<C, P>, _: &[f64; C], _: &[f64; C]) -> Tangent<f64, C> {
-        case.tangent
-    }
-
-    fn forcing_slope(case: &Case<C, P>, t_s: f64) -> [N<f64>; C] {
-        forcing_slope::<O, C, D, P>(case, t_s)
+    #[inline(always)]
+    fn in_range(&self, x: &[N<T>; D]) -> T::Mask {
+        let mut largest = x[0].abs();
+        for i in 1..C {
+            // A coordinate that is not finite is the larger one, and not below the limit.
+            largest = N(T::select(x[i].abs().0.less(largest.0), largest.0, x[i].abs().0));
+        }
+        largest.0.less(self.farthest.0)
     }
 }
 
-fn forcing_slope<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
-    case: &Case<C, P>,
-    t_s: f64,
-) -> [N<f64>; C] {
-    let p = case.p.map(|value| N(value).constant());
-    O::forcing(&p, N(Dual { value: t_s, slope: 1.0 })).map(|driven| N(driven.0.slope))
+/// The coordinates of a state, and their speeds.
+fn halves<T: Copy, const C: usize, const D: usize>(x: &[T; D]) -> ([T; C], [T; C]) {
+    const { assert!(D == 2 * C, "a state is the coordinates and their speeds") };
+    (std::array::from_fn(|i| x[i]), std::array::from_fn(|i| x[C + i]))
 }
 
-fn set<T: Lane, const K: usize>(to: &mut [N<T>; K], lane: usize, from: &[f64; K]) {
+fn set<T: Lane>(to: &mut [N<T>], lane: usize, from: &[N<f64>]) {
     for (to, from) in to.iter_mut().zip(from) {
-        to.0.set(lane, *from);
+        to.0.set(lane, from.0);
     }
 }

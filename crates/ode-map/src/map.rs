@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 use std::time::Instant;
 
-use lane_ode::{Failure, MAX_LANES, Simd};
+use lane_ode::{MAX_LANES, Simd};
 use serde_json::{Map as JsonMap, Value};
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
@@ -19,8 +19,8 @@ use sweep_engine::{
 };
 use sweep_parameter::{Channel, Range};
 
-use crate::equations::Case;
-use crate::run::{Method, Model, Run, runs};
+use crate::equations::{Case, Model};
+use crate::run::{Method, Run, Work};
 use crate::{Coordinate, Oscillator, Parameter};
 
 methods! {
@@ -46,7 +46,8 @@ const FLOOR: f64 = 1e-9;
 
 /// Names of methods in results.
 const METHODS: [&str; 3] = ["rk4", "dopri5", "rodas5p"];
-/// Values of `status`: those of the nonlinear model, then those of the linear one alone.
+/// Values of `status`: those of the nonlinear model, with `Failure`'s in their order behind the
+/// first, then those of the linear one alone.
 const STATUSES: [&str; 8] = [
     "ok",
     "diverged",
@@ -66,146 +67,80 @@ pub struct Map<O, const C: usize, const D: usize, const P: usize> {
     of: PhantomData<O>,
 }
 
-/// A parameter of an oscillator, or an edge of the window.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Named {
-    of: Parameter,
-    place: Result<usize, usize>,
-}
-
 /// Edges of the window, which are parameters like others.
 const EDGES: [Parameter; 2] = [
-    Parameter {
-        name: "window_from_s",
-        unit: "s",
-        description: "where the window begins",
-        range: Range::NonNegative,
-        default: 0.0,
-        source: "the grid file's [time]",
-    },
-    Parameter {
-        name: "window_to_s",
-        unit: "s",
-        description: "where the window ends",
-        range: Range::NonNegative,
-        default: 0.0,
-        source: "the grid file's [time]",
-    },
+    edge("window_from_s", "where the window begins"),
+    edge("window_to_s", "where the window ends"),
 ];
 
-impl sweep_parameter::Parameter for Named {
+const fn edge(name: &'static str, description: &'static str) -> Parameter {
+    let source = "the grid file's [time]";
+    Parameter { name, unit: "s", description, range: Range::NonNegative, default: 0.0, source }
+}
+
+impl sweep_parameter::Parameter for Parameter {
     fn name(&self) -> &str {
-        self.of.name
+        self.name
     }
 
     fn unit(&self) -> &'static str {
-        self.of.unit
+        self.unit
     }
 
     fn description(&self) -> &'static str {
-        self.of.description
+        self.description
     }
 
     fn range(&self) -> Range {
-        self.of.range
+        self.range
     }
 
     fn window_edge(&self) -> Option<usize> {
-        self.place.err()
+        EDGES.iter().position(|edge| edge == self)
     }
 }
 
-/// A coordinate as a channel, by its number.
-#[derive(Debug)]
-pub struct CoordinateOf<O, const C: usize, const D: usize, const P: usize> {
-    place: usize,
-    of: PhantomData<O>,
-}
-
-impl<O, const C: usize, const D: usize, const P: usize> Clone for CoordinateOf<O, C, D, P> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<O, const C: usize, const D: usize, const P: usize> Copy for CoordinateOf<O, C, D, P> {}
-
-impl<O, const C: usize, const D: usize, const P: usize> PartialEq for CoordinateOf<O, C, D, P> {
-    fn eq(&self, other: &Self) -> bool {
-        self.place == other.place
-    }
-}
-
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
-    CoordinateOf<O, C, D, P>
-{
-    const EVERY: [Self; C] = {
-        let mut every = [Self { place: 0, of: PhantomData }; C];
-        let mut k = 0;
-        while k < C {
-            every[k].place = k;
-            k += 1;
-        }
-        every
-    };
-
-    const fn of(self) -> Coordinate {
-        O::COORDINATES[self.place]
-    }
-}
-
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Channel
-    for CoordinateOf<O, C, D, P>
-{
-    fn every() -> &'static [Self] {
-        &Self::EVERY
-    }
-
+impl Channel for Coordinate {
     fn name(self) -> &'static str {
-        self.of().name
+        self.name
     }
 
     fn unit(self) -> &'static str {
-        self.of().unit
+        self.unit
     }
 
     fn description(self) -> &'static str {
-        self.of().description
+        self.description
     }
-}
-
-fn parameters<O, const C: usize, const D: usize, const P: usize>() -> Vec<Named>
-where
-    O: Oscillator<C, D, P>,
-{
-    let own = O::PARAMETERS.into_iter().enumerate().map(|(k, of)| Named { of, place: Ok(k) });
-    let edges = EDGES.into_iter().enumerate().map(|(k, of)| Named { of, place: Err(k) });
-    own.chain(edges).collect()
 }
 
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> EngineModel
     for Map<O, C, D, P>
 {
-    type Parameter = Named;
-    type Channel = CoordinateOf<O, C, D, P>;
+    type Parameter = Parameter;
+    type Channel = Coordinate;
     type Integrator = Integrator;
 
     const BUILD: Build = Build { version: O::VERSION, numerics: 1 };
 
-    fn parameters(&self) -> Vec<Named> {
-        parameters::<O, C, D, P>()
+    fn channels() -> &'static [Coordinate] {
+        &O::COORDINATES
     }
 
-    fn find(&self, name: &str) -> Result<Named, UnknownParameter> {
-        let found = parameters::<O, C, D, P>().into_iter().find(|one| one.of.name == name);
+    fn parameters(&self) -> Vec<Parameter> {
+        O::PARAMETERS.into_iter().chain(EDGES).collect()
+    }
+
+    fn find(&self, name: &str) -> Result<Parameter, UnknownParameter> {
+        let found = self.parameters().into_iter().find(|one| one.name == name);
         found.ok_or_else(|| UnknownParameter {
             reason: "no parameter has this name".to_owned(),
             is_strange: true,
         })
     }
 
-    fn write(&mut self, parameter: &Named, value: f64) {
-        if let Ok(place) = parameter.place {
+    fn write(&mut self, parameter: &Parameter, value: f64) {
+        if let Some(place) = O::PARAMETERS.iter().position(|one| one.name == parameter.name) {
             self.values[place] = value;
         }
     }
@@ -225,7 +160,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Rea
     }
 
     fn schema_of_set() -> Value {
-        set(&parameters::<O, C, D, P>(), JsonMap::new())
+        set(&Self::blank().parameters(), JsonMap::new())
     }
 }
 
@@ -275,42 +210,33 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
     }
 
     fn listed(plan: Option<&Plan<Self>>) -> Vec<Listed<Self>> {
-        let defaults = O::PARAMETERS.map(|one| one.default);
-        let line = |parameter: Named| {
-            let value = match parameter.place {
-                Ok(place) => Some(plan.map_or(defaults[place], |plan| plan.model.values[place])),
-                Err(edge) => plan.map(|plan| plan.window_s[edge]),
-            };
-            let is_given = parameter.place.is_ok_and(|place| value != Some(defaults[place]));
-            let source = if is_given { "given" } else { parameter.of.source };
-            Listed { value, source: source.to_owned(), parameter }
-        };
-        parameters::<O, C, D, P>().into_iter().map(line).collect()
+        let own = O::PARAMETERS.into_iter().enumerate().map(|(k, parameter)| {
+            let value = plan.map_or(parameter.default, |plan| plan.model.values[k]);
+            let source = if value == parameter.default { parameter.source } else { "given" };
+            Listed { parameter, value: Some(value), source: source.to_owned() }
+        });
+        let edges = EDGES.into_iter().enumerate().map(|(k, parameter)| {
+            let value = plan.map(|plan| plan.window_s[k]);
+            Listed { parameter, value, source: parameter.source.to_owned() }
+        });
+        own.chain(edges).collect()
     }
 }
 
-/// A row as it is computed.
+/// A row as it is computed: the runs of both models.
 #[derive(Clone)]
 struct Row<const C: usize> {
-    /// None without an equilibrium.
-    runs: Option<[Run<C>; 2]>,
+    runs: [Run<C>; 2],
     error: Option<f64>,
     converged: Option<bool>,
 }
 
 impl<const C: usize> Row<C> {
     fn status(&self) -> usize {
-        let Some(runs) = &self.runs else { return NO_EQUILIBRIUM };
-        let code = |run: &Run<C>| match run.failure.map(|(reason, _)| reason) {
-            None => 0,
-            Some(Failure::Diverged) => 1,
-            Some(Failure::StepTooSmall) => 2,
-            Some(Failure::StepLimit) => 3,
-        };
-        match (code(&runs[0]), code(&runs[1])) {
-            (0, 0) => 0,
-            (0, linear) => NO_EQUILIBRIUM + linear,
-            (nonlinear, _) => nonlinear,
+        match self.runs.map(|run| run.failure.map_or(0, |(status, _)| status)) {
+            [0, 0] => 0,
+            [0, linear] => NO_EQUILIBRIUM + linear,
+            [nonlinear, _] => nonlinear,
         }
     }
 }
@@ -344,11 +270,9 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         let limits = self.plan.reliability.limits;
         let method = self.direct().1;
         let compared = |row: Row<C>| {
-            let run = |model: usize| row.runs.as_ref().map(|runs| &runs[model]);
-            let amplitudes = [0, 1].map(|model| {
-                let sound = run(model).filter(|run| run.failure.is_none());
-                let peaks = |run: &Run<C>| channels.iter().map(|k| run.peaks[*k]).collect();
-                sound.map_or_else(Vec::new, peaks)
+            let amplitudes = row.runs.map(|run| {
+                let sound = channels.iter().filter(|_| run.failure.is_none());
+                sound.map(|k| run.peaks[*k]).collect::<Vec<_>>()
             });
             let ratio = |k: usize| {
                 let linear = amplitudes[1].get(k).filter(|linear| **linear != 0.0)?;
@@ -368,9 +292,9 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
                 method,
                 error: row.error,
                 status: row.status(),
-                fail_time_s: [0, 1].into_iter().find_map(|k| run(k)?.failure).map(|(_, at)| at),
-                steps: [0, 1].map(|model| run(model).map_or(0, |run| run.steps)),
-                rejected: [0, 1].map(|model| run(model).map_or(0, |run| run.rejected)),
+                fail_time_s: row.runs.iter().find_map(|run| run.failure).and_then(|(_, at)| at),
+                steps: row.runs.map(|run| run.steps),
+                rejected: row.runs.map(|run| run.rejected),
                 amplitudes,
                 ratios,
             }
@@ -380,7 +304,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
 
     /// Coordinates that the plan compares.
     fn channels(&self) -> Vec<usize> {
-        self.plan.reliability.channels.iter().map(|channel| channel.place).collect()
+        let place = |channel: &Coordinate| O::COORDINATES.iter().position(|one| one == channel);
+        self.plan.reliability.channels.iter().filter_map(place).collect()
     }
 
     /// The method of all rows, if it is one, and its name's position.
@@ -401,21 +326,17 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         let cases: Vec<Option<Case<C, P>>> = axis_values.iter().map(ready).collect();
         let places: Vec<usize> = (0..cases.len()).filter(|k| cases[*k].is_some()).collect();
         let there: Vec<&Case<C, P>> = cases.iter().flatten().collect();
-        let mut rows = vec![Row { runs: None, error: None, converged: None }; cases.len()];
-        let both = |method: Method, cases: &[&Case<C, P>]| {
-            [Model::Nonlinear, Model::Linear]
-                .map(|model| runs::<O, C, D, P>(model, method, cases, self.plan.end_s, is_stopped))
-        };
+        let none = Run { failure: Some((NO_EQUILIBRIUM, None)), ..Run::NONE };
+        let mut rows = vec![Row { runs: [none; 2], error: None, converged: None }; cases.len()];
         if let (Some(method), _) = self.direct() {
-            let [nonlinear, linear] = both(method, &there);
-            for (k, place) in places.into_iter().enumerate() {
-                rows[place].runs = Some([nonlinear[k], linear[k]]);
+            for (place, runs) in places.into_iter().zip(self.both(method, &there, is_stopped)) {
+                rows[place].runs = runs;
             }
             return rows;
         }
         // Each point has steps of its own, so that a row does not depend on its company.
         for (place, case) in places.into_iter().zip(there) {
-            self.climb(&mut rows[place], case, &both);
+            self.climb(&mut rows[place], case, is_stopped);
             if is_stopped() {
                 break;
             }
@@ -423,27 +344,33 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         rows
     }
 
-    /// Halves the step until two runs agree.
-    fn climb(
+    /// Both models at some points, by one method.
+    fn both(
         &self,
-        row: &mut Row<C>,
-        case: &Case<C, P>,
-        both: &dyn Fn(Method, &[&Case<C, P>]) -> [Vec<Run<C>>; 2],
-    ) {
+        method: Method,
+        cases: &[&Case<C, P>],
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Vec<[Run<C>; 2]> {
+        let (end_s, of) = (self.plan.end_s, PhantomData);
+        let runs =
+            |model| Work::<O, C, D, P> { model, method, cases, end_s, is_stopped, of }.runs();
+        let pairs = runs(Model::Nonlinear).into_iter().zip(runs(Model::Linear));
+        pairs.map(|(nonlinear, linear)| [nonlinear, linear]).collect()
+    }
+
+    /// Halves the step until two runs agree.
+    fn climb(&self, row: &mut Row<C>, case: &Case<C, P>, is_stopped: &dyn Fn() -> bool) {
         let Steps::Checked(accuracy) = self.plan.integrator.steps() else { return };
         let channels = self.channels();
         let mut step_s = (FIRST_STEP_RAD / case.fastest_rad_per_s()).min(self.plan.end_s / 8.0);
-        let mut before: Option<[Run<C>; 2]> = None;
-        for _ in 0..MOST_RUNGS {
-            let [nonlinear, linear] = both(Method::Rk4(step_s), &[case]);
-            let now = [nonlinear[0], linear[0]];
-            let error = before.and_then(|before| error_left(&before, &now, &channels));
-            (row.runs, row.error) = (Some(now), error);
-            row.converged = Some(error.is_some_and(|error| error <= accuracy));
+        for rung in 0..MOST_RUNGS {
+            let now = self.both(Method::Rk4(step_s), &[case], is_stopped)[0];
+            row.error = if rung > 0 { error_left(&row.runs, &now, &channels) } else { None };
+            row.converged = Some(row.error.is_some_and(|error| error <= accuracy));
+            row.runs = now;
             if row.converged == Some(true) {
                 return;
             }
-            before = Some(now);
             step_s *= 0.5;
         }
     }

@@ -4,18 +4,21 @@ use std::marker::PhantomData;
 
 use lane_ode::rodas::{self, Stiff};
 use lane_ode::{
-    Ended, Failure, Forcing, Kernel, Lane, Leg, MAX_LANES, N, Partials, Peaks, Sample, Simd, Step,
-    System, Task, Tolerance, dopri5, rk4,
+    Ended, Forcing, Kernel, Lane, Leg, MAX_LANES, N, Partials, Peaks, Sample, Simd, Step, Task,
+    Tolerance, dopri5, rk4,
 };
 
 use crate::Oscillator;
-use crate::equations::{Case, Linear, Nonlinear, Side};
-
-/// Coordinates beyond this have diverged.
-const FARTHEST: f64 = 1e12;
+use crate::equations::{Case, Equations, Model};
 
 /// Accepted and rejected steps of a trajectory at most.
 const MOST_STEPS: u64 = 100_000_000;
+
+/// The first step that adaptive methods try, as a part of the run; its error says what follows.
+const FIRST_STEP: f64 = 1e-6;
+
+/// Stretches of a trajectory: before its window, in it and behind it.
+const LEGS: usize = 3;
 
 /// How a trajectory is integrated.
 #[derive(Clone, Copy, Debug)]
@@ -31,48 +34,39 @@ pub(crate) enum Method {
 /// What came of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Run<const C: usize> {
-    /// Why it ended early, and when (s).
-    pub(crate) failure: Option<(Failure, f64)>,
+    /// Why it ended early, as a position among statuses; and when (s), if it had begun.
+    pub(crate) failure: Option<(usize, Option<f64>)>,
     /// Largest deviations from equilibrium in the window.
     pub(crate) peaks: [f64; C],
     pub(crate) steps: u64,
     pub(crate) rejected: u64,
 }
 
-/// Both models, in the order of columns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Model {
-    Nonlinear,
-    Linear,
+impl<const C: usize> Run<C> {
+    /// A trajectory that has not begun.
+    pub(crate) const NONE: Self = Self { failure: None, peaks: [0.0; C], steps: 0, rejected: 0 };
 }
 
-/// One model at every point from rest to `end_s`, by one method. Once `is_stopped` says so, what
-/// comes means nothing.
-pub(crate) fn runs<O, const C: usize, const D: usize, const P: usize>(
-    model: Model,
-    method: Method,
-    cases: &[&Case<C, P>],
-    end_s: f64,
-    is_stopped: &dyn Fn() -> bool,
-) -> Vec<Run<C>>
-where
-    O: Oscillator<C, D, P>,
-{
-    let of = Work::<O, C, D, P> { model, method, cases, end_s, is_stopped, of: PhantomData };
-    match method {
-        // The stiff method goes trajectory by trajectory.
-        Method::Rodas5p(..) => Simd::Scalar.dispatch(of),
-        _ => Simd::best().dispatch(of),
+/// One model at every point from rest to `end_s`, by one method.
+pub(crate) struct Work<'a, O, const C: usize, const D: usize, const P: usize> {
+    pub(crate) model: Model,
+    pub(crate) method: Method,
+    pub(crate) cases: &'a [&'a Case<C, P>],
+    pub(crate) end_s: f64,
+    /// Once it says so, what comes means nothing.
+    pub(crate) is_stopped: &'a dyn Fn() -> bool,
+    pub(crate) of: PhantomData<O>,
+}
+
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Work<'_, O, C, D, P> {
+    /// What comes of every point.
+    pub(crate) fn runs(self) -> Vec<Run<C>> {
+        match self.method {
+            // The stiff method goes trajectory by trajectory.
+            Method::Rodas5p(..) => Simd::Scalar.dispatch(self),
+            _ => Simd::best().dispatch(self),
+        }
     }
-}
-
-struct Work<'a, O, const C: usize, const D: usize, const P: usize> {
-    model: Model,
-    method: Method,
-    cases: &'a [&'a Case<C, P>],
-    end_s: f64,
-    is_stopped: &'a dyn Fn() -> bool,
-    of: PhantomData<O>,
 }
 
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Kernel
@@ -82,96 +76,32 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Ker
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Vec<Run<C>> {
-        match self.model {
-            Model::Nonlinear => {
-                self.of_side::<T, Nonlinear<O, T, C, D, P>, Nonlinear<O, f64, C, D, P>>(zero)
-            }
-            Model::Linear => {
-                self.of_side::<T, Linear<O, T, C, D, P>, Linear<O, f64, C, D, P>>(zero)
-            }
-        }
-    }
-}
-
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Work<'_, O, C, D, P> {
-    #[inline(always)]
-    fn of_side<T: Lane, S: Side<T, C, P>, S1: Side<f64, C, P>>(&self, zero: T) -> Vec<Run<C>> {
+        let of = |relative, absolute| Tolerance { relative, absolute, max_steps: MOST_STEPS };
         match self.method {
-            Method::Rk4(_) => {
-                let mut task = Trajectories::<T, S, C, D, P>::new(zero, self);
+            Method::Rk4(step_s) => {
+                let mut task = Trajectories::new(zero, &self, step_s);
                 rk4::integrate(zero, &mut task);
                 task.runs
             }
             Method::Dopri5(relative, absolute) => {
-                let mut task = Trajectories::<T, S, C, D, P>::new(zero, self);
-                let tolerance = Tolerance { relative, absolute, max_steps: MOST_STEPS };
-                dopri5::integrate(zero, &mut task, &tolerance);
+                let mut task = Trajectories::new(zero, &self, FIRST_STEP * self.end_s);
+                dopri5::integrate(zero, &mut task, &of(relative, absolute));
                 task.runs
             }
             Method::Rodas5p(relative, absolute) => {
-                let mut task = Trajectories::<f64, S1, C, D, P>::new(0.0, self);
-                let tolerance = Tolerance { relative, absolute, max_steps: MOST_STEPS };
-                rodas::integrate::<D, C, _>(&mut task, &tolerance);
+                let mut task = Trajectories::new(0.0, &self, FIRST_STEP * self.end_s);
+                rodas::integrate::<D, C, _>(&mut task, &of(relative, absolute));
                 task.runs
             }
         }
     }
 }
 
-/// The equations of one side as a first-order system.
-struct First<S, T, const C: usize> {
-    side: S,
-    farthest: N<T>,
-}
-
-impl<T: Lane, S: Side<T, C, P>, const C: usize, const D: usize, const P: usize> System<T, D>
-    for Sided<S, T, C, P>
-{
-    type Forcing = [N<T>; C];
-
-    #[inline(always)]
-    fn forcing(&self, t_s: N<T>) -> [N<T>; C] {
-        self.0.side.forcing(t_s)
-    }
-
-    #[inline(always)]
-    fn derivative(&self, forcing: &[N<T>; C], x: &[N<T>; D]) -> [N<T>; D] {
-        let (q, u) = halves(x);
-        let free = self.0.side.accelerations(&q, &u);
-        let mut slopes = *x;
-        for i in 0..C {
-            slopes[i] = u[i];
-            slopes[C + i] = free[i] + forcing[i];
-        }
-        slopes
-    }
-
-    #[inline(always)]
-    fn in_range(&self, x: &[N<T>; D]) -> T::Mask {
-        let mut largest = x[0].abs();
-        for i in 1..C {
-            // A coordinate that is not finite is the larger one, and not below the limit.
-            largest = N(T::select(x[i].abs().0.less(largest.0), largest.0, x[i].abs().0));
-        }
-        largest.0.less(self.0.farthest.0)
-    }
-}
-
-/// Names the number of parameters too.
-struct Sided<S, T, const C: usize, const P: usize>(First<S, T, C>);
-
-fn halves<T: Copy, const C: usize, const D: usize>(x: &[T; D]) -> ([T; C], [T; C]) {
-    const { assert!(D == 2 * C, "a state is the coordinates and their speeds") };
-    (std::array::from_fn(|i| x[i]), std::array::from_fn(|i| x[C + i]))
-}
-
 /// Trajectories fed into lanes, and their peaks.
-struct Trajectories<'a, T, S, const C: usize, const D: usize, const P: usize> {
-    system: Sided<S, T, C, P>,
-    cases: &'a [&'a Case<C, P>],
-    end_s: f64,
+struct Trajectories<'a, O, T, const C: usize, const D: usize, const P: usize> {
+    work: &'a Work<'a, O, C, D, P>,
+    system: Equations<O, T, C, D, P>,
     step_s: f64,
-    is_stopped: &'a dyn Fn() -> bool,
     taken: usize,
     /// Which trajectory and which of its legs each lane holds.
     held: [(usize, usize); MAX_LANES],
@@ -181,35 +111,22 @@ struct Trajectories<'a, T, S, const C: usize, const D: usize, const P: usize> {
     runs: Vec<Run<C>>,
 }
 
-impl<'a, T: Lane, S: Side<T, C, P>, const C: usize, const D: usize, const P: usize>
-    Trajectories<'a, T, S, C, D, P>
+impl<'a, O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: usize>
+    Trajectories<'a, O, T, C, D, P>
 {
-    fn new<O>(zero: T, of: &Work<'a, O, C, D, P>) -> Self {
+    /// In steps of `step_s`, or for adaptive methods with that to try first.
+    fn new(zero: T, work: &'a Work<'a, O, C, D, P>, step_s: f64) -> Self {
         let zero = N(zero);
-        let none = Run { failure: None, peaks: [0.0; C], steps: 0, rejected: 0 };
-        let step_s = match of.method {
-            Method::Rk4(step_s) => step_s,
-            // The first to try; its error says what follows.
-            Method::Dopri5(..) | Method::Rodas5p(..) => 1e-6 * of.end_s,
-        };
         Self {
-            system: Sided(First { side: S::new(zero), farthest: zero.lit(FARTHEST) }),
-            cases: of.cases,
-            end_s: of.end_s,
+            work,
+            system: Equations::new(work.model, zero),
             step_s,
-            is_stopped: of.is_stopped,
             taken: 0,
             held: [(0, 0); MAX_LANES],
             peaks: Peaks::new(zero),
             inside: zero,
-            runs: vec![none; of.cases.len()],
+            runs: vec![Run::NONE; work.cases.len()],
         }
-    }
-
-    /// Ends of a trajectory's legs: the window's edges, and the run's end.
-    fn ends(&self, trajectory: usize) -> [f64; 4] {
-        let [from_s, to_s] = self.cases[trajectory].window_s;
-        [0.0, from_s, to_s, self.end_s]
     }
 
     #[inline(always)]
@@ -222,61 +139,53 @@ impl<'a, T: Lane, S: Side<T, C, P>, const C: usize, const D: usize, const P: usi
     }
 }
 
-impl<T: Lane, S: Side<T, C, P>, const C: usize, const D: usize, const P: usize> Task<T, D>
-    for Trajectories<'_, T, S, C, D, P>
+impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: usize> Task<T, D>
+    for Trajectories<'_, O, T, C, D, P>
 {
-    type System = Sided<S, T, C, P>;
+    type System = Equations<O, T, C, D, P>;
 
     fn system(&self) -> &Self::System {
         &self.system
     }
 
     fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; D]) -> Option<Leg> {
-        let (trajectory, leg) = self.held[lane];
-        let mut next = leg + 1;
+        let (trajectory, mut leg) = self.held[lane];
+        if let Ended::Arrived(count) | Ended::Failed { count, .. } = ended {
+            let run = &mut self.runs[trajectory];
+            run.steps += count.accepted;
+            run.rejected += count.rejected;
+            run.peaks = self.peaks.lane(lane);
+        }
         match ended {
-            Ended::Idle => next = usize::MAX,
-            Ended::Arrived(count) => {
-                let run = &mut self.runs[trajectory];
-                run.steps += count.accepted;
-                run.rejected += count.rejected;
+            Ended::Arrived(_) => leg += 1,
+            Ended::Failed { reason, time_s, .. } => {
+                self.runs[trajectory].failure = Some((1 + reason as usize, Some(time_s)));
+                leg = LEGS;
             }
-            Ended::Failed { reason, time_s, count } => {
-                let run = &mut self.runs[trajectory];
-                run.steps += count.accepted;
-                run.rejected += count.rejected;
-                run.failure = Some((reason, time_s));
-                next = usize::MAX;
-            }
+            Ended::Idle => leg = LEGS,
         }
         loop {
-            if next < 3 {
-                let (trajectory, _) = self.held[lane];
-                let ends = self.ends(trajectory);
+            while leg < LEGS {
+                // The window's edges cut the run.
+                let [from_s, to_s] = self.work.cases[self.held[lane].0].window_s;
+                let ends = [0.0, from_s, to_s, self.work.end_s];
+                let (start_s, end_s) = (ends[leg], ends[leg + 1]);
                 // A window may begin with the run, or end with it.
-                if ends[next] < ends[next + 1] {
-                    self.held[lane].1 = next;
-                    self.inside.0.set(lane, if next == 1 { 1.0 } else { 0.0 });
-                    let (start_s, end_s) = (ends[next], ends[next + 1]);
+                if start_s < end_s {
+                    self.held[lane].1 = leg;
+                    self.inside.0.set(lane, if leg == 1 { 1.0 } else { 0.0 });
                     return Some(Leg { start_s, end_s, step_s: self.step_s.min(end_s - start_s) });
                 }
-                next += 1;
-                continue;
-            }
-            if !matches!(ended, Ended::Idle) && self.held[lane].0 == trajectory {
-                self.runs[trajectory].peaks = self.peaks.lane(lane);
+                leg += 1;
             }
             self.peaks.reset(lane);
             self.inside.0.set(lane, 0.0);
-            let taken = self.taken;
-            let case = *self.cases.get(taken)?;
+            let case = *self.work.cases.get(self.taken)?;
+            self.held[lane] = (self.taken, 0);
             self.taken += 1;
-            self.held[lane] = (taken, 0);
-            self.system.0.side.take(lane, case);
-            for value in x.iter_mut() {
-                value.0.set(lane, 0.0);
-            }
-            next = 0;
+            self.system.take(lane, case);
+            x.iter_mut().for_each(|value| value.0.set(lane, 0.0));
+            leg = 0;
         }
     }
 
@@ -293,17 +202,14 @@ impl<T: Lane, S: Side<T, C, P>, const C: usize, const D: usize, const P: usize> 
     }
 
     fn is_stopped(&self) -> bool {
-        (self.is_stopped)()
+        (self.work.is_stopped)()
     }
 }
 
-impl<S: Side<f64, C, P>, const C: usize, const D: usize, const P: usize> Stiff<D, C>
-    for Trajectories<'_, f64, S, C, D, P>
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Stiff<D, C>
+    for Trajectories<'_, O, f64, C, D, P>
 {
     fn partials(&self, t_s: f64, x: &[N<f64>; D], partials: &mut Partials<C>) {
-        let case = self.cases[self.held[0].0];
-        let (q, u) = halves(&x.map(|value| value.0));
-        [partials.by_coordinate, partials.by_speed] = S::tangent(case, &q, &u).parts();
-        partials.by_time = S::forcing_slope(case, t_s);
+        *partials = self.system.partials(self.work.cases[self.held[0].0], t_s, x);
     }
 }

@@ -1,10 +1,9 @@
 //! The boundary: for each value of the first axis, the places along the second where a quantity
 //! passes its limit, without filling the grid.
 //!
-//! The quantity enters as a signed distance from its limit, negative on the reliable side
-//! ([`Evaluate`]); nothing here knows a machine. Trials go to the evaluator in batches, and what a
-//! batch costs is counted in lane groups (`batch.rs`): nine trials cost as much as
-//! sixteen.
+//! The quantity enters as a signed distance from its limit, negative on the reliable side;
+//! nothing here knows a machine. Trials are evaluated in batches, and what a batch costs is counted
+//! in lane groups (`batch.rs`): nine trials cost as much as sixteen.
 //!
 //! 1. A lattice: evenly spread values of the second axis, in evenly spread rows. It finds every
 //!    island wider than its cells.
@@ -22,7 +21,6 @@
 //! pure function of the input.
 
 mod batch;
-pub mod distance;
 pub mod file;
 mod look;
 mod neighbour;
@@ -37,26 +35,13 @@ mod tests;
 mod trace;
 mod warm;
 
-pub use distance::TracedQuantity;
 use neighbour::{Neighbour, hint, nearest, shared};
 use net::{Net, Want};
+pub use quantity::TracedQuantity;
 use row::RowSearch;
 pub use search::{BoundaryOptions, BoundaryTask};
 use span::{Hint, Question, Side, SideRange, Span, Tried};
 pub use trace::trace;
-
-/// Evaluates trial points.
-pub trait Evaluate {
-    /// Why it stopped before all was done.
-    type Stop;
-
-    /// One signed distance from the limit a trial, in the same order: negative on the reliable
-    /// side, `None` where the quantity is not defined.
-    ///
-    /// # Errors
-    /// When it was stopped, or could not go on.
-    fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Self::Stop>;
-}
 
 /// A point to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -25,9 +25,12 @@ pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static 
     /// Which build writes a result.
     const BUILD: Build;
 
+    /// Every channel.
+    fn channels() -> &'static [Self::Channel];
+
     /// Channels that are compared if the grid file names none.
     fn default_channels() -> Vec<Self::Channel> {
-        Self::Channel::every().to_vec()
+        Self::channels().to_vec()
     }
 
     /// Every parameter there is.

@@ -122,9 +122,9 @@ pub fn run(
     };
     match result {
         Ok(Some(tally)) => {
-            let joined = run.complete(job, tally, Some(session.clone()))?;
-            let ended = Ended::Finished(Box::new(joined.tally));
-            Ok(RunReport { ended, session: Some(session), notes: joined.notes })
+            let notes = run.complete(job, &tally, Some(session.clone()))?;
+            let ended = Ended::Finished(Box::new(tally));
+            Ok(RunReport { ended, session: Some(session), notes })
         }
         Ok(None) => {
             let mut notes = run.take_notes();

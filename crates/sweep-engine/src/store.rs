@@ -118,20 +118,13 @@ pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<Column> {
 /// A power of two, so that chunks fill whole SIMD lane groups: 8 for the smallest grids, so that
 /// every core gets some; then 32 to 4096, for about a thousand chunks; then 4096 each, for chunks
 /// of a megabyte.
-pub const fn chunk_points(points: u64) -> u64 {
+pub fn chunk_points(points: u64) -> u64 {
     const SMALL_GRID: u64 = 128;
     const CHUNKS: u64 = 1024;
     if points <= SMALL_GRID {
         return 8;
     }
-    let wanted = points.div_ceil(CHUNKS);
-    if wanted <= 32 {
-        32
-    } else if wanted >= 4096 {
-        4096
-    } else {
-        wanted.next_power_of_two()
-    }
+    points.div_ceil(CHUNKS).clamp(32, 4096).next_power_of_two()
 }
 
 // The files of a folder that have one name: those of every run, of shards, and of searches.

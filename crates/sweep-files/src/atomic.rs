@@ -141,12 +141,8 @@ pub fn clear_leftovers(folder: &Path) {
 /// # Errors
 /// [`FileError::Io`].
 pub fn remove(path: &Path) -> Result<(), FileError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => {
-            Err(FileError::io("delete", path)(error))
-        }
-        _ => Ok(()),
-    }
+    regular::if_there(fs::remove_file(path)).map_err(FileError::io("delete", path))?;
+    Ok(())
 }
 
 /// The folder a path lives in.

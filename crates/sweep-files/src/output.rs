@@ -1,7 +1,7 @@
 //! A file that a command is about to write.
 
 use std::fs;
-use std::io::{self, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
@@ -100,11 +100,8 @@ pub fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
     if folder_alike(&text) || text.strip_suffix('.').is_some_and(folder_alike) {
         return refuse("it is the name of a folder", NAME_A_FILE);
     }
-    let found = match fs::symlink_metadata(path) {
-        Ok(found) => found,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(FileError::io("look at", path)(error)),
-    };
+    let found = regular::if_there(fs::symlink_metadata(path));
+    let Some(found) = found.map_err(FileError::io("look at", path))? else { return Ok(()) };
     if found.is_symlink() {
         return refuse(
             "it is a symbolic link",

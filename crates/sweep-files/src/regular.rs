@@ -12,9 +12,20 @@ use std::path::Path;
 pub fn open(path: &Path) -> io::Result<File> {
     // Before opening too: opening is enough to set some devices going.
     expect_regular(fs::metadata(path)?.file_type())?;
-    let file = without_waiting(OpenOptions::new().read(true)).open(path)?;
+    let file = careful(OpenOptions::new().read(true), true).open(path)?;
     expect_regular(file.metadata()?.file_type())?;
     Ok(file)
+}
+
+/// What was found; nothing where there is nothing.
+///
+/// # Errors
+/// Any other that the system has answered.
+pub fn if_there<T>(found: io::Result<T>) -> io::Result<Option<T>> {
+    match found {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        found => found.map(Some),
+    }
 }
 
 /// Most bytes of a plan or of a sidecar. Ours have kilobytes; 16 MiB of JSON may take half a GB.
@@ -33,7 +44,7 @@ pub fn read_json(path: &Path) -> io::Result<Vec<u8>> {
 /// Opens a regular file to read and write. Follows no symbolic link.
 pub(crate) fn open_to_write(path: &Path) -> io::Result<File> {
     expect_regular(fs::symlink_metadata(path)?.file_type())?;
-    let file = not_through_links(OpenOptions::new().read(true).write(true)).open(path)?;
+    let file = careful(OpenOptions::new().read(true).write(true), false).open(path)?;
     expect_regular(file.metadata()?.file_type())?;
     Ok(file)
 }
@@ -44,7 +55,7 @@ pub(crate) fn open_to_write(path: &Path) -> io::Result<File> {
 /// What the system answers, or that the path leads to something else, in words.
 pub fn open_or_create(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
-    match not_through_links(options.read(true).write(true).create_new(true)).open(path) {
+    match careful(options.read(true).write(true).create_new(true), false).open(path) {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => open_to_write(path),
         made => made,
     }
@@ -84,31 +95,18 @@ pub(crate) fn what(found: FileType) -> Option<&'static str> {
     }
 }
 
-#[cfg(unix)]
-fn without_waiting(options: &mut OpenOptions) -> &mut OpenOptions {
-    flags(options, rustix::fs::OFlags::NONBLOCK)
-}
-
-#[cfg(unix)]
-fn not_through_links(options: &mut OpenOptions) -> &mut OpenOptions {
-    flags(options, rustix::fs::OFlags::NONBLOCK | rustix::fs::OFlags::NOFOLLOW)
-}
-
-#[cfg(unix)]
-fn flags(options: &mut OpenOptions, flags: rustix::fs::OFlags) -> &mut OpenOptions {
-    use std::os::unix::fs::OpenOptionsExt as _;
-    // The bits of flags that fit the system's own type; the sign means nothing.
-    options.custom_flags(flags.bits().cast_signed())
-}
-
-/// Elsewhere no such file can be named by a path that a user would give.
-#[cfg(not(unix))]
-fn without_waiting(options: &mut OpenOptions) -> &mut OpenOptions {
-    options
-}
-
-#[cfg(not(unix))]
-fn not_through_links(options: &mut OpenOptions) -> &mut OpenOptions {
+/// Options that wait for nobody, and follow symbolic links only where that is said. Elsewhere than
+/// on Unix no file that does either can be named by a path that a user would give.
+#[cfg_attr(not(unix), allow(unused_variables))]
+fn careful(options: &mut OpenOptions, follows_links: bool) -> &mut OpenOptions {
+    #[cfg(unix)]
+    {
+        use rustix::fs::OFlags;
+        use std::os::unix::fs::OpenOptionsExt as _;
+        let links = if follows_links { OFlags::empty() } else { OFlags::NOFOLLOW };
+        // The bits of flags that fit the system's own type; the sign means nothing.
+        options.custom_flags((OFlags::NONBLOCK | links).bits().cast_signed());
+    }
     options
 }
 

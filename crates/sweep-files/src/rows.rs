@@ -5,7 +5,7 @@ use std::path::Path;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::Float64Type;
-use arrow_array::{Array, ArrayRef, RecordBatch};
+use arrow_array::{Array, ArrayRef, Int32Array, RecordBatch, StringArray};
 use arrow_schema::ArrowError;
 use serde::Serialize;
 use serde_json::Value;
@@ -241,7 +241,10 @@ impl<'a> Row<'a> {
     #[inline]
     pub fn word(self, column: usize) -> Option<&'a str> {
         match self.cells(column)? {
-            Cells::Texts { names, codes } => names.get(codes[self.at] as usize).map(String::as_str),
+            Cells::Words(places, words) => {
+                let place = places.is_valid(self.at).then(|| places.value(self.at))?;
+                Some(words.value(place as usize))
+            }
             Cells::Flags(cells) => cells[self.at].map(|flag| if flag { "true" } else { "false" }),
             Cells::Numbers(_) => None,
         }
@@ -253,11 +256,8 @@ impl<'a> Row<'a> {
 enum Cells {
     /// Missing ones are NaN.
     Numbers(Vec<f64>),
-    /// Few words are many rows' word: places among the names; missing ones are the greatest.
-    Texts {
-        names: Vec<String>,
-        codes: Vec<u32>,
-    },
+    /// Few words are many rows' word: a place of each row among them.
+    Words(Int32Array, StringArray),
     Flags(Vec<Option<bool>>),
 }
 
@@ -273,11 +273,7 @@ fn decode(array: &ArrayRef, kind: CellKind) -> Result<Cells, ArrowError> {
         CellKind::Flag => Cells::Flags(cells::flags(array)?.iter().collect()),
         CellKind::Text => {
             let coded = cells::words(array)?;
-            let names = coded.values().iter();
-            let names = names.map(|name| name.unwrap_or_default().to_owned()).collect();
-            let codes = coded.keys().iter();
-            let codes = codes.map(|code| code.map_or(u32::MAX, i32::cast_unsigned)).collect();
-            Cells::Texts { names, codes }
+            Cells::Words(coded.keys().clone(), coded.values().clone())
         }
     })
 }

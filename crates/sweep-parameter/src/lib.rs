@@ -21,8 +21,6 @@ pub trait Parameter: Clone + PartialEq + fmt::Debug + Send + Sync {
 
 /// A motion that is compared between two models.
 pub trait Channel: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
-    /// Every channel.
-    fn every() -> &'static [Self];
     /// Name in grid files and column names.
     fn name(self) -> &'static str;
     /// Unit.

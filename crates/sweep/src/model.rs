@@ -40,6 +40,10 @@ impl Model for Washer {
 
     const BUILD: Build = BUILD;
 
+    fn channels() -> &'static [Channel] {
+        &Channel::ALL
+    }
+
     fn default_channels() -> Vec<Channel> {
         DEFAULT_CHANNELS.to_vec()
     }

@@ -5,7 +5,6 @@ use crate::engine::ModelEngine;
 use crate::model::Washer;
 use crate::plan::Plan;
 use sweep_engine::asking::{Asking, Stopped};
-use sweep_engine::boundary::search::Models;
 use sweep_engine::boundary::{
     BoundaryOptions, BoundaryTask, Edge, EdgeKind, Traced, quantity, trace,
 };
@@ -66,8 +65,7 @@ fn asked(tolerance: Option<f64>, lattice: u16) -> BoundaryOptions {
 fn traced(task: &Task, threads: usize, interrupt: &Interrupt) -> Result<Traced, Stopped> {
     let engine = Washer::engine(&task.plan, Some(&task.quantity.name)).unwrap();
     let asking = Asking::new(engine, threads, interrupt, None, &|_| {}).unwrap();
-    let models = Models::new(task, asking);
-    trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {})
+    trace(&task.distances(&asking), &task.firsts, task.curves, &task.search, &mut |_| {})
 }
 
 /// Axis values of every point of the grid.
@@ -214,9 +212,10 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
         };
         let engine = Washer::engine(&task.plan, Some(&task.quantity.name)).unwrap();
         let asking = Asking::new(engine, 2, &interrupt, Some(*trials), &tell).unwrap();
-        let models = Models::new(&task, asking);
-        let found = trace(&models, &task.firsts, task.curves, &task.search, &mut |_| {});
-        let trials = models.asking.into_trials().unwrap();
+        let distances = task.distances(&asking);
+        let found = trace(&distances, &task.firsts, task.curves, &task.search, &mut |_| {});
+        drop(distances);
+        let trials = asking.into_trials().unwrap();
         match found {
             Ok(found) => break (found, trials),
             Err(Stopped::Interrupted) => assert!(trials.count() > there),

@@ -120,10 +120,6 @@ macro_rules! declare {
 channels!(declare);
 
 impl sweep_parameter::Channel for Channel {
-    fn every() -> &'static [Self] {
-        &Self::ALL
-    }
-
     fn name(self) -> &'static str {
         self.name()
     }

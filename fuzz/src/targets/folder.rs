@@ -67,7 +67,7 @@ pub(crate) fn run(bytes: &[u8]) {
             assert_eq!(tally.points, home.plan.points());
             let result = fs::read(&output).expect("there is a result");
             assert!(name == CHUNK || result == home.result, "{name} has changed the result");
-            let _ = opened.complete(&job, tally, None);
+            let _ = opened.complete(&job, &tally, None);
         }
         Err(error) => assert!(name == CHUNK, "{name}: {error}"),
     }

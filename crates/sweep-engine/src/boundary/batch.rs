@@ -22,12 +22,8 @@ pub(super) fn deal(wants: &[&Want], span: &Span) -> Vec<usize> {
             Want::Net(net) if !net.is_ample(counts[k], span) => Some(net.spread / counts[k] as f64),
             _ => None,
         };
-        let mut widest: Option<(usize, f64)> = None;
-        for (k, width) in (0..wants.len()).filter_map(|k| Some((k, width(k)?))) {
-            if widest.is_none_or(|(_, most)| width > most) {
-                widest = Some((k, width));
-            }
-        }
+        let widths = (0..wants.len()).filter_map(|k| Some((k, width(k)?)));
+        let widest = widths.reduce(|most, next| if next.1 > most.1 { next } else { most });
         let Some((k, _)) = widest else { break };
         counts[k] += 1;
     }

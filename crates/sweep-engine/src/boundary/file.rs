@@ -60,18 +60,15 @@ impl<M: Rows> BoundaryTask<M> {
 
     fn add_columns(&self, table: &mut Table, traced: &Traced) {
         let TracedQuantity { name: of, unit, .. } = &self.quantity;
-        let lines: Vec<Line<'_>> = traced
-            .curves
-            .iter()
-            .enumerate()
-            .flat_map(|(curve, rows)| rows.iter().map(move |row| (curve, row)))
-            .flat_map(|(curve, row)| {
-                row.edges.iter().enumerate().map(move |(k, edge)| {
+        let mut lines = Vec::new();
+        for (curve, rows) in traced.curves.iter().enumerate() {
+            for row in rows {
+                for (k, edge) in row.edges.iter().enumerate() {
                     let number = if edge.bracket.is_some() { k + 1 } else { 0 };
-                    Line { curve, row, number, edge }
-                })
-            })
-            .collect();
+                    lines.push(Line { curve, row, number, edge });
+                }
+            }
+        }
         self.add_axes(table, &lines);
         table.words(
             "kind",

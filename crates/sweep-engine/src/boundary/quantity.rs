@@ -1,8 +1,8 @@
-//! The quantity of a boundary, and its limit: any column of numbers that a plan's rows can have.
+//! The quantity of a boundary, its limit, and distances from that: any column of numbers that a
+//! plan's rows can have.
 
 use sweep_parameter::{Channel as _, Worse};
 
-use super::distance::{Scale, TracedQuantity};
 use crate::store::{Column, Kind};
 use crate::{Error, Plan, Swept, nearest};
 
@@ -10,6 +10,54 @@ use crate::{Error, Plan, Swept, nearest};
 const RATIO: &str = "ratio_";
 /// The column of the least ratio.
 const LEAST_RATIO: &str = "ratio_min";
+
+/// A quantity with a limit, named as its column in a result file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TracedQuantity {
+    /// The column's name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// The value at which the boundary runs.
+    pub limit: f64,
+    /// The side of the limit that is bad.
+    pub worse: Worse,
+    /// What its distances from the limit are.
+    pub scale: Scale,
+}
+
+/// What a distance from a limit is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scale {
+    /// The logarithm of the quantity over its limit.
+    Logarithm,
+    /// The difference over this.
+    Over(f64),
+}
+
+impl TracedQuantity {
+    /// Signed distance of a value from the limit, negative on the good side.
+    pub fn distance(&self, value: f64) -> f64 {
+        match (self.scale, self.worse) {
+            (Scale::Logarithm, worse) => {
+                let distance = worse.by(libm::log(value / self.limit), 0.0);
+                // A ratio one rounding on the good side of the limit is still there.
+                let is_good = worse.by(value, self.limit) < 0.0;
+                if is_good { distance.min(-f64::MIN_POSITIVE) } else { distance }
+            }
+            (Scale::Over(per), worse) => worse.by(value, self.limit) / per,
+        }
+    }
+
+    /// The quantity at a distance from its limit.
+    pub fn value(&self, distance: f64) -> f64 {
+        let away = self.worse.by(distance, 0.0);
+        match self.scale {
+            Scale::Logarithm => self.limit * libm::exp(away),
+            Scale::Over(per) => self.limit + away * per,
+        }
+    }
+}
 
 /// Every column that a boundary of this plan can be drawn through, each with the plan that computes
 /// it: a channel is compared even if the grid file leaves it out, and so is a metric measured that
@@ -24,7 +72,7 @@ pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
     let mut least = plan.clone();
     least.reliability.limits.least = Some(plan.reliability.limits.over_estimate());
     let further = [plan.clone(), least].into_iter().chain(M::variants(plan));
-    let plans = M::Channel::every().iter().map(of_one).chain(further.map(|plan| (plan, None)));
+    let plans = M::channels().iter().map(of_one).chain(further.map(|plan| (plan, None)));
     let mut offered: Vec<(Column, Plan<M>)> = Vec::new();
     for (plan, only) in plans {
         for column in M::layout(&plan).columns {
@@ -61,7 +109,7 @@ pub fn traced<M: Swept>(
         let meant = nearest(name, names());
         let meant = meant.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
         let of_channels: Vec<String> =
-            M::Channel::every().iter().flat_map(|channel| of_channel(channel.name())).collect();
+            M::channels().iter().flat_map(|channel| of_channel(channel.name())).collect();
         let is_of_channel = |name: &&str| of_channels.iter().any(|known| known == name);
         let names: Vec<&str> = names().filter(|name| !is_of_channel(name)).collect();
         let [ratio, nonlinear, linear] = of_channel("CHANNEL");

@@ -1,6 +1,6 @@
 //! One row: the trials along it, the sides that they show, and the trials that it wants next.
 
-use super::net::{self};
+use super::net;
 use super::{Edge, EdgeKind, Hint, Net, Question, Side, SideRange, Span, Tried, Want, look};
 
 /// After so many rounds brackets are cut evenly, and after so many looks none is taken any more:
@@ -208,18 +208,21 @@ impl RowSearch {
         !self.samples.is_empty() && !self.is_asked() && self.brackets(span).iter().all(is_narrow)
     }
 
+    /// Neighbouring samples on different sides.
+    fn changes(&self) -> impl Iterator<Item = [Tried; 2]> + '_ {
+        let pairs = self.samples.windows(2).map(|pair| [pair[0], pair[1]]);
+        pairs.filter(|[a, b]| a.side() != b.side())
+    }
+
     /// Stretches of one side, in order; each reaches to where the side changes, or to the range's
     /// end.
     pub(super) fn runs(&self, span: &Span) -> Vec<SideRange> {
         let mut runs: Vec<SideRange> = Vec::new();
         let mut from = span.least;
-        for pair in self.samples.windows(2) {
-            let (a, b) = (pair[0], pair[1]);
-            if a.side() != b.side() {
-                let to = crossing(&a, &b).unwrap_or(0.5 * (a.at + b.at));
-                runs.push(SideRange { from, to, side: a.side() });
-                from = to;
-            }
+        for [a, b] in self.changes() {
+            let to = crossing(&a, &b).unwrap_or(0.5 * (a.at + b.at));
+            runs.push(SideRange { from, to, side: a.side() });
+            from = to;
         }
         if let Some(last) = self.samples.last() {
             runs.push(SideRange { from, to: span.greatest, side: last.side() });
@@ -237,12 +240,7 @@ impl RowSearch {
 
     /// What the row says in the end; `value` turns positions into values.
     pub(super) fn edges(&self, span: &Span, value: &dyn Fn(f64) -> f64) -> Vec<Edge> {
-        let mut edges = Vec::new();
-        for pair in self.samples.windows(2) {
-            let [a, b] = [pair[0], pair[1]];
-            if a.side() == b.side() {
-                continue;
-            }
+        let edge = |[a, b]: [Tried; 2]| {
             let is_narrow = b.at - a.at <= span.tolerance;
             let leaps = |leap: f64| !leap.is_finite() || (leap.abs() > LEAP && is_narrow);
             let kind = match (a.distance, b.distance) {
@@ -250,13 +248,14 @@ impl RowSearch {
                 (Some(_), Some(_)) => EdgeKind::Crossing,
                 _ => EdgeKind::Undefined,
             };
-            edges.push(Edge {
+            Edge {
                 kind,
                 at: if kind == EdgeKind::Crossing { crossing(&a, &b).map(value) } else { None },
                 bracket: Some([value(a.at), value(b.at)]),
                 distances: [a.distance, b.distance],
-            });
-        }
+            }
+        };
+        let mut edges: Vec<Edge> = self.changes().map(edge).collect();
         if edges.is_empty() {
             let kind = match self.samples.first().map(Tried::side) {
                 Some(Side::Reliable) => EdgeKind::NoneReliable,

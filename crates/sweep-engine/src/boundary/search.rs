@@ -1,11 +1,11 @@
-//! The task of a plan, and the evaluator over a model: its distances at trial points.
+//! The task of a plan, and a model's distances at trial points.
 
 use super::quantity::traced;
-use super::{Evaluate, Search, TracedQuantity, Trial};
+use super::{Search, TracedQuantity, Trial};
 use crate::asking::{Asking, Stopped};
 use crate::config::written::finite;
-use crate::store::{Column, Done, Key, Rows};
-use crate::{Axis, AxisValues, Error, Model, Plan, Swept};
+use crate::store::{Done, Key, Rows};
+use crate::{AxisValues, Error, Model, Plan, Swept};
 use sweep_parameter::Parameter as _;
 
 /// Rows of all curves together that are accepted: what is known of them stays in memory.
@@ -114,53 +114,33 @@ impl<M: Rows + Swept> BoundaryTask<M> {
             tolerance: given,
             lattice: options.lattice.into(),
         };
-        let firsts = all(first);
+        let firsts = (0..first.values.len()).map(|k| first.values.value(k)).collect();
         Ok(Self { plan, quantity, firsts, curves: curves as usize, search })
     }
-}
 
-fn all<M: Model>(axis: &Axis<M>) -> Vec<f64> {
-    (0..axis.values.len()).map(|k| axis.values.value(k)).collect()
-}
-
-/// A model at trial points.
-pub struct Models<'a, M: Model> {
-    task: &'a BoundaryTask<M>,
-    /// The quantity's column of the plan's rows, and its place among them.
-    column: Option<(usize, Column)>,
-    /// What it asks.
-    pub asking: Asking<'a>,
-}
-
-impl<'a, M: Rows> Models<'a, M> {
-    /// An evaluator over a task's plan by its engine.
-    pub fn new(task: &'a BoundaryTask<M>, asking: Asking<'a>) -> Self {
-        let mut columns = M::layout(&task.plan).columns.into_iter().enumerate();
-        let column = columns.find(|(_, column)| column.name == task.quantity.name);
-        Self { task, column, asking }
-    }
-
-    fn distance(&self, done: &Done) -> Option<f64> {
-        let (place, column) = self.column.as_ref()?;
-        let value = column.number(done.rows.first()?[*place])?;
-        Some(self.task.quantity.distance(value))
-    }
-}
-
-impl<M: Rows> Evaluate for Models<'_, M> {
-    type Stop = Stopped;
-
-    fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Stopped> {
-        let keys: Vec<Vec<Key>> = trials.iter().map(|trial| vec![key(trial)]).collect();
-        let values = |k: usize, _| {
-            let Trial { curve, first, second } = trials[k];
-            // The axes beyond the second vary fastest.
-            let mut values = self.task.plan.axis_values(curve as u64);
-            values[..2].copy_from_slice(&[first, second]);
-            values
+    /// The distances at trial points, by what is asked of the plan's engine.
+    pub fn distances<'a>(
+        &'a self,
+        asking: &'a Asking<'_>,
+    ) -> impl Fn(&[Trial]) -> Result<Vec<Option<f64>>, Stopped> + 'a {
+        let columns = M::layout(&self.plan).columns;
+        let place = columns.iter().position(|column| column.name == self.quantity.name);
+        let distance = move |done: &Done| {
+            let cell = done.rows.first()?[place?];
+            Some(self.quantity.distance(columns[place?].number(cell)?))
         };
-        let answer = |_, points: Vec<Done>| Ok(points.iter().map(|of| self.distance(of)).collect());
-        Ok(self.asking.ask(&keys, 1, &values, &answer)?.concat())
+        move |trials| {
+            let keys: Vec<Vec<Key>> = trials.iter().map(|trial| vec![key(trial)]).collect();
+            let values = |k: usize, _| {
+                let Trial { curve, first, second } = trials[k];
+                // The axes beyond the second vary fastest.
+                let mut values = self.plan.axis_values(curve as u64);
+                values[..2].copy_from_slice(&[first, second]);
+                values
+            };
+            let answer = |_, points: Vec<Done>| Ok(points.iter().map(&distance).collect());
+            Ok(asking.ask(&keys, 1, &values, &answer)?.concat())
+        }
     }
 }
 

@@ -7,29 +7,6 @@ use std::convert::Infallible;
 
 use super::*;
 
-/// A function of first and second value, and what was asked of it.
-pub(crate) struct Function<F> {
-    of: F,
-    asked: RefCell<Vec<Trial>>,
-    batches: RefCell<Vec<usize>>,
-}
-
-impl<F: Fn(f64, f64) -> Option<f64>> Function<F> {
-    pub(crate) fn new(of: F) -> Self {
-        Self { of, asked: RefCell::default(), batches: RefCell::default() }
-    }
-}
-
-impl<F: Fn(f64, f64) -> Option<f64>> Evaluate for Function<F> {
-    type Stop = Infallible;
-
-    fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Infallible> {
-        self.asked.borrow_mut().extend_from_slice(trials);
-        self.batches.borrow_mut().push(trials.len());
-        Ok(trials.iter().map(|trial| (self.of)(trial.first, trial.second)).collect())
-    }
-}
-
 pub(crate) const SEARCH: Search = Search {
     least: 60.0,
     greatest: 300.0,
@@ -48,10 +25,15 @@ pub(crate) fn traced(
     firsts: &[f64],
     search: &Search,
 ) -> Traced {
-    let function = Function::new(of);
+    let (asked, batches) = (RefCell::new(Vec::<Trial>::new()), RefCell::new(Vec::new()));
+    let evaluate = |trials: &[Trial]| {
+        asked.borrow_mut().extend_from_slice(trials);
+        batches.borrow_mut().push(trials.len());
+        Ok(trials.iter().map(|trial| of(trial.first, trial.second)).collect())
+    };
     let mut tell = |rows| assert!(rows < firsts.len(), "{rows}");
-    let Ok(traced) = trace(&function, firsts, 1, search, &mut tell);
-    let (asked, batches) = (function.asked.borrow(), function.batches.borrow());
+    let Ok::<_, Infallible>(traced) = trace(&evaluate, firsts, 1, search, &mut tell);
+    let (asked, batches) = (asked.borrow(), batches.borrow());
     assert!(batches.iter().all(|&trials| trials > 0), "{batches:?}");
     assert_eq!((traced.trials, traced.rounds), (asked.len(), batches.len()));
     assert_eq!(traced.lane_groups, batches.iter().map(|trials| trials.div_ceil(8)).sum::<usize>());
@@ -335,18 +317,12 @@ fn logarithmic_axes_are_searched_by_their_logarithms() {
 
 #[test]
 fn curves_share_batches() {
-    struct Shifted;
-    impl Evaluate for Shifted {
-        type Stop = Infallible;
-        fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, Infallible> {
-            Ok(trials
-                .iter()
-                .map(|t| like_fig12(t.first, t.second - 9.0 * t.curve as f64))
-                .collect())
-        }
-    }
+    let shifted = |trials: &[Trial]| -> Result<_, Infallible> {
+        let distance = |t: &Trial| like_fig12(t.first, t.second - 9.0 * t.curve as f64);
+        Ok(trials.iter().map(distance).collect())
+    };
     let firsts = masses(39);
-    let [Ok(one), Ok(three)] = [1, 3].map(|n| trace(&Shifted, &firsts, n, &SEARCH, &mut |_| {}));
+    let [Ok(one), Ok(three)] = [1, 3].map(|n| trace(&shifted, &firsts, n, &SEARCH, &mut |_| {}));
     assert!(three.rounds <= one.rounds + 4, "{} for {}", three.rounds, one.rounds);
     for (k, rows) in three.curves.iter().enumerate() {
         for row in rows {
@@ -370,17 +346,14 @@ fn rows_in_any_order_give_the_same_edges() {
 
 #[test]
 fn an_evaluator_that_stops_ends_the_search() {
-    struct Third(Cell<usize>);
-    impl Evaluate for Third {
-        type Stop = &'static str;
-        fn evaluate(&self, trials: &[Trial]) -> Result<Vec<Option<f64>>, &'static str> {
-            self.0.set(self.0.get() + 1);
-            if self.0.get() == 3 {
-                return Err("enough");
-            }
-            Ok(trials.iter().map(|t| like_fig12(t.first, t.second)).collect())
+    let batches = Cell::new(0);
+    let third = |trials: &[Trial]| {
+        batches.set(batches.get() + 1);
+        if batches.get() == 3 {
+            return Err("enough");
         }
-    }
-    let ended = trace(&Third(Cell::new(0)), &masses(9), 1, &SEARCH, &mut |_| {});
+        Ok(trials.iter().map(|t| like_fig12(t.first, t.second)).collect())
+    };
+    let ended = trace(&third, &masses(9), 1, &SEARCH, &mut |_| {});
     assert_eq!(ended, Err("enough"));
 }

@@ -5,7 +5,7 @@ use super::batch::{LANES, deal, lane_groups};
 use super::pockets::Beside;
 use super::span::{Question, SideRange, Span, Tried};
 use super::warm::{self, HEARD};
-use super::{Evaluate, Neighbour, RowSearch, Search, Traced, TracedRow, Trial, Want};
+use super::{Neighbour, RowSearch, Search, Traced, TracedRow, Trial, Want};
 
 /// Rows that are worked on at once, in whole curves: bounds memory, and is plenty to fill lanes.
 const ROWS_AT_ONCE: usize = 1 << 14;
@@ -17,18 +17,20 @@ const ANNOUNCED: [isize; 6] = [-1, 1, -2, 2, -4, 4];
 /// Where rows disagree, no gap between trials is wider than this part of a cell of the lattice.
 const GAP: f64 = 0.25;
 
-/// Traces `curves` curves over these values of the first axis. Before every batch `tell` hears how
-/// many rows are done, unless a neighbour will announce something.
+/// Traces `curves` curves over these values of the first axis. `evaluate` gives one signed distance
+/// from the limit a trial, in the same order: negative on the reliable side, `None` where the
+/// quantity is not defined. Before every batch `tell` hears how many rows are done, unless a
+/// neighbour will announce something.
 ///
 /// # Errors
-/// Whatever stopped the evaluator.
-pub fn trace<E: Evaluate>(
-    evaluator: &E,
+/// Whatever stopped the evaluation.
+pub fn trace<E>(
+    evaluate: &dyn Fn(&[Trial]) -> Result<Vec<Option<f64>>, E>,
     firsts: &[f64],
     curves: usize,
     search: &Search,
     tell: &mut dyn FnMut(usize),
-) -> Result<Traced, E::Stop> {
+) -> Result<Traced, E> {
     let mut traced = Traced { curves: Vec::with_capacity(curves), ..Traced::default() };
     let at_once = (ROWS_AT_ONCE / firsts.len().max(1)).max(1);
     while traced.curves.len() < curves {
@@ -38,7 +40,7 @@ pub fn trace<E: Evaluate>(
         while let Some(batch) = block.next() {
             let trials: Vec<Trial> = batch.iter().map(|(trial, ..)| *trial).collect();
             tell(begun * firsts.len() + block.rows_done());
-            let distances = evaluator.evaluate(&trials)?;
+            let distances = evaluate(&trials)?;
             for ((_, place, at), distance) in batch.iter().zip(distances) {
                 block.insert(*place, *at, distance);
             }
@@ -46,7 +48,7 @@ pub fn trace<E: Evaluate>(
             traced.lane_groups += lane_groups(trials.len());
             traced.rounds += 1;
         }
-        traced.curves.extend(block.finish(firsts));
+        traced.curves.extend(block.finish());
     }
     Ok(traced)
 }
@@ -182,11 +184,9 @@ impl<'a> Block<'a> {
                 if !heard.iter().flatten().all(|rank| slots[*rank].is_placed) {
                     continue;
                 }
-                let [left, right] = [0, 1].map(|side| {
-                    let ranks: &[usize] = &heard[side];
-                    let seen = |rank: &usize| neighbour(slots, &self.order, *rank);
-                    ranks.iter().map(seen).collect::<Vec<_>>()
-                });
+                let seen = |rank: &usize| neighbour(slots, &self.order, *rank);
+                let [left, right] =
+                    heard.each_ref().map(|ranks| ranks.iter().map(seen).collect::<Vec<_>>());
                 let mut row = warm::start(*at, &left, &right, &self.span);
                 let of_row = row.wants(&self.span);
                 ready.push(((curve, rank), row, of_row));
@@ -248,14 +248,14 @@ impl<'a> Block<'a> {
         self.curves.iter().flatten().filter(|slot| slot.is_settled).count()
     }
 
-    fn finish(self, firsts: &[f64]) -> Vec<Vec<TracedRow>> {
+    fn finish(self) -> Vec<Vec<TracedRow>> {
         let value = |at: f64| value(&self.search, &self.span, at);
         let mut ranks: Vec<usize> = (0..self.order.len()).collect();
         ranks.sort_by_key(|rank| self.order[*rank].index);
         let traced = |slots: &Vec<Slot>| {
             let rows = ranks.iter().filter_map(|rank| {
                 let row = slots[*rank].row.as_ref()?;
-                let first = firsts[self.order[*rank].index];
+                let first = self.firsts[self.order[*rank].index];
                 let edges = row.edges(&self.span, &value);
                 Some(TracedRow { first, edges, trials: row.trials() })
             });

@@ -8,23 +8,20 @@ pub(super) const HEARD: usize = 2;
 /// The part of a prediction's last correction by which it may still be off.
 const CORRECTION: f64 = 0.25;
 
-/// A new row at `at` among rows that are done: those to its left and those to its right, the
-/// nearest first.
+/// A new row at `at` among rows that are done: those to its left and those to its right, at least
+/// one each, the nearest first.
 pub(super) fn start(
     at: f64,
     left: &[Neighbour<'_>],
     right: &[Neighbour<'_>],
     span: &Span,
 ) -> RowSearch {
-    let both_ends = || Question::places(vec![span.least, span.greatest]);
-    let (Some(a), Some(b)) = (left.first(), right.first()) else {
-        return RowSearch::new(both_ends(), [None; 2]);
-    };
+    let (a, b) = (&left[0], &right[0]);
     if !a.is_like(b) {
         return between_unlike(at, left, right, span);
     }
     if a.runs.len() < 2 {
-        return RowSearch::new(both_ends(), [None; 2]);
+        return RowSearch::new(Question::places(vec![span.least, span.greatest]), [None; 2]);
     }
     let like: Vec<Neighbour<'_>> = [left, right]
         .into_iter()

@@ -7,7 +7,6 @@ use std::time::Instant;
 use super::{GridArgs, Lines as _, installed, short};
 use crate::asking::{Asking, Stopped};
 use crate::boundary::quantity::offered;
-use crate::boundary::search::Models;
 use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, trace};
 use crate::effort::{Effort, EffortArgs};
 use crate::store::{Column, OpenedTrials, Trials};
@@ -179,9 +178,10 @@ pub fn search<M: Swept>(
     let (threads, interrupt) = (effort.threads()?, effort.interrupt);
     let engine = M::engine(&task.plan, Some(&task.quantity.name))?;
     let asking = Asking::new(engine, threads, interrupt, trials, &shown)?;
-    let models = Models::new(task, asking);
     let mut standing = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
-    let found = trace(&models, &task.firsts, task.curves, &task.search, &mut standing);
+    let distances = task.distances(&asking);
+    let found = trace(&distances, &task.firsts, task.curves, &task.search, &mut standing);
+    drop(distances);
     progress.finish();
-    Ok((Stopped::found(found)?, models.asking.into_trials()))
+    Ok((Stopped::found(found)?, asking.into_trials()))
 }

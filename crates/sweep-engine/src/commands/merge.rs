@@ -43,10 +43,9 @@ pub fn of_job(name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
         tell("interrupted; the chunks are kept");
         return Ok(Exit::interrupted(interrupt.signal()));
     };
-    let joined = run.complete(job, tally, None)?;
-    joined.notes.iter().for_each(|note| tell(note));
-    let mut text = format!("{name}: joined {} points\n", joined.tally.points);
-    text += &rows(&joined.tally, job);
+    run.complete(job, &tally, None)?.iter().for_each(|note| tell(note));
+    let mut text = format!("{name}: joined {} points\n", tally.points);
+    text += &rows(&tally, job);
     text.line("file", output.display());
     tell(text.trim_end());
     Ok(Exit::Done)

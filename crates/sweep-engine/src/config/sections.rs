@@ -70,7 +70,7 @@ pub(super) fn sections<M: Read>(
         let about = "if given, a point is reliable where every ratio is above this too";
         keys.key(Key::new("ratio_min", about).set(), &Kind::Number(RATIO_MIN), &mut limits.least);
         let key = Key::new("channels", "motions that are compared").set();
-        keys.words(key, "channel", M::Channel::every(), M::Channel::name, channels);
+        keys.words(key, "channel", M::channels(), M::Channel::name, channels);
     });
 }
 

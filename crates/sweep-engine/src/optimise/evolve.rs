@@ -180,12 +180,8 @@ impl<'a> Ranks<'a> {
         if a > 0.0 || b > 0.0 {
             return Some(a.total_cmp(&b));
         }
-        let (mut less, mut greater) = (false, false);
-        for (a, b) in self.objectives(first).iter().zip(self.objectives(second)) {
-            less |= a < b;
-            greater |= a > b;
-        }
-        match (less, greater) {
+        let pairs = || self.objectives(first).iter().zip(self.objectives(second));
+        match (pairs().any(|(a, b)| a < b), pairs().any(|(a, b)| a > b)) {
             (true, true) => None,
             (true, false) => Some(Ordering::Less),
             (false, true) => Some(Ordering::Greater),

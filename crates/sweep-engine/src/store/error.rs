@@ -36,17 +36,6 @@ pub enum StoreError {
         /// Where the plans part.
         differences: Vec<PlanDifference>,
     },
-    /// The plan has more numbers than a run folder keeps.
-    #[error(
-        "the plan is too long for {}: written out, it has more than {} MiB\n  = help: write values \
-         as a range, or points as a list in a file of their own",
-        folder.display(),
-        sweep_files::regular::LONGEST_JSON_BYTES >> 20
-    )]
-    LongPlan {
-        /// The run folder.
-        folder: PathBuf,
-    },
     /// The finished output belongs to another plan, or is of a build that computes other numbers.
     #[error(
         "{} already holds the result of another plan or build:\n{}  = help: give another --out, or \
@@ -60,9 +49,9 @@ pub enum StoreError {
         /// Where the plans part.
         differences: Vec<PlanDifference>,
     },
-    /// A shard that does not fit.
+    /// A shard that does not fit, or a plan with more numbers than a run folder keeps.
     #[error("{0}")]
-    Shard(String),
+    Refused(String),
     /// Chunks are missing, so there is no whole result to write.
     #[error("{} is incomplete: {missing} of {chunks} chunks are missing{}\n  = help: \
          {}", folder.display(), of_shards(missing_shards), how_to_complete(missing_shards))]
@@ -154,10 +143,7 @@ impl StoreError {
     /// Whether nothing was begun, because the request does not fit what is there.
     pub fn is_refusal(&self) -> bool {
         match self {
-            Self::PlanDiffers { .. }
-            | Self::OutputDiffers { .. }
-            | Self::LongPlan { .. }
-            | Self::Shard(_) => true,
+            Self::PlanDiffers { .. } | Self::OutputDiffers { .. } | Self::Refused(_) => true,
             Self::Threads(error) => error.is_refusal(),
             Self::File(error) => error.is_refusal(),
             _ => false,

@@ -56,12 +56,9 @@ impl Lock {
             match taken {
                 Ok(()) if !atomic::is_named(&file, &path) => continue,
                 Ok(()) => {
-                    if shard.is_none() {
-                        sign(&mut file, &path)?;
-                    }
                     let shard = match shard {
                         Some(shard) => take_shard(folder, shard)?,
-                        None => None,
+                        None => sign(&mut file, &path).map(|()| None)?,
                     };
                     return Ok(Self { _run: Some(file), _shard: shard, path, missing: false });
                 }
@@ -92,9 +89,12 @@ impl Lock {
 
 /// Everyone who holds the folder now, as far as it can be read without disturbing them.
 pub(super) fn holders(folder: &Folder) -> Vec<Holder> {
-    let locks = shard_locks(folder).into_iter();
-    let mut found: Vec<Holder> =
-        locks.filter_map(|(shard, path)| held_by(&path, Some(shard))).collect();
+    let names = regular::names(&folder.path).unwrap_or_default().into_iter();
+    let lock = |name: OsString| Some((shard_of_name(name.to_str()?)?, folder.file(name)));
+    let mut locks: Vec<(u64, PathBuf)> = names.filter_map(lock).collect();
+    locks.sort_unstable();
+    let held = locks.iter().filter_map(|(shard, path)| held_by(path, Some(*shard)));
+    let mut found: Vec<Holder> = held.collect();
     // Shards share the folder's lock, and whoever last held it alone has left his name in it.
     if found.is_empty() {
         found.extend(held_by(&folder.file(LOCK), None));
@@ -145,14 +145,6 @@ fn no_locks_here(error: &io::Error) -> bool {
     const ENOLCK: i32 = 37;
     error.kind() == io::ErrorKind::Unsupported
         || (cfg!(target_os = "linux") && error.raw_os_error() == Some(ENOLCK))
-}
-
-fn shard_locks(folder: &Folder) -> Vec<(u64, PathBuf)> {
-    let names = regular::names(&folder.path).unwrap_or_default().into_iter();
-    let lock = |name: OsString| Some((shard_of_name(name.to_str()?)?, folder.file(name)));
-    let mut found: Vec<(u64, PathBuf)> = names.filter_map(lock).collect();
-    found.sort_unstable();
-    found
 }
 
 /// The shard that a lock is named after, if any.

@@ -17,15 +17,6 @@ use sweep_files::batches::of_arrow;
 use sweep_files::panics;
 use sweep_files::{self as files, ParquetFile, Writer, atomic, seal};
 
-/// A finished result.
-#[derive(Debug)]
-pub struct Joined {
-    /// What it holds.
-    pub tally: Tally,
-    /// Things a user should hear of.
-    pub notes: Vec<String>,
-}
-
 /// A result file in the making: batches of [`BATCH_ROWS`] rows, the last perhaps of fewer.
 struct MapWriter<'a> {
     output: &'a Path,
@@ -101,8 +92,8 @@ impl OpenRun {
         job: &Job<'_>,
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<Tally>, StoreError> {
-        let output = self.output().to_path_buf();
-        let file = atomic::begin(self.folder())?;
+        let output = self.folder.output.clone();
+        let file = atomic::begin(&self.folder.path)?;
         let from_arrow = |error| StoreError::parquet("write", &output)(of_arrow(error));
         let mut rows = ResultRows::new(&job.layout);
         let mut writer = MapWriter::begin(job, file, &output)?;
@@ -135,22 +126,23 @@ impl OpenRun {
         Ok(Some(tally))
     }
 
-    /// Ends a run whose output is in place: writes the sidecar and removes the folder.
+    /// Ends a run whose output is in place: writes the sidecar and removes the folder. Gives what a
+    /// user should hear of.
     ///
     /// # Errors
     /// [`StoreError::File`] when the sidecar cannot be written.
     pub fn complete(
         mut self,
         job: &Job<'_>,
-        tally: Tally,
+        tally: &Tally,
         session: Option<Session>,
-    ) -> Result<Joined, StoreError> {
-        let sidecar = provenance::sidecar(&self.folder, job, &tally, session)?;
+    ) -> Result<Vec<String>, StoreError> {
+        let sidecar = provenance::sidecar(&self.folder, job, tally, session)?;
         let path = self.folder.sidecar();
         files::judge(&path, self.folder.account())?;
-        atomic::write(self.folder(), &path, &sidecar)?;
+        atomic::write(&self.folder.path, &path, &sidecar)?;
         let mut notes = self.take_notes();
         notes.extend(remove(&self.folder, self.lock));
-        Ok(Joined { tally, notes })
+        Ok(notes)
     }
 }

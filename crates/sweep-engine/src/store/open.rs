@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::io::{self, ErrorKind, Read as _};
+use std::io::{ErrorKind, Read as _};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard};
 
-use arrow_schema::SchemaRef;
+use arrow_schema::Schema;
 use serde_json::json;
 
 use super::chunk::{self, Damage, Place, Shape};
@@ -69,7 +69,7 @@ impl OpenRun {
     ///
     /// # Errors
     /// [`StoreError::Busy`] when another run holds the output, [`StoreError::PlanDiffers`],
-    /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::Shard`]
+    /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::Refused`]
     /// for a part that does not fit, [`StoreError::File`] for anything else at the output that is
     /// not ours, and for the file system.
     pub fn open(
@@ -78,22 +78,19 @@ impl OpenRun {
         options: OpenOptions<'_>,
     ) -> Result<Opened, StoreError> {
         let folder = Folder::of(output, &job.layout)?;
-        if !options.fresh
-            && !folder.path.exists()
-            && let Some((file, tally)) = finished(&folder, job)?
-        {
-            return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
-        }
-        let mut dealt =
-            shard::resolve(options.shard, options.environment, Dealing::read(&folder)?)?;
-        if options.fresh && dealt.is_some() {
-            return Err(StoreError::Shard(format!(
-                "--fresh would delete what the other shards have done\n  = help: delete {} first, \
-                 then start the shards",
-                folder.path.display()
-            )));
-        }
-        let shard = dealt.map(|(shard, _)| shard.index);
+        let resolve = |frozen| shard::resolve(options.shard, options.environment, frozen);
+        let mut dealt = None;
+        let shard = || {
+            dealt = resolve(Dealing::read(&folder)?)?;
+            if options.fresh && dealt.is_some() {
+                return Err(StoreError::Refused(format!(
+                    "--fresh would delete what the other shards have done\n  = help: delete {} \
+                     first, then start the shards",
+                    folder.path.display()
+                )));
+            }
+            Ok(dealt.map(|(shard, _)| shard.index))
+        };
         let finished = || finished(&folder, job);
         let (lock, notes) = match claim(&folder, job, options.fresh, shard, finished)? {
             Claim::Finished((file, tally)) => {
@@ -103,7 +100,7 @@ impl OpenRun {
         };
         if let Some((_, dealing)) = dealt {
             let frozen = dealing.freeze(&folder)?;
-            dealt = shard::resolve(options.shard, options.environment, Some(frozen))?;
+            dealt = resolve(Some(frozen))?;
         }
         let place =
             Place { plan: job.hash(), shape: Shape::of(&job.layout), chunk: 0, first: 0, count: 0 };
@@ -173,9 +170,9 @@ impl OpenRun {
     /// What there is of a chunk; a damaged file is set aside and noted.
     fn read(&mut self, chunk: u64) -> Result<Option<Vec<Done>>, StoreError> {
         match read_chunk(&self.folder, &self.place(chunk))? {
-            ChunkFile::There(outcomes) => Ok(Some(outcomes)),
-            ChunkFile::Absent => Ok(None),
-            ChunkFile::Damaged(damage) => {
+            Some(Ok(outcomes)) => Ok(Some(outcomes)),
+            None => Ok(None),
+            Some(Err(damage)) => {
                 let path = self.folder.file(chunk_name(chunk));
                 let aside = set_aside(&path)?;
                 self.notes.push(format!(
@@ -200,7 +197,7 @@ impl OpenRun {
         let is_whole = outcomes.len() as u64 == place.count;
         // Another process with the same shard may have done it.
         if !is_whole
-            && let ChunkFile::There(known) = read_chunk(&self.folder, &place)?
+            && let Some(Ok(known)) = read_chunk(&self.folder, &place)?
             && known.len() > outcomes.len()
         {
             return Ok(());
@@ -271,16 +268,6 @@ impl OpenRun {
         (own.saturating_mul(self.chunk_points).saturating_sub(short), there)
     }
 
-    /// The unfinished run's folder.
-    pub fn folder(&self) -> &Path {
-        &self.folder.path
-    }
-
-    /// Where the finished file goes.
-    pub fn output(&self) -> &Path {
-        &self.folder.output
-    }
-
     /// Things a user should hear of once: damaged chunks, a file system without locks.
     pub fn take_notes(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notes)
@@ -300,8 +287,8 @@ impl OpenRun {
     pub fn record(&self, session: &Session) -> Result<(), StoreError> {
         let name =
             format!("session-{}-{}-{}.json", session.host, session.pid, session.started_unix_s);
-        let path = self.folder().join(name.replace(['/', '\0'], "_"));
-        Ok(atomic::write(self.folder(), &path, &pretty(&json!(session)))?)
+        let path = self.folder.file(name.replace(['/', '\0'], "_"));
+        Ok(atomic::write(&self.folder.path, &path, &pretty(&json!(session)))?)
     }
 
     /// The error that says which chunks, and of which shards, are missing from the whole.
@@ -319,29 +306,18 @@ impl OpenRun {
     }
 }
 
-/// What is where a chunk's file would be.
-pub(super) enum ChunkFile {
-    There(Vec<Done>),
-    Absent,
-    Damaged(Damage),
-}
-
-/// Reads a chunk's file.
-pub(super) fn read_chunk(folder: &Folder, place: &Place) -> Result<ChunkFile, StoreError> {
+/// What is where a chunk's file would be: its outcomes, or why they are none.
+pub(super) fn read_chunk(
+    folder: &Folder,
+    place: &Place,
+) -> Result<Option<Result<Vec<Done>, Damage>>, StoreError> {
     let path = &folder.file(chunk_name(place.chunk));
     let mut bytes = Vec::new();
     // A byte too many is enough to know that it is too long.
     let read = regular::open(path)
         .and_then(|file| file.take(place.most_bytes() + 1).read_to_end(&mut bytes));
-    match read {
-        Ok(_) => {}
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(ChunkFile::Absent),
-        Err(error) => return Err(StoreError::io("read", path)(error)),
-    }
-    Ok(match chunk::decode(place, &bytes) {
-        Ok(outcomes) => ChunkFile::There(outcomes),
-        Err(damage) => ChunkFile::Damaged(damage),
-    })
+    let read = regular::if_there(read).map_err(StoreError::io("read", path))?;
+    Ok(read.map(|_| chunk::decode(place, &bytes)))
 }
 
 /// The chunks that have a file.
@@ -362,11 +338,9 @@ pub(super) fn finished(
     job: &Job<'_>,
 ) -> Result<Option<(ResultFile, Tally)>, StoreError> {
     let Some((file, result)) = of_plan(folder, job)? else { return Ok(None) };
-    let schema = job.layout.schema();
-    let [was, is] = [file.schema(), &schema].map(column_names);
-    if was != is {
-        let differences = vec![columns_apart(&was, &is)];
-        return Err(StoreError::OutputDiffers { output: folder.output.clone(), differences });
+    if let Some(apart) = columns_apart(file.schema(), &job.layout.schema()) {
+        let (output, differences) = (folder.output.clone(), vec![apart]);
+        return Err(StoreError::OutputDiffers { output, differences });
     }
     // Files of this build carry a digest.
     if !file.is_sealed() {
@@ -385,8 +359,16 @@ pub(super) fn of_plan(
     folder: &Folder,
     job: &Job<'_>,
 ) -> Result<Option<(ParquetFile, ResultFile)>, StoreError> {
-    let Some(file) = read::finished(&folder.output)? else { return Ok(None) };
-    let result = ResultFile::of(&file, job.layout.kind)?;
+    match fs::metadata(&folder.output) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        // What some programs make of a file before its content.
+        Ok(found) if found.len() == 0 => return Ok(None),
+        _ => {}
+    }
+    let (file, kind) = (ParquetFile::open(&folder.output)?, job.layout.kind);
+    let result = ResultFile::of(&file, kind).ok_or_else(|| {
+        read::unlike(&file, format!("its metadata is not that of a {}", kind.name()))
+    })?;
     if result.plan_hash == job.hash().to_hex().as_str() {
         return Ok(Some((file, result)));
     }
@@ -396,17 +378,17 @@ pub(super) fn of_plan(
     Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
 }
 
-fn column_names(schema: &SchemaRef) -> Vec<&str> {
-    schema.fields().iter().map(|field| field.name().as_str()).collect()
-}
-
-/// The columns that only one of two builds has for the same plan.
-fn columns_apart(was: &[&str], is: &[&str]) -> PlanDifference {
+/// The columns that only one of two builds has for the same plan, if they differ.
+fn columns_apart(was: &Schema, is: &Schema) -> Option<PlanDifference> {
+    let [was, is] = [was, is].map(|schema| -> Vec<&str> {
+        schema.fields().iter().map(|field| field.name().as_str()).collect()
+    });
     let only = |some: &[&str], others: &[&str]| {
         let of_some: Vec<_> = some.iter().filter(|name| !others.contains(name)).copied().collect();
         (!of_some.is_empty()).then(|| of_some.join(", "))
     };
-    PlanDifference { pointer: "/columns".to_owned(), was: only(was, is), is: only(is, was) }
+    let pointer = "/columns".to_owned();
+    (was != is).then(|| PlanDifference { pointer, was: only(&was, &is), is: only(&is, &was) })
 }
 
 /// What claiming an output came to.
@@ -417,16 +399,23 @@ pub(super) enum Claim<T> {
     Held(Lock, Vec<String>),
 }
 
-/// Takes a folder's lock, and finds this plan frozen in the folder or freezes it. Where there was
-/// none, `finished` has the first word unless the work is to start over: nothing is frozen then.
+/// Takes a folder's lock, for the `shard` if it says one, and finds this plan frozen in the folder
+/// or freezes it. Where there was none, `finished` has the first word unless the work is to start
+/// over: nothing is frozen then, nor is a folder made.
 pub(super) fn claim<T>(
     folder: &Folder,
     job: &Job<'_>,
     fresh: bool,
-    shard: Option<u64>,
-    finished: impl FnOnce() -> Result<Option<T>, StoreError>,
+    shard: impl FnOnce() -> Result<Option<u64>, StoreError>,
+    finished: impl Fn() -> Result<Option<T>, StoreError>,
 ) -> Result<Claim<T>, StoreError> {
-    let lock = Lock::acquire(folder, shard)?;
+    if !fresh
+        && !folder.path.exists()
+        && let Some(finished) = finished()?
+    {
+        return Ok(Claim::Finished(finished));
+    }
+    let lock = Lock::acquire(folder, shard()?)?;
     let mut notes: Vec<String> = lock.note(folder).into_iter().collect();
     if fresh {
         clear(folder)?;
@@ -497,19 +486,13 @@ fn is_ours(name: &str) -> bool {
 /// note.
 pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
     let removed = clear(folder).and_then(|()| lock.retire()).and_then(|()| {
-        match fs::remove_dir(&folder.path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                Err(StoreError::io("remove the folder", &folder.path)(error))
-            }
-            _ => Ok(()),
-        }
+        let removed = regular::if_there(fs::remove_dir(&folder.path));
+        removed.map_err(StoreError::io("remove the folder", &folder.path))
     });
-    match removed {
-        Ok(()) => None,
-        Err(error) => Some(format!(
-            "the result is whole, but {} could not be removed; delete it by hand ({})",
-            folder.path.display(),
-            error.to_string().lines().next().unwrap_or_default()
-        )),
-    }
+    let error = removed.err()?.to_string();
+    Some(format!(
+        "the result is whole, but {} could not be removed; delete it by hand ({})",
+        folder.path.display(),
+        error.lines().next().unwrap_or_default()
+    ))
 }

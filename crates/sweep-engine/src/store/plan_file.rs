@@ -1,7 +1,6 @@
 //! The frozen plan: what a run folder was begun with, and where another plan differs from it.
 
 use std::fs;
-use std::io;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -61,10 +60,9 @@ impl PlanFile {
     /// Reads the plan of a run folder.
     pub(super) fn read(folder: &Folder) -> Result<Found, StoreError> {
         let path = folder.file(PLAN);
-        let text = match regular::read_json(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
-            Err(error) => return Err(StoreError::io("read", &path)(error)),
+        let text = regular::if_there(regular::read_json(&path));
+        let Some(text) = text.map_err(StoreError::io("read", &path))? else {
+            return Ok(Found::Nothing);
         };
         // A file of another format need not match its hash: the run is refused with what differs.
         let whole = |found: &Self| {
@@ -81,7 +79,12 @@ impl PlanFile {
     pub(super) fn freeze(&self, folder: &Folder) -> Result<(), StoreError> {
         let text = pretty(&json!(self));
         if text.len() as u64 >= regular::LONGEST_JSON_BYTES {
-            return Err(StoreError::LongPlan { folder: folder.path.clone() });
+            return Err(StoreError::Refused(format!(
+                "the plan is too long for {}: written out, it has more than {} MiB\n  = help: \
+                 write values as a range, or points as a list in a file of their own",
+                folder.path.display(),
+                regular::LONGEST_JSON_BYTES >> 20
+            )));
         }
         atomic::create(&folder.path, &folder.file(PLAN), &text)?;
         Ok(())
@@ -103,13 +106,7 @@ pub(super) fn pretty(value: &Value) -> Vec<u8> {
 
 /// Hash of the build that runs and the plan it runs.
 pub(super) fn plan_hash(version: &str, numerics: u32, plan: &Value) -> blake3::Hash {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(version.as_bytes());
-    hasher.update(b"\n");
-    hasher.update(numerics.to_string().as_bytes());
-    hasher.update(b"\n");
-    hasher.update(plan.to_string().as_bytes());
-    hasher.finalize()
+    blake3::hash(format!("{version}\n{numerics}\n{plan}").as_bytes())
 }
 
 /// The plan with the facts beside it, for showing differences of either by path.
@@ -129,12 +126,9 @@ pub(super) fn set_aside(path: &Path) -> Result<std::path::PathBuf, StoreError> {
     let mut name = path.as_os_str().to_owned();
     name.push(".damaged");
     let aside = std::path::PathBuf::from(name);
-    match fs::rename(path, &aside) {
-        Ok(()) => Ok(aside),
-        // Another shard of the same run set it aside first.
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(aside),
-        Err(error) => Err(StoreError::io("set aside", path)(error)),
-    }
+    // Another shard of the same run may have set it aside first.
+    let renamed = regular::if_there(fs::rename(path, &aside));
+    renamed.map_err(StoreError::io("set aside", path)).map(|_| aside)
 }
 
 #[cfg(test)]

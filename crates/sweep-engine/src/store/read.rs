@@ -2,9 +2,6 @@
 //! range over.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::io::ErrorKind;
-use std::path::Path;
 
 use parquet::errors::ParquetError;
 use serde::Serialize;
@@ -31,40 +28,26 @@ pub struct ResultFile {
 }
 
 impl ResultFile {
-    /// What the metadata says.
-    ///
-    /// # Errors
-    /// [`StoreError::Parquet`] for a file that is not the result of a run.
-    pub fn of(file: &ParquetFile, kind: FileKind<'_>) -> Result<Self, StoreError> {
-        own_word(file, kind).ok_or_else(|| {
-            let reason = format!("its metadata is not that of a {}", kind.name());
-            StoreError::parquet("read", file.path())(ParquetError::General(reason))
+    /// What the metadata says; nothing of a file that is not of this kind.
+    pub fn of(file: &ParquetFile, kind: FileKind<'_>) -> Option<Self> {
+        // Other files of this program carry the plan too: a boundary's rows are not points.
+        if file.kind() != Some(kind) {
+            return None;
+        }
+        let numerics = file.value(key::NUMERICS).and_then(|numerics| numerics.parse().ok());
+        Some(Self {
+            plan: file.json(key::PLAN)?,
+            plan_hash: file.value(key::PLAN_HASH)?.to_owned(),
+            version: file.value(key::VERSION)?.to_owned(),
+            numerics: numerics.unwrap_or(0),
+            points: file.rows(),
         })
     }
 }
 
-fn own_word(file: &ParquetFile, kind: FileKind<'_>) -> Option<ResultFile> {
-    // Other files of this program carry the plan too: a boundary's rows are not points.
-    if file.kind() != Some(kind) {
-        return None;
-    }
-    Some(ResultFile {
-        plan: file.json(key::PLAN)?,
-        plan_hash: file.value(key::PLAN_HASH)?.to_owned(),
-        version: file.value(key::VERSION)?.to_owned(),
-        numerics: file.value(key::NUMERICS).and_then(|numerics| numerics.parse().ok()).unwrap_or(0),
-        points: file.rows(),
-    })
-}
-
-/// The finished file at an output, checked; `None` if nothing is there yet.
-pub fn finished(path: &Path) -> Result<Option<ParquetFile>, StoreError> {
-    match fs::metadata(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-        // What some programs make of a file before its content.
-        Ok(found) if found.len() == 0 => Ok(None),
-        _ => Ok(Some(ParquetFile::open(path)?)),
-    }
+/// That a file is not what it is taken for.
+pub(super) fn unlike(file: &ParquetFile, reason: String) -> StoreError {
+    StoreError::parquet("read", file.path())(ParquetError::General(reason))
 }
 
 /// An extreme value, and its place.
@@ -161,21 +144,8 @@ pub(super) fn add(counts: &mut NameCounts, name: &str) {
 /// # Errors
 /// [`StoreError::File`], and [`StoreError::Parquet`] for a file that lacks a result's columns.
 pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
-    const COLUMNS: [&str; 11] = [
-        "point",
-        "status",
-        "stable",
-        "beyond",
-        "reliable",
-        "sensitive",
-        "method",
-        "error",
-        "converged",
-        "min_gap_nonlinear_m",
-        "friction_speed_off",
-    ];
     let fields = file.schema().fields().iter().map(|field| field.name().as_str());
-    let ratios: Vec<&str> = fields.clone().filter(|name| name.starts_with("ratio_")).collect();
+    let ratios = fields.clone().filter(|name| name.starts_with("ratio_"));
     let has = |name: &str| fields.clone().any(|field| field == name);
     // A result of `sweep stability` or `sweep dwell` has no verdicts.
     let (is_of_stability, has_verdicts) = (has("stable"), !has("stable") && !has("motion"));
@@ -184,17 +154,22 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         false => &["point", "status"],
     };
     if let Some(name) = needed.iter().find(|name| !has(name)) {
-        let reason = ParquetError::General(format!("there is no column `{name}`"));
-        return Err(StoreError::parquet("read", file.path())(reason));
+        return Err(unlike(file, format!("there is no column `{name}`")));
     }
     let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
     let over = limits.map_or(0.0, RatioLimits::over_estimate);
-    let greatest_ratio = ratios.iter().position(|name| *name == "ratio_max");
-    let own = COLUMNS.len();
-    let [point, status, stable, beyond, reliable, sensitive, method, error, converged, gap, off] =
-        std::array::from_fn(|column| column);
+    let mut names: Vec<&str> = ratios.collect();
+    let ratios = names.len();
+    let mut column = |name| {
+        names.push(name);
+        names.len() - 1
+    };
+    let [point, status, method] = ["point", "status", "method"].map(&mut column);
+    let [stable, beyond, reliable] = ["stable", "beyond", "reliable"].map(&mut column);
+    let [sensitive, error, converged] = ["sensitive", "error", "converged"].map(&mut column);
+    let [greatest, gap] = ["ratio_max", "min_gap_nonlinear_m"].map(&mut column);
+    let off = column("friction_speed_off");
     let mut tally = Tally::default();
-    let names = [&COLUMNS[..], &ratios].concat();
     file.each_row(&names, |row| {
         let flag = |column| row.cell(column).flag();
         tally.points += 1;
@@ -213,7 +188,7 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         if !has_verdicts {
             return Ok(());
         }
-        let least = (own..names.len()).map(|k| row.value(k)).fold(f64::INFINITY, f64::min);
+        let least = (0..ratios).map(|k| row.value(k)).fold(f64::INFINITY, f64::min);
         let reliable = flag(reliable);
         match reliable {
             Some(true) => tally.reliable += 1,
@@ -234,8 +209,7 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         };
         extreme(&mut tally.greatest_off, row.value(off), f64::gt);
         extreme(&mut tally.greatest_error, row.value(error), f64::gt);
-        let ratio = greatest_ratio.map_or(f64::NAN, |k| row.value(own + k));
-        extreme(&mut tally.greatest_ratio, ratio, f64::gt);
+        extreme(&mut tally.greatest_ratio, row.value(greatest), f64::gt);
         extreme(&mut tally.least_gap_nonlinear_m, row.value(gap), f64::lt);
         Ok::<(), StoreError>(())
     })?;
@@ -309,7 +283,7 @@ pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
         }
         Ok::<(), StoreError>(())
     })?;
-    Ok(Overview { result: own_word(file, FileKind::Map), rows: file.rows(), columns: ranges })
+    Ok(Overview { result: ResultFile::of(file, FileKind::Map), rows: file.rows(), columns: ranges })
 }
 
 impl ColumnRange {
@@ -318,18 +292,16 @@ impl ColumnRange {
         if !value.is_nan() {
             let (least, greatest) = self.range.unwrap_or((value, value));
             self.range = Some((least.min(value), greatest.max(value)));
-        } else if let Some(word) = word {
-            self.count(word);
-        } else {
-            self.nulls += 1;
+            return;
         }
-    }
-
-    fn count(&mut self, name: &str) {
-        if let Some((_, count)) = self.names.iter_mut().find(|(known, _)| known == name) {
+        let Some(word) = word else {
+            self.nulls += 1;
+            return;
+        };
+        if let Some((_, count)) = self.names.iter_mut().find(|(known, _)| known == word) {
             *count += 1;
         } else if self.names.len() < NAMES_SHOWN {
-            self.names.push((name.to_owned(), 1));
+            self.names.push((word.to_owned(), 1));
         }
     }
 }

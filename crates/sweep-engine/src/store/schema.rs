@@ -220,7 +220,12 @@ pub fn properties(job: &Job<'_>) -> WriterProperties {
     let builder = writer(job.version, metadata)
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_max_row_group_bytes(None);
-    job.layout.all().fold(builder, encoding).build()
+    // A dictionary of them would be written and thrown away.
+    let unlike = job.layout.all().filter(|column| column.kind == Kind::Measured);
+    let plain = |builder: WriterPropertiesBuilder, column: &Column| {
+        builder.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), false)
+    };
+    unlike.fold(builder, plain).build()
 }
 
 /// Settings of every file that this program writes.
@@ -230,15 +235,6 @@ pub(crate) fn writer(version: &str, metadata: Vec<KeyValue>) -> WriterProperties
         .set_created_by(format!("{CREATED_BY}{version}"))
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_key_value_metadata(Some(metadata))
-}
-
-fn encoding(builder: WriterPropertiesBuilder, column: &Column) -> WriterPropertiesBuilder {
-    let path = ColumnPath::from(column.name.as_str());
-    match column.kind {
-        // A dictionary of them would be written and thrown away.
-        Kind::Measured => builder.set_column_dictionary_enabled(path, false),
-        _ => builder,
-    }
 }
 
 /// Rows on their way into a batch.

@@ -88,13 +88,10 @@ impl Dealing {
     /// none: it only says who computes a chunk, never what is in it.
     pub(super) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
         let path = folder.file(SHARDS);
-        match regular::read_json(&path) {
-            Ok(text) => Ok(serde_json::from_slice(&text)
-                .ok()
-                .filter(|dealing: &Self| (1..=MAX_SHARDS).contains(&dealing.shards))),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(StoreError::io("read", &path)(error)),
-        }
+        let text = regular::if_there(regular::read_json(&path));
+        let text = text.map_err(StoreError::io("read", &path))?;
+        let dealing = text.and_then(|text| serde_json::from_slice(&text).ok());
+        Ok(dealing.filter(|dealing: &Self| (1..=MAX_SHARDS).contains(&dealing.shards)))
     }
 
     /// The shards, counted from 1, that lack a chunk.
@@ -117,13 +114,11 @@ impl Dealing {
         if atomic::create(&folder.path, &path, &text)? {
             return Ok(self);
         }
-        match Self::read(folder)? {
-            Some(frozen) => Ok(frozen),
-            None => {
-                atomic::write(&folder.path, &path, &text)?;
-                Ok(self)
-            }
+        if let Some(frozen) = Self::read(folder)? {
+            return Ok(frozen);
         }
+        atomic::write(&folder.path, &path, &text)?;
+        Ok(self)
     }
 }
 
@@ -132,14 +127,14 @@ impl Dealing {
 /// whole run.
 ///
 /// # Errors
-/// [`StoreError::Shard`] when the request, the scheduler and the frozen dealing do not fit
+/// [`StoreError::Refused`] when the request, the scheduler and the frozen dealing do not fit
 /// together.
 pub(super) fn resolve(
     request: Option<ShardRequest>,
     environment: Environment<'_>,
     frozen: Option<Dealing>,
 ) -> Result<Option<(Shard, Dealing)>, StoreError> {
-    let refuse = |text: String| Err(StoreError::Shard(text));
+    let refuse = |text: String| Err(StoreError::Refused(text));
     let other = |shards: u64, asked: u64, help: String| {
         refuse(format!(
             "this run was dealt into {shards} shards by the first to start, not {asked}\n  = help: \
@@ -209,7 +204,7 @@ impl Scheduler {
         let number = |name: &'static str| match environment(name) {
             None => Ok(None),
             Some(text) => text.parse::<u64>().map(Some).map_err(|_| {
-                StoreError::Shard(format!("{name} is `{text}`, which is not a number"))
+                StoreError::Refused(format!("{name} is `{text}`, which is not a number"))
             }),
         };
         if let Some(id) = number("SLURM_ARRAY_TASK_ID")? {
@@ -225,17 +220,12 @@ impl Scheduler {
 
 /// Numbers as `sbatch --array=` takes them: `2,5-7`.
 pub fn list(numbers: impl IntoIterator<Item = u64>) -> String {
-    let mut ranges: Vec<(u64, u64)> = Vec::new();
-    for number in numbers {
-        match ranges.last_mut() {
-            Some((_, end)) if *end + 1 == number => *end = number,
-            _ => ranges.push((number, number)),
-        }
-    }
-    let range = |(start, end): &(u64, u64)| {
-        if start == end { start.to_string() } else { format!("{start}-{end}") }
-    };
-    ranges.iter().map(range).collect::<Vec<_>>().join(",")
+    let numbers: Vec<u64> = numbers.into_iter().collect();
+    let ranges = numbers.chunk_by(|number, next| number + 1 == *next).map(|range| match range {
+        [first, .., last] => format!("{first}-{last}"),
+        _ => range[0].to_string(),
+    });
+    ranges.collect::<Vec<_>>().join(",")
 }
 
 #[cfg(test)]

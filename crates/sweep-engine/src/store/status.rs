@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::open::{self, ChunkFile, chunks_there, read_chunk};
+use super::open::{self, chunks_there, read_chunk};
 use super::plan_file::{Found, PlanFile};
 use super::read::{NameCounts, add, failed};
 use super::shard::{self, Dealing};
@@ -79,7 +79,18 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     let (ours, hash) = (PlanFile::of(job), job.hash());
     match PlanFile::read(&folder)? {
         Found::Plan(found) => open::refuse_other_plan(&folder, &found, &ours)?,
-        Found::Nothing => return finished(&folder, job, status),
+        Found::Nothing => {
+            let Some((_, tally)) = open::finished(&folder, job)? else { return Ok(status) };
+            return Ok(FolderStatus {
+                state: State::Finished,
+                points_done: tally.points,
+                points_failed: failed(&tally.by_status),
+                by_status: tally.by_status,
+                chunks_done: chunks,
+                chunks_missing: 0,
+                ..status
+            });
+        }
         Found::Damaged => {}
     }
     let place = |chunk: u64| {
@@ -97,16 +108,16 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     for chunk in chunks_there(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
         let place = place(chunk);
         match read_chunk(&folder, &place)? {
-            ChunkFile::There(points) => {
+            Some(Ok(points)) => {
                 if points.len() as u64 == place.count {
                     present.insert(chunk);
                 }
                 status.points_done += points.len() as u64;
                 points.iter().filter_map(name).for_each(|name| add(&mut status.by_status, name));
             }
-            ChunkFile::Damaged(_) => status.chunks_damaged.push(chunk),
+            Some(Err(_)) => status.chunks_damaged.push(chunk),
             // The run was finished, or the chunk set aside, a moment ago.
-            ChunkFile::Absent => {}
+            None => {}
         }
     }
     status.chunks_done = present.len() as u64;
@@ -124,22 +135,6 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
             status.missing_shard_numbers.iter().map(|shard| shard - 1 + dealing.first_array_id);
         status.missing_shards = shard::list(array_ids);
         status.shards = Some(dealing.shards);
-    }
-    Ok(status)
-}
-
-fn finished(
-    folder: &Folder,
-    job: &Job<'_>,
-    mut status: FolderStatus,
-) -> Result<FolderStatus, StoreError> {
-    if let Some((_, tally)) = open::finished(folder, job)? {
-        status.state = State::Finished;
-        status.points_done = tally.points;
-        status.points_failed = failed(&tally.by_status);
-        status.by_status = tally.by_status;
-        status.chunks_done = status.chunks;
-        status.chunks_missing = 0;
     }
     Ok(status)
 }

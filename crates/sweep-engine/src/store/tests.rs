@@ -10,7 +10,6 @@ use proptest::prelude::*;
 use serde_json::json;
 use tempfile::TempDir;
 
-use super::merge::Joined;
 use super::*;
 use sweep_files::{FileError, ParquetFile, cells};
 
@@ -67,9 +66,11 @@ fn write_missing(run: &OpenRun) -> u64 {
         .count() as u64
 }
 
-fn finish(mut run: OpenRun, job: &Job<'_>) -> Joined {
+/// What the result holds, and what a user should hear of.
+fn finish(mut run: OpenRun, job: &Job<'_>) -> (Tally, Vec<String>) {
     let tally = run.join(job, &|| false).unwrap().unwrap();
-    run.complete(job, tally, None).unwrap()
+    let notes = run.complete(job, &tally, None).unwrap();
+    (tally, notes)
 }
 
 /// The bytes of an undisturbed run.

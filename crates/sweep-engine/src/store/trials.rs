@@ -18,7 +18,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
+use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::open::{self, Claim};
@@ -68,11 +68,8 @@ impl Trials {
     /// anything else at the output that is not ours, and for the file system.
     pub fn open(output: &Path, job: &Job<'_>, fresh: bool) -> Result<OpenedTrials, StoreError> {
         let folder = Folder::beside(output, job.layout.kind)?;
-        if !fresh && !folder.path.exists() && is_finished(&folder, job)? {
-            return Ok(OpenedTrials::Finished);
-        }
         let finished = || Ok(is_finished(&folder, job)?.then_some(()));
-        let (lock, mut notes) = match open::claim(&folder, job, fresh, None, finished)? {
+        let (lock, mut notes) = match open::claim(&folder, job, fresh, || Ok(None), finished)? {
             Claim::Finished(()) => return Ok(OpenedTrials::Finished),
             Claim::Held(lock, notes) => (lock, notes),
         };
@@ -145,19 +142,12 @@ impl Trials {
 
 /// The file of trials, made if need be; how many records it holds; and the trials in them.
 fn contents(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> Result<(File, usize, Known), StoreError> {
-    let file = regular::open_or_create(path).map_err(StoreError::io("open", path))?;
-    let (mut found, mut known) = (0, Known::new());
-    let mut records = BufReader::new(&file);
-    loop {
-        let mut record = [0; RECORD_BYTES];
-        match records.read_exact(&mut record) {
-            Ok(()) => found += 1,
-            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => break,
-            Err(error) => return Err(StoreError::io("read", path)(error)),
-        }
-        known.extend(decode(plan, &record));
-    }
-    Ok((file, found, known))
+    let mut file = regular::open_or_create(path).map_err(StoreError::io("open", path))?;
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).map_err(StoreError::io("read", path))?;
+    let records = bytes.chunks_exact(RECORD_BYTES);
+    let found = records.len();
+    Ok((file, found, records.filter_map(|record| decode(plan, record)).collect()))
 }
 
 /// Whether the output is the finished file of this search and build.

@@ -89,8 +89,8 @@ fn damage_after_opening_is_met_at_the_join() {
     assert!(error.to_string().contains("2 of 11 chunks are missing"), "{error}");
     assert!(!home.output().exists());
     assert_eq!(write_missing(&run), 2);
-    let joined = finish(run, &job);
-    assert!(joined.notes[0].contains("chunk-00000004.bin"), "{:?}", joined.notes);
+    let (_, notes) = finish(run, &job);
+    assert!(notes[0].contains("chunk-00000004.bin"), "{:?}", notes);
     assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));
 }
 

@@ -93,8 +93,8 @@ fn chunks_leave_no_trace_across_batches() {
     for chunk in (0..run.chunks()).rev() {
         write(&run, chunk);
     }
-    let joined = finish(run, &job);
-    assert_eq!(joined.tally.points, points);
+    let (tally, _) = finish(run, &job);
+    assert_eq!(tally.points, points);
     assert_eq!(fs::read(home.output()).unwrap(), bytes);
 }
 
@@ -226,7 +226,7 @@ fn the_sidecar_adds_up_the_sessions() {
     run.record(&session(7, 40)).unwrap();
     write_missing(&run);
     let tally = run.join(&job, &|| false).unwrap().unwrap();
-    run.complete(&job, tally, Some(session(9, 41))).unwrap();
+    run.complete(&job, &tally, Some(session(9, 41))).unwrap();
     let text = fs::read_to_string(home.0.path().join("x.run.json")).unwrap();
     let sidecar: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(sidecar["file"], "x.parquet");
@@ -248,7 +248,7 @@ fn the_tally_agrees_with_the_outcomes() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     let run = open(&home.output(), &job);
     write_missing(&run);
-    let tally = finish(run, &job).tally;
+    let (tally, _) = finish(run, &job);
     let layout = synthetic::layout();
     let position = |name: &str| layout.position(name).unwrap();
     let (reliable, ratio) = (position("reliable"), position("ratio_max"));

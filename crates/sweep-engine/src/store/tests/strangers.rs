@@ -88,8 +88,8 @@ fn leftovers_go_and_strangers_files_in_the_folder_stay() {
     let run = open(&home.output(), &job);
     assert!(!left.exists());
     write_missing(&run);
-    let joined = finish(run, &job);
+    let (_, notes) = finish(run, &job);
     assert!(mine.exists());
-    assert!(joined.notes[0].contains("could not be removed"), "{:?}", joined.notes);
+    assert!(notes[0].contains("could not be removed"), "{:?}", notes);
     assert_eq!(fs::read_dir(home.partial()).unwrap().count(), 1);
 }
