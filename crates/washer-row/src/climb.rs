@@ -3,7 +3,7 @@
 use washer_model::{Channel, ModelKind, Point, Swing};
 
 use crate::ladder::{Ladder, Rung};
-use crate::measures::{CREEPING_M_PER_S, Floor, Metric, TURN_FLOOR};
+use crate::measures::{CREEPING_M_PER_S, Floor, Left, Metric, TURN_FLOOR};
 use crate::outcome::{Deviations, Outcome, Status, Trajectory};
 use crate::run::{Rule, RungRun};
 use crate::twin::Departure;
@@ -157,7 +157,7 @@ impl Climb {
             return Some((share * found.of_numbers).max(unseen));
         }
         let of_caps = convergence.of_caps * found.of_caps;
-        Some(convergence.error_left(found.greatest(), unseen).max(of_caps))
+        Some(convergence.error_left(found.greatest(), unseen).max(of_caps).max(found.left))
     }
 
     fn error(&self, ladder: &Ladder) -> Option<f64> {
@@ -337,6 +337,8 @@ struct Difference {
     of_numbers: f64,
     /// In those of them that caps move more than the motion.
     of_caps: f64,
+    /// In those of which all of it is left.
+    left: f64,
 }
 
 impl Difference {
@@ -369,8 +371,9 @@ impl Judge<'_> {
             return is_one.then_some(Difference::default());
         }
         let of_course = self.point.course_difference(self.model, &a.course, &b.course);
-        let [of_motion, of_caps] = self.of_numbers(of_a, of_b);
-        Some(Difference { of_course, of_numbers: of_motion.max(of_caps), of_caps })
+        let [of_motion, of_caps, left] = self.of_numbers(of_a, of_b);
+        let of_numbers = of_motion.max(of_caps).max(left);
+        Some(Difference { of_course, of_numbers, of_caps, left })
     }
 
     /// The error that this rung has in common with others, so that no comparison shows it: what
@@ -458,24 +461,24 @@ impl Judge<'_> {
         METRIC_FLOOR * (to_s - from_s)
     }
 
-    /// The greatest relative differences of what a row takes from two trajectories: of the motion,
-    /// and of what caps move more.
-    fn of_numbers(&self, a: &Trajectory, b: &Trajectory) -> [f64; 2] {
+    /// The greatest relative differences of what a row takes from two trajectories, by what is left
+    /// of them ([`Left`]).
+    fn of_numbers(&self, a: &Trajectory, b: &Trajectory) -> [f64; 3] {
         let Self { point, rule, .. } = self;
-        let mut greatest = [0.0_f64; 2];
-        let mut compare = |is_of_caps: bool, a: f64, b: f64, least: f64| {
+        let mut greatest = [0.0_f64; 3];
+        let mut compare = |left: Left, a: f64, b: f64, least: f64| {
             if a != b {
                 // A quotient that is no number must not pass for none.
                 let share = (a - b).abs() / b.abs().max(least);
-                let greatest = &mut greatest[usize::from(is_of_caps)];
+                let greatest = &mut greatest[left as usize];
                 *greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
             }
         };
         for (a, b) in a.amplitudes.iter().zip(&b.amplitudes) {
-            compare(false, *a, *b, 0.0);
+            compare(Left::OfMotion, *a, *b, 0.0);
         }
         if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
-            compare(true, a, b, point.clearance_m());
+            compare(Left::OfCaps, a, b, point.clearance_m());
         }
         for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(rule.measures.of_model()) {
             let facts = number.metric.facts();
@@ -486,13 +489,13 @@ impl Judge<'_> {
                 Floor::PartOfWeight => METRIC_FLOOR * point.weight_n(),
                 Floor::Creeping => CREEPING_M_PER_S,
             };
-            compare(facts.is_of_caps, *a, *b, least);
+            compare(facts.left, *a, *b, least);
         }
         for (a, b) in a.turns.iter().zip(&b.turns) {
             for channel in &rule.channels {
                 let i = channel.index();
                 let (a, b) = (a[i].max(TURN_FLOOR), b[i].max(TURN_FLOOR));
-                compare(false, b + TURN_WEIGHT * (a - b), b, 0.0);
+                compare(Left::OfMotion, b + TURN_WEIGHT * (a - b), b, 0.0);
             }
         }
         greatest
