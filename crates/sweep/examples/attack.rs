@@ -342,7 +342,9 @@ fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
 fn with_elements(seed: u64, grid: &str, folder: &std::path::Path) -> String {
     let mut rng = Rng(seed.rotate_left(32));
     let unbalance = "[[further_unbalances]]\nmass_kg = 0.1\nx_m = 0.1\nradius_m = -0.2\n";
-    std::fs::write(folder.join("machine.toml"), format!("{WITH_ELEMENTS}\n{unbalance}"))
+    // Of its own: grids are read while others are written.
+    let machine = format!("machine-{seed}.toml");
+    std::fs::write(folder.join(&machine), format!("{WITH_ELEMENTS}\n{unbalance}"))
         .expect("the temporary folder can be written to");
     let mut set = String::new();
     for (name, value, powers) in ELEMENTS {
@@ -351,7 +353,7 @@ fn with_elements(seed: u64, grid: &str, folder: &std::path::Path) -> String {
             set += &format!("{name} = {}\n", value * 10f64.powf(rng.between(-powers, powers)));
         }
     }
-    grid.replacen("[set]\n", &format!("machine = \"machine.toml\"\n[set]\n{set}"), 1)
+    grid.replacen("[set]\n", &format!("machine = \"{machine}\"\n[set]\n{set}"), 1)
 }
 
 /// A grid whose drum runs up, brakes to a fraction of its speed within milliseconds, and goes on.
