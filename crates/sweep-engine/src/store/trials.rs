@@ -18,7 +18,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::open::{self, Claim};
@@ -142,12 +142,20 @@ impl Trials {
 
 /// The file of trials, made if need be; how many records it holds; and the trials in them.
 fn contents(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> Result<(File, usize, Known), StoreError> {
-    let mut file = regular::open_or_create(path).map_err(StoreError::io("open", path))?;
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(StoreError::io("read", path))?;
-    let records = bytes.chunks_exact(RECORD_BYTES);
-    let found = records.len();
-    Ok((file, found, records.filter_map(|record| decode(plan, record)).collect()))
+    let file = regular::open_or_create(path).map_err(StoreError::io("open", path))?;
+    let (mut found, mut known) = (0, Known::new());
+    // One by one: the file may be long, and somebody else's.
+    let mut records = BufReader::new(&file);
+    loop {
+        let mut record = [0; RECORD_BYTES];
+        match records.read_exact(&mut record) {
+            Ok(()) => found += 1,
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => break,
+            Err(error) => return Err(StoreError::io("read", path)(error)),
+        }
+        known.extend(decode(plan, &record));
+    }
+    Ok((file, found, known))
 }
 
 /// Whether the output is the finished file of this search and build.
