@@ -71,27 +71,55 @@ struct Smooth {
 
 impl Smooth {
     const NONE: Self = Self { slopes: [[N(0.0); STATES]; COORDINATES], corners: Vec::new() };
+}
 
-    /// Becomes the sum of some, so many times each.
-    #[inline(always)]
-    fn sum(&mut self, of: &[Self], times: &[f64]) {
-        for i in 0..COORDINATES {
-            let mut sums = [N(0.0); STATES];
-            for k in 0..of.len() {
-                for j in 0..STATES {
-                    sums[j] += of[k].slopes[i][j] * times[k];
-                }
-            }
-            self.slopes[i] = sums;
+/// How often each of what is summed counts.
+type Times = [f64; INSTANTS_AT_CORNERS];
+
+/// Sums of the same, each by times of its own. Coordinate by coordinate, so that what is summed
+/// stays in the nearest cache, and several at once, so that what is loaded serves them all.
+#[inline(always)]
+fn sum(of: &[Smooth], times: &[Times], sums: &mut [Smooth]) {
+    let ((times_of_four, times_of_rest), (fours, rest)) =
+        (times.as_chunks::<4>(), sums.as_chunks_mut::<4>());
+    for i in 0..COORDINATES {
+        for place in 0..fours.len() {
+            sum_slopes(of, i, &times_of_four[place], &mut fours[place]);
         }
-        self.corners.clear();
+        for place in 0..rest.len() {
+            sum_slopes(of, i, &[times_of_rest[place]], core::array::from_mut(&mut rest[place]));
+        }
+    }
+    for (place, times) in times.iter().enumerate() {
+        sums[place].corners.clear();
         for m in 0..of[0].corners.len() {
             let mut corner = Corner::none(N(0.0));
             for k in 0..of.len() {
                 corner.add(&of[k].corners[m], times[k]);
             }
-            self.corners.push(corner);
+            sums[place].corners.push(corner);
         }
+    }
+}
+
+/// The derivatives of one acceleration.
+#[inline(always)]
+fn sum_slopes<const SUMS: usize>(
+    of: &[Smooth],
+    i: usize,
+    times: &[Times; SUMS],
+    sums: &mut [Smooth; SUMS],
+) {
+    let mut sum = [[N(0.0); STATES]; SUMS];
+    for k in 0..of.len() {
+        for place in 0..SUMS {
+            for j in 0..STATES {
+                sum[place][j] += of[k].slopes[i][j] * times[place][k];
+            }
+        }
+    }
+    for place in 0..SUMS {
+        sums[place].slopes[i] = sum[place];
     }
 }
 
@@ -113,19 +141,20 @@ impl<T: Lane> Aside for Along<'_, T> {
         }
         let mut at = vec![Smooth::NONE; PLACES];
         let mut three = [Smooth::NONE; 3];
+        let mut parabolas = [[0.0; INSTANTS_AT_CORNERS]; PLACES];
+        for k in 0..PLACES {
+            let t = k as f64 / AT_ONCE as f64 - 1.0;
+            let through = [0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)];
+            parabolas[k][..through.len()].copy_from_slice(&through);
+        }
         for first in (0..self.clock.steps).step_by(AT_ONCE) {
             for (row, columns) in columns.iter_mut().enumerate() {
                 if self.forces.is_empty() {
-                    for k in 0..PLACES {
-                        interpolate(&taken[row], weights, 2 * first + k, &mut at[k]);
-                    }
+                    interpolate(&taken[row], weights, 2 * first, &mut at);
                 } else {
-                    for k in 0..three.len() {
-                        interpolate(&taken[row], weights, 2 * first + k * AT_ONCE, &mut three[k]);
-                    }
+                    interpolate(&taken[row], weights, 2 * first, &mut three);
+                    sum(&three, &parabolas, &mut at);
                     for k in 0..PLACES {
-                        let t = k as f64 / AT_ONCE as f64 - 1.0;
-                        at[k].sum(&three, &[0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)]);
                         self.apply(row, 2 * first + k, 1.0, &mut at[k]);
                     }
                 }
@@ -253,15 +282,21 @@ pub(super) fn weights(steps: usize, instants: usize) -> Vec<Vec<f64>> {
     weights
 }
 
-/// What is smooth at one of the places of [`weights`], counted through the turn.
+/// What is smooth from a place of [`weights`] on, counted through the turn, at even places of the
+/// next [`PLACES`].
 #[inline(always)]
-fn interpolate(taken: &[Smooth], weights: &[Vec<f64>], place: usize, at: &mut Smooth) {
-    let (first, part) = (place / weights.len(), place % weights.len());
-    let mut factors = [0.0; INSTANTS_AT_CORNERS];
-    for (instant, weight) in weights[part].iter().enumerate() {
-        factors[(first + instant) % taken.len()] = *weight;
+fn interpolate(taken: &[Smooth], weights: &[Vec<f64>], from: usize, at: &mut [Smooth]) {
+    let mut times = [[0.0; INSTANTS_AT_CORNERS]; PLACES];
+    let times = &mut times[..at.len()];
+    let every = (PLACES - 1) / (at.len() - 1);
+    for (k, times) in times.iter_mut().enumerate() {
+        let place = from + k * every;
+        let (first, part) = (place / weights.len(), place % weights.len());
+        for (instant, weight) in weights[part].iter().enumerate() {
+            times[(first + instant) % taken.len()] = *weight;
+        }
     }
-    at.sum(taken, &factors);
+    sum(taken, times, at);
 }
 
 /// One step of some disturbances; the derivatives are those at its stages.

@@ -108,7 +108,12 @@ pub(super) struct Seen {
 pub(super) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<Turned> {
     // Of a kind, what is seen comes first.
     let kind = |asked: &Asked<'_>| (asked.row.kind(), !asked.is_seen);
-    by_kind(asked, kind, |asked| Simd::best().dispatch(Turns { asked, is_stopped }))
+    by_kind(asked, kind, |asked| {
+        let turns = Turns { asked, is_stopped };
+        // Wide lanes that are mostly empty take longer than narrow ones.
+        let is_few = asked.len() <= Simd::narrow().lanes();
+        if is_few { Simd::dispatch_narrow(turns) } else { Simd::best().dispatch(turns) }
+    })
 }
 
 /// What is found of each: of those of a row's kind together, which come in the order of `kind`'s

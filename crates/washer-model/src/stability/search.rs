@@ -54,6 +54,9 @@ const LEAST_SIZE: f64 = 1e-4;
 /// The matrix is taken anew where a correction leaves more than this share of what was missing.
 const FAST_ENOUGH: f64 = 0.2;
 
+/// Less than this is missing no more after a correction by a state's own matrix.
+const NEXT_IS_LAST: f64 = 1e-3;
+
 /// How far a turn is from closing, as a share of its deviation; not finite if it left the model's
 /// range.
 pub(crate) fn missing(
@@ -84,8 +87,9 @@ pub(super) fn apart(monodromy: &Square) -> Option<Lu<STATES>> {
     Lu::new(apart)
 }
 
-/// The search for a periodic response at one speed, by Newton's method: with the matrix that it
-/// has as long as that brings it closer fast enough, else with the response's own.
+/// The search for a periodic response at one speed, by Newton's method: once with the matrix of a
+/// response nearby, whose hinge rings in another phase, then with one of its own as long as that
+/// brings it closer fast enough.
 pub(super) struct Solve<'a> {
     row: Row<'a>,
     state: [f64; STATES],
@@ -137,6 +141,7 @@ impl<'a> Search<'a> for Solve<'a> {
             (self.is_over, self.found) = (true, seen);
             return;
         }
+        let (is_own, is_borrowed) = (seen.is_some(), self.turns == 1 && seen.is_none());
         match seen {
             Some(seen) => {
                 self.factors = apart(&seen.monodromy);
@@ -154,7 +159,10 @@ impl<'a> Search<'a> for Solve<'a> {
             }
             // The next correction leaves as much less as the last one did.
             let rate = if self.missing.is_finite() { missing / self.missing } else { 1.0 };
-            self.is_last = missing * rate.min(1.0) < CLOSE;
+            self.is_last = missing * rate.min(1.0) < CLOSE || is_own && missing < NEXT_IS_LAST;
+            if is_borrowed {
+                self.factors = None;
+            }
             // Slow progress is judged over corrections, not over looks.
             self.missing = missing;
         }
