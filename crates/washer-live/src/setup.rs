@@ -161,9 +161,9 @@ const METHODS: [Method; 3] = [
 
 fn walk_rung(walk: &mut Walk<'_>, rung: &mut Rung) -> Option<()> {
     walk.choice(&mut rung.level, &Level::ALL)?;
-    let Convergence { contraction, of_caps, believed_to, own_error, expected } =
+    let Convergence { contraction, of_caps, of_earlier, believed_to, own_error, expected } =
         &mut rung.convergence;
-    walk.numbers([contraction, of_caps, believed_to, own_error, expected])?;
+    walk.numbers([contraction, of_caps, of_earlier, believed_to, own_error, expected])?;
     rung.follows_bearings = walk.count(usize::from(rung.follows_bearings))? > 0;
     let is_own = |method: &Method| discriminant(method) == discriminant(&rung.method);
     let place = METHODS.iter().position(is_own).unwrap_or(METHODS.len());

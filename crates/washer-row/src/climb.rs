@@ -54,6 +54,9 @@ const FREE_OF_MODES: f64 = 0.1;
 /// with the phase of the motion, and shrinks less from rung to rung than the motion's error does.
 const TURN_WEIGHT: f64 = 3.0;
 
+/// Differences of which all is left count so many times: an error of 1.86 times one was seen.
+const WEIGHT_OF_ALL: f64 = 2.0;
+
 /// The time of a clash on a capped rung errs by so many times its difference from the rung before:
 /// 2.6 was seen where drum and tub touch by a micrometre.
 const CLASH_WEIGHT: f64 = 4.0;
@@ -68,8 +71,8 @@ struct Climb {
     rung: usize,
     /// The last run, but for a twin's.
     run: Option<RungRun>,
-    /// How far it is from the run before; absent where they do not compare.
-    difference: Option<Difference>,
+    /// How far each run was from the one before; absent where they do not compare.
+    differences: Vec<Option<Difference>>,
     /// The error that `run` and the run before it have in common.
     unseen: f64,
     /// Whether the run before is capped and rings by more than is asked, and `run` is plain RK4:
@@ -136,18 +139,31 @@ impl Climb {
         self.unseen = by.unseen(&now, is);
         let of_clash = by.of_clash(&before, &now, is);
         self.besides = by.of_sag(&now, is).max(of_clash).max(by.of_gap(&now, is));
-        self.difference = found;
+        self.differences.push(found);
         (self.rung, self.run) = (rung, Some(now));
+    }
+
+    /// How far the last run is from the one before.
+    fn difference(&self) -> Option<Difference> {
+        *self.differences.last()?
+    }
+
+    /// How far the numbers of the one before were from its own, if there was one.
+    fn earlier(&self) -> f64 {
+        let earlier = self.differences.iter().rev().nth(1);
+        earlier.map_or(0.0, |found| found.map_or(f64::INFINITY, |found| found.of_numbers))
     }
 
     /// The error left of what is compared; absent where nothing says so. `unseen` is what no
     /// comparison shows.
     fn error_with(&self, ladder: &Ladder, unseen: f64) -> Option<f64> {
+        let convergence = &ladder.rungs[self.rung].convergence;
+        // Not a number, and left out, where no share of an infinite one counts.
+        let unseen = unseen.max(convergence.of_earlier * self.earlier());
         if self.is_chaotic() {
             return self.spread().map(|spread| (ROUGHLY * spread).max(unseen));
         }
-        let found = self.difference.filter(|_| !self.is_beside_what_rings)?;
-        let convergence = &ladder.rungs[self.rung].convergence;
+        let found = self.difference().filter(|_| !self.is_beside_what_rings)?;
         let is_common = found.of_course <= COMMON_COURSE;
         let is_finer = ladder.is_finer(self.rung);
         // From the reference on, a course in common is enough: phases that differ, and bearings
@@ -177,7 +193,7 @@ impl Climb {
 
     /// How far the numbers of the row are from those of the run before, and from the twin's.
     fn spread(&self) -> Option<f64> {
-        let from_before = self.difference?.of_numbers;
+        let from_before = self.difference()?.of_numbers;
         match self.twin {
             Some(twin) => twin.spread.map(|spread| spread.max(from_before)),
             None => Some(from_before),
@@ -314,7 +330,7 @@ impl Climbs {
             outcome.error = errors.map(|(nonlinear, linear)| nonlinear.max(linear));
             outcome.converged = Some(outcome.error.is_some_and(|error| error <= rule.accuracy));
             // A twin that is off where RK4 agrees with itself leaves an error, and no chaos.
-            let of_rk4 = nonlinear.difference.map(|difference| difference.of_numbers);
+            let of_rk4 = nonlinear.difference().map(|difference| difference.of_numbers);
             let disagrees = of_rk4.is_none_or(|of_numbers| of_numbers > rule.accuracy);
             outcome.sensitive = Some(nonlinear.is_chaotic() && disagrees);
         }
@@ -470,6 +486,7 @@ impl Judge<'_> {
             if a != b {
                 // A quotient that is no number must not pass for none.
                 let share = (a - b).abs() / b.abs().max(least);
+                let share = if left == Left::All { WEIGHT_OF_ALL * share } else { share };
                 let greatest = &mut greatest[left as usize];
                 *greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
             }

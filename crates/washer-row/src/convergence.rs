@@ -16,6 +16,9 @@ pub struct Convergence {
     pub contraction: f64,
     /// The same of what caps move more than the motion.
     pub of_caps: f64,
+    /// The error left as a share of the difference before the last one, at least: two runs may
+    /// agree by chance, three hardly do.
+    pub of_earlier: f64,
     /// Up to which difference that is so. Beyond, errors are not of first order, and the difference
     /// itself counts.
     pub believed_to: f64,
@@ -30,6 +33,7 @@ impl Convergence {
     pub const NONE: Self = Self {
         contraction: 1.0,
         of_caps: 0.0,
+        of_earlier: 0.0,
         believed_to: 0.0,
         own_error: 0.0,
         expected: f64::INFINITY,
