@@ -403,13 +403,16 @@ impl Judge<'_> {
         })
     }
 
-    /// What caps make of the time of a clash that just happens, by its difference from the run
-    /// before: it is as the root of the depth, and has no first order.
+    /// What caps make of the time of a clash, or of a stop's contact, that just happens, by its
+    /// difference from the run before: it is as the root of the depth, and has no first order.
     fn of_clash(&self, before: &RungRun, run: &RungRun, rung: &Rung) -> f64 {
-        let times_s = self.clash_s(before).zip(self.clash_s(run));
-        times_s.filter(|_| rung.level.is_capped()).map_or(0.0, |(a_s, b_s)| {
-            CLASH_WEIGHT * (a_s - b_s).abs() / b_s.max(self.clash_floor_s())
-        })
+        let numbers = self.rule.measures.of_model().zip(&before.trajectory.metrics);
+        let numbers = numbers.zip(&run.trajectory.metrics).filter(|((number, _), _)| {
+            rung.level.is_capped() && number.metric.facts().floor == Floor::PartOfWindow
+        });
+        let floor_s = self.clash_floor_s();
+        let shares = numbers.map(|((_, a_s), b_s)| (a_s - b_s).abs() / b_s.max(floor_s));
+        CLASH_WEIGHT * shares.fold(0.0, f64::max)
     }
 
     /// What the gap rings where it may be least, as a share of the clearance. No motion amplifies
