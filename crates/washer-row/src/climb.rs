@@ -177,7 +177,8 @@ impl Climb {
     }
 
     fn error(&self, ladder: &Ladder) -> Option<f64> {
-        self.error_with(ladder, self.unseen).map(|error| error.max(self.besides))
+        let error = self.error_with(ladder, self.unseen)?.max(self.besides);
+        error.is_finite().then_some(error)
     }
 
     /// The error left, also where errors are not of first order any more.

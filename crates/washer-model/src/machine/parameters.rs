@@ -24,6 +24,9 @@ pub struct Parameter {
     index: usize,
 }
 
+/// Farther than this (m) is no place on a machine, and no motion of one.
+pub(crate) const FARTHEST_M: f64 = 10.0;
+
 /// Where a parameter's default comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
@@ -270,10 +273,15 @@ impl Parameter {
         self.row.source
     }
 
-    /// Values it may take.
+    /// Values it may take. No place on a machine is farther than [`FARTHEST_M`]: who writes
+    /// millimetres is told.
     #[must_use]
     pub fn range(&self) -> Range {
-        self.row.range
+        match (self.row.unit, self.row.range) {
+            ("m", Range::Any) => Range::Within(-FARTHEST_M, FARTHEST_M),
+            ("m", Range::NonNegative) => Range::Within(0.0, FARTHEST_M),
+            (_, range) => range,
+        }
     }
 
     /// What it writes.

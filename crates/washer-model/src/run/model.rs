@@ -6,6 +6,7 @@ use crate::lanes::InLanes;
 use crate::linear::outputs::{LinearMotion, LinearOutputs};
 use crate::linear::rotor_terms::Terms;
 use crate::linear::step::{self, RotorAt, StepConstants};
+use crate::machine::parameters::FARTHEST_M;
 use crate::machine::spin::{SpinLanes, SpinState, SpinStretch};
 use crate::nonlinear;
 use crate::nonlinear::ahead::derivative_ahead;
@@ -17,9 +18,6 @@ use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
 use crate::point::Point;
 use core::f64::consts::FRAC_PI_2;
 use lane_ode::{Lane, N, Sample, SemiImplicit, System, Task, Tolerance, additive, dopri5};
-
-/// Coordinates farther than this from equilibrium (m) have left the machine.
-const FARTHEST_M: f64 = 10.0;
 
 /// One of the two models, over lanes.
 pub(crate) trait Model<T: Lane>: System<T, STATES> {
