@@ -13,8 +13,8 @@
 //!
 //! The promise: every row that is neither sensitive nor unconverged has RK4's status, RK4's verdict
 //! and RK4's amplitudes within the accuracy; a row is sensitive only where RK4 does not agree with
-//! itself. RK4 runs here at half the step of the fast method's reference, and at an eighth in grids
-//! where that is off. Where verdicts differ, RK4 at the reference's very step has the word. Exits
+//! itself. RK4 runs here at half the step of the fast method's reference, and at a sixteenth in
+//! grids where that is off. Where verdicts differ, RK4 at the reference's very step has the word. Exits
 //! with 1 if a row breaks the promise.
 //!
 //! With `grazing`, the clearance of each grid is such that drum and tub just touch in one of its
@@ -445,7 +445,7 @@ fn attack(seed: u64, kind: Kind, folder: &std::path::Path) -> Found {
         let mut judge = halved;
         if difference(&plan, row, judge) > accuracy {
             // It may be the judge that is off: rows climb to shorter steps.
-            let finer = Integrator::Rk4 { step_s: step_s / 4.0 };
+            let finer = Integrator::Rk4 { step_s: step_s / 8.0 };
             judge = &quarter.get_or_insert_with(|| evaluate(finer))[i];
         }
         let (halved, error) = (judge, difference(&plan, row, judge));
