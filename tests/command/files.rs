@@ -90,7 +90,7 @@ fn no_command_writes_over_what_is_not_its_own() {
 fn a_result_has_no_name_of_another_format() {
     let home = fresh_home();
     for writer in WRITERS.iter().filter(|writer| writer[0] != "plot") {
-        let said = assert_refused(&home.sweep(&[writer, &["x.CSV"]].concat()), writer, "x.CSV");
+        let said = assert_refused(&home.sweep(&[*writer, &["x.CSV"]].concat()), writer, "x.CSV");
         assert!(said.contains("Parquet") && said.contains("`sweep export`"), "{said}");
     }
     assert_eq!(home.names(), ["g.toml", "map.parquet"]);

@@ -73,7 +73,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     trials.take_notes().iter().for_each(|note| tell(note));
     let there = trials.count() as u64;
     if there > 0 {
-        tell(&format!("going on from {}", counted(there as usize, "point")));
+        tell(&format!("going on: {} there", counted(there as usize, "point")));
     }
     let began = Instant::now();
     let effort = args.effort.with(&interrupt);

@@ -310,7 +310,7 @@ mod tests {
     #[test]
     fn an_error_that_nothing_has_is_left_out() {
         let greatest_error = Some(Extreme { value: f64::INFINITY, point: 0 });
-        let by_method = vec![("fast".to_owned(), 1)];
+        let by_method = [("fast".to_owned(), 1)].into();
         let tally = Tally { points: 1, greatest_error, by_method, ..Tally::default() };
         let said = counts(&tally, 2.0.into(), &|_| String::new());
         assert!(said.contains("error  rows by method: 1 fast"), "{said}");
