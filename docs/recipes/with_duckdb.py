@@ -1,9 +1,9 @@
 """The map with DuckDB: SQL on the file as it lies there, its metadata included.
 
-    python docs/recipes/with_duckdb.py results/quick.parquet [MASS_KG]
+    python docs/recipes/with_duckdb.py results/quick.parquet [FIRST]
 
-Answers: which least damping keeps this unbalance reliable? And where does the drum come nearest to
-the tub?
+Answers: from which value of the second axis on is this value of the first reliable? And where does
+the drum come nearest to the tub?
 """
 
 import sys
@@ -16,28 +16,34 @@ UNITS = """
     WHERE decode(pair.key) = 'sweep.columns'
 """
 
-# A row without a verdict (null) is not a reliable one.
-LEAST_DAMPING = """
-    WITH at_mass AS (
+AXES = """
+    SELECT decode(value)::JSON ->> '$.axis[*].parameter'
+    FROM parquet_kv_metadata($path) WHERE decode(key) = 'sweep.plan'
+"""
+
+# Names of columns cannot be parameters of a query, and are put in. A row without a verdict (null)
+# is not a reliable one.
+LEAST_SECOND = """
+    WITH at_first AS (
         SELECT * FROM read_parquet($path)
-        WHERE unbalance_mass_kg = (
-            SELECT min(unbalance_mass_kg) FROM read_parquet($path)
-            WHERE unbalance_mass_kg >= $mass_kg
+        WHERE {first_axis} = (
+            SELECT min({first_axis}) FROM read_parquet($path)
+            WHERE {first_axis} >= $first
         )
     )
     SELECT
-        min(unbalance_mass_kg),
-        min(damping_n_s_per_m) FILTER (
-            damping_n_s_per_m > coalesce(
-                (SELECT max(damping_n_s_per_m) FROM at_mass WHERE reliable IS NOT TRUE),
+        min({first_axis}),
+        min({second_axis}) FILTER (
+            {second_axis} > coalesce(
+                (SELECT max({second_axis}) FROM at_first WHERE reliable IS NOT TRUE),
                 '-infinity'::DOUBLE
             )
         )
-    FROM at_mass
+    FROM at_first
 """
 
 NEAREST = """
-    SELECT unbalance_mass_kg, damping_n_s_per_m, min_gap_nonlinear_m, reliable
+    SELECT {first_axis}, {second_axis}, min_gap_nonlinear_m, reliable
     FROM read_parquet($path) ORDER BY min_gap_nonlinear_m LIMIT 5
 """
 
@@ -47,27 +53,38 @@ def units(path):
     return dict(duckdb.execute(UNITS, {"path": path}).fetchall())
 
 
-def least_damping(path, mass_kg):
-    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which
-    on it is reliable.
+def axes(path):
+    """The names of the map's two axes."""
+    return duckdb.execute(AXES, {"path": path}).fetchone()[0]
 
-    The damping is None if even the strongest of the map does not do.
+
+def of_axes(query, path):
+    """A query with the names of the map's axes."""
+    first_axis, second_axis = axes(path)
+    return query.format(first_axis=first_axis, second_axis=second_axis)
+
+
+def least_second(path, first):
+    """The first value of the first axis that is not below `first`, and the value of the second axis
+    from which on it is reliable; None if even the greatest is not.
     """
-    return duckdb.execute(LEAST_DAMPING, {"path": path, "mass_kg": mass_kg}).fetchone()
+    return duckdb.execute(of_axes(LEAST_SECOND, path), {"path": path, "first": first}).fetchone()
 
 
 def main():
     """Read the command line, tell."""
-    path, mass_kg = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else 0.6
+    path, first = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else float("-inf")
     print(f"the five least gaps ({units(path)['min_gap_nonlinear_m']}), nonlinear model")
-    for mass, damping, gap, reliable in duckdb.execute(NEAREST, {"path": path}).fetchall():
+    first_axis, second_axis = axes(path)
+    nearest = duckdb.execute(of_axes(NEAREST, path), {"path": path})
+    for at_first, at_second, gap, reliable in nearest.fetchall():
         print(
-            f"  {gap:.5f} at {mass:g} kg, {damping:g} N "
-            f"s/m{'' if reliable else ', where the linear model is wrong'}"
+            f"  {gap:.5f} at {first_axis} {at_first:g}, {second_axis} {at_second:g}"
+            f"{'' if reliable else ', where the linear model is wrong'}"
         )
-    mass, damping = least_damping(path, mass_kg)
-    answer = "at no damping of this map" if damping is None else f"from {damping:g} N s/m"
-    print(f"{mass_kg:g} kg stays reliable {answer} (grid: {mass:g} kg)")
+    kept, least = least_second(path, first)
+    answer = "none of this map" if least is None else f"{least:g} and above"
+    print(f"{first_axis} {kept:g} stays reliable at {second_axis} {answer}")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """The map with pandas, which drops metadata: units come from the file by way of pyarrow.
 
-    python docs/recipes/with_pandas.py results/quick.parquet [MASS_KG]
+    python docs/recipes/with_pandas.py results/quick.parquet [FIRST]
 
-Answers: which least damping keeps this unbalance reliable? And shows the map as a table.
+Answers: from which value of the second axis on is this value of the first reliable? And shows the
+map as a table.
 """
 
 import json
@@ -23,39 +24,38 @@ def load(path):
     return pd.read_parquet(path, dtype_backend="pyarrow")
 
 
-def least_damping(path, mass_kg):
-    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which
-    on it is reliable.
+def axes(path):
+    """The names of the map's two axes."""
+    plan = json.loads(pq.read_metadata(path).metadata[b"sweep.plan"])
+    return [axis["parameter"] for axis in plan["axis"]]
 
-    The damping is None if even the strongest of the map does not do.
+
+def least_second(path, first):
+    """The first value of the first axis that is not below `first`, and the value of the second axis
+    from which on it is reliable; None if even the greatest is not.
     """
-    reliable = load(path).pivot(
-        index="damping_n_s_per_m", columns="unbalance_mass_kg", values="reliable"
-    )
-    mass = min(mass for mass in reliable.columns if mass >= mass_kg)
-    # From the strongest damping down, as long as every one is reliable; a row without a verdict is
+    first_axis, second_axis = axes(path)
+    reliable = load(path).pivot(index=second_axis, columns=first_axis, values="reliable")
+    first = min(value for value in reliable.columns if value >= first)
+    # From the greatest value down, as long as every one is reliable; a row without a verdict is
     # not.
-    column = reliable[mass].sort_index(ascending=False).fillna(False)
+    column = reliable[first].sort_index(ascending=False).fillna(False)
     kept = column[column.astype(bool).cummin()]
-    return mass, kept.index.min() if len(kept) else None
+    return first, kept.index.min() if len(kept) else None
 
 
 def main():
     """Read the command line, tell."""
-    path, mass_kg = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else 0.6
+    path, first = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else float("-inf")
     unit = units(path)
     table = load(path)
-    print(
-        f"ratio_max over damping ({unit['damping_n_s_per_m']}) and mass "
-        f"({unit['unbalance_mass_kg']})"
-    )
-    picture = table.pivot(
-        index="damping_n_s_per_m", columns="unbalance_mass_kg", values="ratio_max"
-    )
+    first_axis, second_axis = axes(path)
+    print(f"ratio_max over {second_axis} ({unit[second_axis]}) and {first_axis}")
+    picture = table.pivot(index=second_axis, columns=first_axis, values="ratio_max")
     print(picture.sort_index(ascending=False).to_string(float_format="{:.2f}".format))
-    mass, damping = least_damping(path, mass_kg)
-    answer = "at no damping of this map" if damping is None else f"from {damping:g} N s/m"
-    print(f"{mass_kg:g} kg stays reliable {answer} (grid: {mass:g} kg)")
+    kept, least = least_second(path, first)
+    answer = "none of this map" if least is None else f"{least:g} and above"
+    print(f"{first_axis} {kept:g} stays reliable at {second_axis} {answer}")
 
 
 if __name__ == "__main__":

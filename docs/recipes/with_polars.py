@@ -1,8 +1,9 @@
 """The map with polars, lazily: only the columns and row groups that a question needs are read.
 
-    python docs/recipes/with_polars.py results/quick.parquet [MASS_KG]
+    python docs/recipes/with_polars.py results/quick.parquet [FIRST]
 
-Answers: which least damping keeps each unbalance reliable, and which channel decides?
+Answers: from which value of the second axis on is each of the first reliable, and which channel
+decides?
 """
 
 import json
@@ -17,45 +18,42 @@ def units(path):
     return {name: facts["unit"] for name, facts in dictionary.items()}
 
 
+def axes(path):
+    """The names of the map's two axes."""
+    plan = json.loads(pl.read_parquet_metadata(path)["sweep.plan"])
+    return [axis["parameter"] for axis in plan["axis"]]
+
+
 def requirement(path):
-    """One row per mass of the grid: the damping from which on it is reliable; null if no damping of
-    the map does."""
+    """One row per value of the first axis: the value of the second one from which on it is
+    reliable; null if even the greatest is not."""
+    first_axis, second_axis = axes(path)
     rows = pl.scan_parquet(path)
     # A row without a verdict (null) is not a reliable one.
-    worst = pl.col("damping_n_s_per_m").filter(~pl.col("reliable").fill_null(False)).max()
-    above = pl.col("damping_n_s_per_m").filter(
-        pl.col("damping_n_s_per_m") > worst.fill_null(float("-inf"))
-    )
-    return (
-        rows.group_by("unbalance_mass_kg")
-        .agg(above.min().alias("damping_n_s_per_m"))
-        .sort("unbalance_mass_kg")
-    )
+    worst = pl.col(second_axis).filter(~pl.col("reliable").fill_null(False)).max()
+    above = pl.col(second_axis).filter(pl.col(second_axis) > worst.fill_null(float("-inf")))
+    return rows.group_by(first_axis).agg(above.min().alias(second_axis)).sort(first_axis)
 
 
-def least_damping(path, mass_kg):
-    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which
-    on it is reliable.
-
-    The damping is None if even the strongest of the map does not do.
+def least_second(path, first):
+    """The first value of the first axis that is not below `first`, and the value of the second axis
+    from which on it is reliable; None if even the greatest is not.
     """
-    return requirement(path).filter(pl.col("unbalance_mass_kg") >= mass_kg).first().collect().row(0)
+    return requirement(path).filter(pl.col(axes(path)[0]) >= first).first().collect().row(0)
 
 
 def main():
     """Read the command line, tell."""
-    path, mass_kg = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else 0.6
+    path, first = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else float("-inf")
     unit = units(path)
-    print(
-        f"damping ({unit['damping_n_s_per_m']}) from which on a mass ({unit['unbalance_mass_kg']}) "
-        f"is reliable"
-    )
+    first_axis, second_axis = axes(path)
+    print(f"{second_axis} ({unit[second_axis]}) from which on a value of {first_axis} is reliable")
     print(requirement(path).collect())
     deciding = pl.col("ratio_max_channel")
     print(pl.scan_parquet(path).group_by(deciding).len().sort("len", descending=True).collect())
-    mass, damping = least_damping(path, mass_kg)
-    answer = "at no damping of this map" if damping is None else f"from {damping:g} N s/m"
-    print(f"{mass_kg:g} kg stays reliable {answer} (grid: {mass:g} kg)")
+    kept, least = least_second(path, first)
+    answer = "none of this map" if least is None else f"{least:g} and above"
+    print(f"{first_axis} {kept:g} stays reliable at {second_axis} {answer}")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """The map with pyarrow, which sees everything: types, nulls, and the file's own metadata.
 
-    python docs/recipes/with_pyarrow.py results/quick.parquet [MASS_KG]
+    python docs/recipes/with_pyarrow.py results/quick.parquet [FIRST]
 
-Answers: which least damping keeps this unbalance reliable?
+Answers: from which value of the second axis on is this value of the first reliable?
 """
 
 import json
@@ -18,35 +18,40 @@ def units(path):
     return {name: dictionary[name]["unit"] for name in pq.read_schema(path).names}
 
 
-def least_damping(path, mass_kg):
-    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which
-    on it is reliable.
+def axes(path):
+    """The names of the map's two axes."""
+    plan = json.loads(pq.read_metadata(path).metadata[b"sweep.plan"])
+    return [axis["parameter"] for axis in plan["axis"]]
 
-    The damping is None if even the strongest of the map does not do.
+
+def least_second(path, first):
+    """The first value of the first axis that is not below `first`, and the value of the second axis
+    from which on it is reliable; None if even the greatest is not.
     """
-    columns = ["unbalance_mass_kg", "damping_n_s_per_m", "reliable"]
-    rows = pq.read_table(path, columns=columns)
-    heavier = rows.filter(pc.field("unbalance_mass_kg") >= mass_kg)
-    mass = pc.min(heavier["unbalance_mass_kg"]).as_py()
-    column = heavier.filter(pc.field("unbalance_mass_kg") == mass)
+    first_axis, second_axis = axes(path)
+    rows = pq.read_table(path, columns=[first_axis, second_axis, "reliable"])
+    rows = rows.filter(pc.field(first_axis) >= first)
+    first = pc.min(rows[first_axis]).as_py()
+    column = rows.filter(pc.field(first_axis) == first)
     # A row without a verdict (null) is not a reliable one.
     reliable = pc.field("reliable").is_valid() & pc.field("reliable")
-    worst = pc.max(column.filter(~reliable)["damping_n_s_per_m"]).as_py()
-    above = column if worst is None else column.filter(pc.field("damping_n_s_per_m") > worst)
-    return mass, pc.min(above["damping_n_s_per_m"]).as_py()
+    worst = pc.max(column.filter(~reliable)[second_axis]).as_py()
+    above = column if worst is None else column.filter(pc.field(second_axis) > worst)
+    return first, pc.min(above[second_axis]).as_py()
 
 
 def main():
     """Read the command line, tell."""
-    path, mass_kg = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else 0.6
+    path, first = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else float("-inf")
     metadata = pq.read_metadata(path).metadata
     plan = json.loads(metadata[b"sweep.plan"])
     print(f"{plan['name']}: made by sweep {metadata[b'sweep.version'].decode()}")
+    first_axis, second_axis = axes(path)
     for name, unit in units(path).items():
         print(f"  {name:24} {unit}")
-    mass, damping = least_damping(path, mass_kg)
-    answer = "at no damping of this map" if damping is None else f"from {damping:g} N s/m"
-    print(f"{mass_kg:g} kg stays reliable {answer} (grid: {mass:g} kg)")
+    kept, least = least_second(path, first)
+    answer = "none of this map" if least is None else f"{least:g} and above"
+    print(f"{first_axis} {kept:g} stays reliable at {second_axis} {answer}")
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 """The map as an xarray dataset: one dimension per axis of the grid, units and descriptions as
 attributes.
 
-    python docs/recipes/with_xarray.py results/quick.parquet [MASS_KG [PICTURE.png | MAP.nc]]
+    python docs/recipes/with_xarray.py results/quick.parquet [FIRST [PICTURE.png | MAP.nc]]
 
-Answers: which least damping keeps this unbalance reliable? Works for any number of axes; with two
-it draws the map. A name that ends in .nc is written as NetCDF (with `pip install netCDF4`), for
-MATLAB, Octave and ncview.
+Answers: from which value of the second axis on is this value of the first reliable? Draws the map.
+A name that ends in .nc is written as NetCDF (with `pip install netCDF4`), for MATLAB, Octave and
+ncview.
 """
 
 import json
@@ -45,18 +45,18 @@ def units(path):
     return {name: variable.attrs["units"] for name, variable in load(path).variables.items()}
 
 
-def least_damping(path, mass_kg):
-    """(mass, damping): the first mass of the grid not below `mass_kg`, and the damping from which
-    on it is reliable.
-
-    The damping is None if even the strongest of the map does not do.
+def least_second(path, first):
+    """The first value of the first axis that is not below `first`, and the value of the second axis
+    from which on it is reliable; None if even the greatest is not.
     """
-    column = load(path)["reliable"].sel(unbalance_mass_kg=mass_kg, method="bfill")
-    # From the strongest damping down, as long as every one is reliable; a row without a verdict is
+    data = load(path)["reliable"]
+    first_axis, second_axis = data.dims
+    column = data.isel({first_axis: data[first_axis].values.searchsorted(first)})
+    # From the greatest value down, as long as every one is reliable; a row without a verdict is
     # not.
-    downward = column.sortby("damping_n_s_per_m", ascending=False) == True  # noqa: E712
-    kept = downward.damping_n_s_per_m.where(downward.cumprod("damping_n_s_per_m") == 1, drop=True)
-    return float(column.unbalance_mass_kg), float(kept.min()) if kept.size else None
+    downward = column.sortby(second_axis, ascending=False) == True  # noqa: E712
+    kept = downward[second_axis].where(downward.cumprod(second_axis) == 1, drop=True)
+    return float(column[first_axis]), float(kept.min()) if kept.size else None
 
 
 def write_netcdf(data, path):
@@ -67,20 +67,21 @@ def write_netcdf(data, path):
 
 def main():
     """Read the command line, tell, draw."""
-    path, mass_kg = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else 0.6
+    path, first = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else float("-inf")
     data = load(path)
+    first_axis, second_axis = data["reliable"].dims
     print(data["ratio_max"])
     if len(sys.argv) > 3 and sys.argv[3].endswith(".nc"):
         write_netcdf(data, sys.argv[3])
-    elif len(sys.argv) > 3 and data["ratio_max"].ndim == 2:
+    elif len(sys.argv) > 3:
         limit = json.loads(data.attrs["plan"])["reliability"]["ratio_limit"]
         data["ratio_max"].plot.contourf(
-            x="unbalance_mass_kg", levels=[0, 1, limit, 5, 10, 50], figsize=(8, 6)
+            x=first_axis, levels=[0, 1, limit, 5, 10, 50], figsize=(8, 6)
         )
         plt.savefig(sys.argv[3], dpi=120)
-    mass, damping = least_damping(path, mass_kg)
-    answer = "at no damping of this map" if damping is None else f"from {damping:g} N s/m"
-    print(f"{mass_kg:g} kg stays reliable {answer} (grid: {mass:g} kg)")
+    kept, least = least_second(path, first)
+    answer = "none of this map" if least is None else f"{least:g} and above"
+    print(f"{first_axis} {kept:g} stays reliable at {second_axis} {answer}")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 """Holds the reading recipes against each other, on a map as it is and on the same map with verdicts
-taken out.
+taken out, and its second axis under another name.
 
     python scripts/checks/check_recipes.py MAP.parquet
 
@@ -22,21 +22,21 @@ LIBRARIES = ["pyarrow", "pandas", "polars", "duckdb", "xarray"]
 
 def by_hand(path, mass_kg):
     """The answer by plain loops over plain rows."""
-    columns = ["unbalance_mass_kg", "damping_n_s_per_m", "reliable"]
-    rows = pq.read_table(path, columns=columns).to_pylist()
+    second = pq.read_schema(path).names[2]
+    rows = pq.read_table(path, columns=["unbalance_mass_kg", second, "reliable"]).to_pylist()
     mass = min(row["unbalance_mass_kg"] for row in rows if row["unbalance_mass_kg"] >= mass_kg)
     column = [row for row in rows if row["unbalance_mass_kg"] == mass]
     kept = None
-    for row in sorted(column, key=lambda row: -row["damping_n_s_per_m"]):
+    for row in sorted(column, key=lambda row: -row[second]):
         if row["reliable"] is not True:
             break
-        kept = row["damping_n_s_per_m"]
+        kept = row[second]
     return mass, kept
 
 
 def without_verdicts(path, copy):
     """Takes out the verdict of every seventh point, and of all at the strongest damping and the
-    greatest mass."""
+    greatest mass; calls the damping friction."""
     table = pq.read_table(path)
     strongest = pc.equal(table["damping_n_s_per_m"], pc.max(table["damping_n_s_per_m"]))
     greatest = pc.equal(table["unbalance_mass_kg"], pc.max(table["unbalance_mass_kg"]))
@@ -44,9 +44,11 @@ def without_verdicts(path, copy):
     gone = pc.or_(pa.chunked_array([pa.array(point % 7 == 3)]), pc.and_(strongest, greatest))
     place = table.column_names.index("reliable")
     verdicts = pc.if_else(gone, pa.scalar(None, pa.bool_()), table["reliable"])
-    told = pq.read_metadata(path).metadata
-    table = table.set_column(place, table.field(place), verdicts).replace_schema_metadata(told)
-    pq.write_table(table, copy)
+    renamed = [b"damping_n_s_per_m", b"friction_n"]
+    told = {key: value.replace(*renamed) for key, value in pq.read_metadata(path).metadata.items()}
+    old, new = (name.decode() for name in renamed)
+    table = table.set_column(place, table.field(place), verdicts).rename_columns({old: new})
+    pq.write_table(table.replace_schema_metadata(told), copy)
 
 
 def main():
@@ -69,7 +71,7 @@ def main():
                 right = by_hand(file, mass_kg)
                 answers.append(right)
                 for name, recipe in recipes.items():
-                    answer = tuple(recipe.least_damping(file, mass_kg))
+                    answer = tuple(recipe.least_second(file, mass_kg))
                     if answer != right:
                         found = f"{name}: {answer} for {mass_kg} kg in {file}"
                         wrong.append(f"{found}; by hand {right}")

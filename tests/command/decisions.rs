@@ -229,8 +229,8 @@ fn a_trace_says_which_limit_its_point_breaks() {
 #[test]
 fn a_report_names_quantities_in_words_and_both_limits() {
     let grid = grid(3, 2).replace("ratio_limit = 2.0", "ratio_limit = 2.0\nratio_min = 0.999");
-    let home = Home::new(&format!("metrics = [\"damper_speed\"]\n{grid}"));
-    let done = home.sweep(&["run", "g.toml", "--progress", "none"]);
+    let home = Home::new(&format!("metrics = [\"damper_speed\", \"static_sag\"]\n{grid}"));
+    let done = home.sweep(&["run", "g.toml", "--set", "spin_ramp_s=0.05", "--progress", "none"]);
     assert_eq!(code(&done), Some(0), "{}", said(&done));
     let written = home.sweep(&["report", MAP, "-o", "r.html"]);
     assert_eq!(code(&written), Some(0), "{}", said(&written));
@@ -240,10 +240,14 @@ fn a_report_names_quantities_in_words_and_both_limits() {
         ">Tub front, vertical<",
         ">Least ratio<",
         ">Damper speed<",
+        ">Static sag<",
+        ">Ratio tub yaw<",
+        "Resonances at Unbalance mass 0.525",
         "Unbalance mass ",
     ] {
         assert!(page.contains(text), "{text}");
     }
+    assert_eq!(page.matches(">Tub front, vertical<").count(), 1, "of the nonlinear model alone");
     // Each damper's are among those of all, and numbers stay with their units.
     assert!(!page.contains("Damper 1 speed"), "numbered");
     assert!(page.contains("\u{a0}N\u{a0}s/m") && page.contains("\u{a0}m/s"), "units");

@@ -70,7 +70,7 @@ fn a_point_may_stand_in_place_of_an_axis() {
         let dwell = ["dwell", "grid.toml", "--speed", "250", "--starts", "1", "--out", file];
         let done = sweep(&folder, &[&dwell[..], &point].concat(), None);
         assert!(
-            said(&done).contains("1 at 1 points and speeds: 1 quasi periodic"),
+            said(&done).contains("1 at 1 point and speed: 1 quasi periodic"),
             "{}",
             said(&done)
         );

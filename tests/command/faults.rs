@@ -393,7 +393,7 @@ fn a_folder_that_cannot_be_written_is_told() {
     let words = home.words();
     let run = output(home.under(&[]).args(&words[..words.len() - 1]).arg(&blocked));
     assert_eq!(run.status.code(), Some(1), "{}", said(&run));
-    assert!(said(&run).contains("write elsewhere with --out"), "{}", said(&run));
+    assert!(said(&run).contains("or give another path"), "{}", said(&run));
     assert!(Path::new(&home.path("g.toml")).is_file());
 }
 

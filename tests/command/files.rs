@@ -87,6 +87,52 @@ fn no_command_writes_over_what_is_not_its_own() {
 }
 
 #[test]
+fn a_result_has_no_name_of_another_format() {
+    let home = fresh_home();
+    for writer in WRITERS.iter().filter(|writer| writer[0] != "plot") {
+        let said = assert_refused(&home.sweep(&[*writer, &["x.CSV"]].concat()), writer, "x.CSV");
+        assert!(said.contains("Parquet") && said.contains("`sweep export`"), "{said}");
+    }
+    assert_eq!(home.names(), ["g.toml", "map.parquet"]);
+}
+
+#[test]
+fn a_file_of_another_kind_is_said_to_be_one_and_nothing_else() {
+    let home = fresh_home();
+    assert!(home.sweep(&["init", "--machine", "m.toml"]).status.success());
+    let study = "grid = \"g.toml\"\nseed = 1\n[[parameter]]\nname = \"friction_n\"\n";
+    fs::write(home.path("s.toml"), study).expect("a study is written");
+    for (file, text) in [("gm.toml", "m.toml"), ("gg.toml", "g.toml")] {
+        let grid = grid(5, 8).replace("[spin]", &format!("machine = \"{text}\"\n[spin]"));
+        fs::write(home.path(file), grid).expect("a grid is written");
+    }
+    for (words, kind, help) in [
+        (["run", "m.toml"], "a machine file", "a grid file names it: machine = \"m.toml\""),
+        (["optimise", "m.toml"], "a machine file", "machine = \"m.toml\""),
+        (["check", "s.toml"], "a study file", "`sweep optimise` takes it"),
+        (["optimise", "g.toml"], "a grid file", "a study file names it: grid = \"g.toml\""),
+        (["check", "gg.toml"], "a grid file", "`sweep run` takes it"),
+    ] {
+        let run = home.sweep(&words);
+        let said = said(&run);
+        assert_eq!(run.status.code(), Some(2), "{words:?}: {said}");
+        let one = said.contains("1 mistake,") && said.contains(&format!("this is {kind}"));
+        assert!(one && said.contains(help), "{words:?}: {said}");
+    }
+    assert!(home.sweep(&["check", "gm.toml"]).status.success());
+}
+
+#[test]
+fn help_is_of_what_the_command_has() {
+    let home = fresh_home();
+    for words in [["init", "nodir/x.toml"], ["init", "g.toml/x.toml"], ["plot", "no.parquet"]] {
+        let said = said(&home.sweep(&words));
+        let is_foreign = said.contains("--out") || said.contains("chunks");
+        assert!(said.contains("= help: ") && !is_foreign, "{words:?}: {said}");
+    }
+}
+
+#[test]
 fn a_figure_does_not_overwrite_its_data_by_any_path() {
     let home = fresh_home();
     fs::rename(home.path("map.parquet"), home.path("map.svg")).expect("the map is renamed");

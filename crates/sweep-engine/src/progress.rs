@@ -4,6 +4,7 @@ use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use crate::config::section::counted;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sweep_files::panics::lock;
 
@@ -85,7 +86,7 @@ impl Progress {
 
     /// The points of a search and their rate.
     fn points(&self, points: u64) -> String {
-        format!("{points} points, {}", per_second(self.rate(points)))
+        format!("{}, {}", counted(points as usize, "point"), per_second(self.rate(points)))
     }
 
     /// Says it beside the bar, which counts on its own; or in a line, and then none for a while.

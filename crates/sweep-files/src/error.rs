@@ -97,17 +97,17 @@ fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
              finished chunks are kept"
         }
         io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied => {
-            "make it writable for this user, or write elsewhere with --out"
+            "give this user the right to it, or another path"
         }
         io::ErrorKind::NotFound => {
             if let Some(near) = near(path) {
                 return format!("{} is there: is it meant?", near.display()).into();
             }
-            "check the name; if it was there and has vanished, bring it back and run the same \
-             command again: chunks that are still there are used"
+            "check the name and its folder; if it has vanished, bring it back and run the same \
+             command again"
         }
         io::ErrorKind::NotADirectory => {
-            "a part of that path is a file, not a folder: move it, or write elsewhere with --out"
+            "a part of that path is a file, not a folder: move it, or give another path"
         }
         io::ErrorKind::InvalidInput => "give the name of a regular file",
         _ => {

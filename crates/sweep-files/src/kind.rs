@@ -114,6 +114,14 @@ impl FileKind<'_> {
         self.own().map_or("map", |(_, word, ..)| word)
     }
 
+    /// The format that an ending says, if files of this kind are of another.
+    pub(crate) fn other_format(self, path: &Path) -> Option<&'static str> {
+        const OTHERS: &str = "csv tsv txt json toml xlsx ods nc h5 svg png pdf html zip";
+        let ending = path.extension()?;
+        let is_parquet = self == Self::Map || self.own().is_some();
+        OTHERS.split(' ').find(|other| is_parquet && ending.eq_ignore_ascii_case(other))
+    }
+
     fn own(self) -> Option<&'static (FileKind<'static>, &'static str, &'static str, &'static str)> {
         OWN.iter().find(|(kind, ..)| *kind == self)
     }

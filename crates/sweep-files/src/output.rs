@@ -100,6 +100,13 @@ pub fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
     if folder_alike(&text) || text.strip_suffix('.').is_some_and(folder_alike) {
         return refuse("it is the name of a folder", NAME_A_FILE);
     }
+    if let Some(ending) = kind.other_format(path) {
+        return refuse(
+            &format!("it ends in .{ending}, and the file would be Parquet"),
+            "give a name that ends in .parquet; `sweep export` makes CSV or Excel of the file, and \
+             `sweep plot` pictures",
+        );
+    }
     let found = regular::if_there(fs::symlink_metadata(path));
     let Some(found) = found.map_err(FileError::io("look at", path))? else { return Ok(()) };
     if found.is_symlink() {

@@ -124,10 +124,11 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     })
 }
 
-/// Resonances of the plan's own machine, before the axes, up to its greatest speed; none where it
+/// Resonances of the machine at the middle of every axis, up to its greatest speed; none where it
 /// has no modes.
 pub(crate) fn resonances(plan: &Plan) -> Vec<[String; 3]> {
-    let (machine, spin) = (plan.model.machine.clone(), plan.model.spin.clone());
+    let middle: Vec<f64> = plan.axes.iter().map(|axis| axis.values.between(0.5)).collect();
+    let Washer { machine, spin, .. } = plan.scenario_at(&middle).model;
     let greatest_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
     let count = (greatest_rpm / MODES_EVERY_RPM).ceil() as u32;
     let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODES_EVERY_RPM * f64::from(k)).collect();

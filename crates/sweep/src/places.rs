@@ -1,7 +1,7 @@
 //! Where rows about held speeds are: points by the values of their axes.
 
+use sweep_engine::commands::cells::short;
 use sweep_files::{ParquetFile, key};
-use washer_model::decimal;
 
 /// The axes that a file has columns of.
 pub(crate) fn axes(file: &ParquetFile) -> Vec<String> {
@@ -14,8 +14,18 @@ pub(crate) fn axes(file: &ParquetFile) -> Vec<String> {
 /// A point in words, as `unbalance_mass_kg 0.4, 250 rpm`.
 pub(crate) fn words(axes: &[String], values: &[f64]) -> String {
     let one = |(name, value): (&String, &f64)| match name.as_str() {
-        "speed_rpm" => format!("{} rpm", decimal(*value)),
-        _ => format!("{name} {}", decimal(*value)),
+        "speed_rpm" => format!("{} rpm", short(*value)),
+        _ => format!("{name} {}", short(*value)),
     };
     axes.iter().zip(values).map(one).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn numbers_are_rounded_for_people() {
+        let axes = ["mass_kg", "speed_rpm"].map(str::to_owned);
+        let said = super::words(&axes, &[0.939_999_999_999_999_8, 250.0]);
+        assert_eq!(said, "mass_kg 0.94, 250 rpm");
+    }
 }

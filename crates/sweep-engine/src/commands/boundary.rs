@@ -8,6 +8,7 @@ use super::{GridArgs, Lines as _, installed, short};
 use crate::asking::{Asking, Stopped};
 use crate::boundary::quantity::offered;
 use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, trace};
+use crate::config::section::counted;
 use crate::effort::{Effort, EffortArgs};
 use crate::store::{Column, OpenedTrials, Trials};
 use crate::{Axis, Error, Exit, Plan, Progress, StoreError, Swept, duration, show, tell};
@@ -72,16 +73,15 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     trials.take_notes().iter().for_each(|note| tell(note));
     let there = trials.count() as u64;
     if there > 0 {
-        tell(&format!("going on: {there} points are there"));
+        tell(&format!("going on: {} there", counted(there as usize, "point")));
     }
     let began = Instant::now();
     let effort = args.effort.with(&interrupt);
     let (found, trials) = search(&task, Some(trials), effort)?;
     let Some(found) = found else {
-        let kept = trials.map_or(0, |trials| trials.count());
+        let kept = counted(trials.map_or(0, |trials| trials.count()), "point");
         let wall = duration(began.elapsed().as_secs_f64());
-        let mut text =
-            format!("{}: interrupted with {kept} points kept, after {wall}\n", plan.name);
+        let mut text = format!("{}: interrupted with {kept} kept, after {wall}\n", plan.name);
         text.line("go on", "the same command");
         tell(text.trim_end());
         return Ok(Exit::interrupted(interrupt.signal()));
@@ -121,12 +121,12 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
     let BoundaryTask { plan, quantity, search, .. } = task;
     let grid: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
     let mut text = format!(
-        "{}: {} = {} traced with {} points (the grid has {grid}) in {} rounds, {}\n",
+        "{}: {} = {} traced with {} (the grid has {grid}) in {}, {}\n",
         plan.name,
         quantity.name,
         quantity.limit,
-        traced.trials,
-        traced.rounds,
+        counted(traced.trials, "point"),
+        counted(traced.rounds, "round"),
         duration(wall_s)
     );
     let rows = || traced.curves.iter().flatten();
@@ -145,7 +145,7 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
     let brackets = rows().flat_map(|row| &row.edges).filter_map(|edge| edge.bracket);
     if let Some(widest) = brackets.map(|[low, high]| high - low).reduce(f64::max) {
         let unit = plan.axes.get(1).map_or("", |axis| axis.parameter.unit());
-        let told = format!("at most {widest:.3} {unit} wide (asked: {})", search.tolerance);
+        let told = format!("at most {widest:.3} {unit} wide (asked: {})", short(search.tolerance));
         text.line("brackets", told);
     }
     // Cells of a logarithmic axis grow: the largest counts.

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use super::{Lines as _, quoted, short, table};
-use crate::config::section::cut;
+use crate::config::section::{counted, cut};
 use crate::{Build, Error, Exit, StoreError, show, tell};
 use fail_on::FailOn;
 use sweep_files::{FileKind, Output};
@@ -263,7 +263,8 @@ fn boundary(moved: &Moved) -> String {
         }
     };
     if !moved.unlike.is_empty() {
-        let _ = write!(told, "; {} lines have other numbers of crossings", moved.unlike.len());
+        let lines = counted(moved.unlike.len(), "line");
+        let _ = write!(told, "; other numbers of crossings in {lines}");
     }
     told
 }

@@ -2,6 +2,7 @@
 
 use super::run::rows;
 use super::{Lines as _, ResultArgs, installed};
+use crate::config::section::counted;
 use crate::store::{OpenRun, Opened};
 use crate::{Error, Exit, Job, Plan, Swept, tell};
 use std::path::Path;
@@ -44,7 +45,7 @@ pub fn of_job(name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
         return Ok(Exit::interrupted(interrupt.signal()));
     };
     run.complete(job, &tally, None)?.iter().for_each(|note| tell(note));
-    let mut text = format!("{name}: joined {} points\n", tally.points);
+    let mut text = format!("{name}: joined {}\n", counted(tally.points as usize, "point"));
     text += &rows(&tally, job);
     text.line("file", output.display());
     tell(text.trim_end());

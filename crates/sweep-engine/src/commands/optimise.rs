@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::cells::table as text_table;
 use super::{Lines as _, installed, word};
+use crate::config::section::counted;
 use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
@@ -88,7 +89,8 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     }
     let (candidates, rows) = (tried.len() as u64, study.rows());
     let how = format!(
-        "{candidates} candidates of {rows} points in {}, {:.0} points/s",
+        "{candidates} candidates of {} in {}, {:.0} points/s",
+        counted(rows as usize, "point"),
         duration(wall_s),
         (candidates * rows) as f64 / wall_s
     );

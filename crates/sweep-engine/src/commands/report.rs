@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::show::Further;
 use super::{conditions, short, word};
+use crate::columns::MODELS;
 use crate::store::read::{Tally, tally};
 use crate::{Error, Exit, GridInput, Plan, Swept, tell};
 use sweep_files::{FileKind, Output, ParquetFile, key};
@@ -32,7 +33,8 @@ pub struct Args {
     requirements: Vec<String>,
 }
 
-/// The resonances of a plan's model: motion, speed with its unit, and damping ratio of each.
+/// The resonances of a plan's model at the middle of every axis: motion, speed with its unit, and
+/// damping ratio of each.
 pub type Resonances<M> = dyn Fn(&Plan<M>) -> Vec<[String; 3]>;
 
 /// Writes the page.
@@ -74,8 +76,8 @@ pub fn run<M: Swept>(
          ratio of the nonlinear model to the linear one is {range}. {sensitive} are chaotic, \
          {undefined} have no verdict.{over}</p>\n"
     );
-    let heads = ["nonlinear model", "worst", "limit", "at"];
-    body += &table("The worst of it", &heads, &worst(&file, limits)?);
+    let heads = ["", "worst", "limit", "at"];
+    body += &table("The worst of it", &heads, &worst(&file)?);
     let mut held = true;
     let mut claims = Vec::new();
     for condition in &requirements {
@@ -106,7 +108,10 @@ pub fn run<M: Swept>(
     if let Ok(run) = &run {
         let found: Vec<_> = resonances(run).into_iter().map(Vec::from).collect();
         let heads = ["motion", "resonance", "damping ratio"];
-        body += &table("Resonances of the machine as given", &heads, &found);
+        let middle: Vec<_> =
+            run.axes.iter().map(|axis| Cell::Number(axis.values.between(0.5))).collect();
+        let title = format!("Resonances at {}", place(&file, &middle));
+        body += &table(title.trim_end_matches(" at "), &heads, &found);
     }
     body += &about;
     if let Ok(run) = &run {
@@ -132,45 +137,47 @@ fn within(limits: RatioLimits) -> String {
     )
 }
 
-/// The worst value, its limit and its place, for every quantity of the nonlinear model. What has
-/// numbers, as of the second foot, is among those of all.
-fn worst(file: &ResultTable, limits: Option<RatioLimits>) -> Result<Vec<Vec<String>>, Error> {
+/// The worst value, its limit and its place, for every quantity that is bad one way, but those of
+/// the linear model. What has numbers, as of the second foot, is among those of all.
+fn worst(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
     let axes = file.axes();
-    let unit_of = |name: &str| file.column(name).map_or("", |column| column.unit.as_str());
     let mut found = Vec::new();
     for column in &file.columns {
         let name = column.name.as_str();
-        let limit = match name {
-            "ratio_max" => limits.map(|limits| limits.most),
-            "ratio_min" => limits.and_then(|limits| limits.least),
-            _ => column.limit,
-        };
-        let is_ratio = ["ratio_max", "ratio_min"].contains(&name);
         let is_numbered =
             name.split('_').nth(1).is_some_and(|word| word.chars().all(|c| c.is_ascii_digit()));
-        let is_shown = is_ratio || name.contains("nonlinear") || name.contains("growth");
-        let Some(worse) = column.worse.filter(|_| is_shown && !is_numbered) else { continue };
+        let is_shown = !is_numbered && name.split('_').all(|word| word != MODELS[1]);
+        let Some(worse) = column.worse.filter(|_| is_shown) else { continue };
         let columns: Vec<&str> = [name].into_iter().chain(axes.iter().copied()).collect();
         let rows = top(file, &columns, None, Some((name, worse)), 1)?;
         let Some([value, at @ ..]) = rows.first().map(Vec::as_slice) else { continue };
         let Cell::Number(number) = value else { continue };
-        // A number stays with its unit on one line.
-        let with_unit = |text: String, unit: &str| match unit {
-            "" => text,
-            unit => format!("{text} {unit}").replace(' ', "\u{a0}"),
-        };
-        let places = axes.iter().zip(at).map(|(axis, value)| {
-            format!("{} {}", words(axis), with_unit(word(value), unit_of(axis)))
-        });
         let shown = |value: f64| with_unit(significant(value, 4), &column.unit);
         found.push(vec![
             quantity(name),
             shown(*number),
-            limit.map_or_else(String::new, shown),
-            places.collect::<Vec<_>>().join(", "),
+            column.limit.map_or_else(String::new, shown),
+            place(file, at),
         ]);
     }
     Ok(found)
+}
+
+/// Values of the axes in words.
+fn place(file: &ResultTable, at: &[Cell]) -> String {
+    let unit_of = |name: &str| file.column(name).map_or("", |column| column.unit.as_str());
+    let axes = file.axes().into_iter().zip(at);
+    let values =
+        axes.map(|(axis, at)| format!("{} {}", words(axis), with_unit(word(at), unit_of(axis))));
+    values.collect::<Vec<_>>().join(", ")
+}
+
+/// A number, which stays with its unit on one line.
+fn with_unit(text: String, unit: &str) -> String {
+    match unit {
+        "" => text,
+        unit => format!("{text} {unit}").replace(' ', "\u{a0}"),
+    }
 }
 
 /// How many of a machine's numbers have which source, with the names of those that are few.

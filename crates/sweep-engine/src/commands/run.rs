@@ -198,10 +198,11 @@ impl RunCommand<'_> {
 
 /// What this process did.
 fn work(session: &Session) -> String {
-    let Session { points, threads, simd, .. } = session;
+    let Session { simd, .. } = session;
     let (wall, rate) = (duration(session.wall_s), per_second(session.points_per_s));
-    let threads = counted(*threads, "thread");
-    format!("{points} points in {wall}, {rate} on {threads} ({simd})")
+    let points = counted(session.points as usize, "point");
+    let threads = counted(session.threads, "thread");
+    format!("{points} in {wall}, {rate} on {threads} ({simd})")
 }
 
 /// A result's rows: verdicts, failures, extremes. At most six lines.
@@ -277,8 +278,11 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
     if let Some(greatest) = &tally.greatest_error {
         let methods: Vec<String> =
             tally.by_method.iter().map(|(method, count)| format!("{count} {method}")).collect();
-        let (error, methods) = (greatest.value, methods.join(", "));
-        text.line("error", format!("at most {error:.1e} left in a row; rows by method: {methods}"));
+        // What failed has no finite one.
+        let error = Some(greatest.value).filter(|error| error.is_finite());
+        let left = error.map(|error| format!("at most {error:.1e} left in a row; "));
+        let left = left.unwrap_or_default();
+        text.line("error", format!("{left}rows by method: {}", methods.join(", ")));
     }
     let place = |point: u64| match at(point) {
         place if place.is_empty() => place,
@@ -301,6 +305,16 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::read::Extreme;
+
+    #[test]
+    fn an_error_that_nothing_has_is_left_out() {
+        let greatest_error = Some(Extreme { value: f64::INFINITY, point: 0 });
+        let by_method = [("fast".to_owned(), 1)].into();
+        let tally = Tally { points: 1, greatest_error, by_method, ..Tally::default() };
+        let said = counts(&tally, 2.0.into(), &|_| String::new());
+        assert!(said.contains("error  rows by method: 1 fast"), "{said}");
+    }
 
     #[test]
     fn the_share_is_of_points_with_a_verdict() {

@@ -3,7 +3,7 @@
 use super::draft::Draft;
 use super::keys::Options;
 use super::sections::{described, sections, walk};
-use super::source::{Location, is_blank};
+use super::source::{Location, SourceId, is_blank};
 use super::syntax::{self, parse};
 use super::written::name_of;
 use super::{
@@ -11,6 +11,8 @@ use super::{
 };
 use crate::Design;
 use crate::plan::Plan;
+use crate::program;
+use toml::de::DeTable;
 
 /// Reads the grid file and puts the constants in place. `None` if the grid file has no text.
 pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
@@ -28,6 +30,9 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
         return None;
     }
     let table = parse(&text, source, report);
+    if is_another::<M>("grid", table.get_ref(), source, report) {
+        return None;
+    }
     let root = Section::new("the grid file", Location::new(source, 0..0), table.get_ref(), report);
 
     let mut keys = Keys::new(Walk::Read(root));
@@ -53,4 +58,45 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
     walk(&mut draft.plan, &mut Keys::new(Walk::Set(&options)));
     draft.plan.set.extend(options.changed.into_inner());
     Some(draft)
+}
+
+/// The keys of study files.
+const STUDY: [&str; 8] =
+    ["name", "grid", "parameter", "population", "candidates", "seed", "objective", "conditions"];
+
+/// Refuses a file as a whole that should be of one kind and is of another: it has most of its keys
+/// from that one, and none that the other has not.
+pub fn is_another<M: Read>(
+    own: &str,
+    table: &DeTable<'_>,
+    source: SourceId,
+    report: &Report,
+) -> bool {
+    let grid = described::<M>().finish();
+    let has = |kind: &str, key: &str| match kind {
+        "grid" => ["set", "axis"].contains(&key) || grid["properties"].get(key).is_some(),
+        "study" => STUDY.contains(&key),
+        _ => M::is_own_key(key),
+    };
+    let keys: Vec<&str> = table.keys().map(|key| &**key.get_ref()).collect();
+    let is = |kind: &&str| {
+        let theirs = keys.iter().filter(|key| has(kind, key)).count();
+        2 * theirs > keys.len() && keys.iter().all(|key| has(kind, key) || !has(own, key))
+    };
+    let kinds = [own, "grid", "study", M::OWN_FILE.unwrap_or_default()];
+    let Some(kind) = kinds.into_iter().find(is).filter(|kind| *kind != own) else { return false };
+    report.push_with(|sources| {
+        let (program, name) = (program(), sources.name(source));
+        let help = match kind {
+            "grid" => {
+                format!("`{program} run` takes it, and a study file names it: grid = {name:?}")
+            }
+            "study" => format!("`{program} optimise` takes it"),
+            _ => format!("a grid file names it: {kind} = {name:?}"),
+        };
+        Diagnostic::new(format!("this is a {kind} file"))
+            .at(&Location::new(source, 0..0), format!("expected a {own} file"))
+            .help(help)
+    });
+    true
 }

@@ -14,6 +14,11 @@ pub trait Read: Model {
     /// What to do where there is no grid file yet.
     const TO_START: Option<&'static str> = None;
 
+    /// Whether files of the model's own have this key at the top.
+    fn is_own_key(_: &str) -> bool {
+        false
+    }
+
     /// The model before anything is read: what is left out has these values.
     fn blank() -> Self;
 

@@ -10,7 +10,7 @@ use sweep_results::{Column, Goal, Mistake, columns};
 use super::Evolution;
 use crate::config::axes::{add, spacing};
 use crate::config::design::{DEFAULT_SEED, MOST_SEED};
-use crate::config::grid::draft;
+use crate::config::grid::{draft, is_another};
 use crate::config::parameters::find;
 use crate::config::section::listed;
 use crate::config::sections::name;
@@ -84,6 +84,9 @@ impl<M: Rows> Study<M> {
         let help = "docs/optimise.md has one to start from";
         let (text, source) = syntax::text(path, "study", Some(help), report)?;
         let table = parse(&text, source, report);
+        if is_another::<M>("study", table.get_ref(), source, report) {
+            return None;
+        }
         let root =
             Section::new("the study file", Location::new(source, 0..0), table.get_ref(), report);
         let name = name(&root, path);

@@ -28,7 +28,7 @@ pub(crate) fn told(source: &Source, live: Option<&Live>) -> String {
         live.into_iter().flat_map(|live| live.resonances.iter().cloned().map(Vec::from)).collect();
     let heads = ["Motion", "Resonance", "Damping ratio"];
     table("What was run", &["", ""], &run)
-        + &table("Resonances of the machine as given", &heads, &resonances)
+        + &table("Resonances at the middle of the map", &heads, &resonances)
 }
 
 /// What to be careful about, of a map.

@@ -2,6 +2,7 @@
 //! `[reliability]`, `[stability]`.
 
 use serde_json::json;
+use sweep_engine::config::grid::is_another;
 use sweep_engine::config::report::{Diagnostic, Report};
 use sweep_engine::config::section::{Field, Section, cut};
 use sweep_engine::config::source::{Location, beside, read};
@@ -11,6 +12,7 @@ use washer_model::Machine;
 use washer_row::{Metric, Part};
 
 use super::{GridInput, machine, machine_json};
+use crate::model::Washer;
 use crate::speeds::SpeedList;
 
 /// `machine` when the grid names none.
@@ -61,6 +63,9 @@ fn named(input: &GridInput, root: &Section<'_>) -> Machine {
 fn machine_of(text: &str, name: &str, report: &Report) -> Machine {
     let source = report.add(name, text);
     let table = parse(text, source, report);
+    if is_another::<Washer>("machine", table.get_ref(), source, report) {
+        return Machine::paper();
+    }
     let at = Location::new(source, 0..0);
     machine::read(text, Section::new("the machine file", at, table.get_ref(), report))
 }

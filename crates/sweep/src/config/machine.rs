@@ -274,6 +274,15 @@ pub(crate) fn to_json(machine: &Machine) -> Value {
     Keys::told(false, |keys| walk(&mut machine.clone(), keys)).finish()
 }
 
+/// Whether a machine file has this key at the top.
+pub(super) fn is_key(key: &str) -> bool {
+    let mut parts = PARTS.iter().zip(&*KEYS);
+    parts.any(|(part, own)| match part.section {
+        "" => own.iter().any(|own| own.name == key),
+        section => section == key,
+    })
+}
+
 /// Walks over every section.
 fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
     for (part, own) in PARTS.iter().zip(&*KEYS) {

@@ -5,7 +5,7 @@ use sweep_engine::config::{Draft, Key, Keys, Kind, Read, Walk};
 use washer_model::Machine;
 use washer_row::{Criterion, Measures, Metric};
 
-use super::{GridInput, grid, schema, spin, validate};
+use super::{GridInput, grid, machine, schema, spin, validate};
 use crate::model::Washer;
 
 impl Read for Washer {
@@ -13,6 +13,10 @@ impl Read for Washer {
 
     const TO_START: Option<&'static str> =
         Some("`sweep init FILE` writes a grid file to start from");
+
+    fn is_own_key(key: &str) -> bool {
+        machine::is_key(key)
+    }
 
     fn blank() -> Self {
         let (machine, spin) = (Machine::paper(), spin::BLANK);

@@ -53,7 +53,8 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
     })?;
     let list: Vec<String> =
         kinds.iter().map(|(kind, count)| format!("{count} {}", kind.replace('_', " "))).collect();
-    let counted = format!("{rows} at {places} points and speeds: {}", list.join(", "));
+    let s = if places == 1 { "" } else { "s" };
+    let counted = format!("{rows} at {places} point{s} and speed{s}: {}", list.join(", "));
     let mut lines = vec![("motions", counted)];
     for (name, farthest) in TOLD.iter().zip(&farthest) {
         if let Some((value, kind, at)) = farthest {

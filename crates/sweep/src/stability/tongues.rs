@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use washer_model::decimal;
 
 use crate::places;
+use sweep_engine::config::section::counted;
 use sweep_files::{FileError, ParquetFile};
 
 /// Tongues that a summary lists.
@@ -99,12 +100,12 @@ impl Summary {
         let mut lines = vec![(
             "stable",
             format!(
-                "{} of {} rows, {} not, {} without a response; {} points",
+                "{} of {} rows, {} not, {} without a response; {}",
                 self.rows - self.unstable - self.without - self.beyond,
                 self.rows,
                 self.unstable,
                 self.without,
-                self.points
+                counted(self.points as usize, "point")
             ),
         )];
         if self.beyond > 0 {
