@@ -59,6 +59,17 @@ pub struct Plan<M: Model> {
 #[derive(Clone, Debug, Default)]
 pub struct WrittenIn(pub BTreeMap<String, String>);
 
+impl WrittenIn {
+    /// Where single numbers of these names were written, in words; `None` of what was not.
+    #[must_use]
+    pub fn source(&self, names: &[impl AsRef<str>]) -> Option<String> {
+        let mut places: Vec<&str> =
+            names.iter().filter_map(|name| Some(self.0.get(name.as_ref())?.as_str())).collect();
+        places.dedup();
+        (!places.is_empty()).then(|| format!("given: {}", places.join(", ")))
+    }
+}
+
 impl PartialEq for WrittenIn {
     fn eq(&self, _: &Self) -> bool {
         true

@@ -295,7 +295,7 @@ fn fitted<'a>(
         problem.model = ModelKind::Linear;
     }
     let mut repeated = None;
-    if options.bootstrap > 0 {
+    if options.bootstrap > 0 && best.is_settled {
         repeated = Some(bootstrap(&mut problem, &best.x, &against, options.bootstrap, work)?);
     }
     let found = report::Found {
@@ -428,7 +428,7 @@ fn bootstrap(
         }
         let made = AtomicUsize::new(0);
         let search = Search { problem, journal: None, work, made: &made };
-        let again = search.from(x)?;
+        let again = search.from(x)?.filter(|again| again.is_settled);
         found.extend(again.map(|again| again.x[..problem.free.len()].to_vec()));
     }
     problem.cases = measured;

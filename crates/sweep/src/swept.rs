@@ -1,7 +1,5 @@
 //! What computes the washing machine's rows, for the engine's commands.
 
-use std::borrow::Cow;
-
 use sweep_engine::estimate::Estimate;
 use sweep_engine::{Engine, Error, Swept};
 use washer_model::{Machine, Parameter, Spin, Target};
@@ -72,14 +70,9 @@ impl Swept for Washer {
                 _ => parameter.get(machine, spin).filter(|_| plan.is_some() || !of_grid),
             };
             // A parameter of several numbers: each may have been written elsewhere.
-            let place = |part: Cow<'_, str>| plan?.written.0.get(part.as_ref()).map(String::as_str);
-            let mut places: Vec<&str> =
-                parameter.parts(machine).into_iter().filter_map(place).collect();
-            places.dedup();
-            let source = match of_grid || places.is_empty() {
-                true => parameter.source().to_string(),
-                false => format!("given: {}", places.join(", ")),
-            };
+            let given = |plan: &Plan| plan.written.source(&parameter.parts(machine));
+            let given = plan.filter(|_| !of_grid).and_then(given);
+            let source = given.unwrap_or_else(|| parameter.source().to_string());
             Listed { parameter, value, source }
         };
         Parameter::all(machine, spin).into_iter().map(row).collect()
@@ -95,6 +88,7 @@ mod tests {
 
     use super::*;
     use sweep_engine::commands::parameters::as_json;
+    use sweep_engine::plan::WrittenIn;
 
     #[test]
     fn json_holds_every_parameter() {
@@ -110,7 +104,7 @@ mod tests {
     #[test]
     fn what_a_user_wrote_is_not_ascribed_to_the_paper_whatever_its_value() {
         let folder = tempfile::tempdir().unwrap();
-        let machine = crate::config::machine_file(&Machine::paper())
+        let machine = crate::config::machine_file(&Machine::paper(), &WrittenIn::default())
             + "friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n";
         std::fs::write(folder.path().join("own.toml"), machine).unwrap();
         let grid = folder.path().join("grid.toml");

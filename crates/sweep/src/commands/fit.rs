@@ -99,7 +99,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     };
     if let Some(path) = &args.out {
         let (machine, _) = fitted.problem.machine(0, &fitted.x);
-        let text = config::machine_file(&machine);
+        let text = config::machine_file(&machine, &fitted.problem.written());
         if !atomic::create(atomic::parent(path), path, text.as_bytes())? {
             return Err(taken(path));
         }

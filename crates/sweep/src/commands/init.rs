@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use washer_model::Machine;
 
 use crate::config;
+use sweep_engine::plan::WrittenIn;
 use sweep_engine::{Error, Exit, print, tell};
 use sweep_files::atomic;
 
@@ -27,7 +28,10 @@ pub struct Args {
 /// # Errors
 /// When the file exists or cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let text = if args.machine { config::machine_file(&Machine::paper()) } else { GRID.to_owned() };
+    let text = match args.machine {
+        true => config::machine_file(&Machine::paper(), &WrittenIn::default()),
+        false => GRID.to_owned(),
+    };
     let default = if args.machine { "machine.toml" } else { "grid.toml" };
     let path = args.file.as_deref().unwrap_or(Path::new(default));
     if path == Path::new("-") {

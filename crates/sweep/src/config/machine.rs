@@ -15,6 +15,7 @@ use sweep_engine::config::report::{Diagnostic, Report};
 use sweep_engine::config::schema::{document, of};
 use sweep_engine::config::section::{Field, Section};
 use sweep_engine::config::source::is_blank;
+use sweep_engine::plan::WrittenIn;
 
 /// A section of the machine file. It holds the parameters whose names begin with its prefix. Three
 /// that differ in a component are an array: `inertia_kg_m2` holds `inertia_11_kg_m2` and two more.
@@ -419,9 +420,9 @@ fn value(name: &str, machine: &Machine) -> Option<f64> {
     find(name, machine)?.get(machine, &no_spin())
 }
 
-/// The machine as the text of a machine file, each number with its meaning and source: loading it
-/// gives the same machine, bit for bit.
-pub(crate) fn to_toml(machine: &Machine) -> String {
+/// The machine as the text of a machine file, each number with its meaning and source, the built-in
+/// machine's if it was not written: loading it gives the same machine, bit for bit.
+pub(crate) fn to_toml(machine: &Machine, written: &WrittenIn) -> String {
     let mut text = "# A machine in full, in SI units. Lengths in m from O, midway between the \
                     bearings before loading: x along the\n\
          # drum axis towards the door, y up, z sideways. Inertia about each body's own mass \
@@ -436,18 +437,21 @@ pub(crate) fn to_toml(machine: &Machine) -> String {
         }
         for key in own {
             let Some(values) = key.given(part, k, machine) else { continue };
-            let written = match key.is_vector() {
+            let line = match key.is_vector() {
                 true => format!("{} = {values:?}", key.name),
                 false => format!("{} = {:?}", key.name, values[0]),
             };
-            let first = find(&key.names(&part.prefix(k))[0], machine);
-            match first.filter(|_| key.left_out == LeftOut::Refused) {
+            let names = key.names(&part.prefix(k));
+            let given = written.source(&names);
+            let is_said = given.is_some() || key.left_out == LeftOut::Refused;
+            match find(&names[0], machine).filter(|_| is_said) {
                 Some(first) => {
-                    let (source, said) = (first.source(), first.description());
+                    let source = given.unwrap_or_else(|| first.source().to_string());
+                    let said = first.description();
                     let said = if key.is_vector() { String::new() } else { format!("{said} ") };
-                    text.push_str(&format!("{written:<40} # {said}[{source}]\n"));
+                    text.push_str(&format!("{line:<40} # {said}[{source}]\n"));
                 }
-                None => text.push_str(&format!("{written}\n")),
+                None => text.push_str(&format!("{line}\n")),
             }
         }
     }

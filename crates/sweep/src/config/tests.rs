@@ -19,6 +19,7 @@ use super::*;
 use crate::method::Integrator;
 use crate::plan::AxisValues;
 use sweep_engine::design::{Design, Rule};
+use sweep_engine::plan::WrittenIn;
 
 /// What the fuzzer's inputs are read as.
 #[path = "../../../../fuzz/src/input.rs"]
@@ -221,7 +222,11 @@ fn a_written_machine_reads_back_the_same_bits() {
     full.cabinet = Some(washer_model::Cabinet { mass_kg: 31.5, ..Default::default() });
     for machine in [machine, Machine::paper(), full] {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("machine.toml"), machine_file(&machine)).unwrap();
+        std::fs::write(
+            folder.path().join("machine.toml"),
+            machine_file(&machine, &WrittenIn::default()),
+        )
+        .unwrap();
         let grid = folder.path().join("grid.toml");
         std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
         assert_eq!(load(&grid, &[]).unwrap().model.machine, machine);
@@ -231,7 +236,7 @@ fn a_written_machine_reads_back_the_same_bits() {
 /// What is wrong with a machine file, made from the built-in one's.
 fn mistakes_of_machine(change: impl FnOnce(String) -> String, sets: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let file = change(machine_file(&Machine::paper()));
+    let file = change(machine_file(&Machine::paper(), &WrittenIn::default()));
     std::fs::write(folder.path().join("machine.toml"), file).unwrap();
     let grid = folder.path().join("grid.toml");
     std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
@@ -289,7 +294,11 @@ fn a_machine_of_a_thousand_springs_is_enough() {
         let mut machine = Machine::paper();
         machine.springs = vec![machine.springs[0]; springs];
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("machine.toml"), machine_file(&machine)).unwrap();
+        std::fs::write(
+            folder.path().join("machine.toml"),
+            machine_file(&machine, &WrittenIn::default()),
+        )
+        .unwrap();
         let grid = folder.path().join("grid.toml");
         std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
         load(&grid, &[]).map_err(|mistakes| mistakes.to_string())
@@ -511,7 +520,7 @@ proptest! {
         line in 0_usize..60,
         value in any::<f64>(),
     ) {
-        let machine = machine_file(&Machine::paper());
+        let machine = machine_file(&Machine::paper(), &WrittenIn::default());
         let mut lines: Vec<String> = machine.lines().map(str::to_owned).collect();
         let line = line % lines.len();
         if let Some((key, rest)) = lines[line].clone().split_once(" = ") {

@@ -10,6 +10,8 @@ use washer_model::Channel;
 
 /// Fewest samples of a column: fewer say nothing of their noise.
 const FEWEST: usize = 16;
+/// What names of the nonlinear model's channels begin with in a file of `sweep trace`.
+const TRACED: &str = "nonlinear_";
 /// Rows that are usually farther apart (s) show no turn of a drum.
 const SLOWEST_S: f64 = 0.2;
 
@@ -136,8 +138,11 @@ impl Measured {
 fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
     let mut measured = Measured { name, ..Measured::default() };
     let mut seen: Vec<&str> = Vec::new();
+    // Of a file of `sweep trace` the nonlinear motion is taken.
+    let is_trace = table.columns.iter().any(|column| column.name.value.starts_with(TRACED));
     for (k, column) in table.columns.iter().enumerate() {
         let (name, at) = (column.name.value.as_str(), &column.name.at);
+        let name = name.strip_prefix(TRACED).unwrap_or(name);
         if seen.contains(&name) {
             let title = format!("the column `{name}` is given twice");
             report.push(Diagnostic::new(title).at(at, "expected each column once"));
@@ -158,6 +163,7 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
                 times(&table, k, report);
             }
             ("speed_rpm", _) => measured.speed_rpm = Some(column.values.clone()),
+            (_, None) if is_trace => {}
             (_, Some(_)) if samples >= FEWEST && is_still(&column.values) => {
                 let title = format!("the column `{name}` never changes");
                 report.push(Diagnostic::new(title).at(at, "expected what a sensor measured"));
@@ -261,6 +267,18 @@ mod tests {
         assert_eq!(named("drum_front_z").as_deref(), Some("drum_front_z_m"));
         assert_eq!(named("cabinet_force_z_n").as_deref(), Some("cabinet_force_z_n"));
         assert_eq!(named("tub_yaw_m"), None);
+    }
+
+    #[test]
+    fn a_file_of_trace_is_its_nonlinear_motion() {
+        let names = ["time_s", "nonlinear_tub_yaw", "linear_tub_yaw", "min_gap_nonlinear_m"];
+        let column = |name: &str| {
+            (name.to_owned(), (0..20).map(|k| 0.01 * f64::from(k)).collect::<Vec<f64>>())
+        };
+        let measured = Measured::of_columns(names.map(column).to_vec()).unwrap();
+        let columns: Vec<String> =
+            measured.signals.iter().map(|signal| signal.quantity.column()).collect();
+        assert_eq!(columns, ["tub_yaw_rad"]);
     }
 
     #[test]

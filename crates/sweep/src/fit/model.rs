@@ -18,6 +18,7 @@ use super::measured::{Measured, Quantity, Signal};
 use super::speed::Smoothed;
 use crate::engine::reference_step_s;
 use crate::plan::{Plan, ready};
+use sweep_engine::plan::WrittenIn;
 use sweep_engine::threads::Stop;
 
 /// Neighbours are this share of a number away from it.
@@ -178,6 +179,20 @@ impl Problem<'_> {
             free.parameter.set(&mut machine, &mut spin, *value);
         }
         (machine, spin)
+    }
+
+    /// Where the numbers of the first case's machine are from.
+    pub(crate) fn written(&self) -> WrittenIn {
+        let plan = &self.cases[0].plan;
+        let mut written = plan.written.clone();
+        for free in self.free.iter().filter(|free| free.is_of(0)) {
+            let files = self.cases.iter().enumerate().filter(|(case, _)| free.is_of(*case));
+            let files: Vec<&str> = files.map(|(_, case)| &*case.measured.name).collect();
+            let from = format!("fit to {}", files.join(", "));
+            let parts = free.parameter.parts(&plan.model.machine).into_iter();
+            written.0.extend(parts.map(|part| (part.into_owned(), from.clone())));
+        }
+        written
     }
 
     /// Whether an unknown matters to a case.

@@ -24,6 +24,9 @@ use sweep_engine::commands::cells::{Lines as _, table};
 const REACH: f64 = 1.959_964;
 /// Between which share of two units a signal is taken for one in the other.
 const UNIT_SLACK: f64 = 1.5;
+/// What is said of a search that came to no end.
+const UNSETTLED: &str = "not known: the search did not come to its end, so no intervals; expected \
+                         a nearer start (`--set NAME=VALUE`), ranges, or fewer `--free`";
 /// Speeds at which the fitted machine's stability is looked at.
 const SPEEDS: u32 = 120;
 
@@ -33,7 +36,8 @@ type ByColumn<T> = BTreeMap<String, T>;
 /// What a fit found. Numbers that are not known are null.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Report {
-    /// Whether the model follows the measurement within its noise. If not, there are no intervals.
+    /// Whether the model is known to follow the measurement within its noise. If not, there are no
+    /// intervals.
     pub(crate) follows: bool,
     /// Why not.
     pub(crate) objection: Option<String>,
@@ -155,7 +159,8 @@ impl Found<'_> {
     pub(super) fn report(&self) -> Result<Report, Error> {
         let Self { problem, statistics, .. } = *self;
         let best = &self.minima[0];
-        let objection = statistics.objection(problem);
+        let unsettled = (!best.is_settled).then(|| UNSETTLED.to_owned());
+        let objection = unsettled.or_else(|| statistics.objection(problem));
         let follows = objection.is_none();
         let covariance = statistics.of_free(problem);
         let error = |k: usize| covariance[k][k].max(0.0).sqrt();
@@ -357,9 +362,6 @@ impl Found<'_> {
                 ));
             }
         }
-        if !self.minima[0].is_settled {
-            notes.push("the search did not come to its end".to_owned());
-        }
         notes
     }
 }
@@ -395,13 +397,22 @@ impl Report {
         if self.parameters.iter().any(|fit| fit.bootstrap_95.is_some()) {
             headings.push("by bootstrap".to_owned());
         }
+        let mut text = String::new();
+        text.line(
+            "model",
+            &match &self.objection {
+                None => "follows the measurement within its noise".to_owned(),
+                Some(reason) if self.settled => {
+                    format!("does not follow: {reason}; so no intervals")
+                }
+                Some(reason) => reason.clone(),
+            },
+        );
         // Without a free number the model is compared alone.
-        let mut text = if rows.is_empty() { String::new() } else { table(&headings, &rows, "") };
-        let mut say = |what: &str, said: &str| text.line(what, said);
-        match &self.objection {
-            None => say("model", "follows the measurement within its noise"),
-            Some(reason) => say("model", &format!("does not follow: {reason}; so no intervals")),
+        if !rows.is_empty() {
+            text.push_str(&table(&headings, &rows, ""));
         }
+        let mut say = |what: &str, said: &str| text.line(what, said);
         self.untold.iter().for_each(|untold| say("untold", untold));
         for file in &self.files {
             let column = |(column, noise): (&String, &f64)| {

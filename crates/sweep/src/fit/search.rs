@@ -36,7 +36,7 @@ pub(crate) fn descend(
 ) -> Result<Option<Descent>, Ended> {
     let Some(mut now) = evaluate(start)? else { return Ok(None) };
     let mut x = start.to_vec();
-    let (mut evaluations, mut damping) = (1, 1e-3);
+    let (mut evaluations, mut damping, mut stretch) = (1, 1e-3, 1.0);
     let done = |x, summary, evaluations, is_settled| {
         Ok(Some(Descent { x, summary, evaluations, is_settled }))
     };
@@ -61,9 +61,9 @@ pub(crate) fn descend(
             return done(x, now, evaluations, true);
         }
         loop {
-            let step: Vec<f64> =
-                solved(damping).iter().zip(&scale).map(|(step, s)| step / s).collect();
-            let shorter = moving.iter().zip(&step).fold(1.0_f64, |share, (&k, step)| {
+            let solution = solved(damping);
+            let step: Vec<f64> = solution.iter().zip(&scale).map(|(step, s)| step / s).collect();
+            let length = moving.iter().zip(&step).fold(stretch, |share: f64, (&k, step)| {
                 let width = ranges[k][1] - ranges[k][0];
                 let width = if width.is_finite() { 0.1 * width } else { 0.0 };
                 let size = x[k].abs().max(start[k].abs()).max(width);
@@ -71,19 +71,24 @@ pub(crate) fn descend(
             });
             let mut trial = x.clone();
             for (&k, step) in moving.iter().zip(&step) {
-                trial[k] = (trial[k] + shorter * step).clamp(ranges[k][0], ranges[k][1]);
+                trial[k] = (trial[k] + length * step).clamp(ranges[k][0], ranges[k][1]);
             }
             // Where rounding hides what is left to gain, as corners of friction do, it ends too.
             if evaluations >= MOST || damping > 1e4 {
-                return done(x, now, evaluations, left < ROUGH);
+                return done(x, now, evaluations, damping > 1e4 && left < ROUGH);
             }
             evaluations += 1;
             match evaluate(&trial)? {
                 Some(found) if found.cost < now.cost => {
+                    // Where a large residual's curvature flattens the cost, steps by slopes alone
+                    // are too short: the next is as long as what this one gained asks for.
+                    let gain = (now.cost - found.cost) / (length * dot(&solution, &pull));
+                    stretch = (length / (2.0 - gain).max(0.25)).max(1.0);
                     (x, now) = (trial, found);
                     damping = (damping * 0.1).max(1e-9);
                     break;
                 }
+                _ if stretch > 1.0 => stretch = 1.0,
                 _ => damping = (damping * 10.0).max(1e-4),
             }
         }
@@ -116,6 +121,22 @@ mod tests {
         let normal = slopes.map(|a| slopes.map(|b| dot(&a, &b)).to_vec()).to_vec();
         let pull = slopes.map(|a| dot(&a, &residual)).to_vec();
         Ok(Some(Summary { cost: dot(&residual, &residual), sigma: vec![1.0; 2], normal, pull }))
+    }
+
+    #[test]
+    fn steps_grow_where_a_large_residual_makes_them_short() {
+        // Residuals x + 1 and bend x^2 + x - 1: Gauss and Newton's steps leave `bend` of the way.
+        let bend = 0.97;
+        let evaluate = |x: &[f64]| -> Result<Option<Summary>, Ended> {
+            let residual = [x[0] + 1.0, bend * x[0] * x[0] + x[0] - 1.0].map(|r| 100.0 * r);
+            let slopes = [-100.0, -100.0 * (2.0 * bend * x[0] + 1.0)];
+            let (normal, pull) = (vec![vec![dot(&slopes, &slopes)]], vec![dot(&slopes, &residual)]);
+            Ok(Some(Summary { cost: dot(&residual, &residual), sigma: vec![1.0; 2], normal, pull }))
+        };
+        let free = [[f64::NEG_INFINITY, f64::INFINITY]];
+        let found = descend(&[1.0], &free, &evaluate).unwrap().unwrap();
+        assert!(found.is_settled && found.evaluations < 40, "{found:?}");
+        assert!(found.x[0].abs() < 0.01, "{found:?}");
     }
 
     #[test]

@@ -132,6 +132,59 @@ fn a_model_without_the_friction_says_that_it_does_not_follow() {
 }
 
 #[test]
+fn a_search_that_came_to_no_end_gives_no_intervals() {
+    let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 3.0))];
+    let method = Problem::method(&cases).unwrap();
+    let (model, simd) = (ModelKind::Nonlinear, simd_from_environment().unwrap());
+    let free = free(&options(&["damping_n_s_per_m"]), &cases).unwrap();
+    let with_shift = false;
+    let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
+    let x = problem.start();
+    let against = problem.against(&x).unwrap();
+    let summary = problem.summary(&against);
+    let statistics = Statistics::of(&problem, &against, &summary);
+    for is_settled in [true, false] {
+        let (x, summary) = (x.clone(), summary.clone());
+        let found = report::Found {
+            problem: &problem,
+            minima: &[Descent { x, summary, evaluations: 1, is_settled }],
+            against: &against,
+            at_start: &against,
+            statistics: &statistics,
+            evaluations: 1,
+            step_effect: None,
+            repeated: None,
+            draws: 0,
+        };
+        let report = found.report().unwrap();
+        assert_eq!(report.parameters[0].interval_95.is_some(), is_settled, "{report:?}");
+        assert_eq!(report.parameters[0].standard_error.is_some(), is_settled, "{report:?}");
+        assert_eq!((report.follows, report.objection.is_none()), (is_settled, is_settled));
+        let text = report.text();
+        let first = text.lines().next().unwrap();
+        assert_eq!(first.contains("the search did not come to its end"), !is_settled, "{text}");
+        assert_eq!(text.contains("follows the measurement"), is_settled, "{text}");
+    }
+}
+
+#[test]
+fn a_fitted_machine_file_says_where_its_numbers_are_from() {
+    let start = [VISCOUS[0], VISCOUS[1], ("friction_n", 5.0)];
+    let cases = vec![case_at(&start, 1.0, reference("viscous", 1.0))];
+    let free = free(&options(&["damping_n_s_per_m"]), &cases).unwrap();
+    let (method, model) = (Problem::method(&cases).unwrap(), ModelKind::Nonlinear);
+    let simd = simd_from_environment().unwrap();
+    let with_shift = false;
+    let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
+    let (machine, _) = problem.machine(0, &problem.start());
+    let text = crate::config::machine_file(&machine, &problem.written());
+    let said = |key: &str| text.lines().find(|line| line.starts_with(key)).unwrap();
+    assert!(said("damping_n_s_per_m").ends_with("[given: fit to viscous.csv]"), "{text}");
+    assert!(said("friction_n").ends_with("[given: --at]"), "{text}");
+    assert!(said("stiffness_n_per_m").ends_with("[paper, section 3.1]"), "{text}");
+}
+
+#[test]
 #[ignore = "half a minute; run by tests_with_tools"]
 fn friction_is_told_from_viscous_damping() {
     let names: Vec<&str> = FRICTION.iter().map(|(name, _)| *name).collect();
