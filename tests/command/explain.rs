@@ -46,7 +46,7 @@ fn within(value: &Value, meant: f64, tolerance: f64) {
 
 #[test]
 fn the_papers_machine_has_two_tongues_with_the_references_edges_and_dampings() {
-    let more = ["--json", "--ratio-limit", "2.5", "--name", "own"];
+    let more = ["--json", "--ratio-limit", "2.5", "--name", "own", "--progress", "none"];
     let arguments = [&["--at", "damping_n_s_per_m=140"], &more[..]].concat();
     let done = explain(&grid(PAPER, AXES), &arguments);
     assert_eq!(done.status.code(), Some(0), "{}", said(&done));
@@ -116,9 +116,17 @@ fn a_stable_machine_is_told_so() {
         explain(&grid(PAPER, AXES), &["--at", "damping_n_s_per_m=300", "--speed", "200:340:5"]);
     let told = said(&done);
     assert_eq!(done.status.code(), Some(0), "{told}");
-    for line in ["stable at every speed from 200 to 340 rpm", "no tongue is crossed"] {
+    for line in ["stable at every speed from 200 to 340 rpm", "and the models agree"] {
         assert!(told.contains(line), "{line}\n{told}");
     }
+    // What is said follows the limits.
+    let strict = format!("{}[reliability]\nratio_min = 1.9\n", grid(PAPER, AXES));
+    let done = explain(&strict, &["--at", "damping_n_s_per_m=300", "--speed", "200:340:20"]);
+    let told = said(&done);
+    for line in ["the limits are 1.9 and 2", "over-estimates, a ratio is below 1.9"] {
+        assert!(told.contains(line), "{line}\n{told}");
+    }
+    assert!(!told.contains("the models agree"), "{told}");
 }
 
 #[test]

@@ -61,6 +61,7 @@ impl Progress {
             ProgressMode::Auto if std::io::stderr().is_terminal() => {
                 let target = ProgressDrawTarget::stderr_with_hz(8);
                 let bar = ProgressBar::with_draw_target(Some(total), target);
+                bar.enable_steady_tick(Duration::from_millis(125));
                 Shown::Bar(bar.with_style(style(template)))
             }
             ProgressMode::Auto => lines(60),

@@ -35,12 +35,19 @@ pub struct Watch<'a> {
     /// Set when a chunk could not be kept: what is in hand would be lost too.
     abort: AtomicBool,
     done: AtomicU64,
+    is_late: Option<&'a (dyn Fn() -> bool + Sync)>,
 }
 
 impl<'a> Watch<'a> {
     /// A watch over nothing but the stop flag.
     pub const fn new(interrupt: &'a Interrupt) -> Self {
-        Self { interrupt, abort: AtomicBool::new(false), done: AtomicU64::new(0) }
+        let (abort, done) = (AtomicBool::new(false), AtomicU64::new(0));
+        Self { interrupt, abort, done, is_late: None }
+    }
+
+    /// The same, and over a time that the work may take.
+    pub const fn until(interrupt: &'a Interrupt, is_late: &'a (dyn Fn() -> bool + Sync)) -> Self {
+        Self { is_late: Some(is_late), ..Self::new(interrupt) }
     }
 
     /// Counts points done, for the bar.
@@ -60,7 +67,8 @@ impl<'a> Watch<'a> {
 
     /// Whether the engine is to stop.
     pub fn stopped(&self) -> bool {
-        self.interrupt.stopped() || self.abort.load(Ordering::Relaxed)
+        let is_late = || self.is_late.is_some_and(|is_late| is_late());
+        self.interrupt.stopped() || self.abort.load(Ordering::Relaxed) || is_late()
     }
 }
 

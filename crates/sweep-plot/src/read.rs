@@ -311,9 +311,16 @@ fn find_in<'a>(provenance: &'a [(String, Value)], key: &str) -> Option<&'a Value
         .find_map(|(name, value)| if name == key { Some(value) } else { find(value, key) })
 }
 
+/// More letters of a name would leave no room for what was set.
+const NAME_LETTERS: usize = 40;
+
 /// As in "fig12, tub_mass_kg = 20".
 fn run_name(provenance: &[(String, Value)]) -> Option<String> {
-    let mut named = find_in(provenance, "name")?.as_str()?.to_owned();
+    let name = find_in(provenance, "name")?.as_str()?;
+    let mut named: String = name.chars().take(NAME_LETTERS).collect();
+    if named.len() < name.len() {
+        named.push('…');
+    }
     let sets = find_in(provenance, "set").and_then(Value::as_object);
     for (name, value) in sets.into_iter().flatten() {
         let value = match value {

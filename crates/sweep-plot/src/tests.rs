@@ -324,8 +324,8 @@ fn mode_shapes_are_those_of_the_file() {
     let shape: serde_json::Map<String, Value> =
         (1..=10).map(|i| (format!("q{i}"), serde_json::json!(q(i, -0.3)))).collect();
     let facts = serde_json::json!([
-        { "name": "rocking, horizontal \
-                   plane", "resonances": [{ "speed_rpm": 100.0, "shape": shape }] },
+        { "mode": 1, "name": "rocking, horizontal \
+                   plane", "resonances": [{ "speed_rpm": 100.06, "shape": shape }] },
         { "name": "drum bending on its shaft", "resonances": [] },
     ]);
     let machine = serde_json::json!({ "machine": {
@@ -336,10 +336,12 @@ fn mode_shapes_are_those_of_the_file() {
     let with_shapes = || file().metadata("sweep.modes", &facts.to_string());
     let figure = svg(with_shapes(), &viewed(View::Shapes));
     for said in
-        [">Rocking, horizontal plane,<", ">100.0 rpm<", ">horizontal, a quarter of a period later<"]
+        [">Rocking, horizontal plane,<", ">100.1 rpm<", ">horizontal, a quarter of a period later<"]
     {
         assert!(figure.contains(said), "{said}");
     }
+    let stars = svg(with_shapes(), &PlotOptions::default());
+    assert!(stars.contains(">100.1 rpm<"), "the same in all figures of a file");
     let carried = data(with_shapes(), &viewed(View::Shapes));
     let panels = carried["chart"]["panels"].as_array().unwrap();
     assert_eq!(panels.len(), 1);

@@ -1,9 +1,6 @@
 //! The cost of a run: time, from a few points integrated on the spot; memory and disk, from what is
 //! held at once.
 
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::{Duration, Instant};
-
 use lane_ode::MAX_LANES;
 use washer_model::ModelKind;
 use washer_row::{Deviations, Ladder, Metric, Outcome};
@@ -16,14 +13,12 @@ use sweep_engine::plan::shortest_step_s;
 use sweep_engine::store::{Shape, chunk_points};
 use sweep_engine::{Error, Interrupt, Job};
 
-/// Integration goes on with longer and longer beginnings of a trajectory until one takes this long.
-const LONG_ENOUGH: Duration = Duration::from_millis(60);
+/// Integration goes on with longer and longer beginnings of a trajectory until one takes this long,
+/// in seconds.
+const LONG_ENOUGH_S: f64 = 0.2;
 
-/// No further place of the grid is tried after this.
-const BUDGET: Duration = Duration::from_millis(350);
-
-/// Whole trajectories are given up after this.
-const WHOLE: Duration = Duration::from_secs(1);
+/// Whole trajectories are given up after this time.
+const WHOLE_S: f64 = 4.0;
 
 /// The first beginning that is tried by a method that chooses its steps: at most [`FIRST_STEPS`] of
 /// them.
@@ -35,8 +30,8 @@ const FIRST_STEPS: f64 = 1e4;
 const TOGETHER_S: f64 = 2.0;
 const MOST_TOGETHER: u64 = 64;
 
-/// Parts of the way through the grid at which points are tried.
-const PLACES: [f64; 3] = [0.5, 0.9, 0.1];
+/// Multiples of the golden section spread evenly over a unit, and repeat nothing.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// The program, its libraries and its buffers, before any point (measured: docs/scaling.md).
 const BASE_BYTES: f64 = 14e6;
@@ -49,30 +44,23 @@ const CELL_BYTES: f64 = 5.0;
 /// in results of one point with 35 and 40 columns.
 const RESULT_COLUMN_BYTES: f64 = 800.0;
 
-/// Integrates some points of the plan, for about half a second, and reckons from there for so
-/// many threads.
+/// Integrates some points of the plan, for some seconds at most, and reckons from there for so many
+/// threads.
 ///
 /// # Errors
 /// What keeps a run from having an engine.
 pub(crate) fn of(plan: &Plan, threads: usize) -> Result<Estimate, Error> {
-    reckoned(plan, threads, WHOLE)
+    reckoned(plan, threads, WHOLE_S)
 }
 
 /// As [`of`], where whole trajectories are given up after a time.
-fn reckoned(plan: &Plan, threads: usize, whole: Duration) -> Result<Estimate, Error> {
+fn reckoned(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate, Error> {
     let engine = ModelEngine::new(plan)?;
     // Finding the rungs is no cost of points.
     engine.ladders();
-    let began = Instant::now();
-    let first = Measured::take(&engine, PLACES[0], whole);
-    let mut samples = vec![Measured::spread(&engine, &first).unwrap_or(first)];
-    for place in &PLACES[1..] {
-        if samples[0].integrated_s < plan.end_s && began.elapsed() < BUDGET {
-            samples.push(Measured::take(&engine, *place, whole));
-        }
-    }
-    let core_s_per_point =
-        samples.iter().map(|sample| sample.core_s_per_point).sum::<f64>() / samples.len() as f64;
+    let first = Measured::take(&engine, whole_s);
+    let Measured { core_s_per_point, points, integrated_s } =
+        Measured::spread(&engine, &first).unwrap_or(first);
     let chunk = chunk_points(plan.points());
     let layout = &Job::of(plan).layout;
     let disk_bytes = plan.points() as f64 * Shape::of(layout).bytes_a_row() as f64;
@@ -85,8 +73,8 @@ fn reckoned(plan: &Plan, threads: usize, whole: Duration) -> Result<Estimate, Er
         threads,
         wall_s: points_a_thread as f64 * core_s_per_point,
         core_s_per_point,
-        sampled_points: samples.iter().map(|sample| sample.points).sum(),
-        sampled_s: samples.iter().map(|sample| sample.integrated_s).fold(plan.end_s, f64::min),
+        sampled_points: points,
+        sampled_s: integrated_s,
         memory_bytes: memory_bytes(&engine, threads),
         disk_bytes,
         result_bytes: disk_bytes + columns * RESULT_COLUMN_BYTES,
@@ -94,7 +82,7 @@ fn reckoned(plan: &Plan, threads: usize, whole: Duration) -> Result<Estimate, Er
     })
 }
 
-/// The cost measured at one place of the grid.
+/// The cost measured of some points.
 struct Measured {
     core_s_per_point: f64,
     points: u64,
@@ -102,13 +90,12 @@ struct Measured {
 }
 
 impl Measured {
-    fn take(engine: &ModelEngine<'_>, place: f64, whole: Duration) -> Self {
+    fn take(engine: &ModelEngine<'_>, whole_s: f64) -> Self {
         let plan = engine.plan();
         let points = plan.points().min(MAX_LANES as u64);
-        let first = (plan.points().saturating_sub(points) as f64 * place) as u64;
         // What checks itself costs most where little moves, so that a beginning says too much.
         if let Steps::Checked(_) = plan.integrator.steps()
-            && let Some(cost_s) = cost_within(whole, engine, first..first + points)
+            && let Some(cost_s) = cost_within(whole_s, engine, points)
         {
             let core_s_per_point = cost_s / points as f64;
             return Self { core_s_per_point, points, integrated_s: plan.end_s };
@@ -122,14 +109,14 @@ impl Measured {
             cut.end_s = end_s;
             cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
             // The cut plan's own rungs would be of slower spin, and longer steps.
-            let cost_s = cost_s(&engine.over(&cut), first..first + points);
+            let cost_s = cost_s(&engine.over(&cut), points);
             let of_length = |metric: &Metric| !matches!(metric, Metric::Growth | Metric::Dwell);
             if !cut.model.measures.metrics.iter().all(of_length) {
                 cut.model.measures.metrics.retain(of_length);
                 held_s = cost_s;
                 continue;
             }
-            if end_s >= plan.end_s || cost_s >= LONG_ENOUGH.as_secs_f64() {
+            if end_s >= plan.end_s || cost_s >= LONG_ENOUGH_S {
                 // What does not grow with the length (the equilibrium) must not be multiplied.
                 let (base_end_s, base_s) = shorter.unwrap_or((0.0, 0.0));
                 let rate = ((cost_s - base_s) / (end_s - base_end_s)).max(0.0);
@@ -142,18 +129,17 @@ impl Measured {
         }
     }
 
-    /// Whole trajectories of points from all over the grid, integrated together: the rows that are
-    /// left to a slower rung then share its lanes, as in the run. Few points leave such lanes
-    /// empty, and cost several times as much each.
+    /// Whole trajectories of more points, integrated together: the rows that are left to a slower
+    /// rung then share its lanes, as in the run. Few points leave such lanes empty, and cost
+    /// several times as much each.
     fn spread(engine: &ModelEngine<'_>, first: &Self) -> Option<Self> {
         let plan = engine.plan();
-        if first.integrated_s < plan.end_s || plan.points() <= first.points {
+        let affordable = (TOGETHER_S / first.core_s_per_point) as u64;
+        let points = affordable.min(MOST_TOGETHER).min(plan.points());
+        if first.integrated_s < plan.end_s || points <= first.points {
             return None;
         }
-        let affordable = (TOGETHER_S / first.core_s_per_point) as u64;
-        let points = affordable.clamp(first.points, MOST_TOGETHER).min(plan.points());
-        let place = |k| (u128::from(plan.points()) * u128::from(k) / u128::from(points)) as u64;
-        let core_s_per_point = cost_s(engine, (0..points).map(place)) / points as f64;
+        let core_s_per_point = cost_s(engine, points) / points as f64;
         Some(Self { core_s_per_point, points, integrated_s: plan.end_s })
     }
 }
@@ -170,35 +156,23 @@ fn first_end_s(plan: &Plan) -> f64 {
     short_s.min(plan.end_s)
 }
 
-/// Time that one core takes for these points' runs.
-fn cost_s(engine: &ModelEngine<'_>, points: impl Iterator<Item = u64>) -> f64 {
-    cost_within(Duration::MAX, engine, points).unwrap_or(f64::INFINITY)
+/// Time that one core takes for so many points' runs.
+fn cost_s(engine: &ModelEngine<'_>, points: u64) -> f64 {
+    cost_within(f64::INFINITY, engine, points).unwrap_or(f64::INFINITY)
 }
 
-/// The same, if they are done by then.
-fn cost_within(
-    most: Duration,
-    engine: &ModelEngine<'_>,
-    points: impl Iterator<Item = u64>,
-) -> Option<f64> {
-    let axis_values = points.map(|point| engine.plan().axis_values(point));
-    let axis_values: Vec<Vec<f64>> = axis_values.collect();
+/// The same, if they are done by then. One lies in each of as many equal parts of the grid, here
+/// and there in it: at even distances all might have the same value of an axis.
+fn cost_within(most_s: f64, engine: &ModelEngine<'_>, points: u64) -> Option<f64> {
+    let plan = engine.plan();
+    let part = plan.points() as f64 / points as f64;
+    let place = |k| ((k as f64 + (k as f64 * GOLDEN).fract()) * part) as u64;
+    let axis_values: Vec<Vec<f64>> = (0..points).map(|k| plan.axis_values(place(k))).collect();
+    let began_s = busy_s();
+    let is_late = || busy_s() - began_s > most_s;
     let interrupt = Interrupt::new();
-    let watch = Watch::new(&interrupt);
-    std::thread::scope(|scope| {
-        let (done, is_done) = mpsc::channel::<()>();
-        let watch = &watch;
-        scope.spawn(move || {
-            if is_done.recv_timeout(most) == Err(RecvTimeoutError::Timeout) {
-                watch.abort();
-            }
-        });
-        let began_s = busy_s();
-        let outcomes = engine.evaluate_under(&axis_values, watch);
-        let cost_s = busy_s() - began_s;
-        drop(done);
-        outcomes.map(|_| cost_s)
-    })
+    let outcomes = engine.evaluate_under(&axis_values, &Watch::until(&interrupt, &is_late));
+    outcomes.map(|_| busy_s() - began_s)
 }
 
 /// Time that this thread has had a core for: what others do on the machine meanwhile is no cost of
@@ -212,7 +186,8 @@ fn busy_s() -> f64 {
 /// Time on the wall, where the system has no other clock that is known here.
 #[cfg(not(unix))]
 fn busy_s() -> f64 {
-    static BEGAN: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+    static BEGAN: std::sync::LazyLock<std::time::Instant> =
+        std::sync::LazyLock::new(std::time::Instant::now);
     BEGAN.elapsed().as_secs_f64()
 }
 
@@ -301,17 +276,20 @@ mod tests {
     #[test]
     fn checked_rows_are_measured_whole_where_there_is_time() {
         let plan = plan_by("", "\"rk4-mass-scaled\"", 16, 50.0);
-        let sampled_s = |whole| reckoned(&plan, 1, whole).unwrap().sampled_s;
-        assert_eq!(sampled_s(Duration::MAX), plan.end_s);
-        assert!(sampled_s(Duration::ZERO) < plan.end_s);
+        let sampled_s = |whole_s| reckoned(&plan, 1, whole_s).unwrap().sampled_s;
+        assert_eq!(sampled_s(f64::INFINITY), plan.end_s);
+        assert!(sampled_s(0.0) < plan.end_s);
+        // With friction a point takes a tenth of a second and more.
+        let plan = plan_by("[set]\nfriction_n = 30\n", "\"rk4-mass-scaled\"", 16, 50.0);
+        assert_eq!(of(&plan, 1).unwrap().sampled_s, plan.end_s);
     }
 
     #[test]
     fn held_speeds_cost_the_same_however_long_the_run_is() {
         let top = "metrics = [\"growth\"]\nstability = { speed_rpm = \"250,300\" }\n";
         let plan = plan_by(top, "\"rk4-mass-scaled\"", 16, 50.0);
-        let [whole, begun] = [Duration::MAX, Duration::ZERO]
-            .map(|whole| reckoned(&plan, 1, whole).unwrap().core_s_per_point);
+        let [whole, begun] = [f64::INFINITY, 0.0]
+            .map(|whole_s| reckoned(&plan, 1, whole_s).unwrap().core_s_per_point);
         // Checked rows cost most where little moves, some 20 times as much; held speeds that are
         // multiplied with the length are 100,000 times too dear.
         assert!(begun < 300.0 * whole, "{begun} s a point from a beginning, {whole} s in truth");

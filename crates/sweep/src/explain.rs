@@ -6,18 +6,21 @@ mod profile;
 mod tongue;
 pub(crate) mod words;
 
-use lane_ode::Simd;
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use washer_model::{
     Cases, Channel, Crossed, Crossing, LeftRange, NoEquilibrium, Point, Response, Timing, cross,
     modes, peaks_without_departures,
 };
 
-use crate::engine::{ModelEngine, Watch, reference_step_s};
+use crate::engine::{ModelEngine, Watch, reference_step_s, simd_from_environment};
 use crate::plan::{self, Plan, Scenario};
 use crate::speeds::Speeds;
 use sweep_engine::config::NamedValues;
-use sweep_engine::{Error, Interrupt};
+use sweep_engine::effort::Effort;
+use sweep_engine::progress::Progress;
+use sweep_engine::{Error, Interrupt, threads};
 
 use sweep_parameter::RatioLimits;
 use tongue::{Asker, Seen, tongues};
@@ -91,8 +94,8 @@ pub(crate) struct Passage {
     pub(crate) crossed: Result<Crossed, LeftRange>,
 }
 
-/// Explains a plan's one point, on all threads of the rayon pool that it is called in. Once
-/// `interrupt` is raised it ends early, and what it returns means nothing.
+/// Explains a plan's one point. Once the interrupt is raised it ends early, and what it returns
+/// means nothing.
 ///
 /// # Errors
 /// A profile without a speed to look at, a machine without equilibrium or modes, and an instruction
@@ -101,9 +104,18 @@ pub(crate) fn explain(
     plan: &Plan,
     at: NamedValues,
     speeds: Option<Speeds>,
-    simd: Simd,
-    interrupt: &Interrupt,
+    effort: Effort<'_>,
 ) -> Result<Explanation, Error> {
+    threads::pool(effort.threads()?)?.install(|| explained(plan, at, speeds, effort))
+}
+
+fn explained(
+    plan: &Plan,
+    at: NamedValues,
+    speeds: Option<Speeds>,
+    Effort { progress, interrupt, .. }: Effort<'_>,
+) -> Result<Explanation, Error> {
+    let simd = simd_from_environment()?;
     let scenario = plan.scenario(0);
     let profile_rpm = profile::range(&scenario.model.spin, plan.end_s)?;
     let point = ready(plan, &scenario).map_err(Error::model)?;
@@ -111,8 +123,21 @@ pub(crate) fn explain(
         Some(speeds) => speeds,
         None => looked(&point, profile_rpm[1])?,
     };
-    let mut asker =
-        Asker { simd, plan, scenario: &scenario, point: &point, interrupt, followed: Vec::new() };
+    let (progress, done) = (Progress::of_search(progress, 0, 0), AtomicU64::new(0));
+    let counted = |speeds: usize| {
+        let before = done.fetch_add(speeds as u64, Ordering::Relaxed);
+        progress.show_search(0, before + speeds as u64);
+    };
+    counted(0);
+    let mut asker = Asker {
+        simd,
+        plan,
+        scenario: &scenario,
+        point: &point,
+        interrupt,
+        counted: &counted,
+        followed: Vec::new(),
+    };
     asker.follow(looked.to.max(profile_rpm[1]));
     let (seen, swept) = rayon::join(|| tongues(&asker, looked), || swept(plan, interrupt));
     let ((found, seen), swept) = (seen, swept?);

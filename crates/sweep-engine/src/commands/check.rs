@@ -6,6 +6,7 @@ use super::{GridArgs, short};
 use crate::config::section::counted;
 use crate::design::{Design, Distribution};
 use crate::estimate::size;
+use crate::method::{Integrator as _, Steps};
 use crate::{Axis, AxisValues, Error, Estimate, Exit, Plan, Swept, duration, show, tell, threads};
 use sweep_parameter::{Channel as _, Parameter as _, RatioLimits};
 
@@ -80,7 +81,11 @@ fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
 fn took<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let part = match estimate.sampled_s {
         whole if whole >= plan.end_s => String::new(),
-        part => format!(", the first {part} s each"),
+        part => {
+            let is_even = matches!(plan.integrator.steps(), Steps::Fixed(_));
+            let off = if is_even { "" } else { "; as steps follow the motion, it may be far off" };
+            format!(", the first {part} s each{off}")
+        }
     };
     let points = counted(estimate.sampled_points as usize, "point");
     let about = duration(estimate.wall_s);

@@ -10,12 +10,15 @@ use crate::label::Label;
 use crate::read::Kind;
 use crate::scene::{INK, MUTED};
 use crate::table::Table;
+use sweep_files::key;
 
 /// One mode over speed.
 pub(super) struct Mode {
     pub(super) name: String,
     pub(super) speed: Vec<f64>,
     pub(super) frequency: Vec<f64>,
+    /// Speeds at which it is the speed.
+    pub(super) resonances: Vec<f64>,
     /// Least and greatest over a turn, if the file has them.
     pub(super) band: Option<(Vec<f64>, Vec<f64>)>,
 }
@@ -51,7 +54,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
     });
     let of_sums = sums.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
     for (mode, colour, style) in of_modes.chain(of_sums) {
-        stars.extend(crossings(&mode).into_iter().map(|at| (at, at, format!("{at:.1} rpm"))));
+        stars.extend(mode.resonances.iter().map(|&at| (at, at, format!("{at:.1} rpm"))));
         series.push(Series::new(mode.name, colour, mode.speed, mode.frequency, style));
     }
     let ends = vec![0.0, top];
@@ -85,7 +88,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
 /// [`crate::PlotError::Undrawable`] when it lacks a column.
 pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>> {
     table.source.expect(Kind::Modes, "--modes", "`sweep modes --out FILE` writes a modes file")?;
-    let mut speeds: Vec<f64> = modes(table)?.iter().flat_map(crossings).collect();
+    let mut speeds: Vec<f64> = modes(table)?.into_iter().flat_map(|mode| mode.resonances).collect();
     speeds.sort_by(f64::total_cmp);
     Ok(speeds)
 }
@@ -127,8 +130,8 @@ fn sums(modes: &[Mode], unstable: &Unstable) -> Vec<Mode> {
         };
         let speed = modes[a].speed.clone();
         let of_both = |speed: &f64| at_speed(&modes[a], *speed) + at_speed(&modes[b], *speed);
-        let frequency = speed.iter().map(of_both).collect();
-        Mode { name, speed, frequency, band: None }
+        let frequency: Vec<f64> = speed.iter().map(of_both).collect();
+        Mode { name, resonances: crossings(&speed, &frequency), speed, frequency, band: None }
     };
     pairs.into_iter().map(sum).collect()
 }
@@ -175,25 +178,32 @@ pub(super) fn modes(table: &Table) -> Result<Vec<Mode>> {
         rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
         let pick = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
         let said = names.and_then(|names| names.get(*rows.first()?));
+        let known = || -> Option<Vec<f64>> {
+            let mut all = table.source.list(key::MODES);
+            let found = all.find(|mode| mode["mode"] == wanted)?["resonances"].as_array()?;
+            found.iter().map(|resonance| resonance["speed_rpm"].as_f64()).collect()
+        };
+        let (speed, frequency) = (pick(speed), pick(frequency));
         Mode {
             name: said.map_or(format!("mode {wanted}"), |said| format!("{wanted} {said}")),
-            speed: pick(speed),
-            frequency: pick(frequency),
+            resonances: known().unwrap_or_else(|| crossings(&speed, &frequency)),
+            speed,
+            frequency,
             band: band.map(|(low, high)| (pick(low), pick(high))),
         }
     };
     Ok(numbers.into_iter().map(mode).collect())
 }
 
-/// Speeds at which the mode's frequency, taken as linear between the given speeds, is the speed.
-pub(super) fn crossings(mode: &Mode) -> Vec<f64> {
-    let both = mode.frequency.iter().zip(&mode.speed);
+/// Speeds at which a mode's frequency, taken as linear between the given speeds, is the speed.
+fn crossings(speeds: &[f64], frequencies: &[f64]) -> Vec<f64> {
+    let both = frequencies.iter().zip(speeds);
     let excess: Vec<f64> = both.map(|(frequency, speed)| frequency - speed).collect();
     (1..excess.len())
         .filter(|&k| excess[k - 1] > 0.0 && excess[k] <= 0.0)
         .map(|k| {
             let part = excess[k - 1] / (excess[k - 1] - excess[k]);
-            mode.speed[k - 1] + part * (mode.speed[k] - mode.speed[k - 1])
+            speeds[k - 1] + part * (speeds[k] - speeds[k - 1])
         })
         .collect()
 }
@@ -205,8 +215,8 @@ mod tests {
     #[test]
     fn a_mode_is_excited_where_its_frequency_is_the_speed() {
         let speed: Vec<f64> = (0..=10).map(|k| 30.0 * f64::from(k)).collect();
-        let frequency = speed.iter().map(|speed| 150.0 - 0.02 * speed).collect();
-        let found = crossings(&Mode { name: String::new(), speed, frequency, band: None });
+        let frequency: Vec<f64> = speed.iter().map(|speed| 150.0 - 0.02 * speed).collect();
+        let found = crossings(&speed, &frequency);
         assert_eq!(found.len(), 1);
         assert!((found[0] - 150.0 / 1.02).abs() < 1e-9);
     }

@@ -87,18 +87,18 @@ pub(crate) fn draw(
         };
         cells.draw(&mut scene, &panel, &cut.rest);
         let divided = cells.layer.as_ref().and_then(|layer| Some((layer, layer.level.as_ref()?)));
-        if let Some(divided) = divided {
-            let room = MOST_POINTS / cuts.cuts.len();
-            cells.draw_line(&mut scene, &panel, divided, &cut.rest, room);
-        }
+        let room = MOST_POINTS / cuts.cuts.len();
+        let mut lines = divided.map_or_else(Vec::new, |divided| {
+            cells.draw_line(&mut scene, &panel, divided, &cut.rest, room)
+        });
         if let Some(overlay) = overlay {
             draw_overlay(&mut scene, &panel, overlay);
         }
-        // Above the lines, which they interrupt.
+        // Above the lines, which they interrupt where there is no room beside them.
         if let Some(divided) = divided {
             let overlaid = overlay.iter().flat_map(|overlay| &overlay.lines);
-            let overlaid: Vec<_> = overlaid.map(|line| places(&panel, line)).collect();
-            cells.name_regions(&mut scene, &panel, divided, (&cut.rest, &overlaid));
+            lines.extend(overlaid.map(|line| places(&panel, line)));
+            cells.name_regions(&mut scene, &panel, divided, (&cut.rest, &lines));
         }
         let lowest = index + columns >= cuts.cuts.len();
         panel.frame(&mut scene, lowest, column == 0);
@@ -366,7 +366,7 @@ impl<'a> Cells<'a> {
             && self.map.counts[cell].sensitive > 0
     }
 
-    /// Draws the level's line with at most `room` points.
+    /// Draws the level's line with at most `room` points, and gives their places, px.
     fn draw_line(
         &self,
         scene: &mut Scene,
@@ -374,16 +374,19 @@ impl<'a> Cells<'a> {
         divided: (&Layer, &Level),
         rest: &[usize],
         room: usize,
-    ) {
+    ) -> Vec<Vec<Option<[f64; 2]>>> {
         let cell = |_, x, y| self.map.grid.cell(x, y, rest);
-        let lines = level_lines(self.map, divided, 1, cell, room);
+        let lines = level_lines(self.map, divided, 1, cell, room).into_iter().flatten();
         let mut outline = Outline::default();
-        for line in lines.iter().flatten() {
+        let lines = lines.map(|line| {
             let points: Vec<[f64; 2]> = line.iter().map(|&[x, y]| panel.at(x, y)).collect();
             outline.add_line(&points);
-        }
+            points.into_iter().map(Some).collect()
+        });
+        let lines = lines.collect();
         scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
         scene.line(outline, Stroke::solid(INK, 2.6));
+        lines
     }
 
     fn name_regions(
@@ -391,7 +394,7 @@ impl<'a> Cells<'a> {
         scene: &mut Scene,
         panel: &Panel,
         (layer, level): (&Layer, &Level),
-        (rest, overlaid): (&[usize], &[Vec<Option<[f64; 2]>>]),
+        (rest, lines): (&[usize], &[Vec<Option<[f64; 2]>>]),
     ) {
         let place = |axis: &GridAxis, scale: Scale, part: f64| {
             let found = axis.borders.partition_point(|&border| scale.position(border) <= part);
@@ -412,8 +415,8 @@ impl<'a> Cells<'a> {
             };
             let size = [text_width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
             let area = [panel.width, panel.height];
-            // Off the other file's line, unless that leaves no room.
-            let clear = |point: [f64; 2]| inside(point) && !is_near(panel, overlaid, point);
+            // Off the lines, unless that leaves no room.
+            let clear = |point: [f64; 2]| inside(point) && !is_near(panel, lines, point);
             let found = roomiest(area, size, clear).or_else(|| roomiest(area, size, inside));
             if let Some([x, y]) = found {
                 let at = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];

@@ -249,7 +249,10 @@ pub(super) fn subtitle(
     let (of_machine, at) = (machine(table), together::at(&table.source));
     let further = at.iter().filter(|(name, _)| of_machine.iter().all(|(known, _)| known != name));
     let further = further.map(|(name, value)| (name.as_str(), *value));
-    let said = of_machine.iter().copied().chain(further);
+    // What was set stands in the name.
+    let set = table.source.find("set");
+    let is_new = |(name, value): &(&str, f64)| set.is_none_or(|set| set[*name] != *value);
+    let said = of_machine.iter().copied().chain(further).filter(is_new);
     let mut parts = table.source.notes(said.map(|(name, value)| parameter(name, value)));
     parts.extend(of_both(least_gaps_mm, apart));
     if let Some(rows) = table.stretch {

@@ -3,7 +3,7 @@
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
 use crate::error::Result;
-use crate::figures::campbell::{between, crossings, modes};
+use crate::figures::campbell::{between, modes};
 use crate::label::Label;
 use crate::table::Table;
 
@@ -18,13 +18,13 @@ pub(crate) fn chart(table: &Table) -> Result<Chart> {
     let mut series = Vec::new();
     let mut stars = Vec::new();
     for (k, mode) in modes(table)?.into_iter().enumerate() {
-        let resonances = crossings(&mode);
+        let resonances = &mode.resonances;
         let Some((least, greatest)) = mode.band.filter(|_| !resonances.is_empty()) else {
             continue;
         };
         let percent = |k: usize| 50.0 * (greatest[k] - least[k]) / mode.frequency[k];
         let percent: Vec<f64> = (0..mode.frequency.len()).map(percent).collect();
-        for speed in resonances {
+        for &speed in resonances {
             stars.push((speed, between(&mode.speed, &percent, speed), format!("{speed:.1} rpm")));
         }
         let colour = DISTINCT[k % DISTINCT.len()];

@@ -75,7 +75,8 @@ function createLive(host, data) {
   function set(k, value) {
     values[k] = value;
     const { number, range, scaled } = inputs[k];
-    number.value = value;
+    // As it was meant, where a step of an axis was rounded.
+    number.value = Number(value.toPrecision(12));
     range.value = scaled(value);
     if (live.sliders[k].log) range.setAttribute("aria-valuetext", value);
   }

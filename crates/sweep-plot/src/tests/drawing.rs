@@ -1,6 +1,6 @@
 //! What is drawn where: places that stand alone, names off lines, legends that tell lines apart.
 
-use super::super::sample::{Sample, boundary, map};
+use super::super::sample::{MapSample, Sample, boundary, map, trace};
 use super::super::scene::{Item, Outline};
 use super::super::*;
 use super::svg;
@@ -78,6 +78,32 @@ fn names_of_regions_keep_off_the_line_of_another_file() {
         .metadata("sweep.plan", &format!(r#"{{"axis": [{AXES}]}}"#));
     let [_, moved] = place_of(&over_the_map(line), NAME);
     assert!((moved - y).abs() > 16.0, "{moved} {y}");
+}
+
+#[test]
+fn names_of_regions_keep_off_the_line_between_them() {
+    let axes = [("unbalance_mass_kg", 6, 0.28), ("friction_n", 6, 6.0)];
+    let values = |step: f64| (0..6).map(move |k| step * f64::from(k)).collect::<Vec<f64>>();
+    let corner = MapSample {
+        axes: axes.iter().map(|&(name, _, step)| (name, values(step))).collect(),
+        limit: 2.0,
+        // Beyond the limit right of a line from the lower middle to the right edge.
+        yaw: &|at| Some([0.01 * (2.0 + 2.0 * (at[0] - 0.7) - at[1] / 8.0).max(0.1), 0.01]),
+        chaotic: &|_| false,
+    };
+    let figure = svg(corner.sample(), &PlotOptions::default());
+    let [_, y] = place_of(&figure, "linear model unreliable");
+    // Its panel ends at 512 px; in the middle of the region it would lie over the line.
+    assert!(y > 480.0, "{y}");
+}
+
+#[test]
+fn a_subtitle_says_once_what_was_set_whatever_the_name() {
+    let name = "long ".repeat(40);
+    let plan = serde_json::json!({ "name": name, "set": { "damping_n_s_per_m": 120.0 } });
+    let figure = svg(trace().metadata("sweep.plan", &plan.to_string()), &PlotOptions::default());
+    let said = "…, damping_n_s_per_m = 120 · unbalance mass 0.4 kg · least gap";
+    assert!(figure.contains(said), "{figure}");
 }
 
 #[test]

@@ -1,10 +1,9 @@
 //! `sweep explain GRID.toml --at NAME=VALUE`: why the linear model fails at a point.
 
-use crate::engine::simd_from_environment;
 use crate::explain::{explain, json, words};
 use crate::speeds::{Speeds, turning};
 use sweep_engine::commands::grid::GridArgs;
-use sweep_engine::{Error, Exit, Interrupt, show, threads};
+use sweep_engine::{EffortArgs, Error, Exit, Interrupt, show};
 
 /// Arguments of `sweep explain`.
 #[derive(Debug, clap::Args)]
@@ -19,9 +18,8 @@ pub struct Args {
     /// Print everything as JSON
     #[arg(long)]
     json: bool,
-    /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
-    threads: Option<usize>,
+    #[command(flatten)]
+    effort: EffortArgs,
 }
 
 /// What `--help` adds.
@@ -37,12 +35,9 @@ disturbance is measured by its energy. docs/stability.md explains every line.";
 /// without equilibrium or modes.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let (plan, at) = args.grid.load_point(&args.grid.at)?;
-    let threads = threads::count(args.threads, &threads::process)?;
-    let simd = simd_from_environment()?;
     // A signal ends the process: there is nothing to keep.
     let interrupt = Interrupt::new();
-    let work = || explain(&plan, at, args.speed, simd, &interrupt);
-    let found = threads::pool(threads)?.install(work)?;
+    let found = explain(&plan, at, args.speed, args.effort.with(&interrupt))?;
     if args.json {
         return show(&format!("{:#}\n", json::of(&found)));
     }

@@ -65,6 +65,8 @@ pub(crate) struct Asker<'a> {
     pub(crate) point: &'a Point,
     /// Once it is raised, no response is found, and what is made of that means nothing.
     pub(crate) interrupt: &'a Interrupt,
+    /// Told of so many more speeds that are answered.
+    pub(crate) counted: &'a (dyn Fn(usize) + Sync),
     /// The point's responses over speed.
     pub(crate) followed: Vec<Responses<'a>>,
 }
@@ -85,8 +87,10 @@ impl Asker<'_> {
             if is_stopped() {
                 return vec![None; speeds.len()];
             }
-            let found = Responses::at(&mut self.followed.clone(), &asked, &is_stopped).into_iter();
-            found.map(|answer| answer.ok()?.into_iter().next()).collect::<Vec<_>>()
+            let found = Responses::at(&mut self.followed.clone(), &asked, &is_stopped);
+            (self.counted)(found.len());
+            let first = |answer: Result<Vec<_>, _>| answer.ok()?.into_iter().next();
+            found.into_iter().map(first).collect::<Vec<_>>()
         };
         let parts: Vec<_> = speeds_rpm.par_chunks(AT_ONCE).map(of_part).collect();
         parts.into_iter().flatten().collect()
@@ -438,6 +442,7 @@ impl Tongue {
                 })
                 .collect();
             let found = Responses::at(&mut followed, &asked, &is_stopped);
+            (asker.counted)(found.len());
             let mut most_rpm = vec![0.0; wanted.len()];
             for ((place, rpm), responses) in asked.into_iter().zip(found) {
                 let first = responses.ok().and_then(|responses| responses.into_iter().next());

@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 
 use washer_model::{Channel, Ending, Kind, LeftRange, Settled, State, decimal};
 
+use sweep_engine::commands::cells::short;
+
 use super::{Closing, End, Explanation, Passage, Resonance, Swept, Tongue};
 
 /// Where a line ends.
@@ -123,13 +125,21 @@ fn verdict(text: &mut String, swept: &Swept) {
         .collect();
     let words = format!(
         "the linear model is {word}: most in {}, where the nonlinear motion is {} times the \
-         linear one ({} from {from} to {to} s); the limit is {}",
+         linear one ({} from {from} to {to} s); {}",
         channel.name(),
         significant(ratio),
         amplitudes.join(" against "),
-        decimal(swept.limits.most)
+        match (decimal(swept.limits.most), swept.limits.least) {
+            (most, None) => format!("the limit is {most}"),
+            (most, Some(least)) => format!("the limits are {} and {most}", decimal(least)),
+        }
     );
     line(text, "swept", words);
+    if over_estimates(swept) {
+        let below = short(swept.limits.over_estimate());
+        let words = format!("the linear model over-estimates, a ratio is below {below}");
+        line(text, "too high", words);
+    }
     let others: Vec<String> = swept
         .channels
         .iter()
@@ -143,6 +153,11 @@ fn verdict(text: &mut String, swept: &Swept) {
     if !others.is_empty() {
         line(text, "ratios", others.join(", "));
     }
+}
+
+/// Whether the linear model gives a channel too much, as summaries of runs count it.
+fn over_estimates(swept: &Swept) -> bool {
+    swept.verdict.least.is_some_and(|(_, least)| least < swept.limits.over_estimate())
 }
 
 fn of_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages: &[Passage]) {
@@ -313,12 +328,13 @@ fn closes(text: &mut String, tongue: &Tongue) {
 /// What the tongues have to do with the swept verdict.
 fn judgement(text: &mut String, found: &Explanation) {
     let swept = &found.swept;
-    let Some(reliable) = swept.verdict.reliable else {
+    let Some((_, greatest)) = swept.verdict.greatest else {
         line(text, "so", "there is no verdict to explain");
         return;
     };
+    let is_within = greatest < swept.limits.most;
     let words = match &found.without_departures {
-        None if reliable => {
+        None if is_within && !over_estimates(swept) => {
             "no tongue is crossed before the window ends, and the models agree".to_owned()
         }
         None => {
@@ -339,7 +355,7 @@ fn judgement(text: &mut String, found: &Explanation) {
                     significant(ratio),
                     channel.name()
                 );
-                match (reliable, ratio < swept.limits.most) {
+                match (is_within, ratio < swept.limits.most) {
                     (false, true) => format!(
                         "{same}, within the limit: the verdict rests on motion left over from \
                          before the tongue, and would change with the ramp"
@@ -349,8 +365,8 @@ fn judgement(text: &mut String, found: &Explanation) {
                          without what earlier resonances left"
                     ),
                     (true, true) => format!(
-                        "{same}: the point is reliable because the ramp is through before a \
-                         disturbance has grown; a dwell inside a tongue would not be"
+                        "{same}: the motion keeps the limit because the ramp is through before \
+                         a disturbance has grown; a dwell inside a tongue would not"
                     ),
                     (true, false) => format!(
                         "{same}, beyond the limit: here what earlier resonances left keeps the \

@@ -4,10 +4,9 @@ use serde_json::Value;
 
 use super::{Effort, refused_speeds};
 use crate::config::GridInput;
-use crate::engine::simd_from_environment;
 use crate::explain::{explain, json, words};
 use crate::speeds::Speeds;
-use sweep_engine::{Error, threads};
+use sweep_engine::Error;
 
 /// What is found at a point.
 #[derive(Debug)]
@@ -40,9 +39,7 @@ pub fn explain_point(
         })
     };
     let speeds = speeds_rpm.map(even).transpose()?;
-    let (threads, simd) = (effort.threads()?, simd_from_environment()?);
-    let work = || explain(&plan, at, speeds, simd, effort.interrupt);
-    let found = threads::pool(threads)?.install(work)?;
+    let found = explain(&plan, at, speeds, effort)?;
     if effort.interrupt.stopped() {
         return Ok(None);
     }

@@ -35,6 +35,8 @@ pub fn find_modes(
 /// A machine whose modes are asked for, by its name, and the run that it is in.
 pub(crate) struct Asked {
     pub(crate) name: String,
+    /// Constants that were set, and the point, by name.
+    set: Map<String, Value>,
     machine: Machine,
     spin: Spin,
     timing: Timing,
@@ -54,14 +56,18 @@ impl Asked {
         let Some(grid) = grid else {
             return Ok(Self {
                 name: "paper".to_owned(),
+                set: Map::new(),
                 machine: Machine::paper(),
                 spin: Spin::Ramp { peak_rpm: greatest_rpm, ramp_s: 1.0 },
                 timing: Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 },
             });
         };
-        let plan = if at.is_empty() { grid.load()? } else { grid.load_point(at)?.0 };
+        let (plan, at) =
+            if at.is_empty() { (grid.load()?, Vec::new()) } else { grid.load_point(at)? };
+        let at = at.into_iter().map(|(name, value)| (name, value.into()));
+        let set = plan.set.iter().cloned().chain(at).collect();
         let (timing, Washer { machine, spin, .. }) = (timing(&plan), plan.model);
-        Ok(Self { name: plan.name, machine, spin, timing })
+        Ok(Self { name: plan.name, set, machine, spin, timing })
     }
 }
 
@@ -120,7 +126,7 @@ impl Analysis {
     }
 
     /// The modes as columns, with what is known of each in the metadata.
-    pub(crate) fn table(&self, Asked { name, machine, .. }: &Asked) -> Table {
+    pub(crate) fn table(&self, Asked { name, set, machine, .. }: &Asked) -> Table {
         let (speeds, modes) = (&self.speeds_rpm, &self.modes);
         let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
         let mut table = Table::new(crate::identity::BUILD);
@@ -159,7 +165,10 @@ impl Analysis {
             let said = "share of critical damping by it";
             add("exact_damping_ratio", "1", said, Exact::damping_ratio);
         }
-        let plan = json!({ "name": name, "machine": config::machine_json(machine) });
+        let mut plan = json!({ "name": name, "machine": config::machine_json(machine) });
+        if !set.is_empty() {
+            plan["set"] = set.clone().into();
+        }
         table.metadata(key::PLAN, &plan);
         let all: Value = modes.iter().enumerate().map(|(k, mode)| facts(k, mode)).collect();
         table.metadata(key::MODES, &all);
