@@ -14,8 +14,8 @@
 //! The promise: every row that is neither sensitive nor unconverged has RK4's status, RK4's verdict
 //! and RK4's amplitudes within the accuracy; a row is sensitive only where RK4 does not agree with
 //! itself. RK4 runs here at half the step of the fast method's reference, and at a sixteenth in
-//! grids where that is off. Where verdicts differ, RK4 at the reference's very step has the word. Exits
-//! with 1 if a row breaks the promise.
+//! grids where that is off. Where verdicts differ, RK4 at the reference's very step has the word.
+//! Exits with 1 if a row breaks the promise.
 //!
 //! With `grazing`, the clearance of each grid is such that drum and tub just touch in one of its
 //! rows, and the time of their clash is compared too. With `elements`, machines have friction
