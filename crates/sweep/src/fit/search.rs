@@ -13,8 +13,10 @@ const WORTH: f64 = 2e-4;
 const ROUGH: f64 = 0.1;
 /// No step changes a number by more than this share of it, or of a tenth of its range.
 const LONGEST: f64 = 0.5;
+/// The least damping: that after some six steps that all went well.
+const LEAST: f64 = 1e-9;
 /// Most evaluations of a descent.
-const MOST: usize = 80;
+const MOST: usize = 200;
 
 /// Where a descent ended.
 #[derive(Clone, Debug)]
@@ -56,7 +58,7 @@ pub(crate) fn descend(
         let pull: Vec<f64> = moving.iter().zip(&scale).map(|(&k, s)| now.pull[k] / s).collect();
         let solved = |damping: f64| eigen.apply(&pull, |value| 1.0 / (value.max(0.0) + damping));
         // By how much the cost would fall if it were quadratic.
-        let left = dot(&solved(1e-9), &pull);
+        let left = dot(&solved(LEAST), &pull);
         if left < WORTH {
             return done(x, now, evaluations, true);
         }
@@ -80,12 +82,13 @@ pub(crate) fn descend(
             evaluations += 1;
             match evaluate(&trial)? {
                 Some(found) if found.cost < now.cost => {
-                    // Where a large residual's curvature flattens the cost, steps by slopes alone
-                    // are too short: the next is as long as what this one gained asks for.
+                    // Where steps go well and still come to no end, a large residual's curvature
+                    // makes them too short: the next is as long as this one's gain asks for.
                     let gain = (now.cost - found.cost) / (length * dot(&solution, &pull));
-                    stretch = (length / (2.0 - gain).max(0.25)).max(1.0);
+                    let longer = (length / (2.0 - gain).max(0.25)).max(1.0);
+                    stretch = if damping > LEAST { 1.0 } else { longer };
                     (x, now) = (trial, found);
-                    damping = (damping * 0.1).max(1e-9);
+                    damping = (damping * 0.1).max(LEAST);
                     break;
                 }
                 _ if stretch > 1.0 => stretch = 1.0,
