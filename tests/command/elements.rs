@@ -194,6 +194,11 @@ fn friction_is_taken_at_the_speed_that_the_linear_motion_has() {
     let at = ["--at", "unbalance_mass_kg=1"];
     let modes = home.sweep(&[&["modes", "g.toml", "--json"][..], &at].concat());
     let modes: serde_json::Value = serde_json::from_slice(&modes.stdout).expect("it is JSON");
+    let point = home.sweep(&[&["modes", "g.toml", "--out", "modes.parquet"][..], &at].concat());
+    assert!(point.status.success(), "{}", said(&point));
+    home.sweep(&["plot", "modes.parquet", "-o", "modes.svg"]);
+    let figure = fs::read_to_string(home.path("modes.svg")).expect("it was drawn");
+    assert!(figure.contains("unbalance_mass_kg = 1 "), "a figure shows what was set");
     let export = home.sweep(&["export", "map.parquet", "map.csv"]);
     assert!(export.status.success(), "{}", said(&export));
     let csv = fs::read_to_string(home.path("map.csv")).expect("it was written");
