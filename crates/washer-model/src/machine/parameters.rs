@@ -273,8 +273,8 @@ impl Parameter {
         self.row.source
     }
 
-    /// Values it may take. No place on a machine is farther than [`FARTHEST_M`]: who writes
-    /// millimetres is told.
+    /// Values it may take. No place on a machine is farther than 10 m: who writes millimetres is
+    /// told.
     #[must_use]
     pub fn range(&self) -> Range {
         match (self.row.unit, self.row.range) {
