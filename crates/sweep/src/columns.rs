@@ -281,7 +281,8 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
     if !in_map {
         let on_curve = |row: &ResultRow| Some(growth(row)?.is_on_curve);
         let text = "false where the response is not on that curve, but was found from the linear \
-                    model's response; branch then counts on";
+                    model's response; branch then counts on, and where it is the first of its \
+                    speed, a machine that runs up may be in another motion";
         columns.push(ResultColumn::flag("on_curve", text, on_curve));
     }
     columns
@@ -295,8 +296,8 @@ fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
     let kind = if is_of_speed { CellKind::Count } else { CellKind::KnownCount };
     let branch = move |row: &ResultRow| number(row).or(is_of_speed.then_some(0));
     let folds = "how many folds the point's curve of responses has before this one, followed from \
-                 a low speed up; a machine that runs up is on the least branch that there is at a \
-                 speed";
+                 a low speed up; of those on the curve, a machine that runs up is on the least \
+                 branch that there is at a speed";
     let end = |name: &str, side: &str, place: usize| {
         let text =
             format!("speed of the fold {side} which the branch is not; null where it has none");

@@ -12,6 +12,7 @@ mod plain;
 mod respond;
 pub(crate) mod search;
 pub(crate) mod settings;
+mod stepwise;
 #[cfg(test)]
 mod tests;
 pub(crate) mod turn;

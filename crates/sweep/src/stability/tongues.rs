@@ -26,6 +26,8 @@ pub(crate) struct Row {
     pub(crate) branch_to_rpm: Option<f64>,
     /// What of the machine's geometry it passes.
     pub(crate) beyond: Option<String>,
+    /// Whether it is not on the curve of responses.
+    pub(crate) is_off_curve: bool,
     /// What moves in the modes that take part, and their numbers.
     pub(crate) modes: Vec<(f64, String)>,
     pub(crate) status: String,
@@ -50,6 +52,8 @@ pub(crate) struct Summary {
     unstable: u64,
     /// Rows that are stable by their multipliers, and pass what no machine can.
     beyond: u64,
+    /// Rows, each the first of its speed, that are not on the curve of responses.
+    off_curve: u64,
     /// Rows behind another of the same point and speed, which all else leaves out.
     coexisting: u64,
     tongues: Vec<Tongue>,
@@ -76,6 +80,7 @@ impl Summary {
         let follows = same_point && self.last.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
         self.points += u64::from(!same_point);
         self.without += u64::from(row.status != "ok");
+        self.off_curve += u64::from(row.is_off_curve);
         self.beyond += u64::from(row.growth_per_s <= 0.0 && row.beyond.is_some());
         if row.growth_per_s > 0.0 {
             self.unstable += 1;
@@ -111,6 +116,11 @@ impl Summary {
         if self.beyond > 0 {
             let words = "rows pass what no machine can (column beyond), and count for neither";
             lines.push(("beyond", format!("{} {words}", self.beyond)));
+        }
+        if self.off_curve > 0 {
+            let words = "of these rows are off the curve (column on_curve): a machine that runs up \
+                         may be in another motion there (`sweep dwell`)";
+            lines.push(("off curve", format!("{} {words}", self.off_curve)));
         }
         if self.coexisting > 0 {
             let words = "further rows: other responses at the same speeds (column branch)";
@@ -177,7 +187,7 @@ pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, FileError> {
     let axes = places::axes(file);
     let numbers = ["point", "speed_rpm", "growth_per_s", "frequency_cpm", "branch_to_rpm"];
     let modes = ["mode_1", "mode_2", "mode_1_name", "mode_2_name"];
-    let words = ["kind", "status", "beyond"];
+    let words = ["kind", "status", "beyond", "on_curve"];
     let own = [&numbers[..], &modes, &words].concat();
     let names = [&own[..], &axes.iter().map(String::as_str).collect::<Vec<_>>()].concat();
     let mut summary = Summary { axes: axes.clone(), ..Summary::default() };
@@ -185,6 +195,7 @@ pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, FileError> {
         let [point, speed_rpm, growth_per_s, frequency_cpm, branch_to_rpm] =
             std::array::from_fn(|column| row.value(column));
         let [kind, status, beyond] = [9, 10, 11].map(|column| row.word(column).map(str::to_owned));
+        let is_off_curve = row.word(12) == Some("false");
         let modes = [5, 6].map(|column| (row.value(column), row.word(column + 2)));
         let modes = modes.into_iter().filter(|(number, _)| !number.is_nan());
         summary.add(Row {
@@ -196,6 +207,7 @@ pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, FileError> {
             kind: kind.unwrap_or_default(),
             branch_to_rpm: Some(branch_to_rpm).filter(|speed| !speed.is_nan()),
             beyond,
+            is_off_curve,
             modes: modes
                 .map(|(number, name)| (number, name.unwrap_or_default().to_owned()))
                 .collect(),
@@ -234,6 +246,7 @@ mod tests {
                 growth_per_s,
                 kind: kind.to_owned(),
                 status: status.to_owned(),
+                is_off_curve: kind == "period_doubling",
                 ..Row::default()
             });
         }
@@ -245,10 +258,11 @@ mod tests {
         );
         let lines = summary.lines();
         assert_eq!(lines[0].1, "1 of 7 rows, 5 not, 1 without a response; 2 points");
-        assert!(lines[1].1.starts_with("1 further rows"));
-        assert!(lines[2].1.starts_with(
+        assert!(lines[1].1.starts_with("2 of these rows are off the curve"));
+        assert!(lines[2].1.starts_with("1 further rows"));
+        assert!(lines[3].1.starts_with(
             "unbalance_mass_kg 0.1: 2 to 3 rpm, quasi periodic, up to 0.3000 /s at 3"
         ));
-        assert!(lines[3].1.starts_with("unbalance_mass_kg 0.1: 4 rpm, period doubling, up to"));
+        assert!(lines[4].1.starts_with("unbalance_mass_kg 0.1: 4 rpm, period doubling, up to"));
     }
 }

@@ -8,7 +8,7 @@
 
 use super::monodromy::{INSTANTS, Square};
 use super::orbit::{Asked, Turned};
-use super::search::{Search, apart, missing};
+use super::search::{Search, apart, factored, missing, solved};
 use super::settings::Settings;
 use crate::coordinates::{COORDINATES, STATES};
 use lane_ode::{Lu, N};
@@ -162,6 +162,8 @@ struct Step {
     onto: Place,
     across: Place,
     corrections: usize,
+    /// How many of these by the derivatives in use.
+    since: usize,
     missing: f64,
     /// What is known of the curve at `onto`, once that is seen.
     seen: Option<Box<Jacobian>>,
@@ -251,7 +253,19 @@ impl<'a> Curve<'a> {
         let is_far = (0..COORDINATES).any(|i| (last.at[i] * UNIT).abs() > FARTHEST);
         let is_back = at_rpm < speed_of(&self.nodes[0].at);
         let is_over = at_rpm >= self.until_rpm || is_far || is_back || count >= MOST_PLACES;
-        if is_over || self.length < SHORTEST_STEP {
+        if is_over {
+            return;
+        }
+        if self.length < SHORTEST_STEP {
+            // Steps of a turn that are longer than corners are wide make stairs of a curve.
+            let from = last.length - FIRST_STEP;
+            if self.settings.follow_closer() {
+                let kept = self.nodes.partition_point(|node| node.length < from).max(1);
+                self.nodes.truncate(kept);
+                self.folds.retain(|fold| *fold < kept);
+                self.length = FIRST_STEP;
+                self.look_again();
+            }
             return;
         }
         // Along the tangent, and as it turned in the last step.
@@ -274,7 +288,7 @@ impl<'a> Curve<'a> {
     fn correct(&mut self, onto: Place, across: Place) {
         self.at = onto;
         let missing = f64::INFINITY;
-        self.step = Some(Step { onto, across, corrections: 0, missing, seen: None });
+        self.step = Some(Step { onto, across, corrections: 0, since: 0, missing, seen: None });
     }
 
     /// The step led nowhere.
@@ -304,9 +318,9 @@ impl<'a> Curve<'a> {
             matrix[i][SPEED] = N(by_speed * UNIT_OF_SPEED / unit_of(i));
         }
         matrix[SPEED] = step.across.map(N);
-        let Some(factors) = Lu::new(matrix) else { return self.shorten() };
+        let Some(factors) = factored(&matrix) else { return self.shorten() };
         let jacobian = Box::new(Jacobian { monodromy, factors });
-        self.corrected(Step { seen: Some(jacobian), ..step }, &seen.end);
+        self.corrected(Step { seen: Some(jacobian), since: 0, ..step }, &seen.end);
     }
 
     /// What a turn from where the step has come makes of the state.
@@ -315,8 +329,14 @@ impl<'a> Curve<'a> {
         let speed_rpm = speed_of(&self.at);
         let missing = missing(self.settings.point, speed_rpm, &state_of(&self.at), end);
         let is_slow = step.corrections > 1 && missing > FAST_ENOUGH * step.missing;
-        if !missing.is_finite() || step.corrections == MOST || is_slow {
+        if !missing.is_finite() || step.corrections == MOST || is_slow && step.since == 0 {
             return self.shorten();
+        }
+        if is_slow {
+            // The derivatives of another place are of no more use.
+            (step.missing, step.seen) = (f64::INFINITY, None);
+            self.step = Some(step);
+            return;
         }
         let end = place_of(end, speed_rpm);
         let mut gap = [N(0.0); PLACE];
@@ -325,19 +345,19 @@ impl<'a> Curve<'a> {
         }
         let off: Place = core::array::from_fn(|i| step.onto[i] - self.at[i]);
         gap[SPEED] = N(dot(&step.across, &off));
-        let correction = jacobian.factors.solve(&gap);
+        let correction = solved(&jacobian.factors, &gap);
         self.at = core::array::from_fn(|i| self.at[i] + correction[i].0);
         let off: Place = core::array::from_fn(|i| self.at[i] - step.onto[i]);
         let off = dot(&off, &off);
         if off.is_nan() || off > LONGEST_STEP * LONGEST_STEP {
             return self.shorten();
         }
-        (step.corrections, step.missing) = (step.corrections + 1, missing);
+        (step.corrections, step.since, step.missing) =
+            (step.corrections + 1, step.since + 1, missing);
         if missing < CLOSE { self.arrived(step) } else { self.step = Some(step) }
     }
 
-    /// Arrives at the last node once more, with derivatives of that very place. From a tangent that
-    /// is not quite its own, no step would be short enough.
+    /// Arrives at the last node once more, with derivatives of that very place.
     fn look_again(&mut self) {
         self.scale(0.5);
         if let Some(last) = self.nodes.pop() {
@@ -349,7 +369,7 @@ impl<'a> Curve<'a> {
         let Some(jacobian) = step.seen else { return self.shorten() };
         let mut one = [N(0.0); PLACE];
         one[SPEED] = N(1.0);
-        let tangent = jacobian.factors.solve(&one).map(|entry| entry.0);
+        let tangent = solved(&jacobian.factors, &one).map(|entry| entry.0);
         let tangent = unit(&tangent);
         let before = match self.turning {
             Some(turning) => self.nodes.get(turning.after),
@@ -365,11 +385,10 @@ impl<'a> Curve<'a> {
             let gone = apart(&before.at);
             let cosine = dot(&before.tangent, &tangent);
             let is_turned = cosine.is_nan() || cosine < MOST_TURNED;
-            if is_turned && !before.is_own && self.turning.is_none() {
-                return self.look_again();
-            }
             if is_turned || off > MOST_CORRECTED * gone {
-                return self.shorten();
+                // From a tangent that is not quite its own, no step would be short enough.
+                let is_own = before.is_own || self.turning.is_some();
+                return if is_own { self.shorten() } else { self.look_again() };
             }
             length = before.length + gone;
             turns_back = before.tangent[SPEED] * tangent[SPEED] < 0.0;

@@ -132,7 +132,7 @@ impl Kernel for OfTurn<'_> {
         let (zero, row) = (N(zero), self.0);
         // The one machine in every lane, a disturbance in each; the first group has none.
         let linear: Linear<T> = model(zero, &[row]);
-        let clock = Clock { step_s: zero.lit(row.step_s()), steps: row.steps };
+        let clock = Clock { step_s: zero.lit(row.step_s()), steps: row.steps, hinge_kept: None };
         let mut groups = vec![[zero; STATES]; 1 + STATES.div_ceil(T::LANES)];
         for j in 0..STATES {
             groups[1 + j / T::LANES][j].0.set(j % T::LANES, 1.0);

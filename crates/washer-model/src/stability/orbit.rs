@@ -5,6 +5,7 @@
 //! `search.rs` at one speed, and followed over speed by `branch.rs`.
 
 use super::monodromy::{Along, INSTANTS, Square, weights};
+use super::stepwise::Stepwise;
 use super::turn::{Clock, Watch, turn};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -26,6 +27,11 @@ use lane_ode::{Aside, Kernel, Lane, Lu, N, Peaks, Simd};
 /// capped hinge faster than its cap.
 const CAP_SHARE: f64 = 0.7;
 
+/// Where responses with corners are followed, the steps of a turn take so many nepers off the
+/// hinge's speeds: of its swing that leaves 2 %. Where it is in tune with a multiple of the drum's
+/// speed, hits of stops would make it swing so far that the curve is not followed over it.
+const OFF_HINGE: f64 = 8.0;
+
 /// A point at a constant speed.
 #[derive(Clone, Copy)]
 pub(crate) struct Row<'a> {
@@ -33,7 +39,7 @@ pub(crate) struct Row<'a> {
     pub(crate) speed_rpm: f64,
     /// Steps of a turn.
     pub(crate) steps: usize,
-    /// Even instants of it at which derivatives are taken.
+    /// Even instants of it at which derivatives are taken; as many as steps: those of the steps.
     pub(crate) instants: usize,
     /// On the modes of bearings and hinge; none if the steps follow these.
     pub(crate) caps: Option<Caps>,
@@ -61,6 +67,11 @@ impl Row<'_> {
     /// the coordinates.
     pub(super) fn unit_per_s(&self) -> f64 {
         1.0 / self.step_s()
+    }
+
+    /// Whether derivatives are those of the steps themselves.
+    pub(super) fn is_stepwise(&self) -> bool {
+        self.instants == self.steps
     }
 
     /// Whether forces have corners.
@@ -149,7 +160,8 @@ impl Kernel for Turns<'_> {
         let mut turned = Vec::with_capacity(self.asked.len());
         let Some(first) = self.asked.first() else { return turned };
         let Row { steps, instants, .. } = first.row;
-        let weights = if first.is_seen { weights(steps, instants) } else { Vec::new() };
+        let is_weighed = first.is_seen && !first.row.is_stepwise();
+        let weights = if is_weighed { weights(steps, instants) } else { Vec::new() };
         for asked in self.asked.chunks(T::LANES) {
             if (self.is_stopped)() {
                 break;
@@ -185,7 +197,9 @@ pub(crate) fn model<T: Lane, M: Model<T>>(zero: N<T>, rows: &[Row<'_>]) -> M {
 /// The clock of rows in lanes, the last in those that are left over.
 #[inline(always)]
 pub(crate) fn clock<T: Lane>(zero: N<T>, rows: &[Row<'_>]) -> Clock<T> {
-    let mut clock = Clock { step_s: zero, steps: rows[0].steps };
+    let kept = || libm::exp(-OFF_HINGE / rows[0].steps as f64);
+    let hinge_kept = rows[0].is_stepwise().then(kept);
+    let mut clock = Clock { step_s: zero, steps: rows[0].steps, hinge_kept };
     for lane in 0..T::LANES {
         clock.step_s.0.set(lane, rows[lane.min(rows.len() - 1)].step_s());
     }
@@ -205,11 +219,15 @@ fn see<T: Lane>(zero: N<T>, asked: &[Asked<'_>], weights: &[Vec<f64>], turned: &
     }
     let seen = asked.iter().filter(|asked| asked.is_seen).count();
     let mut watched = Watched::new(zero, &model, &clock);
-    watched.with_corners = rows[0].has_corners();
+    watched.with_corners = rows[0].has_corners() && !rows[0].is_stepwise();
     watched.instants = rows[0].instants.max(INSTANTS);
     turn(&model, &clock, &mut ends, if seen > 0 { Some(&mut watched) } else { None });
     let mut monodromies: Vec<Square> = Vec::new();
-    if seen > 0 {
+    if rows[0].is_stepwise() {
+        for Asked { row, start, .. } in &asked[..seen] {
+            monodromies.push(zero.0.aside(Stepwise { zero, row: *row, start: *start }));
+        }
+    } else if seen > 0 {
         let spread: Vec<Row<'_>> = rows[..seen].iter().copied().cycle().take(T::LANES).collect();
         let along = Along {
             zero,

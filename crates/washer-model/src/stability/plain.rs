@@ -47,7 +47,8 @@ impl Aside for Plain<'_> {
     fn run(self) -> Option<Square> {
         let zero = N(0.0).constant();
         let tangent: Nonlinear<Dual<f64>> = model(zero, &[self.row]);
-        let clock = Clock { step_s: zero.lit(self.row.step_s()), steps: self.row.steps };
+        let clock =
+            Clock { step_s: zero.lit(self.row.step_s()), steps: self.row.steps, hinge_kept: None };
         let mut x = self.start;
         for _ in 0..MOST_ROUNDS {
             let mut columns = vec![[zero; STATES]; STATES];
@@ -142,7 +143,7 @@ impl Aside for Trace<'_> {
         let zero = N(0.0).constant();
         let model: Nonlinear<Dual<f64>> = model(zero, &[self.row]);
         let (step_s, steps) = (self.row.step_s(), self.row.steps);
-        let clock = Clock { step_s: zero.lit(step_s), steps };
+        let clock = Clock { step_s: zero.lit(step_s), steps, hinge_kept: None };
         let mut states = [self.start.map(|x| zero.lit(x))];
         let mut diagonal = Diagonal { model: &model, step_s, steps, sum: 0.0 };
         turn(&model, &clock, &mut states, Some(&mut diagonal));

@@ -6,7 +6,7 @@ use super::orbit::{Asked, Row, Seen, Turned, turns};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::point::Point;
 use core::f64::consts::TAU;
-use lane_ode::{Lu, N};
+use lane_ode::{Aside, Lu, N, Simd};
 
 /// A search that asks for turns until it is over.
 pub(super) trait Search<'a> {
@@ -41,11 +41,11 @@ pub(super) fn finish<'a, S: Search<'a>>(searches: &mut [S], is_stopped: &dyn Fn(
 /// Turns that the search for a response may take.
 const MOST_TURNS: usize = 80;
 
-/// A response is found once another turn moves it by less than this share of its greatest
-/// coordinate.
+/// A response is looked at for the last time once another turn should move it by less than this
+/// share of its greatest coordinate,
 const CLOSE: f64 = 1e-10;
 
-/// Where the last corrections let that be expected, this is enough.
+/// and is found if that turn moves it by less than this.
 const CLOSE_AT_LAST: f64 = 1e-8;
 
 /// Smaller deviations (m, rad) count as this: without unbalance there is none but rounding.
@@ -84,7 +84,38 @@ pub(super) fn apart(monodromy: &Square) -> Option<Lu<STATES>> {
     for i in 0..STATES {
         apart[i][i] = apart[i][i] + 1.0;
     }
-    Lu::new(apart)
+    factored(&apart)
+}
+
+/// Factors of a matrix.
+pub(super) fn factored<const C: usize>(matrix: &[[N<f64>; C]; C]) -> Option<Lu<C>> {
+    Simd::one_lane(Factor(matrix))
+}
+
+/// The solution for a right-hand side.
+pub(super) fn solved<const C: usize>(factors: &Lu<C>, of: &[N<f64>; C]) -> [N<f64>; C] {
+    Simd::one_lane(Solution(factors, of))
+}
+
+struct Factor<'a, const C: usize>(&'a [[N<f64>; C]; C]);
+struct Solution<'a, const C: usize>(&'a Lu<C>, &'a [N<f64>; C]);
+
+impl<const C: usize> Aside for Factor<'_, C> {
+    type Output = Option<Lu<C>>;
+
+    #[inline(always)]
+    fn run(self) -> Option<Lu<C>> {
+        Lu::new(*self.0)
+    }
+}
+
+impl<const C: usize> Aside for Solution<'_, C> {
+    type Output = [N<f64>; C];
+
+    #[inline(always)]
+    fn run(self) -> [N<f64>; C] {
+        self.0.solve(self.1)
+    }
 }
 
 /// The search for a periodic response at one speed, by Newton's method: once with the matrix of a
@@ -130,14 +161,17 @@ impl<'a> Search<'a> for Solve<'a> {
             return Vec::new();
         }
         let is_seen = self.is_last || self.factors.is_none();
-        vec![Asked { row: self.row, start: self.state, is_seen }]
+        // To come nearer, derivatives at half the instants are enough: of what was missing they
+        // leave some 1e-7.
+        let instants = self.row.instants / if self.is_last { 1 } else { 2 };
+        vec![Asked { row: Row { instants, ..self.row }, start: self.state, is_seen }]
     }
 
     fn take(&mut self, turned: Vec<Turned>) {
         let Some(Turned { end, seen }) = turned.into_iter().next() else { return };
         self.turns += 1;
         let missing = missing(self.row.point, self.row.speed_rpm, &self.state, &end);
-        if seen.is_some() && missing < if self.is_last { CLOSE_AT_LAST } else { CLOSE } {
+        if self.is_last && missing < CLOSE_AT_LAST {
             (self.is_over, self.found) = (true, seen);
             return;
         }
@@ -153,7 +187,7 @@ impl<'a> Search<'a> for Solve<'a> {
         self.is_over |= !missing.is_finite() || self.turns == MOST_TURNS;
         if let (false, Some(factors)) = (self.is_over, &self.factors) {
             let gap = core::array::from_fn(|i| N(end[i] - self.state[i]));
-            let correction = factors.solve(&gap);
+            let correction = solved(factors, &gap);
             for i in 0..STATES {
                 self.state[i] += correction[i].0;
             }

@@ -37,7 +37,6 @@ struct Care {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Use {
     Rows,
-    Linear,
     Followed,
 }
 
@@ -45,12 +44,17 @@ enum Use {
 const OF_ROWS: Care =
     Care { steps: 96, instants: INSTANTS, phase: 0.25, shift_per_s: 3e-4, at_corners_s: 1e-4 };
 
-/// Of the linear model, whose forces have no corners, and whose response turns with the drum.
-const OF_LINEAR: Care = Care { at_corners_s: f64::INFINITY, ..OF_FOLLOWED };
-
-/// Where responses are only followed: what lies on the curve is looked for anew.
+/// Of the linear model, whose forces have no corners, and whose response turns with the drum; and
+/// where smooth responses are only followed: what lies on the curve is looked for anew.
 const OF_FOLLOWED: Care =
-    Care { steps: 48, instants: 8, phase: 0.4, shift_per_s: 3e-3, at_corners_s: 5e-4 };
+    Care { steps: 48, instants: 8, phase: 0.4, shift_per_s: 3e-3, at_corners_s: f64::INFINITY };
+
+/// Steps of every turn where responses with corners are followed, at least. A hit of a stop rings
+/// the hinge, by other steps or caps otherwise, so that a change of these would break the curve.
+/// They damp what rings, at low speeds most, where the hinge is in tune with a multiple of the
+/// drum's speed over and over.
+const STEPS_AT_CORNERS: usize = 256;
+const MOST_STEPS_AT_CORNERS: usize = 2048;
 
 /// Responses are followed from this share of the slowest mode's frequency, a multiple of so many
 /// parts of a turn per minute.
@@ -112,6 +116,8 @@ pub(crate) struct Settings<'a> {
     rest: Option<Modes>,
     /// Modes where ranges begin, by range.
     frozen: BTreeMap<i64, Result<Arc<Modes>, NoAnswer>>,
+    /// Steps of every turn where responses with corners are followed, at least.
+    steps_at_corners: usize,
     /// By range and use.
     ranges: BTreeMap<(i64, Use), Result<Setting, NoAnswer>>,
 }
@@ -136,7 +142,14 @@ impl<'a> Settings<'a> {
             false => Cow::Owned(point.without_friction()),
         };
         let rest = modes(&free, 0.0, 0.0).ok();
-        Self { point, free, rest, frozen: BTreeMap::new(), ranges: BTreeMap::new() }
+        Self {
+            point,
+            free,
+            rest,
+            frozen: BTreeMap::new(),
+            steps_at_corners: STEPS_AT_CORNERS,
+            ranges: BTreeMap::new(),
+        }
     }
 
     /// The machine without friction.
@@ -161,7 +174,7 @@ impl<'a> Settings<'a> {
 
     /// A row for the linear model.
     pub(super) fn linear(&mut self, row: Row<'a>) -> Row<'a> {
-        self.chosen(row.speed_rpm, Use::Linear).map_or(row, |case| case.row)
+        self.chosen(row.speed_rpm, Use::Followed).map_or(row, |case| case.row)
     }
 
     /// As [`Self::case`], where responses are only followed.
@@ -169,14 +182,34 @@ impl<'a> Settings<'a> {
     /// # Errors
     /// As [`Self::case`].
     pub(super) fn followed(&mut self, speed_rpm: f64) -> Result<Row<'a>, NoAnswer> {
-        Ok(self.chosen(speed_rpm, Use::Followed)?.row)
+        let point = self.point;
+        if !point.machine.elements.are_nonsmooth() {
+            return Ok(self.chosen(speed_rpm, Use::Followed)?.row);
+        }
+        let rest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?;
+        let fastest = rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
+        let longest_turn_s = 60.0 / self.lowest_rpm()?;
+        let steps = whole(point, fastest * longest_turn_s / OF_FOLLOWED.phase)?;
+        let steps = steps.max(self.steps_at_corners);
+        let caps = Some(caps(steps, 60.0 / speed_rpm));
+        Ok(Row { point, speed_rpm, steps, instants: steps, caps })
+    }
+
+    /// From now on, responses with corners are followed by turns of twice as many steps; false if
+    /// there are none, or enough.
+    pub(super) fn follow_closer(&mut self) -> bool {
+        let is_closer = self.point.machine.elements.are_nonsmooth()
+            && self.steps_at_corners < MOST_STEPS_AT_CORNERS;
+        if is_closer {
+            self.steps_at_corners *= 2;
+        }
+        is_closer
     }
 
     fn chosen(&mut self, speed_rpm: f64, of: Use) -> Result<Case<'a>, NoAnswer> {
         let range = (RANGES * libm::log2(speed_rpm)).floor() as i64;
         let care = match of {
             Use::Rows => OF_ROWS,
-            Use::Linear => OF_LINEAR,
             Use::Followed => OF_FOLLOWED,
         };
         let known = self.ranges.get(&(range, of)).cloned();

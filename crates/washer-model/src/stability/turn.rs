@@ -1,6 +1,6 @@
 //! A turn of the drum by classical Runge-Kutta: states in lanes, several of them side by side.
 
-use crate::coordinates::STATES;
+use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, STATES};
 use lane_ode::{Lane, N, System};
 
 /// Even steps over one turn of each lane's drum.
@@ -10,6 +10,8 @@ pub(crate) struct Clock<T> {
     pub(super) step_s: N<T>,
     /// Steps a turn.
     pub(super) steps: usize,
+    /// What a step leaves of the hinge's speeds, where it is damped.
+    pub(super) hinge_kept: Option<f64>,
 }
 
 impl<T: Lane> Clock<T> {
@@ -136,6 +138,11 @@ pub(crate) fn turn<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
                 _ => None,
             };
             stages(system, clock.step_s, &forcings, x, count, watch);
+            if let Some(kept) = clock.hinge_kept {
+                for i in [HINGE_YAW, HINGE_PITCH] {
+                    x[COORDINATES + i] = (x[COORDINATES + i] * kept).v();
+                }
+            }
         }
     }
 }

@@ -1,0 +1,102 @@
+//! What the steps of a turn themselves do to small disturbances of its start: the turn once more,
+//! over dual numbers.
+//!
+//! Steps that are longer than forces' corners are wide land beside these or on them, and what they
+//! make of a disturbance is not what the motion makes of it (`monodromy.rs`). Newton's method asks
+//! for the steps' own.
+
+use super::monodromy::Square;
+use super::orbit::{Row, clock, model};
+use super::turn::{Unwatched, turn};
+use crate::coordinates::STATES;
+use crate::run::model::Nonlinear;
+use lane_ode::{Aside, Dual, Lane, N};
+
+/// A turn from a state. Lanes share its disturbances.
+pub(super) struct Stepwise<'a, T> {
+    pub(super) zero: N<T>,
+    pub(super) row: Row<'a>,
+    pub(super) start: [f64; STATES],
+}
+
+impl<T: Lane> Aside for Stepwise<'_, T> {
+    type Output = Square;
+
+    #[inline(always)]
+    fn run(self) -> Square {
+        let (zero, rows) = (self.zero.constant(), [self.row]);
+        let model: Nonlinear<Dual<T>> = model(zero, &rows);
+        let clock = clock(zero, &rows);
+        let mut groups = vec![[zero; STATES]; STATES.div_ceil(T::LANES)];
+        for j in 0..STATES {
+            let group = &mut groups[j / T::LANES];
+            for i in 0..STATES {
+                group[i].0.value.set(j % T::LANES, self.start[i]);
+            }
+            group[j].0.slope.set(j % T::LANES, 1.0);
+        }
+        turn(&model, &clock, &mut groups, None::<&mut Unwatched>);
+        let mut matrix = [[N(0.0); STATES]; STATES];
+        for i in 0..STATES {
+            for j in 0..STATES {
+                matrix[i][j] = N(groups[j / T::LANES][i].0.slope.get(j % T::LANES));
+            }
+        }
+        matrix
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{BumpStop, Dwell, Machine, Point, Spin, Timing, prepare, respond};
+    use lane_ode::Simd;
+
+    /// The paper's machine with 0.3 kg on dampers of 30 N s/m, whose response folds back.
+    fn folded(change: impl Fn(&mut Machine)) -> Point {
+        let mut machine = Machine::paper();
+        machine.unbalance.mass_kg = 0.3;
+        machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 30.0);
+        change(&mut machine);
+        let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![100.0] };
+        let timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints: 0 };
+        prepare(Simd::best(), &[(machine, spin)], &timing).remove(0).unwrap()
+    }
+
+    #[test]
+    fn an_element_that_does_nothing_leaves_the_curve_where_it_is() {
+        let stop = BumpStop {
+            tub_m: [0.35, -0.28, 0.0],
+            direction: [0.0, -1.0, 0.0],
+            clearance_m: 1.0,
+            stiffness_n_per_m: 0.0,
+            damping_n_s_per_m: 0.0,
+            softness_m: 1e-4,
+        };
+        let points = [
+            folded(|_| {}),
+            folded(|machine| machine.stops.push(stop)),
+            folded(|machine| machine.dampers[0].friction_n = 1e-6),
+        ];
+        let [without, with @ ..] = points.each_ref().map(|point| {
+            let dwells = [60.0, 110.0, 185.0, 255.0].map(|speed_rpm| Dwell { point, speed_rpm });
+            let found: Vec<_> =
+                respond(&dwells, &|| false).into_iter().map(Result::unwrap).collect();
+            found.concat().into_iter().filter(|response| response.is_on_curve).collect::<Vec<_>>()
+        });
+        // At 255 rpm it has three.
+        assert_eq!(without.len(), 6);
+        for with in with {
+            assert_eq!(with.len(), without.len());
+            for (one, other) in with.iter().zip(&without) {
+                let at = one.speed_rpm;
+                assert_eq!(one.branch, other.branch, "{at}");
+                for (a, b) in one.nonlinear.iter().zip(&other.nonlinear) {
+                    assert!((a / b - 1.0).abs() < 1e-3, "{at}: {a} for {b}");
+                }
+                let folds =
+                    one.between_rpm.iter().flatten().zip(other.between_rpm.iter().flatten());
+                assert!(folds.into_iter().all(|(a, b)| (a - b).abs() < 0.05), "{at}");
+            }
+        }
+    }
+}
