@@ -10,10 +10,13 @@ where
     let likeness = |name: &str| {
         // Leaving out the unit or a leading word is as common as a slip of the finger.
         let is_word = || name.split('_').any(|word| word == typed);
-        let part = typed.len() >= 4 && (name.starts_with(&typed) || is_word());
+        let is_long = typed.len() >= 4;
+        if is_long && name.starts_with(&typed) {
+            return 1.0;
+        }
         // One slip in a short word leaves too little for the measures of likeness.
         let one_slip = typed.len() >= 3 && strsim::damerau_levenshtein(&typed, name) == 1;
-        if part {
+        if is_long && is_word() {
             return 0.95;
         }
         let measured = strsim::jaro_winkler(&typed, name)
@@ -44,12 +47,15 @@ mod tests {
             "spring_stiffness_n_per_m",
             "spin_ramp_s",
             "run",
+            "damper_2_friction_n",
+            "damper_1_friction_n",
         ];
         let near = |typed| nearest(typed, valid);
         assert_eq!(near("unbalance_mas_kg"), Some("unbalance_mass_kg"));
         assert_eq!(near("Unbalance_Mass_kg"), Some("unbalance_mass_kg"));
         assert_eq!(near("frame_mass"), Some("frame_mass_kg"));
         assert_eq!(near("damping"), Some("damping_n_s_per_m"));
+        assert_eq!(near("damper_1_friction"), Some("damper_1_friction_n"));
         assert_eq!(near("spring_stifness_n_per_m"), Some("spring_stiffness_n_per_m"));
         assert_eq!([near("rnu"), near("runn"), near("rum")], [Some("run"); 3]);
         assert_eq!(near("colour"), None);

@@ -113,8 +113,9 @@ impl Metric {
         match self {
             Self::CabinetForce => Facts {
                 unit: "N",
-                description: "greatest magnitude in the window of the sum of all spring and damper \
-                              forces on the cabinet (at rest the weight)",
+                description: "greatest magnitude in the window of the sum of the forces of all \
+                              springs, dampers, stops and bushings on the cabinet (at rest the \
+                              weight)",
                 record: |wanted| wanted.cabinet_force = true,
                 of: Some(|extra| extra.cabinet_force_n.into_iter().collect()),
                 ..PLAIN

@@ -272,7 +272,7 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         text.line("sensitive", format!("{sensitive}: chaotic, a near twin departs exponentially"));
     }
     if *unconverged > 0 {
-        let told = format!("all but {unconverged}, whose error is above the accuracy");
+        let told = format!("all but {unconverged}, whose error is above the accuracy or unknown");
         text.line("converged", told);
     }
     if let Some(greatest) = &tally.greatest_error {

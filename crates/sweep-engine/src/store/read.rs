@@ -208,7 +208,9 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
             }
         };
         extreme(&mut tally.greatest_off, row.value(off), f64::gt);
-        extreme(&mut tally.greatest_error, row.value(error), f64::gt);
+        // Of a run that failed nothing is left to err.
+        let error = if row.word(status) == Some("ok") { row.value(error) } else { f64::NAN };
+        extreme(&mut tally.greatest_error, error, f64::gt);
         extreme(&mut tally.greatest_ratio, row.value(greatest), f64::gt);
         extreme(&mut tally.least_gap_nonlinear_m, row.value(gap), f64::lt);
         Ok::<(), StoreError>(())

@@ -80,17 +80,25 @@ fn machine(machine: &Value) -> Option<String> {
         mass("unbalance")?,
         quantity(&machine["unbalance"], "radius_m")?
     )];
-    // Numbers that all elements of a list have in common, each behind its word.
+    // Numbers of a list's elements, each behind its word: the one that they have in common, or the
+    // least and the greatest.
     let elements = |(list, numbers): (&str, &[(&str, &str)])| {
         let all = machine.get(list).and_then(Value::as_array)?;
-        let first = all.first()?;
-        let common = numbers.iter().filter_map(|(word, number)| {
-            let alike = all.iter().all(|one| one[number] == first[number]);
-            Some(format!(" {word} {}", quantity(first, number).filter(|_| alike)?))
+        let said = numbers.iter().filter_map(|(word, number)| {
+            let by_size = |a: &&Value, b: &&Value| {
+                let [a, b] = [a, b].map(|of| of[*number].as_f64().unwrap_or(f64::NAN));
+                a.total_cmp(&b)
+            };
+            let [least, most] = [all.iter().min_by(by_size)?, all.iter().max_by(by_size)?];
+            let from = match least[*number] == most[*number] {
+                true => String::new(),
+                false => format!("{} to ", significant(least[*number].as_f64()?, 4)),
+            };
+            Some(format!(" {word} {from}{}", quantity(most, number)?))
         });
         let words = list.replace('_', " ");
         let words = if all.len() == 1 { words.trim_end_matches('s') } else { &words };
-        Some(format!("{} {words}{}", all.len(), common.collect::<Vec<_>>().join(",")))
+        Some(format!("{} {words}{}", all.len(), said.collect::<Vec<_>>().join(",")))
     };
     let lists: [(&str, &[(&str, &str)]); 6] = [
         ("springs", &[("of", "stiffness_n_per_m")]),

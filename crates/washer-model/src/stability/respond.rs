@@ -72,34 +72,32 @@ impl<'a> Responses<'a> {
         for (curve, (_, fastest_rpm)) in curves.iter_mut().zip(points) {
             let lowest = from.map_or_else(|| curve.settings.lowest_rpm(), |it| Ok(it.speed_rpm));
             let lowest = lowest.ok().filter(|lowest| lowest < fastest_rpm);
-            let case = lowest.and_then(|lowest| curve.settings.case(lowest).ok());
-            starts.push(case.map(|case| (curve.settings.linear(case.row), case)));
+            starts.push(lowest.and_then(|lowest| curve.settings.followed(lowest).ok()));
         }
         // A curve does not depend on where the linear model takes friction.
         let rows: Vec<Row<'_>> = curves
             .iter()
             .zip(&starts)
             .filter_map(|(curve, start)| {
-                let (row, _) = start.as_ref()?;
-                Some(Row { point: curve.settings.without_friction(), ..*row })
+                Some(Row { point: curve.settings.without_friction(), ..(*start)? })
             })
             .collect();
         let linear = together(&rows, is_stopped);
         let begun = starts.iter().flatten().zip(&linear);
         let mut solves: Vec<Solve<'_>> = begun
-            .map(|((_, case), linear)| {
-                let state = from.map_or_else(|| from_linear(case, linear).state, |it| it.start);
-                Solve::new(case.row, state, None)
+            .map(|(row, linear)| {
+                let at_linear = || from_linear(row.point, linear).state;
+                Solve::new(*row, from.map_or_else(at_linear, |it| it.start), None)
             })
             .collect();
         let mut is_whole = finish(&mut solves, is_stopped);
         let mut solves = solves.into_iter();
         for ((curve, (_, fastest_rpm)), start) in curves.iter_mut().zip(points).zip(&starts) {
-            if let Some((_, case)) = start
+            if let Some(row) = start
                 && let Some((state, _)) = solves.next().and_then(Solve::found)
             {
                 let until_rpm = from.map_or(BEYOND, |_| 1.0) * fastest_rpm;
-                curve.begin(case.row.speed_rpm, &state, until_rpm);
+                curve.begin(row.speed_rpm, &state, until_rpm);
             }
         }
         is_whole = is_whole && finish(&mut curves, is_stopped);
@@ -142,7 +140,7 @@ impl<'a> Responses<'a> {
             // Friction and stops make responses beside those of the curve.
             if guesses.is_empty() || case.row.has_corners() {
                 let branch = guesses.last().map_or(0, |last| last.branch + 1);
-                guesses.push(Guess { branch, ..from_linear(case, &linear) });
+                guesses.push(Guess { branch, ..from_linear(case.row.point, &linear) });
             }
             for guess in guesses {
                 solves.push(Solve::new(case.row, guess.state, guess.factors.clone()));
@@ -243,8 +241,8 @@ fn are_moved(
 }
 
 /// The linear model's response, where there is one; else the machine at rest.
-fn from_linear(case: &Case<'_>, linear: &LinearResponse) -> Guess {
-    let rest = <Nonlinear<f64> as Model<f64>>::at_rest(case.row.point);
+fn from_linear(point: &Point, linear: &LinearResponse) -> Guess {
+    let rest = <Nonlinear<f64> as Model<f64>>::at_rest(point);
     let is_known = linear.start.iter().all(|x| x.is_finite());
     let deviation = |i: usize| if is_known { linear.start[i] } else { 0.0 };
     let state = core::array::from_fn(|i| rest[i] + deviation(i));

@@ -161,10 +161,13 @@ impl<'a> Search<'a> for Solve<'a> {
             return Vec::new();
         }
         let is_seen = self.is_last || self.factors.is_none();
-        // To come nearer, derivatives at half the instants are enough: of what was missing they
-        // leave some 1e-7.
-        let instants = self.row.instants / if self.is_last { 1 } else { 2 };
-        vec![Asked { row: Row { instants, ..self.row }, start: self.state, is_seen }]
+        let mut row = self.row;
+        if !(self.is_last || row.is_stepwise()) {
+            // To come nearer, derivatives at half the instants are enough: of what was missing they
+            // leave some 1e-7.
+            row.instants /= 2;
+        }
+        vec![Asked { row, start: self.state, is_seen }]
     }
 
     fn take(&mut self, turned: Vec<Turned>) {
