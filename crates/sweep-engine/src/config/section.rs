@@ -95,7 +95,10 @@ impl<'a> Section<'a> {
     }
 
     fn get(&self, key: &'static str) -> Option<&'a Value<'a>> {
-        self.known.borrow_mut().push(key);
+        // A key that may be a number or a word is asked for twice.
+        if !self.is_known(key) {
+            self.known.borrow_mut().push(key);
+        }
         self.table.get(key)
     }
 

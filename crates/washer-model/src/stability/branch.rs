@@ -64,7 +64,8 @@ const MOST_TURNED: f64 = 0.8;
 /// A place is no neighbour if it was corrected by more than this share of the step.
 const MOST_CORRECTED: f64 = 0.5;
 
-/// A place's tangent is its own if the derivatives were taken no farther from it than this.
+/// A place's tangent is its own if the derivatives were taken at all instants, and no farther from
+/// it than this.
 const OWN: f64 = 1e-3;
 
 /// Relative difference of speeds by which the curve's slope along the speed is taken.
@@ -257,7 +258,8 @@ impl<'a> Curve<'a> {
             return;
         }
         if self.length < SHORTEST_STEP {
-            // Steps of a turn that are longer than corners are wide make stairs of a curve.
+            // Steps of a turn that are longer than corners are wide make stairs of a curve, and
+            // ranges of speed with steps of their own break it.
             let from = last.length - FIRST_STEP;
             if self.settings.follow_closer() {
                 let kept = self.nodes.partition_point(|node| node.length < from).max(1);
@@ -393,7 +395,7 @@ impl<'a> Curve<'a> {
             length = before.length + gone;
             turns_back = before.tangent[SPEED] * tangent[SPEED] < 0.0;
         }
-        let (is_own, monodromy) = (off < OWN, jacobian.monodromy);
+        let (is_own, monodromy) = (off < OWN && self.is_careful, jacobian.monodromy);
         let node = Node { at: self.at, tangent, is_own, length, monodromy };
         if let Some(turning) = self.turning {
             return self.closer(node, turning);

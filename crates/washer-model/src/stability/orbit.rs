@@ -27,9 +27,10 @@ use lane_ode::{Aside, Kernel, Lane, Lu, N, Peaks, Simd};
 /// capped hinge faster than its cap.
 const CAP_SHARE: f64 = 0.7;
 
-/// Where responses with corners are followed, the steps of a turn take so many nepers off the
-/// hinge's speeds: of its swing that leaves 2 %. Where it is in tune with a multiple of the drum's
-/// speed, hits of stops would make it swing so far that the curve is not followed over it.
+/// Where derivatives are those of the steps, which is where responses with corners are followed, the
+/// steps of a turn take so many nepers off the hinge's speeds: of its swing that leaves 2 %. Where
+/// it is in tune with a multiple of the drum's speed, hits of stops would make it swing so far that
+/// the curve is not followed over it.
 const OFF_HINGE: f64 = 8.0;
 
 /// A point at a constant speed.
@@ -225,7 +226,9 @@ fn see<T: Lane>(zero: N<T>, asked: &[Asked<'_>], weights: &[Vec<f64>], turned: &
     let mut monodromies: Vec<Square> = Vec::new();
     if rows[0].is_stepwise() {
         for Asked { row, start, .. } in &asked[..seen] {
-            monodromies.push(zero.0.aside(Stepwise { zero, row: *row, start: *start }));
+            let (constant, row) = (zero.constant(), [*row]);
+            let (model, clock) = (self::model(constant, &row), self::clock(constant, &row));
+            monodromies.push(zero.0.aside(Stepwise { zero, model, clock, start: *start }));
         }
     } else if seen > 0 {
         let spread: Vec<Row<'_>> = rows[..seen].iter().copied().cycle().take(T::LANES).collect();

@@ -49,12 +49,11 @@ const OF_ROWS: Care =
 const OF_FOLLOWED: Care =
     Care { steps: 48, instants: 8, phase: 0.4, shift_per_s: 3e-3, at_corners_s: f64::INFINITY };
 
-/// Steps of every turn where responses with corners are followed, at least. A hit of a stop rings
-/// the hinge, by other steps or caps otherwise, so that a change of these would break the curve.
-/// They damp what rings, at low speeds most, where the hinge is in tune with a multiple of the
-/// drum's speed over and over.
-const STEPS_AT_CORNERS: usize = 256;
-const MOST_STEPS_AT_CORNERS: usize = 2048;
+/// Steps of every turn where responses with corners are followed, and others where ranges' own steps
+/// lose them: at least, and at most. A hit of a stop rings the hinge, by other steps or caps
+/// otherwise, so that a change of these would break the curve.
+const LEAST_STEPS: usize = 256;
+const MOST_STEPS_FOLLOWED: usize = 2048;
 
 /// Responses are followed from this share of the slowest mode's frequency, a multiple of so many
 /// parts of a turn per minute.
@@ -116,8 +115,8 @@ pub(crate) struct Settings<'a> {
     rest: Option<Modes>,
     /// Modes where ranges begin, by range.
     frozen: BTreeMap<i64, Result<Arc<Modes>, NoAnswer>>,
-    /// Steps of every turn where responses with corners are followed, at least.
-    steps_at_corners: usize,
+    /// Steps of every turn where responses are followed, at least, if ranges do not choose them.
+    steps: Option<usize>,
     /// By range and use.
     ranges: BTreeMap<(i64, Use), Result<Setting, NoAnswer>>,
 }
@@ -147,7 +146,7 @@ impl<'a> Settings<'a> {
             free,
             rest,
             frozen: BTreeMap::new(),
-            steps_at_corners: STEPS_AT_CORNERS,
+            steps: point.machine.elements.are_nonsmooth().then_some(LEAST_STEPS),
             ranges: BTreeMap::new(),
         }
     }
@@ -183,27 +182,23 @@ impl<'a> Settings<'a> {
     /// As [`Self::case`].
     pub(super) fn followed(&mut self, speed_rpm: f64) -> Result<Row<'a>, NoAnswer> {
         let point = self.point;
-        if !point.machine.elements.are_nonsmooth() {
+        let Some(least) = self.steps else {
             return Ok(self.chosen(speed_rpm, Use::Followed)?.row);
-        }
+        };
         let rest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?;
         let fastest = rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
         let longest_turn_s = 60.0 / self.lowest_rpm()?;
         let steps = whole(point, fastest * longest_turn_s / OF_FOLLOWED.phase)?;
-        let steps = steps.max(self.steps_at_corners);
+        let steps = steps.max(least);
         let caps = Some(caps(steps, 60.0 / speed_rpm));
         Ok(Row { point, speed_rpm, steps, instants: steps, caps })
     }
 
-    /// From now on, responses with corners are followed by turns of twice as many steps; false if
-    /// there are none, or enough.
+    /// From now on, responses are followed by turns of more steps; false if there are enough.
     pub(super) fn follow_closer(&mut self) -> bool {
-        let is_closer = self.point.machine.elements.are_nonsmooth()
-            && self.steps_at_corners < MOST_STEPS_AT_CORNERS;
-        if is_closer {
-            self.steps_at_corners *= 2;
-        }
-        is_closer
+        let steps = self.steps.map_or(LEAST_STEPS, |steps| 2 * steps);
+        self.steps = Some(steps);
+        steps <= MOST_STEPS_FOLLOWED
     }
 
     fn chosen(&mut self, speed_rpm: f64, of: Use) -> Result<Case<'a>, NoAnswer> {

@@ -6,28 +6,26 @@
 //! for the steps' own.
 
 use super::monodromy::Square;
-use super::orbit::{Row, clock, model};
-use super::turn::{Unwatched, turn};
+use super::turn::{Clock, Unwatched, turn};
 use crate::coordinates::STATES;
 use crate::run::model::Nonlinear;
 use lane_ode::{Aside, Dual, Lane, N};
 
 /// A turn from a state. Lanes share its disturbances.
-pub(super) struct Stepwise<'a, T> {
+pub(super) struct Stepwise<T> {
     pub(super) zero: N<T>,
-    pub(super) row: Row<'a>,
+    /// The same in every lane.
+    pub(super) model: Nonlinear<Dual<T>>,
+    pub(super) clock: Clock<Dual<T>>,
     pub(super) start: [f64; STATES],
 }
 
-impl<T: Lane> Aside for Stepwise<'_, T> {
+impl<T: Lane> Aside for Stepwise<T> {
     type Output = Square;
 
     #[inline(always)]
     fn run(self) -> Square {
-        let (zero, rows) = (self.zero.constant(), [self.row]);
-        let model: Nonlinear<Dual<T>> = model(zero, &rows);
-        let clock = clock(zero, &rows);
-        let mut groups = vec![[zero; STATES]; STATES.div_ceil(T::LANES)];
+        let mut groups = vec![[self.zero.constant(); STATES]; STATES.div_ceil(T::LANES)];
         for j in 0..STATES {
             let group = &mut groups[j / T::LANES];
             for i in 0..STATES {
@@ -35,7 +33,7 @@ impl<T: Lane> Aside for Stepwise<'_, T> {
             }
             group[j].0.slope.set(j % T::LANES, 1.0);
         }
-        turn(&model, &clock, &mut groups, None::<&mut Unwatched>);
+        turn(&self.model, &self.clock, &mut groups, None::<&mut Unwatched>);
         let mut matrix = [[N(0.0); STATES]; STATES];
         for i in 0..STATES {
             for j in 0..STATES {
