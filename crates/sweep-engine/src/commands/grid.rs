@@ -12,7 +12,8 @@ pub struct GridArgs {
     /// Grid file
     #[arg(value_name = "GRID.toml")]
     pub grid: PathBuf,
-    /// Set a constant, over those of the grid file; may be repeated
+    /// Set a constant, over those of the grid file, or an axis, which sweeps nothing then; may be
+    /// repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub sets: Vec<String>,
     /// The point, on the grid or between its points: a value for an axis, which sweeps nothing

@@ -22,7 +22,8 @@ pub struct Args {
     /// Study file
     #[arg(value_name = "STUDY.toml")]
     study: PathBuf,
-    /// Set a constant of the grid file that the study names; may be repeated
+    /// Set a constant of the grid file that the study names, or an axis of it, which sweeps nothing
+    /// then; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     sets: Vec<String>,
     /// File of all candidates [default: results/NAME.parquet]

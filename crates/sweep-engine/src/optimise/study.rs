@@ -1,5 +1,6 @@
 //! A study file: what is minimised over which parameters, and what must hold.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -248,16 +249,18 @@ fn parameters<M: Rows>(
         else {
             continue;
         };
-        let parts = draft.plan.model.parts(&parameter);
-        let shares = |other: &M::Parameter| {
-            draft.plan.model.parts(other).iter().any(|part| parts.contains(part))
+        let model = &draft.plan.model;
+        let parts = model.parts(&parameter);
+        let shares = |theirs: &[Cow<'_, str>]| theirs.iter().any(|part| parts.contains(part));
+        let set = draft.constants.iter().find(|one| one.is_over_file && shares(&one.parts));
+        let swept = || {
+            let mut axes = draft.plan.axes.iter().enumerate();
+            let (k, axis) = axes.find(|(_, axis)| shares(&model.parts(&axis.parameter)))?;
+            let at = report.place(&format!("axis[{k}]"))?;
+            Some(Located { value: axis.parameter.name().to_owned(), at })
         };
-        let other = draft.plan.axes.iter().position(|axis| shares(&axis.parameter));
-        if let Some((k, first)) =
-            other.and_then(|k| Some((k, report.place(&format!("axis[{k}]"))?)))
-        {
-            let value = draft.plan.axes[k].parameter.name();
-            report.push(twice(&name, &Located { value, at: first }));
+        if let Some(first) = set.map(|constant| constant.name.clone()).or_else(swept) {
+            report.push(twice(&name, &first));
             continue;
         }
         let mut axis = crate::plan::Axis { parameter, values: bounds.value.clone() };

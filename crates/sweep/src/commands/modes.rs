@@ -20,7 +20,8 @@ pub struct Args {
     /// Grid file whose machine is analysed, axes left aside; without it the built-in machine
     #[arg(value_name = "GRID.toml")]
     grid: Option<PathBuf>,
-    /// Set a constant, over those of the grid file; may be repeated
+    /// Set a constant, over those of the grid file, or an axis, which sweeps nothing then; may be
+    /// repeated
     #[arg(long = "set", value_name = "NAME=VALUE", requires = "grid")]
     sets: Vec<String>,
     /// A point of the grid instead: a value for each axis; may be repeated
