@@ -193,3 +193,40 @@ fn tolerances_of_what_is_looked_for_spread_over_the_design() {
     // The same first candidate: of eight machines apart in damping, the worst is worse.
     assert_ne!(first("wide.parquet"), first("exact.parquet"));
 }
+
+#[test]
+fn the_path_of_the_best_is_judged_before_the_search() {
+    let folder = folder_with("2", STUDY);
+    for (rest, told) in [
+        ("--best study.toml", "no file of `sweep optimise --best`"),
+        ("--best grid.toml", "no file of `sweep optimise --best`"),
+        ("--out x.toml.parquet --best ./x.toml.parquet", "another file than that of all"),
+        ("--best best.toml --candidate 24", "expected a number from 0 to 23"),
+        ("--set damping_n_s_per_m=90", "`damping_n_s_per_m` is given twice"),
+    ] {
+        let refused = sweep(&folder, &format!("optimise study.toml {rest}")).output();
+        let refused = refused.expect("it starts");
+        assert_eq!(refused.status.code(), Some(2), "{rest}: {}", said(&refused));
+        assert!(said(&refused).contains(told), "{rest}: {}", said(&refused));
+    }
+    assert!(fs::read_to_string(folder.path().join("study.toml")).is_ok_and(|text| text == STUDY));
+    // Folders are made, and the own file of another candidate is written over.
+    for candidate in [0, 23] {
+        let line = format!("optimise study.toml --best made/best.toml --candidate {candidate}");
+        does(&folder, &line);
+        let own = fs::read_to_string(folder.path().join("made/best.toml")).expect("it is there");
+        assert!(own.starts_with(&format!("# Candidate {candidate} of study.\n")), "{own}");
+    }
+}
+
+#[test]
+fn a_study_without_a_feasible_candidate_says_so_and_writes_no_machine() {
+    let folder = folder_with("2", &STUDY.replace("max(ratio_max) < 50", "max(ratio_max) < 0"));
+    let line = "optimise study.toml --best best.toml";
+    let done = sweep(&folder, line).output().expect("it starts");
+    assert_eq!(done.status.code(), Some(4), "{}", said(&done));
+    for told in ["0 of 24, 0 on the front", "none is feasible; best.toml is not written"] {
+        assert!(said(&done).contains(told), "no {told} in {}", said(&done));
+    }
+    assert!(!folder.path().join("best.toml").exists());
+}

@@ -23,6 +23,8 @@ pub enum FileKind<'a> {
     Dwell,
     /// Result of `sweep optimise`.
     Optimise,
+    /// The model's own file of a candidate: `sweep optimise --best`.
+    Candidate,
     /// Curves of `sweep fit`.
     Fit,
     /// Result of `sweep compare --out`.
@@ -59,6 +61,9 @@ const OWN: [(FileKind<'static>, &str, &str, &str); 8] = [
     (FileKind::Differences, "differences", key::DIFFERENCES, "result of `sweep compare --out`"),
 ];
 
+/// The beginning of the model's own file of a candidate.
+pub const CANDIDATE: &str = "# Candidate ";
+
 /// The first line of an exported CSV file.
 pub const EXPORTED_CSV: &str = "# exported by sweep ";
 
@@ -66,6 +71,7 @@ impl FileKind<'_> {
     /// The kind in words: "the file there is no NAME".
     pub fn name(self) -> &'static str {
         match self {
+            Self::Candidate => "file of `sweep optimise --best`",
             Self::Exported { .. } => "table of `sweep export`",
             Self::Account { .. } => "account of the run with this --out",
             Self::Svg => "SVG picture of `sweep plot`",
@@ -86,6 +92,7 @@ impl FileKind<'_> {
         };
         let objection = format!("the file there is no {}", self.name());
         let is_ours = match self {
+            Self::Candidate => begins(CANDIDATE.as_bytes())?,
             Self::Exported { ending: "csv" } => begins(EXPORTED_CSV.as_bytes())?,
             Self::Exported { .. } => begins(b"PK\x03\x04")?,
             Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,

@@ -38,7 +38,7 @@ mod writer;
 pub use columns::{CellKind, Column, columns};
 pub use error::FileError;
 pub use footer::Refused;
-pub use kind::{EXPORTED_CSV, FileKind};
+pub use kind::{CANDIDATE, EXPORTED_CSV, FileKind};
 pub use leaves::{Step, dotted, leaves};
 pub use output::{Output, beside, judge, ready, write};
 pub use parquet::{CREATED_BY, ParquetFile};

@@ -163,6 +163,7 @@ mod tests {
             FileKind::Dwell => key::DWELL,
             FileKind::Optimise => key::OPTIMISE,
             FileKind::Fit => key::FIT,
+            FileKind::Candidate => return format!("{}3 of x.\n", crate::CANDIDATE).into_bytes(),
             FileKind::Differences => key::DIFFERENCES,
             FileKind::Exported { ending: "csv" } => {
                 return format!("{}x\n", crate::EXPORTED_CSV).into_bytes();
@@ -202,6 +203,7 @@ mod tests {
         let account = FileKind::Account { of: OsStr::new("x.parquet") };
         PARQUET.into_iter().chain([
             account,
+            FileKind::Candidate,
             FileKind::Svg,
             FileKind::Png,
             FileKind::Html,

@@ -11,7 +11,7 @@ use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
 use crate::store::{OpenedTrials, Trials};
 use crate::{EffortArgs, Error, Exit, StoreError, Swept, duration, tell};
-use sweep_files::{FileKind, Output, atomic, key};
+use sweep_files::{CANDIDATE, FileKind, Output, atomic, key};
 use sweep_parameter::Parameter as _;
 use sweep_results::{Cell, ResultTable};
 
@@ -66,11 +66,13 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let default = || PathBuf::from(format!("results/{}.parquet", study.name));
     let output = args.out.clone().unwrap_or_else(default);
     let file = Output::begin(&output, FileKind::Optimise)?;
+    let own = own_output(&study, args, &output)?;
     let interrupt = installed()?;
     let mut trials = match Trials::open(&output, &study.job(), args.fresh)? {
         OpenedTrials::Open(trials) => *trials,
         OpenedTrials::Finished => {
-            return told(&study, args, &output, "it is there already (--fresh searches again)");
+            let how = "it is there already (--fresh searches again)";
+            return told(&study, args.candidate, own, &output, how);
         }
     };
     trials.take_notes().iter().for_each(|note| tell(note));
@@ -95,19 +97,51 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         duration(wall_s),
         (candidates * rows) as f64 / wall_s
     );
-    told(&study, args, &output, &how)
+    told(&study, args.candidate, own, &output, &how)
 }
 
-/// The file's content in short, and the model's file of a candidate if one is asked for.
-fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Result<Exit, Error> {
+/// Claims the path of the model's own file, if one is asked for, before the search.
+fn own_output<'a, M: Swept>(
+    study: &Study<M>,
+    args: &'a Args,
+    output: &Path,
+) -> Result<Option<(&'a Path, Output<'a>)>, Error> {
+    let Some(path) = args.best.as_deref() else { return Ok(None) };
+    let refused = |expected: &str| Err(Error::option("--best", path.display(), expected));
+    if M::OWN_FILE.is_none() {
+        return refused("a model with a file of its own");
+    }
+    let candidates = study.evolution.candidates;
+    if let Some(candidate) = args.candidate.filter(|&one| one >= candidates) {
+        let expected = format!("a number from 0 to {}", candidates - 1);
+        return Err(Error::option("--candidate", candidate, expected));
+    }
+    let own = Output::begin(path, FileKind::Candidate)?;
+    // Neither may be there yet; the folders of both are.
+    let place =
+        |path: &Path| Some(atomic::parent(path).canonicalize().ok()?.join(path.file_name()?));
+    if place(path) == place(output) {
+        return refused("another file than that of all candidates");
+    }
+    Ok(Some((path, own)))
+}
+
+/// The file's content in short, and the model's own file of a candidate if one is asked for.
+fn told<M: Swept>(
+    study: &Study<M>,
+    candidate: Option<u64>,
+    own: Option<(&Path, Output<'_>)>,
+    output: &Path,
+    how: &str,
+) -> Result<Exit, Error> {
     let mut text = format!("{}: {how}\n", study.name);
     let file = ResultTable::open(output)?;
     let about = file.file().json(key::OPTIMISE).unwrap_or_default();
-    let own = parameters(study).iter().map(|axis| axis.parameter.name());
+    let sought = parameters(study).iter().map(|axis| axis.parameter.name());
     let objectives = study.objectives.iter().map(|one| one.name.as_str());
     let names: Vec<&str> =
-        ["candidate", "feasible", "on_front"].into_iter().chain(own).chain(objectives).collect();
-    let chosen = args.candidate.or_else(|| about["best"].as_u64());
+        ["candidate", "feasible", "on_front"].into_iter().chain(sought).chain(objectives).collect();
+    let chosen = candidate.or_else(|| about["best"].as_u64());
     let (mut feasible, mut front, mut values) = (0, Vec::new(), None);
     file.file().each_row(&names, |row| {
         let cells: Vec<Cell> = (0..names.len()).map(|column| row.cell(column)).collect();
@@ -136,18 +170,17 @@ fn told<M: Swept>(study: &Study<M>, args: &Args, output: &Path, how: &str) -> Re
         names.iter().take(1).chain(&names[3..]).map(|&name| name.to_owned()).collect();
     let listed: Vec<Vec<String>> = listed.map(|cells| shown(cells)).collect();
     text.push_str(&text_table(&headings, &listed, "  "));
-    if let Some(path) = &args.best {
+    if let Some((path, file)) = own {
         let own = values.as_deref().and_then(|values| own_file(study, values));
-        let expected = match chosen {
-            None => "a study with a feasible candidate; this one has none".to_owned(),
-            Some(chosen) => {
-                format!("a model with a file of its own, and candidate {chosen} of {all}")
+        match chosen.zip(own) {
+            Some((chosen, own)) => {
+                file.finish(format!("{CANDIDATE}{chosen} of {}.\n{own}", study.name).as_bytes())?;
+                text.line("wrote", path.display());
             }
-        };
-        let own = own.ok_or_else(|| Error::option("--best", path.display(), expected))?;
-        let own = format!("# Candidate {} of {}.\n{own}", chosen.unwrap_or_default(), study.name);
-        atomic::write(atomic::parent(path), path, own.as_bytes())?;
-        text.line("wrote", path.display());
+            None => {
+                text.line("best", format!("none is feasible; {} is not written", path.display()));
+            }
+        }
     }
     text.line("file", output.display());
     text.next("plot", output);
