@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::open::{self, chunks_there, read_chunk};
 use super::plan_file::{Found, PlanFile};
@@ -30,6 +30,7 @@ pub enum State {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FolderStatus {
     /// The finished file, or where it will be.
+    #[serde(serialize_with = "shown")]
     pub output: PathBuf,
     /// How far.
     pub state: State,
@@ -58,6 +59,11 @@ pub struct FolderStatus {
     pub missing_shards: String,
     /// The same shards by their numbers from 1, for `--shard I/N`.
     pub missing_shard_numbers: Vec<u64>,
+}
+
+/// A path as people see it: JSON holds no other bytes than text.
+fn shown<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&path.display())
 }
 
 /// Looks at an output and its folder. What would stop a run is an error here too: another plan in
@@ -137,4 +143,18 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         status.shards = Some(dealing.shards);
     }
     Ok(status)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_path_that_is_no_text_is_shown() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let output = std::ffi::OsStr::from_bytes(b"o\xff.parquet").into();
+        let status = FolderStatus { output, ..FolderStatus::default() };
+        assert_eq!(serde_json::json!(status)["output"], "o\u{fffd}.parquet");
+    }
 }
