@@ -30,6 +30,26 @@ REFUSED = [
     "set_with_a_string", "spin_out_of_range", "spin_table_empty", "spin_table_with_keys_of_a_ramp",
     "step_zero", "type_wrong", "type_wrong_in_array", "window_negative", "window_of_three",
 ]
+# None of the grids of sweeps/ has a distribution.
+DESIGN = """
+[design]
+method = "monte_carlo"
+points = 8
+"""
+SPREAD = """
+[spin]
+profile = "triangular"
+peak_rpm = 350.0
+ramp_s = 50.0
+[time]
+end_s = 50.0
+[[axis]]
+parameter = "unbalance_mass_kg"
+RANGE
+[[axis]]
+parameter = "damping_n_s_per_m"
+distribution = { kind = "normal", mean = 120.0, sd = 10.0 }
+"""
 
 
 def main() -> int:
@@ -59,6 +79,11 @@ def main() -> int:
         expect("grid", path.name, path.read_text(), True)
     expect("grid", "sweep init", run("init", "-"), True)
     expect("machine", "sweep init --machine", run("init", "--machine", "-"), True)
+    extent = SPREAD.replace("RANGE", "range = { from = 0.1, to = 1.0 }")
+    counted = SPREAD.replace("RANGE", "range = { from = 0.1, to = 1.0, count = 3 }")
+    expect("grid", "a design with a distribution", DESIGN + extent, True)
+    expect("grid", "a design with a count", DESIGN + counted, False)
+    expect("grid", "a distribution without a design", counted, False)
     for name in REFUSED:
         expect("grid", name, (BROKEN / f"{name}.toml").read_text(), False)
     for name in ["empty", "impossible", "incomplete", "springless"]:
@@ -66,7 +91,7 @@ def main() -> int:
 
     for failure in failures:
         print(failure, file=sys.stderr)
-    print(f"{len(grids) + 2} files accepted, {len(REFUSED) + 4} refused, {len(failures)} wrong",
+    print(f"{len(grids) + 3} files accepted, {len(REFUSED) + 6} refused, {len(failures)} wrong",
           file=sys.stderr)
     return 1 if failures else 0
 

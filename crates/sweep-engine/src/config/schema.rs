@@ -23,12 +23,14 @@ pub fn grid<M: Read>() -> Value {
                  without a count";
     described.add(Key::new("axis", about), axes);
     let mut schema = described.finish();
-    // Whether a range has a count depends on whether there is a design.
+    // A design alone takes distributions, and counts its points itself.
     schema["if"] = json!({ "required": ["design"] });
-    let counted = json!({ "properties": { "range": { "required": ["count"] } } });
+    let counted = json!({ "range": { "required": ["count"] } });
     let every_axis = |items: Value| json!({ "properties": { "axis": { "items": items } } });
-    schema["then"] = every_axis(json!({ "not": counted }));
-    schema["else"] = every_axis(counted);
+    let not_counted = json!({ "required": ["range"], "properties": counted });
+    schema["then"] = every_axis(json!({ "not": not_counted }));
+    let not_spread = json!({ "required": ["distribution"] });
+    schema["else"] = every_axis(json!({ "properties": counted, "not": not_spread }));
     document("Grid file of sweep", schema)
 }
 
