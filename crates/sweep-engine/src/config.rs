@@ -67,6 +67,8 @@ use crate::plan::{Plan, WrittenIn};
 pub struct GridInput<M> {
     /// The file, to which the paths in it are relative.
     pub path: PathBuf,
+    /// The run's name, over the file's.
+    name: Option<String>,
     /// If it is not the file's.
     text: Option<String>,
     /// The text of a file of the model's own, in place of the one that the grid names.
@@ -79,7 +81,8 @@ pub struct GridInput<M> {
 impl<M: Read> GridInput<M> {
     /// A grid file. The paths in it are relative to its folder.
     pub fn file(path: PathBuf, sets: Vec<String>) -> Self {
-        Self { path, text: None, own_file: None, sets, at: Vec::new(), model: PhantomData }
+        let (name, text, own_file, at) = (None, None, None, Vec::new());
+        Self { path, name, text, own_file, sets, at, model: PhantomData }
     }
 
     /// The text of a grid file. Messages call it by this name, which is also that of the run if the
@@ -108,6 +111,12 @@ impl<M: Read> GridInput<M> {
     #[must_use]
     pub fn fixing(self, at: &[String]) -> Self {
         Self { at: at.to_vec(), ..self }
+    }
+
+    /// As it is, with this name of the run, if it is one, over the file's.
+    #[must_use]
+    pub fn named(self, name: Option<String>) -> Self {
+        Self { name, ..self }
     }
 
     /// Reads the grid, puts the constants in place, and checks the whole.

@@ -35,13 +35,19 @@ impl GridArgs {
         self.sets.iter().cloned().chain(limit).collect()
     }
 
+    /// The grid with all changes but `--at`.
+    pub fn input<M: Read>(&self) -> GridInput<M> {
+        GridInput::file(self.grid.clone(), self.sets()).named(self.name.clone())
+    }
+
     /// The plan.
     ///
     /// # Errors
     /// Every mistake in the grid file and the constants.
     pub fn load<M: Read>(&self) -> Result<Plan<M>, Diagnostics> {
-        let plan = GridInput::<M>::file(self.grid.clone(), self.sets()).fixing(&self.at).load()?;
-        Ok(self.named(plan))
+        let plan = self.input().fixing(&self.at).load()?;
+        self.tell_window(&plan);
+        Ok(plan)
     }
 
     /// The plan at one point, with the values of its axes.
@@ -52,16 +58,9 @@ impl GridArgs {
         &self,
         at: &[String],
     ) -> Result<(Plan<M>, NamedValues), Diagnostics> {
-        let (plan, at) = GridInput::<M>::file(self.grid.clone(), self.sets()).load_point(at)?;
-        Ok((self.named(plan), at))
-    }
-
-    fn named<M: Read>(&self, mut plan: Plan<M>) -> Plan<M> {
-        if let Some(name) = &self.name {
-            plan.name.clone_from(name);
-        }
+        let (plan, at) = self.input().load_point(at)?;
         self.tell_window(&plan);
-        plan
+        Ok((plan, at))
     }
 
     /// Says so where `--set end_s` leaves the window's end where the grid file puts it.

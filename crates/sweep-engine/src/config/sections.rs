@@ -56,7 +56,9 @@ pub(super) fn sections<M: Read>(
     let schema = json!({ "type": "string", "pattern": "^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$" });
     let read = |root: &Section<'_>, _| {
         let path = input.map_or(Path::new(""), |input| &input.path);
-        Field::Given(Located { value: self::name(root, path).into(), at: root.at().clone() })
+        let over = input.and_then(|input| input.name.as_deref());
+        let name = self::name(root, path, over, "add `name = \"...\"`, or pass `--name`");
+        Field::Given(Located { value: name.into(), at: root.at().clone() })
     };
     keys.key(Key::new("name", about), &Kind::Own(&read, schema), name);
     model.walk(keys, input);
@@ -90,23 +92,26 @@ pub fn plain_name(text: &str) -> Result<String, String> {
     if is_plain(text) { Ok(text.to_owned()) } else { Err(format!("expected {PLAIN_NAME}")) }
 }
 
-/// The name that a file gives its run, or its own.
-pub fn name(root: &Section<'_>, path: &Path) -> String {
+/// The name that a file gives its run, or its own; `over` is over both. `help` is of a file without
+/// any.
+pub fn name(root: &Section<'_>, path: &Path, over: Option<&str>, help: &str) -> String {
     match root.text("name") {
-        Field::Given(found) if is_plain(found.value) => return found.value.to_owned(),
+        Field::Given(found) if is_plain(found.value) => {
+            return over.unwrap_or(found.value).to_owned();
+        }
         Field::Given(found) => {
             let title = "`name` is not a plain file name";
             root.report.refuse::<()>(&found.at, title, format!("expected {PLAIN_NAME}"));
         }
         Field::Bad => {}
         Field::Absent => {
-            let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-            if is_plain(stem) {
-                return stem.to_owned();
+            let stem = || path.file_stem().and_then(|stem| stem.to_str());
+            if let Some(name) = over.or_else(stem).filter(|name| is_plain(name)) {
+                return name.to_owned();
             }
             let title = "`name` is missing, and the file's own name cannot stand in for it";
             let refusal = Diagnostic::new(title).at(root.at(), format!("expected {PLAIN_NAME}"));
-            root.report.push_missing(refusal);
+            root.report.push_missing(refusal.help(help));
         }
     }
     String::new()

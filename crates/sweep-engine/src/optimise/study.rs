@@ -90,7 +90,7 @@ impl<M: Rows> Study<M> {
         }
         let root =
             Section::new("the study file", Location::new(source, 0..0), table.get_ref(), report);
-        let name = name(&root, path);
+        let name = name(&root, path, None, "add `name = \"...\"`, or rename the file");
         let grid = root.require(root.text("grid"), "grid", "a grid file, relative to this file");
         let input = grid.map(|grid| GridInput::file(beside(path, grid.value), sets.to_vec()));
         let mut draft = input.and_then(|input| draft::<M>(&input, report));

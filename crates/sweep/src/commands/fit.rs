@@ -53,16 +53,11 @@ on from there. docs/fit.md explains every line.";
 /// Mistakes in the grid file, the measurements or the options; data that cannot tell; and a machine
 /// file that cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let GridArgs { grid, at, name, .. } = &args.grid;
-    let grid = GridInput::file(grid.clone(), args.grid.sets()).fixing(at);
+    let grid: GridInput = args.grid.input().fixing(&args.grid.at);
     let mut cases = Vec::new();
     for text in &args.measured {
         let (path, constants) = parted(text);
-        let mut case = fit::case(&grid, &constants, Measured::read(path)?)?;
-        if let Some(name) = name {
-            case.plan.name.clone_from(name);
-        }
-        cases.push(case);
+        cases.push(fit::case(&grid, &constants, Measured::read(path)?)?);
     }
     let taken = |path: &PathBuf| Error::File {
         action: "write",

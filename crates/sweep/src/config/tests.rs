@@ -586,3 +586,13 @@ fn a_list_is_a_file_of_points_whose_content_counts() {
         .0;
     assert_eq!((point.points(), point.design), (1, None));
 }
+
+#[test]
+fn a_name_from_outside_stands_in_for_one_that_a_file_cannot_give() {
+    let text = include_str!("../../../../sweeps/quick.toml").lines();
+    let text = text.filter(|line| !line.starts_with("name")).map(|line| format!("{line}\n"));
+    let input = GridInput::text("my grid", text.collect(), Vec::new());
+    let refused = input.load().unwrap_err().to_string();
+    assert!(refused.contains("or pass `--name`"), "{refused}");
+    assert_eq!(input.named(Some("mine".to_owned())).load().unwrap().name, "mine");
+}
