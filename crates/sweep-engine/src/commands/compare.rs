@@ -241,26 +241,29 @@ fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
 
 /// How far the boundary moved.
 fn boundary(moved: &Moved) -> String {
-    let unit = &moved.unit;
-    let mut told = match moved.farthest() {
-        None => "no crossing in both".to_owned(),
-        Some(_) if moved.crossings.iter().all(|crossing| crossing.by() == [0.0; 2]) => {
-            format!("{} crossings, none moved", moved.crossings.len())
+    let Moved { axis, unit, crossings, .. } = moved;
+    let count = counted(crossings.len(), "crossing");
+    let mut told = match (moved.farthest(), moved.mean()) {
+        (Some(_), _) if crossings.iter().all(|crossing| crossing.by() == [0.0; 2]) => {
+            format!("{count} along {axis}, none moved")
         }
-        Some(farthest) => {
+        (Some(_), _) if crossings.iter().all(|one| one.bracket[0] == one.bracket[1]) => {
+            format!("{count} along {axis}, none moved out of its bracket")
+        }
+        (Some(farthest), Some([least, greatest])) => {
             let place = moved.keys.iter().zip(&farthest.place);
             let place: Vec<String> =
                 place.map(|(name, value)| format!("{name} {}", short(*value))).collect();
             let [from, to] =
                 farthest.bracket.map(|[low, high]| format!("{} to {}", short(low), short(high)));
-            let (crossings, axis, certain) = (moved.crossings.len(), &moved.axis, moved.certain());
-            let ([least, greatest], place) = (moved.mean(), place.join(", "));
+            let (certain, place) = (moved.certain(), place.join(", "));
             format!(
-                "{crossings} crossings along {axis}, {certain} moved farther than their brackets \
-                 explain; in the mean they moved by {least:+.3} to {greatest:+.3} {unit}; farthest \
-                 at {place}: from within {from} to within {to}"
+                "{count} along {axis}, {certain} moved farther than brackets explain; in the mean \
+                 by {least:+.3} to {greatest:+.3} {unit}; farthest at {place}: from within {from} \
+                 to within {to}"
             )
         }
+        _ => "no crossing in both".to_owned(),
     };
     if !moved.unlike.is_empty() {
         let lines = counted(moved.unlike.len(), "line");

@@ -63,10 +63,11 @@ impl Moved {
     }
 
     /// How far crossings moved in the mean, with sign: the least and the greatest by their
-    /// brackets.
-    pub fn mean(&self) -> [f64; 2] {
-        let count = self.crossings.len().max(1) as f64;
-        [0, 1].map(|end| self.crossings.iter().map(|one| one.by()[end]).sum::<f64>() / count)
+    /// brackets; `None` without any.
+    pub fn mean(&self) -> Option<[f64; 2]> {
+        let count = self.crossings.len() as f64;
+        let mean = |end| self.crossings.iter().map(|one| one.by()[end]).sum::<f64>() / count;
+        (!self.crossings.is_empty()).then(|| [0, 1].map(mean))
     }
 
     /// Crossings that moved farther than their brackets explain.

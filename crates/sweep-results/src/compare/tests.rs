@@ -184,10 +184,12 @@ fn a_boundary_that_moves_does_so_for_certain_only_past_its_brackets() {
     let farthest = moved.farthest().unwrap();
     assert_eq!((farthest.by(), farthest.at_least()), ([2.5, 3.5], 2.5));
     // 0.3 and 3, give or take half a unit; the third is where it was.
-    let mean = moved.mean();
+    let mean = moved.mean().unwrap();
     assert!((mean[0] - 2.3 / 3.0).abs() < 1e-9 && (mean[1] - 4.3 / 3.0).abs() < 1e-9, "{mean:?}");
     assert_eq!(moved.unlike.len(), 1);
     assert_eq!(moved.unlike[0].1, [0, 1]);
+    let moved = compare(&first, &boundary(&[None, None, None, None])).unwrap().boundary.unwrap();
+    assert_eq!((moved.mean(), moved.unlike.len()), (None, 3));
 }
 
 #[test]
