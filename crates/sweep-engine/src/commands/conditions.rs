@@ -33,7 +33,8 @@ pub fn parse(
 pub fn of_rows(text: Option<&String>, table: &ResultTable) -> Result<Option<Condition>, Error> {
     let condition = parse("--where", text.map_or(&[], std::slice::from_ref), table)?.pop();
     if let Some(Condition { text, .. }) = condition.as_ref().filter(|one| one.has_folds()) {
-        let expected = "an expression without count(), share(), min(), max() and mean()";
+        let expected =
+            "an expression without count(), share(), min(), max(), mean() and quantile()";
         return Err(Error::option("--where", text, expected));
     }
     Ok(condition)

@@ -41,7 +41,7 @@ An expression compares columns (`sweep show FILE` lists them), numbers and texts
 `COLUMN is null` and `COLUMN is not null` ask for missing values.
 
 It speaks of every row, unless all of its columns stand within functions over all rows: count() \
-and share() of a condition, min(), max() and mean() of a number.
+and share() of a condition, min(), max() and mean() of a number, and quantile(NUMBER, 0.95).
 
 A comparison with a missing value (null) is neither true nor false, as in SQL, and a row that is \
 neither does not keep the expression: a point that failed does not pass a gate unnoticed. Nor has \
