@@ -223,3 +223,20 @@ fn an_interrupted_shard_is_gone_on_with_as_that_shard() {
         said(&run)
     );
 }
+
+#[test]
+fn a_hangup_ends_a_run_unless_it_was_ignored() {
+    for (before, code) in [("", 129), ("trap '' HUP; ", 143)] {
+        let home = fresh_home();
+        home.choose_for_seconds();
+        let script = format!(
+            "{before}\"$@\" & sweep=$!\n{}sleep 0.1; kill -HUP $sweep; kill -HUP $sweep; \
+             sleep 0.3; kill -TERM $sweep; wait $sweep",
+            until("test -e x.parquet.partial/plan.json")
+        );
+        // Whatever started the tests may ignore it.
+        let shell = ["env", "--default-signal=HUP", "sh", "-c", &script, "sh"];
+        let run = under(&home, &shell, RUN);
+        assert_eq!(run.status.code(), Some(code), "{before}: {}", said(&run));
+    }
+}

@@ -25,6 +25,8 @@ pub enum Exit {
     NotHeld = 4,
     /// Another run holds this output.
     Busy = 75,
+    /// Hung up (SIGHUP).
+    HungUp = 129,
     /// Interrupted (SIGINT).
     Interrupted = 130,
     /// Asked to stop (SIGTERM).
@@ -33,20 +35,25 @@ pub enum Exit {
 
 impl Exit {
     /// Every exit code, with what it means to a script.
-    pub const ALL: [(Self, &'static str); 8] = [
+    pub const ALL: [(Self, &'static str); 9] = [
         (Self::Done, "done"),
         (Self::Failed, "an I/O or internal failure"),
         (Self::BadInput, "bad input, refused before any work"),
         (Self::PointsFailed, "with --fail-on-error: done, but some points failed"),
         (Self::NotHeld, "done: a `require`, or a `compare --fail-on`, does not hold"),
         (Self::Busy, "another run holds this output"),
+        (Self::HungUp, "hung up; finished work is kept"),
         (Self::Interrupted, "interrupted; finished work is kept"),
         (Self::Terminated, "terminated; finished work is kept"),
     ];
 
     /// What a process ends with that this signal has interrupted.
     pub fn interrupted(signal: Option<u8>) -> Self {
-        if signal == Some(15) { Self::Terminated } else { Self::Interrupted }
+        match signal {
+            Some(1) => Self::HungUp,
+            Some(15) => Self::Terminated,
+            _ => Self::Interrupted,
+        }
     }
 
     /// All codes with their meanings, for `--help`.
@@ -214,7 +221,7 @@ mod tests {
 
     #[test]
     fn the_codes_are_the_contract() {
-        assert_eq!(Exit::ALL.map(|(exit, _)| exit as u8), [0, 1, 2, 3, 4, 75, 130, 143]);
+        assert_eq!(Exit::ALL.map(|(exit, _)| exit as u8), [0, 1, 2, 3, 4, 75, 129, 130, 143]);
         for (_, meaning) in Exit::ALL {
             assert!(Exit::table().contains(meaning));
         }

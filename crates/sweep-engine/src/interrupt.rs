@@ -1,5 +1,5 @@
-//! SIGINT and SIGTERM: the first asks the run to stop where nothing is lost, the second leaves at
-//! once.
+//! SIGINT, SIGTERM and SIGHUP: the first asks the run to stop where nothing is lost, the second
+//! leaves at once.
 
 use std::io;
 use std::sync::Arc;
@@ -32,7 +32,8 @@ impl Interrupt {
         Self::default()
     }
 
-    /// Installs the handlers for this process. A second signal ends it at once with 130 or 143.
+    /// Installs the handlers for this process. A second SIGINT or SIGTERM ends it at once with 130
+    /// or 143.
     ///
     /// # Errors
     /// When the system refuses a handler.
@@ -44,6 +45,13 @@ impl Interrupt {
             flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.stop))?;
             flag::register_usize(signal, Arc::clone(&interrupt.signal), signal as usize)?;
             flag::register(signal, Arc::clone(&interrupt.stop))?;
+        }
+        // A terminal that closes may send it twice, so that a second one changes nothing.
+        #[cfg(target_os = "linux")]
+        if hears_hangups() {
+            use signal_hook::consts::SIGHUP;
+            flag::register_usize(SIGHUP, Arc::clone(&interrupt.signal), SIGHUP as usize)?;
+            flag::register(SIGHUP, Arc::clone(&interrupt.stop))?;
         }
         Ok(interrupt)
     }
@@ -59,8 +67,17 @@ impl Interrupt {
         self.stop.load(Ordering::Acquire)
     }
 
-    /// The signal that asked (2 for SIGINT, 15 for SIGTERM).
+    /// The signal that asked (1 for SIGHUP, 2 for SIGINT, 15 for SIGTERM).
     pub fn signal(&self) -> Option<u8> {
         if self.stopped() { u8::try_from(self.signal.load(Ordering::Relaxed)).ok() } else { None }
     }
+}
+
+/// Whether SIGHUP is not ignored, as `nohup` has it.
+#[cfg(target_os = "linux")]
+fn hears_hangups() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    // The lowest bit is signal 1.
+    ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|it| it & 1 == 0)
 }
