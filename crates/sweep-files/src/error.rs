@@ -47,6 +47,16 @@ pub enum FileError {
         /// Which file.
         path: PathBuf,
     },
+    /// A result of this program that another one has written anew.
+    #[error(
+        "{} carries no digest: another program has rewritten it\n  = help: \
+         restore it from a copy, or move it away and run the command again that wrote it",
+        path.display()
+    )]
+    Rewritten {
+        /// Which file.
+        path: PathBuf,
+    },
 }
 
 /// How a damaged file is known.

@@ -342,10 +342,6 @@ pub(super) fn finished(
         let (output, differences) = (folder.output.clone(), vec![apart]);
         return Err(StoreError::OutputDiffers { output, differences });
     }
-    // Files of this build carry a digest.
-    if !file.is_sealed() {
-        return Err(FileError::damaged(&folder.output).into());
-    }
     let tally = read::tally(&file)?;
     Ok(Some((result, tally)))
 }
@@ -354,7 +350,7 @@ pub(super) fn finished(
 /// none.
 ///
 /// # Errors
-/// [`StoreError::OutputDiffers`] if another plan or build made it.
+/// [`StoreError::OutputDiffers`] if another plan or build made it; [`FileError::Rewritten`].
 pub(super) fn of_plan(
     folder: &Folder,
     job: &Job<'_>,
@@ -370,6 +366,10 @@ pub(super) fn of_plan(
         read::unlike(&file, format!("its metadata is not that of a {}", kind.name()))
     })?;
     if result.plan_hash == job.hash().to_hex().as_str() {
+        // Files of this build carry a digest.
+        if !file.is_sealed() {
+            return Err(FileError::Rewritten { path: folder.output.clone() }.into());
+        }
         return Ok(Some((file, result)));
     }
     let ResultFile { plan, version, numerics, .. } = result;

@@ -171,11 +171,16 @@ fn a_result_whose_digest_is_cut_out_is_no_result_of_this_build() {
     write_missing(&run);
     finish(run, &job);
     let mut bytes = fs::read(home.output()).unwrap();
-    let at = bytes.windows(12).rposition(|window| window == b"sweep.digest").unwrap();
-    bytes[at + 6] = b'D';
-    fs::write(home.output(), &bytes).unwrap();
-    let error = OpenRun::open(&home.output(), &job, options()).unwrap_err();
+    let mut refused = |word: &[u8], by: &[u8]| {
+        let at = bytes.windows(word.len()).rposition(|window| window == word).unwrap();
+        bytes[at..at + by.len()].copy_from_slice(by);
+        fs::write(home.output(), &bytes).unwrap();
+        OpenRun::open(&home.output(), &job, options()).unwrap_err()
+    };
+    let error = refused(b"sweep.digest", b"sweep.D");
     assert!(matches!(error, StoreError::File(FileError::Damaged { .. })), "{error}");
+    let error = refused(b"sweep version", b"other");
+    assert!(matches!(error, StoreError::File(FileError::Rewritten { .. })), "{error}");
 }
 
 #[test]
