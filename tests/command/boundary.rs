@@ -52,7 +52,7 @@ fn a_curve_for_every_combination_of_further_axes_in_a_figure() {
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(0), "{said}");
     // No gap closes in a tenth of a second: six rows say so.
-    assert!(said.contains("6 none_in_range_reliable") && !said.contains("brackets"), "{said}");
+    assert!(said.contains("6 lines reliable throughout") && !said.contains("brackets"), "{said}");
     let file = "results/grid-boundary.parquet";
     assert!(folder.path().join(file).is_file());
     let drawn = Command::new(sweep_binary())

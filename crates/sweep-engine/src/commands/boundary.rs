@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::{GridArgs, Lines as _, installed, short};
 use crate::asking::{Asking, Stopped};
 use crate::boundary::quantity::offered;
-use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, trace};
+use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, TracedRow, trace};
 use crate::config::section::counted;
 use crate::effort::{Effort, EffortArgs};
 use crate::store::{Column, OpenedTrials, Trials};
@@ -130,17 +130,17 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
         duration(wall_s)
     );
     let rows = || traced.curves.iter().flatten();
-    let counted = |(kind, name): (EdgeKind, &str)| {
-        let count = rows().flat_map(|row| &row.edges).filter(|edge| edge.kind == kind).count();
-        (count > 0).then(|| format!("{count} {name}"))
-    };
-    text.line(
-        "found",
-        EdgeKind::ALL.into_iter().filter_map(counted).collect::<Vec<_>>().join(", "),
-    );
-    let several = rows().filter(|row| row.edges.len() > 1).count();
+    let of_kind = |row: &TracedRow, kind| row.edges.iter().filter(|edge| edge.kind == kind).count();
+    let found = EdgeKind::ALL.into_iter().filter_map(|(kind, _)| {
+        let count: usize = rows().map(|row| of_kind(row, kind)).sum();
+        let [noun, rest] = in_words(kind);
+        (count > 0).then(|| counted(count, noun) + rest)
+    });
+    text.line("found", found.collect::<Vec<_>>().join(", "));
+    let several = rows().filter(|row| of_kind(row, EdgeKind::Crossing) > 1).count();
     if several > 0 {
-        text.line("folds", format!("{several} values of the first axis have several crossings"));
+        let values = counted(several, "value");
+        text.line("folds", format!("several crossings at {values} of the first axis"));
     }
     let brackets = rows().flat_map(|row| &row.edges).filter_map(|edge| edge.bracket);
     if let Some(widest) = brackets.map(|[low, high]| high - low).reduce(f64::max) {
@@ -158,6 +158,18 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
     let told = format!("every island of {cell}; smaller ones may be missed (--lattice)");
     text.line("promises", told);
     text
+}
+
+/// An edge of this kind: a noun, and what follows it.
+const fn in_words(kind: EdgeKind) -> [&'static str; 2] {
+    match kind {
+        EdgeKind::Crossing => ["crossing", ""],
+        EdgeKind::Jump => ["jump", ""],
+        EdgeKind::Undefined => ["edge", " of undefined points"],
+        EdgeKind::NoneReliable => ["line", " reliable throughout"],
+        EdgeKind::NoneUnreliable => ["line", " unreliable throughout"],
+        EdgeKind::NoneUndefined => ["line", " undefined throughout"],
+    }
 }
 
 /// Searches, with a memory of trials if there is one, and gives it back; nothing is found where the

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::plan::Plan;
 use sweep_engine::commands::grid::{ResultArgs, quoted};
+use sweep_engine::config::section::counted;
 use sweep_engine::store::{ShardRequest, chunk_points};
 use sweep_engine::{Error, Exit, print, tell};
 
@@ -72,7 +73,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let chunks = plan.points().div_ceil(chunk_points(plan.points()));
     if args.shards > chunks {
         tell(&format!(
-            "note: the run has {chunks} chunks, so only {chunks} of the {} shards have work",
+            "note: with {}, the run leaves {} of the {} shards without work",
+            counted(chunks as usize, "chunk"),
+            args.shards - chunks,
             args.shards
         ));
     }
