@@ -335,12 +335,13 @@ impl Parser<'_> {
             Token::Word(word) if word == "true" || word == "false" => {
                 typed(Node::Literal(Cell::Flag(word == "true")), CellKind::Flag)
             }
-            Token::Word(word) => match FUNCTIONS.iter().find(|(name, _)| *name == word) {
-                Some((name, fold)) if self.peek().0 == Token::Sign("(") => {
-                    self.function(name, *fold, span)
+            Token::Word(word) if self.peek().0 == Token::Sign("(") => {
+                match FUNCTIONS.iter().find(|(name, _)| *name == word) {
+                    Some((name, fold)) => self.function(name, *fold, span),
+                    None => unknown_function(word, span),
                 }
-                _ => self.column(&word, span),
-            },
+            }
+            Token::Word(word) => self.column(&word, span),
             Token::Sign(_) | Token::End => {
                 let title = match token {
                     Token::Sign(sign) => format!("`{sign}` where a value should be"),
@@ -436,6 +437,16 @@ impl Parser<'_> {
     }
 }
 
+fn unknown_function(word: String, span: Range<usize>) -> Parsed {
+    let names = FUNCTIONS.map(|(name, _)| name.to_owned());
+    Err(Mistake {
+        title: format!("unknown function `{word}`"),
+        span,
+        expected: format!("expected one of {}", names.join(", ")),
+        candidates: Some((word, names.into())),
+    })
+}
+
 fn expect(found: &Typed, wanted: CellKind, why: &str) -> Result<(), Mistake> {
     if found.kind == wanted {
         return Ok(());
@@ -460,6 +471,7 @@ mod tests {
     fn mistakes_are_pointed_at() {
         for (text, at, said) in [
             ("ratio_mx < 1.5", "ratio_mx", "unknown column `ratio_mx`"),
+            ("sqrt(ratio_max) > 0", "sqrt", "unknown function `sqrt`: expected one of abs, count"),
             ("ratio_max = 1.5", "=", "expected `==`"),
             ("ratio_max < 2 && reliable", "&&", "expected `and`"),
             ("!reliable", "!", "expected `not`"),

@@ -23,10 +23,14 @@ pub fn top(
 ) -> Result<Vec<Vec<Cell>>, ResultsError> {
     let path = table.path().display();
     let read: Vec<&str> = columns.iter().copied().chain(by.map(|(name, _)| name)).collect();
-    if let Some(name) = read.iter().find(|name| table.column(name).is_none()) {
+    let unknown = read.iter().filter(|name| table.column(name).is_none()).map(|name| {
         let near = nearest(name, table.columns.iter().map(|column| column.name.as_str()));
         let meant = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
-        return Err(ResultsError::Refused(format!("{path} has no column `{name}`{meant}")));
+        format!("{path} has no column `{name}`{meant}")
+    });
+    let unknown: Vec<String> = unknown.collect();
+    if !unknown.is_empty() {
+        return Err(ResultsError::Refused(unknown.join("\n")));
     }
     if let Some((name, _)) = by
         && table.column(name).is_some_and(|column| column.kind == CellKind::Text)
@@ -118,6 +122,8 @@ mod tests {
         let by = |name| top(&table, &["point"], None, Some((name, Worse::Greater)), 1);
         assert!(matches!(by("status"), Err(ResultsError::Refused(_))));
         assert!(matches!(by("none"), Err(ResultsError::Refused(_))));
+        let unknown = top(&table, &["none", "ratio_mx"], None, None, 1).unwrap_err().to_string();
+        assert!(unknown.contains("`none`") && unknown.contains("did you mean `ratio_max`?"));
         assert!(by("reliable").is_ok());
     }
 }
