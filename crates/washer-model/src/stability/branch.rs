@@ -393,7 +393,9 @@ impl<'a> Curve<'a> {
                 return if is_own { self.shorten() } else { self.look_again() };
             }
             length = before.length + gone;
-            turns_back = before.tangent[SPEED] * tangent[SPEED] < 0.0;
+            // At a fold itself the tangent may point to either side.
+            let is_from_fold = self.folds.last() == Some(&(self.nodes.len() - 1));
+            turns_back = !is_from_fold && before.tangent[SPEED] * tangent[SPEED] < 0.0;
         }
         let (is_own, monodromy) = (off < OWN && self.is_careful, jacobian.monodromy);
         let node = Node { at: self.at, tangent, is_own, length, monodromy };
