@@ -189,7 +189,7 @@ fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
     text.line("verdict", &said);
     if plan.integrator.direct().is_none() {
         let method = outcome.method.name();
-        text.line("method", &format!("{method}, as in the point's row of a map; the file: rk4"));
+        text.line("method", format!("{method}, as in the point's row of a map; the file: rk4"));
     }
     if outcome.sensitive == Some(true) {
         text.line("sensitive", "chaotic: the digits are those of one trajectory");

@@ -49,9 +49,9 @@ const OF_ROWS: Care =
 const OF_FOLLOWED: Care =
     Care { steps: 48, instants: 8, phase: 0.4, shift_per_s: 3e-3, at_corners_s: f64::INFINITY };
 
-/// Steps of every turn where responses with corners are followed, and others where ranges' own steps
-/// lose them: at least, and at most. A hit of a stop rings the hinge, by other steps or caps
-/// otherwise, so that a change of these would break the curve.
+/// Steps of every turn where responses with corners are followed, and others that ranges' own steps
+/// lose: at least, and at most. A hit of a stop rings the hinge, by other steps or caps otherwise,
+/// so that a change of these would break the curve.
 const LEAST_STEPS: usize = 256;
 const MOST_STEPS_FOLLOWED: usize = 2048;
 
