@@ -27,9 +27,9 @@ use lane_ode::{Aside, Kernel, Lane, Lu, N, Peaks, Simd};
 /// capped hinge faster than its cap.
 const CAP_SHARE: f64 = 0.7;
 
-/// Where derivatives are those of the steps, as where responses with corners are followed, the steps
-/// of a turn take so many nepers off the hinge's speeds: of its swing that leaves 2 %. Where it is
-/// in tune with a multiple of the drum's speed, hits of stops would make it swing so far that the
+/// Where derivatives are those of the steps, as where responses with corners are followed, a turn's
+/// steps take so many nepers off the hinge's speeds: of its swing that leaves 2 %. Where it is in
+/// tune with a multiple of the drum's speed, hits of stops would make it swing so far that the
 /// curve is not followed over it.
 const OFF_HINGE: f64 = 8.0;
 
