@@ -5,7 +5,7 @@ mod ladder;
 mod pool;
 
 pub(crate) use growth::{Carried, fastest, motions, responses};
-pub(crate) use ladder::reference_step_s;
+pub(crate) use ladder::{reference, reference_step_s};
 pub(crate) use sweep_engine::{Engine, Watch};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -16,7 +16,7 @@ use washer_model::{
     Point, Spin, Start, Timing, histories, instants, together,
 };
 
-use crate::engine::{ModelEngine, Quick, reference_step_s};
+use crate::engine::{ModelEngine, Quick, reference, rule};
 use crate::method::Integrator;
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, friction_speeds, ready};
@@ -26,7 +26,7 @@ use sweep_engine::store::read;
 use sweep_engine::threads::Stop;
 use sweep_engine::{Error, StoreError, Table, threads};
 use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
-use washer_row::Level;
+use washer_row::{Level, MODELS};
 
 /// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as
 /// many.
@@ -165,6 +165,8 @@ pub(crate) struct Trace {
     pub(crate) instants: usize,
     /// How each model failed that did, in words.
     pub(crate) failures: Vec<String>,
+    /// What integrated the nonlinear model, by its name in rows, where all points have one.
+    pub(crate) method: Option<String>,
 }
 
 /// Histories of a plan's only point, which `at` names, or of all of its points, in a pool of their
@@ -229,7 +231,9 @@ pub(crate) fn trace(
     }
     table.metadata(key::TRACE, &facts);
     let failures = failures.into_iter().flatten().flatten().collect();
-    Ok(Trace { table, instants: run.times_s.len(), failures })
+    let method = run.method_json.get("row").or_else(|| run.method_json.get("method"));
+    let method = method.and_then(Value::as_str).map(str::to_owned);
+    Ok(Trace { table, instants: run.times_s.len(), failures, method })
 }
 
 /// As [`trace`] of every point of a plan, in one table with the points' numbers and axes: so many
@@ -263,7 +267,8 @@ pub(crate) fn trace_all(plan: &Plan, view: &View, stop: Stop<'_>) -> Trace {
     table.metadata(key::PLAN, &plan.to_json());
     let facts = json!({ "every_s": view.every_s, "start": start_json(&view.start) });
     table.metadata(key::TRACE, &facts);
-    Trace { table, instants: each.iter().map(|run| run.times_s.len()).sum(), failures }
+    let instants = each.iter().map(|run| run.times_s.len()).sum();
+    Trace { table, instants, failures, method: None }
 }
 
 /// One point made ready.
@@ -445,18 +450,27 @@ fn named(letter: char, values: &[f64; COORDINATES]) -> Value {
 }
 
 /// What integrates the nonlinear model and the linear one. A map may scale the bearings' mass to be
-/// quick; a single trajectory that is no row's keeps them as they are, in stable steps.
+/// quick; a single trajectory that is no row's keeps them as they are, by the reference's method.
 fn methods(plan: &Plan, point: &Point, spin: &Spin, quick: Option<Quick>) -> ([Method; 2], Value) {
-    if let Some(Quick { level, methods, .. }) = quick {
+    let of_row = |level: Level| {
         let mut json = plan.integrator.to_json();
         json["row"] = level.name().into();
-        return (methods, json);
+        json
+    };
+    if let Some(Quick { level, methods, .. }) = quick {
+        return (methods, of_row(level));
     }
     match plan.integrator.direct() {
         Some((_, method)) => ([method; 2], plan.integrator.to_json()),
         None => {
-            let step_s = reference_step_s(&Cases::new([(point, spin)], plan.end_s));
-            ([Method::Rk4 { step_s }; 2], Integrator::Rk4 { step_s }.to_json())
+            let cases = Cases::new([(point, spin)], plan.end_s);
+            let accuracy = rule(plan).accuracy;
+            let methods = MODELS.map(|model| reference(&cases, model, accuracy));
+            let json = match methods[0] {
+                Method::Rk4 { step_s } => Integrator::Rk4 { step_s }.to_json(),
+                _ => of_row(Level::Additive),
+            };
+            (methods, json)
         }
     }
 }
@@ -623,6 +637,34 @@ mod tests {
     fn peak(rows: &RecordBatch, column: &str, from: usize) -> f64 {
         let values = rows.column_by_name(column).unwrap().as_primitive::<Float64Type>();
         values.values()[from..].iter().fold(0.0, |peak, value| value.abs().max(peak))
+    }
+
+    /// Steps of 2e-4 s pass the corners of friction: they were off by a hundredth of a foot's load.
+    #[test]
+    fn a_trace_with_friction_is_as_true_as_its_row() {
+        let folder = tempfile::tempdir().unwrap();
+        let machine = include_str!("../../../docs/examples/friction.toml");
+        std::fs::write(folder.path().join("machine.toml"), machine).unwrap();
+        let grid = "machine = \"machine.toml\"\n[time]\nend_s = 3.3\nwindow_s = [3.2, 3.3]\n\
+             [spin]\nprofile = \"table\"\ntime_s = [0, 3, 3.2, 3.25]\nspeed_rpm = [0, 1400, 0, 0]\n";
+        let path = folder.path().join("grid.toml");
+        let loads = |integrator: &str| {
+            std::fs::write(&path, format!("{grid}{integrator}")).unwrap();
+            let plan = crate::config::load(&path, &[]).unwrap();
+            let extras = Extras { forces: true, ..Extras::default() };
+            let (models, start) = (Models::Nonlinear, Start::default());
+            let view = View { every_s: Some(1e-3), models, start, extras, quick: None };
+            let traced = trace(&plan, plan.scenario(0), Vec::new(), &view, &|| false).unwrap();
+            let rows = traced.table.finish().unwrap().0;
+            let column = rows.column_by_name("foot_1_load_nonlinear_n").unwrap();
+            (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), traced.method)
+        };
+        let (of_file, method) = loads("");
+        assert_eq!(method.as_deref(), Some("additive"));
+        let (expected, _) = loads("[integrator]\nmethod = \"rk4\"\nstep_s = 1e-5\n");
+        for (load_n, expected_n) in of_file.iter().zip(&expected) {
+            assert!((load_n / expected_n - 1.0).abs() < 2e-3, "{load_n} for {expected_n}");
+        }
     }
 
     #[test]

@@ -164,7 +164,7 @@ fn walk_rung(walk: &mut Walk<'_>, rung: &mut Rung) -> Option<()> {
     let Convergence { contraction, of_caps, of_earlier, believed_to, own_error, expected } =
         &mut rung.convergence;
     walk.numbers([contraction, of_caps, of_earlier, believed_to, own_error, expected])?;
-    rung.follows_bearings = walk.count(usize::from(rung.follows_bearings))? > 0;
+    walk.numbers(rung.left_out.each_mut())?;
     let is_own = |method: &Method| discriminant(method) == discriminant(&rung.method);
     let place = METHODS.iter().position(is_own).unwrap_or(METHODS.len());
     let method = METHODS.get(walk.count(place)?)?;

@@ -98,12 +98,12 @@ impl Point {
         -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[TUB_Y])).0
     }
 
-    /// A bound on the swing of hinge and bearings after all jumps of the drum's acceleration. Steps
-    /// longer than their periods leave it out; steps that follow the hinge leave out what the
-    /// bearings swing.
+    /// A bound on what steps leave out of the swing of hinge and bearings after all jumps of the
+    /// drum's acceleration: these shares of each. Steps longer than their periods leave all of it
+    /// out.
     #[must_use]
-    pub fn ringing(&self, follows_hinge: bool) -> Swing {
-        let ringing = if follows_hinge { self.ringing.of_bearings() } else { self.ringing };
+    pub fn ringing(&self, left_out: [f64; 2]) -> Swing {
+        let ringing = self.ringing.share(left_out);
         Swing { channels: ringing.channels(), gap_m: ringing.gap_m() }
     }
 

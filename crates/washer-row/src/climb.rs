@@ -75,9 +75,6 @@ struct Climb {
     differences: Vec<Option<Difference>>,
     /// The error that `run` and the run before it have in common.
     unseen: f64,
-    /// Whether the run before is capped and rings by more than is asked, and `run` is plain RK4:
-    /// their difference then says nothing of `run`'s error, which may be twice as much.
-    is_beside_what_rings: bool,
     /// What `run` errs besides, however alike the runs are: by its caps, and in its least gap.
     besides: f64,
     /// What a near twin says, once there was one.
@@ -133,9 +130,7 @@ impl Climb {
             self.run = Some(before);
             return;
         }
-        let [was, is] = [self.rung, rung].map(|rung| &by.ladder.rungs[rung]);
-        self.is_beside_what_rings =
-            was.level.is_capped() && !is.level.is_capped() && self.unseen > by.rule.accuracy;
+        let is = &by.ladder.rungs[rung];
         self.unseen = by.unseen(&now, is);
         let of_clash = by.of_clash(&before, &now, is);
         self.besides = by.of_sag(&now, is).max(of_clash).max(by.of_gap(&now, is));
@@ -163,7 +158,7 @@ impl Climb {
         if self.is_chaotic() {
             return self.spread().map(|spread| (ROUGHLY * spread).max(unseen));
         }
-        let found = self.difference().filter(|_| !self.is_beside_what_rings)?;
+        let found = self.difference()?;
         let is_common = found.of_course <= COMMON_COURSE;
         let is_finer = ladder.is_finer(self.rung);
         // From the reference on, a course in common is enough: phases that differ, and bearings
@@ -208,9 +203,7 @@ impl Climb {
     /// The run to ask for next for an error of at most `tolerance`; none if it is there, or if no
     /// further run would help.
     fn higher(&self, by: Judge<'_>) -> Option<usize> {
-        if self.run.is_none() {
-            return Some(by.first());
-        }
+        let Some(run) = &self.run else { return Some(by.first()) };
         let (ladder, tolerance) = (by.ladder, by.rule.accuracy);
         let reference = ladder.reference()?;
         if self.failed() && self.rung + 1 < reference {
@@ -221,9 +214,9 @@ impl Climb {
         if is_settled(self.error(ladder)) || self.is_chaotic() {
             return None;
         }
+        let is_in_doubt = !is_settled(self.error_with(ladder, 0.0));
         if self.rung >= ladder.judge().unwrap_or(reference) {
             // What two steps of plain RK4 leave in doubt may be chaos, which no step settles.
-            let is_in_doubt = !is_settled(self.error_with(ladder, 0.0));
             let may_be_chaos = is_in_doubt && by.model == ModelKind::Nonlinear;
             if may_be_chaos && self.twin.is_none() && Some(self.rung) == ladder.judge() {
                 return Some(ladder.twin());
@@ -233,8 +226,13 @@ impl Climb {
                 return None;
             }
         }
-        let higher = self.rung + 1;
-        (higher < ladder.rungs.len()).then_some(higher)
+        let mut higher = self.rung + 1..ladder.rungs.len();
+        if is_in_doubt {
+            return higher.next();
+        }
+        // Rungs that leave as much out as this one settle nothing.
+        let last = higher.clone().last();
+        higher.find(|rung| by.left_out(run, &ladder.rungs[*rung]) <= tolerance).or(last)
     }
 }
 
@@ -426,6 +424,11 @@ impl Judge<'_> {
         self.of_ringing(rung, within_s, |swing| swing.gap_m / least_m)
     }
 
+    /// The error of a run like this one by what a rung leaves out of ringing and sag.
+    fn left_out(&self, run: &RungRun, rung: &Rung) -> f64 {
+        self.unseen(run, rung).max(self.of_gap(run, rung)).max(self.of_sag(run, rung))
+    }
+
     /// What a rung leaves out of ringing, in parts of the motion by `share`: by a bound, and where
     /// that is not enough, by modes and what is left of them in an interval.
     fn of_ringing(
@@ -434,13 +437,9 @@ impl Judge<'_> {
         within_s: impl Fn(&Swing) -> [f64; 2],
         share: impl Fn(&Swing) -> f64,
     ) -> f64 {
-        if rung.follows_bearings {
-            return 0.0;
-        }
-        let follows_hinge = !rung.level.is_capped();
-        let bound = self.point.ringing(follows_hinge);
+        let bound = self.point.ringing(rung.left_out);
         match share(&bound) > FREE_OF_MODES * self.rule.accuracy {
-            true => share(&self.point.ringing_left(follows_hinge, within_s(&bound))),
+            true => share(&self.point.ringing_left(rung.left_out, within_s(&bound))),
             false => share(&bound),
         }
     }

@@ -15,9 +15,9 @@ pub struct Rung {
     pub method: Method,
     /// What its difference from the rung before says.
     pub convergence: Convergence,
-    /// Whether its steps follow the bearings, so that what they swing after a jump of the drum's
-    /// acceleration is in its numbers.
-    pub follows_bearings: bool,
+    /// The shares of what hinge and bearings swing after a jump of the drum's acceleration that its
+    /// numbers leave out.
+    pub left_out: [f64; 2],
 }
 
 impl Rung {
@@ -66,7 +66,7 @@ impl Ladder {
     /// One method, which nothing is compared with.
     #[must_use]
     pub fn direct(level: Level, method: Method) -> Self {
-        let rung = Rung { level, method, convergence: Convergence::NONE, follows_bearings: false };
+        let rung = Rung { level, method, convergence: Convergence::NONE, left_out: [0.0; 2] };
         Self { rungs: vec![rung], reference: None, held_back: None }
     }
 

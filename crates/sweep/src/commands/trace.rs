@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
-use crate::trace::{Extras, Models, StartValue, View, every, in_pool, start_of, start_value};
+use crate::trace::{
+    Extras, Models, StartValue, Trace, View, every, in_pool, start_of, start_value,
+};
 use sweep_engine::commands::cells::{Lines as _, short, table};
 use sweep_engine::commands::grid::quoted;
 use sweep_engine::{Error, Exit, Job, StoreError, tell};
@@ -81,17 +83,17 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let output = Output::begin(&args.out, FileKind::Trace)?;
     let view = View { every_s, models, start, extras, quick: None };
     // A signal ends the process: there is nothing to keep.
-    let trace = in_pool(&plan, at, &view, &|| false).map_err(Error::model)?;
-    trace.failures.iter().for_each(|failure| tell(failure));
-    let instants = trace.instants;
-    let bytes = trace.table.into_bytes();
+    let traced = in_pool(&plan, at, &view, &|| false).map_err(Error::model)?;
+    let Trace { table, instants, failures, method } = traced;
+    failures.iter().for_each(|failure| tell(failure));
+    let bytes = table.into_bytes();
     output.finish(&bytes.map_err(StoreError::parquet("write", &args.out))?)?;
     let of = if args.all { format!(" of {} points", plan.points()) } else { String::new() };
     let (out, end_s) = (args.out.display(), plan.end_s);
     tell(&format!("wrote {out}: {instants} instants{of} from 0 to {end_s} s"));
     // A map's row is of machines that start at rest, and of both models.
     if args.start.is_empty() && !args.all && models == Models::Both {
-        tell(compared(&plan, &chosen)?.trim_end());
+        tell(compared(&plan, &chosen, method)?.trim_end());
     }
     Ok(Exit::Done)
 }
@@ -147,8 +149,8 @@ fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> 
 }
 
 /// Peaks of both models in the window, their ratios and the verdict: what the point's row of a map
-/// holds.
-fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
+/// holds. `of_file` is the method of the trace.
+fn compared(plan: &Plan, at: &[String], of_file: Option<String>) -> Result<String, Error> {
     let mut outcomes = ModelEngine::new(plan)?.evaluate_at(&[Vec::new()]);
     let Some(outcome) = outcomes.pop() else { return Ok(String::new()) };
     let (channels, limits) = (&plan.reliability.channels, plan.reliability.limits);
@@ -187,9 +189,10 @@ fn compared(plan: &Plan, at: &[String]) -> Result<String, Error> {
         _ => "undefined: no ratio is".to_owned(),
     };
     text.line("verdict", &said);
-    if plan.integrator.direct().is_none() {
+    if let Some(of_file) = of_file.filter(|_| plan.integrator.direct().is_none()) {
         let method = outcome.method.name();
-        text.line("method", format!("{method}, as in the point's row of a map; the file: rk4"));
+        let told = format!("{method}, as in the point's row of a map; the file: {of_file}");
+        text.line("method", told);
     }
     if outcome.sensitive == Some(true) {
         text.line("sensitive", "chaotic: the digits are those of one trajectory");

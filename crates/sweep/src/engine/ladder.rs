@@ -56,14 +56,19 @@ const SHORTER: f64 = 1.5;
 /// A finest rung is climbed if it costs less than this share of the reference.
 const WORTH_IT: f64 = 0.5;
 
+/// Accuracies below this are tight: caps alone hold the nonlinear model's rungs short, and rungs far
+/// apart agree too little, because errors shrink with the caps' square alone.
+const TIGHT: f64 = 5e-5;
+
 /// For what errors a model's capped rungs are chosen, in parts of the accuracy. The first one only
 /// shows the error of the second.
 ///
 /// The linear model amplifies nothing: its first rung may be coarser, and a third is hardly ever
 /// asked for. Its second holds the row, and what a capped hinge does to motions that do not turn
 /// with the drum is more than the rule expects where a run-up is short: ten times was seen.
-const fn aims(model: ModelKind) -> &'static [f64] {
+fn aims(model: ModelKind, accuracy: f64) -> &'static [f64] {
     match model {
+        ModelKind::Nonlinear if accuracy < TIGHT => &[1.0, 0.25],
         ModelKind::Nonlinear => &[10.0, 0.15, 0.01],
         ModelKind::Linear => &[100.0, 0.12, 0.01],
     }
@@ -87,14 +92,12 @@ const fn first_order(model: ModelKind) -> f64 {
 /// smaller by orders of magnitude.
 const FIRST_ORDER_OF_RK4: f64 = 0.2;
 
-/// Error of plain RK4 at its longer step as a share of its difference from the finest capped rung,
-/// as far as it grows with that. Mostly it is far less; 0.013 was seen where the motion is
-/// amplified.
+/// Error of plain RK4 at its longer step as a share of its difference from a capped rung, as far as
+/// it grows with that. Mostly it is far less; 0.013 was seen where the motion is amplified.
 const CONTRACTION_TO_RK4: f64 = 0.02;
 
-/// What it may err by itself, however near the finest capped rung is, where a violent motion
-/// amplifies ringing of the hinge: 2.2e-4 was seen, of a difference of 7.5e-4, and 1.4e-4 of
-/// 3.4e-4.
+/// What it may err by itself, however near the capped rung is, where a violent motion amplifies
+/// ringing of the hinge: 2.2e-4 was seen, of a difference of 7.5e-4, and 1.4e-4 of 3.4e-4.
 const OWN_ERROR_OF_RK4: f64 = 3e-4;
 
 /// A contraction that the rule expects, and that does not follow from steps and caps, is not
@@ -132,19 +135,23 @@ const BEST_CONTRACTION: f64 = 1e-3;
 
 /// The rungs of the fast method for these cases.
 pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladder {
-    let has_corners = model == ModelKind::Nonlinear && cases.are_nonsmooth();
     let following_step_s = following_step_s(cases);
+    let follows = |step_s: f64| step_s <= following_step_s;
     let plain = |step_s: f64, contraction: f64, believed_to: f64| Rung {
         level: Level::Rk4,
         method: Method::Rk4 { step_s },
         convergence: Convergence { contraction, believed_to, ..Convergence::NONE },
-        follows_bearings: step_s <= following_step_s,
+        left_out: [cases.left_out_of_hinge(step_s), if follows(step_s) { 0.0 } else { 1.0 }],
     };
     let reference_step_s = reference_step_s(cases);
-    if has_corners {
-        let mut rungs = SHARES_AT_CORNERS.map(|share| at_corners(share, accuracy)).to_vec();
-        let finer = rungs.pop();
-        return Ladder::checked(rungs, Some(AT_CORNERS.to_owned())).with_finer(finer);
+    if has_corners(cases, model) {
+        let [first, second, reference, finer] =
+            SHARES_AT_CORNERS.map(|share| at_corners(share, accuracy));
+        // It damps what bearings swing, however tight its tolerance.
+        let step_s = following_step_s.min(REFERENCE_STEP_S);
+        let following = plain(step_s, CONTRACTION_OF_FOLLOWING, f64::INFINITY);
+        return Ladder::checked(vec![first, second, reference], Some(AT_CORNERS.to_owned()))
+            .with_finer([finer, following]);
     }
     let mut rungs = capped(cases, model, accuracy);
     let held_back = if rungs.is_empty() { too_fast(cases, accuracy) } else { None };
@@ -159,9 +166,20 @@ pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladd
     // Two steps that are nearly the same would agree on an error that neither shows.
     let shorter_s = following_step_s.min(0.5 * halved_s);
     let following = plain(shorter_s, CONTRACTION_OF_FOLLOWING, f64::INFINITY);
-    let is_needed = !halved.follows_bearings;
-    let finer = [Some(halved), is_needed.then_some(following)];
+    let finer = [Some(halved), (!follows(halved_s)).then_some(following)];
     Ladder::checked(rungs, held_back).with_finer(finer.into_iter().flatten())
+}
+
+/// The method that a row without doubts climbs to at most.
+pub(crate) fn reference(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Method {
+    match has_corners(cases, model) {
+        true => at_corners(SHARES_AT_CORNERS[2], accuracy).method,
+        false => Method::Rk4 { step_s: reference_step_s(cases) },
+    }
+}
+
+fn has_corners(cases: &Cases<'_>, model: ModelKind) -> bool {
+    model == ModelKind::Nonlinear && cases.are_nonsmooth()
 }
 
 /// A rung for forces with corners.
@@ -177,7 +195,7 @@ fn at_corners(share: f64, accuracy: f64) -> Rung {
             believed_to: f64::INFINITY,
             ..Convergence::NONE
         },
-        follows_bearings: false,
+        left_out: [0.0, 1.0],
     }
 }
 
@@ -213,7 +231,9 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
         return Vec::new();
     }
     let mut chosen: Vec<(Level, f64, Geared)> = Vec::new();
-    for (level, aim) in [Level::Fast, Level::Fast, Level::Fine].into_iter().zip(aims(model)) {
+    for (level, aim) in
+        [Level::Fast, Level::Fast, Level::Fine].into_iter().zip(aims(model, accuracy))
+    {
         // The nonlinear model has one gear after the first: what instability amplifies later is
         // small while the drum is slow, and a window may end early.
         let found = match chosen.is_empty() || model == ModelKind::Linear {
@@ -248,15 +268,20 @@ fn capped(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Vec<Rung> {
         Rung {
             level: *level,
             method: Method::Geared(*geared),
-            follows_bearings: false,
+            left_out: [1.0, 1.0],
             convergence: Convergence {
                 contraction,
                 of_caps,
                 believed_to: first_order(model),
                 expected: match before {
-                    Some((_, aim, _)) if *level != Level::Finest => *aim,
-                    // What reaches the finest rung is amplified far more than ringing is: of
-                    // Fig. 12's rows this rule sent 46 on to RK4, which they agree with to 1.1e-4.
+                    Some((_, aim, _))
+                        if model == ModelKind::Nonlinear && *level != Level::Finest =>
+                    {
+                        *aim
+                    }
+                    // The linear model amplifies no ringing. What reaches the finest rung is
+                    // amplified far more than ringing is: of Fig. 12's rows this rule sent 46 on
+                    // to RK4, which they agree with to 1.1e-4.
                     _ => f64::INFINITY,
                 },
                 ..Convergence::NONE

@@ -35,20 +35,20 @@ impl Point {
     /// With friction nothing counts as decayed: that may hold the tub, whose dampers are all that
     /// takes energy from these modes. A machine without modes keeps the bound.
     #[must_use]
-    pub fn ringing_left(&self, follows_hinge: bool, [from_s, to_s]: [f64; 2]) -> Swing {
-        let bound = self.ringing(follows_hinge);
+    pub fn ringing_left(&self, left_out: [f64; 2], [from_s, to_s]: [f64; 2]) -> Swing {
+        let bound = self.ringing(left_out);
         let Some(groups) = self.ringing_by_modes.get_or_init(|| by_modes(self).ok()) else {
             return bound;
         };
         let mut sum = Swing::NONE;
-        for Decaying { per_jump, decay_per_s } in &groups[usize::from(follows_hinge)..] {
+        for (Decaying { per_jump, decay_per_s }, share) in groups.iter().zip(left_out) {
             let left = |jump: &Jump| {
                 let for_s = (from_s - jump.at_s).max(0.0);
                 jump.by_rad_per_s2 * libm::exp(-decay_per_s * for_s)
             };
             let before = self.jumps.iter().filter(|jump| jump.at_s < to_s);
             let left_rad_per_s2 = before.map(left).fold(0.0, |sum, left| sum + left);
-            sum = sum.with(per_jump, |sum, of| sum + MOST * left_rad_per_s2 * of);
+            sum = sum.with(per_jump, |sum, of| sum + share * MOST * left_rad_per_s2 * of);
         }
         sum.with(&bound, f64::min)
     }
@@ -143,23 +143,24 @@ mod tests {
     fn what_decays_is_less_later_and_nothing_decays_with_friction() {
         let machine = Machine::paper();
         let rings = point(machine.clone(), ramp(300.0, 20.0));
-        let [early, late] = [0.0, 10.0].map(|from_s| rings.ringing_left(false, [from_s, 20.0]));
+        let left = |rings: &Point, from_s| rings.ringing_left([1.0; 2], [from_s, 20.0]);
+        let [early, late] = [0.0, 10.0].map(|from_s| left(&rings, from_s));
         // 240 N s/m: the hinge's modes decay by some 0.2 /s.
         let share = late.gap_m / early.gap_m;
         assert!((0.05..0.4).contains(&share), "{share}");
         let mut with_friction = machine;
         with_friction.dampers[0].friction_n = 20.0;
         let rings = point(with_friction, ramp(300.0, 20.0));
-        let [early, late] = [0.0, 10.0].map(|from_s| rings.ringing_left(false, [from_s, 20.0]));
+        let [early, late] = [0.0, 10.0].map(|from_s| left(&rings, from_s));
         assert_eq!(early, late);
     }
 
     #[test]
     fn modes_say_less_than_the_bound_and_not_nothing() {
         let rings = point(Machine::paper(), ramp(300.0, 20.0));
-        for follows_hinge in [false, true] {
-            let bound = rings.ringing(follows_hinge);
-            let by_modes = rings.ringing_left(follows_hinge, [0.0, 20.0]);
+        for left_out in [[1.0, 1.0], [0.1, 1.0], [0.0, 1.0]] {
+            let bound = rings.ringing(left_out);
+            let by_modes = rings.ringing_left(left_out, [0.0, 20.0]);
             let of_bound = by_modes.with(&bound, |swing, bound| swing / bound);
             let least = of_bound.channels.into_iter().fold(of_bound.gap_m, f64::min);
             assert!(by_modes != bound && least > 0.01, "{of_bound:?}");
@@ -175,11 +176,11 @@ mod tests {
         // At the run's end, in the window, and between the two.
         let [at_end, inside, behind] =
             [20.0, 14.0, 19.0].map(|peak_s| point(Machine::paper(), to(peak_s)));
-        let ringing = |point: &Point, within_s| point.ringing_left(false, within_s).gap_m;
+        let ringing = |point: &Point, within_s| point.ringing_left([1.0; 2], within_s).gap_m;
         let once = ringing(&at_end, [10.0, 20.0]);
         assert_eq!(
-            at_end.ringing(false),
-            point(Machine::paper(), ramp(300.0, 20.0)).ringing(false)
+            at_end.ringing([1.0; 2]),
+            point(Machine::paper(), ramp(300.0, 20.0)).ringing([1.0; 2])
         );
         assert!(ringing(&inside, [10.0, 18.0]) > 2.0 * once);
         assert!(ringing(&behind, [10.0, 18.0]) < 1.1 * once);

@@ -119,9 +119,10 @@ impl Ringing {
         }
     }
 
-    /// The part of it that is the bearings'.
-    pub(crate) fn of_bearings(&self) -> Self {
-        Self { hinge_rad: 0.0, ..*self }
+    /// These shares of what hinge and bearings swing.
+    pub(crate) fn share(&self, [of_hinge, of_bearings]: [f64; 2]) -> Self {
+        let (hinge_rad, bearings_m) = (of_hinge * self.hinge_rad, of_bearings * self.bearings_m);
+        Self { hinge_rad, bearings_m, ..*self }
     }
 
     /// The greatest swing of the gap between drum and tub (m).
