@@ -79,6 +79,23 @@ fn a_curve_for_every_combination_of_further_axes_in_a_figure() {
 }
 
 #[test]
+fn brackets_of_a_logarithmic_axis_are_told_in_the_unit_that_was_asked() {
+    let folder = folder_with("0.1");
+    let grid = GRID.replace("END", "0.1").split_once("[[axis]]").expect("axes").0.to_owned();
+    let axes = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.2, 0.4]\n[[axis]]\n\
+         parameter = \"spring_stiffness_n_per_m\"\n\
+         range = { from = 4e3, to = 4e4, count = 3, spacing = \"log\" }\n";
+    let text = format!("metrics = [\"static_sag\"]\n{grid}{axes}");
+    fs::write(folder.path().join("grid.toml"), text).expect("the grid is written");
+    let arguments = ["--quantity", "static_sag_m", "--limit", "0.01", "--tolerance", "0.01"];
+    let done = boundary(&folder, &arguments).output().expect("it starts");
+    let said = String::from_utf8_lossy(&done.stderr);
+    let widest = said.split("brackets  at most ").nth(1).expect("brackets").split(' ').next();
+    let widest: f64 = widest.expect("a number").parse().expect("a number");
+    assert!(widest <= 0.01 && said.contains("of its value wide (asked: 0.01)"), "{said}");
+}
+
+#[test]
 fn what_cannot_be_traced_is_refused_before_any_work() {
     let folder = folder_with("0.1");
     fs::write(folder.path().join("notes.parquet"), "mine").expect("the notes are written");

@@ -143,9 +143,17 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
         text.line("folds", format!("several crossings at {values} of the first axis"));
     }
     let brackets = rows().flat_map(|row| &row.edges).filter_map(|edge| edge.bracket);
-    if let Some(widest) = brackets.map(|[low, high]| high - low).reduce(f64::max) {
-        let unit = plan.axes.get(1).map_or("", |axis| axis.parameter.unit());
-        let told = format!("at most {widest:.3} {unit} wide (asked: {})", short(search.tolerance));
+    let width = |[low, high]: [f64; 2]| match search.second_log {
+        true => (high / low).ln(),
+        false => high - low,
+    };
+    if let Some(widest) = brackets.map(width).reduce(f64::max) {
+        let unit = match search.second_log {
+            true => "of its value",
+            false => plan.axes.get(1).map_or("", |axis| axis.parameter.unit()),
+        };
+        let (widest, asked) = (short(widest), short(search.tolerance));
+        let told = format!("at most {widest} {unit} wide (asked: {asked})");
         text.line("brackets", told);
     }
     // Cells of a logarithmic axis grow: the largest counts.
