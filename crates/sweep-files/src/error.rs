@@ -95,16 +95,16 @@ impl FileError {
 fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
     let told = match source.kind() {
         io::ErrorKind::StorageFull => {
-            "the disk is full: free some space and run the same command again; finished chunks \
-             are kept"
+            "the disk is full: free some space and run the same command again; finished chunks of \
+             a run are kept"
         }
         io::ErrorKind::QuotaExceeded => {
             "the quota is used up: free some space and run the same command again; finished chunks \
-             are kept"
+             of a run are kept"
         }
         io::ErrorKind::FileTooLarge => {
             "a file-size limit was hit: raise it (ulimit -f) and run the same command again; \
-             finished chunks are kept"
+             finished chunks of a run are kept"
         }
         io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied => {
             "give this user the right to it, or another path"
@@ -122,7 +122,7 @@ fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
         io::ErrorKind::InvalidInput => "give the name of a regular file",
         _ => {
             "check the disk (the system's log may say more) and run the same command again; \
-             finished chunks are kept"
+             finished chunks of a run are kept"
         }
     };
     told.into()

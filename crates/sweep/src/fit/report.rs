@@ -423,7 +423,8 @@ impl Report {
             say("file", &format!("{}: {} samples", file.file, file.samples));
             say("noise", &format!("{} (ISO/TS 18571)", columns.join(", ")));
             if let Some(shift_s) = file.shift_s {
-                say("clock", &format!("shifted by {shift_s:.6} s"));
+                let way = if shift_s < 0.0 { "late" } else { "early" };
+                say("clock", &format!("{:.6} s {way}", shift_s.abs()));
             }
             if let Some(spin) = &file.spin {
                 let noise = short(spin.noise_rpm);
