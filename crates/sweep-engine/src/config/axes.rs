@@ -128,6 +128,9 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
             column.values.iter().enumerate().filter(|(_, value)| !range.contains(**value))
         {
             sound = false;
+            if list.table.is_refused(value) {
+                continue;
+            }
             report.push_with(|sources| {
                 let what = format!("value {} of {}", row + 1, quoted(name.value));
                 refused_number(&what, value, &list.table.place(sources, k, row), range)

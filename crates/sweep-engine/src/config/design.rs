@@ -13,8 +13,7 @@ pub const MOST_SEED: u64 = (1 << 53) - 1;
 /// Points of Sobol's sequence with 32 bits.
 const MOST_SOBOL: u64 = 1 << 32;
 
-/// Walks over the section. Where it is read there is no design after a mistake, and a list has no
-/// points yet.
+/// Walks over the section. Where it is read a list has no points yet.
 pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
     keys.table(Key::new("design", ""), |keys| {
         let rules = Rule::ALL.map(|(_, name, about)| (name, about));
@@ -28,8 +27,10 @@ pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
             Some((rule, ..)) => spread(*rule, design, keys),
             None => listed(design, keys),
         });
-        if chosen.is_none() {
-            *design = None;
+        // A stand-in for what is refused, so that the axes are read all the same.
+        if chosen.is_none() && keys.section().is_some() && design.is_none() {
+            *design =
+                Some(Design::Spread { rule: Rule::MonteCarlo, points: 1, seed: DEFAULT_SEED });
         }
         if matches!(keys.walk, Walk::Set(_)) && !matches!(design, Some(Design::Spread { .. })) {
             spread(Rule::LatinHypercube, &mut None, keys);

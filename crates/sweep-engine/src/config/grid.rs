@@ -49,8 +49,8 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
             Some(list) => axes::listed_axes(root, list, &mut draft),
             None => drop(root.tables("axis")),
         },
-        // The right axes depend on a method that is unknown.
-        (Field::Given(_) | Field::Bad, None) => drop(root.tables("axis")),
+        // The right axes depend on a design that is no table.
+        (Field::Bad, None) => drop(root.tables("axis")),
         (_, design) => axes::axes(root, design, &mut draft),
     }
     keys.finish();
@@ -61,7 +61,7 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
 }
 
 /// The keys of study files.
-const STUDY: [&str; 8] =
+pub const STUDY: [&str; 8] =
     ["name", "grid", "parameter", "population", "candidates", "seed", "objective", "conditions"];
 
 /// Refuses a file as a whole that should be of one kind and is of another: it has most of its keys

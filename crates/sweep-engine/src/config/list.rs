@@ -40,7 +40,7 @@ impl NumberTable {
         let shown = shown(path);
         let file = Location::new(report.add(shown.as_str(), String::new()), 0..0);
         match table(path, &file, true, report) {
-            Ok(read) => read.map(|(table, _)| table),
+            Ok((table, _)) => report.is_clean().then_some(table),
             Err(reason) => {
                 let title = format!("cannot read {shown}: {reason}");
                 let help = "expected a CSV or Parquet file of numbers under a line of names";
@@ -57,6 +57,11 @@ impl NumberTable {
         let located = |((value, values), at)| ListColumn { name: Located { value, at }, values };
         let columns = columns.into_iter().zip(places).map(located).collect();
         Self { columns, rows: Rows::Binary(Location::new(source, 0..0)) }
+    }
+
+    /// Whether a value was refused when it was read.
+    pub fn is_refused(&self, value: f64) -> bool {
+        matches!(self.rows, Rows::Lines { .. }) && value.is_nan()
     }
 
     /// The place of a value, both counted from 0.
@@ -104,14 +109,14 @@ fn shown(path: &Path) -> String {
     cut(&path.display().to_string(), LONGEST_PATH)
 }
 
-/// The table of a file, and the hash of its bytes; `None` after mistakes, which are reported. The
-/// file is named at `file`. With `gaps`, a missing value is NaN.
+/// The table of a file, and the hash of its bytes; mistakes are reported. The file is named at
+/// `file`. With `gaps`, a missing value is NaN; else that is one that was refused.
 fn table(
     path: &Path,
     file: &Location,
     gaps: bool,
     report: &Report,
-) -> Result<Option<(NumberTable, String)>, Unreadable> {
+) -> Result<(NumberTable, String), Unreadable> {
     let bytes = bytes(path)?;
     let hash = blake3::hash(&bytes).to_hex().to_string();
     if bytes.starts_with(b"PAR1") {
@@ -119,7 +124,7 @@ fn table(
         let located = |value| Located { value, at: file.clone() };
         let column = |(name, values)| ListColumn { name: located(name), values };
         let columns = columns.into_iter().map(column).collect();
-        return Ok(Some((NumberTable { columns, rows: Rows::Binary(file.clone()) }, hash)));
+        return Ok((NumberTable { columns, rows: Rows::Binary(file.clone()) }, hash));
     }
     let text = String::from_utf8(bytes)
         .map_err(|error| error.utf8_error().valid_up_to() + 1)
@@ -128,9 +133,8 @@ fn table(
     let source = report.add(shown(path), String::new());
     let read = csv::read(&text, source, gaps, report);
     report.fill(source, text);
-    Ok(read?.map(|(columns, starts, separator)| {
-        (NumberTable { columns, rows: Rows::Lines { source, starts, separator } }, hash)
-    }))
+    let (columns, starts, separator) = read?;
+    Ok((NumberTable { columns, rows: Rows::Lines { source, starts, separator } }, hash))
 }
 
 /// Reads the listed points.
@@ -139,7 +143,7 @@ pub(super) fn read(file: &str, grid: &Path, report: &Report) -> Option<List> {
     let at = report.place("design.file")?;
     let shown = shown(&path);
     let (table, hash) = match table(&path, &at, false, report) {
-        Ok(read) => read?,
+        Ok(read) => read,
         Err(reason) => {
             let title = format!("cannot read the list of points {shown}: {reason}");
             let expected = "expected a CSV or Parquet file of numbers, one column a parameter, \
@@ -148,6 +152,9 @@ pub(super) fn read(file: &str, grid: &Path, report: &Report) -> Option<List> {
         }
     };
     let points = table.columns.first().map_or(0, |column| column.values.len());
+    if points == 0 && !report.is_clean() {
+        return None;
+    }
     if points == 0 {
         let title = format!("the list of points {shown} is empty");
         let expected = "expected a line of parameter names, and under it a row of numbers a point";

@@ -11,7 +11,7 @@ use sweep_results::{Column, Goal, Mistake, columns};
 use super::Evolution;
 use crate::config::axes::{add, spacing};
 use crate::config::design::{DEFAULT_SEED, MOST_SEED};
-use crate::config::grid::{draft, is_another};
+use crate::config::grid::{STUDY, draft, is_another};
 use crate::config::parameters::find;
 use crate::config::section::listed;
 use crate::config::sections::name;
@@ -91,7 +91,8 @@ impl<M: Rows> Study<M> {
         let root =
             Section::new("the study file", Location::new(source, 0..0), table.get_ref(), report);
         let name = name(&root, path, None, "add `name = \"...\"`, or rename the file");
-        let grid = root.require(root.text("grid"), "grid", "a grid file, relative to this file");
+        let [_, grid, parameter, population, candidates, seed, objective, conditions] = STUDY;
+        let grid = root.require(root.text(grid), grid, "a grid file, relative to this file");
         let input = grid.map(|grid| GridInput::file(beside(path, grid.value), sets.to_vec()));
         let mut draft = input.and_then(|input| draft::<M>(&input, report));
         let grid = draft.as_ref().map(|draft| draft.plan.clone());
@@ -99,10 +100,10 @@ impl<M: Rows> Study<M> {
             flatten(&mut draft.plan);
         }
         let design = grid.as_ref().and_then(|grid| grid.design.as_ref());
-        let parameters = parameters(&root, design, &mut draft);
-        let population = root.whole("population", &(4..=MOST[0])).or(0);
-        let candidates = root.whole("candidates", &(1..=MOST[0])).or(0);
-        let seed = root.whole("seed", &(0..=MOST_SEED)).or(DEFAULT_SEED);
+        let parameters = parameters(&root, root.tables(parameter), design, &mut draft);
+        let population = root.whole(population, &(4..=MOST[0])).or(0);
+        let candidates = root.whole(candidates, &(1..=MOST[0])).or(0);
+        let seed = root.whole(seed, &(0..=MOST_SEED)).or(DEFAULT_SEED);
         // Candidates of a single row fill whole groups of lanes.
         let usual = (10 * parameters.len() as u64).next_multiple_of(8).max(32);
         let population = population.filter(|&one| one > 0).unwrap_or(usual);
@@ -111,17 +112,16 @@ impl<M: Rows> Study<M> {
             whole::steps(draft);
             M::judge(draft);
         }
-        // Columns are those of a sound plan.
-        let plan = draft.filter(|_| report.is_clean()).map(|draft| draft.plan);
-        let known = plan.as_ref().map(|plan| columns(&M::layout(plan).schema()));
+        let plan = draft.map(|draft| draft.plan);
+        let known = plan.as_ref().map_or_else(Vec::new, |plan| columns(&M::layout(plan).schema()));
         let rows = grid.as_ref().map_or(1, Plan::points);
         if rows > MOST[1] {
             let title = format!("a grid of {rows} points for every candidate");
             report.refuse::<()>(root.at(), title, format!("expected at most {}", MOST[1]));
         }
-        let goals = Goals { known: known.as_deref(), rows, text: &text, report };
-        let objectives = objectives(&root, &goals);
-        let conditions = root.texts("conditions").given();
+        let goals = Goals { known, is_sound: report.is_clean(), rows, text: &text, report };
+        let objectives = objectives(&root, root.tables(objective), &goals);
+        let conditions = root.texts(conditions).given();
         let conditions = conditions.into_iter().flat_map(|texts| texts.value);
         let conditions = conditions.filter_map(|text| goals.read(&text, Goal::excess)).collect();
         root.finish();
@@ -210,10 +210,11 @@ fn flatten<M: Model>(plan: &mut Plan<M>) {
 /// Reads every `[[parameter]]`, and adds an axis for each that is right.
 fn parameters<M: Rows>(
     root: &Section<'_>,
+    sections: Vec<Section<'_>>,
     design: Option<&Design>,
     draft: &mut Option<Draft<'_, M>>,
 ) -> Vec<Sought> {
-    let (report, sections) = (root.report, root.tables("parameter"));
+    let report = root.report;
     if sections.is_empty() || sections.len() as u64 > MOST[2] {
         let title = format!("{} tables [[parameter]]", sections.len());
         let expected = format!("expected from 1 to {}, each with name, from and to", MOST[2]);
@@ -288,10 +289,9 @@ fn spreads<M: Rows>(design: Option<&Design>, draft: &Option<Draft<'_, M>>) -> bo
 }
 
 /// Reads every `[[objective]]`.
-fn objectives(root: &Section<'_>, goals: &Goals<'_>) -> Vec<Objective> {
+fn objectives(root: &Section<'_>, sections: Vec<Section<'_>>, goals: &Goals<'_>) -> Vec<Objective> {
     const VERBS: [(&str, f64); 2] = [("minimise", 1.0), ("maximise", -1.0)];
     let mut objectives: Vec<Objective> = Vec::new();
-    let sections = root.tables("objective");
     if sections.is_empty() {
         root.missing("objective", "[[objective]] with `minimise` or `maximise`");
     }
@@ -333,8 +333,9 @@ fn column_name(text: &str) -> String {
 
 /// What expressions are read over.
 struct Goals<'a> {
-    /// The columns of rows; none while the plan is not sound.
-    known: Option<&'a [Column]>,
+    /// The columns of rows; some may be missing while the plan is not sound.
+    known: Vec<Column>,
+    is_sound: bool,
     rows: u64,
     text: &'a str,
     report: &'a Report,
@@ -346,8 +347,9 @@ impl Goals<'_> {
         found: &Located<&str>,
         read: fn(&str, &[Column]) -> Result<Goal, Mistake>,
     ) -> Option<Goal> {
-        let mistake = match read(found.value, self.known?) {
+        let mistake = match read(found.value, &self.known) {
             Ok(goal) => return Some(goal),
+            Err(mistake) if mistake.candidates.is_some() && !self.is_sound => return None,
             Err(mistake) => mistake,
         };
         // Behind the quote, unless escapes have moved it.

@@ -8,20 +8,20 @@ use super::super::section::{counted, short};
 use super::super::source::{Located, Location, SourceId};
 use super::{ID, ListColumn, Unreadable, fits};
 
-/// Columns, the byte at which each row's line begins, and what separates cells.
+/// Columns, with NaN for what is refused; the byte at which each row's line begins, and what
+/// separates cells.
 pub(super) type Read = (Vec<ListColumn>, Vec<u32>, char);
 
-/// Reads a text; `None` after mistakes, which are reported.
+/// Reads a text; mistakes are reported.
 pub(super) fn read(
     text: &str,
     source: SourceId,
     gaps: bool,
     report: &Report,
-) -> Result<Option<Read>, Unreadable> {
+) -> Result<Read, Unreadable> {
     let mut separator = ',';
     let mut columns: Vec<ListColumn> = Vec::new();
     let mut starts: Vec<u32> = Vec::new();
-    let mut sound = true;
     let mut next = 0;
     for line in text.split_inclusive('\n') {
         let start = next;
@@ -33,7 +33,7 @@ pub(super) fn read(
         if columns.is_empty() {
             separator = [';', '\t'].into_iter().find(|&other| line.contains(other)).unwrap_or(',');
         }
-        let count = 1 + line.matches(separator).count();
+        let count = cells(line, separator, offset).count();
         if columns.is_empty() {
             fits(0, count)?;
             let column = |(name, at): (&str, _)| ListColumn {
@@ -44,7 +44,6 @@ pub(super) fn read(
             continue;
         }
         if count != columns.len() {
-            sound = false;
             report.push_with(|_| {
                 let at = Location::new(source, offset..offset + line.len());
                 let [names, numbers] = ["name", "number"].map(|what| counted(columns.len(), what));
@@ -76,11 +75,13 @@ pub(super) fn read(
                 ',' => cell.parse::<f64>(),
                 _ => cell.replace(',', ".").parse(),
             };
-            if let Ok(value) = number {
+            if let Ok(value) = number
+                && (gaps || !value.is_nan())
+            {
                 column.values.push(value);
                 continue;
             }
-            sound = false;
+            column.values.push(f64::NAN);
             report.push_with(|_| {
                 let title = format!("`{}` is not a number", short(cell));
                 let expected = "expected a number such as 0.25, 80 or 1e7";
@@ -88,7 +89,7 @@ pub(super) fn read(
             });
         }
     }
-    Ok(sound.then_some((columns, starts, separator)))
+    Ok((columns, starts, separator))
 }
 
 /// The place of a cell in the line that begins at a byte of a text.
@@ -108,8 +109,15 @@ fn body(line: &str, start: usize) -> (&str, usize) {
 
 /// The cells of a line without white space and quotation marks, and their places.
 fn cells(line: &str, separator: char, offset: usize) -> impl Iterator<Item = (&str, Range<usize>)> {
-    let mut next = offset;
-    line.split(separator).map(move |cell| {
+    let (mut next, mut is_quoted, mut may_begin) = (offset, false, true);
+    // A separator between quotation marks, which may begin a cell, is none.
+    let ends = move |c: char| {
+        is_quoted ^= c == '"' && (is_quoted || may_begin);
+        let ends = c == separator && !is_quoted;
+        may_begin = ends || c == '"' || may_begin && c.is_whitespace();
+        ends
+    };
+    line.split(ends).map(move |cell| {
         let start = next + (cell.len() - cell.trim_start().len());
         next += cell.len() + 1;
         let trimmed = cell.trim();

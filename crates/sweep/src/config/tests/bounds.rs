@@ -122,9 +122,26 @@ fn a_wrong_choice_hides_no_mistake_beside_it() {
         &["unknown method", "`step_s` = 0", "`rtol` has the wrong type", "unknown key `order`"],
     );
     refused(
-        &format!("{SMALLEST}[design]\nmethod = \"halton\"\npoints = 0\nseed = -1\nskip = 3\n"),
-        &["unknown method", "`points` = 0", "`seed` = -1", "unknown key `skip`"],
+        &format!(
+            "{SMALLEST}[design]\nmethod = \"halton\"\npoints = 0\nseed = -1\nskip = 3\n\
+             [[axis]]\nparameter = \"tub_mas_kg\"\n"
+        ),
+        &[
+            "unknown method",
+            "`points` = 0",
+            "`seed` = -1",
+            "unknown key `skip`",
+            "unknown parameter `tub_mas_kg`",
+            "`range` is missing",
+        ],
     );
+    let refused = load_list(SMALLEST, "tub_mas_kg,shaft_mass_kg\n1,x\n1,-5\n1\n").unwrap_err();
+    for part in
+        ["unknown parameter", "`x` is not a number", "value 2 of `shaft_mass_kg`", "a row of"]
+    {
+        assert!(refused.contains(part), "no {part} in\n{refused}");
+    }
+    assert!(refused.contains("4 mistakes"), "{refused}");
 }
 
 #[test]
