@@ -67,12 +67,12 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart> {
     let label = Label::new("Growth of a small disturbance", "1/s");
     let levels = vec![(0.0, "unstable above".to_owned())];
     let panel = ChartPanel { levels, ..ChartPanel::new("growth", label, series.collect()) };
-    let alone = match &swept[..] {
-        [one] => unstable(&one.speed, &one.growth),
-        _ => Vec::new(),
+    let (alone, edges) = match &swept[..] {
+        [one] => (unstable(&one.speed, &one.growth), edges(&one.speed, &one.growth)),
+        _ => Default::default(),
     };
-    let edges = alone.iter().flatten().take(MOST_EDGES);
-    let marks = edges.map(|&edge| Mark::of_speed(edge, edge)).collect();
+    let edges = edges.into_iter().take(MOST_EDGES);
+    let marks = edges.map(|edge| Mark::of_speed(edge, edge)).collect();
     Ok(Chart {
         title: "Where a dwell at constant speed is unstable".to_owned(),
         subtitle: notes.join(" · "),
@@ -383,6 +383,14 @@ pub(super) fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
     stretches_within(speed, growth, &[[0.0, f64::INFINITY]])
 }
 
+/// The speeds at which growth passes 0. Where a range ends because there is no answer beyond, it is
+/// not known to.
+fn edges(speed: &[f64], growth: &[f64]) -> Vec<f64> {
+    let known = speed.iter().zip(growth);
+    let grows = |edge: f64| known.clone().any(|(&at, &growth)| at == edge && growth > 0.0);
+    unstable(speed, growth).into_iter().flatten().filter(|&edge| !grows(edge)).collect()
+}
+
 /// The stretches of x in which a curve over it is within one of these ranges; straight between its
 /// points.
 pub(super) fn stretches_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec<[f64; 2]> {
@@ -427,6 +435,7 @@ mod tests {
         let speed = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
         let growth = [-1.0, 1.0, 2.0, -2.0, f64::NAN, 1.0, 1.0];
         assert_eq!(unstable(&speed, &growth), [[1.5, 3.5], [6.0, 7.0]]);
+        assert_eq!(edges(&speed, &growth), [1.5, 3.5]);
         assert!(unstable(&speed[..1], &growth[..1]).is_empty());
     }
 

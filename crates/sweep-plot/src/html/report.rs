@@ -85,14 +85,13 @@ fn machine(machine: &Value) -> Option<String> {
     let elements = |(list, numbers): (&str, &[(&str, &str)])| {
         let all = machine.get(list).and_then(Value::as_array)?;
         let said = numbers.iter().filter_map(|(word, number)| {
-            let by_size = |a: &&Value, b: &&Value| {
-                let [a, b] = [a, b].map(|of| of[*number].as_f64().unwrap_or(f64::NAN));
-                a.total_cmp(&b)
-            };
-            let [least, most] = [all.iter().min_by(by_size)?, all.iter().max_by(by_size)?];
-            let from = match least[*number] == most[*number] {
+            // What an element does not say is 0; what none says is not told.
+            let size = |of: &Value| of[*number].as_f64().unwrap_or_default();
+            let most = all.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
+            let least = all.iter().map(size).fold(f64::INFINITY, f64::min);
+            let from = match least == size(most) {
                 true => String::new(),
-                false => format!("{} to ", significant(least[*number].as_f64()?, 4)),
+                false => format!("{} to ", significant(least, 4)),
             };
             Some(format!(" {word} {from}{}", quantity(most, number)?))
         });
