@@ -100,9 +100,26 @@ fn a_fit_ends_in_a_machine_file_that_runs() {
     assert!(picture.contains("damping 1") && !picture.contains("damping 120 N s/m"));
     assert!(picture.contains("monday"));
     assert!(!picture.contains("unbalance_mass_kg = 0.3"));
+    // A fit is written over a fit, and over nothing else.
     let again = home.sweep(&[&words[..], &more].concat());
-    assert_eq!(again.status.code(), Some(1), "{}", said(&again));
-    assert!(said(&again).contains("give another name"), "{}", said(&again));
+    assert!(again.status.success(), "{}", said(&again));
+    let over = home.sweep(&[&words[..], &["--out", "own.toml"]].concat());
+    assert_eq!(over.status.code(), Some(2), "{}", said(&over));
+    assert!(said(&over).contains("own.toml cannot be an output"), "{}", said(&over));
+}
+
+#[test]
+fn a_number_that_differs_from_damper_to_damper_needs_a_range() {
+    let home = bench();
+    let apart = ["--set", "damper_1_friction_n=20", "--set", "damper_2_friction_n=30"];
+    let words = ["fit", "g.toml", "run.csv", "--free", "friction_n"];
+    let refused = home.sweep(&[&words[..], &apart].concat());
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(
+        said(&refused).contains("`friction_n` differs from part to part"),
+        "{}",
+        said(&refused)
+    );
 }
 
 #[test]

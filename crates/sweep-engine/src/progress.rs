@@ -24,6 +24,8 @@ pub enum ProgressMode {
 pub struct Progress {
     shown: Mutex<Shown>,
     total: u64,
+    /// What the total is of.
+    parts: &'static str,
     /// Points that were there at the start: they count as done, but not towards the rate.
     start: u64,
     began: Instant,
@@ -38,19 +40,14 @@ enum Shown {
 impl Progress {
     /// The progress of a run.
     pub fn new(mode: ProgressMode, total: u64, start: u64) -> Self {
-        let progress = Self::shown(mode, BAR, total, start);
+        let progress = Self::of_search(mode, total, "points", start);
         progress.show(start);
         progress
     }
 
-    /// The progress of a search, whose points nobody can count beforehand. It counts rows up to
-    /// this total, if there are rows. `start` points were there at the start.
-    pub fn of_search(mode: ProgressMode, rows: u64, start: u64) -> Self {
-        let template = if rows == 0 { POINTS } else { ROWS };
-        Self::shown(mode, template, rows, start)
-    }
-
-    fn shown(mode: ProgressMode, template: &str, total: u64, start: u64) -> Self {
+    /// The progress of a search, whose points nobody can count beforehand. It counts parts up to
+    /// this total, which are called so, if there are any. `start` points were there at the start.
+    pub fn of_search(mode: ProgressMode, total: u64, parts: &'static str, start: u64) -> Self {
         let lines = |seconds| {
             let every = Duration::from_secs(seconds);
             Shown::Lines { every, next: Instant::now() + every }
@@ -62,46 +59,44 @@ impl Progress {
                 let target = ProgressDrawTarget::stderr_with_hz(8);
                 let bar = ProgressBar::with_draw_target(Some(total), target);
                 bar.enable_steady_tick(Duration::from_millis(125));
-                Shown::Bar(bar.with_style(style(template)))
+                Shown::Bar(bar.with_style(style(if total == 0 { POINTS } else { BAR })))
             }
             ProgressMode::Auto => lines(60),
         };
-        Self { shown: Mutex::new(shown), total, start, began: Instant::now() }
+        Self { shown: Mutex::new(shown), total, parts, start, began: Instant::now() }
     }
 
     /// Shows that `done` points of the total are there.
     pub fn show(&self, done: u64) {
-        self.tell(done, |_| self.line(done));
+        self.tell(done, || self.line(done));
     }
 
-    /// Shows that so many rows of a search are done, with so many points.
-    pub fn show_search(&self, rows: u64, points: u64) {
-        self.tell(rows, |counts_rows| {
-            let points = self.points(points);
-            match self.total {
-                total if total > 0 && !counts_rows => format!("{rows} of {total} rows, {points}"),
-                _ => points,
-            }
-        });
+    /// Shows that so many parts of a search are done, with so many points.
+    pub fn show_search(&self, done: u64, points: u64) {
+        self.tell(done, || self.search_line(done, points));
     }
 
-    /// The points of a search and their rate.
-    fn points(&self, points: u64) -> String {
-        format!("{}, {}", counted(points as usize, "point"), per_second(self.rate(points)))
+    fn search_line(&self, done: u64, points: u64) -> String {
+        let rate = per_second(self.rate(points));
+        let points = format!("{}, {rate}", counted(points as usize, "point"));
+        match (self.total, self.parts) {
+            (0, _) => points,
+            (total, parts) => format!("{done} of {total} {parts}, {points}"),
+        }
     }
 
-    /// Says it beside the bar, which counts on its own; or in a line, and then none for a while.
-    fn tell(&self, position: u64, text: impl FnOnce(bool) -> String) {
+    /// Says it beside the bar; or in a line, and then none for a while.
+    fn tell(&self, position: u64, text: impl FnOnce() -> String) {
         // A thread that finds another saying it goes on.
         let Ok(mut shown) = self.shown.try_lock() else { return };
         match &mut *shown {
             Shown::Bar(bar) => {
                 bar.set_position(position);
-                bar.set_message(text(true));
+                bar.set_message(text());
             }
             Shown::Lines { every, next } if Instant::now() >= *next => {
                 // A log that cannot be written to must not end the run.
-                let _ = writeln!(std::io::stderr(), "{}", text(false));
+                let _ = writeln!(std::io::stderr(), "{}", text());
                 *next = Instant::now() + *every;
             }
             _ => {}
@@ -144,10 +139,7 @@ impl Progress {
 /// The bar with its numbers.
 const BAR: &str = "{wide_bar} {msg}";
 
-/// The bar of a search.
-const ROWS: &str = "{wide_bar} {human_pos}/{human_len} rows  {msg}";
-
-/// The bar of a search without rows.
+/// The bar of a search of unknown length.
 const POINTS: &str = "{spinner} {msg}";
 
 fn style(template: &str) -> ProgressStyle {
@@ -203,10 +195,10 @@ mod tests {
 
     #[test]
     fn a_search_counts_its_rows_and_the_rate_of_its_new_points() {
-        let mut progress = Progress::of_search(ProgressMode::Plain, 39, 100);
+        let mut progress = Progress::of_search(ProgressMode::Plain, 39, "speeds", 100);
         progress.began = Instant::now() - Duration::from_secs(10);
-        let points = progress.points(200);
-        assert!(points.starts_with("200 points, ") && points.ends_with(" points/s"), "{points}");
-        assert!((9.0..=10.0).contains(&progress.rate(200)), "{points}");
+        let line = progress.search_line(7, 200);
+        assert!(line.starts_with("7 of 39 speeds, 200 points, "), "{line}");
+        assert!((9.0..=10.0).contains(&progress.rate(200)), "{line}");
     }
 }

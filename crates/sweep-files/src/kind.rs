@@ -2,7 +2,7 @@
 
 use std::ffi::OsStr;
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::{FileError, ParquetFile, key, regular};
 
@@ -23,8 +23,8 @@ pub enum FileKind<'a> {
     Dwell,
     /// Result of `sweep optimise`.
     Optimise,
-    /// The model's own file of a candidate: `sweep optimise --best`.
-    Candidate,
+    /// The model's own file: `sweep optimise --best`, `sweep fit --out`.
+    Own,
     /// Curves of `sweep fit`.
     Fit,
     /// Result of `sweep compare --out`.
@@ -61,8 +61,8 @@ const OWN: [(FileKind<'static>, &str, &str, &str); 8] = [
     (FileKind::Differences, "differences", key::DIFFERENCES, "result of `sweep compare --out`"),
 ];
 
-/// The beginning of the model's own file of a candidate.
-pub const CANDIDATE: &str = "# Candidate ";
+/// The beginning of the model's own file; what it is of follows.
+pub const OWN_FILE: &str = "# Written by sweep: ";
 
 /// The first line of an exported CSV file.
 pub const EXPORTED_CSV: &str = "# exported by sweep ";
@@ -71,7 +71,7 @@ impl FileKind<'_> {
     /// The kind in words: "the file there is no NAME".
     pub fn name(self) -> &'static str {
         match self {
-            Self::Candidate => "file of `sweep optimise --best`",
+            Self::Own => "file of `sweep optimise --best` or `sweep fit --out`",
             Self::Exported { .. } => "table of `sweep export`",
             Self::Account { .. } => "account of the run with this --out",
             Self::Svg => "SVG picture of `sweep plot`",
@@ -92,7 +92,7 @@ impl FileKind<'_> {
         };
         let objection = format!("the file there is no {}", self.name());
         let is_ours = match self {
-            Self::Candidate => begins(CANDIDATE.as_bytes())?,
+            Self::Own => begins(OWN_FILE.as_bytes())?,
             Self::Exported { ending: "csv" } => begins(EXPORTED_CSV.as_bytes())?,
             Self::Exported { .. } => begins(b"PK\x03\x04")?,
             Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,
@@ -143,8 +143,27 @@ impl ParquetFile {
     }
 }
 
+/// The sidecar beside a result, under its name: `x.run.json` beside `x.parquet`, `v1.5.run.json`
+/// beside `v1.5`.
+pub fn beside(output: &Path, ending: &str) -> PathBuf {
+    let stem = if output.extension().is_some_and(|extension| extension == "parquet") {
+        output.file_stem()
+    } else {
+        output.file_name()
+    };
+    let mut name = stem.unwrap_or_default().to_owned();
+    name.push(".");
+    name.push(ending);
+    output.with_file_name(name)
+}
+
+/// Whether it is an account, but not that of another result whose place it is: what was renamed
+/// together with its result still has the old name in it.
 fn is_account(path: &Path, of: &OsStr) -> std::io::Result<bool> {
     let text = regular::read_json(path)?;
     let account: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
-    Ok(account["plan_hash"].is_string() && account["file"].as_str() == Some(&of.to_string_lossy()))
+    let is_free = |named: &str| {
+        named == of.to_string_lossy() || beside(&path.with_file_name(named), "run.json") != path
+    };
+    Ok(account["plan_hash"].is_string() && account["file"].as_str().is_some_and(is_free))
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use tempfile::NamedTempFile;
 
@@ -68,20 +68,6 @@ pub fn ready(folder: &Path) -> Result<(), FileError> {
     Ok(())
 }
 
-/// The sidecar beside a result, under its name: `x.run.json` beside `x.parquet`, `v1.5.run.json`
-/// beside `v1.5`.
-pub fn beside(output: &Path, ending: &str) -> PathBuf {
-    let stem = if output.extension().is_some_and(|extension| extension == "parquet") {
-        output.file_stem()
-    } else {
-        output.file_name()
-    };
-    let mut name = stem.unwrap_or_default().to_owned();
-    name.push(".");
-    name.push(ending);
-    output.with_file_name(name)
-}
-
 /// The rule of what a file may be written over.
 ///
 /// # Errors
@@ -131,6 +117,7 @@ pub fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
 mod tests {
     use std::ffi::OsStr;
     use std::io::Cursor;
+    use std::path::PathBuf;
     use std::sync::Arc;
 
     use arrow_array::{ArrayRef, Float64Array, RecordBatch};
@@ -163,7 +150,7 @@ mod tests {
             FileKind::Dwell => key::DWELL,
             FileKind::Optimise => key::OPTIMISE,
             FileKind::Fit => key::FIT,
-            FileKind::Candidate => return format!("{}3 of x.\n", crate::CANDIDATE).into_bytes(),
+            FileKind::Own => return format!("{}x\n", crate::OWN_FILE).into_bytes(),
             FileKind::Differences => key::DIFFERENCES,
             FileKind::Exported { ending: "csv" } => {
                 return format!("{}x\n", crate::EXPORTED_CSV).into_bytes();
@@ -203,7 +190,7 @@ mod tests {
         let account = FileKind::Account { of: OsStr::new("x.parquet") };
         PARQUET.into_iter().chain([
             account,
-            FileKind::Candidate,
+            FileKind::Own,
             FileKind::Svg,
             FileKind::Png,
             FileKind::Html,
@@ -243,9 +230,6 @@ mod tests {
                     assert!(fs::read(&path).unwrap() == before);
                 }
             }
-            let account = FileKind::Account { of: OsStr::new("y.parquet") };
-            fs::write(&path, example(account)).unwrap();
-            refusal(&path, kind);
             for mine in ["my thesis", "PAR1", "{}"] {
                 fs::write(&path, mine).unwrap();
                 refusal(&path, kind);
@@ -259,7 +243,7 @@ mod tests {
 
     #[test]
     fn names_that_differ_have_neighbours_that_differ() {
-        let named = |output| beside(Path::new(output), "svg");
+        let named = |output| crate::beside(Path::new(output), "svg");
         assert_eq!(named("maps/x.parquet"), Path::new("maps/x.svg"));
         assert_eq!(named("v1.0"), Path::new("v1.0.svg"));
         assert_eq!(named("v1.5.parquet"), Path::new("v1.5.svg"));

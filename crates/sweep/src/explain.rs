@@ -123,10 +123,12 @@ fn explained(
         Some(speeds) => speeds,
         None => looked(&point, profile_rpm[1])?,
     };
-    let (progress, done) = (Progress::of_search(progress, 0, 0), AtomicU64::new(0));
+    // Behind those that are looked at come speeds that nobody can count beforehand.
+    let (total, done) = (looked.values().len() as u64, AtomicU64::new(0));
+    let progress = Progress::of_search(progress, total, "speeds looked at", 0);
     let counted = |speeds: usize| {
-        let before = done.fetch_add(speeds as u64, Ordering::Relaxed);
-        progress.show_search(0, before + speeds as u64);
+        let done = done.fetch_add(speeds as u64, Ordering::Relaxed) + speeds as u64;
+        progress.show_search(done.min(total), done);
     };
     counted(0);
     let mut asker = Asker {

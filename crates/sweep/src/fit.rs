@@ -203,7 +203,8 @@ fn free_number(
     };
     let Some(start) = start else {
         let expected = "expected a range, NAME=FROM:TO, or a value by --set";
-        return refuse(format!("`{name}` has no value to start from"), expected);
+        let is = if value.is_some() { "is 0" } else { "differs from part to part" };
+        return refuse(format!("`{name}` {is}: there is no value to start from"), expected);
     };
     Some(Free { parameter, range, start, case: None })
 }

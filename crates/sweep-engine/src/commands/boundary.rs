@@ -193,7 +193,7 @@ pub fn search<M: Swept>(
     let there = trials.as_ref().map_or(0, |trials| trials.count() as u64);
     let rows = (task.firsts.len() * task.curves) as u64;
     let rows_done = AtomicU64::new(0);
-    let progress = Progress::of_search(effort.progress, rows, there);
+    let progress = Progress::of_search(effort.progress, rows, "rows", there);
     let shown = |points| progress.show_search(rows_done.load(Ordering::Relaxed), points);
     let (threads, interrupt) = (effort.threads()?, effort.interrupt);
     let engine = M::engine(&task.plan, Some(&task.quantity.name))?;

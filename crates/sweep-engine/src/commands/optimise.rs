@@ -11,7 +11,7 @@ use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
 use crate::store::{OpenedTrials, Trials};
 use crate::{EffortArgs, Error, Exit, StoreError, Swept, duration, tell};
-use sweep_files::{CANDIDATE, FileKind, Output, atomic, key};
+use sweep_files::{FileKind, OWN_FILE, Output, atomic, key};
 use sweep_parameter::Parameter as _;
 use sweep_results::{Cell, ResultTable};
 
@@ -116,7 +116,7 @@ fn own_output<'a, M: Swept>(
         let expected = format!("a number from 0 to {}", candidates - 1);
         return Err(Error::option("--candidate", candidate, expected));
     }
-    let own = Output::begin(path, FileKind::Candidate)?;
+    let own = Output::begin(path, FileKind::Own)?;
     // Neither may be there yet; the folders of both are.
     let place =
         |path: &Path| Some(atomic::parent(path).canonicalize().ok()?.join(path.file_name()?));
@@ -174,7 +174,8 @@ fn told<M: Swept>(
         let own = values.as_deref().and_then(|values| own_file(study, values));
         match chosen.zip(own) {
             Some((chosen, own)) => {
-                file.finish(format!("{CANDIDATE}{chosen} of {}.\n{own}", study.name).as_bytes())?;
+                let of = format!("candidate {chosen} of {}", study.name);
+                file.finish(format!("{OWN_FILE}{of}\n{own}").as_bytes())?;
                 text.line("wrote", path.display());
             }
             None => {

@@ -1,7 +1,6 @@
 //! `sweep fit GRID.toml MEASURED.csv --free NAME,...`: the numbers that make the model follow a
 //! measurement.
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::config::{self, GridInput};
@@ -9,7 +8,7 @@ use crate::fit::{self, FitOptions, Measured, Work};
 use sweep_engine::commands::grid::GridArgs;
 use sweep_engine::progress::Progress;
 use sweep_engine::{EffortArgs, Error, Exit, Interrupt, StoreError, show, tell, threads};
-use sweep_files::{self as files, FileKind, atomic};
+use sweep_files::{FileKind, OWN_FILE, Output};
 
 /// Arguments of `sweep fit`.
 #[derive(Debug, clap::Args)]
@@ -59,24 +58,14 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         let (path, constants) = parted(text);
         cases.push(fit::case(&grid, &constants, Measured::read(path)?)?);
     }
-    let taken = |path: &PathBuf| Error::File {
-        action: "write",
-        path: path.clone(),
-        source: ErrorKind::AlreadyExists.into(),
-    };
-    if let Some(path) = args.out.as_ref().filter(|path| path.exists()) {
-        return Err(taken(path));
-    }
-    let numbers = 0..cases.len();
-    let of_path =
-        args.curves.iter().flat_map(|path| numbers.clone().map(move |k| numbered(path, k)));
-    let curves: Vec<PathBuf> = of_path.collect();
-    for path in &curves {
-        files::ready(atomic::parent(path))?;
-        files::judge(path, FileKind::Fit)?;
-    }
+    let out = args.out.as_deref().map(|path| Output::begin(path, FileKind::Own)).transpose()?;
+    let count = cases.len();
+    let of_path = |path: &PathBuf| (0..count).map(|k| numbered(path, k)).collect::<Vec<_>>();
+    let curves: Vec<PathBuf> = args.curves.iter().flat_map(of_path).collect();
+    let begun = curves.iter().map(|path| Output::begin(path, FileKind::Fit));
+    let begun = begun.collect::<Result<Vec<_>, _>>()?;
     let interrupt = Interrupt::install().map_err(Error::signals)?;
-    let progress = Progress::of_search(args.effort.progress, 0, 0);
+    let progress = Progress::of_search(args.effort.progress, 0, "", 0);
     let seen = |made: usize| progress.show_search(0, made as u64);
     let journal = args.out.as_ref().map(|out| {
         let mut name = out.as_os_str().to_owned();
@@ -92,18 +81,17 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         tell("interrupted: with --out, what was found out is kept, and the same command goes on");
         return Ok(Exit::interrupted(interrupt.signal()));
     };
-    if let Some(path) = &args.out {
+    if let (Some(path), Some(out)) = (&args.out, out) {
         let (machine, _) = fitted.problem.machine(0, &fitted.x);
         let text = config::machine_file(&machine, &fitted.problem.written());
-        if !atomic::create(atomic::parent(path), path, text.as_bytes())? {
-            return Err(taken(path));
-        }
+        out.finish(
+            format!("{OWN_FILE}fitted to {:?}\n{text}", args.measured.join(" ")).as_bytes(),
+        )?;
         tell(&format!("wrote {}", path.display()));
     }
-    for (case, path) in curves.iter().enumerate() {
+    for (case, (path, file)) in curves.iter().zip(begun).enumerate() {
         let bytes = fitted.curves(case).into_bytes();
-        let bytes = bytes.map_err(StoreError::parquet("write", path))?;
-        files::write(path, FileKind::Fit, &bytes)?;
+        file.finish(&bytes.map_err(StoreError::parquet("write", path))?)?;
         tell(&format!("wrote {0}; next: sweep plot {0}", path.display()));
     }
     let report = &fitted.report;

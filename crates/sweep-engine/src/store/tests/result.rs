@@ -196,6 +196,12 @@ fn results_that_differ_after_a_dot_have_a_sidecar_each() {
         let text = fs::read_to_string(home.0.path().join(sidecar)).unwrap();
         assert_eq!(serde_json::from_str::<Value>(&text).unwrap()["file"], name);
     }
+    // They may be renamed together.
+    for (was, is) in [("v1.0", "w.parquet"), ("v1.0.run.json", "w.run.json")] {
+        fs::rename(home.0.path().join(was), home.0.path().join(is)).unwrap();
+    }
+    let renamed = OpenRun::open(&home.0.path().join("w.parquet"), &job, options()).unwrap();
+    assert!(matches!(renamed, Opened::Finished(..)));
     // A result whose sidecar would be another's, and a stranger's file of its name.
     let refused = |output: &Path| {
         let error = OpenRun::open(output, &job, options()).unwrap_err();
