@@ -32,7 +32,7 @@ if [ -e "$before/$grid" ]; then
 else
     echo "The grid is new: there is nothing to compare it with." >> "$out/summary.md"
 fi
-"$sweep" require "$out/after.parquet" "${GATE:-count(status != 'ok') == 0}" 2> "$out/gate.txt" ||
-    code=$?
+"$sweep" require "$out/after.parquet" "${GATE:-count(status != 'ok') == 0}" \
+    > "$out/gate.txt" 2>&1 || code=$?
 { printf '\n```text\n'; cat "$out/gate.txt"; printf '```\n'; } >> "$out/summary.md"
 exit "$code"

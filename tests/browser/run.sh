@@ -27,7 +27,7 @@ fi
 "$venv/bin/python" "$here/check_page.py" "$map" "$work/page.html" ${SHOTS:+--screenshots "$SHOTS"}
 
 # The page of a trace: curves, with resonance passages marked.
-"$sweep" modes --speed 0:400:50 --out "$work/modes.parquet" 2> /dev/null
+"$sweep" modes --speed 0:400:50 --out "$work/modes.parquet" > /dev/null 2>&1
 "$sweep" trace "$root/sweeps/fig11.toml" --every 0.02 --out "$work/trace.parquet"
 "$sweep" plot "$work/trace.parquet" --modes "$work/modes.parquet" -o "$work/trace.html"
 "$venv/bin/python" "$here/check_chart.py" "$work/trace.parquet" "$work/trace.html" \

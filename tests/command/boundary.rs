@@ -3,10 +3,10 @@
 #![cfg(unix)]
 
 use std::fs;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::home::sweep_binary;
+use crate::home::{said, sweep_binary};
 use crate::signal;
 
 /// A tenth of a second of every trajectory is plenty for what is tested here.
@@ -49,7 +49,7 @@ fn a_curve_for_every_combination_of_further_axes_in_a_figure() {
     let folder = folder_with("0.1");
     let done =
         boundary(&folder, &["--quantity", "min_gap_nonlinear_m"]).output().expect("it starts");
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    let said = said(&done);
     assert_eq!(done.status.code(), Some(0), "{said}");
     // No gap closes in a tenth of a second: six rows say so.
     assert!(said.contains("6 lines reliable throughout") && !said.contains("brackets"), "{said}");
@@ -145,7 +145,6 @@ fn an_interrupted_search_goes_on_and_ends_in_the_same_bytes() {
     let arguments = ["--threads", "1", "--lattice", "11", "--progress", "none", "--out"];
     let search = |out: &str| boundary(&folder, &[&arguments, &[out][..]].concat());
     let undisturbed = search("whole.parquet").output().expect("it starts");
-    let said = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(undisturbed.status.code(), Some(0), "{}", said(&undisturbed));
     for (name, code) in [("INT", 130), ("TERM", 143)] {
         let child = at_work(&folder, &mut search("x.parquet"));

@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::{Command, Output};
 
-use crate::home::sweep_binary;
+use crate::home::{said, sweep_binary};
 
 const GRID: &str = r#"
 machine = "paper"
@@ -33,10 +33,6 @@ fn sweep(folder: &tempfile::TempDir, arguments: &[&str], simd: Option<&str>) -> 
     command.output().expect("it starts")
 }
 
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout)
-}
-
 #[test]
 fn every_motion_of_a_held_speed_has_a_row() {
     let folder = folder();
@@ -53,6 +49,13 @@ fn every_motion_of_a_held_speed_has_a_row() {
             assert!(told.contains(line), "{line}\n{told}");
         }
     }
+    let json = sweep(&folder, &["show", file, "--json"], None).stdout;
+    let json: serde_json::Value = serde_json::from_slice(&json).expect("it is JSON");
+    assert_eq!(json["lines"][0][0], "motions");
+    assert_eq!(
+        (&json["columns"][0]["greatest"], &json["columns"][0]["name"]),
+        (&1.into(), &"point".into())
+    );
     let gate = ["require", file, "nonlinear_tub_yaw < 0.1"];
     assert_eq!(sweep(&folder, &gate, None).status.code(), Some(4));
     let at = "unbalance_mass_kg=0.4";

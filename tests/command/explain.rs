@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::home::sweep_binary;
+use crate::home::{said, sweep_binary};
 
 const AXES: &str = r#"
 [[axis]]
@@ -33,10 +33,6 @@ fn explain(grid: &str, arguments: &[&str]) -> Output {
     let mut command = Command::new(sweep_binary());
     command.current_dir(folder.path()).args(["explain", "grid.toml"]).args(arguments);
     command.output().expect("it starts")
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout)
 }
 
 fn within(value: &Value, meant: f64, tolerance: f64) {

@@ -443,6 +443,20 @@ fn failed_points_are_rows_and_fail_the_run_only_when_asked() {
         let run = output(home.run().arg("--fail-on-error").args(fresh));
         assert_eq!(run.status.code(), Some(3), "{fresh:?}: {}", said(&run));
     }
+    // A shard speaks of its own rows, and the merge of all.
+    let sharded = |words: &[&str]| home.sweep(&[words, &["g.toml", "--out", "s.parquet"]].concat());
+    for (words, code) in [
+        (&["run", "--shard", "1/2", "--fail-on-error"][..], 3),
+        (&["run", "--shard", "2/2"], 0),
+        (&["merge", "--fail-on-error"], 3),
+        (&["merge"], 0),
+    ] {
+        let done = sharded(words);
+        assert_eq!(done.status.code(), Some(code), "{words:?}: {}", said(&done));
+        assert!(said(&done).contains(" no_equilibrium"), "{words:?}: {}", said(&done));
+    }
+    let checked = home.sweep(&["check", "g.toml"]);
+    assert!(said(&checked).contains(" no_equilibrium, of "), "{}", said(&checked));
     let whole = output(fresh_home().run().arg("--fail-on-error"));
     assert_eq!(whole.status.code(), Some(0), "{}", said(&whole));
 }

@@ -328,7 +328,7 @@ fn files_that_are_not_regular_are_not_read() {
         [&["show", "fifo.parquet"] as &[&str], &["plot", "fifo.parquet"], &["show", "/dev/zero"]]
     {
         let run = home.sweep(words);
-        assert_eq!(run.status.code(), Some(1), "{}", said(&run));
+        assert_eq!(run.status.code(), Some(2), "{}", said(&run));
         assert!(said(&run).contains("not a regular file"), "{words:?}: {}", said(&run));
     }
 }

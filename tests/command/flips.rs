@@ -80,7 +80,7 @@ fn a_flipped_bit_of_a_result_is_refused_or_changes_nothing() {
             refused[k] += 1;
             let is_named = told.contains("error: ") && told.contains("x.parquet");
             assert!(is_named && !told.contains("panicked"), "bit {bit}, {words:?}: {told}");
-            assert_eq!(left.output.status.code(), Some(1), "bit {bit}, {words:?}: {told}");
+            assert_eq!(left.output.status.code(), Some(2), "bit {bit}, {words:?}: {told}");
             assert!(left.result == bytes && left.picture.is_none(), "bit {bit}, {words:?}: {told}");
         }
     }

@@ -38,9 +38,9 @@ pub(crate) fn grid(masses: u32, dampings: u32) -> String {
     )
 }
 
-/// What a command says to people.
+/// What a command answers, and what else it says.
 pub(crate) fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat()
 }
 
 /// A temporary folder; it goes with this value.

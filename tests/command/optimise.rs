@@ -4,10 +4,10 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::home::sweep_binary;
+use crate::home::{said, sweep_binary};
 use crate::signal;
 
 const GRID: &str = r#"
@@ -54,10 +54,6 @@ fn sweep(folder: &tempfile::TempDir, line: &str) -> Command {
     let mut command = Command::new(sweep_binary());
     command.current_dir(folder.path()).args(line.split(' '));
     command
-}
-
-fn said(output: &Output) -> String {
-    [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat()
 }
 
 fn does(folder: &tempfile::TempDir, line: &str) -> String {
@@ -150,7 +146,9 @@ fn every_mistake_in_a_study_and_its_grid_is_told_at_once() {
     let wrong = STUDY
         .replace("candidates = 24", "candidate = 24")
         .replace("damping_n_s_per_m", "dampin_n_s_per_m")
-        .replace("to = 12000", "to = 4000\ntolerance = 0.1");
+        .replace("to = 12000", "to = 4000\ntolerance = 0.1")
+        .replace("max(ratio_max) < 50", "max(ratio_max) = 50")
+        .replace("max(cabinet_force_nonlinear_n)", "cabinet_force_nonlinear_n");
     let folder = folder_with("-2", &wrong);
     let refused = sweep(&folder, "optimise study.toml").output().expect("it starts");
     assert_eq!(refused.status.code(), Some(2));
@@ -161,11 +159,13 @@ fn every_mistake_in_a_study_and_its_grid_is_told_at_once() {
         "from 4000 to 4000",
         "a tolerance that no design spreads",
         "grid.toml:5:18",
-        "5 mistakes",
+        "study.toml:6:78",
+        "expected max(), min(), mean()",
+        "7 mistakes",
     ] {
         assert!(said(&refused).contains(told), "no {told} in {}", said(&refused));
     }
-    // Expressions are read once everything else is right.
+    // Which columns there are is known once everything else is right.
     let wrong = STUDY
         .replace("ratio_max) < 50", "ratio_mx) < 50")
         .replace("max(cabinet_force_nonlinear_n)", "cabinet_force_nonlinear_n");
@@ -198,8 +198,8 @@ fn tolerances_of_what_is_looked_for_spread_over_the_design() {
 fn the_path_of_the_best_is_judged_before_the_search() {
     let folder = folder_with("2", STUDY);
     for (rest, told) in [
-        ("--best study.toml", "no file of `sweep optimise --best`"),
-        ("--best grid.toml", "no file of `sweep optimise --best`"),
+        ("--best study.toml", "no file of `sweep optimise --best` or"),
+        ("--best grid.toml", "no file of `sweep optimise --best` or"),
         ("--out x.toml.parquet --best ./x.toml.parquet", "another file than that of all"),
         ("--best best.toml --candidate 24", "expected a number from 0 to 23"),
         ("--set damping_n_s_per_m=90", "`damping_n_s_per_m` is given twice"),
@@ -215,7 +215,10 @@ fn the_path_of_the_best_is_judged_before_the_search() {
         let line = format!("optimise study.toml --best made/best.toml --candidate {candidate}");
         does(&folder, &line);
         let own = fs::read_to_string(folder.path().join("made/best.toml")).expect("it is there");
-        assert!(own.starts_with(&format!("# Candidate {candidate} of study.\n")), "{own}");
+        assert!(
+            own.starts_with(&format!("# Written by sweep: candidate {candidate} of study\n")),
+            "{own}"
+        );
     }
 }
 

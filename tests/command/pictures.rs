@@ -156,7 +156,7 @@ fn a_flipped_bit_is_refused() {
         fs::write(home.path("map.parquet"), bytes).expect("the map is written");
         let run = home.sweep(&["plot", "map.parquet", "-o", "a.svg"]);
         let said = String::from_utf8_lossy(&run.stderr);
-        assert_eq!(run.status.code(), Some(1), "bit {bit}: {said}");
+        assert_eq!(run.status.code(), Some(2), "bit {bit}: {said}");
         assert!(said.contains("map.parquet is"), "bit {bit}: {said}");
         assert!(!said.contains("panicked"), "bit {bit}: {said}");
         assert!(!home.path("a.svg").exists(), "bit {bit}");

@@ -6,7 +6,7 @@ use std::fs;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::home::sweep_binary;
+use crate::home::{said, sweep_binary};
 use crate::signal;
 
 const GRID: &str = r#"
@@ -39,10 +39,6 @@ fn sweep(folder: &tempfile::TempDir, arguments: &[&str]) -> Command {
     let mut command = Command::new(sweep_binary());
     command.current_dir(folder.path()).args(arguments);
     command
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout)
 }
 
 fn stability(folder: &tempfile::TempDir, speed: &str, more: &[&str]) -> Output {

@@ -12,6 +12,7 @@ use sweep_engine::config::schema::set;
 use sweep_engine::config::{Keys, Read};
 use sweep_engine::estimate::Estimate;
 use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Steps};
+use sweep_engine::store::read::{NameCounts, add};
 use sweep_engine::store::{Done, Job, Layout, Rows, Shape, axis_columns};
 use sweep_engine::{
     Build, Engine, Error, GridInput, KeepRow, Listed, Model as EngineModel, NextRow, Plan,
@@ -186,7 +187,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
         let began = Instant::now();
         let rows = Evaluator { plan }.rows(&some, &|| false);
         let core_s_per_point = began.elapsed().as_secs_f64() / points as f64;
-        drop(rows);
+        let mut sampled = NameCounts::new();
+        rows.iter().for_each(|row| add(&mut sampled, STATUSES[row.status()]));
         let layout = &Job::of(plan).layout;
         let result_bytes = plan.points() as f64 * Shape::of(layout).bytes_a_row() as f64;
         let steps = match plan.integrator.steps() {
@@ -199,7 +201,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
             threads,
             wall_s: plan.points() as f64 * core_s_per_point / threads as f64,
             core_s_per_point,
-            sampled_points: points,
+            sampled,
             sampled_s: plan.end_s,
             // Chunks in hand, or a row group.
             memory_bytes: 14e6 + result_bytes.min(40e6),

@@ -1,5 +1,7 @@
 //! What a run will take, as `check` tells it.
 
+use crate::store::read::NameCounts;
+
 /// What a run will take. Every number is an estimate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
@@ -11,8 +13,8 @@ pub struct Estimate {
     pub wall_s: f64,
     /// Time of one core for one point.
     pub core_s_per_point: f64,
-    /// Points that were integrated for it.
-    pub sampled_points: u64,
+    /// Points that were integrated for it, by status.
+    pub sampled: NameCounts,
     /// How far, of the plan's `end_s`.
     pub sampled_s: f64,
     /// Memory at its peak.

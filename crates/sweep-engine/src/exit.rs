@@ -21,7 +21,8 @@ pub enum Exit {
     BadInput = 2,
     /// Done, but some points failed and `--fail-on-error` was given.
     PointsFailed = 3,
-    /// What `require`, or `compare --fail-on`, was asked for does not hold.
+    /// What `require`, `report` or `compare --fail-on` asks does not hold, or `optimise` found
+    /// nothing that keeps its conditions.
     NotHeld = 4,
     /// Another run holds this output.
     Busy = 75,
@@ -37,10 +38,10 @@ impl Exit {
     /// Every exit code, with what it means to a script.
     pub const ALL: [(Self, &'static str); 9] = [
         (Self::Done, "done"),
-        (Self::Failed, "an I/O or internal failure"),
-        (Self::BadInput, "bad input, refused before any work"),
+        (Self::Failed, "a failure of the system or of this program"),
+        (Self::BadInput, "bad input, or an unreadable file: refused before any work"),
         (Self::PointsFailed, "with --fail-on-error: done, but some points failed"),
-        (Self::NotHeld, "done: a `require`, or a `compare --fail-on`, does not hold"),
+        (Self::NotHeld, "done: what require, report, compare or optimise asks for does not hold"),
         (Self::Busy, "another run holds this output"),
         (Self::HungUp, "hung up; finished work is kept"),
         (Self::Interrupted, "interrupted; finished work is kept"),
@@ -56,10 +57,11 @@ impl Exit {
         }
     }
 
-    /// All codes with their meanings, for `--help`.
+    /// All codes with their meanings, and what goes where, for `--help`.
     pub fn table() -> String {
         let line = |(exit, meaning)| format!("\n  {:>3}  {meaning}", exit as u8);
-        format!("Exit codes:{}", Self::ALL.map(line).concat())
+        let outputs = "Answers go to standard output, all else to standard error.";
+        format!("{outputs}\n\nExit codes:{}", Self::ALL.map(line).concat())
     }
 }
 
@@ -130,26 +132,16 @@ impl Error {
     /// The exit code it ends with.
     pub fn exit(&self) -> Exit {
         let is_refusal = match self {
-            Self::Input(_) | Self::Model(_) | Self::Refused(_) => true,
+            Self::Files(error)
+            | Self::Results(ResultsError::File(error))
+            | Self::Plot(PlotError::File(error)) => error.is_refusal(),
             Self::Store(StoreError::Busy { .. }) => return Exit::Busy,
             Self::Store(error) => error.is_refusal(),
-            Self::Files(error) => error.is_refusal(),
             Self::Threads(error) => error.is_refusal(),
-            Self::Results(error) => error.is_refusal(),
-            Self::Plot(error) => error.is_usage(),
-            Self::File { .. } | Self::Stdout(_) => false,
+            Self::File { .. } | Self::Stdout(_) | Self::Plot(PlotError::Drawing(_)) => false,
+            _ => true,
         };
         if is_refusal { Exit::BadInput } else { Exit::Failed }
-    }
-
-    /// The text, with what to do about it where something can be said.
-    pub fn worded(&self) -> String {
-        match self {
-            Self::File { source, .. } if source.kind() == io::ErrorKind::AlreadyExists => {
-                format!("{self}\n  = help: give another name, or remove the file first")
-            }
-            _ => self.to_string(),
-        }
     }
 
     /// Tells the user, on standard error, in colour on a terminal unless `NO_COLOR` is set.
@@ -162,7 +154,7 @@ impl Error {
                 // With standard error gone there is nobody left to tell; the exit code still does.
                 let _ = writeln!(anstream::stderr(), "{text}");
             }
-            other => tell(&format!("error: {}", other.worded())),
+            other => tell(&format!("error: {other}")),
         }
     }
 }
@@ -187,8 +179,8 @@ fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> String {
     safe
 }
 
-/// Writes what people read, or JSON, to standard output. What a file has put into it that is no
-/// text cannot reach the terminal.
+/// Writes the answer that was asked for, as people read it or as JSON, to standard output. What a
+/// file has put into it that is no text cannot reach the terminal.
 ///
 /// # Errors
 /// As [`print()`].
@@ -209,7 +201,7 @@ pub fn print(text: &str) -> Result<Exit, Error> {
     }
 }
 
-/// Writes a message for people to standard error; as in `show`, text only.
+/// Writes what else people should hear to standard error; as in `show`, text only.
 pub fn tell(text: &str) {
     // As in `Error::report`: nobody is left to tell.
     let _ = writeln!(anstream::stderr(), "{}", escaped(text, is_unsafe));
@@ -252,11 +244,15 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_exists_comes_with_advice() {
-        let exists = io::Error::from(io::ErrorKind::AlreadyExists);
-        let error = Error::File { action: "write", path: "grid.toml".into(), source: exists };
-        assert_eq!(error.exit(), Exit::Failed);
-        assert!(error.to_string().starts_with("cannot write grid.toml: "));
-        assert!(error.worded().ends_with("help: give another name, or remove the file first"));
+    fn a_file_that_cannot_be_read_is_bad_input_and_a_disk_that_fails_is_not() {
+        let io = |action, kind: io::ErrorKind| {
+            let (path, source) = (PathBuf::from("x.parquet"), kind.into());
+            Error::from(FileError::Io { action, path, source }).exit()
+        };
+        assert_eq!(io("open", io::ErrorKind::NotFound), Exit::BadInput);
+        assert_eq!(io("open", io::ErrorKind::Other), Exit::Failed);
+        assert_eq!(io("write", io::ErrorKind::PermissionDenied), Exit::Failed);
+        let error = FileError::damaged(&PathBuf::from("x.parquet"));
+        assert_eq!(Error::Plot(error.into()).exit(), Exit::BadInput);
     }
 }

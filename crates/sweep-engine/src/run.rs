@@ -16,6 +16,7 @@ use std::time::{Duration, Instant};
 
 use crate::interrupt::Interrupt;
 use crate::store::provenance::{self, Session};
+use crate::store::read::NameCounts;
 use crate::store::{Done, OpenOptions, OpenRun, Opened, ResultFile, Shard, ShardRequest, Tally};
 use crate::threads::{self};
 use crate::watch::Parts;
@@ -46,8 +47,8 @@ pub enum Ended {
     Already(Box<ResultFile>, Box<Tally>),
     /// The output is in place.
     Finished(Box<Tally>),
-    /// This shard's part is there; the merge comes when all are.
-    Shard(Shard),
+    /// This shard's part is there, with so many rows by status; the merge comes when all are.
+    Shard(Shard, NameCounts),
     /// A signal stopped it; what is done is kept.
     Interrupted {
         /// The signal.
@@ -132,7 +133,7 @@ pub fn run(
             notes.extend(run.record(&session).err().map(|error| error.to_string()));
             let (points, kept) = run.own_points();
             let ended = match (interrupt.signal(), run.shard()) {
-                (None, Some(shard)) => Ended::Shard(shard),
+                (None, Some(shard)) => Ended::Shard(shard, run.statuses(job)?),
                 (signal, _) => {
                     Ended::Interrupted { signal: signal.unwrap_or_default(), kept, points }
                 }

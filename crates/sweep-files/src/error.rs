@@ -84,9 +84,13 @@ impl FileError {
         Self::Damaged { path: path.to_path_buf() }
     }
 
-    /// Whether the request is at fault, and nothing was done.
-    pub const fn is_refusal(&self) -> bool {
-        matches!(self, Self::Refused { .. })
+    /// Whether the request is at fault, and nothing was done: a file that is not there or is not
+    /// what it must be.
+    pub fn is_refusal(&self) -> bool {
+        use io::ErrorKind::{InvalidInput, NotADirectory, NotFound, PermissionDenied};
+        let Self::Io { action, source, .. } = self else { return true };
+        let kinds = [InvalidInput, NotADirectory, NotFound, PermissionDenied];
+        *action == "open" && kinds.contains(&source.kind())
     }
 }
 

@@ -19,8 +19,8 @@ use crate::{CellKind, Column, FileError, ParquetFile, cells, columns, key};
 pub enum Cell {
     /// No value; a number that is none counts as such.
     Null,
-    /// A number.
-    Number(f64),
+    /// A number; JSON has one that is whole without a point.
+    Number(#[serde(serialize_with = "plainly")] f64),
     /// Words.
     Text(String),
     /// True or false.
@@ -39,6 +39,13 @@ impl Cell {
         let Self::Number(number) = self else { return None };
         Some(*number)
     }
+}
+
+fn plainly<S: serde::Serializer>(number: &f64, to: S) -> Result<S::Ok, S::Error> {
+    let whole = *number as i64;
+    // Every one up to this is exact.
+    let is_whole = whole as f64 == *number && number.abs() < 2_f64.powi(53);
+    if is_whole { to.serialize_i64(whole) } else { to.serialize_f64(*number) }
 }
 
 /// The limits of a plan's ratios.

@@ -35,15 +35,5 @@ pub enum PlotError {
     Drawing(String),
 }
 
-impl PlotError {
-    /// Whether the command line is at fault rather than a file or the machine.
-    pub fn is_usage(&self) -> bool {
-        match self {
-            Self::File(error) => error.is_refusal(),
-            other => matches!(other, Self::Unfit(_)),
-        }
-    }
-}
-
 /// What there is unless the figure could not be made.
 pub(crate) type Result<T, E = PlotError> = std::result::Result<T, E>;

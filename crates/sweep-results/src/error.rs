@@ -13,12 +13,5 @@ pub enum ResultsError {
     Refused(String),
 }
 
-impl ResultsError {
-    /// Whether the user's words are to blame, rather than a file.
-    pub const fn is_refusal(&self) -> bool {
-        !matches!(self, Self::File(_))
-    }
-}
-
 /// An answer, unless there is none.
 pub(crate) type Result<T, E = ResultsError> = std::result::Result<T, E>;

@@ -6,7 +6,6 @@ mod fit;
 mod held;
 mod init;
 mod man;
-mod merge;
 mod modes;
 mod plot;
 #[cfg(test)]
@@ -15,7 +14,6 @@ mod run;
 mod schema;
 mod show;
 mod slurm;
-mod status;
 mod trace;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -24,8 +22,8 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use crate::dwell::Search;
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::{
-    boundary, check, compare, examples, export, optimise, parameters, report, require,
-    show as show_engine,
+    boundary, check, compare, examples, export, merge, optimise, parameters, report, require,
+    show as show_engine, status,
 };
 use sweep_engine::nearest;
 use sweep_engine::{Error, Exit};
@@ -74,7 +72,6 @@ pub enum Command {
     /// Find periodic responses at constant speeds, and unstable ones
     #[command(after_long_help = held::RESPONSES_LONG)]
     #[command(mut_arg("out", |out| out.help(out_of("stability"))))]
-    #[command(mut_arg("fail_on_error", |flag| flag.help("Exit with 3 if any row has no response")))]
     Stability(held::Args<held::Responses>),
     /// Find the motions that held speeds end in
     #[command(after_long_help = held::MOTIONS_LONG)]
@@ -99,9 +96,9 @@ pub enum Command {
     /// Write a result as CSV or as an Excel workbook, with units
     Export(export::Args),
     /// Show how far a run is: done, missing, failed, running
-    Status(status::Args),
+    Status(held::JobArgs<status::Args>),
     /// Join the finished shards of a run into its one result file
-    Merge(merge::Args),
+    Merge(held::JobArgs<merge::Args>),
     /// Print the script that submits a run to a Slurm cluster
     Slurm(slurm::Args),
     /// Write a commented grid file, or a machine file, to start from
@@ -211,8 +208,8 @@ impl Command {
         match self {
             Self::Run(args) => run::run(args),
             Self::Check(args) => check::run::<crate::Washer>(args),
-            Self::Merge(args) => merge::run(args),
-            Self::Status(args) => status::run(args),
+            Self::Merge(args) => args.merge(),
+            Self::Status(args) => args.status(),
             Self::Slurm(args) => slurm::run(args),
             Self::Show(args) => show_engine::run(args, &show::FURTHER),
             Self::Report(args) => report::run(args, &show::FURTHER, &crate::live::resonances),

@@ -3,13 +3,14 @@
 
 use lane_ode::MAX_LANES;
 use washer_model::ModelKind;
-use washer_row::{Deviations, Ladder, Metric, Outcome};
+use washer_row::{Deviations, Ladder, Metric, Outcome, ROW_STATUSES, row_status};
 
 use crate::engine::{Engine, ModelEngine, Watch};
 use crate::plan::Plan;
 use sweep_engine::estimate::Estimate;
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::plan::shortest_step_s;
+use sweep_engine::store::read::{NameCounts, add};
 use sweep_engine::store::{Shape, chunk_points};
 use sweep_engine::{Error, Interrupt, Job};
 
@@ -59,7 +60,7 @@ fn reckoned(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate, Error
     // Finding the rungs is no cost of points.
     engine.ladders();
     let first = Measured::take(&engine, whole_s);
-    let Measured { core_s_per_point, points, integrated_s } =
+    let Measured { core_s_per_point, sampled, integrated_s } =
         Measured::spread(&engine, &first).unwrap_or(first);
     let chunk = chunk_points(plan.points());
     let layout = &Job::of(plan).layout;
@@ -73,7 +74,7 @@ fn reckoned(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate, Error
         threads,
         wall_s: points_a_thread as f64 * core_s_per_point,
         core_s_per_point,
-        sampled_points: points,
+        sampled,
         sampled_s: integrated_s,
         memory_bytes: memory_bytes(&engine, threads),
         disk_bytes,
@@ -85,7 +86,8 @@ fn reckoned(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate, Error
 /// The cost measured of some points.
 struct Measured {
     core_s_per_point: f64,
-    points: u64,
+    /// Points, by status.
+    sampled: NameCounts,
     integrated_s: f64,
 }
 
@@ -95,10 +97,10 @@ impl Measured {
         let points = plan.points().min(MAX_LANES as u64);
         // What checks itself costs most where little moves, so that a beginning says too much.
         if let Steps::Checked(_) = plan.integrator.steps()
-            && let Some(cost_s) = cost_within(whole_s, engine, points)
+            && let Some((cost_s, sampled)) = cost_within(whole_s, engine, points)
         {
             let core_s_per_point = cost_s / points as f64;
-            return Self { core_s_per_point, points, integrated_s: plan.end_s };
+            return Self { core_s_per_point, sampled, integrated_s: plan.end_s };
         }
         let mut shorter: Option<(f64, f64)> = None;
         let mut end_s = first_end_s(plan);
@@ -109,7 +111,7 @@ impl Measured {
             cut.end_s = end_s;
             cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
             // The cut plan's own rungs would be of slower spin, and longer steps.
-            let cost_s = cost_s(&engine.over(&cut), points);
+            let (cost_s, sampled) = cost_of(&engine.over(&cut), points);
             let of_length = |metric: &Metric| !matches!(metric, Metric::Growth | Metric::Dwell);
             if !cut.model.measures.metrics.iter().all(of_length) {
                 cut.model.measures.metrics.retain(of_length);
@@ -122,7 +124,7 @@ impl Measured {
                 let rate = ((cost_s - base_s) / (end_s - base_end_s)).max(0.0);
                 let whole_s = held_s + cost_s + rate * (plan.end_s - end_s);
                 let core_s_per_point = whole_s / points as f64;
-                return Self { core_s_per_point, points, integrated_s: end_s };
+                return Self { core_s_per_point, sampled, integrated_s: end_s };
             }
             shorter = Some((end_s, cost_s));
             end_s = (4.0 * end_s).min(plan.end_s);
@@ -136,11 +138,12 @@ impl Measured {
         let plan = engine.plan();
         let affordable = (TOGETHER_S / first.core_s_per_point) as u64;
         let points = affordable.min(MOST_TOGETHER).min(plan.points());
-        if first.integrated_s < plan.end_s || points <= first.points {
+        if first.integrated_s < plan.end_s || points <= first.sampled.values().sum() {
             return None;
         }
-        let core_s_per_point = cost_s(engine, points) / points as f64;
-        Some(Self { core_s_per_point, points, integrated_s: plan.end_s })
+        let (cost_s, sampled) = cost_of(engine, points);
+        let core_s_per_point = cost_s / points as f64;
+        Some(Self { core_s_per_point, sampled, integrated_s: plan.end_s })
     }
 }
 
@@ -156,14 +159,14 @@ fn first_end_s(plan: &Plan) -> f64 {
     short_s.min(plan.end_s)
 }
 
-/// Time that one core takes for so many points' runs.
-fn cost_s(engine: &ModelEngine<'_>, points: u64) -> f64 {
-    cost_within(f64::INFINITY, engine, points).unwrap_or(f64::INFINITY)
+/// Time (s) that one core takes for so many points' runs, and how they end.
+fn cost_of(engine: &ModelEngine<'_>, points: u64) -> (f64, NameCounts) {
+    cost_within(f64::INFINITY, engine, points).unwrap_or((f64::INFINITY, NameCounts::new()))
 }
 
 /// The same, if they are done by then. One lies in each of as many equal parts of the grid, here
 /// and there in it: at even distances all might have the same value of an axis.
-fn cost_within(most_s: f64, engine: &ModelEngine<'_>, points: u64) -> Option<f64> {
+fn cost_within(most_s: f64, engine: &ModelEngine<'_>, points: u64) -> Option<(f64, NameCounts)> {
     let plan = engine.plan();
     let part = plan.points() as f64 / points as f64;
     let place = |k| ((k as f64 + (k as f64 * GOLDEN).fract()) * part) as u64;
@@ -171,8 +174,11 @@ fn cost_within(most_s: f64, engine: &ModelEngine<'_>, points: u64) -> Option<f64
     let began_s = busy_s();
     let is_late = || busy_s() - began_s > most_s;
     let interrupt = Interrupt::new();
-    let outcomes = engine.evaluate_under(&axis_values, &Watch::until(&interrupt, &is_late));
-    outcomes.map(|_| busy_s() - began_s)
+    let outcomes = engine.evaluate_under(&axis_values, &Watch::until(&interrupt, &is_late))?;
+    let cost_s = busy_s() - began_s;
+    let mut sampled = NameCounts::new();
+    outcomes.iter().for_each(|outcome| add(&mut sampled, ROW_STATUSES[row_status(outcome).0]));
+    Some((cost_s, sampled))
 }
 
 /// Time that this thread has had a core for: what others do on the machine meanwhile is no cost of

@@ -39,13 +39,13 @@ pub(crate) fn error(py: Python<'_>, error: &Error) -> PyErr {
         Error::Input(mistakes) => plan_error(py, mistakes),
         Error::Files(_)
         | Error::File { .. }
-        | Error::Store(StoreError::File(_))
-        | Error::Plot(PlotError::File(_)) => PyOSError::new_err(error.worded()),
+        | Error::Store(StoreError::File(_) | StoreError::Parquet { .. })
+        | Error::Plot(PlotError::File(_)) => PyOSError::new_err(error.to_string()),
         other if other.exit() == Exit::BadInput => {
             let nothing = PyList::empty(py).into_any().unbind();
-            raised(py, "PlanError", other.worded(), nothing)
+            raised(py, "PlanError", other.to_string(), nothing)
         }
-        _ => PyRuntimeError::new_err(error.worded()),
+        _ => PyRuntimeError::new_err(error.to_string()),
     }
 }
 

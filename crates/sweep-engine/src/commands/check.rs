@@ -2,12 +2,13 @@
 
 use std::fmt::Write as _;
 
+use super::run::failed_words;
 use super::{GridArgs, short};
 use crate::config::section::counted;
 use crate::design::{Design, Distribution};
 use crate::estimate::size;
 use crate::method::{Integrator as _, Steps};
-use crate::{Axis, AxisValues, Error, Estimate, Exit, Plan, Swept, duration, show, tell, threads};
+use crate::{Axis, AxisValues, Error, Estimate, Exit, Plan, Swept, duration, show, threads};
 use sweep_parameter::{Channel as _, Parameter as _, RatioLimits};
 
 /// Arguments of `sweep check`.
@@ -30,8 +31,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         return show(&format!("{:#}\n", plan.to_json()));
     }
     let estimate = M::estimate(&plan, threads::count(None, &threads::process)?)?;
-    tell(summary(&plan, &estimate).trim_end());
-    Ok(Exit::Done)
+    show(&summary(&plan, &estimate))
 }
 
 /// The plan in a few lines.
@@ -69,16 +69,20 @@ fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let Estimate { threads, simd, .. } = estimate;
     let threads = counted(*threads, "thread");
     line("runs on", format!("{threads}, instruction set {simd}"));
-    line("takes", took(plan, estimate));
+    let tried = counted(estimate.sampled.values().sum::<u64>() as usize, "point");
+    line("takes", took(plan, estimate, &tried));
     let [memory, disk, result] =
         [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(size);
     let disk = format!("on disk {disk} while it runs, and at most {result} for the result");
     line("", format!("{memory} of memory; {disk}"));
+    if let Some(why) = failed_words(&estimate.sampled) {
+        line("failed", format!("{why}, of {tried} tried"));
+    }
     text
 }
 
 /// The time, and what it was reckoned from.
-fn took<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
+fn took<M: Swept>(plan: &Plan<M>, estimate: &Estimate, tried: &str) -> String {
     let part = match estimate.sampled_s {
         whole if whole >= plan.end_s => String::new(),
         part => {
@@ -87,9 +91,8 @@ fn took<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
             format!(", the first {part} s each{off}")
         }
     };
-    let points = counted(estimate.sampled_points as usize, "point");
     let about = duration(estimate.wall_s);
-    format!("about {about}: an estimate, from {points} integrated just now{part}")
+    format!("about {about}: an estimate, from {tried} integrated just now{part}")
 }
 
 fn describe<M: Swept>(axis: &Axis<M>, design: Option<&Design>) -> String {

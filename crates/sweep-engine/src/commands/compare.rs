@@ -96,12 +96,12 @@ pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
     } else if args.markdown {
         show(&markdown(args, &found, &broken))?;
     } else {
-        show(&text(args, &found))?;
+        let broken = broken.iter().map(|broken| format!("--fail-on: {broken}\n"));
+        show(&(text(args, &found) + &broken.collect::<String>()))?;
         if let Some(out) = &args.out {
             let out = out.display();
             tell(&format!("wrote {out}: sweep plot {}", quoted(&out.to_string())));
         }
-        broken.iter().for_each(|broken| tell(&format!("--fail-on: {broken}")));
     }
     Ok(if broken.is_empty() { Exit::Done } else { Exit::NotHeld })
 }

@@ -1,6 +1,6 @@
 //! `sweep merge GRID.toml`: finished shards into the one file.
 
-use super::run::rows;
+use super::run::{done, rows};
 use super::{Lines as _, ResultArgs, installed};
 use crate::config::section::counted;
 use crate::store::{OpenRun, Opened};
@@ -13,6 +13,9 @@ pub struct Args {
     #[command(flatten)]
     /// The run.
     pub target: ResultArgs,
+    /// Exit with 3 if any row failed
+    #[arg(long)]
+    fail_on_error: bool,
 }
 
 /// Joins what the shards have left.
@@ -22,21 +25,21 @@ pub struct Args {
 /// its end.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
-    of_job(&plan.name, &Job::of(&plan), &args.target.output(&plan))
+    of_job(args, &plan.name, &Job::of(&plan), &args.target.output(&plan))
 }
 
 /// Joins what the shards of a job have left.
 ///
 /// # Errors
 /// As [`run`].
-pub fn of_job(name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
+pub fn of_job(args: &Args, name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
     let interrupt = installed()?;
     let mut run = match OpenRun::open_for_merge(output, job)? {
         Opened::Run(run) => run,
         Opened::Finished(file, tally) => {
             let there = format!("{name}: all {} points are there already\n", file.points);
             tell((there + &rows(&tally, job)).trim_end());
-            return Ok(Exit::Done);
+            return Ok(done(args.fail_on_error, &tally.by_status));
         }
     };
     run.take_notes().iter().for_each(|note| tell(note));
@@ -49,5 +52,5 @@ pub fn of_job(name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
     text += &rows(&tally, job);
     text.line("file", output.display());
     tell(text.trim_end());
-    Ok(Exit::Done)
+    Ok(done(args.fail_on_error, &tally.by_status))
 }

@@ -97,7 +97,7 @@ pub fn run<M: Swept>(
     for path in &args.further {
         let opened = ParquetFile::open(path)?;
         let (picture, _) = described(path)?;
-        let lines = (further.lines)(&opened)?;
+        let lines = further.listed(&opened)?;
         let lines: Vec<_> =
             lines.into_iter().map(|(name, text)| vec![name.to_owned(), text]).collect();
         let shown = path.file_stem().unwrap_or_default().to_string_lossy();

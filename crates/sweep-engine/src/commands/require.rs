@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::{conditions, table, word};
-use crate::{Error, Exit, show, tell};
+use crate::{Error, Exit, show};
 use sweep_results::{Checked, ResultTable, check};
 
 /// Arguments of `sweep require`.
@@ -73,8 +73,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         });
         show(&format!("{said:#}\n"))?;
     } else {
-        let text: String = checked.iter().map(|checked| said(args, checked)).collect();
-        tell(text.trim_end());
+        show(&checked.iter().map(|checked| said(args, checked)).collect::<String>())?;
     }
     Ok(if holds { Exit::Done } else { Exit::NotHeld })
 }

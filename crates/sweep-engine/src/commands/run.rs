@@ -6,7 +6,7 @@ use super::{Lines as _, ResultArgs, short};
 use crate::config::section::counted;
 use crate::progress::per_second;
 use crate::run::{self as runner, Ended, RunOptions, RunReport};
-use crate::store::read::{DwellCounts, FAR_OFF, failed, failures};
+use crate::store::read::{DwellCounts, FAR_OFF, NameCounts, failed, failures};
 use crate::store::{Session, ShardRequest, Tally};
 use crate::{
     EffortArgs, Engine, Error, Exit, Interrupt, Job, Plan, Swept, duration, tell, threads,
@@ -23,9 +23,6 @@ pub struct Args {
     /// How it is done.
     #[command(flatten)]
     pub work: WorkArgs,
-    /// Exit with 3 if any row of the finished result failed
-    #[arg(long)]
-    pub fail_on_error: bool,
 }
 
 /// How a run is done, by whichever engine.
@@ -42,6 +39,9 @@ pub struct WorkArgs {
     /// Start over, even if the result is there or another plan was begun
     #[arg(long)]
     pub fresh: bool,
+    /// Exit with 3 if any row failed
+    #[arg(long)]
+    pub fail_on_error: bool,
 }
 
 impl WorkArgs {
@@ -66,7 +66,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     let engine = M::engine(&plan, None)?;
     let report = execute(args, &plan, engine.as_ref(), &installed()?, "")?;
-    Ok(exit(args.fail_on_error, &report))
+    Ok(exit(&args.work, &report))
 }
 
 /// Signals, heeded from now on.
@@ -111,16 +111,19 @@ pub fn execute<M: Swept>(
 }
 
 /// How a run ends the program.
-pub fn exit(fail_on_error: bool, report: &RunReport) -> Exit {
-    match &report.ended {
-        Ended::Interrupted { signal, .. } => Exit::interrupted(Some(*signal)),
-        Ended::Already(_, tally) | Ended::Finished(tally)
-            if fail_on_error && failed(&tally.by_status) > 0 =>
-        {
-            Exit::PointsFailed
-        }
-        _ => Exit::Done,
-    }
+pub fn exit(work: &WorkArgs, report: &RunReport) -> Exit {
+    let by_status = match &report.ended {
+        Ended::Interrupted { signal, .. } => return Exit::interrupted(Some(*signal)),
+        Ended::Already(_, tally) | Ended::Finished(tally) => &tally.by_status,
+        Ended::Shard(_, by_status) => by_status,
+    };
+    done(work.fail_on_error, by_status)
+}
+
+/// How what is done ends the program.
+pub(super) fn done(fail_on_error: bool, by_status: &NameCounts) -> Exit {
+    let is_failure = fail_on_error && failed(by_status) > 0;
+    if is_failure { Exit::PointsFailed } else { Exit::Done }
 }
 
 /// A command that computes the rows of a file, as its summary speaks of it.
@@ -178,8 +181,11 @@ impl RunCommand<'_> {
                 text = format!("{name}: {work}\n");
                 finished(&mut text, tally)?;
             }
-            Ended::Shard(shard) => {
+            Ended::Shard(shard, by_status) => {
                 text = format!("{name}, shard {} of {}: {work}\n", shard.index, shard.of);
+                if let Some(failed) = failed_words(by_status) {
+                    text.line("failed", failed);
+                }
                 let merge = target.command("merge") + of_merge;
                 text.line("next", format!("{merge}, when all shards are done"));
             }
@@ -263,10 +269,8 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         let told = format!("{which}: the linear model over-estimates, a ratio is below {below}");
         text.line("too high", told);
     }
-    let failed: Vec<String> =
-        failures(&tally.by_status).map(|(status, count)| format!("{count} {status}")).collect();
-    if !failed.is_empty() {
-        text.line("failed", failed.join(", "));
+    if let Some(failed) = failed_words(&tally.by_status) {
+        text.line("failed", failed);
     }
     if *sensitive > 0 {
         text.line("sensitive", format!("{sensitive}: chaotic, a near twin departs exponentially"));
@@ -300,6 +304,13 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         text.line("least gap", format!("{:.5} m{}", least.value, place(least.point)));
     }
     text
+}
+
+/// How many failed and why, if any did.
+pub(super) fn failed_words(by_status: &NameCounts) -> Option<String> {
+    let failed = failures(by_status).map(|(status, count)| format!("{count} {status}"));
+    let failed = failed.collect::<Vec<_>>().join(", ");
+    (!failed.is_empty()).then_some(failed)
 }
 
 #[cfg(test)]

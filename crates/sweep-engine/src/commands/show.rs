@@ -16,6 +16,9 @@ use sweep_results::{Cell, Condition, ResultTable, ratio_limits, top};
 /// Rows shown where none are asked for by number.
 const ROWS_SHOWN: u16 = 10;
 
+/// Lines of one name that are shown.
+const MOST_LISTED: usize = 12;
+
 /// Arguments of `sweep show`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -62,6 +65,21 @@ impl Further<'_> {
     /// Nothing.
     pub const NONE: Further<'static> =
         Further { lines: &|_| Ok(Vec::new()), is_of_a_metric: |_| false };
+
+    /// The lines about a file; of many of one name the first.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn listed(&self, file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
+        let mut listed = Vec::new();
+        for alike in (self.lines)(file)?.chunk_by(|a, b| a.0 == b.0) {
+            listed.extend(alike.iter().take(MOST_LISTED).cloned());
+            if alike.len() > MOST_LISTED {
+                listed.push(("", format!("and {} more", alike.len() - MOST_LISTED)));
+            }
+        }
+        Ok(listed)
+    }
 }
 
 /// Shows a file's content in short: for a result its verdicts, extremes and metrics, for any other
@@ -77,7 +95,9 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
     let opened = ParquetFile::open(&args.file)?;
     let file = overview(&opened)?;
     if args.json {
-        return show(&format!("{:#}\n", in_json(args, &opened, &file)?));
+        let mut said = in_json(args, &opened, &file)?;
+        said["lines"] = json!((further.lines)(&opened)?);
+        return show(&format!("{said:#}\n"));
     }
     let mut text = String::new();
     text.line("file", args.file.display());
@@ -102,7 +122,7 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
         }
         None => {
             text.line("made by", opened.created_by().unwrap_or("unknown"));
-            for (name, words) in (further.lines)(&opened)? {
+            for (name, words) in further.listed(&opened)? {
                 text.line(name, &words);
             }
             if let Some(traced) = opened.json(key::BOUNDARY) {
@@ -160,8 +180,8 @@ fn shown_columns(args: &Args, file: &ResultTable, keep: Option<&Condition>) -> V
             columns.push(name.to_owned());
         }
     }
-    // Files without places or verdict show what they have.
-    if columns.is_empty() {
+    // Files without places or verdict show what they have, and so does JSON.
+    if columns.is_empty() || args.json {
         columns = file.columns.iter().map(|column| column.name.clone()).collect();
     }
     columns
@@ -176,8 +196,8 @@ fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, 
             "unit": column.unit,
             "worse": column.worse.map(Worse::name),
             "nulls": column.nulls,
-            "least": column.range.map(|(least, _)| least),
-            "greatest": column.range.map(|(_, greatest)| greatest),
+            "least": column.range.map(|(least, _)| Cell::Number(least)),
+            "greatest": column.range.map(|(_, greatest)| Cell::Number(greatest)),
             "counts": (!column.names.is_empty()).then(counts),
         })
     };

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::{Lines as _, ResultArgs};
 use crate::store::{FolderStatus, State, shard_list, status};
-use crate::{Error, Exit, Job, Plan, Swept, show, tell};
+use crate::{Error, Exit, Job, Plan, Swept, show};
 
 /// Arguments of `sweep status`.
 #[derive(Debug, clap::Args)]
@@ -35,11 +35,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
 /// As [`run`].
 pub fn of_job(args: &Args, job: &Job<'_>, output: &Path, again: [&str; 2]) -> Result<Exit, Error> {
     let found = status(output, job)?;
-    if args.json {
-        return show(&format!("{:#}\n", json!(found)));
-    }
-    tell(summary(args, &found, again).trim_end());
-    Ok(Exit::Done)
+    show(&if args.json { format!("{:#}\n", json!(found)) } else { summary(args, &found, again) })
 }
 
 fn summary(args: &Args, found: &FolderStatus, [verb, options]: [&str; 2]) -> String {

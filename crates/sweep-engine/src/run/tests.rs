@@ -102,7 +102,7 @@ fn same_bytes_for_any_number_of_shards() {
             )
             .unwrap();
             assert!(
-                matches!(report.ended, Ended::Shard(done) if done.index == index),
+                matches!(report.ended, Ended::Shard(done, _) if done.index == index),
                 "{report:?}"
             );
         }

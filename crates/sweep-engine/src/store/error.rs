@@ -146,6 +146,7 @@ impl StoreError {
             Self::PlanDiffers { .. } | Self::OutputDiffers { .. } | Self::Refused(_) => true,
             Self::Threads(error) => error.is_refusal(),
             Self::File(error) => error.is_refusal(),
+            Self::Parquet { action, .. } => *action == "read",
             _ => false,
         }
     }

@@ -16,7 +16,7 @@ use super::error::StoreError;
 use super::lock::{self, Lock};
 use super::plan_file::{Found, PlanFile, pretty, set_aside};
 use super::provenance::{self, Session};
-use super::read::{self, ResultFile, Tally};
+use super::read::{self, NameCounts, ResultFile, Tally};
 use super::schema::Done;
 use super::shard::{self, Dealing, Shard, ShardRequest};
 use super::{Folder, Job, PLAN, SHARDS, TRIALS, chunk_name, chunk_of_name, chunk_points};
@@ -209,6 +209,19 @@ impl OpenRun {
             lock(&self.parts).insert(chunk, outcomes);
         }
         Ok(())
+    }
+
+    /// How this process's rows that are there ended.
+    ///
+    /// # Errors
+    /// [`StoreError::File`].
+    pub fn statuses(&mut self, job: &Job<'_>) -> Result<NameCounts, StoreError> {
+        let (mut counts, own) = (NameCounts::new(), self.present().clone());
+        for chunk in own {
+            let rows = self.read_chunk(chunk)?.unwrap_or_default();
+            read::add_statuses(&mut counts, job, &rows);
+        }
+        Ok(counts)
     }
 
     /// The outcomes there are of chunks that are not whole, to go on from.

@@ -8,6 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::error::StoreError;
+use super::{Done, Job, Kind};
 use sweep_files::{FileKind, ParquetFile, columns, key};
 use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::ratio_limits;
@@ -134,8 +135,17 @@ pub fn failed(by_status: &NameCounts) -> u64 {
     failures(by_status).map(|(_, count)| count).sum()
 }
 
+/// Counts rows of a job by status.
+pub(super) fn add_statuses(counts: &mut NameCounts, job: &Job<'_>, points: &[Done]) {
+    let Some(column) = job.layout.position("status") else { return };
+    let Kind::Name(names) = &job.layout.columns[column].kind else { return };
+    let rows = points.iter().flat_map(|done| &done.rows);
+    let named = rows.filter_map(|row| names.get(row[column]? as usize));
+    named.for_each(|name| add(counts, name));
+}
+
 /// Counts one more of a name.
-pub(super) fn add(counts: &mut NameCounts, name: &str) {
+pub fn add(counts: &mut NameCounts, name: &str) {
     *counts.entry(name.to_owned()).or_default() += 1;
 }
 

@@ -7,9 +7,9 @@ use serde::{Serialize, Serializer};
 
 use super::open::{self, chunks_there, read_chunk};
 use super::plan_file::{Found, PlanFile};
-use super::read::{NameCounts, add, failed};
+use super::read::{NameCounts, add_statuses, failed};
 use super::shard::{self, Dealing};
-use super::{Done, Folder, Holder, Job, Kind, Place, Shape, StoreError, chunk_points, lock};
+use super::{Folder, Holder, Job, Place, Shape, StoreError, chunk_points, lock};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -105,12 +105,6 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         Place { plan: hash, shape, chunk, first, count: points_a_chunk.min(job.points - first) }
     };
     let mut present = BTreeSet::new();
-    let of_status = job.layout.position("status");
-    let name = |done: &Done| {
-        let column = of_status?;
-        let Kind::Name(names) = &job.layout.columns[column].kind else { return None };
-        names.get((*done.rows.first()?.get(column)?)? as usize).copied()
-    };
     for chunk in chunks_there(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
         let place = place(chunk);
         match read_chunk(&folder, &place)? {
@@ -119,7 +113,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
                     present.insert(chunk);
                 }
                 status.points_done += points.len() as u64;
-                points.iter().filter_map(name).for_each(|name| add(&mut status.by_status, name));
+                add_statuses(&mut status.by_status, job, &points);
             }
             Some(Err(_)) => status.chunks_damaged.push(chunk),
             // The run was finished, or the chunk set aside, a moment ago.

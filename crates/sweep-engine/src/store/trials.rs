@@ -142,7 +142,7 @@ impl Trials {
 
 /// The file of trials, made if need be; how many records it holds; and the trials in them.
 fn contents(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> Result<(File, usize, Known), StoreError> {
-    let file = regular::open_or_create(path).map_err(StoreError::io("open", path))?;
+    let file = regular::open_or_create(path).map_err(StoreError::io("open or make", path))?;
     let (mut found, mut known) = (0, Known::new());
     // One by one: the file may be long, and somebody else's.
     let mut records = BufReader::new(&file);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::show::lines;
+use super::show::FURTHER;
 use crate::dwell::Search;
 use crate::plan::Plan;
 use crate::speeds::SpeedList;
@@ -10,6 +10,7 @@ use crate::stability::{Held, check};
 use sweep_engine::commands::cells::Lines as _;
 use sweep_engine::commands::grid::ResultArgs;
 use sweep_engine::commands::run::{RunCommand, WorkArgs, exit, installed};
+use sweep_engine::commands::{merge, status};
 use sweep_engine::{Error, Exit, Job};
 use sweep_files::ParquetFile;
 
@@ -28,9 +29,6 @@ pub struct Args<Asked: clap::Args> {
     /// How it is done.
     #[command(flatten)]
     work: WorkArgs,
-    /// Exit with 3 if any row is not ok
-    #[arg(long)]
-    fail_on_error: bool,
 }
 
 /// The periodic responses are asked for, of which nothing more can be said.
@@ -75,7 +73,7 @@ impl<Asked: clap::Args + Copy + Into<Option<Search>>> Args<Asked> {
     /// Mistakes in the grid file or the options, and whatever keeps the file from being written;
     /// finished chunks are kept.
     pub(super) fn run(&self) -> Result<Exit, Error> {
-        let Self { target, speed, asked, work, fail_on_error } = self;
+        let Self { target, speed, asked, work } = self;
         let search: Option<Search> = (*asked).into();
         let plan: Plan = target.grid.load()?;
         check(&plan, "--speed", &speed.to_string())?;
@@ -92,7 +90,7 @@ impl<Asked: clap::Args + Copy + Into<Option<Search>>> Args<Asked> {
             options: [&options, &format!("{of_merge}{options}")],
         };
         let finished = |text: &mut String, _: &_| {
-            for (name, words) in lines(&ParquetFile::open(&output)?)? {
+            for (name, words) in FURTHER.listed(&ParquetFile::open(&output)?)? {
                 text.line(name, words);
             }
             text.line("file", output.display());
@@ -100,7 +98,7 @@ impl<Asked: clap::Args + Copy + Into<Option<Search>>> Args<Asked> {
             Ok(())
         };
         let report = command.execute(&held.engine()?, &job, &output, &installed()?, &finished)?;
-        Ok(exit(*fail_on_error, &report))
+        Ok(exit(work, &report))
     }
 }
 
@@ -110,9 +108,42 @@ fn options(speed: &SpeedList, search: Option<Search>) -> String {
     format!(" --speed {speed}{search}")
 }
 
+/// Arguments of `sweep status` or `sweep merge`, of a run or of held speeds.
+#[derive(Debug, clap::Args)]
+pub struct JobArgs<Of: clap::Args> {
+    #[command(flatten)]
+    of: Of,
+    #[command(flatten)]
+    held: HeldArgs,
+}
+
+impl JobArgs<status::Args> {
+    /// Shows the progress, without disturbing it.
+    ///
+    /// # Errors
+    /// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
+    pub(super) fn status(&self) -> Result<Exit, Error> {
+        let plan: Plan = self.of.target.grid.load()?;
+        let (job, output, [verb, options]) = self.held.job(&plan, &self.of.target);
+        status::of_job(&self.of, &job, &output, [&verb, &options])
+    }
+}
+
+impl JobArgs<merge::Args> {
+    /// Joins what the shards have left.
+    ///
+    /// # Errors
+    /// As the engine's command.
+    pub(super) fn merge(&self) -> Result<Exit, Error> {
+        let plan: Plan = self.of.target.grid.load()?;
+        let (job, output, _) = self.held.job(&plan, &self.of.target);
+        merge::of_job(&self.of, &plan.name, &job, &output)
+    }
+}
+
 /// Which job `status` and `merge` mean.
 #[derive(Debug, clap::Args)]
-pub(super) struct HeldArgs {
+struct HeldArgs {
     /// Constant spin speeds in rpm of `sweep stability`, or of `sweep dwell`: as there
     #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
     speed: Option<SpeedList>,
@@ -127,11 +158,7 @@ pub(super) struct HeldArgs {
 impl HeldArgs {
     /// The job on a plan and its output, the command that goes on with it and what stands behind
     /// its arguments.
-    pub(super) fn job<'a>(
-        &'a self,
-        plan: &'a Plan,
-        target: &ResultArgs,
-    ) -> (Job<'a>, PathBuf, [String; 2]) {
+    fn job<'a>(&'a self, plan: &'a Plan, target: &ResultArgs) -> (Job<'a>, PathBuf, [String; 2]) {
         let Some(speed) = &self.speed else {
             return (Job::of(plan), target.output(plan), ["run".to_owned(), String::new()]);
         };

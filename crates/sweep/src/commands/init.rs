@@ -1,6 +1,5 @@
 //! `sweep init`: a grid or machine file to start from.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use washer_model::Machine;
@@ -8,7 +7,7 @@ use washer_model::Machine;
 use crate::config;
 use sweep_engine::plan::WrittenIn;
 use sweep_engine::{Error, Exit, print, tell};
-use sweep_files::atomic;
+use sweep_files::{FileError, atomic};
 
 /// The commented grid file.
 const GRID: &str = include_str!("starter.toml");
@@ -38,8 +37,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         return print(&text);
     }
     if !atomic::create(atomic::parent(path), path, text.as_bytes())? {
-        let source = io::ErrorKind::AlreadyExists.into();
-        return Err(Error::File { action: "write", path: path.to_owned(), source });
+        let reason = "a file is there already".to_owned();
+        let help = "give another name, or remove that file first";
+        return Err(FileError::Refused { path: path.to_owned(), reason, help }.into());
     }
     let shown = path.display();
     tell(&if args.machine {

@@ -80,8 +80,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         let taken: Vec<String> = taken.collect();
         text.push_str(&format!("friction is taken as in the run: {}\n", taken.join(", ")));
     }
-    tell(text.trim_end());
-    Ok(Exit::Done)
+    show(&text)
 }
 
 /// How far the suspension's frozen and exact motions differ, where they were asked for.

@@ -58,5 +58,5 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         }
         tell(&format!("traces      {}", folder.display()));
     }
-    Ok(exit(args.run.fail_on_error, &report))
+    Ok(exit(&args.run.work, &report))
 }

@@ -11,7 +11,7 @@ use washer_row::Metric;
 pub(super) const FURTHER: Further<'static> = Further { lines: &lines, is_of_a_metric };
 
 /// What a file about held speeds says as a whole: lines, each with its name.
-pub(super) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
+fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
     Ok(match file.kind() {
         Some(FileKind::Stability) => tongues::summary(file)?.lines(),
         Some(FileKind::Dwell) => dwell::summary::lines(file)?,

@@ -5,9 +5,6 @@ use std::collections::BTreeMap;
 use crate::places;
 use sweep_files::{FileError, ParquetFile};
 
-/// Places that are listed.
-const MOST_LISTED: usize = 12;
-
 /// Channels whose farthest motion is told.
 const TOLD: [&str; 2] = ["tub_yaw", "tub_pitch"];
 
@@ -63,11 +60,8 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
             lines.push(("farthest", format!("{name} {:.1} mrad, {kind}, at {at}", 1e3 * value)));
         }
     }
-    for (at, motions) in several.iter().take(MOST_LISTED) {
+    for (at, motions) in &several {
         lines.push(("several", format!("{motions} motions at {}", places::words(&axes, at))));
-    }
-    if several.len() > MOST_LISTED {
-        lines.push(("", format!("and at {} more", several.len() - MOST_LISTED)));
     }
     Ok(lines)
 }

@@ -55,7 +55,7 @@ impl Task<'_> {
             Ended::Already(..) | Ended::Finished(_) => RanToFile::Whole(ResultTable::read(output)?),
             Ended::Interrupted { kept, points, .. } => RanToFile::Interrupted { kept, points },
             // Only what a scheduler's variables say makes a shard of a run.
-            Ended::Shard(_) => RanToFile::Interrupted { kept: 0, points: self.job.points },
+            Ended::Shard(..) => RanToFile::Interrupted { kept: 0, points: self.job.points },
         })
     }
 }

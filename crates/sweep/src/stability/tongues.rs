@@ -8,9 +8,6 @@ use crate::places;
 use sweep_engine::config::section::counted;
 use sweep_files::{FileError, ParquetFile};
 
-/// Tongues that a summary lists.
-const MOST_LISTED: usize = 12;
-
 /// What is read of a row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Row {
@@ -126,21 +123,17 @@ impl Summary {
             let words = "further rows: other responses at the same speeds (column branch)";
             lines.push(("others", format!("{} {words}", self.coexisting)));
         }
-        for row in self.jumps.iter().take(MOST_LISTED) {
+        for row in &self.jumps {
             let (of_point, rpm) = (self.of_point(row), row.branch_to_rpm.unwrap_or_default());
             let words = "running up, the response folds back and the motion jumps";
             lines.push(("jump", format!("{of_point}at {rpm:.2} rpm, {words}")));
         }
-        lines.extend(more(self.jumps.len(), "jumps"));
         // All of one point; else the worst.
         let mut listed: Vec<&Tongue> = self.tongues.iter().collect();
         if self.points > 1 {
             listed.sort_by(|a, b| b.at.growth_per_s.total_cmp(&a.at.growth_per_s));
         }
-        for tongue in listed.iter().take(MOST_LISTED) {
-            lines.push(("unstable", self.words(tongue)));
-        }
-        lines.extend(more(listed.len(), "tongues"));
+        lines.extend(listed.iter().map(|tongue| ("unstable", self.words(tongue))));
         lines
     }
 
@@ -171,12 +164,6 @@ impl Summary {
         }
         text
     }
-}
-
-/// Says how many of these are left out, if any are.
-fn more(count: usize, what: &str) -> Option<(&'static str, String)> {
-    let left = count.checked_sub(MOST_LISTED).filter(|left| *left > 0)?;
-    Some(("", format!("and {left} more {what}")))
 }
 
 /// Reads through a stability file.
