@@ -8,7 +8,7 @@
 
 use super::monodromy::{INSTANTS, Square};
 use super::orbit::{Asked, Turned};
-use super::search::{Search, apart, factored, missing, solved};
+use super::search::{Search, apart, factored, missing};
 use super::settings::Settings;
 use crate::coordinates::{COORDINATES, STATES};
 use lane_ode::{Lu, N};
@@ -74,6 +74,10 @@ const BESIDE: f64 = 1e-5;
 /// A fold is found this closely (relative, of its speed), in so many rounds.
 const FOLD: f64 = 1e-6;
 const FOLD_ROUNDS: usize = 5;
+
+/// Where forces have corners, steps that are longer than these are wide make stairs of a curve: two
+/// folds whose speeds are closer than this (relative) are such a stair, and no jump of the machine.
+const STAIR: f64 = 4e-4;
 
 /// Nodes on either side of a fold are no farther from it than this.
 const BY_FOLD: f64 = 0.3;
@@ -264,7 +268,6 @@ impl<'a> Curve<'a> {
             if self.settings.follow_closer() {
                 let kept = self.nodes.partition_point(|node| node.length < from).max(1);
                 self.nodes.truncate(kept);
-                self.folds.retain(|fold| *fold < kept);
                 self.length = FIRST_STEP;
                 self.look_again();
             }
@@ -347,7 +350,7 @@ impl<'a> Curve<'a> {
         }
         let off: Place = core::array::from_fn(|i| step.onto[i] - self.at[i]);
         gap[SPEED] = N(dot(&step.across, &off));
-        let correction = solved(&jacobian.factors, &gap);
+        let correction = jacobian.factors.solve(&gap);
         self.at = core::array::from_fn(|i| self.at[i] + correction[i].0);
         let off: Place = core::array::from_fn(|i| self.at[i] - step.onto[i]);
         let off = dot(&off, &off);
@@ -359,10 +362,17 @@ impl<'a> Curve<'a> {
         if missing < CLOSE { self.arrived(step) } else { self.step = Some(step) }
     }
 
+    /// Whether the curve goes on up in speed, as it began: each fold turns it.
+    fn rises(&self) -> bool {
+        self.folds.len().is_multiple_of(2)
+    }
+
     /// Arrives at the last node once more, with derivatives of that very place.
     fn look_again(&mut self) {
         self.scale(0.5);
         if let Some(last) = self.nodes.pop() {
+            // A fold that it is would be found twice.
+            self.folds.retain(|fold| *fold < self.nodes.len());
             self.correct(last.at, last.tangent);
         }
     }
@@ -371,7 +381,7 @@ impl<'a> Curve<'a> {
         let Some(jacobian) = step.seen else { return self.shorten() };
         let mut one = [N(0.0); PLACE];
         one[SPEED] = N(1.0);
-        let tangent = solved(&jacobian.factors, &one).map(|entry| entry.0);
+        let tangent = jacobian.factors.solve(&one).map(|entry| entry.0);
         let tangent = unit(&tangent);
         let before = match self.turning {
             Some(turning) => self.nodes.get(turning.after),
@@ -393,9 +403,9 @@ impl<'a> Curve<'a> {
                 return if is_own { self.shorten() } else { self.look_again() };
             }
             length = before.length + gone;
-            // At a fold itself the tangent may point to either side.
-            let is_from_fold = self.folds.last() == Some(&(self.nodes.len() - 1));
-            turns_back = !is_from_fold && before.tangent[SPEED] * tangent[SPEED] < 0.0;
+            // At a fold itself the tangent may point to either side: how many folds there are says
+            // which way the curve goes on, and two of them close by are not taken for one.
+            turns_back = self.rises() == (tangent[SPEED] < 0.0);
         }
         let (is_own, monodromy) = (off < OWN && self.is_careful, jacobian.monodromy);
         let node = Node { at: self.at, tangent, is_own, length, monodromy };
@@ -465,12 +475,29 @@ impl<'a> Curve<'a> {
         self.turning = Some(turning);
     }
 
+    /// Its folds without stairs.
+    fn folds_of_machine(&self) -> Vec<usize> {
+        let has_corners = self.settings.point.machine.elements.are_nonsmooth();
+        let at = |fold: usize| self.nodes[fold].at[SPEED] * UNIT_OF_SPEED;
+        let mut folds: Vec<usize> = Vec::new();
+        for &fold in &self.folds {
+            match folds.last() {
+                Some(&last) if has_corners && (at(fold) - at(last)).abs() < STAIR => {
+                    folds.pop();
+                }
+                _ => folds.push(fold),
+            }
+        }
+        folds
+    }
+
     /// Where responses at a speed (rpm) are to be looked for, in the order of the curve; none where
     /// the curve does not get there.
     pub(super) fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
         let end = self.nodes.iter().position(|node| speed_of(&node.at) >= BEYOND * speed_rpm);
         let nodes = &self.nodes[..end.map_or(self.nodes.len(), |end| end + 1)];
         let target = libm::log(speed_rpm) / UNIT_OF_SPEED;
+        let folds = self.folds_of_machine();
         let mut guesses = Vec::new();
         for (k, pair) in nodes.windows(2).enumerate() {
             let [a, b] = pair else { continue };
@@ -490,9 +517,9 @@ impl<'a> Curve<'a> {
                 (1.0 - share) * a.monodromy[i][j].0 + share * b.monodromy[i][j].0
             };
             let monodromy = core::array::from_fn(|i| core::array::from_fn(|j| N(mean(i, j))));
-            let branch = self.folds.iter().filter(|&&fold| fold <= k).count();
+            let branch = folds.iter().filter(|&&fold| fold <= k).count();
             let fold = |number: usize| {
-                let place = *self.folds.get(number)?;
+                let place = *folds.get(number)?;
                 nodes.get(place).map(|node| speed_of(&node.at))
             };
             let ends = [branch.checked_sub(1).and_then(fold), fold(branch)];
@@ -534,5 +561,64 @@ impl<'a> Search<'a> for Curve<'a> {
             (Some(step), [turned]) => self.corrected(step, &turned.end),
             _ => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BumpStop, Machine, Spin, Timing, prepare};
+    use lane_ode::Simd;
+
+    /// The paper's machine, with a stop that does nothing or without.
+    fn point(has_stop: bool) -> crate::Point {
+        let mut machine = Machine::paper();
+        machine.stops.extend(has_stop.then_some(BumpStop {
+            tub_m: [0.35, -0.28, 0.0],
+            direction: [0.0, -1.0, 0.0],
+            clearance_m: 1.0,
+            stiffness_n_per_m: 0.0,
+            damping_n_s_per_m: 0.0,
+            softness_m: 1e-4,
+        }));
+        let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![100.0] };
+        let timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints: 0 };
+        prepare(Simd::best(), &[(machine, spin)], &timing).remove(0).unwrap()
+    }
+
+    /// A curve through these speeds (rpm), each a length of 1 from the last, that turns back at
+    /// these nodes.
+    fn curve<'a>(point: &'a crate::Point, speeds_rpm: &[f64], folds: &[usize]) -> Curve<'a> {
+        let mut curve = Curve::new(Settings::new(point));
+        for (k, &speed_rpm) in speeds_rpm.iter().enumerate() {
+            let at = place_of(&[0.0; STATES], speed_rpm);
+            let (tangent, monodromy) = ([0.0; PLACE], [[N(0.0); STATES]; STATES]);
+            curve.nodes.push(Node { at, tangent, is_own: true, length: k as f64, monodromy });
+        }
+        curve.folds = folds.to_vec();
+        curve
+    }
+
+    #[test]
+    fn a_stair_of_steps_at_corners_is_no_fold_of_the_machine() {
+        let speeds_rpm = [200.0, 220.05, 220.0, 240.0, 230.0, 260.0];
+        let found = |has_stop: bool, speed_rpm: f64| {
+            let point = point(has_stop);
+            let guesses = curve(&point, &speeds_rpm, &[1, 2, 3, 4]).guesses(speed_rpm);
+            guesses.iter().map(|it| (it.branch, it.between_rpm[1].is_some())).collect::<Vec<_>>()
+        };
+        assert_eq!(found(false, 210.0), [(0, true)]);
+        assert_eq!(found(false, 250.0), [(4, false)]);
+        assert_eq!(found(true, 210.0), [(0, true)]);
+        assert_eq!(found(true, 225.0), [(0, true)]);
+        assert_eq!(found(true, 250.0), [(2, false)]);
+    }
+
+    #[test]
+    fn a_fold_that_is_looked_at_again_is_not_counted_twice() {
+        let point = point(false);
+        let mut curve = curve(&point, &[200.0, 220.0, 240.0], &[1, 2]);
+        curve.look_again();
+        assert_eq!((curve.nodes.len(), curve.folds), (2, vec![1]));
     }
 }

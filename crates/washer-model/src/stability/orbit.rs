@@ -220,8 +220,10 @@ fn see<T: Lane>(zero: N<T>, asked: &[Asked<'_>], weights: &[Vec<f64>], turned: &
     }
     let seen = asked.iter().filter(|asked| asked.is_seen).count();
     let mut watched = Watched::new(zero, &model, &clock);
-    watched.with_corners = rows[0].has_corners() && !rows[0].is_stepwise();
-    watched.instants = rows[0].instants.max(INSTANTS);
+    if !rows[0].is_stepwise() {
+        watched.with_corners = rows[0].has_corners();
+        watched.instants = rows[0].instants.max(INSTANTS);
+    }
     turn(&model, &clock, &mut ends, if seen > 0 { Some(&mut watched) } else { None });
     let mut monodromies: Vec<Square> = Vec::new();
     if rows[0].is_stepwise() {

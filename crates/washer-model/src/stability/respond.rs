@@ -137,10 +137,14 @@ impl<'a> Responses<'a> {
             let Ok(case) = case else { continue };
             let Some(linear) = linear.next() else { continue };
             let mut guesses = followed[*place].0.guesses(*speed_rpm);
-            // Friction and stops make responses beside those of the curve.
+            // Friction and stops make responses beside those of the curve. A machine that is slower
+            // than where the curve begins is in the only one that there is.
             if guesses.is_empty() || case.row.has_corners() {
                 let branch = guesses.last().map_or(0, |last| last.branch + 1);
-                guesses.push(Guess { branch, ..from_linear(case.row.point, &linear) });
+                let begins_rpm = followed[*place].0.settings.lowest_rpm();
+                let is_on_curve = begins_rpm.is_ok_and(|begins_rpm| *speed_rpm < begins_rpm);
+                let guess = from_linear(case.row.point, &linear);
+                guesses.push(Guess { branch, is_on_curve, ..guess });
             }
             for guess in guesses {
                 solves.push(Solve::new(case.row, guess.state, guess.factors.clone()));

@@ -92,13 +92,7 @@ pub(super) fn factored<const C: usize>(matrix: &[[N<f64>; C]; C]) -> Option<Lu<C
     Simd::one_lane(Factor(matrix))
 }
 
-/// The solution for a right-hand side.
-pub(super) fn solved<const C: usize>(factors: &Lu<C>, of: &[N<f64>; C]) -> [N<f64>; C] {
-    Simd::one_lane(Solution(factors, of))
-}
-
 struct Factor<'a, const C: usize>(&'a [[N<f64>; C]; C]);
-struct Solution<'a, const C: usize>(&'a Lu<C>, &'a [N<f64>; C]);
 
 impl<const C: usize> Aside for Factor<'_, C> {
     type Output = Option<Lu<C>>;
@@ -106,15 +100,6 @@ impl<const C: usize> Aside for Factor<'_, C> {
     #[inline(always)]
     fn run(self) -> Option<Lu<C>> {
         Lu::new(*self.0)
-    }
-}
-
-impl<const C: usize> Aside for Solution<'_, C> {
-    type Output = [N<f64>; C];
-
-    #[inline(always)]
-    fn run(self) -> [N<f64>; C] {
-        self.0.solve(self.1)
     }
 }
 
@@ -190,7 +175,7 @@ impl<'a> Search<'a> for Solve<'a> {
         self.is_over |= !missing.is_finite() || self.turns == MOST_TURNS;
         if let (false, Some(factors)) = (self.is_over, &self.factors) {
             let gap = core::array::from_fn(|i| N(end[i] - self.state[i]));
-            let correction = solved(factors, &gap);
+            let correction = factors.solve(&gap);
             for i in 0..STATES {
                 self.state[i] += correction[i].0;
             }

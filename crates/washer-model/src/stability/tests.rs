@@ -308,6 +308,8 @@ fn responses_do_not_depend_on_company() {
     for (dwell, answer) in dwells.iter().zip(&together).step_by(8) {
         assert_eq!(&all(&[*dwell])[0], answer);
     }
+    // At 20 rpm, the first, a machine is slower than where its curve begins.
+    assert!(together[0].as_ref().unwrap()[0].is_on_curve);
 }
 
 /// Followed both ways every 0.25 rpm by an independent program, and lost where it folds.
