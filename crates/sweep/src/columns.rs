@@ -278,13 +278,16 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
         columns.extend(growing_mode_columns(prefix, place));
     }
     columns.extend(branch_columns(prefix));
-    if !in_map {
-        let on_curve = |row: &ResultRow| Some(growth(row)?.is_on_curve);
-        let text = "false where the response is not on that curve, but was found from the linear \
-                    model's response; branch then counts on, and where it is the first of its \
-                    speed, a machine that runs up may be in another motion";
-        columns.push(ResultColumn::flag("on_curve", text, on_curve));
-    }
+    let on_curve = |row: &ResultRow| Some(growth(row)?.is_on_curve);
+    let text = if in_map {
+        "false where at any of the plan's speeds no response on that curve was found: a machine \
+         that runs up may be in another motion there"
+    } else {
+        "false where the response is not on that curve, but was found from the linear model's \
+         response; branch then counts on, and where it is the first of its speed, a machine that \
+         runs up may be in another motion"
+    };
+    columns.push(ResultColumn::flag(format!("{prefix}on_curve"), text, on_curve));
     columns
 }
 

@@ -29,6 +29,17 @@ pub(crate) fn fastest(found: &[Result<Vec<Response>, Status>]) -> Option<&Respon
     there.reduce(|most, next| if next.growth_per_s() > most.growth_per_s() { next } else { most })
 }
 
+/// What is told of it. Where it is within the machine's geometry, what another of these passes is
+/// told too; where one is missing or off the curve, so is it: a machine that runs up may be in
+/// another motion there.
+fn of_speeds(found: &[Result<Vec<Response>, Status>]) -> Option<Growth> {
+    let firsts = || found.iter().map(|found| found.as_ref().ok()?.first());
+    let fastest = fastest(found)?;
+    let beyond = fastest.beyond.or_else(|| firsts().flatten().find_map(|first| first.beyond));
+    let is_on_curve = firsts().all(|first| first.is_some_and(|first| first.is_on_curve));
+    Some(Growth { beyond, is_on_curve, ..Growth::from(fastest) })
+}
+
 /// The motions that points end in at constant speeds, or why there are none. Once `is_stopped` says
 /// so, what comes means nothing.
 pub(crate) fn motions(
@@ -47,8 +58,7 @@ pub(crate) fn motions(
 
 /// Adds what metrics ask of points at constant speeds (rpm), those of all points in lanes: the
 /// fastest growing disturbance of the response that a machine is in that runs up, where the first
-/// speed wins a tie, and how far its motions go. Speeds without an answer are left out. Where that
-/// response is within the machine's geometry, what another passes is told.
+/// speed wins a tie, and how far its motions go. Speeds without an answer are left out.
 pub(super) fn add(
     rows: &mut [(&mut Outcome, &Point)],
     simd: Simd,
@@ -60,11 +70,7 @@ pub(super) fn add(
     if metrics.contains(&Metric::Growth) {
         let found = responses(&dwells, is_stopped);
         for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
-            outcome.growth = fastest(found).map(|fastest| {
-                let there = found.iter().flatten().filter_map(|responses| responses.first());
-                let others = || there.clone().find_map(|response| response.beyond);
-                Growth { beyond: fastest.beyond.or_else(others), ..Growth::from(fastest) }
-            });
+            outcome.growth = of_speeds(found);
         }
     }
     if metrics.contains(&Metric::Dwell) {
@@ -77,5 +83,36 @@ pub(super) fn add(
             });
             outcome.dwelt = Dwelt::of(all);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use washer_model::Channel;
+
+    #[test]
+    fn growth_is_that_of_a_run_up_only_where_no_speed_is_off_the_curve() {
+        let response = |speed_rpm: f64, is_on_curve: bool| {
+            Ok(vec![Response {
+                speed_rpm,
+                is_on_curve,
+                branch: 0,
+                between_rpm: [None; 2],
+                beyond: None,
+                nonlinear: [0.0; Channel::ALL.len()],
+                linear: [0.0; Channel::ALL.len()],
+                start: [0.0; STATE_LEN],
+                multiplier: [-1.2, 0.0],
+                participants: Vec::new(),
+            }])
+        };
+        let [on, other] = [response(240.0, true), response(260.0, true)];
+        let growth =
+            |found: &[_]| of_speeds(found).map(|it| (it.fastest.speed_rpm, it.is_on_curve));
+        assert_eq!(growth(&[on.clone(), other.clone()]), Some((260.0, true)));
+        assert_eq!(growth(&[response(230.0, false), on, other.clone()]), Some((260.0, false)));
+        assert_eq!(growth(&[Err(Status::NoResponse), other]), Some((260.0, false)));
+        assert_eq!(growth(&[Err(Status::NoResponse)]), None);
     }
 }

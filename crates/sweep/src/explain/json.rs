@@ -32,6 +32,7 @@ pub(crate) fn of(found: &Explanation) -> Value {
             "step_rpm": found.seen.looked.step,
             "without_response": found.seen.without_response,
             "jumps_rpm": found.seen.jumps_rpm,
+            "off_curve_rpm": found.seen.off_curve_rpm,
             "beyond": found.seen.beyond.iter().map(|(rpm, what)| {
                 json!({ "speed_rpm": rpm, "passes": what.name() })
             }).collect::<Value>(),

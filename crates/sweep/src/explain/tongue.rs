@@ -176,6 +176,8 @@ pub(crate) struct Seen {
     pub(crate) without_response: usize,
     /// Speeds (rpm) at which a machine that runs up leaves its branch of responses.
     pub(crate) jumps_rpm: Vec<f64>,
+    /// Speeds (rpm) at which the response is not on the curve of a machine that runs up.
+    pub(crate) off_curve_rpm: Vec<f64>,
     /// Speeds (rpm) at which the response passes the machine's geometry, and what of it.
     pub(crate) beyond: Vec<(f64, Beyond)>,
 }
@@ -210,7 +212,9 @@ pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> (Vec<Tongue>, Seen) 
     }
     let without_response = responses.iter().filter(|response| response.is_none()).count();
     let beyond = there().filter_map(|it| Some((it.speed_rpm, it.beyond?))).collect();
-    (tongues, Seen { looked, without_response, jumps_rpm, beyond })
+    let off_curve = there().filter(|response| !response.is_on_curve);
+    let off_curve_rpm = off_curve.map(|response| response.speed_rpm).collect();
+    (tongues, Seen { looked, without_response, jumps_rpm, off_curve_rpm, beyond })
 }
 
 /// What the drum ends in that is held where each of these grows most, slightly disturbed.

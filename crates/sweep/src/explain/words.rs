@@ -56,6 +56,9 @@ pub(crate) fn of(found: &Explanation) -> String {
         );
         line(&mut text, "jump", words);
     }
+    if let Some(words) = off_curve(&found.seen.off_curve_rpm) {
+        line(&mut text, "off curve", words);
+    }
     if let (Some((from, what)), Some((to, _))) =
         (found.seen.beyond.first(), found.seen.beyond.last())
     {
@@ -77,6 +80,16 @@ pub(crate) fn of(found: &Explanation) -> String {
     judgement(&mut text, found);
     limits(&mut text, found);
     text
+}
+
+/// At which speeds (rpm) another response was found than that of a machine that runs up.
+fn off_curve(speeds_rpm: &[f64]) -> Option<String> {
+    let [from, to] = [speeds_rpm.first()?, speeds_rpm.last()?].map(|rpm| decimal(*rpm));
+    Some(format!(
+        "at {} of the speeds, from {from} to {to} rpm, the response is off the curve: a machine \
+         that runs up may be in another motion there (`sweep dwell`)",
+        speeds_rpm.len()
+    ))
 }
 
 /// How many bands of speed there are, and tongues in them. Where a tongue ends because the motion
@@ -414,6 +427,14 @@ mod tests {
         assert!(lines.len() > 1 && lines.iter().all(|line| line.chars().count() <= WIDTH));
         assert!(lines[0].starts_with("      name  word"), "{}", lines[0]);
         assert!(lines[1].starts_with("            word"), "{}", lines[1]);
+    }
+
+    #[test]
+    fn responses_off_the_curve_are_not_taken_for_those_of_a_run_up() {
+        assert_eq!(off_curve(&[]), None);
+        let words = off_curve(&[255.0, 256.0, 270.0]).unwrap();
+        assert!(words.starts_with("at 3 of the speeds, from 255 to 270 rpm, the response is off"));
+        assert!(words.ends_with("(`sweep dwell`)"));
     }
 
     #[test]
