@@ -420,7 +420,13 @@ impl<'a> Curve<'a> {
         }
         if turns_back {
             let after = self.nodes.len() - 2;
-            self.look_for_fold(Turning { after, rounds: FOLD_ROUNDS });
+            if self.nodes[after].tangent[SPEED] * tangent[SPEED] < 0.0 {
+                self.look_for_fold(Turning { after, rounds: FOLD_ROUNDS });
+            } else {
+                // It turned twice about the last fold.
+                self.folds.push(after + 1);
+                self.advance();
+            }
         } else {
             self.advance();
         }
