@@ -1,6 +1,6 @@
 //! The clocks of adaptive methods: every lane with its own time, step and end.
 
-use crate::control::{StepControl, Tolerance, Verdict};
+use crate::control::{StepControl, Tolerance};
 use crate::lane::{Lane, MAX_LANES};
 use crate::num::N;
 use crate::system::{Count, Ended, Failure, Task};
@@ -18,7 +18,8 @@ pub(crate) struct Lanes<T> {
     pub(crate) time: N<T>,
     control: StepControl<T>,
     legs: [Progress; MAX_LANES],
-    ended: [Option<Ended>; MAX_LANES],
+    /// How a lane's leg ended, until the next is asked for.
+    pub(crate) ended: [Option<Ended>; MAX_LANES],
 }
 
 impl<T: Lane> Lanes<T> {
@@ -77,6 +78,13 @@ impl<T: Lane> Lanes<T> {
         h
     }
 
+    /// Where a lane's step of these ends.
+    #[inline(always)]
+    pub(crate) fn reached(&self, lane: usize, h: N<T>) -> f64 {
+        let (step, time, end_s) = (h.0.get(lane), self.time.0.get(lane), self.legs[lane].end_s);
+        if time + step >= end_s || step == end_s - time { end_s } else { time + step }
+    }
+
     /// After steps `h` with this error, in lanes where they were accepted and where the states they
     /// led to are in range: how far each lane has gone.
     #[inline(always)]
@@ -88,44 +96,41 @@ impl<T: Lane> Lanes<T> {
         tolerance: &Tolerance,
     ) -> N<T> {
         let mut length = h.lit(0.0);
-        let [accepted, in_range] = lanes.map(T::bits);
+        let lanes = lanes.map(T::bits);
         let next = self.control.proposals(error, h);
         // Lane by lane: bookkeeping in scalars is small beside a step's evaluations.
-        for (lane, leg) in
-            self.legs[..T::LANES].iter_mut().enumerate().filter(|(_, lane)| lane.is_active)
-        {
-            let step = h.0.get(lane);
-            let time = self.time.0.get(lane);
-            let is_last = time + step >= leg.end_s || step == leg.end_s - time;
-            let fail = |reason, time_s, count| Some(Ended::Failed { reason, time_s, count });
-            if accepted >> lane & 1 == 1 {
-                let reached = if is_last { leg.end_s } else { time + step };
-                length.0.set(lane, step);
+        for lane in 0..T::LANES {
+            if !self.legs[lane].is_active {
+                continue;
+            }
+            let [is_accepted, is_in_range] = lanes.map(|bits| bits >> lane & 1 == 1);
+            let (before, reached) = (self.time.0.get(lane), self.reached(lane, h));
+            self.control.settle(lane, is_accepted, &next);
+            let leg = &mut self.legs[lane];
+            let count = &mut leg.count;
+            let time = if is_accepted {
+                count.accepted += 1;
+                length.0.set(lane, h.0.get(lane));
                 self.time.0.set(lane, reached);
-                leg.count.accepted += 1;
-                if in_range >> lane & 1 == 0 {
-                    self.ended[lane] = fail(Failure::Diverged, reached, leg.count);
-                } else if is_last {
-                    self.ended[lane] = Some(Ended::Arrived(leg.count));
-                }
-                self.control.settle(lane, Verdict::Accepted, &next);
+                reached
             } else {
-                leg.count.rejected += 1;
-                self.control.settle(lane, Verdict::Rejected, &next);
-                let step = self.control.step.0.get(lane);
-                if step <= 16.0 * f64::EPSILON * time.abs().max(leg.end_s) {
-                    let reason = if in_range >> lane & 1 == 0 {
-                        Failure::Diverged
-                    } else {
-                        Failure::StepTooSmall
-                    };
-                    self.ended[lane] = fail(reason, time, leg.count);
-                }
-            }
-            let made = leg.count.accepted + leg.count.rejected;
-            if made >= tolerance.max_steps && self.ended[lane].is_none() {
-                self.ended[lane] = fail(Failure::StepLimit, time, leg.count);
-            }
+                count.rejected += 1;
+                before
+            };
+            let least = 16.0 * f64::EPSILON * time.abs().max(leg.end_s);
+            let is_stuck = !is_accepted && self.control.step.0.get(lane) <= least;
+            let fail = |reason, time_s| Some(Ended::Failed { reason, time_s, count: *count });
+            self.ended[lane] = if !is_in_range && (is_accepted || is_stuck) {
+                fail(Failure::Diverged, time)
+            } else if is_stuck {
+                fail(Failure::StepTooSmall, time)
+            } else if is_accepted && reached >= leg.end_s {
+                Some(Ended::Arrived(*count))
+            } else if count.accepted + count.rejected >= tolerance.max_steps {
+                fail(Failure::StepLimit, before)
+            } else {
+                None
+            };
         }
         length
     }

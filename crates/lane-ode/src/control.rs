@@ -52,13 +52,6 @@ pub(crate) const fn padded<const ROWS: usize, const COLUMNS: usize>(
     matrix
 }
 
-/// Whether a step counts.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Verdict {
-    Accepted,
-    Rejected,
-}
-
 /// Proportional-integral step control (Hairer and Wanner II, section IV.2): h grows by
 /// 0.9 err^-alpha err_before^beta, within 0.2 to 5.
 ///
@@ -130,24 +123,21 @@ impl<T: Lane> StepControl<T> {
         }
     }
 
-    /// Takes up a lane's proposal.
+    /// Takes up a lane's proposal, after a step that was accepted or not.
     #[inline(always)]
-    pub(crate) fn settle(&mut self, lane: usize, verdict: Verdict, next: &Proposals<T>) {
+    pub(crate) fn settle(&mut self, lane: usize, is_accepted: bool, next: &Proposals<T>) {
         let bit = 1 << lane;
-        match verdict {
-            Verdict::Accepted => {
-                let mut step = next.accepted.0.get(lane);
-                if self.was_rejected & bit != 0 {
-                    step = step.min(self.step.0.get(lane));
-                }
-                self.step.0.set(lane, step);
-                self.memory.0.set(lane, next.memory.0.get(lane));
-                self.was_rejected &= !bit;
+        if is_accepted {
+            let mut step = next.accepted.0.get(lane);
+            if self.was_rejected & bit != 0 {
+                step = step.min(self.step.0.get(lane));
             }
-            Verdict::Rejected => {
-                self.step.0.set(lane, next.rejected.0.get(lane));
-                self.was_rejected |= bit;
-            }
+            self.step.0.set(lane, step);
+            self.memory.0.set(lane, next.memory.0.get(lane));
+            self.was_rejected &= !bit;
+        } else {
+            self.step.0.set(lane, next.rejected.0.get(lane));
+            self.was_rejected |= bit;
         }
     }
 }

@@ -10,11 +10,12 @@
 //! 27, in the transformed variables of Hairer and Wanner, Solving Ordinary Differential Equations
 //! II, section IV.7, Eq. 7.25. The tests hold them against the order conditions.
 
-use crate::control::{StepControl, Tolerance, Verdict, padded};
+use crate::adaptive::Lanes;
+use crate::control::{Tolerance, padded};
 use crate::linear_solve::Lu;
 use crate::num::N;
 use crate::partials::Partials;
-use crate::system::{Count, Ended, Failure, Step, System as _, Task};
+use crate::system::{Ended, Failure, Step, System as _, Task};
 
 const STAGES: usize = 8;
 
@@ -193,117 +194,93 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(
 ) {
     const { assert!(D == 2 * K, "a state is the coordinates and their speeds") };
     let mut x = [N(0.0); D];
-    let mut control = StepControl::new(N(0.0));
+    let mut lanes = Lanes::new(N(0.0));
     let mut partials = Partials::<K>::zero();
-    let mut how = Ended::Idle;
+    let (mut is_fresh, mut is_known) = (true, false);
 
-    while let Some(leg) = task.next_leg(0, how, &mut x) {
-        control.start(0, leg.step_s);
-        let mut t = leg.start_s;
-        let mut count = Count::default();
-        let mut is_fresh = true;
-        let mut is_known = false;
-        how = loop {
-            if task.is_stopped() {
-                return;
-            }
-            // Never past the end of the leg, nor a sliver short of it.
-            let left = leg.end_s - t;
-            let is_last = control.step.0 * 1.01 >= left;
-            let h = if is_last { N(left) } else { control.step };
-            let reached = if is_last { leg.end_s } else { t + h.0 };
-            if !is_known {
-                task.partials(t, &x, &mut partials);
-                is_known = true;
-            }
-            let eliminated = Eliminated::new(&partials, h);
+    loop {
+        if lanes.take_up(task, &mut x) {
+            (is_fresh, is_known) = (true, false);
+        }
+        if task.is_stopped() || !lanes.are_active() {
+            return;
+        }
+        let h = lanes.steps();
+        let (start, end) = (lanes.time, lanes.reached(0, h));
+        if !is_known {
+            task.partials(start.0, &x, &mut partials);
+            is_known = true;
+        }
+        let eliminated = Eliminated::new(&partials, h);
 
-            let mut stages = [[N(0.0); D]; STAGES];
-            let mut y = x;
-            let at_start = task.system().forcing_aside(N(t));
-            let mut forcing = at_start;
-            // A matrix without factors makes no step: the error stays NaN and the next try is
-            // shorter.
-            let mut error = N(f64::NAN);
-            if let Some(eliminated) = &eliminated {
-                let per_h = h.recip();
-                for stage in 0..STAGES {
-                    if stage > 0 && NODE[stage] != NODE[stage - 1] {
-                        let time =
-                            if NODE[stage] == 1.0 { N(reached) } else { h * NODE[stage] + N(t) };
-                        forcing = task.system().forcing_aside(time);
-                    }
-                    y = x;
-                    let mut earlier = [N(0.0); D];
-                    for j in 0..stage {
-                        let weight = per_h.lit(C[stage][j]);
-                        for i in 0..D {
-                            y[i] += stages[j][i] * A[stage][j];
-                            earlier[i] += weight * stages[j][i];
-                        }
-                    }
-                    let slope = task.system().derivative_aside(&forcing, &y);
-                    let time_weight = (h * TIME[stage]).v();
-                    let mut b = slope;
+        let mut stages = [[N(0.0); D]; STAGES];
+        let mut y = x;
+        let at_start = task.system().forcing_aside(start);
+        let mut forcing = at_start;
+        // A matrix without factors makes no step: the error stays NaN and the next try is shorter.
+        let mut error = N(f64::NAN);
+        if let Some(eliminated) = &eliminated {
+            let per_h = h.recip();
+            for stage in 0..STAGES {
+                if stage > 0 && NODE[stage] != NODE[stage - 1] {
+                    let time = if NODE[stage] == 1.0 { N(end) } else { h * NODE[stage] + start };
+                    forcing = task.system().forcing_aside(time);
+                }
+                y = x;
+                let mut earlier = [N(0.0); D];
+                for j in 0..stage {
+                    let weight = per_h.lit(C[stage][j]);
                     for i in 0..D {
-                        b[i] = per_h * earlier[i] + slope[i];
+                        y[i] += stages[j][i] * A[stage][j];
+                        earlier[i] += weight * stages[j][i];
                     }
-                    for i in 0..K {
-                        b[K + i] += time_weight * partials.by_time[i];
-                    }
-                    stages[stage] = eliminated.solve(&partials, &b);
                 }
+                let slope = task.system().derivative_aside(&forcing, &y);
+                let time_weight = (h * TIME[stage]).v();
+                let mut b = slope;
                 for i in 0..D {
-                    y[i] += stages[STAGES - 1][i];
+                    b[i] = per_h * earlier[i] + slope[i];
                 }
-                error = tolerance.norm(&x, &y, &stages[STAGES - 1]);
+                for i in 0..K {
+                    b[K + i] += time_weight * partials.by_time[i];
+                }
+                stages[stage] = eliminated.solve(&partials, &b);
             }
+            for i in 0..D {
+                y[i] += stages[STAGES - 1][i];
+            }
+            error = tolerance.norm(&x, &y, &stages[STAGES - 1]);
+        }
 
-            let next = control.proposals(error, h);
-            let fail = |reason, time_s, count| Ended::Failed { reason, time_s, count };
-            let is_in_range = task.system().in_range(&y);
-            if error.0 < 1.0 {
-                count.accepted += 1;
-                control.settle(0, Verdict::Accepted, &next);
-                let dense = Dense::new(h, &x, &y, &stages);
-                if is_fresh {
-                    task.begin(&at_start, &x, &dense.slope_before);
-                    is_fresh = false;
-                }
-                task.observe(
-                    &forcing,
-                    &Step {
-                        end_s: N(reached),
-                        length_s: h,
-                        before: &x,
-                        slope_before: &dense.slope_before,
-                        after: &y,
-                        slope_after: &dense.slope_after,
-                        dense: Some(&dense.fourth),
-                    },
-                );
-                x = y;
-                t = reached;
-                is_known = false;
-                if !is_in_range {
-                    break fail(Failure::Diverged, t, count);
-                }
-                if is_last {
-                    break Ended::Arrived(count);
-                }
-            } else {
-                count.rejected += 1;
-                control.settle(0, Verdict::Rejected, &next);
-                if control.step.0 <= 16.0 * f64::EPSILON * t.abs().max(leg.end_s) {
-                    let reason =
-                        if is_in_range { Failure::StepTooSmall } else { Failure::Diverged };
-                    break fail(reason, t, count);
-                }
+        let accepted = error.0 < 1.0;
+        let in_range = task.system().in_range(&y);
+        let length_s = lanes.settle(h, error, [accepted, in_range], tolerance);
+        if accepted {
+            let dense = Dense::new(h, &x, &y, &stages);
+            if is_fresh {
+                task.begin(&at_start, &x, &dense.slope_before);
             }
-            if count.accepted + count.rejected >= tolerance.max_steps {
-                break fail(Failure::StepLimit, t, count);
+            task.observe(
+                &forcing,
+                &Step {
+                    end_s: lanes.time,
+                    length_s,
+                    before: &x,
+                    slope_before: &dense.slope_before,
+                    after: &y,
+                    slope_after: &dense.slope_after,
+                    dense: Some(&dense.fourth),
+                },
+            );
+            x = y;
+            (is_fresh, is_known) = (false, false);
+            // Where the allowance ran out: after this step, not before.
+            if let Some(Ended::Failed { reason: Failure::StepLimit, time_s, .. }) =
+                &mut lanes.ended[0]
+            {
+                *time_s = end;
             }
-        };
+        }
     }
 }
 
