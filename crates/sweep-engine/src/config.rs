@@ -146,13 +146,11 @@ fn resolve<M: Read, T>(
     finish: impl FnOnce(&mut Draft<'_, M>) -> T,
 ) -> Result<(Plan<M>, T), Diagnostics> {
     let report = Report::default();
-    let Some(mut draft) = grid::draft(input, &report) else {
-        return Err(report.into_diagnostics());
-    };
-    let finished = finish(&mut draft);
-    whole::steps(&draft);
-    M::judge(&draft);
-    let mut plan = draft.plan;
-    plan.written = WrittenIn(report.written());
-    report.finish((plan, finished))
+    let read = grid::draft(input, &report).map(|mut draft| {
+        let finished = finish(&mut draft);
+        whole::steps(&draft);
+        M::judge(&draft);
+        (Plan { written: WrittenIn(report.written()), ..draft.plan }, finished)
+    });
+    report.finish(read)
 }

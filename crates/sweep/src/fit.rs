@@ -148,7 +148,7 @@ fn free(options: &FitOptions, cases: &[Case]) -> Result<Vec<Free>, Diagnostics> 
             found.push(Free { case: (option == "--own").then_some(k), ..free });
         }
     }
-    mistakes.finish(found)
+    mistakes.finish(Some(found))
 }
 
 /// One of them, of a case, beside those that are known; what is wrong with it is reported.

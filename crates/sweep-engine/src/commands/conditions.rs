@@ -23,7 +23,7 @@ pub fn parse(
         }
     };
     let parsed = texts.iter().filter_map(parse).collect();
-    report.finish(parsed)
+    report.finish(Some(parsed))
 }
 
 /// The condition of `--where`, which chooses rows.

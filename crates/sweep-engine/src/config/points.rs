@@ -58,7 +58,7 @@ where
             report.push(Diagnostic::new(title).at(&whole, expected));
         }
     }
-    report.finish(of_axes)
+    report.finish(Some(of_axes))
 }
 
 /// The mistake of a column that holds no numbers.

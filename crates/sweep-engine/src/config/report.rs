@@ -208,9 +208,9 @@ impl Report {
         self.found.borrow().found.is_empty()
     }
 
-    /// The value if nothing is wrong.
-    pub fn finish<T>(self, value: T) -> Result<T, Diagnostics> {
-        if self.is_clean() { Ok(value) } else { Err(self.into_diagnostics()) }
+    /// The value if there is one and nothing is wrong.
+    pub fn finish<T>(self, value: Option<T>) -> Result<T, Diagnostics> {
+        value.filter(|_| self.is_clean()).ok_or_else(|| self.into_diagnostics())
     }
 
     /// Everything that was found.

@@ -75,10 +75,7 @@ impl<M: Rows> Study<M> {
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, Diagnostics> {
         let report = Report::default();
         let study = Self::read(path, sets, &report);
-        match study {
-            Some(study) => report.finish(study),
-            None => Err(report.into_diagnostics()),
-        }
+        report.finish(study)
     }
 
     fn read(path: &Path, sets: &[String], report: &Report) -> Option<Self> {

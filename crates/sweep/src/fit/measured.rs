@@ -111,10 +111,7 @@ impl Measured {
         let report = Report::default();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let found = NumberTable::read(path, &report).map(|table| judged(name, table, &report));
-        match found {
-            Some(measured) => report.finish(measured),
-            None => Err(report.into_diagnostics()),
-        }
+        report.finish(found)
     }
 
     /// A measurement in memory.
@@ -125,7 +122,7 @@ impl Measured {
         let report = Report::default();
         let table = NumberTable::of_columns("table", columns, &report);
         let measured = judged("table".to_owned(), table, &report);
-        report.finish(measured)
+        report.finish(Some(measured))
     }
 
     /// Samples of all columns together.
