@@ -43,6 +43,8 @@ pub use search::{BoundaryOptions, BoundaryTask};
 use span::{Hint, Question, Side, SideRange, Span, Tried};
 pub use trace::trace;
 
+use sweep_parameter::named;
+
 /// A point to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
@@ -72,38 +74,22 @@ pub struct Search {
     pub lattice: usize,
 }
 
-/// What a row of the boundary file says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum EdgeKind {
-    /// The quantity passes its limit continuously within the bracket.
-    Crossing,
-    /// The quantity leaps over its limit within the bracket, however closely one looks.
-    Jump,
-    /// On one side of the bracket the quantity is not defined (a model failed, or there is nothing
-    /// to compare).
-    Undefined,
-    /// On the reliable side wherever it was evaluated.
-    NoneReliable,
-    /// Not on the reliable side wherever it was evaluated.
-    NoneUnreliable,
-    /// Not defined wherever it was evaluated.
-    NoneUndefined,
-}
-
-impl EdgeKind {
-    /// Every kind with its name, in the order of the file's dictionary, which is that above.
-    pub const ALL: [(Self, &'static str); 6] = [
-        (Self::Crossing, "crossing"),
-        (Self::Jump, "jump"),
-        (Self::Undefined, "undefined"),
-        (Self::NoneReliable, "none_in_range_reliable"),
-        (Self::NoneUnreliable, "none_in_range_unreliable"),
-        (Self::NoneUndefined, "none_in_range_undefined"),
-    ];
-
-    /// As in the file.
-    pub const fn name(self) -> &'static str {
-        Self::ALL[self as usize].1
+named! {
+    /// What a row of the boundary file says, in the order of the file's dictionary.
+    pub enum EdgeKind {
+        /// The quantity passes its limit continuously within the bracket.
+        Crossing = "crossing",
+        /// The quantity leaps over its limit within the bracket, however closely one looks.
+        Jump = "jump",
+        /// On one side of the bracket the quantity is not defined (a model failed, or there is
+        /// nothing to compare).
+        Undefined = "undefined",
+        /// On the reliable side wherever it was evaluated.
+        NoneReliable = "none_in_range_reliable",
+        /// Not on the reliable side wherever it was evaluated.
+        NoneUnreliable = "none_in_range_unreliable",
+        /// Not defined wherever it was evaluated.
+        NoneUndefined = "none_in_range_undefined",
     }
 }
 

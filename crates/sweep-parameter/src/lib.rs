@@ -2,6 +2,8 @@
 //! their names; and which way a number of a result is bad. Models, the engine and whoever reads
 //! results share them.
 
+mod named;
+
 use std::fmt;
 
 /// A number that can be set and swept.
@@ -73,31 +75,17 @@ impl Range {
     }
 }
 
-/// Which way a number is bad.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Worse {
-    /// The greater it is.
-    Greater,
-    /// The less it is.
-    Less,
+named! {
+    /// Which way a number is bad; named as column dictionaries say it.
+    pub enum Worse {
+        /// The greater it is.
+        Greater = "greater",
+        /// The less it is.
+        Less = "less",
+    }
 }
 
 impl Worse {
-    /// As column dictionaries say it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Greater => "greater",
-            Self::Less => "less",
-        }
-    }
-
-    /// Of this name.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Greater, Self::Less].into_iter().find(|one| one.name() == name)
-    }
-
     /// The worst value: the greatest or the least.
     #[must_use]
     pub const fn extreme(self) -> &'static str {

@@ -1,6 +1,6 @@
 //! What a map can show: one column, with its words and colours.
 
-use sweep_parameter::Worse;
+use sweep_parameter::{Worse, named};
 
 use super::PlotOptions;
 use super::colour::ColourScale;
@@ -19,28 +19,22 @@ pub(crate) struct Shown {
     pub(crate) channel: Option<String>,
 }
 
-/// What columns are of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Group {
-    /// A ratio of both models.
-    Ratio,
-    /// An amplitude of the nonlinear model.
-    Nonlinear,
-    /// An amplitude of the linear model.
-    Linear,
-    /// Anything else.
-    Other,
+named! {
+    /// What columns are of, in the order in which a page offers them: by the name that a page has
+    /// for it, which is what the names of a channel's columns start with.
+    pub(crate) enum Group {
+        /// A ratio of both models.
+        Ratio = "ratio",
+        /// An amplitude of the nonlinear model.
+        Nonlinear = "nonlinear",
+        /// An amplitude of the linear model.
+        Linear = "linear",
+        /// Anything else.
+        Other = "other",
+    }
 }
 
 impl Group {
-    /// Every group, in the order in which a page offers them.
-    pub(crate) const ALL: [Self; 4] = [Self::Ratio, Self::Nonlinear, Self::Linear, Self::Other];
-
-    /// As a page knows it, which is what the names of a channel's columns start with.
-    pub(crate) const fn name(self) -> &'static str {
-        ["ratio", "nonlinear", "linear", "other"][self as usize]
-    }
-
     /// In words, for a list to choose from.
     pub(crate) const fn words(self) -> &'static str {
         match self {

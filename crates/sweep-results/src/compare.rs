@@ -15,30 +15,21 @@ pub use plans::PlanChange;
 use crate::error::{Result, ResultsError};
 use side::Side;
 use sweep_files::{Cell, ResultTable, ratio_limits};
+use sweep_parameter::named;
 
-/// What became of a row's verdict.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Flip {
-    /// The same.
-    None,
-    /// It was reliable and is not.
-    Lost,
-    /// It was not reliable and is.
-    Gained,
-    /// It has a verdict, or has none any more.
-    Defined,
-}
-
-impl Flip {
-    /// In the file of differences.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Lost => "lost",
-            Self::Gained => "gained",
-            Self::Defined => "defined",
-        }
+named! {
+    /// What became of a row's verdict, as a file of differences says it.
+    #[derive(Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Flip {
+        /// The same.
+        None = "none",
+        /// It was reliable and is not.
+        Lost = "lost",
+        /// It was not reliable and is.
+        Gained = "gained",
+        /// It has a verdict, or has none any more.
+        Defined = "defined",
     }
 }
 

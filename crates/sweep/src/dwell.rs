@@ -10,8 +10,9 @@ use std::sync::Arc;
 
 use lane_ode::Simd;
 use serde_json::{Value, json};
+use sweep_parameter::named;
 use washer_model::{Dwell, Endings, Starts, State, Wanted, decimal};
-use washer_row::{Status, named};
+use washer_row::Status;
 
 use crate::engine::{Carried, motions as motions_of};
 use crate::plan::Plan;
@@ -39,8 +40,7 @@ impl FromStr for Carry {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let named = Self::ALL.into_iter().find(|way| way.name() == text);
-        named.ok_or_else(|| "expected up or down".to_owned())
+        Self::named(text).ok_or_else(|| "expected up or down".to_owned())
     }
 }
 

@@ -400,7 +400,7 @@ pub(crate) fn keep(
             }
             let names = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
             let at = names.zip(plan.axis_values(point)).collect();
-            let level = level.and_then(|name| Level::ALL.into_iter().find(|it| it.name() == name));
+            let level = level.and_then(|name| Level::named(&name));
             let view = View {
                 every_s: Some(plan.end_s / KEPT_INSTANTS),
                 models: Models::Both,

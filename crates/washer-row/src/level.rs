@@ -1,6 +1,6 @@
 //! The rung or method that a row's numbers come from.
 
-crate::named! {
+sweep_parameter::named! {
     /// Which method a row's numbers come from, and which rung if it has several. The position is
     /// its code in chunk files, so new ones go to the end.
     #[derive(Default)]

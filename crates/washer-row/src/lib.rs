@@ -15,7 +15,6 @@ mod convergence;
 mod ladder;
 mod level;
 mod measures;
-mod named;
 mod outcome;
 mod run;
 mod twin;

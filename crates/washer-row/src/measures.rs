@@ -1,9 +1,8 @@
 //! What a run measures: the amplitude by which the two models are compared, and metrics.
 
-use sweep_parameter::{Limit, Worse};
+use sweep_parameter::{Limit, Worse, named};
 use washer_model::{Channel, Extra, Wanted};
 
-use crate::named;
 use crate::outcome::{Deviations, Outcome};
 
 /// Deviations below this count as this (m, rad) where turns are compared: neither 0 over 0 nor what

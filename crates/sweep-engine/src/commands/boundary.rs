@@ -131,7 +131,7 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
     );
     let rows = || traced.curves.iter().flatten();
     let of_kind = |row: &TracedRow, kind| row.edges.iter().filter(|edge| edge.kind == kind).count();
-    let found = EdgeKind::ALL.into_iter().filter_map(|(kind, _)| {
+    let found = EdgeKind::ALL.into_iter().filter_map(|kind| {
         let count: usize = rows().map(|row| of_kind(row, kind)).sum();
         let [noun, rest] = in_words(kind);
         (count > 0).then(|| counted(count, noun) + rest)

@@ -52,8 +52,7 @@ impl Read for Washer {
             let key = Key::new("criterion", about).set();
             let mut word = criterion.name().to_owned();
             keys.key(key, &Kind::Word(&Criterion::ALL.map(Criterion::name)), &mut word);
-            let found = Criterion::ALL.into_iter().find(|one| one.name() == word);
-            *criterion = found.unwrap_or_default();
+            *criterion = Criterion::named(&word).unwrap_or_default();
         }
     }
 

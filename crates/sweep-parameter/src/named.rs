@@ -1,7 +1,7 @@
 //! Enumerations whose values have names.
 
 /// An enumeration of values without data, each with its name in files: the type, `ALL` of its
-/// values in the order of their codes, and `name`.
+/// values in the order of their codes, `name`, and `named`.
 #[macro_export]
 macro_rules! named {
     (
@@ -21,6 +21,11 @@ macro_rules! named {
             /// Name in files.
             pub const fn name(self) -> &'static str {
                 [$($name),+][self as usize]
+            }
+
+            /// The one of this name.
+            pub fn named(name: &str) -> Option<Self> {
+                Self::ALL.into_iter().find(|one| one.name() == name)
             }
         }
     };
