@@ -2,6 +2,7 @@
 //! (`store::schema`), in one piece.
 
 use std::io::Cursor;
+use std::path::Path;
 use std::sync::Arc;
 
 use arrow_array::types::Int32Type;
@@ -13,6 +14,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use serde_json::Value;
 
+use crate::StoreError;
 use crate::build::Build;
 use crate::store::schema::{Column, Kind, writer};
 use sweep_files::batches::of_arrow;
@@ -104,18 +106,18 @@ impl Table {
         plan.unwrap_or_default()
     }
 
-    /// The file's bytes.
+    /// The bytes of a file at `path`.
     ///
     /// # Errors
-    /// What the Parquet library refuses: a defect of whoever filled the table.
-    pub fn into_bytes(self) -> Result<Vec<u8>, ParquetError> {
-        self.finish().map(|(_, bytes)| bytes)
+    /// As [`Self::finish`].
+    pub fn into_bytes(self, path: &Path) -> Result<Vec<u8>, StoreError> {
+        self.finish().map(|(_, bytes)| bytes).map_err(StoreError::parquet("write", path))
     }
 
     /// The columns, and the bytes of their file.
     ///
     /// # Errors
-    /// As [`Self::into_bytes`].
+    /// What the Parquet library refuses: a defect of whoever filled the table.
     pub fn finish(mut self) -> Result<(RecordBatch, Vec<u8>), ParquetError> {
         let Build { version, numerics } = self.build;
         self.text(key::VERSION, version.to_owned());

@@ -79,7 +79,7 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
     let task = Task::new(&plan, &asked(Some(0.5), 3)).unwrap();
     let interrupt = Interrupt::new();
     let traced = [1, 3].map(|threads| traced(&task, threads, &interrupt).unwrap());
-    let [one, three] = [0, 1].map(|k| task.table(&traced[k]).into_bytes().unwrap());
+    let [one, three] = [0, 1].map(|k| task.table(&traced[k]).finish().unwrap().1);
     assert!(one == three, "other bytes on three threads");
 
     let engine = ModelEngine::new(&plan).unwrap();

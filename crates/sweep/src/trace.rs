@@ -415,9 +415,7 @@ pub(crate) fn keep(
             // The row of a point without an equilibrium says so.
             if let Ok(trace) = found {
                 let path = folder.join(format!("point-{point}.parquet"));
-                let bytes =
-                    trace.table.into_bytes().map_err(StoreError::parquet("write", &path))?;
-                files::write(&path, FileKind::Trace, &bytes)?;
+                files::write(&path, FileKind::Trace, &trace.table.into_bytes(&path)?)?;
             }
             done();
             Ok(())

@@ -11,7 +11,7 @@ use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, TracedRow
 use crate::config::section::counted;
 use crate::effort::{Effort, EffortArgs};
 use crate::store::{Column, OpenedTrials, Trials};
-use crate::{Axis, Error, Exit, Plan, Progress, StoreError, Swept, duration, show, tell};
+use crate::{Axis, Error, Exit, Plan, Progress, Swept, duration, show, tell};
 use sweep_files::{FileKind, Output};
 use sweep_parameter::{Parameter as _, Worse};
 
@@ -86,8 +86,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         tell(text.trim_end());
         return Ok(Exit::interrupted(interrupt.signal()));
     };
-    let bytes = task.table(&found).into_bytes();
-    file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;
+    file.finish(&task.table(&found).into_bytes(&output)?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::{Lines as _, quoted, short, table};
 use crate::config::section::{counted, cut};
-use crate::{Build, Error, Exit, StoreError, show, tell};
+use crate::{Build, Error, Exit, show, tell};
 use fail_on::FailOn;
 use sweep_files::{FileKind, Output};
 use sweep_plot::capitalised;
@@ -85,9 +85,7 @@ pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
             let expected = "two maps: other files have no differences row by row";
             return Err(Error::option("--out", path.display(), expected));
         }
-        let bytes = differences::bytes(args, &found, &tables, build)
-            .map_err(StoreError::parquet("write", path))?;
-        output.finish(&bytes)?;
+        output.finish(&differences::table(args, &found, &tables, build).into_bytes(path)?)?;
     }
     let broken: Vec<String> =
         args.fail_on.iter().filter_map(|fail_on| fail_on.found(&found)).collect();

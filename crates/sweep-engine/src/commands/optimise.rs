@@ -10,7 +10,7 @@ use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
 use crate::store::{OpenedTrials, Trials};
-use crate::{EffortArgs, Error, Exit, StoreError, Swept, duration, tell};
+use crate::{EffortArgs, Error, Exit, Swept, duration, tell};
 use sweep_files::{FileKind, OWN_FILE, Output, atomic, key};
 use sweep_parameter::Parameter as _;
 use sweep_results::{Cell, ResultTable};
@@ -85,8 +85,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         tell(&format!("{}: interrupted after {wall}; the same command goes on", study.name));
         return Ok(Exit::interrupted(interrupt.signal()));
     };
-    let bytes = table(&study, &tried).into_bytes();
-    file.finish(&bytes.map_err(StoreError::parquet("write", &output))?)?;
+    file.finish(&table(&study, &tried).into_bytes(&output)?)?;
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }

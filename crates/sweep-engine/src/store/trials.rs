@@ -288,7 +288,7 @@ mod tests {
         table.text(key::PLAN_HASH, ours.hash().to_hex().to_string());
         table.metadata(key::BOUNDARY, &json!({}));
         table.counts("points", "", [1]);
-        fs::write(&output, table.into_bytes().unwrap()).unwrap();
+        fs::write(&output, table.into_bytes(&output).unwrap()).unwrap();
         let opened = Trials::open(&output, &ours, false);
         assert!(matches!(opened, Ok(OpenedTrials::Finished)), "{opened:?}");
         let refused = Trials::open(&output, &other, false);

@@ -7,7 +7,7 @@ use crate::config::{self, GridInput};
 use crate::fit::{self, FitOptions, Measured, Work};
 use sweep_engine::commands::grid::GridArgs;
 use sweep_engine::progress::Progress;
-use sweep_engine::{EffortArgs, Error, Exit, Interrupt, StoreError, show, tell, threads};
+use sweep_engine::{EffortArgs, Error, Exit, Interrupt, show, tell, threads};
 use sweep_files::{FileKind, OWN_FILE, Output};
 
 /// Arguments of `sweep fit`.
@@ -90,8 +90,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         tell(&format!("wrote {}", path.display()));
     }
     for (case, (path, file)) in curves.iter().zip(begun).enumerate() {
-        let bytes = fitted.curves(case).into_bytes();
-        file.finish(&bytes.map_err(StoreError::parquet("write", path))?)?;
+        file.finish(&fitted.curves(case).into_bytes(path)?)?;
         tell(&format!("wrote {0}; next: sweep plot {0}", path.display()));
     }
     let report = &fitted.report;

@@ -8,7 +8,7 @@ use washer_model::{Exact, ModeAtSpeed, ModeOverSpeed, decimal};
 use crate::config::GridInput;
 use crate::library::modes::{Analysis, Asked};
 use crate::speeds::Speeds;
-use sweep_engine::{Error, Exit, StoreError, show, tell};
+use sweep_engine::{Error, Exit, show, tell};
 use sweep_files::{FileKind, Output};
 
 /// Modes of the suspension, which differ from exact motions most.
@@ -57,9 +57,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let found = Analysis::new(&asked, &speeds, args.exact, &|| false)?;
     let Some(analysis) = found else { return Ok(Exit::Interrupted) };
     if let (Some(path), Some(output)) = (&args.out, output) {
-        let bytes = analysis.table(&asked).into_bytes();
-        let bytes = bytes.map_err(StoreError::parquet("write", path))?;
-        output.finish(&bytes)?;
+        output.finish(&analysis.table(&asked).into_bytes(path)?)?;
         tell(&format!(
             "wrote {}: {} modes at {} speeds",
             path.display(),

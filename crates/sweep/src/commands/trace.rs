@@ -9,7 +9,7 @@ use crate::trace::{
 };
 use sweep_engine::commands::cells::{Lines as _, short, table};
 use sweep_engine::commands::grid::quoted;
-use sweep_engine::{Error, Exit, Job, StoreError, tell};
+use sweep_engine::{Error, Exit, Job, tell};
 use sweep_files::{FileKind, Output, key};
 use sweep_parameter::Worse;
 use sweep_results::{Cell, ResultTable, top};
@@ -86,8 +86,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let traced = in_pool(&plan, at, &view, &|| false).map_err(Error::model)?;
     let Trace { table, instants, failures, method } = traced;
     failures.iter().for_each(|failure| tell(failure));
-    let bytes = table.into_bytes();
-    output.finish(&bytes.map_err(StoreError::parquet("write", &args.out))?)?;
+    output.finish(&table.into_bytes(&args.out)?)?;
     let of = if args.all { format!(" of {} points", plan.points()) } else { String::new() };
     let (out, end_s) = (args.out.display(), plan.end_s);
     tell(&format!("wrote {out}: {instants} instants{of} from 0 to {end_s} s"));

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use parquet::errors::ParquetError;
 use serde_json::json;
 
 use super::Args;
@@ -12,12 +11,12 @@ use sweep_parameter::Worse;
 use sweep_results::{Comparison, ResultTable, SharedRow};
 
 /// The file of differences: one row per row that both have.
-pub(super) fn bytes(
+pub(super) fn table(
     args: &Args,
     found: &Comparison,
     tables: &[ResultTable; 2],
     build: Build,
-) -> Result<Vec<u8>, ParquetError> {
+) -> Table {
     let mut table = Table::new(build);
     let rows = || found.shared.iter();
     table.counts("point", "row of A, from 0", rows().map(|row| row.rows[0]));
@@ -58,5 +57,5 @@ pub(super) fn bytes(
             "plan": found.plan,
         }),
     );
-    table.into_bytes()
+    table
 }
