@@ -16,50 +16,44 @@ use sweep_files::{self as files, ParquetFile};
 
 /// A column without its rows, which [`super::table::Column`] has.
 pub(crate) use sweep_files::Column as ColumnFacts;
-use sweep_parameter::Worse;
+use sweep_parameter::{Worse, named};
 
-/// What a file holds. Its columns show which.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
-    /// Candidates of a study.
-    Optimise,
-    /// Motions that held speeds end in.
-    Dwell,
-    /// Periodic responses over constant speeds.
-    Stability,
-    /// One row per grid point.
-    Map,
-    /// One row per grid point that two maps share.
-    Differences,
-    /// Time histories of both models at one point, or of a measurement and the model fitted to it.
-    Trace,
-    /// Modes over spin speed.
-    Modes,
-    /// The curve on which the ratio is at its limit.
-    Boundary,
-    /// A map whose points are scattered.
-    Design,
-}
-
-/// Each kind as in "a map file", with columns that show it, the surest first.
-const KINDS: [(Kind, &str, &[&str]); 9] = [
-    (Kind::Optimise, "study", &["candidate", "on_front"]),
-    (Kind::Dwell, "dwell", &["motion", "speed_rpm"]),
-    (Kind::Stability, "stability", &["growth_per_s", "speed_rpm"]),
-    (Kind::Map, "map", &["status", "ratio_max"]),
-    (Kind::Differences, "differences", &["ratio_change", "flip"]),
-    (Kind::Trace, "trace", &["time_s"]),
-    (Kind::Modes, "modes", &["mode", "frequency_rpm", "speed_rpm"]),
-    (Kind::Boundary, "boundary", &[]),
-    (Kind::Design, "design", &["status", "ratio_max"]),
-];
-
-impl Kind {
-    /// As in "a map file".
-    pub(crate) const fn name(self) -> &'static str {
-        KINDS[self as usize].1
+named! {
+    /// What a file holds, named as in "a map file".
+    pub(crate) enum Kind {
+        /// Candidates of a study.
+        Optimise = "study",
+        /// Motions that held speeds end in.
+        Dwell = "dwell",
+        /// Periodic responses over constant speeds.
+        Stability = "stability",
+        /// One row per grid point.
+        Map = "map",
+        /// One row per grid point that two maps share.
+        Differences = "differences",
+        /// Time histories of both models at one point, or of a measurement and the model fitted to
+        /// it.
+        Trace = "trace",
+        /// Modes over spin speed.
+        Modes = "modes",
+        /// The curve on which the ratio is at its limit.
+        Boundary = "boundary",
+        /// A map whose points are scattered.
+        Design = "design",
     }
 }
+
+/// The columns that show each kind, the surest first. A design has those of a map.
+const SHOWN_BY: [(Kind, &[&str]); 8] = [
+    (Kind::Optimise, &["candidate", "on_front"]),
+    (Kind::Dwell, &["motion", "speed_rpm"]),
+    (Kind::Stability, &["growth_per_s", "speed_rpm"]),
+    (Kind::Map, &["status", "ratio_max"]),
+    (Kind::Differences, &["ratio_change", "flip"]),
+    (Kind::Trace, &["time_s"]),
+    (Kind::Modes, &["mode", "frequency_rpm", "speed_rpm"]),
+    (Kind::Boundary, &[]),
+];
 
 /// A file whose columns are those of a figure.
 #[derive(Debug)]
@@ -347,7 +341,7 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 
 fn recognise(names: &[&str]) -> Option<Kind> {
     let of_trace = |name: &&str| name.starts_with("nonlinear_") || name.starts_with("measured_");
-    let is = |(kind, _, columns): &&(Kind, &str, &[&str])| {
+    let is = |(kind, columns): &&(Kind, &[&str])| {
         columns.iter().all(|name| names.contains(name))
             && match kind {
                 Kind::Trace => names.iter().any(of_trace),
@@ -355,7 +349,7 @@ fn recognise(names: &[&str]) -> Option<Kind> {
                 _ => true,
             }
     };
-    KINDS.iter().find(is).map(|(kind, ..)| *kind)
+    SHOWN_BY.iter().find(is).map(|(kind, _)| *kind)
 }
 
 /// The two columns between which a boundary is known to lie, after its two coordinates.

@@ -6,40 +6,30 @@ mod xlsx;
 use std::path::Path;
 
 use sweep_files::{FileKind, Output};
+use sweep_parameter::named;
 
 use crate::error::{Result, ResultsError};
 use sweep_files::ResultTable;
 
-/// A format, known by a file's ending.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Text: comments that begin with `#`, a line of names, a line per row.
-    Csv,
-    /// A workbook: the rows, the columns with units and descriptions, the plan.
-    Xlsx,
+named! {
+    /// A format, named as the ending of its files.
+    pub enum Format {
+        /// Text: comments that begin with `#`, a line of names, a line per row.
+        Csv = "csv",
+        /// A workbook: the rows, the columns with units and descriptions, the plan.
+        Xlsx = "xlsx",
+    }
 }
 
 impl Format {
-    /// Every format.
-    pub const ALL: [Self; 2] = [Self::Csv, Self::Xlsx];
-
-    /// The ending of its files, without a point.
-    pub const fn ending(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            Self::Xlsx => "xlsx",
-        }
-    }
-
     /// The format of a file's name.
     pub fn of(path: &Path) -> Option<Self> {
-        let ending = path.extension()?.to_str()?.to_ascii_lowercase();
-        Self::ALL.into_iter().find(|format| format.ending() == ending)
+        Self::named(&path.extension()?.to_str()?.to_ascii_lowercase())
     }
 
     /// What such a file may be written over.
     pub const fn kind(self) -> FileKind<'static> {
-        FileKind::Exported { ending: self.ending() }
+        FileKind::Exported { ending: self.name() }
     }
 }
 
@@ -69,6 +59,6 @@ fn names(table: &ResultTable) -> Vec<&str> {
 
 /// A refusal of a format.
 fn no_room(table: &ResultTable, format: Format, reason: &str) -> ResultsError {
-    let (path, ending) = (table.path().display(), format.ending());
+    let (path, ending) = (table.path().display(), format.name());
     ResultsError::Refused(format!("{path} cannot be exported as .{ending}: {reason}"))
 }
