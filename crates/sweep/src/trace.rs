@@ -644,7 +644,8 @@ mod tests {
         let machine = include_str!("../../../docs/examples/friction.toml");
         std::fs::write(folder.path().join("machine.toml"), machine).unwrap();
         let grid = "machine = \"machine.toml\"\n[time]\nend_s = 3.3\nwindow_s = [3.2, 3.3]\n\
-             [spin]\nprofile = \"table\"\ntime_s = [0, 3, 3.2, 3.25]\nspeed_rpm = [0, 1400, 0, 0]\n";
+             [spin]\nprofile = \"table\"\ntime_s = [0, 3, 3.2, 3.25]\n\
+             speed_rpm = [0, 1400, 0, 0]\n";
         let path = folder.path().join("grid.toml");
         let loads = |integrator: &str| {
             std::fs::write(&path, format!("{grid}{integrator}")).unwrap();

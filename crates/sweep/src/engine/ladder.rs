@@ -56,8 +56,8 @@ const SHORTER: f64 = 1.5;
 /// A finest rung is climbed if it costs less than this share of the reference.
 const WORTH_IT: f64 = 0.5;
 
-/// Accuracies below this are tight: caps alone hold the nonlinear model's rungs short, and rungs far
-/// apart agree too little, because errors shrink with the caps' square alone.
+/// Accuracies below this are tight: caps alone hold the nonlinear model's rungs short, and rungs
+/// far apart agree too little, because errors shrink with the caps' square alone.
 const TIGHT: f64 = 5e-5;
 
 /// For what errors a model's capped rungs are chosen, in parts of the accuracy. The first one only
@@ -300,8 +300,8 @@ fn expected_share(cases: &Cases<'_>, model: ModelKind, coarser: &Geared, finer: 
 }
 
 /// How many times greater than reckoned the share of an error that is left may be. Where caps are
-/// as low as the first rung's, a mode's shift is less than proportional to it. Where the accuracy is
-/// tight, 2.8 times as much was seen to be left in motions that amplify errors a hundredfold.
+/// as low as the first rung's, a mode's shift is less than proportional to it. Where the accuracy
+/// is tight, 2.8 times as much was seen to be left in motions that amplify errors a hundredfold.
 fn reserve(rung: usize, accuracy: f64) -> f64 {
     match rung {
         1 if accuracy < TIGHT => 2.5,
