@@ -177,7 +177,6 @@ pub fn prepare(
     let wanted = Wanted { damper_speeds: true, ..Wanted::default() };
     for _ in 0..MOST_MOTIONS {
         let mut open: Vec<&mut Open> = all.iter_mut().filter(|one| !one.is_done).collect();
-        open.sort_by(|a, b| a.step_s.total_cmp(&b.step_s));
         for alike in open.chunk_by_mut(|a, b| a.step_s == b.step_s) {
             let step_s = alike[0].step_s;
             let cap = STEP_TIMES_CAP * RK4_STABILITY_LIMIT / step_s;

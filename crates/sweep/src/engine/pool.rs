@@ -22,9 +22,8 @@ use super::{ModelEngine, Watch, growth};
 use crate::plan::Scenario;
 use sweep_files::panics::lock;
 
-/// Points that are made ready together: with friction they share lanes in the search for its
-/// speeds.
-const FED: usize = 4 * MAX_LANES;
+/// Points that are made ready together.
+const FED: usize = MAX_LANES;
 
 /// Kinds of runs, of which less than a group waits each.
 const KINDS: usize = 12;
