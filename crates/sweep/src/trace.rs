@@ -165,8 +165,8 @@ pub(crate) struct Trace {
     pub(crate) instants: usize,
     /// How each model failed that did, in words.
     pub(crate) failures: Vec<String>,
-    /// What integrated the nonlinear model, by its name in rows, where all points have one.
-    pub(crate) method: Option<String>,
+    /// What integrated the nonlinear model of the only point.
+    pub(crate) level: Option<Level>,
 }
 
 /// Histories of a plan's only point, which `at` names, or of all of its points, in a pool of their
@@ -231,9 +231,7 @@ pub(crate) fn trace(
     }
     table.metadata(key::TRACE, &facts);
     let failures = failures.into_iter().flatten().flatten().collect();
-    let method = run.method_json.get("row").or_else(|| run.method_json.get("method"));
-    let method = method.and_then(Value::as_str).map(str::to_owned);
-    Ok(Trace { table, instants: run.times_s.len(), failures, method })
+    Ok(Trace { table, instants: run.times_s.len(), failures, level: Some(run.level) })
 }
 
 /// As [`trace`] of every point of a plan, in one table with the points' numbers and axes: so many
@@ -268,7 +266,7 @@ pub(crate) fn trace_all(plan: &Plan, view: &View, stop: Stop<'_>) -> Trace {
     let facts = json!({ "every_s": view.every_s, "start": start_json(&view.start) });
     table.metadata(key::TRACE, &facts);
     let instants = each.iter().map(|run| run.times_s.len()).sum();
-    Trace { table, instants, failures, method: None }
+    Trace { table, instants, failures, level: None }
 }
 
 /// One point made ready.
@@ -278,6 +276,8 @@ struct Run {
     start: Start,
     /// The method of the nonlinear model, and that of the linear one.
     methods: [Method; 2],
+    /// What a row says of the nonlinear model's.
+    level: Level,
     method_json: Value,
     times_s: Vec<f64>,
 }
@@ -288,14 +288,14 @@ impl Run {
         let checkpoints = view.quick.map_or(0, |quick| quick.checkpoints);
         let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
         let point = ready(machine, spin.clone(), &timing)?;
-        let (methods, method_json) = methods(plan, &point, &spin, view.quick);
+        let (methods, level, method_json) = methods(plan, &point, &spin, view.quick);
         let times_s = match view.every_s {
             Some(every_s) => {
                 (0..instants(plan.end_s, every_s)).map(|k| k as f64 * every_s).collect()
             }
             None => spin.whole_turns_s(plan.end_s),
         };
-        Ok(Self { point, spin, start: view.start, methods, method_json, times_s })
+        Ok(Self { point, spin, start: view.start, methods, level, method_json, times_s })
     }
 }
 
@@ -449,26 +449,32 @@ fn named(letter: char, values: &[f64; COORDINATES]) -> Value {
 
 /// What integrates the nonlinear model and the linear one. A map may scale the bearings' mass to be
 /// quick; a single trajectory that is no row's keeps them as they are, by the reference's method.
-fn methods(plan: &Plan, point: &Point, spin: &Spin, quick: Option<Quick>) -> ([Method; 2], Value) {
+fn methods(
+    plan: &Plan,
+    point: &Point,
+    spin: &Spin,
+    quick: Option<Quick>,
+) -> ([Method; 2], Level, Value) {
     let of_row = |level: Level| {
         let mut json = plan.integrator.to_json();
         json["row"] = level.name().into();
         json
     };
     if let Some(Quick { level, methods, .. }) = quick {
-        return (methods, of_row(level));
+        return (methods, level, of_row(level));
     }
     match plan.integrator.direct() {
-        Some((_, method)) => ([method; 2], plan.integrator.to_json()),
+        Some((level, method)) => ([method; 2], level, plan.integrator.to_json()),
         None => {
             let cases = Cases::new([(point, spin)], plan.end_s);
             let accuracy = rule(plan).accuracy;
             let methods = MODELS.map(|model| reference(&cases, model, accuracy));
-            let json = match methods[0] {
-                Method::Rk4 { step_s } => Integrator::Rk4 { step_s }.to_json(),
-                _ => of_row(Level::Additive),
-            };
-            (methods, json)
+            match methods[0] {
+                Method::Rk4 { step_s } => {
+                    (methods, Level::Rk4, Integrator::Rk4 { step_s }.to_json())
+                }
+                _ => (methods, Level::Additive, of_row(Level::Additive)),
+            }
         }
     }
 }
@@ -656,10 +662,10 @@ mod tests {
             let traced = trace(&plan, plan.scenario(0), Vec::new(), &view, &|| false).unwrap();
             let rows = traced.table.finish().unwrap().0;
             let column = rows.column_by_name("foot_1_load_nonlinear_n").unwrap();
-            (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), traced.method)
+            (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), traced.level)
         };
-        let (of_file, method) = loads("");
-        assert_eq!(method.as_deref(), Some("additive"));
+        let (of_file, level) = loads("");
+        assert_eq!(level, Some(Level::Additive));
         let (expected, _) = loads("[integrator]\nmethod = \"rk4\"\nstep_s = 1e-5\n");
         for (load_n, expected_n) in of_file.iter().zip(&expected) {
             assert!((load_n / expected_n - 1.0).abs() < 2e-3, "{load_n} for {expected_n}");

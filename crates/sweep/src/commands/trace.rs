@@ -14,7 +14,7 @@ use sweep_files::{FileKind, Output, key};
 use sweep_parameter::Worse;
 use sweep_results::{Cell, ResultTable, top};
 use washer_model::Channel;
-use washer_row::{Trajectory, Verdict};
+use washer_row::{Level, Trajectory, Verdict};
 
 /// Arguments of `sweep trace`.
 #[derive(Debug, clap::Args)]
@@ -84,7 +84,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let view = View { every_s, models, start, extras, quick: None };
     // A signal ends the process: there is nothing to keep.
     let traced = in_pool(&plan, at, &view, &|| false).map_err(Error::model)?;
-    let Trace { table, instants, failures, method } = traced;
+    let Trace { table, instants, failures, level } = traced;
     failures.iter().for_each(|failure| tell(failure));
     output.finish(&table.into_bytes(&args.out)?)?;
     let of = if args.all { format!(" of {} points", plan.points()) } else { String::new() };
@@ -92,7 +92,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     tell(&format!("wrote {out}: {instants} instants{of} from 0 to {end_s} s"));
     // A map's row is of machines that start at rest, and of both models.
     if args.start.is_empty() && !args.all && models == Models::Both {
-        tell(compared(&plan, &chosen, method)?.trim_end());
+        tell(compared(&plan, &chosen, level)?.trim_end());
     }
     Ok(Exit::Done)
 }
@@ -149,7 +149,7 @@ fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> 
 
 /// Peaks of both models in the window, their ratios and the verdict: what the point's row of a map
 /// holds. `of_file` is the method of the trace.
-fn compared(plan: &Plan, at: &[String], of_file: Option<String>) -> Result<String, Error> {
+fn compared(plan: &Plan, at: &[String], of_file: Option<Level>) -> Result<String, Error> {
     let mut outcomes = ModelEngine::new(plan)?.evaluate_at(&[Vec::new()]);
     let Some(outcome) = outcomes.pop() else { return Ok(String::new()) };
     let (channels, limits) = (&plan.reliability.channels, plan.reliability.limits);
@@ -189,8 +189,8 @@ fn compared(plan: &Plan, at: &[String], of_file: Option<String>) -> Result<Strin
     };
     text.line("verdict", &said);
     if let Some(of_file) = of_file.filter(|_| plan.integrator.direct().is_none()) {
-        let method = outcome.method.name();
-        let told = format!("{method}, as in the point's row of a map; the file: {of_file}");
+        let [row, file] = [outcome.method, of_file].map(Level::name);
+        let told = format!("{row}, as in the point's row of a map; the file: {file}");
         text.line("method", told);
     }
     if outcome.sensitive == Some(true) {
