@@ -573,23 +573,14 @@ impl<'a> Search<'a> for Curve<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{BumpStop, Machine, Spin, Timing, prepare};
-    use lane_ode::Simd;
+    use crate::Machine;
+    use crate::stability::tests::{idle_stop, prepared};
 
     /// The paper's machine, with a stop that does nothing or without.
     fn point(has_stop: bool) -> crate::Point {
         let mut machine = Machine::paper();
-        machine.stops.extend(has_stop.then_some(BumpStop {
-            tub_m: [0.35, -0.28, 0.0],
-            direction: [0.0, -1.0, 0.0],
-            clearance_m: 1.0,
-            stiffness_n_per_m: 0.0,
-            damping_n_s_per_m: 0.0,
-            softness_m: 1e-4,
-        }));
-        let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![100.0] };
-        let timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints: 0 };
-        prepare(Simd::best(), &[(machine, spin)], &timing).remove(0).unwrap()
+        machine.stops.extend(has_stop.then(idle_stop));
+        prepared(machine, 100.0)
     }
 
     /// A curve through these speeds (rpm), each a length of 1 from the last, that turns back at

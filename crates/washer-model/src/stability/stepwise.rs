@@ -46,36 +46,24 @@ impl<T: Lane> Aside for Stepwise<T> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{BumpStop, Dwell, Machine, Point, Spin, Timing, prepare, respond};
-    use lane_ode::Simd;
+    use crate::stability::tests::{idle_stop, prepared, with};
+    use crate::{Dwell, Machine, Point, respond};
 
     /// The paper's machine with 0.3 kg on dampers of 30 N s/m, whose response folds back.
     fn folded(change: impl Fn(&mut Machine)) -> Point {
-        let mut machine = Machine::paper();
-        machine.unbalance.mass_kg = 0.3;
-        machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 30.0);
+        let mut machine = with(0.3, 30.0);
         change(&mut machine);
-        let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![100.0] };
-        let timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints: 0 };
-        prepare(Simd::best(), &[(machine, spin)], &timing).remove(0).unwrap()
+        prepared(machine, 100.0)
     }
 
     #[test]
     fn an_element_that_does_nothing_leaves_the_curve_where_it_is() {
-        let stop = BumpStop {
-            tub_m: [0.35, -0.28, 0.0],
-            direction: [0.0, -1.0, 0.0],
-            clearance_m: 1.0,
-            stiffness_n_per_m: 0.0,
-            damping_n_s_per_m: 0.0,
-            softness_m: 1e-4,
-        };
         let points = [
             folded(|_| {}),
-            folded(|machine| machine.stops.push(stop)),
+            folded(|machine| machine.stops.push(idle_stop())),
             folded(|machine| machine.dampers[0].friction_n = 1e-6),
         ];
-        let [without, with @ ..] = points.each_ref().map(|point| {
+        let [without, others @ ..] = points.each_ref().map(|point| {
             let dwells = [60.0, 110.0, 185.0, 255.0].map(|speed_rpm| Dwell { point, speed_rpm });
             let found: Vec<_> =
                 respond(&dwells, &|| false).into_iter().map(Result::unwrap).collect();
@@ -83,7 +71,7 @@ mod tests {
         });
         // At 255 rpm it has three.
         assert_eq!(without.len(), 6);
-        for with in with {
+        for with in others {
             assert_eq!(with.len(), without.len());
             for (one, other) in with.iter().zip(&without) {
                 let at = one.speed_rpm;

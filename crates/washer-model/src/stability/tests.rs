@@ -17,7 +17,7 @@ use std::f64::consts::PI;
 
 const TIMING: Timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints: 0 };
 
-fn prepared(machine: Machine, speed_rpm: f64) -> Point {
+pub(super) fn prepared(machine: Machine, speed_rpm: f64) -> Point {
     let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![speed_rpm] };
     prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
@@ -26,11 +26,23 @@ fn paper(case: &Value) -> Machine {
     with(number(case, "unbalance_mass_kg"), number(case, "damping_n_s_per_m"))
 }
 
-fn with(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
+pub(super) fn with(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = unbalance_mass_kg;
     machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = damping_n_s_per_m);
     machine
+}
+
+/// A stop that the tub never comes near, and that would do nothing.
+pub(super) fn idle_stop() -> BumpStop {
+    BumpStop {
+        tub_m: [0.35, -0.28, 0.0],
+        direction: [0.0, -1.0, 0.0],
+        clearance_m: 1.0,
+        stiffness_n_per_m: 0.0,
+        damping_n_s_per_m: 0.0,
+        softness_m: 1e-4,
+    }
 }
 
 fn number(case: &Value, name: &str) -> f64 {
