@@ -110,6 +110,8 @@ const WORTH_A_GEAR: f64 = 1.1;
 /// The machines for which a run's steps and caps are chosen, with their modes without caps.
 pub struct Cases<'a> {
     cases: Vec<Result<Case<'a>, NoModes>>,
+    /// When the runs end (s).
+    end_s: f64,
     is_stopped: &'a dyn Fn() -> bool,
 }
 
@@ -125,8 +127,6 @@ struct Case<'a> {
     hinge_rad_per_s: f64,
     /// The faster one.
     faster_hinge_rad_per_s: f64,
-    /// How long the run is (s).
-    end_s: f64,
     /// The greatest speed of the drum.
     top_rad_per_s: f64,
     /// The drum at the greatest speed of each gear.
@@ -183,7 +183,6 @@ impl<'a> Case<'a> {
             fastest_at_rest_rad_per_s: with_hinge(at_rest),
             hinge_rad_per_s: hinge,
             faster_hinge_rad_per_s: modes[SUSPENSION_MODES + 1].magnitude_rad_per_s,
-            end_s,
             top_rad_per_s: top,
             fastest_rad_per_s: highest_frequency_rad_per_s(point, 0.0)?
                 .max(highest_frequency_rad_per_s(point, top)?),
@@ -325,7 +324,7 @@ impl<'a> Cases<'a> {
     ) -> Self {
         let points = points.into_iter().take_while(|_| !is_stopped());
         let cases = points.map(|(point, spin)| Case::new(point, spin, end_s)).collect();
-        Self { cases, is_stopped }
+        Self { cases, end_s, is_stopped }
     }
 
     /// The longest step (s) at which plain RK4 is stable at all points; `None` if there are none.
@@ -342,8 +341,9 @@ impl<'a> Cases<'a> {
     #[must_use]
     pub fn left_out_of_hinge(&self, step_s: f64) -> f64 {
         let late_rad = self.cases.iter().flatten().map(|case| {
-            let step_phase = step_s * case.faster_hinge_rad_per_s;
-            case.end_s * case.faster_hinge_rad_per_s * Formula::Rk4.error_per_radian(step_phase)
+            let hinge_rad_per_s = case.faster_hinge_rad_per_s;
+            let error_per_radian = Formula::Rk4.error_per_radian(step_s * hinge_rad_per_s);
+            self.end_s * hinge_rad_per_s * error_per_radian
         });
         rounded_down(late_rad.fold(0.0, f64::max).min(1.0))
     }

@@ -147,7 +147,7 @@ pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladd
     if has_corners(cases, model) {
         let [first, second, reference, finer] =
             SHARES_AT_CORNERS.map(|share| at_corners(share, accuracy));
-        // It damps what bearings swing, however tight its tolerance.
+        // The additive method damps what bearings swing, however tight its tolerance.
         let step_s = following_step_s.min(REFERENCE_STEP_S);
         let following = plain(step_s, CONTRACTION_OF_FOLLOWING, f64::INFINITY);
         return Ladder::checked(vec![first, second, reference], Some(AT_CORNERS.to_owned()))
@@ -172,8 +172,9 @@ pub(crate) fn ladder(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Ladd
 
 /// The method that a row without doubts climbs to at most.
 pub(crate) fn reference(cases: &Cases<'_>, model: ModelKind, accuracy: f64) -> Method {
+    let [.., share, _] = SHARES_AT_CORNERS;
     match has_corners(cases, model) {
-        true => at_corners(SHARES_AT_CORNERS[2], accuracy).method,
+        true => at_corners(share, accuracy).method,
         false => Method::Rk4 { step_s: reference_step_s(cases) },
     }
 }
