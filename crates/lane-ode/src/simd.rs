@@ -79,6 +79,16 @@ impl Simd {
             .unwrap_or(Self::Scalar)
     }
 
+    /// The one with the fewest lanes that take so many trajectories at once, up to this: half the
+    /// lanes cost little more than half the time where a processor splits its widest instructions.
+    /// Results are the same bits on all of them.
+    #[must_use]
+    pub fn for_lanes(self, count: usize) -> Self {
+        let fits =
+            |simd: &Self| simd.is_available() && (count..=self.lanes()).contains(&simd.lanes());
+        Self::ALL.into_iter().rev().find(fits).unwrap_or(self)
+    }
+
     /// Whether this processor has it.
     #[must_use]
     pub fn is_available(self) -> bool {

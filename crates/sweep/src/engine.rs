@@ -69,14 +69,6 @@ fn forced_simd() -> Result<Option<Simd>, Error> {
     })
 }
 
-/// The instruction set with the fewest lanes that take so many trajectories at once: half the lanes
-/// cost little more than half the time where a processor splits its widest instructions. Results
-/// are the same bits on all of them.
-fn narrowest(trajectories: usize) -> Simd {
-    let fits = |simd: &Simd| simd.is_available() && simd.lanes() >= trajectories;
-    Simd::ALL.into_iter().rev().find(fits).unwrap_or_else(Simd::best)
-}
-
 impl<'a> ModelEngine<'a> {
     /// An engine for a plan, on the best instruction set or the one asked for.
     ///
@@ -196,7 +188,7 @@ impl<'a> ModelEngine<'a> {
     }
 
     fn simd_for(&self, trajectories: usize) -> Simd {
-        self.forced.unwrap_or_else(|| narrowest(trajectories))
+        self.forced.unwrap_or_else(|| Simd::best().for_lanes(trajectories))
     }
 
     /// Points made ready, those of one window together; or why there is none.

@@ -16,7 +16,7 @@ use washer_model::{
     Point, Spin, Start, Timing, histories, instants, together,
 };
 
-use crate::engine::{ModelEngine, Quick, reference, rule};
+use crate::engine::{ModelEngine, Quick, reference};
 use crate::method::Integrator;
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, friction_speeds, ready};
@@ -467,13 +467,12 @@ fn methods(
         Some((level, method)) => ([method; 2], level, plan.integrator.to_json()),
         None => {
             let cases = Cases::new([(point, spin)], plan.end_s);
-            let accuracy = rule(plan).accuracy;
-            let methods = MODELS.map(|model| reference(&cases, model, accuracy));
+            let methods = MODELS.map(|model| reference(&cases, model));
             match methods[0] {
                 Method::Rk4 { step_s } => {
                     (methods, Level::Rk4, Integrator::Rk4 { step_s }.to_json())
                 }
-                _ => (methods, Level::Additive, of_row(Level::Additive)),
+                _ => (methods, Level::Dop853, of_row(Level::Dop853)),
             }
         }
     }
@@ -665,7 +664,7 @@ mod tests {
             (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), traced.level)
         };
         let (of_file, level) = loads("");
-        assert_eq!(level, Some(Level::Additive));
+        assert_eq!(level, Some(Level::Dop853));
         let (expected, _) = loads("[integrator]\nmethod = \"rk4\"\nstep_s = 1e-5\n");
         for (load_n, expected_n) in of_file.iter().zip(&expected) {
             assert!((load_n / expected_n - 1.0).abs() < 2e-3, "{load_n} for {expected_n}");

@@ -153,10 +153,11 @@ fn walk_ladder(walk: &mut Walk<'_>, ladder: &mut Ladder) -> Option<()> {
 }
 
 /// The methods that pages run, before their numbers are read.
-const METHODS: [Method; 3] = [
+const METHODS: [Method; 4] = [
     Method::Rk4 { step_s: 0.0 },
     Method::Geared(Geared::steady(0.0, Caps { bearings_rad_per_s: 0.0, hinge_rad_per_s: None })),
     Method::Additive(Tolerance { relative: 0.0, absolute: 0.0, max_steps: 0 }),
+    Method::Dop853 { step_s: 0.0 },
 ];
 
 fn walk_rung(walk: &mut Walk<'_>, rung: &mut Rung) -> Option<()> {
@@ -172,7 +173,7 @@ fn walk_rung(walk: &mut Walk<'_>, rung: &mut Rung) -> Option<()> {
         rung.method = *method;
     }
     match &mut rung.method {
-        Method::Rk4 { step_s } => walk.numbers([step_s])?,
+        Method::Rk4 { step_s } | Method::Dop853 { step_s } => walk.numbers([step_s])?,
         Method::Geared(Geared { gears }) => {
             for Gear { up_to_rad_per_s, step_s, caps } in gears {
                 walk.numbers([up_to_rad_per_s, step_s, &mut caps.bearings_rad_per_s])?;

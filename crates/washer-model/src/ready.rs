@@ -38,8 +38,10 @@ const MOST_SHORTENED: f64 = 0.01;
 /// The bearings' cap times the step, as a share of the limit of stability.
 const STEP_TIMES_CAP: f64 = 0.9;
 
-/// Binary digits of a step: the last ones of an eigenvalue depend on the processor.
-const STEP_DIGITS: f64 = 256.0;
+/// How many steps there are to choose from within a doubling: so few that points beside each other
+/// share lanes, and that the last digits of an eigenvalue, which depend on the processor, do not
+/// count.
+const STEPS_OF_A_DOUBLING: f64 = 8.0;
 
 /// A search for the own speeds of a point.
 pub(crate) struct Search {
@@ -177,12 +179,14 @@ pub fn prepare(
     let wanted = Wanted { damper_speeds: true, ..Wanted::default() };
     for _ in 0..MOST_MOTIONS {
         let mut open: Vec<&mut Open> = all.iter_mut().filter(|one| !one.is_done).collect();
+        open.sort_by(|a, b| a.step_s.total_cmp(&b.step_s));
         for alike in open.chunk_by_mut(|a, b| a.step_s == b.step_s) {
             let step_s = alike[0].step_s;
             let cap = STEP_TIMES_CAP * RK4_STABILITY_LIMIT / step_s;
             let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
             let method = Method::Geared(Geared::steady(step_s, caps));
             let runs: Vec<&Point> = alike.iter().map(|one| &one.point).collect();
+            let simd = simd.for_lanes(runs.len());
             let (_, extras) = simulate_with(simd, ModelKind::Linear, &method, &runs, wanted);
             for (one, extra) in alike.iter_mut().zip(extras) {
                 one.take(&extra.damper_speeds_m_per_s);
@@ -211,8 +215,7 @@ impl Open {
     }
 }
 
-/// With few digits: the last ones of an eigenvalue depend on the processor.
 fn rounded_down(step_s: f64) -> f64 {
-    let unit = step_s.log2().floor().exp2() / STEP_DIGITS;
+    let unit = step_s.log2().floor().exp2() / STEPS_OF_A_DOUBLING;
     (step_s / unit).floor() * unit
 }

@@ -43,6 +43,12 @@ pub enum Method {
     /// An explicit formula on the machine whose bearings and hinge have scaled mass, so that none
     /// of their modes is faster than a cap (section 4.3 of the model page).
     Geared(Geared),
+    /// Dormand and Prince's formula of order 8, bearings and hinge as they are. The linear model
+    /// takes RK4 in its place.
+    Dop853 {
+        /// Longest step.
+        step_s: f64,
+    },
     /// Dormand-Prince 5(4).
     Dopri5(Tolerance),
     /// Kennedy and Carpenter's additive method of order 5(4), bearings and hinge implicit, for
@@ -75,7 +81,7 @@ fn enter<T: Lane, M: Model<T>>(
 ) -> Leg {
     model.set_spin(lane, &point.stretches[leg.stretch]);
     let step_s = match method {
-        Method::Rk4 { step_s } => *step_s,
+        Method::Rk4 { step_s } | Method::Dop853 { step_s } => *step_s,
         Method::Geared(geared) => {
             let gear = geared.gear(leg.fastest_rad_per_s);
             model.set_caps(lane, &gear.caps);
@@ -167,7 +173,7 @@ pub fn simulate_until(
 /// A model before the lanes' type is known, and what integrates it.
 pub(crate) trait Family {
     type Over<T: Lane>: Model<T>;
-    /// [`Method::Geared`], by the model's formula.
+    /// [`Method::Geared`] and [`Method::Dop853`], by the model's formula.
     type Geared: Fixed;
     /// [`Method::Additive`].
     type Additive: Stepper;
@@ -206,7 +212,9 @@ impl<'a> Order<'a> {
         const { assert!(F::Geared::FORMULA as u8 == Formula::of(F::KIND) as u8) };
         match *self.method {
             Method::Rk4 { .. } => simd.dispatch(self.by::<F, _>(ByRk4)),
-            Method::Geared(_) => simd.dispatch(self.by::<F, _>(F::Geared::NEW)),
+            Method::Geared(_) | Method::Dop853 { .. } => {
+                simd.dispatch(self.by::<F, _>(F::Geared::NEW))
+            }
             Method::Dopri5(tolerance) => simd.dispatch(self.by::<F, _>(ByDopri5(tolerance))),
             Method::Additive(tolerance) => simd.dispatch(self.by::<F, _>(F::ADDITIVE(tolerance))),
             Method::Rodas5p(tolerance) => {

@@ -43,7 +43,9 @@ impl Rung {
                     1e3 * step_s
                 )
             }
-            Method::Rk4 { step_s } => format!("{name} (step {:.3} ms)", 1e3 * step_s),
+            Method::Rk4 { step_s } | Method::Dop853 { step_s } => {
+                format!("{name} (step {:.3} ms)", 1e3 * step_s)
+            }
             Method::Additive(tolerance) => format!("{name} (tolerance {:.0e})", tolerance.relative),
             // Not on the fast method's ladder.
             Method::Dopri5(_) | Method::Rodas5p(_) => name.to_owned(),
@@ -70,8 +72,8 @@ impl Ladder {
         Self { rungs: vec![rung], reference: None, held_back: None }
     }
 
-    /// Rungs that check one another, at least two, of which the last is the reference: plain RK4
-    /// after the same in longer steps, or the additive method.
+    /// Rungs that check one another, at least two, of which the last is the reference: a formula
+    /// on the machine as it is, after the same in longer steps.
     #[must_use]
     pub const fn checked(rungs: Vec<Rung>, held_back: Option<String>) -> Self {
         let reference = Some(rungs.len() - 1);

@@ -20,6 +20,8 @@ sweep_parameter::named! {
         Rodas5p = "rodas5p",
         /// The additive method, for forces with corners.
         Additive = "additive",
+        /// Dormand and Prince's formula of order 8, for the same.
+        Dop853 = "dop853",
     }
 }
 

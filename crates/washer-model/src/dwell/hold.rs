@@ -46,17 +46,10 @@ pub(super) fn recorded(
     let find = |held: &[Held<'_>]| {
         let groups = held.chunks(simd.lanes());
         let group =
-            |held: &[Held<'_>]| narrowest(simd, held.len()).dispatch(Hold { held, turns, wanted });
+            |held: &[Held<'_>]| simd.for_lanes(held.len()).dispatch(Hold { held, turns, wanted });
         groups.flat_map(group).collect()
     };
     by_kind(held, |held| (held.row.kind(), false), find)
-}
-
-/// The instruction set with the fewest lanes that hold so many, up to a widest.
-fn narrowest(widest: Simd, count: usize) -> Simd {
-    let fits =
-        |simd: &Simd| simd.is_available() && (count..=widest.lanes()).contains(&simd.lanes());
-    Simd::ALL.into_iter().filter(fits).min_by_key(|simd| simd.lanes()).unwrap_or(widest)
 }
 
 /// Rows of one kind, no more than there are lanes.

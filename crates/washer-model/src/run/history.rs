@@ -152,7 +152,9 @@ fn sample_by<F: Family>(asked: &[Asked<'_>], stop: Stop<'_>) -> Vec<States> {
             Simd::dispatch_narrow(by::<F, _>(asked, stop, ByRk4))
         }
         Method::Rk4 { .. } => Simd::one_lane(by::<F, _>(asked, stop, ByRk4)),
-        Method::Geared(_) => Simd::one_lane(by::<F, _>(asked, stop, F::Geared::NEW)),
+        Method::Geared(_) | Method::Dop853 { .. } => {
+            Simd::one_lane(by::<F, _>(asked, stop, F::Geared::NEW))
+        }
         Method::Dopri5(tolerance) => Simd::one_lane(by::<F, _>(asked, stop, ByDopri5(tolerance))),
         Method::Additive(tolerance) => {
             Simd::one_lane(by::<F, _>(asked, stop, F::ADDITIVE(tolerance)))

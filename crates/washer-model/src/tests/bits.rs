@@ -20,9 +20,10 @@ const GEARED: Geared = {
     geared.gears[0] = Gear { up_to_rad_per_s: 15.0, step_s: 1.3e-3, caps: CAPS };
     geared
 };
-const METHODS: [Method; 4] = [
+const METHODS: [Method; 5] = [
     Method::Rk4 { step_s: 1e-4 },
     Method::Geared(GEARED),
+    Method::Dop853 { step_s: 4e-4 },
     Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
     Method::Additive(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
