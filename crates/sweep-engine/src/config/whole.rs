@@ -40,21 +40,21 @@ pub fn window<M: Model>(
     let [from_s, to_s, end_s] = [from_s, to_s, end_s].map(decimal);
     let title =
         format!("the window from {from_s} s to {to_s} s does not fit into a run to {end_s} s");
+    refuse(draft, title, &concerns, "expected window_from_s < window_to_s <= end_s");
+}
+
+/// Refuses how the concerned numbers go together, at each place where one was written.
+pub fn refuse<M: Model>(draft: &Draft<'_, M>, title: String, concerns: &[String], expected: &str) {
     draft.report.push_with(|sources| {
-        let expected = "expected window_from_s < window_to_s <= end_s";
         let labels = once(expected).chain(repeat("and this"));
-        let places = places(draft, &concerns, sources);
+        let places = places(draft, concerns, sources);
         places.iter().zip(labels).fold(Diagnostic::new(title), |all, (at, label)| all.at(at, label))
     });
 }
 
 /// Where the concerned numbers were written: the axes that sweep them first, then files and
 /// arguments.
-pub fn places<M: Model>(
-    draft: &Draft<'_, M>,
-    concerns: &[String],
-    sources: &Sources,
-) -> Vec<Location> {
+fn places<M: Model>(draft: &Draft<'_, M>, concerns: &[String], sources: &Sources) -> Vec<Location> {
     let sweeps = |parameter: &M::Parameter| {
         let parts = draft.plan.model.parts(parameter);
         parts.iter().any(|part| concerns.iter().any(|key| key == part))

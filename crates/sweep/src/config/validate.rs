@@ -1,7 +1,6 @@
 //! Checks of the resolved plan as a whole, each pointing back at the numbers it concerns.
 
 use std::collections::BTreeSet;
-use std::iter;
 
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
@@ -13,8 +12,7 @@ use crate::model::Washer;
 use crate::plan::{Plan, Scenario, timing};
 use sweep_engine::config::Draft;
 use sweep_engine::config::report::Diagnostic;
-use sweep_engine::config::source::Location;
-use sweep_engine::config::whole::{places, refuse_step, window};
+use sweep_engine::config::whole::{refuse, refuse_step, window};
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::plan::{MOST_STEPS, shortest_step_s};
 
@@ -115,12 +113,12 @@ impl Judge<'_> {
     /// they go together.
     fn corner(&mut self, scenario: &Scenario, new: Swept) {
         if new.machine {
-            self.violations(scenario.model.machine.joint_violations(), false);
+            self.violations(scenario.model.machine.joint_violations());
         }
         if new.spin {
             let violations = scenario.model.spin.joint_violations();
             self.spin_is_sound = violations.is_empty();
-            self.violations(violations, true);
+            self.violations(violations);
         }
         if new.window {
             window(self.draft, scenario, &mut self.reported);
@@ -130,14 +128,11 @@ impl Judge<'_> {
         }
     }
 
-    fn violations(&mut self, found: Vec<Violation>, of_spin: bool) {
-        for violation in found {
-            let concerns = keys(&violation, of_spin);
+    fn violations(&mut self, found: Vec<Violation>) {
+        for Violation { title, concerns, expected } in found {
             let judged = !concerns.iter().any(|key| self.draft.report.is_doubtful(key));
             if judged && self.reported.insert(concerns.clone()) {
-                self.draft.report.push_with(|sources| {
-                    describe(&violation, &places(self.draft, &concerns, sources))
-                });
+                refuse(self.draft, title, &concerns, &format!("expected {expected}"));
             }
         }
     }
@@ -159,20 +154,6 @@ fn turns(draft: &Draft<'_, Washer>, scenario: &Scenario, reported: &mut BTreeSet
     let expected =
         format!("expected at most {MOST_TURNS} turns for \"{name}\": shorten the window");
     draft.report.push(Diagnostic::new(title).at(&criterion, expected));
-}
-
-/// The keys under which the numbers' places are kept.
-fn keys(violation: &Violation, of_spin: bool) -> Vec<String> {
-    let tabled = of_spin && !matches!(violation, Violation::OutOfRange { .. });
-    let key = |name: String| if tabled { format!("spin_{name}") } else { name };
-    violation.concerns().into_iter().map(key).collect()
-}
-
-fn describe(violation: &Violation, places: &[Location]) -> Diagnostic {
-    let expected = format!("expected {}", violation.expected());
-    let labels = iter::once(expected).chain(iter::repeat("and this".to_owned()));
-    let diagnostic = Diagnostic::new(violation.to_string());
-    places.iter().zip(labels).fold(diagnostic, |refusal, (place, label)| refusal.at(place, label))
 }
 
 /// A machine whose fastest motion is too fast for an explicit method: for any number of steps that

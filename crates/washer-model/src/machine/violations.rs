@@ -13,207 +13,25 @@ const TIMES: Range = Range::NonNegative;
 const SPEEDS: Range = Range::Within(-1e5, 1e5);
 
 /// One reason why a machine or a spin is impossible.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Violation {
-    /// A number outside its parameter's range, or not a finite number.
-    #[error("{} = {} is out of range", parameter.name(), decimal(*value))]
-    OutOfRange {
-        /// The parameter.
-        parameter: Parameter,
-        /// Its value.
-        value: f64,
-    },
-    /// Principal moments of inertia that no rigid body has: one exceeds the sum of the other two.
-    #[error(
-        "no rigid body has the {body}'s inertia: I{} = {} exceeds the other two's sum, {}",
-        11 * (greatest + 1),
-        decimal(moments_kg_m2[*greatest]),
-        rounded(moments_kg_m2.iter().sum::<f64>() - moments_kg_m2[*greatest])
-    )]
-    Inertia {
-        /// `"tub"`, `"shaft"` or `"drum"`.
-        body: &'static str,
-        /// Index of the greatest moment, 0 to 2.
-        greatest: usize,
-        /// The three moments, in kg m^2.
-        moments_kg_m2: [f64; 3],
-    },
-    /// A spring or damper whose ends coincide.
-    #[error(
-        "the ends of {element} {number} are {} m apart: it has no direction",
-        rounded(*length_m)
-    )]
-    ZeroLength {
-        /// `"spring"` or `"damper"`.
-        element: &'static str,
-        /// Which, from 1.
-        number: usize,
-        /// Distance between its ends.
-        length_m: f64,
-    },
-    /// A stop whose direction has no length.
-    #[error("stop {number} has no direction")]
-    NoDirection {
-        /// Which stop, from 1.
-        number: usize,
-    },
-    /// An unbalance on the drum's axis, of a machine that has others.
-    #[error("unbalance {number} is on the drum's axis and unbalances nothing, beside others")]
-    OnAxis {
-        /// Which, from 1, the one that every machine has.
-        number: usize,
-    },
-    /// A cabinet whose feet do not hold it: not three or four of them, all in a line, or feet
-    /// without a cabinet.
-    #[error("{}", of_feet(*count, *has_cabinet))]
-    Feet {
-        /// How many.
-        count: usize,
-        /// Whether there is a cabinet on them.
-        has_cabinet: bool,
-    },
-    /// A foot that does not stand as high as the first: a floor is even.
-    #[error(
-        "foot {number} stands {} m {} than foot 1",
-        rounded(higher_m.abs()),
-        if *higher_m > 0.0 { "higher" } else { "lower" }
-    )]
-    FootOffTheFloor {
-        /// Which, from 1.
-        number: usize,
-        /// How much higher it stands (m).
-        higher_m: f64,
-    },
-    /// A foot that carries nothing even at rest: the machine's mass centre is beyond the others.
-    #[error("foot {number} lifts at rest: it would carry {load_n:.1} N")]
-    FootInTheAir {
-        /// Which, from 1.
-        number: usize,
-        /// Its load (N).
-        load_n: f64,
-    },
-    /// Bearings at one place cannot hold the shaft's direction.
-    #[error("front and rear bearing are {} m apart and hold no angle", rounded(*distance_m))]
-    BearingsTogether {
-        /// Distance between them.
-        distance_m: f64,
-    },
-    /// No spring carries the machine.
-    #[error("the machine has no springs: nothing carries it")]
-    NoSprings,
-    /// Times and speeds of a spin table do not pair up, or there are none.
-    #[error("{}", of_table(*times, *speeds))]
-    TableLength {
-        /// How many times.
-        times: usize,
-        /// How many speeds.
-        speeds: usize,
-    },
-    /// The first time of a spin table is not 0.
-    #[error("the spin table starts at {time_s} s")]
-    TableStart {
-        /// The first time.
-        time_s: f64,
-    },
-    /// A time of a spin table that does not come after the one before it.
-    #[error("time {time_s} s of the spin table follows {before_s} s")]
-    TableOrder {
-        /// Index of the later time, from 0.
-        index: usize,
-        /// The time before it.
-        before_s: f64,
-        /// The time.
-        time_s: f64,
-    },
-    /// An entry of a spin table that is out of range.
-    #[error(
-        "{column} = {} (entry {}) of the spin table is out of range",
-        decimal(*value),
-        index + 1
-    )]
-    TableValue {
-        /// `"time_s"` or `"speed_rpm"`.
-        column: &'static str,
-        /// Index from 0.
-        index: usize,
-        /// The entry.
-        value: f64,
-    },
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{title}")]
+pub struct Violation {
+    /// What is wrong.
+    pub title: String,
+    /// The numbers to look at: parameter names, or `spin_time_s[3]` and the like in a spin's table.
+    /// Empty where the missing thing has no number.
+    pub concerns: Vec<String>,
+    /// What would be accepted instead.
+    pub expected: String,
 }
 
 impl Violation {
-    /// The numbers to look at: parameter names, or `time_s[3]` and the like in a spin table. Empty
-    /// where the missing thing has no number.
-    #[must_use]
-    pub fn concerns(&self) -> Vec<String> {
-        match self {
-            Self::OutOfRange { parameter, .. } => vec![parameter.name().to_owned()],
-            Self::Inertia { body, .. } => {
-                [11, 22, 33].map(|ii| format!("{body}_inertia_{ii}_kg_m2")).into()
-            }
-            Self::ZeroLength { element, number, .. } => ["tub", "cabinet"]
-                .into_iter()
-                .flat_map(|end| components(&format!("{element}_{number}_{end}_"), "_m"))
-                .collect(),
-            Self::NoDirection { number } => {
-                components(&format!("stop_{number}_direction_"), "").into()
-            }
-            Self::OnAxis { number: 1 } => vec!["unbalance_radius_m".to_owned()],
-            Self::OnAxis { number } => vec![format!("unbalance_{number}_radius_m")],
-            Self::Feet { count, .. } => {
-                (1..=*count).flat_map(|foot| components(&format!("foot_{foot}_"), "_m")).collect()
-            }
-            Self::FootInTheAir { number, .. } => {
-                components(&format!("foot_{number}_"), "_m").into()
-            }
-            Self::FootOffTheFloor { number, .. } => vec![format!("foot_{number}_y_m")],
-            Self::BearingsTogether { .. } => {
-                vec!["bearing_rear_x_m".to_owned(), "bearing_front_x_m".to_owned()]
-            }
-            Self::NoSprings => Vec::new(),
-            Self::TableLength { .. } => vec!["speed_rpm".to_owned(), "time_s".to_owned()],
-            Self::TableStart { .. } => vec!["time_s[0]".to_owned()],
-            Self::TableOrder { index, .. } => vec![format!("time_s[{index}]")],
-            Self::TableValue { column, index, .. } => vec![format!("{column}[{index}]")],
-        }
-    }
-
-    /// The values that would be accepted instead.
-    #[must_use]
-    pub fn expected(&self) -> String {
-        match self {
-            Self::OutOfRange { parameter, value } => parameter.range().instead_of(*value),
-            Self::Inertia { .. } => "each moment at most the sum of the other two".to_owned(),
-            Self::ZeroLength { .. } => format!("ends at least {SHORTEST_M:e} m apart"),
-            Self::NoDirection { .. } => {
-                "the way from the tub to the stop, such as [0, 0, 1]; any length but 0 is made 1"
-                    .to_owned()
-            }
-            Self::OnAxis { .. } => {
-                "a distance from the axis, negative on the other side; a mass on the axis belongs \
-                 to the drum"
-                    .to_owned()
-            }
-            Self::Feet { has_cabinet: false, .. } => {
-                "a section [cabinet] with mass_kg, centre_m and friction, or no [[feet]]".to_owned()
-            }
-            Self::Feet { .. } => {
-                "three or four [[feet]] with foot_m = [x, y, z], not all in a line".to_owned()
-            }
-            Self::FootOffTheFloor { .. } => {
-                "one height for all feet: the second number of foot_m".to_owned()
-            }
-            Self::FootInTheAir { .. } => {
-                "feet around the mass centre of cabinet and machine together".to_owned()
-            }
-            Self::BearingsTogether { .. } => format!("bearings at least {SHORTEST_M:e} m apart"),
-            Self::NoSprings => "at least one spring".to_owned(),
-            Self::TableLength { .. } => "as many speeds as times, at least one of each".to_owned(),
-            Self::TableStart { .. } => "a table that starts at time 0".to_owned(),
-            Self::TableOrder { .. } => "times that increase".to_owned(),
-            Self::TableValue { column: "time_s", value, .. } => TIMES.instead_of(*value),
-            Self::TableValue { .. } => SPEEDS.to_string(),
-        }
+    fn new(
+        title: String,
+        concerns: impl IntoIterator<Item = String>,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self { title, concerns: concerns.into_iter().collect(), expected: expected.into() }
     }
 }
 
@@ -251,12 +69,10 @@ impl Machine {
         // The spin's own parameters are the spin's to judge; any table has none.
         let no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
         let mut found = out_of_range(self, &no_spin);
-        let in_range = |names: &[String]| {
-            !found.iter().any(|v| v.concerns().iter().any(|name| names.contains(name)))
-        };
         let mut joint = self.joint_violations();
         // A number refused by itself says all there is to say about what depends on it.
-        joint.retain(|violation| in_range(&violation.concerns()));
+        let refused = |name: &String| found.iter().any(|one| one.concerns.contains(name));
+        joint.retain(|violation| !violation.concerns.iter().any(refused));
         found.append(&mut joint);
         found
     }
@@ -275,19 +91,42 @@ impl Machine {
             let sum: f64 = moments_kg_m2.iter().sum();
             // A thin disc reaches equality: rounding must not refuse it.
             if moments_kg_m2[greatest] > (sum - moments_kg_m2[greatest]) * (1.0 + 1e-9) {
-                joint.push(Violation::Inertia { body, greatest, moments_kg_m2 });
+                let (ii, moment) = (11 * (greatest + 1), decimal(moments_kg_m2[greatest]));
+                let others = rounded(sum - moments_kg_m2[greatest]);
+                joint.push(Violation::new(
+                    format!(
+                        "no rigid body has the {body}'s inertia: I{ii} = {moment} exceeds the \
+                         other two's sum, {others}"
+                    ),
+                    [11, 22, 33].map(|ii| format!("{body}_inertia_{ii}_kg_m2")),
+                    "each moment at most the sum of the other two",
+                ));
             }
         }
         let springs = self.springs.iter().map(|s| ("spring", s.given_length_m())).enumerate();
         let dampers = self.dampers.iter().map(|d| ("damper", d.given_length_m())).enumerate();
         for (k, (element, length_m)) in springs.chain(dampers) {
             if length_m < SHORTEST_M {
-                joint.push(Violation::ZeroLength { element, number: k + 1, length_m });
+                let (number, length_m) = (k + 1, rounded(length_m));
+                let end = |end: &str| components(&format!("{element}_{number}_{end}_"), "_m");
+                joint.push(Violation::new(
+                    format!(
+                        "the ends of {element} {number} are {length_m} m apart: it has no direction"
+                    ),
+                    ["tub", "cabinet"].into_iter().flat_map(end),
+                    format!("ends at least {SHORTEST_M:e} m apart"),
+                ));
             }
         }
         for (k, stop) in self.stops.iter().enumerate() {
             if stop.direction_length() < SHORTEST_M {
-                joint.push(Violation::NoDirection { number: k + 1 });
+                let number = k + 1;
+                joint.push(Violation::new(
+                    format!("stop {number} has no direction"),
+                    components(&format!("stop_{number}_direction_"), ""),
+                    "the way from the tub to the stop, such as [0, 0, 1]; any length but 0 is made \
+                     1",
+                ));
             }
         }
         let has_cabinet = self.cabinet.is_some();
@@ -297,33 +136,68 @@ impl Machine {
                 for (k, foot) in self.feet.iter().enumerate() {
                     let higher_m = foot.foot_m[1] - first_y_m;
                     if higher_m.abs() > SHORTEST_M {
-                        joint.push(Violation::FootOffTheFloor { number: k + 1, higher_m });
+                        let (number, by_m) = (k + 1, rounded(higher_m.abs()));
+                        let way = if higher_m > 0.0 { "higher" } else { "lower" };
+                        joint.push(Violation::new(
+                            format!("foot {number} stands {by_m} m {way} than foot 1"),
+                            [format!("foot_{number}_y_m")],
+                            "one height for all feet: the second number of foot_m",
+                        ));
                     }
                 }
                 let loads_n = feet.at_rest_n(self).into_iter().enumerate();
                 let lifted = loads_n.filter(|(_, load_n)| *load_n <= 0.0);
-                joint.extend(
-                    lifted.map(|(k, load_n)| Violation::FootInTheAir { number: k + 1, load_n }),
-                );
+                joint.extend(lifted.map(|(k, load_n)| {
+                    let number = k + 1;
+                    Violation::new(
+                        format!("foot {number} lifts at rest: it would carry {load_n:.1} N"),
+                        components(&format!("foot_{number}_"), "_m"),
+                        "feet around the mass centre of cabinet and machine together",
+                    )
+                }));
             }
             None if has_cabinet || !self.feet.is_empty() => {
-                joint.push(Violation::Feet { count: self.feet.len(), has_cabinet });
+                let count = self.feet.len();
+                let expected = match has_cabinet {
+                    true => "three or four [[feet]] with foot_m = [x, y, z], not all in a line",
+                    false => {
+                        "a section [cabinet] with mass_kg, centre_m and friction, or no [[feet]]"
+                    }
+                };
+                let feet = (1..=count).flat_map(|foot| components(&format!("foot_{foot}_"), "_m"));
+                joint.push(Violation::new(of_feet(count, has_cabinet), feet, expected));
             }
             None => {}
         }
         if !self.further_unbalances.is_empty() {
             for (k, unbalance) in self.unbalances().enumerate() {
                 if unbalance.mass_kg != 0.0 && unbalance.radius_m == 0.0 {
-                    joint.push(Violation::OnAxis { number: k + 1 });
+                    let number = k + 1;
+                    let which = if k == 0 { String::new() } else { format!("{number}_") };
+                    joint.push(Violation::new(
+                        format!(
+                            "unbalance {number} is on the drum's axis and unbalances nothing, \
+                             beside others"
+                        ),
+                        [format!("unbalance_{which}radius_m")],
+                        "a distance from the axis, negative on the other side; a mass on the axis \
+                         belongs to the drum",
+                    ));
                 }
             }
         }
         let distance_m = self.bearings.front_x_m - self.bearings.rear_x_m;
         if distance_m < SHORTEST_M {
-            joint.push(Violation::BearingsTogether { distance_m });
+            let distance_m = rounded(distance_m);
+            joint.push(Violation::new(
+                format!("front and rear bearing are {distance_m} m apart and hold no angle"),
+                ["rear", "front"].map(|end| format!("bearing_{end}_x_m")),
+                format!("bearings at least {SHORTEST_M:e} m apart"),
+            ));
         }
         if self.springs.is_empty() {
-            joint.push(Violation::NoSprings);
+            let title = "the machine has no springs: nothing carries it".to_owned();
+            joint.push(Violation::new(title, [], "at least one spring"));
         }
         joint
     }
@@ -332,10 +206,13 @@ impl Machine {
 /// Every single number outside its range. Parameters of several numbers are judged by their parts.
 fn out_of_range(machine: &Machine, spin: &Spin) -> Vec<Violation> {
     let judge = |parameter: Parameter| {
-        let value = parameter.get(machine, spin)?;
+        let (name, value, range) =
+            (parameter.name(), parameter.get(machine, spin)?, parameter.range());
         let single = !parameter.target().is_several();
-        (single && !parameter.range().contains(value))
-            .then_some(Violation::OutOfRange { parameter, value })
+        (single && !range.contains(value)).then(|| {
+            let title = format!("{name} = {} is out of range", decimal(value));
+            Violation::new(title, [name.to_owned()], range.instead_of(value))
+        })
     };
     Parameter::all(machine, spin).into_iter().filter_map(judge).collect()
 }
@@ -358,18 +235,37 @@ impl Spin {
         let Self::Table { time_s, speed_rpm } = self else { return Vec::new() };
         let mut found = Vec::new();
         if time_s.len() != speed_rpm.len() || time_s.is_empty() {
-            found.push(Violation::TableLength { times: time_s.len(), speeds: speed_rpm.len() });
+            found.push(Violation::new(
+                of_table(time_s.len(), speed_rpm.len()),
+                ["spin_speed_rpm", "spin_time_s"].map(str::to_owned),
+                "as many speeds as times, at least one of each",
+            ));
         }
         for (column, values, range) in [("time_s", time_s, TIMES), ("speed_rpm", speed_rpm, SPEEDS)]
         {
             let bad = values.iter().enumerate().filter(|(_, value)| !range.contains(**value));
-            found.extend(bad.map(|(index, &value)| Violation::TableValue { column, index, value }));
+            found.extend(bad.map(|(index, &value)| {
+                let (said, entry) = (decimal(value), index + 1);
+                let expected = match column {
+                    "time_s" => range.instead_of(value),
+                    _ => range.to_string(),
+                };
+                Violation::new(
+                    format!("{column} = {said} (entry {entry}) of the spin table is out of range"),
+                    [format!("spin_{column}[{index}]")],
+                    expected,
+                )
+            }));
         }
         if let Some(&time_s) = time_s.first()
             && TIMES.contains(time_s)
             && time_s != 0.0
         {
-            found.push(Violation::TableStart { time_s });
+            found.push(Violation::new(
+                format!("the spin table starts at {time_s} s"),
+                ["spin_time_s[0]".to_owned()],
+                "a table that starts at time 0",
+            ));
         }
         for (k, pair) in time_s.windows(2).enumerate() {
             if let &[before_s, time_s] = pair
@@ -377,7 +273,11 @@ impl Spin {
                 && TIMES.contains(time_s)
                 && time_s <= before_s
             {
-                found.push(Violation::TableOrder { index: k + 1, before_s, time_s });
+                found.push(Violation::new(
+                    format!("time {time_s} s of the spin table follows {before_s} s"),
+                    [format!("spin_time_s[{}]", k + 1)],
+                    "times that increase",
+                ));
             }
         }
         found
@@ -454,8 +354,8 @@ mod tests {
         let spin = Spin::Ramp { peak_rpm: 1.0, ramp_s: 1.0 };
         let found = machine.violations();
         assert_eq!(found.len(), 3, "{found:?}");
-        for name in found.iter().flat_map(Violation::concerns) {
-            assert!(Parameter::find(&name, &machine, &spin).is_ok(), "{name}");
+        for name in found.iter().flat_map(|one| &one.concerns) {
+            assert!(Parameter::find(name, &machine, &spin).is_ok(), "{name}");
         }
     }
 
