@@ -1,9 +1,7 @@
 //! The clocks of adaptive methods: every lane with its own time, step and end.
 
-use crate::control::{StepControl, Tolerance};
-use crate::lane::{Lane, MAX_LANES};
-use crate::num::N;
-use crate::system::{Count, Ended, Failure, Task};
+use crate::control::StepControl;
+use crate::{Count, Ended, Failure, Lane, MAX_LANES, N, Task, Tolerance};
 
 /// The leg of one lane.
 #[derive(Clone, Copy, Default)]

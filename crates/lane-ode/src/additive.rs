@@ -13,10 +13,8 @@
 //! (2016) 975. The tests measure the order that they give.
 
 use crate::adaptive::Lanes;
-use crate::control::{Tolerance, padded};
-use crate::lane::Lane;
-use crate::num::N;
-use crate::system::{SemiImplicit, Step, System as _, Task};
+use crate::control::padded;
+use crate::{Lane, N, SemiImplicit, Step, System as _, Task, Tolerance};
 
 const STAGES: usize = 8;
 

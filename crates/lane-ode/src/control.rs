@@ -1,7 +1,6 @@
 //! Error norm and step size control of adaptive methods, per lane.
 
-use crate::lane::Lane;
-use crate::num::N;
+use crate::{Lane, N};
 
 /// Limits of an adaptive method.
 #[derive(Clone, Copy, Debug, PartialEq)]

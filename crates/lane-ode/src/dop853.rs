@@ -9,9 +9,7 @@
 //! latter.
 
 use crate::fixed::Legs;
-use crate::lane::Lane;
-use crate::num::N;
-use crate::system::{Step, System as _, Task};
+use crate::{Lane, N, Step, System as _, Task};
 use core::hint::black_box;
 
 /// On the imaginary axis the method is stable up to |h w| = 5.96.

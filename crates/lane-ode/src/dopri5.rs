@@ -5,10 +5,8 @@
 //! sections II.4 to II.6.
 
 use crate::adaptive::Lanes;
-use crate::control::{Tolerance, padded};
-use crate::lane::Lane;
-use crate::num::N;
-use crate::system::{Step, System as _, Task};
+use crate::control::padded;
+use crate::{Lane, N, Step, System as _, Task, Tolerance};
 
 const STAGES: usize = 7;
 

@@ -1,8 +1,7 @@
 //! Forward automatic differentiation: the same source, with one derivative carried along.
 
-use crate::lane::{Aside, Lane};
-use crate::num::N;
-use crate::real::{Real, operations};
+use crate::real::operations;
+use crate::{Aside, Lane, N, Real};
 
 /// A value and its derivative along one direction. Nest it for second derivatives.
 #[derive(Clone, Copy, Debug)]

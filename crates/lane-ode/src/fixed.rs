@@ -1,8 +1,6 @@
 //! The common part of methods with a fixed step: each lane's place in its leg, and how legs end.
 
-use crate::lane::{Lane, MAX_LANES};
-use crate::num::N;
-use crate::system::{Count, Ended, Failure, Leg, Task};
+use crate::{Count, Ended, Failure, Lane, Leg, MAX_LANES, N, Task};
 
 /// Most steps between two calls of [`Task::is_stopped`]: some hundredths of a second.
 pub const STEPS_AT_ONCE: u64 = 1 << 14;

@@ -1,6 +1,6 @@
 //! Lanes: independent trajectories side by side in one number.
 
-use crate::real::Real;
+use crate::Real;
 
 /// The most lanes that any instruction set has here.
 pub const MAX_LANES: usize = 8;

@@ -1,6 +1,6 @@
 //! Linear equations of a fixed size: Gauss's elimination, on the stack.
 
-use crate::num::N;
+use crate::N;
 
 /// Row-pivoted triangular factors of a square matrix.
 #[derive(Clone)]

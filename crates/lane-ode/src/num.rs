@@ -6,7 +6,7 @@
 //! its types say, on every instruction set. The rules, for a sum of two products, are
 //! `a*b + c*d = fma(a, b, c*d)`.
 
-use crate::real::Real;
+use crate::Real;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A value with operators.

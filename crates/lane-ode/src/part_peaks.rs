@@ -1,9 +1,7 @@
 //! Peaks of every part of a trajectory that is cut at known instants.
 
-use crate::lane::{Lane, MAX_LANES};
-use crate::num::N;
-use crate::peaks::Peaks;
-use crate::quintic::{Quintic, Sample, within_step};
+use crate::quintic::{Quintic, within_step};
+use crate::{Lane, MAX_LANES, N, Peaks, Sample};
 
 /// Largest magnitude of `M` outputs in every part of each lane's trajectory, parts being divided by
 /// instants of the lane's own.

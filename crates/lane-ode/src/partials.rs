@@ -1,10 +1,7 @@
 //! Partial derivatives of a second-order system, exact to rounding: the same source over dual
 //! numbers.
 
-use crate::dual::Dual;
-use crate::lane::Lane;
-use crate::num::N;
-use crate::system::System;
+use crate::{Dual, Lane, N, System};
 
 /// How the accelerations of a system of `C` coordinates change with its state and with time.
 ///

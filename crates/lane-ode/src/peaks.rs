@@ -1,8 +1,7 @@
 //! Streaming peaks: the largest magnitude of each output between steps as well as at them.
 
-use crate::lane::Lane;
-use crate::num::N;
-use crate::quintic::{Quintic, Sample};
+use crate::quintic::Quintic;
+use crate::{Lane, N, Sample};
 
 /// Largest magnitude so far of `M` outputs.
 ///

@@ -1,7 +1,6 @@
 //! An output between the ends of a step: the polynomial through values, slopes and curvatures.
 
-use crate::lane::Lane;
-use crate::num::N;
+use crate::{Lane, N};
 
 /// An output with its first two derivatives in time.
 #[derive(Clone, Copy, Debug)]

@@ -4,9 +4,7 @@
 //! Ordinary Differential Equations I, Table II.1.2.
 
 use crate::fixed::Legs;
-use crate::lane::Lane;
-use crate::num::N;
-use crate::system::{Step, System as _, Task};
+use crate::{Lane, N, Step, System as _, Task};
 use core::hint::black_box;
 
 /// On the imaginary axis the method is stable up to |h w| = 2 sqrt(2).

@@ -11,11 +11,8 @@
 //! II, section IV.7, Eq. 7.25. The tests hold them against the order conditions.
 
 use crate::adaptive::Lanes;
-use crate::control::{Tolerance, padded};
-use crate::linear_solve::Lu;
-use crate::num::N;
-use crate::partials::Partials;
-use crate::system::{Ended, Failure, Step, System as _, Task};
+use crate::control::padded;
+use crate::{Ended, Failure, Lu, N, Partials, Step, System as _, Task, Tolerance};
 
 const STAGES: usize = 8;
 

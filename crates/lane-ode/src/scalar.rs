@@ -1,9 +1,7 @@
 //! `f64` as one lane.
 
-use crate::lane::{Aside, Lane};
-use crate::real::{Real, operations};
-use crate::simd::Simd;
-use crate::trig;
+use crate::real::operations;
+use crate::{Aside, Lane, Real, Simd, trig};
 
 impl Real for f64 {
     type Mask = bool;

@@ -4,7 +4,7 @@ use core::fmt;
 
 #[cfg(not(target_arch = "x86_64"))]
 use crate::lane::out_of_line as one_lane;
-use crate::lane::{Aside, Lane};
+use crate::{Aside, Lane};
 #[cfg(target_arch = "x86_64")]
 use x86::one_lane;
 

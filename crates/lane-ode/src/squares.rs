@@ -1,8 +1,6 @@
 //! Streaming integrals of squares, for root mean squares.
 
-use crate::lane::Lane;
-use crate::num::N;
-use crate::quintic::Sample;
+use crate::{Lane, N, Sample};
 
 /// Integrals over time of the squares of `M` outputs.
 ///

@@ -1,7 +1,6 @@
 //! What integrators need of a system, and what they report of a trajectory.
 
-use crate::lane::{Aside, Lane};
-use crate::num::N;
+use crate::{Aside, Lane, N};
 
 /// A first-order system x' = f(t, x) with `D` states, in lanes.
 pub trait System<T: Lane, const D: usize> {

@@ -1,8 +1,7 @@
 //! How long an output is above zero, between steps as well as at them.
 
-use crate::lane::Lane;
-use crate::num::N;
-use crate::quintic::{Quintic, Sample};
+use crate::quintic::Quintic;
+use crate::{Lane, N, Sample};
 
 /// Halvings that find where an output passes zero: to a millionth of a millionth of the step.
 const HALVINGS: usize = 40;

@@ -6,9 +6,7 @@
 //! against arbitrary precision (`tests/trig.rs`): up to 1.2 ulp within pi/4, 1.5 ulp up to 1e6 rad,
 //! 1.6 ulp of angles in turns.
 
-use crate::lane::Lane;
-use crate::num::N;
-use crate::real::Real;
+use crate::{Lane, N, Real};
 use core::f64::consts::FRAC_PI_4;
 
 /// fdlibm `k_sin.c`: S1 to S6.

@@ -8,15 +8,14 @@ use serde_json::{Map as JsonMap, Value};
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
+use sweep_engine::config::Keys;
 use sweep_engine::config::schema::set;
-use sweep_engine::config::{Keys, Read};
-use sweep_engine::estimate::Estimate;
 use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Steps};
 use sweep_engine::store::read::{NameCounts, add};
-use sweep_engine::store::{Done, Job, Layout, Rows, Shape, axis_columns};
+use sweep_engine::store::{Done, Layout, Shape, axis_columns};
 use sweep_engine::{
-    Build, Engine, Error, GridInput, KeepRow, Listed, Model as EngineModel, NextRow, Plan,
-    Scenario, Swept, UnknownParameter, Watch, methods,
+    Build, Engine, Error, Estimate, GridInput, Job, KeepRow, Listed, Model as EngineModel, NextRow,
+    Plan, Read, Rows, Scenario, Swept, UnknownParameter, Watch, methods,
 };
 use sweep_parameter::{Channel, Range};
 

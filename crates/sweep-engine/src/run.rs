@@ -14,13 +14,12 @@ use std::sync::Mutex;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-use crate::interrupt::Interrupt;
 use crate::store::provenance::{self, Session};
 use crate::store::read::NameCounts;
 use crate::store::{Done, OpenOptions, OpenRun, Opened, ResultFile, Shard, ShardRequest, Tally};
 use crate::threads::{self};
 use crate::watch::Parts;
-use crate::{Engine, Environment, Job, Progress, ProgressMode, StoreError, Watch};
+use crate::{Engine, Environment, Interrupt, Job, Progress, ProgressMode, StoreError, Watch};
 use sweep_files::panics::{self, lock, unlocked};
 
 /// How to run.

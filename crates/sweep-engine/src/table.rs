@@ -14,9 +14,8 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use serde_json::Value;
 
-use crate::StoreError;
-use crate::build::Build;
 use crate::store::schema::{Column, Kind, writer};
+use crate::{Build, StoreError};
 use sweep_files::batches::of_arrow;
 use sweep_files::{Writer, key, panics, seal};
 use sweep_parameter::{Parameter, Worse};

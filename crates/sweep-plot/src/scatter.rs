@@ -1,13 +1,12 @@
 //! Points that are scattered rather than on a grid: what a design's figures need of its file.
 
-use super::PlotOptions;
-use super::error::{PlotError, Result};
+use super::error::Result;
 use super::influence::Influence;
 use super::label::{self, Label};
 use super::layer::{self, Group, Level};
 use super::read::Source;
-use super::share::Share;
-use super::swept;
+use super::{PlotOptions, swept};
+use crate::{PlotError, Share};
 use sweep_parameter::Worse;
 
 /// Most numbers of points that are kept; of a longer file some points are picked.

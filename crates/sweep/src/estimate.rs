@@ -5,14 +5,13 @@ use lane_ode::MAX_LANES;
 use washer_model::ModelKind;
 use washer_row::{Deviations, Ladder, Metric, Outcome, ROW_STATUSES, row_status};
 
-use crate::engine::{Engine, ModelEngine, Watch};
+use crate::engine::ModelEngine;
 use crate::plan::Plan;
-use sweep_engine::estimate::Estimate;
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::plan::shortest_step_s;
 use sweep_engine::store::read::{NameCounts, add};
 use sweep_engine::store::{Shape, chunk_points};
-use sweep_engine::{Error, Interrupt, Job};
+use sweep_engine::{Engine, Error, Estimate, Interrupt, Job, Watch};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long,
 /// in seconds.

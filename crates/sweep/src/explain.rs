@@ -14,13 +14,11 @@ use washer_model::{
     modes, peaks_without_departures,
 };
 
-use crate::engine::{ModelEngine, Watch, reference_step_s, simd_from_environment};
+use crate::engine::{ModelEngine, reference_step_s, simd_from_environment};
 use crate::plan::{self, Plan, Scenario};
 use crate::speeds::Speeds;
 use sweep_engine::config::NamedValues;
-use sweep_engine::effort::Effort;
-use sweep_engine::progress::Progress;
-use sweep_engine::{Error, Interrupt, threads};
+use sweep_engine::{Effort, Error, Interrupt, Progress, Watch, threads};
 
 use sweep_parameter::RatioLimits;
 use tongue::{Asker, Seen, tongues};

@@ -27,11 +27,10 @@ use washer_model::{Method, ModelKind, Parameter, Range, Target};
 
 use crate::config::GridInput;
 use crate::engine::simd_from_environment;
-use sweep_engine::config::report::{Diagnostic, Report as Mistakes};
-use sweep_engine::config::source::Location;
-use sweep_engine::design::{Design, Distribution, Rule, Shape};
+use sweep_engine::config::{Diagnostic, Location, Report as Mistakes};
+use sweep_engine::design::{Rule, Shape};
 use sweep_engine::threads::Stop;
-use sweep_engine::{Diagnostics, Error, tell};
+use sweep_engine::{Design, Diagnostics, Distribution, Error, tell};
 
 use algebra::Symmetric;
 use journal::Journal;

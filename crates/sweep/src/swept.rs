@@ -1,7 +1,6 @@
 //! What computes the washing machine's rows, for the engine's commands.
 
-use sweep_engine::estimate::Estimate;
-use sweep_engine::{Engine, Error, Swept};
+use sweep_engine::{Engine, Error, Estimate, Swept};
 use washer_model::{Machine, Parameter, Spin, Target};
 use washer_row::{Criterion, Demand, Metric};
 

@@ -1,11 +1,10 @@
 //! For benchmarks: parts of a step that the public interface does not expose.
 
 use crate::coordinates::STATES;
-use crate::kind::ModelKind;
-use crate::nonlinear::coupling::{Caps, Coupling};
-use crate::point::Point;
+use crate::nonlinear::coupling::Coupling;
 use crate::run::model::Model;
 use crate::run::{Family, OfLinear, OfNonlinear};
+use crate::{Caps, ModelKind, Point};
 use core::hint::black_box;
 use core::marker::PhantomData;
 use lane_ode::{Kernel, Lane, N, Simd, System};

@@ -11,13 +11,11 @@ mod starts;
 mod tests;
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, STATES};
-use crate::modes::Modes;
+use crate::coordinates::STATES;
 use crate::run::model::{Model, Nonlinear};
-use crate::run::{Extra, Wanted};
 use crate::stability::orbit::Row;
 use crate::stability::settings::{Case, Settings};
-use crate::stability::{Dwell, NoAnswer, Response, respond};
+use crate::{COORDINATES, Dwell, Extra, Modes, NoAnswer, Response, Wanted, respond};
 use course::{BLOCK, Course, Need, WINDOW, are_alike};
 use exponent::exponents;
 use hold::{Held, hold, recorded};

@@ -36,18 +36,15 @@
 pub(crate) mod geared;
 pub(crate) mod ringing;
 
-use crate::coordinates::COORDINATES;
+use crate::{
+    COORDINATES, Caps, Formula, Gear, Geared, Mode, ModelKind, Modes, NoModes, Point, Spin,
+    highest_frequency_rad_per_s,
+};
 use core::iter;
 
-use crate::fast::geared::{Formula, GEARS, Gear, Geared, interpolation_phase};
-use crate::kind::ModelKind;
-use crate::machine::spin::Spin;
-use crate::modes::{
-    Mode, Modes, Motion, NoModes, fastest_rigid_rad_per_s, highest_frequency_rad_per_s,
-    highest_with_caps, modes_with_caps, motions,
-};
-use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
-use crate::point::Point;
+use crate::fast::geared::{GEARS, interpolation_phase};
+use crate::modes::{Motion, fastest_rigid_rad_per_s, highest_with_caps, modes_with_caps, motions};
+use crate::nonlinear::coupling::BACKWARD_SHARE;
 
 /// Modes of the suspension: yaw, pitch, two translations.
 pub(crate) const SUSPENSION_MODES: usize = 4;

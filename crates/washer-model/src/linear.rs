@@ -12,9 +12,8 @@ pub(crate) mod sparse;
 pub(crate) mod step;
 pub(crate) mod symmetric;
 
-use crate::coordinates::{
-    COORDINATES, ROTOR_TURNS, SHAFT_Y, SHAFT_Z, TUB, TUB_TURNS, TUB_Y, TUB_Z, seeded,
-};
+use crate::COORDINATES;
+use crate::coordinates::{ROTOR_TURNS, SHAFT_Y, SHAFT_Z, TUB, TUB_TURNS, TUB_Y, TUB_Z, seeded};
 use crate::lanes::{Constant as _, InLanes as _, lane_struct};
 use crate::linear::harmonics::{FUNCTIONS, HARMONICS, SAMPLES};
 use crate::linear::rotor_terms::{

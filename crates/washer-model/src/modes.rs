@@ -6,12 +6,11 @@
 pub(crate) mod campbell;
 pub(crate) mod shape;
 
-use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT, STATES, TUB};
-use crate::kind::ModelKind;
-use crate::linear::{LinearPoint, Matrices};
+use crate::coordinates::{HINGE_PITCH, HINGE_YAW, SHAFT, STATES, TUB};
+use crate::linear::LinearPoint;
 use crate::machine::spin::SpinState;
-use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
-use crate::point::Point;
+use crate::nonlinear::coupling::BACKWARD_SHARE;
+use crate::{COORDINATES, Caps, Matrices, ModelKind, Point};
 use core::f64::consts::TAU;
 use faer::linalg::solvers::{Llt, Solve as _};
 use faer::{Mat, Side, c64};

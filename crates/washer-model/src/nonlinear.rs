@@ -14,9 +14,9 @@ pub(crate) mod forces;
 pub(crate) mod frame;
 pub(crate) mod outputs;
 
+use crate::COORDINATES;
 use crate::coordinates::{
-    COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_YAW, TUB, TUB_PITCH, TUB_Y, TUB_YAW,
-    TUB_Z,
+    HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_YAW, TUB, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z,
 };
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};

@@ -4,18 +4,17 @@ pub(crate) mod friction;
 pub(crate) mod ringing;
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, TUB_PITCH, TUB_Y};
+use crate::coordinates::{TUB_PITCH, TUB_Y};
 use crate::lanes::InLanes as _;
 use crate::linear::outputs::{LinearOutputs, LineariseOutputs};
-use crate::linear::{LinearPoint, Linearise, Matrices, tub_tangents};
-use crate::machine::Machine;
+use crate::linear::{LinearPoint, Linearise, tub_tangents};
 use crate::machine::feet::Feet;
-use crate::machine::spin::{Spin, SpinState, SpinStretch, stretch_at};
+use crate::machine::spin::{SpinState, SpinStretch, stretch_at};
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, Motion};
-use crate::point::friction::FrictionSpeed;
-use crate::point::ringing::{Decaying, Jump, Ringing, Swing, jumps};
+use crate::point::ringing::{Decaying, Jump, Ringing, jumps};
+use crate::{COORDINATES, FrictionSpeed, Machine, Matrices, Spin, Swing};
 use lane_ode::{Kernel, Lane, N, Simd};
 use std::sync::{Arc, OnceLock};
 

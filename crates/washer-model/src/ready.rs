@@ -9,15 +9,12 @@
 //! Friction that moves more slowly than 4 v_s / pi is viscous by its own law, with F / v_s. That is
 //! the least speed: a damper that the drum cannot move against its friction is taken at it.
 
-use crate::fast::geared::Geared;
-use crate::kind::ModelKind;
-use crate::machine::Machine;
-use crate::machine::spin::Spin;
 use crate::modes::fastest_rigid_rad_per_s;
-use crate::nonlinear::coupling::Caps;
-use crate::point::friction::FrictionSpeed;
-use crate::point::{self, NoEquilibrium, Point, Timing, legs};
-use crate::run::{Method, Wanted, simulate_with};
+use crate::point::{self, legs};
+use crate::{
+    Caps, FrictionSpeed, Geared, Machine, Method, ModelKind, NoEquilibrium, Point, Spin, Timing,
+    Wanted, simulate_with,
+};
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 

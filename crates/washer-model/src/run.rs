@@ -17,14 +17,13 @@ pub use snapshots::Snapshot;
 pub use wanted::{Extra, StopLoad, Wanted};
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, STATES};
-use crate::fast::geared::{Formula, Geared};
-use crate::kind::ModelKind;
+use crate::coordinates::STATES;
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::{RADIAL, squared};
-use crate::point::{PlannedLeg, Point};
+use crate::point::PlannedLeg;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::stepper::{ByAdditive, ByDop853, ByDopri5, ByRk4, Fixed, Stepper};
+use crate::{COORDINATES, Formula, Geared, ModelKind, Point};
 use core::marker::PhantomData;
 use extras::{Extras, Instants, Seen};
 use lane_ode::{

@@ -3,8 +3,7 @@
 
 use washer_model::{Formula, Gear, Method, ModelKind};
 
-use crate::convergence::Convergence;
-use crate::level::Level;
+use crate::{Convergence, Level};
 
 /// One way to integrate a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]

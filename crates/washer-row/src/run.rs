@@ -6,8 +6,7 @@ use washer_model::{
     Channel, Course, Extra, Method, ModelKind, Point, Record, Wanted, simulate_until,
 };
 
-use crate::measures::{Criterion, Measures};
-use crate::outcome::{Deviations, Status, Trajectory};
+use crate::{Criterion, Deviations, Measures, Status, Trajectory};
 
 /// What rows take from trajectories, and what they must be good for.
 #[derive(Clone, Debug, PartialEq)]

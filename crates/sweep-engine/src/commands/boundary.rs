@@ -9,9 +9,8 @@ use crate::asking::{Asking, Stopped};
 use crate::boundary::quantity::offered;
 use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, TracedRow, trace};
 use crate::config::section::counted;
-use crate::effort::{Effort, EffortArgs};
 use crate::store::{Column, OpenedTrials, Trials};
-use crate::{Axis, Error, Exit, Plan, Progress, Swept, duration, show, tell};
+use crate::{Axis, Effort, EffortArgs, Error, Exit, Plan, Progress, Swept, duration, show, tell};
 use sweep_files::{FileKind, Output};
 use sweep_parameter::{Parameter as _, Worse};
 

@@ -9,9 +9,7 @@ use super::written::name_of;
 use super::{
     Diagnostic, Field, GridInput, Keys, Read, Report, Section, Walk, axes, design, list, parameters,
 };
-use crate::Design;
-use crate::plan::Plan;
-use crate::program;
+use crate::{Design, Plan, program};
 use toml::de::DeTable;
 
 /// Reads the grid file and puts the constants in place. `None` if the grid file has no text.

@@ -12,7 +12,6 @@ use serde_json::json;
 
 use super::chunk::{self, Damage, Place, Shape};
 use super::differences::PlanDifference;
-use super::error::StoreError;
 use super::lock::{self, Lock};
 use super::plan_file::{Found, PlanFile, pretty, set_aside};
 use super::provenance::{self, Session};
@@ -20,7 +19,7 @@ use super::read::{self, NameCounts, ResultFile, Tally};
 use super::schema::Done;
 use super::shard::{self, Dealing, Shard, ShardRequest};
 use super::{Folder, Job, PLAN, SHARDS, TRIALS, chunk_name, chunk_of_name, chunk_points};
-use crate::threads::Environment;
+use crate::{Environment, StoreError};
 use sweep_files::panics::lock;
 use sweep_files::{FileError, ParquetFile, atomic, regular};
 

@@ -7,11 +7,10 @@ use sweep_parameter::Worse;
 use crate::axis::evenly_by_log;
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::DISTINCT;
-use crate::error::{PlotError, Result};
-use crate::label;
+use crate::error::Result;
 use crate::read::bracket;
 use crate::table::{Column, Table};
-use crate::together;
+use crate::{PlotError, label, together};
 
 /// One place of the file: where it is, and the bracket it lies in. The place is NaN where there is
 /// no such number.

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::config::{self, GridInput};
 use crate::fit::{self, FitOptions, Measured, Work};
 use sweep_engine::commands::grid::GridArgs;
-use sweep_engine::progress::Progress;
-use sweep_engine::{EffortArgs, Error, Exit, Interrupt, show, tell, threads};
+use sweep_engine::{EffortArgs, Error, Exit, Interrupt, Progress, show, tell, threads};
 use sweep_files::{FileKind, OWN_FILE, Output};
 
 /// Arguments of `sweep fit`.

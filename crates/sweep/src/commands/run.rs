@@ -7,9 +7,8 @@ use crate::plan::Plan;
 use crate::trace::{self, MOST_KEPT};
 use sweep_engine::commands::run as engine_run;
 use sweep_engine::commands::run::{execute, exit, installed};
-use sweep_engine::progress::Progress;
 use sweep_engine::run::Ended;
-use sweep_engine::{Error, Exit, tell, threads};
+use sweep_engine::{Error, Exit, Progress, tell, threads};
 use sweep_files::{self as files, ParquetFile};
 
 /// Arguments of `sweep run`.

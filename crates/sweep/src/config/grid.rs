@@ -3,11 +3,10 @@
 
 use serde_json::json;
 use sweep_engine::config::grid::is_another;
-use sweep_engine::config::report::{Diagnostic, Report};
-use sweep_engine::config::section::{Field, Section, cut};
-use sweep_engine::config::source::{Location, beside, read};
+use sweep_engine::config::section::cut;
+use sweep_engine::config::source::{beside, read};
 use sweep_engine::config::syntax::parse;
-use sweep_engine::config::{Key, Keys, Kind, Walk};
+use sweep_engine::config::{Diagnostic, Field, Key, Keys, Kind, Location, Report, Section, Walk};
 use washer_model::Machine;
 use washer_row::{Metric, Part};
 

@@ -9,12 +9,11 @@ use washer_model::{
     BumpStop, Bushing, Cabinet, Damper, Foot, Machine, Parameter, Spin, Spring, Target, Unbalance,
 };
 
-use sweep_engine::config::keys::{self, Keys, Walk};
-use sweep_engine::config::kind::{Kind, Numbers, about};
-use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_engine::config::keys::{self};
+use sweep_engine::config::kind::{Numbers, about};
 use sweep_engine::config::schema::{document, of};
-use sweep_engine::config::section::{Field, Section};
 use sweep_engine::config::source::is_blank;
+use sweep_engine::config::{Diagnostic, Field, Keys, Kind, Report, Section, Walk};
 use sweep_engine::plan::WrittenIn;
 
 /// A section of the machine file. It holds the parameters whose names begin with its prefix. Three

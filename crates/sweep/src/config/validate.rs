@@ -10,9 +10,8 @@ use washer_row::Criterion;
 use crate::method::REFERENCE_SHARE;
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, timing};
-use sweep_engine::config::Draft;
-use sweep_engine::config::report::Diagnostic;
 use sweep_engine::config::whole::{refuse, refuse_step, window};
+use sweep_engine::config::{Diagnostic, Draft};
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::plan::{MOST_STEPS, shortest_step_s};
 

@@ -13,12 +13,11 @@ use super::Effort;
 use super::points::PointTable;
 use super::result::ResultTable;
 use super::run::Task;
-use crate::engine::{ModelEngine, Watch};
+use crate::engine::ModelEngine;
 use crate::plan::Plan;
-use sweep_engine::progress::Progress;
 use sweep_engine::store::{BATCH_ROWS, Done, Layout, ResultRows};
 use sweep_engine::watch::Parts;
-use sweep_engine::{Error, Job, StoreError, threads};
+use sweep_engine::{Error, Job, Progress, StoreError, Watch, threads};
 use sweep_files::panics::{self, lock};
 use washer_row::Ladder;
 

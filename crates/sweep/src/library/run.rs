@@ -4,9 +4,8 @@ use std::path::Path;
 
 use super::Effort;
 use super::result::ResultTable;
-use crate::engine::Engine;
 use sweep_engine::run::{Ended, RunOptions};
-use sweep_engine::{Error, Job, run as runner};
+use sweep_engine::{Engine, Error, Job, run as runner};
 
 /// How a run into a file ended.
 #[derive(Debug)]

@@ -1,13 +1,13 @@
 //! One trajectory at a constant speed, turn by turn until what is seen of it no longer changes.
 
-use super::exponent::{Exponent, apart};
+use super::exponent::apart;
 use super::hold::{Held, Turn};
 use super::lines::strongest;
 use super::starts::size;
 use super::{Ending, Settled, State};
 use crate::channel::CHANNELS;
 use crate::coordinates::{STATES, TUB_PITCH, TUB_YAW};
-use crate::run::Extra;
+use crate::{Exponent, Extra};
 
 /// Turns between two looks.
 pub(super) const BLOCK: usize = 16;

@@ -2,12 +2,11 @@
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::kind::ModelKind;
 use crate::run::extras::{Extras, Instants};
 use crate::run::model::Nonlinear;
-use crate::run::wanted::{Extra, Wanted};
 use crate::stability::orbit::{Row, Watched, by_kind, clock, model};
 use crate::stability::turn::turn;
+use crate::{Extra, ModelKind, Wanted};
 use lane_ode::{Kernel, Lane, N, Simd, System as _};
 
 /// A machine held at a speed.

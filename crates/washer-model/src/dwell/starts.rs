@@ -1,10 +1,10 @@
 //! Where trajectories start: beside a periodic response, and kicked off it.
 
-use crate::coordinates::{COORDINATES, STATES, TUB, TUB_PITCH, TUB_YAW};
+use crate::coordinates::{STATES, TUB, TUB_PITCH, TUB_YAW};
 use crate::fast::SUSPENSION_MODES;
-use crate::modes::{Modes, shape};
-use crate::point::Point;
+use crate::modes::shape;
 use crate::stability::rounded;
+use crate::{COORDINATES, Modes, Point};
 
 /// A start is off the periodic response by this share of its greatest coordinate, in each of the
 /// suspension's modes.

@@ -1,7 +1,6 @@
 //! Gears: a formula whose step and caps follow the drum's speed.
 
-use crate::kind::ModelKind;
-use crate::nonlinear::coupling::Caps;
+use crate::{Caps, ModelKind};
 use lane_ode::dop853::{DOP853_STABILITY_LIMIT, DOP853_STAGES};
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 

@@ -6,15 +6,13 @@ use core::array;
 use core::f64::consts::TAU;
 use core::ops::Range;
 
-use crate::channel::Channel;
-use crate::coordinates::COORDINATES;
 use crate::fast::{SUSPENSION_MODES, rounded_down};
 use crate::linear::outputs::LinearMotion;
 use crate::machine::spin::SpinState;
-use crate::modes::{Mode, NoModes, modes, motions};
+use crate::modes::motions;
 use crate::nonlinear::outputs::Motion;
-use crate::point::Point;
-use crate::point::ringing::{Decaying, Jump, Swing};
+use crate::point::ringing::{Decaying, Jump};
+use crate::{COORDINATES, Channel, Mode, NoModes, Point, Swing, modes};
 use lane_ode::N;
 
 /// The swing that a run leaves out, and the one that it has in its place.

@@ -5,12 +5,12 @@
 //! speeds: a stage's coordinates are known one stage earlier, so that few operations wait for the
 //! accelerations of the stage before.
 
-use crate::coordinates::{COORDINATES, ROTOR_TURNS, TUB};
+use crate::COORDINATES;
+use crate::coordinates::{ROTOR_TURNS, TUB};
 use crate::lanes::lane_struct;
-use crate::linear::Constants;
-use crate::linear::harmonics;
 use crate::linear::rotor_terms::{self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, Terms};
 use crate::linear::symmetric::Symmetric4;
+use crate::linear::{Constants, harmonics};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
 use crate::nonlinear::coupling::{Coupling, HingeMass, mass_scaled_system};

@@ -3,8 +3,8 @@
 
 use lane_ode::{N, Real};
 
+use crate::Machine;
 use crate::lanes::lane_struct;
-use crate::machine::Machine;
 
 /// Most feet.
 pub(crate) const FEET: usize = 4;

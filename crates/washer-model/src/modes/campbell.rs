@@ -6,10 +6,9 @@
 //! assurance criterion, with the mass matrix as weight. A stretch without clear likeness is halved
 //! until it has it.
 
-use crate::coordinates::COORDINATES;
-use crate::modes::shape::{Motion, motion};
-use crate::modes::{Mode, Modes, NoModes, assurance, modes};
-use crate::point::Point;
+use crate::modes::assurance;
+use crate::modes::shape::motion;
+use crate::{COORDINATES, Mode, Modes, Motion, NoModes, Point, modes};
 use core::f64::consts::TAU;
 
 /// Angles of a turn over which frequencies are averaged. Frequencies vary with harmonics 1 and 2 of

@@ -1,11 +1,10 @@
 //! Mode shapes in words: the motion of tub and drum that dominates each.
 
 use crate::coordinates::{
-    COORDINATES, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW,
-    TUB_Z,
+    HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z,
 };
 use crate::modes::inner;
-use crate::point::Point;
+use crate::{COORDINATES, Point};
 use core::fmt;
 
 /// A plane through the drum axis, or both.

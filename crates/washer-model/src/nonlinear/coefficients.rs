@@ -1,7 +1,7 @@
 //! The machine's numbers as the equations use them, one set per lane.
 
+use crate::Machine;
 use crate::lanes::lane_struct;
-use crate::machine::Machine;
 use crate::nonlinear::elements::Elements;
 use lane_ode::N;
 

@@ -10,8 +10,8 @@ pub(crate) mod bounds;
 pub(crate) mod corners;
 
 use crate::lanes::{InAnyLane, lane_struct};
-use crate::machine::{BumpStop, Bushing, Damper, Machine, Spring};
 use crate::nonlinear::frame::{Tilt, Vec3, difference, dot, plus_cross, scaled, sum};
+use crate::{BumpStop, Bushing, Damper, Machine, Spring};
 use core::f64::consts::PI;
 use lane_ode::{Aside, Lane, N, Real};
 

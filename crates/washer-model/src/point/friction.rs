@@ -1,6 +1,6 @@
 //! At which speed amplitudes the linear model of a point takes friction.
 
-use crate::machine::{Damper, Machine};
+use crate::{Damper, Machine};
 use core::f64::consts::PI;
 
 /// At which speed amplitude the linear model takes the friction of a damper.

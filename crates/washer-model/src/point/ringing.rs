@@ -11,9 +11,9 @@
 
 use core::array;
 
-use crate::channel::{CHANNELS, Channel, Kind};
-use crate::machine::Machine;
+use crate::channel::{CHANNELS, Kind};
 use crate::machine::spin::SpinStretch;
+use crate::{Channel, Machine};
 
 /// Free bodies swing by more than the static deflection, up to this factor.
 const MOST: f64 = 2.0;

@@ -1,9 +1,8 @@
 //! The difference of two runs of one trajectory.
 
 use super::{Course, Waypoint};
-use crate::coordinates::COORDINATES;
-use crate::kind::ModelKind;
-use crate::point::{PlannedLeg, Point};
+use crate::point::PlannedLeg;
+use crate::{COORDINATES, ModelKind, Point};
 
 /// Coordinates that follow the motion of interest. The hinge's two are left out: they also ring,
 /// hardly damped, and mostly without effect on any output.

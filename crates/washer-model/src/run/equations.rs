@@ -2,13 +2,12 @@
 //! project's own.
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, STATES};
-use crate::kind::ModelKind;
+use crate::coordinates::STATES;
 use crate::machine::spin::{SpinStretch, stretch_at};
 use crate::nonlinear::coupling::Coupling;
-use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::tangent::Tangent;
+use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Aside, Dual, N, Partials, Simd};
 use std::sync::Arc;
 

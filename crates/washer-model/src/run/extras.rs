@@ -6,13 +6,11 @@
 use super::Method;
 use super::loads::Loads;
 use super::snapshots::Snapshots;
-use super::wanted::{Extra, Wanted};
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::kind::ModelKind;
 use crate::machine::spin::cuts_s;
 use crate::nonlinear::outputs::{RADIAL, squared};
-use crate::point::Point;
+use crate::{Extra, ModelKind, Point, Wanted};
 use lane_ode::{Aside, Lane, N, PartPeaks, Sample, SquareIntegrals, TimeAbove};
 
 /// Parts into which forces and speeds cut steps that are not held short by the bearings.

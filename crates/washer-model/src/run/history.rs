@@ -7,18 +7,17 @@
 //! motion of frequency w, or 1e-9 at 1200 rpm and a step of 2e-4 s.
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, STATES};
-use crate::kind::ModelKind;
+use crate::coordinates::STATES;
 use crate::machine::spin::stretch_at;
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::squared;
-use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::snapshots::share_of_step;
 use crate::run::stepper::{ByDopri5, ByRk4, Fixed, Stepper};
 use crate::run::stiff::{OnLeg, StiffTask};
-use crate::run::suspension::{Forces, forces};
-use crate::run::{Family, Method, OfLinear, OfNonlinear, Stop, coupling, enter};
+use crate::run::suspension::forces;
+use crate::run::{Family, OfLinear, OfNonlinear, coupling, enter};
+use crate::{COORDINATES, Forces, Method, ModelKind, Point, Stop};
 use core::marker::PhantomData;
 use lane_ode::{
     Aside, Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, Simd, Step,

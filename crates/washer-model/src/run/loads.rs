@@ -4,15 +4,13 @@
 //! their rates; the linear model's are first order in its deviations from equilibrium.
 
 use super::suspension::{deviating, dual, forces, on_cabinet};
-use super::wanted::{Extra, StopLoad, Wanted};
-use crate::coordinates::{COORDINATES, STATES, TUB};
-use crate::kind::ModelKind;
+use crate::coordinates::{STATES, TUB};
 use crate::lanes::{Constant as _, InLanes as _};
 use crate::machine::feet::{FEET, LOAD, Spread, turning_n};
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::{Vec3, dot};
-use crate::point::Point;
 use crate::run::model::tub_samples;
+use crate::{COORDINATES, Extra, ModelKind, Point, StopLoad, Wanted};
 use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
 
 /// Least values are found as greatest distances below this (N), farther than any load.

@@ -1,21 +1,20 @@
 //! The two models as systems over lanes, and what they have in common.
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, FIRST_ANGLE, STATES, TUB};
+use crate::coordinates::{FIRST_ANGLE, STATES, TUB};
 use crate::lanes::InLanes;
 use crate::linear::outputs::{LinearMotion, LinearOutputs};
 use crate::linear::rotor_terms::Terms;
 use crate::linear::step::{self, RotorAt, StepConstants};
 use crate::machine::parameters::FARTHEST_M;
 use crate::machine::spin::{SpinLanes, SpinState, SpinStretch};
-use crate::nonlinear;
 use crate::nonlinear::ahead::derivative_ahead;
 use crate::nonlinear::coefficients::Coefficients;
-use crate::nonlinear::coupling::{Caps, Coupling, Sag};
+use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
-use crate::point::Point;
+use crate::{COORDINATES, Caps, Point, nonlinear};
 use core::f64::consts::FRAC_PI_2;
 use lane_ode::{Lane, N, Sample, SemiImplicit, System, Task, Tolerance, additive, dopri5};
 

@@ -2,11 +2,10 @@
 //! with.
 
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, STATES, TUB};
-use crate::kind::ModelKind;
-use crate::point::Point;
+use crate::coordinates::{STATES, TUB};
 use crate::run::model::tub_samples;
 use crate::run::suspension::forces;
+use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Lane, MAX_LANES, N, Sample};
 use std::sync::Arc;
 

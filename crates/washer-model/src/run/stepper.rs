@@ -1,8 +1,8 @@
 //! Integrators whose lanes are trajectories. Each is compiled as a kernel of its own: one function
 //! of all of them takes the compiler longer than all apart.
 
+use crate::Formula;
 use crate::coordinates::STATES;
-use crate::fast::geared::Formula;
 use crate::run::model::Model;
 use lane_ode::{Lane, Task, Tolerance, dop853, dopri5, rk4};
 

@@ -1,10 +1,10 @@
 //! Trajectories by the stiff method: one at a time, its derivatives by lanes of dual numbers.
 
 use super::{Extra, Family, Order, Record, Run};
-use crate::coordinates::{COORDINATES, STATES};
-use crate::point::Point;
+use crate::coordinates::STATES;
 use crate::run::model::Model;
 use crate::run::tangent::Tangent;
+use crate::{COORDINATES, Point};
 use core::marker::PhantomData;
 use lane_ode::{
     Dual, Ended, Forcing, Kernel, Lane, Leg, N, Partials, Step, Task, Tolerance, rodas,

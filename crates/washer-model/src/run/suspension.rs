@@ -4,13 +4,12 @@
 //! The laws are those of the equations (`nonlinear/elements.rs`). The linear model's forces are
 //! first order in its deviations, by automatic differentiation at the equilibrium.
 
-use crate::coordinates::{COORDINATES, STATES, TUB, TUB_Y, TUB_Z};
-use crate::kind::ModelKind;
+use crate::coordinates::{STATES, TUB, TUB_Y, TUB_Z};
 use crate::lanes::Constant as _;
 use crate::machine::feet::LOAD;
 use crate::nonlinear::elements::{CabinetLine, Ends, Law, PointMotion, TubMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
-use crate::point::Point;
+use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Dual, Lane, N};
 use std::borrow::Cow;
 

@@ -1,10 +1,10 @@
 //! A model's partial derivatives: the model once more, over lanes of dual numbers.
 
-use crate::coordinates::{COORDINATES, STATES};
+use crate::coordinates::STATES;
 use crate::machine::spin::SpinStretch;
 use crate::nonlinear::coupling::Coupling;
-use crate::point::Point;
 use crate::run::model::Model;
+use crate::{COORDINATES, Point};
 use lane_ode::{Dual, Lane, N, Partials};
 
 /// A model over dual numbers, with the same trajectory in every lane. Each lane carries a direction

@@ -1,7 +1,7 @@
 //! What may be recorded on request, and what such records hold.
 
 use super::Course;
-use super::snapshots::Snapshot;
+use crate::Snapshot;
 use crate::channel::CHANNELS;
 
 /// The record of one stop.
