@@ -15,7 +15,6 @@ pub struct Dual<T> {
 impl<T: Real> Dual<T> {
     /// A constant.
     #[inline(always)]
-    #[must_use]
     pub fn constant(value: T) -> Self {
         Self { value, slope: value.lit(0.0) }
     }
@@ -24,7 +23,6 @@ impl<T: Real> Dual<T> {
 impl<T: Real> N<T> {
     /// This value as a constant of a dual number.
     #[inline(always)]
-    #[must_use]
     pub fn constant(self) -> N<Dual<T>> {
         N(Dual::constant(self.0))
     }

@@ -17,7 +17,6 @@ impl<const C: usize> Lu<C> {
     /// Loan, Matrix Computations, Algorithm 3.4.1). `None` if a column has nothing left but zeros,
     /// or something not finite.
     #[inline(always)]
-    #[must_use]
     pub fn new(mut a: [[N<f64>; C]; C]) -> Option<Self> {
         let mut order = [0; C];
         for i in 0..C {
@@ -52,7 +51,6 @@ impl<const C: usize> Lu<C> {
 
     /// Solves for one right-hand side.
     #[inline(always)]
-    #[must_use]
     pub fn solve(&self, b: &[N<f64>; C]) -> [N<f64>; C] {
         let mut x = *b;
         for i in 0..C {

@@ -21,7 +21,6 @@ pub struct Product<T>(T, T);
 impl<T: Real> Product<T> {
     /// Rounds the product to a value.
     #[inline(always)]
-    #[must_use]
     pub fn v(self) -> N<T> {
         N(self.0.mul(self.1))
     }
@@ -61,13 +60,11 @@ impl<T: Real> N<T> {
     }
     /// `self * self`
     #[inline(always)]
-    #[must_use]
     pub fn squared(self) -> Product<T> {
         Product(self.0, self.0)
     }
     /// Sine and cosine.
     #[inline(always)]
-    #[must_use]
     pub fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.0.sin_cos();
         (Self(sin), Self(cos))

@@ -23,7 +23,6 @@ pub struct PartPeaks<T, const M: usize> {
 impl<T: Lane, const M: usize> PartPeaks<T, M> {
     /// Uncut trajectories of which nothing has been seen yet.
     #[inline(always)]
-    #[must_use]
     pub fn new(zero: N<T>) -> Self {
         Self {
             peaks: Peaks::new(zero),

@@ -19,7 +19,6 @@ pub struct Partials<const C: usize> {
 
 impl<const C: usize> Partials<C> {
     /// All zero.
-    #[must_use]
     pub const fn zero() -> Self {
         Self { by_coordinate: [[N(0.0); C]; C], by_speed: [[N(0.0); C]; C], by_time: [N(0.0); C] }
     }

@@ -17,7 +17,6 @@ pub struct Peaks<T, const M: usize> {
 impl<T: Lane, const M: usize> Peaks<T, M> {
     /// No output seen yet.
     #[inline(always)]
-    #[must_use]
     pub fn new(zero: N<T>) -> Self {
         Self { peak: [zero; M], last: [Sample::still(zero, zero); M] }
     }
@@ -30,7 +29,6 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
 
     /// The peaks of one lane.
     #[inline(always)]
-    #[must_use]
     pub fn lane(&self, lane: usize) -> [f64; M] {
         self.peak.map(|peak| peak.0.get(lane))
     }

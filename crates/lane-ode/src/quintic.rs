@@ -16,7 +16,6 @@ pub struct Sample<T> {
 impl<T: Copy> Sample<T> {
     /// A constant output.
     #[inline(always)]
-    #[must_use]
     pub const fn still(value: N<T>, zero: N<T>) -> Self {
         Self { value, slope: zero, curvature: zero }
     }
@@ -34,7 +33,6 @@ impl<T: Lane> Sample<T> {
     /// The output between two samples, at a `share` (0 to 1) of the step of `length_s` from one to
     /// the other: that of the polynomial of degree 5 which meets both.
     #[inline(always)]
-    #[must_use]
     pub fn between(start: &Self, end: &Self, length_s: N<T>, share: f64) -> Self {
         Quintic::new(length_s, start, end).sample(length_s.lit(share), length_s)
     }

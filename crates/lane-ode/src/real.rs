@@ -45,12 +45,10 @@ pub trait Real: Copy {
     #[must_use]
     fn abs(self) -> Self;
     /// Sine and cosine of an angle in radians.
-    #[must_use]
     fn sin_cos(self) -> (Self, Self);
     /// Where `self < b`; false where either is NaN.
     fn less(self, b: Self) -> Self::Mask;
     /// `a` where the mask holds, else `b`.
-    #[must_use]
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// Whether the mask holds in every lane.
     fn all(mask: Self::Mask) -> bool;

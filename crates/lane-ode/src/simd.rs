@@ -65,13 +65,11 @@ impl Simd {
     }
 
     /// The best that this processor has.
-    #[must_use]
     pub fn best() -> Self {
         Self::ALL.into_iter().find(|simd| simd.is_available()).unwrap_or(Self::Scalar)
     }
 
     /// What [`Self::dispatch_narrow`] runs on.
-    #[must_use]
     pub fn narrow() -> Self {
         [Self::Avx2, Self::Neon, Self::Simd128]
             .into_iter()
@@ -90,7 +88,6 @@ impl Simd {
     }
 
     /// Whether this processor has it.
-    #[must_use]
     pub fn is_available(self) -> bool {
         match self {
             #[cfg(target_arch = "x86_64")]
@@ -115,7 +112,6 @@ impl Simd {
     }
 
     /// Its name in lower case.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
@@ -127,7 +123,6 @@ impl Simd {
     }
 
     /// Trajectories side by side.
-    #[must_use]
     pub const fn lanes(self) -> usize {
         match self {
             Self::Scalar => 1,

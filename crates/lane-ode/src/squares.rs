@@ -16,7 +16,6 @@ pub struct SquareIntegrals<T, const M: usize> {
 impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
     /// Nothing seen yet.
     #[inline(always)]
-    #[must_use]
     pub fn new(zero: N<T>) -> Self {
         Self { integral: [zero; M], last: [Sample::still(zero, zero); M] }
     }
@@ -27,7 +26,6 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
     }
 
     /// The integrals of one lane, in the square of the output's unit times seconds.
-    #[must_use]
     pub fn lane(&self, lane: usize) -> [f64; M] {
         self.integral.map(|integral| integral.0.get(lane))
     }

@@ -198,7 +198,6 @@ impl<T: Lane, const D: usize> Step<'_, T, D> {
     ///
     /// Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.6 (`contd5`).
     #[inline(always)]
-    #[must_use]
     pub fn at(&self, s: N<T>) -> [N<T>; D] {
         let rest = 1.0 - s;
         let mut x = *self.before;

@@ -19,7 +19,6 @@ pub struct TimeAbove<T> {
 impl<T: Lane> TimeAbove<T> {
     /// Nothing seen yet.
     #[inline(always)]
-    #[must_use]
     pub fn new(zero: N<T>) -> Self {
         Self { time_s: zero, last: Sample::still(zero, zero) }
     }
@@ -30,7 +29,6 @@ impl<T: Lane> TimeAbove<T> {
     }
 
     /// The time of one lane (s).
-    #[must_use]
     pub fn lane(&self, lane: usize) -> f64 {
         self.time_s.0.get(lane)
     }

@@ -61,7 +61,6 @@ pub struct WrittenIn(pub BTreeMap<String, String>);
 
 impl WrittenIn {
     /// Where single numbers of these names were written, in words; `None` of what was not.
-    #[must_use]
     pub fn source(&self, names: &[impl AsRef<str>]) -> Option<String> {
         let mut places: Vec<&str> =
             names.iter().filter_map(|name| Some(self.0.get(name.as_ref())?.as_str())).collect();

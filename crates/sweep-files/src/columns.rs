@@ -56,7 +56,6 @@ impl Column {
 }
 
 /// The columns of rows, without those of types that none of our files has.
-#[must_use]
 pub fn columns(schema: &Schema) -> Vec<Column> {
     let fields = schema.fields().iter().enumerate();
     fields.filter_map(|(place, field)| column(field, place)).collect()

@@ -52,7 +52,6 @@ impl Range {
     pub const LARGEST: f64 = 1e12;
 
     /// Whether `value` is allowed; never for NaN or infinity.
-    #[must_use]
     pub fn contains(self, value: f64) -> bool {
         value.abs() <= Self::LARGEST
             && match self {
@@ -65,7 +64,6 @@ impl Range {
     }
 
     /// The accepted values, for the message about a refused one.
-    #[must_use]
     pub fn instead_of(self, value: f64) -> String {
         if value.is_finite() && value.abs() > Self::LARGEST && !matches!(self, Self::Within(..)) {
             format!("{self}, at most {:e} in magnitude", Self::LARGEST)
@@ -87,7 +85,6 @@ named! {
 
 impl Worse {
     /// The worst value: the greatest or the least.
-    #[must_use]
     pub const fn extreme(self) -> &'static str {
         match self {
             Self::Greater => "greatest",
@@ -96,7 +93,6 @@ impl Worse {
     }
 
     /// How much worse `a` is than `b`; at most 0 where it is not.
-    #[must_use]
     pub fn by(self, a: f64, b: f64) -> f64 {
         match self {
             Self::Greater => a - b,
@@ -133,13 +129,11 @@ impl From<f64> for RatioLimits {
 
 impl RatioLimits {
     /// Whether a point with these least and greatest ratios is trusted.
-    #[must_use]
     pub fn trust(self, least: f64, greatest: f64) -> bool {
         greatest < self.most && self.least.is_none_or(|limit| least > limit)
     }
 
     /// How far such a point is from turning its verdict, as a share of the limit.
-    #[must_use]
     pub fn margin(self, least: f64, greatest: f64) -> f64 {
         let from = |ratio: f64, limit: f64| (ratio / limit - 1.0).abs();
         let of_least = self.least.map_or(f64::INFINITY, |limit| from(least, limit));
@@ -147,7 +141,6 @@ impl RatioLimits {
     }
 
     /// Below this ratio the linear model over-estimates as much as it may under-estimate.
-    #[must_use]
     pub fn over_estimate(self) -> f64 {
         self.least.unwrap_or(1.0 / self.most)
     }
@@ -155,7 +148,6 @@ impl RatioLimits {
 
 /// A number as a message shows it: the shortest decimal that reads back the same, in powers of ten
 /// where it would be long.
-#[must_use]
 pub fn decimal(value: f64) -> String {
     let text = format!("{value:?}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
@@ -176,7 +168,6 @@ impl fmt::Display for Range {
 }
 
 /// The ending of names of numbers in this unit; `None` where names do not show it.
-#[must_use]
 pub fn unit_suffix(unit: &str) -> Option<&'static str> {
     Some(match unit {
         "m" => "_m",

@@ -85,7 +85,6 @@ macro_rules! declare {
             pub const ALL: [Self; [$($key),+].len()] = [$(Self::$name),+];
 
             /// Name in grid files and column names.
-            #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => $key,)+
@@ -93,7 +92,6 @@ macro_rules! declare {
             }
 
             /// The name for C, with its zero byte.
-            #[must_use]
             pub const fn c_name(self) -> &'static CStr {
                 match self {
                     $(Self::$name => terminated(concat!($key, "\0")),)+
@@ -101,7 +99,6 @@ macro_rules! declare {
             }
 
             /// One line for column dictionaries and docs.
-            #[must_use]
             pub const fn description(self) -> &'static str {
                 match self {
                     $(Self::$name => $description,)+
@@ -146,13 +143,11 @@ pub(crate) const CHANNELS: usize = Channel::ALL.len();
 
 impl Channel {
     /// Position in [`Channel::ALL`] and in the model's output vector.
-    #[must_use]
     pub const fn index(self) -> usize {
         self as usize
     }
 
     /// `"m"` or `"rad"`.
-    #[must_use]
     pub const fn unit(self) -> &'static str {
         match self.kind() {
             Kind::TubPoint | Kind::DrumPoint => "m",

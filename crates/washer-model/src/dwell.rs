@@ -425,7 +425,6 @@ fn are_same(a: &Ending, b: &Ending) -> bool {
 impl Endings {
     /// Whether a motion's largest deviations are about those of a periodic response: what has not
     /// settled there comes to it or leaves it slowly.
-    #[must_use]
     pub fn is_near_response(&self, motion: &Ending) -> bool {
         let near =
             |response: &Response| are_alike(&motion.peaks, &response.nonlinear, SAME_ROUGHLY);
@@ -446,7 +445,6 @@ impl Ending {
     ];
 
     /// Its position in [`Self::KINDS`].
-    #[must_use]
     pub fn kind(&self) -> usize {
         match (self.settled, self.state) {
             (Some(Settled::Periodic { turns }), _) => (turns as usize).min(3) - 1,

@@ -306,14 +306,12 @@ fn error_of_shift(mode: &Mode, shift_rad_per_s: f64, speed_rad_per_s: f64) -> f6
 
 impl<'a> Cases<'a> {
     /// Points with their spins, which last until `end_s`.
-    #[must_use]
     pub fn new(points: impl IntoIterator<Item = (&'a Point, &'a Spin)>, end_s: f64) -> Self {
         Self::until(points, end_s, &|| false)
     }
 
     /// As [`Self::new`], until `is_stopped`: it is asked before each machine's eigenvalues are
     /// found, and once it says so, whatever these cases give means nothing.
-    #[must_use]
     pub fn until(
         points: impl IntoIterator<Item = (&'a Point, &'a Spin)>,
         end_s: f64,
@@ -326,7 +324,6 @@ impl<'a> Cases<'a> {
 
     /// The longest step (s) at which plain RK4 is stable at all points; `None` if there are none.
     /// Machines without modes are left out.
-    #[must_use]
     pub fn plain_step_s(&self) -> Option<f64> {
         let steps =
             self.cases.iter().flatten().map(|case| Formula::Rk4.limit() / case.fastest_rad_per_s);
@@ -335,7 +332,6 @@ impl<'a> Cases<'a> {
 
     /// The share of what hinges swing after a jump that plain RK4 leaves out by these steps (s):
     /// the phase (rad) by which it is late at the end.
-    #[must_use]
     pub fn left_out_of_hinge(&self, step_s: f64) -> f64 {
         let late_rad = self.cases.iter().flatten().map(|case| {
             let hinge_rad_per_s = case.faster_hinge_rad_per_s;
@@ -347,7 +343,6 @@ impl<'a> Cases<'a> {
 
     /// Whether some machine's forces have corners that steps longer than they are wide do not see:
     /// friction and stops. There errors do not shrink with the step by the order of a formula.
-    #[must_use]
     pub fn are_nonsmooth(&self) -> bool {
         self.cases.iter().flatten().any(|case| case.point.machine.elements.are_nonsmooth())
     }
@@ -357,7 +352,6 @@ impl<'a> Cases<'a> {
     ///
     /// Where a multiple of the drum's speed passes a whirl of the hinge, the hinge is left
     /// ringing, hardly damped. Runs with caps have the ringing, but soon not its phase.
-    #[must_use]
     pub fn hinge_to_drum(&self) -> f64 {
         self.cases
             .iter()
@@ -368,7 +362,6 @@ impl<'a> Cases<'a> {
 
     /// Whether closed stops or stiffened springs make the tub swing faster (rad/s, given back) than
     /// anything else that the method has to follow.
-    #[must_use]
     pub fn stiffened_rad_per_s(&self) -> Option<f64> {
         let stiffened = self.cases.iter().flatten().filter(|case| {
             case.fastest_followed_rad_per_s > case.fastest_at_rest_rad_per_s

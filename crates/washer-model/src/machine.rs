@@ -227,7 +227,6 @@ impl Machine {
     }
 
     /// Weight of tub, shaft, drum and unbalances (N).
-    #[must_use]
     pub fn weight_n(&self) -> f64 {
         let of_bodies = self.tub.mass_kg + self.shaft.mass_kg + self.drum.mass_kg;
         let of_laundry = self.further_unbalances.iter().map(|unbalance| unbalance.mass_kg);
@@ -239,7 +238,6 @@ impl Machine {
     /// 3.1, the bare drum and unbalance split of the equations page, and this project's assumptions
     /// where the paper is silent (bearing positions, hinge, fronts, clearance, free lengths of the
     /// springs).
-    #[must_use]
     pub fn paper() -> Self {
         let [unbalance_mass_kg, drum_mass_kg, drum_x_m] = [0.4, 3.64, 0.200];
         let unbalance = Unbalance { mass_kg: unbalance_mass_kg, x_m: 0.300, radius_m: 0.200 };

@@ -55,7 +55,6 @@ pub struct Mode {
 
 impl Mode {
     /// Share of critical damping: below 1 the motion swings, below 0 it grows.
-    #[must_use]
     pub fn damping_ratio(&self) -> f64 {
         -self.re_per_s / self.magnitude_rad_per_s
     }
@@ -70,7 +69,6 @@ impl Mode {
     }
 
     /// Damped natural frequency in cycles per minute.
-    #[must_use]
     pub fn frequency_rpm(&self) -> f64 {
         self.im_rad_per_s * 60.0 / TAU
     }
@@ -87,7 +85,6 @@ pub struct Modes {
 
 /// Modal assurance criterion of two shapes of unit modal mass, with the mass matrix as weight: 1
 /// for the same motion, 0 for motions that share none.
-#[must_use]
 pub(crate) fn assurance(
     mass: &[[f64; COORDINATES]; COORDINATES],
     a: &[[f64; 2]; COORDINATES],

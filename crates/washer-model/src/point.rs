@@ -84,14 +84,12 @@ pub(crate) struct PlannedLeg {
 
 impl Point {
     /// Coordinates at static equilibrium (m, rad), unbalance up.
-    #[must_use]
     pub const fn equilibrium(&self) -> &[f64; COORDINATES] {
         &self.equilibrium
     }
 
     /// How far the tub's mass centre sinks (m) from its place in the machine file to the static
     /// equilibrium. In the machine file springs carry no load, unless they have free lengths.
-    #[must_use]
     pub fn static_sag_m(&self) -> f64 {
         let (sin_pitch, _) = N(self.equilibrium[TUB_PITCH]).sin_cos();
         -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[TUB_Y])).0
@@ -100,7 +98,6 @@ impl Point {
     /// A bound on what steps leave out of the swing of hinge and bearings after all jumps of the
     /// drum's acceleration: these shares of each. Steps longer than their periods leave all of it
     /// out.
-    #[must_use]
     pub fn ringing(&self, left_out: [f64; 2]) -> Swing {
         let ringing = self.ringing.share(left_out);
         Swing { channels: ringing.channels(), gap_m: ringing.gap_m() }
@@ -109,7 +106,6 @@ impl Point {
     /// How far each channel (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) is
     /// where it is because the weight of drum and unbalance bends the hinge. Seen from the shaft
     /// that bend turns backwards, where a cap on the hinge is not exact.
-    #[must_use]
     pub fn hinge_sag(&self) -> [f64; CHANNELS] {
         self.ringing.sag()
     }
@@ -129,19 +125,16 @@ impl Point {
     }
 
     /// Weight (N) of what the springs carry.
-    #[must_use]
     pub const fn weight_n(&self) -> f64 {
         self.weight_n
     }
 
     /// The gap between drum and tub at rest (m).
-    #[must_use]
     pub const fn clearance_m(&self) -> f64 {
         self.machine.bodies.clearance.0
     }
 
     /// The window's edges (s).
-    #[must_use]
     pub fn window_s(&self) -> [f64; 2] {
         let inside = || self.legs.iter().filter(|leg| leg.in_window);
         let from = inside().next().map_or(0.0, |leg| leg.start_s);
@@ -149,14 +142,12 @@ impl Point {
     }
 
     /// At which speed amplitudes the linear model takes the friction of the dampers that have it.
-    #[must_use]
     pub fn friction_speeds(&self) -> &[FrictionSpeed] {
         &self.friction_speeds
     }
 
     /// By what factor these are off from the speeds (m/s) that the dampers had in a motion, the
     /// greatest of all; `None` without friction.
-    #[must_use]
     pub fn friction_speed_off(&self, occurred_m_per_s: &[f64]) -> Option<f64> {
         let off = self.friction_speeds.iter().filter_map(|taken| {
             let occurred = occurred_m_per_s.get(taken.damper)?.max(taken.least_m_per_s);
@@ -194,7 +185,6 @@ impl Point {
 
     /// M, C, K and F of the linear model (Eq. 41) at spin angle `theta_rad`, speed and
     /// acceleration.
-    #[must_use]
     pub fn matrices(
         &self,
         theta_rad: f64,

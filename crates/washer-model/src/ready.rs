@@ -154,7 +154,6 @@ struct Open {
 ///
 /// # Errors
 /// Per point: [`NoEquilibrium`].
-#[must_use]
 pub fn prepare(
     simd: Simd,
     points: &[(Machine, Spin)],

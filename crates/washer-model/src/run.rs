@@ -61,7 +61,6 @@ pub enum Method {
 
 impl Method {
     /// Whether trajectories side by side in lanes have steps of their own.
-    #[must_use]
     pub const fn has_own_steps(&self) -> bool {
         matches!(self, Self::Dopri5(_) | Self::Additive(_))
     }
@@ -131,13 +130,11 @@ pub struct Record {
 
 /// Integrates one model at every point and records peaks. The result does not depend on the
 /// instruction set, nor on which points come together.
-#[must_use]
 pub fn simulate(simd: Simd, model: ModelKind, method: &Method, points: &[&Point]) -> Vec<Record> {
     simulate_with(simd, model, method, points, Wanted::default()).0
 }
 
 /// As [`simulate`], and records one [`Extra`] per point if anything else is wanted.
-#[must_use]
 pub fn simulate_with(
     simd: Simd,
     model: ModelKind,
@@ -150,7 +147,6 @@ pub fn simulate_with(
 
 /// As [`simulate_with`]; `None` if `stop` says so before all trajectories have ended. It is asked
 /// every [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps at least.
-#[must_use]
 pub fn simulate_until(
     simd: Simd,
     model: ModelKind,

@@ -21,7 +21,6 @@ pub struct Rung {
 
 impl Rung {
     /// The rung in words, as one of this model's.
-    #[must_use]
     pub fn describe(&self, model: ModelKind) -> String {
         let name = self.level.name();
         match &self.method {
@@ -65,7 +64,6 @@ pub struct Ladder {
 
 impl Ladder {
     /// One method, which nothing is compared with.
-    #[must_use]
     pub fn direct(level: Level, method: Method) -> Self {
         let rung = Rung { level, method, convergence: Convergence::NONE, left_out: [0.0; 2] };
         Self { rungs: vec![rung], reference: None, held_back: None }
@@ -73,7 +71,6 @@ impl Ladder {
 
     /// Rungs that check one another, at least two, of which the last is the reference: a formula
     /// on the machine as it is, after the same in longer steps.
-    #[must_use]
     pub const fn checked(rungs: Vec<Rung>, held_back: Option<String>) -> Self {
         let reference = Some(rungs.len() - 1);
         Self { rungs, reference, held_back }
@@ -88,7 +85,6 @@ impl Ladder {
 
     /// The place of the reference, which agrees with the rung before, mostly. None where there is
     /// nothing but one method.
-    #[must_use]
     pub const fn reference(&self) -> Option<usize> {
         self.reference
     }
@@ -100,20 +96,17 @@ impl Ladder {
 
     /// The place of the rung whose twin tells chaos: the one behind the reference where there is
     /// one, because that settles most of what the reference leaves in doubt.
-    #[must_use]
     pub(crate) fn judge(&self) -> Option<usize> {
         self.reference.map(|reference| (reference + 1).min(self.rungs.len() - 1))
     }
 
     /// Stands behind all rungs for the last one that rows are judged by, from a start beside the
     /// row's own ([`Point::nudged`](washer_model::Point::nudged)).
-    #[must_use]
     pub const fn twin(&self) -> usize {
         self.rungs.len()
     }
 
     /// The method of a rung, or of the twin.
-    #[must_use]
     pub fn method(&self, rung: usize) -> &Method {
         let of_twin = self.judge().unwrap_or(0);
         &self.rungs[if rung == self.twin() { of_twin } else { rung }].method
@@ -121,7 +114,6 @@ impl Ladder {
 
     /// The method of the rows that capped modes of this level hold; of a ladder without such a
     /// rung, the finest capped one's below it.
-    #[must_use]
     pub fn capped(&self, level: Level) -> Option<Method> {
         let is_capped = |rung: &&Rung| rung.level.is_capped() && rung.level <= level;
         self.rungs.iter().rfind(is_capped).map(|rung| rung.method)

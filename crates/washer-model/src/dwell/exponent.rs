@@ -26,7 +26,6 @@ pub struct Exponent {
 
 impl Exponent {
     /// Whether it is above 0 by more than chance: three standard errors.
-    #[must_use]
     pub fn is_positive(&self) -> bool {
         self.per_s > 3.0 * self.error_per_s
     }

@@ -30,7 +30,6 @@ impl Formula {
     /// Most of the linear model's time goes into its matrices at every instant that a formula asks
     /// for: two a step by order 4, eleven by order 8. So order 4 takes less time, and its shorter
     /// steps bear caps twice as high.
-    #[must_use]
     pub const fn of(model: ModelKind) -> Self {
         match model {
             ModelKind::Nonlinear => Self::Dop853,
@@ -39,7 +38,6 @@ impl Formula {
     }
 
     /// Evaluations of the right-hand side per second of motion.
-    #[must_use]
     pub fn evaluations_per_s(self, step_s: f64) -> f64 {
         let stages = match self {
             Self::Rk4 => 4.0,
@@ -99,13 +97,11 @@ pub struct Geared {
 
 impl Geared {
     /// The same step and caps at every speed.
-    #[must_use]
     pub const fn steady(step_s: f64, caps: Caps) -> Self {
         Self { gears: [Gear { up_to_rad_per_s: f64::INFINITY, step_s, caps }; GEARS] }
     }
 
     /// The gear of the fastest drum.
-    #[must_use]
     pub const fn top(&self) -> &Gear {
         &self.gears[GEARS - 1]
     }
@@ -113,7 +109,6 @@ impl Geared {
     /// The greatest ratio of this choice's error to that of a coarser one, over the parts of the
     /// error (truncation, interpolation between steps, caps of bearings and hinge) and over the
     /// speeds of the drum.
-    #[must_use]
     pub fn share_of_error(&self, coarser: &Self) -> f64 {
         let speeds = self.gears.iter().chain(&coarser.gears).map(|gear| gear.up_to_rad_per_s);
         let shares = speeds.filter(|speed| *speed > 0.0).map(|speed| {

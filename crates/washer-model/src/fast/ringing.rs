@@ -32,7 +32,6 @@ impl Point {
     ///
     /// With friction nothing counts as decayed: that may hold the tub, whose dampers are all that
     /// takes energy from these modes. A machine without modes keeps the bound.
-    #[must_use]
     pub fn ringing_left(&self, left_out: [f64; 2], [from_s, to_s]: [f64; 2]) -> Swing {
         let bound = self.ringing(left_out);
         let Some(groups) = self.ringing_by_modes.get_or_init(|| by_modes(self).ok()) else {

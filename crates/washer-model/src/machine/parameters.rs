@@ -146,7 +146,6 @@ impl Block {
 
 impl Target {
     /// Whether these are several numbers at once.
-    #[must_use]
     pub const fn is_several(self) -> bool {
         matches!(self, Self::Bearings(_) | Self::Springs(_) | Self::Dampers(_))
     }
@@ -216,7 +215,6 @@ impl fmt::Debug for Parameter {
 impl Parameter {
     /// Every parameter of this machine and spin, in the table's order, numbered elements one by
     /// one.
-    #[must_use]
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
         let is_there = |row: &&Row| row.target.is_of(machine, spin).is_ok();
         let single = TABLE.iter().filter(is_there).map(Self::single);
@@ -250,32 +248,27 @@ impl Parameter {
     }
 
     /// Name in grid files, on the command line and of the result's column.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// SI unit (rpm for speeds), as in the name's suffix but readable.
-    #[must_use]
     pub fn unit(&self) -> &'static str {
         self.row.unit
     }
 
     /// What it is, in a phrase.
-    #[must_use]
     pub fn description(&self) -> &'static str {
         self.row.description
     }
 
     /// Where the built-in machine's value comes from.
-    #[must_use]
     pub fn source(&self) -> Source {
         self.row.source
     }
 
     /// Values it may take. No place on a machine is farther than 10 m: who writes millimetres is
     /// told.
-    #[must_use]
     pub fn range(&self) -> Range {
         match (self.row.unit, self.row.range) {
             ("m", Range::Any) => Range::Within(-FARTHEST_M, FARTHEST_M),
@@ -285,14 +278,12 @@ impl Parameter {
     }
 
     /// What it writes.
-    #[must_use]
     pub fn target(&self) -> Target {
         self.row.target
     }
 
     /// Its value; `None` if it writes several numbers and they differ, or if the machine has no
     /// such number.
-    #[must_use]
     pub fn get(&self, machine: &Machine, spin: &Spin) -> Option<f64> {
         (self.row.get)(machine, spin, self.index)
     }
@@ -305,7 +296,6 @@ impl Parameter {
 
     /// Names of the single numbers this parameter writes: its own name, unless it writes several at
     /// once.
-    #[must_use]
     pub fn parts(&self, machine: &Machine) -> Vec<Cow<'static, str>> {
         let of_every = |count: usize, element: &str, number: &str| {
             (1..=count).map(|k| format!("{element}_{k}_{number}").into()).collect()
@@ -361,7 +351,6 @@ fn common<T>(items: &[T], value: fn(&T) -> f64) -> Option<f64> {
 
 impl Spring {
     /// Distance between the ends as given, before the machine sags, in m.
-    #[must_use]
     pub fn given_length_m(&self) -> f64 {
         distance_m(self.cabinet_m, self.tub_m)
     }
@@ -369,7 +358,6 @@ impl Spring {
 
 impl Damper {
     /// Distance between the ends as given, before the machine sags, in m.
-    #[must_use]
     pub fn given_length_m(&self) -> f64 {
         distance_m(self.cabinet_m, self.tub_m)
     }
@@ -377,7 +365,6 @@ impl Damper {
 
 impl BumpStop {
     /// Length of the direction as given.
-    #[must_use]
     pub fn direction_length(&self) -> f64 {
         distance_m(self.direction, [0.0; 3])
     }

@@ -145,7 +145,6 @@ impl Spin {
     }
 
     /// The fastest speed from 0 to `end_s`, rad/s.
-    #[must_use]
     pub fn greatest_speed_rad_per_s(&self, end_s: f64) -> f64 {
         let starts: Vec<f64> = self.stretches().iter().map(|stretch| stretch.start_s.0).collect();
         let times_s = starts.into_iter().chain([end_s]).filter(|&t_s| t_s <= end_s);

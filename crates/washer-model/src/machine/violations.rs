@@ -64,7 +64,6 @@ fn rounded(value: f64) -> String {
 
 impl Machine {
     /// Everything impossible about this machine; empty for a sound one.
-    #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
         // The spin's own parameters are the spin's to judge; any table has none.
         let no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
@@ -78,7 +77,6 @@ impl Machine {
     }
 
     /// Combinations of numbers that are impossible although each number is in its range.
-    #[must_use]
     pub fn joint_violations(&self) -> Vec<Violation> {
         let mut joint = Vec::new();
         for (body, moments_kg_m2) in [
@@ -219,7 +217,6 @@ fn out_of_range(machine: &Machine, spin: &Spin) -> Vec<Violation> {
 
 impl Spin {
     /// Everything impossible about this spin; empty for a sound one.
-    #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
         match self {
             Self::Table { .. } => self.joint_violations(),
@@ -230,7 +227,6 @@ impl Spin {
     }
 
     /// Everything impossible about a table. The numbers of a profile are independent.
-    #[must_use]
     pub fn joint_violations(&self) -> Vec<Violation> {
         let Self::Table { time_s, speed_rpm } = self else { return Vec::new() };
         let mut found = Vec::new();

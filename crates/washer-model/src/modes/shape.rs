@@ -73,7 +73,6 @@ impl Motion {
     ];
 
     /// Position of its name in [`Self::NAMES`].
-    #[must_use]
     pub const fn name_index(&self) -> usize {
         3 * self.movement as usize + self.plane as usize
     }

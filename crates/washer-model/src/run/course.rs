@@ -16,7 +16,6 @@ impl Point {
     ///
     /// Zero if there is nothing to compare. Unlike a difference of amplitudes, it shows deviations
     /// after an early peak.
-    #[must_use]
     pub fn course_difference(&self, model: ModelKind, a: &Course, b: &Course) -> f64 {
         let rest = match model {
             ModelKind::Nonlinear => self.equilibrium,
@@ -42,7 +41,6 @@ impl Point {
 
     /// From when on (s) the gap between drum and tub may be least, if it swings by this much beside
     /// what a run has: the beginning of the first leg in which it came so near to its least.
-    #[must_use]
     pub fn gap_least_from_s(&self, course: &Course, swing_m: f64) -> f64 {
         let farthest_m = course.last().map_or(0.0, |last| last.radial_m);
         let is_near = |at: &Waypoint| at.radial_m >= farthest_m - 2.0 * swing_m;
@@ -53,7 +51,6 @@ impl Point {
     /// How far two runs of the nonlinear model are apart at each instant that both recorded: the
     /// instant (s) and the greatest difference of any coordinate but the hinge's, as a share of
     /// that coordinate's greatest deviation from equilibrium in the whole run.
-    #[must_use]
     pub fn departure(&self, a: &Course, b: &Course) -> Vec<(f64, f64)> {
         let mut greatest = [0.0_f64; FOLLOWED];
         for now in b {

@@ -37,7 +37,6 @@ enum Either {
 
 impl Equations {
     /// One model's equations at a point.
-    #[must_use]
     pub fn new(point: &Point, model: ModelKind) -> Self {
         let (model, at_rest) = match model {
             ModelKind::Nonlinear => (
@@ -53,7 +52,6 @@ impl Equations {
     }
 
     /// The state at rest in static equilibrium, from which trajectories start.
-    #[must_use]
     pub const fn at_rest(&self) -> &[f64; STATE_LEN] {
         &self.at_rest
     }
@@ -65,7 +63,6 @@ impl Equations {
     }
 
     /// f at time `t_s`, at a kink from its right.
-    #[must_use]
     pub fn derivative(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [f64; STATE_LEN] {
         self.move_to(t_s);
         match &self.model {
@@ -75,7 +72,6 @@ impl Equations {
     }
 
     /// The Jacobian of f by the state, row by row, exact to rounding.
-    #[must_use]
     pub fn jacobian(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [[f64; STATE_LEN]; STATE_LEN] {
         self.move_to(t_s);
         let partials = match &self.model {
@@ -95,7 +91,6 @@ impl Equations {
 
     /// The channels' deviations from equilibrium (m, rad), in the order of [`crate::Channel::ALL`],
     /// and their rates.
-    #[must_use]
     pub fn channels(
         &mut self,
         t_s: f64,

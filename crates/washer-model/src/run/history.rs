@@ -63,7 +63,6 @@ pub struct Start {
 
 /// Integrates one model at one point and keeps its state at 0, `every_s`, 2 `every_s` and so on to
 /// the end of the run.
-#[must_use]
 pub fn history<'a>(
     model: ModelKind,
     method: &Method,
@@ -76,7 +75,6 @@ pub fn history<'a>(
 
 /// As [`history`], as far as it has come when `stop` says so. It is asked every
 /// [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps at least.
-#[must_use]
 pub fn history_until<'a>(
     model: ModelKind,
     method: &Method,
@@ -94,7 +92,6 @@ pub fn history_until<'a>(
 }
 
 /// How many instants there are from 0 to an end, so far apart.
-#[must_use]
 pub fn instants(end_s: f64, every_s: f64) -> usize {
     // The quotient may come out a hair below the whole number that was meant.
     1 + (end_s / every_s * (1.0 + 1e-12)).floor() as usize
@@ -115,7 +112,6 @@ pub struct Asked<'a> {
 
 /// Integrates one model at several points. By plain Runge-Kutta, so many points at once as there
 /// are lanes; each history has the same bits alone.
-#[must_use]
 pub fn histories<'a>(model: ModelKind, asked: Vec<Asked<'a>>, stop: Stop<'_>) -> Vec<History<'a>> {
     let is_plain = asked.iter().all(|one| matches!(one.method, Method::Rk4 { .. }));
     let at_once = if is_plain { together() } else { 1 };
@@ -132,7 +128,6 @@ pub fn histories<'a>(model: ModelKind, asked: Vec<Asked<'a>>, stop: Stop<'_>) ->
 }
 
 /// How many points [`histories`] takes at once.
-#[must_use]
 pub fn together() -> usize {
     Simd::narrow().lanes()
 }
@@ -172,19 +167,16 @@ fn of(model: ModelKind, asked: Asked<'_>, sampled: States) -> History<'_> {
 
 impl History<'_> {
     /// How many instants there are; fewer than asked for if the trajectory failed.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.states.len()
     }
 
     /// Whether there are none. There is always the start.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.states.is_empty()
     }
 
     /// The outputs at instant `k`, if the trajectory got there.
-    #[must_use]
     pub fn instant(&self, k: usize) -> Option<Instant> {
         let state = self.states.get(k)?;
         let time_s = self.times_s[k];
@@ -207,7 +199,6 @@ impl History<'_> {
     }
 
     /// The forces of springs and dampers at instant `k`, if the trajectory got there.
-    #[must_use]
     pub fn forces(&self, k: usize) -> Option<Forces> {
         self.states.get(k).map(|state| forces(self.point, self.model, state))
     }

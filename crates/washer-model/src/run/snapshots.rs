@@ -31,7 +31,6 @@ pub struct Snapshot {
 
 impl Snapshot {
     /// Sum of all forces on the cabinet along c1, c2 and c3 (N), of the model that was integrated.
-    #[must_use]
     pub fn cabinet_force_n(&self, point: &Point, model: ModelKind) -> [f64; 3] {
         let mut state = [0.0; STATES];
         for (q, [place, speed]) in TUB.into_iter().zip(self.tub) {

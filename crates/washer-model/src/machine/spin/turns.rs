@@ -17,7 +17,6 @@ struct Piece<'a> {
 impl Spin {
     /// Turns of the drum from one time to another (s), counted by the angle that it travels in
     /// either direction.
-    #[must_use]
     pub fn turns_within(&self, window_s: [f64; 2]) -> f64 {
         let stretches = self.stretches();
         let pieces = pieces(&stretches, window_s);
@@ -25,7 +24,6 @@ impl Spin {
     }
 
     /// The times from 0 to `end_s` at which the drum has made a whole number of turns; at least 0.
-    #[must_use]
     pub fn whole_turns_s(&self, end_s: f64) -> Vec<f64> {
         whole_turns_s(&self.stretches(), [0.0, end_s])
     }
