@@ -15,9 +15,9 @@ use sweep_engine::store::read::{NameCounts, add};
 use sweep_engine::store::{Done, Layout, Shape, axis_columns};
 use sweep_engine::{
     Build, Engine, Error, Estimate, GridInput, Job, KeepRow, Listed, Model as EngineModel, NextRow,
-    Plan, Read, Rows, Scenario, Swept, UnknownParameter, Watch, methods,
+    Plan, Read, Rows, Scenario, Swept, Watch, methods,
 };
-use sweep_parameter::{Channel, Range};
+use sweep_parameter::{Channel, Range, UnknownParameter};
 
 use crate::equations::{Case, Model};
 use crate::run::{Method, Run, Work};
@@ -133,10 +133,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
 
     fn find(&self, name: &str) -> Result<Parameter, UnknownParameter> {
         let found = self.parameters().into_iter().find(|one| one.name == name);
-        found.ok_or_else(|| UnknownParameter {
-            reason: "no parameter has this name".to_owned(),
-            is_strange: true,
-        })
+        found.ok_or_else(UnknownParameter::strange)
     }
 
     fn write(&mut self, parameter: &Parameter, value: f64) {

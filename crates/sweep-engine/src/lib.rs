@@ -41,7 +41,7 @@ pub use effort::{Effort, EffortArgs};
 pub use estimate::Estimate;
 pub use exit::{Error, Exit, print, show, tell};
 pub use interrupt::{Interrupt, survive_file_size_limits};
-pub use model::{Model, UnknownParameter};
+pub use model::Model;
 pub use plan::{Axis, AxisValues, Plan, Reliability, Scenario};
 pub use program::program;
 pub use progress::{Progress, ProgressMode, duration};

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
-use sweep_parameter::{Channel, Parameter};
+use sweep_parameter::{Channel, Parameter, UnknownParameter};
 
 use crate::build::Build;
 use crate::method::Integrator;
@@ -49,13 +49,4 @@ pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static 
 
     /// Writes a parameter's value, which is in its range.
     fn write(&mut self, parameter: &Self::Parameter, value: f64);
-}
-
-/// Why a name is no parameter.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct UnknownParameter {
-    /// In words.
-    pub reason: String,
-    /// No model has a parameter of this name: there may be one of a name near to it.
-    pub is_strange: bool,
 }

@@ -31,6 +31,33 @@ pub trait Channel: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
     fn description(self) -> &'static str;
 }
 
+/// Why a name is no parameter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownParameter {
+    /// In words.
+    pub reason: String,
+    /// No model has a parameter of this name: there may be one of a name near to it.
+    pub is_strange: bool,
+}
+
+impl UnknownParameter {
+    /// Of a name that no model has.
+    pub fn strange() -> Self {
+        Self { reason: "no parameter has this name".to_owned(), is_strange: true }
+    }
+
+    /// Of a name that this very model lacks.
+    pub fn not_here(reason: impl Into<String>) -> Self {
+        Self { reason: reason.into(), is_strange: false }
+    }
+}
+
+impl fmt::Display for UnknownParameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.reason)
+    }
+}
+
 /// Values that a parameter may take. No number above [`Range::LARGEST`] in magnitude is accepted,
 /// so that products of a few parameters stay finite.
 #[derive(Clone, Copy, Debug, PartialEq)]

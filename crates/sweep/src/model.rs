@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use sweep_engine::{Build, Model, UnknownParameter};
-use washer_model::{Channel, Machine, Parameter, Spin};
+use sweep_engine::{Build, Model};
+use washer_model::{Channel, Machine, Parameter, Spin, UnknownParameter};
 use washer_row::Measures;
 
 use crate::identity::BUILD;
@@ -53,10 +53,7 @@ impl Model for Washer {
     }
 
     fn find(&self, name: &str) -> Result<Parameter, UnknownParameter> {
-        Parameter::find(name, &self.machine, &self.spin).map_err(|error| UnknownParameter {
-            reason: error.to_string(),
-            is_strange: error == washer_model::UnknownParameter::Name,
-        })
+        Parameter::find(name, &self.machine, &self.spin)
     }
 
     fn parts(&self, parameter: &Parameter) -> Vec<Cow<'static, str>> {

@@ -71,7 +71,7 @@ impl Swept for Washer {
             // A parameter of several numbers: each may have been written elsewhere.
             let given = |plan: &Plan| plan.written.source(&parameter.parts(machine));
             let given = plan.filter(|_| !of_grid).and_then(given);
-            let source = given.unwrap_or_else(|| parameter.source().to_string());
+            let source = given.unwrap_or_else(|| parameter.source().to_owned());
             Listed { parameter, value, source }
         };
         Parameter::all(machine, spin).into_iter().map(row).collect()

@@ -82,9 +82,7 @@ pub use fast::Cases;
 pub use fast::geared::{Formula, Gear, Geared};
 pub use kind::ModelKind;
 pub use linear::Matrices;
-pub use machine::parameters::{
-    Parameter, Range, Source, Target, UnknownParameter, decimal, unit_suffix,
-};
+pub use machine::parameters::{Parameter, Range, Target, UnknownParameter, decimal, unit_suffix};
 pub use machine::spin::Spin;
 pub use machine::violations::Violation;
 pub use machine::{

@@ -1,13 +1,13 @@
 //! Constants (`[set]`, `--set`, `--at`): names from the parameter table with a value each.
 
-use sweep_parameter::{Parameter as _, Range};
+use sweep_parameter::{Parameter as _, Range, UnknownParameter};
 
 use super::draft::{Claimed, Constant, Draft};
 use super::written::name_of;
 use super::{
     Diagnostic, Located, NamedValues, Read, Section, Written, quoted, sections::described,
 };
-use crate::{Plan, UnknownParameter, program};
+use crate::{Plan, program};
 
 /// Names offered as the nearest one; a machine of thousands of springs has more than a reader wants
 /// compared.

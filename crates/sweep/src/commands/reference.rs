@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::{env, fs, iter};
 
-use washer_model::{Channel, Machine, Parameter, Range, Source, Spin, Target};
+use washer_model::{Channel, Machine, Parameter, Range, Spin, Target};
 use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 
 use super::command;
@@ -34,11 +34,8 @@ fn parameters() -> String {
     let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
     let all = Parameter::all(&with_one_of_each(), &spin);
     // Told once, before the table.
-    let told = all.iter().find_map(|parameter| match parameter.source() {
-        Source::Derived(how) => Some(how),
-        _ => None,
-    });
-    let how = told.unwrap_or_default();
+    let how = all.iter().find_map(|parameter| parameter.source().strip_prefix("derived: "));
+    let how = how.unwrap_or_default();
     text.push_str(&format!(include_str!("reference/parameters.txt"), how = how));
     row(&mut text, &["name", "built in", "unit", "meaning", "values", "source"]);
     row(&mut text, &["---"; 6]);
@@ -59,8 +56,8 @@ fn parameters() -> String {
         let has_source = value_of(name).is_some() || of_grid;
         let source = match parameter.source() {
             _ if !has_source => String::new(),
-            Source::Derived(how) if Some(how) == told => "derived".to_owned(),
-            source => source.to_string(),
+            source if source.strip_prefix("derived: ") == Some(how) => "derived".to_owned(),
+            source => source.to_owned(),
         };
         // The first of three coordinates tells of all.
         let of_three = description.strip_suffix("towards the door");

@@ -445,7 +445,7 @@ pub(crate) fn to_toml(machine: &Machine, written: &WrittenIn) -> String {
             let is_said = given.is_some() || key.left_out == LeftOut::Refused;
             match find(&names[0], machine).filter(|_| is_said) {
                 Some(first) => {
-                    let source = given.unwrap_or_else(|| first.source().to_string());
+                    let source = given.unwrap_or_else(|| first.source().to_owned());
                     let said = first.description();
                     let said = if key.is_vector() { String::new() } else { format!("{said} ") };
                     text.push_str(&format!("{line:<40} # {said}[{source}]\n"));

@@ -7,7 +7,7 @@ mod table;
 use std::borrow::Cow;
 use std::fmt;
 
-pub use sweep_parameter::{Range, decimal, unit_suffix};
+pub use sweep_parameter::{Range, UnknownParameter, decimal, unit_suffix};
 
 use crate::{BumpStop, Damper, Machine, Spin, Spring};
 use table::{BLOCKS, TABLE};
@@ -26,23 +26,6 @@ pub struct Parameter {
 
 /// Farther than this (m) is no place on a machine, and no motion of one.
 pub(crate) const FARTHEST_M: f64 = 10.0;
-
-/// Where a parameter's default comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// Printed by the paper, at this place.
-    Paper(&'static str),
-    /// Follows from what the paper prints, in this way.
-    Derived(&'static str),
-    /// The paper is silent: this project's assumption, for this reason.
-    Assumed(&'static str),
-    /// A constant everybody uses.
-    Convention,
-    /// Has no default: the grid file's `[spin]` gives it.
-    Grid,
-    /// Has no default of its own: the grid file's `[time]` gives it.
-    Time,
-}
 
 /// What a parameter writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,41 +47,13 @@ pub enum Target {
     Window(usize),
 }
 
-/// Why a name is not a parameter of this machine and spin.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum UnknownParameter {
-    /// No row of the table has this name.
-    #[error("no parameter has this name")]
-    Name,
-    /// The name is one of a numbered element that the machine does not have.
-    #[error("the machine has {count} {}, numbered from 1", plural(element, *count))]
-    Number {
-        /// `"spring"`, `"damper"`, `"stop"`, `"bushing"`, `"unbalance"` or `"foot"`.
-        element: &'static str,
-        /// How many there are.
-        count: usize,
-    },
-    /// The name is one of a numbered point of the spin's table that is not there.
-    #[error("the spin's table has {count} points, numbered from 1")]
-    TablePoint {
-        /// How many there are; 0 if the spin is not given as a table.
-        count: usize,
-    },
-    /// The machine has no cabinet.
-    #[error("the machine has no [cabinet]")]
-    NoCabinet,
-    /// A spin given as a table has no peak and no ramp.
-    #[error("a spin given as a table has no such number")]
-    TableSpin,
-}
-
 /// One line of the table.
 struct Row {
     /// The whole name, or what follows `spring_1_` and the like.
     name: &'static str,
     unit: &'static str,
     description: &'static str,
-    source: Source,
+    source: &'static str,
     range: Range,
     target: Target,
     get: Get,
@@ -119,8 +74,8 @@ struct Block {
     /// Number of the first element.
     first: usize,
     count: fn(&Machine, &Spin) -> usize,
-    /// The error for a number that no element has, by the last one that there is.
-    missing: fn(&'static str, usize) -> UnknownParameter,
+    /// What has them, and what one is called.
+    of: [&'static str; 2],
 }
 
 impl Block {
@@ -130,8 +85,7 @@ impl Block {
         rows: &'static [&'static [Row]],
         count: fn(&Machine, &Spin) -> usize,
     ) -> Self {
-        let missing = |element, count| UnknownParameter::Number { element, count };
-        Self { element, rows, first: 1, count, missing }
+        Self { element, rows, first: 1, count, of: ["the machine", element] }
     }
 
     fn rows(&self) -> impl Iterator<Item = &'static Row> {
@@ -153,22 +107,13 @@ impl Target {
     /// Whether machine and spin have it, for what is not one of numbered elements.
     fn is_of(self, machine: &Machine, spin: &Spin) -> Result<(), UnknownParameter> {
         match self {
-            Self::Spin if matches!(spin, Spin::Table { .. }) => Err(UnknownParameter::TableSpin),
-            Self::Cabinet if machine.cabinet.is_none() => Err(UnknownParameter::NoCabinet),
+            Self::Spin if matches!(spin, Spin::Table { .. }) => {
+                Err(UnknownParameter::not_here("a spin given as a table has no such number"))
+            }
+            Self::Cabinet if machine.cabinet.is_none() => {
+                Err(UnknownParameter::not_here("the machine has no [cabinet]"))
+            }
             _ => Ok(()),
-        }
-    }
-}
-
-impl fmt::Display for Source {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Paper(place) => write!(f, "paper, {place}"),
-            Self::Derived(how) => write!(f, "derived: {how}"),
-            Self::Assumed(why) => write!(f, "assumed: {why}"),
-            Self::Convention => f.write_str("convention"),
-            Self::Grid => f.write_str("the grid file's [spin]"),
-            Self::Time => f.write_str("the grid file's [time]"),
         }
     }
 }
@@ -236,15 +181,19 @@ impl Parameter {
         for block in BLOCKS {
             if let Some((number, rest)) = numbered(name, block.element) {
                 let row = block.rows().find(|row| row.name == rest);
-                let row = row.ok_or(UnknownParameter::Name)?;
+                let row = row.ok_or_else(UnknownParameter::strange)?;
                 let count = (block.count)(machine, spin);
                 return match number.checked_sub(block.first) {
                     Some(k) if k < count => Ok(block.parameter(row, k)),
-                    _ => Err((block.missing)(block.element, block.first + count - 1)),
+                    _ => {
+                        let (last, [owner, noun]) = (block.first + count - 1, block.of);
+                        let there = format!("{owner} has {last} {}", plural(noun, last));
+                        Err(UnknownParameter::not_here(format!("{there}, numbered from 1")))
+                    }
                 };
             }
         }
-        Err(UnknownParameter::Name)
+        Err(UnknownParameter::strange())
     }
 
     /// Name in grid files, on the command line and of the result's column.
@@ -262,8 +211,9 @@ impl Parameter {
         self.row.description
     }
 
-    /// Where the built-in machine's value comes from.
-    pub fn source(&self) -> Source {
+    /// Where the built-in machine's value comes from: the paper and where in it, `derived` or
+    /// `assumed` and how, a convention, or the grid file.
+    pub fn source(&self) -> &'static str {
         self.row.source
     }
 

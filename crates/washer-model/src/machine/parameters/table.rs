@@ -1,8 +1,7 @@
 //! The rows of the table of parameters.
 
 use super::Range::{Any, Negative, NonNegative, Positive, Within};
-use super::Source::{Assumed, Convention, Derived, Grid, Paper, Time};
-use super::{Block, Get, Range, Row, Set, Source, Target, UnknownParameter, common, table_points};
+use super::{Block, Get, Range, Row, Set, Target, common, table_points};
 use crate::{Damper, Machine, Spin};
 
 /// What a row writes, how it reads it and how it writes it.
@@ -107,23 +106,25 @@ macro_rules! axes {
     };
 }
 
-const TABLE_2: Source = Paper("Table 2");
-const TABLE_3: Source = Paper("Table 3");
-const TABLE_4: Source = Paper("Table 4");
-const SECTION_3_1: Source = Paper("section 3.1");
-const NONE: Source = Assumed("none unless given");
-const USUAL_SPEED: Source = Assumed("a usual value");
-const OWN_SPEED: Source = Assumed("that of the linear motion");
+const TABLE_2: &str = "paper, Table 2";
+const TABLE_3: &str = "paper, Table 3";
+const TABLE_4: &str = "paper, Table 4";
+const SECTION_3_1: &str = "paper, section 3.1";
+const NONE: &str = "assumed: none unless given";
+const USUAL_SPEED: &str = "assumed: a usual value";
+const OWN_SPEED: &str = "assumed: that of the linear motion";
 /// Speeds at which friction is taken: what divides by them stays finite.
 const SPEED: Range = Within(1e-6, 1e3);
-const SPLIT: Source = Derived("the drum of Tables 2 and 3 less its 0.4 kg unbalance");
+const GRID: &str = "the grid file's [spin]";
+const TIME: &str = "the grid file's [time]";
+const SPLIT: &str = "derived: the drum of Tables 2 and 3 less its 0.4 kg unbalance";
 
 /// Rows with a single number each, and those that write several.
 #[rustfmt::skip]
 pub(super) static TABLE: &[Row] = &[
-    row!("gravity_m_per_s2", "m/s^2", NonNegative, Convention,
+    row!("gravity_m_per_s2", "m/s^2", NonNegative, "convention",
         "acceleration of gravity, downwards", machine gravity_m_per_s2),
-    row!("radial_clearance_m", "m", NonNegative, Assumed("a usual gap"),
+    row!("radial_clearance_m", "m", NonNegative, "assumed: a usual gap",
         "radial gap between drum and tub at rest", machine radial_clearance_m),
     row!("tub_mass_kg", "kg", Positive, TABLE_2,
         "mass of the tub", machine tub.mass_kg),
@@ -135,7 +136,7 @@ pub(super) static TABLE: &[Row] = &[
         "tub's moment of inertia about the vertical", machine tub.inertia_kg_m2[1]),
     row!("tub_inertia_33_kg_m2", "kg m^2", Positive, TABLE_3,
         "tub's moment of inertia about the horizontal cross axis", machine tub.inertia_kg_m2[2]),
-    row!("tub_front_x_m", "m", Any, Assumed("level with the drum's front"),
+    row!("tub_front_x_m", "m", Any, "assumed: level with the drum's front",
         "front centre of the tub on its axis (P_TE)", machine tub.front_x_m),
     row!("shaft_mass_kg", "kg", Positive, TABLE_2,
         "mass of shaft and rotor", machine shaft.mass_kg),
@@ -158,15 +159,15 @@ pub(super) static TABLE: &[Row] = &[
         machine drum.inertia_kg_m2[1]),
     row!("drum_inertia_33_kg_m2", "kg m^2", Positive, SPLIT,
         "bare drum's moment of inertia along d3", machine drum.inertia_kg_m2[2]),
-    row!("drum_hinge_x_m", "m", Any, Assumed("between front bearing and drum"),
+    row!("drum_hinge_x_m", "m", Any, "assumed: between front bearing and drum",
         "where drum and shaft meet (P_D, L_D)", machine drum.hinge_x_m),
-    row!("drum_front_x_m", "m", Any, Assumed("the drum's middle is at the unbalance"),
+    row!("drum_front_x_m", "m", Any, "assumed: the drum's middle is at the unbalance",
         "front centre of the drum on its axis (P_DE, L_D + L_DE)", machine drum.front_x_m),
     row!("unbalance_mass_kg", "kg", NonNegative, TABLE_2,
         "point mass stuck to the drum's wall (m_u)", machine unbalance.mass_kg),
     row!("unbalance_x_m", "m", Any, SPLIT,
         "position of the unbalance along the axis (x_u)", machine unbalance.x_m),
-    row!("unbalance_radius_m", "m", NonNegative, Paper("its text"),
+    row!("unbalance_radius_m", "m", NonNegative, "paper, its text",
         "distance of the unbalance from the axis (r_u)", machine unbalance.radius_m),
     row!("flexure_stiffness_n_m_per_rad", "N m/rad", Positive, SECTION_3_1,
         "bending stiffness between shaft and drum (K_D)", machine flexure.stiffness_n_m_per_rad),
@@ -178,9 +179,9 @@ pub(super) static TABLE: &[Row] = &[
         set |Machine { bearings: b, .. }, _, _, v| {
             [b.front_stiffness_n_per_m, b.rear_stiffness_n_per_m] = [v; 2];
         }),
-    row!("bearing_front_x_m", "m", Positive, Assumed("a usual length"),
+    row!("bearing_front_x_m", "m", Positive, "assumed: a usual length",
         "front bearing centre (L_fb)", machine bearings.front_x_m),
-    row!("bearing_rear_x_m", "m", Negative, Assumed("O is midway between the bearings"),
+    row!("bearing_rear_x_m", "m", Negative, "assumed: O is midway between the bearings",
         "rear bearing centre (-L_rb)", machine bearings.rear_x_m),
     row!("bearing_front_stiffness_n_per_m", "N/m", Positive, SECTION_3_1,
         "radial stiffness of the front bearing (K_fb)", machine bearings.front_stiffness_n_per_m),
@@ -209,9 +210,9 @@ pub(super) static TABLE: &[Row] = &[
         set |m, _, _, v| {
             m.dampers.iter_mut().for_each(|d| d.friction_linear_speed_m_per_s = Some(v));
         }),
-    row!("spin_peak_rpm", "rpm", Range::Within(-1e5, 1e5), Grid,
+    row!("spin_peak_rpm", "rpm", Range::Within(-1e5, 1e5), GRID,
         "greatest spin speed; negative turns backwards", spin peak_rpm),
-    row!("spin_ramp_s", "s", Positive, Grid,
+    row!("spin_ramp_s", "s", Positive, GRID,
         "duration of the run-up, and of a triangle's run-down (Figs. 10 to 12: 50 s, assumed)",
         spin ramp_s),
     row!("cabinet_mass_kg", "kg", NonNegative, NONE,
@@ -224,9 +225,9 @@ pub(super) static TABLE: &[Row] = &[
         "mass centre of the cabinet, sideways", cabinet centre_m[2]),
     row!("cabinet_friction", "", Within(0.0, 10.0), NONE,
         "coefficient of friction between feet and floor", cabinet friction),
-    row!("window_from_s", "s", NonNegative, Time,
+    row!("window_from_s", "s", NonNegative, TIME,
         "when amplitudes begin to be taken", window 0),
-    row!("window_to_s", "s", NonNegative, Time,
+    row!("window_to_s", "s", NonNegative, TIME,
         "when amplitudes cease to be taken", window 1),
 ];
 
@@ -236,7 +237,7 @@ static SPRING: &[&[Row]] = &[
     &[
         row!("stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1,
             "stiffness of this spring", of springs stiffness_n_per_m),
-        row!("free_length_m", "m", NonNegative, Assumed("the distance between the ends as given"),
+        row!("free_length_m", "m", NonNegative, "assumed: the distance between the ends as given",
             "length of this spring without force", Target::Machine,
             get |m, _, k| {
                 m.springs.get(k).map(|s| s.free_length_m.unwrap_or_else(|| s.given_length_m()))
@@ -282,7 +283,7 @@ static STOP: &[&[Row]] = &[
             "stiffness of this stop in contact", of stops stiffness_n_per_m),
         row!("damping_n_s_per_m", "N s/m", NonNegative, NONE,
             "damping of this stop in contact", of stops damping_n_s_per_m),
-        row!("softness_m", "m", Within(1e-9, 1.0), Assumed("a tenth of a millimetre"),
+        row!("softness_m", "m", Within(1e-9, 1.0), "assumed: a tenth of a millimetre",
             "depth over which contact with this stop sets in", of stops softness_m),
     ],
     axes!("tub_" "_m", "m", Any, NONE, "tub point of this stop, ", of stops tub_m),
@@ -328,9 +329,9 @@ static FOOT: &[&[Row]] =
 /// Rows of each point of a spin's table, after `spin_table_1_`.
 #[rustfmt::skip]
 static SPIN_POINT: &[&[Row]] = &[&[
-    row!("time_s", "s", NonNegative, Grid,
+    row!("time_s", "s", NonNegative, GRID,
         "time of this point of the spin's table; the first is 0", table time_s),
-    row!("speed_rpm", "rpm", Range::Within(-1e5, 1e5), Grid,
+    row!("speed_rpm", "rpm", Range::Within(-1e5, 1e5), GRID,
         "speed at this point of the spin's table", table speed_rpm),
 ]];
 
@@ -347,7 +348,7 @@ pub(super) static BLOCKS: &[Block] = &[
     },
     Block::new("foot", FOOT, |machine, _| machine.feet.len()),
     Block {
-        missing: |_, count| UnknownParameter::TablePoint { count },
+        of: ["the spin's table", "point"],
         ..Block::new("spin_table", SPIN_POINT, |_, spin| table_points(spin))
     },
 ];
