@@ -69,22 +69,21 @@ impl Simd {
         Self::ALL.into_iter().find(|simd| simd.is_available()).unwrap_or(Self::Scalar)
     }
 
+    /// The one with the fewest lanes, no more than this one has, that takes so many trajectories at
+    /// once; else this one. Half the lanes cost little more than half the time where a processor
+    /// splits its widest instructions.
+    pub fn narrowed(self, trajectories: usize) -> Self {
+        let fits = |simd: &Self| (trajectories..=self.lanes()).contains(&simd.lanes());
+        let mut narrowest_first = Self::ALL.into_iter().rev().filter(|simd| simd.is_available());
+        narrowest_first.find(fits).unwrap_or(self)
+    }
+
     /// What [`Self::dispatch_narrow`] runs on.
     pub fn narrow() -> Self {
         [Self::Avx2, Self::Neon, Self::Simd128]
             .into_iter()
             .find(|simd| simd.is_available())
             .unwrap_or(Self::Scalar)
-    }
-
-    /// The one with the fewest lanes that take so many trajectories at once, up to this: half the
-    /// lanes cost little more than half the time where a processor splits its widest instructions.
-    /// Results are the same bits on all of them.
-    #[must_use]
-    pub fn for_lanes(self, count: usize) -> Self {
-        let fits =
-            |simd: &Self| simd.is_available() && (count..=self.lanes()).contains(&simd.lanes());
-        Self::ALL.into_iter().rev().find(fits).unwrap_or(self)
     }
 
     /// Whether this processor has it.

@@ -164,24 +164,16 @@ impl AxisValues {
         }
     }
 
-    /// Indices of the least and the greatest value.
-    pub fn extremes(&self) -> [u64; 2] {
-        match self {
-            Self::List(values) => {
-                let by_value = |a: &(usize, &f64), b: &(usize, &f64)| a.1.total_cmp(b.1);
-                let index = |found: Option<(usize, &f64)>| found.map_or(0, |(i, _)| i as u64);
-                let pairs = || values.iter().enumerate();
-                [index(pairs().min_by(by_value)), index(pairs().max_by(by_value))]
-            }
-            Self::Distributed(_) => [0, 1],
-            Self::Linear { from, to, count } | Self::Log { from, to, count } => {
-                if from <= to {
-                    [0, count - 1]
-                } else {
-                    [count - 1, 0]
-                }
-            }
-        }
+    /// The least and the greatest value.
+    ///
+    /// # Panics
+    /// If there are no values.
+    pub fn extremes(&self) -> [f64; 2] {
+        let ends = [0, self.len() - 1].map(|i| self.value(i));
+        let all = if let Self::List(values) = self { values } else { &ends[..] };
+        let all = || all.iter().copied();
+        let found = [all().min_by(f64::total_cmp), all().max_by(f64::total_cmp)];
+        found.map(Option::unwrap_or_default)
     }
 }
 
@@ -255,7 +247,7 @@ impl<M: Model> Plan<M> {
         }
         let end = |(k, axis): (usize, &Axis<M>)| {
             let greatest = k < Self::CORNER_AXES && corner >> k & 1 == 1;
-            axis.values.value(axis.values.extremes()[usize::from(greatest)])
+            axis.values.extremes()[usize::from(greatest)]
         };
         self.axes.iter().enumerate().map(end).collect()
     }

@@ -4,7 +4,9 @@
 use divan::{Bencher, counter::ItemsCount};
 use lane_ode::{Simd, Tolerance};
 use washer_model::bench::{Part, evaluate};
-use washer_model::{Caps, Machine, Method, ModelKind, Point, Spin, Timing, prepare, simulate};
+use washer_model::{
+    Caps, Machine, Method, ModelKind, Point, Profile, Spin, Timing, prepare, simulate,
+};
 
 fn main() {
     divan::main();
@@ -23,7 +25,10 @@ fn kernels() -> Vec<(ModelKind, Simd)> {
 
 /// The paper's machine over the first `end_s` of its run-up, amplitudes over the second half.
 fn points(simd: Simd, end_s: f64) -> Vec<Point> {
-    let scenario = (Machine::paper(), Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 });
+    let scenario = (
+        Machine::paper(),
+        Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 },
+    );
     let timing = Timing { end_s, window_s: [0.5 * end_s, end_s], checkpoints: 0 };
     prepare(simd, &vec![scenario; simd.lanes()], &timing).into_iter().map(Result::unwrap).collect()
 }

@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use lane_ode::Simd;
 use washer_model::{
-    BumpStop, Bushing, Cases, Dwell, Machine, Method, ModelKind, Point, Spin, Starts, Timing,
-    endings, prepare, respond, simulate,
+    BumpStop, Bushing, Cases, Dwell, Machine, Method, ModelKind, Point, Profile, Spin, Starts,
+    Timing, endings, prepare, respond, simulate,
 };
 
 /// As many as the widest lanes hold.
@@ -55,7 +55,10 @@ fn table(unit: &str, subjects: &[String], rounds: &[Vec<f64>]) -> Vec<f64> {
 
 /// One core, every instruction set and model.
 fn trajectories(rounds: usize) {
-    let scenario = (Machine::paper(), Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 });
+    let scenario = (
+        Machine::paper(),
+        Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 },
+    );
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
     let points: Vec<Point> = prepare(Simd::best(), &vec![scenario; TRAJECTORIES], &timing)
         .into_iter()
@@ -101,7 +104,7 @@ fn trajectories(rounds: usize) {
 /// One core, the whole grid of Fig. 12: plain steps and the fast method. What both models'
 /// trajectories take by the latter at 1e-3, once each (s).
 fn methods(rounds: usize) -> f64 {
-    let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+    let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
     let (end_s, window_s) = (50.0, [30.0, 50.0]);
     let mut scenarios = Vec::new();
     for mass in 0..39 {
@@ -234,7 +237,7 @@ fn boundaries(rounds: usize) {
 /// Responses at constant speeds, both models' with all multipliers; `pair_s` is what a point's two
 /// trajectories of 50 s take by the fast method.
 fn dwells(rounds: usize, pair_s: f64) {
-    let spin = Spin::Ramp { peak_rpm: 350.0, ramp_s: 50.0 };
+    let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 50.0 };
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = 0.4;
@@ -396,7 +399,7 @@ fn elements(rounds: usize) {
         ("all of these", &[&friction, &stops, &gasket, &stiffening]),
     ];
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
-    let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+    let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
     let machines = subjects.map(|(_, fits)| {
         let scenarios: Vec<_> = (0..TRAJECTORIES)
             .map(|i| {

@@ -15,8 +15,8 @@ use ladder::ladder;
 use lane_ode::Simd;
 use once_cell::sync::OnceCell;
 use pool::{Feed, Keep, Pool};
-use washer_model::{Cases, Machine, Method, Point, Spin, Timing, prepare};
-use washer_row::{Demand, Ladder, Level, MODELS, Outcome, Rule, RungRun, Status, runs};
+use washer_model::{Cases, Machine, Method, ModelKind, Point, Spin, Timing, prepare};
+use washer_row::{Demand, Ladder, Level, Outcome, Rule, RungRun, Status, runs};
 
 use crate::columns::Columns;
 use crate::plan::{Plan, Scenario};
@@ -126,7 +126,7 @@ impl<'a> ModelEngine<'a> {
 
     fn find_ladders(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
         if let Some((level, method)) = self.plan.integrator.direct() {
-            return MODELS.map(|_| Ladder::direct(level, method));
+            return ModelKind::ALL.map(|_| Ladder::direct(level, method));
         }
         // The fast method's, by the corners of the grid.
         let scenarios: Vec<_> =
@@ -136,7 +136,7 @@ impl<'a> ModelEngine<'a> {
         let ready = ready
             .filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.model.spin)));
         let cases = Cases::until(ready, self.plan.end_s, is_stopped);
-        MODELS.map(|model| ladder(&cases, model, self.rule.accuracy))
+        ModelKind::ALL.map(|model| ladder(&cases, model, self.rule.accuracy))
     }
 
     /// One row per point given by the values of its axes, on the grid or between its points;
@@ -188,7 +188,7 @@ impl<'a> ModelEngine<'a> {
     }
 
     fn simd_for(&self, trajectories: usize) -> Simd {
-        self.forced.unwrap_or_else(|| Simd::best().for_lanes(trajectories))
+        self.forced.unwrap_or_else(|| Simd::best().narrowed(trajectories))
     }
 
     /// Points made ready, those of one window together; or why there is none.
@@ -221,7 +221,7 @@ impl<'a> ModelEngine<'a> {
         let stop = || watch.stopped();
         let together = |points: &[&Point]| {
             let simd = self.simd_for(points.len());
-            runs(simd, MODELS[model], method, points, &self.rule, &stop).unwrap_or_default()
+            runs(simd, ModelKind::ALL[model], method, points, &self.rule, &stop).unwrap_or_default()
         };
         let panicked = || RungRun::failed(Status::Panicked);
         together_or_alone(points, together, panicked)

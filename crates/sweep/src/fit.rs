@@ -63,8 +63,8 @@ pub struct FitOptions {
     #[arg(long, value_name = "NAME[=FROM:TO],...", value_delimiter = ',')]
     pub own: Vec<String>,
     /// Fit the nonlinear model, or the linear one
-    #[arg(long, value_name = "MODEL", default_value = NONLINEAR)]
-    #[arg(value_parser = [NONLINEAR, LINEAR])]
+    #[arg(long, value_name = "MODEL", default_value = ModelKind::Nonlinear.name())]
+    #[arg(value_parser = ModelKind::ALL.map(ModelKind::name))]
     pub model: String,
     /// Take the clock of every file as it is, instead of fitting a shift of it
     #[arg(long)]
@@ -82,10 +82,6 @@ pub struct FitOptions {
     #[arg(value_parser = clap::value_parser!(u32).range(0..=100_000))]
     pub draws: u32,
 }
-
-/// The models that can be fitted.
-const NONLINEAR: &str = "nonlinear";
-const LINEAR: &str = "linear";
 
 /// A fit that was made.
 pub(crate) struct Fitted<'a> {
@@ -127,7 +123,7 @@ fn middle(grid: &GridInput, constants: &[String]) -> Result<Vec<String>, Diagnos
     let several =
         plan.axes.iter().filter(|axis| axis.values.len() > 1 && !is_given(axis.parameter.name()));
     let value = |axis: &crate::plan::Axis| {
-        let [from, to] = axis.values.extremes().map(|k| axis.values.value(k));
+        let [from, to] = axis.values.extremes();
         format!("{}={}", axis.parameter.name(), 0.5 * (from + to))
     };
     Ok(several.map(value).collect())
@@ -231,7 +227,7 @@ fn fitted<'a>(
 ) -> Result<Fitted<'a>, Ended> {
     let free = free(options, &cases)?;
     let method = Problem::method(&cases).map_err(Error::model)?;
-    let model = if options.model == LINEAR { ModelKind::Linear } else { ModelKind::Nonlinear };
+    let model = ModelKind::named(&options.model).unwrap_or(ModelKind::Nonlinear);
     let simd = simd_from_environment()?;
     let (with_shift, stop) = (!options.no_shift, work.stop);
     let mut problem = Problem { cases, free, model, with_shift, method, simd, stop };

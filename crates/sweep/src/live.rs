@@ -95,7 +95,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     let axes = plan.axes.iter().map(|axis| slider(axis, None));
     let Washer { machine, spin, .. } = &plan.model;
     let further = sliders.iter().map(|axis| slider(axis, axis.parameter.get(machine, spin)));
-    let columns = |number: Measured| ["nonlinear", "linear"].map(|model| number.column(model));
+    let columns = |number: Measured| ModelKind::ALL.map(|model| number.column(model.name()));
     let criterion = plan.model.measures.criterion;
     // What a column has where there is no ratio is not a page's.
     let ratio = criterion.ratio().split(';').next().unwrap_or_default();
@@ -146,7 +146,7 @@ pub(crate) fn resonances(plan: &Plan) -> Vec<[String; 3]> {
 }
 
 fn slider(Axis { parameter, values }: &Axis, value: Option<f64>) -> Slider {
-    let [from, to] = values.extremes().map(|at| values.value(at));
+    let [from, to] = values.extremes();
     let (name, description) = (parameter.name().to_owned(), parameter.description().to_owned());
     Slider { name, description, from, to, value }
 }
@@ -255,8 +255,9 @@ fn setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Err
     let ladders = ModelEngine::new(plan)?.ladders().clone();
     let wide = widened(plan, sliders);
     let wide_ladders = ModelEngine::new(&wide)?.ladders().clone();
-    let words = [(&ladders[0], ModelKind::Nonlinear), (&ladders[1], ModelKind::Linear)]
-        .map(|(ladder, model)| ladder.rungs.iter().map(|rung| rung.describe(model)).collect());
+    let words = ModelKind::ALL.map(|model| {
+        ladders[model as usize].rungs.iter().map(|rung| rung.describe(model)).collect()
+    });
     let parameters = wide.axes.iter().map(|axis| axis.parameter.clone()).collect();
     let setup = Setup {
         machine: plan.model.machine.clone(),

@@ -65,12 +65,12 @@ mod tests {
     use crate::method::Integrator;
     use sweep_engine::design::{Design, Rule};
     use sweep_engine::{AxisValues, Reliability};
-    use washer_model::{Machine, Parameter, Spin};
+    use washer_model::{Machine, Parameter, Profile, Spin};
     use washer_row::Measures;
 
     fn plan(axes: &[(&str, AxisValues)]) -> Plan {
         let machine = Machine::paper();
-        let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+        let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
         let axis = |(name, values): &(&str, AxisValues)| Axis {
             parameter: Parameter::find(name, &machine, &spin).unwrap(),
             values: values.clone(),

@@ -1,7 +1,7 @@
 //! What computes the washing machine's rows, for the engine's commands.
 
 use sweep_engine::{Engine, Error, Estimate, Swept};
-use washer_model::{Machine, Parameter, Spin, Target};
+use washer_model::{Machine, Parameter, Profile, Spin, Target};
 use washer_row::{Criterion, Demand, Metric};
 
 use crate::config::grid::lacking;
@@ -59,7 +59,10 @@ impl Swept for Washer {
 
     fn listed(plan: Option<&Plan>) -> Vec<Listed> {
         // The spin's parameters exist without a grid, but have no value.
-        let (paper, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
+        let (paper, spin) = (
+            Machine::paper(),
+            Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 },
+        );
         let (machine, spin) =
             plan.map_or((&paper, &spin), |plan| (&plan.model.machine, &plan.model.spin));
         let row = |parameter: Parameter| {
@@ -91,7 +94,7 @@ mod tests {
 
     #[test]
     fn json_holds_every_parameter() {
-        let spin = Spin::Ramp { peak_rpm: 120.0, ramp_s: 2.0 };
+        let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 120.0, ramp_s: 2.0 };
         let json: Value = serde_json::from_str(&as_json(&Washer::listed(None))).unwrap();
         assert_eq!(
             json.as_array().map(Vec::len),

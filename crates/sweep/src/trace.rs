@@ -26,7 +26,7 @@ use sweep_engine::store::read;
 use sweep_engine::threads::Stop;
 use sweep_engine::{Error, StoreError, Table, threads};
 use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
-use washer_row::{Level, MODELS};
+use washer_row::Level;
 
 /// Most instants that are kept: some 5 GB of both models' states in memory would be ten times as
 /// many.
@@ -151,7 +151,7 @@ pub(crate) enum Models {
 impl Models {
     fn kinds(self) -> &'static [ModelKind] {
         match self {
-            Self::Both => &[ModelKind::Nonlinear, ModelKind::Linear],
+            Self::Both => &ModelKind::ALL,
             Self::Nonlinear => &[ModelKind::Nonlinear],
             Self::Linear => &[ModelKind::Linear],
         }
@@ -348,10 +348,8 @@ fn columns(
         table.numbers("drum_angle_rad", "rad", what, angles.map(Some));
     }
     let counts: Vec<usize> = runs.iter().map(|run| run.times_s.len()).collect();
-    let models = models.iter().map(|(kind, histories)| {
-        let name = if *kind == ModelKind::Linear { "linear" } else { "nonlinear" };
-        Columns::new(name, histories, &counts)
-    });
+    let models =
+        models.iter().map(|(kind, histories)| Columns::new(kind.name(), histories, &counts));
     let models: Vec<Columns<'_>> = models.collect();
     models.iter().for_each(|model| model.channels(table));
     models.iter().for_each(|model| model.gap(table));
@@ -467,7 +465,7 @@ fn methods(
         Some((level, method)) => ([method; 2], level, plan.integrator.to_json()),
         None => {
             let cases = Cases::new([(point, spin)], plan.end_s);
-            let methods = MODELS.map(|model| reference(&cases, model));
+            let methods = ModelKind::ALL.map(|model| reference(&cases, model));
             match methods[0] {
                 Method::Rk4 { step_s } => {
                     (methods, Level::Rk4, Integrator::Rk4 { step_s }.to_json())

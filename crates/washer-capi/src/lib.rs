@@ -11,7 +11,7 @@ use core::ptr;
 use core::slice;
 use lane_ode::Simd;
 use washer_model::{
-    Channel, Equations, Machine, ModelKind, Parameter, STATE_LEN, Spin, Timing, prepare,
+    Channel, Equations, Machine, ModelKind, Parameter, Profile, STATE_LEN, Spin, Timing, prepare,
 };
 
 /// The equations of one machine and its spin.
@@ -93,18 +93,14 @@ unsafe fn make(setup: &Setup) -> Result<Washer, Status> {
     let names = unsafe { array(setup.names, setup.constants)? };
     let values = unsafe { array(setup.values, setup.constants)? };
 
-    let model = match model {
-        "nonlinear" => ModelKind::Nonlinear,
-        "linear" => ModelKind::Linear,
-        _ => return Err(Status::UnknownName),
-    };
+    let model = ModelKind::named(model).ok_or(Status::UnknownName)?;
     let (peak_rpm, ramp_s) = (setup.peak_rpm, setup.ramp_s);
-    let mut spin = match profile {
-        "cycloidal" => Spin::Cycloidal { peak_rpm, ramp_s },
-        "triangular" => Spin::Triangular { peak_rpm, ramp_s },
-        "ramp" => Spin::Ramp { peak_rpm, ramp_s },
-        "table" => Spin::Table { time_s: time_s.to_vec(), speed_rpm: speed_rpm.to_vec() },
-        _ => return Err(Status::UnknownName),
+    let mut spin = match Profile::named(profile) {
+        Some(profile) => Spin::Ramped { profile, peak_rpm, ramp_s },
+        None if profile == "table" => {
+            Spin::Table { time_s: time_s.to_vec(), speed_rpm: speed_rpm.to_vec() }
+        }
+        None => return Err(Status::UnknownName),
     };
     let mut machine = Machine::paper();
     for (&name, &value) in names.iter().zip(values) {

@@ -7,7 +7,7 @@ use washer_model::{
     Timing, history, prepare, respond,
 };
 use washer_row::{
-    Climbs, Demand, Deviations, Ladder, Level, MODELS, Next, Outcome, Rule, RungRun, Status, Terms,
+    Climbs, Demand, Deviations, Ladder, Level, Next, Outcome, Rule, RungRun, Status, Terms,
     Trajectory, Verdict, runs,
 };
 
@@ -194,7 +194,7 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
 }
 
 fn by_method(model: usize, method: &Method, points: &[&Point], rule: &Rule) -> Vec<RungRun> {
-    let found = runs(Simd::best(), MODELS[model], method, points, rule, &|| false);
+    let found = runs(Simd::best(), ModelKind::ALL[model], method, points, rule, &|| false);
     found.unwrap_or_default()
 }
 

@@ -5,8 +5,8 @@ use core::mem::discriminant;
 use lane_ode::Tolerance;
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    BumpStop, Bushing, Caps, Channel, Foot, Gear, Geared, Machine, Method, Parameter, Spin,
-    Unbalance,
+    BumpStop, Bushing, Caps, Channel, Foot, Gear, Geared, Machine, Method, Parameter, Profile,
+    Spin, Unbalance,
 };
 use washer_row::{Convergence, Criterion, Ladder, Level, Measures, Metric, Rule, Rung};
 
@@ -114,18 +114,16 @@ impl Setup {
 /// Which profile it is; its numbers are parameters.
 fn walk_profile(walk: &mut Walk<'_>, spin: &mut Spin) -> Option<()> {
     let code = walk.count(match spin {
-        Spin::Cycloidal { .. } => 0,
-        Spin::Triangular { .. } => 1,
-        Spin::Ramp { .. } => 2,
-        Spin::Table { time_s, .. } => 3 + time_s.len(),
+        Spin::Ramped { profile, .. } => *profile as usize,
+        Spin::Table { time_s, .. } => Profile::ALL.len() + time_s.len(),
     })?;
     if walk.is_reading() {
-        let (peak_rpm, ramp_s) = (0.0, 0.0);
-        *spin = match code {
-            0 => Spin::Cycloidal { peak_rpm, ramp_s },
-            1 => Spin::Triangular { peak_rpm, ramp_s },
-            2 => Spin::Ramp { peak_rpm, ramp_s },
-            more => Spin::Table { time_s: vec![0.0; more - 3], speed_rpm: vec![0.0; more - 3] },
+        *spin = match Profile::ALL.get(code) {
+            Some(&profile) => Spin::Ramped { profile, peak_rpm: 0.0, ramp_s: 0.0 },
+            None => {
+                let none = vec![0.0; code - Profile::ALL.len()];
+                Spin::Table { time_s: none.clone(), speed_rpm: none }
+            }
         };
     }
     Some(())

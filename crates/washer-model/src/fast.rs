@@ -549,7 +549,7 @@ pub(crate) fn rounded_down(number: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Machine, Timing, prepare};
+    use crate::{Machine, Profile, Timing, prepare};
     use core::cell::Cell;
     use lane_ode::Simd;
 
@@ -559,7 +559,7 @@ mod tests {
         for spring in &mut machine.springs {
             spring.stiffness_n_per_m *= stiffer;
         }
-        let spin = Spin::Ramp { peak_rpm: 100.0, ramp_s: 4.0 };
+        let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 100.0, ramp_s: 4.0 };
         let timing = Timing { end_s: 4.0, window_s: [3.0, 4.0], checkpoints: 0 };
         let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
         let ready: Vec<_> = points.iter().flatten().map(|point| (point, &spin)).collect();
@@ -580,7 +580,7 @@ mod tests {
     #[test]
     fn a_choice_is_put_down_where_it_is_told_to() {
         let machine = Machine::paper();
-        let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+        let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
         let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
         let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
         let asked = Cell::new(0);
@@ -608,7 +608,7 @@ mod tests {
     #[test]
     fn one_step_for_all_speeds_is_the_top_gears() {
         let machine = Machine::paper();
-        let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+        let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
         let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
         let points = prepare(Simd::Scalar, &[(machine, spin.clone())], &timing);
         let cases = Cases::new(points.iter().flatten().map(|point| (point, &spin)), timing.end_s);

@@ -21,14 +21,14 @@
 //!
 //! ```
 //! use lane_ode::Simd;
-//! use washer_model::{Machine, Spin, Timing, campbell, modes, prepare};
+//! use washer_model::{Machine, Profile, Spin, Timing, campbell, modes, prepare};
 //!
 //! let standard = Machine::paper();
 //! let mut stiff = standard.clone();
 //! for spring in &mut stiff.springs {
 //!     spring.stiffness_n_per_m *= 2.0;
 //! }
-//! let spin = Spin::Ramp { peak_rpm: 400.0, ramp_s: 40.0 };
+//! let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 400.0, ramp_s: 40.0 };
 //! let timing = Timing { end_s: 50.0, window_s: [0.0, 50.0], checkpoints: 0 };
 //! let points = prepare(Simd::best(), &[(standard, spin.clone()), (stiff, spin)], &timing);
 //!
@@ -83,7 +83,7 @@ pub use fast::geared::{Formula, Gear, Geared};
 pub use kind::ModelKind;
 pub use linear::Matrices;
 pub use machine::parameters::{Parameter, Range, Target, UnknownParameter, decimal, unit_suffix};
-pub use machine::spin::Spin;
+pub use machine::spin::{Profile, Spin};
 pub use machine::violations::Violation;
 pub use machine::{
     Bearings, BumpStop, Bushing, Cabinet, Damper, Drum, Flexure, Foot, Machine, Shaft, Spring, Tub,
@@ -98,9 +98,7 @@ pub use point::ringing::Swing;
 pub use point::{NoEquilibrium, Point, Timing};
 pub use ready::prepare;
 pub use run::equations::{Equations, STATE_LEN};
-pub use run::history::{
-    Asked, History, Instant, Start, histories, history, history_until, instants, together,
-};
+pub use run::history::{Asked, History, Instant, Start, histories, history, instants, together};
 pub use run::suspension::Forces;
 pub use run::{
     Course, Extra, Method, Record, Snapshot, Stop, StopLoad, Wanted, Waypoint, simulate,

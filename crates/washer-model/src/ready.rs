@@ -182,7 +182,7 @@ pub fn prepare(
             let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
             let method = Method::Geared(Geared::steady(step_s, caps));
             let runs: Vec<&Point> = alike.iter().map(|one| &one.point).collect();
-            let simd = simd.for_lanes(runs.len());
+            let simd = simd.narrowed(runs.len());
             let (_, extras) = simulate_with(simd, ModelKind::Linear, &method, &runs, wanted);
             for (one, extra) in alike.iter_mut().zip(extras) {
                 one.take(&extra.damper_speeds_m_per_s);

@@ -61,9 +61,6 @@ const WEIGHT_OF_ALL: f64 = 2.0;
 /// 2.6 was seen where drum and tub touch by a micrometre.
 const CLASH_WEIGHT: f64 = 4.0;
 
-/// Both models in the order of [`Climbs`].
-pub const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
-
 /// One model's trajectory on its ladder.
 #[derive(Clone, Debug, Default)]
 struct Climb {
@@ -92,7 +89,7 @@ struct Twin {
 /// By what rows are judged, all alike.
 #[derive(Clone, Copy, Debug)]
 pub struct Terms<'a> {
-    /// Of both models, in the order of [`MODELS`].
+    /// Of both models, in the order of [`ModelKind::ALL`].
     pub ladders: &'a [Ladder; 2],
     /// What outcomes must be good for.
     pub demand: Demand,
@@ -102,7 +99,7 @@ pub struct Terms<'a> {
 
 impl<'a> Terms<'a> {
     fn of(self, model: usize, point: &'a Point) -> Judge<'a> {
-        let (ladder, model) = (&self.ladders[model], MODELS[model]);
+        let (ladder, model) = (&self.ladders[model], ModelKind::ALL[model]);
         Judge { ladder, point, model, rule: self.rule }
     }
 }
@@ -243,7 +240,7 @@ pub struct Climbs([Climb; 2]);
 /// What a row needs next.
 #[derive(Clone, Debug)]
 pub enum Next {
-    /// These runs: positions in [`MODELS`] and on that model's ladder.
+    /// These runs: positions in [`ModelKind::ALL`] and on that model's ladder.
     Runs(Vec<(usize, usize)>),
     /// Nothing.
     Done(Box<Outcome>),

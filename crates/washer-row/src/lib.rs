@@ -20,7 +20,7 @@ mod run;
 mod twin;
 mod verdict;
 
-pub use climb::{Climbs, Demand, MODELS, Next, Terms};
+pub use climb::{Climbs, Demand, Next, Terms};
 pub use convergence::Convergence;
 pub use ladder::{Ladder, Rung};
 pub use level::Level;

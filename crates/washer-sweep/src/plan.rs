@@ -165,8 +165,7 @@ impl PyPlan {
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let axes = PyDict::new(py);
         for axis in &self.evaluator.plan().axes {
-            let [least, greatest] = axis.values.extremes().map(|k| axis.values.value(k));
-            axes.set_item(axis.parameter.name(), (least, greatest))?;
+            axes.set_item(axis.parameter.name(), <(f64, f64)>::from(axis.values.extremes()))?;
         }
         Ok(axes)
     }

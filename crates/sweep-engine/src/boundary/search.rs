@@ -79,7 +79,7 @@ impl<M: Rows + Swept> BoundaryTask<M> {
                 plan.axes.len()
             ));
         };
-        let [least, greatest] = second.values.extremes().map(|k| second.values.value(k));
+        let [least, greatest] = second.values.extremes();
         if least >= greatest {
             return refused(format!(
                 "the second axis, `{}`, has one value: give it the range to search, as range = {{ \

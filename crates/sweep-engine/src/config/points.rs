@@ -40,7 +40,7 @@ where
         }
         of_axes[place] = Some(k);
         let axis = &plan.axes[place];
-        let ends = axis.values.extremes().map(|k| axis.values.value(k));
+        let ends = axis.values.extremes();
         let [least, greatest] = ends;
         let is_on_axis = |value: &f64| (least..=greatest).contains(value);
         for (row, value) in

@@ -197,7 +197,7 @@ impl<M: Rows> Study<M> {
 fn flatten<M: Model>(plan: &mut Plan<M>) {
     for axis in &mut plan.axes {
         if let AxisValues::List(_) = axis.values {
-            let [from, to] = axis.values.extremes().map(|k| axis.values.value(k));
+            let [from, to] = axis.values.extremes();
             axis.values = AxisValues::Linear { from, to, count: if from < to { 2 } else { 1 } };
         }
     }

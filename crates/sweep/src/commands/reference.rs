@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::{env, fs, iter};
 
-use washer_model::{Channel, Machine, Parameter, Range, Spin, Target};
+use washer_model::{Channel, Machine, Parameter, Profile, Range, Spin, Target};
 use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 
 use super::command;
@@ -31,7 +31,7 @@ fn row(text: &mut String, cells: &[&str]) {
 
 fn parameters() -> String {
     let mut text = head("Parameters");
-    let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
+    let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
     let all = Parameter::all(&with_one_of_each(), &spin);
     // Told once, before the table.
     let how = all.iter().find_map(|parameter| parameter.source().strip_prefix("derived: "));
@@ -119,7 +119,10 @@ fn methods() -> String {
 fn columns() -> String {
     let mut text = head("Columns of a result file");
     text.push_str(include_str!("reference/columns.txt"));
-    let (machine, spin) = (Machine::paper(), Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 });
+    let (machine, spin) = (
+        Machine::paper(),
+        Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 },
+    );
     let axes = Parameter::all(&machine, &spin)
         .into_iter()
         .filter(|parameter| ["unbalance_mass_kg", "damping_n_s_per_m"].contains(&parameter.name()))

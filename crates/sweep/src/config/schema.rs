@@ -2,13 +2,13 @@
 
 use serde_json::{Map, Value};
 use sweep_engine::config::schema::{of, set as set_schema};
-use washer_model::{Parameter, Spin};
+use washer_model::{Parameter, Profile, Spin};
 
 use super::machine::{PARTS, Times, with_one_of_each};
 
 /// `[set]`: names of the table as properties; those of numbered elements as patterns.
 pub(super) fn set() -> Value {
-    let spin = Spin::Triangular { peak_rpm: 0.0, ramp_s: 0.0 };
+    let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
     let machine = with_one_of_each();
     let mut all = Parameter::all(&machine, &spin);
     let table = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };

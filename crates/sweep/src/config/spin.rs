@@ -3,68 +3,47 @@
 use sweep_engine::config::keys::Variants;
 use sweep_engine::config::kind::{Numbers, about};
 use sweep_engine::config::{Field, Key, Keys, Kind};
-use washer_model::{Machine, Parameter, Range, Spin};
+use washer_model::{Machine, Parameter, Profile, Range, Spin};
 
 /// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are
 /// made ready together.
 pub(super) const MOST_ROWS: usize = 20_000;
 
 /// Stands in for a wrong spin, so that axes over its numbers are still known.
-pub(super) const BLANK: Spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+pub(super) const BLANK: Spin =
+    Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
 
-/// A profile that a peak and a ramp give.
-struct Ramped {
-    name: &'static str,
-    description: &'static str,
-    make: fn(f64, f64) -> Spin,
+/// What a profile is that a peak and a ramp give.
+const fn about_profile(profile: Profile) -> &'static str {
+    match profile {
+        Profile::Cycloidal => "smooth run-up, then constant",
+        Profile::Triangular => "linear up, and as long down",
+        Profile::Ramp => "linear up, then constant",
+    }
 }
-
-/// The profiles that a peak and a ramp give.
-const RAMPED: [Ramped; 3] = [
-    Ramped {
-        name: "cycloidal",
-        description: "smooth run-up, then constant",
-        make: |peak_rpm, ramp_s| Spin::Cycloidal { peak_rpm, ramp_s },
-    },
-    Ramped {
-        name: "triangular",
-        description: "linear up, and as long down",
-        make: |peak_rpm, ramp_s| Spin::Triangular { peak_rpm, ramp_s },
-    },
-    Ramped {
-        name: "ramp",
-        description: "linear up, then constant",
-        make: |peak_rpm, ramp_s| Spin::Ramp { peak_rpm, ramp_s },
-    },
-];
 
 /// The profile that is given as a table.
 const TABLE: &str = "table";
-
-/// A spin's profile.
-const fn name(spin: &Spin) -> &'static str {
-    match spin {
-        Spin::Cycloidal { .. } => RAMPED[0].name,
-        Spin::Triangular { .. } => RAMPED[1].name,
-        Spin::Ramp { .. } => RAMPED[2].name,
-        Spin::Table { .. } => TABLE,
-    }
-}
 
 /// Walks over the section.
 pub(super) fn walk(spin: &mut Spin, keys: &mut Keys<'_>) {
     keys.table(Key::new("spin", "").needed("a section [spin]"), |keys| {
         keys.places = "spin_".to_owned();
         let said = (TABLE, "linear between given points, constant after the last");
-        let all = RAMPED.iter().map(|profile| (profile.name, profile.description));
+        let all = Profile::ALL.map(|profile| (profile.name(), about_profile(profile)));
+        let set = all.len();
         let variants =
-            Variants { all: all.chain([said]).collect(), default: None, set: RAMPED.len() };
-        let now = variants.all.iter().position(|(known, _)| *known == name(spin));
+            Variants { all: all.into_iter().chain([said]).collect(), default: None, set };
+        let now = match spin {
+            Spin::Ramped { profile, .. } => *profile as usize,
+            Spin::Table { .. } => set,
+        };
         let key = Key::new("profile", "").set();
-        let chosen = keys.variants(key, &variants, now, |keys, k| match RAMPED.get(k) {
-            Some(profile) => ramped(profile, spin, keys),
-            None => table(spin, keys),
-        });
+        let chosen =
+            keys.variants(key, &variants, Some(now), |keys, k| match Profile::ALL.get(k) {
+                Some(&profile) => ramped(profile, spin, keys),
+                None => table(spin, keys),
+            });
         if chosen.is_none() && keys.section().is_some() {
             *spin = BLANK;
         }
@@ -72,13 +51,10 @@ pub(super) fn walk(spin: &mut Spin, keys: &mut Keys<'_>) {
 }
 
 /// Peak and ramp.
-fn ramped(&Ramped { name, make, .. }: &Ramped, spin: &mut Spin, keys: &mut Keys<'_>) {
-    let reason = format!("only the profile \"{TABLE}\" has it, not \"{name}\"");
+fn ramped(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
+    let reason = format!("only the profile \"{TABLE}\" has it, not \"{}\"", profile.name());
     keys.misplace(&["time_s", "speed_rpm"], &reason);
-    let (Spin::Cycloidal { peak_rpm, ramp_s }
-    | Spin::Triangular { peak_rpm, ramp_s }
-    | Spin::Ramp { peak_rpm, ramp_s }) = spin
-    else {
+    let Spin::Ramped { profile: now, peak_rpm, ramp_s } = spin else {
         let title = "the grid's spin is a table, which has no peak and no ramp";
         keys.refuse("profile", title, "expected a grid file with `peak_rpm` and `ramp_s`");
         return;
@@ -95,7 +71,10 @@ fn ramped(&Ramped { name, make, .. }: &Ramped, spin: &mut Spin, keys: &mut Keys<
             is_right &= matches!(found, Field::Given(_)) || keys.section().is_none();
         }
     }
-    *spin = if is_right { make(*peak_rpm, *ramp_s) } else { BLANK };
+    *now = profile;
+    if !is_right {
+        *spin = BLANK;
+    }
 }
 
 /// Speeds at times.
@@ -127,16 +106,4 @@ fn table(spin: &mut Spin, keys: &mut Keys<'_>) {
         (time_s, speed_rpm) = Default::default();
     }
     *spin = Spin::Table { time_s, speed_rpm };
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_profile_has_one_name() {
-        for Ramped { name, make, .. } in &RAMPED {
-            assert_eq!(super::name(&make(350.0, 50.0)), *name);
-        }
-    }
 }

@@ -12,7 +12,7 @@ mod points;
 use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
-use washer_model::{Machine, Spin};
+use washer_model::{Machine, Profile, Spin};
 use washer_row::{Measures, Metric};
 
 use super::*;
@@ -113,7 +113,10 @@ fn what_is_left_out_has_its_default() {
     let plan = load_text(SMALLEST, &[]).unwrap();
     assert_eq!(plan.name, "grid");
     assert_eq!(plan.model.machine, Machine::paper());
-    assert_eq!(plan.model.spin, Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 });
+    assert_eq!(
+        plan.model.spin,
+        Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 }
+    );
     assert_eq!((plan.end_s, plan.window_s), (50.0, [0.0, 50.0]));
     assert_eq!(plan.integrator, Integrator::Rk4MassScaled { accuracy: 1e-3 });
     assert_eq!(plan.points(), 1);
@@ -170,7 +173,10 @@ fn later_layers_override_earlier_ones() {
     assert_eq!(plan.model.machine.unbalance.mass_kg, 0.3);
     let dampings = plan.model.machine.dampers.iter().map(|damper| damper.damping_n_s_per_m);
     assert_eq!(dampings.collect::<Vec<_>>(), [100.0, 90.0]);
-    assert_eq!(plan.model.spin, Spin::Triangular { peak_rpm: 600.0, ramp_s: 50.0 });
+    assert_eq!(
+        plan.model.spin,
+        Spin::Ramped { profile: Profile::Triangular, peak_rpm: 600.0, ramp_s: 50.0 }
+    );
     // An axis of one damper beside a constant for all of them.
     let axis = "[[axis]]\nparameter = \"damper_1_damping_n_s_per_m\"\nvalues = [50, 60]\n";
     let plan = load_text(format!("{grid}{axis}"), &[]).unwrap();
@@ -576,7 +582,10 @@ fn a_list_is_a_file_of_points_whose_content_counts() {
         [plan.axis_values(0), plan.axis_values(1)],
         [[0.25, 50.0], [0.5, 40.0]].map(Vec::from)
     );
-    assert_eq!(plan.scenario(1).model.spin, Spin::Triangular { peak_rpm: 350.0, ramp_s: 40.0 });
+    assert_eq!(
+        plan.scenario(1).model.spin,
+        Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 40.0 }
+    );
     let other = load_list(&text.replace("40", "41"));
     assert_ne!(plan.to_json()["design"]["hash"], other.to_json()["design"]["hash"]);
     assert_eq!(plan.to_json()["axis"], other.to_json()["axis"]);

@@ -77,7 +77,7 @@ impl Swept {
         let elements = (forces + further) as u64;
         let rows = match spin {
             Spin::Table { time_s, .. } => time_s.len() as u64,
-            Spin::Cycloidal { .. } | Spin::Triangular { .. } | Spin::Ramp { .. } => 1,
+            Spin::Ramped { .. } => 1,
         };
         let counts_turns = draft.plan.model.measures.criterion == Criterion::Envelope
             && (self.spin || self.window);

@@ -84,7 +84,7 @@ fn a_panic_over_one_item_is_that_items_defect() {
 #[test]
 fn groups_of_any_size_give_the_same_bits_in_as_few_lanes_as_they_need() {
     for trajectories in 1..=9 {
-        let simd = Simd::best().for_lanes(trajectories);
+        let simd = Simd::best().narrowed(trajectories);
         let narrower = |other: &Simd| other.is_available() && other.lanes() < simd.lanes();
         let fits = |lanes: usize| lanes >= trajectories;
         assert!(fits(simd.lanes()) || simd == Simd::best(), "{trajectories} in {simd:?}");

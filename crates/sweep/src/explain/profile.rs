@@ -1,6 +1,6 @@
 //! The spin profile in time: its range, and when it is within a band of speeds.
 
-use washer_model::{Spin, decimal};
+use washer_model::{Profile, Spin, decimal};
 
 use sweep_engine::Error;
 
@@ -43,8 +43,8 @@ fn instants_s(spin: &Spin, end_s: f64) -> Vec<f64> {
     let mut times: Vec<f64> =
         (0..=INSTANTS).map(|k| end_s * (k as f64 / INSTANTS as f64)).collect();
     let kinks = match spin {
-        Spin::Cycloidal { ramp_s, .. } | Spin::Ramp { ramp_s, .. } => vec![*ramp_s],
-        Spin::Triangular { ramp_s, .. } => vec![*ramp_s, 2.0 * ramp_s],
+        Spin::Ramped { profile: Profile::Triangular, ramp_s, .. } => vec![*ramp_s, 2.0 * ramp_s],
+        Spin::Ramped { ramp_s, .. } => vec![*ramp_s],
         Spin::Table { time_s, .. } => time_s.clone(),
     };
     times.extend(kinks.into_iter().filter(|&kink_s| kink_s < end_s));
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_band_is_crossed_up_and_down() {
-        let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 };
+        let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
         let inside = times_inside_s(&spin, 100.0, [140.0, 210.0]);
         assert_eq!(inside.len(), 2);
         for (found, meant) in inside.iter().flatten().zip([20.0, 30.0, 70.0, 80.0]) {
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn e_folds_are_the_area_under_growth_over_time() {
-        let spin = Spin::Ramp { peak_rpm: 100.0, ramp_s: 10.0 };
+        let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 100.0, ramp_s: 10.0 };
         // A triangle of 20 rpm, which take 2 s, and a height of 0.5 /s.
         let growths = [[40.0, 0.0], [50.0, 0.5], [60.0, 0.0]];
         assert!((e_folds(&spin, [4.0, 6.0], &growths) - 0.5).abs() < 1e-5);

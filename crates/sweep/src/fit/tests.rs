@@ -45,7 +45,7 @@ fn options(free: &[&str]) -> FitOptions {
     FitOptions {
         free: free.iter().map(|name| (*name).to_owned()).collect(),
         own: Vec::new(),
-        model: NONLINEAR.to_owned(),
+        model: ModelKind::Nonlinear.name().to_owned(),
         no_shift: false,
         starts: 1,
         bootstrap: 0,
@@ -271,7 +271,10 @@ fn intervals_know_that_noise_is_correlated() {
 #[test]
 fn a_linear_model_says_what_the_nonlinear_one_would_have() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 8.0))];
-    let linear = FitOptions { model: LINEAR.to_owned(), ..options(&["spring_stiffness_n_per_m"]) };
+    let linear = FitOptions {
+        model: ModelKind::Linear.name().to_owned(),
+        ..options(&["spring_stiffness_n_per_m"])
+    };
     let report = fitted(cases, &linear);
     let said = "the nonlinear model would move spring_stiffness_n_per_m by";
     assert!(report.objection.as_ref().is_some_and(|why| why.contains(said)), "{report:?}");

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 use washer_model::{
-    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Spin, Stop, Timing,
+    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Profile, Spin, Stop, Timing,
     campbell_until, exact_motions,
 };
 
@@ -58,7 +58,7 @@ impl Asked {
                 name: "paper".to_owned(),
                 set: Map::new(),
                 machine: Machine::paper(),
-                spin: Spin::Ramp { peak_rpm: greatest_rpm, ramp_s: 1.0 },
+                spin: Spin::Ramped { profile: Profile::Ramp, peak_rpm: greatest_rpm, ramp_s: 1.0 },
                 timing: Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 },
             });
         };

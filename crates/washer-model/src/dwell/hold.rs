@@ -45,7 +45,7 @@ pub(super) fn recorded(
     let find = |held: &[Held<'_>]| {
         let groups = held.chunks(simd.lanes());
         let group =
-            |held: &[Held<'_>]| simd.for_lanes(held.len()).dispatch(Hold { held, turns, wanted });
+            |held: &[Held<'_>]| simd.narrowed(held.len()).dispatch(Hold { held, turns, wanted });
         groups.flat_map(group).collect()
     };
     by_kind(held, |held| (held.row.kind(), false), find)

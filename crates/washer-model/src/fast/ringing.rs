@@ -124,7 +124,7 @@ fn swing(point: &Point, theta_rad: f64, mode: &Mode, load: &[f64; COORDINATES]) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Machine, Spin, Timing, prepare};
+    use crate::{Machine, Profile, Spin, Timing, prepare};
     use lane_ode::Simd;
 
     fn point(machine: Machine, spin: Spin) -> Point {
@@ -133,7 +133,7 @@ mod tests {
     }
 
     fn ramp(peak_rpm: f64, ramp_s: f64) -> Spin {
-        Spin::Ramp { peak_rpm, ramp_s }
+        Spin::Ramped { profile: Profile::Ramp, peak_rpm, ramp_s }
     }
 
     #[test]

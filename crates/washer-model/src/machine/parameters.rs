@@ -280,7 +280,7 @@ fn plural(noun: &str, count: usize) -> String {
 fn table_points(spin: &Spin) -> usize {
     match spin {
         Spin::Table { time_s, speed_rpm } => time_s.len().min(speed_rpm.len()),
-        Spin::Cycloidal { .. } | Spin::Triangular { .. } | Spin::Ramp { .. } => 0,
+        Spin::Ramped { .. } => 0,
     }
 }
 

@@ -11,23 +11,11 @@ use lane_ode::{Lane, N, Real, trig};
 /// Speed of the drum over time, as a user describes it. Speeds in rpm, times in s.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Spin {
-    /// Cycloidal run-up, then constant (Eq. 42): w = peak (t/ramp - sin(2 pi t/ramp) / 2 pi).
-    Cycloidal {
-        /// Speed reached at the end of the ramp.
-        peak_rpm: f64,
-        /// Duration of the ramp.
-        ramp_s: f64,
-    },
-    /// Linear up over `ramp_s`, linear down over `ramp_s`, then at rest.
-    Triangular {
-        /// Speed at the turn.
-        peak_rpm: f64,
-        /// Duration of each flank.
-        ramp_s: f64,
-    },
-    /// Linear up over `ramp_s`, then constant.
-    Ramp {
-        /// Speed reached at the end of the ramp.
+    /// Up over a ramp, and on from there.
+    Ramped {
+        /// How it goes up, and on.
+        profile: Profile,
+        /// Speed at the end of the ramp.
         peak_rpm: f64,
         /// Duration of the ramp.
         ramp_s: f64,
@@ -39,6 +27,18 @@ pub enum Spin {
         /// Speeds at these times.
         speed_rpm: Vec<f64>,
     },
+}
+
+sweep_parameter::named! {
+    /// How a drum is run up to a peak.
+    pub enum Profile {
+        /// Cycloidal, then constant (Eq. 42): w = peak (t/ramp - sin(2 pi t/ramp) / 2 pi).
+        Cycloidal = "cycloidal",
+        /// Linear up, linear down in as long, then at rest.
+        Triangular = "triangular",
+        /// Linear up, then constant.
+        Ramp = "ramp",
+    }
 }
 
 lane_struct! {
@@ -112,7 +112,7 @@ impl Spin {
     pub(crate) fn stretches(&self) -> Vec<SpinStretch> {
         let per_s = |rpm: f64| rpm / 60.0;
         match self {
-            Self::Cycloidal { peak_rpm, ramp_s } => {
+            Self::Ramped { profile: Profile::Cycloidal, peak_rpm, ramp_s } => {
                 let peak = per_s(*peak_rpm);
                 // Eq. 42 integrated: theta = w (t^2 / 2T + T (cos(2 pi t / T) - 1) / 4 pi^2).
                 let up = SpinStretch {
@@ -130,10 +130,10 @@ impl Spin {
                 };
                 vec![up, level]
             }
-            Self::Triangular { peak_rpm, ramp_s } => {
+            Self::Ramped { profile: Profile::Triangular, peak_rpm, ramp_s } => {
                 linear_stretches(&[(0.0, 0.0), (*ramp_s, per_s(*peak_rpm)), (2.0 * ramp_s, 0.0)])
             }
-            Self::Ramp { peak_rpm, ramp_s } => {
+            Self::Ramped { profile: Profile::Ramp, peak_rpm, ramp_s } => {
                 linear_stretches(&[(0.0, 0.0), (*ramp_s, per_s(*peak_rpm))])
             }
             Self::Table { time_s, speed_rpm } => {

@@ -220,9 +220,7 @@ impl Spin {
     pub fn violations(&self) -> Vec<Violation> {
         match self {
             Self::Table { .. } => self.joint_violations(),
-            Self::Cycloidal { .. } | Self::Triangular { .. } | Self::Ramp { .. } => {
-                out_of_range(&Machine::paper(), self)
-            }
+            Self::Ramped { .. } => out_of_range(&Machine::paper(), self),
         }
     }
 
@@ -283,6 +281,7 @@ impl Spin {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Profile;
 
     /// What `change` makes wrong with the paper's machine, as text.
     fn wrong(change: impl FnOnce(&mut Machine)) -> Vec<String> {
@@ -347,7 +346,7 @@ mod tests {
         machine.dampers[0].cabinet_m = machine.dampers[0].tub_m;
         machine.bearings.front_x_m = 1e-9;
         machine.bearings.rear_x_m = -1e-9;
-        let spin = Spin::Ramp { peak_rpm: 1.0, ramp_s: 1.0 };
+        let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 1.0, ramp_s: 1.0 };
         let found = machine.violations();
         assert_eq!(found.len(), 3, "{found:?}");
         for name in found.iter().flat_map(|one| &one.concerns) {
@@ -359,13 +358,20 @@ mod tests {
     fn spins_are_judged_whole() {
         let judge =
             |spin: Spin| spin.violations().iter().map(ToString::to_string).collect::<Vec<_>>();
-        assert_eq!(judge(Spin::Ramp { peak_rpm: -350.0, ramp_s: 50.0 }), [""; 0]);
+        assert_eq!(
+            judge(Spin::Ramped { profile: Profile::Ramp, peak_rpm: -350.0, ramp_s: 50.0 }),
+            [""; 0]
+        );
         assert_eq!(
             judge(Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 9.0] }),
             [""; 0]
         );
         assert_eq!(
-            judge(Spin::Cycloidal { peak_rpm: f64::INFINITY, ramp_s: 0.0 }),
+            judge(Spin::Ramped {
+                profile: Profile::Cycloidal,
+                peak_rpm: f64::INFINITY,
+                ramp_s: 0.0
+            }),
             ["spin_peak_rpm = inf is out of range", "spin_ramp_s = 0 is out of range"]
         );
         assert_eq!(

@@ -70,23 +70,10 @@ pub fn history<'a>(
     start: &Start,
     every_s: f64,
 ) -> History<'a> {
-    history_until(model, method, point, start, every_s, &|| false)
-}
-
-/// As [`history`], as far as it has come when `stop` says so. It is asked every
-/// [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps at least.
-pub fn history_until<'a>(
-    model: ModelKind,
-    method: &Method,
-    point: &'a Point,
-    start: &Start,
-    every_s: f64,
-    stop: Stop<'_>,
-) -> History<'a> {
     let end_s = point.legs.last().map_or(0.0, |leg| leg.end_s);
     let times_s = (0..instants(end_s, every_s)).map(|k| k as f64 * every_s).collect();
     let asked = [Asked { point, method: *method, start: *start, times_s }];
-    let sampled = sample(model, &asked, stop).pop().unwrap_or_default();
+    let sampled = sample(model, &asked, &|| false).pop().unwrap_or_default();
     let [asked] = asked;
     of(model, asked, sampled)
 }
@@ -111,7 +98,8 @@ pub struct Asked<'a> {
 }
 
 /// Integrates one model at several points. By plain Runge-Kutta, so many points at once as there
-/// are lanes; each history has the same bits alone.
+/// are lanes; each history has the same bits alone. It comes as far as it is when `stop` says so,
+/// which is asked every [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps at least.
 pub fn histories<'a>(model: ModelKind, asked: Vec<Asked<'a>>, stop: Stop<'_>) -> Vec<History<'a>> {
     let is_plain = asked.iter().all(|one| matches!(one.method, Method::Rk4 { .. }));
     let at_once = if is_plain { together() } else { 1 };

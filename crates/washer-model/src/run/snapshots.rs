@@ -130,13 +130,13 @@ fn between<T: Lane>(
 mod tests {
     use super::*;
     use crate::run::history::{Start, history};
-    use crate::{Channel, Machine, Method, Spin, Timing, Wanted, prepare, simulate_with};
+    use crate::{Channel, Machine, Method, Profile, Spin, Timing, Wanted, prepare, simulate_with};
     use lane_ode::Simd;
 
     #[test]
     fn snapshots_are_those_of_a_history_in_any_company() {
         let timing = Timing { end_s: 3.0, window_s: [0.0, 3.0], checkpoints: 0 };
-        let spin = Spin::Triangular { peak_rpm: 300.0, ramp_s: 1.3 };
+        let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 300.0, ramp_s: 1.3 };
         let machines: Vec<(Machine, Spin)> = [0.2, 0.4, 0.6]
             .map(|mass_kg| {
                 let mut machine = Machine::paper();
@@ -152,7 +152,7 @@ mod tests {
             .collect();
         let wanted = Wanted { snapshots: true, ..Wanted::default() };
         let method = Method::Rk4 { step_s: 2e-4 };
-        for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        for model in ModelKind::ALL {
             let all: Vec<&Point> = points.iter().collect();
             let (_, together) = simulate_with(Simd::best(), model, &method, &all, wanted);
             let (_, alone) = simulate_with(Simd::Scalar, model, &method, &all[1..2], wanted);

@@ -111,7 +111,6 @@ mod tests {
     use crate::{Channel, Machine, Method, ModelKind, Spin, Timing, prepare};
     use lane_ode::Simd;
 
-    const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
     const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.7, 2.9], checkpoints: 0 };
 
     /// A run-up past the resonances, with kinks inside and outside of the window.
@@ -142,7 +141,7 @@ mod tests {
     #[test]
     fn agrees_with_converged_rk4() {
         let point = point(2e8);
-        for model in MODELS {
+        for model in ModelKind::ALL {
             let run =
                 |method: &Method| crate::simulate(Simd::best(), model, method, &[&point]).remove(0);
             let reference = run(&Method::Rk4 { step_s: 5e-5 });
@@ -161,7 +160,7 @@ mod tests {
     #[test]
     fn serves_bearings_on_which_explicit_methods_crawl() {
         let [stiff, rigid] = [2e9, 1e11].map(point);
-        for model in MODELS {
+        for model in ModelKind::ALL {
             let run = |method: &Method, point| {
                 crate::simulate(Simd::best(), model, method, &[point]).remove(0)
             };
@@ -182,7 +181,7 @@ mod tests {
         // One lane takes the points one after another; another instruction set may have them side
         // by side.
         for method in [rodas(1e-5), Method::Dopri5(tolerance), Method::Rk4 { step_s: 2e-4 }] {
-            for model in MODELS {
+            for model in ModelKind::ALL {
                 let together = crate::simulate(Simd::Scalar, model, &method, &all);
                 for (point, record) in all.iter().zip(together) {
                     let alone = crate::simulate(Simd::best(), model, &method, &[point]);

@@ -2,8 +2,8 @@
 
 use super::instruments::{EVERYTHING, paper, random_machine, random_spin};
 use crate::{
-    Caps, Extra, Gear, Geared, Machine, Method, ModelKind, Point, Record, Spin, Timing, Wanted,
-    prepare, simulate_until, simulate_with,
+    Caps, Extra, Gear, Geared, Machine, Method, ModelKind, Point, Profile, Record, Spin, Timing,
+    Wanted, prepare, simulate_until, simulate_with,
 };
 use core::cell::Cell;
 use lane_ode::{STEPS_AT_ONCE, Simd, Tolerance};
@@ -31,7 +31,7 @@ const METHODS: [Method; 5] = [
 /// Corners, edges and middle of the quick map and a few between, its spin in a second: eleven
 /// points, so that lanes of four and eight are left part empty.
 fn quick_map() -> Vec<Scenario> {
-    let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 0.6 };
+    let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 0.6 };
     let corners = [0.05, 0.525, 1.0].into_iter().flat_map(|m| [60.0, 180.0, 300.0].map(|c| (m, c)));
     corners.chain([(0.4, 90.0), (0.7, 120.0)]).map(|(m, c)| (paper(m, c), spin.clone())).collect()
 }
@@ -124,7 +124,9 @@ fn same_in_any_company(scenarios: &[Scenario]) {
         assert!(alone == picked(&together, &[i]), "scenario {i} alone");
     }
     // Neighbours of which two fail, one early and one late, and whose lanes others take up.
-    let wild = |ramp_s: f64| (paper(30.0, 0.0), Spin::Ramp { peak_rpm: 9e4, ramp_s });
+    let wild = |ramp_s: f64| {
+        (paper(30.0, 0.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 9e4, ramp_s })
+    };
     let mut mixed = scenarios.to_vec();
     mixed.insert(1, wild(0.02));
     mixed.insert(5, wild(0.3));
@@ -169,7 +171,11 @@ fn same_bits_in_any_company_random_machines() {
 #[test]
 fn a_leg_is_cut_where_no_bit_shows_it() {
     let timing = Timing { end_s: 1.0, window_s: [0.9, 1.0], checkpoints: 0 };
-    let spins = [2.0, 0.37, 0.11].map(|ramp_s| Spin::Triangular { peak_rpm: 350.0, ramp_s });
+    let spins = [2.0, 0.37, 0.11].map(|ramp_s| Spin::Ramped {
+        profile: Profile::Triangular,
+        peak_rpm: 350.0,
+        ramp_s,
+    });
     let scenarios: Vec<_> = spins.into_iter().map(|spin| (paper(0.4, 90.0), spin)).collect();
     let simd = Simd::best();
     let points: Vec<_> =
@@ -196,7 +202,8 @@ fn a_leg_is_cut_where_no_bit_shows_it() {
 #[test]
 fn a_stop_is_answered_within_a_leg_by_every_method() {
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
-    let scenario = (paper(0.4, 90.0), Spin::Ramp { peak_rpm: 350.0, ramp_s: 1.0 });
+    let scenario =
+        (paper(0.4, 90.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 });
     let point = prepare(Simd::best(), &[scenario], &timing).remove(0).unwrap();
     let tolerance = Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000 };
     let dop853 = Method::Geared(Geared::steady(2e-5, CAPS));

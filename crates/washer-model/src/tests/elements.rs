@@ -5,8 +5,8 @@ use super::instruments::{paper, ready};
 use super::reference::reference;
 use crate::coordinates::COORDINATES;
 use crate::{
-    BumpStop, Bushing, Channel, Damper, Machine, Method, ModelKind, Point, Spin, Spring, Start,
-    Unbalance, history, simulate,
+    BumpStop, Bushing, Channel, Damper, Machine, Method, ModelKind, Point, Profile, Spin, Spring,
+    Start, Unbalance, history, simulate,
 };
 use core::f64::consts::PI;
 use lane_ode::{Simd, Tolerance};
@@ -79,8 +79,8 @@ fn held_against<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N] {
     let case = reference(&format!("elements_{name}.json"));
     let (peak_rpm, ramp_s) = (case["peak_rpm"].as_f64().unwrap(), case["ramp_s"].as_f64().unwrap());
     let spin = match case["spin"].as_str().unwrap() {
-        "triangular" => Spin::Triangular { peak_rpm, ramp_s },
-        "cycloidal" => Spin::Cycloidal { peak_rpm, ramp_s },
+        "triangular" => Spin::Ramped { profile: Profile::Triangular, peak_rpm, ramp_s },
+        "cycloidal" => Spin::Ramped { profile: Profile::Cycloidal, peak_rpm, ramp_s },
         other => panic!("{other}"),
     };
     let point = ready(machine(&case), spin, case["end_s"].as_f64().unwrap());
@@ -232,7 +232,7 @@ fn friction_is_the_stated_viscous_damping_in_the_linear_model() {
         damper.damping_n_s_per_m += 4.0 * damper.friction_n / (PI * LINEAR_SPEED_M_PER_S);
         damper.friction_n = 0.0;
     }
-    let spin = || Spin::Ramp { peak_rpm: 300.0, ramp_s: 1.0 };
+    let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 };
     let [point, viscous] = [machine, viscous].map(|machine| ready(machine, spin(), 1.0));
     let matrices = |point: &Point| {
         let found = point.matrices(0.3, 20.0, 1.0);
@@ -248,7 +248,8 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
     // Closed at rest, and soft enough for a first order.
     machine.stops[2].clearance_m = 0.01;
     machine.stops.iter_mut().for_each(|stop| stop.softness_m = 0.05);
-    let point = ready(machine, Spin::Ramp { peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
+    let point =
+        ready(machine, Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
     let apart = |size: f64| {
         let start = Start {
             deviations: std::array::from_fn(|i| size * (0.3 + 0.1 * i as f64)),
@@ -278,7 +279,7 @@ fn elements_without_force_and_other_machines_in_the_lanes_leave_the_bits_alone()
     let mut rubbing = idle.clone();
     rubbing.dampers.iter_mut().for_each(|d| d.friction_n = 60.0);
     rubbing.springs.iter_mut().for_each(|s| s.cubic_n_per_m3 = 1e6);
-    let spin = || Spin::Ramp { peak_rpm: 350.0, ramp_s: 1.0 };
+    let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 };
     let [plain, idle, rubbing] = [plain, idle, rubbing].map(|machine| ready(machine, spin(), 1.5));
     let method = Method::Rk4 { step_s: 2e-4 };
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {

@@ -4,8 +4,8 @@
 use super::instruments::{EVERYTHING, paper};
 use crate::machine::spin::cuts_s;
 use crate::{
-    Caps, Channel, Geared, Machine, Method, ModelKind, Point, Spin, Start, Timing, Wanted, history,
-    prepare, simulate, simulate_with,
+    Caps, Channel, Geared, Machine, Method, ModelKind, Point, Profile, Spin, Start, Timing, Wanted,
+    history, prepare, simulate, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
@@ -160,7 +160,7 @@ fn at_rest_the_cabinet_carries_the_weight() {
     let weight_n = machine.gravity_m_per_s2
         * (machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg);
     let timing = Timing { end_s: 0.02, window_s: [0.0, 0.02], checkpoints: 0 };
-    let still = Spin::Ramp { peak_rpm: 0.0, ramp_s: 1.0 };
+    let still = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 1.0 };
     let point = prepare(Simd::best(), &[(machine, still)], &timing).remove(0).unwrap();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let (_, extras) = simulate_with(
@@ -180,7 +180,7 @@ fn at_rest_the_cabinet_carries_the_weight() {
 
 #[test]
 fn the_built_in_machine_sags_as_the_model_page_says() {
-    let spin = Spin::Ramp { peak_rpm: 0.0, ramp_s: 1.0 };
+    let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 1.0 };
     let machine = Machine::paper();
     let centre_m = machine.tub.centre_x_m;
     let point = prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap();

@@ -2,7 +2,8 @@
 
 use crate::modes::motions;
 use crate::{
-    Damper, Machine, Method, ModelKind, Point, Spin, Timing, Wanted, modes, prepare, simulate_with,
+    Damper, Machine, Method, ModelKind, Point, Profile, Spin, Timing, Wanted, modes, prepare,
+    simulate_with,
 };
 use lane_ode::Simd;
 
@@ -29,7 +30,7 @@ pub(crate) fn machine(
 }
 
 fn ready(machines: &[Machine]) -> Vec<Point> {
-    let spin = Spin::Triangular { peak_rpm: 350.0, ramp_s: 12.0 };
+    let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 12.0 };
     let points: Vec<_> = machines.iter().map(|machine| (machine.clone(), spin.clone())).collect();
     prepare(Simd::best(), &points, &TIMING).into_iter().map(Result::unwrap).collect()
 }

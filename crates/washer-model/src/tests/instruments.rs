@@ -7,7 +7,7 @@ use crate::nonlinear::equilibrium;
 use crate::nonlinear::floating::Floating;
 use crate::nonlinear::{Half, Halves, halves};
 use crate::point::Point;
-use crate::{Machine, Parameter, Spin, Target, Timing, Wanted, prepare};
+use crate::{Machine, Parameter, Profile, Spin, Target, Timing, Wanted, prepare};
 use lane_ode::{Lane, N, Real, Simd};
 
 /// Every record that there is.
@@ -25,7 +25,7 @@ pub(super) const EVERYTHING: Wanted = Wanted {
 
 /// Fig. 12's spin.
 pub(super) fn triangular() -> Spin {
-    Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 }
+    Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 }
 }
 
 /// The paper's machine at another unbalance mass and damping.
@@ -61,9 +61,9 @@ pub(super) fn random_spin(rng: &mut fastrand::Rng, kind: usize, end_s: f64) -> S
     let peak_rpm = 200.0 + 400.0 * rng.f64();
     let ramp_s = end_s * (0.3 + 0.4 * rng.f64());
     match kind % 4 {
-        0 => Spin::Cycloidal { peak_rpm, ramp_s },
-        1 => Spin::Triangular { peak_rpm, ramp_s },
-        2 => Spin::Ramp { peak_rpm: -peak_rpm, ramp_s },
+        0 => Spin::Ramped { profile: Profile::Cycloidal, peak_rpm, ramp_s },
+        1 => Spin::Ramped { profile: Profile::Triangular, peak_rpm, ramp_s },
+        2 => Spin::Ramped { profile: Profile::Ramp, peak_rpm: -peak_rpm, ramp_s },
         _ => Spin::Table {
             time_s: vec![0.0, 0.4 * ramp_s, ramp_s],
             speed_rpm: vec![100.0, peak_rpm, 50.0],

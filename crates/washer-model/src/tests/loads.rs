@@ -5,8 +5,8 @@ use super::energy::{axes, place};
 use crate::machine::feet::{Feet, LOAD};
 use crate::machine::{Cabinet, Foot, Machine};
 use crate::{
-    Extra, Method, ModelKind, Point, Spin, Start, StopLoad, Timing, Wanted, history, prepare,
-    simulate_with,
+    Extra, Method, ModelKind, Point, Profile, Spin, Start, StopLoad, Timing, Wanted, history,
+    prepare, simulate_with,
 };
 use lane_ode::Simd;
 
@@ -32,7 +32,7 @@ fn on_feet(mut machine: Machine) -> Machine {
 }
 
 fn point(machine: Machine) -> Point {
-    let spin = Spin::Ramp { peak_rpm: 300.0, ramp_s: 2.0 };
+    let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 2.0 };
     prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 

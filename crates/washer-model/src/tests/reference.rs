@@ -10,7 +10,8 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::equilibrium;
 use crate::{
-    Channel, Method, ModelKind, Spin, Timing, highest_frequency_rad_per_s, modes, prepare, simulate,
+    Channel, Method, ModelKind, Profile, Spin, Timing, highest_frequency_rad_per_s, modes, prepare,
+    simulate,
 };
 use core::f64::consts::TAU;
 use lane_ode::{Aside, N, Simd};
@@ -117,7 +118,7 @@ fn val_linear_matrices_match_an_independent_expansion() {
 fn val_eigenvalues_match_an_independent_solution() {
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     for case in reference("modes.json")["cases"].as_array().unwrap() {
-        let spin = Spin::Ramp { peak_rpm: 100.0, ramp_s: 1.0 };
+        let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 100.0, ramp_s: 1.0 };
         let point = prepare(Simd::Scalar, &[(machine(case), spin)], &timing).remove(0).unwrap();
         let speed = case["speed_rpm"].as_f64().unwrap() * TAU / 60.0;
         let ours = modes(&point, case["theta"].as_f64().unwrap(), speed).unwrap().modes;
@@ -152,7 +153,7 @@ fn val_reliability_map_matches_an_independent_one() {
             let mut machine = Machine::paper();
             machine.unbalance.mass_kg = row[0];
             machine.dampers.iter_mut().for_each(|d| d.damping_n_s_per_m = row[1]);
-            (machine, Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 })
+            (machine, Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 })
         })
         .collect();
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };

@@ -53,17 +53,13 @@ macro_rules! access {
     (spin $field:ident) => {
         (
             Target::Spin,
-            |_, spin, _| match spin {
-                Spin::Cycloidal { $field, .. }
-                | Spin::Triangular { $field, .. }
-                | Spin::Ramp { $field, .. } => Some(*$field),
-                Spin::Table { .. } => None,
+            |_, spin, _| {
+                if let Spin::Ramped { $field, .. } = spin { Some(*$field) } else { None }
             },
-            |_, spin, _, v| match spin {
-                Spin::Cycloidal { $field, .. }
-                | Spin::Triangular { $field, .. }
-                | Spin::Ramp { $field, .. } => *$field = v,
-                Spin::Table { .. } => {}
+            |_, spin, _, v| {
+                if let Spin::Ramped { $field, .. } = spin {
+                    *$field = v;
+                }
             },
         )
     };

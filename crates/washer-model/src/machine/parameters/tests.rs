@@ -2,9 +2,10 @@
 
 use super::Range::{Any, Negative, NonNegative, Positive};
 use super::*;
+use crate::Profile;
 
 fn spin() -> Spin {
-    Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 }
+    Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 }
 }
 
 #[test]

@@ -152,6 +152,7 @@ impl SpinStretch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Profile;
 
     /// The angle in turns, whole ones dropped, as the equations of motion see it.
     fn phase(spin: &Spin, t_s: f64) -> f64 {
@@ -164,9 +165,9 @@ mod tests {
     #[test]
     fn whole_turns_are_where_theta_is_a_multiple_of_two_pi() {
         for spin in [
-            Spin::Triangular { peak_rpm: 350.0, ramp_s: 50.0 },
-            Spin::Cycloidal { peak_rpm: 1200.0, ramp_s: 20.0 },
-            Spin::Ramp { peak_rpm: -600.0, ramp_s: 4.0 },
+            Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 },
+            Spin::Ramped { profile: Profile::Cycloidal, peak_rpm: 1200.0, ramp_s: 20.0 },
+            Spin::Ramped { profile: Profile::Ramp, peak_rpm: -600.0, ramp_s: 4.0 },
             Spin::Table {
                 time_s: vec![0.0, 5.0, 9.0, 20.0],
                 speed_rpm: vec![30.0, 200.0, 50.0, 700.0],
@@ -192,7 +193,7 @@ mod tests {
     #[test]
     fn ends_of_turns_go_with_the_whole_turn_beside_them() {
         // One turn a second after the first.
-        let spin = Spin::Ramp { peak_rpm: 60.0, ramp_s: 2.0 };
+        let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 2.0 };
         let cuts = |window_s| cuts_s(&spin.stretches(), window_s);
         let near = |found: Vec<f64>, expected: &[f64]| {
             assert_eq!(found.len(), expected.len(), "{found:?}");
@@ -204,7 +205,7 @@ mod tests {
         near(cuts([2.5, 4.5]), &[]);
         near(cuts([2.5, 3.4]), &[]);
         near(cuts([3.2, 3.4]), &[]);
-        let still = Spin::Ramp { peak_rpm: 0.0, ramp_s: 2.0 };
+        let still = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 2.0 };
         near(cuts_s(&still.stretches(), [0.0, 100.0]), &[]);
     }
 

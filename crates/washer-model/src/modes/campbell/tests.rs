@@ -3,13 +3,13 @@
 use crate::machine::Machine;
 use crate::modes::campbell::{ModeAtSpeed, ModeOverSpeed, campbell};
 use crate::modes::shape::{Movement, Plane};
-use crate::{Point, Spin, Timing, modes, prepare};
+use crate::{Point, Profile, Spin, Timing, modes, prepare};
 use core::f64::consts::TAU;
 use lane_ode::Simd;
 use std::sync::OnceLock;
 
 fn point(machine: Machine) -> Point {
-    let spin = Spin::Ramp { peak_rpm: 1200.0, ramp_s: 20.0 };
+    let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 1200.0, ramp_s: 20.0 };
     let timing = Timing { end_s: 20.0, window_s: [0.0, 20.0], checkpoints: 0 };
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
 }

@@ -2,7 +2,8 @@
 
 use crate::coordinates::COORDINATES;
 use crate::{
-    Channel, History, Machine, Method, ModelKind, Point, Spin, Start, Timing, history, prepare,
+    Channel, History, Machine, Method, ModelKind, Point, Profile, Spin, Start, Timing, history,
+    prepare,
 };
 use lane_ode::Simd;
 
@@ -35,7 +36,7 @@ fn difference(file: &str, history: &History<'_>) -> f64 {
 
 #[test]
 fn val_a_run_up_matches_an_independent_one() {
-    let spin = Spin::Cycloidal { peak_rpm: 600.0, ramp_s: 4.0 };
+    let spin = Spin::Ramped { profile: Profile::Cycloidal, peak_rpm: 600.0, ramp_s: 4.0 };
     let point = point(Machine::paper(), spin, 6.0);
     // Steps that do not divide the time between instants, so that most instants lie inside one.
     let method = Method::Rk4 { step_s: 0.97e-4 };
@@ -51,7 +52,11 @@ fn val_a_run_up_and_down_matches_an_independent_one() {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = 0.7;
     machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 110.0);
-    let point = point(machine, Spin::Triangular { peak_rpm: 350.0, ramp_s: 8.0 }, 16.0);
+    let point = point(
+        machine,
+        Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 8.0 },
+        16.0,
+    );
     let method = Method::Rk4 { step_s: 1e-4 };
     for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
         let history = history(model, &method, &point, &Start::default(), 0.01);
@@ -62,7 +67,11 @@ fn val_a_run_up_and_down_matches_an_independent_one() {
 
 #[test]
 fn a_trajectory_does_not_depend_on_how_often_it_is_read() {
-    let point = point(Machine::paper(), Spin::Ramp { peak_rpm: 300.0, ramp_s: 1.0 }, 1.0);
+    let point = point(
+        Machine::paper(),
+        Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 },
+        1.0,
+    );
     let adaptive = lane_ode::Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: 1_000_000 };
     for method in
         [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(adaptive), Method::Rodas5p(adaptive)]
@@ -80,7 +89,11 @@ fn a_trajectory_does_not_depend_on_how_often_it_is_read() {
 
 #[test]
 fn a_failed_trajectory_ends_before_the_time_of_its_failure() {
-    let point = point(Machine::paper(), Spin::Ramp { peak_rpm: 300.0, ramp_s: 1.0 }, 1.0);
+    let point = point(
+        Machine::paper(),
+        Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 },
+        1.0,
+    );
     let mut start = Start::default();
     start.speeds[4] = 100.0;
     let history =
@@ -101,7 +114,8 @@ fn at_rest_the_cabinet_carries_the_weight() {
         + machine.drum.mass_kg
         + machine.unbalance.mass_kg;
     let weight = mass * machine.gravity_m_per_s2;
-    let point = point(machine, Spin::Ramp { peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
+    let point =
+        point(machine, Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         let history = history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &Start::default(), 0.1);
         let forces = history.forces(0).unwrap();
@@ -115,7 +129,11 @@ fn at_rest_the_cabinet_carries_the_weight() {
 
 #[test]
 fn linear_forces_are_the_nonlinear_ones_to_first_order() {
-    let point = point(Machine::paper(), Spin::Ramp { peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
+    let point = point(
+        Machine::paper(),
+        Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 },
+        0.1,
+    );
     let apart = |size: f64| {
         let start = Start {
             deviations: std::array::from_fn(|i| size * (0.3 + 0.1 * i as f64)),
@@ -137,7 +155,11 @@ fn linear_forces_are_the_nonlinear_ones_to_first_order() {
 
 #[test]
 fn both_models_start_where_they_are_told() {
-    let point = point(Machine::paper(), Spin::Ramp { peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
+    let point = point(
+        Machine::paper(),
+        Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 },
+        0.1,
+    );
     let start = Start {
         deviations: std::array::from_fn(|i| 1e-3 * i as f64),
         speeds: std::array::from_fn(|i| 0.1 - 0.01 * i as f64),

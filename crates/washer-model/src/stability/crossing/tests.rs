@@ -1,7 +1,7 @@
 use super::super::{Dwell, respond};
 use super::*;
 use crate::machine::Machine;
-use crate::machine::spin::Spin;
+use crate::machine::spin::{Profile, Spin};
 use crate::point::{Timing, prepare};
 
 const STEP_S: f64 = 2e-4;
@@ -13,7 +13,7 @@ fn point(spin: Spin) -> Point {
 
 /// A run that gains speed until 2 s, and is held from there.
 fn ramp() -> Point {
-    point(Spin::Ramp { peak_rpm: 250.0, ramp_s: 2.0 })
+    point(Spin::Ramped { profile: Profile::Ramp, peak_rpm: 250.0, ramp_s: 2.0 })
 }
 
 #[test]
