@@ -83,11 +83,11 @@ pub fn run(
 ) -> Result<RunReport, StoreError> {
     let RunOptions { threads, fresh, shard, environment, .. } = options;
     let mut run = match OpenRun::open(output, job, OpenOptions { fresh, shard, environment })? {
-        Opened::Finished(file, tally) => {
-            let ended = Ended::Already(file, tally);
+        Opened::Finished((file, tally)) => {
+            let ended = Ended::Already(Box::new(file), Box::new(tally));
             return Ok(RunReport { ended, session: None, notes: Vec::new() });
         }
-        Opened::Run(run) => *run,
+        Opened::Open(run) => run,
     };
     let (points, there) = run.own_points();
     if let Some(shard) = run.shard() {

@@ -49,7 +49,7 @@ pub use read::{ResultFile, Tally};
 pub use schema::{BATCH_ROWS, Column, Done, Kind, Layout, ResultRows, Row};
 pub use shard::{Shard, ShardRequest, list as shard_list};
 pub use status::{FolderStatus, State, status};
-pub use trials::{Key, OpenedTrials, Trials};
+pub use trials::{Key, Trials};
 
 use sweep_parameter::{Parameter as _, RatioLimits};
 

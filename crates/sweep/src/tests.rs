@@ -8,7 +8,7 @@ use sweep_engine::asking::{Asking, Stopped};
 use sweep_engine::boundary::{
     BoundaryOptions, BoundaryTask, Edge, EdgeKind, Traced, quantity, trace,
 };
-use sweep_engine::store::{OpenedTrials, Rows as _, Trials};
+use sweep_engine::store::{Opened, Rows as _, Trials};
 use sweep_engine::{Interrupt, Swept as _};
 use sweep_parameter::Worse;
 use sweep_plot::contour::zero_lines;
@@ -201,7 +201,7 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
     let job = task.job();
     let mut stops = 0;
     let (found, trials) = loop {
-        let Ok(OpenedTrials::Open(trials)) = Trials::open(&output, &job, false) else { panic!() };
+        let Ok(Opened::Open(trials)) = Trials::open(&output, &job, false) else { panic!() };
         let interrupt = Interrupt::new();
         let there = trials.count();
         // The first to be told so much stops it, wherever it is in its batch.
@@ -211,7 +211,7 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
             }
         };
         let engine = Washer::engine(&task.plan, Some(&task.quantity.name)).unwrap();
-        let asking = Asking::new(engine, 2, &interrupt, Some(*trials), &tell).unwrap();
+        let asking = Asking::new(engine, 2, &interrupt, Some(trials), &tell).unwrap();
         let distances = task.distances(&asking);
         let found = trace(&distances, &task.firsts, task.curves, &task.search, &mut |_| {});
         drop(distances);

@@ -54,7 +54,7 @@ pub(crate) fn run(bytes: &[u8]) {
     let _ = status(&output, &job);
     assert_eq!(fs::read(partial.join(name)).expect("the input is there"), content);
     let mut opened = match OpenRun::open(&output, &job, options()) {
-        Ok(Opened::Run(opened)) => opened,
+        Ok(Opened::Open(opened)) => opened,
         Ok(Opened::Finished(..)) => panic!("there is no result"),
         Err(error) => {
             assert!(error.to_string().contains("x."), "{error}");

@@ -9,7 +9,7 @@ use crate::asking::{Asking, Stopped};
 use crate::boundary::quantity::offered;
 use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, TracedRow, trace};
 use crate::config::section::counted;
-use crate::store::{Column, OpenedTrials, Trials};
+use crate::store::{Column, Opened, Trials};
 use crate::{Axis, Effort, EffortArgs, Error, Exit, Plan, Progress, Swept, duration, show, tell};
 use sweep_files::{FileKind, Output};
 use sweep_parameter::{Parameter as _, Worse};
@@ -63,8 +63,8 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let file = Output::begin(&output, FileKind::Boundary)?;
     let interrupt = installed()?;
     let mut trials = match Trials::open(&output, &task.job(), args.fresh)? {
-        OpenedTrials::Open(trials) => *trials,
-        OpenedTrials::Finished => {
+        Opened::Open(trials) => trials,
+        Opened::Finished(()) => {
             let there = "the boundary is there already (--fresh traces it again)";
             return Ok(told(format!("{}: {there}\n", plan.name), &output));
         }

@@ -35,8 +35,8 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
 pub fn of_job(args: &Args, name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
     let interrupt = installed()?;
     let mut run = match OpenRun::open_for_merge(output, job)? {
-        Opened::Run(run) => run,
-        Opened::Finished(file, tally) => {
+        Opened::Open(run) => run,
+        Opened::Finished((file, tally)) => {
             let there = format!("{name}: all {} points are there already\n", file.points);
             tell((there + &rows(&tally, job)).trim_end());
             return Ok(done(args.fail_on_error, &tally.by_status));

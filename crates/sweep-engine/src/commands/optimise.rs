@@ -9,7 +9,7 @@ use crate::config::section::counted;
 use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
-use crate::store::{OpenedTrials, Trials};
+use crate::store::{Opened, Trials};
 use crate::{EffortArgs, Error, Exit, Swept, duration, tell};
 use sweep_files::{FileKind, OWN_FILE, Output, atomic, key};
 use sweep_parameter::Parameter as _;
@@ -69,8 +69,8 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let own = own_output(&study, args, &output)?;
     let interrupt = installed()?;
     let mut trials = match Trials::open(&output, &study.job(), args.fresh)? {
-        OpenedTrials::Open(trials) => *trials,
-        OpenedTrials::Finished => {
+        Opened::Open(trials) => trials,
+        Opened::Finished(()) => {
             let how = "it is there already (--fresh searches again)";
             return told(&study, args.candidate, own, &output, how);
         }

@@ -36,11 +36,11 @@ pub struct OpenOptions<'a> {
 
 /// What opening an output came to.
 #[derive(Debug)]
-pub enum Opened {
+pub enum Opened<F, T> {
     /// The output is there, whole, and of this very plan.
-    Finished(Box<ResultFile>, Box<Tally>),
-    /// There is something to do; the run holds its lock.
-    Run(Box<OpenRun>),
+    Finished(F),
+    /// There is something to do, by what holds the lock.
+    Open(T),
 }
 
 /// A run folder this process has a right to.
@@ -75,7 +75,7 @@ impl OpenRun {
         output: &Path,
         job: &Job<'_>,
         options: OpenOptions<'_>,
-    ) -> Result<Opened, StoreError> {
+    ) -> Result<Opened<(ResultFile, Tally), Self>, StoreError> {
         let folder = Folder::of(output, &job.layout)?;
         let resolve = |frozen| shard::resolve(options.shard, options.environment, frozen);
         let mut dealt = None;
@@ -92,10 +92,8 @@ impl OpenRun {
         };
         let finished = || finished(&folder, job);
         let (lock, notes) = match claim(&folder, job, options.fresh, shard, finished)? {
-            Claim::Finished((file, tally)) => {
-                return Ok(Opened::Finished(Box::new(file), Box::new(tally)));
-            }
-            Claim::Held(lock, notes) => (lock, notes),
+            Opened::Finished(found) => return Ok(Opened::Finished(found)),
+            Opened::Open(held) => held,
         };
         if let Some((_, dealing)) = dealt {
             let frozen = dealing.freeze(&folder)?;
@@ -115,14 +113,17 @@ impl OpenRun {
             notes,
         };
         run.rescan()?;
-        Ok(Opened::Run(Box::new(run)))
+        Ok(Opened::Open(run))
     }
 
     /// Opens what shards have left, in order to join it; never begins a run.
     ///
     /// # Errors
     /// [`StoreError::NoRun`] when nothing is there; else as [`OpenRun::open`].
-    pub fn open_for_merge(output: &Path, job: &Job<'_>) -> Result<Opened, StoreError> {
+    pub fn open_for_merge(
+        output: &Path,
+        job: &Job<'_>,
+    ) -> Result<Opened<(ResultFile, Tally), Self>, StoreError> {
         let folder = Folder::of(output, &job.layout)?;
         if !folder.path.exists() && !output.exists() {
             return Err(StoreError::NoRun { output: output.to_path_buf(), folder: folder.path });
@@ -403,29 +404,22 @@ fn columns_apart(was: &Schema, is: &Schema) -> Option<PlanDifference> {
     (was != is).then(|| PlanDifference { pointer, was: only(&was, &is), is: only(&is, &was) })
 }
 
-/// What claiming an output came to.
-pub(super) enum Claim<T> {
-    /// The output is there, whole, and of this very plan.
-    Finished(T),
-    /// The folder's lock, and what a user should hear of.
-    Held(Lock, Vec<String>),
-}
-
 /// Takes a folder's lock, for the `shard` if it says one, and finds this plan frozen in the folder
 /// or freezes it. Where there was none, `finished` has the first word unless the work is to start
-/// over: nothing is frozen then, nor is a folder made.
+/// over: nothing is frozen then, nor is a folder made. With the lock comes what a user should hear
+/// of.
 pub(super) fn claim<T>(
     folder: &Folder,
     job: &Job<'_>,
     fresh: bool,
     shard: impl FnOnce() -> Result<Option<u64>, StoreError>,
     finished: impl Fn() -> Result<Option<T>, StoreError>,
-) -> Result<Claim<T>, StoreError> {
+) -> Result<Opened<T, (Lock, Vec<String>)>, StoreError> {
     if !fresh
         && !folder.path.exists()
         && let Some(finished) = finished()?
     {
-        return Ok(Claim::Finished(finished));
+        return Ok(Opened::Finished(finished));
     }
     let lock = Lock::acquire(folder, shard()?)?;
     let mut notes: Vec<String> = lock.note(folder).into_iter().collect();
@@ -445,7 +439,7 @@ pub(super) fn claim<T>(
             if !fresh && let Some(finished) = finished()? {
                 // What dies between publishing its file and removing its folder leaves that.
                 remove(folder, lock);
-                return Ok(Claim::Finished(finished));
+                return Ok(Opened::Finished(finished));
             }
             ours.freeze(folder)?;
             // Another process, a shard, may have been first, with another plan.
@@ -454,7 +448,7 @@ pub(super) fn claim<T>(
             }
         }
     }
-    Ok(Claim::Held(lock, notes))
+    Ok(Opened::Open((lock, notes)))
 }
 
 /// Refuses a folder that another plan was begun in.

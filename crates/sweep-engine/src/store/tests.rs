@@ -42,8 +42,8 @@ fn options() -> OpenOptions<'static> {
 
 fn open(output: &Path, job: &Job<'_>) -> OpenRun {
     match OpenRun::open(output, job, options()).unwrap() {
-        Opened::Run(run) => *run,
-        Opened::Finished(file, _) => panic!("finished: {file:?}"),
+        Opened::Open(run) => run,
+        Opened::Finished((file, _)) => panic!("finished: {file:?}"),
     }
 }
 

@@ -21,7 +21,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::open::{self, Claim};
+use super::open::{self, Opened};
 use super::plan_file::set_aside;
 use super::{Folder, Job, Lock, StoreError, TRIALS};
 use sweep_files::regular;
@@ -36,15 +36,6 @@ pub type Key = [u64; 3];
 
 /// Trials and their answers.
 type Known = BTreeMap<Key, Option<f64>>;
-
-/// What opening a search's output came to.
-#[derive(Debug)]
-pub enum OpenedTrials {
-    /// The output is there, whole, and of this very plan.
-    Finished,
-    /// There is something to do; the search holds its lock.
-    Open(Box<Trials>),
-}
 
 /// The trials of a search that this process has a right to.
 #[derive(Debug)]
@@ -66,12 +57,12 @@ impl Trials {
     /// [`StoreError::Busy`] when another process holds the output, [`StoreError::PlanDiffers`],
     /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::File`] for
     /// anything else at the output that is not ours, and for the file system.
-    pub fn open(output: &Path, job: &Job<'_>, fresh: bool) -> Result<OpenedTrials, StoreError> {
+    pub fn open(output: &Path, job: &Job<'_>, fresh: bool) -> Result<Opened<(), Self>, StoreError> {
         let folder = Folder::beside(output, job.layout.kind)?;
-        let finished = || Ok(is_finished(&folder, job)?.then_some(()));
+        let finished = || Ok(open::of_plan(&folder, job)?.map(drop));
         let (lock, mut notes) = match open::claim(&folder, job, fresh, || Ok(None), finished)? {
-            Claim::Finished(()) => return Ok(OpenedTrials::Finished),
-            Claim::Held(lock, notes) => (lock, notes),
+            Opened::Finished(()) => return Ok(Opened::Finished(())),
+            Opened::Open(held) => held,
         };
         let path = folder.file(TRIALS);
         let plan = *job.hash().as_bytes();
@@ -97,7 +88,7 @@ impl Trials {
             let cut = file.set_len(whole).and_then(|()| file.seek(SeekFrom::End(0)));
             cut.map_err(StoreError::io("write", &path))?;
         }
-        Ok(OpenedTrials::Open(Box::new(Self { folder, lock, file, path, plan, known, notes })))
+        Ok(Opened::Open(Self { folder, lock, file, path, plan, known, notes }))
     }
 
     /// How many trials are there.
@@ -158,11 +149,6 @@ fn contents(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> Result<(File, usize, K
     Ok((file, found, known))
 }
 
-/// Whether the output is the finished file of this search and build.
-fn is_finished(folder: &Folder, job: &Job<'_>) -> Result<bool, StoreError> {
-    Ok(open::of_plan(folder, job)?.is_some())
-}
-
 fn encode(plan: &[u8; blake3::OUT_LEN], key: Key, answer: Option<f64>) -> Vec<u8> {
     let [a, b, c] = key;
     let content = [a, b, c, answer.unwrap_or(f64::NAN).to_bits()].map(u64::to_le_bytes);
@@ -198,7 +184,7 @@ mod tests {
 
     fn open(output: &Path, job: &Job<'_>) -> Trials {
         match Trials::open(output, job, false) {
-            Ok(OpenedTrials::Open(trials)) => *trials,
+            Ok(Opened::Open(trials)) => trials,
             other => panic!("expected trials, got {other:?}"),
         }
     }
@@ -268,7 +254,7 @@ mod tests {
         open(&output, &ours).keep([0; 3], None).unwrap();
         let refused = Trials::open(&output, &other, false);
         assert!(matches!(refused, Err(StoreError::PlanDiffers { .. })), "{refused:?}");
-        let Ok(OpenedTrials::Open(trials)) = Trials::open(&output, &other, true) else { panic!() };
+        let Ok(Opened::Open(trials)) = Trials::open(&output, &other, true) else { panic!() };
         assert_eq!(trials.count(), 0);
         let busy = Trials::open(&output, &other, false);
         assert!(matches!(busy, Err(StoreError::Busy { .. })), "{busy:?}");
@@ -290,15 +276,15 @@ mod tests {
         table.counts("points", "", [1]);
         fs::write(&output, table.into_bytes(&output).unwrap()).unwrap();
         let opened = Trials::open(&output, &ours, false);
-        assert!(matches!(opened, Ok(OpenedTrials::Finished)), "{opened:?}");
+        assert!(matches!(opened, Ok(Opened::Finished(()))), "{opened:?}");
         let refused = Trials::open(&output, &other, false);
         assert!(matches!(refused, Err(StoreError::OutputDiffers { .. })), "{refused:?}");
         assert!(!home.path().join("x.parquet.partial").exists());
         // A search that died with its file in place has left its folder.
-        let Ok(OpenedTrials::Open(_)) = Trials::open(&output, &ours, true) else { panic!() };
+        let Ok(Opened::Open(_)) = Trials::open(&output, &ours, true) else { panic!() };
         fs::remove_file(home.path().join("x.parquet.partial/plan.json")).unwrap();
         let opened = Trials::open(&output, &ours, false);
-        assert!(matches!(opened, Ok(OpenedTrials::Finished)), "{opened:?}");
+        assert!(matches!(opened, Ok(Opened::Finished(()))), "{opened:?}");
         assert!(!home.path().join("x.parquet.partial").exists());
     }
 }

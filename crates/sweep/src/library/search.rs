@@ -12,7 +12,7 @@ use sweep_engine::commands::boundary::search as trace;
 use sweep_engine::optimise::Study;
 use sweep_engine::optimise::file::table as study_table;
 use sweep_engine::optimise::search::search;
-use sweep_engine::store::{OpenedTrials, Trials};
+use sweep_engine::store::{Opened, Trials};
 use sweep_engine::{Error, Job, Table};
 use sweep_files::{FileKind, Output};
 
@@ -72,8 +72,8 @@ fn found<T>(
 ) -> Result<Option<ResultTable>, Error> {
     let file = output.map(|path| Output::begin(path, kind)).transpose()?;
     let trials = match output.map(|path| Trials::open(path, job, fresh)).transpose()? {
-        Some(OpenedTrials::Finished) => return output.map(ResultTable::read).transpose(),
-        Some(OpenedTrials::Open(trials)) => Some(*trials),
+        Some(Opened::Finished(())) => return output.map(ResultTable::read).transpose(),
+        Some(Opened::Open(trials)) => Some(trials),
         None => None,
     };
     let (found, trials) = search(trials)?;

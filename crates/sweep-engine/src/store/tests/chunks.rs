@@ -100,7 +100,7 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
     let shard = |index| {
         let shard = Some(ShardRequest::Given(Shard { index, of: 4 }));
         match OpenRun::open(&home.output(), &job, OpenOptions { shard, ..options() }).unwrap() {
-            Opened::Run(run) => *run,
+            Opened::Open(run) => run,
             Opened::Finished(..) => panic!("is not done"),
         }
     };
@@ -121,7 +121,7 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
     assert_eq!(running.iter().map(|holder| holder.shard).collect::<Vec<_>>(), [Some(1), Some(3)]);
     drop((first, third, again));
 
-    let Opened::Run(mut merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
+    let Opened::Open(mut merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
         panic!("is not done")
     };
     let error = merge.join(&job, &|| false).unwrap_err();
@@ -159,10 +159,10 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
         write_missing(&shard(index));
     }
     assert_eq!(status(&home.output(), &job).unwrap().state, State::Complete);
-    let Opened::Run(merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
+    let Opened::Open(merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
         panic!("is not done")
     };
-    finish(*merge, &job);
+    finish(merge, &job);
     assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));
     let found = status(&home.output(), &job).unwrap();
     assert_eq!((found.state, found.points_done), (State::Finished, POINTS));

@@ -20,7 +20,7 @@ fn another_plan_is_refused_with_the_difference_until_fresh() {
     assert!(text.contains(r#"/sweep_version: was "0.0.0-test", is "9.9.9""#), "{text}");
 
     let fresh = OpenOptions { fresh: true, ..options() };
-    let Opened::Run(run) = OpenRun::open(&home.output(), &other, fresh).unwrap() else {
+    let Opened::Open(run) = OpenRun::open(&home.output(), &other, fresh).unwrap() else {
         panic!("must run")
     };
     assert!(run.is_missing(0));
@@ -35,7 +35,7 @@ fn another_plan_is_refused_with_the_difference_until_fresh() {
 fn another_build_of_the_version_is_another_run() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     let other = Job { numerics: 2, ..synthetic::job(POINTS) };
-    let refusal = |what: Result<Opened, StoreError>| {
+    let refusal = |what: Result<Opened<_, OpenRun>, StoreError>| {
         let error = what.unwrap_err();
         assert!(error.is_refusal());
         assert!(error.to_string().contains("/numerics: was 1, is 2"), "{error}");
@@ -61,7 +61,7 @@ fn another_build_of_the_version_is_another_run() {
     finish(run, &job);
     refusal(OpenRun::open(&home.output(), &other, options()));
     let fresh = OpenOptions { fresh: true, ..options() };
-    assert!(matches!(OpenRun::open(&home.output(), &other, fresh).unwrap(), Opened::Run(_)));
+    assert!(matches!(OpenRun::open(&home.output(), &other, fresh).unwrap(), Opened::Open(_)));
 }
 
 #[test]

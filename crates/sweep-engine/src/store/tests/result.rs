@@ -104,7 +104,7 @@ fn a_finished_output_is_left_alone() {
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
-    let Opened::Finished(file, tally) = OpenRun::open(&home.output(), &job, options()).unwrap()
+    let Opened::Finished((file, tally)) = OpenRun::open(&home.output(), &job, options()).unwrap()
     else {
         panic!("is done")
     };
