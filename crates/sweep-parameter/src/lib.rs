@@ -80,14 +80,25 @@ impl Range {
 
     /// Whether `value` is allowed; never for NaN or infinity.
     pub fn contains(self, value: f64) -> bool {
+        let [least, greatest] = self.bounds();
         value.abs() <= Self::LARGEST
-            && match self {
-                Self::Any => true,
-                Self::Positive => value > 0.0,
-                Self::NonNegative => value >= 0.0,
-                Self::Negative => value < 0.0,
-                Self::Within(least, greatest) => (least..=greatest).contains(&value),
-            }
+            && (least..=greatest).contains(&value)
+            && !(value == 0.0 && self.excludes_zero())
+    }
+
+    /// The least and the greatest value; infinite where there is no bound but [`Self::LARGEST`].
+    pub const fn bounds(self) -> [f64; 2] {
+        match self {
+            Self::Any => [f64::NEG_INFINITY, f64::INFINITY],
+            Self::Positive | Self::NonNegative => [0.0, f64::INFINITY],
+            Self::Negative => [f64::NEG_INFINITY, 0.0],
+            Self::Within(least, greatest) => [least, greatest],
+        }
+    }
+
+    /// Whether 0 bounds it and is not allowed.
+    pub const fn excludes_zero(self) -> bool {
+        matches!(self, Self::Positive | Self::Negative)
     }
 
     /// The accepted values, for the message about a refused one.

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
-use washer_model::{Method, ModelKind, Parameter, Range, Target};
+use washer_model::{Method, ModelKind, Parameter, Target};
 
 use crate::config::GridInput;
 use crate::engine::simd_from_environment;
@@ -175,12 +175,7 @@ fn free_number(
     if known.iter().any(|free| free.parameter == parameter) {
         return refuse(format!("`{name}` is free twice"), "expected each once");
     }
-    let allowed = match parameter.range() {
-        Range::Within(from, to) => [from, to],
-        Range::NonNegative | Range::Positive => [0.0, f64::INFINITY],
-        Range::Negative => [f64::NEG_INFINITY, 0.0],
-        Range::Any => [f64::NEG_INFINITY, f64::INFINITY],
-    };
+    let allowed = parameter.range().bounds();
     let parsed = range.map(|range| {
         let (from, to) = range.split_once(':')?;
         let [from, to] = [from.trim().parse().ok()?, to.trim().parse().ok()?];

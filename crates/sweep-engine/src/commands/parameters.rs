@@ -63,12 +63,6 @@ pub fn as_json<M: Swept>(rows: &[Listed<M>]) -> String {
 
 /// Bounds of a range, `null` where there is none but the common greatest magnitude.
 fn range(range: Range) -> Value {
-    let (least, greatest) = match range {
-        Range::Any => (None, None),
-        Range::Positive | Range::NonNegative => (Some(0.0), None),
-        Range::Negative => (None, Some(0.0)),
-        Range::Within(least, greatest) => (Some(least), Some(greatest)),
-    };
-    let excluded = matches!(range, Range::Positive | Range::Negative);
-    json!({ "least": least, "greatest": greatest, "zero_excluded": excluded })
+    let [least, greatest] = range.bounds();
+    json!({ "least": least, "greatest": greatest, "zero_excluded": range.excludes_zero() })
 }
