@@ -51,11 +51,9 @@ impl Answer {
             Status::Ok => Trajectory { amplitudes: amplitudes.to_vec(), ..of.clone() },
             failed => Trajectory::failed(failed),
         };
-        let mut compared = Outcome::new(
-            outcome.point,
-            every(&outcome.nonlinear, &amplitudes[0]),
-            every(&outcome.linear, &amplitudes[1]),
-        );
+        let nonlinear = every(&outcome.nonlinear, &amplitudes[0]);
+        let linear = every(&outcome.linear, &amplitudes[1]);
+        let mut compared = Outcome::new(outcome.point, nonlinear, linear);
         compared.compare_turns(&Channel::ALL);
         let Verdict { ratios, .. } = Verdict::new(&compared, Channel::ALL.len(), limits);
         let levels = [0, 1].map(|model| ladders[model].rungs[rungs[model]].level);

@@ -540,10 +540,8 @@ impl Search<'_, '_> {
 /// A number of few digits. The last digits of an eigenvalue depend on the processor and on the
 /// system's mathematical library; a result must not.
 pub(crate) fn rounded_down(number: f64) -> f64 {
-    f64::from_bits(
-        number.to_bits() >> (f64::MANTISSA_DIGITS - 1 - STEP_BITS)
-            << (f64::MANTISSA_DIGITS - 1 - STEP_BITS),
-    )
+    const DROPPED: u32 = f64::MANTISSA_DIGITS - 1 - STEP_BITS;
+    f64::from_bits(number.to_bits() >> DROPPED << DROPPED)
 }
 
 #[cfg(test)]

@@ -80,11 +80,8 @@ impl<T: Lane> Aside for Linearise<'_, T> {
             for (kind, (speed, acceleration)) in
                 [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().enumerate()
             {
-                let spin = SpinState::new(
-                    (zero.lit(sin), zero.lit(cos)),
-                    zero.lit(speed),
-                    zero.lit(acceleration),
-                );
+                let angle = (zero.lit(sin), zero.lit(cos));
+                let spin = SpinState::new(angle, zero.lit(speed), zero.lit(acceleration));
                 let Half { mut floating, inertia, .. } = rotor(bodies, &spin, q, &still);
                 floating.apply(&on_shaft);
                 let (force, torque) = floating.generalised_forces();

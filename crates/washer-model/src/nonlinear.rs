@@ -69,14 +69,10 @@ pub(crate) fn accelerations<T: Lane>(
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
     let (tub, rotor) = apart(machine, coupling, sag, spin, q, u);
-    coupling.accelerations(
-        &machine.bodies,
-        spin.speed,
-        &Deflection::new(q, &tub.tilt, &rotor.tilt),
-        &sag.bearings,
-        (&tub.floating, &Factors::new(tub.inertia)),
-        (&rotor.floating, &Factors::new(rotor.inertia)),
-    )
+    let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
+    let (of_tub, of_rotor) = (Factors::new(tub.inertia), Factors::new(rotor.inertia));
+    let (tub, rotor) = ((&tub.floating, &of_tub), (&rotor.floating, &of_rotor));
+    coupling.accelerations(&machine.bodies, spin.speed, &deflection, &sag.bearings, tub, rotor)
 }
 
 /// What a unit of generalised force on each of the tub's coordinates adds to the accelerations.
@@ -92,21 +88,16 @@ pub(crate) fn by_load<T: Lane>(
     let (tub, rotor) = apart(machine, coupling, sag, spin, q, u);
     let (of_tub, of_rotor) = (Factors::new(tub.inertia), Factors::new(rotor.inertia));
     let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
-    let (mut free, mut by_load) = ([spin.speed; COORDINATES], [[spin.speed; COORDINATES]; 4]);
+    let (b, speed, at_rest) = (&machine.bodies, spin.speed, &sag.bearings);
+    let (mut free, mut by_load) = ([speed; COORDINATES], [[speed; COORDINATES]; 4]);
     // Without a load, then with each: a loop, for one copy of the code.
     for loaded in 0..=TUB.len() {
         let mut floating = tub.floating;
         if loaded > 0 {
             floating.push(loaded - 1);
         }
-        let found = coupling.accelerations(
-            &machine.bodies,
-            spin.speed,
-            &deflection,
-            &sag.bearings,
-            (&floating, &of_tub),
-            (&rotor.floating, &of_rotor),
-        );
+        let (tub, rotor) = ((&floating, &of_tub), (&rotor.floating, &of_rotor));
+        let found = coupling.accelerations(b, speed, &deflection, at_rest, tub, rotor);
         if loaded == 0 {
             free = found;
         } else {
@@ -282,12 +273,8 @@ pub(crate) fn rotor<T: Real>(
         (b.drum_share * rho_a[1]).v(),
         (b.drum_share * rho_a[2]).v(),
     ]);
-    let drift = tilt.in_cabinet_axes(&combination(
-        b.along_shaft,
-        axis_acceleration,
-        b.drum_share,
-        &rho_acceleration_a,
-    ));
+    let drift = combination(b.along_shaft, axis_acceleration, b.drum_share, &rho_acceleration_a);
+    let drift = tilt.in_cabinet_axes(&drift);
     let arm_9 = {
         let share = -(b.drum_share * rho[0]).v();
         let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];

@@ -15,6 +15,7 @@ use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, Motion};
 use crate::point::ringing::{Decaying, Jump, Ringing, jumps};
 use crate::{COORDINATES, FrictionSpeed, Machine, Matrices, Spin, Swing};
+use core::iter::zip;
 use lane_ode::{Kernel, Lane, N, Simd};
 use std::sync::{Arc, OnceLock};
 
@@ -235,42 +236,34 @@ impl Kernel for Prepare<'_> {
             let at_rest = Motion { q, u: still, a: still };
             let unbalance_up = SpinState::new((zero, zero.lit(1.0)), zero, zero);
             let rest = Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
-            let parts = machines
-                .into_iter()
-                .zip(linear)
-                .zip(linear_outputs)
-                .zip(steepest)
-                .zip(group)
-                .zip(courses.by_ref());
-            ready.extend(parts.enumerate().map(
-                |(
-                    lane,
-                    (((((coefficients, linear), linear_outputs), steepest), (machine, _)), course),
-                )| {
-                    if found >> lane & 1 == 0 {
-                        return Err(NoEquilibrium);
-                    }
-                    let steepest = steepest.map(|tangents| Box::new(linear.with_tub(tangents)));
-                    Ok(Point {
-                        ringing: Ringing::new(machine, ringing::sum_rad_per_s2(&course.jumps)),
-                        ringing_by_modes: OnceLock::new(),
-                        jumps: course.jumps,
-                        nudge: 0.0,
-                        instants_s: [].into(),
-                        machine: coefficients,
-                        equilibrium: q.map(|q| q.0.get(lane)),
-                        rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),
-                        linear,
-                        linear_outputs,
-                        friction_speeds: FrictionSpeed::all(machine),
-                        steepest,
-                        stretches: course.stretches,
-                        legs: course.legs,
-                        weight_n: machine.weight_n(),
-                        feet: Feet::new(machine),
-                    })
-                },
-            ));
+            let models = zip(zip(machines, linear), zip(linear_outputs, steepest));
+            let given = zip(group, courses.by_ref());
+            for (lane, (model, ((machine, _), course))) in zip(models, given).enumerate() {
+                if found >> lane & 1 == 0 {
+                    ready.push(Err(NoEquilibrium));
+                    continue;
+                }
+                let ((coefficients, linear), (linear_outputs, steepest)) = model;
+                let steepest = steepest.map(|tangents| Box::new(linear.with_tub(tangents)));
+                ready.push(Ok(Point {
+                    ringing: Ringing::new(machine, ringing::sum_rad_per_s2(&course.jumps)),
+                    ringing_by_modes: OnceLock::new(),
+                    jumps: course.jumps,
+                    nudge: 0.0,
+                    instants_s: [].into(),
+                    machine: coefficients,
+                    equilibrium: q.map(|q| q.0.get(lane)),
+                    rest: core::array::from_fn(|i| rest[i].value.0.get(lane)),
+                    linear,
+                    linear_outputs,
+                    friction_speeds: FrictionSpeed::all(machine),
+                    steepest,
+                    stretches: course.stretches,
+                    legs: course.legs,
+                    weight_n: machine.weight_n(),
+                    feet: Feet::new(machine),
+                }));
+            }
         }
         ready
     }

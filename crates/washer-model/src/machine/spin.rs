@@ -121,13 +121,9 @@ impl Spin {
                     wave_hz: N(1.0 / ramp_s),
                     ..SpinStretch::at_rest(0.0, 0.0)
                 };
-                let level = SpinStretch {
-                    turns_per_s: N(peak),
-                    ..SpinStretch::at_rest(
-                        *ramp_s,
-                        up.turns_at_start.0 + turns_of_ramp(0.0, peak, *ramp_s),
-                    )
-                };
+                let turns = up.turns_at_start.0 + turns_of_ramp(0.0, peak, *ramp_s);
+                let level =
+                    SpinStretch { turns_per_s: N(peak), ..SpinStretch::at_rest(*ramp_s, turns) };
                 vec![up, level]
             }
             Self::Ramped { profile: Profile::Triangular, peak_rpm, ramp_s } => {
@@ -234,10 +230,7 @@ impl<T: Lane> SpinLanes<T> {
             turn_rate -= rate * sin;
             turn_acceleration -= (TAU * (rate * self.wave_hz).v()).v() * cos;
         }
-        SpinState::new(
-            trig::sin_cos_turns(turns),
-            (TAU * turn_rate).v(),
-            (TAU * turn_acceleration).v(),
-        )
+        let angle = trig::sin_cos_turns(turns);
+        SpinState::new(angle, (TAU * turn_rate).v(), (TAU * turn_acceleration).v())
     }
 }

@@ -48,16 +48,13 @@ pub(crate) fn derivative_ahead<T: Lane>(
     let zero = g.lit(0.0);
     tub.floating.axis_drift = [zero; 2];
     rotor.floating.axis_drift = [zero; 2];
+    let none = Deflection { offset: [zero; 2], tilt: [zero; 2] };
     let (of_tub, of_rotor) = (Factors::new(tub.inertia), Factors::new(rotor.inertia));
-    let on_shaft = mass_scaled_load(
-        b,
-        (g_squared.recip(), zero),
-        &deflection,
-        &Deflection { offset: [zero; 2], tilt: [zero; 2] },
-        &tub.floating.response(&of_tub),
-        &rotor.floating.response(&of_rotor),
-    );
-    let a = under_load((&tub.floating, &of_tub), (&rotor.floating, &of_rotor), &on_shaft);
+    let (tub, rotor) = (&tub.floating, &rotor.floating);
+    let (by_tub, by_rotor) = (tub.response(&of_tub), rotor.response(&of_rotor));
+    let squares = (g_squared.recip(), zero);
+    let on_shaft = mass_scaled_load(b, squares, &deflection, &none, &by_tub, &by_rotor);
+    let a = under_load((tub, &of_tub), (rotor, &of_rotor), &on_shaft);
     let mut k = *r;
     for i in 0..COORDINATES {
         k[i] = r[COORDINATES + i] + g * a[i];

@@ -151,12 +151,8 @@ impl<T: Real> Axes<T> {
         let drum_front = self.drum_front(b, motion);
         let rho = blend(b.rho_1, &self.drum[0], b.rho_2, &self.drum[1]);
         let one = b.tub_share.lit(1.0);
-        let rotor_centre = point(
-            motion,
-            SHAFT_Y,
-            &blend(b.along_shaft, &self.shaft_axis, b.drum_share, &rho),
-            one,
-        );
+        let rotor_centre = blend(b.along_shaft, &self.shaft_axis, b.drum_share, &rho);
+        let rotor_centre = point(motion, SHAFT_Y, &rotor_centre, one);
         let total_centre = blend(b.tub_share, &tub_centre, b.rotor_share, &rotor_centre);
         observed(&Places { tub_front, drum_front, total_centre }, motion)
     }
@@ -164,12 +160,8 @@ impl<T: Real> Axes<T> {
     #[inline(always)]
     fn drum_front(&self, b: &Bodies<T>, motion: &Motion<T>) -> Course<T> {
         let one = b.drum_hinge.lit(1.0);
-        point(
-            motion,
-            SHAFT_Y,
-            &blend(b.drum_hinge, &self.shaft_axis, b.hinge_to_front, &self.drum[0]),
-            one,
-        )
+        let front = blend(b.drum_hinge, &self.shaft_axis, b.hinge_to_front, &self.drum[0]);
+        point(motion, SHAFT_Y, &front, one)
     }
 }
 

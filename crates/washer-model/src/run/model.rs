@@ -112,10 +112,8 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
     #[inline(always)]
     fn derivative(&self, spin: &SpinState<T>, x: &[N<T>; STATES]) -> [N<T>; STATES] {
         let (q, u) = split(x);
-        joined(
-            &u,
-            &nonlinear::accelerations(&self.machine, &self.coupling, &self.sag, spin, &q, &u),
-        )
+        let Self { machine, coupling, sag, .. } = self;
+        joined(&u, &nonlinear::accelerations(machine, coupling, sag, spin, &q, &u))
     }
 
     #[inline(always)]
@@ -261,13 +259,8 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     fn renew(&self, t_s: N<T>, forcing: &mut LinearForcing<T>) {
         forcing.spin = self.spin.at(t_s);
         let hinge_mass = self.coupling.hinge_mass(self.flexure_stiffness, &forcing.spin, self.sag);
-        forcing.rotor.renew(
-            &self.constants,
-            &self.coupling,
-            &self.terms,
-            &forcing.spin,
-            hinge_mass,
-        );
+        let Self { constants, coupling, terms, .. } = self;
+        forcing.rotor.renew(constants, coupling, terms, &forcing.spin, hinge_mass);
     }
 
     #[inline(always)]
