@@ -85,14 +85,11 @@ impl Source {
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = ParquetFile::open(path)?;
         let rows = usize::try_from(file.rows()).unwrap_or(usize::MAX);
-        let provenance: Vec<(String, Value)> = file
-            .pairs()
-            .filter(|entry| entry.key != ARROW_SCHEMA)
-            .map(|entry| {
-                let text = entry.value.clone().unwrap_or_default();
-                (entry.key.clone(), serde_json::from_str(&text).unwrap_or(Value::String(text)))
-            })
-            .collect();
+        let provenance = file.pairs().filter(|entry| entry.key != ARROW_SCHEMA).map(|entry| {
+            let text = entry.value.clone().unwrap_or_default();
+            (entry.key.clone(), serde_json::from_str(&text).unwrap_or(Value::String(text)))
+        });
+        let provenance: Vec<(String, Value)> = provenance.collect();
         let columns = files::columns(file.schema()).into_iter();
         let columns: Vec<ColumnFacts> =
             columns.map(|column| by_name(column, file.schema())).collect();

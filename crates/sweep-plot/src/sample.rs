@@ -128,11 +128,8 @@ impl MapSample<'_> {
     pub(crate) fn write_long(&self, folder: &Path, name: &str) -> PathBuf {
         const ROWS: usize = 1 << 14;
         let all = self.points();
-        write_all(
-            folder,
-            name,
-            (0..all).step_by(ROWS).map(|row| self.rows(row..all.min(row + ROWS))),
-        )
+        let some = |row: usize| self.rows(row..all.min(row + ROWS));
+        write_all(folder, name, (0..all).step_by(ROWS).map(some))
     }
 
     fn points(&self) -> usize {

@@ -23,15 +23,9 @@ where
             .min(strsim::normalized_damerau_levenshtein(&typed, name) + 0.45);
         if one_slip { measured.max(0.9) } else { measured }
     };
-    valid
-        .into_iter()
-        .map(|name| (name, likeness(name)))
-        .filter(|&(_, likeness)| likeness > 0.8)
-        .fold(None, |best: Option<(&str, f64)>, next| match best {
-            Some(best) if best.1 >= next.1 => Some(best),
-            _ => Some(next),
-        })
-        .map(|(name, _)| name)
+    let rated = valid.into_iter().map(|name| (name, likeness(name)));
+    let near = rated.filter(|&(_, likeness)| likeness > 0.8);
+    near.reduce(|best, next| if best.1 >= next.1 { best } else { next }).map(|(name, _)| name)
 }
 
 #[cfg(test)]

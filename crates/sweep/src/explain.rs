@@ -214,14 +214,11 @@ fn crossings(
     let spin = &asker.scenario.model.spin;
     let end_s = asker.plan.end_s;
     // In order of time, with the tongue of each.
-    let mut times: Vec<(usize, [f64; 2])> = tongues
-        .iter()
-        .enumerate()
-        .flat_map(|(k, tongue)| {
-            let inside = profile::times_inside_s(spin, end_s, tongue.from_to_rpm);
-            inside.into_iter().map(move |from_to_s| (k, from_to_s))
-        })
-        .collect();
+    let times = tongues.iter().enumerate().flat_map(|(k, tongue)| {
+        let inside = profile::times_inside_s(spin, end_s, tongue.from_to_rpm);
+        inside.into_iter().map(move |from_to_s| (k, from_to_s))
+    });
+    let mut times: Vec<(usize, [f64; 2])> = times.collect();
     times.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
     for i in 1..times.len() {
         // Neighbours share an edge, found twice.

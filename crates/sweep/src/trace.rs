@@ -438,11 +438,7 @@ fn remove_former(folder: &Path) -> Result<(), StoreError> {
 
 /// Ten numbers as q1 to q10 or u1 to u10.
 fn named(letter: char, values: &[f64; COORDINATES]) -> Value {
-    values
-        .iter()
-        .enumerate()
-        .map(|(i, value)| (format!("{letter}{}", i + 1), json!(value)))
-        .collect()
+    (1..).zip(values).map(|(i, value)| (format!("{letter}{i}"), *value)).collect()
 }
 
 /// What integrates the nonlinear model and the linear one. A map may scale the bearings' mass to be

@@ -31,11 +31,8 @@ pub(crate) fn stream<'py>(
 
 /// The schema alone.
 pub(crate) fn schema<'py>(py: Python<'py>, schema: &SchemaRef) -> PyResult<Bound<'py, PyCapsule>> {
-    PyCapsule::new_with_value(
-        py,
-        FFI_ArrowSchema::try_from(schema.as_ref()).map_err(wrong)?,
-        SCHEMA,
-    )
+    let schema = FFI_ArrowSchema::try_from(schema.as_ref()).map_err(wrong)?;
+    PyCapsule::new_with_value(py, schema, SCHEMA)
 }
 
 /// Every row of a table that speaks the protocol, with its schema; `None` for one that does not.

@@ -113,11 +113,8 @@ pub fn traced<M: Swept>(
         let is_of_channel = |name: &&str| of_channels.iter().any(|known| known == name);
         let names: Vec<&str> = names().filter(|name| !is_of_channel(name)).collect();
         let [ratio, nonlinear, linear] = of_channel("CHANNEL");
-        let expected = format!(
-            "one of {}, {ratio}, {nonlinear}, {linear}{}{meant}",
-            names.join(", "),
-            M::FURTHER
-        );
+        let (names, further) = (names.join(", "), M::FURTHER);
+        let expected = format!("one of {names}, {ratio}, {nonlinear}, {linear}{further}{meant}");
         return Err(Error::option("--quantity", name, expected));
     };
     let (column, mut plan) = offered.swap_remove(at);

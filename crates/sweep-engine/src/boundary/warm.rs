@@ -67,20 +67,15 @@ fn between_unlike(
     let part = (at - rich.at) / (poor.at - rich.at);
     let shared = shared(rich, poor, few.get(1));
     let moved = |[k, m]: [usize; 2]| poor.runs[m].from - rich.runs[k].from;
-    let mut roots: Vec<Hint> = shared
-        .iter()
-        .map(|pair| {
-            let moved = moved(*pair);
-            hint(rich.runs[pair[0]].from + part * moved, CORRECTION * moved, span)
-        })
-        .collect();
+    let roots = shared.iter().map(|pair| {
+        let moved = moved(*pair);
+        hint(rich.runs[pair[0]].from + part * moved, CORRECTION * moved, span)
+    });
+    let mut roots: Vec<Hint> = roots.collect();
     if rich.runs.len() == 2 && shared.is_empty() {
         // It leaves the range between the two, towards where it comes from.
-        let from: Vec<(f64, f64)> = many
-            .iter()
-            .filter(|row| row.is_like(&rich))
-            .map(|row| (row.at, row.runs[1].from))
-            .collect();
+        let alike = many.iter().filter(|row| row.is_like(&rich));
+        let from: Vec<(f64, f64)> = alike.map(|row| (row.at, row.runs[1].from)).collect();
         let root = polynomial(&from, at);
         if span.contains(root) {
             roots.push(hint(root, CORRECTION * (root - rich.runs[1].from), span));

@@ -90,14 +90,8 @@ fn axis() -> Value {
     let range = table(ends.into_iter().chain(further), &["from", "to"]);
     let values =
         json!({ "type": "array", "items": number(Range::Any), "minItems": 1, "uniqueItems": true });
-    json!({
-        "oneOf": [
-            table([("parameter", parameter.clone()), ("values", values)], &["parameter", "values"]),
-            table([("parameter", parameter.clone()), ("range", range)], &["parameter", "range"]),
-            table(
-                [("parameter", parameter), ("distribution", distribution())],
-                &["parameter", "distribution"],
-            ),
-        ],
-    })
+    let given =
+        |(key, value)| table([("parameter", parameter.clone()), (key, value)], &["parameter", key]);
+    let ways = [("values", values), ("range", range), ("distribution", distribution())];
+    json!({ "oneOf": ways.map(given) })
 }

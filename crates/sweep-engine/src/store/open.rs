@@ -175,11 +175,9 @@ impl OpenRun {
             Some(Err(damage)) => {
                 let path = self.folder.file(chunk_name(chunk));
                 let aside = set_aside(&path)?;
-                self.notes.push(format!(
-                    "{}: {damage}; kept as {} and computed again",
-                    path.display(),
-                    aside.file_name().unwrap_or_default().to_string_lossy()
-                ));
+                let (path, aside) = (path.display(), aside.file_name().unwrap_or_default());
+                let kept = format!("kept as {} and computed again", aside.to_string_lossy());
+                self.notes.push(format!("{path}: {damage}; {kept}"));
                 Ok(None)
             }
         }

@@ -69,11 +69,8 @@ impl Trials {
         let (mut file, found, known) = contents(&path, &plan)?;
         if known.is_empty() && found > 0 {
             let aside = set_aside(&path)?;
-            notes.push(format!(
-                "{}: no trial is as it was written; kept as {}, and they are made again",
-                path.display(),
-                aside.display()
-            ));
+            let kept = format!("kept as {}, and they are made again", aside.display());
+            notes.push(format!("{}: no trial is as it was written; {kept}", path.display()));
             (file, ..) = contents(&path, &plan)?;
         } else {
             if found > known.len() {

@@ -170,12 +170,9 @@ pub(crate) struct Overlay {
 pub(crate) fn overlay(table: &Table, axes: [&str; 2]) -> Result<Overlay> {
     let names: Vec<&str> = table.source.planned_axes().collect();
     if names != axes {
-        return Err(PlotError::Unfit(format!(
-            "{} is a boundary over {}; the map is over {}",
-            table.source.path.display(),
-            names.join(", "),
-            axes.join(", ")
-        )));
+        let [names, axes] = [&names[..], &axes].map(|all| all.join(", "));
+        let said = format!("is a boundary over {names}; the map is over {axes}");
+        return Err(PlotError::Unfit(format!("{} {said}", table.source.path.display())));
     }
     let chart = chart(table)?;
     let name = format!("traced boundary: {}", limit(table));

@@ -72,13 +72,10 @@ fn quantity(of: &Value, key: &str) -> Option<String> {
 
 fn machine(machine: &Value) -> Option<String> {
     let mass = |body: &str| quantity(&machine[body], "mass_kg");
+    let (tub, shaft, drum) = (mass("tub")?, mass("shaft")?, mass("drum")?);
+    let (unbalance, radius) = (mass("unbalance")?, quantity(&machine["unbalance"], "radius_m")?);
     let mut parts = vec![format!(
-        "tub {}, shaft {}, drum {}, unbalance {} at radius {}",
-        mass("tub")?,
-        mass("shaft")?,
-        mass("drum")?,
-        mass("unbalance")?,
-        quantity(&machine["unbalance"], "radius_m")?
+        "tub {tub}, shaft {shaft}, drum {drum}, unbalance {unbalance} at radius {radius}"
     )];
     // Numbers of a list's elements, each behind its word: the one that they have in common, or the
     // least and the greatest.

@@ -58,12 +58,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let Some(analysis) = found else { return Ok(Exit::Interrupted) };
     if let (Some(path), Some(output)) = (&args.out, output) {
         output.finish(&analysis.table(&asked).into_bytes(path)?)?;
-        tell(&format!(
-            "wrote {}: {} modes at {} speeds",
-            path.display(),
-            analysis.modes.len(),
-            speeds.len()
-        ));
+        let (path, modes, speeds) = (path.display(), analysis.modes.len(), speeds.len());
+        tell(&format!("wrote {path}: {modes} modes at {speeds} speeds"));
     }
     if args.json {
         return show(&format!("{:#}\n", analysis.to_json(&asked.name)));
@@ -116,14 +112,10 @@ fn differences(analysis: &Analysis) -> String {
 
 /// What a reader wants of each mode, a line each.
 fn listing(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
-    let lowest = decimal(speeds[0]);
+    let lowest = format!("at {} rpm", decimal(speeds[0]));
     let mut text = format!(
-        "mode   resonance   over a turn   damping   frequency   motion\n\
-         {:>16}{:>14}{:>10}{:>12}\n",
-        "rpm",
-        "+- rpm",
-        "ratio",
-        format!("at {lowest} rpm")
+        "mode   resonance   over a turn   damping   frequency   motion\n             \
+         rpm        +- rpm     ratio{lowest:>12}\n"
     );
     for (k, mode) in modes.iter().enumerate() {
         let start = mode.at_speed[0].frequency_rpm;

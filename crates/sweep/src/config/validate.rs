@@ -175,11 +175,9 @@ pub(crate) fn stability(draft: &Draft<'_, Washer>) {
     let axes = draft.plan.axes.iter().any(|axis| axis.values.len() > 1);
     let at = if axes { ", at the grid's hardest corner" } else { "" };
     if share * limit_s < shortest_step_s(end_s) {
-        let title = format!(
-            "the machine is too stiff: an explicit method needs {:.1e} steps to {} s",
-            end_s / (share * limit_s),
-            decimal(end_s)
-        );
+        let (steps, end_s) = (end_s / (share * limit_s), decimal(end_s));
+        let needs = format!("an explicit method needs {steps:.1e} steps to {end_s} s");
+        let title = format!("the machine is too stiff: {needs}");
         let place =
             ["integrator", "time.end_s"].into_iter().find_map(|key| draft.report.place(key));
         let refusal = place.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {

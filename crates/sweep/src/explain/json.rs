@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
-use washer_model::{Ending, LeftRange, Participant};
+use washer_model::{Channel, Ending, LeftRange, Participant};
 
 use super::{Explanation, Passage, Swept, Tongue};
 
@@ -44,12 +44,8 @@ pub(crate) fn of(found: &Explanation) -> Value {
 }
 
 fn by_channel(swept: &Swept, amplitudes: &[f64]) -> Value {
-    let channels = swept.channels.iter().zip(amplitudes);
-    channels
-        .map(|(channel, amplitude)| {
-            (format!("{}_{}", channel.name(), channel.unit()), json!(amplitude))
-        })
-        .collect()
+    let name = |channel: &Channel| format!("{}_{}", channel.name(), channel.unit());
+    swept.channels.iter().map(name).zip(amplitudes.iter().copied()).collect()
 }
 
 fn of_swept(swept: &Swept) -> Value {

@@ -1,7 +1,5 @@
 //! An explanation in words.
 
-use std::fmt::Write as _;
-
 use washer_model::{Channel, Ending, Kind, LeftRange, Settled, State, decimal};
 
 use sweep_engine::commands::cells::short;
@@ -62,13 +60,11 @@ pub(crate) fn of(found: &Explanation) -> String {
     if let (Some((from, what)), Some((to, _))) =
         (found.seen.beyond.first(), found.seen.beyond.last())
     {
+        let [from, to] = [from, to].map(|rpm| decimal(*rpm));
+        let (count, what) = (found.seen.beyond.len(), what.name().replace('_', " "));
         let words = format!(
-            "at {} of the speeds, from {} to {} rpm, the response passes what no machine can ({}): \
-             there growth says nothing of a machine",
-            found.seen.beyond.len(),
-            decimal(*from),
-            decimal(*to),
-            what.name().replace('_', " ")
+            "at {count} of the speeds, from {from} to {to} rpm, the response passes what no \
+             machine can ({what}): there growth says nothing of a machine"
         );
         line(&mut text, "beyond", words);
     }
@@ -153,16 +149,12 @@ fn verdict(text: &mut String, swept: &Swept) {
         let words = format!("the linear model over-estimates, a ratio is below {below}");
         line(text, "too high", words);
     }
-    let others: Vec<String> = swept
-        .channels
-        .iter()
-        .zip(&swept.verdict.ratios)
-        .filter(|(of, _)| **of != channel)
-        .map(|(of, ratio)| match ratio {
-            Some(ratio) => format!("{} {}", of.name(), significant(*ratio)),
-            None => format!("{} none", of.name()),
-        })
-        .collect();
+    let ratios = swept.channels.iter().zip(&swept.verdict.ratios);
+    let others = ratios.filter(|(of, _)| **of != channel).map(|(of, ratio)| {
+        let ratio = ratio.map_or("none".to_owned(), significant);
+        format!("{} {ratio}", of.name())
+    });
+    let others: Vec<String> = others.collect();
     if !others.is_empty() {
         line(text, "ratios", others.join(", "));
     }
@@ -182,12 +174,8 @@ fn of_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages: 
         Kind::Stable => "it is stable",
     };
     let [from, to] = tongue.from_to_rpm;
-    let words = format!(
-        "{from:.2} to {to:.2} rpm: {kind}, at up to {:.4} /s at {:.2} rpm{}",
-        at.growth_per_s(),
-        at.speed_rpm,
-        ends(tongue)
-    );
+    let grows = format!("{kind}, at up to {:.4} /s at {:.2} rpm", at.growth_per_s(), at.speed_rpm);
+    let words = format!("{from:.2} to {to:.2} rpm: {grows}{}", ends(tongue));
     line(text, "tongue", words);
     let (low, high) = (at.frequency_cpm(), at.speed_rpm - at.frequency_cpm());
     let lines = match at.kind() {
@@ -199,14 +187,10 @@ fn of_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages: 
     };
     line(text, "lines", lines);
     for mode in &at.participants {
-        let words = format!(
-            "{}, {}: {:.2} per minute at this speed; {:.0} % of the energy",
-            mode.mode,
-            mode.motion,
-            mode.frequency_cpm,
-            100.0 * mode.share
-        );
-        line(text, "mode", words);
+        let (number, motion) = (mode.mode, mode.motion);
+        let (cpm, percent) = (mode.frequency_cpm, 100.0 * mode.share);
+        let place = format!("{number}, {motion}: {cpm:.2} per minute at this speed");
+        line(text, "mode", format!("{place}; {percent:.0} % of the energy"));
     }
     let words = match &tongue.resonance {
         Some(resonance) => meeting(resonance, at.speed_rpm),
@@ -258,8 +242,7 @@ fn ends(tongue: &Tongue) -> String {
             End::Range => "the speeds looked at end, and not the growth",
             End::NoResponse => "no response is found beyond",
         };
-        // Writing to a String cannot fail.
-        let _ = write!(words, "; at {rpm:.2} rpm {why}");
+        words += &format!("; at {rpm:.2} rpm {why}");
     }
     words
 }
@@ -281,39 +264,30 @@ fn meeting(resonance: &Resonance, speed_rpm: f64) -> String {
     };
     let multiple = f64::from(resonance.order) * speed_rpm;
     let miss = 100.0 * (resonance.sum_cpm / multiple - 1.0);
-    format!(
-        "{} = {:.2} per minute, against {target}, {multiple:.2} ({miss:+.2} %)",
-        sum_words(resonance),
-        resonance.sum_cpm
-    )
+    let (sum, cpm) = (sum_words(resonance), resonance.sum_cpm);
+    format!("{sum} = {cpm:.2} per minute, against {target}, {multiple:.2} ({miss:+.2} %)")
 }
 
 fn crossed(text: &mut String, passage: &Passage) {
     let [from, to] = passage.from_to_s;
     let cut = if passage.is_cut { ", where the run ends" } else { "" };
-    let mut words = format!(
-        "from {from:.3} to {to:.3} s{cut}: {:.2} e-folds, a factor of {}",
-        passage.e_folds,
-        significant(passage.e_folds.exp())
-    );
+    let (folds, factor) = (passage.e_folds, significant(passage.e_folds.exp()));
+    let mut words =
+        format!("from {from:.3} to {to:.3} s{cut}: {folds:.2} e-folds, a factor of {factor}");
     match &passage.crossed {
         Err(LeftRange { time_s }) => {
-            let _ = write!(words, "; the run leaves the model's range at {time_s:.3} s");
+            words += &format!("; the run leaves the model's range at {time_s:.3} s");
         }
         Ok(crossed) => {
-            let _ = write!(
-                words,
-                "; in truth a small disturbance of the run grows at most {}-fold",
-                significant(crossed.amplification)
-            );
+            let most = significant(crossed.amplification);
+            words +=
+                &format!("; in truth a small disturbance of the run grows at most {most}-fold");
             if let [Some(before), Some(after)] = crossed.departure_j {
-                let _ = write!(
-                    words,
-                    "; the run's own departure from the periodic response goes from {} to {} mJ, \
-                     a factor of {} in amplitude",
-                    significant(1e3 * before),
-                    significant(1e3 * after),
-                    significant((after / before).sqrt())
+                let numbers = [1e3 * before, 1e3 * after, (after / before).sqrt()];
+                let [before, after, factor] = numbers.map(significant);
+                words += &format!(
+                    "; the run's own departure from the periodic response goes from {before} to \
+                     {after} mJ, a factor of {factor} in amplitude"
                 );
             }
         }
@@ -399,12 +373,9 @@ fn limits(text: &mut String, found: &Explanation) {
          a tongue",
         decimal(found.seen.looked.step)
     );
-    if found.seen.without_response > 0 {
-        let _ = write!(
-            words,
-            ". No response was found at {} of the speeds, which are left out",
-            found.seen.without_response
-        );
+    let without = found.seen.without_response;
+    if without > 0 {
+        words += &format!(". No response was found at {without} of the speeds, which are left out");
     }
     line(text, "limits", words);
 }

@@ -398,16 +398,12 @@ impl Report {
             headings.push("by bootstrap".to_owned());
         }
         let mut text = String::new();
-        text.line(
-            "model",
-            &match &self.objection {
-                None => "follows the measurement within its noise".to_owned(),
-                Some(reason) if self.settled => {
-                    format!("does not follow: {reason}; so no intervals")
-                }
-                Some(reason) => reason.clone(),
-            },
-        );
+        let model = match &self.objection {
+            None => "follows the measurement within its noise".to_owned(),
+            Some(reason) if self.settled => format!("does not follow: {reason}; so no intervals"),
+            Some(reason) => reason.clone(),
+        };
+        text.line("model", model);
         // Without a free number the model is compared alone.
         if !rows.is_empty() {
             text.push_str(&table(&headings, &rows, ""));

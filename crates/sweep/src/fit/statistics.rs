@@ -123,11 +123,8 @@ impl Statistics {
         if let Some((k, share)) = shares.max_by(|a, b| a.1.total_cmp(&b.1))
             && share > MOTION
         {
-            reasons.push(format!(
-                "{:.0} % of {} are left over as a motion, not as noise",
-                100.0 * share,
-                named(k)
-            ));
+            let (percent, of) = (100.0 * share, named(k));
+            reasons.push(format!("{percent:.0} % of {of} are left over as a motion, not as noise"));
         }
         if self.disagreement > DISAGREEMENT {
             reasons.push(format!(
@@ -139,9 +136,9 @@ impl Statistics {
         if let Some((bias, free)) = bias.max_by(|a, b| a.0.total_cmp(b.0))
             && *bias > BIAS
         {
+            let name = free.parameter.name();
             reasons.push(format!(
-                "the nonlinear model would move {} by {bias:.1} standard errors",
-                free.parameter.name()
+                "the nonlinear model would move {name} by {bias:.1} standard errors"
             ));
         }
         if reasons.is_empty() {
@@ -163,13 +160,8 @@ impl Statistics {
         let covariance = self.of_free(problem);
         let names: Vec<&str> = problem.free.iter().map(|free| free.parameter.name()).collect();
         // Of a number that is 0 nothing is relative.
-        let sizes: Vec<f64> = problem
-            .free
-            .iter()
-            .zip(x)
-            .map(|(free, x)| x.abs().max(free.start.abs()))
-            .map(|size| if size > 0.0 { size } else { 1.0 })
-            .collect();
+        let greater = problem.free.iter().zip(x).map(|(free, x)| x.abs().max(free.start.abs()));
+        let sizes: Vec<f64> = greater.map(|size| if size > 0.0 { size } else { 1.0 }).collect();
         let row = |(i, row): (usize, &Vec<f64>)| -> Vec<f64> {
             row.iter().zip(&sizes).map(|(c, size)| c / (sizes[i] * size)).collect()
         };
