@@ -309,12 +309,13 @@ fn counts_json(map: &Map) -> Value {
 
 /// Entries of a legend, each the style of its sign and its words.
 fn legend_json(entries: &[(Sign, String)]) -> Value {
-    let lines = |hatch: &Hatch| {
+    let hatched = |hatch: &Hatch| {
         let [ink, paper] = [INK, PAPER].map(Colour::css);
-        match hatch.strokes.len() {
+        let lines = match hatch.strokes.len() {
             1 => format!("135deg,{ink} 0 1px,transparent 1px 6px"),
             _ => format!("45deg,{ink} 0 1px,{paper} 1px 2px,{ink} 2px 3px,transparent 3px 7px"),
-        }
+        };
+        format!("background:repeating-linear-gradient({lines})")
     };
     let style = |sign: &Sign| match sign {
         // As it is drawn: dark between light, on any ground.
@@ -322,12 +323,8 @@ fn legend_json(entries: &[(Sign, String)]) -> Value {
             "height:6px;background:#1b1f24;border:solid #ffffff;border-width:1.5px 0".to_owned()
         }
         Sign::Area(colour) => format!("background:{}", colour.css()),
-        Sign::Failed => format!(
-            "background:repeating-linear-gradient({}) {}",
-            lines(&failed_hatch()),
-            FAILED.css()
-        ),
-        Sign::Hatched(hatch) => format!("background:repeating-linear-gradient({})", lines(hatch)),
+        Sign::Failed => format!("{} {}", hatched(&failed_hatch()), FAILED.css()),
+        Sign::Hatched(hatch) => hatched(hatch),
         _ => "background:radial-gradient(circle,var(--muted) 2px,var(--paper) 2.5px);\
               outline:1px solid var(--faint)"
             .to_owned(),

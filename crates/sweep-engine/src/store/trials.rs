@@ -74,11 +74,9 @@ impl Trials {
             (file, ..) = contents(&path, &plan)?;
         } else {
             if found > known.len() {
-                notes.push(format!(
-                    "{}: {} of {found} trials are not as they were written; they are made again",
-                    path.display(),
-                    found - known.len()
-                ));
+                let (path, torn) = (path.display(), found - known.len());
+                let told = "trials are not as they were written; they are made again";
+                notes.push(format!("{path}: {torn} of {found} {told}"));
             }
             // A torn record goes, so that the next one begins where a record should.
             let whole = found as u64 * RECORD_BYTES as u64;

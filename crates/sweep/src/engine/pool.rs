@@ -53,7 +53,8 @@ pub(super) type Keep<'a> = dyn Fn(Outcome) + Sync + 'a;
 /// How long a thread that waits for others goes without a look at the stop flag.
 const LOOK_UP: Duration = Duration::from_millis(50);
 
-/// Runs of one rung of one model: positions on its ladder, behind it for twins, and in `ModelKind::ALL`.
+/// Runs of one rung of one model: positions on its ladder, behind it for twins, and in
+/// `ModelKind::ALL`.
 type ModelRung = (usize, usize);
 
 /// A point's row on its way.

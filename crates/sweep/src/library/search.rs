@@ -33,12 +33,8 @@ pub fn find_boundary(
         return Err(Error::option("lattice", options.lattice, "from 1 to 1000"));
     }
     let task = BoundaryTask::new(plan, options)?;
-    found(
-        (&task.job(), FileKind::Boundary),
-        (output, fresh),
-        |trials| trace(&task, trials, effort),
-        |found| task.table(found),
-    )
+    let search = |trials| trace(&task, trials, effort);
+    found((&task.job(), FileKind::Boundary), (output, fresh), search, |found| task.table(found))
 }
 
 /// The candidates of a study file, constants `NAME=VALUE` over those of its grid; `None` if the
@@ -55,12 +51,10 @@ pub fn optimise_study(
     effort: Effort<'_>,
 ) -> Result<Option<ResultTable>, Error> {
     let study = Study::<Washer>::load(path, sets)?;
-    found(
-        (&study.job(), FileKind::Optimise),
-        (output, fresh),
-        |trials| search(&study, trials, effort),
-        |tried| study_table(&study, tried),
-    )
+    let search = |trials| search(&study, trials, effort);
+    found((&study.job(), FileKind::Optimise), (output, fresh), search, |tried| {
+        study_table(&study, tried)
+    })
 }
 
 /// What a search finds, with the trials that its output keeps. A finished output is read.
