@@ -187,7 +187,8 @@ pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> (Vec<Tongue>, Seen) 
     let speeds = looked.values();
     let responses = asker.responses(&speeds);
     let there = || responses.iter().flatten();
-    let ends = there().filter_map(|response| response.between_rpm[1]);
+    let on_curve = there().filter(|response| response.is_on_curve);
+    let ends = on_curve.filter_map(|response| response.between_rpm[1]);
     let mut jumps_rpm: Vec<f64> = ends.filter(|&rpm| rpm <= looked.to).collect();
     jumps_rpm.dedup();
     let kind = |response: &Option<Response>| response.as_ref().map(Response::kind);

@@ -60,7 +60,7 @@ pub(crate) fn of(found: &Explanation) -> String {
     if let (Some((from, what)), Some((to, _))) =
         (found.seen.beyond.first(), found.seen.beyond.last())
     {
-        let [from, to] = [from, to].map(|rpm| decimal(*rpm));
+        let [from, to] = [from, to].map(|rpm| short(*rpm));
         let (count, what) = (found.seen.beyond.len(), what.name().replace('_', " "));
         let words = format!(
             "at {count} of the speeds, from {from} to {to} rpm, the response passes what no \
@@ -80,7 +80,7 @@ pub(crate) fn of(found: &Explanation) -> String {
 
 /// At which speeds (rpm) another response was found than that of a machine that runs up.
 fn off_curve(speeds_rpm: &[f64]) -> Option<String> {
-    let [from, to] = [speeds_rpm.first()?, speeds_rpm.last()?].map(|rpm| decimal(*rpm));
+    let [from, to] = [speeds_rpm.first()?, speeds_rpm.last()?].map(|rpm| short(*rpm));
     Some(format!(
         "at {} of the speeds, from {from} to {to} rpm, the response is off the curve: a machine \
          that runs up may be in another motion there (`sweep dwell`)",

@@ -2,9 +2,8 @@
 
 use std::fmt::Write as _;
 
-use washer_model::decimal;
-
 use crate::places;
+use sweep_engine::commands::cells::short;
 use sweep_engine::config::section::counted;
 use sweep_files::{FileError, ParquetFile};
 
@@ -54,8 +53,10 @@ pub(crate) struct Summary {
     /// Rows behind another of the same point and speed, which all else leaves out.
     coexisting: u64,
     tongues: Vec<Tongue>,
-    /// Points and speeds (rpm) at which a machine that runs up comes to the end of its branch.
+    /// Rows on branches whose end a machine that runs up comes to.
     jumps: Vec<Row>,
+    /// The fastest of all rows.
+    fastest_rpm: f64,
     last: Option<Row>,
 }
 
@@ -70,8 +71,10 @@ impl Summary {
             return;
         }
         self.rows += 1;
+        self.fastest_rpm = self.fastest_rpm.max(row.speed_rpm);
         let end = |row: &Row| (row.point, row.branch_to_rpm);
-        if row.branch_to_rpm.is_some() && self.jumps.last().map(end) != Some(end(&row)) {
+        let has_end = row.branch_to_rpm.is_some() && !row.is_off_curve;
+        if has_end && self.jumps.last().map(end) != Some(end(&row)) {
             self.jumps.push(row.clone());
         }
         let follows = same_point && self.last.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
@@ -125,6 +128,9 @@ impl Summary {
         }
         for row in &self.jumps {
             let (of_point, rpm) = (self.of_point(row), row.branch_to_rpm.unwrap_or_default());
+            if rpm > self.fastest_rpm {
+                continue;
+            }
             let words = "running up, the response folds back and the motion jumps";
             lines.push(("jump", format!("{of_point}at {rpm:.2} rpm, {words}")));
         }
@@ -148,7 +154,7 @@ impl Summary {
     fn words(&self, tongue: &Tongue) -> String {
         let Tongue { at, from_to_rpm: [from, to] } = tongue;
         let mut text = self.of_point(at);
-        let [speed, first, last] = [at.speed_rpm, *from, *to].map(decimal);
+        let [speed, first, last] = [at.speed_rpm, *from, *to].map(short);
         let to = if first == last { String::new() } else { format!(" to {last}") };
         // Writing to a String cannot fail.
         let _ = write!(
@@ -251,5 +257,30 @@ mod tests {
             "unbalance_mass_kg 0.1: 2 to 3 rpm, quasi periodic, up to 0.3000 /s at 3"
         ));
         assert!(lines[4].1.starts_with("unbalance_mass_kg 0.1: 4 rpm, period doubling, up to"));
+    }
+
+    #[test]
+    fn jumps_are_those_of_the_curve_at_speeds_that_were_asked() {
+        let mut summary = Summary::default();
+        for (speed_rpm, ends_rpm, is_off_curve) in
+            [(240.0, 245.0, false), (245.0, 248.0, true), (250.0, 260.0, false)]
+        {
+            let branch_to_rpm = Some(ends_rpm);
+            summary.add(Row { speed_rpm, branch_to_rpm, is_off_curve, ..Row::default() });
+        }
+        let lines = summary.lines();
+        let jumps: Vec<_> = lines.iter().filter(|(name, _)| *name == "jump").collect();
+        assert_eq!(jumps.len(), 1, "{lines:?}");
+        assert!(jumps[0].1.starts_with("at 245.00 rpm"), "{lines:?}");
+    }
+
+    #[test]
+    fn speeds_are_rounded_for_people() {
+        let mut summary = Summary::default();
+        for speed_rpm in [0.1 + 0.2, 249.700_000_000_000_02] {
+            summary.add(Row { speed_rpm, growth_per_s: 1.0, ..Row::default() });
+        }
+        let (_, tongue) = summary.lines().pop().unwrap();
+        assert!(tongue.starts_with("0.3 to 249.7 rpm"), "{tongue}");
     }
 }
