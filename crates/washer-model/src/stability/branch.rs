@@ -618,4 +618,26 @@ mod tests {
         curve.look_again();
         assert_eq!((curve.nodes.len(), curve.folds), (2, vec![1]));
     }
+
+    /// Before and behind two folds within a step the curve goes the same way.
+    #[test]
+    fn a_curve_that_turns_twice_about_a_fold_has_two() {
+        let point = point(false);
+        let mut curve = curve(&point, &[220.0, 230.0], &[1]);
+        let mut up = [0.0; PLACE];
+        up[SPEED] = 1.0;
+        for node in &mut curve.nodes {
+            node.tangent = up;
+        }
+        let one = |i: usize, j: usize| N(f64::from(u8::from(i == j)));
+        let matrix = core::array::from_fn(|i| core::array::from_fn(|j| one(i, j)));
+        let factors = factored::<PLACE>(&matrix).unwrap();
+        let jacobian = Jacobian { monodromy: [[N(0.0); STATES]; STATES], factors };
+        curve.correct(place_of(&[0.0; STATES], 240.0), up);
+        let step = curve.step.take().unwrap();
+        curve.until_rpm = 300.0;
+        curve.arrived(Step { seen: Some(Box::new(jacobian)), ..step });
+        assert_eq!((curve.nodes.len(), &curve.folds[..]), (3, &[1, 2][..]));
+        assert!(curve.turning.is_none() && curve.rises());
+    }
 }
