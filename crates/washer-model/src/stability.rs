@@ -73,8 +73,9 @@ pub struct Response {
     pub speed_rpm: f64,
     /// Whether it is on the curve of responses that begins at a low speed.
     pub is_on_curve: bool,
-    /// How many folds the curve has before this one: 0 is the branch of a machine that runs up. Of
-    /// a response beside the curve, one more than of the last on it.
+    /// How many folds the curve has before this one: 0 is the branch of a machine that runs up. It
+    /// counts on where that curve is lost and another comes down from a high speed; a response
+    /// beside both has one more than the last at its speed.
     pub branch: u32,
     /// Speeds (rpm) of the folds between which that branch lies, lower and upper: none where it
     /// goes on.

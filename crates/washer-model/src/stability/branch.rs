@@ -1,10 +1,12 @@
-//! The periodic response followed over speed, from a low one up and round its folds.
+//! The periodic response followed over speed, from a low one up and round its folds, or from a high
+//! one down.
 //!
 //! A curve of states and speeds, both in units of their own, is followed by pseudo-arclength
 //! (Keller 1977): along the tangent and its turning, then back onto the curve in the plane across
 //! the tangent, by the derivatives where the step has led. Steps grow where few corrections are
 //! needed and shrink where many are. The curve depends on the machine alone. So does what is found
 //! of it at a speed: the part of the curve counts up to where it first is [`BEYOND`] times as fast.
+//! Where it never is, it is lost, and a second one counts too, followed down.
 
 use super::monodromy::{INSTANTS, Square};
 use super::orbit::{Asked, Turned};
@@ -84,6 +86,10 @@ const BY_FOLD: f64 = 0.3;
 
 /// Places of a curve, at most.
 const MOST_PLACES: usize = 4000;
+
+/// A smooth curve is lost that comes no farther than a first step in so many places: it creeps up
+/// to where forces are not smooth, as a spring's is that passes its hook.
+const CREEPING: usize = 100;
 
 /// Coordinates (m, rad) beyond which no machine goes.
 const FARTHEST: f64 = 1.0;
@@ -201,16 +207,24 @@ pub(super) struct Guess {
     pub(super) state: [f64; STATES],
     /// Factors of 1 - Phi nearby.
     pub(super) factors: Option<Lu<STATES>>,
-    /// Whether the curve says so.
+    /// Whether it is of the curve that is followed up.
     pub(super) is_on_curve: bool,
+}
+
+impl Guess {
+    /// Whether it is where one of the curves is.
+    pub(super) fn is_followed(&self) -> bool {
+        self.is_on_curve || self.factors.is_some()
+    }
 }
 
 /// The curve of a point's responses.
 #[derive(Clone)]
 pub(super) struct Curve<'a> {
     pub(super) settings: Settings<'a>,
-    /// It is followed until it is as fast as this (rpm).
+    /// It is followed until it is as fast as this (rpm), or as slow.
     until_rpm: f64,
+    is_down: bool,
     nodes: Vec<Node>,
     /// Positions of nodes where it turns back in speed.
     folds: Vec<usize>,
@@ -231,6 +245,7 @@ impl<'a> Curve<'a> {
         Self {
             settings,
             until_rpm: 0.0,
+            is_down: false,
             nodes: Vec::new(),
             folds: Vec::new(),
             at: [0.0; PLACE],
@@ -241,12 +256,11 @@ impl<'a> Curve<'a> {
         }
     }
 
-    /// Is to follow it from a response at a speed (rpm) up to another speed.
+    /// Is to follow it from a response at a speed (rpm) up or down to another speed.
     pub(super) fn begin(&mut self, speed_rpm: f64, start: &[f64; STATES], until_rpm: f64) {
-        self.until_rpm = until_rpm;
-        // At first, up in speed.
+        (self.until_rpm, self.is_down) = (until_rpm, until_rpm < speed_rpm);
         let mut across = [0.0; PLACE];
-        across[SPEED] = 1.0;
+        across[SPEED] = if self.is_down { -1.0 } else { 1.0 };
         self.correct(place_of(start, speed_rpm), across);
     }
 
@@ -256,16 +270,24 @@ impl<'a> Curve<'a> {
         let Some(last) = self.nodes.last() else { return };
         let (at_rpm, count) = (speed_of(&last.at), self.nodes.len());
         let is_far = (0..COORDINATES).any(|i| (last.at[i] * UNIT).abs() > FARTHEST);
-        let is_back = at_rpm < speed_of(&self.nodes[0].at);
-        let is_over = at_rpm >= self.until_rpm || is_far || is_back || count >= MOST_PLACES;
-        if is_over {
+        let begins_rpm = speed_of(&self.nodes[0].at);
+        let [low_rpm, high_rpm] = match self.is_down {
+            true => [self.until_rpm.next_up(), begins_rpm.next_up()],
+            false => [begins_rpm, self.until_rpm],
+        };
+        let is_within = (low_rpm..high_rpm).contains(&at_rpm);
+        let creeps = |before: &Node| last.length - before.length < FIRST_STEP;
+        let is_stuck = count > CREEPING
+            && creeps(&self.nodes[count - CREEPING])
+            && !self.settings.point.machine.elements.are_nonsmooth();
+        if !is_within || is_far || is_stuck || count >= MOST_PLACES {
             return;
         }
         if self.length < SHORTEST_STEP {
             // Steps of a turn that are longer than corners are wide make stairs of a curve, and
             // ranges of speed with steps of their own break it.
             let from = last.length - FIRST_STEP;
-            if self.settings.follow_closer() {
+            if !self.is_down && self.settings.follow_closer() {
                 let kept = self.nodes.partition_point(|node| node.length < from).max(1);
                 self.nodes.truncate(kept);
                 self.length = FIRST_STEP;
@@ -362,9 +384,9 @@ impl<'a> Curve<'a> {
         if missing < CLOSE { self.arrived(step) } else { self.step = Some(step) }
     }
 
-    /// Whether the curve goes on up in speed, as it began: each fold turns it.
+    /// Whether the curve goes on up in speed: each fold turns it.
     fn rises(&self) -> bool {
-        self.folds.len().is_multiple_of(2)
+        self.folds.len().is_multiple_of(2) != self.is_down
     }
 
     /// Arrives at the last node once more, with derivatives of that very place.
@@ -497,10 +519,23 @@ impl<'a> Curve<'a> {
         folds
     }
 
+    /// Whether it ends before what counts of it at a speed (rpm) does.
+    pub(super) fn is_lost(&self, speed_rpm: f64) -> bool {
+        let is_short = |node: &Node| speed_of(&node.at) < BEYOND * speed_rpm;
+        let begins_rpm = self.settings.lowest_rpm();
+        begins_rpm.is_ok_and(|it| it < speed_rpm) && self.nodes.iter().all(is_short)
+    }
+
+    /// How many folds it has.
+    pub(super) fn folds(&self) -> u32 {
+        self.folds_of_machine().len() as u32
+    }
+
     /// Where responses at a speed (rpm) are to be looked for, in the order of the curve; none where
     /// the curve does not get there.
     pub(super) fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
-        let end = self.nodes.iter().position(|node| speed_of(&node.at) >= BEYOND * speed_rpm);
+        let is_past = |node: &Node| !self.is_down && speed_of(&node.at) >= BEYOND * speed_rpm;
+        let end = self.nodes.iter().position(is_past);
         let nodes = &self.nodes[..end.map_or(self.nodes.len(), |end| end + 1)];
         let target = libm::log(speed_rpm) / UNIT_OF_SPEED;
         let folds = self.folds_of_machine();
@@ -531,10 +566,14 @@ impl<'a> Curve<'a> {
             let ends = [branch.checked_sub(1).and_then(fold), fold(branch)];
             guesses.push(Guess {
                 branch: branch as u32,
-                between_rpm: if branch % 2 == 0 { ends } else { [ends[1], ends[0]] },
+                between_rpm: if (branch % 2 == 0) != self.is_down {
+                    ends
+                } else {
+                    [ends[1], ends[0]]
+                },
                 state: state_of(&between(a, b, share).0),
                 factors: apart(&monodromy),
-                is_on_curve: true,
+                is_on_curve: !self.is_down,
             });
         }
         guesses
@@ -639,5 +678,25 @@ mod tests {
         curve.arrived(Step { seen: Some(Box::new(jacobian)), ..step });
         assert_eq!((curve.nodes.len(), &curve.folds[..]), (3, &[1, 2][..]));
         assert!(curve.turning.is_none() && curve.rises());
+    }
+
+    #[test]
+    fn a_curve_followed_down_has_its_branches_the_other_way_round() {
+        let point = point(false);
+        let mut curve = curve(&point, &[260.0, 220.0, 240.0, 200.0], &[1, 2]);
+        curve.is_down = true;
+        let found = |speed_rpm: f64| {
+            let guesses = curve.guesses(speed_rpm).into_iter();
+            guesses
+                .map(|it| {
+                    (it.branch, it.between_rpm.map(|rpm| rpm.map(f64::round)), it.is_on_curve)
+                })
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(found(250.0), [(0, [Some(220.0), None], false)]);
+        assert_eq!(found(210.0), [(2, [None, Some(240.0)], false)]);
+        assert_eq!(found(230.0).iter().map(|it| it.0).collect::<Vec<_>>(), [0, 1, 2]);
+        assert_eq!(found(230.0)[1].1, [Some(220.0), Some(240.0)]);
+        assert!(curve.is_lost(210.0) && !curve.is_lost(205.0) && !curve.is_lost(40.0));
     }
 }

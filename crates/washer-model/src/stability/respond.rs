@@ -54,7 +54,12 @@ pub fn respond(
 
 /// A point's periodic responses over speed.
 #[derive(Clone)]
-pub struct Responses<'a>(Curve<'a>);
+pub struct Responses<'a> {
+    /// Their curve from a low speed up.
+    up: Curve<'a>,
+    /// Where that is lost, the one from a high speed down.
+    down: Option<Curve<'a>>,
+}
 
 impl<'a> Responses<'a> {
     /// Follows the responses of some points from a low speed up, each to the fastest speed (rpm)
@@ -66,49 +71,49 @@ impl<'a> Responses<'a> {
         from: Option<&Response>,
         is_stopped: &dyn Fn() -> bool,
     ) -> Vec<Self> {
-        let mut curves: Vec<Curve<'a>> =
-            points.iter().map(|(point, _)| Curve::new(Settings::new(point))).collect();
-        let mut starts = Vec::new();
-        for (curve, (_, fastest_rpm)) in curves.iter_mut().zip(points) {
+        let begun = points.iter().map(|&(point, fastest_rpm)| {
+            let curve = Curve::new(Settings::new(point));
             let lowest = from.map_or_else(|| curve.settings.lowest_rpm(), |it| Ok(it.speed_rpm));
-            let lowest = lowest.ok().filter(|lowest| lowest < fastest_rpm);
-            starts.push(lowest.and_then(|lowest| curve.settings.followed(lowest).ok()));
+            let lowest = lowest.ok().filter(|&lowest| lowest < fastest_rpm);
+            let until_rpm = from.map_or(BEYOND, |_| 1.0) * fastest_rpm;
+            (curve, lowest.map(|lowest| [lowest, until_rpm]))
+        });
+        let Some(up) = followed(begun.collect(), from, is_stopped) else { return Vec::new() };
+        // A remedy is tried on its own branch alone.
+        let is_lost = |curve: &Curve<'_>, rpm: f64| from.is_none() && curve.is_lost(rpm);
+        let lost = up.iter().zip(points).filter(|(curve, (_, rpm))| is_lost(curve, *rpm));
+        let begun = lost.map(|(curve, (point, _))| {
+            let [highest, lowest] = [curve.settings.highest_rpm(), curve.settings.lowest_rpm()];
+            let ends = highest.ok().zip(lowest.ok()).filter(|(highest, lowest)| highest > lowest);
+            (Curve::new(Settings::new(point)), ends.map(<[f64; 2]>::from))
+        });
+        let Some(down) = followed(begun.collect(), None, is_stopped) else { return Vec::new() };
+        let mut down = down.into_iter();
+        let all = up.into_iter().zip(points).map(|(up, (_, rpm))| {
+            let down = if is_lost(&up, *rpm) { down.next() } else { None };
+            Self { up, down }
+        });
+        all.collect()
+    }
+
+    /// Where responses at a speed (rpm) are to be looked for: on the curve, and where that is lost
+    /// on the second, whose branches count on.
+    fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
+        let mut guesses = self.up.guesses(speed_rpm);
+        if let Some(down) = self.down.as_ref().filter(|_| self.up.is_lost(speed_rpm)) {
+            let others = down.guesses(speed_rpm).into_iter();
+            let first = self.up.folds() + 1;
+            guesses.extend(others.map(|it| Guess { branch: first + it.branch, ..it }));
         }
-        // A curve does not depend on where the linear model takes friction.
-        let rows: Vec<Row<'_>> = curves
-            .iter()
-            .zip(&starts)
-            .filter_map(|(curve, start)| {
-                Some(Row { point: curve.settings.without_friction(), ..(*start)? })
-            })
-            .collect();
-        let linear = together(&rows, is_stopped);
-        let begun = starts.iter().flatten().zip(&linear);
-        let mut solves: Vec<Solve<'_>> = begun
-            .map(|(row, linear)| {
-                let at_linear = || from_linear(row.point, linear).state;
-                Solve::new(*row, from.map_or_else(at_linear, |it| it.start), None)
-            })
-            .collect();
-        let mut is_whole = finish(&mut solves, is_stopped);
-        let mut solves = solves.into_iter();
-        for ((curve, (_, fastest_rpm)), start) in curves.iter_mut().zip(points).zip(&starts) {
-            if let Some(row) = start
-                && let Some((state, _)) = solves.next().and_then(Solve::found)
-            {
-                let until_rpm = from.map_or(BEYOND, |_| 1.0) * fastest_rpm;
-                curve.begin(row.speed_rpm, &state, until_rpm);
-            }
-        }
-        is_whole = is_whole && finish(&mut curves, is_stopped);
-        if is_whole { curves.into_iter().map(Self).collect() } else { Vec::new() }
+        guesses
     }
 
     /// Of each place in `followed` and speed (rpm) the responses that the point's curve passes
     /// there, in its order, on lanes. The first is that of a machine that runs up, until its
-    /// branch ends. Behind them is what a search from the linear model's response finds beside the
-    /// curve, where the machine has friction or stops, or the curve has none. What is found does
-    /// not depend on what else is asked for, nor on how much farther the curve was followed.
+    /// branch ends. Behind them are those of the second curve, where the first is lost, and what a
+    /// search from the linear model's response finds beside both, where the machine has friction or
+    /// stops; where the first curve has none, this search's comes first. What is found does not
+    /// depend on what else is asked for, nor on how much farther the curve was followed.
     ///
     /// Where growth is close to 0, a response is that of the machine as it is, by classical
     /// Runge-Kutta in steps that follow its bearings.
@@ -126,9 +131,9 @@ impl<'a> Responses<'a> {
         }
         let (mut cases, mut rows) = (Vec::with_capacity(asked.len()), Vec::new());
         for &(place, speed_rpm) in asked {
-            let Some(Self(curve)) = followed.get_mut(place) else { return stopped() };
-            let case = curve.settings.case(speed_rpm);
-            rows.extend(case.as_ref().ok().map(|case| curve.settings.linear(case.row)));
+            let Some(Self { up, .. }) = followed.get_mut(place) else { return stopped() };
+            let case = up.settings.case(speed_rpm);
+            rows.extend(case.as_ref().ok().map(|case| up.settings.linear(case.row)));
             cases.push(case);
         }
         let mut linear = linear_responses(&rows, is_stopped).into_iter();
@@ -136,15 +141,17 @@ impl<'a> Responses<'a> {
         for (number, (case, (place, speed_rpm))) in cases.iter().zip(asked).enumerate() {
             let Ok(case) = case else { continue };
             let Some(linear) = linear.next() else { continue };
-            let mut guesses = followed[*place].0.guesses(*speed_rpm);
+            let mut guesses = followed[*place].guesses(*speed_rpm);
             // Friction and stops make responses beside those of the curve. A machine that is slower
             // than where the curve begins is in the only one that there is.
-            if guesses.is_empty() || case.row.has_corners() {
+            let is_beside = guesses.iter().all(|guess| !guess.is_on_curve);
+            if is_beside || case.row.has_corners() {
                 let branch = guesses.last().map_or(0, |last| last.branch + 1);
-                let begins_rpm = followed[*place].0.settings.lowest_rpm();
+                let begins_rpm = followed[*place].up.settings.lowest_rpm();
                 let is_on_curve = begins_rpm.is_ok_and(|begins_rpm| *speed_rpm < begins_rpm);
                 let guess = from_linear(case.row.point, &linear);
-                guesses.push(Guess { branch, is_on_curve, ..guess });
+                let at = if is_beside { 0 } else { guesses.len() };
+                guesses.insert(at, Guess { branch, is_on_curve, ..guess });
             }
             for guess in guesses {
                 solves.push(Solve::new(case.row, guess.state, guess.factors.clone()));
@@ -201,16 +208,60 @@ impl<'a> Responses<'a> {
     }
 }
 
-/// Leaves out what is found from the linear response and is on the curve all the same.
+/// Curves followed between two speeds (rpm), each from the linear model's response, or `from`
+/// another machine's; none once `is_stopped` says so.
+fn followed<'a>(
+    begun: Vec<(Curve<'a>, Option<[f64; 2]>)>,
+    from: Option<&Response>,
+    is_stopped: &dyn Fn() -> bool,
+) -> Option<Vec<Curve<'a>>> {
+    let (mut curves, ends): (Vec<Curve<'a>>, Vec<Option<[f64; 2]>>) = begun.into_iter().unzip();
+    let starts: Vec<Option<Row<'_>>> = curves
+        .iter_mut()
+        .zip(&ends)
+        .map(|(curve, ends)| curve.settings.followed((*ends)?[0]).ok())
+        .collect();
+    // A curve does not depend on where the linear model takes friction.
+    let rows: Vec<Row<'_>> = curves
+        .iter()
+        .zip(&starts)
+        .filter_map(|(curve, start)| {
+            Some(Row { point: curve.settings.without_friction(), ..(*start)? })
+        })
+        .collect();
+    let linear = together(&rows, is_stopped);
+    let begun = starts.iter().flatten().zip(&linear);
+    let mut solves: Vec<Solve<'_>> = begun
+        .map(|(row, linear)| {
+            let at_linear = || from_linear(row.point, linear).state;
+            Solve::new(*row, from.map_or_else(at_linear, |it| it.start), None)
+        })
+        .collect();
+    let is_whole = finish(&mut solves, is_stopped);
+    let mut solves = solves.into_iter();
+    for ((curve, ends), start) in curves.iter_mut().zip(&ends).zip(&starts) {
+        if let (Some(row), Some([_, until_rpm])) = (start, ends)
+            && let Some((state, _)) = solves.next().and_then(Solve::found)
+        {
+            curve.begin(row.speed_rpm, &state, *until_rpm);
+        }
+    }
+    (is_whole && finish(&mut curves, is_stopped)).then_some(curves)
+}
+
+/// Leaves out what is found from the linear response and is on a curve all the same, and what is on
+/// both.
 fn forget_known(looked: &[Look<'_>], found: &mut [Result<Response, NoAnswer>]) {
     for place in 0..found.len() {
         let Look { number, guess, .. } = &looked[place];
         let Ok(Response { start, .. }) = &found[place] else { continue };
         let is_same =
             |known: &Response| (0..COORDINATES).all(|i| (known.start[i] - start[i]).abs() < SAME);
-        let before = (0..place).rev().take_while(|before| looked[*before].number == *number);
-        let is_known = !guess.is_on_curve
-            && before.into_iter().any(|before| found[before].as_ref().is_ok_and(is_same));
+        let is_other = |other: &usize| {
+            looked[*other].number == *number && (*other < place || !guess.is_followed())
+        };
+        let mut others = (0..found.len()).filter(|other| *other != place).filter(is_other);
+        let is_known = !guess.is_on_curve && others.any(|it| found[it].as_ref().is_ok_and(is_same));
         if is_known {
             found[place] = Err(NoAnswer::NoResponse);
         }
@@ -267,7 +318,7 @@ impl Look<'_> {
     fn answer(&self, solve: Solve<'_>) -> Result<Response, NoAnswer> {
         let (start, seen) = solve.found().ok_or(NoAnswer::NoResponse)?;
         let is_far = |i: usize| (start[i] - self.guess.state[i]).abs() > FARTHEST_FROM_GUESS;
-        if self.guess.is_on_curve && (0..COORDINATES).any(is_far) {
+        if self.guess.is_followed() && (0..COORDINATES).any(is_far) {
             return Err(NoAnswer::NoResponse);
         }
         let row = &self.case.row;

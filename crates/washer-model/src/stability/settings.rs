@@ -60,6 +60,9 @@ const MOST_STEPS_FOLLOWED: usize = 2048;
 const LOWEST_SHARE: f64 = 0.45;
 const LOWEST_DIGITS: f64 = 64.0;
 
+/// and where that curve is lost, from so many times the fastest's down: responses are small there.
+const HIGHEST_SHARE: f64 = 2.0;
+
 /// Steps of a turn, at most: a drum so slow that it asks for more leaves its machine at rest, but
 /// for its own unbalance going round.
 const MOST_STEPS: usize = 1 << 15;
@@ -158,9 +161,18 @@ impl<'a> Settings<'a> {
 
     /// From where responses are followed (rpm): below all that the suspension answers to.
     pub(super) fn lowest_rpm(&self) -> Result<f64, NoAnswer> {
-        let slowest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?.modes[0].frequency_rpm();
+        self.share_of_mode(LOWEST_SHARE, 0)
+    }
+
+    /// From where they are followed down: above all that it answers to.
+    pub(super) fn highest_rpm(&self) -> Result<f64, NoAnswer> {
+        self.share_of_mode(HIGHEST_SHARE, SUSPENSION_MODES - 1)
+    }
+
+    fn share_of_mode(&self, share: f64, mode: usize) -> Result<f64, NoAnswer> {
+        let rpm = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?.modes[mode].frequency_rpm();
         // The last digits of an eigenvalue are the processor's own.
-        Ok((LOWEST_SHARE * slowest * LOWEST_DIGITS).ceil() / LOWEST_DIGITS)
+        Ok((share * rpm * LOWEST_DIGITS).ceil() / LOWEST_DIGITS)
     }
 
     /// That of a speed.

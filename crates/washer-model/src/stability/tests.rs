@@ -361,6 +361,23 @@ fn val_branches_match_an_independent_program() {
     }
 }
 
+/// The curve creeps up to a spring that passes its hook, and comes to no speed above 148 rpm.
+#[test]
+fn where_the_curve_is_lost_another_comes_down() {
+    let point = prepared(with(0.9, 20.0), 100.0);
+    let dwells = [240.0, 260.0, 340.0].map(|speed_rpm| Dwell { point: &point, speed_rpm });
+    let found: Vec<_> = all(&dwells).into_iter().map(Result::unwrap).collect();
+    // One that a search finds comes first.
+    let [beside, down] = &found[0][..] else { panic!("{found:?}") };
+    assert_eq!((beside.branch, beside.between_rpm), (down.branch + 1, [None; 2]));
+    for responses in &found[1..] {
+        let [response] = &responses[..] else { panic!("{found:?}") };
+        assert_eq!((response.branch, response.between_rpm), (down.branch, down.between_rpm));
+    }
+    assert!(down.between_rpm[0].is_some() && !found.concat().iter().any(|it| it.is_on_curve));
+    assert_eq!([1, 2].map(|k| found[k][0].kind()), [Kind::PeriodDoubling, Kind::Stable]);
+}
+
 /// A machine of its own: masses, inertias, stiffnesses, damping and unbalance of the paper's,
 /// each times a factor.
 fn random(random: &mut fastrand::Rng) -> Machine {
