@@ -49,6 +49,6 @@ pub use store::{Job, Rows, StoreError};
 pub use swept::{Listed, Swept};
 pub use table::Table;
 pub use threads::{Environment, ThreadsError};
-pub use watch::{Engine, KeepRow, NextRow, Watch};
+pub use watch::{Engine, KeepRow, KnownRow, NextRow, Watch};
 
 pub use sweep_results::nearest;

@@ -181,7 +181,8 @@ impl Work<'_> {
     /// error lets.
     fn compute(&self, run: &OpenRun) -> Result<(), StoreError> {
         let pool = threads::pool(self.threads)?;
-        let watch = Watch::new(self.interrupt);
+        let known = |point| run.known(point);
+        let watch = Watch::knowing(self.interrupt, &known);
         let (_, start) = run.own_points();
         // Bounded, so that a disk slower than the engine holds the engine up instead of filling
         // memory.

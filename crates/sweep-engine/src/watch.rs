@@ -14,6 +14,9 @@ pub type NextRow<'a> = dyn Fn() -> Option<(u64, Vec<f64>)> + Sync + 'a;
 /// Takes what came of a row.
 pub type KeepRow<'a> = dyn Fn(Done) + Sync + 'a;
 
+/// Recalls what came of a row.
+pub type KnownRow<'a> = dyn Fn(u64) -> Option<Done> + Sync + 'a;
+
 /// What computes points.
 pub trait Engine: Sync {
     /// Evaluates points until `next` gives none, each with what it is known by and the values of
@@ -36,18 +39,29 @@ pub struct Watch<'a> {
     abort: AtomicBool,
     done: AtomicU64,
     is_late: Option<&'a (dyn Fn() -> bool + Sync)>,
+    known: Option<&'a KnownRow<'a>>,
 }
 
 impl<'a> Watch<'a> {
     /// A watch over nothing but the stop flag.
     pub const fn new(interrupt: &'a Interrupt) -> Self {
         let (abort, done) = (AtomicBool::new(false), AtomicU64::new(0));
-        Self { interrupt, abort, done, is_late: None }
+        Self { interrupt, abort, done, is_late: None, known: None }
+    }
+
+    /// The same, and over what earlier processes have kept.
+    pub const fn knowing(interrupt: &'a Interrupt, known: &'a KnownRow<'a>) -> Self {
+        Self { known: Some(known), ..Self::new(interrupt) }
     }
 
     /// The same, and over a time that the work may take.
     pub const fn until(interrupt: &'a Interrupt, is_late: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Self { is_late: Some(is_late), ..Self::new(interrupt) }
+    }
+
+    /// What has been kept of a row, by whichever process.
+    pub fn known(&self, row: u64) -> Option<Done> {
+        self.known.and_then(|known| known(row))
     }
 
     /// Counts points done, for the bar.

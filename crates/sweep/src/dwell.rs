@@ -1,7 +1,7 @@
 //! What held speeds end in, over a grid: what `sweep dwell` asks of the engine of dwells, its rows,
 //! and what a finished file says.
 
-mod columns;
+pub(crate) mod columns;
 pub(crate) mod summary;
 
 use std::fmt;
@@ -17,9 +17,9 @@ use washer_row::Status;
 use crate::engine::{Carried, motions as motions_of};
 use crate::plan::Plan;
 use columns::{DwellColumn, RowOf};
-use sweep_engine::Error;
 use sweep_engine::columns::{declared, row};
 use sweep_engine::store::{Column, Done};
+use sweep_engine::{Error, Watch};
 
 /// Rows that a thread takes at once, at most: their starts fill lanes. Where rows have more starts
 /// than these, they are fewer: what is kept of a trajectory is 0.1 MB.
@@ -59,7 +59,7 @@ fn positive(text: &str) -> Result<f64, String> {
 /// How motions are looked for.
 #[derive(Clone, Copy, Debug, PartialEq, clap::Args)]
 pub struct Search {
-    /// Starts a speed, the disturbed periodic response among them
+    /// Starts a speed, the disturbed periodic response among them; at most 1024
     #[arg(long, value_name = "N", default_value_t = 8,
           value_parser = clap::value_parser!(u64).range(1..=Search::MOST_STARTS))]
     pub starts: u64,
@@ -72,7 +72,8 @@ pub struct Search {
     /// Look for the smallest kick that does not come back, where there are several motions
     #[arg(long)]
     pub threshold: bool,
-    /// Keep so many states of each motion, once a turn: a row each, with its coordinates
+    /// Keep so many states of each motion, at most 256, once a turn: a row each, with its
+    /// coordinates
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true,
           value_parser = clap::value_parser!(u64).range(..=256))]
     pub sections: u64,
@@ -146,7 +147,14 @@ impl Search {
 
     /// The columns of a file.
     pub(crate) fn columns(&self, plan: &Plan) -> Vec<Column> {
-        declared(columns::columns(plan, self.sections > 0))
+        declared(self.columns_of_rows(plan))
+    }
+
+    fn columns_of_rows(&self, plan: &Plan) -> Vec<DwellColumn> {
+        let (channels, measures) = (&plan.reliability.channels, &plan.model.measures);
+        let mut columns = columns::columns(channels, measures, self.sections > 0);
+        columns.extend(self.carry.is_some().then(columns::carried).into_iter().flatten());
+        columns
     }
 }
 
@@ -173,7 +181,7 @@ impl Motions {
             with_threshold: search.threshold,
             wanted,
         };
-        Self { search, starts, columns: columns::columns(plan, search.sections > 0) }
+        Self { search, starts, columns: search.columns_of_rows(plan) }
     }
 
     /// Rows that a thread takes at once, of its share and of a number of speeds a point.
@@ -191,24 +199,25 @@ impl Motions {
         Done { point: number, rows: vec![row(&self.columns, &none)] }
     }
 
-    /// The rows of these dwells, each with its number. Once `is_stopped` says so, what comes means
-    /// nothing.
+    /// Keeps the rows of these dwells, each with its number, as they come. Once the watch has
+    /// stopped, what comes means nothing.
     pub(crate) fn find(
         &self,
         simd: Simd,
         speeds_rpm: &[f64],
         asked: &[(u64, Dwell<'_>)],
-        is_stopped: &dyn Fn() -> bool,
-    ) -> Vec<Done> {
+        keep: &dyn Fn(Done),
+        watch: &Watch<'_>,
+    ) {
+        let is_stopped = || watch.stopped();
         let Some(carry) = self.search.carry else {
             let dwells: Vec<(Dwell<'_>, Carried)> =
                 asked.iter().map(|(_, dwell)| (*dwell, None)).collect();
-            let found = motions_of(simd, &dwells, &self.starts, is_stopped);
+            let found = motions_of(simd, &dwells, &self.starts, &is_stopped);
             let each = asked.iter().zip(found);
-            return each.map(|((row, _), found)| self.done(*row, found)).collect();
+            return each.for_each(|((row, _), found)| keep(self.done(*row, found)));
         };
         let speeds = speeds_rpm.len() as u64;
-        let mut done = Vec::with_capacity(asked.len());
         let groups: Vec<&[(u64, Dwell<'_>)]> =
             asked.chunk_by(|a, b| a.0 / speeds == b.0 / speeds).collect();
         let mut carried: Vec<Carried> = vec![None; groups.len()];
@@ -219,23 +228,31 @@ impl Motions {
                 Carry::Up => row % speeds >= place,
                 Carry::Down => row % speeds <= place,
             };
-            let is_needed = |k: &usize| groups[*k].iter().any(is_further);
-            let needed: Vec<usize> = (0..groups.len()).filter(is_needed).collect();
+            let row_of = |k: usize| groups[k][0].0 / speeds * speeds + place;
+            let is_asked = |k: usize| groups[k].iter().any(|(asked, _)| *asked == row_of(k));
+            let mut needed = Vec::new();
+            for k in (0..groups.len()).filter(|k| groups[*k].iter().any(is_further)) {
+                match Some(k).filter(|k| !is_asked(*k)).and_then(|k| watch.known(row_of(k))) {
+                    Some(known) => carried[k] = columns::carried_by(&known),
+                    None => needed.push(k),
+                }
+            }
             let dwell = |k: &usize| {
                 let speed_rpm = speeds_rpm[place as usize];
                 (Dwell { point: groups[*k][0].1.point, speed_rpm }, carried[*k])
             };
             let dwells: Vec<(Dwell<'_>, Carried)> = needed.iter().map(dwell).collect();
-            let found = motions_of(simd, &dwells, &self.starts, is_stopped);
+            let found = motions_of(simd, &dwells, &self.starts, &is_stopped);
+            if is_stopped() {
+                return;
+            }
             for (k, found) in needed.into_iter().zip(found) {
                 carried[k] = found.as_ref().ok().and_then(last_state);
-                let row = groups[k][0].0 / speeds * speeds + place;
-                if groups[k].iter().any(|(asked, _)| *asked == row) {
-                    done.push(self.done(row, found));
+                if is_asked(k) {
+                    keep(self.done(row_of(k), found));
                 }
             }
         }
-        done
     }
 
     fn done(&self, number: u64, found: Result<Endings, Status>) -> Done {
@@ -262,4 +279,36 @@ impl Motions {
 fn last_state(found: &Endings) -> Carried {
     let motion = found.motions.first()?;
     (!matches!(motion.state, State::LeftRange { .. })).then_some(motion.end)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::stability::Held;
+    use sweep_engine::{Engine as _, Interrupt, KnownRow};
+    use sweep_files::panics::{lock, unlocked};
+
+    #[test]
+    fn a_motion_is_taken_along_from_a_row_that_was_kept() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/examples/plateau.toml");
+        let plan = crate::config::load(path.as_ref(), &[]).unwrap();
+        let (carry, longest) = (Some(Carry::Up), 5.0);
+        let search = Search { starts: 8, kick: 6.0, carry, threshold: false, sections: 0, longest };
+        let held = Held { plan: &plan, speeds_rpm: &[300.0, 305.0, 310.0], search: Some(search) };
+        let (engine, calm) = (held.engine().unwrap(), Interrupt::new());
+        let found = |rows: std::ops::Range<u64>, known: &KnownRow<'_>| {
+            let (left, done) = (Mutex::new(rows), Mutex::new(Vec::new()));
+            let next = || lock(&left).next().map(|row| (row, Vec::new()));
+            engine.evaluate(&next, &|one| lock(&done).push(one), &Watch::knowing(&calm, known));
+            let mut done = unlocked(done);
+            done.sort_by_key(|one: &Done| one.point);
+            done
+        };
+        let whole = found(0..3, &|_| None);
+        assert_eq!(found(2..3, &|row| whole.get(row as usize).cloned()), whole[2..]);
+        // It is taken from there, and not found again.
+        assert_ne!(found(2..3, &|_| whole.first().cloned()), whole[2..]);
+    }
 }

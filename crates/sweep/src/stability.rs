@@ -15,7 +15,7 @@ use crate::columns::Columns;
 use crate::dwell::{Motions, Search};
 use crate::engine::{Engine, Watch, responses, simd_from_environment, together_or_alone};
 use crate::plan::{Plan, timing};
-use sweep_engine::store::{Column, Done, Kind, Layout, axis_columns};
+use sweep_engine::store::{Column, Kind, Layout, axis_columns};
 use sweep_engine::{Error, Job, KeepRow, NextRow};
 use sweep_files::{FileKind, key};
 
@@ -154,20 +154,26 @@ pub(crate) struct DwellEngine<'a> {
 }
 
 impl DwellEngine<'_> {
-    /// These rows, those of neighbouring points and speeds in lanes together. Once `is_stopped`
-    /// says so, what comes means nothing.
-    fn rows(&self, rows: &[u64], is_stopped: &dyn Fn() -> bool) -> Vec<Done> {
+    /// Keeps these rows, those of neighbouring points and speeds in lanes together, as they come.
+    fn rows(&self, rows: &[u64], keep: &KeepRow<'_>, watch: &Watch<'_>) {
+        // What comes of a search that was stopped means nothing.
+        let is_stopped = || watch.stopped();
+        let keep = |done| {
+            if !is_stopped() {
+                keep(done)
+            }
+        };
         let speeds = self.held.speeds_rpm.len() as u64;
         let mut wanted: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
         wanted.dedup();
         let points: BTreeMap<u64, Result<Point, Status>> =
             wanted.iter().copied().zip(self.ready(&wanted)).collect();
-        let (mut done, mut asked) = (Vec::with_capacity(rows.len()), Vec::new());
+        let mut asked = Vec::new();
         for &row in rows {
             let speed_rpm = self.held.speeds_rpm[(row % speeds) as usize];
             match &points[&(row / speeds)] {
                 Ok(point) => asked.push((row, Dwell { point, speed_rpm })),
-                Err(status) => done.push(match &self.asked {
+                Err(status) => keep(match &self.asked {
                     Asked::Responses(columns) => columns.done(Outcome::failed(row, *status)),
                     Asked::Motions(motions) => motions.failed(row, *status),
                 }),
@@ -176,17 +182,16 @@ impl DwellEngine<'_> {
         match &self.asked {
             Asked::Responses(columns) => {
                 let dwells: Vec<Dwell<'_>> = asked.iter().map(|(_, dwell)| *dwell).collect();
-                for ((row, _), found) in asked.iter().zip(responses(&dwells, is_stopped)) {
+                for ((row, _), found) in asked.iter().zip(responses(&dwells, &is_stopped)) {
                     let none = |status| Outcome::failed(*row, status);
                     let outcome = found.map_or_else(none, |found| self.outcome(*row, &found));
-                    done.push(columns.done(outcome));
+                    keep(columns.done(outcome));
                 }
             }
             Asked::Motions(motions) => {
-                done.extend(motions.find(self.simd, self.held.speeds_rpm, &asked, is_stopped));
+                motions.find(self.simd, self.held.speeds_rpm, &asked, &keep, watch);
             }
         }
-        done
     }
 
     fn ready(&self, points: &[u64]) -> Vec<Result<Point, Status>> {
@@ -227,7 +232,6 @@ impl Engine for DwellEngine<'_> {
             Asked::Responses(_) => share.min(POINTS_AT_ONCE * speeds).clamp(AT_ONCE[0], AT_ONCE[1]),
             Asked::Motions(motions) => motions.at_once(share, speeds),
         };
-        let is_stopped = || watch.stopped();
         rayon::broadcast(|_| {
             while !watch.stopped() {
                 let rows = std::iter::from_fn(next).map(|(row, _)| row);
@@ -235,10 +239,7 @@ impl Engine for DwellEngine<'_> {
                 if rows.is_empty() {
                     break;
                 }
-                let done = self.rows(&rows, &is_stopped);
-                if !watch.stopped() {
-                    done.into_iter().for_each(keep);
-                }
+                self.rows(&rows, keep, watch);
             }
         });
     }

@@ -167,6 +167,13 @@ impl OpenRun {
         Ok(whole)
     }
 
+    /// What is kept of a point, by whichever process.
+    pub fn known(&self, point: u64) -> Option<Done> {
+        let place = self.place(self.chunk_of(point));
+        let there = read_chunk(&self.folder, &place).ok()??.ok()?;
+        there.into_iter().find(|done| done.point == point)
+    }
+
     /// What there is of a chunk; a damaged file is set aside and noted.
     fn read(&mut self, chunk: u64) -> Result<Option<Vec<Done>>, StoreError> {
         match read_chunk(&self.folder, &self.place(chunk))? {

@@ -42,6 +42,8 @@ pub enum Kind {
     Axis,
     /// A number that may repeat.
     Time,
+    /// A number for whoever goes on with an unfinished run: the file does not have it.
+    Kept,
     /// True or false.
     Flag,
     /// A position in a list of names that is the same for every row, batch and run of the plan.
@@ -120,7 +122,7 @@ impl Column {
     pub fn number(&self, cell: Option<u64>) -> Option<f64> {
         match self.kind {
             Kind::Count | Kind::KnownCount => cell.map(|count| count as f64),
-            Kind::Measured | Kind::Axis | Kind::Time => cell.map(f64::from_bits),
+            Kind::Measured | Kind::Axis | Kind::Time | Kind::Kept => cell.map(f64::from_bits),
             Kind::Flag | Kind::Name(_) => None,
         }
     }
@@ -131,7 +133,7 @@ impl Column {
             Kind::Count => (DataType::UInt64, false),
             Kind::KnownCount => (DataType::UInt64, true),
             Kind::Axis => (DataType::Float64, false),
-            Kind::Measured | Kind::Time => (DataType::Float64, true),
+            Kind::Measured | Kind::Time | Kind::Kept => (DataType::Float64, true),
             Kind::Flag => (DataType::Boolean, true),
             Kind::Name(_) => (names(), true),
         };
@@ -161,7 +163,7 @@ impl Column {
             Kind::Axis => Arc::new(Float64Array::from_iter_values(
                 cells.map(|cell| cell.map_or(f64::NAN, f64::from_bits)),
             )),
-            Kind::Measured | Kind::Time => {
+            Kind::Measured | Kind::Time | Kind::Kept => {
                 Arc::new(cells.map(|cell| cell.map(f64::from_bits)).collect::<Float64Array>())
             }
             Kind::Flag => {
@@ -179,7 +181,7 @@ impl Column {
     pub(super) fn takes(&self, cell: Option<u64>) -> bool {
         match (&self.kind, cell) {
             (Kind::Count | Kind::Axis, cell) => cell.is_some(),
-            (_, None) | (Kind::KnownCount | Kind::Measured | Kind::Time, _) => true,
+            (_, None) | (Kind::KnownCount | Kind::Measured | Kind::Time | Kind::Kept, _) => true,
             (Kind::Flag, Some(flag)) => flag <= 1,
             (Kind::Name(names), Some(name)) => name < names.len() as u64,
         }
@@ -192,7 +194,8 @@ impl Layout {
         static POINT: std::sync::LazyLock<Column> = std::sync::LazyLock::new(|| {
             Column::new("point", "1", "index in grid order", Kind::Count)
         });
-        std::iter::once(&*POINT).chain(&self.axes).chain(&self.columns)
+        let columns = self.columns.iter().filter(|column| column.kind != Kind::Kept);
+        std::iter::once(&*POINT).chain(&self.axes).chain(columns)
     }
 
     /// The Arrow schema.

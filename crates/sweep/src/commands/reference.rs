@@ -12,7 +12,10 @@ use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 use super::command;
 use crate::columns::Columns;
 use crate::config::machine::with_one_of_each;
+use crate::dwell::columns as of_dwells;
 use crate::method::Integrator;
+use arrow_schema::{DataType, Schema};
+use sweep_engine::columns::declared;
 use sweep_engine::method::{Integrator as _, default_method};
 use sweep_engine::store::{Column, Kind, Layout};
 use sweep_files::key;
@@ -134,28 +137,7 @@ fn columns() -> String {
     let measures = Measures { metrics, stops: 1, feet: 1, dampers: 1, ..Measures::default() };
     let columns = Columns::of_measures(&Channel::ALL, 2.0.into(), &measures, true);
     let layout = Layout::of_map(axes, columns.declared());
-    row(&mut text, &["column", "type", "unit", "worse", "limit", "meaning"]);
-    row(&mut text, &["---"; 6]);
-    let mut names = HashSet::new();
-    for field in layout.schema().fields().iter().filter(|field| !is_a_further_one(field.name())) {
-        let name = of_any(field.name());
-        if !names.insert(name.clone()) {
-            continue;
-        }
-        let told = |key: &str| field.metadata().get(key).map_or("", String::as_str);
-        let data_type = match field.data_type() {
-            arrow_schema::DataType::Dictionary(..) => "text".to_owned(),
-            plain => plain.to_string().to_lowercase(),
-        };
-        let data_type = data_type + if field.is_nullable() { "" } else { ", never null" };
-        let unit = match told("unit") {
-            unit if unit != "1" && name.ends_with("CHANNEL") => "the channel's",
-            unit => unit,
-        };
-        let (name, meaning) = (format!("`{name}`"), of_any_model(told("description")));
-        let [worse, limit] = [key::WORSE, key::LIMIT].map(told);
-        row(&mut text, &[&name, &data_type, unit, worse, limit, &meaning]);
-    }
+    table(&mut text, &layout.schema(), &[key::WORSE, key::LIMIT]);
     text.push_str("\nChannels:\n\n");
     row(&mut text, &["channel", "unit", "what moves"]);
     row(&mut text, &["---"; 3]);
@@ -177,13 +159,42 @@ fn columns() -> String {
         metrics = listed(&mut Metric::ALL.iter().map(|metric| metric.name())),
         statuses = listed(&mut ROW_STATUSES.into_iter()),
     ));
+    let columns = declared(of_dwells::columns(&Channel::ALL, &Measures::default(), false));
+    table(&mut text, &Layout::of_map(Vec::new(), columns).schema(), &[]);
     text
+}
+
+/// A row for each column, once for all channels and models, with these of its facts.
+fn table(text: &mut String, columns: &Schema, facts: &[&str]) {
+    row(text, &[&["column", "type", "unit"], facts, &["meaning"]].concat());
+    row(text, &vec!["---"; 4 + facts.len()]);
+    let mut names = HashSet::new();
+    for field in columns.fields().iter().filter(|field| !is_a_further_one(field.name())) {
+        let name = of_any(field.name());
+        if !names.insert(name.clone()) {
+            continue;
+        }
+        let told = |key: &str| field.metadata().get(key).map_or("", String::as_str);
+        let data_type = match field.data_type() {
+            DataType::Dictionary(..) => "text".to_owned(),
+            plain => plain.to_string().to_lowercase(),
+        };
+        let data_type = data_type + if field.is_nullable() { "" } else { ", never null" };
+        let unit = match told("unit") {
+            unit if unit != "1" && name.ends_with("CHANNEL") => "the channel's",
+            unit => unit,
+        };
+        let (name, meaning) = (format!("`{name}`"), of_any_model(told("description")));
+        let facts = facts.iter().map(|key| told(key));
+        let cells = [name.as_str(), &data_type, unit].into_iter().chain(facts);
+        row(text, &cells.chain([meaning.as_str()]).collect::<Vec<_>>());
+    }
 }
 
 /// A column's name, with CHANNEL and MODEL in place of one channel's and one model's.
 fn of_any(name: &str) -> String {
     let of_channel = Channel::ALL.iter().find_map(|channel| {
-        ["nonlinear_", "linear_", "ratio_", "dwell_"].into_iter().find_map(|before| {
+        ["nonlinear_", "linear_", "ratio_", "dwell_", "periodic_"].into_iter().find_map(|before| {
             (name.strip_prefix(before)? == channel.name()).then(|| format!("{before}CHANNEL"))
         })
     });

@@ -3,20 +3,21 @@
 use std::sync::Arc;
 
 use sweep_engine::columns::{MODELS, ResultColumn};
-use sweep_engine::store::Kind;
+use sweep_engine::store::{Done, Kind};
 use washer_model::{COORDINATES, Channel, Ending, Endings, Response, STATE_LEN, Settled, State};
-use washer_row::{Measured, Status};
+use washer_row::{Measured, Measures, Status};
 
-use crate::plan::Plan;
+use super::last_state;
+use crate::engine::Carried;
 
 /// A row: one of the motions of a dwell, at one of its turns from 0 if these are kept; or none.
-pub(super) struct RowOf {
+pub(crate) struct RowOf {
     pub(super) found: Result<Arc<Endings>, Status>,
     pub(super) motion: usize,
     pub(super) turn: usize,
 }
 
-pub(super) type DwellColumn = ResultColumn<RowOf>;
+pub(crate) type DwellColumn = ResultColumn<RowOf>;
 
 /// Kinds of motions that have settled, of [`Ending::KINDS`].
 const SETTLED: usize = 5;
@@ -125,7 +126,11 @@ fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
 }
 
 /// Every column, in order; with those of states once a turn, if these are kept.
-pub(super) fn columns(plan: &Plan, with_sections: bool) -> Vec<DwellColumn> {
+pub(crate) fn columns(
+    channels: &[Channel],
+    measures: &Measures,
+    with_sections: bool,
+) -> Vec<DwellColumn> {
     let motion = |row: &RowOf| Some(row.motion as u64);
     let text = "number of the motion at this speed: 0 is the one that the disturbed periodic \
                 response ends in";
@@ -142,9 +147,9 @@ pub(super) fn columns(plan: &Plan, with_sections: bool) -> Vec<DwellColumn> {
     columns.push(ResultColumn::name("kind", text, Ending::KINDS[..SETTLED].to_vec(), RowOf::kind));
     let text = "after how many turns it repeats; null where it does not";
     columns.push(counts("period_turns", text, RowOf::period_turns));
-    columns.extend(channel_columns(&plan.reliability.channels));
+    columns.extend(channel_columns(channels));
     let of_turns = |number: &Measured| number.metric.is_of_turns();
-    for number in plan.model.measures.of_model().filter(of_turns) {
+    for number in measures.of_model().filter(of_turns) {
         let text = format!("{}, over 128 further turns of the motion", number.description());
         let (name, unit) = (number.column(MODELS[0]), number.metric.facts().unit);
         let of = move |row: &RowOf| number.of(&row.within()?.extra);
@@ -210,6 +215,20 @@ pub(super) fn columns(plan: &Plan, with_sections: bool) -> Vec<DwellColumn> {
         columns.extend(section_columns());
     }
     columns
+}
+
+/// The state in which a machine is taken to the next speed, kept for whoever goes on from there.
+pub(super) fn carried() -> impl Iterator<Item = DwellColumn> {
+    let of = |i: usize| move |row: &RowOf| Some(last_state(row.found()?)?[i].to_bits());
+    (0..STATE_LEN)
+        .map(move |i| ResultColumn::new(format!("carried_{i}"), "", "", Kind::Kept, of(i)))
+}
+
+/// The state that a row was kept with.
+pub(super) fn carried_by(known: &Done) -> Carried {
+    let cells = known.rows.first()?.last_chunk::<STATE_LEN>()?;
+    let state: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
+    state?.try_into().ok()
 }
 
 /// Columns of states once a turn.
