@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::cells::table as text_table;
-use super::{Lines as _, installed, word};
+use super::{Lines as _, installed, short, word};
 use crate::config::section::counted;
 use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
@@ -142,9 +142,16 @@ fn told<M: Swept>(
         ["candidate", "feasible", "on_front"].into_iter().chain(sought).chain(objectives).collect();
     let chosen = candidate.or_else(|| about["best"].as_u64());
     let (mut feasible, mut front, mut values) = (0, Vec::new(), None);
+    // The least of the first objective, before the search stays beside the best and then.
+    let (mut least, first_near) = ([f64::INFINITY; 2], study.evolution.first_near());
     file.file().each_row(&names, |row| {
         let cells: Vec<Cell> = (0..names.len()).map(|column| row.cell(column)).collect();
-        feasible += usize::from(cells[1] == Cell::Flag(true));
+        if cells[1] == Cell::Flag(true) {
+            feasible += 1;
+            let number = cells.get(3 + study.parameters.len()).and_then(Cell::number);
+            let own = &mut least[usize::from(row.index() >= first_near)];
+            *own = own.min(number.map_or(f64::INFINITY, |one| study.objectives[0].sign * one));
+        }
         if Some(row.index()) == chosen {
             let own = cells[3..].iter().take(study.parameters.len());
             values = own.map(Cell::number).collect::<Option<Vec<f64>>>();
@@ -158,6 +165,17 @@ fn told<M: Swept>(
     text.line("feasible", format!("{feasible} of {all}, {} on the front", front.len()));
     if let Some(best) = about["best"].as_u64() {
         text.line("best", format!("candidate {best}"));
+    }
+    if let ([objective], [before, near]) = (&study.objectives[..], least)
+        && before.is_finite()
+        && first_near < all
+    {
+        let [before, after] = [before, near.min(before)].map(|one| short(objective.sign * one));
+        let more = if before == after { "" } else { ": more candidates may take it farther" };
+        let (late, name) = (all - first_near, &objective.name);
+        let told =
+            format!("the last {late}, beside the best, took {name} from {before} to {after}");
+        text.line("search", told + more);
     }
     front.sort_by(|a, b| {
         let of = |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);
