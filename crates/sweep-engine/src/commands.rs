@@ -26,7 +26,7 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use crate::program::call_program;
 use crate::survive_file_size_limits;
 use crate::{Error, Exit, Swept};
-use cells::{Lines, clipped, short, table, word};
+use cells::{Lines, clipped, short, span, table, word};
 use grid::{GridArgs, ResultArgs, quoted};
 use run::installed;
 

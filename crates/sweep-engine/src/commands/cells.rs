@@ -38,6 +38,13 @@ pub fn short(value: f64) -> String {
     }
 }
 
+/// From one number to another, with all their digits where fewer do not tell them apart.
+pub fn span([from, to]: [f64; 2], said: impl Fn(f64) -> String) -> String {
+    let is_told_apart = from == to || said(from) != said(to);
+    let [from, to] = [from, to].map(|end| if is_told_apart { said(end) } else { end.to_string() });
+    format!("{from} to {to}")
+}
+
 /// A cell in a word.
 pub fn word(cell: &Cell) -> String {
     match cell {
@@ -87,6 +94,12 @@ mod tests {
         let expected =
             ["0", "0.05", "300", "-1.50000e-7", "2.00000e12", "0.333333", "0.55", "0.00123457"];
         assert_eq!(shown, expected);
+    }
+
+    #[test]
+    fn ends_of_a_range_are_told_apart() {
+        let said = [[0.6, 0.600_000_1], [0.6, 0.6], [1.0, 2.0]].map(|ends| span(ends, short));
+        assert_eq!(said, ["0.6 to 0.6000001", "0.6 to 0.6", "1 to 2"]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::run::failed_words;
-use super::{GridArgs, short};
+use super::{GridArgs, short, span};
 use crate::config::section::counted;
 use crate::design::{Design, Distribution};
 use crate::estimate::size;
@@ -105,8 +105,8 @@ fn describe<M: Swept>(axis: &Axis<M>, design: Option<&Design>) -> String {
         }
         AxisValues::Distributed(Distribution { shape, from, to }) => {
             let numbers = shape.numbers().map(|(key, number)| format!("{key} {number}"));
-            let [from, to] = [*from, *to].map(short);
-            format!("{name}: {}, {}, from {from} to {to}", shape.name(), numbers.join(", "))
+            let range = span([*from, *to], short);
+            format!("{name}: {}, {}, from {range}", shape.name(), numbers.join(", "))
         }
         AxisValues::List(values) => {
             let shown: Vec<_> = values.iter().take(8).map(f64::to_string).collect();

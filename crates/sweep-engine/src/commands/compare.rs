@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use super::{Lines as _, quoted, short, table};
+use super::{Lines as _, quoted, short, span, table};
 use crate::config::section::{counted, cut};
 use crate::{Build, Error, Exit, show, tell};
 use fail_on::FailOn;
@@ -73,9 +73,9 @@ What --fail-on takes:
 /// Files that cannot be read or compared, and an output that cannot be written.
 pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
     let files = [&args.first, &args.second];
+    let tables = [ResultTable::open(files[0])?, ResultTable::open(files[1])?];
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Differences)).transpose()?;
-    let tables = [ResultTable::open(files[0])?, ResultTable::open(files[1])?];
     let found = compare(&tables[0], &tables[1])?;
     if let Some([given, of]) = args.fail_on.iter().find_map(|fail_on| fail_on.lacks(&found)) {
         return Err(Error::option("--fail-on", given, of));
@@ -252,8 +252,7 @@ fn boundary(moved: &Moved) -> String {
             let place = moved.keys.iter().zip(&farthest.place);
             let place: Vec<String> =
                 place.map(|(name, value)| format!("{name} {}", short(*value))).collect();
-            let [from, to] =
-                farthest.bracket.map(|[low, high]| format!("{} to {}", short(low), short(high)));
+            let [from, to] = farthest.bracket.map(|ends| span(ends, short));
             let (certain, place) = (moved.certain(), place.join(", "));
             format!(
                 "{count} along {axis}, {certain} moved farther than brackets explain; in the mean \

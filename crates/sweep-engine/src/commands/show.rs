@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use super::run::counts;
-use super::{Lines as _, clipped, conditions, short, table, word};
+use super::{Lines as _, clipped, conditions, short, span, table, word};
 use crate::store::read::{ColumnRange, Overview, ResultFile, Tally, overview, tally};
 use crate::{Error, Exit, show};
 use sweep_files::{ParquetFile, key};
@@ -319,7 +319,7 @@ fn range(column: &ColumnRange) -> String {
     if let Some((least, greatest)) = column.range {
         let unit = column.unit.as_deref().filter(|unit| *unit != "1");
         let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
-        parts.push(format!("{} to {}{unit}", short(least), short(greatest)));
+        parts.push(span([least, greatest], short) + &unit);
     }
     let names = column.names.iter();
     parts.extend(names.map(|(name, count)| format!("{count} {}", clipped(name))));

@@ -123,9 +123,8 @@ fn spin(spin: &Value) -> Option<String> {
 }
 
 fn time(time: &Value) -> Option<String> {
-    let number = |value: &Value| value.as_f64().map(|value| significant(value, 4));
-    let [from, to] = [number(&time["window_s"][0])?, number(&time["window_s"][1])?];
-    let end = number(&time["end_s"])?;
+    let [from, to] = [time["window_s"][0].as_f64()?, time["window_s"][1].as_f64()?];
+    let end = time["end_s"].as_f64()?;
     Some(format!("0 to {end} s; amplitudes are the largest deviations from {from} to {to} s"))
 }
 

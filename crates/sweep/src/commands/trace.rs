@@ -7,7 +7,7 @@ use crate::plan::Plan;
 use crate::trace::{
     Extras, Models, StartValue, Trace, View, every, in_pool, start_of, start_value,
 };
-use sweep_engine::commands::cells::{Lines as _, short, table};
+use sweep_engine::commands::cells::{Lines as _, short, span, table};
 use sweep_engine::commands::grid::quoted;
 use sweep_engine::{Error, Exit, Job, tell};
 use sweep_files::{FileKind, Output, key};
@@ -167,10 +167,10 @@ fn compared(plan: &Plan, at: &[String], of_file: Option<Level>) -> Result<String
     };
     let rows: Vec<Vec<String>> = channels.iter().enumerate().map(row).collect();
     let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
-    let [from, to] = plan.window_s.map(short);
+    let window = span(plan.window_s, short);
     let what = plan.model.measures.criterion.amplitude();
     let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
-    let mut text = format!("{what}, {from} to {to} s{place}:\n{}", table(&headings, &rows, ""));
+    let mut text = format!("{what}, {window} s{place}:\n{}", table(&headings, &rows, ""));
     // The ratio that is beyond its limit, or the greatest.
     let too_low = limits.least.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
     let told = match (verdict.greatest, too_low) {
