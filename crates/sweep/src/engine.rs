@@ -4,7 +4,7 @@ mod growth;
 mod ladder;
 mod pool;
 
-pub(crate) use growth::{Carried, fastest, motions, responses};
+pub(crate) use growth::{Carried, motions, of_speeds, responses};
 pub(crate) use ladder::{reference, reference_step_s};
 pub(crate) use sweep_engine::{Engine, Watch};
 

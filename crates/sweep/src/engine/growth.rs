@@ -22,19 +22,15 @@ pub(crate) fn responses(
     together_or_alone(dwells, together, || Err(Status::Panicked))
 }
 
-/// The response of a machine that runs up whose disturbances grow fastest, of those at some speeds;
-/// the first of equals.
-pub(crate) fn fastest(found: &[Result<Vec<Response>, Status>]) -> Option<&Response> {
-    let there = found.iter().flatten().filter_map(|responses| responses.first());
-    there.reduce(|most, next| if next.growth_per_s() > most.growth_per_s() { next } else { most })
-}
-
-/// What is told of it. Where it is within the machine's geometry, what another of these passes is
-/// told too; where one is missing or off the curve, so is it: a machine that runs up may be in
-/// another motion there.
-fn of_speeds(found: &[Result<Vec<Response>, Status>]) -> Option<Growth> {
+/// What is told of the response of a machine that runs up whose disturbances grow fastest, of those
+/// at some speeds; the first of equals. Where it is within the machine's geometry, what another of
+/// these passes is told too; where one is missing or off the curve, so is it: a machine that runs
+/// up may be in another motion there.
+pub(crate) fn of_speeds(found: &[Result<Vec<Response>, Status>]) -> Option<Growth> {
     let firsts = || found.iter().map(|found| found.as_ref().ok()?.first());
-    let fastest = fastest(found)?;
+    let faster = |most: &Response, next: &Response| next.growth_per_s() > most.growth_per_s();
+    let fastest =
+        firsts().flatten().reduce(|most, next| if faster(most, next) { next } else { most })?;
     let beyond = fastest.beyond.or_else(|| firsts().flatten().find_map(|first| first.beyond));
     let is_on_curve = firsts().all(|first| first.is_some_and(|first| first.is_on_curve));
     Some(Growth { beyond, is_on_curve, ..Growth::from(fastest) })

@@ -98,6 +98,8 @@ pub(crate) struct Measured {
     /// The tachometer, if there is one (rpm); NaN where it has no sample.
     pub(crate) speed_rpm: Option<Vec<f64>>,
     pub(crate) signals: Vec<Signal>,
+    /// Rows before time 0, when the drum is at rest yet: they are left out.
+    pub(crate) early: usize,
     /// Stretches of time without any row (s).
     pub(crate) gaps_s: Vec<[f64; 2]>,
 }
@@ -133,7 +135,9 @@ impl Measured {
 
 /// The table as a measurement; what is wrong with it is reported.
 fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
-    let mut measured = Measured { name, ..Measured::default() };
+    let clock = table.columns.iter().find(|column| column.name.value == "time_s");
+    let early = clock.map_or(0, |clock| clock.values.iter().take_while(|t| **t < 0.0).count());
+    let mut measured = Measured { name, early, ..Measured::default() };
     let mut seen: Vec<&str> = Vec::new();
     // Of a file of `sweep trace` the nonlinear motion is taken.
     let is_trace = table.columns.iter().any(|column| column.name.value.starts_with(TRACED));
@@ -153,20 +157,21 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
                 Diagnostic::new(title).at(&table.place(sources, k, row), expected)
             });
         }
-        let samples = column.values.iter().filter(|value| !value.is_nan()).count();
+        let values = &column.values[early..];
+        let samples = values.iter().filter(|value| !value.is_nan()).count();
         match (name, Quantity::named(name)) {
             ("time_s", _) => {
-                measured.time_s.clone_from(&column.values);
+                measured.time_s = values.to_vec();
                 times(&table, k, report);
             }
-            ("speed_rpm", _) => measured.speed_rpm = Some(column.values.clone()),
+            ("speed_rpm", _) => measured.speed_rpm = Some(values.to_vec()),
             (_, None) if is_trace => {}
-            (_, Some(_)) if samples >= FEWEST && is_still(&column.values) => {
+            (_, Some(_)) if samples >= FEWEST && is_still(values) => {
                 let title = format!("the column `{name}` never changes");
                 report.push(Diagnostic::new(title).at(at, "expected what a sensor measured"));
             }
             (_, Some(quantity)) if samples >= FEWEST => {
-                measured.signals.push(Signal { quantity, values: column.values.clone() });
+                measured.signals.push(Signal { quantity, values: values.to_vec() });
             }
             (_, Some(_)) => {
                 let title = format!("the column `{name}` has {samples} samples");
@@ -208,14 +213,13 @@ fn is_still(values: &[f64]) -> bool {
 fn times(table: &NumberTable, column: usize, report: &Report) {
     let values = &table.columns[column].values;
     let mut last = f64::NEG_INFINITY;
-    let mut seen = [false; 4];
+    let mut seen = [false; 3];
     let usual = usual_step(values).unwrap_or_default();
     for (row, &time_s) in values.iter().enumerate() {
         let (mistake, said) = match time_s {
             _ if time_s.is_nan() => (0, "a row without its time".to_owned()),
-            _ if time_s < 0.0 => (1, format!("time_s = {time_s} s: the run begins at 0, at rest")),
-            _ if time_s <= last => (2, format!("time goes back: {time_s} s after {last} s")),
-            _ if usual > SLOWEST_S => (3, format!("rows are {usual} s apart: are these ms?")),
+            _ if time_s <= last => (1, format!("time goes back: {time_s} s after {last} s")),
+            _ if usual > SLOWEST_S => (2, format!("rows are {usual} s apart: are these ms?")),
             _ => {
                 last = time_s;
                 continue;
@@ -295,12 +299,21 @@ mod tests {
         assert!(refused("time_s,tub_yaw\n0,inf\n").contains("is infinite"));
         let rows: String = (0..20).map(|k| format!("{},1\n", 0.01 * f64::from(k))).collect();
         assert!(refused(&format!("time_s,tub_yaw\n{rows}")).contains("never changes"));
-        // Milliseconds, and a clock whose zero is elsewhere: once, not once a row.
-        for (from, said) in [(0, "rows are 2 s apart: are these ms?"), (-30, "begins at 0")] {
-            let rows: String = (0..20).map(|k| format!("{},{k}\n", from + 2 * k)).collect();
-            let text = refused(&format!("time_s,tub_yaw\n{rows}"));
-            assert_eq!(text.matches(said).count(), 1, "{text}");
-        }
+        // Milliseconds: once, not once a row.
+        let rows: String = (0..20).map(|k| format!("{},{k}\n", 2 * k)).collect();
+        let text = refused(&format!("time_s,tub_yaw\n{rows}"));
+        assert_eq!(text.matches("rows are 2 s apart: are these ms?").count(), 1, "{text}");
+    }
+
+    #[test]
+    fn rows_before_the_run_are_left_out() {
+        let columns = |from: i32| {
+            let numbers = |by: f64| (from..20).map(|k| by * f64::from(k)).collect();
+            let named = |(name, by): (&str, f64)| (name.to_owned(), numbers(by));
+            [("time_s", 0.01), ("tub_yaw", 1.0), ("speed_rpm", 2.0)].map(named).to_vec()
+        };
+        let [whole, early] = [0, -30].map(|from| Measured::of_columns(columns(from)).unwrap());
+        assert_eq!(early, Measured { early: 30, ..whole });
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use serde_json::Value;
 use washer_model::{Dwell, Method};
-use washer_row::{Outcome, Verdict as RowVerdict};
+use washer_row::{Growth, Outcome, Verdict as RowVerdict};
 
 use super::algebra::{centred, dot, quantile};
 use super::iso18571::{Rating, rate};
@@ -15,10 +15,11 @@ use super::search::Descent;
 use super::speed::Smoothed;
 use super::statistics::Statistics;
 use crate::config;
-use crate::engine::{ModelEngine, fastest, responses};
+use crate::engine::{ModelEngine, of_speeds, responses};
 use crate::plan::{Axis, AxisValues, Plan, between, ready, timing};
 use sweep_engine::Error;
-use sweep_engine::commands::cells::{Lines as _, table};
+use sweep_engine::commands::cells::{Lines as _, span, table};
+use sweep_engine::config::section::counted;
 
 /// Standard errors to either end of a 95 % interval.
 const REACH: f64 = 1.959_964;
@@ -129,6 +130,8 @@ pub(crate) struct Verdict {
     /// zero, the machine is outside every band of instability, by so much.
     pub(crate) growth_per_s: Option<f64>,
     pub(crate) growth_at_rpm: Option<f64>,
+    /// Whether the responses at all these speeds are on the curve of a machine that runs up.
+    pub(crate) growth_on_curve: Option<bool>,
 }
 
 /// One minimum.
@@ -294,14 +297,14 @@ impl Found<'_> {
             probability_reliable: (!drawn.is_empty()).then(|| reliable as f64 / drawn.len() as f64),
             ratio_max_95: middle_95(drawn.iter().filter_map(ratio)),
             draws: drawn.len(),
-            growth_per_s: growth.map(|[growth, _]| growth),
-            growth_at_rpm: growth.map(|[_, speed]| speed),
+            growth_per_s: growth.map(|growth| growth.fastest.growth_per_s()),
+            growth_at_rpm: growth.map(|growth| growth.fastest.speed_rpm),
+            growth_on_curve: growth.map(|growth| growth.is_on_curve),
         })
     }
 
-    /// The fastest growing disturbance of the fitted machine at speeds up to its fastest: its
-    /// growth (1/s), and where (rpm).
-    fn growth(&self, case: usize, plan: &Plan) -> Option<[f64; 2]> {
+    /// The fastest growing disturbance of the fitted machine at speeds up to its fastest.
+    fn growth(&self, case: usize, plan: &Plan) -> Option<Growth> {
         let (machine, spin) = self.problem.machine(case, &self.minima[0].x);
         let most_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
         let point = ready(machine, spin, &timing(plan)).ok()?;
@@ -312,7 +315,7 @@ impl Found<'_> {
         let dwell = |&speed_rpm: &f64| Dwell { point: &point, speed_rpm };
         let found =
             responses(&speeds.iter().map(dwell).collect::<Vec<_>>(), &|| (self.problem.stop)());
-        fastest(&found).map(|response| [response.growth_per_s(), response.speed_rpm])
+        of_speeds(&found)
     }
 
     /// What else a reader should know.
@@ -351,6 +354,10 @@ impl Found<'_> {
         }
         for case in &self.problem.cases {
             let measured = &case.measured;
+            if measured.early > 0 {
+                let rows = counted(measured.early, "row");
+                notes.push(format!("{}: {rows} before time 0 left out", measured.name));
+            }
             for [from, to] in &measured.gaps_s {
                 notes.push(format!("{} has no rows from {from} to {to} s", measured.name));
             }
@@ -382,7 +389,7 @@ impl Report {
                 format!("{value:.4e}")
             }
         };
-        let interval = |[from, to]: [f64; 2]| format!("{} to {}", short(from), short(to));
+        let interval = |ends| span(ends, short);
         let row = |fit: &Fit| {
             let unknown = if fit.at_bound { "at its bound" } else { "not known" };
             let known = fit.interval_95.map_or_else(|| unknown.to_owned(), interval);
@@ -451,7 +458,14 @@ impl Report {
                         "outside every band of instability: disturbances die away"
                     };
                     let rate = short(growth.abs());
-                    say("margin", &format!("{side} by {rate} /s at {speed:.0} rpm"));
+                    let off = match verdict.growth_on_curve {
+                        Some(false) => {
+                            "; off the curve of responses at some speeds, where it may \
+                                        be in another motion (`sweep stability`)"
+                        }
+                        _ => "",
+                    };
+                    say("margin", &format!("{side} by {rate} /s at {speed:.0} rpm{off}"));
                 }
             }
         }
