@@ -229,7 +229,8 @@ fn format_of(path: &Path) -> Result<Format> {
 /// written. The output's name and the options are judged before the output is touched.
 pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), PlotError> {
     let format = format_of(output)?;
-    let file = Output::begin(output, format)?;
+    // A figure that cannot be drawn makes no folder.
+    files::judge(output, format)?;
     let mut bytes = figure(input, options, format)?;
     if format == Format::Html {
         // What the page shows where scripts are switched off.
@@ -237,7 +238,7 @@ pub fn render(input: &Path, options: &PlotOptions, output: &Path) -> Result<(), 
         let still = figure(input, &options, Format::Png)?;
         bytes = html::with_still(&bytes, &still);
     }
-    Ok(file.finish(&bytes)?)
+    Ok(Output::begin(output, format)?.finish(&bytes)?)
 }
 
 /// A file's figure as an SVG picture of its own, and what its plan says in words, both HTML.

@@ -26,8 +26,8 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     let Some(format) = Format::of(&args.out) else {
         return Err(Error::option("OUT", args.out.display(), "a name that ends in .csv or .xlsx"));
     };
-    let output = Output::begin(&args.out, format.kind())?;
     let file = ResultTable::open(&args.file)?;
+    let output = Output::begin(&args.out, format.kind())?;
     export(&file, format, output)?;
     tell(&format!("wrote {}: {} rows", args.out.display(), file.rows()));
     Ok(Exit::Done)

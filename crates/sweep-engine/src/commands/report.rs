@@ -48,8 +48,8 @@ pub fn run<M: Swept>(
     resonances: &Resonances<M>,
 ) -> Result<Exit, Error> {
     let output = args.out.clone().unwrap_or_else(|| args.result.with_extension("html"));
-    let page = Output::begin(&output, FileKind::Html)?;
     let file = ResultTable::open(&args.result)?;
+    let page = Output::begin(&output, FileKind::Html)?;
     if file.file().kind() != Some(FileKind::Map) {
         let expected = format!("a {}; other files go behind it", FileKind::Map.name());
         return Err(Error::option("RESULT", args.result.display(), expected));
