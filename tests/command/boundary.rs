@@ -52,7 +52,10 @@ fn a_curve_for_every_combination_of_further_axes_in_a_figure() {
     let said = said(&done);
     assert_eq!(done.status.code(), Some(0), "{said}");
     // No gap closes in a tenth of a second: six rows say so.
-    assert!(said.contains("6 lines reliable throughout") && !said.contains("brackets"), "{said}");
+    assert!(
+        said.contains("6 lines within the limit throughout") && !said.contains("brackets"),
+        "{said}"
+    );
     let file = "results/grid-boundary.parquet";
     assert!(folder.path().join(file).is_file());
     let drawn = Command::new(sweep_binary())

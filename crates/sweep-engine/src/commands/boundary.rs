@@ -172,8 +172,8 @@ const fn in_words(kind: EdgeKind) -> [&'static str; 2] {
         EdgeKind::Crossing => ["crossing", ""],
         EdgeKind::Jump => ["jump", ""],
         EdgeKind::Undefined => ["edge", " of undefined points"],
-        EdgeKind::NoneReliable => ["line", " reliable throughout"],
-        EdgeKind::NoneUnreliable => ["line", " unreliable throughout"],
+        EdgeKind::NoneReliable => ["line", " within the limit throughout"],
+        EdgeKind::NoneUnreliable => ["line", " beyond the limit throughout"],
         EdgeKind::NoneUndefined => ["line", " undefined throughout"],
     }
 }

@@ -9,7 +9,7 @@ use crate::run::{self as runner, Ended, RunOptions, RunReport};
 use crate::store::read::{DwellCounts, FAR_OFF, NameCounts, failed, failures};
 use crate::store::{Session, ShardRequest, Tally};
 use crate::{
-    EffortArgs, Engine, Error, Exit, Interrupt, Job, Plan, Swept, duration, tell, threads,
+    Design, EffortArgs, Engine, Error, Exit, Interrupt, Job, Plan, Swept, duration, tell, threads,
 };
 use sweep_parameter::RatioLimits;
 use sweep_plot::Share;
@@ -93,7 +93,7 @@ pub fn execute<M: Swept>(
     let finished = |text: &mut String, tally: &Tally| {
         text.push_str(&rows(tally, job));
         text.line("file", output.display());
-        if plan.design.is_some() {
+        if matches!(plan.design, Some(Design::Spread { .. })) {
             text.line("share", share(tally));
         }
         text.next("plot", output);

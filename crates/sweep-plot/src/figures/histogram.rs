@@ -76,10 +76,11 @@ fn title(scatter: &Scatter) -> String {
     }
 }
 
-/// How sure the share is, and which points it does not count.
+/// How sure the share is, where points are drawn, and which it does not count.
 fn notes(scatter: &Scatter) -> Vec<String> {
     let mut notes = Vec::new();
-    if let Some(share) = scatter.share() {
+    let is_drawn = scatter.source.design_method() != Some("list");
+    if let Some(share) = scatter.share().filter(|_| is_drawn) {
         let [low, high] = [share.low, share.high].map(|part| 100.0 * part);
         notes.push(format!("with 95 % confidence {low:.1} to {high:.1} % (Wilson)"));
     }
