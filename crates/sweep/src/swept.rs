@@ -30,7 +30,17 @@ impl Swept for Washer {
 
     fn words(plan: &Plan) -> Vec<(&'static str, String)> {
         let metrics: Vec<_> = plan.model.measures.metrics.iter().map(|one| one.name()).collect();
-        if metrics.is_empty() { Vec::new() } else { vec![("metrics", metrics.join(", "))] }
+        let mut words = Vec::new();
+        if !metrics.is_empty() {
+            words.push(("metrics", metrics.join(", ")));
+        }
+        if let Spin::Table { speed_rpm, .. } = &plan.model.spin
+            && let Some(first) = speed_rpm.first().filter(|first| **first != 0.0)
+        {
+            let how = "from the first instant, with the suspension at rest: it begins by a jump";
+            words.push(("spin", format!("{first} rpm {how}")));
+        }
+        words
     }
 
     fn criterion(&self) -> &'static str {

@@ -77,8 +77,8 @@ pub(super) fn sections<M: Read>(
 }
 
 /// What a name may be: it becomes a file's.
-const PLAIN_NAME: &str = "letters, digits, `-`, `_` and `.`, beginning with a letter or digit, at \
-                          most 100 characters";
+const PLAIN_NAME: &str = "letters a to z and A to Z, digits, `-`, `_` and `.`, beginning with a \
+                          letter or digit, at most 100 characters";
 
 fn is_plain(name: &str) -> bool {
     let first = name.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());

@@ -29,7 +29,11 @@ const TABLE: &str = "table";
 pub(super) fn walk(spin: &mut Spin, keys: &mut Keys<'_>) {
     keys.table(Key::new("spin", "").needed("a section [spin]"), |keys| {
         keys.places = "spin_".to_owned();
-        let said = (TABLE, "linear between given points, constant after the last");
+        let said = (
+            TABLE,
+            "linear between given points, constant after the last; a first speed other than 0 is \
+             there at once",
+        );
         let all = Profile::ALL.map(|profile| (profile.name(), about_profile(profile)));
         let set = all.len();
         let variants =
