@@ -17,7 +17,7 @@ pub(crate) struct Lanes<T> {
     control: StepControl<T>,
     legs: [Progress; MAX_LANES],
     /// How a lane's leg ended, until the next is asked for.
-    pub(crate) ended: [Option<Ended>; MAX_LANES],
+    ended: [Option<Ended>; MAX_LANES],
 }
 
 impl<T: Lane> Lanes<T> {
@@ -102,7 +102,7 @@ impl<T: Lane> Lanes<T> {
                 continue;
             }
             let [is_accepted, is_in_range] = lanes.map(|bits| bits >> lane & 1 == 1);
-            let (before, reached) = (self.time.0.get(lane), self.reached(lane, h));
+            let reached = self.reached(lane, h);
             self.control.settle(lane, is_accepted, &next);
             let leg = &mut self.legs[lane];
             let count = &mut leg.count;
@@ -113,7 +113,7 @@ impl<T: Lane> Lanes<T> {
                 reached
             } else {
                 count.rejected += 1;
-                before
+                self.time.0.get(lane)
             };
             let least = 16.0 * f64::EPSILON * time.abs().max(leg.end_s);
             let is_stuck = !is_accepted && self.control.step.0.get(lane) <= least;
@@ -125,7 +125,7 @@ impl<T: Lane> Lanes<T> {
             } else if is_accepted && reached >= leg.end_s {
                 Some(Ended::Arrived(*count))
             } else if count.accepted + count.rejected >= tolerance.max_steps {
-                fail(Failure::StepLimit, before)
+                fail(Failure::StepLimit, time)
             } else {
                 None
             };

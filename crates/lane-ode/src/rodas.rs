@@ -12,7 +12,7 @@
 
 use crate::adaptive::Lanes;
 use crate::control::padded;
-use crate::{Ended, Failure, Lu, N, Partials, Step, System as _, Task, Tolerance};
+use crate::{Lu, N, Partials, Step, System as _, Task, Tolerance};
 
 const STAGES: usize = 8;
 
@@ -271,12 +271,6 @@ pub fn integrate<const D: usize, const K: usize, P: Stiff<D, K>>(
             );
             x = y;
             (is_fresh, is_known) = (false, false);
-            // Where the allowance ran out: after this step, not before.
-            if let Some(Ended::Failed { reason: Failure::StepLimit, time_s, .. }) =
-                &mut lanes.ended[0]
-            {
-                *time_s = end;
-            }
         }
     }
 }
