@@ -14,7 +14,7 @@ use crate::columns::Columns;
 use crate::config::machine::with_one_of_each;
 use crate::dwell::columns as of_dwells;
 use crate::method::Integrator;
-use arrow_schema::{DataType, Schema};
+use arrow_schema::Schema;
 use sweep_engine::columns::declared;
 use sweep_engine::method::{Integrator as _, default_method};
 use sweep_engine::store::{Column, Kind, Layout};
@@ -40,8 +40,8 @@ fn parameters() -> String {
     let how = all.iter().find_map(|parameter| parameter.source().strip_prefix("derived: "));
     let how = how.unwrap_or_default();
     text.push_str(&format!(include_str!("reference/parameters.txt"), how = how));
-    row(&mut text, &["name", "built in", "unit", "meaning", "values", "source"]);
-    row(&mut text, &["---"; 6]);
+    row(&mut text, &["name", "built in", "meaning", "values", "source"]);
+    row(&mut text, &["---"; 5]);
     let machine = Machine::paper();
     let value_of = |name: &str| {
         let parameter = all.iter().find(|parameter| parameter.name() == name)?;
@@ -74,7 +74,7 @@ fn parameters() -> String {
         let name = format!("`{name}`{}", if of_three.is_some() { ", y, z" } else { "" });
         let meaning = of_three.unwrap_or(description).trim_end_matches([',', ' ']);
         let (values, range) = (values.join(", "), allowed(parameter.range()));
-        row(&mut text, &[&name, &values, parameter.unit(), meaning, &range, &source]);
+        row(&mut text, &[&name, &values, meaning, &range, &source]);
     }
     text
 }
@@ -137,7 +137,7 @@ fn columns() -> String {
     let measures = Measures { metrics, stops: 1, feet: 1, dampers: 1, ..Measures::default() };
     let columns = Columns::of_measures(&Channel::ALL, 2.0.into(), &measures, true);
     let layout = Layout::of_map(axes, columns.declared());
-    table(&mut text, &layout.schema(), &[key::WORSE, key::LIMIT]);
+    list(&mut text, &layout.schema());
     text.push_str("\nChannels:\n\n");
     row(&mut text, &["channel", "unit", "what moves"]);
     row(&mut text, &["---"; 3]);
@@ -160,14 +160,12 @@ fn columns() -> String {
         statuses = listed(&mut ROW_STATUSES.into_iter()),
     ));
     let columns = declared(of_dwells::columns(&Channel::ALL, &Measures::default(), false));
-    table(&mut text, &Layout::of_map(Vec::new(), columns).schema(), &[]);
+    list(&mut text, &Layout::of_map(Vec::new(), columns).schema());
     text
 }
 
-/// A row for each column, once for all channels and models, with these of its facts.
-fn table(text: &mut String, columns: &Schema, facts: &[&str]) {
-    row(text, &[&["column", "type", "unit"], facts, &["meaning"]].concat());
-    row(text, &vec!["---"; 4 + facts.len()]);
+/// A line for each column, once for all channels and models.
+fn list(text: &mut String, columns: &Schema) {
     let mut names = HashSet::new();
     for field in columns.fields().iter().filter(|field| !is_a_further_one(field.name())) {
         let name = of_any(field.name());
@@ -175,19 +173,19 @@ fn table(text: &mut String, columns: &Schema, facts: &[&str]) {
             continue;
         }
         let told = |key: &str| field.metadata().get(key).map_or("", String::as_str);
-        let data_type = match field.data_type() {
-            DataType::Dictionary(..) => "text".to_owned(),
-            plain => plain.to_string().to_lowercase(),
-        };
-        let data_type = data_type + if field.is_nullable() { "" } else { ", never null" };
         let unit = match told("unit") {
-            unit if unit != "1" && name.ends_with("CHANNEL") => "the channel's",
+            "1" => "",
+            _ if name.ends_with("CHANNEL") => "the channel's unit",
             unit => unit,
         };
-        let (name, meaning) = (format!("`{name}`"), of_any_model(told("description")));
-        let facts = facts.iter().map(|key| told(key));
-        let cells = [name.as_str(), &data_type, unit].into_iter().chain(facts);
-        row(text, &cells.chain([meaning.as_str()]).collect::<Vec<_>>());
+        let [worse, limit] = [key::WORSE, key::LIMIT].map(told);
+        let facts = [("", unit), ("worse: ", worse), ("limit: ", limit)];
+        let facts = facts.iter().filter(|(_, fact)| !fact.is_empty());
+        let facts =
+            facts.map(|(what, fact)| format!("{what}{fact}")).collect::<Vec<_>>().join(", ");
+        let facts = if facts.is_empty() { facts } else { format!(" ({facts})") };
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "- `{name}`{facts}: {}", of_any_model(told("description")));
     }
 }
 
