@@ -139,8 +139,8 @@ fn place_of(kind: Option<&str>) -> usize {
 pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart> {
     let held = Held::one(source, &options.at, "--at")?;
     let columns = ["motion", YAW, PITCH];
-    if let Some(name) = columns.into_iter().find(|name| source.column(name).is_none()) {
-        return Err(source.lacks(name, "numeric"));
+    if columns.into_iter().any(|name| source.column(name).is_none()) {
+        return Err(source.empty("it keeps no states: `sweep dwell --sections N` does"));
     }
     // Speed, motion, its kind, and its states by yaw.
     let mut found: Vec<(f64, f64, usize, Vec<[f64; 2]>)> = Vec::new();
