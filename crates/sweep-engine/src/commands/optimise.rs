@@ -6,9 +6,9 @@ use std::time::Instant;
 use super::cells::table as text_table;
 use super::{Lines as _, installed, short, word};
 use crate::config::section::counted;
-use crate::optimise::Study;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
+use crate::optimise::study::{Sought, Study};
 use crate::store::{Opened, Trials};
 use crate::{EffortArgs, Error, Exit, Swept, duration, tell};
 use sweep_files::{FileKind, OWN_FILE, Output, atomic, key};
@@ -181,6 +181,21 @@ fn told<M: Swept>(
         let of = |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);
         of(a).unwrap_or(f64::NAN).total_cmp(&of(b).unwrap_or(f64::NAN))
     });
+    let is_at_end = |(sought, value): &(&Sought, &f64)| {
+        [0.0, 1.0].into_iter().any(|end| sought.bounds.between(end) == **value)
+    };
+    let bounded = study.parameters.iter().zip(values.iter().flatten());
+    let ends: Vec<&str> = bounded
+        .zip(parameters(study))
+        .filter(|(bounded, _)| is_at_end(bounded))
+        .map(|(_, axis)| axis.parameter.name())
+        .collect();
+    if !ends.is_empty() {
+        text.line(
+            "bounds",
+            format!("reached by {}: a wider range may have better", ends.join(", ")),
+        );
+    }
     let listed = front.iter().step_by(front.len().div_ceil(LISTED).max(1));
     let shown = |cells: &[Cell]| cells.iter().take(1).chain(&cells[3..]).map(word).collect();
     let headings: Vec<String> =
