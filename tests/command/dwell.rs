@@ -163,9 +163,11 @@ fn bytes_depend_on_neither_threads_nor_instruction_set_nor_shards() {
         for shard in [["--shard", "1/2"], ["--shard", "2/2"]] {
             bytes(&[shard[0], shard[1], "--out", "c.parquet"], None);
         }
-        let merge =
-            ["merge", "grid.toml", "--speed", "240:300:30", "--dwell", "--out", "c.parquet"];
-        let merged = sweep(&folder, &[&merge[..], search].concat(), None);
+        let of = ["grid.toml", "--speed", "240:300:30", "--dwell", "--out", "c.parquet"];
+        let asked = |verb| sweep(&folder, &[&[verb][..], &of, search].concat(), None);
+        let next = "next  sweep merge grid.toml --out c.parquet --dwell --speed 240:300:30";
+        assert!(said(&asked("status")).contains(next), "{}", said(&asked("status")));
+        let merged = asked("merge");
         assert_eq!(merged.status.code(), Some(0), "{}", said(&merged));
         let joined = fs::read(folder.path().join("c.parquet")).expect("it is there");
         assert!(first == Some(joined));

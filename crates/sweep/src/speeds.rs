@@ -6,6 +6,9 @@ use std::str::FromStr;
 /// Most speeds that are accepted: an hour of computing.
 pub(crate) const MOST_SPEEDS: f64 = 100_000.0;
 
+/// The greatest that a drum is held at (rpm): as of `spin_peak_rpm`.
+const MOST_RPM: f64 = 1e5;
+
 /// Even speeds, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Speeds {
@@ -113,6 +116,9 @@ impl FromStr for SpeedList {
         }
         if values_rpm.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err("expected rising speeds".to_owned());
+        }
+        if values_rpm.last().is_some_and(|last| *last > MOST_RPM) {
+            return Err(format!("expected at most {MOST_RPM} rpm"));
         }
         let count = values_rpm.len();
         if count as f64 > MOST_SPEEDS + 1.0 {

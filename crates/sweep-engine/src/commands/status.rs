@@ -25,20 +25,20 @@ pub struct Args {
 /// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
-    of_job(args, &Job::of(&plan), &args.target.output(&plan), ["run", ""])
+    of_job(args, &Job::of(&plan), &args.target.output(&plan), ["run", "", ""])
 }
 
-/// Shows the progress of a job on its output. `again` is the command that goes on with it, and
-/// what stands behind its arguments.
+/// Shows the progress of a job on its output. `again` is the command that goes on with it, what
+/// stands behind its arguments, and what behind those of `merge`.
 ///
 /// # Errors
 /// As [`run`].
-pub fn of_job(args: &Args, job: &Job<'_>, output: &Path, again: [&str; 2]) -> Result<Exit, Error> {
+pub fn of_job(args: &Args, job: &Job<'_>, output: &Path, again: [&str; 3]) -> Result<Exit, Error> {
     let found = status(output, job)?;
     show(&if args.json { format!("{:#}\n", json!(found)) } else { summary(args, &found, again) })
 }
 
-fn summary(args: &Args, found: &FolderStatus, [verb, options]: [&str; 2]) -> String {
+fn summary(args: &Args, found: &FolderStatus, [verb, own, of_merge]: [&str; 3]) -> String {
     let mut text = String::new();
     let state = match found.state {
         State::NotStarted => "not started",
@@ -72,15 +72,15 @@ fn summary(args: &Args, found: &FolderStatus, [verb, options]: [&str; 2]) -> Str
         text.line("shards", shards);
         let missing = shard_list(found.missing_shard_numbers.iter().copied());
         if !missing.is_empty() {
-            let run = format!("{} --shard I/{shards}", args.target.command("run"));
+            let run = format!("{}{own} --shard I/{shards}", args.target.command(verb));
             text.line("again", format!("{run}, for I = {missing}"));
             text.line("on Slurm", format!("sbatch --array={} ...", found.missing_shards));
         }
     }
     let next = match found.state {
-        State::Complete => args.target.command("merge"),
-        _ => args.target.command(verb),
-    } + options;
+        State::Complete => args.target.command("merge") + of_merge,
+        _ => args.target.command(verb) + own,
+    };
     if found.running.is_empty() && (found.shards.is_none() || found.state == State::Complete) {
         text.line("next", &next);
     }

@@ -79,15 +79,14 @@ impl<Asked: clap::Args + Copy + Into<Option<Search>>> Args<Asked> {
         check(&plan, "--speed", &speed.to_string())?;
         let held = Held { plan: &plan, speeds_rpm: speed.values(), search };
         let (job, output) = (held.job(), held.output(target.out.as_deref()));
-        let options = options(speed, search);
-        let of_merge = if search.is_some() { " --dwell" } else { "" };
+        let [own, of_merge] = options(speed, search);
         let command = RunCommand {
             name: &plan.name,
             verb: held.verb(),
             rows: "rows",
             target,
             work,
-            options: [&options, &format!("{of_merge}{options}")],
+            options: [&own, &of_merge],
         };
         let finished = |text: &mut String, _: &_| {
             for (name, words) in FURTHER.listed(&ParquetFile::open(&output)?)? {
@@ -102,10 +101,12 @@ impl<Asked: clap::Args + Copy + Into<Option<Search>>> Args<Asked> {
     }
 }
 
-/// The options of a command line that ask the same.
-fn options(speed: &SpeedList, search: Option<Search>) -> String {
-    let search = search.map(|search| search.to_string()).unwrap_or_default();
-    format!(" --speed {speed}{search}")
+/// The options of a command line that ask the same, and those of `merge`.
+fn options(speed: &SpeedList, search: Option<Search>) -> [String; 2] {
+    let own = search.map(|search| search.to_string()).unwrap_or_default();
+    let own = format!(" --speed {speed}{own}");
+    let of_merge = format!("{}{own}", if search.is_some() { " --dwell" } else { "" });
+    [own, of_merge]
 }
 
 /// Arguments of `sweep status` or `sweep merge`, of a run or of held speeds.
@@ -124,8 +125,8 @@ impl JobArgs<status::Args> {
     /// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
     pub(super) fn status(&self) -> Result<Exit, Error> {
         let plan: Plan = self.of.target.grid.load()?;
-        let (job, output, [verb, options]) = self.held.job(&plan, &self.of.target);
-        status::of_job(&self.of, &job, &output, [&verb, &options])
+        let (job, output, [verb, own, of_merge]) = self.held.job(&plan, &self.of.target);
+        status::of_job(&self.of, &job, &output, [&verb, &own, &of_merge])
     }
 }
 
@@ -156,15 +157,16 @@ struct HeldArgs {
 }
 
 impl HeldArgs {
-    /// The job on a plan and its output, the command that goes on with it and what stands behind
-    /// its arguments.
-    fn job<'a>(&'a self, plan: &'a Plan, target: &ResultArgs) -> (Job<'a>, PathBuf, [String; 2]) {
+    /// The job on a plan and its output, the command that goes on with it, what stands behind its
+    /// arguments and what behind those of `merge`.
+    fn job<'a>(&'a self, plan: &'a Plan, target: &ResultArgs) -> (Job<'a>, PathBuf, [String; 3]) {
         let Some(speed) = &self.speed else {
-            return (Job::of(plan), target.output(plan), ["run".to_owned(), String::new()]);
+            return (Job::of(plan), target.output(plan), ["run", "", ""].map(str::to_owned));
         };
         let search = self.dwell.then_some(self.search);
         let held = Held { plan, speeds_rpm: speed.values(), search };
-        let again = [held.verb().to_owned(), options(speed, search)];
+        let [own, of_merge] = options(speed, search);
+        let again = [held.verb().to_owned(), own, of_merge];
         (held.job(), held.output(target.out.as_deref()), again)
     }
 }
