@@ -170,12 +170,13 @@ fn told<M: Swept>(
         && before.is_finite()
         && first_near < all
     {
-        let [before, after] = [before, near.min(before)].map(|one| short(objective.sign * one));
-        let more = if before == after { "" } else { ": more candidates may take it farther" };
-        let (late, name) = (all - first_near, &objective.name);
-        let told =
-            format!("the last {late}, beside the best, took {name} from {before} to {after}");
-        text.line("search", told + more);
+        let name = &objective.name;
+        let gained = match [before, near.min(before)].map(|one| short(objective.sign * one)) {
+            [before, after] if before == after => "found none better".to_owned(),
+            [from, to] => format!("took {name} from {from} to {to}; more may take it farther"),
+        };
+        let late = all - first_near;
+        text.line("search", format!("the last {late} candidates, beside the best, {gained}"));
     }
     front.sort_by(|a, b| {
         let of = |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);
