@@ -113,8 +113,9 @@ pub extern "C" fn history(model: usize, rung: usize, every_s: f64) -> usize {
 
 /// How disturbances grow at a point of so many values while the drum turns at the constant speeds
 /// (rpm) behind them: 1, 0 or -1 as above; for each speed how fast the fastest one grows (1/s; NaN
-/// where there is no periodic response), its frequency (cycles per minute), and what it is, by its
-/// place among [`washer_model::Kind::ALL`].
+/// where there is no periodic response), its frequency (cycles per minute), what it is, by its
+/// place among [`washer_model::Kind::ALL`], and 1 where the response is on the curve of a machine
+/// that runs up, else 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn growth(values: usize) -> usize {
     answer(|setup, input, output| {
@@ -122,8 +123,9 @@ pub extern "C" fn growth(values: usize) -> usize {
         let found = crate::growth(setup, values, speeds_rpm);
         output.push(code(found.as_ref().err()));
         for disturbance in found.unwrap_or_default() {
-            output.extend(disturbance.map_or([f64::NAN; 3], |of| {
-                [of.growth_per_s(), of.frequency_cpm(), f64::from(of.kind() as u8)]
+            output.extend(disturbance.map_or([f64::NAN; 4], |(of, is_on_curve)| {
+                let [kind, on_curve] = [of.kind() as u8, u8::from(is_on_curve)].map(f64::from);
+                [of.growth_per_s(), of.frequency_cpm(), kind, on_curve]
             }));
         }
     })

@@ -225,7 +225,8 @@ pub fn motion(
 }
 
 /// The fastest growing disturbance of a point's periodic response at each of some constant speeds
-/// (rpm); none where there is no response.
+/// (rpm), and whether that is on the curve of a machine that runs up; none where there is no
+/// response.
 ///
 /// # Errors
 /// [`NoPoint`].
@@ -233,12 +234,11 @@ pub fn growth(
     setup: &Setup,
     values: &[f64],
     speeds_rpm: &[f64],
-) -> Result<Vec<Option<Disturbance>>, NoPoint> {
+) -> Result<Vec<Option<(Disturbance, bool)>>, NoPoint> {
     let point = ready(setup, values)?;
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-    Ok(respond(&dwells, &|| false)
-        .into_iter()
-        .map(|answer| answer.ok()?.first().map(Response::disturbance))
-        .collect())
+    let told = |first: &Response| (first.disturbance(), first.is_on_curve);
+    let answers = respond(&dwells, &|| false).into_iter();
+    Ok(answers.map(|answer| answer.ok()?.first().map(told)).collect())
 }

@@ -4,12 +4,21 @@
 // machine whose growth is slow, and of another one.
 const GROWTH = { from: 50, slow: [24, 1], quick: [300, 10] };
 
-// Of the fastest disturbance at each speed: growth (1/s), frequency (cycles per minute), kind.
+// Of the fastest disturbance at each speed: growth (1/s), frequency (cycles per minute), kind, and
+// whether the response is on the curve of a machine that runs up.
 async function growthAt(pool, kind, values, speeds) {
   const urgency = kind === "check" ? 1 : 0;
   const { numbers } = await pool.ask(kind, urgency, "growth", [...values, ...speeds],
     [values.length]);
-  return Array.from(speeds, (_, k) => numbers.slice(1 + 3 * k, 4 + 3 * k));
+  return Array.from(speeds, (_, k) => numbers.slice(1 + 4 * k, 5 + 4 * k));
+}
+
+// What a reader should know of the speeds at which a response is off that curve.
+function toldOffCurve(speeds, isOnCurve) {
+  const off = Array.from(speeds).filter((_, k) => isOnCurve[k] === 0);
+  const told = off.map((rpm) => significant(rpm)).join(", ");
+  return told && ` Off the curve of responses at ${told} rpm: a machine that runs up may be in `
+    + "another motion there.";
 }
 
 function createGrowth(host, live, pool) {
@@ -46,13 +55,15 @@ function createGrowth(host, live, pool) {
     spec.shadeMeaning = "disturbances grow";
     chartHost.replaceChildren();
     const chart = createChart(chartHost, spec, "Growth of disturbances over speed");
-    const kinds = [];
+    const [kinds, isOnCurve] = [[], []];
     let left = speeds.length;
     const part = async (k) => {
       const some = speeds.subarray(k, k + together);
       const found = await growthAt(pool, "growth", point.values, some);
       if (of !== asked) return;
-      found.forEach((one, at) => { [y[k + at], frequencies[k + at], kinds[k + at]] = one; });
+      found.forEach((one, at) => {
+        [y[k + at], frequencies[k + at], kinds[k + at], isOnCurve[k + at]] = one;
+      });
       left -= some.length;
       about.textContent = `Computing: ${left} of ${speeds.length} speeds are left.`;
       chart.changed();
@@ -83,7 +94,8 @@ function createGrowth(host, live, pool) {
     const said = grow.length ? `Disturbances grow ${grow.join(", and ")}.`
       : "Disturbances decay at every speed.";
     const seconds = ((performance.now() - started) / 1000).toFixed(1);
-    about.textContent = `${said} ${speeds.length} speeds in ${seconds} s.`;
+    const off = toldOffCurve(speeds, isOnCurve);
+    about.textContent = `${said}${off} ${speeds.length} speeds in ${seconds} s.`;
     box.dataset.speeds = speeds.join(" ");
     box.dataset.growth = y.join(" ");
     box.dataset.point = point.values.join(" ");

@@ -156,7 +156,8 @@ function createLive(host, data) {
     line.dataset.growth = most;
     line.textContent = Number.isFinite(most) ? `Growth at most ${significant(most, 3)} /s, at `
       + `${significant(live.growthSpeedsRpm[growth.indexOf(most)])} rpm of ${growth.length} `
-      + "constant speeds" : "No response at any of the map's constant speeds";
+      + `constant speeds.${toldOffCurve(live.growthSpeedsRpm, found.map((one) => one[3]))}`
+      : "No response at any of the map's constant speeds";
   }
 
   // Work that was let go fails without an error.
