@@ -1,6 +1,6 @@
 use super::*;
 use crate::lane::Lane;
-use crate::system::{Leg, System};
+use crate::system::{Ended, Failure, Leg, System};
 use crate::tests::array::Array;
 
 type Matrix = [[f64; STAGES]; STAGES];

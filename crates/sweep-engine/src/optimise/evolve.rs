@@ -307,15 +307,16 @@ mod tests {
 
     #[test]
     fn a_short_search_ends_beside_the_least() {
-        // Without trials beside the best the worst of these is 16 times as large.
+        // Without trials beside the best the middle of these is above 1e-4.
         let bowl = |at: &[f64]| (at[0] - 0.3).powi(2) + 3.0 * (at[1] - 0.6).powi(2);
         let least = |seed| {
             let short = Evolution { candidates: 256, seed, ..ONE };
             let found = tried(short, |at| Some(vec![bowl(at)]));
             bowl(&found[front(&found, 1)[0]].place)
         };
-        let worst = (1..20).map(least).fold(0.0, f64::max);
-        assert!(worst < 1e-4, "{worst}");
+        let mut found: Vec<f64> = (0..21).map(least).collect();
+        found.sort_by(f64::total_cmp);
+        assert!(found[10] < 5e-5, "{found:?}");
     }
 
     #[test]
