@@ -15,11 +15,10 @@
 //! the order of its formula. Friction's harmonics also drive the hinge, which swings hardly damped
 //! at 411 rad/s, and which caps detune: with bearings capped at 1300 rad/s and steps that see the
 //! corners, half of 120 rows of `sweeps/friction.toml` err by more than 5.6e-3, at 2600 rad/s by
-//! more than 1.7e-3. So the nonlinear model with corners keeps both as they are. Its first rungs are
-//! by the additive method, which takes them implicitly and finds the corners by its error estimate.
-//! Where that needs steps so short that bearings bear them, order 8 in fixed steps is quicker: at
-//! half a millisecond it errs as little as the additive method at a tolerance of 3e-7, in half the
-//! time.
+//! more than 1.7e-3. So the nonlinear model with corners keeps both as they are. Its first rungs
+//! are by the additive method, which takes them implicitly and finds the corners by its error
+//! estimate. Where that needs steps so short that bearings bear them, order 8 in fixed steps is
+//! quicker: in steps of half a millisecond it errs less than the additive method at 3e-7.
 //!
 //! Nothing is taken from other points, so a row depends on the plan and its own parameters alone.
 
