@@ -540,8 +540,13 @@ impl Search<'_, '_> {
 /// A number of few digits. The last digits of an eigenvalue depend on the processor and on the
 /// system's mathematical library; a result must not.
 pub(crate) fn rounded_down(number: f64) -> f64 {
-    const DROPPED: u32 = f64::MANTISSA_DIGITS - 1 - STEP_BITS;
-    f64::from_bits(number.to_bits() >> DROPPED << DROPPED)
+    to_bits(number, STEP_BITS)
+}
+
+/// A positive number with so many binary digits behind the first; the others are dropped.
+pub(crate) fn to_bits(number: f64, bits: u32) -> f64 {
+    let dropped = f64::MANTISSA_DIGITS - 1 - bits;
+    f64::from_bits(number.to_bits() >> dropped << dropped)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 //! Friction that moves more slowly than 4 v_s / pi is viscous by its own law, with F / v_s. That is
 //! the least speed: a damper that the drum cannot move against its friction is taken at it.
 
+use crate::fast::to_bits;
 use crate::modes::fastest_rigid_rad_per_s;
 use crate::point::{self, legs};
 use crate::{
@@ -35,10 +36,8 @@ const MOST_SHORTENED: f64 = 0.01;
 /// The bearings' cap times the step, as a share of the limit of stability.
 const STEP_TIMES_CAP: f64 = 0.9;
 
-/// How many steps there are to choose from within a doubling: so few that points beside each other
-/// share lanes, and that the last digits of an eigenvalue, which depend on the processor, do not
-/// count.
-const STEPS_OF_A_DOUBLING: f64 = 8.0;
+/// Binary digits of a step behind the first: the last ones of an eigenvalue depend on the processor.
+const STEP_BITS: u32 = 8;
 
 /// A search for the own speeds of a point.
 pub(crate) struct Search {
@@ -167,7 +166,7 @@ pub fn prepare(
         let legs = legs(&point.stretches, &to_window).into();
         let point = Point { legs, ..point.at_own_speeds(&search.speeds_m_per_s()) };
         let swing = fastest_rigid_rad_per_s(&point, &point.linear).ok()?;
-        let step_s = rounded_down(STEP_RAD / swing.max(point.legs.last()?.fastest_rad_per_s));
+        let step_s = to_bits(STEP_RAD / swing.max(point.legs.last()?.fastest_rad_per_s), STEP_BITS);
         let shortest_s = MOST_SHORTENED * step_s;
         Some(Open { place, point, search, step_s, shortest_s, is_done: false })
     };
@@ -202,16 +201,11 @@ impl Open {
     fn take(&mut self, speeds_m_per_s: &[f64]) {
         if speeds_m_per_s.is_empty() {
             // A hinge under its cap, or friction at a low speed, is too stiff for the step.
-            self.step_s = rounded_down(SHORTER * self.step_s);
+            self.step_s = to_bits(SHORTER * self.step_s, STEP_BITS);
             self.is_done = self.step_s < self.shortest_s;
             return;
         }
         self.is_done = self.search.take(&own(&self.point, speeds_m_per_s));
         self.point = self.point.at_own_speeds(&self.search.speeds_m_per_s());
     }
-}
-
-fn rounded_down(step_s: f64) -> f64 {
-    let unit = step_s.log2().floor().exp2() / STEPS_OF_A_DOUBLING;
-    (step_s / unit).floor() * unit
 }

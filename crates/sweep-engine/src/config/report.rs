@@ -8,7 +8,7 @@ use sweep_results::nearest;
 
 /// More mistakes than this are counted but not kept: a wrong file should not fill a terminal or the
 /// memory.
-const KEPT: usize = 30;
+const KEPT: usize = 100;
 
 /// One mistake.
 #[derive(Debug)]
