@@ -131,7 +131,7 @@ const ABSOLUTE_TOLERANCE: f64 = 2e-2;
 
 /// Longest step of order 8 at corners (s), and what it is of plain RK4's longest.
 const STEP_AT_CORNERS_S: f64 = 5e-4;
-const STEP_TO_PLAIN: f64 = 0.83 * DOP853_STABILITY_LIMIT / RK4_STABILITY_LIMIT;
+const STEP_TO_PLAIN: f64 = Formula::Dop853.limit() / RK4_STABILITY_LIMIT;
 
 /// The steps of order 8 in parts of that. The second is the reference.
 const STEPS_AT_CORNERS: [f64; 3] = [1.0, 0.5, 0.25];

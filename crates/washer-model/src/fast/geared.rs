@@ -49,7 +49,7 @@ impl Formula {
     /// The greatest h w in use. Classical Runge-Kutta damps motion near its limit of stability, so
     /// that nearly all of the limit is in use. The formula of order 8 hardly does: with 0.97 of its
     /// limit instead of 0.83, errors were twenty times as large.
-    pub(crate) const fn limit(self) -> f64 {
+    pub const fn limit(self) -> f64 {
         match self {
             Self::Rk4 => 0.97 * RK4_STABILITY_LIMIT,
             Self::Dop853 => 0.83 * DOP853_STABILITY_LIMIT,

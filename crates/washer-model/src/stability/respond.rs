@@ -257,10 +257,10 @@ fn forget_known(looked: &[Look<'_>], found: &mut [Result<Response, NoAnswer>]) {
         let Ok(Response { start, .. }) = &found[place] else { continue };
         let is_same =
             |known: &Response| (0..COORDINATES).all(|i| (known.start[i] - start[i]).abs() < SAME);
-        let is_other = |other: &usize| {
-            looked[*other].number == *number && (*other < place || !guess.is_followed())
-        };
-        let mut others = (0..found.len()).filter(|other| *other != place).filter(is_other);
+        let first = looked.partition_point(|look| look.number < *number);
+        let last = if guess.is_followed() { place } else { found.len() };
+        let alike = (first..last).take_while(|other| looked[*other].number == *number);
+        let mut others = alike.filter(|other| *other != place);
         let is_known = !guess.is_on_curve && others.any(|it| found[it].as_ref().is_ok_and(is_same));
         if is_known {
             found[place] = Err(NoAnswer::NoResponse);
