@@ -36,7 +36,7 @@ const MOST_SHORTENED: f64 = 0.01;
 /// The bearings' cap times the step, as a share of the limit of stability.
 const STEP_TIMES_CAP: f64 = 0.9;
 
-/// Binary digits of a step behind the first: the last ones of an eigenvalue depend on the processor.
+/// Binary digits of a step behind the first: the last ones of an eigenvalue are the processor's.
 const STEP_BITS: u32 = 8;
 
 /// A search for the own speeds of a point.
