@@ -288,12 +288,8 @@ function moved([low, high], by, [least, greatest]) {
   return [low + shift, high + shift];
 }
 
+// The place of the first that is no less, in a sorted list.
 function lowerBound(sorted, value) {
-  let low = 0, high = sorted.length;
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (sorted[middle] < value) low = middle + 1;
-    else high = middle;
-  }
-  return low;
+  const at = sorted.findIndex((one) => one >= value);
+  return at < 0 ? sorted.length : at;
 }

@@ -254,20 +254,15 @@ function createLive(host, data) {
         const width = numbers.length / part.length;
         part.forEach((cell, at) => {
           const answer = parsedAnswer(numbers.slice(at * width, (at + 1) * width), live);
-          if (answer.is === 1) fine.push({ ...cell, answer });
+          const { ratios, byColumn } = answer;
+          const extremes = { ratio_max: greatestOf(ratios), ratio_min: leastOf(ratios) };
+          if (answer.is === 1) fine.push({ ...cell, columns: { ...byColumn, ...extremes } });
         });
         fineLeft -= part.length;
         panel.dataset.fine = `${fine.length} ${fineLeft}`;
         map.request();
       }, tellError);
     }
-  }
-
-  // What a layer of the map shows of a finer cell; NaN where it shows something else.
-  function layerValue({ column }, answer) {
-    if (column === "ratio_max") return greatestOf(answer.ratios);
-    if (column === "ratio_min") return leastOf(answer.ratios);
-    return answer.byColumn[column] ?? NaN;
   }
 
   // The sliders of axes, and the middles of their ranges.
@@ -294,8 +289,9 @@ function createLive(host, data) {
     hasFine: () => fine.length > 0,
     cells(context, layer, at, colour) {
       if (!layer) return;
-      for (const { from, to, answer } of fine) {
-        const value = layerValue(layer, answer);
+      for (const { from, to, columns } of fine) {
+        const value = columns[layer.column];
+        // It shows something else.
         if (!Number.isFinite(value)) continue;
         const [left, low] = at(...from).map(Math.round);
         const [right, high] = at(...to).map(Math.round);
