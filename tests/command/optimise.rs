@@ -69,6 +69,23 @@ fn number(folder: &tempfile::TempDir, line: &str, column: &str) -> f64 {
 }
 
 #[test]
+fn of_several_objectives_it_is_said_what_the_last_third_put_on_the_front() {
+    let second = "[[objective]]\nmaximise = \"min(min_gap_nonlinear_m)\"\n[[parameter]]";
+    let folder = folder_with("2", &STUDY.replacen("[[parameter]]", second, 1));
+    let text = does(&folder, "optimise study.toml");
+    let told = text.split_once("the last 8 candidates put ").expect("the line `search`").1;
+    let told = told.split_once(" on the front").expect("its end").0;
+    let (late, front) = told.split_once(" of ").expect("two counts");
+    let held = [
+        format!("count(on_front and candidate >= 16) == {late}"),
+        format!("count(on_front) == {front}"),
+    ];
+    let checked = sweep(&folder, "require results/study.parquet").args(&held).output();
+    let checked = checked.expect("it starts");
+    assert_eq!(checked.status.code(), Some(0), "{}", said(&checked));
+}
+
+#[test]
 fn the_machine_file_of_the_best_has_the_force_that_the_study_says() {
     let folder = folder_with("2", STUDY);
     let text = does(&folder, "optimise study.toml --best best.toml --threads 2");
@@ -228,7 +245,7 @@ fn a_study_without_a_feasible_candidate_says_so_and_writes_no_machine() {
     let line = "optimise study.toml --best best.toml";
     let done = sweep(&folder, line).output().expect("it starts");
     assert_eq!(done.status.code(), Some(4), "{}", said(&done));
-    for told in ["0 of 24, 0 on the front", "none is feasible; best.toml is not written"] {
+    for told in ["feasible  0 of 24\n", "none is feasible; best.toml is not written"] {
         assert!(said(&done).contains(told), "no {told} in {}", said(&done));
     }
     assert!(!folder.path().join("best.toml").exists());

@@ -8,7 +8,7 @@ use super::{Lines as _, installed, short, word};
 use crate::config::section::counted;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::search;
-use crate::optimise::study::{Sought, Study};
+use crate::optimise::study::{Objective, Sought, Study};
 use crate::store::{Opened, Trials};
 use crate::{EffortArgs, Error, Exit, Swept, duration, tell};
 use sweep_files::{FileKind, OWN_FILE, Output, atomic, key};
@@ -142,14 +142,15 @@ fn told<M: Swept>(
         ["candidate", "feasible", "on_front"].into_iter().chain(sought).chain(objectives).collect();
     let chosen = candidate.or_else(|| about["best"].as_u64());
     let (mut feasible, mut front, mut values) = (0, Vec::new(), None);
-    // The least of the first objective, before the search stays beside the best and then.
-    let (mut least, first_near) = ([f64::INFINITY; 2], study.evolution.first_near());
+    // The least of the first objective before the last third and in it, and what that put on the
+    // front.
+    let (mut least, mut late, first_late) = ([f64::INFINITY; 2], 0, study.evolution.first_late());
     file.file().each_row(&names, |row| {
         let cells: Vec<Cell> = (0..names.len()).map(|column| row.cell(column)).collect();
         if cells[1] == Cell::Flag(true) {
             feasible += 1;
             let number = cells.get(3 + study.parameters.len()).and_then(Cell::number);
-            let own = &mut least[usize::from(row.index() >= first_near)];
+            let own = &mut least[usize::from(row.index() >= first_late)];
             *own = own.min(number.map_or(f64::INFINITY, |one| study.objectives[0].sign * one));
         }
         if Some(row.index()) == chosen {
@@ -157,26 +158,30 @@ fn told<M: Swept>(
             values = own.map(Cell::number).collect::<Option<Vec<f64>>>();
         }
         if cells[2] == Cell::Flag(true) {
+            late += usize::from(row.index() >= first_late);
             front.push(cells);
         }
         Ok::<(), Error>(())
     })?;
-    let all = file.rows();
-    text.line("feasible", format!("{feasible} of {all}, {} on the front", front.len()));
+    let (all, several) = (file.rows(), study.objectives.len() > 1);
+    let ended = match front.len() {
+        count if several => format!(", {count} on the front"),
+        count @ 2.. => format!(", {count} of them equally good"),
+        _ => String::new(),
+    };
+    text.line("feasible", format!("{feasible} of {all}{ended}"));
     if let Some(best) = about["best"].as_u64() {
         text.line("best", format!("candidate {best}"));
     }
-    if let ([objective], [before, near]) = (&study.objectives[..], least)
-        && before.is_finite()
-        && first_near < all
-    {
-        let name = &objective.name;
-        let gained = match [before, near.min(before)].map(|one| short(objective.sign * one)) {
+    if least[0].is_finite() && first_late < all {
+        let Objective { name, sign, .. } = &study.objectives[0];
+        let farther = "; more may take it farther";
+        let gained = match [least[0], least[0].min(least[1])].map(|one| short(sign * one)) {
+            _ if several => format!("put {late} of {} on the front{farther}", front.len()),
             [before, after] if before == after => "found none better".to_owned(),
-            [from, to] => format!("took {name} from {from} to {to}; more may take it farther"),
+            [from, to] => format!("took {name} from {from} to {to}{farther}"),
         };
-        let late = all - first_near;
-        text.line("search", format!("the last {late} candidates, beside the best, {gained}"));
+        text.line("search", format!("the last {} candidates {gained}", all - first_late));
     }
     front.sort_by(|a, b| {
         let of = |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);

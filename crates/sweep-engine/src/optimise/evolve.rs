@@ -48,11 +48,11 @@ pub struct Candidate {
 }
 
 impl Evolution {
-    /// The first trial beside the best, if there are any: with one objective, of the last third.
-    pub fn first_near(&self) -> u64 {
+    /// The first trial of the last third, if any is after the first generation; with one objective
+    /// they are tried beside the best.
+    pub fn first_late(&self) -> u64 {
         let Self { candidates, population, .. } = *self;
-        let first = if self.objectives == 1 { candidates - candidates / 3 } else { candidates };
-        first.max(population.min(candidates))
+        (candidates - candidates / 3).max(population.min(candidates))
     }
 }
 
@@ -90,7 +90,7 @@ pub fn evolve<E>(
                 return (0..parameters).filter_map(|axis| start.place(k, axis)).collect();
             }
             let number = first as u64 + k;
-            let near = best.filter(|_| number >= evolution.first_near());
+            let near = best.filter(|_| objectives == 1 && number >= evolution.first_late());
             mutant(&tried, &members, (k as usize, near), number, evolution)
         };
         let places: Vec<Vec<f64>> = (0..count).map(place).collect();
