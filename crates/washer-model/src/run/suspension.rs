@@ -10,7 +10,7 @@ use crate::machine::feet::LOAD;
 use crate::nonlinear::elements::{CabinetLine, Ends, Law, PointMotion, TubMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
 use crate::{COORDINATES, ModelKind, Point};
-use lane_ode::{Dual, Lane, N};
+use lane_ode::{Dual, Lane, N, Real};
 use std::borrow::Cow;
 
 /// Forces of the suspension at one instant.
@@ -150,8 +150,9 @@ pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -
 /// From the cabinet end of each spring to its tub end (m), then of each damper, at some
 /// coordinates; in cabinet axes.
 pub(crate) fn attachments(point: &Point, q: &[f64; COORDINATES]) -> [Vec<[f64; 3]>; 2] {
-    let q = along(q, &[0.0; COORDINATES]);
-    let span = |ends: &Ends<f64>| tub_from_cabinet(&q, &ends.constant()).map(|x| x.0.value);
+    let q = q.map(N);
+    let tilt = Tilt::of_tub(&q);
+    let span = |ends: &Ends<f64>| from_cabinet(&tilt, &q, ends).map(|x| x.0);
     let elements = &point.machine.elements;
     [
         elements.springs.iter().map(|spring| span(&spring.ends)).collect(),
@@ -214,7 +215,12 @@ fn along(q: &[f64; COORDINATES], direction: &[f64; COORDINATES]) -> [N<Dual<f64>
 
 /// From the cabinet end to the tub end, in cabinet axes.
 fn tub_from_cabinet(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> Vec3<Dual<f64>> {
-    let tub = Tilt::of_tub(q).in_cabinet_axes(&ends.tub);
+    from_cabinet(&Tilt::of_tub(q), q, ends)
+}
+
+/// The same of a tub that is tilted so.
+fn from_cabinet<T: Real>(tilt: &Tilt<T>, q: &[N<T>; COORDINATES], ends: &Ends<T>) -> Vec3<T> {
+    let tub = tilt.in_cabinet_axes(&ends.tub);
     [
         tub[0] - ends.cabinet[0],
         tub[1] + q[TUB_Y] - ends.cabinet[1],

@@ -367,18 +367,19 @@ impl Look<'_> {
 /// What of the machine's geometry a motion passes.
 fn beyond(point: &Point, seen: &Seen) -> Option<Beyond> {
     let rest = attachments(point, point.equilibrium());
-    let is_past = |kind: usize| {
-        seen.states.iter().any(|state| {
-            let now = attachments(point, &core::array::from_fn(|i| state[i]));
-            now[kind].iter().zip(&rest[kind]).any(|(now, rest)| {
+    let mut is_past = [false; 2];
+    for state in &seen.states {
+        let now = attachments(point, &core::array::from_fn(|i| state[i]));
+        for ((is_past, now), rest) in is_past.iter_mut().zip(now).zip(&rest) {
+            *is_past |= now.iter().zip(rest).any(|(now, rest)| {
                 let along: f64 = now.iter().zip(rest).map(|(a, b)| a * b).sum();
                 along.is_nan() || along <= 0.0
-            })
-        })
-    };
-    if is_past(0) {
+            });
+        }
+    }
+    if is_past[0] {
         Some(Beyond::SpringHooks)
-    } else if is_past(1) {
+    } else if is_past[1] {
         Some(Beyond::DamperEnds)
     } else if seen.gap_m.is_nan() || seen.gap_m <= 0.0 {
         Some(Beyond::Clearance)
