@@ -150,7 +150,10 @@ fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> 
 /// Peaks of both models in the window, their ratios and the verdict: what the point's row of a map
 /// holds. `of_file` is the method of the trace.
 fn compared(plan: &Plan, at: &[String], of_file: Option<Level>) -> Result<String, Error> {
-    let mut outcomes = ModelEngine::new(plan)?.evaluate_at(&[Vec::new()]);
+    // What is told has nothing of held speeds.
+    let mut plan = plan.clone();
+    plan.model.held_speeds = None;
+    let mut outcomes = ModelEngine::new(&plan)?.evaluate_at(&[Vec::new()]);
     let Some(outcome) = outcomes.pop() else { return Ok(String::new()) };
     let (channels, limits) = (&plan.reliability.channels, plan.reliability.limits);
     let verdict = Verdict::new(&outcome, channels.len(), limits);
