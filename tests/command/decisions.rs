@@ -273,6 +273,8 @@ fn a_report_names_quantities_in_words_and_both_limits() {
         assert!(page.contains(text), "{text}");
     }
     assert_eq!(page.matches(">Tub front, vertical<").count(), 1, "of the nonlinear model alone");
+    // The file does not say who wrote a number: not even this one, which --set did.
+    assert!(!page.contains("assumed") && page.contains("sweep parameters"), "where from");
     // Each damper's are among those of all, and numbers stay with their units.
     assert!(!page.contains("Damper 1 speed"), "numbered");
     assert!(page.contains("\u{a0}N\u{a0}s/m") && page.contains("\u{a0}m/s"), "units");

@@ -1,6 +1,5 @@
 //! `sweep report RESULT [FILE ...]`: one page to print, for whoever decides.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::show::Further;
@@ -9,7 +8,7 @@ use crate::columns::MODELS;
 use crate::store::read::{Tally, tally};
 use crate::{Error, Exit, GridInput, Plan, Swept, tell};
 use sweep_files::{FileKind, Output, ParquetFile, key};
-use sweep_parameter::{Parameter as _, RatioLimits};
+use sweep_parameter::RatioLimits;
 use sweep_plot::{described, escape, quantity, sheet, significant, table, words};
 use sweep_results::{Cell, ResultTable, check, ratio_limits, top};
 
@@ -114,9 +113,8 @@ pub fn run<M: Swept>(
         body += &table(title.trim_end_matches(" at "), &heads, &found);
     }
     body += &about;
-    if let Ok(run) = &run {
-        body += &table("Where the machine's numbers are from", &["", ""], &sources(run));
-    }
+    // A result holds its numbers, whoever wrote them.
+    body += "<p>Where each number is from: sweep parameters, with the grid file.</p>\n";
     let hashes = [key::PLAN_HASH, key::VERSION, key::NUMERICS, key::DIGEST].into_iter();
     let hashes = hashes.filter_map(|key| Some((key, file.file().value(key)?)));
     let hashes: Vec<String> = hashes.map(|(key, value)| format!("{key} {value}")).collect();
@@ -178,21 +176,4 @@ fn with_unit(text: String, unit: &str) -> String {
         "" => text,
         unit => format!("{text} {unit}").replace(' ', "\u{a0}"),
     }
-}
-
-/// How many of a machine's numbers have which source, with the names of those that are few.
-fn sources<M: Swept>(plan: &Plan<M>) -> Vec<Vec<String>> {
-    const FEW: usize = 12;
-    let mut by_source: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for line in M::listed(Some(plan)).into_iter().filter(|line| line.value.is_some()) {
-        // What follows the colon says why it is assumed.
-        let source = line.source.split(':').next().unwrap_or_default().to_owned();
-        by_source.entry(source).or_default().push(line.parameter.name().to_owned());
-    }
-    let said = |(source, names): (String, Vec<String>)| {
-        let some = names.iter().take(FEW).cloned().collect::<Vec<_>>().join(", ");
-        let more = if names.len() > FEW { ", ..." } else { "" };
-        vec![source, format!("{}: {some}{more}", names.len())]
-    };
-    by_source.into_iter().map(said).collect()
 }
