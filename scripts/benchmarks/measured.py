@@ -6,6 +6,7 @@ import platform
 import re
 import signal
 import subprocess
+import tempfile
 import textwrap
 import time
 
@@ -76,24 +77,31 @@ class Spent:
     interrupted once `is_enough` says so, if that is given."""
 
     def __init__(self, *command, is_enough=None):
-        began = time.perf_counter()
-        process = subprocess.Popen(
-            list(map(str, command)), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-            text=True,
-        )
-        if is_enough:
+        code = 130 if is_enough else 0
+        with tempfile.TemporaryFile() as printed:
+            began = time.perf_counter()
+            process = subprocess.Popen(
+                list(map(str, command)), cwd=ROOT, stdout=printed, stderr=subprocess.STDOUT
+            )
+            account = pathlib.Path(f"/proc/{process.pid}/status")
             ended = os.WEXITED | os.WNOHANG | os.WNOWAIT
-            while not is_enough() and os.waitid(os.P_PID, process.pid, ended) is None:
+            # The kernel's account of a process that is gone begins with this script's own memory.
+            self.memory_mb = 0.0
+            while os.waitid(os.P_PID, process.pid, ended) is None:
+                if most := re.search(r"VmHWM:\s*(\d+) kB", account.read_text()):
+                    self.memory_mb = int(most[1]) * 1.024e-3
+                if is_enough and is_enough():
+                    process.send_signal(signal.SIGINT)
+                    is_enough = None
                 time.sleep(0.1)
-            process.send_signal(signal.SIGINT)
-        text = process.stdout.read()
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode != (130 if is_enough else 0):
-            raise SystemExit(f"{' '.join(map(str, command))}: {text.strip()}")
-        self.wall_s = time.perf_counter() - began
-        self.core_s = usage.ru_utime + usage.ru_stime
-        self.memory_mb = usage.ru_maxrss / 1024
+            _, status, usage = os.wait4(process.pid, 0)
+            self.wall_s = time.perf_counter() - began
+            self.core_s = usage.ru_utime + usage.ru_stime
+            process.returncode = os.waitstatus_to_exitcode(status)
+            if process.returncode != code:
+                printed.seek(0)
+                text = printed.read().decode().strip()
+                raise SystemExit(f"{' '.join(map(str, command))}: {text}")
 
 
 if __name__ == "__main__":
