@@ -38,7 +38,8 @@ values = [0.2, 0.4]
 SHARDS = 3 if IS_CHECK else 64
 ROUNDS = 1 if IS_CHECK else 3
 # Maps by the fast method and by plain rk4, and masses of the grids that show what files cost.
-MAPS = ("quick", "quick") if IS_CHECK else ("fig12", "fig12_reference")
+FAST, PLAIN = ("quick", "quick") if IS_CHECK else ("fig12", "fig12_reference")
+SPEEDS = "240:260:10" if IS_CHECK else "210:350:1"
 MASSES = (100, 300) if IS_CHECK else (1000, 10_000)
 
 
@@ -117,9 +118,9 @@ def rows_in(result):
     return pq.read_metadata(result).num_rows
 
 
-def of_threads(sweep, grid, result):
+def of_threads(sweep, words, result):
     """Core-seconds of a run, and the main thread's share of them."""
-    command = [sys.executable, "scripts/benchmarks/thread_times.py", sweep, "run", grid]
+    command = [sys.executable, "scripts/benchmarks/thread_times.py", sweep, *words.split()]
     text = run(*command, "--fresh", "--out", result, "--progress", "none")
     spent = re.findall(r"^ *(\S+) +(\S+) s +\S+ %$", text, re.MULTILINE)
     total_s = sum(float(seconds) for _, seconds in spent)
@@ -129,17 +130,25 @@ def of_threads(sweep, grid, result):
 def files(sweep, folder):
     """What points cost, and what files of a million and of ten million rows cost beside them."""
     rows, per_core_s, shares = [], [], []
-    methods = "`rk4-mass-scaled`, accuracy 1e-3, checks included", "`rk4`, step 2e-4 s"
-    for name, words in zip(MAPS, methods):
-        core_s, share = of_threads(sweep, f"sweeps/{name}.toml", folder / "threads.parquet")
+    methods = {
+        "`rk4-mass-scaled`, accuracy 1e-3, checks included": f"run sweeps/{FAST}.toml",
+        "the same, accuracy 1e-6": f"run sweeps/{FAST}.toml --set accuracy=1e-6",
+        "`rk4`, step 2e-4 s": f"run sweeps/{PLAIN}.toml",
+    }
+    for method, words in methods.items():
+        core_s, share = of_threads(sweep, words, folder / "threads.parquet")
         count = rows_in(folder / "threads.parquet")
         per_core_s.append(count / core_s)
         shares.append(f"{100 * share:.2f} %")
-        rows.append([f"a point, {words}",
+        rows.append([f"a point, {method}",
                      f"{figure(count / core_s)} a core-second ({count} in {core_s:.1f} s)",
-                     f"`scripts/benchmarks/thread_times.py` of `sweep run sweeps/{name}.toml`"])
+                     f"`thread_times.py` of `sweep {words}`"])
     rows.append(["chunks, hashes, syncs, progress and join",
-                 " and ".join(shares) + " of these times", "the same: the main thread"])
+                 ", ".join(shares) + " of these times", "the same: the main thread"])
+    words, result = f"stability sweeps/{FAST}.toml --speed {SPEEDS}", folder / "speeds.parquet"
+    spent = Spent(sweep, *words.split(), "--out", result, "--fresh")
+    rows.append([f"stability of {rows_in(result)} responses",
+                 told(spent, result.stat().st_size / 1e6), f"`sweep {words}`"])
     few, many = (folder / f"{count}.toml" for count in MASSES)
     for grid, count in zip((few, many), MASSES):
         million = (ROOT / "sweeps/million.toml").read_text()
@@ -202,7 +211,7 @@ def duration(seconds):
 
 def estimates(per_core_s, chunks_mb, result_mb, join_s):
     """What a million and a billion points of 50 s would cost."""
-    fast, plain = per_core_s
+    fast, _, plain = per_core_s
     chunks = [(1e6, 1024), (1e9, 4096)]
     whole = [(count, math.ceil(count / size), size) for count, size in chunks]
     rows = [
@@ -223,6 +232,12 @@ def estimates(per_core_s, chunks_mb, result_mb, join_s):
             table(["", "10^6 points", "10^9 points"], rows))
 
 
+def minutes(spent):
+    """Of the cores, and on the wall."""
+    whole, seconds = divmod(round(spent.wall_s), 60)
+    return f"{spent.core_s / 60:.1f} core-minutes, {whole}:{seconds:02} min"
+
+
 def build(_, folder):
     """The program from nothing, and what it is made of."""
     spent = Spent("cargo", "build", "--release", "--locked", "-p", "sweep", "--target-dir", folder)
@@ -234,8 +249,10 @@ def build(_, folder):
         tree = run("cargo", "tree", "--locked", "-p", package, "-e", "normal", "--prefix", "none")
         return len({line.split(" (")[0] for line in tree.splitlines()})
 
+    wheel = Spent("env", f"CARGO_TARGET_DIR={folder}/wheel", sys.executable, "-m", "pip", "wheel",
+                  "--no-deps", "-w", folder, ".")
+
     tree = "`cargo tree -p sweep -e normal --prefix none \\| sed 's/ (.*//' \\| sort -u \\| wc -l`"
-    minutes, seconds = divmod(spent.wall_s, 60)
     rows = [
         ["crates in the binary, ours included", crates("sweep"), tree],
         ["`lane-ode` alone", crates("lane-ode"), "the same with `-p lane-ode`"],
@@ -243,9 +260,9 @@ def build(_, folder):
          crates("washer-model"), "the same with `-p washer-model`"],
         ["the binary, and without symbols", ", ".join(sizes),
          "`ls -l target/release/sweep`, and after `strip`"],
-        ["from an empty target folder",
-         f"{spent.core_s / 60:.1f} core-minutes, {minutes:.0f}:{seconds:02.0f} min",
+        ["from an empty target folder", minutes(spent),
          "`time cargo build --release --locked -p sweep`"],
+        ["the Python package, the same", minutes(wheel), "`time pip wheel --no-deps .`"],
     ]
     put("docs/building.md", "build", table(["what", "figure", "command"], rows), said())
 
