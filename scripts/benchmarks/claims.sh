@@ -4,14 +4,14 @@
 #
 #     scripts/benchmarks/claims.sh [PART ...]
 #
-# Parts: kernels, methods, elements, points, build, peers.
+# Parts: kernels, methods, elements, points, build, peers, samples (outputs that pages show).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 parts=("$@")
-[ $# -gt 0 ] || parts=(kernels methods elements points build peers)
+[ $# -gt 0 ] || parts=(kernels methods elements points build peers samples)
 for part in "${parts[@]}"; do
   case $part in
-    kernels | methods | elements | points | build | peers) ;;
+    kernels | methods | elements | points | build | peers | samples) ;;
     *)
       echo "$part: no such part" >&2
       exit 2
@@ -34,5 +34,6 @@ for part in "${parts[@]}"; do
       scripts/tools/python.sh scripts/benchmarks/costs.py "$sweep" "$part"
       ;;
     peers) scripts/peers/run.sh ;;
+    samples) scripts/tools/python.sh scripts/checks/try_docs.py "$sweep" --measure ;;
   esac
 done

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A new user's tour: runs the commands of the README and the guide, and compares their outputs.
 
-    python scripts/checks/try_docs.py SWEEP_BINARY [--write]
+    python scripts/checks/try_docs.py SWEEP_BINARY [--write | --measure]
 
 The tour starts in a fresh copy of the repository's files and takes the README, then the pages of
 docs/SUMMARY.md, in order:
@@ -15,7 +15,7 @@ docs/SUMMARY.md, in order:
   Markdown file that does not say why it is not run.
 
 What depends on the machine is not compared: on a line with a rate, threads, memory or the time of a
-search, numbers with their units and the names of instruction sets.
+search, numbers with their units and the names of instruction sets. --measure renews these too.
 
 Python's own library is all it needs, besides what the pages install themselves.
 """
@@ -90,7 +90,7 @@ def renewed(shown, printed):
     return [known.get(comparable(line), line) for line in printed]
 
 
-def tour(page, run, write):
+def tour(page, run, write, measure):
     """Takes one page; returns its counts of commands and samples, and its stale samples."""
     name = page.relative_to(ROOT)
     lines = page.read_text().splitlines()
@@ -109,7 +109,7 @@ def tour(page, run, write):
                 ran += 1
         elif language == "text" and printed is not None:
             samples += 1
-            right = renewed(lines[start:end], printed)
+            right = printed if measure else renewed(lines[start:end], printed)
             if lines[start:end] != right:
                 stale.append((start, end, right))
     if write and stale:
@@ -140,7 +140,8 @@ def untried(names):
 
 def main():
     """Run the tour; exit with 1 if anything is wrong."""
-    sweep, write = pathlib.Path(sys.argv[1]).resolve(), "--write" in sys.argv[2:]
+    sweep, measure = pathlib.Path(sys.argv[1]).resolve(), "--measure" in sys.argv[2:]
+    write = measure or "--write" in sys.argv[2:]
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True)
     with tempfile.TemporaryDirectory() as folder:
         copy, programs = pathlib.Path(folder, "sweep"), pathlib.Path(folder, "bin")
