@@ -161,7 +161,7 @@ def main():
             )
             return done.returncode, [line.rstrip() for line in done.stdout.splitlines()]
 
-        taken = [tour(page, run, write) for page in pages()]
+        taken = [tour(page, run, write, measure) for page in pages()]
     names = filter(None, os.fsdecode(listed.stdout).split("\0"))
     wrong = [line for _, _, found in taken for line in found]
     wrong += untried(name for name in names if name.endswith(".md") and (ROOT / name).is_file())
