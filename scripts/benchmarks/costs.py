@@ -119,12 +119,13 @@ def rows_in(result):
 
 
 def of_threads(sweep, words, result):
-    """Core-seconds of a run, and the main thread's share of them."""
+    """A run's time on the wall (s), its core-seconds, and the main thread's share of these."""
     command = [sys.executable, "scripts/benchmarks/thread_times.py", sweep, *words.split()]
     text = run(*command, "--fresh", "--out", result, "--progress", "none")
     spent = re.findall(r"^ *(\S+) +(\S+) s +\S+ %$", text, re.MULTILINE)
     total_s = sum(float(seconds) for _, seconds in spent)
-    return total_s, sum(float(seconds) for name, seconds in spent if name == "main") / total_s
+    main_s = sum(float(seconds) for name, seconds in spent if name == "main")
+    return float(re.search(r"wall +(\S+) s", text)[1]), total_s, main_s / total_s
 
 
 def files(sweep, folder):
@@ -136,12 +137,13 @@ def files(sweep, folder):
         "`rk4`, step 2e-4 s": f"run sweeps/{PLAIN}.toml",
     }
     for method, words in methods.items():
-        core_s, share = of_threads(sweep, words, folder / "threads.parquet")
+        wall_s, core_s, share = of_threads(sweep, words, folder / "threads.parquet")
         count = rows_in(folder / "threads.parquet")
         per_core_s.append(count / core_s)
         shares.append(f"{100 * share:.2f} %")
         rows.append([f"a point, {method}",
-                     f"{figure(count / core_s)} a core-second ({count} in {core_s:.1f} s)",
+                     f"{figure(count / core_s)} a core-second ({count} in {core_s:.1f} core-s, "
+                     f"{wall_s:.2f} s)",
                      f"`thread_times.py` of `sweep {words}`"])
     rows.append(["chunks, hashes, syncs, progress and join",
                  ", ".join(shares) + " of these times", "the same: the main thread"])
