@@ -36,6 +36,7 @@ NUMBERS = re.compile(
     r"\b[0-9]+ (h [0-9]+ min|min [0-9]+ s)\b"
     r"|\b[0-9][0-9.e+-]*( (ms|s|days?|kB|MB|GB)\b)?|\b(avx512|avx2|neon|scalar)\b"
 )
+PROGRESS = re.compile(r"[0-9]+ of [0-9]+ points \([0-9.]+ %\)")
 NOT_RUN = re.compile(r"<!-- not run: .+ -->$")
 PLACEHOLDER = re.compile(r"@@\w+@@")
 # Pages whose `python` blocks scripts/checks/python_recipes.py runs.
@@ -159,7 +160,9 @@ def main():
                 ["bash", "-euo", "pipefail", "-c", command], cwd=copy, env=environment, text=True,
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             )
-            return done.returncode, [line.rstrip() for line in done.stdout.splitlines()]
+            lines = [line.rstrip() for line in done.stdout.splitlines()]
+            # A run of minutes says how far it is.
+            return done.returncode, [line for line in lines if not PROGRESS.match(line)]
 
         taken = [tour(page, run, write, measure) for page in pages()]
     names = filter(None, os.fsdecode(listed.stdout).split("\0"))
