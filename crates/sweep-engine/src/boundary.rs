@@ -22,18 +22,18 @@
 
 mod batch;
 pub mod file;
-mod look;
 mod neighbour;
 mod net;
 mod pockets;
 pub mod quantity;
+mod refine;
 mod row;
 pub mod search;
 mod span;
 #[cfg(test)]
 mod tests;
 mod trace;
-mod warm;
+mod warm_start;
 
 use neighbour::{Neighbour, hint, nearest, shared};
 use net::{Net, Want};

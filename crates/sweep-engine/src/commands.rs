@@ -24,8 +24,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::program::call_program;
-use crate::survive_file_size_limits;
-use crate::{Error, Exit, Swept};
+use crate::{Error, Exit, Swept, survive_file_size_limits};
 use cells::{Lines, clipped, short, span, table, word};
 use grid::{GridArgs, ResultArgs, quoted};
 use run::installed;

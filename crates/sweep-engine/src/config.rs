@@ -21,7 +21,6 @@
 //! them no number may be written twice, not even under two names, because nothing would say which
 //! comes last.
 
-mod again;
 pub mod axes;
 mod canonical;
 pub mod design;
@@ -31,6 +30,7 @@ pub mod keys;
 pub mod kind;
 pub mod list;
 pub mod parameters;
+mod plan_to_toml;
 mod points;
 pub mod read;
 mod render;
@@ -100,8 +100,8 @@ impl<M: Read> GridInput<M> {
         let top = plan.as_object().into_iter().flatten().filter(|(key, _)| is_read(key));
         let own = M::OWN_FILE.and_then(|key| plan.get(key)?.as_object());
         Self {
-            text: Some(again::file(top)),
-            own_file: own.map(again::file),
+            text: Some(plan_to_toml::file(top)),
+            own_file: own.map(plan_to_toml::file),
             ..Self::file(name.into(), Vec::new())
         }
     }

@@ -46,7 +46,7 @@ pub use merge::write_map;
 pub use open::{OpenOptions, OpenRun, Opened};
 pub use provenance::Session;
 pub use read::{ResultFile, Tally};
-pub use schema::{BATCH_ROWS, Column, Done, Kind, Layout, ResultRows, Row};
+pub use schema::{BATCH_ROWS, Column, Done, Holds, Layout, ResultRows, Row};
 pub use shard::{Shard, ShardRequest, list as shard_list};
 pub use status::{FolderStatus, State, status};
 pub use trials::{Key, Trials};
@@ -108,7 +108,7 @@ pub trait Rows: Read {
 pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<Column> {
     let column = |axis: &Axis<M>| {
         let parameter = &axis.parameter;
-        Column::new(parameter.name(), parameter.unit(), parameter.description(), Kind::Axis)
+        Column::new(parameter.name(), parameter.unit(), parameter.description(), Holds::Axis)
     };
     plan.axes.iter().map(column).collect()
 }

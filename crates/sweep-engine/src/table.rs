@@ -14,7 +14,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use serde_json::Value;
 
-use crate::store::schema::{Column, Kind, writer};
+use crate::store::schema::{Column, Holds, writer};
 use crate::{Build, StoreError};
 use sweep_files::batches::of_arrow;
 use sweep_files::{Writer, key, panics, seal};
@@ -42,7 +42,7 @@ impl Table {
         values: impl IntoIterator<Item = Option<f64>>,
     ) {
         let array: Float64Array = values.into_iter().collect();
-        self.add(name, unit, description, Kind::Measured, Arc::new(array));
+        self.add(name, unit, description, Holds::Measured, Arc::new(array));
     }
 
     /// Adds values of a parameter.
@@ -64,7 +64,7 @@ impl Table {
     /// Adds counts.
     pub fn counts(&mut self, name: &str, description: &str, values: impl IntoIterator<Item = u64>) {
         let array = UInt64Array::from_iter_values(values);
-        self.add(name, "1", description, Kind::Count, Arc::new(array));
+        self.add(name, "1", description, Holds::Count, Arc::new(array));
     }
 
     /// Adds words from a short list.
@@ -75,16 +75,16 @@ impl Table {
         values: impl IntoIterator<Item = &'a str>,
     ) {
         let array: DictionaryArray<Int32Type> = values.into_iter().collect();
-        self.add(name, "", description, Kind::Name(Vec::new()), Arc::new(array));
+        self.add(name, "", description, Holds::Name(Vec::new()), Arc::new(array));
     }
 
     /// Adds truth values.
     pub fn flags(&mut self, name: &str, description: &str, values: impl Iterator<Item = bool>) {
         let array: BooleanArray = values.map(Some).collect();
-        self.add(name, "", description, Kind::Flag, Arc::new(array));
+        self.add(name, "", description, Holds::Flag, Arc::new(array));
     }
 
-    fn add(&mut self, name: &str, unit: &str, description: &str, kind: Kind, array: ArrayRef) {
+    fn add(&mut self, name: &str, unit: &str, description: &str, kind: Holds, array: ArrayRef) {
         self.columns.push((Column::new(name, unit, description, kind), array));
     }
 

@@ -6,7 +6,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 /// Whether to end early, asked by any thread.
-pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
+pub type Cancel<'a> = &'a (dyn Fn() -> bool + Sync);
 
 /// Looks up a variable of this process.
 pub fn process(name: &str) -> Option<String> {

@@ -53,7 +53,7 @@ impl Cuts {
         let picks = picks(extra, &pins, &counts);
         let fixed = extra.iter().zip(&picks).skip(usize::from(is_free));
         let mut notes: Vec<String> =
-            fixed.map(|(axis, pick)| axis.said(axis.values[pick[0]])).collect();
+            fixed.map(|(axis, pick)| axis.format_value(axis.values[pick[0]])).collect();
         let mut cuts = vec![Cut { rest: vec![0; extra.len()], name: None }];
         if let Some(axis) = extra.first().filter(|_| is_free) {
             if picks[0].len() < axis.values.len() {
@@ -62,7 +62,7 @@ impl Cuts {
             let named = |(place, pick): (usize, &usize)| {
                 let mut rest = vec![0; extra.len()];
                 rest[0] = place;
-                Cut { rest, name: Some(axis.said(axis.values[*pick])) }
+                Cut { rest, name: Some(axis.format_value(axis.values[*pick])) }
             };
             cuts = picks[0].iter().enumerate().map(named).collect();
         }

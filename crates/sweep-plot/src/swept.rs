@@ -47,7 +47,7 @@ impl SweptAxis {
     }
 
     /// A value of the axis, with its name and unit: "Damping 140 N s/m".
-    pub(crate) fn said(&self, value: f64) -> String {
+    pub(crate) fn format_value(&self, value: f64) -> String {
         label::valued(&self.words, value, &self.unit)
     }
 }

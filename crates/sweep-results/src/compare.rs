@@ -7,14 +7,13 @@ mod side;
 use std::collections::HashMap;
 
 use serde::Serialize;
-use sweep_files::FileKind;
+use sweep_files::{Cell, FileKind, ResultTable, ratio_limits};
 
 pub use boundary::{Crossing, Moved};
 pub use plans::PlanChange;
 
 use crate::error::{Result, ResultsError};
 use side::Side;
-use sweep_files::{Cell, ResultTable, ratio_limits};
 use sweep_parameter::named;
 
 named! {

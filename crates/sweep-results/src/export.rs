@@ -5,11 +5,10 @@ mod xlsx;
 
 use std::path::Path;
 
-use sweep_files::{FileKind, Output};
+use sweep_files::{FileKind, Output, ResultTable};
 use sweep_parameter::named;
 
 use crate::error::{Result, ResultsError};
-use sweep_files::ResultTable;
 
 named! {
     /// A format, named as the ending of its files.

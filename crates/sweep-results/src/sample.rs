@@ -12,10 +12,8 @@ use arrow_schema::{Field, Schema};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde_json::{Value, json};
-use sweep_files::{Writer, key};
+use sweep_files::{ResultTable, Writer, key};
 use sweep_parameter::Worse;
-
-use sweep_files::ResultTable;
 
 /// A column of a file in the making: name, unit, cells.
 pub(crate) type Made = (&'static str, &'static str, ArrayRef);
@@ -60,7 +58,7 @@ pub(crate) fn write(path: &Path, columns: Vec<Made>, keys: &[(&str, Value)]) {
 pub(crate) fn plan() -> Value {
     json!({
         "name": "sample",
-        "machine": { "tub": { "mass_kg": 24.0 } },
+        "machine": { "body": { "mass_kg": 24.0 } },
         "axis": [
             { "parameter": "unbalance_mass_kg", "values": [0.1, 0.2] },
             { "parameter": "damping_n_s_per_m", "values": [60.0, 70.0, 80.0] },
@@ -83,9 +81,9 @@ pub(crate) fn map(ratios: &[Option<f64>]) -> Vec<Made> {
         ("point", "1", Arc::new(UInt64Array::from_iter_values(0..rows as u64))),
         ("unbalance_mass_kg", "kg", numbers(&masses)),
         ("damping_n_s_per_m", "N s/m", numbers(&dampings)),
-        ("nonlinear_tub_yaw", "rad", numbers(ratios)),
-        ("linear_tub_yaw", "rad", numbers(&vec![Some(1.0); rows])),
-        ("ratio_tub_yaw", "1", numbers(ratios)),
+        ("nonlinear_body_yaw", "rad", numbers(ratios)),
+        ("linear_body_yaw", "rad", numbers(&vec![Some(1.0); rows])),
+        ("ratio_body_yaw", "1", numbers(ratios)),
         ("ratio_max", "1", numbers(ratios)),
         ("reliable", "", flags(&reliable)),
         ("sensitive", "", flags(&sensitive)),

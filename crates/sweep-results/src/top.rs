@@ -3,8 +3,7 @@
 use crate::condition::{Condition, each_row};
 use crate::error::{Result, ResultsError};
 use crate::nearest::nearest;
-use sweep_files::CellKind;
-use sweep_files::{Cell, ResultTable};
+use sweep_files::{Cell, CellKind, ResultTable};
 use sweep_parameter::Worse;
 
 /// The first `count` rows by the column `by`, as if it were the worse the greater or the less it

@@ -5,9 +5,8 @@ use std::mem::take;
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
-use sweep_engine::store::Kind as CellKind;
 use sweep_engine::store::read::FAR_OFF;
-use sweep_engine::store::{Column, Done, Layout, Rows, axis_columns};
+use sweep_engine::store::{Column, Done, Holds, Layout, Rows, axis_columns};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, Motion};
 use washer_row::{
@@ -296,7 +295,7 @@ fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
     let number = |row: &ResultRow| Some(u64::from(growth(row)?.branch));
     // It says which of a speed's rows a row is, and so is never null there.
     let is_of_speed = prefix.is_empty();
-    let kind = if is_of_speed { CellKind::Count } else { CellKind::KnownCount };
+    let kind = if is_of_speed { Holds::Count } else { Holds::KnownCount };
     let branch = move |row: &ResultRow| number(row).or(is_of_speed.then_some(0));
     let folds = "how many folds the point's curve of responses has before this one, followed from \
                  a low speed up; of those on the curve, a machine that runs up is on the least \
@@ -332,7 +331,7 @@ fn growing_mode_columns(prefix: &str, place: usize) -> [WasherColumn; 3] {
     let (moves, names) = ("what moves in it", Motion::NAMES.to_vec());
     let frequency = "its damped natural frequency at this speed in cycles per minute";
     [
-        ResultColumn::new(name.clone(), "1", text, CellKind::KnownCount, number),
+        ResultColumn::new(name.clone(), "1", text, Holds::KnownCount, number),
         ResultColumn::name(format!("{name}_name"), moves, names, move |row| {
             Some(mode(row)?.name as usize)
         }),

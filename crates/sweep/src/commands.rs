@@ -25,8 +25,7 @@ use sweep_engine::commands::{
     boundary, check, compare, examples, export, merge, optimise, parameters, report, require,
     show as show_engine, status,
 };
-use sweep_engine::nearest;
-use sweep_engine::{Error, Exit};
+use sweep_engine::{Error, Exit, nearest};
 
 /// Subcommands by what they are for, as help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [

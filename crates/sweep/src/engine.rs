@@ -29,7 +29,7 @@ pub(crate) const CHECKPOINTS: u32 = 128;
 
 /// What a row by capped modes came from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Quick {
+pub(crate) struct CappedRun {
     pub(crate) level: Level,
     /// The nonlinear model's, the linear one's.
     pub(crate) methods: [Method; 2],
@@ -115,13 +115,13 @@ impl<'a> ModelEngine<'a> {
 
     /// How the trajectories of a row of this level were integrated; `None` where modes were not
     /// capped.
-    pub(crate) fn quick(&self, level: Level) -> Option<Quick> {
+    pub(crate) fn quick(&self, level: Level) -> Option<CappedRun> {
         if !level.is_capped() {
             return None;
         }
         let [nonlinear, linear] = self.ladders();
         let methods = [nonlinear.capped(level)?, linear.capped(level)?];
-        Some(Quick { level, methods, checkpoints: self.timing.checkpoints })
+        Some(CappedRun { level, methods, checkpoints: self.timing.checkpoints })
     }
 
     fn find_ladders(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {

@@ -1,10 +1,10 @@
 //! Why the linear model fails at a point: the tongues of instability that its run crosses, and what
 //! they do to the run.
 
+pub(crate) mod format;
 pub(crate) mod json;
 mod profile;
 mod tongue;
-pub(crate) mod words;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

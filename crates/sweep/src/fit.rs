@@ -29,7 +29,7 @@ use crate::config::GridInput;
 use crate::engine::simd_from_environment;
 use sweep_engine::config::{Diagnostic, Location, Report as Mistakes};
 use sweep_engine::design::{Rule, Shape};
-use sweep_engine::threads::Stop;
+use sweep_engine::threads::Cancel;
 use sweep_engine::{Design, Diagnostics, Distribution, Error, tell};
 
 use algebra::Symmetric;
@@ -94,7 +94,7 @@ pub(crate) struct Fitted<'a> {
 /// How a fit goes about its work.
 pub(crate) struct Work<'a> {
     /// Ends it early; what comes then means nothing.
-    pub(crate) stop: Stop<'a>,
+    pub(crate) stop: Cancel<'a>,
     /// Hears of every evaluation: how many there were.
     pub(crate) seen: &'a (dyn Fn(usize) + Sync),
     /// Where answers are kept.

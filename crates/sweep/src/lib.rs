@@ -12,7 +12,7 @@
 //! * `boundary` traces the curve where the ratio is at its limit, `trace` writes one point's time
 //!   histories. [`sweep_plot`] draws any of these files.
 //! * `library` is the commands' work as functions: an [`Evaluator`] takes tables of points, a
-//!   [`ResultTable`] holds a result in memory.
+//!   [`MemoryTable`] holds a result in memory.
 //! * `commands` is the command line; `progress`, `interrupt` and `exit` serve it.
 //!
 //! This crate exports what the program, the fuzzer and the examples use.
@@ -66,7 +66,7 @@ pub use engine::ModelEngine;
 pub use fit::FitOptions;
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use library::{
-    BoundaryOptions, Effort, Evaluator, Explained, PointTable, RanToFile, ResultTable, Task,
+    BoundaryOptions, Effort, Evaluator, Explained, MemoryTable, PointTable, RanToFile, Task,
     TraceOptions, explain_point, find_boundary, find_modes, fit_tables, held, list_parameters,
     optimise_study, trace_point,
 };

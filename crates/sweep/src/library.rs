@@ -19,7 +19,7 @@ pub use explain::{Explained, explain_point};
 pub use fit::fit_tables;
 pub use modes::find_modes;
 pub use points::PointTable;
-pub use result::ResultTable;
+pub use result::MemoryTable;
 pub use run::{RanToFile, Task};
 pub use search::{BoundaryOptions, find_boundary, optimise_study};
 pub use stability::held;

@@ -15,7 +15,7 @@ use crate::columns::Columns;
 use crate::dwell::{Motions, Search};
 use crate::engine::{Engine, Watch, responses, simd_from_environment, together_or_alone};
 use crate::plan::{Plan, timing};
-use sweep_engine::store::{Column, Kind, Layout, axis_columns};
+use sweep_engine::store::{Column, Holds, Layout, axis_columns};
 use sweep_engine::{Error, Job, KeepRow, NextRow};
 use sweep_files::{FileKind, key};
 
@@ -100,7 +100,7 @@ impl<'a> Held<'a> {
             }
         };
         let mut axes = axis_columns(plan);
-        axes.push(Column::new("speed_rpm", "rpm", "constant spin of the shaft", Kind::Axis));
+        axes.push(Column::new("speed_rpm", "rpm", "constant spin of the shaft", Holds::Axis));
         let speeds = speeds_rpm.len() as u64;
         let layout = Layout {
             axes,

@@ -16,14 +16,14 @@ use washer_model::{
     Point, Spin, Start, Timing, histories, instants, together,
 };
 
-use crate::engine::{ModelEngine, Quick, reference};
+use crate::engine::{CappedRun, ModelEngine, reference};
 use crate::method::Integrator;
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, friction_speeds, ready};
 use sweep_engine::config::NamedValues;
 use sweep_engine::method::Integrator as _;
 use sweep_engine::store::read;
-use sweep_engine::threads::Stop;
+use sweep_engine::threads::Cancel;
 use sweep_engine::{Error, StoreError, Table, threads};
 use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
 use washer_row::Level;
@@ -136,7 +136,7 @@ pub(crate) struct View {
     pub(crate) start: Start,
     pub(crate) extras: Extras,
     /// For the trajectories of the point's row, how that was found.
-    pub(crate) quick: Option<Quick>,
+    pub(crate) quick: Option<CappedRun>,
 }
 
 /// Which models are integrated.
@@ -178,7 +178,7 @@ pub(crate) fn in_pool(
     plan: &Plan,
     at: Option<Vec<(String, f64)>>,
     view: &View,
-    stop: Stop<'_>,
+    stop: Cancel<'_>,
 ) -> Result<Trace, NoEquilibrium> {
     // A thread for each model, where there may be two.
     let wanted = if at.is_some() { 2 } else { threads::cores() };
@@ -204,7 +204,7 @@ pub(crate) fn trace(
     scenario: Scenario,
     at: NamedValues,
     view: &View,
-    stop: Stop<'_>,
+    stop: Cancel<'_>,
 ) -> Result<Trace, NoEquilibrium> {
     let run = Run::new(plan, scenario, view)?;
     let runs = [&run];
@@ -237,7 +237,7 @@ pub(crate) fn trace(
 /// As [`trace`] of every point of a plan, in one table with the points' numbers and axes: so many
 /// at once as there are lanes, each with the bits that it has alone. A point without equilibrium
 /// has no rows, and is among the failures.
-pub(crate) fn trace_all(plan: &Plan, view: &View, stop: Stop<'_>) -> Trace {
+pub(crate) fn trace_all(plan: &Plan, view: &View, stop: Cancel<'_>) -> Trace {
     let mut failures = Vec::new();
     let mut runs = Vec::new();
     for number in 0..plan.points() {
@@ -303,7 +303,7 @@ impl Run {
 fn integrate<'a>(
     runs: &[&'a Run],
     models: Models,
-    stop: Stop<'_>,
+    stop: Cancel<'_>,
 ) -> Vec<(ModelKind, Vec<History<'a>>)> {
     let kinds = models.kinds();
     let groups: Vec<(ModelKind, &[&'a Run])> = kinds
@@ -383,7 +383,7 @@ pub(crate) fn keep(
     result: &ParquetFile,
     folder: &Path,
     threads: usize,
-    stop: Stop<'_>,
+    stop: Cancel<'_>,
     done: &(dyn Fn() + Sync),
 ) -> Result<(), StoreError> {
     let plan = engine.plan();
@@ -447,14 +447,14 @@ fn methods(
     plan: &Plan,
     point: &Point,
     spin: &Spin,
-    quick: Option<Quick>,
+    quick: Option<CappedRun>,
 ) -> ([Method; 2], Level, Value) {
     let of_row = |level: Level| {
         let mut json = plan.integrator.to_json();
         json["row"] = level.name().into();
         json
     };
-    if let Some(Quick { level, methods, .. }) = quick {
+    if let Some(CappedRun { level, methods, .. }) = quick {
         return (methods, level, of_row(level));
     }
     match plan.integrator.direct() {

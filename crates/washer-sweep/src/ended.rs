@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sweep::{Error, RanToFile, ResultTable, Task};
+use sweep::{Error, MemoryTable, RanToFile, Task};
 
 use crate::errors;
 use crate::result::PyResultTable;
 use crate::work::{Attended, How, attended};
 
 /// The rows, or those that were computed before Ctrl-C.
-pub(crate) fn rows(py: Python<'_>, evaluated: Attended<ResultTable>) -> PyResult<PyResultTable> {
+pub(crate) fn rows(py: Python<'_>, evaluated: Attended<MemoryTable>) -> PyResult<PyResultTable> {
     let table = evaluated.or_raise(py, |evaluated| match evaluated {
         Err(error) => errors::error(py, &error),
         Ok(table) => {
@@ -63,7 +63,7 @@ pub(crate) fn rows_or_file(
 /// A search's table, or what `interrupted` raises.
 pub(crate) fn table(
     py: Python<'_>,
-    found: Attended<Option<ResultTable>>,
+    found: Attended<Option<MemoryTable>>,
     interrupted: impl Fn() -> PyErr,
 ) -> PyResult<PyResultTable> {
     let found = found.or_raise(py, |_| interrupted())?;
@@ -71,7 +71,7 @@ pub(crate) fn table(
 }
 
 /// An interruption that holds what was computed.
-pub(crate) fn holding(py: Python<'_>, text: String, result: Option<ResultTable>) -> PyErr {
+pub(crate) fn holding(py: Python<'_>, text: String, result: Option<MemoryTable>) -> PyErr {
     match result.map(|result| Py::new(py, PyResultTable::new(result))).transpose() {
         Ok(result) => {
             let result = result.map_or_else(|| py.None(), Py::into_any);

@@ -11,7 +11,7 @@ use arrow_schema::{DataType, Field};
 use pyo3::exceptions::{PyKeyError, PyOSError};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyCapsule, PyDict, PyList};
-use sweep::ResultTable;
+use sweep::MemoryTable;
 use sweep_files::{FileKind, cells};
 use sweep_plot::PlotOptions;
 
@@ -20,10 +20,10 @@ use crate::errors;
 
 /// Rows of a result in memory.
 #[pyclass(name = "Result", module = "washer_sweep", frozen)]
-pub(crate) struct PyResultTable(Arc<ResultTable>);
+pub(crate) struct PyResultTable(Arc<MemoryTable>);
 
 impl PyResultTable {
-    pub(crate) fn new(table: ResultTable) -> Self {
+    pub(crate) fn new(table: MemoryTable) -> Self {
         Self(Arc::new(table))
     }
 
@@ -191,6 +191,6 @@ fn append(values: &Bound<'_, PyList>, part: &ArrayRef) -> PyResult<()> {
 /// Reads a result file of any kind.
 #[pyfunction]
 pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<PyResultTable> {
-    let table = py.detach(|| ResultTable::read(&path));
+    let table = py.detach(|| MemoryTable::read(&path));
     table.map(PyResultTable::new).map_err(|error| errors::error(py, &error))
 }

@@ -3,7 +3,7 @@
 
 use sweep_parameter::{Channel as _, Worse};
 
-use crate::store::{Column, Kind};
+use crate::store::{Column, Holds};
 use crate::{Error, Plan, Swept, nearest};
 
 /// What the columns of ratios start with.
@@ -76,7 +76,7 @@ pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
     let mut offered: Vec<(Column, Plan<M>)> = Vec::new();
     for (plan, only) in plans {
         for column in M::layout(&plan).columns {
-            let is_number = matches!(column.kind, Kind::Measured | Kind::Time | Kind::Count);
+            let is_number = matches!(column.kind, Holds::Measured | Holds::Time | Holds::Count);
             let is_asked = only.as_ref().is_none_or(|only| only.contains(&column.name));
             let is_new = offered.iter().all(|(known, _)| known.name != column.name);
             if is_number && column.worse.is_some() && is_asked && is_new {

@@ -1,7 +1,7 @@
 //! One row: the trials along it, the sides that they show, and the trials that it wants next.
 
 use super::net;
-use super::{Edge, EdgeKind, Hint, Net, Question, Side, SideRange, Span, Tried, Want, look};
+use super::{Edge, EdgeKind, Hint, Net, Question, Side, SideRange, Span, Tried, Want, refine};
 
 /// After so many rounds brackets are cut evenly, and after so many looks none is taken any more:
 /// whatever the function does, it ends.
@@ -93,7 +93,7 @@ impl RowSearch {
         }
         if wants.is_empty() && self.looks < PATIENCE {
             self.looks += 1;
-            wants = look::around(&self.samples, span);
+            wants = refine::around(&self.samples, span);
         }
         wants
     }

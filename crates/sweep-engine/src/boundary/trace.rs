@@ -4,7 +4,7 @@
 use super::batch::{LANES, deal, lane_groups};
 use super::pockets::Beside;
 use super::span::{Question, SideRange, Span, Tried};
-use super::warm::{self, HEARD};
+use super::warm_start::{self, HEARD};
 use super::{Neighbour, RowSearch, Search, Traced, TracedRow, Trial, Want};
 
 /// Rows that are worked on at once, in whole curves: bounds memory, and is plenty to fill lanes.
@@ -187,7 +187,7 @@ impl<'a> Block<'a> {
                 let seen = |rank: &usize| neighbour(slots, &self.order, *rank);
                 let [left, right] =
                     heard.each_ref().map(|ranks| ranks.iter().map(seen).collect::<Vec<_>>());
-                let mut row = warm::start(*at, &left, &right, &self.span);
+                let mut row = warm_start::start(*at, &left, &right, &self.span);
                 let of_row = row.wants(&self.span);
                 ready.push(((curve, rank), row, of_row));
             }

@@ -73,13 +73,13 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         });
         show(&format!("{said:#}\n"))?;
     } else {
-        show(&checked.iter().map(|checked| said(args, checked)).collect::<String>())?;
+        show(&checked.iter().map(|checked| format_checked(args, checked)).collect::<String>())?;
     }
     Ok(if holds { Exit::Done } else { Exit::NotHeld })
 }
 
 /// What came of an expression: a line, and the rows that do not keep it.
-fn said(args: &Args, checked: &Checked) -> String {
+fn format_checked(args: &Args, checked: &Checked) -> String {
     let verdict = if checked.holds { "holds" } else { "FAILS" };
     let mut text = format!("{verdict}  {}", checked.expression);
     // Writing to a String cannot fail.

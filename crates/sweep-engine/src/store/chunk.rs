@@ -288,11 +288,11 @@ mod tests {
 
     fn row() -> impl Strategy<Value = Row> {
         let cell = |column: &Column| match &column.kind {
-            crate::store::Kind::Count | crate::store::Kind::Axis => {
+            crate::store::Holds::Count | crate::store::Holds::Axis => {
                 any::<u64>().prop_map(Some).boxed()
             }
-            crate::store::Kind::Flag => prop::option::of(0..2_u64).boxed(),
-            crate::store::Kind::Name(names) => prop::option::of(0..names.len() as u64).boxed(),
+            crate::store::Holds::Flag => prop::option::of(0..2_u64).boxed(),
+            crate::store::Holds::Name(names) => prop::option::of(0..names.len() as u64).boxed(),
             _ => any::<Option<u64>>().boxed(),
         };
         synthetic::layout().columns.iter().map(cell).collect::<Vec<_>>()

@@ -14,8 +14,7 @@ use super::read::{self};
 use super::schema::{self};
 use super::{BATCH_ROWS, Job, OpenRun, ResultRows, Session, StoreError, Tally};
 use sweep_files::batches::of_arrow;
-use sweep_files::panics;
-use sweep_files::{self as files, ParquetFile, Writer, atomic, seal};
+use sweep_files::{self as files, ParquetFile, Writer, atomic, panics, seal};
 
 /// A result file in the making: batches of [`BATCH_ROWS`] rows, the last perhaps of fewer.
 struct MapWriter<'a> {

@@ -17,7 +17,7 @@ use super::plan_file::{Found, PlanFile, pretty, set_aside};
 use super::provenance::{self, Session};
 use super::read::{self, NameCounts, ResultFile, Tally};
 use super::schema::Done;
-use super::shard::{self, Dealing, Shard, ShardRequest};
+use super::shard::{self, Shard, ShardLayout, ShardRequest};
 use super::{Folder, Job, PLAN, SHARDS, TRIALS, chunk_name, chunk_of_name, chunk_points};
 use crate::{Environment, StoreError};
 use sweep_files::panics::lock;
@@ -53,7 +53,7 @@ pub struct OpenRun {
     place: Place,
     points: u64,
     chunk_points: u64,
-    dealt: Option<(Shard, Dealing)>,
+    dealt: Option<(Shard, ShardLayout)>,
     /// This process's chunks that are there; behind a lock because workers look while the writer
     /// adds.
     present: Mutex<BTreeSet<u64>>,
@@ -80,7 +80,7 @@ impl OpenRun {
         let resolve = |frozen| shard::resolve(options.shard, options.environment, frozen);
         let mut dealt = None;
         let shard = || {
-            dealt = resolve(Dealing::read(&folder)?)?;
+            dealt = resolve(ShardLayout::read(&folder)?)?;
             if options.fresh && dealt.is_some() {
                 return Err(StoreError::Refused(format!(
                     "--fresh would delete what the other shards have done\n  = help: delete {} \
@@ -313,7 +313,7 @@ impl OpenRun {
     pub fn incomplete(&self) -> Result<StoreError, StoreError> {
         let chunks = self.chunks();
         let present = self.present();
-        let dealing = Dealing::read(&self.folder)?;
+        let dealing = ShardLayout::read(&self.folder)?;
         Ok(StoreError::Incomplete {
             folder: self.folder.path.clone(),
             missing: chunks - present.len() as u64,

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::error::StoreError;
-use super::{Done, Job, Kind};
+use super::{Done, Holds, Job};
 use sweep_files::{FileKind, ParquetFile, columns, key};
 use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::ratio_limits;
@@ -138,7 +138,7 @@ pub fn failed(by_status: &NameCounts) -> u64 {
 /// Counts rows of a job by status.
 pub(super) fn add_statuses(counts: &mut NameCounts, job: &Job<'_>, points: &[Done]) {
     let Some(column) = job.layout.position("status") else { return };
-    let Kind::Name(names) = &job.layout.columns[column].kind else { return };
+    let Holds::Name(names) = &job.layout.columns[column].kind else { return };
     let rows = points.iter().flat_map(|done| &done.rows);
     let named = rows.filter_map(|row| names.get(row[column]? as usize));
     named.for_each(|name| add(counts, name));

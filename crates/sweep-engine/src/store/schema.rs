@@ -31,7 +31,7 @@ pub const BATCH_ROWS: usize = 1 << 12;
 
 /// What a column's cells are.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum Holds {
     /// A whole number, never null.
     Count,
     /// A whole number, if it is known.
@@ -60,7 +60,7 @@ pub struct Column {
     /// One line.
     pub description: String,
     /// What its cells are.
-    pub kind: Kind,
+    pub kind: Holds,
     /// Which way it is bad, if it is a number that can be.
     pub worse: Option<Worse>,
     /// Up to where it is good, if that has a meaning of its own.
@@ -112,7 +112,7 @@ impl Column {
         name: impl Into<String>,
         unit: &str,
         description: impl Into<String>,
-        kind: Kind,
+        kind: Holds,
     ) -> Self {
         let (name, description) = (name.into(), description.into());
         Self { name, unit: unit.into(), description, kind, worse: None, limit: None }
@@ -121,21 +121,21 @@ impl Column {
     /// The number in a cell, if it is a column of numbers.
     pub fn number(&self, cell: Option<u64>) -> Option<f64> {
         match self.kind {
-            Kind::Count | Kind::KnownCount => cell.map(|count| count as f64),
-            Kind::Measured | Kind::Axis | Kind::Time | Kind::Kept => cell.map(f64::from_bits),
-            Kind::Flag | Kind::Name(_) => None,
+            Holds::Count | Holds::KnownCount => cell.map(|count| count as f64),
+            Holds::Measured | Holds::Axis | Holds::Time | Holds::Kept => cell.map(f64::from_bits),
+            Holds::Flag | Holds::Name(_) => None,
         }
     }
 
     fn field(&self) -> Field {
         let names = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
         let (data_type, nullable) = match self.kind {
-            Kind::Count => (DataType::UInt64, false),
-            Kind::KnownCount => (DataType::UInt64, true),
-            Kind::Axis => (DataType::Float64, false),
-            Kind::Measured | Kind::Time | Kind::Kept => (DataType::Float64, true),
-            Kind::Flag => (DataType::Boolean, true),
-            Kind::Name(_) => (names(), true),
+            Holds::Count => (DataType::UInt64, false),
+            Holds::KnownCount => (DataType::UInt64, true),
+            Holds::Axis => (DataType::Float64, false),
+            Holds::Measured | Holds::Time | Holds::Kept => (DataType::Float64, true),
+            Holds::Flag => (DataType::Boolean, true),
+            Holds::Name(_) => (names(), true),
         };
         self.declared(data_type, nullable)
     }
@@ -156,20 +156,20 @@ impl Column {
     /// The column's array; cells that must be there and are not become zeros.
     fn array(&self, cells: impl Iterator<Item = Option<u64>>) -> Result<ArrayRef, ArrowError> {
         Ok(match &self.kind {
-            Kind::Count => {
+            Holds::Count => {
                 Arc::new(UInt64Array::from_iter_values(cells.map(Option::unwrap_or_default)))
             }
-            Kind::KnownCount => Arc::new(cells.collect::<UInt64Array>()),
-            Kind::Axis => Arc::new(Float64Array::from_iter_values(
+            Holds::KnownCount => Arc::new(cells.collect::<UInt64Array>()),
+            Holds::Axis => Arc::new(Float64Array::from_iter_values(
                 cells.map(|cell| cell.map_or(f64::NAN, f64::from_bits)),
             )),
-            Kind::Measured | Kind::Time | Kind::Kept => {
+            Holds::Measured | Holds::Time | Holds::Kept => {
                 Arc::new(cells.map(|cell| cell.map(f64::from_bits)).collect::<Float64Array>())
             }
-            Kind::Flag => {
+            Holds::Flag => {
                 Arc::new(cells.map(|cell| cell.map(|flag| flag != 0)).collect::<BooleanArray>())
             }
-            Kind::Name(names) => {
+            Holds::Name(names) => {
                 let keys: Int32Array = cells.map(|name| i32::try_from(name?).ok()).collect();
                 let names = StringArray::from_iter_values(names);
                 Arc::new(DictionaryArray::<Int32Type>::try_new(keys, Arc::new(names))?)
@@ -180,10 +180,12 @@ impl Column {
     /// Whether a cell is one of this column.
     pub(super) fn takes(&self, cell: Option<u64>) -> bool {
         match (&self.kind, cell) {
-            (Kind::Count | Kind::Axis, cell) => cell.is_some(),
-            (_, None) | (Kind::KnownCount | Kind::Measured | Kind::Time | Kind::Kept, _) => true,
-            (Kind::Flag, Some(flag)) => flag <= 1,
-            (Kind::Name(names), Some(name)) => name < names.len() as u64,
+            (Holds::Count | Holds::Axis, cell) => cell.is_some(),
+            (_, None) | (Holds::KnownCount | Holds::Measured | Holds::Time | Holds::Kept, _) => {
+                true
+            }
+            (Holds::Flag, Some(flag)) => flag <= 1,
+            (Holds::Name(names), Some(name)) => name < names.len() as u64,
         }
     }
 }
@@ -192,9 +194,9 @@ impl Layout {
     /// Every column, in order.
     fn all(&self) -> impl Iterator<Item = &Column> + Clone {
         static POINT: std::sync::LazyLock<Column> = std::sync::LazyLock::new(|| {
-            Column::new("point", "1", "index in grid order", Kind::Count)
+            Column::new("point", "1", "index in grid order", Holds::Count)
         });
-        let columns = self.columns.iter().filter(|column| column.kind != Kind::Kept);
+        let columns = self.columns.iter().filter(|column| column.kind != Holds::Kept);
         std::iter::once(&*POINT).chain(&self.axes).chain(columns)
     }
 
@@ -224,7 +226,7 @@ pub fn properties(job: &Job<'_>) -> WriterProperties {
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_max_row_group_bytes(None);
     // A dictionary of them would be written and thrown away.
-    let unlike = job.layout.all().filter(|column| column.kind == Kind::Measured);
+    let unlike = job.layout.all().filter(|column| column.kind == Holds::Measured);
     let plain = |builder: WriterPropertiesBuilder, column: &Column| {
         builder.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), false)
     };

@@ -76,14 +76,14 @@ impl FromStr for ShardRequest {
 /// What the first shard froze.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Dealing {
+pub(super) struct ShardLayout {
     /// How many parts.
     pub shards: u64,
     /// The scheduler's number of shard 1.
     pub first_array_id: u64,
 }
 
-impl Dealing {
+impl ShardLayout {
     /// The number of shards of a run folder, if any shard has started. An unreadable file counts as
     /// none: it only says who computes a chunk, never what is in it.
     pub(super) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
@@ -132,8 +132,8 @@ impl Dealing {
 pub(super) fn resolve(
     request: Option<ShardRequest>,
     environment: Environment<'_>,
-    frozen: Option<Dealing>,
-) -> Result<Option<(Shard, Dealing)>, StoreError> {
+    frozen: Option<ShardLayout>,
+) -> Result<Option<(Shard, ShardLayout)>, StoreError> {
     let refuse = |text: String| Err(StoreError::Refused(text));
     let other = |shards: u64, asked: u64, help: String| {
         refuse(format!(
@@ -142,7 +142,7 @@ pub(super) fn resolve(
         ))
     };
     if let Some(ShardRequest::Given(shard)) = request {
-        let dealing = frozen.unwrap_or(Dealing { shards: shard.of, first_array_id: 1 });
+        let dealing = frozen.unwrap_or(ShardLayout { shards: shard.of, first_array_id: 1 });
         let shards = dealing.shards;
         if shards != shard.of {
             let help = format!("I/{shards}, or run it whole without --shard");
@@ -162,11 +162,11 @@ pub(super) fn resolve(
         };
     };
     let dealing = match (frozen, asked.or(scheduler.count)) {
-        (Some(Dealing { shards, .. }), Some(of)) if asked.is_some() && of != shards => {
+        (Some(ShardLayout { shards, .. }), Some(of)) if asked.is_some() && of != shards => {
             return other(shards, of, format!("auto/{shards}"));
         }
         (Some(dealing), _) => dealing,
-        (None, Some(shards)) => Dealing { shards, first_array_id: scheduler.first },
+        (None, Some(shards)) => ShardLayout { shards, first_array_id: scheduler.first },
         (None, None) => {
             return refuse(format!(
                 "{} is set, but not how many shards there are\n  = help: give --shard auto/N, or \
@@ -238,7 +238,7 @@ mod tests {
         move |name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
     }
 
-    fn refusal(result: Result<Option<(Shard, Dealing)>, StoreError>) -> String {
+    fn refusal(result: Result<Option<(Shard, ShardLayout)>, StoreError>) -> String {
         let error = result.unwrap_err();
         assert!(error.is_refusal());
         error.to_string()
@@ -286,7 +286,7 @@ mod tests {
         ]);
         let (shard, dealing) = resolve(None, &zero_based, None).unwrap().unwrap();
         assert_eq!(shard, Shard { index: 3, of: 8 });
-        assert_eq!(dealing, Dealing { shards: 8, first_array_id: 0 });
+        assert_eq!(dealing, ShardLayout { shards: 8, first_array_id: 0 });
     }
 
     #[test]
@@ -296,7 +296,7 @@ mod tests {
             ("SLURM_ARRAY_TASK_MIN", "3"),
             ("SLURM_ARRAY_TASK_COUNT", "2"),
         ]);
-        let frozen = Dealing { shards: 8, first_array_id: 1 };
+        let frozen = ShardLayout { shards: 8, first_array_id: 1 };
         let (shard, dealing) = resolve(None, &resubmitted, Some(frozen)).unwrap().unwrap();
         assert_eq!((shard, dealing), (Shard { index: 7, of: 8 }, frozen));
     }
@@ -325,7 +325,7 @@ mod tests {
 
     #[test]
     fn another_number_of_shards_than_the_frozen_one_is_refused() {
-        let frozen = Some(Dealing { shards: 4, first_array_id: 1 });
+        let frozen = Some(ShardLayout { shards: 4, first_array_id: 1 });
         let given = Some(ShardRequest::Given(Shard { index: 1, of: 8 }));
         assert!(refusal(resolve(given, &environment(&[]), frozen)).contains("into 4 shards"));
         let pod = environment(&[("JOB_COMPLETION_INDEX", "1")]);
@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn a_shard_lacks_something_until_its_last_chunk_is_there() {
-        let dealing = Dealing { shards: 4, first_array_id: 1 };
+        let dealing = ShardLayout { shards: 4, first_array_id: 1 };
         assert_eq!(dealing.incomplete(6, &BTreeSet::new()), [1, 2, 3, 4]);
         assert_eq!(dealing.incomplete(6, &BTreeSet::from([0, 1, 3, 4])), [2, 3]);
         assert!(

@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 use super::open::{self, chunks_there, read_chunk};
 use super::plan_file::{Found, PlanFile};
 use super::read::{NameCounts, add_statuses, failed};
-use super::shard::{self, Dealing};
+use super::shard::{self, ShardLayout};
 use super::{Folder, Holder, Job, Place, Shape, StoreError, chunk_points, lock};
 
 /// How far a run is.
@@ -125,7 +125,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     status.chunks_missing = chunks - status.chunks_done;
     status.state = if status.chunks_missing == 0 { State::Complete } else { State::Unfinished };
     status.running = lock::holders(&folder);
-    if let Some(dealing) = Dealing::read(&folder)? {
+    if let Some(dealing) = ShardLayout::read(&folder)? {
         let running =
             |shard: &u64| status.running.iter().any(|holder| holder.shard == Some(*shard));
         let missing =

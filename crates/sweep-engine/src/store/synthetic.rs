@@ -3,7 +3,7 @@
 use serde_json::json;
 use sweep_files::FileKind;
 
-use super::{Column, Done, Job, Kind, Layout, Row};
+use super::{Column, Done, Holds, Job, Layout, Row};
 
 /// Statuses of rows.
 pub const STATUSES: [&str; 4] = ["ok", "diverged", "step_limit", "linear_diverged"];
@@ -12,21 +12,21 @@ pub const STATUSES: [&str; 4] = ["ok", "diverged", "step_limit", "linear_diverge
 pub fn layout() -> Layout {
     let column =
         |name: &str, unit: &str, kind| Column::new(name, unit, format!("the {name}"), kind);
-    let measured = |name: &str| column(name, "m", Kind::Measured);
+    let measured = |name: &str| column(name, "m", Holds::Measured);
     Layout {
-        axes: vec![column("mass_kg", "kg", Kind::Axis), column("damping", "N s/m", Kind::Axis)],
+        axes: vec![column("mass_kg", "kg", Holds::Axis), column("damping", "N s/m", Holds::Axis)],
         columns: vec![
             measured("nonlinear_a"),
             measured("linear_a"),
-            column("ratio_max", "1", Kind::Measured),
-            column("reliable", "", Kind::Flag),
-            column("sensitive", "", Kind::Flag),
-            column("method", "", Kind::Name(vec!["rk4", "dopri5"])),
-            column("error", "1", Kind::Measured),
-            column("converged", "", Kind::Flag),
-            column("status", "", Kind::Name(STATUSES.to_vec())),
-            column("fail_time_s", "s", Kind::Time),
-            column("steps", "1", Kind::Count),
+            column("ratio_max", "1", Holds::Measured),
+            column("reliable", "", Holds::Flag),
+            column("sensitive", "", Holds::Flag),
+            column("method", "", Holds::Name(vec!["rk4", "dopri5"])),
+            column("error", "1", Holds::Measured),
+            column("converged", "", Holds::Flag),
+            column("status", "", Holds::Name(STATUSES.to_vec())),
+            column("fail_time_s", "s", Holds::Time),
+            column("steps", "1", Holds::Count),
         ],
         kind: FileKind::Map,
         rows_a_point: 1,

@@ -3,7 +3,6 @@
 
 use std::path::Path;
 
-use crate::PlotOptions;
 use crate::axis::extremes;
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, NONLINEAR};
@@ -15,7 +14,7 @@ use crate::figures::{passages, trace};
 use crate::label::{self, Label};
 use crate::read::{ColumnFacts, Source};
 use crate::scene::{Colour, INK};
-use crate::together;
+use crate::{PlotOptions, together};
 
 /// Kinds of motions as the file has them, in words, and their colours; the last is what did not
 /// settle.

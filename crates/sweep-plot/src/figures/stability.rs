@@ -52,7 +52,8 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart> {
     let differs = |k: usize| shown.iter().any(|point| point[k] != shown[0][k]);
     let name = |point: &[f64]| {
         let named = axes.iter().zip(point).enumerate().filter(|(k, _)| differs(*k));
-        let named: Vec<String> = named.map(|(_, (axis, value))| said(axis, *value)).collect();
+        let named: Vec<String> =
+            named.map(|(_, (axis, value))| format_value(axis, *value)).collect();
         if named.is_empty() { "growth".to_owned() } else { named.join(", ") }
     };
     let series = swept.iter().zip(shown).enumerate().map(|(k, (point, values))| {
@@ -60,7 +61,7 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart> {
         Series::new(name(values), DISTINCT[k], x, y, Style::Solid(2.2))
     });
     let common = axes.iter().zip(&shown[0]).enumerate().filter(|(k, _)| !differs(*k));
-    let mut notes = source.notes(common.map(|(_, (axis, value))| said_within(axis, *value)));
+    let mut notes = source.notes(common.map(|(_, (axis, value))| format_within(axis, *value)));
     if shown.len() < count {
         notes.push(format!("{} of {count} points", shown.len()));
     }
@@ -219,12 +220,12 @@ pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable> {
     })
 }
 
-fn said(axis: &ColumnFacts, value: f64) -> String {
+fn format_value(axis: &ColumnFacts, value: f64) -> String {
     label::valued(&label::words(&axis.name), value, &axis.unit)
 }
 
 /// As [`said`], within a sentence: the words are small, the unit keeps its letters.
-fn said_within(axis: &ColumnFacts, value: f64) -> String {
+fn format_within(axis: &ColumnFacts, value: f64) -> String {
     label::valued(&label::words(&axis.name).to_lowercase(), value, &axis.unit)
 }
 
@@ -314,7 +315,7 @@ impl<'a> Held<'a> {
     /// The run and the first point, in words.
     pub(super) fn notes(&self) -> Vec<String> {
         let values = self.axes.iter().zip(&self.points[0]);
-        self.source.notes(values.map(|(axis, value)| said_within(axis, *value)))
+        self.source.notes(values.map(|(axis, value)| format_within(axis, *value)))
     }
 
     /// The points' rows, each with the place of its point.

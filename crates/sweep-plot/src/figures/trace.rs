@@ -44,7 +44,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
     let names = match &other {
         Some(other) => told_apart(table, other),
-        None => sides.map(said_of),
+        None => sides.map(format_side),
     };
     // The second curve lies in front; where it hides the first one, this must shine through.
     let front = other.as_ref().unwrap_or(table);
@@ -137,7 +137,7 @@ fn sides(table: &Table) -> [&'static str; 2] {
 }
 
 /// A side in the legend.
-fn said_of(side: &str) -> String {
+fn format_side(side: &str) -> String {
     if MODELS.contains(&side) { format!("{side} model") } else { side.to_owned() }
 }
 

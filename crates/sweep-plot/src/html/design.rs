@@ -6,8 +6,7 @@ use super::{CHART, CORE, DESIGN, START, chart_json, computing, curve, embed, pag
 use crate::figures::{histogram, influence, matrix};
 use crate::frame::HEADING_HEIGHT;
 use crate::scatter::{Scatter, Side};
-use crate::svg;
-use crate::{PlotOptions, View};
+use crate::{PlotOptions, View, svg};
 
 /// The page, which opens with the view that the options name.
 pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions) -> String {

@@ -7,7 +7,7 @@ use sweep_files::{ParquetFile, dotted, key, leaves};
 /// One place where the plans of two files part.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanChange {
-    /// Dotted path: `machine.tub.mass_kg`.
+    /// Dotted path: `machine.body.mass_kg`.
     pub path: String,
     /// Value in the first file; null if it has none there.
     pub first: Value,

@@ -84,12 +84,12 @@ fn numbers_that_came_or_went_changed_by_more_than_any_measure() {
 #[test]
 fn what_was_set_otherwise_is_named() {
     let mut plan = sample::plan();
-    plan["machine"]["tub"]["mass_kg"] = json!(20.0);
-    plan["set"] = json!({ "tub_mass_kg": 20.0 });
+    plan["machine"]["body"]["mass_kg"] = json!(20.0);
+    plan["set"] = json!({ "body_mass_kg": 20.0 });
     let second = file(sample::map(&RATIOS), &[(key::PLAN, plan)]);
     let found = compare(&map(&RATIOS), &second).unwrap();
     let paths: Vec<&str> = found.plan.iter().map(|change| change.path.as_str()).collect();
-    assert_eq!(paths, ["machine.tub.mass_kg", "set"]);
+    assert_eq!(paths, ["machine.body.mass_kg", "set"]);
     assert_eq!((&found.plan[0].first, &found.plan[0].second), (&json!(24.0), &json!(20.0)));
 }
 
@@ -111,20 +111,20 @@ fn maps_of_other_grids_compare_where_they_meet() {
 fn an_axis_that_one_file_lacks_is_left_out_if_it_has_one_value() {
     let with_spin = |values: &[f64]| {
         let mut plan = sample::plan();
-        plan["axis"].as_array_mut().unwrap().push(json!({ "parameter": "spin_peak_rpm" }));
+        plan["axis"].as_array_mut().unwrap().push(json!({ "parameter": "forcing_rad_per_s" }));
         let mut columns = sample::map(&RATIOS);
         let values: Vec<_> = values.iter().copied().map(Some).collect();
-        columns.insert(3, ("spin_peak_rpm", "rpm", numbers(&values)));
+        columns.insert(3, ("forcing_rad_per_s", "rad/s", numbers(&values)));
         file(columns, &[(key::PLAN, plan)])
     };
     let found = compare(&map(&RATIOS), &with_spin(&[350.0; 6])).unwrap();
-    assert_eq!(found.fixed, [(1, "spin_peak_rpm".to_owned(), 350.0)]);
+    assert_eq!(found.fixed, [(1, "forcing_rad_per_s".to_owned(), 350.0)]);
     assert_eq!(found.shared.len(), 6);
     let two = with_spin(&[300.0, 300.0, 300.0, 350.0, 350.0, 350.0]);
     let refused = compare(&map(&RATIOS), &two).unwrap_err();
     assert!(matches!(refused, ResultsError::Refused(_)));
     assert!(
-        refused.to_string().contains("only the second has the axis `spin_peak_rpm`"),
+        refused.to_string().contains("only the second has the axis `forcing_rad_per_s`"),
         "{refused}"
     );
 }

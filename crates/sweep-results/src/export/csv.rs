@@ -2,10 +2,9 @@
 
 use std::fmt::Write as _;
 
-use sweep_files::{EXPORTED_CSV, FileError, key};
+use sweep_files::{Cell, EXPORTED_CSV, FileError, ResultTable, key};
 
 use super::names;
-use sweep_files::{Cell, ResultTable};
 
 /// Bytes of text that are written at once, at least.
 const AT_ONCE: usize = 1 << 16;

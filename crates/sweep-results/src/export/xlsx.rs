@@ -4,11 +4,10 @@ use rust_xlsxwriter::{
     DocProperties, ExcelDateTime, Format as Style, Workbook, Worksheet, XlsxError,
 };
 use serde_json::Value;
-use sweep_files::{dotted, key, leaves};
+use sweep_files::{Cell, Column, ResultTable, dotted, key, leaves};
 
 use super::{Format, names, no_room};
 use crate::error::{Result, ResultsError};
-use sweep_files::{Cell, Column, ResultTable};
 
 /// Rows of a sheet, less the two of headings.
 const MOST_ROWS: u64 = (1 << 20) - 2;
@@ -217,7 +216,7 @@ mod tests {
         let mut leaves = Vec::new();
         collect(&sample::plan(), &mut leaves);
         let paths: Vec<&str> = leaves.iter().map(|(path, _)| path.as_str()).collect();
-        assert!(paths.contains(&"machine.tub.mass_kg"), "{paths:?}");
+        assert!(paths.contains(&"machine.body.mass_kg"), "{paths:?}");
         assert!(paths.contains(&"axis.1.values"), "{paths:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Which columns there are, in which order, and what they say.
 
 use arrow_array::Float64Array;
-use sweep_engine::store::{Kind as Cells, ResultRows};
+use sweep_engine::store::{Holds, ResultRows};
 use washer_row::{Criterion, Status};
 
 use super::*;
@@ -14,7 +14,7 @@ fn columns(measures: &Measures) -> Columns {
 
 fn layout(measures: Measures) -> Layout {
     let axis =
-        |name: &str, unit: &str| Column::new(name, unit, format!("swept {name}"), Cells::Axis);
+        |name: &str, unit: &str| Column::new(name, unit, format!("swept {name}"), Holds::Axis);
     let axes = vec![axis("unbalance_mass_kg", "kg"), axis("damping_n_s_per_m", "N s/m")];
     Layout::of_map(axes, columns(&measures).declared())
 }

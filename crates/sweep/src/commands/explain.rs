@@ -1,6 +1,6 @@
 //! `sweep explain GRID.toml --at NAME=VALUE`: why the linear model fails at a point.
 
-use crate::explain::{explain, json, words};
+use crate::explain::{explain, format, json};
 use crate::speeds::{Speeds, turning};
 use sweep_engine::commands::grid::GridArgs;
 use sweep_engine::{EffortArgs, Error, Exit, Interrupt, show};
@@ -41,5 +41,5 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     if args.json {
         return show(&format!("{:#}\n", json::of(&found)));
     }
-    show(&words::of(&found))
+    show(&format::of(&found))
 }

@@ -17,7 +17,7 @@ use crate::method::Integrator;
 use arrow_schema::Schema;
 use sweep_engine::columns::declared;
 use sweep_engine::method::{Integrator as _, default_method};
-use sweep_engine::store::{Column, Kind, Layout};
+use sweep_engine::store::{Column, Holds, Layout};
 use sweep_files::key;
 
 /// The head of a page, which says that it is generated.
@@ -130,7 +130,7 @@ fn columns() -> String {
         .into_iter()
         .filter(|parameter| ["unbalance_mass_kg", "damping_n_s_per_m"].contains(&parameter.name()))
         .map(|parameter| {
-            Column::new(parameter.name(), parameter.unit(), parameter.description(), Kind::Axis)
+            Column::new(parameter.name(), parameter.unit(), parameter.description(), Holds::Axis)
         })
         .collect();
     let metrics = Metric::ALL.to_vec();

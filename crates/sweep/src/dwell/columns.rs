@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sweep_engine::columns::{MODELS, ResultColumn};
-use sweep_engine::store::{Done, Kind};
+use sweep_engine::store::{Done, Holds};
 use washer_model::{COORDINATES, Channel, Ending, Endings, Response, STATE_LEN, Settled, State};
 use washer_row::{Measured, Measures, Status};
 
@@ -94,7 +94,7 @@ impl RowOf {
 
 /// Counts, null where they are not known.
 fn counts(name: &str, text: &str, of: fn(&RowOf) -> Option<u64>) -> DwellColumn {
-    ResultColumn::new(name, "1", text, Kind::KnownCount, of)
+    ResultColumn::new(name, "1", text, Holds::KnownCount, of)
 }
 
 /// Numbers of both models' motions at each channel.
@@ -134,7 +134,7 @@ pub(crate) fn columns(
     let motion = |row: &RowOf| Some(row.motion as u64);
     let text = "number of the motion at this speed: 0 is the one that the disturbed periodic \
                 response ends in";
-    let mut columns = vec![ResultColumn::new("motion", "1", text, Kind::Count, motion)];
+    let mut columns = vec![ResultColumn::new("motion", "1", text, Holds::Count, motion)];
     columns.push(counts("starts", "how many starts ended in it", |row| {
         Some(u64::from(row.motion()?.starts))
     }));
@@ -221,7 +221,7 @@ pub(crate) fn columns(
 pub(super) fn carried() -> impl Iterator<Item = DwellColumn> {
     let of = |i: usize| move |row: &RowOf| Some(last_state(row.found()?)?[i].to_bits());
     (0..STATE_LEN)
-        .map(move |i| ResultColumn::new(format!("carried_{i}"), "", "", Kind::Kept, of(i)))
+        .map(move |i| ResultColumn::new(format!("carried_{i}"), "", "", Holds::Kept, of(i)))
 }
 
 /// The state that a row was kept with.

@@ -19,7 +19,7 @@ use super::speed::Smoothed;
 use crate::engine::reference_step_s;
 use crate::plan::{Plan, ready};
 use sweep_engine::plan::WrittenIn;
-use sweep_engine::threads::Stop;
+use sweep_engine::threads::Cancel;
 
 /// Neighbours are this share of a number away from it.
 const NEAR: f64 = 1e-5;
@@ -93,7 +93,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) method: Method,
     pub(crate) simd: Simd,
     /// Ends the work early; what comes then means nothing.
-    pub(crate) stop: Stop<'a>,
+    pub(crate) stop: Cancel<'a>,
 }
 
 /// A machine, its spin, and the shift of the clock that it is seen by (s).

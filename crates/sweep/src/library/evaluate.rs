@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::Effort;
 use super::points::PointTable;
-use super::result::ResultTable;
+use super::result::MemoryTable;
 use super::run::Task;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
@@ -46,7 +46,7 @@ impl Evaluator {
     /// # Errors
     /// Columns or values that do not fit the plan's axes; no threads; `SWEEP_SIMD` naming nothing
     /// this machine has.
-    pub fn evaluate(&self, table: &PointTable, effort: Effort<'_>) -> Result<ResultTable, Error> {
+    pub fn evaluate(&self, table: &PointTable, effort: Effort<'_>) -> Result<MemoryTable, Error> {
         let points = table.on(&self.plan)?;
         let mut job = Job::of(&self.plan);
         job.points = table.rows() as u64;
@@ -77,7 +77,7 @@ impl Task<'_> {
     ///
     /// # Errors
     /// No threads, and a panic of the engine.
-    pub fn in_memory(&self, effort: Effort<'_>) -> Result<ResultTable, Error> {
+    pub fn in_memory(&self, effort: Effort<'_>) -> Result<MemoryTable, Error> {
         let Self { job, engine } = self;
         let pool = threads::pool(effort.threads()?)?;
         let watch = Watch::new(effort.interrupt);
@@ -103,7 +103,7 @@ impl Task<'_> {
         })?;
         let is_whole = watch.points_done() == job.points;
         let batches = gathered.into_batches().map_err(|error| defect(error.to_string()))?;
-        Ok(ResultTable::of_rows(job, batches, is_whole))
+        Ok(MemoryTable::of_rows(job, batches, is_whole))
     }
 }
 

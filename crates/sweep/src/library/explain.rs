@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::{Effort, refused_speeds};
 use crate::config::GridInput;
-use crate::explain::{explain, json, words};
+use crate::explain::{explain, format, json};
 use crate::speeds::Speeds;
 use sweep_engine::Error;
 
@@ -43,7 +43,7 @@ pub fn explain_point(
     if effort.interrupt.stopped() {
         return Ok(None);
     }
-    Ok(Some(Explained { found: json::of(&found), text: words::of(&found) }))
+    Ok(Some(Explained { found: json::of(&found), text: format::of(&found) }))
 }
 
 #[cfg(test)]

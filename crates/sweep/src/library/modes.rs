@@ -7,7 +7,7 @@ use washer_model::{
 };
 
 use super::check_speeds;
-use super::result::ResultTable;
+use super::result::MemoryTable;
 use crate::config::{self, Diagnostics, GridInput};
 use crate::model::Washer;
 use crate::plan::{friction_speeds, ready, timing};
@@ -24,11 +24,11 @@ pub fn find_modes(
     at: &[String],
     speeds_rpm: &[f64],
     interrupt: &Interrupt,
-) -> Result<Option<ResultTable>, Error> {
+) -> Result<Option<MemoryTable>, Error> {
     check_speeds(speeds_rpm, 2, |speed| speed >= 0.0, ", 0 or greater")?;
     let asked = Asked::of(grid, at, speeds_rpm[speeds_rpm.len() - 1])?;
     let analysis = Analysis::new(&asked, speeds_rpm, false, &|| interrupt.stopped())?;
-    let table = |analysis: Analysis| ResultTable::of_table(FileKind::Modes, analysis.table(&asked));
+    let table = |analysis: Analysis| MemoryTable::of_table(FileKind::Modes, analysis.table(&asked));
     analysis.map(table).transpose()
 }
 

@@ -14,7 +14,7 @@ use sweep_plot::{PlotOptions, render};
 
 /// A result with its rows in memory.
 #[derive(Debug)]
-pub struct ResultTable {
+pub struct MemoryTable {
     kind: FileKind<'static>,
     plan: Value,
     schema: SchemaRef,
@@ -31,7 +31,7 @@ enum FileContent {
     Rows { points: u64, layout: Box<Layout>, is_whole: bool },
 }
 
-impl ResultTable {
+impl MemoryTable {
     /// The rows of a run, or of one at constant speeds.
     pub(super) fn of_rows(job: &Job<'_>, batches: Vec<RecordBatch>, is_whole: bool) -> Self {
         let (plan, layout) = (job.plan.clone(), Box::new(job.layout.clone()));

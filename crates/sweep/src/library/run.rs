@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Effort;
-use super::result::ResultTable;
+use super::result::MemoryTable;
 use sweep_engine::run::{Ended, RunOptions};
 use sweep_engine::{Engine, Error, Job, run as runner};
 
@@ -11,7 +11,7 @@ use sweep_engine::{Engine, Error, Job, run as runner};
 #[derive(Debug)]
 pub enum RanToFile {
     /// The file is in place; these are its rows.
-    Whole(ResultTable),
+    Whole(MemoryTable),
     /// The interrupt was raised. What is done is kept, and the same call goes on.
     Interrupted {
         /// Rows that are there.
@@ -51,7 +51,7 @@ impl Task<'_> {
         let report = runner::run(&*self.engine, &self.job, output, options, effort.interrupt)?;
         report.notes.iter().for_each(|note| tell(note));
         Ok(match report.ended {
-            Ended::Already(..) | Ended::Finished(_) => RanToFile::Whole(ResultTable::read(output)?),
+            Ended::Already(..) | Ended::Finished(_) => RanToFile::Whole(MemoryTable::read(output)?),
             Ended::Interrupted { kept, points, .. } => RanToFile::Interrupted { kept, points },
             // Only what a scheduler's variables say makes a shard of a run.
             Ended::Shard(..) => RanToFile::Interrupted { kept: 0, points: self.job.points },

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Effort;
-use super::result::ResultTable;
+use super::result::MemoryTable;
 use crate::model::Washer;
 use crate::plan::Plan;
 pub use sweep_engine::boundary::BoundaryOptions;
@@ -28,7 +28,7 @@ pub fn find_boundary(
     output: Option<&Path>,
     fresh: bool,
     effort: Effort<'_>,
-) -> Result<Option<ResultTable>, Error> {
+) -> Result<Option<MemoryTable>, Error> {
     if !(1..=1000).contains(&options.lattice) {
         return Err(Error::option("lattice", options.lattice, "from 1 to 1000"));
     }
@@ -49,7 +49,7 @@ pub fn optimise_study(
     output: Option<&Path>,
     fresh: bool,
     effort: Effort<'_>,
-) -> Result<Option<ResultTable>, Error> {
+) -> Result<Option<MemoryTable>, Error> {
     let study = Study::<Washer>::load(path, sets)?;
     let search = |trials| search(&study, trials, effort);
     found((&study.job(), FileKind::Optimise), (output, fresh), search, |tried| {
@@ -63,16 +63,16 @@ fn found<T>(
     (output, fresh): (Option<&Path>, bool),
     search: impl FnOnce(Option<Trials>) -> Result<(Option<T>, Option<Trials>), Error>,
     table: impl FnOnce(&T) -> Table,
-) -> Result<Option<ResultTable>, Error> {
+) -> Result<Option<MemoryTable>, Error> {
     let file = output.map(|path| Output::begin(path, kind)).transpose()?;
     let trials = match output.map(|path| Trials::open(path, job, fresh)).transpose()? {
-        Some(Opened::Finished(())) => return output.map(ResultTable::read).transpose(),
+        Some(Opened::Finished(())) => return output.map(MemoryTable::read).transpose(),
         Some(Opened::Open(trials)) => Some(trials),
         None => None,
     };
     let (found, trials) = search(trials)?;
     let Some(found) = found else { return Ok(None) };
-    let found = ResultTable::of_table(kind, table(&found))?;
+    let found = MemoryTable::of_table(kind, table(&found))?;
     if let Some(file) = file {
         found.finish(file)?;
     }

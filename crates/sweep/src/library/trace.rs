@@ -2,7 +2,7 @@
 
 use clap::ValueEnum as _;
 
-use super::result::ResultTable;
+use super::result::MemoryTable;
 use crate::config::GridInput;
 use crate::trace::{self, Extras, Models, View, every, start_of, start_value};
 use sweep_engine::{Error, Interrupt};
@@ -35,7 +35,7 @@ pub fn trace_point(
     at: &[String],
     options: &TraceOptions,
     interrupt: &Interrupt,
-) -> Result<Option<(ResultTable, Vec<String>)>, Error> {
+) -> Result<Option<(MemoryTable, Vec<String>)>, Error> {
     let (plan, at) = match options.all {
         true => (grid.clone().fixing(at).load()?, None),
         false => grid.load_point(at).map(|(plan, at)| (plan, Some(at)))?,
@@ -58,7 +58,7 @@ pub fn trace_point(
     if interrupt.stopped() {
         return Ok(None);
     }
-    Ok(Some((ResultTable::of_table(FileKind::Trace, trace.table)?, trace.failures)))
+    Ok(Some((MemoryTable::of_table(FileKind::Trace, trace.table)?, trace.failures)))
 }
 
 #[cfg(test)]

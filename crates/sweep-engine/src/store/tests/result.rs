@@ -119,7 +119,7 @@ fn a_finished_output_is_left_alone() {
 
     // A build with further columns for the same plan does not take it for its own.
     let mut with = synthetic::job(POINTS);
-    with.layout.columns.push(Column::new("further_n", "N", "a further one", Kind::Measured));
+    with.layout.columns.push(Column::new("further_n", "N", "a further one", Holds::Measured));
     let error = OpenRun::open(&home.output(), &with, options()).unwrap_err();
     assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.is_refusal(), "{error}");
     assert!(error.to_string().contains("further_n"), "{error}");
