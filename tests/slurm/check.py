@@ -1,12 +1,13 @@
 """A sweep on a real Slurm cluster: an array over two nodes, a task killed, a node killed, the
 controller killed.
 
-usage: check.py SWEEP_BINARY
+usage: check.py SWEEP_BINARY [--tasks N] [SCENARIO ...]
 
 Each time the merged file must be the single machine's, byte for byte. Needs root, slurm-wlm and
 munge; run.sh sees to that.
 """
 
+import argparse
 import json
 import os
 import signal
@@ -19,9 +20,7 @@ from pathlib import Path
 import cluster
 from cluster import Cluster
 
-SHARDS = 8
-
-# Sixteen chunks of eight points, two for each shard, each some tenths of a second of work.
+# Chunks of eight points, two for each task, each some tenths of a second of work.
 GRID = """
 name = "array"
 machine = "paper"
@@ -41,7 +40,7 @@ step_s = 1e-5
 
 [[axis]]
 parameter = "unbalance_mass_kg"
-range = { from = 0.05, to = 1.0, count = 16 }
+range = { from = 0.05, to = 1.0, count = CHUNKS }
 
 [[axis]]
 parameter = "damping_n_s_per_m"
@@ -56,10 +55,10 @@ channels = ["tub_front_y", "drum_front_z", "tub_yaw"]
 class Sweep:
     """One grid in a folder of its own, on the cluster."""
 
-    def __init__(self, slurm: Cluster, binary: Path, folder: Path):
-        self.slurm, self.binary, self.folder = slurm, binary, folder
+    def __init__(self, slurm: Cluster, binary: Path, folder: Path, shards: int):
+        self.slurm, self.binary, self.folder, self.shards = slurm, binary, folder, shards
         folder.mkdir()
-        (folder / "array.toml").write_text(GRID)
+        (folder / "array.toml").write_text(GRID.replace("CHUNKS", str(2 * shards)))
         self.result = folder / "results/array.parquet"
         self.partial = folder / "results/array.parquet.partial"
 
@@ -79,7 +78,7 @@ class Sweep:
     def script(self) -> Path:
         script = self.folder / "submit.sh"
         text = self.sweep(
-            "slurm", "array.toml", "--shards", str(SHARDS), "--time", "10", "--mem", "200M"
+            "slurm", "array.toml", "--shards", str(self.shards), "--time", "10", "--mem", "200M"
         ).stdout
         script.write_text(text)
         return script
@@ -97,7 +96,7 @@ class Sweep:
         found = []
 
         def look():
-            for shard in range(1, SHARDS + 1):
+            for shard in range(1, self.shards + 1):
                 pid = self.process(str(shard)) if self.chunks(shard) == 1 else None
                 if pid:
                     os.kill(pid, signal.SIGSTOP)
@@ -111,7 +110,7 @@ class Sweep:
         return found[0]
 
     def chunks(self, shard: int) -> int:
-        own = (self.partial / f"chunk-{chunk:08}.bin" for chunk in range(shard - 1, 16, SHARDS))
+        own = (self.partial / f"chunk-{chunk:08}.bin" for chunk in range(shard - 1, 2 * self.shards, self.shards))
         return sum(chunk.exists() for chunk in own)
 
     def process(self, task: str) -> int | None:
@@ -147,9 +146,8 @@ def array_over_two_nodes(sweep: Sweep, expected: bytes):
     sweep.slurm.wait_for("merge", watch, 90, lambda: sweep.slurm.tasks(sweep.array))
     assert nodes == {"n1", "n2"}, nodes
     sessions = json.loads((sweep.folder / "results/array.run.json").read_text())["sessions"]
-    assert sorted(session["shard"] for session in sessions) == [
-        f"{i}/{SHARDS}" for i in range(1, SHARDS + 1)
-    ]
+    shards = {f"{i}/{sweep.shards}" for i in range(1, sweep.shards + 1)}
+    assert len(sessions) == sweep.shards and {session["shard"] for session in sessions} == shards
     assert {session["threads"] for session in sessions} == {
         1
     }, "threads are the cores that Slurm gave"
@@ -163,7 +161,7 @@ def plain_array_numbered_from_zero(sweep: Sweep, expected: bytes):
     job = sweep.slurm.ask(
         "sbatch",
         "--parsable",
-        f"--array=0-{SHARDS - 1}",
+        f"--array=0-{sweep.shards - 1}",
         "--open-mode=append",
         wrap,
         cwd=sweep.folder,
@@ -172,7 +170,7 @@ def plain_array_numbered_from_zero(sweep: Sweep, expected: bytes):
     sweep.slurm.ask("scancel", "--state=PENDING", job)
     sweep.slurm.wait_for_job(job, 60)
     status = sweep.status()
-    assert status["shards"] == SHARDS and status["missing_shards"], status
+    assert status["shards"] == sweep.shards and status["missing_shards"], status
     refused = sweep.sweep("merge", "array.toml", code=1).stderr
     assert "is incomplete" in refused and "of shards" in refused, refused
     again = sweep.slurm.ask(
@@ -191,9 +189,10 @@ def task_killed(sweep: Sweep, expected: bytes):
     states = sweep.slurm.wait_for_job(sweep.array, 90)
     assert states.pop(task) == "FAILED" and set(states.values()) == {"COMPLETED"}, states
     # The merge came, found the hole and said so.
-    assert sweep.slurm.wait_for_job(merge, 30) == {"N/A": "FAILED"}
+    ended = sweep.slurm.wait_for_job(merge, 30)
+    assert ended == {"N/A": "FAILED"}, (ended, sweep.logs()[-3000:])
     log = (sweep.folder / f"results/array.slurm-merge-{merge}.log").read_text()
-    assert f"1 of 16 chunks are missing, of shards {task}" in log, log
+    assert f"1 of {2 * sweep.shards} chunks are missing, of shards {task}" in log, log
     status = sweep.status()
     assert status["missing_shards"] == task and status["chunks_missing"] == 1, status
     _, merge = sweep.submit(f"--array={status['missing_shards']}")
@@ -275,12 +274,12 @@ SCENARIOS = [
 ]
 
 
-def main(binary: Path, names: list[str]):
+def main(binary: Path, shards: int, names: list[str]):
     with tempfile.TemporaryDirectory(prefix="sweep-slurm-") as home:
         home = Path(home)
         (home / "cluster").mkdir()
-        with Cluster(home / "cluster") as slurm:
-            alone = Sweep(slurm, binary, home / "alone")
+        with Cluster(home / "cluster", patience=shards / 8) as slurm:
+            alone = Sweep(slurm, binary, home / "alone", shards)
             began = time.monotonic()
             alone.sweep("run", "array.toml", "--progress", "none")
             expected = alone.result.read_bytes()
@@ -289,7 +288,7 @@ def main(binary: Path, names: list[str]):
                 if names and scenario.__name__ not in names:
                     continue
                 began = time.monotonic()
-                scenario(Sweep(slurm, binary, home / scenario.__name__), expected)
+                scenario(Sweep(slurm, binary, home / scenario.__name__, shards), expected)
                 print(
                     f"{scenario.__name__}: {time.monotonic() - began:.0f} s, the same bytes",
                     flush=True,
@@ -297,4 +296,9 @@ def main(binary: Path, names: list[str]):
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]).resolve(), sys.argv[2:])
+    parser = argparse.ArgumentParser()
+    parser.add_argument("binary", type=Path)
+    parser.add_argument("--tasks", type=int, default=8)
+    parser.add_argument("scenarios", nargs="*")
+    asked = parser.parse_intermixed_args()
+    main(asked.binary.resolve(), asked.tasks, asked.scenarios)

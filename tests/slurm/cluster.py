@@ -12,8 +12,10 @@ from pathlib import Path
 
 
 class Cluster:
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, patience: float):
         self.folder = folder
+        # How many times the usual seconds it is waited.
+        self.patience = patience
         self.munge = folder / "munge"
         self.processes: dict[str, subprocess.Popen] = {}
         self.environment = {
@@ -171,10 +173,10 @@ class Cluster:
         )
 
     def wait_for(self, what, condition, seconds, show=lambda: ""):
-        until = time.monotonic() + seconds
+        until = time.monotonic() + self.patience * seconds
         while not condition():
             if time.monotonic() > until:
-                raise AssertionError(f"no {what} after {seconds} s {show()}\n{self.logs()}")
+                raise AssertionError(f"no {what} after {self.patience * seconds} s {show()}\n{self.logs()}")
             time.sleep(0.05)
 
     def logs(self) -> str:

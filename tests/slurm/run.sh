@@ -1,6 +1,6 @@
 #!/bin/sh
 # A sweep on a real Slurm cluster of two virtual nodes on this host:
-# tests/slurm/run.sh [SCENARIO ...]
+# tests/slurm/run.sh [--tasks N] [SCENARIO ...]
 #
 # Debian's slurm-wlm and munge, without systemd; installed here where they are missing. The daemons
 # need root. SWEEP names another binary than the release build.
