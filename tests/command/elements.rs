@@ -312,3 +312,12 @@ fn growth_with_friction_ends_where_a_boundary_says() {
         assert_eq!(growth_per_s > 0.0, grows, "{growth_per_s} /s at {friction_n} N");
     }
 }
+
+#[test]
+fn a_machine_that_rests_on_a_stop_is_told_before_it_runs() {
+    let home = home(&example());
+    let told = |clearance: &str| said(&home.sweep(&["check", "g.toml", "--set", clearance]));
+    assert!(!told("stop_3_clearance_m=0.04").contains("at rest"));
+    let text = told("stop_3_clearance_m=0.005");
+    assert!(text.contains("stop 3 carries ") && text.contains(" N at rest"), "{text}");
+}

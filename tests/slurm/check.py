@@ -110,8 +110,8 @@ class Sweep:
         return found[0]
 
     def chunks(self, shard: int) -> int:
-        own = (self.partial / f"chunk-{chunk:08}.bin" for chunk in range(shard - 1, 2 * self.shards, self.shards))
-        return sum(chunk.exists() for chunk in own)
+        own = (shard - 1, shard - 1 + self.shards)
+        return sum((self.partial / f"chunk-{chunk:08}.bin").exists() for chunk in own)
 
     def process(self, task: str) -> int | None:
         """The sweep of a task, if it is at work."""

@@ -173,10 +173,11 @@ class Cluster:
         )
 
     def wait_for(self, what, condition, seconds, show=lambda: ""):
-        until = time.monotonic() + self.patience * seconds
+        seconds = self.patience * seconds
+        until = time.monotonic() + seconds
         while not condition():
             if time.monotonic() > until:
-                raise AssertionError(f"no {what} after {self.patience * seconds} s {show()}\n{self.logs()}")
+                raise AssertionError(f"no {what} after {seconds} s {show()}\n{self.logs()}")
             time.sleep(0.05)
 
     def logs(self) -> str:

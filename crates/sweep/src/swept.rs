@@ -7,7 +7,25 @@ use washer_row::{Criterion, Demand, Metric};
 use crate::config::grid::lacking;
 use crate::engine::ModelEngine;
 use crate::model::Washer;
-use crate::plan::Plan;
+use crate::plan::{Plan, ready, timing};
+
+/// A stop that carries more than this share of the machine's weight at rest is told.
+const RESTS_FROM: f64 = 0.01;
+
+/// The stop that the machine of the first point rests on most, if it rests on one.
+fn resting_on(plan: &Plan) -> Option<String> {
+    let Washer { machine, spin, .. } = plan.scenario(0).model;
+    let point = ready(machine, spin, &timing(plan)).ok()?;
+    let pushes_n = point.stops_at_rest_n().into_iter().map(f64::abs).zip(1..);
+    let (push_n, stop) = pushes_n.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (push_n > RESTS_FROM * point.weight_n()).then(|| {
+        let [push_n, weight_n] = [push_n, point.weight_n()].map(f64::round);
+        format!(
+            "stop {stop} carries {push_n} of {weight_n} N at rest: both models have it closed, and \
+             `clearance_m` counts from where the springs carry nothing"
+        )
+    })
+}
 
 impl Swept for Washer {
     fn engine<'a>(plan: &'a Plan, only: Option<&str>) -> Result<Box<dyn Engine + 'a>, Error> {
@@ -40,6 +58,7 @@ impl Swept for Washer {
             let how = "from the first instant, with the suspension at rest: it begins by a jump";
             words.push(("spin", format!("{first} rpm {how}")));
         }
+        words.extend(resting_on(plan).map(|stops| ("stops", stops)));
         words
     }
 

@@ -9,6 +9,7 @@ use crate::lanes::Constant as _;
 use crate::machine::feet::LOAD;
 use crate::nonlinear::elements::{CabinetLine, Ends, Law, PointMotion, TubMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
+use crate::run::model::{Model, Nonlinear};
 use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Dual, Lane, N, Real};
 use std::borrow::Cow;
@@ -137,6 +138,11 @@ pub(crate) fn load_on_cabinet(
     };
     let load = on_cabinet(&tub, &elements.on_tub(&tub));
     load.map(|N(first_order)| first_order.value + first_order.slope)
+}
+
+/// Push of each stop (N) at equilibrium.
+pub(crate) fn stops_at_rest_n(point: &Point) -> Vec<f64> {
+    forces(point, ModelKind::Nonlinear, &<Nonlinear<f64> as Model<f64>>::at_rest(point)).stops_n
 }
 
 /// The speed along each damper (m/s) by the linear model, at deviations from equilibrium.
