@@ -75,6 +75,7 @@ pub(crate) struct Fit {
     pub(crate) start: f64,
     pub(crate) value: f64,
     pub(crate) standard_error: Option<f64>,
+    /// No farther than its range.
     pub(crate) interval_95: Option<[f64; 2]>,
     /// By the fits of resampled residuals, if they were asked for.
     pub(crate) bootstrap_95: Option<[f64; 2]>,
@@ -208,6 +209,8 @@ impl Found<'_> {
         let value = self.minima[0].x[k];
         let at_bound = free.range.contains(&value);
         let known = follows && !at_bound && error > 0.0;
+        let [least, most] = self.problem.range(k);
+        let reached = [(value - REACH * error).max(least), (value + REACH * error).min(most)];
         Fit {
             name: free.parameter.name().to_owned(),
             unit: free.parameter.unit().to_owned(),
@@ -215,7 +218,7 @@ impl Found<'_> {
             start: free.start,
             value,
             standard_error: known.then_some(error),
-            interval_95: known.then_some([value - REACH * error, value + REACH * error]),
+            interval_95: known.then_some(reached),
             bootstrap_95: self.repeated.and_then(|sets| middle_95(sets.iter().map(|x| x[k]))),
             at_bound,
         }

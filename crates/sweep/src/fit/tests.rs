@@ -132,6 +132,16 @@ fn a_model_without_the_friction_says_that_it_does_not_follow() {
 }
 
 #[test]
+fn an_interval_goes_no_farther_than_its_range() {
+    // So early a record cannot tell friction from damping.
+    let cases = vec![case_at(&FRICTION, 1.1, reference("friction", 4.0))];
+    let report = fitted(cases, &options(&["damping_n_s_per_m", "friction_n"]));
+    let from = |fit: &report::Fit| fit.interval_95.map(|[from, _]| from);
+    let least = report.parameters.iter().filter_map(from).reduce(f64::min);
+    assert_eq!(least, Some(0.0), "{}", report.text());
+}
+
+#[test]
 fn a_search_that_came_to_no_end_gives_no_intervals() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 3.0))];
     let method = Problem::method(&cases).unwrap();
