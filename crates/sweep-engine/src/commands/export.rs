@@ -12,8 +12,9 @@ pub struct Args {
     /// A result, trace, modes or boundary file, or any other Parquet file of this program
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Where to write; the ending .csv or .xlsx says how
+    /// Where to write; the ending says how
     #[arg(value_name = "OUT")]
+    #[arg(help = format!("Where to write; the ending {} says how", endings()))]
     out: PathBuf,
 }
 
@@ -24,11 +25,17 @@ pub struct Args {
 /// that cannot be written.
 pub fn run(args: &Args) -> Result<Exit, Error> {
     let Some(format) = Format::of(&args.out) else {
-        return Err(Error::option("OUT", args.out.display(), "a name that ends in .csv or .xlsx"));
+        let expected = format!("a name that ends in {}", endings());
+        return Err(Error::option("OUT", args.out.display(), &expected));
     };
     let file = ResultTable::open(&args.file)?;
     let output = Output::begin(&args.out, format.kind())?;
     export(&file, format, output)?;
     tell(&format!("wrote {}: {} rows", args.out.display(), file.rows()));
     Ok(Exit::Done)
+}
+
+/// `.csv or .xlsx`.
+fn endings() -> String {
+    Format::ALL.map(|format| format!(".{}", format.name())).join(" or ")
 }
