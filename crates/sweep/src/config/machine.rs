@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use serde_json::{Value, json};
 use washer_model::{
-    BumpStop, Bushing, Cabinet, Damper, Foot, Machine, Parameter, Spin, Spring, Target, Unbalance,
+    BumpStop, Bushing, Cabinet, Foot, Machine, Parameter, Spin, Spring, Target, Unbalance,
 };
 
 use sweep_engine::config::keys::{self};
@@ -26,7 +26,7 @@ pub(super) struct Part {
     pub(super) prefix: &'static str,
     /// How often it may stand in a file.
     pub(super) times: Times,
-    /// What may be left out.
+    /// What may be left out, and then is no number of the file; more, by the table of parameters.
     optional: &'static [(&'static str, LeftOut)],
     /// How many a machine has.
     count: fn(&Machine) -> usize,
@@ -74,12 +74,13 @@ static KEYS: LazyLock<Vec<Vec<Key>>> = LazyLock::new(|| {
     let all = Parameter::all(&machine, &no_spin());
     let is_single = |one: &&Parameter| matches!(one.target(), Target::Machine | Target::Cabinet);
     let mut names = vec![Vec::new(); PARTS.len()];
-    for name in all.iter().filter(is_single).map(Parameter::name) {
+    for one in all.iter().filter(is_single) {
+        let name = one.name();
         let rest = |part: &Part| name.strip_prefix(&part.prefix(0));
         let places = (0..PARTS.len()).filter_map(|k| Some((rest(&PARTS[k])?, k)));
         // The longest prefix is its own.
         let own = places.min_by_key(|(rest, _)| rest.len());
-        own.into_iter().for_each(|(rest, k)| names[k].push(rest.to_owned()));
+        own.into_iter().for_each(|(rest, k)| names[k].push((rest.to_owned(), one.left_out())));
     }
     PARTS.iter().zip(names).map(|(part, names)| part.keys(&names)).collect()
 });
@@ -93,9 +94,10 @@ fn stem(name: &str) -> String {
 impl Part {
     /// The keys of these parameters, in the order in which they are written: numbers, arrays, and
     /// what may be left out.
-    fn keys(&self, names: &[String]) -> Vec<Key> {
-        let key = |names: &[String]| {
-            let (first, stem) = (&names[0], stem(&names[0]));
+    fn keys(&self, names: &[(String, Option<f64>)]) -> Vec<Key> {
+        let key = |names: &[(String, Option<f64>)]| {
+            let (first, value) = &names[0];
+            let stem = stem(first);
             let name = match names.len() {
                 1 => first.clone(),
                 // The place of a foot is that of nothing else.
@@ -103,10 +105,12 @@ impl Part {
                 _ => stem,
             };
             let optional = self.optional.iter().find(|(known, _)| *known == name);
-            let left_out = optional.map_or(LeftOut::Refused, |(_, left_out)| *left_out);
-            Key { name, parameters: names.to_vec(), left_out }
+            let by_table = value.map_or(LeftOut::Refused, LeftOut::Is);
+            let left_out = optional.map_or(by_table, |(_, left_out)| *left_out);
+            Key { name, parameters: names.iter().map(|(name, _)| name.clone()).collect(), left_out }
         };
-        let mut keys: Vec<Key> = names.chunk_by(|a, b| stem(a) == stem(b)).map(key).collect();
+        let mut keys: Vec<Key> =
+            names.chunk_by(|(a, _), (b, _)| stem(a) == stem(b)).map(key).collect();
         keys.sort_by_key(|key| (key.left_out != LeftOut::Refused, key.is_vector()));
         keys
     }
@@ -206,25 +210,15 @@ pub(super) const PARTS: [Part; 14] = [
     many!(
         springs: Spring { free_length_m: None, ..Machine::paper().springs[0] },
         "spring_", 1, Some("at least one [[springs]]: nothing else carries the machine"),
-        (FREE_LENGTH, LeftOut::Nothing), ("cubic_n_per_m3", LeftOut::Is(0.0))
+        (FREE_LENGTH, LeftOut::Nothing)
     ),
     many!(
         dampers: Machine::paper().dampers[0],
         "damper_", 1, None,
-        ("friction_n", LeftOut::Is(0.0)),
-        ("friction_speed_m_per_s", LeftOut::Is(Damper::FRICTION_SPEED_M_PER_S)),
         ("friction_linear_speed_m_per_s", LeftOut::Auto)
     ),
-    many!(
-        stops: BumpStop::default(),
-        "stop_", 1, None,
-        ("damping_n_s_per_m", LeftOut::Is(0.0)), ("softness_m", LeftOut::Is(BumpStop::SOFTNESS_M))
-    ),
-    many!(
-        bushings: Bushing::default(),
-        "bushing_", 1, None,
-        ("cubic_n_per_m3", LeftOut::Is(0.0)), ("damping_n_s_per_m", LeftOut::Is(0.0))
-    ),
+    many!(stops: BumpStop::default(), "stop_", 1, None,),
+    many!(bushings: Bushing::default(), "bushing_", 1, None,),
     // The first is `[unbalance]`.
     many!(further_unbalances: Unbalance::default(), "unbalance_", 2, None,),
     many!(feet: Foot::default(), "foot_", 1, None,),

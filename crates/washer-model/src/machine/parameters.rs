@@ -55,6 +55,7 @@ struct Row {
     description: &'static str,
     source: &'static str,
     range: Range,
+    left_out: Option<f64>,
     target: Target,
     get: Get,
     set: Set,
@@ -225,6 +226,11 @@ impl Parameter {
             ("m", Range::NonNegative) => Range::Within(0.0, FARTHEST_M),
             (_, range) => range,
         }
+    }
+
+    /// What it is where a machine file leaves it out, if it may.
+    pub fn left_out(&self) -> Option<f64> {
+        self.row.left_out
     }
 
     /// What it writes.

@@ -2,13 +2,21 @@
 
 use super::Range::{Any, Negative, NonNegative, Positive, Within};
 use super::{Block, Get, Range, Row, Set, Target, common, table_points};
-use crate::{Damper, Machine, Spin};
+use crate::{BumpStop, Damper, Machine, Spin};
 
 /// What a row writes, how it reads it and how it writes it.
 type Access = (Target, Get, Set);
 
-/// A row: name, unit, range, source, description, and at last what it reads and writes.
+/// A row: name, unit, range, source, description, then `else` and what a machine file that leaves
+/// it out means, if it may, and at last what it reads and writes.
 macro_rules! row {
+    ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr,
+        else $left_out:expr, $($access:tt)+) => {
+        Row {
+            left_out: Some($left_out),
+            ..row!($name, $unit, $range, $source, $description, $($access)+)
+        }
+    };
     ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr, $($access:tt)+) => {{
         let (target, get, set): Access = access!($($access)+);
         Row {
@@ -17,6 +25,7 @@ macro_rules! row {
             range: $range,
             source: $source,
             description: $description,
+            left_out: None,
             target,
             get,
             set,
@@ -240,7 +249,8 @@ static SPRING: &[&[Row]] = &[
             },
             set |m, _, k, v| if let Some(s) = m.springs.get_mut(k) { s.free_length_m = Some(v) }),
         row!("cubic_n_per_m3", "N/m^3", NonNegative, NONE,
-            "tension of this spring per cube of its elongation", of springs cubic_n_per_m3),
+            "tension of this spring per cube of its elongation", else 0.0,
+            of springs cubic_n_per_m3),
     ],
     axes!("cabinet_" "_m", "m", Any, TABLE_4, "cabinet end of this spring, ", of springs cabinet_m),
     axes!("tub_" "_m", "m", Any, TABLE_4, "tub end of this spring, ", of springs tub_m),
@@ -253,10 +263,10 @@ static DAMPER: &[&[Row]] = &[
         row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1,
             "damping of this damper", of dampers damping_n_s_per_m),
         row!("friction_n", "N", NonNegative, NONE,
-            "friction of this damper (F_f)", of dampers friction_n),
+            "friction of this damper (F_f)", else 0.0, of dampers friction_n),
         row!("friction_speed_m_per_s", "m/s", SPEED, USUAL_SPEED,
             "speed below which the friction of this damper fades (v_s)",
-            of dampers friction_speed_m_per_s),
+            else Damper::FRICTION_SPEED_M_PER_S, of dampers friction_speed_m_per_s),
         row!("friction_linear_speed_m_per_s", "m/s", SPEED, OWN_SPEED,
             "speed amplitude at which the linear model takes the friction of this damper (V)",
             Target::Machine,
@@ -278,9 +288,10 @@ static STOP: &[&[Row]] = &[
         row!("stiffness_n_per_m", "N/m", NonNegative, NONE,
             "stiffness of this stop in contact", of stops stiffness_n_per_m),
         row!("damping_n_s_per_m", "N s/m", NonNegative, NONE,
-            "damping of this stop in contact", of stops damping_n_s_per_m),
+            "damping of this stop in contact", else 0.0, of stops damping_n_s_per_m),
         row!("softness_m", "m", Within(1e-9, 1.0), "assumed: a tenth of a millimetre",
-            "depth over which contact with this stop sets in", of stops softness_m),
+            "depth over which contact with this stop sets in", else BumpStop::SOFTNESS_M,
+            of stops softness_m),
     ],
     axes!("tub_" "_m", "m", Any, NONE, "tub point of this stop, ", of stops tub_m),
     axes!("direction_" "", "", Any, NONE, "way from the tub to this stop, ", of stops direction),
@@ -295,14 +306,14 @@ static BUSHING: &[&[Row]] = &[
     &[
         row!("cubic_x_n_per_m3", "N/m^3", NonNegative, NONE,
             "force of this bushing per cube of its displacement towards the door",
-            of bushings cubic_n_per_m3[0]),
+            else 0.0, of bushings cubic_n_per_m3[0]),
         row!("cubic_y_n_per_m3", "N/m^3", NonNegative, NONE,
-            "the same upwards", of bushings cubic_n_per_m3[1]),
+            "the same upwards", else 0.0, of bushings cubic_n_per_m3[1]),
         row!("cubic_z_n_per_m3", "N/m^3", NonNegative, NONE,
-            "the same sideways", of bushings cubic_n_per_m3[2]),
+            "the same sideways", else 0.0, of bushings cubic_n_per_m3[2]),
     ],
     axes!("damping_" "_n_s_per_m", "N s/m", NonNegative, NONE, "damping of this bushing ",
-        of bushings damping_n_s_per_m),
+        else 0.0, of bushings damping_n_s_per_m),
 ];
 
 /// Rows of each further unbalance, after `unbalance_2_`.
