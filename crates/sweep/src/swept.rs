@@ -1,7 +1,7 @@
 //! What computes the washing machine's rows, for the engine's commands.
 
 use sweep_engine::{Engine, Error, Estimate, Swept};
-use washer_model::{Machine, Parameter, Profile, Spin, Target};
+use washer_model::{Machine, Parameter, Profile, Spin, Target, stops_at_rest_n};
 use washer_row::{Criterion, Demand, Metric};
 
 use crate::config::grid::lacking;
@@ -16,7 +16,7 @@ const RESTS_FROM: f64 = 0.01;
 fn resting_on(plan: &Plan) -> Option<String> {
     let Washer { machine, spin, .. } = plan.scenario(0).model;
     let point = ready(machine, spin, &timing(plan)).ok()?;
-    let pushes_n = point.stops_at_rest_n().into_iter().map(f64::abs).zip(1..);
+    let pushes_n = stops_at_rest_n(&point).into_iter().map(f64::abs).zip(1..);
     let (push_n, stop) = pushes_n.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (push_n > RESTS_FROM * point.weight_n()).then(|| {
         let [push_n, weight_n] = [push_n, point.weight_n()].map(f64::round);

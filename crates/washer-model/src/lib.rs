@@ -99,7 +99,7 @@ pub use point::{NoEquilibrium, Point, Timing};
 pub use ready::prepare;
 pub use run::equations::{Equations, STATE_LEN};
 pub use run::history::{Asked, History, Instant, Start, histories, history, instants, together};
-pub use run::suspension::Forces;
+pub use run::suspension::{Forces, stops_at_rest_n};
 pub use run::{
     Course, Extra, Method, Record, Snapshot, Stop, StopLoad, Wanted, Waypoint, simulate,
     simulate_until, simulate_with,

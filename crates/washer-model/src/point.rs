@@ -14,7 +14,6 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, Motion};
 use crate::point::ringing::{Decaying, Jump, Ringing, jumps};
-use crate::run::suspension::stops_at_rest_n;
 use crate::{COORDINATES, FrictionSpeed, Machine, Matrices, Spin, Swing};
 use core::iter::zip;
 use lane_ode::{Kernel, Lane, N, Simd};
@@ -129,11 +128,6 @@ impl Point {
     /// Weight (N) of what the springs carry.
     pub const fn weight_n(&self) -> f64 {
         self.weight_n
-    }
-
-    /// Push (N) of each stop on the machine at rest.
-    pub fn stops_at_rest_n(&self) -> Vec<f64> {
-        stops_at_rest_n(self)
     }
 
     /// The gap between drum and tub at rest (m).

@@ -141,7 +141,7 @@ pub(crate) fn load_on_cabinet(
 }
 
 /// Push of each stop (N) at equilibrium.
-pub(crate) fn stops_at_rest_n(point: &Point) -> Vec<f64> {
+pub fn stops_at_rest_n(point: &Point) -> Vec<f64> {
     forces(point, ModelKind::Nonlinear, &<Nonlinear<f64> as Model<f64>>::at_rest(point)).stops_n
 }
 
