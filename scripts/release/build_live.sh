@@ -2,13 +2,13 @@
 # The WebAssembly module that live pages carry, from crates/washer-live:
 # scripts/release/build_live.sh [OUTPUT]
 #
-# OUTPUT is crates/sweep-plot/assets/live.wasm.gz, which is committed, so that nobody needs the
+# OUTPUT is crates/washer-plot/assets/live.wasm.gz, which is committed, so that nobody needs the
 # target to build the program. It is packed, because pages carry it as text. CI builds it once more
 # and compares what both compute (tests/browser/check_module.py): the same bits, whatever the
 # toolchain.
 set -eu
 cd "$(dirname "$0")/../.."
-output=${1:-crates/sweep-plot/assets/live.wasm.gz}
+output=${1:-crates/washer-plot/assets/live.wasm.gz}
 target=wasm32-unknown-unknown
 
 [ -d "$(rustc --print target-libdir --target $target)" ] || rustup target add $target

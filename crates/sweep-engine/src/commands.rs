@@ -28,6 +28,7 @@ use crate::{Error, Exit, Swept, survive_file_size_limits};
 use cells::{Lines, clipped, short, span, table, word};
 use grid::{GridArgs, ResultArgs, quoted};
 use run::installed;
+use sweep_plot::CommonFigures;
 
 #[derive(Debug, Parser)]
 #[command(after_help = Exit::table(), disable_help_subcommand = true)]
@@ -89,7 +90,9 @@ fn run<M: Swept>(command: &Command) -> Result<Exit, Error> {
         Command::Optimise(args) => optimise::run::<M>(args),
         Command::Show(args) => show::run(args, &show::Further::NONE),
         Command::Plot(args) => plot::run(args),
-        Command::Report(args) => report::run::<M>(args, &show::Further::NONE, &|_| Vec::new()),
+        Command::Report(args) => {
+            report::run::<M>(args, &show::Further::NONE, &|_| Vec::new(), &CommonFigures)
+        }
         Command::Require(args) => require::run(args),
         Command::Compare(args) => compare::run(args, M::BUILD),
         Command::Export(args) => export::run(args),

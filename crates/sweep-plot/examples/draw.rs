@@ -4,13 +4,13 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use sweep_plot::{PlotOptions, render};
+use sweep_plot::{CommonFigures, Options, render};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut files = std::env::args_os().skip(1).map(PathBuf::from);
     let (Some(input), Some(output), None) = (files.next(), files.next(), files.next()) else {
         return Err("usage: draw FILE.parquet FIGURE.svg|.png|.html".into());
     };
-    render(&input, &PlotOptions::default(), &output)?;
+    render(&input, &Options::default(), &CommonFigures, &output)?;
     Ok(())
 }

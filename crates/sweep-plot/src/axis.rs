@@ -60,7 +60,7 @@ impl Scale {
 }
 
 /// Least and greatest of the finite values.
-pub(crate) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+pub fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let known = values.filter(|value| value.is_finite()).map(|value| (value, value));
     known.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
 }

@@ -6,72 +6,64 @@ use super::axis::{Scale, extremes};
 use super::colour::{BOTH as BOTH_SIDES, ColourScale, SHADE};
 use super::decimate::envelope;
 use super::frame::{HEADING_HEIGHT, Panel, Sign, TICK_SIZE, heading, legend, legend_height};
-use super::label::{self, Label};
+use super::label::Label;
 use super::raster::text_width;
 use super::scene::{Colour, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
 
 /// A figure of curves.
 #[derive(Clone, Debug, PartialEq, Default)]
-pub(crate) struct Chart {
+pub struct Chart {
     /// What is shown.
-    pub(crate) title: String,
+    pub title: String,
     /// Name of the run and conditions.
-    pub(crate) subtitle: String,
+    pub subtitle: String,
     /// What the x axis shows.
-    pub(crate) x_label: Label,
+    pub x_label: Label,
     /// The x axis is better read by its logarithm.
-    pub(crate) x_log: bool,
+    pub x_log: bool,
     /// From top to bottom.
-    pub(crate) panels: Vec<ChartPanel>,
+    pub panels: Vec<ChartPanel>,
     /// Upright lines through all panels.
-    pub(crate) marks: Vec<Mark>,
+    pub marks: Vec<Mark>,
     /// What the marks mean, in the legend.
-    pub(crate) mark_meaning: String,
+    pub mark_meaning: String,
     /// Ranges of x that are shaded in all panels.
-    pub(crate) shades: Vec<[f64; 2]>,
+    pub shades: Vec<[f64; 2]>,
     /// What the shades mean, in the legend.
-    pub(crate) shade_meaning: String,
+    pub shade_meaning: String,
 }
 
 /// One panel of a chart.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
-pub(crate) struct ChartPanel {
+pub struct ChartPanel {
     /// Short name, by which it is picked.
-    pub(crate) name: String,
+    pub name: String,
     /// What the y axis shows.
     #[serde(flatten)]
-    pub(crate) label: Label,
+    pub label: Label,
     /// Shown in a picture, and at first in a page.
-    pub(crate) shown: bool,
+    pub shown: bool,
     /// Whether the axis is logarithmic.
-    pub(crate) log: bool,
+    pub log: bool,
     /// y values between which the panel extends; by default what its series need.
-    pub(crate) range: Option<(f64, f64)>,
+    pub range: Option<(f64, f64)>,
     /// Height in a picture, px.
-    pub(crate) height: f64,
+    pub height: f64,
     /// In drawing order.
     #[serde(skip)]
-    pub(crate) series: Vec<Series>,
+    pub series: Vec<Series>,
     /// Level lines: value and meaning.
-    pub(crate) levels: Vec<(f64, String)>,
+    pub levels: Vec<(f64, String)>,
     /// Starred points: x, y and a label.
     #[serde(skip)]
-    pub(crate) stars: Vec<(f64, f64, String)>,
+    pub stars: Vec<(f64, f64, String)>,
     /// Ranges of x whose cells hold points on both sides of the level.
-    pub(crate) mixed: Vec<[f64; 2]>,
-}
-
-impl Mark {
-    /// A mark with a speed beside it, rpm.
-    pub(crate) fn of_speed(x: f64, speed_rpm: f64) -> Self {
-        let speed = format!("{speed_rpm:.1}");
-        Self { x, label: format!("{} rpm", label::trimmed(&speed)) }
-    }
+    pub mixed: Vec<[f64; 2]>,
 }
 
 impl ChartPanel {
     /// A panel of these curves that is shown, even, as high as its series need, and 420 px tall.
-    pub(crate) fn new(name: &str, label: Label, series: Vec<Series>) -> Self {
+    pub fn new(name: &str, label: Label, series: Vec<Series>) -> Self {
         let name = name.to_owned();
         Self { name, label, series, shown: true, height: 420.0, ..Self::default() }
     }
@@ -79,7 +71,7 @@ impl ChartPanel {
 
 /// How a series is drawn.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Style {
+pub enum Style {
     /// A solid line of this width, px.
     Solid(f64),
     /// A dashed line.
@@ -92,22 +84,22 @@ pub(crate) enum Style {
 
 /// One curve.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Series {
+pub struct Series {
     /// Name in the legend.
-    pub(crate) name: String,
+    pub name: String,
     /// Its colour.
-    pub(crate) colour: Colour,
+    pub colour: Colour,
     /// Rising; series mostly share theirs.
-    pub(crate) x: Rc<Vec<f64>>,
+    pub x: Rc<Vec<f64>>,
     /// One per x; NaN breaks the line.
-    pub(crate) y: Vec<f64>,
+    pub y: Vec<f64>,
     /// How it is drawn.
-    pub(crate) style: Style,
+    pub style: Style,
 }
 
 impl Series {
     /// A series.
-    pub(crate) fn new(
+    pub fn new(
         name: impl Into<String>,
         colour: Colour,
         x: impl Into<Rc<Vec<f64>>>,
@@ -120,11 +112,11 @@ impl Series {
 
 /// An upright line.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Mark {
+pub struct Mark {
     /// Where.
-    pub(crate) x: f64,
+    pub x: f64,
     /// Words and unit beside it.
-    pub(crate) label: String,
+    pub label: String,
 }
 
 const WIDTH: f64 = 880.0;
@@ -427,10 +419,10 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
 }
 
 /// What the ranges of [`ChartPanel::mixed`] are, in the legend.
-pub(crate) const MIXED: &str = "both: reliable and unreliable points";
+pub const MIXED: &str = "both: reliable and unreliable points";
 
 /// Whether positive values span so much that only a logarithm shows them all.
-pub(crate) fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
+pub fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
     ColourScale::amplitude(values).scale.log
 }
 
@@ -445,7 +437,7 @@ mod tests {
         // The second curve is where the first one's label would stand.
         let mut series = vec![flat(147.8), flat(154.0), flat(162.1)];
         series.push(Series { y: speeds.clone(), ..flat(0.0) });
-        let stars = [147.8, 162.1].map(|at| (at, at, format!("{at} rpm"))).to_vec();
+        let stars = [147.8, 162.1].map(|at| (at, at, format!("{at} Hz"))).to_vec();
         let panel = ChartPanel {
             stars,
             range: Some((0.0, 300.0)),
@@ -454,7 +446,7 @@ mod tests {
         let chart = Chart {
             title: String::new(),
             subtitle: String::new(),
-            x_label: Label::new("Speed", "rpm"),
+            x_label: Label::new("Speed", "Hz"),
             x_log: false,
             panels: vec![panel],
             marks: Vec::new(),

@@ -30,7 +30,7 @@ const SEQUENTIAL: [u32; 10] = [
 
 /// Okabe and Ito's palette without yellow and black (jfly.uni-koeln.de/color), darkest contrasts
 /// first.
-pub(crate) const DISTINCT: [Colour; 6] = [
+pub const DISTINCT: [Colour; 6] = [
     Colour::hex(0x0072b2),
     Colour::hex(0xd55e00),
     Colour::hex(0x009e73),
@@ -40,9 +40,9 @@ pub(crate) const DISTINCT: [Colour; 6] = [
 ];
 
 /// The nonlinear model, in every figure.
-pub(crate) const NONLINEAR: Colour = DISTINCT[0];
+pub const NONLINEAR: Colour = DISTINCT[0];
 /// The linear model, in every figure.
-pub(crate) const LINEAR: Colour = DISTINCT[1];
+pub const LINEAR: Colour = DISTINCT[1];
 /// Cells with points on both sides of a limit: Okabe and Ito's yellow, which no scale here has.
 pub(crate) const BOTH: Colour = Colour::hex(0xf0e442);
 /// Points on the calm side of a limit: the blue of [`BELOW`]'s family that a dot needs on paper.
@@ -52,7 +52,7 @@ pub(crate) const HARSH: Colour = Colour::hex(ABOVE[3]);
 /// Ranges in which a dwell is unstable, behind curves of any colour.
 pub(crate) const SHADE: Colour = Colour::hex(0xcc79a7).with_alpha(70);
 /// Points that failed.
-pub(crate) const FAILED: Colour = Colour::hex(0xbfc5cc);
+pub const FAILED: Colour = Colour::hex(0xbfc5cc);
 
 /// Steps of a colour scale: few enough that neighbours merge to one shape, enough to look smooth.
 pub(crate) const LEVELS: usize = 64;

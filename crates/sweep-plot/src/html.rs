@@ -2,9 +2,8 @@
 //! no network.
 
 mod design;
-mod embed;
+pub mod embed;
 mod histories;
-mod live;
 mod report;
 
 pub(crate) use design::page_of as design_page;
@@ -24,11 +23,12 @@ use super::frame::{Sign, failed_hatch};
 use super::gather::{Counts, Map};
 use super::grid::GridAxis;
 use super::layer::{self, Layer, Level, Shown};
+use super::model::{Computing, Figures};
 use super::read::Source;
 use super::scene::{Colour, Hatch, INK, PAPER};
 use super::swept::SweptAxis;
 use super::table::{Column, Table};
-use super::{Live, PlotOptions, figures, label};
+use super::{Options, figures, label};
 use crate::escape;
 use sweep_parameter::Worse;
 
@@ -42,11 +42,6 @@ const BAR: &str = include_str!("html/bar.js");
 const CELLS: &str = include_str!("html/cells.js");
 const MAP: &str = include_str!("html/map.js");
 const DESIGN: &str = include_str!("html/design.js");
-const SPECTRUM: &str = include_str!("html/spectrum.js");
-const POOL: &str = include_str!("html/pool.js");
-const CURVES: &str = include_str!("html/curves.js");
-const GROWTH: &str = include_str!("html/growth.js");
-const LIVE: &str = include_str!("html/live.js");
 const REPORT: &str = include_str!("html/report.js");
 const START: &str = include_str!("html/start.js");
 
@@ -76,7 +71,12 @@ pub(crate) fn most_cells(columns: usize) -> usize {
 /// # Errors
 /// [`crate::PlotError::Unfit`] for options that the file does not have, and any that reading the
 /// traces brings.
-pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<String> {
+pub(crate) fn map_page(
+    map: &Map,
+    cuts: &Cuts,
+    options: &Options,
+    model: &dyn Figures,
+) -> Result<String> {
     let source = &map.table.source;
     let first = layer::chosen(source, options)?;
     let all = layer::all(source);
@@ -84,7 +84,7 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
     let layers = all.iter().map(|shown| Ok(layer_json(map, shown, shown.layer(map)?, room)));
     let layers = layers.collect::<Result<Vec<Value>>>()?;
     let traces = match &options.traces {
-        Some(folder) => histories::read(folder, map)?,
+        Some(folder) => histories::read(folder, map, model)?,
         None => Value::Null,
     };
     let title = "Where the linear model can be trusted";
@@ -114,22 +114,9 @@ pub(crate) fn map_page(map: &Map, cuts: &Cuts, options: &PlotOptions) -> Result<
     }
     let axes = map.grid.axes.iter().map(|axis| (axis.swept.name.as_str(), axis.swept.log));
     let axes: Vec<(&str, bool)> = axes.collect();
-    let computing = computing(&mut data, options.live.as_ref(), &axes);
-    let scripts = [&[CORE, CHART, BAR, CELLS, MAP][..], computing, &[REPORT, START]].concat();
-    let told = report::told(source, options.live.as_ref()) + &report::caveats(map);
-    Ok(page(title, data, &scripts, source, &told))
-}
-
-/// Adds what a page computes with, if it does. The scripts that it takes; `axes` by name, and
-/// whether they are logarithmic.
-fn computing(
-    data: &mut Value,
-    live: Option<&Live>,
-    axes: &[(&str, bool)],
-) -> &'static [&'static str] {
-    let Some(live) = live else { return &[] };
-    data["live"] = live::json(live, axes);
-    &[SPECTRUM, POOL, CURVES, GROWTH, LIVE]
+    let told = report::told(source, model) + &report::caveats(map, model);
+    let scripts = [&[CORE, CHART, BAR, CELLS, MAP][..], &[REPORT, START]];
+    Ok(page(title, data, scripts, model.computing(&axes), source, &told))
 }
 
 /// The file's own word about itself, without what would fill the page: a list of a million values,
@@ -160,18 +147,19 @@ const MOST_PROVENANCE: usize = 100_000;
 
 /// The page of a chart: every panel, those that a picture shows at first. It may compute, along
 /// what can be moved first.
-pub(crate) fn chart_page(source: &Source, chart: &Chart, live: Option<&Live>) -> String {
-    let mut data = json!({
+pub(crate) fn chart_page(
+    source: &Source,
+    chart: &Chart,
+    computing: Option<Computing>,
+    told: &str,
+) -> String {
+    let data = json!({
         "kind": "chart",
         "title": chart.title,
         "subtitle": chart.subtitle,
         "chart": chart_json(chart, curve),
     });
-    let axis = live.and_then(|live| live.sliders.first()).map_or("", |axis| &axis.name);
-    let computing = computing(&mut data, live, &[(axis, chart.x_log)]);
-    let told = live.map_or_else(String::new, |live| report::told(source, Some(live)));
-    let scripts = [&[CORE, CHART][..], computing, &[START]].concat();
-    page(&chart.title, data, &scripts, source, &told)
+    page(&chart.title, data, [&[CORE, CHART], &[START]], computing, source, told)
 }
 
 /// A page with the picture that it shows where scripts are switched off.
@@ -209,14 +197,26 @@ pub(crate) fn picture(svg: &[u8]) -> String {
     format!("<img alt=\"figure\" src=\"data:image/svg+xml;base64,{data}\">")
 }
 
-/// A page of these data, and of what is `told` of the run in HTML.
-fn page(title: &str, mut data: Value, scripts: &[&str], source: &Source, told: &str) -> String {
+/// A page of these data, and of what is `told` of the run in HTML. What it computes with has its
+/// scripts between these.
+fn page(
+    title: &str,
+    mut data: Value,
+    [first, last]: [&[&str]; 2],
+    computing: Option<Computing>,
+    source: &Source,
+    told: &str,
+) -> String {
+    let (scripts, parts) = computing.map_or((&[][..], ""), |computing| {
+        data["live"] = computing.data;
+        (computing.scripts, computing.parts)
+    });
+    let scripts = [first, scripts, last].concat();
     // Where ticks of even axes can be, with the decimals of their numbers, and how one is chosen.
     let steps: Value = Step::all().map(|step| json!([step.length(), step.decimals()])).collect();
     data["ticks"] = json!({ "steps": steps, "slack": SLACK, "least": LEAST_TICKS });
     data["both"] = json!(BOTH.css());
     data["shade"] = json!(format!("{}{:02x}", SHADE.css(), SHADE.alpha));
-    let worker = if data.get("live").is_some() { live::WORKER } else { "" };
     // What a file says is no place for what follows it.
     let told = [told, &provenance(source)].map(|text| text.replace('{', "&#123;"));
     // Within a script element only `<` could end it, or start a comment.
@@ -225,8 +225,7 @@ fn page(title: &str, mut data: Value, scripts: &[&str], source: &Source, told: &
         .replace("{{style}}", STYLE)
         .replace("{{about}}", &told[0])
         .replace("{{provenance}}", &told[1])
-        .replace("{{parts}}", PARTS)
-        .replace("{{worker}}", worker)
+        .replace("{{parts}}", &[PARTS, parts].concat())
         .replace("{{script}}", &scripts.concat())
         .replace("{{data}}", &data)
 }

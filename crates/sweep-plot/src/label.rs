@@ -52,7 +52,7 @@ fn parted(name: &str) -> (Vec<&str>, String) {
 }
 
 /// The unit that a name's suffix says; empty if none.
-pub(crate) fn unit_of_name(name: &str) -> String {
+pub fn unit_of_name(name: &str) -> String {
     parted(name).1
 }
 
@@ -64,7 +64,7 @@ pub fn words(name: &str) -> String {
 
 /// A column's name in words without its unit and its model, and the model: `min_gap_linear_m` is
 /// the "least gap" of "linear".
-pub(crate) fn of_model(name: &str) -> (String, &'static str) {
+pub fn of_model(name: &str) -> (String, &'static str) {
     let (mut words, _) = parted(name);
     let model = ["nonlinear", "linear"].into_iter().find(|model| words.contains(model));
     words.retain(|word| Some(*word) != model);
@@ -79,14 +79,14 @@ pub(crate) fn of_model(name: &str) -> (String, &'static str) {
     (words.join(" "), model.unwrap_or(""))
 }
 
-/// A result's column in words, without unit and model: `nonlinear_tub_front_y` is "Tub front,
+/// A result's column in words, without unit and model: `nonlinear_body_front_y` is "Body front,
 /// vertical".
 pub fn quantity(name: &str) -> String {
     capitalised(&channel(&of_model(name).0.replace(' ', "_")))
 }
 
-/// A channel's name in words: `tub_front_y` is "tub front, vertical".
-pub(crate) fn channel(name: &str) -> String {
+/// A channel's name in words: `body_front_y` is "body front, vertical".
+pub fn channel(name: &str) -> String {
     for (suffix, words) in [("_y", ", vertical"), ("_z", ", horizontal")] {
         if let Some(stem) = name.strip_suffix(suffix) {
             return stem.replace('_', " ") + words;
@@ -97,7 +97,7 @@ pub(crate) fn channel(name: &str) -> String {
 
 /// The unit of a channel whose file does not say it: angles are named after their axis, the rest
 /// are displacements.
-pub(crate) fn unit_of_channel(name: &str) -> &'static str {
+pub fn unit_of_channel(name: &str) -> &'static str {
     match name.rsplit('_').next() {
         Some("x" | "y" | "z") => "m",
         Some("yaw" | "pitch" | "roll") => "rad",
@@ -113,16 +113,16 @@ pub fn capitalised(text: &str) -> String {
 
 /// What an axis shows; as text, with the unit in brackets.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub(crate) struct Label {
+pub struct Label {
     /// In words.
-    pub(crate) words: String,
+    pub words: String,
     /// Empty if there is none.
-    pub(crate) unit: String,
+    pub unit: String,
 }
 
 impl Label {
     /// Words and unit.
-    pub(crate) fn new(words: &str, unit: &str) -> Self {
+    pub fn new(words: &str, unit: &str) -> Self {
         Self { words: words.to_owned(), unit: unit.to_owned() }
     }
 }
@@ -134,17 +134,17 @@ impl fmt::Display for Label {
 }
 
 /// Words and unit as an axis label.
-pub(crate) fn with_unit(words: &str, unit: &str) -> String {
+pub fn with_unit(words: &str, unit: &str) -> String {
     if unit.is_empty() { words.to_owned() } else { format!("{words} ({unit})") }
 }
 
 /// A name's words, its value to four digits and the unit: "damping 140 N s/m".
-pub(crate) fn valued(words: &str, value: f64, unit: &str) -> String {
+pub fn valued(words: &str, value: f64, unit: &str) -> String {
     format!("{words} {} {unit}", significant(value, 4)).trim().to_owned()
 }
 
 /// The unit in which small motions are shown, and how many of it one of `unit` is.
-pub(crate) fn shown(unit: &str) -> (&str, f64) {
+pub fn shown(unit: &str) -> (&str, f64) {
     match unit {
         "m" => ("mm", 1e3),
         "rad" => ("mrad", 1e3),
@@ -169,7 +169,7 @@ pub fn significant(value: f64, digits: usize) -> String {
 }
 
 /// Without the zeros after the last digit of a decimal fraction.
-pub(crate) fn trimmed(number: &str) -> &str {
+pub fn trimmed(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
@@ -184,24 +184,24 @@ mod tests {
             ("damping_n_s_per_m", "Damping", "N s/m"),
             ("spring_stiffness_n_per_m", "Spring stiffness", "N/m"),
             ("flexure_stiffness_n_m_per_rad", "Flexure stiffness", "N m/rad"),
-            ("spin_peak_rpm", "Spin peak", "rpm"),
+            ("peak_rpm", "Peak", "rpm"),
             ("min_gap_linear_m", "Min gap linear", "m"),
-            ("tub_inertia_11_kg_m2", "Tub inertia 11", "kg m²"),
+            ("body_inertia_11_kg_m2", "Body inertia 11", "kg m²"),
             ("friction_speed_m_per_s", "Friction speed", "m/s"),
             ("spring_1_cubic_n_per_m3", "Spring 1 cubic", "N/m³"),
             ("gravity_m_per_s2", "Gravity", "m/s²"),
-            ("tub_front_x_m", "Tub front x", "m"),
+            ("body_front_x_m", "Body front x", "m"),
             ("growth_per_s", "Growth", "1/s"),
             ("ratio_max", "Ratio max", ""),
             ("s", "S", ""),
         ] {
             assert_eq!((words(name).as_str(), unit_of_name(name).as_str()), (plain, unit));
         }
-        assert_eq!(channel("drum_front_z"), "drum front, horizontal");
+        assert_eq!(channel("end_front_z"), "end front, horizontal");
         assert_eq!(of_model("min_gap_linear_m"), ("least gap".to_owned(), "linear"));
         assert_eq!(of_model("stop_2_force_nonlinear_n"), ("stop 2 force".to_owned(), "nonlinear"));
         for (name, words) in [
-            ("nonlinear_tub_front_y", "Tub front, vertical"),
+            ("nonlinear_body_front_y", "Body front, vertical"),
             ("ratio_max", "Greatest ratio"),
             ("min_gap_nonlinear_m", "Least gap"),
         ] {

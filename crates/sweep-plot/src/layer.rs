@@ -2,7 +2,7 @@
 
 use sweep_parameter::{Worse, named};
 
-use super::PlotOptions;
+use super::Options;
 use super::colour::ColourScale;
 use super::error::{PlotError, Result};
 use super::gather::{Map, Sides};
@@ -145,7 +145,7 @@ pub(crate) fn families(source: &Source) -> Vec<Family<'_>> {
 ///
 /// # Errors
 /// As [`asked`]; [`PlotError::Unfit`] for several.
-pub(crate) fn chosen(source: &Source, options: &PlotOptions) -> Result<Option<Shown>> {
+pub(crate) fn chosen(source: &Source, options: &Options) -> Result<Option<Shown>> {
     let mut asked = asked(source, options)?;
     match asked.len() {
         0 | 1 => Ok(asked.pop().flatten()),
@@ -160,7 +160,7 @@ pub(crate) fn chosen(source: &Source, options: &PlotOptions) -> Result<Option<Sh
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for a column that the file does not have.
-pub(crate) fn asked(source: &Source, options: &PlotOptions) -> Result<Vec<Option<Shown>>> {
+pub(crate) fn asked(source: &Source, options: &Options) -> Result<Vec<Option<Shown>>> {
     let mut all = all(source);
     if options.quantity.is_empty() {
         all.truncate(1);
@@ -240,10 +240,10 @@ impl Shown {
         };
         let is_less_worse = self.worse() == Some(Worse::Less);
         let scale = match (source.kind, source.limit(&self.facts)) {
-            (Kind::Differences, _) if self.column() == "ratio_change" => {
+            (Kind::DIFFERENCES, _) if self.column() == "ratio_change" => {
                 ColourScale::factor(extent)
             }
-            (Kind::Differences, _) if !ratio => ColourScale::difference(extent, is_less_worse),
+            (Kind::DIFFERENCES, _) if !ratio => ColourScale::difference(extent, is_less_worse),
             (_, Some(limit)) if ratio => ColourScale::ratio(extent, limit, is_less_worse),
             (_, Some(limit)) => ColourScale::about(extent, limit * factor, is_less_worse),
             (_, None) => ColourScale::amplitude(extent),
@@ -282,7 +282,7 @@ impl Shown {
         // Which of two files is over which.
         let told = self.facts.description.split(';').next().unwrap_or_default();
         match (self.group, self.channel.as_deref().map(label::channel)) {
-            (Group::Ratio, None) if source.kind == Kind::Differences => {
+            (Group::Ratio, None) if source.kind == Kind::DIFFERENCES => {
                 (capitalised(told), format!("largest ratio of {compared}, nonlinear / linear"))
             }
             (Group::Ratio, None) => {
@@ -304,7 +304,7 @@ impl Shown {
             }
             _ => {
                 let title = match source.kind {
-                    Kind::Differences => capitalised(told),
+                    Kind::DIFFERENCES => capitalised(told),
                     _ => self.short(),
                 };
                 (title, label::of_model(self.column()).0)

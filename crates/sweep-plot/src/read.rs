@@ -15,61 +15,92 @@ use super::label;
 use sweep_files::{self as files, ParquetFile};
 
 /// A column without its rows, which [`super::table::Column`] has.
-pub(crate) use sweep_files::Column as ColumnFacts;
-use sweep_parameter::{Worse, named};
+pub use sweep_files::Column as ColumnFacts;
+use sweep_parameter::Worse;
 
-named! {
-    /// What a file holds, named as in "a map file".
-    pub(crate) enum Kind {
-        /// Candidates of a study.
-        Optimise = "study",
-        /// Motions that held speeds end in.
-        Dwell = "dwell",
-        /// Periodic responses over constant speeds.
-        Stability = "stability",
-        /// One row per grid point.
-        Map = "map",
-        /// One row per grid point that two maps share.
-        Differences = "differences",
-        /// Time histories of both models at one point, or of a measurement and the model fitted to
-        /// it.
-        Trace = "trace",
-        /// Modes over spin speed.
-        Modes = "modes",
-        /// The curve on which the ratio is at its limit.
-        Boundary = "boundary",
-        /// A map whose points are scattered.
-        Design = "design",
+/// What a file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kind {
+    /// As in "a map file".
+    pub name: &'static str,
+    /// The columns that show it. Where it has axes, they stand before the first of these.
+    pub columns: &'static [&'static str],
+    /// And one that begins with one of these, if there are any.
+    pub begins: &'static [&'static str],
+    /// Whether its rows are of points, which `--at` picks.
+    pub has_points: bool,
+}
+
+impl Kind {
+    /// One row per grid point.
+    pub const MAP: Self = Self::of("map", &["status", "ratio_max"]).with_points();
+    /// A map whose points are scattered.
+    pub const DESIGN: Self = Self { name: "design", has_points: false, ..Self::MAP };
+    /// One row per grid point that two maps share.
+    pub const DIFFERENCES: Self = Self::of("differences", &["ratio_change", "flip"]).with_points();
+    /// Candidates of a study.
+    pub const STUDY: Self = Self::of("study", &["candidate", "on_front"]);
+    /// Time histories of both models at one point, or of a measurement and the model fitted to it.
+    pub const TRACE: Self =
+        Self { begins: &["nonlinear_", "measured_"], ..Self::of("trace", &["time_s"]) };
+    /// The curve on which a quantity is at its limit: it has a bracket instead of columns.
+    pub const BOUNDARY: Self = Self::of("boundary", &[]);
+
+    /// A kind that these columns show.
+    pub const fn of(name: &'static str, columns: &'static [&'static str]) -> Self {
+        Self { name, columns, begins: &[], has_points: false }
+    }
+
+    /// A kind whose rows are of points.
+    pub const fn with_points(self) -> Self {
+        Self { has_points: true, ..self }
+    }
+
+    fn is_shown_by(&self, names: &[&str]) -> bool {
+        let begins = |name: &&str| self.begins.iter().any(|begin| name.starts_with(begin));
+        self.columns.iter().all(|name| names.contains(name))
+            && (self.begins.is_empty() || names.iter().any(begins))
+            && (!self.columns.is_empty() || bracket(names).is_some())
     }
 }
 
-/// The columns that show each kind, the surest first. A design has those of a map.
-const SHOWN_BY: [(Kind, &[&str]); 8] = [
-    (Kind::Optimise, &["candidate", "on_front"]),
-    (Kind::Dwell, &["motion", "speed_rpm"]),
-    (Kind::Stability, &["growth_per_s", "speed_rpm"]),
-    (Kind::Map, &["status", "ratio_max"]),
-    (Kind::Differences, &["ratio_change", "flip"]),
-    (Kind::Trace, &["time_s"]),
-    (Kind::Modes, &["mode", "frequency_rpm", "speed_rpm"]),
-    (Kind::Boundary, &[]),
-];
+/// What a model's files have beside those of every model.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Known {
+    /// Kinds of files, the surest first.
+    pub kinds: &'static [Kind],
+    /// Sections of a plan that histories follow from.
+    pub of_runs: &'static [&'static str],
+    /// Those that hold at any speed.
+    pub of_machine: &'static [&'static str],
+}
+
+impl Known {
+    /// All kinds, the surest first. A design has a map's columns.
+    pub fn all_kinds(self) -> impl Iterator<Item = Kind> {
+        let own = self.kinds.iter().copied();
+        let last = [Kind::MAP, Kind::DIFFERENCES, Kind::TRACE, Kind::BOUNDARY];
+        std::iter::once(Kind::STUDY).chain(own).chain(last)
+    }
+}
 
 /// A file whose columns are those of a figure.
 #[derive(Debug)]
-pub(crate) struct Source {
+pub struct Source {
     /// Where it is.
-    pub(crate) path: PathBuf,
+    pub path: PathBuf,
     /// What it holds.
-    pub(crate) kind: Kind,
+    pub kind: Kind,
     /// In file order, without those of types that none of our files has.
-    pub(crate) columns: Vec<ColumnFacts>,
+    pub columns: Vec<ColumnFacts>,
     /// The file-level key-value metadata, parsed where it is JSON; in file order.
-    pub(crate) provenance: Vec<(String, Value)>,
+    pub provenance: Vec<(String, Value)>,
     /// Number of rows.
-    pub(crate) rows: usize,
+    pub rows: usize,
+    /// What the model's files have.
+    pub known: Known,
     /// Name of the run with what its command line set, if the file says them.
-    pub(crate) run_name: Option<String>,
+    pub run_name: Option<String>,
     file: ParquetFile,
 }
 
@@ -82,7 +113,7 @@ impl Source {
     /// # Errors
     /// [`PlotError::File`], or [`PlotError::Undrawable`] when the columns are not those of a file
     /// of ours.
-    pub(crate) fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path, known: Known) -> Result<Self> {
         let file = ParquetFile::open(path)?;
         let rows = usize::try_from(file.rows()).unwrap_or(usize::MAX);
         let provenance = file.pairs().filter(|entry| entry.key != ARROW_SCHEMA).map(|entry| {
@@ -94,23 +125,24 @@ impl Source {
         let columns: Vec<ColumnFacts> =
             columns.map(|column| by_name(column, file.schema())).collect();
         let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-        let kind = recognise(&names).ok_or_else(|| PlotError::Undrawable {
+        let kind = known.all_kinds().find(|kind| kind.is_shown_by(&names));
+        let kind = kind.ok_or_else(|| PlotError::Undrawable {
             path: path.to_owned(),
             reason: format!(
-                "its columns ({}) are those of no map, trace, modes, boundary or stability file, \
-                 so there is no figure that fits it",
-                names.join(", ")
+                "its columns ({}) are those of no file that has a figure: {}",
+                names.join(", "),
+                known.all_kinds().map(|kind| kind.name).collect::<Vec<_>>().join(", ")
             ),
         })?;
         let run_name = run_name(&provenance);
-        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, run_name, file })
+        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, known, run_name, file })
     }
 
     /// Calls `take` for each row, with the columns of these names. One that the file lacks is null.
     ///
     /// # Errors
     /// [`PlotError::File`], and whatever `take` says.
-    pub(crate) fn each_row(
+    pub fn each_row(
         &self,
         names: &[&str],
         mut take: impl FnMut(Row<'_>) -> Result<()>,
@@ -119,24 +151,24 @@ impl Source {
     }
 
     /// The column of that name.
-    pub(crate) fn column(&self, name: &str) -> Option<&ColumnFacts> {
+    pub fn column(&self, name: &str) -> Option<&ColumnFacts> {
         self.columns.iter().find(|column| column.name == name)
     }
 
     /// Columns of numbers whose name starts with `prefix`, without it.
-    pub(crate) fn with_prefix(&self, prefix: &str) -> Vec<(&str, &ColumnFacts)> {
+    pub fn with_prefix(&self, prefix: &str) -> Vec<(&str, &ColumnFacts)> {
         self.numeric()
             .filter_map(|column| Some((column.name.strip_prefix(prefix)?, column)))
             .collect()
     }
 
     /// Columns of numbers.
-    pub(crate) fn numeric(&self) -> impl Iterator<Item = &ColumnFacts> {
+    pub fn numeric(&self) -> impl Iterator<Item = &ColumnFacts> {
         self.columns.iter().filter(|column| column.is_number())
     }
 
     /// The error that something the options name is not there, and what is.
-    pub(crate) fn not_there(
+    pub fn not_there(
         &self,
         option: &str,
         given: impl fmt::Display,
@@ -154,53 +186,66 @@ impl Source {
     }
 
     /// Nothing in it can be drawn.
-    pub(crate) fn empty(&self, reason: &str) -> PlotError {
+    pub fn empty(&self, reason: &str) -> PlotError {
         self.undrawable(format!("nothing to draw: {reason}"))
     }
 
     /// More rows than a figure of its kind shows.
-    pub(crate) fn too_many(&self, rows: usize, most: usize) -> PlotError {
-        let kind = self.kind.name();
+    pub fn too_many(&self, rows: usize, most: usize) -> PlotError {
+        let kind = self.kind.name;
         self.undrawable(format!(
             "a {kind} file of {rows} rows is more than a figure can show, which is {most} of them"
         ))
+    }
+
+    /// Refuses an option that was given and would have no effect on this file; `fits` says whether
+    /// it has one, and `for_what` on what.
+    ///
+    /// # Errors
+    /// [`PlotError::Unfit`].
+    pub fn refuse(&self, option: &str, given: bool, fits: bool, for_what: &str) -> Result<()> {
+        if !given || fits {
+            return Ok(());
+        }
+        let (kind, path) = (self.kind.name, self.path.display());
+        Err(PlotError::Unfit(format!("`{option}` is for {for_what}; {path} is a {kind} file")))
     }
 
     /// Refuses a file of another kind than an option takes.
     ///
     /// # Errors
     /// [`PlotError::Unfit`], which says what writes such a file.
-    pub(crate) fn expect(&self, kind: Kind, option: &str, hint: &str) -> Result<()> {
+    pub fn expect(&self, kind: Kind, option: &str, hint: &str) -> Result<()> {
         if self.kind == kind {
             return Ok(());
         }
-        let (path, own) = (self.path.display(), self.kind.name());
+        let (path, own) = (self.path.display(), self.kind.name);
         Err(PlotError::Unfit(format!("`{option} {path}`: this is a {own} file; {hint}")))
     }
 
     /// A column that this kind of file must have is missing.
-    pub(crate) fn lacks(&self, column: &str, expected: &str) -> PlotError {
-        let kind = self.kind.name();
+    pub fn lacks(&self, column: &str, expected: &str) -> PlotError {
+        let kind = self.kind.name;
         self.undrawable(format!("a {kind} file needs the {expected} column `{column}`"))
     }
 
     /// The first value stored under `key` in the provenance, outer levels before inner ones.
-    pub(crate) fn find(&self, key: &str) -> Option<&Value> {
+    pub fn find(&self, key: &str) -> Option<&Value> {
         find_in(&self.provenance, key)
     }
 
     /// The run's name, if the file says it, and these notes.
-    pub(crate) fn notes(&self, further: impl IntoIterator<Item = String>) -> Vec<String> {
+    pub fn notes(&self, further: impl IntoIterator<Item = String>) -> Vec<String> {
         self.run_name.iter().cloned().chain(further).collect()
     }
 
     /// The run's name, if the file says it, and `rest` as a figure's subtitle.
-    pub(crate) fn subtitle(&self, rest: &str) -> String {
+    pub fn subtitle(&self, rest: &str) -> String {
         self.notes([rest.to_owned()]).join(" · ")
     }
 
     /// What its ratios compare, by the run's criterion.
-    pub(crate) fn compared(&self) -> &'static str {
+    pub fn compared(&self) -> &'static str {
         match self.find("criterion").and_then(Value::as_str) {
             Some("envelope") => "amplitudes by turn",
             Some("rms") => "root mean squares",
@@ -209,22 +254,22 @@ impl Source {
     }
 
     /// How the points were placed, of a file whose points are no grid by its plan.
-    pub(crate) fn design_method(&self) -> Option<&str> {
+    pub fn design_method(&self) -> Option<&str> {
         self.find("design")?.get("method")?.as_str()
     }
 
     /// The entries of a list that the provenance has under `key`.
-    pub(crate) fn list(&self, key: &str) -> impl Iterator<Item = &Value> {
+    pub fn list(&self, key: &str) -> impl Iterator<Item = &Value> {
         self.find(key).and_then(Value::as_array).into_iter().flatten()
     }
 
     /// The swept parameters that the plan names.
-    pub(crate) fn planned_axes(&self) -> impl Iterator<Item = &str> {
+    pub fn planned_axes(&self) -> impl Iterator<Item = &str> {
         self.list("axis").filter_map(|axis| axis.get("parameter")?.as_str())
     }
 
     /// Whether the plan spreads an axis by the logarithm.
-    pub(crate) fn is_log(&self, parameter: &str) -> bool {
+    pub fn is_log(&self, parameter: &str) -> bool {
         self.list("axis").filter(|axis| axis["parameter"] == parameter).any(|axis| {
             axis["range"]["spacing"] == "log" || axis["distribution"]["kind"] == "lognormal"
         })
@@ -232,51 +277,51 @@ impl Source {
 
     /// Up to where a column is good, in its unit: its own limit, or the run's of ratios. Two files
     /// may have two.
-    pub(crate) fn limit(&self, column: &ColumnFacts) -> Option<f64> {
-        let is_of_run = is_ratio(column) && self.kind != Kind::Differences;
+    pub fn limit(&self, column: &ColumnFacts) -> Option<f64> {
+        let is_of_run = is_ratio(column) && self.kind != Kind::DIFFERENCES;
         column.limit.or_else(|| is_of_run.then(|| self.ratio_limit()))
     }
 
     /// The ratio from which on a point is unreliable: the run's limit, or else the paper's, 2.
-    pub(crate) fn ratio_limit(&self) -> f64 {
+    pub fn ratio_limit(&self) -> f64 {
         let limit = self.find("ratio_limit").and_then(Value::as_f64).map(drawable);
         limit.filter(|limit| *limit > 0.0).unwrap_or(2.0)
     }
 }
 
 /// Whether a column's numbers are ratios of both models.
-pub(crate) fn is_ratio(column: &ColumnFacts) -> bool {
+pub fn is_ratio(column: &ColumnFacts) -> bool {
     column.name.starts_with("ratio_") && column.name != "ratio_change"
 }
 
 /// The names of what there is.
-pub(crate) fn some_of<'a>(names: impl Iterator<Item = &'a str>) -> String {
+pub fn some_of<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.collect();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 /// A row of a file.
 #[derive(Clone, Copy)]
-pub(crate) struct Row<'a>(sweep_files::Row<'a>);
+pub struct Row<'a>(sweep_files::Row<'a>);
 
 impl<'a> Row<'a> {
     /// Its number in the file.
-    pub(crate) fn index(self) -> usize {
+    pub fn index(self) -> usize {
         self.0.index() as usize
     }
 
     /// The number in a column as it is drawn, NaN where there is none.
-    pub(crate) fn number(self, column: usize) -> f64 {
+    pub fn number(self, column: usize) -> f64 {
         drawable(self.0.value(column))
     }
 
     /// The numbers in these columns.
-    pub(crate) fn numbers(self, columns: Range<usize>) -> Vec<f64> {
+    pub fn numbers(self, columns: Range<usize>) -> Vec<f64> {
         columns.map(|column| self.number(column)).collect()
     }
 
     /// The word in a column.
-    pub(crate) fn word(self, column: usize) -> Option<&'a str> {
+    pub fn word(self, column: usize) -> Option<&'a str> {
         self.0.word(column)
     }
 }
@@ -305,7 +350,7 @@ fn find_in<'a>(provenance: &'a [(String, Value)], key: &str) -> Option<&'a Value
 /// More letters of a name would leave no room for what was set.
 const NAME_LETTERS: usize = 40;
 
-/// As in "fig12, tub_mass_kg = 20".
+/// As in "fig12, mass_kg = 20".
 fn run_name(provenance: &[(String, Value)]) -> Option<String> {
     let name = find_in(provenance, "name")?.as_str()?;
     let mut named: String = name.chars().take(NAME_LETTERS).collect();
@@ -336,21 +381,8 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
     }
 }
 
-fn recognise(names: &[&str]) -> Option<Kind> {
-    let of_trace = |name: &&str| name.starts_with("nonlinear_") || name.starts_with("measured_");
-    let is = |(kind, columns): &&(Kind, &[&str])| {
-        columns.iter().all(|name| names.contains(name))
-            && match kind {
-                Kind::Trace => names.iter().any(of_trace),
-                Kind::Boundary => bracket(names).is_some(),
-                _ => true,
-            }
-    };
-    SHOWN_BY.iter().find(is).map(|(kind, _)| *kind)
-}
-
 /// The two columns between which a boundary is known to lie, after its two coordinates.
-pub(crate) fn bracket<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
+pub fn bracket<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
     let with_word = |words: &[&str]| {
         names.iter().skip(2).copied().find(|name| name.split('_').any(|part| words.contains(&part)))
     };

@@ -1,4 +1,6 @@
-//! Small files in the forms that this program writes, for tests.
+//! Small files in the forms that this program writes, for tests: this crate's, and those of `washer-plot`.
+
+#![allow(dead_code, reason = "neither has all of it")]
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -112,7 +114,7 @@ fn write_all(folder: &Path, name: &str, samples: impl IntoIterator<Item = Sample
 pub(crate) struct MapSample<'a> {
     pub(crate) axes: Vec<(&'a str, Vec<f64>)>,
     pub(crate) limit: f64,
-    /// Amplitudes of `tub_yaw` in the nonlinear and the linear model, rad; `None` where the run
+    /// Amplitudes of `body_yaw` in the nonlinear and the linear model, rad; `None` where the run
     /// diverged.
     pub(crate) yaw: &'a dyn Fn(&[f64]) -> Option<[f64; 2]>,
     /// Where the motion is `sensitive`.
@@ -164,7 +166,7 @@ impl MapSample<'_> {
         }
         let pitch = |factor: f64| move |value: f64| factor * value;
         let known = |ratio: &f64| ratio.is_finite();
-        let channel = |ratio: &f64| known(ratio).then_some("tub_yaw");
+        let channel = |ratio: &f64| known(ratio).then_some("body_yaw");
         let reliable = |ratio: &f64| known(ratio).then_some(*ratio < self.limit);
         let status = |yaw: &Option<_>| Some(if yaw.is_some() { "ok" } else { "diverged" });
         let fail_time = |yaw: &Option<_>| if yaw.is_some() { f64::NAN } else { 41.5 };
@@ -173,12 +175,12 @@ impl MapSample<'_> {
             "reliability": { "ratio_limit": self.limit },
         });
         sample
-            .numbers("nonlinear_tub_yaw", "rad", model(0))
-            .numbers("nonlinear_tub_pitch", "rad", model(0).into_iter().map(pitch(0.4)))
-            .numbers("linear_tub_yaw", "rad", model(1))
-            .numbers("linear_tub_pitch", "rad", model(1).into_iter().map(pitch(0.5)))
-            .numbers("ratio_tub_yaw", "1", ratio.iter().copied())
-            .numbers("ratio_tub_pitch", "1", ratio.iter().map(|ratio| 0.8 * ratio))
+            .numbers("nonlinear_body_yaw", "rad", model(0))
+            .numbers("nonlinear_body_pitch", "rad", model(0).into_iter().map(pitch(0.4)))
+            .numbers("linear_body_yaw", "rad", model(1))
+            .numbers("linear_body_pitch", "rad", model(1).into_iter().map(pitch(0.5)))
+            .numbers("ratio_body_yaw", "1", ratio.iter().copied())
+            .numbers("ratio_body_pitch", "1", ratio.iter().map(|ratio| 0.8 * ratio))
             .numbers("ratio_max", "1", ratio.iter().copied())
             .words("ratio_max_channel", ratio.iter().map(channel))
             .flags("reliable", ratio.iter().map(reliable))
@@ -220,42 +222,6 @@ pub(crate) fn map() -> Sample {
         chaotic: &|_| false,
     }
     .sample()
-}
-
-/// Twelve seconds of both models, to 300 rpm and back.
-pub(crate) fn trace() -> Sample {
-    let time: Vec<f64> = (0..=6000).map(|k| 0.002 * f64::from(k)).collect();
-    let along = |factor: f64| {
-        time.iter().map(move |t| factor * (t / 12.0) * (20.0 * t).sin()).collect::<Vec<f64>>()
-    };
-    Sample::default()
-        .numbers("time_s", "s", time.iter().copied())
-        .numbers("speed_rpm", "rpm", time.iter().map(|t| 50.0 * (6.0 - (t - 6.0).abs())))
-        .numbers("nonlinear_tub_yaw", "rad", along(0.07))
-        .numbers("nonlinear_drum_front_y", "m", along(0.03))
-        .numbers("linear_tub_yaw", "rad", along(0.009))
-        .numbers("linear_drum_front_y", "m", along(0.02))
-        .numbers("gap_nonlinear_m", "m", along(0.002).into_iter().map(|g| 0.01 - g.abs()))
-        .numbers("gap_linear_m", "m", along(0.001).into_iter().map(|g| 0.01 - g.abs()))
-        .metadata("at", r#"{"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 120.0}"#)
-}
-
-/// Two modes that cross the speed at 100 and 200 rpm, and one far above.
-pub(crate) fn modes() -> Sample {
-    let rows: Vec<(f64, u64)> =
-        (0..=30).flat_map(|k| (1..=3).map(move |mode| (20.0 * f64::from(k), mode))).collect();
-    let frequency = |&(speed, mode): &(f64, u64)| match mode {
-        1 => 110.0 - 0.1 * speed,
-        2 => 190.0 + 0.05 * speed,
-        _ => 4000.0,
-    };
-    Sample::default()
-        .numbers("speed_rpm", "rpm", rows.iter().map(|row| row.0))
-        .counts("mode", rows.iter().map(|row| row.1))
-        .numbers("frequency_rpm", "rpm", rows.iter().map(frequency))
-        .numbers("frequency_hz", "Hz", rows.iter().map(|row| frequency(row) / 60.0))
-        .numbers("frequency_min_rpm", "rpm", rows.iter().map(|row| frequency(row) * 0.99))
-        .numbers("frequency_max_rpm", "rpm", rows.iter().map(|row| frequency(row) * 1.01))
 }
 
 /// A boundary with its bracket.

@@ -5,7 +5,7 @@ use super::influence::Influence;
 use super::label::{self, Label};
 use super::layer::{self, Group, Level};
 use super::read::Source;
-use super::{PlotOptions, swept};
+use super::{Options, swept};
 use crate::{PlotError, Share};
 use sweep_parameter::Worse;
 
@@ -96,7 +96,7 @@ impl Scatter {
     /// # Errors
     /// As [`Source::each_row`] and [`layer::chosen`]; [`PlotError::Undrawable`] without points or
     /// parameters that vary; [`PlotError::Unfit`] for a quantity that is no number.
-    pub(crate) fn read(source: Source, options: &PlotOptions) -> Result<Self> {
+    pub(crate) fn read(source: Source, options: &Options) -> Result<Self> {
         let Some(shown) = layer::chosen(&source, options)? else {
             return Err(PlotError::Unfit(
                 "status is no number, and figures of designs mark failed points in any case"

@@ -5,26 +5,26 @@ use super::axis::extremes;
 
 /// An opaque or translucent colour, sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Colour {
+pub struct Colour {
     /// Red, green, blue.
-    pub(crate) rgb: [u8; 3],
+    pub rgb: [u8; 3],
     /// 255 is opaque.
-    pub(crate) alpha: u8,
+    pub alpha: u8,
 }
 
 impl Colour {
     /// An opaque colour written as in CSS, `0xrrggbb`.
-    pub(crate) const fn hex(rrggbb: u32) -> Self {
+    pub const fn hex(rrggbb: u32) -> Self {
         Self { rgb: [(rrggbb >> 16) as u8, (rrggbb >> 8) as u8, rrggbb as u8], alpha: 255 }
     }
 
     /// The same colour, `alpha` of 255 opaque.
-    pub(crate) const fn with_alpha(self, alpha: u8) -> Self {
+    pub const fn with_alpha(self, alpha: u8) -> Self {
         Self { alpha, ..self }
     }
 
     /// What this colour makes over an opaque one.
-    pub(crate) fn over(self, under: Self) -> Self {
+    pub fn over(self, under: Self) -> Self {
         let part = f64::from(self.alpha) / 255.0;
         let [r, g, b] = [0, 1, 2].map(|k| {
             (part * f64::from(self.rgb[k]) + (1.0 - part) * f64::from(under.rgb[k])).round() as u8
@@ -33,7 +33,7 @@ impl Colour {
     }
 
     /// `#rrggbb`.
-    pub(crate) fn css(self) -> String {
+    pub fn css(self) -> String {
         let [r, g, b] = self.rgb;
         format!("#{r:02x}{g:02x}{b:02x}")
     }
@@ -294,9 +294,9 @@ pub(crate) struct Scene {
 }
 
 /// Letters and frames.
-pub(crate) const INK: Colour = Colour::hex(0x1b1f24);
+pub const INK: Colour = Colour::hex(0x1b1f24);
 /// Secondary text.
-pub(crate) const MUTED: Colour = Colour::hex(0x57606a);
+pub const MUTED: Colour = Colour::hex(0x57606a);
 /// Grid lines.
 pub(crate) const FAINT: Colour = Colour::hex(0xd8dee4);
 /// The sheet.

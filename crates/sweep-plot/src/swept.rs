@@ -8,46 +8,46 @@ use super::label;
 use super::read::{ColumnFacts, Source};
 
 /// Most different values of an axis that are kept. An axis of more is known by its range alone.
-pub(crate) const MOST_VALUES: usize = 1 << 18;
+pub const MOST_VALUES: usize = 1 << 18;
 
 /// A swept parameter with all its values.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub(crate) struct SweptAxis {
+pub struct SweptAxis {
     /// Name of the parameter.
-    pub(crate) name: String,
+    pub name: String,
     /// Its name in words.
-    pub(crate) words: String,
+    pub words: String,
     /// Unit of the values.
-    pub(crate) unit: String,
+    pub unit: String,
     /// Better shown by the logarithm.
-    pub(crate) log: bool,
+    pub log: bool,
     /// The values, rising; of an axis of more than [`MOST_VALUES`] the least and the greatest
     /// alone.
     #[serde(skip)]
-    pub(crate) values: Vec<f64>,
+    pub values: Vec<f64>,
     /// Whether the values are all there.
     #[serde(skip)]
-    pub(crate) complete: bool,
+    pub complete: bool,
 }
 
 impl SweptAxis {
     /// Whether two values are the same to the digits that text keeps.
-    pub(crate) fn near(known: f64, value: f64) -> bool {
+    pub fn near(known: f64, value: f64) -> bool {
         (known - value).abs() <= 1e-9 * value.abs().max(known.abs())
     }
 
     /// Values in the units in which the axis is even.
-    pub(crate) fn evened(&self, values: &[f64]) -> Vec<f64> {
+    pub fn evened(&self, values: &[f64]) -> Vec<f64> {
         values.iter().map(|value| if self.log { value.ln() } else { *value }).collect()
     }
 
     /// The value that is this one in those units.
-    pub(crate) fn un_even(&self, even: f64) -> f64 {
+    pub fn un_even(&self, even: f64) -> f64 {
         if self.log { even.exp() } else { even }
     }
 
     /// A value of the axis, with its name and unit: "Damping 140 N s/m".
-    pub(crate) fn format_value(&self, value: f64) -> String {
+    pub fn format_value(&self, value: f64) -> String {
         label::valued(&self.words, value, &self.unit)
     }
 }
@@ -100,9 +100,9 @@ impl Gathered {
 
 /// The columns that are a file's axes, in file order: those of numbers between the point's index
 /// and the results, or the speeds of each point.
-pub(crate) fn columns(source: &Source) -> Vec<&ColumnFacts> {
+pub fn columns(source: &Source) -> Vec<&ColumnFacts> {
     let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
-    let is_result = |name: &str| of_model(name) || ["ratio_change", "speed_rpm"].contains(&name);
+    let is_result = |name: &str| of_model(name) || source.kind.columns.contains(&name);
     let before = source.columns.iter().take_while(|column| !is_result(&column.name));
     before.filter(|column| column.is_number() && column.name != "point").collect()
 }
@@ -111,7 +111,7 @@ pub(crate) fn columns(source: &Source) -> Vec<&ColumnFacts> {
 ///
 /// # Errors
 /// As [`axes`], but for rows that do not lie on a grid.
-pub(crate) fn is_whole(source: &Source) -> Result<bool> {
+pub fn is_whole(source: &Source) -> Result<bool> {
     let axes = match axes(source) {
         Ok(axes) => axes,
         Err(PlotError::NotAGrid { .. }) => return Ok(false),
@@ -129,7 +129,7 @@ pub(crate) fn is_whole(source: &Source) -> Result<bool> {
 /// As [`Source::each_row`]; [`PlotError::Undrawable`] without rows or axes;
 /// [`PlotError::NotAGrid`] for an axis value that is not a number, or rows that do not lie on a
 /// grid.
-pub(crate) fn axes(source: &Source) -> Result<Vec<SweptAxis>> {
+pub fn axes(source: &Source) -> Result<Vec<SweptAxis>> {
     if source.rows == 0 {
         return Err(source.empty("the map has no rows"));
     }

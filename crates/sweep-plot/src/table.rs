@@ -5,15 +5,15 @@ use std::path::Path;
 
 use super::error::Result;
 use super::label::{self, Label};
-use super::read::{ColumnFacts, Kind, Source};
+use super::read::{ColumnFacts, Kind, Known, Source};
 use super::thin::{Keep, Stretches, Thinner};
 
 /// Most numbers of a file that are kept for a figure: what a page of some megabytes carries.
-pub(crate) const MOST_NUMBERS: usize = 1_400_000;
+pub const MOST_NUMBERS: usize = 1_400_000;
 
 /// The values of a column.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Values {
+pub enum Values {
     /// Any numeric type; null is NaN.
     Numbers(Vec<f64>),
     /// Words, by their numbers.
@@ -22,29 +22,29 @@ pub(crate) enum Values {
 
 /// Words among which few are different.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Words {
+pub struct Words {
     /// The words that occur.
-    pub(crate) names: Vec<String>,
+    pub names: Vec<String>,
     /// One per row: a place among the names, [`NONE`] or [`SEVERAL`].
-    pub(crate) codes: Vec<u8>,
+    pub codes: Vec<u8>,
     /// The name found last: neighbours mostly share theirs.
     last: u8,
 }
 
 /// Code of a row without a word.
-pub(crate) const NONE: u8 = u8::MAX;
+pub const NONE: u8 = u8::MAX;
 /// Code of a cell whose points have different words.
-pub(crate) const SEVERAL: u8 = u8::MAX - 1;
+pub const SEVERAL: u8 = u8::MAX - 1;
 
 impl Words {
     /// Rows without a word.
-    pub(crate) fn none(rows: usize) -> Self {
+    pub fn none(rows: usize) -> Self {
         Self { codes: vec![NONE; rows], ..Self::default() }
     }
 
     /// The code of a word, which is taken up if it is new. Words past the first 254 could only come
     /// from a file that is not ours, and have no code.
-    pub(crate) fn code(&mut self, word: Option<&str>) -> u8 {
+    pub fn code(&mut self, word: Option<&str>) -> u8 {
         let Some(word) = word else { return NONE };
         if self.names.get(usize::from(self.last)).is_some_and(|name| name == word) {
             return self.last;
@@ -63,12 +63,12 @@ impl Words {
     }
 
     /// The word of a row; none where it has none or several.
-    pub(crate) fn get(&self, row: usize) -> Option<&str> {
+    pub fn get(&self, row: usize) -> Option<&str> {
         self.names.get(usize::from(*self.codes.get(row)?)).map(String::as_str)
     }
 
     /// Puts the names in order of the alphabet, whatever order the rows came in.
-    pub(crate) fn sort(&mut self) {
+    pub fn sort(&mut self) {
         let mut sorted = self.names.clone();
         sorted.sort();
         let place = |name: &String| u8::try_from(sorted.binary_search(name).ok()?).ok();
@@ -82,27 +82,27 @@ impl Words {
 
 /// A column.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Column {
+pub struct Column {
     /// What the file says of it.
-    pub(crate) facts: ColumnFacts,
+    pub facts: ColumnFacts,
     /// One per row.
-    pub(crate) values: Values,
+    pub values: Values,
 }
 
 impl Column {
     /// Its name in words, and its unit.
-    pub(crate) fn label(&self) -> Label {
+    pub fn label(&self) -> Label {
         Label::new(&label::words(&self.facts.name), &self.facts.unit)
     }
 
     /// The values, if they are numbers.
-    pub(crate) fn numbers(&self) -> Option<&[f64]> {
+    pub fn numbers(&self) -> Option<&[f64]> {
         let Values::Numbers(values) = &self.values else { return None };
         Some(values)
     }
 
     /// The values, if they are words.
-    pub(crate) fn words(&self) -> Option<&Words> {
+    pub fn words(&self) -> Option<&Words> {
         let Values::Words(words) = &self.values else { return None };
         Some(words)
     }
@@ -110,15 +110,15 @@ impl Column {
 
 /// The columns of a file that a figure needs.
 #[derive(Debug)]
-pub(crate) struct Table {
+pub struct Table {
     /// The file.
-    pub(crate) source: Source,
+    pub source: Source,
     /// In file order.
-    pub(crate) columns: Vec<Column>,
+    pub columns: Vec<Column>,
     /// Number of rows here.
-    pub(crate) rows: usize,
+    pub rows: usize,
     /// Rows of the file that became two rows here, where it was thinned.
-    pub(crate) stretch: Option<usize>,
+    pub stretch: Option<usize>,
 }
 
 impl Table {
@@ -128,10 +128,10 @@ impl Table {
     /// # Errors
     /// As [`Source::each_row`]; [`crate::PlotError::Undrawable`] for modes and boundaries beyond
     /// what a figure keeps.
-    pub(crate) fn read(source: Source) -> Result<Self> {
+    pub fn read(source: Source) -> Result<Self> {
         let most = MOST_NUMBERS / source.numeric().count().max(1);
         if source.rows > most {
-            if source.kind == Kind::Trace {
+            if source.kind == Kind::TRACE {
                 return Self::read_thinned(source, most / 2);
             }
             return Err(source.too_many(source.rows, most));
@@ -172,7 +172,7 @@ impl Table {
     ///
     /// # Errors
     /// As [`Source::each_row`].
-    pub(crate) fn read_thinned(source: Source, count: usize) -> Result<Self> {
+    pub fn read_thinned(source: Source, count: usize) -> Result<Self> {
         let stretches = Stretches::new(source.rows, count);
         let names: Vec<&str> = source.numeric().map(|column| column.name.as_str()).collect();
         let keep = |name: &str| if name == "time_s" { Keep::Instants } else { Keep::Extremes };
@@ -195,12 +195,12 @@ impl Table {
     ///
     /// # Errors
     /// As [`Source::open`] and [`Table::read`].
-    pub(crate) fn open(path: &Path) -> Result<Self> {
-        Self::read(Source::open(path)?)
+    pub fn open(path: &Path, known: Known) -> Result<Self> {
+        Self::read(Source::open(path, known)?)
     }
 
     /// The column of that name.
-    pub(crate) fn column(&self, name: &str) -> Option<&Column> {
+    pub fn column(&self, name: &str) -> Option<&Column> {
         self.columns.iter().find(|column| column.facts.name == name)
     }
 
@@ -208,13 +208,13 @@ impl Table {
     ///
     /// # Errors
     /// [`crate::PlotError::Undrawable`].
-    pub(crate) fn numbers(&self, name: &str) -> Result<&[f64]> {
+    pub fn numbers(&self, name: &str) -> Result<&[f64]> {
         let numbers = self.column(name).and_then(Column::numbers);
         numbers.ok_or_else(|| self.source.lacks(name, "numeric"))
     }
 
     /// Columns of numbers whose name starts with `prefix`, without it.
-    pub(crate) fn with_prefix(&self, prefix: &str) -> Vec<(&str, &Column)> {
+    pub fn with_prefix(&self, prefix: &str) -> Vec<(&str, &Column)> {
         let numbers = self.columns.iter().filter(|column| column.numbers().is_some());
         numbers
             .filter_map(|column| Some((column.facts.name.strip_prefix(prefix)?, column)))

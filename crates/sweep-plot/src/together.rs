@@ -9,27 +9,29 @@ use serde_json::Value;
 use sweep_files::{Step, dotted, key, leaves};
 
 use crate::error::{PlotError, Result};
-use crate::read::Source;
+use crate::read::{Known, Source};
 
-/// What histories, and gaps over them, follow from.
-pub(crate) const RUN: &[&str] = &["machine", "spin", "time.end_s"];
+/// What histories, and extremes of them, follow from.
+pub(crate) fn of_runs(known: Known) -> Vec<&'static str> {
+    [known.of_runs, &["time.end_s"]].concat()
+}
+
 /// What ratios follow from.
-pub(crate) const RATIOS: &[&str] =
-    &["machine", "spin", "time", "reliability.channels", "reliability.criterion"];
-/// What modes, and responses at constant speeds, follow from.
-pub(crate) const MACHINE: &[&str] = &["machine"];
+pub(crate) fn of_ratios(known: Known) -> Vec<&'static str> {
+    [known.of_runs, &["time", "reliability.channels", "reliability.criterion"]].concat()
+}
 
 /// Parameters with their values.
-pub(crate) type At = Vec<(String, f64)>;
+pub type At = Vec<(String, f64)>;
 
 /// The point that a trace says it is of.
-pub(crate) fn at(source: &Source) -> At {
+pub fn at(source: &Source) -> At {
     let at = source.find("at").and_then(Value::as_object).into_iter().flatten();
     at.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
 }
 
 /// Where the plans of two files part, each at a point, in words.
-pub(crate) fn parted(files: [(&Source, &At); 2], parts: &[&str]) -> Vec<String> {
+pub fn parted(files: [(&Source, &At); 2], parts: &[&str]) -> Vec<String> {
     let plans = files.map(|(source, _)| source.find(key::PLAN));
     let [Some(first), Some(second)] = plans else { return Vec::new() };
     let mut found = Vec::new();
@@ -49,12 +51,7 @@ pub(crate) fn parted(files: [(&Source, &At); 2], parts: &[&str]) -> Vec<String> 
 ///
 /// # Errors
 /// [`PlotError::Unfit`], which names the places.
-pub(crate) fn agree(
-    option: &str,
-    path: &Path,
-    files: [(&Source, &At); 2],
-    parts: &[&str],
-) -> Result<()> {
+pub fn agree(option: &str, path: &Path, files: [(&Source, &At); 2], parts: &[&str]) -> Result<()> {
     let found = parted(files, parts);
     if found.is_empty() {
         return Ok(());
@@ -68,7 +65,7 @@ pub(crate) fn agree(
 }
 
 /// The first of some places, and how many more there are.
-pub(crate) fn some(places: &[String], most: usize) -> String {
+pub fn some(places: &[String], most: usize) -> String {
     let more = places.len().saturating_sub(most);
     let first = places[..places.len() - more].join(", ");
     if more > 0 { format!("{first} and {more} more") } else { first }
@@ -105,7 +102,7 @@ fn moved(value: Option<&Value>, at: &At, path: &[Step<'_>]) -> Value {
     named.map_or_else(|| value.cloned().unwrap_or_default(), |(_, value)| (*value).into())
 }
 
-/// Whether a parameter is the value at this place: `tub_mass_kg` is `machine.tub.mass_kg`,
+/// Whether a parameter is the value at this place: `rotor_mass_kg` is `machine.rotor.mass_kg`,
 /// `damping_n_s_per_m` that of every damper, `damper_2_damping_n_s_per_m` that of one.
 fn names(parameter: &str, path: &[Step<'_>]) -> bool {
     let own = if path[0] == Step::Name("machine") { &path[1..] } else { path };
@@ -143,7 +140,7 @@ mod tests {
 
     fn machine(damping: f64, mass: f64, inertia: f64) -> Value {
         json!({
-            "tub": { "mass_kg": mass, "inertia_kg_m2": [1.0, inertia, 1.5] },
+            "rotor": { "mass_kg": mass, "inertia_kg_m2": [1.0, inertia, 1.5] },
             "dampers": [{ "damping_n_s_per_m": damping }, { "damping_n_s_per_m": damping }],
         })
     }
@@ -157,9 +154,9 @@ mod tests {
         assert!(parts_of((&base, &none), (&base, &none)).is_empty());
         let light = machine(140.0, 20.0, 1.6);
         let said = parts_of((&base, &none), (&light, &none));
-        assert_eq!(said, ["machine.tub.mass_kg 24.0 and 20.0"]);
+        assert_eq!(said, ["machine.rotor.mass_kg 24.0 and 20.0"]);
         // A point of a map, and its trace with the numbers in place.
-        let point = at(&[("damping_n_s_per_m", 100.0), ("tub_mass_kg", 20.0)]);
+        let point = at(&[("damping_n_s_per_m", 100.0), ("rotor_mass_kg", 20.0)]);
         let run = machine(100.0, 20.0, 1.6);
         assert!(parts_of((&base, &point), (&run, &none)).is_empty());
         assert!(parts_of((&base, &point), (&base, &point)).is_empty());
@@ -167,20 +164,22 @@ mod tests {
             parts_of((&base, &point), (&base, &none)),
             [
                 "machine.dampers.damping_n_s_per_m 100.0 and 140.0",
-                "machine.tub.mass_kg 20.0 and 24.0"
+                "machine.rotor.mass_kg 20.0 and 24.0"
             ]
         );
         let one = at(&[("damper_2_damping_n_s_per_m", 100.0)]);
         assert_eq!(parts_of((&base, &one), (&base, &none)).len(), 1);
         // Its place has another name than the parameter.
-        let inertia = at(&[("tub_inertia_22_kg_m2", 1.7)]);
+        let inertia = at(&[("rotor_inertia_22_kg_m2", 1.7)]);
         let other = machine(140.0, 24.0, 1.7);
         assert!(parts_of((&base, &inertia), (&other, &none)).is_empty());
         assert_eq!(parts_of((&base, &inertia), (&machine(140.0, 24.0, 1.8), &none)).len(), 1);
         // What one plan has and the other has not.
-        let bare = json!({ "tub": {} });
+        let bare = json!({ "rotor": {} });
         let said = parts_of((&base, &none), (&bare, &none));
         assert_eq!(said.len(), 3, "{said:?}");
-        assert!(said[1].starts_with("machine.tub.inertia_kg_m2 [1.0") && said[1].ends_with("none"));
+        assert!(
+            said[1].starts_with("machine.rotor.inertia_kg_m2 [1.0") && said[1].ends_with("none")
+        );
     }
 }

@@ -26,6 +26,7 @@ use sweep_engine::commands::{
     show as show_engine, status,
 };
 use sweep_engine::{Error, Exit, nearest};
+use washer_plot::WasherFigures;
 
 /// Subcommands by what they are for, as help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [
@@ -211,7 +212,10 @@ impl Command {
             Self::Status(args) => args.status(),
             Self::Slurm(args) => slurm::run(args),
             Self::Show(args) => show_engine::run(args, &show::FURTHER),
-            Self::Report(args) => report::run(args, &show::FURTHER, &crate::live::resonances),
+            Self::Report(args) => {
+                let figures = WasherFigures::default();
+                report::run(args, &show::FURTHER, &crate::live::resonances, &figures)
+            }
             Self::Require(args) => require::run(args),
             Self::Compare(args) => compare::run(args, crate::identity::BUILD),
             Self::Export(args) => export::run(args),

@@ -10,7 +10,7 @@
 //!   on disk meanwhile, and the result file; [`sweep_files`] has the rules of writing and reading.
 //!   `identity` says which builds write the same bytes.
 //! * `boundary` traces the curve where the ratio is at its limit, `trace` writes one point's time
-//!   histories. [`sweep_plot`] draws any of these files.
+//!   histories. [`washer_plot`] draws any of these files.
 //! * `library` is the commands' work as functions: an [`Evaluator`] takes tables of points, a
 //!   [`MemoryTable`] holds a result in memory.
 //! * `commands` is the command line; `progress`, `interrupt` and `exit` serve it.

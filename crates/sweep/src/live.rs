@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use sweep_files::{ParquetFile, key};
-use sweep_plot::{Live, Slider};
 use washer_live::{Setup, Sliders};
 use washer_model::{Channel, Kind, ModeOverSpeed, ModelKind, Parameter, campbell};
+use washer_plot::{Live, Slider};
 use washer_row::{Level, Measured, Metric};
 
 use crate::config::GridInput;

@@ -13,7 +13,6 @@ use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyCapsule, PyDict, PyList};
 use sweep::MemoryTable;
 use sweep_files::{FileKind, cells};
-use sweep_plot::PlotOptions;
 
 use crate::arrow;
 use crate::errors;
@@ -151,7 +150,7 @@ impl PyResultTable {
         let is_rows = ending.eq_ignore_ascii_case("parquet");
         py.detach(|| match is_rows {
             true => self.0.save(&path),
-            false => self.0.draw(&PlotOptions::default(), &path),
+            false => self.0.draw(&path),
         })
         .map_err(|error| errors::error(py, &error))
     }
@@ -164,7 +163,7 @@ impl PyResultTable {
         let drawn = py.detach(|| {
             let folder = tempfile::tempdir()?;
             let path = folder.path().join("figure.svg");
-            match self.0.draw(&PlotOptions::default(), &path) {
+            match self.0.draw(&path) {
                 Ok(()) => std::fs::read_to_string(&path).map(Some),
                 Err(_) => Ok(None),
             }

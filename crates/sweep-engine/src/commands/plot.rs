@@ -2,14 +2,16 @@
 
 use std::path::PathBuf;
 
+use clap::ValueEnum;
+
 use crate::config::written::finite;
 use crate::exit::{Error, Exit, tell};
 use sweep_files::beside;
-use sweep_plot::{PlotOptions, View, render};
+use sweep_plot::{CommonFigures, Figures, Options, View, render};
 
-/// Arguments of `plot`.
+/// Arguments of `plot`, of a model with these views.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct Args<V: ValueEnum + Send + Sync + 'static = View> {
     /// A result file
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
@@ -18,23 +20,17 @@ pub struct Args {
     #[arg(short, long, visible_alias = "out", value_name = "IMAGE")]
     pub output: Option<PathBuf>,
 
-    /// Modes, trace, design, stability: which of its figures [default: frequencies, time, scatter,
-    /// growth]; a page of a design has all three
+    /// Which of a file's figures, where it has several; a page of a design has all three
     #[arg(long, value_enum)]
-    pub view: Option<View>,
+    pub view: Option<V>,
 
     /// Map: the column that the colours show, or `status`; over one axis again for more of them.
     /// Design: the column over the parameters [default: ratio_max]
     #[arg(long, value_name = "COLUMN")]
     pub quantity: Vec<String>,
 
-    /// Channel to show of a trace, of dwells or of responses, as in the column names; may be
-    /// repeated
-    #[arg(long = "channel", value_name = "NAME")]
-    pub channels: Vec<String>,
-
-    /// Map of three or more axes: cut an axis beyond the second at this value. Stability: show the
-    /// points at this value
+    /// Map of three or more axes: cut an axis beyond the second at this value. Other files with
+    /// points: show those at this value
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     pub at: Vec<(String, f64)>,
 
@@ -48,24 +44,26 @@ pub struct Args {
 /// # Errors
 /// As [`render`].
 pub fn run(args: &Args) -> Result<Exit, Error> {
-    draw(args, PlotOptions::default())
+    draw(args, Options { view: args.view, ..Options::default() }, &CommonFigures)
 }
 
-/// As [`run`], with further options.
+/// As [`run`], with what arguments of the model say further.
 ///
 /// # Errors
 /// As [`render`].
-pub fn draw(args: &Args, further: PlotOptions) -> Result<Exit, Error> {
+pub fn draw<V: ValueEnum + Send + Sync>(
+    args: &Args<V>,
+    further: Options,
+    model: &dyn Figures,
+) -> Result<Exit, Error> {
     let output = args.output.clone().unwrap_or_else(|| beside(&args.file, "svg"));
-    let options = PlotOptions {
-        view: args.view,
+    let options = Options {
         quantity: args.quantity.clone(),
-        channels: args.channels.clone(),
         at: args.at.clone(),
         boundary: args.boundary.clone(),
         ..further
     };
-    render(&args.file, &options, &output)?;
+    render(&args.file, &options, model, &output)?;
     tell(&format!("wrote {}", output.display()));
     Ok(Exit::Done)
 }

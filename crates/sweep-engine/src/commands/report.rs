@@ -9,7 +9,7 @@ use crate::store::read::{Tally, tally};
 use crate::{Error, Exit, GridInput, Plan, Swept, tell};
 use sweep_files::{FileKind, Output, ParquetFile, key};
 use sweep_parameter::RatioLimits;
-use sweep_plot::{described, escape, quantity, sheet, significant, table, words};
+use sweep_plot::{Figures, described, escape, quantity, sheet, significant, table, words};
 use sweep_results::{Cell, ResultTable, check, ratio_limits, top};
 
 /// Arguments of `sweep report`.
@@ -45,6 +45,7 @@ pub fn run<M: Swept>(
     args: &Args,
     further: &Further<'_>,
     resonances: &Resonances<M>,
+    model: &dyn Figures,
 ) -> Result<Exit, Error> {
     let output = args.out.clone().unwrap_or_else(|| args.result.with_extension("html"));
     let file = ResultTable::open(&args.result)?;
@@ -54,7 +55,7 @@ pub fn run<M: Swept>(
         return Err(Error::option("RESULT", args.result.display(), expected));
     }
     let requirements = conditions::parse("--require", &args.requirements, &file)?;
-    let (picture, about) = described(&args.result)?;
+    let (picture, about) = described(&args.result, model)?;
     let plan = file.plan.clone().unwrap_or_default();
     let name = plan["name"].as_str().unwrap_or_default();
 
@@ -95,7 +96,7 @@ pub fn run<M: Swept>(
     body += &format!("<figure>{picture}</figure>\n");
     for path in &args.further {
         let opened = ParquetFile::open(path)?;
-        let (picture, _) = described(path)?;
+        let (picture, _) = described(path, model)?;
         let lines = further.listed(&opened)?;
         let lines: Vec<_> =
             lines.into_iter().map(|(name, text)| vec![name.to_owned(), text]).collect();

@@ -147,11 +147,12 @@ fn is_growth(quantity: &str) -> bool {
 }
 
 /// What of its plan the boundary follows from, beside its limit, which is named.
-pub(crate) fn follows_from(table: &Table) -> &'static [&'static str] {
+pub(crate) fn follows_from(table: &Table) -> Vec<&'static str> {
+    let known = table.source.known;
     match quantity(table) {
-        growth if is_growth(growth) => together::MACHINE,
-        "ratio_max" | "ratio_min" => together::RATIOS,
-        _ => together::RUN,
+        growth if is_growth(growth) => known.of_machine.to_vec(),
+        "ratio_max" | "ratio_min" => together::of_ratios(known),
+        _ => together::of_runs(known),
     }
 }
 

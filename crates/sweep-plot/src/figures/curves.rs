@@ -1,6 +1,6 @@
 //! A map file of one axis: ratios, amplitudes and gaps as curves over it.
 
-use crate::PlotOptions;
+use crate::Options;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style, spans_decades};
 use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
 use crate::error::{PlotError, Result};
@@ -18,7 +18,7 @@ const MOST_MARKS: usize = 400;
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for a column that the file does not have, or that is not a curve.
-pub(crate) fn chart(map: &Map, options: &PlotOptions) -> Result<Chart> {
+pub(crate) fn chart(map: &Map, options: &Options) -> Result<Chart> {
     let (axis, table) = (&map.grid.axes[0], &map.table);
     let source = &table.source;
     let asked: Option<Vec<Shown>> = layer::asked(source, options)?.into_iter().collect();

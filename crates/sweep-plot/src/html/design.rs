@@ -2,14 +2,15 @@
 
 use serde_json::{Value, json};
 
-use super::{CHART, CORE, DESIGN, START, chart_json, computing, curve, embed, page, report};
+use super::{CHART, CORE, DESIGN, START, chart_json, curve, embed, page, report};
 use crate::figures::{histogram, influence, matrix};
 use crate::frame::HEADING_HEIGHT;
+use crate::model::Figures;
 use crate::scatter::{Scatter, Side};
-use crate::{PlotOptions, View, svg};
+use crate::{Options, View, svg};
 
 /// The page, which opens with the view that the options name.
-pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions) -> String {
+pub(crate) fn page_of(scatter: &Scatter, options: &Options, model: &dyn Figures) -> String {
     let title = &scatter.title;
     let drawn = matrix::drawn(scatter);
     let chart = histogram::chart(scatter);
@@ -27,7 +28,7 @@ pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions) -> String {
     let (picture, panels) = matrix::draw(scatter);
     let [top, width, height] = [HEADING_HEIGHT, picture.width, picture.height - HEADING_HEIGHT];
     let sides = Side::ALL.map(|side| scatter.words(side));
-    let mut data = json!({
+    let data = json!({
         "kind": "design",
         "title": title,
         "subtitle": scatter.subtitle(&[]),
@@ -53,9 +54,8 @@ pub(crate) fn page_of(scatter: &Scatter, options: &PlotOptions) -> String {
     });
     let axes: Vec<(&str, bool)> =
         scatter.parameters.iter().map(|one| (one.name.as_str(), one.log)).collect();
-    let live = options.live.as_ref();
-    let computing = computing(&mut data, live, &axes);
-    let told = live.map_or_else(String::new, |_| report::told(&scatter.source, live));
-    let scripts = [&[CORE, CHART, DESIGN][..], computing, &[START]].concat();
-    page(title, data, &scripts, &scatter.source, &told)
+    let computing = model.computing(&axes);
+    let told =
+        computing.as_ref().map_or_else(String::new, |_| report::told(&scatter.source, model));
+    page(title, data, [&[CORE, CHART, DESIGN], &[START]], computing, &scatter.source, &told)
 }

@@ -4,22 +4,22 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
 /// Values as little-endian 32 bit floats (7 digits), base64.
-pub(crate) fn floats(values: impl Iterator<Item = f64>) -> String {
+pub fn floats(values: impl Iterator<Item = f64>) -> String {
     STANDARD.encode(values.flat_map(|value| (value as f32).to_le_bytes()).collect::<Vec<u8>>())
 }
 
 /// Values as little-endian 64 bit floats, base64.
-pub(crate) fn doubles(values: &[f64]) -> String {
+pub fn doubles(values: &[f64]) -> String {
     STANDARD.encode(values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())
 }
 
 /// Values as bytes, base64.
-pub(crate) fn bytes(values: impl Iterator<Item = u8>) -> String {
+pub fn bytes(values: impl Iterator<Item = u8>) -> String {
     STANDARD.encode(values.collect::<Vec<u8>>())
 }
 
 /// Truth values as bits, the least of a byte first, base64.
-pub(crate) fn bits(values: &[bool]) -> String {
+pub fn bits(values: &[bool]) -> String {
     let byte = |values: &[bool]| {
         values.iter().rev().fold(0, |byte: u8, value| byte << 1 | u8::from(*value))
     };
@@ -28,7 +28,7 @@ pub(crate) fn bits(values: &[bool]) -> String {
 
 /// Values as little-endian 16 bit integers, base64, and the size of their unit: a curve to 1/32767
 /// of its peak. What is not finite becomes the least integer.
-pub(crate) fn quantised(values: &[f64]) -> (String, f64) {
+pub fn quantised(values: &[f64]) -> (String, f64) {
     let known = values.iter().filter(|value| value.is_finite());
     let peak = known.fold(0.0_f64, |peak, value| peak.max(value.abs()));
     let unit = short(if peak > 0.0 { peak * 1.001 / f64::from(i16::MAX) } else { 1.0 });
@@ -39,7 +39,7 @@ pub(crate) fn quantised(values: &[f64]) -> (String, f64) {
 }
 
 /// A number to six digits, so that it is written short.
-pub(crate) fn short(value: f64) -> f64 {
+pub fn short(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 

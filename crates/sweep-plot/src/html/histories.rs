@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map as Object, Value, json};
 
 use super::{chart_json, embed};
-use crate::PlotOptions;
 use crate::error::{PlotError, Result};
-use crate::figures::trace;
 use crate::gather::Map;
+use crate::model::Figures;
 use crate::read::{Kind, Source};
 use crate::table::Table;
 use crate::together::{self, At};
@@ -28,7 +27,8 @@ const STRETCHES: usize = 500;
 /// # Errors
 /// [`PlotError::File`] for the folder; as [`Table::open`] for its files; [`PlotError::Unfit`] for a
 /// file that is not a trace or belongs to no point of the grid, and for a folder without any.
-pub(crate) fn read(folder: &Path, map: &Map) -> Result<Value> {
+pub(crate) fn read(folder: &Path, map: &Map, model: &dyn Figures) -> Result<Value> {
+    let known = map.table.source.known;
     let names = regular::names(folder).map_err(FileError::io("list", folder))?;
     let mut files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     files.retain(|file| file.extension().is_some_and(|ending| ending == "parquet"));
@@ -40,10 +40,10 @@ pub(crate) fn read(folder: &Path, map: &Map) -> Result<Value> {
     }
     let mut histories = Object::new();
     for file in files {
-        let source = Source::open(&file)?;
+        let source = Source::open(&file, known)?;
         let unfit =
             |what: &str| PlotError::Unfit(format!("`--traces`: {}: {what}", file.display()));
-        if source.kind != Kind::Trace {
+        if source.kind != Kind::TRACE {
             return Err(unfit("not a trace file"));
         }
         let at = together::at(&source);
@@ -57,8 +57,10 @@ pub(crate) fn read(folder: &Path, map: &Map) -> Result<Value> {
         // Where a cell holds several points, which of them a number means is not known.
         let own = if at.is_empty() && map.grid.merged() { &point } else { &at };
         let files = [(&map.table.source, &point), (&source, own)];
-        together::agree("--traces", &file, files, together::RUN)?;
-        histories.insert(cell.to_string(), history(&Table::read_thinned(source, STRETCHES)?)?);
+        together::agree("--traces", &file, files, &together::of_runs(known))?;
+        let chart = model.history(&Table::read_thinned(source, STRETCHES)?)?;
+        let chart = chart_json(&chart, |values| json!(embed::quantised(values)));
+        histories.insert(cell.to_string(), chart);
     }
     Ok(Value::Object(histories))
 }
@@ -90,10 +92,4 @@ fn point(at: &At, cell: usize, map: &Map) -> At {
         rest /= axis.values.len();
     }
     point
-}
-
-/// The figure of one point's trace, in its page's form.
-fn history(table: &Table) -> Result<Value> {
-    let chart = trace::chart(table, &PlotOptions::default())?;
-    Ok(chart_json(&chart, |values| json!(embed::quantised(values))))
 }

@@ -30,9 +30,9 @@ fn points_with(count: u32, further: impl Fn(Sample) -> Sample) -> Sample {
         .numbers("damping_n_s_per_m", "N s/m", damping)
         .numbers("gravity_m_per_s2", "m/s^2", mass.iter().map(|_| 9.81));
     further(parameters)
-        .numbers("nonlinear_tub_yaw", "rad", of(&|k| Some(0.01 * ratio(k)?)))
-        .numbers("linear_tub_yaw", "rad", of(&|k| ratio(k).map(|_| 0.01)))
-        .numbers("ratio_tub_yaw", "1", of(&ratio))
+        .numbers("nonlinear_body_yaw", "rad", of(&|k| Some(0.01 * ratio(k)?)))
+        .numbers("linear_body_yaw", "rad", of(&|k| ratio(k).map(|_| 0.01)))
+        .numbers("ratio_body_yaw", "1", of(&ratio))
         .numbers("ratio_max", "1", of(&ratio))
         .flags("reliable", (0..count as usize).map(|k| ratio(k).map(|ratio| ratio < 2.0)))
         .numbers("min_gap_nonlinear_m", "m", of(&|k| ratio(k).map(|ratio| 0.003 - 0.001 * ratio)))
@@ -41,8 +41,8 @@ fn points_with(count: u32, further: impl Fn(Sample) -> Sample) -> Sample {
         .metadata("sweep.plan", plan)
 }
 
-fn view(view: View) -> PlotOptions {
-    PlotOptions { view: Some(view), ..PlotOptions::default() }
+fn view(view: View) -> Options {
+    Options { view: Some(view), ..Options::default() }
 }
 
 /// How many panels of a picture have an x axis label, by the label.
@@ -52,7 +52,7 @@ fn times(figure: &str, text: &str) -> usize {
 
 #[test]
 fn a_design_has_a_panel_for_each_pair_and_names_its_points() {
-    let figure = svg(points(202), &PlotOptions::default());
+    let figure = svg(points(202), &Options::default());
     for said in [
         "Where the linear model can be trusted",
         "sample · 202 points at random",
@@ -82,7 +82,7 @@ fn long_numbers() -> Sample {
         sample
             .numbers("spring_stiffness_n_per_m", "N/m", spread(5000.0, 12000.0, 0.732))
             .numbers("flexure_stiffness_n_m_per_rad", "N m/rad", spread(15000.0, 30000.0, 0.236))
-            .numbers("tub_inertia_11_kg_m2", "kg m^2", spread(0.8, 1.6, 0.141))
+            .numbers("body_inertia_11_kg_m2", "kg m^2", spread(0.8, 1.6, 0.141))
     })
 }
 
@@ -103,7 +103,7 @@ fn middles(figure: &str) -> Vec<([f64; 2], f64, String)> {
 
 #[test]
 fn numbers_below_neighbouring_panels_do_not_touch() {
-    let figure = svg(long_numbers(), &PlotOptions::default());
+    let figure = svg(long_numbers(), &Options::default());
     let texts = middles(&figure);
     let numbers: Vec<_> = texts.iter().filter(|(_, _, text)| text.parse::<f64>().is_ok()).collect();
     assert!(numbers.len() >= 10, "two below each panel: {numbers:?}");
@@ -122,7 +122,7 @@ fn numbers_below_neighbouring_panels_do_not_touch() {
 
 #[test]
 fn a_unit_is_not_broken() {
-    let figure = svg(long_numbers(), &PlotOptions::default());
+    let figure = svg(long_numbers(), &Options::default());
     for unit in ["(kg m^2)", "(N m/rad)", "(N/m)", "(kg)"] {
         assert!(figure.contains(&format!("{unit}<")), "{unit}");
     }
@@ -141,12 +141,12 @@ fn a_histogram_tells_the_share_and_how_sure_it_is() {
     assert!(figure.contains("41.3 to 60.6 % (Wilson)"), "{figure}");
     assert!(figure.contains("1 undefined · 1 failed"), "{figure}");
     let histogram = |column| {
-        let options = PlotOptions { view: Some(View::Histogram), ..showing(column) };
+        let options = Options { view: Some(View::Histogram), ..showing(column) };
         svg(points(102), &options)
     };
     let gap = histogram("min_gap_nonlinear_m");
     assert!(gap.contains("51.0 % of the points with least gap 0 mm or more"), "{gap}");
-    assert!(histogram("nonlinear_tub_yaw").contains("51.0 % of the points reliable"));
+    assert!(histogram("nonlinear_body_yaw").contains("51.0 % of the points reliable"));
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn influence_puts_first_what_matters() {
 
 #[test]
 fn many_points_are_picked_not_all_drawn_and_all_counted() {
-    let page = carried(&draw(points(250_002), &PlotOptions::default(), "a.html").unwrap());
+    let page = carried(&draw(points(250_002), &Options::default(), "a.html").unwrap());
     let scatter = &page["scatter"];
     let picture = scatter["picture"].as_str().unwrap();
     let counted = ["reliable: below 2 (", "ratio 2 or more (", "excitation (", "no result ("];
@@ -197,7 +197,7 @@ fn many_points_are_picked_not_all_drawn_and_all_counted() {
     let drawn = scatter["of"].as_array().unwrap().len();
     assert!((3000..5000).contains(&drawn), "{drawn}");
     assert!(page["subtitle"].as_str().unwrap().contains("picked at random"));
-    let size = draw(points(250_002), &PlotOptions::default(), "a.svg").unwrap().len();
+    let size = draw(points(250_002), &Options::default(), "a.svg").unwrap().len();
     assert!(size < 2_000_000, "{size}");
 }
 
@@ -206,12 +206,12 @@ fn a_grid_is_no_design_and_a_list_of_a_grid_is_a_map() {
     let refused = message(draw(super::super::sample::map(), &view(View::Scatter), "a.svg"));
     assert!(refused.contains("`--view` is for designs"), "{refused}");
     assert!(message(draw(points(50), &showing("status"), "a.svg")).contains("no number"));
-    let at = PlotOptions { at: vec![("x".to_owned(), 1.0)], ..PlotOptions::default() };
+    let at = Options { at: vec![("x".to_owned(), 1.0)], ..Options::default() };
     assert!(message(draw(points(50), &at, "a.svg")).contains("`--at` is for maps"));
     let listed = || {
         let plan = r#"{ "design": { "method": "list" } }"#;
         super::super::sample::map().metadata("sweep.listed", plan)
     };
-    assert!(svg(listed(), &PlotOptions::default()).contains("linear model unreliable"));
+    assert!(svg(listed(), &Options::default()).contains("linear model unreliable"));
     assert!(svg(listed(), &view(View::Histogram)).contains("Share of the points (%)"));
 }

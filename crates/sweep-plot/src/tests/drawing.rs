@@ -1,6 +1,6 @@
 //! What is drawn where: places that stand alone, names off lines, legends that tell lines apart.
 
-use super::super::sample::{MapSample, Sample, boundary, map, trace};
+use super::super::sample::{MapSample, Sample, boundary, map};
 use super::super::scene::{Item, Outline};
 use super::super::*;
 use super::svg;
@@ -21,7 +21,7 @@ fn folded(axes: &str) -> Sample {
 fn over_the_map(file: Sample) -> String {
     let folder = tempfile::tempdir().unwrap();
     let boundary = Some(file.write(folder.path(), "boundary.parquet"));
-    svg(map(), &PlotOptions { boundary, ..PlotOptions::default() })
+    svg(map(), &Options { boundary, ..Options::default() })
 }
 
 const AXES: &str = r#"{"parameter": "unbalance_mass_kg"}, {"parameter": "damping_n_s_per_m"}"#;
@@ -29,7 +29,9 @@ const AXES: &str = r#"{"parameter": "unbalance_mass_kg"}, {"parameter": "damping
 #[test]
 fn a_crossing_that_no_line_runs_to_is_drawn() {
     let folder = tempfile::tempdir().unwrap();
-    let table = Table::open(&folded("").write(folder.path(), "boundary.parquet")).unwrap();
+    let table =
+        Table::open(&folded("").write(folder.path(), "boundary.parquet"), read::Known::default())
+            .unwrap();
     let chart = figures::boundary::chart(&table).unwrap();
     let scene = chart::draw(&chart);
     let segments = Outline::circle([0.0, 0.0], 3.0).0.len();
@@ -65,7 +67,7 @@ fn place_of(figure: &str, text: &str) -> [f64; 2] {
 #[test]
 fn names_of_regions_keep_off_the_line_of_another_file() {
     const NAME: &str = "linear model reliable";
-    let [_, y] = place_of(&svg(map(), &PlotOptions::default()), NAME);
+    let [_, y] = place_of(&svg(map(), &Options::default()), NAME);
     // The panel's 440 px stand for 45 to 315 N s/m; the name's middle is above its base.
     let through = 315.0 - (y - 5.6 - frame::HEADING_HEIGHT) / 440.0 * 270.0;
     let masses = (1..=10).map(|k| 0.1 * f64::from(k));
@@ -91,29 +93,8 @@ fn names_of_regions_keep_off_the_line_between_them() {
         yaw: &|at| Some([0.01 * (2.0 + 2.0 * (at[0] - 0.7) - at[1] / 8.0).max(0.1), 0.01]),
         chaotic: &|_| false,
     };
-    let figure = svg(corner.sample(), &PlotOptions::default());
+    let figure = svg(corner.sample(), &Options::default());
     let [_, y] = place_of(&figure, "linear model unreliable");
     // Its panel ends at 512 px; in the middle of the region it would lie over the line.
     assert!(y > 480.0, "{y}");
-}
-
-#[test]
-fn a_subtitle_says_once_what_was_set_whatever_the_name() {
-    let name = "long ".repeat(40);
-    let plan = serde_json::json!({ "name": name, "set": { "damping_n_s_per_m": 120.0 } });
-    let figure = svg(trace().metadata("sweep.plan", &plan.to_string()), &PlotOptions::default());
-    let said = "…, damping_n_s_per_m = 120 · unbalance mass 0.4 kg · least gap";
-    assert!(figure.contains(said), "{figure}");
-}
-
-#[test]
-fn subtitles_leave_units_their_letters() {
-    let dwells = Sample::default()
-        .counts("point", [0, 0, 0])
-        .numbers("damping_n_s_per_m", "N s/m", [140.0; 3])
-        .numbers("speed_rpm", "rpm", [200.0, 210.0, 220.0])
-        .numbers("growth_per_s", "1/s", [-0.1, 0.1, 0.2])
-        .words("status", [Some("ok"); 3]);
-    let figure = svg(dwells, &PlotOptions::default());
-    assert!(figure.contains(">damping 140 N s/m<"), "{figure}");
 }

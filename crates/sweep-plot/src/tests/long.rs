@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::super::sample::{MapSample, Sample};
 use super::super::*;
-use super::{carried, draw, message, svg};
+use super::{carried, draw, svg};
 
 /// Values from 0 in steps of 1.
 fn counted(count: usize) -> Vec<f64> {
@@ -35,7 +35,7 @@ fn ratio(at: &[f64]) -> f64 {
 
 fn render_to(input: &Path, name: &str) -> Vec<u8> {
     let output = input.with_file_name(name);
-    render(input, &PlotOptions::default(), &output).unwrap();
+    render(input, &Options::default(), &CommonFigures, &output).unwrap();
     std::fs::read(output).unwrap()
 }
 
@@ -122,10 +122,10 @@ fn a_cell_of_several_points_shows_the_worst_and_says_what_it_holds() {
 
 #[test]
 fn a_small_map_has_a_cell_for_every_point() {
-    let data = carried(&draw(map([30, 40]).sample(), &PlotOptions::default(), "a.html").unwrap());
+    let data = carried(&draw(map([30, 40]).sample(), &Options::default(), "a.html").unwrap());
     assert!(data["counts"].is_null() && data["axes"][0]["spans"].is_null());
     assert!(data["layers"][0]["both"].is_null() && data["layers"][0]["undefined"].is_null());
-    assert!(!svg(map([30, 40]).sample(), &PlotOptions::default()).contains("both:"));
+    assert!(!svg(map([30, 40]).sample(), &Options::default()).contains("both:"));
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn undefined_and_sensitive_points_show_in_their_cell() {
     }
     // The linear model is never chaotic.
     let output = folder.path().join("linear.svg");
-    render(&input, &super::showing("linear_tub_yaw"), &output).unwrap();
+    render(&input, &super::showing("linear_body_yaw"), &CommonFigures, &output).unwrap();
     assert!(!std::fs::read_to_string(output).unwrap().contains("sensitive"));
 }
 
@@ -176,12 +176,12 @@ fn undefined_and_sensitive_points_show_in_their_cell() {
 fn sensitive_points_are_hatched_in_small_maps_too() {
     let chaotic = |at: &[f64]| at == [3.0, 4.0];
     let sample = MapSample { chaotic: &chaotic, ..map([30, 40]) };
-    let drawn = svg(sample.sample(), &PlotOptions::default());
+    let drawn = svg(sample.sample(), &Options::default());
     assert!(drawn.contains(">sensitive: motion is chaotic<"));
     // Without them the picture is the same but for the hatch and its entry of the legend.
-    let none = svg(map([30, 40]).sample(), &PlotOptions::default());
+    let none = svg(map([30, 40]).sample(), &Options::default());
     assert!(!none.contains("sensitive") && drawn.len() > none.len());
-    let data = carried(&draw(sample.sample(), &PlotOptions::default(), "a.html").unwrap());
+    let data = carried(&draw(sample.sample(), &Options::default(), "a.html").unwrap());
     let words = &data["codes"]["sensitive"]["words"];
     assert_eq!(*words, serde_json::json!(["false", "true"]));
 }
@@ -222,13 +222,13 @@ fn a_curve_marks_the_cells_that_hold_both_verdicts() {
     // Every point has a cell of its own: none can hold both.
     let few = vec![("damping_n_s_per_m", counted(240))];
     let few = MapSample { axes: few, yaw: &yaw, ..map([1, 1]) };
-    assert!(!svg(few.sample(), &PlotOptions::default()).contains(said));
+    assert!(!svg(few.sample(), &Options::default()).contains(said));
 }
 
 #[test]
 fn a_page_of_too_many_cuts_picks_some_and_keeps_the_one_asked_for() {
     let values = || [40, 40, 60, 3].map(counted);
-    let names = ["unbalance_mass_kg", "damping_n_s_per_m", "spin_peak_rpm", "tub_mass_kg"];
+    let names = ["unbalance_mass_kg", "damping_n_s_per_m", "peak_hz", "body_mass_kg"];
     let sample = || MapSample { axes: names.into_iter().zip(values()).collect(), ..map([1, 1]) };
     let folder = tempfile::tempdir().unwrap();
     let input = sample().write_long(folder.path(), "map.parquet");
@@ -238,45 +238,16 @@ fn a_page_of_too_many_cuts_picks_some_and_keeps_the_one_asked_for() {
     assert!(data["counts"].is_null(), "what is shown is shown point by point");
     let picked = |data: &Value, k: usize| data["axes"][k]["values"].as_array().unwrap().len();
     let [spins, masses] = [2, 3].map(|k| picked(&data, k));
-    let said = format!("{spins} of 60 values of spin peak");
+    let said = format!("{spins} of 60 values of peak");
     assert!(spins < 60 && data["subtitle"].as_str().unwrap().contains(&said));
     assert_eq!(masses, 3);
 
-    let at = vec![("spin_peak_rpm".to_owned(), 17.0)];
-    let options = PlotOptions { at, ..PlotOptions::default() };
+    let at = vec![("peak_hz".to_owned(), 17.0)];
+    let options = Options { at, ..Options::default() };
     let output = folder.path().join("b.html");
-    render(&input, &options, &output).unwrap();
+    render(&input, &options, &CommonFigures, &output).unwrap();
     let data = carried(&std::fs::read(output).unwrap());
     assert_eq!(data["axes"][2]["values"], serde_json::json!([17.0]));
-}
-
-#[test]
-fn a_long_trace_keeps_its_peaks_within_a_page() {
-    const ROWS: usize = 400_000;
-    let wave = |k: usize| if k == 123_457 { 9.0 } else { (k as f64 * 0.01).sin() };
-    let trace = Sample::default()
-        .numbers("time_s", "s", (0..ROWS).map(|k| k as f64 * 1e-3))
-        .numbers("nonlinear_tub_yaw", "rad", (0..ROWS).map(wave))
-        .numbers("linear_tub_yaw", "rad", (0..ROWS).map(|k| (k as f64 * 0.01).cos()))
-        .numbers("gap_nonlinear_m", "m", (0..ROWS).map(|_| 0.01));
-    let page = draw(trace, &PlotOptions::default(), "a.html").unwrap();
-    assert!(page.len() < 10_000_000, "{}", page.len());
-    let data = carried(&page);
-    assert!(data["subtitle"].as_str().unwrap().contains("least and greatest of every 3 instants"));
-    let yaw = floats(&data["chart"]["panels"][0]["series"][0]["y"]);
-    assert_eq!(yaw.iter().copied().fold(0.0, f64::max), 9000.0, "mrad");
-    assert_eq!(yaw.len(), floats(&data["chart"]["grids"][0]).len());
-}
-
-#[test]
-fn modes_of_more_rows_than_a_figure_shows_are_refused() {
-    const ROWS: usize = 500_000;
-    let modes = Sample::default()
-        .numbers("speed_rpm", "rpm", (0..ROWS).map(|k| k as f64))
-        .counts("mode", (0..ROWS).map(|_| 1))
-        .numbers("frequency_rpm", "rpm", (0..ROWS).map(|_| 100.0));
-    let said = message(draw(modes, &PlotOptions::default(), "a.svg"));
-    assert!(said.contains("a modes file of 500000 rows is more than a figure can show"), "{said}");
 }
 
 #[test]
@@ -286,7 +257,7 @@ fn rows_that_are_the_same_point_are_found_among_merged_ones() {
     let mut sample = map([500, 600]);
     sample.axes[0].1[499] = 498.0;
     let input = sample.write_long(folder.path(), "map.parquet");
-    let drawn = render(&input, &PlotOptions::default(), &folder.path().join("a.svg"));
+    let drawn = render(&input, &Options::default(), &CommonFigures, &folder.path().join("a.svg"));
     let said = drawn.unwrap_err().to_string();
     assert!(said.contains("are the same point"), "{said}");
 }
@@ -301,14 +272,15 @@ fn rows_that_are_no_grid_are_refused_before_they_fill_the_memory() {
         sample = sample.numbers(&format!("x{axis}"), "", values);
     }
     let sample = sample
-        .numbers("nonlinear_tub_yaw", "rad", (0..ROWS).map(|_| 0.01))
+        .numbers("nonlinear_body_yaw", "rad", (0..ROWS).map(|_| 0.01))
         .numbers("ratio_max", "1", (0..ROWS).map(|_| 1.0))
         .words("status", (0..ROWS).map(|_| Some("ok")));
     let folder = tempfile::tempdir().unwrap();
     let input = sample.write(folder.path(), "map.parquet");
     let mut said = String::new();
     let peak = allocation_counter::measure(|| {
-        let drawn = render(&input, &PlotOptions::default(), &folder.path().join("a.svg"));
+        let drawn =
+            render(&input, &Options::default(), &CommonFigures, &folder.path().join("a.svg"));
         said = drawn.unwrap_err().to_string();
     });
     assert!(said.contains("scattered"), "{said}");
@@ -320,22 +292,15 @@ fn columns_of_one_name_do_no_harm() {
     let twice = map([30, 40]).sample().numbers("ratio_max", "1", (0..1200).map(|_| 1.0));
     let twice = twice.numbers("later", "1", (0..1200).map(|_| 1.0));
     for name in ["a.svg", "a.html"] {
-        assert!(draw(twice.clone(), &PlotOptions::default(), name).is_ok(), "{name}");
+        assert!(draw(twice.clone(), &Options::default(), name).is_ok(), "{name}");
     }
-    let time = || (0..50).map(f64::from);
-    let trace = Sample::default()
-        .numbers("time_s", "s", time())
-        .numbers("nonlinear_tub_yaw", "rad", time())
-        .numbers("nonlinear_tub_yaw", "rad", time())
-        .numbers("speed_rpm", "rpm", time());
-    assert!(draw(trace, &PlotOptions::default(), "a.svg").is_ok());
 }
 
 #[test]
 fn metadata_that_would_fill_a_page_is_cut_short() {
     let long = serde_json::to_string(&counted(100_000)).unwrap();
     let sample = map([3, 4]).sample().metadata("note", &long);
-    let page = String::from_utf8(draw(sample, &PlotOptions::default(), "a.html").unwrap()).unwrap();
+    let page = String::from_utf8(draw(sample, &Options::default(), "a.html").unwrap()).unwrap();
     let from = page.find("<dt>note</dt>").unwrap();
     let note = &page[from..from + page[from..].find("</dd>").unwrap()];
     assert!(note.len() < 20_000 && note.contains("characters in all; the file has them)"));

@@ -45,7 +45,7 @@ fn any_column_is_drawn_by_its_name() {
     };
     assert_eq!(data["first"]["column"], "static_sag_m");
     let offered = names(&data["layers"], "column");
-    assert_eq!(offered[..3], ["ratio_max", "ratio_tub_yaw", "ratio_tub_pitch"]);
+    assert_eq!(offered[..3], ["ratio_max", "ratio_body_yaw", "ratio_body_pitch"]);
     assert_eq!(offered[offered.len() - 2..], ["slip_margin_nonlinear_n", "static_sag_m"]);
     let worse = names(&data["layers"], "worse");
     assert_eq!(worse[worse.len() - 2..], ["less", "greater"]);

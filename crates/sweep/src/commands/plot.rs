@@ -6,13 +6,19 @@ use crate::live::{SliderRange, live, slider_range};
 use sweep_engine::commands::plot;
 use sweep_engine::config::written::finite;
 use sweep_engine::{Error, Exit};
-use sweep_plot::PlotOptions;
+use sweep_plot::Options;
+use washer_plot::{View, WasherFigures};
 
 /// Arguments of `sweep plot`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    plot: plot::Args,
+    plot: plot::Args<View>,
+
+    /// Channel to show of a trace, of dwells or of responses, as in the column names; may be
+    /// repeated
+    #[arg(long = "channel", value_name = "NAME")]
+    pub channels: Vec<String>,
 
     /// Trace: mark where these speeds are passed, in rpm, separated by commas
     #[arg(long, value_name = "RPM,...", value_delimiter = ',', value_parser = speed)]
@@ -53,16 +59,21 @@ pub struct Args {
 /// As the engine's command, and a map that no page can compute.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let live = args.live.then(|| live(&args.plot.file, &args.sliders)).transpose()?;
-    let further = PlotOptions {
+    let figures = WasherFigures {
+        view: args.plot.view,
+        channels: args.channels.clone(),
         resonances_rpm: args.resonances.clone(),
         modes: args.modes.clone(),
         stability: args.stability.clone(),
         against: args.against.clone(),
-        traces: args.traces.clone(),
         live,
-        ..PlotOptions::default()
     };
-    plot::draw(&args.plot, further)
+    let further = Options {
+        view: args.plot.view.and_then(View::common),
+        traces: args.traces.clone(),
+        ..Options::default()
+    };
+    plot::draw(&args.plot, further, &figures)
 }
 
 fn speed(text: &str) -> Result<f64, String> {
@@ -96,7 +107,7 @@ mod tests {
         assert_eq!(args.plot.quantity, ["min_gap_linear_m"]);
         assert_eq!(args.plot.at, [("spin_peak_rpm".to_owned(), 350.0)]);
         assert_eq!(args.resonances, [99.9, 147.6]);
-        assert_eq!(args.plot.channels, ["a", "b"]);
+        assert_eq!(args.channels, ["a", "b"]);
     }
 
     #[test]

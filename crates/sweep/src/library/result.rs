@@ -10,7 +10,8 @@ use crate::identity;
 use sweep_engine::store::{Layout, write_map};
 use sweep_engine::{Error, Job, StoreError, Table};
 use sweep_files::{FileError, FileKind, Output, ParquetFile, key};
-use sweep_plot::{PlotOptions, render};
+use sweep_plot::{Options, render};
+use washer_plot::WasherFigures;
 
 /// A result with its rows in memory.
 #[derive(Debug)]
@@ -132,11 +133,12 @@ impl MemoryTable {
     ///
     /// # Errors
     /// As [`sweep_plot::render`] and [`Self::save`].
-    pub fn draw(&self, options: &PlotOptions, output: &Path) -> Result<(), Error> {
+    pub fn draw(&self, output: &Path) -> Result<(), Error> {
         let here = Path::new("a temporary folder");
         let folder = tempfile::tempdir().map_err(FileError::io("make", here))?;
         let path = folder.path().join("result.parquet");
         self.save(&path)?;
-        Ok(render(&path, options, output)?)
+        let (options, figures) = (Options::default(), WasherFigures::default());
+        Ok(render(&path, &options, &figures, output)?)
     }
 }

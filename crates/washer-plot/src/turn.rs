@@ -1,18 +1,17 @@
 //! How far natural frequencies vary over a turn of the drum (the paper's Fig. 7b).
 
-use crate::chart::{Chart, ChartPanel, Series, Style};
-use crate::colour::DISTINCT;
-use crate::error::Result;
-use crate::figures::campbell::{between, modes};
-use crate::label::Label;
-use crate::table::Table;
+use crate::campbell::{between, modes};
+use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::label::Label;
+use sweep_plot::table::Table;
+use sweep_plot::{DISTINCT, PlotError};
 
 /// The chart of a modes file: of each mode that has a resonance, half the distance from its least
 /// to its greatest frequency over a turn, as a share of the mean.
 ///
 /// # Errors
-/// [`crate::PlotError::Undrawable`] without a column, or where no mode has a resonance.
-pub(crate) fn chart(table: &Table) -> Result<Chart> {
+/// [`PlotError::Undrawable`] without a column, or where no mode has a resonance.
+pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     table.numbers("frequency_min_rpm")?;
     table.numbers("frequency_max_rpm")?;
     let mut series = Vec::new();

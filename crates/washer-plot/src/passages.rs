@@ -1,13 +1,13 @@
 //! How far both models go in each turn of the drum, over its speed: resonances come late on the way
 //! up and on the way down.
 
-use crate::PlotOptions;
-use crate::chart::{Chart, Mark, Series, Style};
-use crate::colour::DISTINCT;
-use crate::error::Result;
-use crate::figures::trace;
-use crate::label::Label;
-use crate::table::Table;
+use crate::WasherFigures;
+use crate::kinds::mark_of_speed;
+use crate::trace;
+use sweep_plot::chart::{Chart, Series, Style};
+use sweep_plot::label::Label;
+use sweep_plot::table::Table;
+use sweep_plot::{DISTINCT, PlotError};
 
 /// A stretch of a trace over which the drum only gains or only loses speed: first and last instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,9 +27,9 @@ struct Way {
 /// The chart of a trace file.
 ///
 /// # Errors
-/// As [`trace::chart`]; besides [`crate::PlotError::Undrawable`] without the speed, or where the
+/// As [`trace::chart`]; besides [`PlotError::Undrawable`] without the speed, or where the
 /// drum makes no whole turn while its speed changes.
-pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
+pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, PlotError> {
     let mut chart = trace::chart(table, options)?;
     let time = table.numbers("time_s")?;
     let speed: Vec<f64> = table.numbers("speed_rpm")?.iter().map(|speed| speed.abs()).collect();
@@ -52,7 +52,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
     let (resonances, note) = trace::resonances(table, options)?;
     chart.subtitle = trace::subtitle(table, &[], None) + &note;
     chart.x_label = Label::new("Spin speed", "rpm");
-    chart.marks = resonances.into_iter().map(|speed| Mark::of_speed(speed, speed)).collect();
+    chart.marks = resonances.into_iter().map(|speed| mark_of_speed(speed, speed)).collect();
     chart.mark_meaning = "resonance speed".to_owned();
     chart.shades = trace::unstable_speeds(table, options)?;
     Ok(chart)

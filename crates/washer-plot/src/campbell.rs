@@ -1,26 +1,23 @@
 //! Natural frequencies over spin speed, and where they meet it (the paper's Fig. 7).
 
-use crate::PlotOptions;
-use crate::axis::extremes;
-use crate::chart::{Chart, ChartPanel, Series, Style};
-use crate::colour::DISTINCT;
-use crate::error::Result;
-use crate::figures::stability::{self, Unstable};
-use crate::label::Label;
-use crate::read::Kind;
-use crate::scene::{INK, MUTED};
-use crate::table::Table;
+use crate::WasherFigures;
+use crate::kinds::MODES;
+use crate::stability::{self, Unstable};
 use sweep_files::key;
+use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::label::Label;
+use sweep_plot::table::Table;
+use sweep_plot::{DISTINCT, INK, MUTED, PlotError, extremes};
 
 /// One mode over speed.
-pub(super) struct Mode {
-    pub(super) name: String,
-    pub(super) speed: Vec<f64>,
-    pub(super) frequency: Vec<f64>,
+pub(crate) struct Mode {
+    pub(crate) name: String,
+    pub(crate) speed: Vec<f64>,
+    pub(crate) frequency: Vec<f64>,
     /// Speeds at which it is the speed.
-    pub(super) resonances: Vec<f64>,
+    pub(crate) resonances: Vec<f64>,
     /// Least and greatest over a turn, if the file has them.
-    pub(super) band: Option<(Vec<f64>, Vec<f64>)>,
+    pub(crate) band: Option<(Vec<f64>, Vec<f64>)>,
 }
 
 /// The chart of a modes file. Modes that lie wholly above the greatest speed are left out, and
@@ -28,9 +25,9 @@ pub(super) struct Mode {
 /// drawn too, with a star where such a sum is the speed.
 ///
 /// # Errors
-/// [`crate::PlotError::Undrawable`] without a column or two speeds; as
+/// [`PlotError::Undrawable`] without a column or two speeds; as
 /// [`stability::unstable_of`].
-pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
+pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, PlotError> {
     let unstable = options.stability.as_ref();
     let unstable = unstable.map(|path| stability::unstable_of(table, path)).transpose()?;
     let modes = modes(table)?;
@@ -84,10 +81,10 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
 /// speed.
 ///
 /// # Errors
-/// [`crate::PlotError::Unfit`] when the file is not a modes file,
-/// [`crate::PlotError::Undrawable`] when it lacks a column.
-pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>> {
-    table.source.expect(Kind::Modes, "--modes", "`sweep modes --out FILE` writes a modes file")?;
+/// [`PlotError::Unfit`] when the file is not a modes file,
+/// [`PlotError::Undrawable`] when it lacks a column.
+pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
+    table.source.expect(MODES, "--modes", "`sweep modes --out FILE` writes a modes file")?;
     let mut speeds: Vec<f64> = modes(table)?.into_iter().flat_map(|mode| mode.resonances).collect();
     speeds.sort_by(f64::total_cmp);
     Ok(speeds)
@@ -142,7 +139,7 @@ fn at_speed(mode: &Mode, speed: f64) -> f64 {
 }
 
 /// The value at `x`, straight between the given ones and even beyond them.
-pub(super) fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
+pub(crate) fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
     let above = xs.partition_point(|known| *known < x).min(xs.len() - 1);
     let below = above.saturating_sub(1);
     let step = xs[above] - xs[below];
@@ -154,7 +151,7 @@ pub(super) fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
 }
 
 /// Every mode of a file, by number.
-pub(super) fn modes(table: &Table) -> Result<Vec<Mode>> {
+pub(crate) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
     let speed = table.numbers("speed_rpm")?;
     let number = table.numbers("mode")?;
     let frequency = table.numbers("frequency_rpm")?;

@@ -3,25 +3,23 @@
 use std::path::Path;
 use std::rc::Rc;
 
-use crate::PlotOptions;
-use crate::axis::extremes;
-use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
-use crate::colour::{LINEAR, NONLINEAR};
-use crate::error::{PlotError, Result};
-use crate::figures::machine::machine;
-use crate::figures::{campbell, stability};
-use crate::label::{self, Label};
-use crate::read::Kind;
-use crate::scene::INK;
-use crate::table::Table;
-use crate::together::{self, At};
+use crate::WasherFigures;
+use crate::kinds::{KNOWN, MACHINE, mark_of_speed};
+use crate::machine::machine;
+use crate::{campbell, stability};
+use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::label::{self, Label};
+use sweep_plot::read::Kind;
+use sweep_plot::table::Table;
+use sweep_plot::together::{self, At};
+use sweep_plot::{INK, LINEAR, NONLINEAR, PlotError, extremes};
 
 /// The chart of a trace file.
 ///
 /// # Errors
 /// [`PlotError::Undrawable`] without time, [`PlotError::Unfit`] for an unknown channel, and as
 /// [`campbell::resonances`] for the modes file that gives the resonance speeds.
-pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
+pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, PlotError> {
     let time = Rc::new(table.numbers("time_s")?.to_vec());
     if time.len() < 2 {
         return Err(table.source.empty("a trace needs at least two instants"));
@@ -99,7 +97,7 @@ pub(crate) fn chart(table: &Table, options: &PlotOptions) -> Result<Chart> {
     let (resonances, note) = resonances(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
         let passed = passages(&time, speed, &resonances).into_iter();
-        marks.extend(passed.map(|(x, resonance)| Mark::of_speed(x, resonance)));
+        marks.extend(passed.map(|(x, resonance)| mark_of_speed(x, resonance)));
         shades = stability::stretches_within(&time, speed, &unstable);
         let x = Rc::clone(&time);
         let series = Series::new("", INK, x, speed.to_vec(), Style::Solid(2.0));
@@ -184,9 +182,9 @@ fn difference(panels: &[ChartPanel]) -> Option<f64> {
 }
 
 /// The trace whose nonlinear model is drawn in place of the linear one.
-pub(super) fn other_trace(path: &Path) -> Result<Table> {
-    let table = Table::open(path)?;
-    table.source.expect(Kind::Trace, "--against", "`sweep trace` writes a trace")?;
+pub(crate) fn other_trace(path: &Path) -> Result<Table, PlotError> {
+    let table = Table::open(path, KNOWN)?;
+    table.source.expect(Kind::TRACE, "--against", "`sweep trace` writes a trace")?;
     Ok(table)
 }
 
@@ -241,7 +239,7 @@ fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
 
 /// Name of the run, its unbalance and damping, the rest of the point if the file says which, the
 /// least gaps (mm), and how far two runs are apart.
-pub(super) fn subtitle(
+pub(crate) fn subtitle(
     table: &Table,
     least_gaps_mm: &[(String, f64)],
     apart: Option<f64>,
@@ -262,7 +260,10 @@ pub(super) fn subtitle(
 }
 
 /// The ranges of unstable speeds that the options name, rpm.
-pub(super) fn unstable_speeds(table: &Table, options: &PlotOptions) -> Result<Vec<[f64; 2]>> {
+pub(crate) fn unstable_speeds(
+    table: &Table,
+    options: &WasherFigures,
+) -> Result<Vec<[f64; 2]>, PlotError> {
     match &options.stability {
         Some(path) => Ok(stability::unstable_of(table, path)?.speeds),
         None => Ok(Vec::new()),
@@ -272,14 +273,17 @@ pub(super) fn unstable_speeds(table: &Table, options: &PlotOptions) -> Result<Ve
 /// The resonance speeds that the options name, rpm, and for the subtitle where the machine whose
 /// modes they are is another one. Resonances hardly move with unbalance and damping, so the modes
 /// of a machine serve all its points.
-pub(super) fn resonances(table: &Table, options: &PlotOptions) -> Result<(Vec<f64>, String)> {
+pub(crate) fn resonances(
+    table: &Table,
+    options: &WasherFigures,
+) -> Result<(Vec<f64>, String), PlotError> {
     let mut speeds = options.resonances_rpm.clone();
     let mut note = String::new();
     if let Some(path) = &options.modes {
-        let modes = Table::open(path)?;
+        let modes = Table::open(path, KNOWN)?;
         speeds.extend(campbell::resonances(&modes)?);
         let files = [(&table.source, &together::at(&table.source)), (&modes.source, &At::new())];
-        let parted = together::parted(files, together::MACHINE);
+        let parted = together::parted(files, MACHINE);
         if !parted.is_empty() {
             note = format!(" · resonances of another machine: {}", together::some(&parted, 1));
         }

@@ -2,12 +2,10 @@
 
 use serde_json::Value;
 
-use crate::chart::{Chart, ChartPanel, Series, Style};
-use crate::colour::DISTINCT;
-use crate::error::Result;
-use crate::label::{self, Label};
-use crate::scene::MUTED;
-use crate::table::Table;
+use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::label::{self, Label};
+use sweep_plot::table::Table;
+use sweep_plot::{DISTINCT, MUTED, PlotError};
 
 /// The cost at either end of a 95 % interval, above the least.
 const AT_95: f64 = 3.84;
@@ -15,8 +13,8 @@ const AT_95: f64 = 3.84;
 /// The chart of a fit's curves.
 ///
 /// # Errors
-/// [`crate::PlotError::Undrawable`] for a file that has no profiles.
-pub(crate) fn chart(table: &Table) -> Result<Chart> {
+/// [`PlotError::Undrawable`] for a file that has no profiles.
+pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let empty = || {
         table.source.empty(
             "it has no profiles: they are in the curves of `sweep fit`, if the model follows",
@@ -48,6 +46,6 @@ pub(crate) fn chart(table: &Table) -> Result<Chart> {
 }
 
 /// A list's numbers.
-pub(super) fn numbers(list: &Value) -> Vec<f64> {
+pub(crate) fn numbers(list: &Value) -> Vec<f64> {
     list.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
 }

@@ -2,18 +2,17 @@
 
 use serde_json::Value;
 
-use super::profiles::numbers;
-use crate::chart::{Chart, ChartPanel, Series, Style};
-use crate::error::Result;
-use crate::label::{self, Label};
-use crate::scene::{INK, MUTED};
-use crate::table::Table;
+use crate::profiles::numbers;
+use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::label::{self, Label};
+use sweep_plot::table::Table;
+use sweep_plot::{INK, MUTED, PlotError};
 
 /// The chart of a fit's curves.
 ///
 /// # Errors
-/// [`crate::PlotError::Undrawable`] for a file that has no spectra.
-pub(crate) fn chart(table: &Table) -> Result<Chart> {
+/// [`PlotError::Undrawable`] for a file that has no spectra.
+pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let spectra = table.source.find("spectra").ok_or_else(|| {
         table.source.empty("it has no spectra: they are in the curves of `sweep fit`")
     })?;

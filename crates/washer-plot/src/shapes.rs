@@ -3,11 +3,10 @@
 use serde_json::Value;
 use sweep_files::key;
 
-use crate::chart::{Chart, ChartPanel, Series, Style};
-use crate::colour::DISTINCT;
-use crate::error::Result;
-use crate::label::{self, Label};
-use crate::table::Table;
+use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::label::{self, Label};
+use sweep_plot::table::Table;
+use sweep_plot::{DISTINCT, PlotError};
 
 /// Departures of the drum's axis from the tub's are drawn from this share of the greatest
 /// deflection on.
@@ -31,8 +30,8 @@ type Line = [Vec<Phasor>; 2];
 /// are from rest when the greatest deflection is at its farthest, and a quarter of a period later.
 ///
 /// # Errors
-/// [`crate::PlotError::Undrawable`] where the file holds no machine or no resonances.
-pub(crate) fn chart(table: &Table) -> Result<Chart> {
+/// [`PlotError::Undrawable`] where the file holds no machine or no resonances.
+pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     let places = places(table)
         .ok_or_else(|| table.source.empty("the file does not say where the machine's parts are"))?;
     let mut panels = Vec::new();

@@ -2,9 +2,8 @@
 
 use std::path::Path;
 
-use super::super::sample::{Sample, boundary, map, modes, trace};
-use super::super::*;
-use super::{carried, data, draw, message, svg};
+use super::sample::{Sample, boundary, map};
+use super::*;
 
 /// Points of these unbalances over 200 to 300 rpm. Growth is above 0 from 230 to 250 rpm, by as
 /// much as the unbalance.
@@ -31,27 +30,23 @@ fn stability(masses: &[f64]) -> Sample {
         .metadata("sweep.plan", r#"{"name": "dwell"}"#)
 }
 
-fn page(sample: Sample, options: &PlotOptions) -> serde_json::Value {
-    carried(&draw(sample, options, "figure.html").unwrap())["chart"].clone()
+fn page(sample: Sample, asked: &impl Asked) -> Value {
+    carried(&draw(sample, asked, "figure.html").unwrap())["chart"].clone()
 }
 
-fn viewed(view: View) -> PlotOptions {
-    PlotOptions { view: Some(view), ..PlotOptions::default() }
-}
-
-fn ranges(shades: &serde_json::Value) -> Vec<[f64; 2]> {
-    let ends = |range: &serde_json::Value| [0, 1].map(|end| range[end].as_f64().unwrap());
+fn ranges(shades: &Value) -> Vec<[f64; 2]> {
+    let ends = |range: &Value| [0, 1].map(|end| range[end].as_f64().unwrap());
     shades.as_array().unwrap().iter().map(ends).collect()
 }
 
 #[test]
 fn growth_of_one_point_is_shaded_between_its_marked_edges() {
-    let chart = page(stability(&[0.4]), &PlotOptions::default());
+    let chart = page(stability(&[0.4]), &plain());
     assert_eq!(ranges(&chart["shades"]), [[230.0, 250.0]]);
     let marks: Vec<&str> =
         chart["marks"].as_array().unwrap().iter().map(|mark| mark[1].as_str().unwrap()).collect();
     assert_eq!(marks, ["230 rpm", "250 rpm"]);
-    let figure = svg(stability(&[0.4]), &PlotOptions::default());
+    let figure = svg(stability(&[0.4]), &plain());
     for text in ["dwell · unbalance mass 0.4 kg", "a dwell at this speed is unstable", "230 rpm"] {
         assert!(figure.contains(text), "{text}");
     }
@@ -60,7 +55,7 @@ fn growth_of_one_point_is_shaded_between_its_marked_edges() {
 #[test]
 fn several_points_have_a_curve_each_and_too_many_are_thinned() {
     let names = |masses: &[f64], at: Vec<(String, f64)>| -> Vec<String> {
-        let options = PlotOptions { at, ..PlotOptions::default() };
+        let options = Options { at, ..Options::default() };
         let chart = page(stability(masses), &options);
         let series = chart["panels"][0]["series"].as_array().unwrap().clone();
         series.iter().map(|one| one["name"].as_str().unwrap().to_owned()).collect()
@@ -97,10 +92,10 @@ fn responses_are_dashed_where_they_are_unstable() {
 fn other_figures_shade_the_unstable_speeds() {
     let folder = tempfile::tempdir().unwrap();
     let path = stability(&[0.4]).write(folder.path(), "stability.parquet");
-    let options = PlotOptions { stability: Some(path.clone()), ..PlotOptions::default() };
+    let options = WasherFigures { stability: Some(path.clone()), ..WasherFigures::default() };
     let chart = page(trace(), &options);
     let file = trace().write(folder.path(), "trace.parquet");
-    let table = Table::open(&file).unwrap();
+    let table = Table::open(&file, KNOWN).unwrap();
     let (time, speed) = (table.numbers("time_s").unwrap(), table.numbers("speed_rpm").unwrap());
     let shades = ranges(&chart["shades"]);
     assert!(!shades.is_empty());
@@ -134,8 +129,8 @@ fn a_map_takes_the_line_of_a_boundary_over_its_axes() {
     let same = over(["unbalance_mass_kg", "damping_n_s_per_m"]).write(folder.path(), "a.parquet");
     let other = over(["unbalance_mass_kg", "tub_mass_kg"]).write(folder.path(), "b.parquet");
     let no_boundary = trace().write(folder.path(), "trace.parquet");
-    let with = |path: &Path| PlotOptions { boundary: Some(path.to_owned()), ..Default::default() };
-    let plain = svg(map(), &PlotOptions::default());
+    let with = |path: &Path| Options { boundary: Some(path.to_owned()), ..Default::default() };
+    let without = svg(map(), &plain());
     let figure = svg(map(), &with(&same));
     assert!(
         figure.contains(">traced boundary: no growth at any speed<"),
@@ -143,7 +138,7 @@ fn a_map_takes_the_line_of_a_boundary_over_its_axes() {
     );
     let dashed = |figure: &str| figure.matches("stroke-dasharray").count();
     // The line and its sign in the legend.
-    assert_eq!(dashed(&figure), dashed(&plain) + 2);
+    assert_eq!(dashed(&figure), dashed(&without) + 2);
     for (path, format, said) in [
         (&other, "a.svg", "is a boundary over unbalance_mass_kg, tub_mass_kg"),
         (&no_boundary, "a.svg", "`sweep boundary` writes a boundary file"),
@@ -152,7 +147,7 @@ fn a_map_takes_the_line_of_a_boundary_over_its_axes() {
         let refused = message(draw(map(), &with(path), format));
         assert!(refused.contains(said), "{refused}");
     }
-    let own = svg(over(["unbalance_mass_kg", "damping_n_s_per_m"]), &PlotOptions::default());
+    let own = svg(over(["unbalance_mass_kg", "damping_n_s_per_m"]), &plain());
     assert!(own.contains(">Where the machine may dwell at any speed<"), "the title");
 }
 
@@ -177,15 +172,13 @@ fn what_is_drawn_together_is_of_one_plan() {
     let (own, other) = (24.0, 20.0);
     let map_of = || map().without("sweep.plan").metadata("sweep.plan", &plan(own, axes));
     let trace_of = || trace().metadata("sweep.plan", &plan(own, ""));
-    let boundary = |tub, name| PlotOptions {
-        boundary: Some(named(boundary(), tub, name)),
-        ..Default::default()
-    };
+    let boundary =
+        |tub, name| Options { boundary: Some(named(boundary(), tub, name)), ..Default::default() };
     svg(map_of(), &boundary(own, "b.parquet"));
     let said = message(draw(map_of(), &boundary(other, "c.parquet"), "a.svg"));
     assert!(said.contains("machine.tub.mass_kg 24.0 and 20.0"), "{said}");
 
-    let stability_of = |tub, name| PlotOptions {
+    let stability_of = |tub, name| WasherFigures {
         stability: Some(named(stability(&[0.4]), tub, name)),
         ..Default::default()
     };
@@ -195,7 +188,7 @@ fn what_is_drawn_together_is_of_one_plan() {
         assert!(said.contains("`--stability`") && said.contains("24.0 and 20.0"), "{said}");
     }
 
-    let modes_of = |tub, name, view| PlotOptions {
+    let modes_of = |tub, name, view| WasherFigures {
         modes: Some(named(modes(), tub, name)),
         view,
         ..Default::default()
@@ -210,7 +203,7 @@ fn what_is_drawn_together_is_of_one_plan() {
 
     let traces = folder.path().join("traces");
     std::fs::create_dir(&traces).unwrap();
-    let with = PlotOptions { traces: Some(traces.clone()), ..Default::default() };
+    let with = Options { traces: Some(traces.clone()), ..Default::default() };
     trace_of().write(&traces, "point-3.parquet");
     let carried = data(map_of(), &with);
     assert_eq!(carried["traces"].as_object().unwrap().keys().collect::<Vec<_>>(), ["29"]);
@@ -237,10 +230,10 @@ fn what_does_not_fit_is_refused_with_what_would() {
     let one = stability(&[0.4]).write(folder.path(), "one.parquet");
     let two = stability(&[0.2, 0.7]).write(folder.path(), "two.parquet");
     let no_trace = trace().write(folder.path(), "trace.parquet");
-    let with = |path: &Path| PlotOptions { stability: Some(path.to_owned()), ..Default::default() };
-    let at = PlotOptions { at: vec![("tub_mass_kg".to_owned(), 1.0)], ..Default::default() };
-    let value =
-        PlotOptions { at: vec![("unbalance_mass_kg".to_owned(), 9.0)], ..Default::default() };
+    let with =
+        |path: &Path| WasherFigures { stability: Some(path.to_owned()), ..Default::default() };
+    let at = Options { at: vec![("tub_mass_kg".to_owned(), 1.0)], ..Default::default() };
+    let value = Options { at: vec![("unbalance_mass_kg".to_owned(), 9.0)], ..Default::default() };
     for (result, said) in [
         (draw(trace(), &with(&no_trace), "a.svg"), "`sweep stability` writes a stability file"),
         (draw(stability(&[0.4]), &with(&one), "a.svg"), "`--stability` is for traces"),

@@ -2,11 +2,11 @@
 
 use serde_json::Value;
 
-use crate::table::Table;
+use sweep_plot::table::Table;
 
 /// The two numbers of the machine that reliability turns on, as far as the file has them and all
 /// dampers are alike.
-pub(super) fn machine(table: &Table) -> Vec<(&'static str, f64)> {
+pub(crate) fn machine(table: &Table) -> Vec<(&'static str, f64)> {
     let Some(machine) = table.source.find("machine") else { return Vec::new() };
     let unbalance = machine.pointer("/unbalance/mass_kg").and_then(Value::as_f64);
     let dampers = machine.get("dampers").and_then(Value::as_array).into_iter().flatten();

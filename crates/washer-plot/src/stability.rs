@@ -3,16 +3,16 @@
 
 use std::path::Path;
 
-use crate::PlotOptions;
-use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
-use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
-use crate::error::{PlotError, Result};
-use crate::figures::machine::machine;
-use crate::label::{self, Label};
-use crate::read::{ColumnFacts, Kind, Source, some_of};
-use crate::swept::{self, SweptAxis};
-use crate::table::Table;
-use crate::together::{self, At};
+use crate::WasherFigures;
+use crate::kinds::{KNOWN, MACHINE, STABILITY, mark_of_speed};
+use crate::machine::machine;
+use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::label::{self, Label};
+use sweep_plot::read::{ColumnFacts, Source, some_of};
+use sweep_plot::swept::{self, SweptAxis};
+use sweep_plot::table::Table;
+use sweep_plot::together::{self, At};
+use sweep_plot::{DISTINCT, LINEAR, NONLINEAR, PlotError};
 
 /// Most points whose growth is drawn: each needs a colour.
 const MOST_CURVES: usize = DISTINCT.len();
@@ -24,14 +24,14 @@ const USUAL: [&str; 4] = ["tub_front_y", "tub_front_z", "tub_yaw", "tub_pitch"];
 const MOST_EDGES: usize = 16;
 
 /// What shades mean, in the legend.
-pub(super) const UNSTABLE: &str = "a dwell at this speed is unstable";
+pub(crate) const UNSTABLE: &str = "a dwell at this speed is unstable";
 
 /// One point over speed.
 #[derive(Clone, Default)]
-pub(super) struct Swept {
-    pub(super) speed: Vec<f64>,
+pub(crate) struct Swept {
+    pub(crate) speed: Vec<f64>,
     /// NaN where there is no response.
-    pub(super) growth: Vec<f64>,
+    pub(crate) growth: Vec<f64>,
     /// Values of each column asked for.
     columns: Vec<Vec<f64>>,
 }
@@ -40,8 +40,8 @@ pub(super) struct Swept {
 ///
 /// # Errors
 /// As [`Held::at`], [`Held::read`].
-pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart> {
-    let mut held = Held::at(source, &options.at, "--at")?;
+pub(crate) fn growth(source: &Source, at: &At) -> Result<Chart, PlotError> {
+    let mut held = Held::at(source, at, "--at")?;
     let count = held.points.len();
     if count > MOST_CURVES {
         let some = (0..MOST_CURVES).map(|k| k * (count - 1) / (MOST_CURVES - 1));
@@ -73,7 +73,7 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart> {
         _ => Default::default(),
     };
     let edges = edges.into_iter().take(MOST_EDGES);
-    let marks = edges.map(|edge| Mark::of_speed(edge, edge)).collect();
+    let marks = edges.map(|edge| mark_of_speed(edge, edge)).collect();
     Ok(Chart {
         title: "Where a dwell at constant speed is unstable".to_owned(),
         subtitle: notes.join(" · "),
@@ -92,12 +92,16 @@ pub(crate) fn growth(source: &Source, options: &PlotOptions) -> Result<Chart> {
 ///
 /// # Errors
 /// As [`Held::one`]; [`PlotError::Unfit`] for an unknown channel.
-pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart> {
+pub(crate) fn responses(
+    source: &Source,
+    at: &At,
+    options: &WasherFigures,
+) -> Result<Chart, PlotError> {
     let channels = channels_of(source, "linear");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
     let columns = columns_of(&channels, ["linear", "nonlinear"]);
-    let held = Held::one(source, &options.at, "--at")?;
+    let held = Held::one(source, at, "--at")?;
     let one = held.read(&columns)?.remove(0);
     let panels = channels.iter().zip(is_shown).enumerate().map(|(k, (channel, shown))| {
         let lines = response("nonlinear model", &one, k, label::shown(&channel.1.unit).1);
@@ -118,14 +122,14 @@ pub(crate) fn responses(source: &Source, options: &PlotOptions) -> Result<Chart>
 }
 
 /// Channels of the nonlinear model for which the file has a column of this kind too.
-pub(super) fn channels_of<'a>(source: &'a Source, kind: &str) -> Vec<(&'a str, &'a ColumnFacts)> {
+pub(crate) fn channels_of<'a>(source: &'a Source, kind: &str) -> Vec<(&'a str, &'a ColumnFacts)> {
     let mut channels = source.with_prefix("nonlinear_");
     channels.retain(|(name, _)| source.column(&format!("{kind}_{name}")).is_some());
     channels
 }
 
 /// The columns of these kinds of each channel.
-pub(super) fn columns_of<const N: usize>(
+pub(crate) fn columns_of<const N: usize>(
     channels: &[(&str, &ColumnFacts)],
     kinds: [&str; N],
 ) -> Vec<String> {
@@ -133,7 +137,7 @@ pub(super) fn columns_of<const N: usize>(
 }
 
 /// The panel of a channel.
-pub(super) fn panel(
+pub(crate) fn panel(
     (name, facts): (&str, &ColumnFacts),
     shown: bool,
     series: Vec<Series>,
@@ -145,7 +149,7 @@ pub(super) fn panel(
 
 /// The `k`-th channel's lines, so many times as high: in the linear model and in the periodic
 /// response of the nonlinear one, where that is stable and where it is not.
-pub(super) fn response(name: &str, one: &Swept, k: usize, factor: f64) -> Vec<Series> {
+pub(crate) fn response(name: &str, one: &Swept, k: usize, factor: f64) -> Vec<Series> {
     let [linear, periodic]: [Vec<f64>; 2] =
         [2 * k, 2 * k + 1].map(|k| one.columns[k].iter().map(|value| value * factor).collect());
     let of = |wanted: bool| part(&periodic, &one.growth, wanted);
@@ -169,7 +173,11 @@ fn part(line: &[f64], growth: &[f64], wanted: bool) -> Vec<f64> {
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for an unknown channel.
-pub(super) fn shown(source: &Source, names: &[&str], asked: &[String]) -> Result<Vec<bool>> {
+pub(crate) fn shown(
+    source: &Source,
+    names: &[&str],
+    asked: &[String],
+) -> Result<Vec<bool>, PlotError> {
     if let Some(unknown) = asked.iter().find(|asked| !names.contains(&asked.as_str())) {
         return Err(source.not_there("--channel", unknown, "channel", names.join(", ")));
     }
@@ -183,12 +191,12 @@ pub(super) fn shown(source: &Source, names: &[&str], asked: &[String]) -> Result
 }
 
 /// What a stability file says of another file's machine.
-pub(super) struct Unstable {
+pub(crate) struct Unstable {
     /// Ranges of unstable speeds (rpm).
-    pub(super) speeds: Vec<[f64; 2]>,
+    pub(crate) speeds: Vec<[f64; 2]>,
     /// At each unstable speed of the file (rpm) the damped frequencies of the one or two modes that
     /// take part in what grows (cycles per minute), NaN for none.
-    pub(super) participants: Vec<(f64, [f64; 2])>,
+    pub(crate) participants: Vec<(f64, [f64; 2])>,
 }
 
 /// The unstable speeds of the machine that a trace or a modes file is of.
@@ -196,9 +204,9 @@ pub(super) struct Unstable {
 /// # Errors
 /// As [`Source::open`] and [`Source::expect`]; [`PlotError::Unfit`] where the stability file does
 /// not have this machine.
-pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable> {
-    let source = Source::open(path)?;
-    source.expect(Kind::Stability, "--stability", "`sweep stability` writes a stability file")?;
+pub(crate) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable, PlotError> {
+    let source = Source::open(path, KNOWN)?;
+    source.expect(STABILITY, "--stability", "`sweep stability` writes a stability file")?;
     let mut at: At =
         machine(table).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     let named = together::at(&table.source);
@@ -208,7 +216,7 @@ pub(super) fn unstable_of(table: &Table, path: &Path) -> Result<Unstable> {
     at.retain(|(name, _)| axes.iter().any(|axis| axis.name == *name));
     let held = Held::one(&source, &at, "--stability")?;
     let files = [(&table.source, &named), (&source, &held.values())];
-    together::agree("--stability", path, files, together::MACHINE)?;
+    together::agree("--stability", path, files, MACHINE)?;
     let one = held.read(&["mode_1_cpm", "mode_2_cpm"].map(str::to_owned))?.remove(0);
     let frequency = |place: usize, k: usize| one.columns[place].get(k).copied().unwrap_or(f64::NAN);
     Ok(Unstable {
@@ -230,18 +238,18 @@ fn format_within(axis: &ColumnFacts, value: f64) -> String {
 }
 
 /// A row of a file over constant speeds. What the file does not have is NaN.
-pub(super) struct Row<'a> {
+pub(crate) struct Row<'a> {
     /// Values of the file's axes.
     point: Vec<f64>,
-    pub(super) speed: f64,
+    pub(crate) speed: f64,
     growth: f64,
-    pub(super) kind: Option<&'a str>,
+    pub(crate) kind: Option<&'a str>,
     /// Of the columns asked for.
-    pub(super) values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
 }
 
 /// Points of a file over constant speeds.
-pub(super) struct Held<'a> {
+pub(crate) struct Held<'a> {
     source: &'a Source,
     axes: Vec<&'a ColumnFacts>,
     /// Values of the axes, in file order.
@@ -254,7 +262,7 @@ impl<'a> Held<'a> {
     /// # Errors
     /// As [`Source::each_row`]; [`PlotError::Unfit`] for what is no axis, or no value of it;
     /// [`PlotError::Undrawable`] without rows.
-    fn at(source: &'a Source, at: &At, option: &str) -> Result<Self> {
+    fn at(source: &'a Source, at: &At, option: &str) -> Result<Self, PlotError> {
         let mut held = Self { source, axes: swept::columns(source), points: Vec::new() };
         let place = |name: &str| {
             let names = || held.axes.iter().map(|axis| axis.name.as_str());
@@ -262,7 +270,7 @@ impl<'a> Held<'a> {
             place.ok_or_else(|| source.not_there(option, name, "axis", some_of(names())))
         };
         let pins = at.iter().map(|(name, value)| Ok((place(name)?, *value)));
-        let pins = pins.collect::<Result<Vec<_>>>()?;
+        let pins = pins.collect::<Result<Vec<_>, PlotError>>()?;
         let mut points: Vec<Vec<f64>> = Vec::new();
         let mut seen_rows = false;
         held.each_row_of_all(&[""; 0], |row| {
@@ -290,7 +298,7 @@ impl<'a> Held<'a> {
     ///
     /// # Errors
     /// As [`Self::at`]; [`PlotError::Unfit`] where there are several.
-    pub(super) fn one(source: &'a Source, at: &At, option: &str) -> Result<Self> {
+    pub(crate) fn one(source: &'a Source, at: &At, option: &str) -> Result<Self, PlotError> {
         let held = Self::at(source, at, option)?;
         if held.points.len() > 1 {
             let free = held.axes.iter().map(|axis| axis.name.as_str());
@@ -307,13 +315,13 @@ impl<'a> Held<'a> {
     }
 
     /// The axes with their values at the first point.
-    pub(super) fn values(&self) -> At {
+    pub(crate) fn values(&self) -> At {
         let values = self.axes.iter().zip(&self.points[0]);
         values.map(|(axis, value)| (axis.name.clone(), *value)).collect()
     }
 
     /// The run and the first point, in words.
-    pub(super) fn notes(&self) -> Vec<String> {
+    pub(crate) fn notes(&self) -> Vec<String> {
         let values = self.axes.iter().zip(&self.points[0]);
         self.source.notes(values.map(|(axis, value)| format_within(axis, *value)))
     }
@@ -322,11 +330,11 @@ impl<'a> Held<'a> {
     ///
     /// # Errors
     /// As [`Source::each_row`].
-    pub(super) fn each_row<S: AsRef<str>>(
+    pub(crate) fn each_row<S: AsRef<str>>(
         &self,
         columns: &[S],
         mut take: impl FnMut(usize, Row<'_>),
-    ) -> Result<()> {
+    ) -> Result<(), PlotError> {
         self.each_row_of_all(columns, |row| {
             if let Some(place) = self.points.iter().position(|point| *point == row.point) {
                 take(place, row);
@@ -338,7 +346,7 @@ impl<'a> Held<'a> {
         &self,
         columns: &[S],
         mut take: impl FnMut(Row<'_>),
-    ) -> Result<()> {
+    ) -> Result<(), PlotError> {
         let names = self.axes.iter().map(|axis| axis.name.as_str());
         let names = names.chain(["speed_rpm", "growth_per_s", "kind"]);
         let names: Vec<&str> = names.chain(columns.iter().map(S::as_ref)).collect();
@@ -359,7 +367,7 @@ impl<'a> Held<'a> {
     ///
     /// # Errors
     /// As [`Source::each_row`].
-    pub(super) fn read(&self, columns: &[String]) -> Result<Vec<Swept>> {
+    pub(crate) fn read(&self, columns: &[String]) -> Result<Vec<Swept>, PlotError> {
         let empty = Swept { columns: vec![Vec::new(); columns.len()], ..Swept::default() };
         let mut swept = vec![empty; self.points.len()];
         self.each_row(columns, |place, row| {
@@ -380,7 +388,7 @@ impl<'a> Held<'a> {
 
 /// The ranges of speed in which growth is above 0, taken as linear between the given speeds. A
 /// speed without an answer has no growth (NaN), and gives no edge to its neighbours.
-pub(super) fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
+pub(crate) fn unstable(speed: &[f64], growth: &[f64]) -> Vec<[f64; 2]> {
     stretches_within(speed, growth, &[[0.0, f64::INFINITY]])
 }
 
@@ -394,7 +402,7 @@ fn edges(speed: &[f64], growth: &[f64]) -> Vec<f64> {
 
 /// The stretches of x in which a curve over it is within one of these ranges; straight between its
 /// points.
-pub(super) fn stretches_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec<[f64; 2]> {
+pub(crate) fn stretches_within(x: &[f64], y: &[f64], ranges: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut found: Vec<[f64; 2]> = Vec::new();
     for &[low, high] in ranges {
         let first_own = found.len();

@@ -3,18 +3,15 @@
 
 use std::path::Path;
 
-use crate::axis::extremes;
-use crate::chart::{Chart, ChartPanel, Series, Style};
-use crate::colour::{DISTINCT, FAILED, NONLINEAR};
-use crate::error::Result;
-use crate::figures::stability::{
-    Held, UNSTABLE, channels_of, columns_of, panel, response, shown, unstable,
-};
-use crate::figures::{passages, trace};
-use crate::label::{self, Label};
-use crate::read::{ColumnFacts, Source};
-use crate::scene::{Colour, INK};
-use crate::{PlotOptions, together};
+use crate::WasherFigures;
+use crate::kinds::MACHINE;
+use crate::stability::{Held, UNSTABLE, channels_of, columns_of, panel, response, shown, unstable};
+use crate::{passages, trace};
+use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
+use sweep_plot::label::{self, Label};
+use sweep_plot::read::{ColumnFacts, Source};
+use sweep_plot::together::{self, At};
+use sweep_plot::{Colour, DISTINCT, FAILED, INK, NONLINEAR, PlotError, extremes};
 
 /// Kinds of motions as the file has them, in words, and their colours; the last is what did not
 /// settle.
@@ -45,11 +42,11 @@ type Motion = (f64, usize, Vec<f64>);
 ///
 /// # Errors
 /// As [`Held::one`] and [`shown`].
-pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart> {
+pub(crate) fn chart(source: &Source, at: &At, options: &WasherFigures) -> Result<Chart, PlotError> {
     let channels = channels_of(source, "periodic");
     let names: Vec<&str> = channels.iter().map(|(name, _)| *name).collect();
     let is_shown = shown(source, &names, &options.channels)?;
-    let held = Held::one(source, &options.at, "--at")?;
+    let held = Held::one(source, at, "--at")?;
     let motions = motions(source, &held, &channels)?;
     let one = held.read(&columns_of(&channels, ["linear", "periodic"]))?.remove(0);
     let passing = options.against.as_ref().map(|path| passing(source, &held, path)).transpose()?;
@@ -97,12 +94,12 @@ pub(crate) fn chart(source: &Source, options: &PlotOptions) -> Result<Chart> {
 /// The chart of how far a run goes in each turn that passes over these speeds.
 ///
 /// # Errors
-/// [`crate::PlotError::Unfit`] for a file that is no trace or of another machine.
-fn passing(source: &Source, held: &Held<'_>, path: &Path) -> Result<Chart> {
+/// [`PlotError::Unfit`] for a file that is no trace or of another machine.
+fn passing(source: &Source, held: &Held<'_>, path: &Path) -> Result<Chart, PlotError> {
     let trace = trace::other_trace(path)?;
     let files = [(&trace.source, &together::at(&trace.source)), (source, &held.values())];
-    together::agree("--against", path, files, together::MACHINE)?;
-    passages::chart(&trace, &PlotOptions::default())
+    together::agree("--against", path, files, MACHINE)?;
+    passages::chart(&trace, &WasherFigures::default())
 }
 
 /// The motions at every speed.
@@ -110,7 +107,7 @@ fn motions(
     source: &Source,
     held: &Held<'_>,
     channels: &[(&str, &ColumnFacts)],
-) -> Result<Vec<Motion>> {
+) -> Result<Vec<Motion>, PlotError> {
     let mut columns = columns_of(channels, ["nonlinear"]);
     columns.push(TURN.to_owned());
     let has_turns = source.column(TURN).is_some();
@@ -134,9 +131,9 @@ fn place_of(kind: Option<&str>) -> usize {
 /// each speed in a panel.
 ///
 /// # Errors
-/// As [`Held::one`]; [`crate::PlotError::Undrawable`] where no states were kept.
-pub(crate) fn sections(source: &Source, options: &PlotOptions) -> Result<Chart> {
-    let held = Held::one(source, &options.at, "--at")?;
+/// As [`Held::one`]; [`PlotError::Undrawable`] where no states were kept.
+pub(crate) fn sections(source: &Source, at: &At) -> Result<Chart, PlotError> {
+    let held = Held::one(source, at, "--at")?;
     let columns = ["motion", YAW, PITCH];
     if columns.into_iter().any(|name| source.column(name).is_none()) {
         return Err(source.empty("it keeps no states: `sweep dwell --sections N` does"));

@@ -1,0 +1,429 @@
+//! Files in, figures out.
+
+#[path = "../../sweep-plot/src/sample.rs"]
+mod sample;
+mod stability;
+
+use std::io::Read as _;
+use std::path::Path;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
+
+use self::sample::{Sample, map};
+use super::*;
+
+/// What a test draws with.
+trait Asked {
+    fn draw(&self, input: &Path, output: &Path) -> Result<(), PlotError>;
+}
+
+impl Asked for Options {
+    fn draw(&self, input: &Path, output: &Path) -> Result<(), PlotError> {
+        sweep_plot::render(input, self, &WasherFigures::default(), output)
+    }
+}
+
+impl Asked for WasherFigures {
+    fn draw(&self, input: &Path, output: &Path) -> Result<(), PlotError> {
+        sweep_plot::render(input, &Options::default(), self, output)
+    }
+}
+
+fn draw(sample: Sample, asked: &impl Asked, output: &str) -> Result<Vec<u8>, PlotError> {
+    let folder = tempfile::tempdir().unwrap();
+    let input = sample.write(folder.path(), "input.parquet");
+    let output = folder.path().join(output);
+    asked.draw(&input, &output)?;
+    Ok(std::fs::read(output).unwrap())
+}
+
+fn svg(sample: Sample, asked: &impl Asked) -> String {
+    String::from_utf8(draw(sample, asked, "figure.svg").unwrap()).unwrap()
+}
+
+fn data(sample: Sample, asked: &impl Asked) -> Value {
+    carried(&draw(sample, asked, "figure.html").unwrap())
+}
+
+/// What a page carries as its data.
+fn carried(page: &[u8]) -> Value {
+    let page = std::str::from_utf8(page).unwrap();
+    let start = page.find(r#"id="data">"#).unwrap() + r#"id="data">"#.len();
+    serde_json::from_str(&page[start..start + page[start..].find("</script>").unwrap()]).unwrap()
+}
+
+/// A curve as a page carries it.
+fn curve(text: &Value) -> Vec<f64> {
+    let bytes = STANDARD.decode(text.as_str().unwrap()).unwrap();
+    bytes.chunks(4).map(|four| f64::from(f32::from_le_bytes(four.try_into().unwrap()))).collect()
+}
+
+fn message(result: Result<Vec<u8>, PlotError>) -> String {
+    result.unwrap_err().to_string()
+}
+
+/// As drawn by itself.
+fn plain() -> Options {
+    Options::default()
+}
+
+/// Twelve seconds of both models, to 300 rpm and back.
+pub(crate) fn trace() -> Sample {
+    let time: Vec<f64> = (0..=6000).map(|k| 0.002 * f64::from(k)).collect();
+    let along = |factor: f64| {
+        time.iter().map(move |t| factor * (t / 12.0) * (20.0 * t).sin()).collect::<Vec<f64>>()
+    };
+    Sample::default()
+        .numbers("time_s", "s", time.iter().copied())
+        .numbers("speed_rpm", "rpm", time.iter().map(|t| 50.0 * (6.0 - (t - 6.0).abs())))
+        .numbers("nonlinear_tub_yaw", "rad", along(0.07))
+        .numbers("nonlinear_drum_front_y", "m", along(0.03))
+        .numbers("linear_tub_yaw", "rad", along(0.009))
+        .numbers("linear_drum_front_y", "m", along(0.02))
+        .numbers("gap_nonlinear_m", "m", along(0.002).into_iter().map(|g| 0.01 - g.abs()))
+        .numbers("gap_linear_m", "m", along(0.001).into_iter().map(|g| 0.01 - g.abs()))
+        .metadata("at", r#"{"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 120.0}"#)
+}
+
+/// Two modes that cross the speed at 100 and 200 rpm, and one far above.
+pub(crate) fn modes() -> Sample {
+    let rows: Vec<(f64, u64)> =
+        (0..=30).flat_map(|k| (1..=3).map(move |mode| (20.0 * f64::from(k), mode))).collect();
+    let frequency = |&(speed, mode): &(f64, u64)| match mode {
+        1 => 110.0 - 0.1 * speed,
+        2 => 190.0 + 0.05 * speed,
+        _ => 4000.0,
+    };
+    Sample::default()
+        .numbers("speed_rpm", "rpm", rows.iter().map(|row| row.0))
+        .counts("mode", rows.iter().map(|row| row.1))
+        .numbers("frequency_rpm", "rpm", rows.iter().map(frequency))
+        .numbers("frequency_hz", "Hz", rows.iter().map(|row| frequency(row) / 60.0))
+        .numbers("frequency_min_rpm", "rpm", rows.iter().map(|row| frequency(row) * 0.99))
+        .numbers("frequency_max_rpm", "rpm", rows.iter().map(|row| frequency(row) * 1.01))
+}
+
+#[test]
+fn a_trace_shows_the_asked_channels_and_the_resonances_passed() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = WasherFigures {
+        channels: vec!["drum_front_y".to_owned()],
+        resonances_rpm: vec![150.0],
+        modes: Some(modes().write(folder.path(), "modes.parquet")),
+        ..WasherFigures::default()
+    };
+    let figure = svg(trace(), &options);
+    for said in
+        [">Drum front, vertical<", ">Gap, drum to tub<", ">Spin (rpm)<", ">resonance speed passed<"]
+    {
+        assert!(figure.contains(said), "{said}");
+    }
+    assert!(!figure.contains("Tub yaw"));
+    for speed in ["100 rpm", "150 rpm", "200 rpm"] {
+        assert_eq!(
+            figure.matches(&format!(">{speed}<")).count(),
+            2,
+            "{speed}: on the way up and down"
+        );
+    }
+    assert!(
+        figure.len() < 120_000,
+        "6001 samples are thinned to what the picture shows: {}",
+        figure.len()
+    );
+}
+
+#[test]
+fn a_trace_shows_forces_and_states_when_asked() {
+    let with_forces = || {
+        trace().numbers("cabinet_force_y_nonlinear_n", "N", (0..=6000).map(f64::from)).numbers(
+            "cabinet_force_y_linear_n",
+            "N",
+            (0..=6000).map(f64::from),
+        )
+    };
+    let force =
+        WasherFigures { channels: vec!["cabinet_force_y".to_owned()], ..WasherFigures::default() };
+    let figure = svg(with_forces(), &force);
+    assert!(figure.contains(">Cabinet force y (N)<") && figure.contains(">linear model<"));
+    assert!(!svg(with_forces(), &plain()).contains("Cabinet force"));
+}
+
+#[test]
+fn a_trace_is_held_against_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = Sample::default()
+        .numbers("time_s", "s", [0.0, 6.0, 12.0])
+        .numbers("nonlinear_tub_yaw", "rad", [0.0, 0.09, 0.0])
+        .metadata("sweep.plan", r#"{"name": "another program"}"#);
+    let against = |path| WasherFigures { against: Some(path), ..WasherFigures::default() };
+    let data = data(trace(), &against(other.write(folder.path(), "other.parquet")));
+    let yaw = &data["chart"]["panels"][0]["series"];
+    let named =
+        |k: usize| (yaw[k]["name"].as_str().unwrap().to_owned(), yaw[k]["grid"].as_u64().unwrap());
+    assert_eq!(named(0), ("input".to_owned(), 0), "by its file where it has no name");
+    assert_eq!((named(1), yaw.as_array().unwrap().len()), (("another program".to_owned(), 1), 2));
+    assert!(
+        svg(trace(), &against(trace().write(folder.path(), "same.parquet")))
+            .contains("difference 0.0e0 of")
+    );
+    let modes = against(modes().write(folder.path(), "modes.parquet"));
+    assert!(message(draw(trace(), &modes, "a.svg")).contains("this is a modes file; `sweep trace`"));
+}
+
+#[test]
+fn a_campbell_diagram_stars_the_resonances() {
+    let figure = svg(modes(), &plain());
+    for said in [">100.0 rpm<", ">200.0 rpm<", ">frequency = spin speed<", "1 mode lies above"] {
+        assert!(figure.contains(said), "{said}");
+    }
+}
+
+fn viewed(view: View) -> WasherFigures {
+    WasherFigures { view: Some(view), ..WasherFigures::default() }
+}
+
+#[test]
+fn the_variation_over_a_turn_is_half_of_least_to_greatest() {
+    let figure = svg(modes(), &viewed(View::Variation));
+    for said in [">Variation over a turn (± % of the mean)<", ">100.0 rpm<", ">200.0 rpm<"] {
+        assert!(figure.contains(said), "{said}");
+    }
+    let data = data(modes(), &viewed(View::Variation));
+    let series = data["chart"]["panels"][0]["series"].as_array().unwrap();
+    // The third mode meets no speed.
+    assert_eq!(series.len(), 2);
+    for series in series {
+        let curve = curve(&series["y"]);
+        assert!(curve.len() == 31 && curve.iter().all(|y| (y - 1.0).abs() < 1e-6), "{curve:?}");
+    }
+}
+
+#[test]
+fn mode_shapes_are_those_of_the_file() {
+    let q = |i: usize, re: f64| if [5, 7].contains(&i) { [re, 0.0] } else { [0.0, 0.0] };
+    let shape: serde_json::Map<String, Value> =
+        (1..=10).map(|i| (format!("q{i}"), serde_json::json!(q(i, -0.3)))).collect();
+    let facts = serde_json::json!([
+        { "mode": 1, "name": "rocking, horizontal \
+                   plane", "resonances": [{ "speed_rpm": 100.06, "shape": shape }] },
+        { "name": "drum bending on its shaft", "resonances": [] },
+    ]);
+    let machine = serde_json::json!({ "machine": {
+        "bearings": { "rear_x_m": -0.05 }, "tub": { "front_x_m": 0.45 },
+        "drum": { "hinge_x_m": 0.15, "front_x_m": 0.45 },
+    } });
+    let file = || modes().metadata("sweep.plan", &machine.to_string());
+    let with_shapes = || file().metadata("sweep.modes", &facts.to_string());
+    let figure = svg(with_shapes(), &viewed(View::Shapes));
+    for said in
+        [">Rocking, horizontal plane,<", ">100.1 rpm<", ">horizontal, a quarter of a period later<"]
+    {
+        assert!(figure.contains(said), "{said}");
+    }
+    let stars = svg(with_shapes(), &plain());
+    assert!(stars.contains(">100.1 rpm<"), "the same in all figures of a file");
+    let carried = data(with_shapes(), &viewed(View::Shapes));
+    let panels = carried["chart"]["panels"].as_array().unwrap();
+    assert_eq!(panels.len(), 1);
+    assert_eq!(curve(&panels[0]["series"][2]["y"])[1], 1.0);
+    assert!(message(draw(file(), &viewed(View::Shapes), "a.svg")).contains("holds no resonance"));
+    assert!(
+        message(draw(modes(), &viewed(View::Shapes), "a.svg"))
+            .contains("where the machine's parts are")
+    );
+}
+
+#[test]
+fn passages_are_drawn_over_speed_both_ways() {
+    let options = WasherFigures {
+        channels: vec!["tub_yaw".to_owned()],
+        resonances_rpm: vec![150.0],
+        ..viewed(View::Passages)
+    };
+    let figure = svg(trace(), &options);
+    for said in [
+        ">Spin speed (rpm)<",
+        ">nonlinear model, speed rising<",
+        ">linear model, speed falling<",
+        ">150 rpm<",
+    ] {
+        assert!(figure.contains(said), "{said}");
+    }
+    assert!(!figure.contains(">Gap, drum to tub<"));
+    let data = data(trace(), &options);
+    let chart = &data["chart"];
+    let panels = chart["panels"].as_array().unwrap();
+    let yaw = panels.iter().find(|panel| panel["name"] == "tub_yaw").unwrap();
+    // The sample swings faster than it turns and grows with time: on the way down it is at its end
+    // at rest.
+    let [up, down] = [0, 1].map(|series| curve(&yaw["series"][series]["y"]));
+    assert!(up.is_sorted() && down.is_sorted_by(|a, b| a >= b) && up.len() > 10, "{up:?} {down:?}");
+    let still = Sample::default()
+        .numbers("time_s", "s", [0.0, 1.0, 2.0])
+        .numbers("speed_rpm", "rpm", [60.0, 60.0, 60.0])
+        .numbers("nonlinear_tub_yaw", "rad", [0.0, 0.1, 0.0]);
+    assert!(message(draw(still, &viewed(View::Passages), "a.svg")).contains("no whole turn while"));
+}
+
+#[test]
+fn a_live_page_carries_the_module_and_its_setup() {
+    let slider =
+        |name: &str, value| Slider { name: name.to_owned(), to: 2.0, value, ..Slider::default() };
+    let live = Live {
+        setup: vec![0.1, f64::INFINITY],
+        sliders: vec![slider("unbalance_mass_kg", None), slider("tub_mass_kg", Some(1.5))],
+        channels: vec!["tub_yaw".to_owned()],
+        metrics: vec![["stop_2_force_nonlinear_n", "stop_2_force_linear_n"].map(str::to_owned)],
+        kinds: vec!["period_doubling".to_owned()],
+        ..Live::default()
+    };
+    let options = WasherFigures { live: Some(live), ..WasherFigures::default() };
+    let page = draw(map(), &options, "a.html").unwrap();
+    let live = &carried(&page)["live"];
+    let packed = STANDARD.decode(live["module"].as_str().unwrap()).unwrap();
+    let mut module = Vec::new();
+    flate2::read::GzDecoder::new(&packed[..]).read_to_end(&mut module).unwrap();
+    assert_eq!(module[..8], *b"\0asm\x01\0\0\0");
+    let setup = STANDARD.decode(live["setup"].as_str().unwrap()).unwrap();
+    assert_eq!(setup, [0.1, f64::INFINITY].map(f64::to_le_bytes).concat());
+    assert_eq!(live["sliders"][0]["axis"], true);
+    assert_eq!(live["sliders"][1]["axis"], false);
+    assert_eq!(live["sliders"][1]["words"], "Tub mass");
+    assert_eq!(live["channels"][0]["unit"], "mrad");
+    assert_eq!(live["metrics"][0]["words"], "Stop 2 force");
+    assert_eq!(live["metrics"][0]["unit"], "N");
+    assert_eq!(live["kinds"][0], "period doubling");
+    assert!(String::from_utf8(page).unwrap().contains("id=\"worker\""));
+    assert!(
+        message(draw(map(), &options, "a.svg")).contains("`--live` is for maps drawn as .html")
+    );
+}
+
+#[test]
+fn a_page_takes_the_time_histories_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    trace().write(folder.path(), "by-its-metadata.parquet");
+    let plain = || {
+        Sample::default().numbers("time_s", "s", [0.0, 1.0]).numbers(
+            "nonlinear_tub_yaw",
+            "rad",
+            [0.0, 1.0],
+        )
+    };
+    plain().write(folder.path(), "point-7.parquet");
+    let options = Options { traces: Some(folder.path().to_owned()), ..Options::default() };
+    let carried = data(map(), &options);
+    // Mass 0.4 is the fourth of ten, damping 120 the third of nine.
+    assert_eq!(carried["traces"].as_object().unwrap().keys().collect::<Vec<_>>(), ["29", "7"]);
+    let history = &carried["traces"]["29"];
+    let panel = |name: &str| {
+        let mut panels = history["panels"].as_array().unwrap().iter();
+        panels.find(|panel| panel["name"] == name).unwrap()
+    };
+    assert_eq!(panel("tub_yaw")["unit"], "mrad");
+    assert_eq!(panel("drum_front_y")["words"], "Drum front, vertical");
+    assert!(history.to_string().len() < 40_000, "6001 samples of seven columns are thinned");
+
+    let unknown = Sample::default().numbers("time_s", "s", [0.0, 1.0]).numbers(
+        "nonlinear_tub_yaw",
+        "rad",
+        [0.0, 1.0],
+    );
+    unknown.write(folder.path(), "point-90.parquet");
+    assert!(message(draw(map(), &options, "a.html")).contains("belongs to no point of this map"));
+}
+
+#[test]
+fn a_subtitle_says_once_what_was_set_whatever_the_name() {
+    let name = "long ".repeat(40);
+    let plan = serde_json::json!({ "name": name, "set": { "damping_n_s_per_m": 120.0 } });
+    let figure = svg(trace().metadata("sweep.plan", &plan.to_string()), &plain());
+    let said = "…, damping_n_s_per_m = 120 · unbalance mass 0.4 kg · least gap";
+    assert!(figure.contains(said), "{figure}");
+}
+
+#[test]
+fn subtitles_leave_units_their_letters() {
+    let dwells = Sample::default()
+        .counts("point", [0, 0, 0])
+        .numbers("damping_n_s_per_m", "N s/m", [140.0; 3])
+        .numbers("speed_rpm", "rpm", [200.0, 210.0, 220.0])
+        .numbers("growth_per_s", "1/s", [-0.1, 0.1, 0.2])
+        .words("status", [Some("ok"); 3]);
+    let figure = svg(dwells, &plain());
+    assert!(figure.contains(">damping 140 N s/m<"), "{figure}");
+}
+#[test]
+fn a_long_trace_keeps_its_peaks_within_a_page() {
+    const ROWS: usize = 400_000;
+    let wave = |k: usize| if k == 123_457 { 9.0 } else { (k as f64 * 0.01).sin() };
+    let trace = Sample::default()
+        .numbers("time_s", "s", (0..ROWS).map(|k| k as f64 * 1e-3))
+        .numbers("nonlinear_tub_yaw", "rad", (0..ROWS).map(wave))
+        .numbers("linear_tub_yaw", "rad", (0..ROWS).map(|k| (k as f64 * 0.01).cos()))
+        .numbers("gap_nonlinear_m", "m", (0..ROWS).map(|_| 0.01));
+    let page = draw(trace, &plain(), "a.html").unwrap();
+    assert!(page.len() < 10_000_000, "{}", page.len());
+    let data = carried(&page);
+    assert!(data["subtitle"].as_str().unwrap().contains("least and greatest of every 3 instants"));
+    let yaw = curve(&data["chart"]["panels"][0]["series"][0]["y"]);
+    assert_eq!(yaw.iter().copied().fold(0.0, f64::max), 9000.0, "mrad");
+    assert_eq!(yaw.len(), curve(&data["chart"]["grids"][0]).len());
+}
+
+#[test]
+fn modes_of_more_rows_than_a_figure_shows_are_refused() {
+    const ROWS: usize = 500_000;
+    let modes = Sample::default()
+        .numbers("speed_rpm", "rpm", (0..ROWS).map(|k| k as f64))
+        .counts("mode", (0..ROWS).map(|_| 1))
+        .numbers("frequency_rpm", "rpm", (0..ROWS).map(|_| 100.0));
+    let said = message(draw(modes, &plain(), "a.svg"));
+    assert!(said.contains("a modes file of 500000 rows is more than a figure can show"), "{said}");
+}
+
+#[test]
+fn what_a_file_has_no_use_for_is_refused() {
+    let channel =
+        |name: &str| WasherFigures { channels: vec![name.to_owned()], ..WasherFigures::default() };
+    let resonances = WasherFigures { resonances_rpm: vec![100.0], ..WasherFigures::default() };
+    let against = WasherFigures { against: Some("b.parquet".into()), ..viewed(View::Passages) };
+    for (result, said) in [
+        (draw(map(), &channel("body_yaw"), "a.svg"), "--quantity ratio_tub_yaw"),
+        (draw(trace(), &channel("tub_pitch"), "a.svg"), "it has tub_yaw, drum_front_y"),
+        (draw(map(), &resonances, "a.svg"), "`--resonances` is for traces"),
+        (draw(map(), &viewed(View::Time), "a.svg"), "`--view` is for traces"),
+        (draw(trace(), &viewed(View::Shapes), "a.svg"), "`--view` is for modes files"),
+        (draw(trace(), &against, "a.svg"), "`--against` is for traces over time"),
+        (
+            draw(Sample::default().numbers("x", "", [1.0]), &plain(), "a.svg"),
+            "no file that has a figure: study, dwell, stability, modes, map",
+        ),
+    ] {
+        assert!(message(result).contains(said), "{said}");
+    }
+}
+
+#[test]
+fn the_same_file_gives_the_same_bytes() {
+    for sample in [trace, modes] {
+        for output in ["a.svg", "a.html"] {
+            let twice = [0, 1].map(|_| draw(sample(), &plain(), output).unwrap());
+            assert!(twice[0] == twice[1], "{output}");
+        }
+    }
+}
+
+#[test]
+fn columns_of_one_name_do_no_harm() {
+    let time = || (0..50).map(f64::from);
+    let trace = Sample::default()
+        .numbers("time_s", "s", time())
+        .numbers("nonlinear_tub_yaw", "rad", time())
+        .numbers("nonlinear_tub_yaw", "rad", time())
+        .numbers("speed_rpm", "rpm", time());
+    assert!(draw(trace, &plain(), "a.svg").is_ok());
+}
