@@ -1,4 +1,5 @@
-//! Small files in the forms that this program writes, for tests: this crate's, and those of `washer-plot`.
+//! Small files in the forms that this program writes, for the tests of this crate and of
+//! `washer-plot`.
 
 #![allow(dead_code, reason = "neither has all of it")]
 

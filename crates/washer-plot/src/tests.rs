@@ -170,7 +170,9 @@ fn a_trace_is_held_against_another() {
             .contains("difference 0.0e0 of")
     );
     let modes = against(modes().write(folder.path(), "modes.parquet"));
-    assert!(message(draw(trace(), &modes, "a.svg")).contains("this is a modes file; `sweep trace`"));
+    assert!(
+        message(draw(trace(), &modes, "a.svg")).contains("this is a modes file; `sweep trace`")
+    );
 }
 
 #[test]

@@ -20,7 +20,8 @@ pub struct Args<V: ValueEnum + Send + Sync + 'static = View> {
     #[arg(short, long, visible_alias = "out", value_name = "IMAGE")]
     pub output: Option<PathBuf>,
 
-    /// Which of a file's figures, where it has several; a page of a design has all three
+    /// Which of a file's figures, where it has several [default: the first]; a page of a design
+    /// has all three
     #[arg(long, value_enum)]
     pub view: Option<V>,
 
