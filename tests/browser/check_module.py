@@ -41,6 +41,7 @@ const run = async (bytes) => {
     }
     write(values); found.push(...read(api.speeds(live.everyS)));
     write([...values, 200, 240]); found.push(...read(api.growth(values.length)));
+    write([...values, 240]); found.push(...read(api.dwell(values.length)));
   }
   return found;
 };

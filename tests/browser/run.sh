@@ -45,6 +45,9 @@ fi
 # The same of random machines, along an axis that is logarithmic.
 "$venv/bin/python" "$here/random_points.py" "$sweep" --maps 2
 
+# Growth and dwells at constant speeds, of machines without and with friction.
+"$venv/bin/python" "$here/check_held.py" "$sweep" ${SHOTS:+--screenshots "$SHOTS"}
+
 # The page of a design: points by pairs of parameters, the histogram, the influences.
 cat > "$work/design.toml" << 'END'
 name = "design"

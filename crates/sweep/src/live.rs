@@ -5,7 +5,7 @@ use std::path::Path;
 
 use sweep_files::{ParquetFile, key};
 use washer_live::{Setup, Sliders};
-use washer_model::{Channel, Kind, ModeOverSpeed, ModelKind, Parameter, campbell};
+use washer_model::{Channel, Ending, Kind, ModeOverSpeed, ModelKind, Parameter, campbell};
 use washer_plot::{Live, Slider};
 use washer_row::{Level, Measured, Metric};
 
@@ -17,12 +17,6 @@ use crate::plan::{Axis, Plan, between, corners_of_forces, ready, timing};
 use sweep_engine::Error;
 use sweep_engine::method::ACCURACY;
 use sweep_engine::store::read::overview;
-
-/// What a page says of the metric dwell, and of growth with friction or stops.
-const DWELLS: &str = "The page does not compute the motions that held speeds end in (the metric \
-                      dwell): each takes minutes. The file has them at its own points. ";
-const GROWTH: &str = "With friction or stops the growth at a constant speed takes up to a minute: \
-                      the file has it at its own points.";
 
 /// Parameters that a page offers beside the axes, where the machine has them.
 const OFFERED: [&str; 6] = [
@@ -82,11 +76,7 @@ pub(crate) fn slider_range(text: &str) -> Result<SliderRange, String> {
 pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     let mut plan = plan_of(file)?;
     let has_slow_growth = corners_of_forces(&plan).is_some();
-    let has = |metric| plan.model.measures.metrics.contains(&metric);
-    let left_out = [(has(Metric::Dwell), DWELLS), (has(Metric::Growth) && has_slow_growth, GROWTH)];
-    let left_out: String =
-        left_out.iter().filter(|(is_so, _)| *is_so).map(|(_, said)| *said).collect();
-    let growth_speeds_rpm = take_growth(&mut plan);
+    let (held_speeds_rpm, held_metrics) = take_held(&mut plan);
     let sliders = match ranges {
         [] => usual(&plan),
         _ => chosen(&plan, ranges)?,
@@ -108,9 +98,10 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
         criterion: [criterion.amplitude(), ratio].map(str::to_owned),
         metrics: plan.model.measures.of_model().map(columns).collect(),
-        growth_speeds_rpm,
+        held_speeds_rpm,
+        held_metrics: held_metrics.iter().map(|metric| metric.name().to_owned()).collect(),
         has_slow_growth,
-        left_out,
+        motions: Ending::KINDS.map(str::to_owned).to_vec(),
         has_static_sag: plan.model.measures.metrics.contains(&Metric::StaticSag),
         kinds: Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
         compared: plan.reliability.channels.iter().map(|channel| channel.index()).collect(),
@@ -179,14 +170,12 @@ fn plan_of(file: &Path) -> Result<Plan, Error> {
     Ok(plan)
 }
 
-/// The speeds (rpm) of the metric growth, which a page asks for beside a point's row. Motions that
-/// held speeds end in it does not have.
-fn take_growth(plan: &mut Plan) -> Vec<f64> {
+/// The constant speeds (rpm) of metrics that a page asks for beside a point's row, and these.
+fn take_held(plan: &mut Plan) -> (Vec<f64>, Vec<Metric>) {
     let Washer { measures, held_speeds, .. } = &mut plan.model;
-    let has_growth = measures.metrics.contains(&Metric::Growth);
-    measures.metrics.retain(|metric| !metric.is_of_speeds());
-    let speeds = held_speeds.take().filter(|_| has_growth);
-    speeds.map_or_else(Vec::new, |speeds| speeds.values().to_vec())
+    let held = measures.metrics.extract_if(.., |metric| metric.is_of_speeds()).collect();
+    let speeds = held_speeds.take();
+    (speeds.map_or_else(Vec::new, |speeds| speeds.values().to_vec()), held)
 }
 
 /// The usual sliders: about the plan's values, as far as machines can be.

@@ -131,6 +131,26 @@ pub extern "C" fn growth(values: usize) -> usize {
     })
 }
 
+/// How far the motions go that a point of so many values ends in at the constant speeds (rpm)
+/// behind them: 1, 0 or -1 as above; the speed at which the tub turns farthest (NaN where nothing
+/// was found), what that motion is, by its place among [`washer_model::Ending::KINDS`], and the
+/// largest deviation of each channel (m, rad).
+#[unsafe(no_mangle)]
+pub extern "C" fn dwell(values: usize) -> usize {
+    answer(|setup, input, output| {
+        let Some((values, speeds_rpm)) = input.split_at_checked(values) else { return };
+        let found = crate::dwell(setup, values, speeds_rpm);
+        output.push(code(found.as_ref().err()));
+        match found.ok().flatten() {
+            Some(dwelt) => {
+                output.extend([dwelt.speed_rpm, dwelt.kind as f64]);
+                output.extend(dwelt.deviations);
+            }
+            None => output.extend([f64::NAN; 2 + Channel::ALL.len()]),
+        }
+    })
+}
+
 /// Speeds (rpm) at a point, every `every_s` from 0 to the end.
 #[unsafe(no_mangle)]
 pub extern "C" fn speeds(every_s: f64) -> usize {

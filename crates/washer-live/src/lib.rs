@@ -7,7 +7,8 @@
 //! * [`quick`]: both models at some points by one rung, which is quick and not checked;
 //! * [`check`]: a point as a row of the map has it, by runs that agree;
 //! * [`motion`]: the time history of one model at a point;
-//! * [`growth`]: how fast disturbances grow there while the drum turns at constant speeds.
+//! * [`growth`]: how fast disturbances grow there while the drum turns at constant speeds;
+//! * [`dwell`]: how far the motions go that such a speed ends in.
 //!
 //! Numbers go in and come out as arrays of 64 bit floats; `exports.rs` says in which order. Where
 //! this crate runs natively, [`check`] gives the bits of the program's rows, because both climb by
@@ -20,5 +21,5 @@ mod numbers;
 mod point;
 mod setup;
 
-pub use point::{Answer, Motion, NoPoint, check, growth, motion, quick};
+pub use point::{Answer, Motion, NoPoint, check, dwell, growth, motion, quick};
 pub use setup::{Setup, Sliders};

@@ -3,11 +3,11 @@
 use lane_ode::{Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    Channel, Disturbance, Dwell, Machine, Method, ModelKind, Point, Response, Spin, Start, Target,
-    Timing, history, prepare, respond,
+    Channel, Disturbance, Dwell, Machine, Method, ModelKind, Point, Response, Spin, Start, Starts,
+    Target, Timing, endings, history, prepare, respond,
 };
 use washer_row::{
-    Climbs, Demand, Deviations, Ladder, Level, Next, Outcome, Rule, RungRun, Status, Terms,
+    Climbs, Demand, Deviations, Dwelt, Ladder, Level, Next, Outcome, Rule, RungRun, Status, Terms,
     Trajectory, Verdict, runs,
 };
 
@@ -241,4 +241,22 @@ pub fn growth(
     let told = |first: &Response| (first.disturbance(), first.is_on_curve);
     let answers = respond(&dwells, &|| false).into_iter();
     Ok(answers.map(|answer| answer.ok()?.first().map(told)).collect())
+}
+
+/// How far the motions go that a point ends in at some constant speeds (rpm), from the usual starts;
+/// none where nothing was found.
+///
+/// # Errors
+/// [`NoPoint`].
+pub fn dwell(setup: &Setup, values: &[f64], speeds_rpm: &[f64]) -> Result<Option<Dwelt>, NoPoint> {
+    let point = ready(setup, values)?;
+    let dwells: Vec<Dwell<'_>> =
+        speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+    let carried = vec![None; dwells.len()];
+    let found = endings(Simd::best(), &dwells, &carried, &Starts::default(), &|| false);
+    let motions = found.iter().zip(speeds_rpm).flat_map(|(found, &speed_rpm)| {
+        let motions = found.iter().flat_map(|found| &found.motions);
+        motions.map(move |motion| (speed_rpm, motion))
+    });
+    Ok(Dwelt::of(motions))
 }

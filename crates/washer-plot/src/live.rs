@@ -48,12 +48,14 @@ pub struct Live {
     pub metrics: Vec<[String; 2]>,
     /// Whether the map has the static sag.
     pub has_static_sag: bool,
-    /// The constant speeds (rpm) that the map's growth is about; none if it has none.
-    pub growth_speeds_rpm: Vec<f64>,
-    /// Whether a constant speed takes long: with friction or stops.
+    /// The constant speeds (rpm) that metrics of the map are about; none if it has none of these.
+    pub held_speeds_rpm: Vec<f64>,
+    /// These metrics: `growth`, `dwell`.
+    pub held_metrics: Vec<String>,
+    /// Whether the growth at a constant speed takes long: with friction or stops.
     pub has_slow_growth: bool,
-    /// What the map has and a page does not compute, in a sentence; empty if there is nothing.
-    pub left_out: String,
+    /// What motions that a held speed ends in are, in the module's order.
+    pub motions: Vec<String>,
     /// Ways in which a response at a constant speed can lose its stability, in the module's order;
     /// none where that cannot be asked of the machine.
     pub kinds: Vec<String>,
@@ -101,7 +103,9 @@ pub(crate) fn computing(live: &Live, axes: &[(&str, bool)]) -> Computing {
     data["sliders"] = live.sliders.iter().map(|one| slider(one, axes)).collect();
     data["channels"] = live.channels.iter().map(channel).collect();
     data["metrics"] = live.metrics.iter().map(metric).collect();
-    data["kinds"] = live.kinds.iter().map(|kind| kind.replace('_', " ")).collect();
+    for (key, names) in [("kinds", &live.kinds), ("motions", &live.motions)] {
+        data[key] = names.iter().map(|name| name.replace('_', " ")).collect();
+    }
     Computing { data, scripts: SCRIPTS, parts: PARTS }
 }
 

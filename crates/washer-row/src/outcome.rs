@@ -137,16 +137,12 @@ pub struct Dwelt {
 impl Dwelt {
     /// The farthest of these motions, each with its speed (rpm); the first of equals counts.
     pub fn of<'a>(motions: impl IntoIterator<Item = (f64, &'a Ending)>) -> Option<Self> {
-        let turned = |of: &Deviations| {
-            [Channel::TubYaw, Channel::TubPitch].map(|channel| of[channel.index()])
-        };
-        let turned = |of: &Deviations| turned(of).into_iter().fold(0.0, f64::max);
         let mut farthest = 0.0;
         motions.into_iter().fold(None, |most: Option<Self>, (speed_rpm, motion)| {
             let this = Self { deviations: motion.peaks, speed_rpm, kind: motion.kind() };
             let mut most = most.unwrap_or(this);
-            if turned(&motion.peaks) > farthest {
-                farthest = turned(&motion.peaks);
+            if this.turned_rad() > farthest {
+                farthest = this.turned_rad();
                 most = Self { deviations: most.deviations, ..this };
             }
             for (most, one) in most.deviations.iter_mut().zip(motion.peaks) {
@@ -154,6 +150,12 @@ impl Dwelt {
             }
             Some(most)
         })
+    }
+
+    /// How far the tub turns, by yaw or by pitch (rad).
+    fn turned_rad(&self) -> f64 {
+        let turned = |channel: Channel| self.deviations[channel.index()];
+        turned(Channel::TubYaw).max(turned(Channel::TubPitch))
     }
 }
 

@@ -48,9 +48,7 @@ function createChart(host, spec, name, pick = () => {}) {
   const heights = () => shown().reduce((sum, panel) => sum + panel.height + CHART.gap, 0);
   const height = () => CHART.top + strip + heights() + CHART.bottom;
   const { request, canvas } = surface(figure, height, paint);
-  const area = () => ({
-    left: CHART.left, width: figure.clientWidth - CHART.left - CHART.right,
-  });
+  const area = () => ({ left: CHART.left, width: figure.clientWidth - CHART.left - CHART.right });
   const atX = (x) => area().left + ((even(x) - view[0]) / (view[1] - view[0])) * area().width;
   const toX = (px) => back(view[0] + ((px - area().left) / area().width) * (view[1] - view[0]));
 
@@ -292,12 +290,9 @@ function createChart(host, spec, name, pick = () => {}) {
     view: () => view,
     isZoomed: () => view[0] > all[0] || view[1] < all[1],
     reset: () => setView([...all]),
-    move: (from, [by]) => {
-      setView(moved(from, (-by / area().width) * (from[1] - from[0]), all));
-    },
-    zoom: (factor, event) => {
-      setView(zoomed(view, factor, event ? even(toX(pxOf(event))) : centre(), all));
-    },
+    move: (from, [by]) => setView(moved(from, (-by / area().width) * (from[1] - from[0]), all)),
+    zoom: (factor, event) => setView(zoomed(view, factor,
+      event ? even(toX(pxOf(event))) : centre(), all)),
     read,
     letGo: () => setCursor(null),
     pick(event) {

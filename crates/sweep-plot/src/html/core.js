@@ -146,9 +146,7 @@ function surface(host, height, draw) {
     draw(context, width, tall);
   };
   // Many changes before the next frame are one drawing.
-  const request = () => {
-    if (!pending) pending = requestAnimationFrame(paint);
-  };
+  const request = () => { pending ||= requestAnimationFrame(paint); };
   new ResizeObserver(request).observe(host);
   darkTheme.addEventListener("change", request);
   request();

@@ -110,9 +110,7 @@ function createMatrix(host, data, choose = () => {}) {
     found = null;
     tell();
   };
-  figure.addEventListener("pointerleave", (event) => {
-    if (event.pointerType === "mouse") letGo();
-  });
+  figure.addEventListener("pointerleave", ({ pointerType }) => pointerType === "mouse" && letGo());
   figure.addEventListener("blur", letGo);
   figure.addEventListener("keydown", (event) => {
     const step = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -10, ArrowDown: 10 }[event.key];

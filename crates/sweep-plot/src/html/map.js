@@ -121,9 +121,7 @@ function createMap(host, data, panel) {
     const box = area();
     const layer = currentLayer();
     const fill = filler(layer);
-    const special = {
-      failed: hatching(context, data.palettes.failed), undefined: themed("paper"),
-    };
+    const special = { failed: hatching(context, data.palettes.failed), undefined: themed("paper") };
     context.save();
     context.beginPath();
     context.rect(box.left, box.top, box.width, box.height);
@@ -278,8 +276,8 @@ function createMap(host, data, panel) {
       readout.append(element("p", { class: "help" }, data.traces[point]
         ? "Click or press Enter for its time histories." : "No time history kept for this point."));
     }
-    const value = layer ? `${layer.label}: ${shownValue(layer.column, point)}` : "";
-    const lines = [...coordinates(place), ...(value ? [value] : []), verdict(point)];
+    const value = layer ? [`${layer.label}: ${shownValue(layer.column, point)}`] : [];
+    const lines = [...coordinates(place), ...value, verdict(point)];
     said.textContent = lines.join("; ");
     tip.textContent = lines.join("\n");
     tip.hidden = !hovered;
@@ -336,8 +334,7 @@ function createMap(host, data, panel) {
     return [clientX - bounds.left, clientY - bounds.top];
   };
   const cellAt = (event) => {
-    const box = area();
-    const [px, py] = pxOf(event);
+    const [box, [px, py]] = [area(), pxOf(event)];
     const within = (value, from, size) => value >= from && value < from + size;
     if (!within(px, box.left, box.width) || !within(py, box.top, box.height)) return null;
     const find = (list, even) => Math.min(Math.max(lowerBound(list, even) - 1, 0), list.length - 2);
@@ -364,10 +361,7 @@ function createMap(host, data, panel) {
     },
     read: (event) => hover(cellAt(event)),
     letGo: () => hover(null),
-    pick(event) {
-      const place = cellAt(event);
-      if (place) pin(place);
-    },
+    pick: (event) => cellAt(event) && pin(cellAt(event)),
     key(event) {
       const step = {
         ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],

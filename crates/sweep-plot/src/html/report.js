@@ -67,9 +67,7 @@ function createReport(host, data, map, panel) {
   function link() {
     const state = { ...map.state(), live: panel?.values() };
     history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify(state))}`);
-    const tell = (copied) => () => {
-      said.textContent = `The link is in the address bar${copied}.`;
-    };
+    const tell = (too) => () => { said.textContent = `The link is in the address bar${too}.`; };
     (navigator.clipboard?.writeText(location.href) ?? Promise.reject())
       .then(tell(" and copied"), tell(""));
   }

@@ -60,7 +60,7 @@ stability = { speed_rpm = "200:240:20" }
     for criterion in ["rms", "envelope"] {
         let further = further.replace("CRITERION", criterion);
         let mut plan = plan(&(further + GRID));
-        assert_eq!(take_growth(&mut plan), [200.0, 220.0, 240.0]);
+        assert_eq!(take_held(&mut plan), (vec![200.0, 220.0, 240.0], vec![Metric::Growth]));
         let (setup, _) = setup(&plan, &[]).unwrap();
         let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
         let engine = ModelEngine::new(&plan).unwrap();
@@ -78,6 +78,19 @@ stability = { speed_rpm = "200:240:20" }
         let ratios = setup.rule.channels.iter().map(|of| answer.ratios[of.index()]);
         assert_eq!(ratios.collect::<Vec<_>>(), verdict.ratios, "{criterion}");
     }
+}
+
+#[test]
+fn motions_of_held_speeds_are_the_rows() {
+    let further = "metrics = [\"dwell\"]\nstability = { speed_rpm = \"240,250\" }\n";
+    let mut plan = plan(&(further.to_owned() + GRID));
+    let values = [0.4, 140.0];
+    let outcome = &ModelEngine::new(&plan).unwrap().evaluate_at(&[values.to_vec()])[0];
+    let (speeds_rpm, metrics) = take_held(&mut plan);
+    assert_eq!(metrics, [Metric::Dwell]);
+    let (setup, _) = setup(&plan, &[]).unwrap();
+    assert!(outcome.dwelt.is_some());
+    assert_eq!(washer_live::dwell(&setup, &values, &speeds_rpm).unwrap(), outcome.dwelt);
 }
 
 #[test]

@@ -53,9 +53,7 @@ function createCurves(host, live) {
         const count = numbers[0] === 1 ? numbers[3] : 0;
         [...live.channels, { factor: 1e3 }].forEach(({ factor }, k) => {
           const { y } = (motion[k] ?? gap).series[model];
-          y.forEach((_, i) => {
-            y[i] = i < count ? numbers[4 + i * columns + k] * factor : NaN;
-          });
+          y.forEach((_, i) => { y[i] = i < count ? numbers[4 + i * columns + k] * factor : NaN; });
         });
       });
       version += 1;

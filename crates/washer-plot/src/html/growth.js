@@ -1,4 +1,5 @@
-// How fast small disturbances grow while the drum turns at constant speeds, of the panel's point.
+// What becomes of the panel's point while the drum turns at constant speeds: how fast small
+// disturbances grow, and how far the motions go that it ends in.
 
 // The least speed that is asked for, rpm; about how many are, and how many a call takes: of a
 // machine whose growth is slow, and of another one.
@@ -20,6 +21,29 @@ function toldOffCurve(speeds, isOnCurve) {
   return told && ` Off the curve of responses at ${told} rpm: a machine that runs up may be in `
     + "another motion there.";
 }
+
+// The map's own metrics of constant speeds: what is said of each, and its numbers.
+const HELD = {
+  async growth(pool, values, { heldSpeedsRpm: speeds }) {
+    const found = await growthAt(pool, "check", values, speeds);
+    const growth = found.map((one) => one[0]);
+    const most = Math.max(...growth.filter(Number.isFinite));
+    return [Number.isFinite(most) ? `Growth at most ${significant(most, 3)} /s, at `
+      + `${significant(speeds[growth.indexOf(most)])} rpm of ${speeds.length} constant speeds.`
+      + toldOffCurve(speeds, found.map((one) => one[3]))
+      : "No response at any of the map's constant speeds.", [most]];
+  },
+  async dwell(pool, values, { heldSpeedsRpm: speeds, channels, motions }) {
+    const point = [...values, ...speeds];
+    const { numbers } = await pool.ask("check", 1, "dwell", point, [values.length]);
+    const [, speed, motion, ...most] = numbers;
+    const far = channels.map(({ words, unit, factor }, k) => `${words} `
+      + `${significant(most[k] * factor, 3)} ${unit}`);
+    return [Number.isNaN(speed) ? "No motion was found at any of the map's constant speeds."
+      : `Held at ${speeds.length} constant speeds, it goes as far as ${far.join(", ")}; the tub `
+        + `turns farthest at ${significant(speed)} rpm (${motions[motion]}).`, most];
+  },
+};
 
 function createGrowth(host, live, pool) {
   const find = furnish(host, "growth");

@@ -137,7 +137,7 @@ function createLive(host, data) {
       const speeds = (await asked).numbers;
       if (of === latest) {
         curves.show(found.map((one) => one.numbers), speeds);
-        if (live.growthSpeedsRpm.length) tellGrowth(of).catch(tellError);
+        if (live.heldMetrics.length) tellHeld(of);
         growth?.rested([...values], speeds.reduce((most, speed) => Math.max(most, speed)));
       }
     } catch (error) {
@@ -145,19 +145,21 @@ function createLive(host, data) {
     }
   }
 
-  // The map's own metric, over the speeds that it is about.
-  async function tellGrowth(of) {
-    const line = element("p", { id: "growth-metric" }, "Growth at constant speeds: computing.");
+  // The map's own metrics of constant speeds; what takes long, once it is asked for.
+  function tellHeld(of) {
+    const line = element("p", { id: "held" });
+    const compute = () => Promise.all(live.heldMetrics.map(async (metric) => {
+      line.textContent = "Constant speeds: computing.";
+      const [said, numbers] = await HELD[metric](pool, [...values], live);
+      line.dataset[metric] = numbers.join(" ");
+      return said;
+    })).then((all) => {
+      if (of === latest) line.textContent = all.join(" ");
+    }, tellError);
     told.append(line);
-    const found = await growthAt(pool, "check", values, live.growthSpeedsRpm);
-    if (of !== latest) return;
-    const growth = found.map((one) => one[0]);
-    const most = Math.max(...growth.filter(Number.isFinite));
-    line.dataset.growth = most;
-    line.textContent = Number.isFinite(most) ? `Growth at most ${significant(most, 3)} /s, at `
-      + `${significant(live.growthSpeedsRpm[growth.indexOf(most)])} rpm of ${growth.length} `
-      + `constant speeds.${toldOffCurve(live.growthSpeedsRpm, found.map((one) => one[3]))}`
-      : "No response at any of the map's constant speeds";
+    if (!live.hasSlowGrowth && !live.heldMetrics.includes("dwell")) compute();
+    else line.append(element("button", { type: "button", onclick: compute },
+      `Compute ${live.heldMetrics.join(" and ")} at ${live.heldSpeedsRpm.length} constant speeds`));
   }
 
   // Work that was let go fails without an error.
@@ -166,8 +168,7 @@ function createLive(host, data) {
     status.textContent = `This point could not be computed: ${error.message}. It is a defect.`;
   }
 
-  const compared = (ratios) => live.compared.map((channel) => ratios[channel])
-    .filter(Number.isFinite);
+  const compared = (ratios) => live.compared.map((of) => ratios[of]).filter(Number.isFinite);
   const greatestOf = (ratios) => Math.max(...compared(ratios));
   const leastOf = (ratios) => Math.min(...compared(ratios));
   const isTrusted = (ratios) => greatestOf(ratios) < live.ratioLimit
