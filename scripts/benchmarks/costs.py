@@ -14,6 +14,7 @@ import re
 import statistics
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 
 import pyarrow.parquet as pq
 from measured import IS_CHECK, ROOT, Spent, figure, put, run, said, table
@@ -128,6 +129,26 @@ def of_threads(sweep, words, result):
     return float(re.search(r"wall +(\S+) s", text)[1]), total_s, main_s / total_s
 
 
+def second_thread(sweep, folder):
+    """What a second thread gains, beside what the machine gives to a second process."""
+    def by(threads, place=0):
+        words = ("run", f"sweeps/{FAST}.toml", "--threads", threads, "--progress", "none")
+        return Spent(sweep, *words, "--fresh", "--out", folder / f"second-{place}.parquet").wall_s
+
+    def side_by_side():
+        with ThreadPoolExecutor() as both:
+            return statistics.mean(both.map(by, (1, 1), (1, 2)))
+
+    rounds = [(by(1), by(2), side_by_side()) for _ in range(ROUNDS)]
+    alone_s, two_s, beside_s = map(statistics.median, zip(*rounds))
+    return [
+        ["a second thread", f"{figure(alone_s / two_s)} times as quick ({figure(alone_s)} s, "
+         f"{figure(two_s)} s)", f"`sweep run sweeps/{FAST}.toml --threads 1`, and 2"],
+        ["a second process at once, a thread each", f"{figure(2 * alone_s / beside_s)} times the "
+         f"work ({figure(beside_s)} s)", "the same, `--threads 1` twice"],
+    ]
+
+
 def files(sweep, folder):
     """What points cost, and what files of a million and of ten million rows cost beside them."""
     rows, per_core_s, shares = [], [], []
@@ -147,6 +168,7 @@ def files(sweep, folder):
                      f"`thread_times.py` of `sweep {words}`"])
     rows.append(["chunks, hashes, syncs, progress and join",
                  ", ".join(shares) + " of these times", "the same: the main thread"])
+    rows += second_thread(sweep, folder)
     words, result = f"stability sweeps/{FAST}.toml --speed {SPEEDS}", folder / "speeds.parquet"
     spent = Spent(sweep, *words.split(), "--out", result, "--fresh")
     rows.append([f"stability of {rows_in(result)} responses",
