@@ -243,8 +243,8 @@ pub fn growth(
     Ok(answers.map(|answer| answer.ok()?.first().map(told)).collect())
 }
 
-/// How far the motions go that a point ends in at some constant speeds (rpm), from the usual starts;
-/// none where nothing was found.
+/// How far the motions go that a point ends in at some constant speeds (rpm), from the usual
+/// starts; none where nothing was found.
 ///
 /// # Errors
 /// [`NoPoint`].
