@@ -42,10 +42,7 @@ impl Instants {
                 let parts = (geared.top().step_s / SHORTEST_PART_S).ceil() as u32;
                 Self { parts: parts.clamp(1, PARTS_OF_A_LONG_STEP), clearances: 3 }
             }
-            Method::Dop853 { .. }
-            | Method::Dopri5(_)
-            | Method::Additive(_)
-            | Method::Rodas5p(_) => Self::of_steps(false),
+            _ => Self::of_steps(false),
         }
     }
 }
