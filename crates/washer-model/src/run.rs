@@ -13,9 +13,10 @@ pub(crate) mod suspension;
 mod tangent;
 pub(crate) mod wanted;
 
+pub use loads::Gauge;
 pub use method::{Level, Method, MethodNumbers};
 pub use snapshots::Snapshot;
-pub use wanted::{Extra, StopLoad, Wanted};
+pub use wanted::{Extra, Wanted};
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
