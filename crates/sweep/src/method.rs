@@ -1,10 +1,10 @@
-//! The methods of integration: what a grid file may write, and what each method does. The compiler
-//! asks for every method here, so that none can be forgotten.
+//! The methods of integration that a grid file may write; what each does is
+//! `washer_model`'s.
 
 use lane_ode::Tolerance;
-use sweep_engine::method::{ACCURACY, ATOL, RTOL, STEP_S, Steps};
+use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Steps};
 use sweep_engine::methods;
-use washer_model::Method;
+use washer_model::{Method, MethodNumbers};
 use washer_row::Level;
 
 /// Steps that one leg of an adaptive trajectory may take.
@@ -28,18 +28,16 @@ impl Integrator {
     /// What integrates a trajectory, and what a row says of it; `None` where rungs of other methods
     /// check one another. Of those a trace takes the reference, `rk4`.
     pub fn direct(&self) -> Option<(Level, Method)> {
-        let tolerance =
-            |relative, absolute| Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
-        match *self {
-            Self::Rk4 { step_s } => Some((Level::Rk4, Method::Rk4 { step_s })),
-            Self::Dopri5 { rtol, atol } => {
-                Some((Level::Dopri5, Method::Dopri5(tolerance(rtol, atol))))
+        let level = Level::named(self.name())?;
+        let mut method = Method::of(level);
+        match (method.numbers(), &self.settings()[..]) {
+            (MethodNumbers::Step(step_s), [(_, value)]) => *step_s = *value,
+            (MethodNumbers::Tolerance(tolerance), &[(_, relative), (_, absolute)]) => {
+                *tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
             }
-            Self::Rodas5p { rtol, atol } => {
-                Some((Level::Rodas5p, Method::Rodas5p(tolerance(rtol, atol))))
-            }
-            Self::Rk4MassScaled { .. } => None,
+            _ => return None,
         }
+        Some((level, method))
     }
 }
 
@@ -47,7 +45,7 @@ impl Integrator {
 mod tests {
     use super::*;
     use serde_json::json;
-    use sweep_engine::method::{Integrator as _, default_method};
+    use sweep_engine::method::default_method;
 
     #[test]
     fn a_row_of_the_table_says_what_its_method_does() {

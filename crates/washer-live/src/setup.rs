@@ -1,12 +1,10 @@
 //! What a page computes with.
 
-use core::mem::discriminant;
-
 use lane_ode::Tolerance;
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    BumpStop, Bushing, Caps, Channel, Foot, Gear, Geared, Machine, Method, Parameter, Profile,
-    Spin, Unbalance,
+    BumpStop, Bushing, Channel, Foot, Gear, Geared, Machine, Method, MethodNumbers, Parameter,
+    Profile, Spin, Unbalance,
 };
 use washer_row::{Convergence, Criterion, Ladder, Level, Measures, Metric, Rule, Rung};
 
@@ -53,7 +51,7 @@ impl Setup {
 
     /// From [`Self::to_numbers`]; `None` from anything else.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
-        let ladders = [0, 1].map(|_| Ladder::direct(Level::Rk4, METHODS[0]));
+        let ladders = [0, 1].map(|_| Ladder::direct(Level::Rk4, Method::of(Level::Rk4)));
         let mut setup = Self {
             machine: Machine::paper(),
             spin: Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() },
@@ -150,40 +148,27 @@ fn walk_ladder(walk: &mut Walk<'_>, ladder: &mut Ladder) -> Option<()> {
     Some(())
 }
 
-/// The methods that pages run, before their numbers are read.
-const METHODS: [Method; 4] = [
-    Method::Rk4 { step_s: 0.0 },
-    Method::Geared(Geared::steady(0.0, Caps { bearings_rad_per_s: 0.0, hinge_rad_per_s: None })),
-    Method::Additive(Tolerance { relative: 0.0, absolute: 0.0, max_steps: 0 }),
-    Method::Dop853 { step_s: 0.0 },
-];
-
 fn walk_rung(walk: &mut Walk<'_>, rung: &mut Rung) -> Option<()> {
     walk.choice(&mut rung.level, &Level::ALL)?;
     let Convergence { contraction, of_caps, of_earlier, believed_to, own_error, expected } =
         &mut rung.convergence;
     walk.numbers([contraction, of_caps, of_earlier, believed_to, own_error, expected])?;
     walk.numbers(rung.left_out.each_mut())?;
-    let is_own = |method: &Method| discriminant(method) == discriminant(&rung.method);
-    let place = METHODS.iter().position(is_own).unwrap_or(METHODS.len());
-    let method = METHODS.get(walk.count(place)?)?;
     if walk.is_reading() {
-        rung.method = *method;
+        rung.method = Method::of(rung.level);
     }
-    match &mut rung.method {
-        Method::Rk4 { step_s } | Method::Dop853 { step_s } => walk.numbers([step_s])?,
-        Method::Geared(Geared { gears }) => {
-            for Gear { up_to_rad_per_s, step_s, caps } in gears {
-                walk.numbers([up_to_rad_per_s, step_s, &mut caps.bearings_rad_per_s])?;
-                walk.optional(&mut caps.hinge_rad_per_s)?;
-            }
-        }
-        Method::Additive(Tolerance { relative, absolute, max_steps }) => {
+    match rung.method.numbers() {
+        MethodNumbers::Step(step_s) => walk.numbers([step_s]),
+        MethodNumbers::Gears(Geared { gears }) => gears.iter_mut().try_for_each(|gear| {
+            let Gear { up_to_rad_per_s, step_s, caps } = gear;
+            walk.numbers([up_to_rad_per_s, step_s, &mut caps.bearings_rad_per_s])?;
+            walk.optional(&mut caps.hinge_rad_per_s)
+        }),
+        MethodNumbers::Tolerance(Tolerance { relative, absolute, max_steps }) => {
             let mut steps = *max_steps as f64;
             walk.numbers([relative, absolute, &mut steps])?;
             *max_steps = steps as u64;
+            Some(())
         }
-        Method::Dopri5(_) | Method::Rodas5p(_) => return None,
     }
-    Some(())
 }

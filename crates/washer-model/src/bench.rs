@@ -2,8 +2,8 @@
 
 use crate::coordinates::STATES;
 use crate::nonlinear::coupling::Coupling;
+use crate::run::method::{Family, OfLinear, OfNonlinear};
 use crate::run::model::Model;
-use crate::run::{Family, OfLinear, OfNonlinear};
 use crate::{Caps, ModelKind, Point};
 use core::hint::black_box;
 use core::marker::PhantomData;

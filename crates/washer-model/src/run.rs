@@ -5,97 +5,32 @@ pub(crate) mod equations;
 pub(crate) mod extras;
 pub(crate) mod history;
 pub(crate) mod loads;
+pub(crate) mod method;
 pub(crate) mod model;
 mod snapshots;
-pub(crate) mod stepper;
 pub(crate) mod stiff;
 pub(crate) mod suspension;
 mod tangent;
 pub(crate) mod wanted;
 
+pub use loads::Gauge;
+pub use method::{Level, Method, MethodNumbers};
 pub use snapshots::Snapshot;
-pub use wanted::{Extra, StopLoad, Wanted};
+pub use wanted::{Extra, Wanted};
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::{RADIAL, squared};
-use crate::point::PlannedLeg;
-use crate::run::model::{Linear, Model, Nonlinear};
-use crate::run::stepper::{ByAdditive, ByDop853, ByDopri5, ByRk4, Fixed, Stepper};
-use crate::{COORDINATES, Formula, Geared, ModelKind, Point};
+use crate::run::method::{
+    ByMethod, ByRodas, Family, OfLinear, OfNonlinear, Stepper, coupling, enter,
+};
+use crate::run::model::Model;
+use crate::{COORDINATES, ModelKind, Point};
 use core::marker::PhantomData;
 use extras::{Extras, Instants, Seen};
 use lane_ode::{
     Aside, Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, Task,
-    Tolerance,
 };
-
-/// How trajectories are integrated.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Method {
-    /// Classical Runge-Kutta of order 4.
-    Rk4 {
-        /// Longest step.
-        step_s: f64,
-    },
-    /// An explicit formula on the machine whose bearings and hinge have scaled mass, so that none
-    /// of their modes is faster than a cap (section 4.3 of the model page).
-    Geared(Geared),
-    /// Dormand and Prince's formula of order 8, bearings and hinge as they are. The linear model
-    /// takes RK4 in its place.
-    Dop853 {
-        /// Longest step.
-        step_s: f64,
-    },
-    /// Dormand-Prince 5(4).
-    Dopri5(Tolerance),
-    /// Kennedy and Carpenter's additive method of order 5(4), bearings and hinge implicit, for
-    /// forces with corners: its steps see these, and neither bearings nor hinge hold them short.
-    /// The linear model takes Dormand-Prince in its place.
-    Additive(Tolerance),
-    /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others.
-    /// One trajectory at a time.
-    Rodas5p(Tolerance),
-}
-
-impl Method {
-    /// Whether trajectories side by side in lanes have steps of their own.
-    pub const fn has_own_steps(&self) -> bool {
-        matches!(self, Self::Dopri5(_) | Self::Additive(_))
-    }
-}
-
-/// First step that an adaptive method tries.
-const FIRST_STEP_S: f64 = 1e-5;
-
-/// Starts a leg in a lane: with its spin, its step, and its caps if modes are capped.
-fn enter<T: Lane, M: Model<T>>(
-    model: &mut M,
-    lane: usize,
-    method: &Method,
-    point: &Point,
-    leg: &PlannedLeg,
-) -> Leg {
-    model.set_spin(lane, &point.stretches[leg.stretch]);
-    let step_s = match method {
-        Method::Rk4 { step_s } | Method::Dop853 { step_s } => *step_s,
-        Method::Geared(geared) => {
-            let gear = geared.gear(leg.fastest_rad_per_s);
-            model.set_caps(lane, &gear.caps);
-            gear.step_s
-        }
-        Method::Dopri5(_) | Method::Additive(_) | Method::Rodas5p(_) => FIRST_STEP_S,
-    };
-    Leg { start_s: leg.start_s, end_s: leg.end_s, step_s }
-}
-
-/// How bearings and hinge act where a trajectory starts.
-#[inline(always)]
-pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
-    let Method::Geared(geared) = method else { return Coupling::Springs };
-    Coupling::new(zero, Some(&geared.top().caps))
-}
 
 /// Says whether to stop.
 pub type Stop<'a> = &'a dyn Fn() -> bool;
@@ -158,39 +93,11 @@ pub fn simulate_until(
     if points.is_empty() {
         return Some((Vec::new(), Vec::new()));
     }
-    let order = Order { points, method, wanted, stop };
+    let order = (Order { points, method, wanted, stop }, simd);
     match model {
-        ModelKind::Nonlinear => order.dispatch::<OfNonlinear>(simd),
-        ModelKind::Linear => order.dispatch::<OfLinear>(simd),
+        ModelKind::Nonlinear => method.choose::<OfNonlinear, _>(order),
+        ModelKind::Linear => method.choose::<OfLinear, _>(order),
     }
-}
-
-/// A model before the lanes' type is known, and what integrates it.
-pub(crate) trait Family {
-    type Over<T: Lane>: Model<T>;
-    /// [`Method::Geared`] and [`Method::Dop853`], by the model's formula.
-    type Geared: Fixed;
-    /// [`Method::Additive`].
-    type Additive: Stepper;
-    const ADDITIVE: fn(Tolerance) -> Self::Additive;
-    const KIND: ModelKind;
-}
-
-pub(crate) enum OfNonlinear {}
-pub(crate) enum OfLinear {}
-impl Family for OfNonlinear {
-    type Over<T: Lane> = Nonlinear<T>;
-    type Geared = ByDop853;
-    type Additive = ByAdditive;
-    const ADDITIVE: fn(Tolerance) -> ByAdditive = ByAdditive;
-    const KIND: ModelKind = ModelKind::Nonlinear;
-}
-impl Family for OfLinear {
-    type Over<T: Lane> = Linear<T>;
-    type Geared = ByRk4;
-    type Additive = ByDopri5;
-    const ADDITIVE: fn(Tolerance) -> ByDopri5 = ByDopri5;
-    const KIND: ModelKind = ModelKind::Linear;
 }
 
 /// What to simulate, by either model.
@@ -201,26 +108,15 @@ struct Order<'a> {
     stop: Stop<'a>,
 }
 
-impl<'a> Order<'a> {
-    fn dispatch<F: Family>(self, simd: Simd) -> Option<(Vec<Record>, Vec<Extra>)> {
-        // A match on the formula would compile both of its arms.
-        const { assert!(F::Geared::FORMULA as u8 == Formula::of(F::KIND) as u8) };
-        match *self.method {
-            Method::Rk4 { .. } => simd.dispatch(self.by::<F, _>(ByRk4)),
-            Method::Geared(_) | Method::Dop853 { .. } => {
-                simd.dispatch(self.by::<F, _>(F::Geared::NEW))
-            }
-            Method::Dopri5(tolerance) => simd.dispatch(self.by::<F, _>(ByDopri5(tolerance))),
-            Method::Additive(tolerance) => simd.dispatch(self.by::<F, _>(F::ADDITIVE(tolerance))),
-            Method::Rodas5p(tolerance) => {
-                let family = PhantomData::<F>;
-                Simd::dispatch_narrow(stiff::Simulate { order: self, tolerance, family })
-            }
-        }
+impl<F: Family> ByMethod<F> for (Order<'_>, Simd) {
+    type Output = Option<(Vec<Record>, Vec<Extra>)>;
+
+    fn by<S: Stepper>(self, stepper: S) -> Self::Output {
+        self.1.dispatch(Simulate(self.0, stepper, PhantomData::<F>))
     }
 
-    fn by<F, S>(self, stepper: S) -> Simulate<'a, F, S> {
-        Simulate(self, stepper, PhantomData)
+    fn by_rodas(self, stepper: ByRodas) -> Self::Output {
+        Simd::dispatch_narrow(Simulate(self.0, stepper, PhantomData::<F>))
     }
 }
 
@@ -459,6 +355,6 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
         let point = self.points[state.point];
         let leg = &point.legs[state.leg];
         self.windows.0.set(lane, f64::from(u8::from(leg.in_window)));
-        enter(&mut self.model, lane, self.method, point, leg)
+        enter(&mut self.model, lane, *self.method, point, leg)
     }
 }

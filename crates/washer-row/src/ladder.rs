@@ -1,7 +1,7 @@
 //! Ladders: ways to integrate a trajectory, from the quickest. A point climbs until two rungs
 //! agree.
 
-use washer_model::{Formula, Gear, Method, ModelKind};
+use washer_model::{Formula, Gear, Method, MethodNumbers, ModelKind};
 
 use crate::{Convergence, Level};
 
@@ -23,8 +23,9 @@ impl Rung {
     /// The rung in words, as one of this model's.
     pub fn describe(&self, model: ModelKind) -> String {
         let name = self.level.name();
-        match &self.method {
-            Method::Geared(geared) => {
+        let mut method = self.method;
+        match method.numbers() {
+            MethodNumbers::Gears(geared) => {
                 let Gear { step_s, caps, .. } = geared.top();
                 let order = match Formula::of(model) {
                     Formula::Rk4 => 4,
@@ -41,12 +42,10 @@ impl Rung {
                     1e3 * step_s
                 )
             }
-            Method::Rk4 { step_s } | Method::Dop853 { step_s } => {
-                format!("{name} (step {:.3} ms)", 1e3 * step_s)
+            MethodNumbers::Step(step_s) => format!("{name} (step {:.3} ms)", 1e3 * *step_s),
+            MethodNumbers::Tolerance(tolerance) => {
+                format!("{name} (tolerance {:.0e})", tolerance.relative)
             }
-            Method::Additive(tolerance) => format!("{name} (tolerance {:.0e})", tolerance.relative),
-            // Not on the fast method's ladder.
-            Method::Dopri5(_) | Method::Rodas5p(_) => name.to_owned(),
         }
     }
 }

@@ -13,7 +13,6 @@
 mod climb;
 mod convergence;
 mod ladder;
-mod level;
 mod measures;
 mod outcome;
 mod run;
@@ -23,8 +22,8 @@ mod verdict;
 pub use climb::{Climbs, Demand, Next, Terms};
 pub use convergence::Convergence;
 pub use ladder::{Ladder, Rung};
-pub use level::Level;
 pub use measures::{CREEPING_M_PER_S, Criterion, Facts, Floor, Measured, Measures, Metric, Part};
 pub use outcome::{Deviations, Dwelt, GrowingMode, Growth, Outcome, Status, Trajectory};
 pub use run::{Rule, RungRun, runs};
 pub use verdict::{ROW_STATUSES, Verdict, row_status};
+pub use washer_model::Level;

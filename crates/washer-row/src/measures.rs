@@ -1,7 +1,7 @@
 //! What a run measures: the amplitude by which the two models are compared, and metrics.
 
 use sweep_parameter::{Limit, Worse, named};
-use washer_model::{Channel, Extra, Wanted};
+use washer_model::{Channel, Extra, Gauge, Wanted};
 
 use crate::outcome::{Deviations, Outcome};
 
@@ -86,9 +86,14 @@ named! {
 }
 
 impl Metric {
+    /// What it is read from, if each model has its own: the gauge of its name.
+    fn gauge(self) -> Option<Gauge> {
+        Gauge::named(self.name())
+    }
+
     /// Whether each model has its own; else it belongs to the machine.
-    pub const fn is_of_model(self) -> bool {
-        self.facts().of.is_some()
+    pub fn is_of_model(self) -> bool {
+        self.gauge().is_some()
     }
 
     /// Whether it is of the constant speeds of `[stability]`.
@@ -98,7 +103,7 @@ impl Metric {
 
     /// Whether a motion that goes on for ever has it: a force or a speed, not a time within a
     /// window.
-    pub const fn is_of_turns(self) -> bool {
+    pub fn is_of_turns(self) -> bool {
         self.is_of_model() && !matches!(self, Self::ClashTime | Self::StopContact)
     }
 
@@ -115,8 +120,6 @@ impl Metric {
                 description: "greatest magnitude in the window of the sum of the forces of all \
                               springs, dampers, stops and bushings on the cabinet (at rest the \
                               weight)",
-                record: |wanted| wanted.cabinet_force = true,
-                of: Some(|extra| extra.cabinet_force_n.into_iter().collect()),
                 ..PLAIN
             },
             Self::ClashTime => Facts {
@@ -125,8 +128,6 @@ impl Metric {
                 floor: Floor::PartOfWindow,
                 // Of the gap, which the hinge bends.
                 left: Left::OfCaps,
-                record: |wanted| wanted.clash_time = true,
-                of: Some(|extra| extra.clash_time_s.into_iter().collect()),
                 ..PLAIN
             },
             Self::StaticSag => Facts {
@@ -147,8 +148,6 @@ impl Metric {
                      equilibrium, next to nothing while it is open",
                 ]),
                 floor: Floor::PartOfWeight,
-                record: |wanted| wanted.stops = true,
-                of: Some(|extra| extra.stops.iter().map(|stop| stop.push_n).collect()),
                 ..PLAIN
             },
             Self::StopContact => Facts {
@@ -157,8 +156,6 @@ impl Metric {
                 part: Some(Part::Stop),
                 of_each: Some(["contact", "time in the window for which the stop is closed"]),
                 floor: Floor::PartOfWindow,
-                record: |wanted| wanted.stops = true,
-                of: Some(|extra| extra.stops.iter().map(|stop| stop.contact_s).collect()),
                 ..PLAIN
             },
             Self::FootLoad => Facts {
@@ -170,14 +167,12 @@ impl Metric {
                     "least vertical load of the foot in the window, by statics; below zero it \
                      would lift",
                 ]),
-                of: Some(|extra| extra.foot_loads_n.clone()),
                 ..OF_FEET
             },
             Self::SlipMargin => Facts {
                 unit: "N",
                 description: "least margin of the cabinet against slipping in the window: friction \
                               on all feet together less the horizontal force",
-                of: Some(|extra| extra.slip_margin_n.into_iter().collect()),
                 ..OF_FEET
             },
             Self::WalkMargin => Facts {
@@ -185,7 +180,6 @@ impl Metric {
                 description: "least margin of the cabinet against slipping, turning or both in the \
                               window: the margin against slipping less what the moment about the \
                               vertical takes of it",
-                of: Some(|extra| extra.walk_margin_n.into_iter().collect()),
                 ..OF_FEET
             },
             Self::Growth => Facts {
@@ -205,8 +199,6 @@ impl Metric {
                 // What capped modes ring is more of a speed than of a motion, by their frequency
                 // over the drum's, and is hardly less at the next cap: 0.54 of it was seen.
                 left: Left::All,
-                record: |wanted| wanted.damper_speeds = true,
-                of: Some(|extra| extra.damper_speeds_m_per_s.clone()),
                 ..PLAIN
             },
             // Each channel has a column of its own, in its unit.
@@ -278,10 +270,6 @@ pub struct Facts {
     pub floor: Floor,
     /// How much of a difference is left.
     pub(crate) left: Left,
-    /// What trajectories must record.
-    record: fn(&mut Wanted),
-    /// Its values in such a record, of each part or the only one; none if it is the machine's own.
-    of: Option<fn(&Extra) -> Vec<f64>>,
     /// Which way it is bad: of several parts, the worst stands for all.
     pub worse: Worse,
     /// Up to where it is good, if that has a meaning of its own.
@@ -296,8 +284,6 @@ const PLAIN: Facts = Facts {
     of_each: None,
     floor: Floor::None,
     left: Left::OfMotion,
-    record: |_| (),
-    of: None,
     worse: Worse::Greater,
     limit: None,
 };
@@ -306,7 +292,6 @@ const PLAIN: Facts = Facts {
 const OF_FEET: Facts = Facts {
     part: Some(Part::Foot),
     floor: Floor::Weight,
-    record: |wanted| wanted.feet = true,
     worse: Worse::Less,
     limit: Some(Limit { value: 0.0, scale: 100.0 }),
     ..PLAIN
@@ -347,12 +332,11 @@ impl Measured {
 
     /// Its value in a trajectory's records, if it was recorded.
     pub fn of(self, extra: &Extra) -> Option<f64> {
-        let Facts { of, worse, .. } = self.metric.facts();
-        let values = of?(extra);
+        let mut values = extra.gauge(self.metric.gauge()?).iter().copied();
         match self.part {
-            Some(part) => values.get(part).copied(),
-            None if worse == Worse::Less => values.into_iter().reduce(f64::min),
-            None => values.into_iter().reduce(f64::max),
+            Some(part) => values.nth(part),
+            None if self.metric.facts().worse == Worse::Less => values.reduce(f64::min),
+            None => values.reduce(f64::max),
         }
     }
 }
@@ -397,15 +381,12 @@ impl Measures {
 
     /// What trajectories must record.
     pub fn wanted(&self) -> Wanted {
-        let mut wanted = Wanted {
+        Wanted {
             root_mean_squares: self.criterion == Criterion::Rms,
             turns: self.criterion == Criterion::Envelope,
+            gauges: Gauge::ALL.map(|gauge| self.metrics.iter().any(|it| it.gauge() == Some(gauge))),
             ..Wanted::default()
-        };
-        for metric in &self.metrics {
-            (metric.facts().record)(&mut wanted);
         }
-        wanted
     }
 }
 
@@ -436,8 +417,6 @@ impl Outcome {
 
 #[cfg(test)]
 mod tests {
-    use washer_model::StopLoad;
-
     use super::*;
     use crate::outcome::{Status, Trajectory};
 
@@ -497,13 +476,14 @@ mod tests {
 
     #[test]
     fn the_number_of_all_is_the_extreme_of_each() {
-        let stops = [(20.0, 0.3), (50.0, 0.1)];
-        let stops = stops.map(|(push_n, contact_s)| StopLoad { push_n, contact_s });
-        let extra = Extra {
-            stops: stops.to_vec(),
-            foot_loads_n: vec![90.0, -5.0, 70.0],
-            ..Extra::default()
-        };
+        let mut extra = Extra::default();
+        for (gauge, numbers) in [
+            (Gauge::StopForce, vec![20.0, 50.0]),
+            (Gauge::StopContact, vec![0.3, 0.1]),
+            (Gauge::FootLoad, vec![90.0, -5.0, 70.0]),
+        ] {
+            extra.gauges[gauge as usize] = numbers;
+        }
         let metrics = vec![Metric::StopForce, Metric::StopContact, Metric::FootLoad];
         let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
         let found: Vec<_> = measures.of_model().filter_map(|number| number.of(&extra)).collect();

@@ -2,7 +2,7 @@
 
 use washer_model::{Beyond, Channel, Disturbance, Ending, NoAnswer, Response};
 
-use crate::level::Level;
+use crate::Level;
 
 /// Why a trajectory ended. The position is its code in chunk files, so new ones go to the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

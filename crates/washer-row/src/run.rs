@@ -3,7 +3,7 @@
 use lane_ode::{Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    Channel, Course, Extra, Method, ModelKind, Point, Record, Wanted, simulate_until,
+    Channel, Course, Extra, Gauge, Method, ModelKind, Point, Record, Wanted, simulate_until,
 };
 
 use crate::{Criterion, Deviations, Measures, Status, Trajectory};
@@ -74,14 +74,15 @@ pub fn runs(
 ) -> Option<Vec<RungRun>> {
     let has_friction = |point: &&Point| !point.friction_speeds().is_empty();
     let mut wanted = rule.wanted();
-    wanted.damper_speeds |= model == ModelKind::Linear && points.iter().any(has_friction);
+    wanted.gauges[Gauge::DamperSpeed as usize] |=
+        model == ModelKind::Linear && points.iter().any(has_friction);
     let (records, extras) = simulate_until(simd, model, method, points, wanted, is_stopped)?;
     // None at all if nothing was wanted.
     let mut extras = extras.into_iter();
     let run = |(record, point): (&Record, &&Point)| {
         let extra = extras.next().unwrap_or_default();
         let off = match model {
-            ModelKind::Linear => point.friction_speed_off(&extra.damper_speeds_m_per_s),
+            ModelKind::Linear => point.friction_speed_off(extra.gauge(Gauge::DamperSpeed)),
             ModelKind::Nonlinear => None,
         };
         let mut run = RungRun::new(record, extra, rule);

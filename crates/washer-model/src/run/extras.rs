@@ -4,7 +4,7 @@
 //! that the loop over steps does not change where they are not in use.
 
 use super::Method;
-use super::loads::Loads;
+use super::loads::{Gauge, Loads};
 use super::snapshots::Snapshots;
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -42,10 +42,7 @@ impl Instants {
                 let parts = (geared.top().step_s / SHORTEST_PART_S).ceil() as u32;
                 Self { parts: parts.clamp(1, PARTS_OF_A_LONG_STEP), clearances: 3 }
             }
-            Method::Dop853 { .. }
-            | Method::Dopri5(_)
-            | Method::Additive(_)
-            | Method::Rodas5p(_) => Self::of_steps(false),
+            _ => Self::of_steps(false),
         }
     }
 }
@@ -87,7 +84,7 @@ impl<T: Lane> Extras<T> {
             wanted,
             squares: SquareIntegrals::new(zero),
             turns: PartPeaks::new(zero),
-            loads: Loads::new(zero, wanted, model, point, parts),
+            loads: Loads::new(zero, wanted.gauges, model, point, parts),
             clash: [TimeAbove::new(zero); 3],
             clearances_squared: [zero; 3],
             clearances,
@@ -129,19 +126,21 @@ impl<T: Lane> Extras<T> {
         let mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let wanted = self.wanted;
         let [clash_s, longer_s, shorter_s] = self.clash.map(|clash| clash.lane(lane));
-        let extra = &mut self.found[index];
-        *extra = Extra {
+        let gauges = Gauge::ALL.map(|gauge| match &self.loads {
+            _ if !wanted.reads(gauge) => Vec::new(),
+            _ if gauge == Gauge::ClashTime => vec![clash_s],
+            Some(loads) => loads.of(gauge, lane, point),
+            None => Vec::new(),
+        });
+        self.found[index] = Extra {
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),
             turns,
-            clash_time_s: wanted.clash_time.then_some(clash_s),
-            clash_doubt_s: (wanted.clash_time && self.clearances > 1)
+            gauges,
+            clash_doubt_s: (wanted.reads(Gauge::ClashTime) && self.clearances > 1)
                 .then_some((longer_s - clash_s).max(clash_s - shorter_s)),
+            course: Vec::new(),
             snapshots,
-            ..Extra::default()
         };
-        if let Some(loads) = &self.loads {
-            loads.finish(lane, point, extra);
-        }
     }
 }
 
@@ -183,7 +182,7 @@ impl<T: Lane> Aside for Seen<'_, T> {
         if let Some(snapshots) = &mut extras.snapshots {
             snapshots.see(step, (x, dx), channels);
         }
-        if wanted.clash_time {
+        if wanted.reads(Gauge::ClashTime) {
             let distance_squared = squared(radial);
             for k in 0..extras.clearances {
                 let mut overlap = distance_squared;

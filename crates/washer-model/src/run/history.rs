@@ -11,17 +11,18 @@ use crate::coordinates::STATES;
 use crate::machine::spin::stretch_at;
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::squared;
+use crate::run::method::{
+    ByMethod, ByRk4, ByRodas, Family, OfLinear, OfNonlinear, Stepper, coupling, enter,
+};
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::snapshots::share_of_step;
-use crate::run::stepper::{ByDopri5, ByRk4, Fixed, Stepper};
 use crate::run::stiff::{OnLeg, StiffTask};
 use crate::run::suspension::forces;
-use crate::run::{Family, OfLinear, OfNonlinear, coupling, enter};
 use crate::{COORDINATES, Forces, Method, ModelKind, Point, Stop};
 use core::marker::PhantomData;
 use lane_ode::{
     Aside, Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, Simd, Step,
-    Task, Tolerance, rodas,
+    Task, rodas,
 };
 
 /// One trajectory at some instants.
@@ -129,21 +130,24 @@ fn sample(model: ModelKind, asked: &[Asked<'_>], stop: Stop<'_>) -> Vec<States> 
 
 /// One in one lane; several, by plain Runge-Kutta, side by side.
 fn sample_by<F: Family>(asked: &[Asked<'_>], stop: Stop<'_>) -> Vec<States> {
-    match asked[0].method {
-        Method::Rk4 { .. } if asked.len() > 1 => {
-            Simd::dispatch_narrow(by::<F, _>(asked, stop, ByRk4))
-        }
-        Method::Rk4 { .. } => Simd::one_lane(by::<F, _>(asked, stop, ByRk4)),
-        Method::Geared(_) | Method::Dop853 { .. } => {
-            Simd::one_lane(by::<F, _>(asked, stop, F::Geared::NEW))
-        }
-        Method::Dopri5(tolerance) => Simd::one_lane(by::<F, _>(asked, stop, ByDopri5(tolerance))),
-        Method::Additive(tolerance) => {
-            Simd::one_lane(by::<F, _>(asked, stop, F::ADDITIVE(tolerance)))
-        }
-        Method::Rodas5p(tolerance) => {
-            Simd::one_lane(StiffSample::<F> { asked, stop, tolerance, family: PhantomData })
-        }
+    let family = PhantomData::<F>;
+    match asked {
+        [one] => one.method.choose(Sample { asked, stop, stepper: (), family }),
+        _ => Simd::dispatch_narrow(Sample { asked, stop, stepper: ByRk4, family }),
+    }
+}
+
+impl<F: Family> ByMethod<F> for Sample<'_, F, ()> {
+    type Output = Vec<States>;
+
+    fn by<S: Stepper>(self, stepper: S) -> Vec<States> {
+        let Self { asked, stop, family, .. } = self;
+        Simd::one_lane(Sample { asked, stop, stepper, family })
+    }
+
+    fn by_rodas(self, stepper: ByRodas) -> Vec<States> {
+        let Self { asked, stop, family, .. } = self;
+        Simd::one_lane(Sample { asked, stop, stepper, family })
     }
 }
 
@@ -225,10 +229,6 @@ struct Sample<'a, F, S> {
     family: PhantomData<F>,
 }
 
-fn by<'a, F, S>(asked: &'a [Asked<'a>], stop: Stop<'a>, stepper: S) -> Sample<'a, F, S> {
-    Sample { asked, stop, stepper, family: PhantomData }
-}
-
 impl<F: Family, S: Stepper> Kernel for Sample<'_, F, S> {
     type Output = Vec<States>;
 
@@ -250,14 +250,7 @@ impl<F: Family, S: Stepper> Aside for Sample<'_, F, S> {
 }
 
 /// The same by the stiff method, which wants derivatives.
-struct StiffSample<'a, F> {
-    asked: &'a [Asked<'a>],
-    stop: Stop<'a>,
-    tolerance: Tolerance,
-    family: PhantomData<F>,
-}
-
-impl<F: Family> Aside for StiffSample<'_, F> {
+impl<F: Family> Aside for Sample<'_, F, ByRodas> {
     type Output = Vec<States>;
 
     #[inline(always)]
@@ -265,7 +258,7 @@ impl<F: Family> Aside for StiffSample<'_, F> {
         let sampling = Sampling::<f64, F::Over<f64>>::new(N(0.0), self.asked, self.stop);
         let point = self.asked[0].point;
         let mut task = StiffTask::<f64, _, F::Over<Dual<f64>>>::new(0.0, sampling, point);
-        rodas::integrate(&mut task, &self.tolerance);
+        rodas::integrate(&mut task, &self.stepper.0);
         task.task.found
     }
 }
@@ -338,7 +331,7 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
         }
         let leg = leg?;
         self.legs[lane] = Some(next);
-        Some(enter(&mut self.model, lane, method, point, leg))
+        Some(enter(&mut self.model, lane, *method, point, leg))
     }
 
     #[inline(always)]

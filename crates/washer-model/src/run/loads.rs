@@ -10,8 +10,37 @@ use crate::machine::feet::{FEET, LOAD, Spread, turning_n};
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::{Vec3, dot};
 use crate::run::model::tub_samples;
-use crate::{COORDINATES, Extra, ModelKind, Point, StopLoad, Wanted};
+use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
+
+sweep_parameter::named! {
+    /// A number that can be recorded of a trajectory, within the window.
+    pub enum Gauge {
+        /// Time with a gap below zero (s).
+        ClashTime = "clash_time",
+        /// The greatest magnitude of the sum of all forces of springs and dampers on the cabinet
+        /// (N); at rest it is the weight.
+        CabinetForce = "cabinet_force",
+        /// The greatest push of each stop (N).
+        StopForce = "stop_force",
+        /// How long each stop is closed (s).
+        StopContact = "stop_contact",
+        /// The least vertical load of each foot (N), below zero where it would lift; none if the
+        /// machine has no cabinet.
+        FootLoad = "foot_load",
+        /// The least margin against slipping (N): friction on all feet together less the
+        /// horizontal force; below zero the cabinet slips. None if the machine has no cabinet.
+        SlipMargin = "slip_margin",
+        /// The least margin against walking (N): that against slipping less what turning takes of
+        /// it. None if the machine has no cabinet.
+        WalkMargin = "walk_margin",
+        /// The greatest speed of each damper along it (m/s).
+        DamperSpeed = "damper_speed",
+    }
+}
+
+/// Which gauges are read.
+pub(crate) type Gauges = [bool; Gauge::ALL.len()];
 
 /// Least values are found as greatest distances below this (N), farther than any load.
 const FAR_N: f64 = 1_048_576.0;
@@ -177,21 +206,24 @@ impl<T: Lane> Loads<T> {
     #[inline(always)]
     pub(crate) fn new(
         zero: N<T>,
-        wanted: Wanted,
+        wanted: Gauges,
         model: ModelKind,
         point: &Point,
         parts: u32,
     ) -> Option<Self> {
-        let with_elements = wanted.stops || wanted.feet || wanted.damper_speeds;
-        if !with_elements && !wanted.cabinet_force {
+        // Those from the cabinet's force on.
+        let [_, force, of_elements @ ..] = wanted;
+        let with_elements = of_elements != [false; Gauge::ALL.len() - 2];
+        if !with_elements && !force {
             return None;
         }
         let elements = &point.machine.elements;
+        let with_dampers = wanted[Gauge::DamperSpeed as usize];
         let recorded = Recorded {
-            force: wanted.cabinet_force,
+            force,
             feet: with_elements && point.feet.is_some(),
             stops: if with_elements { elements.stops.len() } else { 0 },
-            dampers: if wanted.damper_speeds { elements.dampers.len() } else { 0 },
+            dampers: if with_dampers { elements.dampers.len() } else { 0 },
         };
         // No closures: they would be compiled without the instruction set.
         let laws = match model {
@@ -244,25 +276,23 @@ impl<T: Lane> Loads<T> {
         }
     }
 
-    /// The records of one lane, that of a point.
-    pub(crate) fn finish(&self, lane: usize, point: &Point, extra: &mut Extra) {
-        if self.recorded.force {
-            let [squared] = self.force_squared.lane(lane);
-            extra.cabinet_force_n = Some(squared.sqrt());
-        }
-        if let (Some(_), Some(feet)) = (&self.spread, &point.feet) {
-            let least_n = self.below.lane(lane).map(|below_n| FAR_N - below_n);
-            extra.foot_loads_n = least_n[..feet.count].to_vec();
-            extra.slip_margin_n = Some(least_n[SLIP]);
-            extra.walk_margin_n = Some(least_n[WALK]);
-        }
-        let of_stop = |stop: &SeenStop<T>| {
-            let [push_n] = stop.push.lane(lane);
-            StopLoad { push_n, contact_s: stop.contact.lane(lane) }
+    /// What a gauge shows of one lane, that of a point: a number of each part, or the only one.
+    pub(crate) fn of(&self, gauge: Gauge, lane: usize, point: &Point) -> Vec<f64> {
+        let greatest = |peaks: &Peaks<T, 1>| peaks.lane(lane)[0];
+        let least = |of: core::ops::Range<usize>| {
+            let below_n = &self.below.lane(lane)[if self.spread.is_some() { of } else { 0..0 }];
+            below_n.iter().map(|below_n| FAR_N - below_n).collect()
         };
-        extra.stops = self.stops.iter().map(of_stop).collect();
-        let speeds = self.speeds.iter().flat_map(|speed| speed.lane(lane));
-        extra.damper_speeds_m_per_s = speeds.collect();
+        match gauge {
+            Gauge::ClashTime => Vec::new(),
+            Gauge::CabinetForce => vec![greatest(&self.force_squared).sqrt()],
+            Gauge::StopForce => self.stops.iter().map(|stop| greatest(&stop.push)).collect(),
+            Gauge::StopContact => self.stops.iter().map(|stop| stop.contact.lane(lane)).collect(),
+            Gauge::FootLoad => least(0..point.feet.as_ref().map_or(0, |feet| feet.count)),
+            Gauge::SlipMargin => least(SLIP..WALK),
+            Gauge::WalkMargin => least(WALK..WALK + 1),
+            Gauge::DamperSpeed => self.speeds.iter().map(greatest).collect(),
+        }
     }
 
     /// A state whose derivative is `dx`: at the end of a step, of which end and length (s) are

@@ -1,31 +1,23 @@
 //! Trajectories by the stiff method: one at a time, its derivatives by lanes of dual numbers.
 
-use super::{Extra, Family, Order, Record, Run};
+use super::{Extra, Record, Run, Simulate};
 use crate::coordinates::STATES;
+use crate::run::method::{ByRodas, Family};
 use crate::run::model::Model;
 use crate::run::tangent::Tangent;
 use crate::{COORDINATES, Point};
-use core::marker::PhantomData;
-use lane_ode::{
-    Dual, Ended, Forcing, Kernel, Lane, Leg, N, Partials, Step, Task, Tolerance, rodas,
-};
+use lane_ode::{Dual, Ended, Forcing, Kernel, Lane, Leg, N, Partials, Step, Task, rodas};
 
-/// Integrates one model at every point and records peaks.
-pub(super) struct Simulate<'a, F> {
-    pub(super) order: Order<'a>,
-    pub(super) tolerance: Tolerance,
-    pub(super) family: PhantomData<F>,
-}
-
-impl<F: Family> Kernel for Simulate<'_, F> {
+impl<F: Family> Kernel for Simulate<'_, F, ByRodas> {
     type Output = Option<(Vec<Record>, Vec<Extra>)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let first = self.order.points[0];
-        let run = Run::<f64, F::Over<f64>>::new(N(0.0), self.order, F::KIND);
+        let Self(order, ByRodas(tolerance), _) = self;
+        let first = order.points[0];
+        let run = Run::<f64, F::Over<f64>>::new(N(0.0), order, F::KIND);
         let mut run = StiffTask::<T, _, F::Over<Dual<T>>>::new(zero, run, first);
-        rodas::integrate(&mut run, &self.tolerance);
+        rodas::integrate(&mut run, &tolerance);
         run.task.recorded()
     }
 }
@@ -109,7 +101,7 @@ impl<T: Lane, R: OnLeg, J: Model<Dual<T>>> rodas::Stiff<STATES, COORDINATES>
 mod tests {
     use super::*;
     use crate::{Channel, Machine, Method, ModelKind, Spin, Timing, prepare};
-    use lane_ode::Simd;
+    use lane_ode::{Simd, Tolerance};
 
     const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.7, 2.9], checkpoints: 0 };
 

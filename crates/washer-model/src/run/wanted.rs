@@ -1,17 +1,9 @@
 //! What may be recorded on request, and what such records hold.
 
 use super::Course;
+use super::loads::{Gauge, Gauges};
 use crate::Snapshot;
 use crate::channel::CHANNELS;
-
-/// The record of one stop.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StopLoad {
-    /// Its greatest push (N).
-    pub push_n: f64,
-    /// How long it is closed (s).
-    pub contact_s: f64,
-}
 
 /// Records to make beyond a [`Record`](super::Record); none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -20,17 +12,8 @@ pub struct Wanted {
     pub root_mean_squares: bool,
     /// Largest deviations of the channels in every turn of the drum.
     pub turns: bool,
-    /// The greatest force that springs and dampers together put on the cabinet.
-    pub cabinet_force: bool,
-    /// How long drum and tub overlap.
-    pub clash_time: bool,
-    /// The greatest push of each stop, and how long it is closed.
-    pub stops: bool,
-    /// The least load of each foot of the cabinet, and the least margins against slipping and
-    /// walking.
-    pub feet: bool,
-    /// The greatest speed of each damper.
-    pub damper_speeds: bool,
+    /// Which [`Gauge`](super::Gauge)s are read.
+    pub gauges: Gauges,
     /// The coordinates at the ends of legs ([`Timing::checkpoints`](crate::Timing)).
     pub course: bool,
     /// All outputs at the point's own instants ([`Point::seen_at`](crate::Point::seen_at)), within
@@ -49,29 +32,12 @@ pub struct Extra {
     /// window's ends belong to the whole turn beside them, and a window without whole turns counts
     /// as one. Empty unless asked for.
     pub turns: Vec<[f64; CHANNELS]>,
-    /// The greatest magnitude of the sum of all forces of springs and dampers on the cabinet (N);
-    /// at rest it is the weight.
-    pub cabinet_force_n: Option<f64>,
-    /// Time with a gap below zero (s).
-    pub clash_time_s: Option<f64>,
-    /// By how much more or less that would be, with the gap off by as much as ringing can make it
+    /// By [`Gauge`]: of each part in the machine's order, or the only one; empty unless asked for.
+    pub gauges: [Vec<f64>; Gauge::ALL.len()],
+    /// By how much more or less the time of clash would be, with the gap off by as much as ringing can make it
     /// (s). Where drum and tub only just touch, it is much of the time itself. Absent where modes
     /// are not capped, because such runs follow the ringing.
     pub clash_doubt_s: Option<f64>,
-    /// Of each stop, in the machine's order.
-    pub stops: Vec<StopLoad>,
-    /// The least vertical load of each foot (N), below zero where it would lift, in the machine's
-    /// order; empty if it has no cabinet.
-    pub foot_loads_n: Vec<f64>,
-    /// The least margin against slipping (N): friction on all feet together less the horizontal
-    /// force; below zero the cabinet slips. Absent if the machine has no cabinet.
-    pub slip_margin_n: Option<f64>,
-    /// The least margin against walking (N): that against slipping less what turning takes of it.
-    /// Absent if the machine has no cabinet.
-    pub walk_margin_n: Option<f64>,
-    /// The greatest speed of each damper along it (m/s), in the machine's order; empty unless asked
-    /// for.
-    pub damper_speeds_m_per_s: Vec<f64>,
     /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed.
     /// Empty unless asked for.
     pub course: Course,
@@ -79,7 +45,24 @@ pub struct Extra {
     pub snapshots: Vec<Snapshot>,
 }
 
+impl Extra {
+    /// What a gauge showed, if it was asked for.
+    pub fn gauge(&self, gauge: Gauge) -> &[f64] {
+        &self.gauges[gauge as usize]
+    }
+}
+
 impl Wanted {
+    /// Whether it asks for a gauge.
+    pub(crate) const fn reads(&self, gauge: Gauge) -> bool {
+        self.gauges[gauge as usize]
+    }
+
+    /// Nothing but a gauge.
+    pub fn gauge(gauge: Gauge) -> Self {
+        Self { gauges: Gauge::ALL.map(|one| one == gauge), ..Self::default() }
+    }
+
     /// Whether any record needs more than the ends of legs.
     pub(crate) fn anything(self) -> bool {
         Self { course: false, ..self } != Self::default()

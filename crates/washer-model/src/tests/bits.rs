@@ -55,14 +55,8 @@ fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
     let Extra {
         root_mean_squares,
         turns,
-        cabinet_force_n,
-        clash_time_s,
+        gauges,
         clash_doubt_s,
-        stops,
-        foot_loads_n,
-        slip_margin_n,
-        walk_margin_n,
-        damper_speeds_m_per_s,
         course,
         // Compared by `run/snapshots.rs`.
         snapshots: _,
@@ -70,10 +64,8 @@ fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
     let waypoints = course.iter().flat_map(|at| at.coordinates.iter().chain([&at.radial_m]));
     bits.extend(waypoints.map(|of| of.to_bits()));
-    let metrics = [cabinet_force_n, clash_time_s, clash_doubt_s, slip_margin_n, walk_margin_n];
-    let of_each = foot_loads_n.iter().chain(damper_speeds_m_per_s);
-    bits.extend(metrics.into_iter().flatten().chain(of_each).map(|number| number.to_bits()));
-    bits.extend(stops.iter().flat_map(|stop| [stop.push_n.to_bits(), stop.contact_s.to_bits()]));
+    let gauges = gauges.iter().flatten().chain(clash_doubt_s);
+    bits.extend(gauges.map(|number| number.to_bits()));
     bits
 }
 

@@ -4,8 +4,8 @@
 use super::instruments::{EVERYTHING, paper};
 use crate::machine::spin::cuts_s;
 use crate::{
-    Caps, Channel, Geared, Machine, Method, ModelKind, Point, Profile, Spin, Start, Timing, Wanted,
-    history, prepare, simulate, simulate_with,
+    Caps, Channel, Gauge, Geared, Machine, Method, ModelKind, Point, Profile, Spin, Start, Timing,
+    Wanted, history, prepare, simulate, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
@@ -96,8 +96,8 @@ fn they_are_what_a_densely_sampled_history_shows() {
             let greatest = extra.turns.iter().fold(0.0_f64, |greatest, turn| greatest.max(turn[i]));
             close(name, greatest, records[0].amplitudes[i], 1e-9);
         }
-        close("force", extra.cabinet_force_n.unwrap(), expected.cabinet_force_n, 1e-4);
-        let clash_s = extra.clash_time_s.unwrap();
+        close("force", extra.gauge(Gauge::CabinetForce)[0], expected.cabinet_force_n, 1e-4);
+        let clash_s = extra.gauge(Gauge::ClashTime)[0];
         assert!(clash_s > 0.05 && clash_s < 2.5, "{clash_s} s, least gap {}", records[0].min_gap_m);
         // Each touch is a sample too long or too short.
         let off_s = (clash_s - expected.clash_time_s).abs();
@@ -127,11 +127,16 @@ fn methods_whose_steps_lie_elsewhere_find_the_same() {
             }
             close(
                 "force",
-                other.cabinet_force_n.unwrap(),
-                reference.cabinet_force_n.unwrap(),
+                other.gauge(Gauge::CabinetForce)[0],
+                reference.gauge(Gauge::CabinetForce)[0],
                 1e-4,
             );
-            close("clash", other.clash_time_s.unwrap(), reference.clash_time_s.unwrap(), 1e-3);
+            close(
+                "clash",
+                other.gauge(Gauge::ClashTime)[0],
+                reference.gauge(Gauge::ClashTime)[0],
+                1e-3,
+            );
         }
     }
 }
@@ -144,11 +149,12 @@ fn only_what_is_asked_for_is_there() {
     let run =
         |wanted| simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], wanted);
     assert!(run(Wanted::default()).1.is_empty());
-    let (_, extras) = run(Wanted { clash_time: true, ..Wanted::default() });
+    let (_, extras) = run(Wanted::gauge(Gauge::ClashTime));
     assert_eq!(extras.len(), 2);
     for extra in extras {
-        assert!(extra.clash_time_s.is_some() && extra.turns.is_empty());
-        assert_eq!((extra.root_mean_squares, extra.cabinet_force_n), (None, None));
+        assert!(extra.root_mean_squares.is_none() && extra.turns.is_empty());
+        let shown = extra.gauges.each_ref().map(Vec::len);
+        assert_eq!(shown, Gauge::ALL.map(|gauge| usize::from(gauge == Gauge::ClashTime)));
     }
 }
 
@@ -172,8 +178,8 @@ fn at_rest_the_cabinet_carries_the_weight() {
         );
         // Springs hold the tub back along c1, where the drum's bearings do: a force that the weight
         // does not have.
-        close("force", extras[0].cabinet_force_n.unwrap(), weight_n, 1e-4);
-        assert_eq!(extras[0].clash_time_s, Some(0.0));
+        close("force", extras[0].gauge(Gauge::CabinetForce)[0], weight_n, 1e-4);
+        assert_eq!(extras[0].gauge(Gauge::ClashTime), [0.0]);
         assert_eq!(extras[0].turns.len(), 1);
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::modes::motions;
 use crate::{
-    Damper, Machine, Method, ModelKind, Point, Profile, Spin, Timing, Wanted, modes, prepare,
-    simulate_with,
+    Damper, Gauge, Machine, Method, ModelKind, Point, Profile, Spin, Timing, Wanted, modes,
+    prepare, simulate_with,
 };
 use lane_ode::Simd;
 
@@ -41,11 +41,11 @@ fn own_speeds_are_those_of_the_linear_motion() {
     let machines = cases.map(|(mass_kg, frictions_n)| machine(mass_kg, frictions_n, None));
     let points = ready(&machines);
     let method = Method::Rk4 { step_s: 2e-4 };
-    let wanted = Wanted { damper_speeds: true, ..Wanted::default() };
+    let wanted = Wanted::gauge(Gauge::DamperSpeed);
     let simulated: Vec<&Point> = points.iter().collect();
     let (_, extras) = simulate_with(Simd::best(), ModelKind::Linear, &method, &simulated, wanted);
     for ((point, extra), machine) in points.iter().zip(&extras).zip(&machines) {
-        let off = point.friction_speed_off(&extra.damper_speeds_m_per_s).unwrap();
+        let off = point.friction_speed_off(extra.gauge(Gauge::DamperSpeed)).unwrap();
         assert!(off < 1.01, "{off}: {:?} for {extra:?}", point.friction_speeds());
         // Nor do they depend on what else is made ready.
         let alone = ready(std::slice::from_ref(machine)).remove(0);

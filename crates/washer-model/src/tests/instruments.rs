@@ -7,18 +7,14 @@ use crate::nonlinear::equilibrium;
 use crate::nonlinear::floating::Floating;
 use crate::nonlinear::{Half, Halves, halves};
 use crate::point::Point;
-use crate::{Machine, Parameter, Profile, Spin, Target, Timing, Wanted, prepare};
+use crate::{Gauge, Machine, Parameter, Profile, Spin, Target, Timing, Wanted, prepare};
 use lane_ode::{Lane, N, Real, Simd};
 
 /// Every record that there is.
 pub(super) const EVERYTHING: Wanted = Wanted {
     root_mean_squares: true,
     turns: true,
-    cabinet_force: true,
-    clash_time: true,
-    stops: true,
-    feet: true,
-    damper_speeds: true,
+    gauges: [true; Gauge::ALL.len()],
     course: true,
     snapshots: true,
 };

@@ -5,25 +5,13 @@ use super::energy::{axes, place};
 use crate::machine::feet::{Feet, LOAD};
 use crate::machine::{Cabinet, Foot, Machine};
 use crate::{
-    Extra, Method, ModelKind, Point, Profile, Spin, Start, StopLoad, Timing, Wanted, history,
-    prepare, simulate_with,
+    Extra, Gauge, Method, ModelKind, Point, Profile, Spin, Start, Timing, Wanted, history, prepare,
+    simulate_with,
 };
 use lane_ode::Simd;
 
 const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.5, 2.9], checkpoints: 0 };
 const EVERY_S: f64 = 1e-4;
-const WANTED: Wanted = Wanted {
-    root_mean_squares: false,
-    turns: false,
-    cabinet_force: false,
-    clash_time: false,
-    stops: true,
-    feet: true,
-    damper_speeds: true,
-    course: false,
-    snapshots: false,
-};
-
 fn on_feet(mut machine: Machine) -> Machine {
     machine.cabinet = Some(Cabinet { mass_kg: 35.0, centre_m: [0.18, -0.1, 0.02], friction: 0.4 });
     let corners = [[0.47, 0.26], [0.47, -0.26], [-0.07, 0.26], [-0.07, -0.26]];
@@ -51,7 +39,10 @@ fn all_close(what: &str, found: &[f64], expected: &[f64], allowed: f64) {
 
 fn found(point: &Point, model: ModelKind, simd: Simd) -> Extra {
     let method = Method::Rk4 { step_s: 1e-4 };
-    let (_, mut extras) = simulate_with(simd, model, &method, &[point], WANTED);
+    let [clash, force] = [Gauge::ClashTime, Gauge::CabinetForce];
+    let gauges = Gauge::ALL.map(|gauge| gauge != clash && gauge != force);
+    let wanted = Wanted { gauges, ..Wanted::default() };
+    let (_, mut extras) = simulate_with(simd, model, &method, &[point], wanted);
     extras.remove(0)
 }
 
@@ -155,16 +146,15 @@ fn they_are_what_a_densely_sampled_history_shows() {
     let hit = pushes_n.iter().zip(&closed_s).filter(|(push_n, s)| **push_n > 20.0 && **s > 0.01);
     assert!(hit.count() >= 2, "{pushes_n:?} N, {closed_s:?} s");
     let extra = found(&point, ModelKind::Nonlinear, Simd::best());
-    all_close("least load of foot", &extra.foot_loads_n, &feet_n, 1e-2);
-    all_close("margin", &[extra.slip_margin_n.unwrap()], &[margin_n], 1e-2);
-    all_close("walking", &[extra.walk_margin_n.unwrap()], &[walk_n], 0.1);
+    all_close("least load of foot", extra.gauge(Gauge::FootLoad), &feet_n, 1e-2);
+    all_close("margin", extra.gauge(Gauge::SlipMargin), &[margin_n], 1e-2);
+    all_close("walking", extra.gauge(Gauge::WalkMargin), &[walk_n], 0.1);
     assert!(walk_n < margin_n - 1.0, "{walk_n} N, {margin_n} N: this machine turns");
-    let of_stops = |of: fn(&StopLoad) -> f64| extra.stops.iter().map(of).collect::<Vec<_>>();
     let greatest_n = pushes_n.iter().copied().fold(0.0, f64::max);
-    all_close("push of stop", &of_stops(|stop| stop.push_n), &pushes_n, 1e-3 * greatest_n);
+    all_close("push of stop", extra.gauge(Gauge::StopForce), &pushes_n, 1e-3 * greatest_n);
     // A damper's tension grows with its speed.
     let tensions_n: Vec<f64> = extra
-        .damper_speeds_m_per_s
+        .gauge(Gauge::DamperSpeed)
         .iter()
         .zip(&machine.dampers)
         .map(|(speed, damper)| {
@@ -175,7 +165,7 @@ fn they_are_what_a_densely_sampled_history_shows() {
         .collect();
     all_close("tension at the greatest speed of damper", &tensions_n, &tautest_n, 1e-2);
     // Every swing may be off by a sample at both ends.
-    all_close("contact of stop", &of_stops(|stop| stop.contact_s), &closed_s, 40.0 * EVERY_S);
+    all_close("contact of stop", extra.gauge(Gauge::StopContact), &closed_s, 40.0 * EVERY_S);
     assert_eq!(found(&point, ModelKind::Nonlinear, Simd::Scalar), extra);
 }
 
@@ -195,11 +185,10 @@ fn the_linear_models_loads_are_those_of_its_history() {
     let extra = found(&point, ModelKind::Linear, Simd::best());
     let at_rest = history.forces(0).unwrap();
     assert!(at_rest.feet_n.iter().zip(&feet_n).all(|(rest_n, n)| rest_n - n > 10.0), "{feet_n:?}");
-    all_close("least load of foot", &extra.foot_loads_n, &feet_n, 1e-2);
-    all_close("margin", &[extra.slip_margin_n.unwrap()], &margin_n, 1e-2);
-    let found_n: Vec<f64> = extra.stops.iter().map(|stop| stop.push_n).collect();
-    all_close("push of stop", &found_n, &pushes_n, 1e-6);
-    let dampers = machine.dampers.iter().zip(&extra.damper_speeds_m_per_s);
+    all_close("least load of foot", extra.gauge(Gauge::FootLoad), &feet_n, 1e-2);
+    all_close("margin", extra.gauge(Gauge::SlipMargin), &margin_n, 1e-2);
+    all_close("push of stop", extra.gauge(Gauge::StopForce), &pushes_n, 1e-6);
+    let dampers = machine.dampers.iter().zip(extra.gauge(Gauge::DamperSpeed));
     let tensions_n: Vec<f64> = dampers
         .map(|(damper, speed)| {
             let linear_speed = damper.friction_linear_speed_m_per_s.unwrap_or(f64::INFINITY);
@@ -236,7 +225,7 @@ fn in_small_motions_both_models_load_the_feet_alike() {
     let rest_n = feet.loads_n(&at_rest).into_iter().fold(f64::INFINITY, f64::min);
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
         let extra = found(&point, model, Simd::best());
-        rest_n - extra.foot_loads_n.into_iter().fold(f64::INFINITY, f64::min)
+        rest_n - extra.gauge(Gauge::FootLoad).iter().copied().fold(f64::INFINITY, f64::min)
     });
     assert!(nonlinear > 0.01, "{nonlinear} N");
     assert!((linear / nonlinear - 1.0).abs() < 5e-3, "{linear} N for {nonlinear} N");
@@ -245,7 +234,7 @@ fn in_small_motions_both_models_load_the_feet_alike() {
 #[test]
 fn a_machine_without_stops_or_cabinet_has_no_such_loads() {
     let point = point(Machine::paper());
-    let extra = found(&point, ModelKind::Nonlinear, Simd::best());
-    assert_eq!(extra.damper_speeds_m_per_s.len(), 2);
-    assert_eq!(Extra { damper_speeds_m_per_s: Vec::new(), ..extra }, Extra::default());
+    let mut extra = found(&point, ModelKind::Nonlinear, Simd::best());
+    let speeds = core::mem::take(&mut extra.gauges[Gauge::DamperSpeed as usize]);
+    assert_eq!((speeds.len(), extra), (2, Extra::default()));
 }

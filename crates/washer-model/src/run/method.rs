@@ -1,0 +1,243 @@
+//! The methods of integration, in one place: what each takes, what a row says of it, and what it is
+//! compiled from.
+//!
+//! Each is compiled as a kernel of its own: one function of all of them takes the compiler longer
+//! than all apart.
+
+use crate::coordinates::STATES;
+use crate::nonlinear::coupling::Coupling;
+use crate::point::PlannedLeg;
+use crate::run::model::{Linear, Model, Nonlinear};
+use crate::{Caps, Formula, Geared, ModelKind, Point};
+use lane_ode::{Lane, Leg, N, Task, Tolerance, dop853, dopri5, rk4};
+
+/// How trajectories are integrated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// Classical Runge-Kutta of order 4.
+    Rk4 {
+        /// Longest step.
+        step_s: f64,
+    },
+    /// An explicit formula on the machine whose bearings and hinge have scaled mass, so that none
+    /// of their modes is faster than a cap (section 4.3 of the model page).
+    Geared(Geared),
+    /// Dormand and Prince's formula of order 8, bearings and hinge as they are. The linear model
+    /// takes RK4 in its place.
+    Dop853 {
+        /// Longest step.
+        step_s: f64,
+    },
+    /// Dormand-Prince 5(4).
+    Dopri5(Tolerance),
+    /// Kennedy and Carpenter's additive method of order 5(4), bearings and hinge implicit, for
+    /// forces with corners: its steps see these, and neither bearings nor hinge hold them short.
+    /// The linear model takes Dormand-Prince in its place.
+    Additive(Tolerance),
+    /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others.
+    /// One trajectory at a time.
+    Rodas5p(Tolerance),
+}
+
+sweep_parameter::named! {
+    /// Which method a row's numbers come from, and which rung if it has several. The position is
+    /// its code in chunk files, so new ones go to the end.
+    #[derive(Default)]
+    pub enum Level {
+        /// The lowest rung that a row may hold: bearings and hinge with capped modes.
+        Fast = "fast",
+        /// The same with less error.
+        Fine = "fine",
+        /// The same with shorter steps and higher caps.
+        Finest = "finest",
+        /// Plain RK4.
+        #[default]
+        Rk4 = "rk4",
+        /// Dormand-Prince 5(4).
+        Dopri5 = "dopri5",
+        /// Rodas5P.
+        Rodas5p = "rodas5p",
+        /// The additive method, for forces with corners.
+        Additive = "additive",
+        /// Dormand and Prince's formula of order 8, for the same.
+        Dop853 = "dop853",
+    }
+}
+
+impl Level {
+    /// Whether it is a rung on which modes of bearings and hinge are capped.
+    pub const fn is_capped(self) -> bool {
+        matches!(self, Self::Fast | Self::Fine | Self::Finest)
+    }
+}
+
+/// The numbers that a method takes.
+#[derive(Debug)]
+pub enum MethodNumbers<'a> {
+    /// Longest step (s).
+    Step(&'a mut f64),
+    /// Steps and caps.
+    Gears(&'a mut Geared),
+    /// Of steps that an adaptive method chooses.
+    Tolerance(&'a mut Tolerance),
+}
+
+/// What is compiled once for each method, over a model.
+pub(crate) trait ByMethod<F: Family>: Sized {
+    type Output;
+    fn by<S: Stepper>(self, stepper: S) -> Self::Output;
+    fn by_rodas(self, stepper: ByRodas) -> Self::Output;
+}
+
+impl Method {
+    /// That of a level, with its numbers still to be put in.
+    pub const fn of(level: Level) -> Self {
+        const CAPS: Caps = Caps { bearings_rad_per_s: 0.0, hinge_rad_per_s: None };
+        const TOLERANCE: Tolerance = Tolerance { relative: 0.0, absolute: 0.0, max_steps: 0 };
+        match level {
+            Level::Fast | Level::Fine | Level::Finest => Self::Geared(Geared::steady(0.0, CAPS)),
+            Level::Rk4 => Self::Rk4 { step_s: 0.0 },
+            Level::Dopri5 => Self::Dopri5(TOLERANCE),
+            Level::Rodas5p => Self::Rodas5p(TOLERANCE),
+            Level::Additive => Self::Additive(TOLERANCE),
+            Level::Dop853 => Self::Dop853 { step_s: 0.0 },
+        }
+    }
+
+    /// What it takes, to be read or put in.
+    pub const fn numbers(&mut self) -> MethodNumbers<'_> {
+        match self {
+            Self::Rk4 { step_s } | Self::Dop853 { step_s } => MethodNumbers::Step(step_s),
+            Self::Geared(geared) => MethodNumbers::Gears(geared),
+            Self::Dopri5(tolerance) | Self::Additive(tolerance) | Self::Rodas5p(tolerance) => {
+                MethodNumbers::Tolerance(tolerance)
+            }
+        }
+    }
+
+    /// Whether trajectories side by side in lanes have steps of their own.
+    pub const fn has_own_steps(&self) -> bool {
+        matches!(self, Self::Dopri5(_) | Self::Additive(_))
+    }
+
+    /// Does something by the integrator of this method.
+    pub(crate) fn choose<F: Family, B: ByMethod<F>>(&self, task: B) -> B::Output {
+        // A match on the formula would compile both of its arms.
+        const { assert!(F::Geared::FORMULA as u8 == Formula::of(F::KIND) as u8) };
+        match *self {
+            Self::Rk4 { .. } => task.by(ByRk4),
+            Self::Geared(_) | Self::Dop853 { .. } => task.by(F::Geared::NEW),
+            Self::Dopri5(tolerance) => task.by(ByDopri5(tolerance)),
+            Self::Additive(tolerance) => task.by(F::ADDITIVE(tolerance)),
+            Self::Rodas5p(tolerance) => task.by_rodas(ByRodas(tolerance)),
+        }
+    }
+}
+
+/// First step that an adaptive method tries.
+const FIRST_STEP_S: f64 = 1e-5;
+
+/// Starts a leg in a lane: with its spin, its step, and its caps if modes are capped.
+pub(crate) fn enter<T: Lane, M: Model<T>>(
+    model: &mut M,
+    lane: usize,
+    mut method: Method,
+    point: &Point,
+    leg: &PlannedLeg,
+) -> Leg {
+    model.set_spin(lane, &point.stretches[leg.stretch]);
+    let step_s = match method.numbers() {
+        MethodNumbers::Step(step_s) => *step_s,
+        MethodNumbers::Gears(geared) => {
+            let gear = geared.gear(leg.fastest_rad_per_s);
+            model.set_caps(lane, &gear.caps);
+            gear.step_s
+        }
+        MethodNumbers::Tolerance(_) => FIRST_STEP_S,
+    };
+    Leg { start_s: leg.start_s, end_s: leg.end_s, step_s }
+}
+
+/// How bearings and hinge act where a trajectory starts.
+#[inline(always)]
+pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
+    let Method::Geared(geared) = method else { return Coupling::Springs };
+    Coupling::new(zero, Some(&geared.top().caps))
+}
+
+/// A model before the lanes' type is known, and what integrates it.
+pub(crate) trait Family {
+    type Over<T: Lane>: Model<T>;
+    /// [`Method::Geared`] and [`Method::Dop853`], by the model's formula.
+    type Geared: Fixed;
+    /// [`Method::Additive`].
+    type Additive: Stepper;
+    const ADDITIVE: fn(Tolerance) -> Self::Additive;
+    const KIND: ModelKind;
+}
+
+pub(crate) enum OfNonlinear {}
+pub(crate) enum OfLinear {}
+impl Family for OfNonlinear {
+    type Over<T: Lane> = Nonlinear<T>;
+    type Geared = ByDop853;
+    type Additive = ByAdditive;
+    const ADDITIVE: fn(Tolerance) -> ByAdditive = ByAdditive;
+    const KIND: ModelKind = ModelKind::Nonlinear;
+}
+impl Family for OfLinear {
+    type Over<T: Lane> = Linear<T>;
+    type Geared = ByRk4;
+    type Additive = ByDopri5;
+    const ADDITIVE: fn(Tolerance) -> ByDopri5 = ByDopri5;
+    const KIND: ModelKind = ModelKind::Linear;
+}
+
+pub(crate) trait Stepper {
+    fn integrate<T: Lane, P: Task<T, STATES, System: Model<T>>>(self, zero: T, task: &mut P);
+}
+
+/// One of fixed steps, as gears have it.
+pub(crate) trait Fixed: Stepper {
+    const NEW: Self;
+    const FORMULA: Formula;
+}
+
+/// Integrators whose lanes are trajectories.
+macro_rules! steppers {
+    ($($Stepper:ident $(($by:ty))? = |$self:ident, $zero:ident, $task:ident| $run:expr;)+) => {$(
+        pub(crate) struct $Stepper$((pub(crate) $by))?;
+
+        impl Stepper for $Stepper {
+            #[inline(always)]
+            fn integrate<T: Lane, P: Task<T, STATES, System: Model<T>>>(
+                $self,
+                $zero: T,
+                $task: &mut P,
+            ) {
+                $run;
+            }
+        }
+    )+};
+}
+
+steppers! {
+    ByRk4 = |self, zero, task| rk4::integrate(zero, task);
+    ByDop853 = |self, zero, task| dop853::integrate(zero, task);
+    ByDopri5(Tolerance) = |self, zero, task| dopri5::integrate(zero, task, &self.0);
+    ByAdditive(Tolerance) =
+        |self, zero, task| P::System::integrate_additive(zero, task, &self.0);
+}
+
+/// In place of a stepper: it wants derivatives (`stiff.rs`).
+pub(crate) struct ByRodas(pub(crate) Tolerance);
+
+impl Fixed for ByRk4 {
+    const NEW: Self = Self;
+    const FORMULA: Formula = Formula::Rk4;
+}
+
+impl Fixed for ByDop853 {
+    const NEW: Self = Self;
+    const FORMULA: Formula = Formula::Dop853;
+}
