@@ -472,9 +472,6 @@ fn methods(
     }
 }
 
-/// The forces of all elements of a kind (N).
-type ForcesOfEach = fn(&Forces) -> &[f64];
-
 /// One model's columns.
 struct Columns<'a> {
     model: &'static str,
@@ -552,22 +549,16 @@ impl<'a> Columns<'a> {
             table.numbers(&name, "N", &description, forces.iter().map(|at| at.as_ref().map(of)));
         };
         let Some(first) = forces.first().and_then(Option::as_ref) else { return };
-        let mut add_each = |part: &str, what: &str, description: &str, of: ForcesOfEach| {
-            for k in 0..of(first).len() {
-                add(&format!("{part}_{}_{what}", k + 1), description, &|at| of(at)[k]);
-            }
-        };
-        let pushes = "tension of the spring, negative where it pushes";
-        add_each("spring", "tension", pushes, |at| &at.springs_n);
-        let drawn = "tension of the damper, positive while it is drawn out";
-        add_each("damper", "tension", drawn, |at| &at.dampers_n);
-        add_each("stop", "force", "push between the tub and the stop", |at| &at.stops_n);
         let axes = ["x", "y", "z"];
-        for k in 0..first.bushings_n.len() {
-            for (i, axis) in axes.into_iter().enumerate() {
-                let what = format!("bushing_{}_force_{axis}", k + 1);
-                let description = format!("force of the bushing on the cabinet along c{}", i + 1);
-                add(&what, &description, &|at| at.bushings_n[k][i]);
+        for (kind, (element, force, description, count)) in Forces::KINDS.into_iter().enumerate() {
+            for k in 0..first.of_kinds()[kind].len() {
+                let (mut name, mut description) =
+                    (format!("{element}_{}_{force}", k / count + 1), description.to_owned());
+                if count > 1 {
+                    name += &format!("_{}", axes[k % count]);
+                    description += &(k % count + 1).to_string();
+                }
+                add(&name, &description, &|at| at.of_kinds()[kind][k]);
             }
         }
         let all = match first.stops_n.is_empty() && first.bushings_n.is_empty() {

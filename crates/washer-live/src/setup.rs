@@ -3,8 +3,7 @@
 use lane_ode::Tolerance;
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    BumpStop, Bushing, Channel, Foot, Gear, Geared, Machine, Method, MethodNumbers, Parameter,
-    Profile, Spin, Unbalance,
+    Channel, ElementList, Gear, Geared, Machine, Method, MethodNumbers, Parameter, Profile, Spin,
 };
 use washer_row::{Convergence, Criterion, Ladder, Level, Measures, Metric, Rule, Rung};
 
@@ -74,13 +73,12 @@ impl Setup {
 
     fn walk(&mut self, walk: &mut Walk<'_>) -> Option<()> {
         let Self { machine, spin, .. } = self;
-        let usual = Machine::paper();
-        walk.sized(&mut machine.springs, &usual.springs[0])?;
-        walk.sized(&mut machine.dampers, &usual.dampers[0])?;
-        walk.sized(&mut machine.stops, &BumpStop::default())?;
-        walk.sized(&mut machine.bushings, &Bushing::default())?;
-        walk.sized(&mut machine.further_unbalances, &Unbalance::default())?;
-        walk.sized(&mut machine.feet, &Foot::default())?;
+        for list in ElementList::all() {
+            let count = walk.count((list.count)(machine))?;
+            if walk.is_reading() {
+                (list.fill)(machine, count);
+            }
+        }
         let cabinets = walk.count(usize::from(machine.cabinet.is_some()))?;
         machine.cabinet = (cabinets > 0).then(|| machine.cabinet.unwrap_or_default());
         walk_profile(walk, spin)?;

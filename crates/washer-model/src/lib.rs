@@ -82,7 +82,9 @@ pub use fast::Cases;
 pub use fast::geared::{Formula, Gear, Geared};
 pub use kind::ModelKind;
 pub use linear::Matrices;
-pub use machine::parameters::{Parameter, Range, Target, UnknownParameter, decimal, unit_suffix};
+pub use machine::parameters::{
+    ElementList, Parameter, Range, Target, UnknownParameter, decimal, unit_suffix,
+};
 pub use machine::spin::{Profile, Spin};
 pub use machine::violations::Violation;
 pub use machine::{

@@ -5,9 +5,7 @@ use std::slice;
 use std::sync::LazyLock;
 
 use serde_json::{Value, json};
-use washer_model::{
-    BumpStop, Bushing, Cabinet, Foot, Machine, Parameter, Spin, Spring, Target, Unbalance,
-};
+use washer_model::{Cabinet, ElementList, Machine, Parameter, Spin, Target};
 
 use sweep_engine::config::keys::{self};
 use sweep_engine::config::kind::{Numbers, about};
@@ -18,16 +16,14 @@ use sweep_engine::plan::WrittenIn;
 
 /// A section of the machine file. It holds the parameters whose names begin with its prefix. Three
 /// that differ in a component are an array: `inertia_kg_m2` holds `inertia_11_kg_m2` and two more.
-pub(super) struct Part {
+struct Part {
     /// Key of the section; empty for the numbers at the top of the file.
-    pub(super) section: &'static str,
+    section: &'static str,
     /// What its parameters' names begin with; completed by the element's number where there may be
     /// any number of them.
-    pub(super) prefix: &'static str,
+    prefix: String,
     /// How often it may stand in a file.
-    pub(super) times: Times,
-    /// What may be left out, and then is no number of the file; more, by the table of parameters.
-    optional: &'static [(&'static str, LeftOut)],
+    times: Times,
     /// How many a machine has.
     count: fn(&Machine) -> usize,
     /// Gives a machine so many, each with what may be left out left out.
@@ -36,7 +32,7 @@ pub(super) struct Part {
 
 /// How often a section may stand in a file.
 #[derive(Clone, Copy)]
-pub(super) enum Times {
+enum Times {
     Once,
     AtMostOnce,
     /// As an array of tables; with the number of the first element, and what a machine needs one
@@ -104,7 +100,7 @@ impl Part {
                 _ if first.starts_with("x_") => format!("{}{stem}", self.prefix),
                 _ => stem,
             };
-            let optional = self.optional.iter().find(|(known, _)| *known == name);
+            let optional = OPTIONAL.iter().find(|(known, _)| *known == name);
             let by_table = value.map_or(LeftOut::Refused, LeftOut::Is);
             let left_out = optional.map_or(by_table, |(_, left_out)| *left_out);
             Key { name, parameters: names.iter().map(|(name, _)| name.clone()).collect(), left_out }
@@ -125,7 +121,7 @@ impl Part {
     fn prefix(&self, k: usize) -> String {
         match self.times {
             Times::Many(first, _) => format!("{}{}_", self.prefix, k + first),
-            Times::Once | Times::AtMostOnce => self.prefix.to_owned(),
+            Times::Once | Times::AtMostOnce => self.prefix.clone(),
         }
     }
 
@@ -166,63 +162,39 @@ impl Key {
 }
 
 /// A section that every file has once.
-const fn once(section: &'static str, prefix: &'static str) -> Part {
-    let (count, fill): (fn(&Machine) -> usize, fn(&mut Machine, usize)) = (|_| 1, |_, _| ());
-    Part { section, prefix, times: Times::Once, optional: &[], count, fill }
-}
-
-/// A list of the machine as an array of tables, each like this one; with the prefix of parameters,
-/// the number of the first, what a machine needs one for, and what may be left out.
-macro_rules! many {
-    ($list:ident: $like:expr, $prefix:literal, $first:literal, $needed:expr,
-        $($optional:expr),*) => {
-        Part {
-            section: stringify!($list),
-            prefix: $prefix,
-            times: Times::Many($first, $needed),
-            optional: &[$($optional),*],
-            count: |machine| machine.$list.len(),
-            fill: |machine, count| machine.$list = vec![$like; count],
-        }
+fn once(section: &'static str) -> Part {
+    let prefix = match section {
+        "" => String::new(),
+        _ => format!("{}_", section.trim_end_matches('s')),
     };
+    Part { section, prefix, times: Times::Once, count: |_| 1, fill: |_, _| () }
 }
 
 /// A spring's free length follows its ends where it is left out.
 const FREE_LENGTH: &str = "free_length_m";
 
+/// What may be left out, and then is no number of the file; more, by the table of parameters.
+const OPTIONAL: [(&str, LeftOut); 2] =
+    [(FREE_LENGTH, LeftOut::Nothing), ("friction_linear_speed_m_per_s", LeftOut::Auto)];
+
 /// Every section of a machine file.
-pub(super) const PARTS: [Part; 14] = [
-    once("", ""),
-    once("tub", "tub_"),
-    once("shaft", "shaft_"),
-    once("drum", "drum_"),
-    once("unbalance", "unbalance_"),
-    once("flexure", "flexure_"),
-    once("bearings", "bearing_"),
-    Part {
+static PARTS: LazyLock<Vec<Part>> = LazyLock::new(|| {
+    let cabinet = Part {
         section: "cabinet",
-        prefix: "cabinet_",
+        prefix: "cabinet_".to_owned(),
         times: Times::AtMostOnce,
-        optional: &[],
         count: |machine| usize::from(machine.cabinet.is_some()),
         fill: |machine, count| machine.cabinet = (count > 0).then(Cabinet::default),
-    },
-    many!(
-        springs: Spring { free_length_m: None, ..Machine::paper().springs[0] },
-        "spring_", 1, Some("at least one [[springs]]: nothing else carries the machine"),
-        (FREE_LENGTH, LeftOut::Nothing)
-    ),
-    many!(
-        dampers: Machine::paper().dampers[0],
-        "damper_", 1, None,
-        ("friction_linear_speed_m_per_s", LeftOut::Auto)
-    ),
-    many!(stops: BumpStop::default(), "stop_", 1, None,),
-    many!(bushings: Bushing::default(), "bushing_", 1, None,),
-    // The first is `[unbalance]`.
-    many!(further_unbalances: Unbalance::default(), "unbalance_", 2, None,),
-    many!(feet: Foot::default(), "foot_", 1, None,),
-];
+    };
+    let of_list = |&ElementList { name: section, element, first, count, fill, .. }: &_| {
+        let springs = "at least one [[springs]]: nothing else carries the machine";
+        let times = Times::Many(first, (section == "springs").then_some(springs));
+        Part { section, prefix: format!("{element}_"), times, count, fill }
+    };
+    let once = ["", "tub", "shaft", "drum", "unbalance", "flexure", "bearings"].map(once);
+    once.into_iter().chain([cabinet]).chain(ElementList::all().map(of_list)).collect()
+});
+
 /// Most elements of one list: enough for any machine, and what depends on all of them stays quick.
 const MOST_ELEMENTS: usize = 1000;
 
@@ -288,7 +260,7 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                 let table = table.needed(&expected);
                 let field = keys.table(table, |keys| part.walk(own, 0, machine, keys));
                 if let (None, Some(report)) = (field.given(), keys.section().map(|it| it.report)) {
-                    own.iter().for_each(|key| doubt(key.names(part.prefix), report));
+                    own.iter().for_each(|key| doubt(key.names(&part.prefix), report));
                 }
             }
             Times::AtMostOnce => drop(keys.table(table, |keys| {

@@ -2,9 +2,9 @@
 
 use serde_json::{Map, Value};
 use sweep_engine::config::schema::{of, set as set_schema};
-use washer_model::{Parameter, Profile, Spin};
+use washer_model::{ElementList, Parameter, Profile, Spin};
 
-use super::machine::{PARTS, Times, with_one_of_each};
+use super::machine::with_one_of_each;
 
 /// `[set]`: names of the table as properties; those of numbered elements as patterns.
 pub(super) fn set() -> Value {
@@ -16,16 +16,14 @@ pub(super) fn set() -> Value {
     let (mut single, mut patterns) = (Vec::new(), Map::new());
     for parameter in &all {
         let name = parameter.name();
-        let lists = PARTS.iter().filter_map(|part| match part.times {
-            Times::Many(first, _) => Some((part.prefix, first)),
-            Times::Once | Times::AtMostOnce => None,
-        });
-        let mut lists = lists.chain([("spin_table_", 1)]);
-        match lists.find_map(|(prefix, first)| Some((prefix, first, name.strip_prefix(prefix)?))) {
-            Some((prefix, first, rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => {
+        let lists = ElementList::all().map(|list| (list.element, list.first));
+        let mut lists = lists.chain([("spin_table", 1)]);
+        let rest = |element| name.strip_prefix(element)?.strip_prefix('_');
+        match lists.find_map(|(element, first)| Some((element, first, rest(element)?))) {
+            Some((element, first, rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => {
                 let suffix = rest.trim_start_matches(|c: char| c.is_ascii_digit());
                 let number = if first == 1 { "[1-9][0-9]*" } else { "([2-9]|[1-9][0-9]+)" };
-                patterns.insert(format!("^{prefix}{number}{suffix}$"), of(parameter));
+                patterns.insert(format!("^{element}_{number}{suffix}$"), of(parameter));
             }
             _ => single.push(parameter.clone()),
         }

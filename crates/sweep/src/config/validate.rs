@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
-use washer_model::{Spin, Target, Violation, decimal, highest_frequency_rad_per_s, prepare};
+use washer_model::{
+    ElementList, Spin, Target, Violation, decimal, highest_frequency_rad_per_s, prepare,
+};
 use washer_row::Criterion;
 
 use crate::method::REFERENCE_SHARE;
@@ -72,9 +74,7 @@ impl Swept {
     /// minutes.
     fn is_too_much(self, draft: &Draft<'_, Washer>, scenario: &Scenario) -> bool {
         let Washer { machine, spin, .. } = &scenario.model;
-        let forces = machine.springs.len() + machine.dampers.len() + machine.stops.len();
-        let further = machine.bushings.len() + machine.further_unbalances.len();
-        let elements = (forces + further) as u64;
+        let elements = ElementList::all().map(|list| (list.count)(machine) as u64).sum::<u64>();
         let rows = match spin {
             Spin::Table { time_s, .. } => time_s.len() as u64,
             Spin::Ramped { .. } => 1,

@@ -10,7 +10,7 @@ use std::fmt;
 pub use sweep_parameter::{Range, UnknownParameter, decimal, unit_suffix};
 
 use crate::{BumpStop, Damper, Machine, Spin, Spring};
-use table::{BLOCKS, TABLE};
+use table::{LISTS, TABLE};
 
 /// A number of the machine, the spin or the window that a user can name, set and sweep.
 ///
@@ -48,6 +48,7 @@ pub enum Target {
 }
 
 /// One line of the table.
+#[derive(Debug)]
 struct Row {
     /// The whole name, or what follows `spring_1_` and the like.
     name: &'static str,
@@ -67,26 +68,31 @@ type Get = fn(&Machine, &Spin, usize) -> Option<f64>;
 /// Writes it.
 type Set = fn(&mut Machine, &mut Spin, usize, f64);
 
-/// Rows of every element of a numbered kind.
-struct Block {
-    /// What names begin with; the number and the row's name follow.
-    element: &'static str,
-    rows: &'static [&'static [Row]],
+/// A list of the machine's elements, in machine files an array of tables; or the points of a spin's
+/// table.
+#[derive(Debug)]
+pub struct ElementList {
+    /// Key in machine files; none of a spin's table.
+    pub name: &'static str,
+    /// What names of parameters begin with; the number and the row's name follow.
+    pub element: &'static str,
     /// Number of the first element.
-    first: usize,
-    count: fn(&Machine, &Spin) -> usize,
-    /// What has them, and what one is called.
-    of: [&'static str; 2],
+    pub first: usize,
+    /// How many a machine has.
+    pub count: fn(&Machine) -> usize,
+    /// Gives a machine so many, each with what may be left out left out.
+    pub fill: fn(&mut Machine, usize),
+    rows: &'static [&'static [Row]],
 }
 
-impl Block {
-    /// Of elements that are numbered from 1.
-    const fn new(
-        element: &'static str,
-        rows: &'static [&'static [Row]],
-        count: fn(&Machine, &Spin) -> usize,
-    ) -> Self {
-        Self { element, rows, first: 1, count, of: ["the machine", element] }
+impl ElementList {
+    /// Every one of a machine, in the order of machine files.
+    pub fn all() -> impl Iterator<Item = &'static Self> {
+        LISTS.iter().filter(|list| !list.name.is_empty())
+    }
+
+    fn count_in(&self, machine: &Machine, spin: &Spin) -> usize {
+        if self.name.is_empty() { table_points(spin) } else { (self.count)(machine) }
     }
 
     fn rows(&self) -> impl Iterator<Item = &'static Row> {
@@ -164,9 +170,9 @@ impl Parameter {
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
         let is_there = |row: &&Row| row.target.is_of(machine, spin).is_ok();
         let single = TABLE.iter().filter(is_there).map(Self::single);
-        let numbered = BLOCKS.iter().flat_map(|block| {
-            (0..(block.count)(machine, spin))
-                .flat_map(move |k| block.rows().map(move |row| block.parameter(row, k)))
+        let numbered = LISTS.iter().flat_map(|list| {
+            (0..list.count_in(machine, spin))
+                .flat_map(move |k| list.rows().map(move |row| list.parameter(row, k)))
         });
         single.chain(numbered).collect()
     }
@@ -179,15 +185,19 @@ impl Parameter {
         if let Some(row) = TABLE.iter().find(|row| row.name == name) {
             return row.target.is_of(machine, spin).map(|()| Self::single(row));
         }
-        for block in BLOCKS {
-            if let Some((number, rest)) = numbered(name, block.element) {
-                let row = block.rows().find(|row| row.name == rest);
+        for list in LISTS {
+            if let Some((number, rest)) = numbered(name, list.element) {
+                let row = list.rows().find(|row| row.name == rest);
                 let row = row.ok_or_else(UnknownParameter::strange)?;
-                let count = (block.count)(machine, spin);
-                return match number.checked_sub(block.first) {
-                    Some(k) if k < count => Ok(block.parameter(row, k)),
+                let count = list.count_in(machine, spin);
+                return match number.checked_sub(list.first) {
+                    Some(k) if k < count => Ok(list.parameter(row, k)),
                     _ => {
-                        let (last, [owner, noun]) = (block.first + count - 1, block.of);
+                        let (owner, noun) = match list.name {
+                            "" => ("the spin's table", "point"),
+                            _ => ("the machine", list.element),
+                        };
+                        let last = list.first + count - 1;
                         let there = format!("{owner} has {last} {}", plural(noun, last));
                         Err(UnknownParameter::not_here(format!("{there}, numbered from 1")))
                     }

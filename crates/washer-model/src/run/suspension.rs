@@ -35,6 +35,22 @@ pub struct Forces {
     pub walk_margin_n: Option<f64>,
 }
 
+impl Forces {
+    /// Every kind of element: its name, what its force is called and is, in how many
+    /// directions: of several, their number follows.
+    pub const KINDS: [(&str, &str, &str, usize); 4] = [
+        ("spring", "tension", "tension of the spring, negative where it pushes", 1),
+        ("damper", "tension", "tension of the damper, positive while it is drawn out", 1),
+        ("stop", "force", "push between the tub and the stop", 1),
+        ("bushing", "force", "force of the bushing on the cabinet along c", 3),
+    ];
+
+    /// The forces of all elements of each kind.
+    pub fn of_kinds(&self) -> [&[f64]; Self::KINDS.len()] {
+        [&self.springs_n, &self.dampers_n, &self.stops_n, self.bushings_n.as_flattened()]
+    }
+}
+
 /// The forces at a state: whole coordinates of the nonlinear model, deviations of the linear one.
 pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> Forces {
     let elements = match model {

@@ -1,8 +1,8 @@
 //! The rows of the table of parameters.
 
 use super::Range::{Any, Negative, NonNegative, Positive, Within};
-use super::{Block, Get, Range, Row, Set, Target, common, table_points};
-use crate::{BumpStop, Damper, Machine, Spin};
+use super::{ElementList, Get, Range, Row, Set, Target, common};
+use crate::{BumpStop, Bushing, Damper, Foot, Machine, Spin, Spring, Unbalance};
 
 /// What a row writes, how it reads it and how it writes it.
 type Access = (Target, Get, Set);
@@ -342,20 +342,36 @@ static SPIN_POINT: &[&[Row]] = &[&[
         "speed at this point of the spin's table", table speed_rpm),
 ]];
 
-/// Rows of numbered elements.
-pub(super) static BLOCKS: &[Block] = &[
-    Block::new("spring", SPRING, |machine, _| machine.springs.len()),
-    Block::new("damper", DAMPER, |machine, _| machine.dampers.len()),
-    Block::new("stop", STOP, |machine, _| machine.stops.len()),
-    Block::new("bushing", BUSHING, |machine, _| machine.bushings.len()),
+/// A list of the machine, of elements like this one: the number of the first, the rows of each.
+macro_rules! list {
+    ($name:ident = $like:expr, $element:literal $first:literal $rows:ident) => {
+        ElementList {
+            name: stringify!($name),
+            element: $element,
+            first: $first,
+            count: |machine| machine.$name.len(),
+            fill: |machine, count| machine.$name = vec![$like; count],
+            rows: $rows,
+        }
+    };
+}
+
+/// Every list, and the points of a spin's table.
+pub(super) static LISTS: &[ElementList] = &[
+    list!(springs = Spring { free_length_m: None, ..Machine::paper().springs[0] },
+        "spring" 1 SPRING),
+    list!(dampers = Machine::paper().dampers[0], "damper" 1 DAMPER),
+    list!(stops = BumpStop::default(), "stop" 1 STOP),
+    list!(bushings = Bushing::default(), "bushing" 1 BUSHING),
     // The first is that of every machine.
-    Block {
-        first: 2,
-        ..Block::new("unbalance", UNBALANCE, |machine, _| machine.further_unbalances.len())
-    },
-    Block::new("foot", FOOT, |machine, _| machine.feet.len()),
-    Block {
-        of: ["the spin's table", "point"],
-        ..Block::new("spin_table", SPIN_POINT, |_, spin| table_points(spin))
+    list!(further_unbalances = Unbalance::default(), "unbalance" 2 UNBALANCE),
+    list!(feet = Foot::default(), "foot" 1 FOOT),
+    ElementList {
+        name: "",
+        element: "spin_table",
+        rows: SPIN_POINT,
+        first: 1,
+        count: |_| 0,
+        fill: |_, _| (),
     },
 ];
