@@ -155,6 +155,9 @@ fn an_interrupted_search_goes_on_and_ends_in_the_same_bytes() {
         let done = child.wait_with_output().expect("it ends");
         assert_eq!(done.status.code(), Some(code), "{}", said(&done));
         assert!(said(&done).contains("points kept"), "{}", said(&done));
+        let again =
+            "go on  sweep boundary grid.toml --threads 1 --lattice 11 --progress none --out";
+        assert!(said(&done).contains(again), "{}", said(&done));
         assert_eq!(names(&folder), ["grid.toml", "whole.parquet", "x.parquet.partial"]);
     }
     // Killed where nothing can be said any more.

@@ -217,6 +217,29 @@ fn friction_is_taken_at_the_speed_that_the_linear_motion_has() {
     assert!(shown.contains("friction  1 rows whose linear model"), "{shown}");
 }
 
+/// At a given speed friction may hold the linear model, but not the machine.
+#[test]
+fn a_given_speed_of_friction_is_compared_with_both_motions() {
+    let grid = GRID.replace("values = [0.05, 1.0]", "values = [0.05, 0.52]");
+    let home = Home::new(&grid.replace("metrics = [", "metrics = [\"damper_speed\", "));
+    fs::write(home.path("machine.toml"), example()).expect("the folder can be written");
+    let given = ["friction_n=80", "friction_linear_speed_m_per_s=0.02"];
+    let words = ["run", "g.toml", "--out", "m.parquet", "--set", given[0], "--set", given[1]];
+    let run = home.sweep(&words);
+    assert!(said(&run).contains("friction  1 rows whose linear model"), "{}", said(&run));
+    let export = home.sweep(&["export", "m.parquet", "m.csv"]);
+    assert!(export.status.success(), "{}", said(&export));
+    let csv = fs::read_to_string(home.path("m.csv")).expect("it was written");
+    let factor = |model: &str| {
+        let speed = |damper| column(&csv, &format!("damper_{damper}_speed_{model}_m_per_s"))[1];
+        let off = |damper| speed(damper).max(4.0 * 0.01 / std::f64::consts::PI) / 0.02;
+        [off(1), off(2)].map(|off| off.max(1.0 / off)).into_iter().fold(1.0, f64::max)
+    };
+    assert!(factor("linear") < 2.0 && factor("nonlinear") > 5.0, "{csv}");
+    let off = column(&csv, "friction_speed_off")[1];
+    assert!((off / factor("nonlinear") - 1.0).abs() < 1e-12, "{off}");
+}
+
 #[test]
 fn live_pages_are_for_one_axis_and_for_designs_of_any_machine() {
     let home = home(&example());

@@ -455,6 +455,9 @@ fn failed_points_are_rows_and_fail_the_run_only_when_asked() {
         assert_eq!(done.status.code(), Some(code), "{words:?}: {}", said(&done));
         assert!(said(&done).contains(" no_equilibrium"), "{words:?}: {}", said(&done));
     }
+    let last = home.sweep(&["run", "g.toml", "--shard", "12/12", "--out", "t.parquet"]);
+    let idle = "with 10 chunks of 8 points, the run leaves 2 of the 12 shards without work";
+    assert!(said(&last).contains(idle), "{}", said(&last));
     let checked = home.sweep(&["check", "g.toml"]);
     assert!(said(&checked).contains(" no_equilibrium, of "), "{}", said(&checked));
     let whole = output(fresh_home().run().arg("--fail-on-error"));

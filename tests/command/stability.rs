@@ -189,7 +189,8 @@ fn growth_is_a_metric_of_maps_and_a_quantity_of_boundaries() {
     let refused = sweep(&plain, &["boundary", "grid.toml", "--quantity", "growth_per_s"]).output();
     let refused = refused.expect("it starts");
     assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
-    assert!(said(&refused).contains("[stability]"), "{}", said(&refused));
+    let expected = "`--quantity growth_per_s`: expected [stability] in the grid file";
+    assert!(said(&refused).contains(expected), "{}", said(&refused));
 }
 
 /// Between its folds the machine has three responses; one of them, found by a search of its own,

@@ -16,7 +16,9 @@ use std::time::{Duration, Instant};
 
 use crate::store::provenance::{self, Session};
 use crate::store::read::NameCounts;
-use crate::store::{Done, OpenOptions, OpenRun, Opened, ResultFile, Shard, ShardRequest, Tally};
+use crate::store::{
+    Done, OpenOptions, OpenRun, Opened, ResultFile, Shard, ShardRequest, Tally, idle_shards,
+};
 use crate::threads::{self};
 use crate::watch::Parts;
 use crate::{Engine, Environment, Interrupt, Job, Progress, ProgressMode, StoreError, Watch};
@@ -92,6 +94,7 @@ pub fn run(
     let (points, there) = run.own_points();
     if let Some(shard) = run.shard() {
         (options.tell)(&format!("shard {} of {}", shard.index, shard.of));
+        idle_shards(job.points, shard.of).iter().for_each(|note| (options.tell)(note));
     }
     for note in run.take_notes() {
         (options.tell)(&note);

@@ -53,6 +53,7 @@ pub use trials::{Key, Trials};
 
 use sweep_parameter::{Parameter as _, RatioLimits};
 
+use crate::config::section::counted;
 use crate::{Axis, Model, Plan, Read};
 use sweep_files::{self as files, FileKind};
 
@@ -125,6 +126,16 @@ pub fn chunk_points(points: u64) -> u64 {
         return 8;
     }
     points.div_ceil(CHUNKS).clamp(32, 4096).next_power_of_two()
+}
+
+/// What to say of shards that get no chunk, if there are any.
+pub fn idle_shards(points: u64, shards: u64) -> Option<String> {
+    let (of_chunk, chunks) = (chunk_points(points), points.div_ceil(chunk_points(points)));
+    (shards > chunks).then(|| {
+        let idle = shards - chunks;
+        let has = format!("{} of {of_chunk} points", counted(chunks as usize, "chunk"));
+        format!("note: with {has}, the run leaves {idle} of the {shards} shards without work")
+    })
 }
 
 // The files of a folder that have one name: those of every run, of shards, and of searches.

@@ -31,6 +31,11 @@ pub trait Swept: Rows {
     /// What a message about a column that no row has says of those that a grid file can ask for.
     const FURTHER: &'static str = "";
 
+    /// What a column needs, if it is one of a kind that not every plan's rows have.
+    fn needed(_column: &str) -> Option<&'static str> {
+        None
+    }
+
     /// Plans of the same points whose rows hold further columns, which this one does not ask for:
     /// one plan for each thing that can be measured.
     fn variants(_: &Plan<Self>) -> Vec<Plan<Self>> {

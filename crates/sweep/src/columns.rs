@@ -204,10 +204,13 @@ fn dwelt_columns(channels: &[Channel]) -> Vec<WasherColumn> {
 /// What the linear model's friction was taken at.
 fn friction_column() -> WasherColumn {
     let text = "by what factor the speed amplitude at which the linear model takes the friction of \
-                a damper is off from that of its own motion in the window, the greatest of all \
-                dampers; 1 where \"auto\" found it, null without friction or if the linear model \
-                failed";
-    let off = |row: &ResultRow| row.outcome.linear.friction_speed_off;
+                a damper is off from those of the motions in the window, the greatest of all \
+                dampers: of both models where it is given, of the linear model where it is \
+                \"auto\", 1 where that found it; null without friction or if the models failed";
+    let off = |row: &ResultRow| {
+        let models = [&row.outcome.nonlinear, &row.outcome.linear];
+        models.iter().filter_map(|model| model.friction_speed_off).reduce(f64::max)
+    };
     let column = ResultColumn::measured("friction_speed_off", "1", text, off);
     column.worse(Worse::Greater).limit(FAR_OFF, 1.0)
 }

@@ -70,6 +70,15 @@ impl Swept for Washer {
         }
     }
 
+    fn needed(column: &str) -> Option<&'static str> {
+        Some(match column.split('_').next()? {
+            "growth" | "dwell" => "[stability] in the grid file, with the speeds of dwells",
+            "foot" | "slip" | "walk" => "a machine with [cabinet] and [[feet]]",
+            "stop" => "a machine with [[stops]]",
+            _ => return None,
+        })
+    }
+
     const FURTHER: &'static str = "; a machine with [cabinet] and feet, with stops, and a grid \
                                    file with [stability] have more";
 

@@ -14,7 +14,7 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, Motion};
 use crate::point::ringing::{Decaying, Jump, Ringing, jumps};
-use crate::{COORDINATES, FrictionSpeed, Machine, Matrices, Spin, Swing};
+use crate::{COORDINATES, FrictionSpeed, Machine, Matrices, ModelKind, Spin, Swing};
 use core::iter::zip;
 use lane_ode::{Kernel, Lane, N, Simd};
 use std::sync::{Arc, OnceLock};
@@ -147,10 +147,12 @@ impl Point {
         &self.friction_speeds
     }
 
-    /// By what factor these are off from the speeds (m/s) that the dampers had in a motion, the
-    /// greatest of all; `None` without friction.
-    pub fn friction_speed_off(&self, occurred_m_per_s: &[f64]) -> Option<f64> {
-        let off = self.friction_speeds.iter().filter_map(|taken| {
+    /// By what factor these are off from the speeds (m/s) that the dampers had in a motion of this
+    /// model, the greatest of all; `None` if there are none. Own speeds are the linear motion's by
+    /// definition, so the nonlinear one is compared with given ones alone.
+    pub fn friction_speed_off(&self, model: ModelKind, occurred_m_per_s: &[f64]) -> Option<f64> {
+        let of_model = |taken: &&FrictionSpeed| model == ModelKind::Linear || !taken.is_own;
+        let off = self.friction_speeds.iter().filter(of_model).filter_map(|taken| {
             let occurred = occurred_m_per_s.get(taken.damper)?.max(taken.least_m_per_s);
             let quotient = taken.speed_m_per_s.max(taken.least_m_per_s) / occurred;
             Some(quotient.max(1.0 / quotient))

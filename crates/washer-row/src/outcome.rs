@@ -57,7 +57,8 @@ pub struct Trajectory {
     /// The model's metrics that the plan asks for, in column order; empty if the model failed.
     pub metrics: Vec<f64>,
     /// The factor by which the speeds at which the linear model takes friction are off from those
-    /// of its motion. `None` without friction, and for the nonlinear model.
+    /// of this motion. `None` without friction, if the model failed, and for the nonlinear model
+    /// where no speed is given.
     pub friction_speed_off: Option<f64>,
     /// Largest deviations by turn of the drum, in the order of `Channel::ALL`: while the two models
     /// are being compared by them.

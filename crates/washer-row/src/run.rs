@@ -72,21 +72,18 @@ pub fn runs(
     rule: &Rule,
     is_stopped: &dyn Fn() -> bool,
 ) -> Option<Vec<RungRun>> {
-    let has_friction = |point: &&Point| !point.friction_speeds().is_empty();
+    let mut taken = points.iter().flat_map(|point| point.friction_speeds());
     let mut wanted = rule.wanted();
     wanted.gauges[Gauge::DamperSpeed as usize] |=
-        model == ModelKind::Linear && points.iter().any(has_friction);
+        taken.any(|taken| model == ModelKind::Linear || !taken.is_own);
     let (records, extras) = simulate_until(simd, model, method, points, wanted, is_stopped)?;
     // None at all if nothing was wanted.
     let mut extras = extras.into_iter();
     let run = |(record, point): (&Record, &&Point)| {
         let extra = extras.next().unwrap_or_default();
-        let off = match model {
-            ModelKind::Linear => point.friction_speed_off(extra.gauge(Gauge::DamperSpeed)),
-            ModelKind::Nonlinear => None,
-        };
+        let off = point.friction_speed_off(model, extra.gauge(Gauge::DamperSpeed));
         let mut run = RungRun::new(record, extra, rule);
-        run.trajectory.friction_speed_off = off;
+        run.trajectory.friction_speed_off = off.filter(|_| record.failure.is_none());
         run
     };
     Some(records.iter().zip(points).map(run).collect())

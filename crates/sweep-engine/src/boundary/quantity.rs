@@ -106,6 +106,11 @@ pub fn traced<M: Swept>(
     let mut offered = offered(plan);
     let Some(at) = offered.iter().position(|(column, _)| column.name == name) else {
         let names = || offered.iter().map(|(column, _)| column.name.as_str());
+        let kind = |name: &str| name.split('_').next().map(str::to_owned);
+        let is_of_kind = |known: &str| kind(known) == kind(name);
+        if let Some(needed) = M::needed(name).filter(|_| !names().any(is_of_kind)) {
+            return Err(Error::option("--quantity", name, needed));
+        }
         let meant = nearest(name, names());
         let meant = meant.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
         let of_channels: Vec<String> =

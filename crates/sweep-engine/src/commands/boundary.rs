@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
+use super::grid::typed;
 use super::{GridArgs, Lines as _, installed, short};
 use crate::asking::{Asking, Stopped};
 use crate::boundary::quantity::offered;
@@ -81,7 +82,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         let kept = counted(trials.map_or(0, |trials| trials.count()), "point");
         let wall = duration(began.elapsed().as_secs_f64());
         let mut text = format!("{}: interrupted with {kept} kept, after {wall}\n", plan.name);
-        text.line("go on", "the same command");
+        text.line("go on", typed());
         tell(text.trim_end());
         return Ok(Exit::interrupted(interrupt.signal()));
     };

@@ -105,6 +105,13 @@ impl ResultArgs {
     }
 }
 
+/// The command line of this process, to copy: it goes on, so `--fresh` is no part of it.
+pub fn typed() -> String {
+    let words = std::env::args_os().skip(1).filter(|word| word != "--fresh");
+    let words = words.map(|word| quoted(&word.to_string_lossy()));
+    std::iter::once(program().to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
 /// A word as a shell takes it.
 pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/._-=:,+".contains(c);

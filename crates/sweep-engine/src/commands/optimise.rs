@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::cells::table as text_table;
+use super::grid::typed;
 use super::{Lines as _, installed, short, word};
 use crate::config::section::counted;
 use crate::optimise::file::{own_file, parameters, table};
@@ -29,7 +30,7 @@ pub struct Args {
     /// File of all candidates [default: results/NAME.parquet]
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write the model's own file (of a washing machine: the machine file) of the best candidate
+    /// Write the model's own file (the file that its grids name) of the best candidate
     #[arg(long, value_name = "FILE")]
     best: Option<PathBuf>,
     /// With --best: of this candidate instead
@@ -82,7 +83,9 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let wall_s = began.elapsed().as_secs_f64();
     let Some(tried) = tried else {
         let wall = duration(wall_s);
-        tell(&format!("{}: interrupted after {wall}; the same command goes on", study.name));
+        let mut text = format!("{}: interrupted after {wall}\n", study.name);
+        text.line("go on", typed());
+        tell(text.trim_end());
         return Ok(Exit::interrupted(interrupt.signal()));
     };
     file.finish(&table(&study, &tried).into_bytes(&output)?)?;

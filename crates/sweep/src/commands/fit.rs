@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::config::{self, GridInput};
 use crate::fit::{self, FitOptions, Measured, Work};
-use sweep_engine::commands::grid::GridArgs;
+use sweep_engine::commands::grid::{GridArgs, typed};
 use sweep_engine::{EffortArgs, Error, Exit, Interrupt, Progress, show, tell, threads};
 use sweep_files::{FileKind, OWN_FILE, Output};
 
@@ -77,7 +77,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &work))?;
     progress.finish();
     let Some(fitted) = found else {
-        tell("interrupted: with --out, what was found out is kept, and the same command goes on");
+        let kept = "with --out, what was found out is kept";
+        tell(&format!("interrupted: {kept}\n     go on  {}", typed()));
         return Ok(Exit::interrupted(interrupt.signal()));
     };
     if let (Some(path), Some(out)) = (&args.out, out) {

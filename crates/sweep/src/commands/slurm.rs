@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::plan::Plan;
 use sweep_engine::commands::grid::{ResultArgs, quoted};
-use sweep_engine::config::section::counted;
-use sweep_engine::store::{ShardRequest, chunk_points};
+use sweep_engine::store::{ShardRequest, idle_shards};
 use sweep_engine::{Error, Exit, print, tell};
 
 /// Tasks that a Slurm array may have unless its administrator allowed more (`MaxArraySize` 1001
@@ -70,15 +69,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let folder = std::env::current_dir().map_err(no_path("the working folder"))?;
     let program = std::env::current_exe().map_err(no_path("this program"))?;
     names_fit(args, &folder, &program)?;
-    let chunks = plan.points().div_ceil(chunk_points(plan.points()));
-    if args.shards > chunks {
-        tell(&format!(
-            "note: with {}, the run leaves {} of the {} shards without work",
-            counted(chunks as usize, "chunk"),
-            args.shards - chunks,
-            args.shards
-        ));
-    }
+    idle_shards(plan.points(), args.shards).iter().for_each(|note| tell(note));
     if args.shards > USUAL_MOST_TASKS {
         tell(
             "note: many clusters allow arrays of 1000 tasks (scontrol show config | grep \

@@ -45,7 +45,8 @@ fn own_speeds_are_those_of_the_linear_motion() {
     let simulated: Vec<&Point> = points.iter().collect();
     let (_, extras) = simulate_with(Simd::best(), ModelKind::Linear, &method, &simulated, wanted);
     for ((point, extra), machine) in points.iter().zip(&extras).zip(&machines) {
-        let off = point.friction_speed_off(extra.gauge(Gauge::DamperSpeed)).unwrap();
+        let speeds = extra.gauge(Gauge::DamperSpeed);
+        let off = point.friction_speed_off(ModelKind::Linear, speeds).unwrap();
         assert!(off < 1.01, "{off}: {:?} for {extra:?}", point.friction_speeds());
         // Nor do they depend on what else is made ready.
         let alone = ready(std::slice::from_ref(machine)).remove(0);
@@ -54,7 +55,7 @@ fn own_speeds_are_those_of_the_linear_motion() {
         assert_eq!(point.friction_speeds().len(), count);
     }
     let given = ready(&[machine(0.4, [60.0, 60.0], Some(0.02))]).remove(0);
-    let off = given.friction_speed_off(&[0.1, 0.005]).unwrap();
+    let off = given.friction_speed_off(ModelKind::Linear, &[0.1, 0.005]).unwrap();
     assert!((off - 5.0).abs() < 1e-12, "{off}: below 4 v_s / pi friction is viscous");
 }
 
