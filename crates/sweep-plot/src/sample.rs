@@ -1,5 +1,5 @@
-//! Small files in the forms that this program writes: for the tests of this crate, and of a model's own
-//! figures.
+//! Small files in the forms that this program writes, for the tests of this crate and of a model's
+//! own figures.
 
 #![allow(dead_code, reason = "neither has all of it")]
 
