@@ -20,5 +20,5 @@ mod numbers;
 mod point;
 mod setup;
 
-pub use point::{Answer, Motion, NoPoint, check, growth, motion, quick};
+pub use point::{Answer, NoPoint, PointHistory, check, growth, motion, quick};
 pub use setup::{Setup, Sliders};
