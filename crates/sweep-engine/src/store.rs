@@ -58,7 +58,7 @@ use crate::{Axis, Model, Plan, Read};
 use sweep_files::{self as files, FileKind};
 
 /// The values of the axes at a point of the grid, first axis first.
-pub type AxisValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
+pub type PointValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
 
 /// What the store must know of a plan.
 pub struct Job<'a> {
@@ -76,7 +76,7 @@ pub struct Job<'a> {
     /// A row is reliable when its ratios are between these.
     pub limits: RatioLimits,
     /// Axis values by point.
-    pub axis_values: AxisValues<'a>,
+    pub axis_values: PointValues<'a>,
 }
 
 impl<'a> Job<'a> {

@@ -5,8 +5,8 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use crate::thrift::{self, Found, Kind, Shape};
-use Kind::{Binary, Bool, Byte, Double, List, Number, Struct};
+use crate::thrift::{self, Found, Shape, Wire};
+use Wire::{Binary, Bool, Byte, Double, List, Number, Struct};
 
 /// The end of a file: the footer's length (bytes) and a mark.
 const TAIL_BYTES: u64 = 8;
@@ -63,7 +63,7 @@ const COLUMN_META_DATA: Shape = &[
 ];
 pub(crate) const STATISTICS: Shape =
     &[(1..=2, Binary), (3..=4, Number), (5..=6, Binary), (7..=8, Bool), (9..=9, Number)];
-const EMPTY: Kind = Struct(&[]);
+const EMPTY: Wire = Struct(&[]);
 
 /// Why a Parquet file is not read, found before the library would fail at it.
 #[derive(Debug, thiserror::Error)]

@@ -9,8 +9,8 @@ use flate2::read::MultiGzDecoder;
 use parquet::basic::Compression;
 
 use crate::footer::{Refused, STATISTICS};
-use crate::thrift::{self, Found, Kind, Shape};
-use Kind::{Bool, Number, Struct};
+use crate::thrift::{self, Found, Shape, Wire};
+use Wire::{Bool, Number, Struct};
 
 /// How many bytes are read for a header: the first number is enough for nearly every one, and no
 /// header has more than the last.

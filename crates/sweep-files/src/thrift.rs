@@ -27,7 +27,7 @@ const UUID: u8 = 13;
 
 /// What the library takes a field for.
 #[derive(Clone, Copy)]
-pub(crate) enum Kind {
+pub(crate) enum Wire {
     Bool,
     Byte,
     /// A number of any width: all are read alike.
@@ -39,7 +39,7 @@ pub(crate) enum Kind {
 }
 
 /// The fields of a struct that the library knows, by their numbers. It skips any other.
-pub(crate) type Shape = &'static [(RangeInclusive<i16>, Kind)];
+pub(crate) type Shape = &'static [(RangeInclusive<i16>, Wire)];
 
 /// What a walk comes past.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,7 +65,7 @@ pub(crate) fn walk<'a>(
     Some(walk.rest)
 }
 
-impl Kind {
+impl Wire {
     const fn is(self, declared: u8) -> bool {
         match self {
             Self::Bool => matches!(declared, TRUE | FALSE),
@@ -117,7 +117,7 @@ impl Walk<'_, '_> {
         }
     }
 
-    fn value(&mut self, declared: u8, known: Option<Kind>) -> Option<()> {
+    fn value(&mut self, declared: u8, known: Option<Wire>) -> Option<()> {
         if !known.is_none_or(|kind| kind.is(declared)) || self.depth == DEEPEST {
             return None;
         }
@@ -136,7 +136,7 @@ impl Walk<'_, '_> {
             LIST | SET => {
                 let head = self.byte()?;
                 let length = if head >> 4 == 0xf { self.varint()? } else { u64::from(head >> 4) };
-                let element = if let Some(Kind::List(kind)) = known { Some(*kind) } else { None };
+                let element = if let Some(Wire::List(kind)) = known { Some(*kind) } else { None };
                 for _ in 0..length {
                     self.value(head & 0xf, element)?;
                 }
@@ -150,7 +150,7 @@ impl Walk<'_, '_> {
                 }
             }
             STRUCT => {
-                let shape = if let Some(Kind::Struct(shape)) = known { Some(shape) } else { None };
+                let shape = if let Some(Wire::Struct(shape)) = known { Some(shape) } else { None };
                 self.fields(shape)?;
             }
             UUID => self.skip(16)?,
@@ -217,9 +217,9 @@ mod tests {
     use super::*;
 
     const SHAPE: Shape = &[
-        (1..=2, Kind::Number),
-        (3..=3, Kind::List(&Kind::Struct(&[(1..=1, Kind::Bool), (2..=2, Kind::Binary)]))),
-        (4..=4, Kind::List(&Kind::Number)),
+        (1..=2, Wire::Number),
+        (3..=3, Wire::List(&Wire::Struct(&[(1..=1, Wire::Bool), (2..=2, Wire::Binary)]))),
+        (4..=4, Wire::List(&Wire::Number)),
     ];
 
     /// What a walk finds in some bytes, and how many stand behind it.

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use lane_ode::Simd;
 use serde_json::{Value, json};
 use sweep_parameter::named;
-use washer_model::{Dwell, Endings, Gauge, Starts, State, Wanted, decimal};
+use washer_model::{Dwell, Endings, Gauge, Recorders, Starts, State, decimal};
 use washer_row::Status;
 
 use crate::engine::{Carried, motions as motions_of};
@@ -168,9 +168,9 @@ pub(crate) struct Motions {
 impl Motions {
     pub(crate) fn new(plan: &Plan, search: Search) -> Self {
         // A motion that goes on for ever has no times and no windows.
-        let Wanted { mut gauges, .. } = plan.model.measures.wanted();
+        let Recorders { mut gauges, .. } = plan.model.measures.wanted();
         gauges[Gauge::ClashTime as usize] = false;
-        let wanted = Wanted { gauges, ..Wanted::default() };
+        let wanted = Recorders { gauges, ..Recorders::default() };
         let starts = Starts {
             count: if search.carry.is_some() { 1 } else { search.starts as usize },
             kick_rad_per_s: search.kick,

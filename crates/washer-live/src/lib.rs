@@ -21,5 +21,5 @@ mod numbers;
 mod point;
 mod setup;
 
-pub use point::{Answer, Motion, NoPoint, check, dwell, growth, motion, quick};
+pub use point::{Answer, NoPoint, PointHistory, check, dwell, growth, motion, quick};
 pub use setup::{Setup, Sliders};

@@ -63,7 +63,7 @@ impl Answer {
 
 /// One model's motion at even instants.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Motion {
+pub struct PointHistory {
     /// Why and when (s) it failed, if it did; there are no instants from there on.
     pub failure: Option<(Failure, f64)>,
     /// Deviations from equilibrium in the order of [`Channel::ALL`] (m, rad).
@@ -213,7 +213,7 @@ pub fn motion(
     model: ModelKind,
     rung: Option<usize>,
     every_s: f64,
-) -> Result<Motion, NoPoint> {
+) -> Result<PointHistory, NoPoint> {
     let point = ready(setup, values)?;
     let ladder = &ladders(setup, values)[model as usize];
     let rung = rung.and_then(|rung| ladder.rungs.get(rung));
@@ -221,7 +221,7 @@ pub fn motion(
     let history = history(model, &rung.method, &point, &Start::default(), every_s);
     let instants = (0..history.len()).filter_map(|k| history.instant(k));
     let (channels, gaps_m) = instants.map(|instant| (instant.channels, instant.gap_m)).unzip();
-    Ok(Motion { failure: history.failure, channels, gaps_m })
+    Ok(PointHistory { failure: history.failure, channels, gaps_m })
 }
 
 /// The fastest growing disturbance of a point's periodic response at each of some constant speeds

@@ -5,8 +5,8 @@ use core::ffi::CStr;
 /// The table of channels, in the order of the models' output vectors: all that the crate knows of a
 /// channel is a row of it. Passes the rows to the macro `$then`.
 ///
-/// A row holds the variant; its name and description; what it is of ([`Kind`]); what the nonlinear
-/// model takes it from (`point`: an entry of `outputs::Places` and its axis, `angle`: a
+/// A row holds the variant; its name and description; what it is of ([`ChannelKind`]); what the
+/// nonlinear model takes it from (`point`: an entry of `outputs::Places` and its axis, `angle`: a
 /// coordinate); and which coordinates the linear model's output depends on. `turning` says that the
 /// output has harmonics of theta as well: the coordinates of the cosine's and of the sine's part,
 /// and which of the parts (0: steady, 1: cosine, 2: sine) are there at rest. The equilibrium has
@@ -57,7 +57,7 @@ pub(crate) use channels;
 
 /// What a channel is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum ChannelKind {
     /// A point that moves with the tub, or mostly so.
     TubPoint,
     /// A point of the drum.
@@ -106,9 +106,9 @@ macro_rules! declare {
             }
 
             /// What it is of.
-            pub(crate) const fn kind(self) -> Kind {
+            pub(crate) const fn kind(self) -> ChannelKind {
                 match self {
-                    $(Self::$name => Kind::$kind,)+
+                    $(Self::$name => ChannelKind::$kind,)+
                 }
             }
         }
@@ -150,8 +150,8 @@ impl Channel {
     /// `"m"` or `"rad"`.
     pub const fn unit(self) -> &'static str {
         match self.kind() {
-            Kind::TubPoint | Kind::DrumPoint => "m",
-            Kind::TubAngle => "rad",
+            ChannelKind::TubPoint | ChannelKind::DrumPoint => "m",
+            ChannelKind::TubAngle => "rad",
         }
     }
 }

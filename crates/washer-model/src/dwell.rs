@@ -15,7 +15,7 @@ use crate::coordinates::STATES;
 use crate::run::model::{Model, Nonlinear};
 use crate::stability::orbit::Row;
 use crate::stability::settings::{Case, Settings};
-use crate::{COORDINATES, Dwell, Extra, Modes, NoAnswer, Response, Wanted, respond};
+use crate::{COORDINATES, Dwell, Modes, NoAnswer, Reading, Recorders, Response, respond};
 use course::{BLOCK, Course, Need, WINDOW, are_alike};
 use exponent::exponents;
 use hold::{Held, hold, recorded};
@@ -47,7 +47,7 @@ pub struct Starts {
     /// Whether to look for the smallest kick that does not come back.
     pub with_threshold: bool,
     /// Further records of each motion.
-    pub wanted: Wanted,
+    pub wanted: Recorders,
 }
 
 impl Default for Starts {
@@ -57,7 +57,7 @@ impl Default for Starts {
             kick_rad_per_s: 6.0,
             longest_s: 600.0,
             with_threshold: false,
-            wanted: Wanted::default(),
+            wanted: Recorders::default(),
         }
     }
 }
@@ -118,7 +118,7 @@ pub struct Ending {
     /// Such states, once a turn, of its last 256 turns at most; coordinates from equilibrium.
     pub sections: Vec<[f64; STATES]>,
     /// What [`Starts::wanted`] asks for, over 128 further turns.
-    pub extra: Extra,
+    pub extra: Reading,
 }
 
 /// What was found at a speed.
@@ -215,7 +215,7 @@ pub fn endings_beside(
 fn record<'a, 'f>(
     simd: Simd,
     found: impl Iterator<Item = &'f mut (Endings, Row<'a>)>,
-    wanted: Wanted,
+    wanted: Recorders,
 ) where
     'a: 'f,
 {

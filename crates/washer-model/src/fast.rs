@@ -43,7 +43,7 @@ use crate::{
 use core::iter;
 
 use crate::fast::geared::{GEARS, interpolation_phase};
-use crate::modes::{Motion, fastest_rigid_rad_per_s, highest_with_caps, modes_with_caps, motions};
+use crate::modes::{Root, fastest_rigid_rad_per_s, highest_with_caps, modes_with_caps, motions};
 use crate::nonlinear::coupling::BACKWARD_SHARE;
 
 /// Modes of the suspension: yaw, pitch, two translations.
@@ -227,7 +227,7 @@ impl<'a> Case<'a> {
         &self,
         state: &State,
         caps: &Caps,
-    ) -> Result<[Motion; COORDINATES], NoModes> {
+    ) -> Result<[Root; COORDINATES], NoModes> {
         let of_bearings = Caps { hinge_rad_per_s: None, ..*caps };
         motions(self.point, state.speed_rad_per_s, Some(&of_bearings))
     }
@@ -237,7 +237,7 @@ impl<'a> Case<'a> {
     fn error_of_caps(
         &self,
         state: &State,
-        capped: &[Motion; COORDINATES],
+        capped: &[Root; COORDINATES],
         caps: &Caps,
         top_rad_per_s: f64,
     ) -> f64 {

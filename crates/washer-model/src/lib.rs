@@ -103,8 +103,8 @@ pub use run::equations::{Equations, STATE_LEN};
 pub use run::history::{Asked, History, Instant, Start, histories, history, instants, together};
 pub use run::suspension::{Forces, stops_at_rest_n};
 pub use run::{
-    Course, Extra, Gauge, Level, Method, MethodNumbers, Record, Snapshot, Stop, Wanted, Waypoint,
-    simulate, simulate_until, simulate_with,
+    Course, Gauge, Level, Method, MethodNumbers, Reading, Record, Recorders, Snapshot, Stop,
+    Waypoint, simulate, simulate_until, simulate_with,
 };
 pub use stability::{
     Beyond, Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant,

@@ -134,7 +134,7 @@ pub(crate) fn modes_with_caps(
     let shape = |state: usize| unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, state)]));
     let likeness = |a: usize, b: usize| assurance(&mass, &shape(a), &shape(b));
     let motions = natural_motions((0..STATES).map(|k| values[k] * system.unit_per_s), &likeness)?;
-    let modes = motions.map(|(Motion { s, magnitude_rad_per_s }, state)| Mode {
+    let modes = motions.map(|(Root { s, magnitude_rad_per_s }, state)| Mode {
         re_per_s: s.re,
         im_rad_per_s: s.im,
         magnitude_rad_per_s,
@@ -148,12 +148,12 @@ pub(crate) fn motions(
     point: &Point,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
-) -> Result<[Motion; COORDINATES], NoModes> {
+) -> Result<[Root; COORDINATES], NoModes> {
     let system = first_order(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
     let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
     if values.iter().filter(|s| s.im == 0.0).count() > 2 {
         // Which rates belong together is told by shapes.
-        return Ok(modes_with_caps(point, 0.0, speed_rad_per_s, caps)?.modes.map(|mode| Motion {
+        return Ok(modes_with_caps(point, 0.0, speed_rad_per_s, caps)?.modes.map(|mode| Root {
             s: c64::new(mode.re_per_s, mode.im_rad_per_s),
             magnitude_rad_per_s: mode.magnitude_rad_per_s,
         }));
@@ -164,7 +164,7 @@ pub(crate) fn motions(
 
 /// A natural motion by its eigenvalue.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Motion {
+pub(crate) struct Root {
     /// s (1/s); its imaginary part is not negative.
     pub(crate) s: c64,
     /// As in [`Mode`].
@@ -176,7 +176,7 @@ pub(crate) struct Motion {
 fn natural_motions(
     values: impl Iterator<Item = c64>,
     likeness: &dyn Fn(usize, usize) -> f64,
-) -> Result<[(Motion, usize); COORDINATES], NoModes> {
+) -> Result<[(Root, usize); COORDINATES], NoModes> {
     let mut swinging = Vec::with_capacity(COORDINATES);
     let mut steady = Vec::new();
     for (state, s) in values.enumerate() {
@@ -184,7 +184,7 @@ fn natural_motions(
             return Err(NoModes::Eigenvalues);
         }
         if s.im > 0.0 {
-            swinging.push((Motion { s, magnitude_rad_per_s: magnitude(s) }, state));
+            swinging.push((Root { s, magnitude_rad_per_s: magnitude(s) }, state));
         } else if s.im == 0.0 {
             steady.push((s.re, state));
         }
@@ -197,7 +197,7 @@ fn natural_motions(
         let most = (0..steady.len()).rev().max_by(|a, b| alike(a).total_cmp(&alike(b)));
         let (fast, _) = steady.remove(most.ok_or(NoModes::Eigenvalues)?);
         let s = c64::new(0.5 * (slow + fast), 0.0);
-        swinging.push((Motion { s, magnitude_rad_per_s: (slow * fast).abs().sqrt() }, state));
+        swinging.push((Root { s, magnitude_rad_per_s: (slow * fast).abs().sqrt() }, state));
     }
     swinging.sort_by(|a, b| a.0.magnitude_rad_per_s.total_cmp(&b.0.magnitude_rad_per_s));
     swinging.try_into().map_err(|_| NoModes::Eigenvalues)

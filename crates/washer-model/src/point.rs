@@ -12,7 +12,7 @@ use crate::machine::feet::Feet;
 use crate::machine::spin::{SpinState, SpinStretch, stretch_at};
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
-use crate::nonlinear::outputs::{Axes, Motion};
+use crate::nonlinear::outputs::{Axes, Moving};
 use crate::point::ringing::{Decaying, Jump, Ringing, jumps};
 use crate::{COORDINATES, FrictionSpeed, Machine, Matrices, ModelKind, Spin, Swing};
 use core::iter::zip;
@@ -118,8 +118,8 @@ impl Point {
         Self { nudge: NUDGE, ..self.clone() }
     }
 
-    /// The same point, with instants (s, rising) at which [`Wanted`](crate::Wanted) can have its
-    /// outputs recorded.
+    /// The same point, with instants (s, rising) at which [`Recorders`](crate::Recorders) can have
+    /// its outputs recorded.
     #[must_use]
     pub fn seen_at(self, instants_s: Arc<[f64]>) -> Self {
         Self { instants_s, ..self }
@@ -235,7 +235,7 @@ impl Kernel for Prepare<'_> {
             let linear = zero.0.aside(Linearise { machine: &in_lanes(zero, &viscous), q: &q });
             let linear_outputs = zero.0.aside(LineariseOutputs { bodies: &lanes.bodies, q: &q });
             let still = [zero; COORDINATES];
-            let at_rest = Motion { q, u: still, a: still };
+            let at_rest = Moving { q, u: still, a: still };
             let unbalance_up = SpinState::new((zero, zero.lit(1.0)), zero, zero);
             let rest = Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
             let models = zip(zip(machines, linear), zip(linear_outputs, steepest));

@@ -13,8 +13,8 @@ use crate::fast::to_bits;
 use crate::modes::fastest_rigid_rad_per_s;
 use crate::point::{self, legs};
 use crate::{
-    Caps, FrictionSpeed, Gauge, Geared, Machine, Method, ModelKind, NoEquilibrium, Point, Spin,
-    Timing, Wanted, simulate_with,
+    Caps, FrictionSpeed, Gauge, Geared, Machine, Method, ModelKind, NoEquilibrium, Point,
+    Recorders, Spin, Timing, simulate_with,
 };
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
@@ -171,7 +171,7 @@ pub fn prepare(
         Some(Open { place, point, search, step_s, shortest_s, is_done: false })
     };
     let mut all: Vec<Open> = ready.iter().enumerate().filter_map(open).collect();
-    let wanted = Wanted::gauge(Gauge::DamperSpeed);
+    let wanted = Recorders::gauge(Gauge::DamperSpeed);
     for _ in 0..MOST_MOTIONS {
         let mut open: Vec<&mut Open> = all.iter_mut().filter(|one| !one.is_done).collect();
         open.sort_by(|a, b| a.step_s.total_cmp(&b.step_s));

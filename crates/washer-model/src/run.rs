@@ -7,16 +7,16 @@ pub(crate) mod history;
 pub(crate) mod loads;
 pub(crate) mod method;
 pub(crate) mod model;
+pub(crate) mod recorders;
 mod snapshots;
 pub(crate) mod stiff;
 pub(crate) mod suspension;
 mod tangent;
-pub(crate) mod wanted;
 
 pub use loads::Gauge;
 pub use method::{Level, Method, MethodNumbers};
+pub use recorders::{Reading, Recorders};
 pub use snapshots::Snapshot;
-pub use wanted::{Extra, Wanted};
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -66,17 +66,17 @@ pub struct Record {
 /// Integrates one model at every point and records peaks. The result does not depend on the
 /// instruction set, nor on which points come together.
 pub fn simulate(simd: Simd, model: ModelKind, method: &Method, points: &[&Point]) -> Vec<Record> {
-    simulate_with(simd, model, method, points, Wanted::default()).0
+    simulate_with(simd, model, method, points, Recorders::default()).0
 }
 
-/// As [`simulate`], and records one [`Extra`] per point if anything else is wanted.
+/// As [`simulate`], and records one [`Reading`] per point if anything else is wanted.
 pub fn simulate_with(
     simd: Simd,
     model: ModelKind,
     method: &Method,
     points: &[&Point],
-    wanted: Wanted,
-) -> (Vec<Record>, Vec<Extra>) {
+    wanted: Recorders,
+) -> (Vec<Record>, Vec<Reading>) {
     simulate_until(simd, model, method, points, wanted, &|| false).unwrap_or_default()
 }
 
@@ -87,9 +87,9 @@ pub fn simulate_until(
     model: ModelKind,
     method: &Method,
     points: &[&Point],
-    wanted: Wanted,
+    wanted: Recorders,
     stop: Stop<'_>,
-) -> Option<(Vec<Record>, Vec<Extra>)> {
+) -> Option<(Vec<Record>, Vec<Reading>)> {
     if points.is_empty() {
         return Some((Vec::new(), Vec::new()));
     }
@@ -104,12 +104,12 @@ pub fn simulate_until(
 struct Order<'a> {
     points: &'a [&'a Point],
     method: &'a Method,
-    wanted: Wanted,
+    wanted: Recorders,
     stop: Stop<'a>,
 }
 
 impl<F: Family> ByMethod<F> for (Order<'_>, Simd) {
-    type Output = Option<(Vec<Record>, Vec<Extra>)>;
+    type Output = Option<(Vec<Record>, Vec<Reading>)>;
 
     fn by<S: Stepper>(self, stepper: S) -> Self::Output {
         self.1.dispatch(Simulate(self.0, stepper, PhantomData::<F>))
@@ -123,7 +123,7 @@ impl<F: Family> ByMethod<F> for (Order<'_>, Simd) {
 struct Simulate<'a, F, S>(Order<'a>, S, PhantomData<F>);
 
 impl<F: Family, S: Stepper> Kernel for Simulate<'_, F, S> {
-    type Output = Option<(Vec<Record>, Vec<Extra>)>;
+    type Output = Option<(Vec<Record>, Vec<Reading>)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
@@ -291,13 +291,13 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     }
 
     /// All records; `None` if some point has none.
-    fn recorded(self) -> Option<(Vec<Record>, Vec<Extra>)> {
+    fn recorded(self) -> Option<(Vec<Record>, Vec<Reading>)> {
         if self.finished < self.points.len() {
             return None;
         }
         let mut found = self.extras.map_or_else(Vec::new, |extras| extras.found);
         if !self.courses.is_empty() {
-            found.resize(self.courses.len(), Extra::default());
+            found.resize(self.courses.len(), Reading::default());
         }
         for (extra, course) in found.iter_mut().zip(self.courses) {
             extra.course = course;

@@ -1,7 +1,7 @@
 //! What a run measures: the amplitude by which the two models are compared, and metrics.
 
 use sweep_parameter::{Limit, Worse, named};
-use washer_model::{Channel, Extra, Gauge, Wanted};
+use washer_model::{Channel, Gauge, Reading, Recorders};
 
 use crate::outcome::{Deviations, Outcome};
 
@@ -331,7 +331,7 @@ impl Measured {
     }
 
     /// Its value in a trajectory's records, if it was recorded.
-    pub fn of(self, extra: &Extra) -> Option<f64> {
+    pub fn of(self, extra: &Reading) -> Option<f64> {
         let mut values = extra.gauge(self.metric.gauge()?).iter().copied();
         match self.part {
             Some(part) => values.nth(part),
@@ -380,12 +380,12 @@ impl Measures {
     }
 
     /// What trajectories must record.
-    pub fn wanted(&self) -> Wanted {
-        Wanted {
+    pub fn wanted(&self) -> Recorders {
+        Recorders {
             root_mean_squares: self.criterion == Criterion::Rms,
             turns: self.criterion == Criterion::Envelope,
             gauges: Gauge::ALL.map(|gauge| self.metrics.iter().any(|it| it.gauge() == Some(gauge))),
-            ..Wanted::default()
+            ..Recorders::default()
         }
     }
 }
@@ -476,7 +476,7 @@ mod tests {
 
     #[test]
     fn the_number_of_all_is_the_extreme_of_each() {
-        let mut extra = Extra::default();
+        let mut extra = Reading::default();
         for (gauge, numbers) in [
             (Gauge::StopForce, vec![20.0, 50.0]),
             (Gauge::StopContact, vec![0.3, 0.1]),
@@ -501,11 +501,11 @@ mod tests {
 
     #[test]
     fn what_is_not_asked_for_is_not_recorded() {
-        assert_eq!(Measures::default().wanted(), Wanted::default());
+        assert_eq!(Measures::default().wanted(), Recorders::default());
         let sag = Measures { metrics: vec![Metric::StaticSag], ..Measures::default() };
         assert_eq!(
             sag.wanted(),
-            Wanted::default(),
+            Recorders::default(),
             "the equilibrium is known without a trajectory"
         );
     }

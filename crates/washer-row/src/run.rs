@@ -3,7 +3,7 @@
 use lane_ode::{Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    Channel, Course, Extra, Gauge, Method, ModelKind, Point, Record, Wanted, simulate_until,
+    Channel, Course, Gauge, Method, ModelKind, Point, Reading, Record, Recorders, simulate_until,
 };
 
 use crate::{Criterion, Deviations, Measures, Status, Trajectory};
@@ -27,8 +27,8 @@ pub struct Rule {
 
 impl Rule {
     /// What trajectories must record.
-    pub fn wanted(&self) -> Wanted {
-        Wanted { course: self.accuracy.is_finite(), ..self.measures.wanted() }
+    pub fn wanted(&self) -> Recorders {
+        Recorders { course: self.accuracy.is_finite(), ..self.measures.wanted() }
     }
 }
 
@@ -51,7 +51,7 @@ impl RungRun {
         Self { trajectory: Trajectory::failed(status), ..Self::default() }
     }
 
-    fn new(record: &Record, mut extra: Extra, rule: &Rule) -> Self {
+    fn new(record: &Record, mut extra: Reading, rule: &Rule) -> Self {
         let course = std::mem::take(&mut extra.course);
         let clash_doubt_s = extra.clash_doubt_s;
         let amplitudes = match rule.measures.criterion {
@@ -89,7 +89,7 @@ pub fn runs(
     Some(records.iter().zip(points).map(run).collect())
 }
 
-fn trajectory(record: &Record, extra: Extra, amplitudes: &Deviations, rule: &Rule) -> Trajectory {
+fn trajectory(record: &Record, extra: Reading, amplitudes: &Deviations, rule: &Rule) -> Trajectory {
     let Record { failure, steps, rejected, .. } = *record;
     if let Some((reason, time_s)) = failure {
         let status = match reason {

@@ -1,7 +1,7 @@
 //! `[design]`: points by a rule over the axes' ranges, or listed in a file of their own.
 
 use super::keys::Variants;
-use super::{Field, Key, Keys, Kind, Walk};
+use super::{Field, Form, Key, Keys, Walk};
 use crate::Design;
 use crate::design::Rule;
 use crate::plan::MOST_POINTS;
@@ -49,7 +49,7 @@ fn listed(design: &mut Option<Design>, keys: &mut Keys<'_>) {
         _ => Default::default(),
     };
     let key = key.needed("a CSV or Parquet file, relative to this file");
-    let found = keys.key(key, &Kind::Text, &mut file);
+    let found = keys.key(key, &Form::Text, &mut file);
     keys.write("points", points.into());
     keys.write("hash", hash.as_str().into());
     if found.given().is_some() || keys.section().is_none() {
@@ -67,9 +67,9 @@ fn spread(rule: Rule, design: &mut Option<Design>, keys: &mut Keys<'_>) {
     let (mut points, mut seed) = numbers.unwrap_or((1, DEFAULT_SEED));
     let most = if rule == Rule::Sobol { MOST_SOBOL } else { MOST_POINTS };
     let key = Key::new("points", "how many").needed("the number of points").set();
-    let points_found = keys.key(key, &Kind::Whole(1..=most), &mut points);
+    let points_found = keys.key(key, &Form::Whole(1..=most), &mut points);
     let key = Key::new("seed", "another seed, another draw").set();
-    let seed_found = keys.key(key, &Kind::Whole(0..=MOST_SEED), &mut seed);
+    let seed_found = keys.key(key, &Form::Whole(0..=MOST_SEED), &mut seed);
     for (name, field) in [("points", points_found), ("seed", seed_found)] {
         if let (None, Field::Given(_)) = (numbers, field) {
             let title =

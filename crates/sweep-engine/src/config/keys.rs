@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 
 use super::section::listed;
-use super::{Field, Kind, Located, Report, Section, Written, twice};
+use super::{Field, Form, Located, Report, Section, Written, twice};
 
 /// A key of a table.
 #[derive(Clone, Copy)]
@@ -75,7 +75,7 @@ impl<'a> Options<'a> {
     }
 
     /// The value under a name. Another than that which stands is noted.
-    fn value(&self, name: &str, kind: &Kind<'_>, was: &Value) -> Field<Value> {
+    fn value(&self, name: &str, kind: &Form<'_>, was: &Value) -> Field<Value> {
         let Some(written) = self.written.iter().find(|written| written.name.value == name) else {
             return Field::Absent;
         };
@@ -213,7 +213,7 @@ impl<'a> Keys<'a> {
     pub fn key<T: Serialize + DeserializeOwned>(
         &mut self,
         key: Key<'_>,
-        kind: &Kind<'_>,
+        kind: &Form<'_>,
         value: &mut T,
     ) -> Field<()> {
         let (place, was) = (format!("{}{}", self.places, key.name), json!(value));
@@ -258,7 +258,7 @@ impl<'a> Keys<'a> {
     ) -> Field<()> {
         let names: Vec<&str> = all.iter().copied().map(name).collect();
         let mut words: Vec<String> = value.iter().map(|one| name(*one).to_owned()).collect();
-        let found = self.key(key, &Kind::Words(what, &names), &mut words);
+        let found = self.key(key, &Form::Words(what, &names), &mut words);
         let of = |word: &String| all.iter().copied().find(|one| name(*one) == word);
         *value = words.iter().filter_map(of).collect();
         found
@@ -353,7 +353,7 @@ impl<'a> Keys<'a> {
         let needed = key.needed.or(variants.default.is_none().then_some(&expected));
         let can_be = if let Walk::Set(_) = self.walk { variants.set } else { names.len() };
         let mut word = now.map(|now| names[now].to_owned());
-        let found = self.key(Key { needed, ..key }, &Kind::Word(&names[..can_be]), &mut word);
+        let found = self.key(Key { needed, ..key }, &Form::Word(&names[..can_be]), &mut word);
         if let (Walk::Set(options), Field::Given(found)) = (&self.walk, &found) {
             // What a word decides is the whole table.
             options.report.put(self.places.trim_end_matches('.'), found.at.clone());

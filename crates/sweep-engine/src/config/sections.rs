@@ -6,10 +6,10 @@ use std::path::Path;
 use serde_json::json;
 use sweep_parameter::{Channel, Range, decimal};
 
+use super::form::Numbers;
 use super::keys::{Told, Variants};
-use super::kind::Numbers;
 use super::{
-    Diagnostic, Field, GridInput, Key, Keys, Kind, Located, Location, Read, Report, Section, Walk,
+    Diagnostic, Field, Form, GridInput, Key, Keys, Located, Location, Read, Report, Section, Walk,
     design,
 };
 use crate::method::{Integrator, Setting, default_method};
@@ -60,7 +60,7 @@ pub(super) fn sections<M: Read>(
         let name = self::name(root, path, over, "add `name = \"...\"`, or pass `--name`");
         Field::Given(Located { value: name.into(), at: root.at().clone() })
     };
-    keys.key(Key::new("name", about), &Kind::Own(&read, schema), name);
+    keys.key(Key::new("name", about), &Form::Own(&read, schema), name);
     model.walk(keys, input);
     keys.table(Key::new("time", "").needed("a section [time]"), |keys| time(end_s, window_s, keys));
     keys.table(Key::new("integrator", ""), |keys| method(integrator, keys));
@@ -68,9 +68,9 @@ pub(super) fn sections<M: Read>(
         model.walk_reliability(keys);
         let Reliability { limits, channels } = reliability;
         let key = Key::new("ratio_limit", "a point is reliable where every ratio is below this");
-        keys.key(key.set(), &Kind::Number(Range::Positive), &mut limits.most);
+        keys.key(key.set(), &Form::Number(Range::Positive), &mut limits.most);
         let about = "if given, a point is reliable where every ratio is above this too";
-        keys.key(Key::new("ratio_min", about).set(), &Kind::Number(RATIO_MIN), &mut limits.least);
+        keys.key(Key::new("ratio_min", about).set(), &Form::Number(RATIO_MIN), &mut limits.least);
         let key = Key::new("channels", "motions that are compared").set();
         keys.words(key, "channel", M::channels(), M::Channel::name, channels);
     });
@@ -123,9 +123,9 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     let key = about.needed("the end of the integration in s");
     let described = json!({ "type": "number", "exclusiveMinimum": 0, "maximum": LONGEST_S });
     let (kind, expected) = match &keys.walk {
-        Walk::Read(_) => (Kind::Number(Range::Any), "a time greater than 0, "),
-        Walk::Set(_) => (Kind::Number(Range::Positive), ""),
-        _ => (Kind::Own(&|_, _| Field::Absent, described), ""),
+        Walk::Read(_) => (Form::Number(Range::Any), "a time greater than 0, "),
+        Walk::Set(_) => (Form::Number(Range::Positive), ""),
+        _ => (Form::Own(&|_, _| Field::Absent, described), ""),
     };
     let mut value = *end_s;
     let end = keys.key(key, &kind, &mut value).given().and_then(|Located { at, .. }| {
@@ -146,7 +146,7 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     let about = "amplitudes are taken from the first to the second time, s; the whole run if left \
                  out";
     let expected = "expected two, [from, to], in s";
-    let kind = Kind::Numbers(Numbers {
+    let kind = Form::Numbers(Numbers {
         places: WINDOW.map(str::to_owned).to_vec(),
         ..Numbers::new(Range::NonNegative, 2..=2, expected)
     });
@@ -215,7 +215,7 @@ fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
         *integrator = (entry.with)(&mut |&Setting { key, range, default, description }| {
             let was = was.iter().find(|(known, _)| *known == key);
             let mut number = was.map_or(default, |(_, number)| *number);
-            keys.key(Key::new(key, description).set(), &Kind::Number(range), &mut number);
+            keys.key(Key::new(key, description).set(), &Form::Number(range), &mut number);
             if let Some((section, at)) = keys.section().and_then(|s| Some((s, s.key_at(key)?))) {
                 section.report.put(format!("integrator.{key}"), at);
             }

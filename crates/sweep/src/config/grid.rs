@@ -6,7 +6,7 @@ use sweep_engine::config::grid::is_another;
 use sweep_engine::config::section::cut;
 use sweep_engine::config::source::{beside, read};
 use sweep_engine::config::syntax::parse;
-use sweep_engine::config::{Diagnostic, Field, Key, Keys, Kind, Location, Report, Section, Walk};
+use sweep_engine::config::{Diagnostic, Field, Form, Key, Keys, Location, Report, Section, Walk};
 use washer_model::Machine;
 use washer_row::{Metric, Part};
 
@@ -94,7 +94,7 @@ pub(super) fn stability(
         let read = |section: &Section<'_>, key| {
             section.text_or_number(key).map(|found| found.value.into())
         };
-        let kind = Kind::Own(&read, json!({ "type": ["string", "number"] }));
+        let kind = Form::Own(&read, json!({ "type": ["string", "number"] }));
         let field = keys.key(Key::new("speed_rpm", about).needed(expected), &kind, &mut text);
         let (Field::Given(found), Some(text), Some(report)) = (field, text, keys.report()) else {
             return;

@@ -7,11 +7,11 @@ use std::sync::LazyLock;
 use serde_json::{Value, json};
 use washer_model::{Cabinet, ElementList, Machine, Parameter, Spin, Target};
 
+use sweep_engine::config::form::{Numbers, about};
 use sweep_engine::config::keys::{self};
-use sweep_engine::config::kind::{Numbers, about};
 use sweep_engine::config::schema::{document, of};
 use sweep_engine::config::source::is_blank;
-use sweep_engine::config::{Diagnostic, Field, Keys, Kind, Report, Section, Walk};
+use sweep_engine::config::{Diagnostic, Field, Form, Keys, Report, Section, Walk};
 use sweep_engine::plan::WrittenIn;
 
 /// A section of the machine file. It holds the parameters whose names begin with its prefix. Three
@@ -309,7 +309,7 @@ impl Key {
         let names = self.names(&part.prefix(k));
         let parameters: Vec<_> = names.iter().filter_map(|name| find(name, machine)).collect();
         let Some(first) = parameters.first() else { return };
-        let number = Kind::Number(first.range());
+        let number = Form::Number(first.range());
         let or_auto = |section: &Section<'_>, key| match section.is_text(key) {
             true => section.choice(key, &[AUTO]).map(|_| AUTO.into()),
             false => number.read(section, key, ""),
@@ -318,18 +318,18 @@ impl Key {
             _ if self.is_vector() => {
                 let three = Numbers::new(first.range(), 3..=3, "expected three numbers");
                 (
-                    Kind::Numbers(Numbers { places: names.clone(), ..three }),
+                    Form::Numbers(Numbers { places: names.clone(), ..three }),
                     String::new(),
                     "an array of three numbers".to_owned(),
                 )
             }
             LeftOut::Auto => {
                 let schema = json!({ "anyOf": [of(first), { "const": AUTO }] });
-                (Kind::Own(&or_auto, schema), String::new(), String::new())
+                (Form::Own(&or_auto, schema), String::new(), String::new())
             }
             _ => {
                 let expected = format!("{}: {}", first.description(), first.range());
-                (Kind::Number(first.range()), about(first), expected)
+                (Form::Number(first.range()), about(first), expected)
             }
         };
         let is_needed = self.left_out == LeftOut::Refused;

@@ -1,7 +1,7 @@
 //! The washing machine in grid files.
 
 use serde_json::Value;
-use sweep_engine::config::{Draft, Key, Keys, Kind, Read, Walk};
+use sweep_engine::config::{Draft, Form, Key, Keys, Read, Walk};
 use washer_model::Machine;
 use washer_row::{Criterion, Measures, Metric};
 
@@ -51,7 +51,7 @@ impl Read for Washer {
         {
             let key = Key::new("criterion", about).set();
             let mut word = criterion.name().to_owned();
-            keys.key(key, &Kind::Word(&Criterion::ALL.map(Criterion::name)), &mut word);
+            keys.key(key, &Form::Word(&Criterion::ALL.map(Criterion::name)), &mut word);
             *criterion = Criterion::named(&word).unwrap_or_default();
         }
     }

@@ -1,8 +1,8 @@
 //! `[spin]`: the profiles by name, and what each is given by.
 
+use sweep_engine::config::form::{Numbers, about};
 use sweep_engine::config::keys::Variants;
-use sweep_engine::config::kind::{Numbers, about};
-use sweep_engine::config::{Field, Key, Keys, Kind};
+use sweep_engine::config::{Field, Form, Key, Keys};
 use washer_model::{Machine, Parameter, Profile, Range, Spin};
 
 /// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are
@@ -71,7 +71,7 @@ fn ramped(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
         if let Ok(parameter) = Parameter::find(parameter, &Machine::paper(), &BLANK) {
             let about = about(&parameter);
             let key = Key::new(key, &about).needed(expected);
-            let found = keys.key(key, &Kind::Number(parameter.range()), value);
+            let found = keys.key(key, &Form::Number(parameter.range()), value);
             is_right &= matches!(found, Field::Given(_)) || keys.section().is_none();
         }
     }
@@ -96,7 +96,7 @@ fn table(spin: &mut Spin, keys: &mut Keys<'_>) {
     let speeds = Numbers { range: Range::Within(-1e5, 1e5), read: Range::Any, ..times.clone() };
     let mut column = |key: &'static str, about: &'static str, numbers, column: &mut Vec<f64>| {
         let key = Key::new(key, about).needed("an array of numbers");
-        matches!(keys.key(key, &Kind::Numbers(numbers), column), Field::Given(_))
+        matches!(keys.key(key, &Form::Numbers(numbers), column), Field::Given(_))
     };
     let found = [
         column("time_s", "increasing times from 0, s", times, &mut time_s),

@@ -9,8 +9,8 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use rayon::slice::ParallelSlice as _;
 use serde::{Deserialize, Serialize};
 use washer_model::{
-    Cases, Machine, Method, ModelKind, Parameter, Point, Snapshot, Spin, Timing, Wanted, prepare,
-    simulate_until,
+    Cases, Machine, Method, ModelKind, Parameter, Point, Recorders, Snapshot, Spin, Timing,
+    prepare, simulate_until,
 };
 
 use super::algebra::{centred, dot};
@@ -231,7 +231,7 @@ impl Problem<'_> {
     ) -> Vec<Option<T>> {
         let (measured, end_s) = (&self.cases[case].measured, self.cases[case].end_s());
         let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
-        let wanted = Wanted { snapshots: true, ..Wanted::default() };
+        let wanted = Recorders { snapshots: true, ..Recorders::default() };
         let of_group = |group: &[usize]| {
             let runs = group.iter().map(|&k| run(k)).enumerate();
             let sound = runs.filter(|(_, (machine, ..))| machine.violations().is_empty());

@@ -7,7 +7,7 @@ use super::starts::size;
 use super::{Ending, Settled, State};
 use crate::channel::CHANNELS;
 use crate::coordinates::{STATES, TUB_PITCH, TUB_YAW};
-use crate::{Exponent, Extra};
+use crate::{Exponent, Reading};
 
 /// Turns between two looks.
 pub(super) const BLOCK: usize = 16;
@@ -193,7 +193,7 @@ impl<'a> Course<'a> {
             time_s: self.made as f64 * self.turn_s(),
             end: self.held.state,
             sections: self.turns.iter().map(|turn| self.off_rest(&turn.end)).collect(),
-            extra: Extra::default(),
+            extra: Reading::default(),
         }
     }
 

@@ -6,7 +6,7 @@ use crate::run::extras::{Extras, Instants};
 use crate::run::model::Nonlinear;
 use crate::stability::orbit::{Row, Watched, by_kind, clock, model};
 use crate::stability::turn::turn;
-use crate::{Extra, ModelKind, Wanted};
+use crate::{ModelKind, Reading, Recorders};
 use lane_ode::{Kernel, Lane, N, Simd, System as _};
 
 /// A machine held at a speed.
@@ -31,7 +31,7 @@ pub(super) struct Turn {
 /// So many turns of each; fewer where one leaves the model's range. They share lanes of `simd` at
 /// most, and what is found of one does not depend on the others.
 pub(super) fn hold(simd: Simd, held: &[Held<'_>], turns: usize) -> Vec<Vec<Turn>> {
-    let found = recorded(simd, held, turns, Wanted::default());
+    let found = recorded(simd, held, turns, Recorders::default());
     found.into_iter().map(|(turns, _)| turns).collect()
 }
 
@@ -40,8 +40,8 @@ pub(super) fn recorded(
     simd: Simd,
     held: &[Held<'_>],
     turns: usize,
-    wanted: Wanted,
-) -> Vec<(Vec<Turn>, Extra)> {
+    wanted: Recorders,
+) -> Vec<(Vec<Turn>, Reading)> {
     let find = |held: &[Held<'_>]| {
         let groups = held.chunks(simd.lanes());
         let group =
@@ -55,11 +55,11 @@ pub(super) fn recorded(
 struct Hold<'a> {
     held: &'a [Held<'a>],
     turns: usize,
-    wanted: Wanted,
+    wanted: Recorders,
 }
 
 impl Kernel for Hold<'_> {
-    type Output = Vec<(Vec<Turn>, Extra)>;
+    type Output = Vec<(Vec<Turn>, Reading)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
@@ -76,8 +76,8 @@ fn hold_lanes<T: Lane>(
     zero: N<T>,
     held: &[Held<'_>],
     turns: usize,
-    wanted: Wanted,
-    found: &mut Vec<(Vec<Turn>, Extra)>,
+    wanted: Recorders,
+    found: &mut Vec<(Vec<Turn>, Reading)>,
 ) {
     let rows: Vec<Row<'_>> = held.iter().map(|held| held.row).collect();
     let clock = clock(zero, &rows);
@@ -89,7 +89,7 @@ fn hold_lanes<T: Lane>(
         }
     }
     let first = found.len();
-    found.extend(held.iter().map(|_| (Vec::with_capacity(turns), Extra::default())));
+    found.extend(held.iter().map(|_| (Vec::with_capacity(turns), Reading::default())));
     let mut watched = Watched::new(zero, &model, &clock);
     watched.with_states = false;
     let of = (ModelKind::Nonlinear, Instants::of_steps(rows[0].caps.is_none()));

@@ -4,7 +4,7 @@
 //! A law ([`Law`]) of a spring or a damper is a function of the line between its ends ([`Line`]); a
 //! line says in what it measures forces. Stops and bushings ([`StopOf`], [`BushingOf`]) have laws
 //! of a tub point's motion. To change a law is to change its `push`; a further kind of element is a
-//! structure with a law, a field of [`Elements`], and a line in [`Further`].
+//! structure with a law, a field of [`Elements`], and a line in [`OptionalForces`].
 
 pub(crate) mod bounds;
 pub(crate) mod corners;
@@ -84,7 +84,7 @@ impl<T: Lane> Elements<T> {
             // A copy: what is lent to a function must lie in memory, on every path.
             let mut whole = load;
             let motion = *tub;
-            zero.0.aside(Further { elements: self, tub: &motion, load: &mut whole });
+            zero.0.aside(OptionalForces { elements: self, tub: &motion, load: &mut whole });
             load = whole;
         }
         load
@@ -112,13 +112,13 @@ impl<T: Lane> Elements<T> {
 
 /// What not every machine has, added to the load on the tub. A zero stiffness or friction adds a
 /// zero, so that no machine's bits depend on those in the other lanes.
-struct Further<'a, T> {
+struct OptionalForces<'a, T> {
     elements: &'a Elements<T>,
     tub: &'a TubMotion<T>,
     load: &'a mut (Vec3<T>, Vec3<T>),
 }
 
-impl<T: Lane> Aside for Further<'_, T> {
+impl<T: Lane> Aside for OptionalForces<'_, T> {
     type Output = ();
 
     #[inline(always)]

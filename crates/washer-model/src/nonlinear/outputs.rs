@@ -17,7 +17,7 @@ use lane_ode::{N, Real, Sample};
 pub(crate) const RADIAL: usize = 2;
 
 /// Coordinates (m, rad) with their first and second time derivatives.
-pub(crate) struct Motion<T> {
+pub(crate) struct Moving<T> {
     pub(crate) q: [N<T>; COORDINATES],
     pub(crate) u: [N<T>; COORDINATES],
     pub(crate) a: [N<T>; COORDINATES],
@@ -52,7 +52,7 @@ macro_rules! observe {
         $from:tt, steady $steady:tt $(, turning cos $cos:tt sin $sin:tt rest $rest:tt)?;
     )+) => {
         #[inline(always)]
-        fn observed<T: Real>(places: &Places<T>, motion: &Motion<T>) -> [Sample<T>; CHANNELS] {
+        fn observed<T: Real>(places: &Places<T>, motion: &Moving<T>) -> [Sample<T>; CHANNELS] {
             [$(taken!(places, motion, $from)),+]
         }
     };
@@ -83,8 +83,8 @@ pub(crate) struct Axes<T> {
 
 impl<T: Real> Axes<T> {
     #[inline(always)]
-    pub(crate) fn new(spin: &SpinState<T>, motion: &Motion<T>) -> Self {
-        let Motion { q, u, a } = motion;
+    pub(crate) fn new(spin: &SpinState<T>, motion: &Moving<T>) -> Self {
+        let Moving { q, u, a } = motion;
         let tub = Tilt::of_tub(q);
         let of_tub = tub.motion(u[TUB_YAW], u[TUB_PITCH]);
         let shaft = Tilt::of_shaft(q);
@@ -129,7 +129,7 @@ impl<T: Real> Axes<T> {
 
     /// Position of the drum's front centre relative to the tub axis, along t2 and t3 (m).
     #[inline(always)]
-    pub(crate) fn radial(&self, b: &Bodies<T>, motion: &Motion<T>) -> [Sample<T>; RADIAL] {
+    pub(crate) fn radial(&self, b: &Bodies<T>, motion: &Moving<T>) -> [Sample<T>; RADIAL] {
         let tub_front = point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let drum_front = self.drum_front(b, motion);
         let [omega, alpha] = &self.tub_turn;
@@ -145,7 +145,7 @@ impl<T: Real> Axes<T> {
 
     /// Positions (m) and angles (rad) in the order of [`Channel::ALL`].
     #[inline(always)]
-    pub(crate) fn channels(&self, b: &Bodies<T>, motion: &Motion<T>) -> [Sample<T>; CHANNELS] {
+    pub(crate) fn channels(&self, b: &Bodies<T>, motion: &Moving<T>) -> [Sample<T>; CHANNELS] {
         let tub_front = point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let tub_centre = point(motion, TUB_Y, &self.tub_axis, b.tub_centre);
         let drum_front = self.drum_front(b, motion);
@@ -158,7 +158,7 @@ impl<T: Real> Axes<T> {
     }
 
     #[inline(always)]
-    fn drum_front(&self, b: &Bodies<T>, motion: &Motion<T>) -> Course<T> {
+    fn drum_front(&self, b: &Bodies<T>, motion: &Moving<T>) -> Course<T> {
         let one = b.drum_hinge.lit(1.0);
         let front = blend(b.drum_hinge, &self.shaft_axis, b.hinge_to_front, &self.drum[0]);
         point(motion, SHAFT_Y, &front, one)
@@ -194,7 +194,7 @@ fn component<T: Real>(course: &Course<T>, i: usize) -> Sample<T> {
 fn angular_acceleration<T: Real>(
     tilt: &Tilt<T>,
     at: &TiltMotion<T>,
-    motion: &Motion<T>,
+    motion: &Moving<T>,
     yaw: usize,
 ) -> Vec3<T> {
     let [yaw, pitch] = [motion.a[yaw], motion.a[yaw + 1]];
@@ -206,7 +206,7 @@ fn angular_acceleration<T: Real>(
 fn axis_course<T: Real>(
     tilt: &Tilt<T>,
     at: &TiltMotion<T>,
-    Motion { u, a, .. }: &Motion<T>,
+    Moving { u, a, .. }: &Moving<T>,
     yaw: usize,
 ) -> Course<T> {
     let (rates, seconds) = ([u[yaw], u[yaw + 1]], [a[yaw], a[yaw + 1]]);
@@ -257,7 +257,7 @@ fn out_of_drum<T: Real>(
 /// A point `reach` along an axis from a bearing midpoint, whose y is coordinate `first`; midpoints
 /// do not move along x.
 #[inline(always)]
-fn point<T: Real>(motion: &Motion<T>, first: usize, axis: &Course<T>, reach: N<T>) -> Course<T> {
+fn point<T: Real>(motion: &Moving<T>, first: usize, axis: &Course<T>, reach: N<T>) -> Course<T> {
     let mut course = Course {
         value: scaled(reach, axis.value),
         rate: scaled(reach, axis.rate),

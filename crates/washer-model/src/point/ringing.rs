@@ -11,7 +11,7 @@
 
 use core::array;
 
-use crate::channel::{CHANNELS, Kind};
+use crate::channel::{CHANNELS, ChannelKind};
 use crate::machine::spin::SpinStretch;
 use crate::{Channel, Machine};
 
@@ -152,8 +152,8 @@ impl Ringing {
 /// What a motion of the drum's front and tilt is in each channel, at most.
 fn in_channels(drum_front_m: f64, tilt_rad: f64) -> [f64; CHANNELS] {
     Channel::ALL.map(|channel| match channel.kind() {
-        Kind::DrumPoint => drum_front_m,
-        Kind::TubPoint => SHARE_OF_TUB * drum_front_m,
-        Kind::TubAngle => SHARE_OF_TUB * tilt_rad,
+        ChannelKind::DrumPoint => drum_front_m,
+        ChannelKind::TubPoint => SHARE_OF_TUB * drum_front_m,
+        ChannelKind::TubAngle => SHARE_OF_TUB * tilt_rad,
     })
 }

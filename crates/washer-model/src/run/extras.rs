@@ -10,7 +10,7 @@ use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::machine::spin::cuts_s;
 use crate::nonlinear::outputs::{RADIAL, squared};
-use crate::{Extra, ModelKind, Point, Wanted};
+use crate::{ModelKind, Point, Reading, Recorders};
 use lane_ode::{Aside, Lane, N, PartPeaks, Sample, SquareIntegrals, TimeAbove};
 
 /// Parts into which forces and speeds cut steps that are not held short by the bearings.
@@ -49,7 +49,7 @@ impl Instants {
 
 /// The recorders, over lanes.
 pub(crate) struct Extras<T> {
-    wanted: Wanted,
+    wanted: Recorders,
     squares: SquareIntegrals<T, CHANNELS>,
     turns: PartPeaks<T, CHANNELS>,
     loads: Option<Loads<T>>,
@@ -61,7 +61,7 @@ pub(crate) struct Extras<T> {
     clearances: usize,
     snapshots: Option<Snapshots<T>>,
     /// Of every point, as far as they have ended.
-    pub(crate) found: Vec<Extra>,
+    pub(crate) found: Vec<Reading>,
 }
 
 impl<T: Lane> Extras<T> {
@@ -69,7 +69,7 @@ impl<T: Lane> Extras<T> {
     #[inline(always)]
     pub(crate) fn new(
         zero: N<T>,
-        wanted: Wanted,
+        wanted: Recorders,
         (model, instants): (ModelKind, Instants),
         point: &Point,
         count: usize,
@@ -89,7 +89,7 @@ impl<T: Lane> Extras<T> {
             clearances_squared: [zero; 3],
             clearances,
             snapshots,
-            found: vec![Extra::default(); count],
+            found: vec![Reading::default(); count],
         })
     }
 
@@ -132,7 +132,7 @@ impl<T: Lane> Extras<T> {
             Some(loads) => loads.of(gauge, lane, point),
             None => Vec::new(),
         });
-        self.found[index] = Extra {
+        self.found[index] = Reading {
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),
             turns,
             gauges,

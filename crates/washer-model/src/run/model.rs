@@ -13,7 +13,7 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::elements::corners::CornerForce;
-use crate::nonlinear::outputs::{Axes, Motion, RADIAL};
+use crate::nonlinear::outputs::{Axes, Moving, RADIAL};
 use crate::{COORDINATES, Caps, Point, nonlinear};
 use core::f64::consts::FRAC_PI_2;
 use lane_ode::{Lane, N, Sample, SemiImplicit, System, Task, Tolerance, additive, dopri5};
@@ -55,9 +55,9 @@ pub(crate) trait Model<T: Lane>: System<T, STATES> {
 
 /// Coordinates with two derivatives, from a state and its derivative.
 #[inline(always)]
-fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> Motion<T> {
+fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> Moving<T> {
     let (q, u) = split(x);
-    Motion { q, u, a: split(dx).1 }
+    Moving { q, u, a: split(dx).1 }
 }
 
 /// Coordinates of a state.

@@ -130,7 +130,9 @@ fn between<T: Lane>(
 mod tests {
     use super::*;
     use crate::run::history::{Start, history};
-    use crate::{Channel, Machine, Method, Profile, Spin, Timing, Wanted, prepare, simulate_with};
+    use crate::{
+        Channel, Machine, Method, Profile, Recorders, Spin, Timing, prepare, simulate_with,
+    };
     use lane_ode::Simd;
 
     #[test]
@@ -150,7 +152,7 @@ mod tests {
             .into_iter()
             .map(|point| point.unwrap().seen_at(Arc::clone(&instants)))
             .collect();
-        let wanted = Wanted { snapshots: true, ..Wanted::default() };
+        let wanted = Recorders { snapshots: true, ..Recorders::default() };
         let method = Method::Rk4 { step_s: 2e-4 };
         for model in ModelKind::ALL {
             let all: Vec<&Point> = points.iter().collect();

@@ -1,6 +1,6 @@
 //! Trajectories by the stiff method: one at a time, its derivatives by lanes of dual numbers.
 
-use super::{Extra, Record, Run, Simulate};
+use super::{Reading, Record, Run, Simulate};
 use crate::coordinates::STATES;
 use crate::run::method::{ByRodas, Family};
 use crate::run::model::Model;
@@ -9,7 +9,7 @@ use crate::{COORDINATES, Point};
 use lane_ode::{Dual, Ended, Forcing, Kernel, Lane, Leg, N, Partials, Step, Task, rodas};
 
 impl<F: Family> Kernel for Simulate<'_, F, ByRodas> {
-    type Output = Option<(Vec<Record>, Vec<Extra>)>;
+    type Output = Option<(Vec<Record>, Vec<Reading>)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {

@@ -1,7 +1,7 @@
 //! After set-up a trajectory leaves the heap alone, however long.
 
 use super::instruments::{EVERYTHING, paper, ready, triangular};
-use crate::{Method, ModelKind, Wanted, simulate_with};
+use crate::{Method, ModelKind, Recorders, simulate_with};
 use lane_ode::{Simd, Tolerance};
 
 #[test]
@@ -24,7 +24,7 @@ fn a_longer_trajectory_asks_no_more_of_the_heap_than_a_short_one() {
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
         for model in [ModelKind::Nonlinear, ModelKind::Linear] {
             for method in [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(tolerance)] {
-                for wanted in [Wanted::default(), everything] {
+                for wanted in [Recorders::default(), everything] {
                     let (short, few) = asked(simd, model, &method, wanted, 0.02);
                     let (long, many) = asked(simd, model, &method, wanted, 0.2);
                     assert!(many > 5 * few, "{few} and {many} steps");

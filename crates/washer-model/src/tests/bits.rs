@@ -2,8 +2,8 @@
 
 use super::instruments::{EVERYTHING, paper, random_machine, random_spin};
 use crate::{
-    Caps, Extra, Gear, Geared, Machine, Method, ModelKind, Point, Profile, Record, Spin, Timing,
-    Wanted, prepare, simulate_until, simulate_with,
+    Caps, Gear, Geared, Machine, Method, ModelKind, Point, Profile, Reading, Record, Recorders,
+    Spin, Timing, prepare, simulate_until, simulate_with,
 };
 use core::cell::Cell;
 use lane_ode::{STEPS_AT_ONCE, Simd, Tolerance};
@@ -47,12 +47,12 @@ fn points(simd: Simd, scenarios: &[Scenario]) -> Vec<Point> {
 }
 
 /// Every number that was recorded as its bits.
-fn bits((record, extra): (&Record, &Extra)) -> Vec<u64> {
+fn bits((record, extra): (&Record, &Reading)) -> Vec<u64> {
     let Record { failure, amplitudes, min_gap_m, steps, rejected } = record;
     let mut bits: Vec<_> = amplitudes.iter().map(|a| a.to_bits()).collect();
     bits.extend([min_gap_m.to_bits(), *steps, *rejected]);
     bits.extend(failure.iter().flat_map(|(reason, time_s)| [*reason as u64, time_s.to_bits()]));
-    let Extra {
+    let Reading {
         root_mean_squares,
         turns,
         gauges,
@@ -210,7 +210,7 @@ fn a_stop_is_answered_within_a_leg_by_every_method() {
                     asked.set(asked.get() + 1);
                     asked.get() > most
                 };
-                simulate_until(Simd::best(), model, &method, &[&point], Wanted::default(), &stop)
+                simulate_until(Simd::best(), model, &method, &[&point], Recorders::default(), &stop)
             };
             assert!(until(u32::MAX).is_some_and(|(records, _)| records[0].failure.is_none()));
             assert!(asked.get() > 3, "{model:?} by {method:?} asks {} times", asked.get());

@@ -4,8 +4,8 @@
 use super::instruments::{EVERYTHING, paper};
 use crate::machine::spin::cuts_s;
 use crate::{
-    Caps, Channel, Gauge, Geared, Machine, Method, ModelKind, Point, Profile, Spin, Start, Timing,
-    Wanted, history, prepare, simulate, simulate_with,
+    Caps, Channel, Gauge, Geared, Machine, Method, ModelKind, Point, Profile, Recorders, Spin,
+    Start, Timing, history, prepare, simulate, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
@@ -148,8 +148,8 @@ fn only_what_is_asked_for_is_there() {
     let method = Method::Geared(Geared::steady(1e-3, caps));
     let run =
         |wanted| simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], wanted);
-    assert!(run(Wanted::default()).1.is_empty());
-    let (_, extras) = run(Wanted::gauge(Gauge::ClashTime));
+    assert!(run(Recorders::default()).1.is_empty());
+    let (_, extras) = run(Recorders::gauge(Gauge::ClashTime));
     assert_eq!(extras.len(), 2);
     for extra in extras {
         assert!(extra.root_mean_squares.is_none() && extra.turns.is_empty());

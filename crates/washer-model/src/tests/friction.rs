@@ -2,7 +2,7 @@
 
 use crate::modes::motions;
 use crate::{
-    Damper, Gauge, Machine, Method, ModelKind, Point, Profile, Spin, Timing, Wanted, modes,
+    Damper, Gauge, Machine, Method, ModelKind, Point, Profile, Recorders, Spin, Timing, modes,
     prepare, simulate_with,
 };
 use lane_ode::Simd;
@@ -41,7 +41,7 @@ fn own_speeds_are_those_of_the_linear_motion() {
     let machines = cases.map(|(mass_kg, frictions_n)| machine(mass_kg, frictions_n, None));
     let points = ready(&machines);
     let method = Method::Rk4 { step_s: 2e-4 };
-    let wanted = Wanted::gauge(Gauge::DamperSpeed);
+    let wanted = Recorders::gauge(Gauge::DamperSpeed);
     let simulated: Vec<&Point> = points.iter().collect();
     let (_, extras) = simulate_with(Simd::best(), ModelKind::Linear, &method, &simulated, wanted);
     for ((point, extra), machine) in points.iter().zip(&extras).zip(&machines) {

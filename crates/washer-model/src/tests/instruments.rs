@@ -7,11 +7,11 @@ use crate::nonlinear::equilibrium;
 use crate::nonlinear::floating::Floating;
 use crate::nonlinear::{Half, Halves, halves};
 use crate::point::Point;
-use crate::{Gauge, Machine, Parameter, Profile, Spin, Target, Timing, Wanted, prepare};
+use crate::{Gauge, Machine, Parameter, Profile, Recorders, Spin, Target, Timing, prepare};
 use lane_ode::{Lane, N, Real, Simd};
 
 /// Every record that there is.
-pub(super) const EVERYTHING: Wanted = Wanted {
+pub(super) const EVERYTHING: Recorders = Recorders {
     root_mean_squares: true,
     turns: true,
     gauges: [true; Gauge::ALL.len()],

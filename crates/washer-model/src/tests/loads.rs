@@ -5,8 +5,8 @@ use super::energy::{axes, place};
 use crate::machine::feet::{Feet, LOAD};
 use crate::machine::{Cabinet, Foot, Machine};
 use crate::{
-    Extra, Gauge, Method, ModelKind, Point, Profile, Spin, Start, Timing, Wanted, history, prepare,
-    simulate_with,
+    Gauge, Method, ModelKind, Point, Profile, Reading, Recorders, Spin, Start, Timing, history,
+    prepare, simulate_with,
 };
 use lane_ode::Simd;
 
@@ -37,11 +37,11 @@ fn all_close(what: &str, found: &[f64], expected: &[f64], allowed: f64) {
     }
 }
 
-fn found(point: &Point, model: ModelKind, simd: Simd) -> Extra {
+fn found(point: &Point, model: ModelKind, simd: Simd) -> Reading {
     let method = Method::Rk4 { step_s: 1e-4 };
     let [clash, force] = [Gauge::ClashTime, Gauge::CabinetForce];
     let gauges = Gauge::ALL.map(|gauge| gauge != clash && gauge != force);
-    let wanted = Wanted { gauges, ..Wanted::default() };
+    let wanted = Recorders { gauges, ..Recorders::default() };
     let (_, mut extras) = simulate_with(simd, model, &method, &[point], wanted);
     extras.remove(0)
 }
@@ -236,5 +236,5 @@ fn a_machine_without_stops_or_cabinet_has_no_such_loads() {
     let point = point(Machine::paper());
     let mut extra = found(&point, ModelKind::Nonlinear, Simd::best());
     let speeds = core::mem::take(&mut extra.gauges[Gauge::DamperSpeed as usize]);
-    assert_eq!((speeds.len(), extra), (2, Extra::default()));
+    assert_eq!((speeds.len(), extra), (2, Reading::default()));
 }

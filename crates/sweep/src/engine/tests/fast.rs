@@ -1,6 +1,6 @@
 //! The fast method's promises, held against plain RK4: on the paper's map, with the channels and
-//! windows that once hid errors, and on other machines. `examples/attack.rs` looks for exceptions
-//! at random.
+//! windows that once hid errors, and on other machines. `examples/differential_test.rs` looks for
+//! exceptions at random.
 
 use rayon::prelude::*;
 use washer_row::{Level, Verdict};

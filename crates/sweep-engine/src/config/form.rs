@@ -10,7 +10,7 @@ use super::words::names;
 use super::{Diagnostic, Field, Located, Section, Written};
 
 /// A kind of value.
-pub enum Kind<'k> {
+pub enum Form<'k> {
     /// A number.
     Number(Range),
     /// A whole number.
@@ -44,7 +44,7 @@ pub struct Numbers {
     pub help: Option<&'static str>,
 }
 
-impl Kind<'_> {
+impl Form<'_> {
     /// The value in a file. The places of several numbers are kept under `place`.
     pub fn read(&self, section: &Section<'_>, key: &'static str, place: &str) -> Field<Value> {
         match self {

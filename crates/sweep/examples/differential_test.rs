@@ -1,14 +1,15 @@
-//! Attacks the fast method's promise: random machines, spin profiles, windows, channels, limits and
+//! Tests the fast method's promise: random machines, spin profiles, windows, channels, limits and
 //! criteria, each row against plain RK4.
 //!
 //! ```sh
-//! cargo run --release -p sweep --example attack -- 20000 1    # rows, seed
-//! cargo run --release -p sweep --example attack -- 9 1000042  # the grid that an exception names
-//! cargo run --release -p sweep --example attack -- 900 1 grazing
-//! cargo run --release -p sweep --example attack -- 900 1 elements
-//! cargo run --release -p sweep --example attack -- 900 1 jumps
-//! cargo run --release -p sweep --example attack -- 900 1 tiny
-//! cargo run --release -p sweep --example attack -- 900 1 exact
+//! cargo run --release -p sweep --example differential_test -- 20000 1    # rows, seed
+//! # The grid that an exception names:
+//! cargo run --release -p sweep --example differential_test -- 9 1000042
+//! cargo run --release -p sweep --example differential_test -- 900 1 grazing
+//! cargo run --release -p sweep --example differential_test -- 900 1 elements
+//! cargo run --release -p sweep --example differential_test -- 900 1 jumps
+//! cargo run --release -p sweep --example differential_test -- 900 1 tiny
+//! cargo run --release -p sweep --example differential_test -- 900 1 exact
 //! ```
 //!
 //! The promise: every row that is neither sensitive nor unconverged has RK4's status, RK4's verdict
@@ -35,7 +36,7 @@ use sweep::{
 /// What is asked of the fast method.
 const ACCURACIES: [f64; 4] = [1e-3, 1e-3, 1e-4, 1e-2];
 
-/// The same with [`Kind::Exact`].
+/// The same with [`TrialKind::Exact`].
 const EXACT_ACCURACIES: [f64; 4] = [1e-5, 1e-5, 1e-6, 1e-4];
 
 /// Step of RK4 that follows bearings as stiff as the paper's (s).
@@ -99,7 +100,7 @@ const ELEMENTS: [(&str, f64, f64); 17] = [
 
 /// What varies in a grid beside the machine's proportions.
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum TrialKind {
     Plain,
     Grazing,
     Elements,
@@ -109,12 +110,12 @@ enum Kind {
 }
 
 /// By their names, but for the plain one.
-const KINDS: [(&str, Kind); 5] = [
-    ("grazing", Kind::Grazing),
-    ("elements", Kind::Elements),
-    ("jumps", Kind::Jumps),
-    ("tiny", Kind::Tiny),
-    ("exact", Kind::Exact),
+const KINDS: [(&str, TrialKind); 5] = [
+    ("grazing", TrialKind::Grazing),
+    ("elements", TrialKind::Elements),
+    ("jumps", TrialKind::Jumps),
+    ("tiny", TrialKind::Tiny),
+    ("exact", TrialKind::Exact),
 ];
 
 /// Numbers from a seed: splitmix64.
@@ -184,7 +185,7 @@ fn grid(seed: u64) -> String {
     let masses = [0.05, 0.4, 1.0].map(|mass| mass * rng.factor(1.6));
     let dampings = [60.0, 120.0, 240.0].map(|damping| damping * rng.factor(1.5));
     format!(
-        "name = \"attack-{seed}\"\nmetrics = [\"cabinet_force\"]\n\
+        "name = \"trial-{seed}\"\nmetrics = [\"cabinet_force\"]\n\
          [set]\n{set}[spin]\n{spin}{peak}\n\
          [time]\nend_s = {end_s}\nwindow_s = [{from_s}, {to_s}]\n\
          [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = {masses:?}\n\
@@ -390,28 +391,28 @@ fn with_tiny_unbalances(seed: u64, grid: &str) -> String {
 }
 
 /// One grid's rows against RK4.
-fn attack(seed: u64, kind: Kind, folder: &std::path::Path) -> Found {
+fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
     let path = folder.join(format!("{seed}.toml"));
     let mut text = grid(seed);
-    let is_grazing = kind == Kind::Grazing;
+    let is_grazing = kind == TrialKind::Grazing;
     if is_grazing {
         text = text.replace("cabinet_force", "clash_time");
     }
-    if kind == Kind::Elements {
+    if kind == TrialKind::Elements {
         let loads = "\"cabinet_force\", \"stop_force\", \"stop_contact\", \"foot_load\", \
                      \"slip_margin\", \"damper_speed\"";
         text = text.replace("\"cabinet_force\"", loads);
         text = with_elements(seed, &text, folder);
     }
-    if kind == Kind::Jumps {
+    if kind == TrialKind::Jumps {
         text = with_jumps(seed, &text);
     }
-    if kind == Kind::Tiny {
+    if kind == TrialKind::Tiny {
         text = with_tiny_unbalances(seed, &text);
     }
-    let accuracies = if kind == Kind::Exact { EXACT_ACCURACIES } else { ACCURACIES };
+    let accuracies = if kind == TrialKind::Exact { EXACT_ACCURACIES } else { ACCURACIES };
     let accuracy = accuracies[(seed % 4) as usize];
-    let follows = matches!(kind, Kind::Jumps | Kind::Exact);
+    let follows = matches!(kind, TrialKind::Jumps | TrialKind::Exact);
     let step_s = if follows { FOLLOWING_STEP_S } else { STEP_S };
     std::fs::write(&path, &text).expect("the temporary folder can be written to");
     let mut loaded = sweep::load(&path, &[]).ok();
@@ -491,11 +492,11 @@ fn main() -> ExitCode {
     let mut words = std::env::args().skip(1);
     let mut number = || words.next()?.parse::<u64>().ok();
     let (Some(rows), Some(first)) = (number(), number()) else {
-        eprintln!("usage: attack ROWS SEED [{}]", KINDS.map(|(name, _)| name).join("|"));
+        eprintln!("usage: differential_test ROWS SEED [{}]", KINDS.map(|(name, _)| name).join("|"));
         return ExitCode::from(2);
     };
     let named = |word: String| KINDS.into_iter().find(|(name, _)| *name == word).ok_or(word);
-    let kind = match words.next().map_or(Ok(("", Kind::Plain)), named) {
+    let kind = match words.next().map_or(Ok(("", TrialKind::Plain)), named) {
         Ok((_, kind)) => kind,
         Err(word) => {
             eprintln!("{word} is none of {}", KINDS.map(|(name, _)| name).join(", "));
@@ -505,7 +506,8 @@ fn main() -> ExitCode {
     // A thread that waits for rows of its grid takes another grid, on the same stack.
     let pool = rayon::ThreadPoolBuilder::new().stack_size(1 << 28).build_global();
     pool.expect("nothing has used the pool");
-    let folder = std::env::temp_dir().join(format!("sweep-attack-{}", std::process::id()));
+    let folder =
+        std::env::temp_dir().join(format!("sweep-differential-test-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     let grids = rows.div_ceil(9);
     // A seed of a grid by itself, or so many from the first.
@@ -516,7 +518,7 @@ fn main() -> ExitCode {
     };
     let found = seeds
         .into_par_iter()
-        .map(|seed| attack(seed, kind, &folder))
+        .map(|seed| tried(seed, kind, &folder))
         .reduce(Found::default, Found::plus);
     // What is left in the temporary folder harms nobody.
     let _ = std::fs::remove_dir_all(&folder);

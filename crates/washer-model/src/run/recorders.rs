@@ -7,7 +7,7 @@ use crate::channel::CHANNELS;
 
 /// Records to make beyond a [`Record`](super::Record); none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Wanted {
+pub struct Recorders {
     /// Root mean squares of the channels.
     pub root_mean_squares: bool,
     /// Largest deviations of the channels in every turn of the drum.
@@ -21,9 +21,9 @@ pub struct Wanted {
     pub snapshots: bool,
 }
 
-/// The records that [`Wanted`] asks for, of one trajectory, within the window.
+/// The records that [`Recorders`] asks for, of one trajectory, within the window.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Extra {
+pub struct Reading {
     /// Root mean square of each channel's deviation from equilibrium, in the order of
     /// `Channel::ALL` (m, rad).
     pub root_mean_squares: Option<[f64; CHANNELS]>,
@@ -45,14 +45,14 @@ pub struct Extra {
     pub snapshots: Vec<Snapshot>,
 }
 
-impl Extra {
+impl Reading {
     /// What a gauge showed, if it was asked for.
     pub fn gauge(&self, gauge: Gauge) -> &[f64] {
         &self.gauges[gauge as usize]
     }
 }
 
-impl Wanted {
+impl Recorders {
     /// Whether it asks for a gauge.
     pub(crate) const fn reads(&self, gauge: Gauge) -> bool {
         self.gauges[gauge as usize]
