@@ -124,7 +124,13 @@ pub(super) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<T
         let turns = Turns { asked, is_stopped };
         // Wide lanes that are mostly empty take longer than narrow ones.
         let is_few = asked.len() <= Simd::narrow().lanes();
-        if is_few { Simd::dispatch_narrow(turns) } else { Simd::best().dispatch(turns) }
+        // Derivatives of the steps fill them with disturbances, of however few turns.
+        let is_filled = asked.iter().any(|asked| asked.is_seen && asked.row.is_stepwise());
+        if is_few && !is_filled {
+            Simd::dispatch_narrow(turns)
+        } else {
+            Simd::best().dispatch(turns)
+        }
     })
 }
 
