@@ -50,6 +50,8 @@ pub(crate) struct Summary {
     beyond: u64,
     /// Rows, each the first of its speed, that are not on the curve of responses.
     off_curve: u64,
+    /// Stable rows above an unstable speed of their point, which a drum that runs up has passed.
+    passed: u64,
     /// Rows behind another of the same point and speed, which all else leaves out.
     coexisting: u64,
     tongues: Vec<Tongue>,
@@ -82,6 +84,10 @@ impl Summary {
         self.without += u64::from(row.status != "ok");
         self.off_curve += u64::from(row.is_off_curve);
         self.beyond += u64::from(row.growth_per_s <= 0.0 && row.beyond.is_some());
+        let is_passed =
+            |tongue: &Tongue| tongue.at.point == row.point && tongue.from_to_rpm[1] < row.speed_rpm;
+        let is_stable = row.growth_per_s <= 0.0 && row.beyond.is_none();
+        self.passed += u64::from(is_stable && self.tongues.last().is_some_and(is_passed));
         if row.growth_per_s > 0.0 {
             self.unstable += 1;
             match self.tongues.last_mut() {
@@ -113,6 +119,11 @@ impl Summary {
                 counted(self.points as usize, "point")
             ),
         )];
+        if self.passed > 0 {
+            let words = "above an unstable speed: a drum that was carried up may be in another \
+                         motion (`sweep dwell --carry up`)";
+            lines[0].1.push_str(&format!("; {} {words}", self.passed));
+        }
         if self.beyond > 0 {
             let words = "rows pass what no machine can (column beyond), and count for neither";
             lines.push(("beyond", format!("{} {words}", self.beyond)));
@@ -228,6 +239,7 @@ mod tests {
             (1.0, 1.0, 0.2, "period_doubling"),
             (1.0, 2.0, f64::NAN, ""),
             (1.0, 3.0, 0.1, "fold"),
+            (1.0, 4.0, -0.1, "stable"),
         ];
         // A second row of a speed is another response, and no speed.
         for (point, speed_rpm, growth_per_s, kind) in rows {
@@ -250,7 +262,8 @@ mod tests {
             [([2.0, 3.0], 3.0), ([4.0, 4.0], 4.0), ([1.0, 1.0], 1.0), ([3.0, 3.0], 3.0)]
         );
         let lines = summary.lines();
-        assert_eq!(lines[0].1, "1 of 7 rows, 5 not, 1 without a response; 2 points");
+        let all = "2 of 8 rows, 5 not, 1 without a response; 2 points; 1 above an unstable speed: ";
+        assert!(lines[0].1.starts_with(all), "{lines:?}");
         assert!(lines[1].1.starts_with("2 of these rows are off the curve"));
         assert!(lines[2].1.starts_with("1 further rows"));
         assert!(lines[3].1.starts_with(
