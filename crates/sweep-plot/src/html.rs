@@ -145,13 +145,24 @@ fn provenance(source: &Source) -> String {
 /// Longest entry of a file's metadata that a page carries whole, characters.
 const MOST_PROVENANCE: usize = 100_000;
 
+/// What a page over these axes computes with, and what it then tells of the run, in HTML.
+fn computed(
+    source: &Source,
+    axes: &[(&str, bool)],
+    model: &dyn Figures,
+) -> (Option<Computing>, String) {
+    let computing = model.computing(axes);
+    let told = computing.as_ref().map_or_else(String::new, |_| report::told(source, model));
+    (computing, told)
+}
+
 /// The page of a chart: every panel, those that a picture shows at first. It may compute, along
-/// what can be moved first.
+/// the axis of this name.
 pub(crate) fn chart_page(
     source: &Source,
     chart: &Chart,
-    computing: Option<Computing>,
-    told: &str,
+    axis: &str,
+    model: &dyn Figures,
 ) -> String {
     let data = json!({
         "kind": "chart",
@@ -159,7 +170,8 @@ pub(crate) fn chart_page(
         "subtitle": chart.subtitle,
         "chart": chart_json(chart, curve),
     });
-    page(&chart.title, data, [&[CORE, CHART], &[START]], computing, source, told)
+    let (computing, told) = computed(source, &[(axis, chart.x_log)], model);
+    page(&chart.title, data, [&[CORE, CHART], &[START]], computing, source, &told)
 }
 
 /// A page with the picture that it shows where scripts are switched off.

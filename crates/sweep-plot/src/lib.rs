@@ -50,6 +50,7 @@ pub use scene::{Colour, INK, MUTED};
 pub use share::Share;
 pub use svg::escape;
 
+use chart::Chart;
 use cuts::Cuts;
 use error::Result;
 use figures::boundary::Overlay;
@@ -144,9 +145,10 @@ pub fn render(
 /// As [`render`].
 pub fn described(input: &Path, model: &dyn Figures) -> Result<(String, String), PlotError> {
     let options = Options::default();
-    let svg = figure(opened(input, &options, model)?, &options, model, Format::Svg)?;
-    let source = Source::open(input, model.known())?;
-    Ok((html::picture(&svg), html::told(&source, model)))
+    let source = opened(input, &options, model)?;
+    let told = html::told(&source, model);
+    let svg = figure(source, &options, model, Format::Svg)?;
+    Ok((html::picture(&svg), told))
 }
 
 fn opened(input: &Path, options: &Options, model: &dyn Figures) -> Result<Source> {
@@ -178,9 +180,20 @@ fn figure(
         }
         _ => model.chart(source, options)?,
     };
+    written(&source, &chart, "", model, format)
+}
+
+/// A chart of a file; over a parameter of this name, if that is an axis.
+fn written(
+    source: &Source,
+    chart: &Chart,
+    axis: &str,
+    model: &dyn Figures,
+    format: Format,
+) -> Result<Vec<u8>> {
     match format {
-        Format::Html => Ok(html::chart_page(&source, &chart, None, "").into_bytes()),
-        _ => image(&chart::draw(&chart), format),
+        Format::Html => Ok(html::chart_page(source, chart, axis, model).into_bytes()),
+        _ => image(&chart::draw(chart), format),
     }
 }
 
@@ -235,13 +248,7 @@ fn map(source: Source, options: &Options, model: &dyn Figures, format: Format) -
     let map = Map::read(source, grid, &columns)?;
     if axes.len() == 1 {
         let chart = figures::curves::chart(&map, options)?;
-        if format != Format::Html {
-            return image(&chart::draw(&chart), format);
-        }
-        let source = &map.table.source;
-        let computing = model.computing(&[(&axes[0].name, chart.x_log)]);
-        let told = computing.as_ref().map_or_else(String::new, |_| html::told(source, model));
-        return Ok(html::chart_page(source, &chart, computing, &told).into_bytes());
+        return written(&map.table.source, &chart, &axes[0].name, model, format);
     }
     Ok(html::map_page(&map, &cuts, options, model)?.into_bytes())
 }

@@ -254,9 +254,5 @@ pub fn dwell(setup: &Setup, values: &[f64], speeds_rpm: &[f64]) -> Result<Option
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
     let carried = vec![None; dwells.len()];
     let found = endings(Simd::best(), &dwells, &carried, &Starts::default(), &|| false);
-    let motions = found.iter().zip(speeds_rpm).flat_map(|(found, &speed_rpm)| {
-        let motions = found.iter().flat_map(|found| &found.motions);
-        motions.map(move |motion| (speed_rpm, motion))
-    });
-    Ok(Dwelt::of(motions))
+    Ok(Dwelt::of(speeds_rpm, &found))
 }

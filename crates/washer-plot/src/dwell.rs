@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::WasherFigures;
 use crate::kinds::MACHINE;
-use crate::stability::{Held, UNSTABLE, channels_of, columns_of, panel, response, shown, unstable};
+use crate::stability::{Held, channels_of, columns_of, over_speeds, panel, response, shown};
 use crate::{passages, trace};
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
 use sweep_plot::label::{self, Label};
@@ -77,18 +77,8 @@ pub(crate) fn chart(source: &Source, at: &At, options: &WasherFigures) -> Result
             extremes(motions.filter(|y| *y > 0.0)).is_some_and(|(low, high)| high > WIDE * low);
         ChartPanel { height: 190.0, log, ..panel((name, facts), is_shown[k], series) }
     });
-    let panels = panels.collect();
-    let mut notes = held.notes();
-    notes.push("largest deviation from equilibrium".to_owned());
-    Ok(Chart {
-        title: "What a held speed ends in".to_owned(),
-        subtitle: notes.join(" · "),
-        x_label: Label::new("Constant spin speed", "rpm"),
-        shades: unstable(&one.speed, &one.growth),
-        shade_meaning: UNSTABLE.to_owned(),
-        panels,
-        ..Chart::default()
-    })
+    let titles = ["What a held speed ends in", "largest deviation from equilibrium"];
+    Ok(over_speeds(titles, &held, &one, panels.collect()))
 }
 
 /// The chart of how far a run goes in each turn that passes over these speeds.

@@ -128,9 +128,9 @@ impl Figures for WasherFigures {
         let machines = "traces, and frequencies of modes files";
         source.refuse("--stability", self.stability.is_some(), trace || over_modes, machines)?;
         if let Some(kind) = self.view.map(View::of) {
+            // Those of designs have been judged as every model's.
             let files = match kind {
                 Kind::TRACE => "traces".to_owned(),
-                Kind::DESIGN => "designs: results of a grid file with [design]".to_owned(),
                 other => format!("{} files", other.name),
             };
             source.refuse("--view", true, is(kind), &files)?;

@@ -107,18 +107,30 @@ pub(crate) fn responses(
         let lines = response("nonlinear model", &one, k, label::shown(&channel.1.unit).1);
         ChartPanel { height: 170.0, ..panel(*channel, shown, lines) }
     });
-    let panels = panels.collect();
+    let titles =
+        ["Periodic responses at constant speed", "largest deviation from equilibrium over a turn"];
+    Ok(over_speeds(titles, &held, &one, panels.collect()))
+}
+
+/// The chart of one point over speed, its unstable speeds shaded; with a title and what its panels
+/// show.
+pub(crate) fn over_speeds(
+    [title, shown]: [&str; 2],
+    held: &Held<'_>,
+    one: &Swept,
+    panels: Vec<ChartPanel>,
+) -> Chart {
     let mut notes = held.notes();
-    notes.push("largest deviation from equilibrium over a turn".to_owned());
-    Ok(Chart {
-        title: "Periodic responses at constant speed".to_owned(),
+    notes.push(shown.to_owned());
+    Chart {
+        title: title.to_owned(),
         subtitle: notes.join(" · "),
         x_label: Label::new("Constant spin speed", "rpm"),
         shades: unstable(&one.speed, &one.growth),
         shade_meaning: UNSTABLE.to_owned(),
         panels,
         ..Chart::default()
-    })
+    }
 }
 
 /// Channels of the nonlinear model for which the file has a column of this kind too.

@@ -1,6 +1,6 @@
 //! The outcome of a grid point: one row of the result file.
 
-use washer_model::{Beyond, Channel, Disturbance, Ending, NoAnswer, Response};
+use washer_model::{Beyond, Channel, Disturbance, Endings, NoAnswer, Response};
 
 use crate::Level;
 
@@ -131,15 +131,20 @@ pub struct Dwelt {
     pub deviations: Deviations,
     /// The speed (rpm) at which the tub turns farthest, by yaw or by pitch.
     pub speed_rpm: f64,
-    /// What that motion is: position in [`Ending::KINDS`].
+    /// What that motion is: position in [`washer_model::Ending::KINDS`].
     pub kind: usize,
 }
 
 impl Dwelt {
-    /// The farthest of these motions, each with its speed (rpm); the first of equals counts.
-    pub fn of<'a>(motions: impl IntoIterator<Item = (f64, &'a Ending)>) -> Option<Self> {
+    /// The farthest of the motions found at these speeds (rpm), of which some may have none; the
+    /// first of equals counts.
+    pub fn of<E>(speeds_rpm: &[f64], found: &[Result<Endings, E>]) -> Option<Self> {
+        let motions = speeds_rpm.iter().zip(found).flat_map(|(&speed_rpm, found)| {
+            let motions = found.iter().flat_map(|found| &found.motions);
+            motions.map(move |motion| (speed_rpm, motion))
+        });
         let mut farthest = 0.0;
-        motions.into_iter().fold(None, |most: Option<Self>, (speed_rpm, motion)| {
+        motions.fold(None, |most: Option<Self>, (speed_rpm, motion)| {
             let this = Self { deviations: motion.peaks, speed_rpm, kind: motion.kind() };
             let mut most = most.unwrap_or(this);
             if this.turned_rad() > farthest {

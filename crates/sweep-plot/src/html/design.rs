@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{CHART, CORE, DESIGN, START, chart_json, curve, embed, page, report};
+use super::{CHART, CORE, DESIGN, START, chart_json, computed, curve, embed, page};
 use crate::figures::{histogram, influence, matrix};
 use crate::frame::HEADING_HEIGHT;
 use crate::model::Figures;
@@ -54,8 +54,6 @@ pub(crate) fn page_of(scatter: &Scatter, options: &Options, model: &dyn Figures)
     });
     let axes: Vec<(&str, bool)> =
         scatter.parameters.iter().map(|one| (one.name.as_str(), one.log)).collect();
-    let computing = model.computing(&axes);
-    let told =
-        computing.as_ref().map_or_else(String::new, |_| report::told(&scatter.source, model));
+    let (computing, told) = computed(&scatter.source, &axes, model);
     page(title, data, [&[CORE, CHART, DESIGN], &[START]], computing, &scatter.source, &told)
 }

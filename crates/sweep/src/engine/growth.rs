@@ -73,11 +73,7 @@ pub(super) fn add(
         let dwells: Vec<_> = dwells.iter().map(|dwell| (*dwell, None)).collect();
         let found = motions(simd, &dwells, &Starts::default(), is_stopped);
         for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
-            let all = speeds_rpm.iter().zip(found).flat_map(|(speed, found)| {
-                let motions = found.iter().flat_map(|found| &found.motions);
-                motions.map(|motion| (*speed, motion))
-            });
-            outcome.dwelt = Dwelt::of(all);
+            outcome.dwelt = Dwelt::of(speeds_rpm, found);
         }
     }
 }
