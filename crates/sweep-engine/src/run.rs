@@ -1,6 +1,6 @@
-//! The runner: takes missing chunks in order, has the engine compute them on all cores, keeps each
-//! as it comes, and joins the whole. Of chunks that a signal or an error cuts short it keeps the
-//! rows that are there.
+//! The runner: takes missing chunks, has the engine compute them on all cores, keeps each as it
+//! comes, and joins the whole. Of chunks that a signal or an error cuts short it keeps the rows that
+//! are there.
 //!
 //! Memory: a chunk (at most 4096 points, about 2 MB) in hand for each thread and as many again on
 //! their way to the disk, then about 40 MB for the join; nothing grows with the number of points
@@ -238,7 +238,11 @@ impl<'a> Hand<'a> {
     ) -> Self {
         let parts = run.take_parts();
         let there: BTreeSet<u64> = parts.values().flatten().map(|outcome| outcome.point).collect();
-        let missing = (0..run.chunks()).filter(|&chunk| run.is_missing(chunk));
+        let chunks = run.chunks();
+        let stride = if work.engine.is_helped_by_neighbours() { 1 } else { stride(chunks) };
+        let order = (0..chunks)
+            .map(move |k| (u128::from(k) * u128::from(stride) % u128::from(chunks)) as u64);
+        let missing = order.filter(|&chunk| run.is_missing(chunk));
         let left = missing.flat_map(|chunk| run.chunk_range(chunk));
         let left = left.filter(move |point| !there.contains(point));
         let (left, parts) = (Mutex::new(Box::new(left) as Box<_>), Parts(Mutex::new(parts)));
@@ -288,6 +292,21 @@ impl<'a> Hand<'a> {
             let _ = self.whole.send((chunk, outcomes));
         }
     }
+}
+
+/// Of so many chunks, the step from each to the next that takes all of them, those that follow one
+/// another far apart. Points that take long lie side by side in a grid: so some come early, and
+/// threads have others to work on meanwhile; and what is done is a sample of what is left.
+fn stride(chunks: u64) -> u64 {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let is_coprime = |stride: &u64| {
+        let (mut a, mut b) = (*stride, chunks);
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        a == 1
+    };
+    ((GOLDEN * chunks as f64) as u64..=chunks).find(is_coprime).unwrap_or(1)
 }
 
 #[cfg(test)]

@@ -30,6 +30,11 @@ pub trait Engine: Sync {
 
     /// The instruction set in use.
     fn simd(&self) -> &str;
+
+    /// Whether rows that come one after another share work.
+    fn is_helped_by_neighbours(&self) -> bool {
+        false
+    }
 }
 
 /// The engine's view of the run it serves.

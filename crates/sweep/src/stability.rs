@@ -244,6 +244,11 @@ impl Engine for DwellEngine<'_> {
         });
     }
 
+    /// A point's rows share its machine made ready, and the curve of its responses.
+    fn is_helped_by_neighbours(&self) -> bool {
+        true
+    }
+
     fn simd(&self) -> &str {
         match self.asked {
             Asked::Responses(_) => Simd::best().name(),

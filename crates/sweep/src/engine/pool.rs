@@ -3,8 +3,8 @@
 //!
 //! A lane group costs the same with one trajectory as with eight. So runs of one rung and model
 //! wait for each other, whichever rows they belong to, and a thread takes a group as soon as there
-//! is a whole one, the highest rung first: rows that are nearly done leave. Only when nothing more
-//! can come are groups taken that are not full. Where every trajectory has steps of its own, groups
+//! is a whole one, the highest rung first: rows that are nearly done leave. Once no more points come,
+//! groups are taken that are not full, the lowest rung first: it has the longest way to go. Where every trajectory has steps of its own, groups
 //! are larger, the longest trajectories first: a lane that ends early takes up the next.
 //!
 //! What a lane computes does not depend on its company, so neither does a row.
@@ -42,7 +42,7 @@ impl ModelEngine<'_> {
 
 /// A row that has seen so many others come after it waits no longer: the group is taken as it is,
 /// so that chunks become whole and an interrupt loses little.
-const PATIENCE: u64 = 1024;
+const PATIENCE: u64 = 2048;
 
 /// Where points come from: at most so many, none at the end. Each with what the caller knows it by.
 pub(super) type Feed<'a> = dyn Fn(usize) -> Vec<(u64, Scenario)> + Sync + 'a;
@@ -92,8 +92,8 @@ pub(super) struct PoolState {
     fed: u64,
     /// Rows that wait for a run, by its kind.
     waiting: BTreeMap<ModelRung, Vec<u64>>,
-    /// The rungs that threads are at work on, one entry each; below all of them is the feed.
-    at_work: Vec<Option<usize>>,
+    /// Threads that are at work on runs or points.
+    at_work: usize,
     /// The feed has run dry.
     is_dry: bool,
 }
@@ -128,7 +128,7 @@ impl Pool<'_> {
                 Work::End => break,
                 Work::Wait => drop(self.changed.wait_timeout(state, LOOK_UP)),
                 Work::Feed => {
-                    state.at_work.push(None);
+                    state.at_work += 1;
                     drop(state);
                     let mut rows = self.fed();
                     let mut state = self.lock();
@@ -137,10 +137,10 @@ impl Pool<'_> {
                         row.came_as = state.fed;
                         state.fed += 1;
                     }
-                    self.advance(state, rows, None);
+                    self.advance(state, rows);
                 }
                 Work::Runs((rung, model), taken) => {
-                    state.at_work.push(Some(rung));
+                    state.at_work += 1;
                     drop(state);
                     let Some(terms) = self.terms() else { break };
                     let ladder = &terms.ladders[model];
@@ -166,7 +166,7 @@ impl Pool<'_> {
                         }
                         rows.push(row);
                     }
-                    self.advance(state, rows, Some(rung));
+                    self.advance(state, rows);
                 }
             }
         }
@@ -196,12 +196,7 @@ impl Pool<'_> {
     }
 
     /// Asks for what rows need next, and hands over those that need nothing.
-    fn advance(
-        &self,
-        mut state: MutexGuard<'_, PoolState>,
-        rows: Vec<Climber>,
-        finished: Option<usize>,
-    ) {
+    fn advance(&self, mut state: MutexGuard<'_, PoolState>, rows: Vec<Climber>) {
         let mut done = Vec::new();
         for mut row in rows {
             let next = if row.pending > 0 {
@@ -223,9 +218,7 @@ impl Pool<'_> {
                 Next::Done(outcome) => done.push((*outcome, row.point)),
             }
         }
-        if let Some(at) = state.at_work.iter().position(|&level| level == finished) {
-            state.at_work.swap_remove(at);
-        }
+        state.at_work -= 1;
         drop(state);
         self.changed.notify_all();
         done.iter_mut().for_each(|(outcome, _)| outcome.forget_turns());
@@ -258,11 +251,9 @@ impl PoolState {
         }
         let lowest = self.waiting.iter().find(|(_, waiting)| !waiting.is_empty());
         match lowest.map(|(kind, waiting)| (*kind, waiting.len())) {
-            // What is at work below may fill the group.
-            Some(((rung, _), _)) if self.at_work.iter().any(|&at| at < Some(rung)) => Work::Wait,
             // The rest is for other threads.
             Some((kind, count)) => self.take(kind, count.div_ceil(2).max(MAX_LANES)),
-            None if self.at_work.is_empty() => Work::End,
+            None if self.at_work == 0 => Work::End,
             None => Work::Wait,
         }
     }
