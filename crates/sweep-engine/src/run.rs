@@ -1,6 +1,6 @@
 //! The runner: takes missing chunks, has the engine compute them on all cores, keeps each as it
-//! comes, and joins the whole. Of chunks that a signal or an error cuts short it keeps the rows that
-//! are there.
+//! comes, and joins the whole. Of chunks that a signal or an error cuts short it keeps the rows
+//! that are there.
 //!
 //! Memory: a chunk (at most 4096 points, about 2 MB) in hand for each thread and as many again on
 //! their way to the disk, then about 40 MB for the join; nothing grows with the number of points

@@ -3,9 +3,10 @@
 //!
 //! A lane group costs the same with one trajectory as with eight. So runs of one rung and model
 //! wait for each other, whichever rows they belong to, and a thread takes a group as soon as there
-//! is a whole one, the highest rung first: rows that are nearly done leave. Once no more points come,
-//! groups are taken that are not full, the lowest rung first: it has the longest way to go. Where every trajectory has steps of its own, groups
-//! are larger, the longest trajectories first: a lane that ends early takes up the next.
+//! is a whole one, the highest rung first: rows that are nearly done leave. Once no more points
+//! come, groups are taken that are not full, the lowest rung first: it has the longest way to go.
+//! Where every trajectory has steps of its own, groups are larger, the longest trajectories first:
+//! a lane that ends early takes up the next.
 //!
 //! What a lane computes does not depend on its company, so neither does a row.
 
