@@ -105,4 +105,4 @@ class Spent:
 
 
 if __name__ == "__main__":
-    print(f"Measured on {machine()}, of commit {commit()}.")
+    print(wrapped(said()))
