@@ -31,7 +31,8 @@ pub trait Engine: Sync {
     /// The instruction set in use.
     fn simd(&self) -> &str;
 
-    /// Whether rows that come one after another share work.
+    /// Whether rows that come one after another share work: `next` then keeps to the grid's order,
+    /// and otherwise takes chunks that are far apart.
     fn is_helped_by_neighbours(&self) -> bool {
         false
     }
