@@ -1,6 +1,8 @@
 //! Against numbers from a program independent of this one, against the machine as it is, and
 //! against its simulation.
 
+mod company;
+
 use super::orbit::{Row, linear_responses};
 use super::plain::{Plain, Trace};
 use super::search::{Solve, finish};

@@ -138,7 +138,10 @@ pub(crate) fn turn<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
                 _ => None,
             };
             stages(system, clock.step_s, &forcings, x, count, watch);
-            if let Some(kept) = clock.hinge_kept {
+            // The step after the last changes no state.
+            if let Some(kept) = clock.hinge_kept
+                && k < clock.steps
+            {
                 for i in [HINGE_YAW, HINGE_PITCH] {
                     x[COORDINATES + i] = (x[COORDINATES + i] * kept).v();
                 }

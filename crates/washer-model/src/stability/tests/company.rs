@@ -1,0 +1,107 @@
+//! Turns do not depend on those that share their lanes.
+
+use super::*;
+use crate::stability::orbit::{Asked, Turned, turns};
+use crate::{Bushing, Unbalance};
+
+/// A random machine with the elements of `kinds`' bits: friction, stops, stiffening springs, a
+/// bushing, a second unbalance.
+fn with_elements(kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
+    let mut machine = random(numbers);
+    let mut between = |low: f64, high: f64| low + (high - low) * numbers.f64();
+    if kinds & 1 != 0 {
+        for damper in &mut machine.dampers {
+            damper.friction_n = between(5.0, 80.0);
+        }
+    }
+    if kinds & 2 != 0 {
+        for side in [1.0, -1.0] {
+            machine.stops.push(BumpStop {
+                tub_m: [0.35, 0.0, 0.28 * side],
+                direction: [0.0, 0.1, side],
+                clearance_m: between(0.004, 0.02),
+                stiffness_n_per_m: between(1e4, 1.5e5),
+                damping_n_s_per_m: between(0.0, 400.0),
+                softness_m: between(1e-4, 1e-3),
+            });
+        }
+    }
+    if kinds & 4 != 0 {
+        machine.springs.iter_mut().for_each(|spring| spring.cubic_n_per_m3 = between(1e5, 3e6));
+    }
+    if kinds & 8 != 0 {
+        machine.bushings.push(Bushing {
+            tub_m: [0.45, 0.0, 0.0],
+            stiffness_n_per_m: [0.0, between(500.0, 2e3), between(500.0, 2e3)],
+            cubic_n_per_m3: [0.0, 1e7, between(5e6, 2e7)],
+            damping_n_s_per_m: [0.0, 10.0, 15.0],
+        });
+    }
+    if kinds & 16 != 0 {
+        let (mass_kg, x_m) = (between(0.05, 0.4), between(0.1, 0.3));
+        machine.further_unbalances.push(Unbalance { mass_kg, x_m, radius_m: 0.18 });
+    }
+    machine
+}
+
+fn bits(turned: &Turned) -> Vec<u64> {
+    let mut numbers: Vec<f64> = turned.end.to_vec();
+    if let Some(seen) = &turned.seen {
+        numbers.extend(seen.monodromy.iter().flatten().map(|entry| entry.0));
+        numbers.extend(seen.peaks);
+        numbers.push(seen.gap_m);
+        numbers.extend(seen.states.iter().flatten());
+    }
+    numbers.into_iter().map(f64::to_bits).collect()
+}
+
+/// Turns of random machines with every choice of elements, alone and in random company. SEED and
+/// MACHINES choose others.
+#[test]
+fn turns_do_not_depend_on_company() {
+    let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
+    let mut numbers = fastrand::Rng::with_seed(given("SEED", 1));
+    for number in 0..given("MACHINES", 64) {
+        let kinds = number % 32;
+        let points: Vec<Point> = (0..1 + numbers.usize(..4))
+            .map(|_| prepared(with_elements(kinds, &mut numbers), 100.0))
+            .collect();
+        let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
+        let speed_rpm = 60.0 + 400.0 * numbers.f64();
+        let mut asked: Vec<Asked<'_>> = Vec::new();
+        for _ in 0..2 + numbers.usize(..12) {
+            let settings = numbers.choice(&mut settings).unwrap();
+            let speed_rpm = speed_rpm * (1.0 + 0.02 * numbers.f64());
+            let row = match numbers.u8(..3) {
+                0 => settings.case(speed_rpm).unwrap().row,
+                1 => settings.case(speed_rpm).unwrap().without_caps().unwrap().row,
+                _ => settings.followed(speed_rpm).unwrap(),
+            };
+            let rest = settings.point.equilibrium();
+            let size = 0.02 * numbers.f64();
+            let start = core::array::from_fn(|i| {
+                let by = size * (2.0 * numbers.f64() - 1.0);
+                if i < 2 || (4..6).contains(&i) {
+                    rest[i] + by
+                } else if i < COORDINATES {
+                    rest[i]
+                } else {
+                    by
+                }
+            });
+            asked.push(Asked { row, start, is_seen: numbers.bool() });
+        }
+        let together = turns(&asked, &|| false);
+        for (asked, together) in asked.iter().zip(&together) {
+            let alone = turns(core::slice::from_ref(asked), &|| false).remove(0);
+            let kind = asked.row.kind();
+            assert!(
+                bits(&alone) == bits(together),
+                "machine {number}, elements {kinds:b}, {kind:?}, seen {}: {:?} {:?}",
+                asked.is_seen,
+                alone.end,
+                together.end
+            );
+        }
+    }
+}
