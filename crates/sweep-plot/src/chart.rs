@@ -180,6 +180,10 @@ pub(crate) fn x_scale(chart: &Chart) -> Scale {
         return Scale::around(xs);
     }
     let (low, high) = extremes(xs).unwrap_or((0.0, 1.0));
+    // The one place of all series is in the middle, so that dots are whole.
+    if high <= low && !chart.x_log {
+        return Scale::linear(low - 0.5, low + 0.5);
+    }
     let high = if high > low { high } else { low + 1.0 };
     if chart.x_log { Scale::log(low, high) } else { Scale::linear(low, high) }
 }

@@ -60,7 +60,7 @@ fn positive(text: &str) -> Result<f64, String> {
 #[derive(Clone, Copy, Debug, PartialEq, clap::Args)]
 pub struct Search {
     /// Starts a speed, the disturbed periodic response among them; at most 1024
-    #[arg(long, value_name = "N", default_value_t = 8,
+    #[arg(long, value_name = "N", default_value_t = 12,
           value_parser = clap::value_parser!(u64).range(1..=Search::MOST_STARTS))]
     pub starts: u64,
     /// Hardest kick, in rad/s of the tub's rocking

@@ -1,6 +1,7 @@
 //! Why the linear model fails at a point: the tongues of instability that its run crosses, and what
 //! they do to the run.
 
+mod cause;
 pub(crate) mod format;
 pub(crate) mod json;
 mod profile;
@@ -20,6 +21,7 @@ use crate::speeds::Speeds;
 use sweep_engine::config::NamedValues;
 use sweep_engine::{Effort, Error, Interrupt, Progress, Watch, threads};
 
+pub(crate) use cause::Cause;
 use sweep_parameter::RatioLimits;
 use tongue::{Asker, Seen, tongues};
 pub(crate) use tongue::{Closing, End, Resonance, Tongue};
@@ -49,6 +51,8 @@ pub(crate) struct Explanation {
     /// The same run, each tongue entered on its periodic response: amplitudes in the window, per
     /// channel of the plan; none where no tongue is crossed before the window ends.
     pub(crate) without_departures: Option<Result<Vec<f64>, LeftRange>>,
+    /// The deviation, and how much of it the tongues' growth makes; none without a ratio.
+    pub(crate) cause: Option<Cause>,
 }
 
 /// What `sweep run` says of the point.
@@ -146,6 +150,12 @@ fn explained(
         || found.par_iter().map(|tongue| tongue.closing(&asker)).collect::<Vec<_>>(),
     );
     let (passages, without_departures) = crossings;
+    let spin = &scenario.model.spin;
+    let step_s = reference_step_s(&Cases::new([(&point, spin)], plan.end_s));
+    let growing = found.iter().zip(&passages).flat_map(|(tongue, passages)| {
+        passages.iter().map(|passage| (passage, tongue.growths.as_slice()))
+    });
+    let cause = cause::cause((&point, spin), step_s, &swept, growing);
     let tongues = found.into_iter().zip(closings).zip(ends_in).zip(passages);
     let tongues = tongues.map(|(((tongue, closing), ends_in), passages)| {
         (Tongue { closing: Some(closing), ends_in, ..tongue }, passages)
@@ -157,6 +167,7 @@ fn explained(
         profile_rpm,
         tongues: tongues.collect(),
         without_departures,
+        cause,
         swept,
     })
 }

@@ -1,6 +1,8 @@
 //! Periodic responses over a grid and speeds: the engine of `sweep stability`, and what a finished
 //! file says.
 
+#[cfg(test)]
+mod tests;
 pub(crate) mod tongues;
 
 use std::collections::BTreeMap;

@@ -6,6 +6,7 @@ mod course;
 mod exponent;
 mod hold;
 mod lines;
+mod multipliers;
 mod starts;
 #[cfg(test)]
 mod tests;
@@ -15,12 +16,15 @@ use crate::coordinates::STATES;
 use crate::run::model::{Model, Nonlinear};
 use crate::stability::orbit::Row;
 use crate::stability::settings::{Case, Settings};
-use crate::{COORDINATES, Dwell, Modes, NoAnswer, Reading, Recorders, Response, respond};
+use crate::{Dwell, Modes, NoAnswer, Reading, Recorders, Response, respond};
 use course::{BLOCK, Course, Need, WINDOW, are_alike};
 use exponent::exponents;
 use hold::{Held, hold, recorded};
 use lane_ode::Simd;
-use starts::{DIRECTIONS, Kick, directions, disturbed, kicked, kicks};
+use multipliers::{Orbit, growths_per_s};
+use starts::{
+    Directions, Kick, MODE_DIRECTIONS, directions, disturbed, kicked, kicks, random_kicks,
+};
 use std::sync::Arc;
 
 pub use exponent::Exponent;
@@ -53,7 +57,7 @@ pub struct Starts {
 impl Default for Starts {
     fn default() -> Self {
         Self {
-            count: 8,
+            count: 12,
             kick_rad_per_s: 6.0,
             longest_s: 600.0,
             with_threshold: false,
@@ -74,6 +78,12 @@ pub enum State {
     },
     /// It did not settle in time.
     NotSettled,
+    /// It wandered as chaos does, but trajectories from its own states ended elsewhere.
+    Transient {
+        /// Its mean life (s): the time that these trajectories took together, by the number of
+        /// those that ended.
+        life_s: f64,
+    },
 }
 
 /// What a motion settled into.
@@ -90,7 +100,8 @@ pub enum Settled {
         /// minute); the drum's speed less it is another.
         frequency_cpm: f64,
     },
-    /// Neighbours part: the largest Lyapunov exponent is above 0 by three standard errors.
+    /// Neighbours part: the largest Lyapunov exponent is above 0 by three standard errors, and
+    /// trajectories from eight of its states stayed in it for 240 s.
     Chaotic,
 }
 
@@ -101,15 +112,18 @@ pub struct Ending {
     pub state: State,
     /// What it is, once it has settled.
     pub settled: Option<Settled>,
-    /// How many starts ended in it.
+    /// How many starts ended in it; none where only a transient did.
     pub starts: u32,
+    /// The smallest kick (rad/s) that led to it: 0 where a disturbed response did, none where only
+    /// a transient or a carried state did.
+    pub least_kick_rad_per_s: Option<f64>,
     /// Largest deviation from equilibrium over its last turns (32 where it repeats, 128 with two
     /// frequencies, else 256), in the order of [`Channel::ALL`](crate::Channel::ALL) (m, rad).
     pub peaks: [f64; CHANNELS],
     /// Least gap between drum and tub at the ends of steps of these turns (m).
     pub min_gap_m: f64,
-    /// How fast neighbours part, where that was asked: of motions whose spectrum does not say what
-    /// they are.
+    /// How fast neighbours part: of periodic motions by their multipliers, without an error; of
+    /// others by a perturbed run, where their spectrum does not say what they are.
     pub exponent: Option<Exponent>,
     /// How long the trajectory was followed (s).
     pub time_s: f64,
@@ -185,6 +199,13 @@ pub fn endings_beside(
         hunts.push(settings.case(dwell.speed_rpm).map(hunt));
     }
     let mut is_whole = finish(simd, &mut hunts, is_stopped);
+    for hunt in hunts.iter_mut().flatten() {
+        hunt.start_survivors();
+    }
+    is_whole = is_whole && finish(simd, &mut hunts, is_stopped);
+    for hunt in hunts.iter_mut().flatten() {
+        hunt.find_transients();
+    }
     if starts.with_threshold {
         for hunt in hunts.iter_mut().flatten() {
             hunt.bracket();
@@ -244,12 +265,20 @@ fn finish(
             return false;
         }
         let mut running: Vec<&mut Course<'_>> = Vec::new();
-        let (mut asking, mut twins) = (Vec::new(), Vec::new());
+        let mut asking = Vec::new();
+        let mut twins = Vec::new();
+        let mut repeating: Vec<(&mut Course<'_>, u32)> = Vec::new();
+        let mut orbits: Vec<Orbit<'_, '_>> = Vec::new();
         for hunt in hunts.iter_mut().flatten() {
-            let direction = hunt.directions[DIRECTIONS - 1];
+            let direction = hunt.directions[MODE_DIRECTIONS - 1];
+            let case = &hunt.case;
             for course in &mut hunt.courses {
                 match course.need {
                     Need::Turns => running.push(course),
+                    Need::Multipliers(period) => {
+                        orbits.push(Orbit { case, held: course.held, period });
+                        repeating.push((course, period));
+                    }
                     Need::Exponent => {
                         twins.push((course.held, direction));
                         asking.push(course);
@@ -258,8 +287,12 @@ fn finish(
                 }
             }
         }
-        if running.is_empty() && asking.is_empty() {
+        if running.is_empty() && asking.is_empty() && repeating.is_empty() {
             return true;
+        }
+        let growths = growths_per_s(&orbits, is_stopped);
+        for ((course, period), growth_per_s) in repeating.into_iter().zip(growths) {
+            course.take_growth(period, growth_per_s);
         }
         let held: Vec<Held<'_>> = running.iter().map(|course| course.held).collect();
         for (course, turns) in running.into_iter().zip(hold(simd, &held, BLOCK)) {
@@ -278,15 +311,19 @@ struct Hunt<'a> {
     case: Case<'a>,
     responses: Vec<Response>,
     from: [f64; STATES],
-    directions: [[f64; COORDINATES]; DIRECTIONS],
+    directions: Directions,
     longest_s: f64,
+    /// Whether the one start is the state that another speed ended in.
+    is_carried: bool,
     courses: Vec<Course<'a>>,
     /// Of each course its kick, if it has one.
     kicks: Vec<Option<Kick>>,
-    /// Courses that are starts; the others look for the threshold.
+    /// Courses that are starts; the others look for the threshold, or try whether chaos survives.
     starts: usize,
-    /// By direction, sizes of kicks that come back and that do not (rad/s).
-    brackets: [Option<[f64; 2]>; DIRECTIONS],
+    /// The number of a chaotic course, and those of the courses from its states.
+    survivors: Vec<(usize, core::ops::Range<usize>)>,
+    /// By direction along mode shapes, sizes of kicks that come back and that do not (rad/s).
+    brackets: [Option<[f64; 2]>; MODE_DIRECTIONS],
 }
 
 impl<'a> Hunt<'a> {
@@ -301,7 +338,7 @@ impl<'a> Hunt<'a> {
         let rest = <Nonlinear<f64> as Model<f64>>::at_rest(point);
         let from = responses.first().map_or(rest, |response| response.start);
         let mut states: Vec<([f64; STATES], Option<Kick>)> = Vec::new();
-        let directions = directions(point, &frozen);
+        let directions = directions(point, &frozen, random_kicks(starts.count));
         if let Some(carried) = carried {
             states.push((disturbed(point, &frozen, &carried), None));
         } else {
@@ -319,10 +356,12 @@ impl<'a> Hunt<'a> {
             from,
             directions,
             longest_s: starts.longest_s,
+            is_carried: carried.is_some(),
             courses: Vec::new(),
             kicks: Vec::new(),
             starts: states.len(),
-            brackets: [None; DIRECTIONS],
+            survivors: Vec::new(),
+            brackets: [None; MODE_DIRECTIONS],
         };
         for (state, kick) in states {
             hunt.start(state, kick);
@@ -333,9 +372,54 @@ impl<'a> Hunt<'a> {
     fn start(&mut self, state: [f64; STATES], kick: Option<Kick>) {
         let held = Held { row: self.case.row, state };
         let grows = |response: &&Response| response.growth_per_s() > 0.0;
-        let leaves = self.responses.iter().filter(grows).map(|response| response.start).collect();
+        let unstable = self.responses.iter().filter(grows);
+        let leaves = unstable.map(|response| vec![response.start]).collect();
         self.courses.push(Course::new(held, leaves, self.longest_s));
         self.kicks.push(kick);
+    }
+
+    /// Starts trajectories from states of each chaotic motion that starts ended in.
+    fn start_survivors(&mut self) {
+        for chaotic in 0..self.starts {
+            if !self.courses[chaotic].is_chaotic() || self.survivors_of(chaotic).is_some() {
+                continue;
+            }
+            let first = self.courses.len();
+            let leaves = self.courses[chaotic].leaves().to_vec();
+            for state in self.courses[chaotic].own_states() {
+                let held = Held { row: self.case.row, state };
+                self.courses.push(Course::survivor(held, leaves.clone()));
+                self.kicks.push(None);
+            }
+            self.survivors.push((chaotic, first..self.courses.len()));
+        }
+    }
+
+    /// Returns the trajectories from states of the motion that a course is in.
+    fn survivors_of(&self, course: usize) -> Option<core::ops::Range<usize>> {
+        let ending = self.courses[course].ending();
+        let of_same = |(other, _): &&(usize, core::ops::Range<usize>)| {
+            are_same(&self.courses[*other].ending(), &ending)
+        };
+        self.survivors.iter().find(of_same).map(|(_, survivors)| survivors.clone())
+    }
+
+    /// Calls what is chaotic a transient where one of the trajectories from its states ended
+    /// elsewhere.
+    fn find_transients(&mut self) {
+        let mut lives: Vec<(usize, f64)> = Vec::new();
+        for chaotic in (0..self.starts).filter(|&course| self.courses[course].is_chaotic()) {
+            let Some(survivors) = self.survivors_of(chaotic) else { continue };
+            let survivors = &self.courses[survivors];
+            let ended = survivors.iter().filter(|course| course.has_ended()).count();
+            if ended > 0 {
+                let time_s: f64 = survivors.iter().map(Course::time_s).sum();
+                lives.push((chaotic, time_s / ended as f64));
+            }
+        }
+        for (course, life_s) in lives {
+            self.courses[course].call_transient(life_s);
+        }
     }
 
     /// Whether a course ended where the first one did.
@@ -345,7 +429,7 @@ impl<'a> Hunt<'a> {
 
     /// Of every direction the kicks between which some stop coming back.
     fn bracket(&mut self) {
-        for direction in 0..DIRECTIONS {
+        for direction in 0..MODE_DIRECTIONS {
             let mut kicks: Vec<(f64, bool)> = Vec::new();
             for (course, kick) in self.kicks.iter().enumerate() {
                 if let Some((of, size)) = kick
@@ -365,7 +449,7 @@ impl<'a> Hunt<'a> {
 
     /// Starts in the middle of the brackets.
     fn halve(&mut self) {
-        for direction in 0..DIRECTIONS {
+        for direction in 0..MODE_DIRECTIONS {
             if let Some([back, gone]) = self.brackets[direction] {
                 let kick = (direction, 0.5 * (back + gone));
                 self.start(kicked(&self.from, &self.directions, kick), Some(kick));
@@ -388,11 +472,22 @@ impl<'a> Hunt<'a> {
 
     fn found(self) -> (Endings, Row<'a>) {
         let mut motions: Vec<Ending> = Vec::new();
-        for course in &self.courses[..self.starts] {
-            let ending = course.ending();
+        for (course, kick) in self.courses[..self.starts].iter().zip(&self.kicks) {
+            let mut ending = course.ending();
+            ending.least_kick_rad_per_s = match kick {
+                Some((_, size)) => Some(*size),
+                None => (!self.is_carried).then_some(0.0),
+            };
             match motions.iter_mut().find(|motion| are_same(motion, &ending)) {
                 Some(known) => known.also(&ending),
                 None => motions.push(ending),
+            }
+        }
+        let ends_of_transients = self.survivors.iter().flat_map(|(_, survivors)| survivors.clone());
+        for course in ends_of_transients.filter(|&course| self.courses[course].has_ended()) {
+            let ending = Ending { starts: 0, ..self.courses[course].ending() };
+            if !motions.iter().any(|motion| are_same(motion, &ending)) {
+                motions.push(ending);
             }
         }
         let gone = self.brackets.iter().flatten().map(|[_, gone]| *gone);
@@ -434,12 +529,13 @@ impl Endings {
 
 impl Ending {
     /// What motions are, by name: in words what they do once a turn, then why that is not known.
-    pub const KINDS: [&str; 7] = [
+    pub const KINDS: [&str; 8] = [
         "periodic",
         "periodic_2",
         "periodic_m",
         "quasi_periodic",
         "chaotic",
+        "transient",
         "left_range",
         "not_settled",
     ];
@@ -450,8 +546,9 @@ impl Ending {
             (Some(Settled::Periodic { turns }), _) => (turns as usize).min(3) - 1,
             (Some(Settled::QuasiPeriodic { .. }), _) => 3,
             (Some(Settled::Chaotic), _) => 4,
-            (None, State::LeftRange { .. }) => 5,
-            (None, State::Ok | State::NotSettled) => 6,
+            (None, State::Transient { .. }) => 5,
+            (None, State::LeftRange { .. }) => 6,
+            (None, State::Ok | State::NotSettled) => 7,
         }
     }
 
@@ -459,6 +556,8 @@ impl Ending {
     /// deviations are those of all starts.
     fn also(&mut self, other: &Self) {
         let starts = self.starts + 1;
+        let kicks = [self.least_kick_rad_per_s, other.least_kick_rad_per_s];
+        let least_kick_rad_per_s = kicks.into_iter().flatten().reduce(f64::min);
         if self.settled.is_none() && other.settled.is_some() {
             *self = other.clone();
         } else if matches!(self.settled, None | Some(Settled::Chaotic)) {
@@ -468,5 +567,6 @@ impl Ending {
             self.min_gap_m = self.min_gap_m.min(other.min_gap_m);
         }
         self.starts = starts;
+        self.least_kick_rad_per_s = least_kick_rad_per_s;
     }
 }

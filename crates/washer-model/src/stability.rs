@@ -4,12 +4,12 @@ mod branch;
 mod corners;
 mod crossing;
 mod exponents;
-mod monodromy;
+pub(crate) mod monodromy;
 pub(crate) mod orbit;
 mod participants;
 #[cfg(test)]
 mod plain;
-mod respond;
+pub(crate) mod respond;
 pub(crate) mod search;
 pub(crate) mod settings;
 mod stepwise;

@@ -53,7 +53,7 @@ pub(crate) fn stability(
 
 /// The motions that constant speeds end in.
 #[pyfunction]
-#[pyo3(signature = (plan, speeds_rpm, out=None, *, starts=8, kick=6.0, carry=None, threshold=false,
+#[pyo3(signature = (plan, speeds_rpm, out=None, *, starts=12, kick=6.0, carry=None, threshold=false,
                     longest=600.0, sections=0, threads=None, progress=true, fresh=false))]
 // Options of a Python function.
 #[expect(clippy::too_many_arguments)]

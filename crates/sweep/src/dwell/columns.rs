@@ -23,10 +23,11 @@ pub(crate) type DwellColumn = ResultColumn<RowOf>;
 const SETTLED: usize = 5;
 
 /// How a row came about.
-const STATUSES: [&str; 8] = [
+const STATUSES: [&str; 9] = [
     "ok",
     "left_range",
     "not_settled",
+    "transient",
     "no_equilibrium",
     "panicked",
     "no_multipliers",
@@ -71,6 +72,13 @@ impl RowOf {
         }
     }
 
+    fn life_s(&self) -> Option<f64> {
+        match self.motion()?.state {
+            State::Transient { life_s } => Some(life_s),
+            State::Ok | State::LeftRange { .. } | State::NotSettled => None,
+        }
+    }
+
     fn is_near_response(&self) -> Option<bool> {
         let motion = self.motion().filter(|motion| motion.state == State::NotSettled)?;
         Some(self.found()?.is_near_response(motion))
@@ -81,6 +89,7 @@ impl RowOf {
             Ok(_) => match self.motion().map(|motion| motion.state) {
                 Some(State::Ok) => "ok",
                 Some(State::LeftRange { .. }) => "left_range",
+                Some(State::Transient { .. }) => "transient",
                 Some(State::NotSettled) | None => "not_settled",
             },
             Err(Status::NoEquilibrium) => "no_equilibrium",
@@ -135,15 +144,19 @@ pub(crate) fn columns(
     let text = "number of the motion at this speed: 0 is the one that the disturbed periodic \
                 response ends in";
     let mut columns = vec![ResultColumn::new("motion", "1", text, Holds::Count, motion)];
-    columns.push(counts("starts", "how many starts ended in it", |row| {
-        Some(u64::from(row.motion()?.starts))
-    }));
-    columns.push(counts("starts_made", "how many starts there were", |row| {
-        Some(u64::from(row.found()?.starts))
+    let text = "how many starts ended in it; 0 where only a transient did";
+    columns.push(counts("starts", text, |row| Some(u64::from(row.motion()?.starts))));
+    let text = "how many starts there were: the disturbed periodic responses, then kicks, two \
+                thirds of them along the modes that rock most, the others in random directions";
+    columns.push(counts("starts_made", text, |row| Some(u64::from(row.found()?.starts))));
+    let text = "smallest kick that led to it; 0: a disturbed periodic response did; null where \
+                only a transient or the last speed's motion did";
+    columns.push(ResultColumn::measured("least_kick_rad_per_s", "rad/s", text, |row: &RowOf| {
+        row.motion()?.least_kick_rad_per_s
     }));
     let text = "periodic: it repeats every turn; periodic_2: every second; periodic_m: every \
-                period_turns; quasi_periodic: two frequencies; chaotic: neighbours part; null \
-                where it did not settle";
+                period_turns; quasi_periodic: two frequencies; chaotic: neighbours part, and eight \
+                trajectories from its states stayed in it for 240 s; null where it did not settle";
     columns.push(ResultColumn::name("kind", text, Ending::KINDS[..SETTLED].to_vec(), RowOf::kind));
     let text = "after how many turns it repeats; null where it does not";
     columns.push(counts("period_turns", text, RowOf::period_turns));
@@ -175,7 +188,8 @@ pub(crate) fn columns(
         (
             "exponent_per_s",
             "1/s",
-            "largest Lyapunov exponent; null where the motion's spectrum says what it is",
+            "largest Lyapunov exponent: of a periodic motion by its Floquet multipliers, below 0; \
+             null where the spectrum shows two frequencies",
             |row| Some(row.motion()?.exponent?.per_s),
         ),
         ("exponent_error_per_s", "1/s", "its standard error", |row| {
@@ -202,12 +216,15 @@ pub(crate) fn columns(
     let text = "of a motion that did not settle: whether its largest deviations are within a \
                 factor of two of the periodic response's, which it then comes to or leaves slowly";
     columns.push(ResultColumn::flag("near_response", text, RowOf::is_near_response));
+    let text = "mean life of a transient; null of other motions";
+    columns.push(ResultColumn::measured("life_s", "s", text, RowOf::life_s));
     let text = "how long its first trajectory was followed";
     columns.push(ResultColumn::measured("followed_s", "s", text, |row: &RowOf| {
         Some(row.motion()?.time_s)
     }));
     let text = "ok; left_range: it went farther than the model is good for, after followed_s; \
-                not_settled: the largest deviations still change; or why there is no motion";
+                not_settled: the largest deviations still change; transient: it wanders as chaos \
+                does, but ends elsewhere after life_s; or why there is no motion";
     columns.push(ResultColumn::name("status", text, STATUSES.to_vec(), |row: &RowOf| {
         STATUSES.iter().position(|status| *status == row.status())
     }));

@@ -3,10 +3,14 @@
 use std::collections::BTreeMap;
 
 use crate::places;
-use sweep_files::{FileError, ParquetFile};
+use sweep_files::{FileError, ParquetFile, key};
 
-/// Channels whose farthest motion is told.
-const TOLD: [&str; 2] = ["tub_yaw", "tub_pitch"];
+/// The channels whose deviations the summary gives.
+const CHANNELS: [&str; 2] = ["tub_yaw", "tub_pitch"];
+
+/// The largest number of motions that have a line each. Basis: they fit on a screen. Doubling it
+/// doubles the longest summary.
+const MAX_LISTED_MOTIONS: usize = 12;
 
 /// Reads through a file: lines, each with its name.
 ///
@@ -20,10 +24,13 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
     // Where there are several motions, and how many.
     let mut several: Vec<(Vec<f64>, u64)> = Vec::new();
     // By channel: how far, which kind of motion, where.
-    let mut farthest: [Option<(f64, String, Vec<f64>)>; TOLD.len()] = [None, None];
+    let mut farthest: [Option<(f64, String, Vec<f64>)>; CHANNELS.len()] = [None, None];
     let has_turns = file.schema().index_of("turn").is_ok();
-    let channels = TOLD.map(|name| format!("nonlinear_{name}"));
-    let names = ["kind", "status", "motion", "turn"].into_iter();
+    let channels = CHANNELS.map(|name| format!("nonlinear_{name}"));
+    let has_kicks = file.schema().index_of("least_kick_rad_per_s").is_ok();
+    let mut listed: Vec<Listed> = Vec::new();
+    let names = ["kind", "status", "motion", "turn", "starts", "starts_made"].into_iter();
+    let names = names.chain(has_kicks.then_some("least_kick_rad_per_s"));
     let names = names.chain(channels.iter().map(String::as_str));
     let names: Vec<&str> = names.chain(axes.iter().map(String::as_str)).collect();
     file.each_row(&names, |row| {
@@ -31,16 +38,28 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
         if has_turns && row.value(3) > 0.0 {
             return Ok(());
         }
-        let place = || (4 + TOLD.len()..names.len()).map(|column| row.value(column)).collect();
+        let first_channel = 6 + usize::from(has_kicks);
+        let first_axis = first_channel + CHANNELS.len();
+        let place = || (first_axis..names.len()).map(|column| row.value(column)).collect();
         let what = row.word(0).or(row.word(1)).unwrap_or_default();
         rows += 1;
+        if listed.len() <= MAX_LISTED_MOTIONS {
+            listed.push(Listed {
+                at: place(),
+                motion: row.value(2),
+                what: what.replace('_', " "),
+                deviations: [0, 1].map(|k| row.value(first_channel + k)),
+                starts: [row.value(4), row.value(5)],
+                least_kick: if has_kicks { row.value(6) } else { f64::NAN },
+            });
+        }
         *kinds.entry(what.to_owned()).or_default() += 1;
         match row.value(2) {
             0.0 => places += 1,
             1.0 => several.push((place(), 2)),
             _ => several.iter_mut().last().into_iter().for_each(|(_, count)| *count += 1),
         }
-        for (column, farthest) in (4..).zip(&mut farthest) {
+        for (column, farthest) in (first_channel..).zip(&mut farthest) {
             let value = row.value(column);
             if value > farthest.as_ref().map_or(f64::NEG_INFINITY, |(known, ..)| *known) {
                 *farthest = Some((value, what.to_owned(), place()));
@@ -53,7 +72,11 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
     let s = if places == 1 { "" } else { "s" };
     let counted = format!("{rows} at {places} point{s} and speed{s}: {}", list.join(", "));
     let mut lines = vec![("motions", counted)];
-    for (name, farthest) in TOLD.iter().zip(&farthest) {
+    if rows as usize <= MAX_LISTED_MOTIONS {
+        lines.extend(listed.iter().map(|motion| ("motion", motion.sentence(&axes))));
+        lines.extend(pushes(file, &axes, &listed).into_iter().map(|line| ("push", line)));
+    }
+    for (name, farthest) in CHANNELS.iter().zip(&farthest) {
         if let Some((value, kind, at)) = farthest {
             let (name, kind) = (name.replace('_', " "), kind.replace('_', " "));
             let at = places::words(&axes, at);
@@ -64,4 +87,65 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
         lines.push(("several", format!("{motions} motions at {}", places::words(&axes, at))));
     }
     Ok(lines)
+}
+
+/// A motion that has a line.
+struct Listed {
+    /// The point and the speed.
+    at: Vec<f64>,
+    motion: f64,
+    /// The kind, or why there is none.
+    what: String,
+    /// Yaw and pitch (rad).
+    deviations: [f64; CHANNELS.len()],
+    /// The number of starts that ended in it, and of all starts.
+    starts: [f64; 2],
+    /// The smallest kick that led to it (rad/s), not finite where it is not known.
+    least_kick: f64,
+}
+
+impl Listed {
+    fn sentence(&self, axes: &[String]) -> String {
+        let mut text = format!("{} at {}", self.what, places::words(axes, &self.at));
+        for (name, value) in CHANNELS.iter().zip(self.deviations) {
+            if value.is_finite() {
+                text += &format!(", {} {:.1} mrad", name.replace('_', " "), 1e3 * value);
+            }
+        }
+        let [ended, made] = self.starts;
+        if made > 0.0 {
+            text += &format!("; from {ended} of {made} starts");
+            if self.least_kick == 0.0 {
+                text += ", the disturbed periodic response among them";
+            } else if self.least_kick > 0.0 {
+                text += &format!(", the weakest a kick of {:.2} rad/s", self.least_kick);
+            }
+        }
+        text
+    }
+
+    /// Whether its numbers are those of a motion that was found.
+    fn is_found(&self) -> bool {
+        self.starts[1] > 0.0
+    }
+}
+
+/// Returns for each point and speed whether a push leads from motion 0 to another.
+fn pushes(file: &ParquetFile, axes: &[String], listed: &[Listed]) -> Vec<String> {
+    let search = file.json(key::DWELL).unwrap_or_default();
+    let Some(hardest) = search["kick_rad_per_s"].as_f64() else { return Vec::new() };
+    let mut lines = Vec::new();
+    for motions in listed.chunk_by(|a, b| a.at == b.at) {
+        let at = places::words(axes, &motions[0].at);
+        let others = motions.iter().filter(|other| other.motion > 0.0);
+        let kicks = others.map(|other| other.least_kick).filter(|kick| kick.is_finite());
+        if !motions[0].is_found() {
+            continue;
+        }
+        lines.push(match kicks.reduce(f64::min) {
+            Some(kick) => format!("a kick of {kick:.2} rad/s leads elsewhere at {at}"),
+            None => format!("no push up to {hardest} rad/s leads elsewhere at {at}"),
+        });
+    }
+    lines
 }

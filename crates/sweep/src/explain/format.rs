@@ -4,7 +4,7 @@ use washer_model::{Channel, Ending, Kind, LeftRange, Settled, State, decimal};
 
 use sweep_engine::commands::cells::short;
 
-use super::{Closing, End, Explanation, Passage, Resonance, Swept, Tongue};
+use super::{Cause, Closing, End, Explanation, Passage, Resonance, Swept, Tongue};
 
 /// Where a line ends.
 const WIDTH: usize = 96;
@@ -35,19 +35,7 @@ pub(crate) fn of(found: &Explanation) -> String {
     text += format!("{}{place}", found.name).trim_end();
     text.push('\n');
     verdict(&mut text, &found.swept);
-    let [from, to] = [found.seen.looked.from, found.seen.looked.to].map(decimal);
-    if found.tongues.is_empty() {
-        let words = format!(
-            "the periodic response is stable at every speed from {from} to {to} rpm, where \
-             there is one"
-        );
-        line(&mut text, "dwells", words);
-    } else {
-        let unstable = bands(found.tongues.iter().map(|(tongue, _)| tongue.ends));
-        let words =
-            format!("the periodic response is unstable in {unstable} from {from} to {to} rpm:");
-        line(&mut text, "dwells", words);
-    }
+    line(&mut text, "dwells", stable_speeds(found));
     for rpm in &found.seen.jumps_rpm {
         let words = format!(
             "at {rpm:.2} rpm the response folds back: a machine that runs up jumps to another there"
@@ -76,6 +64,36 @@ pub(crate) fn of(found: &Explanation) -> String {
     judgement(&mut text, found);
     limits(&mut text, found);
     text
+}
+
+/// Returns at which of the speeds that were looked at the response is stable. Speeds without a
+/// response are no evidence.
+fn stable_speeds(found: &Explanation) -> String {
+    let seen = &found.seen;
+    let [from, to] = [seen.looked.from, seen.looked.to].map(decimal);
+    let (count, missing) = (seen.looked.values().len(), seen.without_response);
+    let unknown = format!(
+        "at {missing} of {count} speeds from {from} to {to} rpm no periodic \
+                           response was found, and whether it is stable is not known (`sweep dwell`)"
+    );
+    if missing == count {
+        return unknown;
+    }
+    if !found.tongues.is_empty() {
+        let unstable = bands(found.tongues.iter().map(|(tongue, _)| tongue.ends));
+        let unstable =
+            format!("the periodic response is unstable in {unstable} from {from} to {to} rpm");
+        return if missing == 0 {
+            format!("{unstable}:")
+        } else {
+            format!("{unstable}; {unknown}:")
+        };
+    }
+    if missing == 0 {
+        return format!("the periodic response is stable at every speed from {from} to {to} rpm");
+    }
+    let known = count - missing;
+    format!("the periodic response is stable at {known} of the speeds looked at; {unknown}")
 }
 
 /// At which speeds (rpm) another response was found than that of a machine that runs up.
@@ -228,6 +246,9 @@ fn end(motion: &Ending) -> String {
         (None, State::LeftRange { .. }) => {
             return format!("farther than the model is good for, {after}");
         }
+        (None, State::Transient { life_s }) => {
+            format!("a transient that wanders for {life_s:.0} s on average, then ends elsewhere")
+        }
         (None, State::Ok | State::NotSettled) => format!("not settled {after}"),
     };
     format!("{}, {what}, if the drum is held there (`sweep dwell`)", far.join(", "))
@@ -342,14 +363,24 @@ fn judgement(text: &mut String, found: &Explanation) {
                     significant(ratio),
                     channel.name()
                 );
+                let grows = growth_until(found.cause.as_ref());
+                let is_cause = found.cause.is_some_and(|cause| cause.is_enough());
                 match (is_within, ratio < swept.limits.most) {
+                    (false, true) if is_cause => format!(
+                        "{same}, within the limit: the verdict rests on motion left over from \
+                         before the tongue, and would change with the ramp; {grows}"
+                    ),
                     (false, true) => format!(
                         "{same}, within the limit: the verdict rests on motion left over from \
-                         before the tongue, and would change with the ramp"
+                         before the tongue, which the tongues do not make large: {grows}"
+                    ),
+                    (false, false) if is_cause => format!(
+                        "{same}, still beyond the limit: the tongues alone make the verdict, \
+                         without what earlier resonances left; {grows}"
                     ),
                     (false, false) => format!(
-                        "{same}, still beyond the limit: the tongues alone make the verdict, \
-                         without what earlier resonances left"
+                        "{same}, still beyond the limit, but the tongues are not its cause: \
+                         {grows}; what the linear model misses is the nonlinear motion itself"
                     ),
                     (true, true) => format!(
                         "{same}: the motion keeps the limit because the ramp is through before \
@@ -364,6 +395,20 @@ fn judgement(text: &mut String, found: &Explanation) {
         },
     };
     line(text, "so", words);
+}
+
+/// Returns how much of the growth that the deviation needs the tongues before it make.
+fn growth_until(cause: Option<&Cause>) -> String {
+    let Some(cause) = cause else { return "the deviation's time is not known".to_owned() };
+    let at = format!("the motion deviates at {:.2} s and {:.0} rpm", cause.time_s, cause.speed_rpm);
+    match cause.needed_e_folds {
+        Some(needed) => format!(
+            "{at}, which takes {needed:.2} e-folds from the difference of the models at the first \
+             tongue; the tongues make {:.2} of them",
+            cause.made_e_folds
+        ),
+        None => format!("{at}, before any tongue is entered"),
+    }
 }
 
 fn limits(text: &mut String, found: &Explanation) {

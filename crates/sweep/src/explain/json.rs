@@ -40,6 +40,13 @@ pub(crate) fn of(found: &Explanation) -> Value {
         "profile_rpm": found.profile_rpm,
         "tongues": tongues.collect::<Value>(),
         "entered_on_responses": without,
+        "deviation": found.cause.map(|cause| json!({
+            "time_s": cause.time_s,
+            "speed_rpm": cause.speed_rpm,
+            "e_folds_needed": cause.needed_e_folds,
+            "e_folds_of_tongues": cause.made_e_folds,
+            "tongues_are_the_cause": cause.is_enough(),
+        })),
     })
 }
 

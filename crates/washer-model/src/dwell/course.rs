@@ -55,10 +55,18 @@ const CLOSE: f64 = 1e-2;
 const NEAR: f64 = 0.5;
 const FARTHER: f64 = 1.02;
 
+/// The time (s) that trajectories from states of a chaotic motion have to stay in it, and the
+/// number of these. Basis: test `chaos_survives_or_is_a_transient`, whose transient ends within
+/// 240 s from each of eight states. Doubling either halves the rate of escape that is seen.
+const SURVIVAL_S: f64 = 240.0;
+const SURVIVORS: usize = 8;
+
 /// What a trajectory needs next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Need {
     Turns,
+    /// The multipliers of the periodic orbit that it repeats, of so many turns.
+    Multipliers(u32),
     Exponent,
     Nothing,
 }
@@ -66,8 +74,8 @@ pub(super) enum Need {
 /// A trajectory on its way.
 pub(super) struct Course<'a> {
     pub(super) held: Held<'a>,
-    /// Unstable responses, which it leaves slowly.
-    leaves: Vec<[f64; STATES]>,
+    /// Unstable periodic orbits, which it leaves slowly: their states once a turn.
+    leaves: Vec<Vec<[f64; STATES]>>,
     /// The last two windows.
     turns: Vec<Turn>,
     made: usize,
@@ -81,7 +89,7 @@ pub(super) struct Course<'a> {
 }
 
 impl<'a> Course<'a> {
-    pub(super) fn new(held: Held<'a>, leaves: Vec<[f64; STATES]>, longest_s: f64) -> Self {
+    pub(super) fn new(held: Held<'a>, leaves: Vec<Vec<[f64; STATES]>>, longest_s: f64) -> Self {
         let windows = (longest_s / held.row.turn_s() / WINDOW as f64).ceil().max(2.0);
         Self {
             held,
@@ -95,6 +103,44 @@ impl<'a> Course<'a> {
             state: State::NotSettled,
             settled: None,
         }
+    }
+
+    /// Returns the trajectory that goes on from a state of another as long as chaos has to survive:
+    /// it is not asked for its exponent.
+    pub(super) fn survivor(held: Held<'a>, leaves: Vec<Vec<[f64; STATES]>>) -> Self {
+        Self { asked_from: usize::MAX, ..Self::new(held, leaves, SURVIVAL_S) }
+    }
+
+    /// Whether it is chaotic, as far as is known.
+    pub(super) fn is_chaotic(&self) -> bool {
+        self.settled == Some(Settled::Chaotic)
+    }
+
+    /// Returns states of its last turns, evenly.
+    pub(super) fn own_states(&self) -> Vec<[f64; STATES]> {
+        let every = (self.turns.len() / SURVIVORS).max(1);
+        self.turns.iter().rev().step_by(every).take(SURVIVORS).map(|turn| turn.end).collect()
+    }
+
+    /// Returns the unstable periodic orbits that it met.
+    pub(super) fn leaves(&self) -> &[Vec<[f64; STATES]>] {
+        &self.leaves
+    }
+
+    /// Calls it a transient, which lives for this long on average.
+    pub(super) fn call_transient(&mut self, life_s: f64) {
+        self.state = State::Transient { life_s };
+        self.settled = None;
+    }
+
+    /// Returns how long it was followed (s).
+    pub(super) fn time_s(&self) -> f64 {
+        self.made as f64 * self.turn_s()
+    }
+
+    /// Whether it ended in a motion or left the model's range.
+    pub(super) fn has_ended(&self) -> bool {
+        self.settled.is_some() || matches!(self.state, State::LeftRange { .. })
     }
 
     /// Its next [`BLOCK`] turns.
@@ -118,13 +164,13 @@ impl<'a> Course<'a> {
             && self.are_alike(REPEATING, REPEATS)
             && self.to_go(turns) < TO_GO
         {
-            self.settle(Settled::Periodic { turns });
+            self.need = Need::Multipliers(turns);
         } else if self.made.is_multiple_of(WINDOW) && self.turns.len() == 2 * WINDOW {
             let may_ask = self.made >= self.asked_from;
             if self.are_alike(WINDOW, ALIKE) {
                 if let Some(turns) = self.clear_period(ROUGHLY_REPEATS) {
                     if self.to_go(turns) < TO_GO {
-                        self.settle(Settled::Periodic { turns });
+                        self.need = Need::Multipliers(turns);
                     }
                 } else if let Some(two) = self.two_frequencies(TWO_LINES) {
                     self.settle(two);
@@ -139,6 +185,26 @@ impl<'a> Course<'a> {
             }
         }
         if self.need == Need::Turns && self.made >= self.most {
+            self.need = Need::Nothing;
+        }
+    }
+
+    /// Takes how fast the fastest disturbance of the orbit that it repeats grows (1/s). An orbit
+    /// whose disturbances grow is a saddle: the trajectory is on its way past it.
+    pub(super) fn take_growth(&mut self, period: u32, growth_per_s: Option<f64>) {
+        self.need = Need::Turns;
+        match growth_per_s {
+            Some(per_s) if per_s <= 0.0 => {
+                self.exponent = Some(Exponent { per_s, error_per_s: 0.0 });
+                return self.settle(Settled::Periodic { turns: period });
+            }
+            Some(_) => {
+                let orbit = self.turns.iter().rev().take(period as usize).map(|turn| turn.end);
+                self.leaves.push(orbit.collect());
+            }
+            None => {}
+        }
+        if self.made >= self.most {
             self.need = Need::Nothing;
         }
     }
@@ -190,20 +256,25 @@ impl<'a> Course<'a> {
             peaks: peaks(turns),
             min_gap_m: turns.iter().map(|turn| turn.gap_m).fold(f64::INFINITY, f64::min),
             exponent: self.exponent,
-            time_s: self.made as f64 * self.turn_s(),
+            least_kick_rad_per_s: None,
+            time_s: self.time_s(),
             end: self.held.state,
             sections: self.turns.iter().map(|turn| self.off_rest(&turn.end)).collect(),
             extra: Reading::default(),
         }
     }
 
-    /// Whether it is still beside a response that it leaves.
+    /// Whether it is still beside an orbit that it leaves.
     fn is_leaving(&self) -> bool {
         let window = (self.turns.len() / 2).min(WINDOW);
         let (before, after) = self.turns.split_at(self.turns.len() - window);
-        self.leaves.iter().any(|response| {
-            let size = size(self.held.row.point, response);
-            let of = |turn: &Turn| apart(&self.held.row, &turn.end, response) / size;
+        self.leaves.iter().any(|orbit| {
+            let sizes = orbit.iter().map(|state| size(self.held.row.point, state));
+            let size = sizes.fold(0.0, f64::max);
+            let of = |turn: &Turn| {
+                let gaps = orbit.iter().map(|state| apart(&self.held.row, &turn.end, state));
+                gaps.fold(f64::INFINITY, f64::min) / size
+            };
             let farthest = |turns: &[Turn]| turns.iter().map(of).fold(0.0, f64::max);
             let now = farthest(after);
             let then = farthest(&before[before.len() - window..]);

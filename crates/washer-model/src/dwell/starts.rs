@@ -13,11 +13,17 @@ const DISTURBED: f64 = 1e-4;
 /// The least kick is this share of the greatest.
 const LEAST_KICK: f64 = 1.0 / 12.0;
 
-/// Directions of kicks: two modes, and both at once.
-pub(super) const DIRECTIONS: usize = 3;
+/// The number of directions along mode shapes: two modes, and both at once.
+pub(super) const MODE_DIRECTIONS: usize = 3;
 
-/// A kick: its direction and its size (rad/s).
+/// The seed of random directions: the same for every machine and speed.
+const SEED: u64 = 2021;
+
+/// A kick: the number of its direction and its size (rad/s).
 pub(super) type Kick = (usize, f64);
+
+/// The velocities of a kick of 1 rad/s, by direction.
+pub(super) type Directions = Vec<[f64; COORDINATES]>;
 
 /// The largest coordinate of the tub (m, rad), from rest.
 pub(super) fn size(point: &Point, state: &[f64; STATES]) -> f64 {
@@ -38,9 +44,13 @@ pub(super) fn disturbed(point: &Point, frozen: &Modes, state: &[f64; STATES]) ->
     beside
 }
 
-/// Speeds of a kick that turns the tub by 1 rad/s: of the two modes of the suspension that rock
-/// most, and of both at once. They are the modes' own, so that bearings do not ring.
-pub(super) fn directions(point: &Point, frozen: &Modes) -> [[f64; COORDINATES]; DIRECTIONS] {
+/// Returns directions of kicks: those along mode shapes, then random ones. All are combinations of
+/// the suspension's modes, so that bearings do not ring.
+///
+/// A kick along mode shapes turns the tub by 1 rad/s: in the two modes that rock most, and in both
+/// at once. A random one has the kinetic energy of the first, and is uniform over the sphere of
+/// that energy: a basin may lie where no mode shape points.
+pub(super) fn directions(point: &Point, frozen: &Modes, random: usize) -> Directions {
     let mut modes: Vec<(usize, f64)> = (0..SUSPENSION_MODES)
         .map(|k| {
             let motion = shape::motion(point, &frozen.mass, &frozen.modes[k].shape);
@@ -48,28 +58,67 @@ pub(super) fn directions(point: &Point, frozen: &Modes) -> [[f64; COORDINATES]; 
         })
         .collect();
     modes.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let unit = |place: usize| -> [f64; COORDINATES] {
+    // The amplitude of a mode of unit modal mass that turns the tub by 1.
+    let amplitude = |place: usize| -> f64 {
         let shape = &frozen.modes[modes[place].0].shape;
         let (yaw, pitch) = (shape[TUB_YAW][0], shape[TUB_PITCH][0]);
-        let turns = (yaw * yaw + pitch * pitch).sqrt();
-        core::array::from_fn(|i| rounded(shape[i][0] / turns))
+        1.0 / (yaw * yaw + pitch * pitch).sqrt()
+    };
+    let unit = |place: usize| -> [f64; COORDINATES] {
+        let shape = &frozen.modes[modes[place].0].shape;
+        core::array::from_fn(|i| rounded(shape[i][0] * amplitude(place)))
     };
     let (first, second) = (unit(0), unit(1));
-    [first, second, core::array::from_fn(|i| first[i] + second[i])]
+    let mut directions = vec![first, second, core::array::from_fn(|i| first[i] + second[i])];
+    let mut numbers = fastrand::Rng::with_seed(SEED);
+    for _ in 0..random {
+        let parts: [f64; SUSPENSION_MODES] = core::array::from_fn(|_| normal(&mut numbers));
+        let length = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let velocity = |i: usize| -> f64 {
+            let shapes = frozen.modes[..SUSPENSION_MODES].iter().map(|mode| mode.shape[i][0]);
+            parts.iter().zip(shapes).map(|(part, shape)| part * shape).sum()
+        };
+        let scale = amplitude(0) / length;
+        directions.push(core::array::from_fn(|i| rounded(scale * velocity(i))));
+    }
+    directions
 }
 
-/// So many kicks up to a size (rad/s), the hardest in all directions first.
+/// Returns a number of the standard normal distribution (Box and Muller).
+fn normal(numbers: &mut fastrand::Rng) -> f64 {
+    let radius = (-2.0 * libm::log(1.0 - numbers.f64())).sqrt();
+    radius * libm::cos(core::f64::consts::TAU * numbers.f64())
+}
+
+/// Returns the number of random directions among a number of kicks: every third kick has one.
+pub(super) const fn random_kicks(count: usize) -> usize {
+    count / 3
+}
+
+/// Returns a number of kicks up to a size (rad/s): those along mode shapes first, the hardest in
+/// all directions before weaker ones, then random ones, from the hardest to the weakest.
 pub(super) fn kicks(count: usize, greatest_rad_per_s: f64) -> Vec<Kick> {
-    let levels = count.div_ceil(DIRECTIONS);
-    let step = if levels > 1 { libm::log(LEAST_KICK) / (levels - 1) as f64 } else { 0.0 };
-    let size = |level: usize| greatest_rad_per_s * libm::exp(step * level as f64);
-    (0..count).map(|k| (k % DIRECTIONS, size(k / DIRECTIONS))).collect()
+    let random = random_kicks(count);
+    let along_modes = count - random;
+    let size = |level: usize, levels: usize| {
+        let step = if levels > 1 { libm::log(LEAST_KICK) / (levels - 1) as f64 } else { 0.0 };
+        greatest_rad_per_s * libm::exp(step * level as f64)
+    };
+    let levels = along_modes.div_ceil(MODE_DIRECTIONS);
+    let mut kicks = Vec::with_capacity(count);
+    for k in 0..along_modes {
+        kicks.push((k % MODE_DIRECTIONS, size(k / MODE_DIRECTIONS, levels)));
+    }
+    for k in 0..random {
+        kicks.push((MODE_DIRECTIONS + k, size(k, random)));
+    }
+    kicks
 }
 
 /// A state with a kick added.
 pub(super) fn kicked(
     state: &[f64; STATES],
-    directions: &[[f64; COORDINATES]; DIRECTIONS],
+    directions: &Directions,
     (direction, size): Kick,
 ) -> [f64; STATES] {
     core::array::from_fn(|i| match i.checked_sub(COORDINATES) {

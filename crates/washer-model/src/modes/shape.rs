@@ -33,7 +33,7 @@ pub enum Movement {
     BearingTilt,
 }
 
-/// A mode shape's movement, and the shares of its kinetic energy in the motions of the machine as
+/// The movement with the greatest share of a mode shape, and the shares of its kinetic energy in the motions of the machine as
 /// one rigid body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
@@ -95,7 +95,8 @@ const HORIZONTAL: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, HINGE_YAW];
 const RIGID: [[usize; 2]; 4] =
     [[TUB_Y, SHAFT_Y], [TUB_Z, SHAFT_Z], [TUB_YAW, SHAFT_YAW], [TUB_PITCH, SHAFT_PITCH]];
 
-/// The dominant movement of a shape of unit modal mass.
+/// Returns the movement with the greatest share of a shape of unit modal mass. Shares of one
+/// movement in two planes do not add up: each is a motion of its own.
 pub(crate) fn motion(
     point: &Point,
     mass: &[[f64; COORDINATES]; COORDINATES],
@@ -105,7 +106,7 @@ pub(crate) fn motion(
     let [vertical_translation, horizontal_translation, yaw, pitch] = shares;
     let movement = if shares.iter().sum::<f64>() < 0.5 {
         relative_movement(point, shape)
-    } else if vertical_translation + horizontal_translation > yaw + pitch {
+    } else if vertical_translation.max(horizontal_translation) > yaw.max(pitch) {
         Movement::Translation
     } else {
         Movement::Rocking

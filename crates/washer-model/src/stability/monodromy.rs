@@ -23,10 +23,10 @@ pub(super) const INSTANTS: usize = 16;
 pub(super) const INSTANTS_AT_CORNERS: usize = 32;
 
 /// Rows and columns of a state's disturbance.
-pub(super) type Square = [[N<f64>; STATES]; STATES];
+pub(crate) type Square = [[N<f64>; STATES]; STATES];
 
 /// The matrix of disturbances whose speeds count per a unit (1/s).
-pub(super) fn per_unit(matrix: &Square, unit_per_s: f64) -> Mat<f64> {
+pub(crate) fn per_unit(matrix: &Square, unit_per_s: f64) -> Mat<f64> {
     let unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
     Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0 * unit(j) / unit(i))
 }

@@ -66,7 +66,7 @@ impl Row<'_> {
 
     /// Disturbances' speeds count per this: a rate that makes the fastest of them of one size with
     /// the coordinates.
-    pub(super) fn unit_per_s(&self) -> f64 {
+    pub(crate) fn unit_per_s(&self) -> f64 {
         1.0 / self.step_s()
     }
 
@@ -87,37 +87,37 @@ impl Row<'_> {
 
 /// A turn that is asked for.
 #[derive(Clone, Copy)]
-pub(super) struct Asked<'a> {
-    pub(super) row: Row<'a>,
+pub(crate) struct Asked<'a> {
+    pub(crate) row: Row<'a>,
     /// Where the unbalance is up: coordinates (m, rad), then their speeds (per s).
-    pub(super) start: [f64; STATES],
+    pub(crate) start: [f64; STATES],
     /// Whether to see all of it, not its end alone.
-    pub(super) is_seen: bool,
+    pub(crate) is_seen: bool,
 }
 
 /// A turn.
-pub(super) struct Turned {
+pub(crate) struct Turned {
     /// The state at its end.
-    pub(super) end: [f64; STATES],
+    pub(crate) end: [f64; STATES],
     /// What was asked to be seen.
-    pub(super) seen: Option<Box<Seen>>,
+    pub(crate) seen: Option<Box<Seen>>,
 }
 
 /// What is seen of a turn.
-pub(super) struct Seen {
+pub(crate) struct Seen {
     /// What it makes of disturbances of its start.
-    pub(super) monodromy: Square,
+    pub(crate) monodromy: Square,
     /// Largest deviations from equilibrium (m, rad).
-    pub(super) peaks: [f64; CHANNELS],
+    pub(crate) peaks: [f64; CHANNELS],
     /// Least gap between drum and tub at the ends of its steps (m).
-    pub(super) gap_m: f64,
+    pub(crate) gap_m: f64,
     /// States at even instants.
-    pub(super) states: Vec<[f64; STATES]>,
+    pub(crate) states: Vec<[f64; STATES]>,
 }
 
 /// Takes turns, in lanes, those of a kind together. What is found of one does not depend on the
 /// others. Once `is_stopped` says so, some are missing.
-pub(super) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<Turned> {
+pub(crate) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<Turned> {
     // Of a kind, what is seen comes first.
     let kind = |asked: &Asked<'_>| (asked.row.kind(), !asked.is_seen);
     by_kind(asked, kind, |asked| {

@@ -8,13 +8,14 @@ use super::participants::{named, shares, vector_of};
 use super::search::{Solve, finish, missing};
 use super::settings::{Case, Settings};
 use super::{Beyond, Dwell, Kind, NoAnswer, Response, rounded};
-use crate::coordinates::COORDINATES;
+use crate::coordinates::{COORDINATES, STATES};
 use crate::fast::SUSPENSION_MODES;
 use crate::modes::modes;
 use crate::point::Point;
 use crate::run::model::{Model, Nonlinear};
 use crate::run::suspension::attachments;
 use core::f64::consts::TAU;
+use faer::{Mat, c64};
 
 /// A motion is judged if the modes that are right have this share of its energy.
 const JUDGED_SHARE: f64 = 0.5;
@@ -23,9 +24,10 @@ const JUDGED_SHARE: f64 = 0.5;
 /// move it.
 const CLOSE_TO_EDGE_PER_S: f64 = 2e-3;
 
-/// Where so many times the drum's speed exceed the hinge's frequency, a harmonic may ring it. A
-/// response that a turn of the machine as it is then misses by more than this share is asked of
-/// that machine: less is what caps leave out of the bearings' own deflection.
+/// Where so many times the drum's speed exceed the hinge's frequency, a harmonic may ring it; where
+/// forces have corners, harmonics have no end. A response that a turn of the machine as it is then
+/// misses by more than this share is asked of that machine: less is what caps leave out of the
+/// bearings' own deflection.
 const HARMONICS_OF_HINGE: f64 = 7.0;
 const RETURNS: f64 = 2e-4;
 
@@ -34,6 +36,20 @@ const FARTHEST_FROM_GUESS: f64 = 5e-3;
 
 /// Responses that are nearer than this (m, rad) are one.
 const SAME: f64 = 1e-6;
+
+/// The longest step (m, rad) of the damped search that follows an undamped one without success.
+/// Basis: it is a fifth of the distance within which a result belongs to its guess. Doubling it
+/// loses responses beside folds to their neighbours; halving it doubles the turns.
+const DAMPED_STEP: f64 = 0.2 * FARTHEST_FROM_GUESS;
+
+/// The factor by which the suspension's slowest transient decays before Newton's method goes on,
+/// where no curve has a response. Basis: Newton's method converges from a thousandth of a motion.
+/// Doubling it makes the integration a tenth shorter.
+const TRANSIENT_LEFT: f64 = 1e-3;
+
+/// The longest such integration (s). Basis: a mode that decays by the factor above within it loses
+/// 0.06 /s or more. Doubling it doubles what a speed without any response costs.
+const LONGEST_TRANSIENT_S: f64 = 120.0;
 
 /// The periodic responses at constant speeds, on lanes; a run of dwells of one point shares its
 /// curve of responses. Per dwell as [`Responses::at`].
@@ -163,7 +179,7 @@ impl<'a> Responses<'a> {
         }
         let mut found: Vec<Result<Response, NoAnswer>> =
             looked.iter().zip(solves).map(|(look, solve)| look.answer(solve)).collect();
-        if is_stopped() {
+        if is_stopped() || !search_again(&looked, &mut found, is_stopped) {
             return stopped();
         }
         forget_known(&looked, &mut found);
@@ -177,20 +193,34 @@ impl<'a> Responses<'a> {
                 close.push((place, looked[place].case.without_caps(), response.start));
             }
         }
-        let mut plain: Vec<Solve<'_>> = close
-            .iter()
-            .filter_map(|(_, case, start)| Some(Solve::new(case.as_ref().ok()?.row, *start, None)))
-            .collect();
-        if !finish(&mut plain, is_stopped) {
+        let mut searches: Vec<(usize, Solve<'_>)> = Vec::new();
+        for (place, case, start) in close {
+            match case {
+                Ok(case) => {
+                    searches.push((place, Solve::new(case.row, start, None)));
+                    looked[place].case = case;
+                }
+                Err(none) => found[place] = Err(none),
+            }
+        }
+        let starts: Vec<(usize, [f64; STATES])> =
+            searches.iter().map(|(place, solve)| (*place, solve.start())).collect();
+        if !take_found(&looked, &mut found, searches, is_stopped) {
             return stopped();
         }
-        let mut plain = plain.into_iter();
-        for (place, case, _) in close {
-            found[place] = case.and_then(|case| {
-                looked[place].case = case;
-                let solve = plain.next().ok_or(NoAnswer::NoResponse)?;
-                looked[place].answer(solve)
-            });
+        // A harmonic that rings the hinge may be far from the capped machine's response.
+        let ways: [fn(&Case<'a>, [f64; STATES]) -> Solve<'a>; 2] = [
+            |case, start| Solve::damped(case.row, start, DAMPED_STEP),
+            |case, start| Solve::after_transient(case.row, start, transient_turns(case)),
+        ];
+        for way in ways {
+            let missing = starts.iter().filter(|(place, _)| is_missing(&found[*place]));
+            let searches =
+                missing.map(|(place, start)| (*place, way(&looked[*place].case, *start)));
+            let searches: Vec<(usize, Solve<'_>)> = searches.collect();
+            if !take_found(&looked, &mut found, searches, is_stopped) {
+                return stopped();
+            }
         }
         let none = |case: Result<Case<'_>, NoAnswer>| case.err().unwrap_or(NoAnswer::NoResponse);
         let mut answers: Vec<Result<Vec<Response>, NoAnswer>> =
@@ -249,6 +279,66 @@ fn followed<'a>(
     (is_whole && finish(&mut curves, is_stopped)).then_some(curves)
 }
 
+/// Searches again for responses that were not found. Those that a curve has are searched by damped
+/// steps. At a speed at which nothing is found then, the machine turns from the linear model's
+/// response until its transient has decayed: it is in a stable response, if it comes to one.
+/// Returns false once `is_stopped` says so.
+fn search_again(
+    looked: &[Look<'_>],
+    found: &mut [Result<Response, NoAnswer>],
+    is_stopped: &dyn Fn() -> bool,
+) -> bool {
+    let mut again: Vec<(usize, Solve<'_>)> = Vec::new();
+    for (place, look) in looked.iter().enumerate() {
+        if look.guess.is_followed() && is_missing(&found[place]) {
+            again.push((place, Solve::damped(look.case.row, look.guess.state, DAMPED_STEP)));
+        }
+    }
+    if !take_found(looked, found, again, is_stopped) {
+        return false;
+    }
+    let mut again: Vec<(usize, Solve<'_>)> = Vec::new();
+    for (place, look) in looked.iter().enumerate() {
+        let mut of_speed =
+            looked.iter().zip(found.iter()).filter(|(it, _)| it.number == look.number);
+        if !look.guess.is_followed() && of_speed.all(|(_, response)| is_missing(response)) {
+            let turns = transient_turns(&look.case);
+            let (row, state) = (look.case.row, look.guess.state);
+            again.push((place, Solve::after_transient(row, state, turns)));
+        }
+    }
+    take_found(looked, found, again, is_stopped)
+}
+
+fn is_missing(response: &Result<Response, NoAnswer>) -> bool {
+    matches!(response, Err(NoAnswer::NoResponse))
+}
+
+/// Returns the number of turns after which the suspension's slowest transient has decayed.
+fn transient_turns(case: &Case<'_>) -> usize {
+    let modes = &case.frozen.modes[..SUSPENSION_MODES];
+    let decay_per_s = modes.iter().map(|mode| -mode.re_per_s).fold(f64::INFINITY, f64::min);
+    let transient_s = -libm::log(TRANSIENT_LEFT) / decay_per_s.max(0.0);
+    (transient_s.min(LONGEST_TRANSIENT_S) / case.row.turn_s()).ceil() as usize
+}
+
+/// Takes searches to their ends, and what they find to its place.
+fn take_found<'a>(
+    looked: &[Look<'a>],
+    found: &mut [Result<Response, NoAnswer>],
+    searches: Vec<(usize, Solve<'a>)>,
+    is_stopped: &dyn Fn() -> bool,
+) -> bool {
+    let (places, mut solves): (Vec<usize>, Vec<Solve<'_>>) = searches.into_iter().unzip();
+    if !finish(&mut solves, is_stopped) {
+        return false;
+    }
+    for (place, solve) in places.into_iter().zip(solves) {
+        found[place] = looked[place].answer(solve);
+    }
+    true
+}
+
 /// Leaves out what is found from the linear response and is on a curve all the same, and what is on
 /// both.
 fn forget_known(looked: &[Look<'_>], found: &mut [Result<Response, NoAnswer>]) {
@@ -279,7 +369,8 @@ fn are_moved(
     let (mut places, mut asked) = (Vec::new(), Vec::new());
     for (place, (look, response)) in looked.iter().zip(found).enumerate() {
         let hinge = look.case.frozen.modes[SUSPENSION_MODES].frequency_rpm();
-        let is_near = hinge < HARMONICS_OF_HINGE * look.case.row.speed_rpm;
+        let is_near =
+            look.case.row.has_corners() || hinge < HARMONICS_OF_HINGE * look.case.row.speed_rpm;
         if let (true, Ok(response), Some(_)) = (is_near, response, look.case.row.caps)
             && let Ok(plain) = look.case.without_caps()
         {
@@ -324,44 +415,48 @@ impl Look<'_> {
         let row = &self.case.row;
         let unit_per_s = row.unit_per_s();
         let matrix = per_unit(&seen.monodromy, unit_per_s);
-        let mut multipliers = matrix.eigenvalues().map_err(|_| NoAnswer::Eigenvalues)?;
-        if multipliers.iter().any(|mu| !mu.re.is_finite() || !mu.im.is_finite()) {
-            return Err(NoAnswer::Eigenvalues);
+        let (mu, vector) = leading_multiplier(&self.case, &matrix).ok_or(NoAnswer::Eigenvalues)?;
+        let mut response = Response {
+            speed_rpm: row.speed_rpm,
+            is_on_curve: self.guess.is_on_curve,
+            branch: self.guess.branch,
+            between_rpm: self.guess.between_rpm,
+            beyond: beyond(row.point, &seen),
+            nonlinear: seen.peaks,
+            linear: self.linear,
+            start,
+            multiplier: [mu.re, mu.im].map(rounded),
+            participants: Vec::new(),
+        };
+        if response.kind() != Kind::Stable {
+            let speed = row.speed_rpm * TAU / 60.0;
+            let frozen = modes(row.point, 0.0, speed).map_err(|_| NoAnswer::Eigenvalues)?;
+            response.participants = named(row.point, &frozen, &vector, unit_per_s);
         }
-        multipliers.retain(|mu| mu.im >= 0.0);
-        multipliers.sort_by(|a, b| {
-            b.norm_sqr().total_cmp(&a.norm_sqr()).then_with(|| b.im.total_cmp(&a.im))
-        });
-        for mu in multipliers {
-            let vector = vector_of(&matrix, mu);
-            let shares = shares(&self.case.frozen, &vector, unit_per_s);
-            let judged = shares.iter().filter(|(mode, _)| *mode < self.case.judged);
-            let share: f64 = judged.map(|(_, energy)| energy).sum();
-            // Not finite where there is no such disturbance.
-            if share.is_nan() || share < JUDGED_SHARE {
-                continue;
-            }
-            let mut response = Response {
-                speed_rpm: row.speed_rpm,
-                is_on_curve: self.guess.is_on_curve,
-                branch: self.guess.branch,
-                between_rpm: self.guess.between_rpm,
-                beyond: beyond(row.point, &seen),
-                nonlinear: seen.peaks,
-                linear: self.linear,
-                start,
-                multiplier: [mu.re, mu.im].map(rounded),
-                participants: Vec::new(),
-            };
-            if response.kind() != Kind::Stable {
-                let speed = row.speed_rpm * TAU / 60.0;
-                let frozen = modes(row.point, 0.0, speed).map_err(|_| NoAnswer::Eigenvalues)?;
-                response.participants = named(row.point, &frozen, &vector, unit_per_s);
-            }
-            return Ok(response);
-        }
-        Err(NoAnswer::Eigenvalues)
+        Ok(response)
     }
+}
+
+/// Returns the largest of a monodromy matrix's multipliers whose motion is the suspension's, in the
+/// upper half plane, and its vector; none where the eigenvalues are not finite. The matrix's speeds
+/// count per the row's unit.
+pub(crate) fn leading_multiplier(case: &Case<'_>, matrix: &Mat<f64>) -> Option<(c64, Mat<c64>)> {
+    let unit_per_s = case.row.unit_per_s();
+    let mut multipliers = matrix.eigenvalues().ok()?;
+    if multipliers.iter().any(|mu| !mu.re.is_finite() || !mu.im.is_finite()) {
+        return None;
+    }
+    multipliers.retain(|mu| mu.im >= 0.0);
+    multipliers
+        .sort_by(|a, b| b.norm_sqr().total_cmp(&a.norm_sqr()).then_with(|| b.im.total_cmp(&a.im)));
+    multipliers.into_iter().find_map(|mu| {
+        let vector = vector_of(matrix, mu);
+        let shares = shares(&case.frozen, &vector, unit_per_s);
+        let judged = shares.iter().filter(|(mode, _)| *mode < case.judged);
+        let share: f64 = judged.map(|(_, energy)| energy).sum();
+        // Not finite where there is no such disturbance.
+        (share >= JUDGED_SHARE).then_some((mu, vector))
+    })
 }
 
 /// What of the machine's geometry a motion passes.

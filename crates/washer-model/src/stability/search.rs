@@ -112,6 +112,10 @@ pub(super) struct Solve<'a> {
     /// Of 1 - Phi; none where the next turn is to give it.
     factors: Option<Lu<STATES>>,
     turns: usize,
+    /// Turns that the motion itself takes before the first correction.
+    transient_turns: usize,
+    /// The largest correction of a coordinate (m, rad).
+    longest_step: f64,
     missing: f64,
     is_last: bool,
     is_over: bool,
@@ -126,11 +130,29 @@ impl<'a> Solve<'a> {
             state,
             factors,
             turns: 0,
+            transient_turns: 0,
+            longest_step: f64::INFINITY,
             missing: f64::INFINITY,
             is_last: false,
             is_over: false,
             found: None,
         }
+    }
+
+    /// Returns the search by damped Newton steps: none changes a coordinate by more than this (m,
+    /// rad). It stays near its start where another response is close by.
+    pub(super) fn damped(row: Row<'a>, state: [f64; STATES], longest_step: f64) -> Self {
+        Self { longest_step, ..Self::new(row, state, None) }
+    }
+
+    /// Returns the search that integrates the transient over a number of turns before it corrects.
+    pub(super) fn after_transient(row: Row<'a>, state: [f64; STATES], turns: usize) -> Self {
+        Self { transient_turns: turns, ..Self::new(row, state, None) }
+    }
+
+    /// Returns the state that it has come to.
+    pub(super) const fn start(&self) -> [f64; STATES] {
+        self.state
     }
 
     /// The state where the unbalance is up, and what is seen of the turn from there; none where
@@ -145,6 +167,9 @@ impl<'a> Search<'a> for Solve<'a> {
         if self.is_over {
             return Vec::new();
         }
+        if self.transient_turns > 0 {
+            return vec![Asked { row: self.row, start: self.state, is_seen: false }];
+        }
         let is_seen = self.is_last || self.factors.is_none();
         let mut row = self.row;
         if !(self.is_last || row.is_stepwise()) {
@@ -157,6 +182,12 @@ impl<'a> Search<'a> for Solve<'a> {
 
     fn take(&mut self, turned: Vec<Turned>) {
         let Some(Turned { end, seen }) = turned.into_iter().next() else { return };
+        if self.transient_turns > 0 {
+            self.transient_turns -= 1;
+            self.state = end;
+            self.is_over = end.iter().any(|x| !x.is_finite());
+            return;
+        }
         self.turns += 1;
         let missing = missing(self.row.point, self.row.speed_rpm, &self.state, &end);
         if self.is_last && missing < CLOSE_AT_LAST {
@@ -176,12 +207,15 @@ impl<'a> Search<'a> for Solve<'a> {
         if let (false, Some(factors)) = (self.is_over, &self.factors) {
             let gap = core::array::from_fn(|i| N(end[i] - self.state[i]));
             let correction = factors.solve(&gap);
+            let longest = correction[..COORDINATES].iter().map(|by| by.0.abs()).fold(0.0, f64::max);
+            let share = (self.longest_step / longest).min(1.0);
             for i in 0..STATES {
-                self.state[i] += correction[i].0;
+                self.state[i] += share * correction[i].0;
             }
             // The next correction leaves as much less as the last one did.
             let rate = if self.missing.is_finite() { missing / self.missing } else { 1.0 };
-            self.is_last = missing * rate.min(1.0) < CLOSE || is_own && missing < NEXT_IS_LAST;
+            let is_close = missing * rate.min(1.0) < CLOSE || is_own && missing < NEXT_IS_LAST;
+            self.is_last = is_close && share == 1.0;
             if is_borrowed {
                 self.factors = None;
             }

@@ -81,10 +81,13 @@ pub(crate) struct Case<'a> {
 }
 
 impl<'a> Case<'a> {
-    /// The same for the machine as it is.
+    /// The same for the machine as it is. A harmonic of the turn may ring its hinge, so derivatives
+    /// are taken at as many instants as where forces have corners: fewer do not see that harmonic,
+    /// and Newton's method fails.
     pub(crate) fn without_caps(&self) -> Result<Self, NoAnswer> {
         let steps = plain_steps(self.row.point, self.row.speed_rpm, self.row.turn_s())?;
-        let row = Row { steps, caps: None, ..self.row };
+        let steps = steps.next_multiple_of(INSTANTS_AT_CORNERS);
+        let row = Row { steps, instants: INSTANTS_AT_CORNERS, caps: None, ..self.row };
         Ok(Self { row, frozen: Arc::clone(&self.frozen), judged: self.judged })
     }
 }

@@ -234,7 +234,7 @@ def dwell(
     speeds_rpm: Sequence[float] | NDArray[np.float64],
     out: str | PathLike[str] | None = None,
     *,
-    starts: int = 8,
+    starts: int = 12,
     kick: float = 6.0,
     carry: Literal["up", "down"] | None = None,
     threshold: bool = False,

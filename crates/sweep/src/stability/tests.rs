@@ -1,0 +1,73 @@
+//! Machines whose responses and endings independent programs know. Files: `tests/held`.
+
+use lane_ode::Simd;
+use washer_model::{Channel, Dwell, Point, Response, Settled, Starts, State, endings, respond};
+
+use crate::plan::{ready, timing};
+
+/// The last point of a grid in `tests/held`.
+fn point(name: &str) -> Point {
+    let path = format!("{}/tests/held/g_{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let plan = crate::config::load(path.as_ref(), &[]).unwrap();
+    let model = plan.scenario(plan.points() - 1).model;
+    ready(model.machine, model.spin, &timing(&plan)).unwrap()
+}
+
+fn responses(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {
+    let dwells: Vec<Dwell<'_>> =
+        speeds_rpm.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
+    respond(&dwells, &|| false).into_iter().map(|found| found.unwrap_or_default()).collect()
+}
+
+#[test]
+fn a_textbook_machine_has_a_response_at_every_speed() {
+    let speeds_rpm = [452.0, 500.0, 532.0, 660.0, 700.0];
+    for (found, rpm) in responses(&point("textbook"), &speeds_rpm).iter().zip(speeds_rpm) {
+        assert!(!found.is_empty(), "{rpm} rpm");
+    }
+}
+
+/// Branches between two others are not lost to them.
+#[test]
+fn branches_of_a_folded_curve_are_all_found() {
+    let speeds_rpm: Vec<f64> = (0..15).map(|k| 144.7 + 0.05 * f64::from(k)).collect();
+    for (found, rpm) in responses(&point("fine17"), &speeds_rpm).iter().zip(&speeds_rpm) {
+        let branches: Vec<u32> = found.iter().map(|response| response.branch).collect();
+        assert_eq!(branches, [2, 3, 4], "{rpm} rpm");
+    }
+}
+
+/// Friction rings the hinge by harmonics without end: 7.786 mm by rk4 at 5e-5 s, 7.767 with caps.
+#[test]
+fn a_response_with_friction_is_that_of_the_machine_as_it_is() {
+    let found = responses(&point("72001_10"), &[264.61]);
+    let drum_m = found[0][0].nonlinear[Channel::DrumFrontZ.index()];
+    assert!((drum_m / 7.786e-3 - 1.0).abs() < 3e-4, "{drum_m}");
+}
+
+/// A motion that repeats every second turn has a multiplier of -1.092 there; what it leaves for
+/// repeats every fourth.
+#[test]
+fn a_saddle_is_no_ending() {
+    let point = point("74002_13");
+    let dwells = [Dwell { point: &point, speed_rpm: 414.0 }];
+    let starts = Starts { count: 1, ..Starts::default() };
+    let found = endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0).unwrap();
+    let motion = &found.motions[0];
+    assert_eq!(motion.settled, Some(Settled::Periodic { turns: 4 }));
+    let yaw_rad = motion.peaks[Channel::TubYaw.index()];
+    assert!((yaw_rad / 50.05e-3 - 1.0).abs() < 5e-3, "{yaw_rad}");
+    assert!(motion.exponent.is_some_and(|exponent| exponent.per_s < 0.0));
+}
+
+#[test]
+#[ignore = "half a minute"]
+fn chaos_survives_or_is_a_transient() {
+    let point = point("74001_8");
+    let dwells = [Dwell { point: &point, speed_rpm: 306.0 }];
+    let found = endings(Simd::best(), &dwells, &[], &Starts::default(), &|| false);
+    let found = found.into_iter().next().unwrap().unwrap();
+    assert!(found.motions.iter().all(|motion| motion.settled != Some(Settled::Chaotic)));
+    let is_transient = |state| matches!(state, State::Transient { life_s } if life_s > 0.0);
+    assert!(found.motions.iter().any(|motion| is_transient(motion.state)));
+}
