@@ -324,6 +324,8 @@ struct Hunt<'a> {
     survivors: Vec<(usize, core::ops::Range<usize>)>,
     /// By direction along mode shapes, sizes of kicks that come back and that do not (rad/s).
     brackets: [Option<[f64; 2]>; MODE_DIRECTIONS],
+    /// The smallest kick in a random direction that does not come back (rad/s).
+    random_gone: Option<f64>,
 }
 
 impl<'a> Hunt<'a> {
@@ -362,6 +364,7 @@ impl<'a> Hunt<'a> {
             starts: states.len(),
             survivors: Vec::new(),
             brackets: [None; MODE_DIRECTIONS],
+            random_gone: None,
         };
         for (state, kick) in states {
             hunt.start(state, kick);
@@ -429,6 +432,14 @@ impl<'a> Hunt<'a> {
 
     /// Of every direction the kicks between which some stop coming back.
     fn bracket(&mut self) {
+        for (course, kick) in self.kicks.iter().enumerate() {
+            if let Some((direction, size)) = *kick
+                && direction >= MODE_DIRECTIONS
+                && !self.comes_back(course)
+            {
+                self.random_gone = Some(self.random_gone.map_or(size, |least| least.min(size)));
+            }
+        }
         for direction in 0..MODE_DIRECTIONS {
             let mut kicks: Vec<(f64, bool)> = Vec::new();
             for (course, kick) in self.kicks.iter().enumerate() {
@@ -490,7 +501,7 @@ impl<'a> Hunt<'a> {
                 motions.push(ending);
             }
         }
-        let gone = self.brackets.iter().flatten().map(|[_, gone]| *gone);
+        let gone = self.brackets.iter().flatten().map(|[_, gone]| *gone).chain(self.random_gone);
         let endings = Endings {
             motions,
             starts: self.starts as u32,
