@@ -1,7 +1,7 @@
 //! Against motions that a program independent of this one found.
 
 use super::*;
-use crate::coordinates::TUB_YAW;
+use crate::coordinates::{COORDINATES, TUB_YAW};
 use crate::tests::elements::machine;
 use crate::tests::reference::reference;
 use crate::{Channel, Method, ModelKind, Spin, Start, Timing, history, prepare};
