@@ -26,6 +26,12 @@ const BYTE_OF_WORDS: u64 = 8;
 /// The beginning of the name by which this program signs its files; a version follows.
 pub const CREATED_BY: &str = "sweep version ";
 
+/// The beginnings of the names by which other writers sign their files. Some of these writers keep
+/// the digest of a result that they write again, where it fits no more. A damaged file of ours
+/// bears none of these names.
+const OTHER_WRITERS: [&str; 6] =
+    ["parquet-cpp", "Polars", "DuckDB", "fastparquet", "parquet-mr", "parquet-rs"];
+
 /// An open Parquet file, ours or another program's.
 #[derive(Debug)]
 pub struct ParquetFile {
@@ -53,10 +59,17 @@ impl ParquetFile {
         }
         let mut file = regular::open(path).map_err(FileError::io("open", path))?;
         let seal = seal::check(&mut file).map_err(FileError::io("read", path))?;
+        let file = match Self::parse(path, file, seal) {
+            Err(_) if seal == Seal::Broken => return Err(FileError::damaged(path)),
+            parsed => parsed?,
+        };
+        if file.is_copy() {
+            file.check_pages()?;
+            return Ok(file);
+        }
         if seal == Seal::Broken {
             return Err(FileError::damaged(path));
         }
-        let file = Self::parse(path, file, seal)?;
         // The library finds a digest where `seal` does not. Every file of this program has one in
         // `seal`'s place, so the name before it has changed.
         let is_ours = file.created_by().is_some_and(|by| by.starts_with(CREATED_BY));
@@ -113,7 +126,13 @@ impl ParquetFile {
         &self.path
     }
 
-    /// Whether it carries a digest, which then fits.
+    /// Whether another program has written a result of this program again, with its digest.
+    pub fn is_copy(&self) -> bool {
+        let is_others = |by: &str| OTHER_WRITERS.iter().any(|writer| by.starts_with(writer));
+        self.created_by().is_some_and(is_others) && self.pairs().any(|pair| pair.key == key::DIGEST)
+    }
+
+    /// Whether it carries a digest that fits.
     pub fn is_sealed(&self) -> bool {
         self.seal == Seal::Whole
     }
@@ -247,17 +266,44 @@ mod tests {
 
     /// The bytes of a file that this program has written, with its digest.
     fn ours() -> Vec<u8> {
+        let mut bytes = io::Cursor::new(with_blank_digest(&format!("{CREATED_BY}0.0.0")));
+        seal::seal(&mut bytes).unwrap();
+        bytes.into_inner()
+    }
+
+    /// The bytes of a file that bears this name, with a digest that does not fit.
+    fn with_blank_digest(created_by: &str) -> Vec<u8> {
         let values: Float64Array = (0..300).map(f64::from).collect();
         let batch = RecordBatch::try_from_iter([("x", Arc::new(values) as _)]).unwrap();
         let properties =
-            WriterProperties::builder().set_created_by(format!("{CREATED_BY}0.0.0")).build();
+            WriterProperties::builder().set_created_by(created_by.to_owned()).build();
         let mut writer = Writer::new(Vec::new(), &batch.schema(), properties).unwrap();
         writer.write(&batch).unwrap();
         let mut writer = writer.end().unwrap();
         writer.append_key_value_metadata(seal::blank());
-        let mut bytes = io::Cursor::new(writer.into_inner().unwrap());
-        seal::seal(&mut bytes).unwrap();
-        bytes.into_inner()
+        writer.into_inner().unwrap()
+    }
+
+    #[test]
+    fn a_result_that_another_program_wrote_again_is_a_copy() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.parquet");
+        for (writer, is_copy) in [
+            ("parquet-cpp-arrow version 21.0.0", true),
+            ("Polars", true),
+            ("sweep version 0.0.0", false),
+            ("sweeq version 0.0.0", false),
+        ] {
+            std::fs::write(&path, with_blank_digest(writer)).unwrap();
+            let opened = ParquetFile::open(&path);
+            assert_eq!(opened.is_ok(), is_copy, "{writer}");
+            if let Ok(file) = opened {
+                assert!(file.is_copy() && !file.is_sealed(), "{writer}");
+                assert!(file.bytes().is_ok(), "{writer}");
+            } else {
+                assert!(matches!(opened, Err(FileError::Damaged { .. })), "{writer}");
+            }
+        }
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub(crate) struct Comparison(pub(crate) fn(Ordering) -> bool);
 pub(crate) enum Fold {
     /// Rows for which a condition is true.
     Count,
-    /// Those, as a part of all rows.
+    /// Rows for which a condition is true, as a part of those for which it is true or false.
     Share,
     Least,
     Greatest,
@@ -94,7 +94,11 @@ impl Node {
     pub(crate) fn value(&self, at: &Context<'_>) -> Cell {
         match self {
             Self::Literal(cell) => cell.clone(),
-            Self::Column(column) => at.row.cell(at.first + *column),
+            Self::Column(column) => match at.row.cell(at.first + *column) {
+                // Other writers store NaN where a value is missing.
+                Cell::Number(value) => number(Some(value)),
+                cell => cell,
+            },
             Self::Folded(fold) => at.folded.get(*fold).cloned().unwrap_or(Cell::Null),
             Self::Changed(change, node) => number(node.number(at).map(change)),
             Self::Calculate(operation, left, right) => {
@@ -230,10 +234,9 @@ impl Folding {
     pub(crate) fn finish(self, fold: Fold) -> Folded {
         let value = match fold {
             Fold::Count => Some(self.sum),
-            Fold::Share => Some(self.sum / self.rows as f64),
+            Fold::Share | Fold::Mean => Some(self.sum / self.over as f64),
             Fold::Least => self.least,
             Fold::Greatest => self.greatest,
-            Fold::Mean => Some(self.sum / self.over as f64),
             Fold::Quantile(part) => quantile(self.numbers, part),
         };
         Folded { value: number(value), over: self.over, whole: self.over == self.rows }

@@ -411,7 +411,12 @@ impl Parser<'_> {
         }
         match self.take() {
             (Token::Number(part), _) if part <= 1.0 => Ok(part),
-            (_, span) => wrong("no part of all rows", span, expected),
+            (Token::Number(percent), span) if percent <= 100.0 => {
+                let title = format!("`{percent}` is not a part of all rows");
+                let part = percent / 100.0;
+                wrong(title, span, format!("expected a number from 0 to 1: {part} for {percent} %"))
+            }
+            (_, span) => wrong("`quantile` takes a part of all rows", span, expected),
         }
     }
 
@@ -492,6 +497,7 @@ mod tests {
             ("status == \"ok", "\"ok", "closing"),
             ("ratio_max is 3", "3", "expected `null`"),
             ("ratio_max < €", "€", "not part of"),
+            ("quantile(ratio_max, 95) < 1", "95", "0.95 for 95 %"),
             ("", "", "ends too early"),
         ] {
             let (found, message) = refused(text);

@@ -171,7 +171,8 @@ mod tests {
             ("count(true) == 6", true),
             ("count(reliable) == 3", true),
             ("count(not reliable) == 2", true),
-            ("share(reliable) == 0.5", true),
+            ("share(reliable) == 3 / 5", true),
+            ("share(not reliable) == 2 / 5", true),
             ("count(ratio_max is null) == 1", true),
             ("min(ratio_max) == 1 and max(ratio_max) == 4", true),
             ("mean(ratio_max) == (1 + 1.5 + 2.5 + 4 + 1.2) / 5", true),
@@ -188,6 +189,25 @@ mod tests {
         assert_eq!(mixed.folded, [Cell::Number(4.0)]);
         let kept = checked("max(ratio_max) == 2.5", Some("not sensitive"), true);
         assert!(kept.holds, "{kept:?}");
+    }
+
+    // NaN is how other writers store a missing value.
+    #[test]
+    fn nan_is_null() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("nan.parquet");
+        let ratios = [Some(1.0), Some(f64::NAN), Some(3.0), None];
+        sample::write(&path, vec![("x", "1", sample::numbers(&ratios))], &[]);
+        let table = ResultTable::open(&path).unwrap();
+        let passes = |text: &str, keep: Option<&str>| {
+            let condition = Condition::parse(text, &table).unwrap();
+            let keep = keep.map(|keep| Condition::parse(keep, &table).unwrap());
+            check(&table, &condition, keep.as_ref(), true, 3).unwrap()
+        };
+        assert!(passes("count(x is null) == 2 and mean(x) == 2 and max(x) == 3", None).holds);
+        assert_eq!(passes("x > 0", Some("x is not null")).rows, 2);
+        assert_eq!(passes("x > 0", None).undefined, 2);
+        assert!(passes("share(x > 2) == 0.5", None).holds);
     }
 
     // One of six rows diverged: nothing that looks at its ratio can be said of all rows.

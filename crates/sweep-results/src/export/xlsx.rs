@@ -4,7 +4,7 @@ use rust_xlsxwriter::{
     DocProperties, ExcelDateTime, Format as Style, Workbook, Worksheet, XlsxError,
 };
 use serde_json::Value;
-use sweep_files::{Cell, Column, ResultTable, dotted, key, leaves};
+use sweep_files::{Cell, Column, ResultTable, dotted, key, leaves, panics};
 
 use super::{Format, names, no_room};
 use crate::error::{Result, ResultsError};
@@ -20,7 +20,15 @@ const WIDTHS: [usize; 2] = [12, 60];
 /// What a filter's button takes of a heading (characters).
 const BUTTON: usize = 3;
 
+/// Returns the workbook of a table. The library panics where the system refuses its temporary
+/// files.
 pub(super) fn bytes(table: &ResultTable) -> Result<Vec<u8>> {
+    let written = panics::caught(|| workbook(table));
+    let reason = |panic| format!("the system refused a temporary file: {panic}");
+    written.unwrap_or_else(|panic| Err(no_room(table, Format::Xlsx, &reason(panic))))
+}
+
+fn workbook(table: &ResultTable) -> Result<Vec<u8>> {
     let no_room = |reason: String| no_room(table, Format::Xlsx, &reason);
     if table.rows() > MOST_ROWS {
         let reason = format!("{} rows, and a sheet has room for {MOST_ROWS}", table.rows());
