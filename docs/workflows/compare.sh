@@ -21,16 +21,31 @@ git archive "$commit" | tar -x -C "$before"
 code=0
 # Known again by comment.sh.
 printf '<!-- sweep: %s -->\n# `%s`\n\n' "$grid" "$grid" > "$out/summary.md"
-"$sweep" run "$grid" --out "$out/after.parquet" --fresh --progress none
-if [ -e "$before/$grid" ]; then
-    "$sweep" run "$before/$grid" --out "$out/before.parquet" --fresh --progress none
+# Writes what went wrong with a grid into the summary.
+refused() {
+    cat "$out/refused.txt" >&2
+    { printf '%s\n\n```text\n' "$1"; cat "$out/refused.txt"; printf '```\n'; } \
+        >> "$out/summary.md"
+}
+
+"$sweep" run "$grid" --out "$out/after.parquet" --fresh --progress none \
+    2> "$out/refused.txt" || code=$?
+if [ "$code" -ne 0 ]; then
+    refused "The grid does not run:"
+    exit "$code"
+fi
+if [ ! -e "$before/$grid" ]; then
+    echo "The grid is new: there is nothing to compare it with." >> "$out/summary.md"
+elif ! "$sweep" run "$before/$grid" --out "$out/before.parquet" --fresh --progress none \
+    2> "$out/refused.txt"; then
+    # What a pull request mends is no reason to refuse it.
+    refused "The grid of the base does not run, so there is nothing to compare it with:"
+else
     "$sweep" compare "$out/before.parquet" "$out/after.parquet" --markdown \
         --fail-on "${FAIL_ON:-flips}" --out "$out/differences.parquet" >> "$out/summary.md" ||
         code=$?
-    # Over one axis there is no such picture.
-    "$sweep" plot "$out/differences.parquet" -o "$out/differences.svg" || :
-else
-    echo "The grid is new: there is nothing to compare it with." >> "$out/summary.md"
+    # Over one axis and of a design there is no such picture.
+    "$sweep" plot "$out/differences.parquet" -o "$out/differences.svg" 2> /dev/null || :
 fi
 "$sweep" require "$out/after.parquet" "${GATE:-count(status != 'ok') == 0}" \
     > "$out/gate.txt" 2>&1 || code=$?

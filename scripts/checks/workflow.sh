@@ -66,6 +66,18 @@ code=0
 GATE='ratio_max < 0' sh "$kit/compare.sh" HEAD grids/one.toml out > /dev/null 2>&1 || code=$?
 [ "$code" = 4 ] && grep -q FAILS out/summary.md || fails "a grid of one axis: exit code $code"
 
+# A pull request that mends the base's grid passes, and one that breaks it says why it does not.
+sed 's/ramp_s = 4.0/ramp_s = -1/' grids/my.toml > grids/broken.toml
+git add grids/broken.toml && git commit -qm "A broken grid"
+cp grids/my.toml grids/broken.toml
+sh "$kit/compare.sh" HEAD grids/broken.toml out > /dev/null 2>&1 || fails "a mended grid is refused"
+grep -q "ramp_s" out/summary.md || fails "the base's mistake is not told"
+grep -q "The grid of the base does not run" out/summary.md || fails "no word of the base"
+git commit -qam "The grid is mended" && sed -i 's/ramp_s = 4.0/ramp_s = -1/' grids/broken.toml
+code=0
+sh "$kit/compare.sh" HEAD grids/broken.toml out > /dev/null 2>&1 || code=$?
+[ "$code" = 2 ] && grep -q "ramp_s" out/summary.md || fails "a broken grid: exit code $code"
+
 # `gh` keeps one comment a file: posting twice leaves one, with the later text.
 mkdir -p "$home/bin" "$home/comments"
 cat > "$home/bin/gh" << 'GH'
