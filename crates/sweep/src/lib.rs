@@ -2,18 +2,17 @@
 //! with arguments.
 //!
 //! * `config` reads a grid file into a [`Plan`], or says every mistake in it. `method` is the table
-//!   of the methods of integration. `design` places points off the grid.
-//! * `engine` takes points of a plan through both models of `washer_model`, and returns an
-//!   [`Outcome`] each; `verdict` makes ratios and a verdict of it. `estimate` says beforehand what
-//!   a run will take.
-//! * `run` computes a plan's points on all cores and keeps them as they come. `store` is the folder
-//!   on disk meanwhile, and the result file; [`sweep_files`] has the rules of writing and reading.
-//!   `identity` says which builds write the same bytes.
-//! * `boundary` traces the curve where the ratio is at its limit, `trace` writes one point's time
-//!   histories. [`washer_plot`] draws any of these files.
+//!   of the methods of integration.
+//! * `engine` takes points of a plan through both models of `washer_model` to outcomes, of which
+//!   `columns` makes rows. `estimate` says beforehand what a run will take.
+//! * [`sweep_engine`] computes a plan's points on all cores and keeps them as they come, traces
+//!   boundaries and runs studies; [`sweep_files`] has the rules of writing and reading. `identity`
+//!   says which builds write the same bytes.
+//! * `trace` writes one point's time histories, `stability`, `dwell`, `explain` and `fit` answer the
+//!   questions of their names. [`washer_plot`] draws any of these files.
 //! * `library` is the commands' work as functions: an [`Evaluator`] takes tables of points, a
 //!   [`MemoryTable`] holds a result in memory.
-//! * `commands` is the command line; `progress`, `interrupt` and `exit` serve it.
+//! * `commands` is the command line.
 //!
 //! This crate exports what the program, the fuzzer and the examples use.
 //!
