@@ -36,6 +36,21 @@ fn parsed(output: &Output) -> Value {
 }
 
 #[test]
+fn a_report_leaves_the_page_of_a_plot_and_asks_for_an_option_per_expression() {
+    let home = mapped();
+    let page = "results/short.html";
+    assert_eq!(code(&home.sweep(&["plot", MAP, "-o", page])), Some(0));
+    let before = fs::read(home.path(page)).unwrap();
+    let written = home.sweep(&["report", MAP]);
+    assert_eq!(code(&written), Some(0), "{}", said(&written));
+    assert!(fs::read(home.path(page)).unwrap() == before);
+    assert!(home.path("results/short.report.html").exists());
+    let refused = home.sweep(&["report", MAP, "--require", "point >= 0", "point < 9"]);
+    assert_eq!(code(&refused), Some(2));
+    assert!(said(&refused).contains("a `--require` of its own"), "{}", said(&refused));
+}
+
+#[test]
 fn a_gate_opens_or_names_the_rows_and_exits_with_4() {
     let home = mapped();
     let opened = home.sweep(&["require", MAP, "ratio_max < 1e6", "count(status == 'ok') == 6"]);

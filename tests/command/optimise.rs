@@ -86,6 +86,38 @@ fn of_several_objectives_it_is_said_what_the_last_third_put_on_the_front() {
 }
 
 #[test]
+fn columns_of_a_study_differ_and_its_best_is_in_the_table() {
+    let objectives = "[[objective]]\nmaximise = \"min(min_gap_nonlinear_m)\"\n\
+        [[objective]]\nminimise = \"max(nonlinear_tub_front_y + nonlinear_tub_front_z)\"\n\
+        [[objective]]\nminimise = \"max(nonlinear_tub_front_y - nonlinear_tub_front_z)\"\n\
+        [[parameter]]";
+    let study = STUDY.replacen("[[parameter]]", objectives, 1).replace("24", "200");
+    let folder = folder_with("2", &study);
+    let text = does(&folder, "optimise study.toml");
+    let best = text.split_once("best  candidate ").expect("a best").1;
+    let best = best.split_whitespace().next().expect("its number");
+    let is_row = |line: &str| line.split_whitespace().next() == Some(best);
+    assert!(text.lines().any(is_row), "no row of candidate {best} in {text}");
+    for column in [
+        "max_nonlinear_tub_front_y_plus_nonlinear_tub_front_z",
+        "max_nonlinear_tub_front_y_minus_nonlinear_tub_front_z",
+    ] {
+        assert!(text.contains(column), "{text}");
+    }
+}
+
+#[test]
+fn an_objective_that_is_a_parameter_has_a_column_of_its_own() {
+    let study = STUDY.replace("max(cabinet_force_nonlinear_n)", "damping_n_s_per_m");
+    let folder = folder_with("2", &study);
+    let grid = GRID.replace("END", "2");
+    let one = &grid[..grid.find("[[axis]]").expect("an axis")];
+    fs::write(folder.path().join("grid.toml"), one).expect("it is written");
+    let text = does(&folder, "optimise study.toml");
+    assert!(text.contains("objective_damping_n_s_per_m"), "{text}");
+}
+
+#[test]
 fn the_machine_file_of_the_best_has_the_force_that_the_study_says() {
     let folder = folder_with("2", STUDY);
     let text = does(&folder, "optimise study.toml --best best.toml --threads 2");

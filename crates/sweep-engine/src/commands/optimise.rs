@@ -205,7 +205,12 @@ fn told<M: Swept>(
             format!("reached by {}: a wider range may have better", ends.join(", ")),
         );
     }
-    let listed = front.iter().step_by(front.len().div_ceil(LISTED).max(1));
+    let apart = front.len().div_ceil(LISTED).max(1);
+    let is_best = |cells: &[Cell]| cells[0].number() == about["best"].as_f64();
+    // The best stands in the table wherever it lies on the front.
+    let listed = front.iter().enumerate();
+    let listed = listed.filter(|(k, cells)| k % apart == 0 || is_best(cells));
+    let listed = listed.map(|(_, cells)| cells);
     let shown = |cells: &[Cell]| cells.iter().take(1).chain(&cells[3..]).map(word).collect();
     let headings: Vec<String> =
         names.iter().take(1).chain(&names[3..]).map(|&name| name.to_owned()).collect();

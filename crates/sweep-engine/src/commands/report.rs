@@ -1,6 +1,6 @@
 //! `sweep report RESULT [FILE ...]`: one page to print, for whoever decides.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::show::Further;
 use super::{conditions, short, word};
@@ -21,7 +21,7 @@ pub struct Args {
     /// Further files of this program, each shown with its figure
     #[arg(value_name = "FILE")]
     further: Vec<PathBuf>,
-    /// The page [default: RESULT with the ending .html]
+    /// The page [default: RESULT with the ending .report.html]
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// The question that the page answers
@@ -47,7 +47,11 @@ pub fn run<M: Swept>(
     resonances: &Resonances<M>,
     model: &dyn Figures,
 ) -> Result<Exit, Error> {
-    let output = args.out.clone().unwrap_or_else(|| args.result.with_extension("html"));
+    let output = args.out.clone().unwrap_or_else(|| args.result.with_extension("report.html"));
+    for path in args.further.iter().filter(|path| is_expression(path)) {
+        let expected = "a file; each expression needs a `--require` of its own";
+        return Err(Error::option("FILE", path.display(), expected));
+    }
     let file = ResultTable::open(&args.result)?;
     let page = Output::begin(&output, FileKind::Html)?;
     if file.file().kind() != Some(FileKind::Map) {
@@ -125,6 +129,12 @@ pub fn run<M: Swept>(
     page.finish(sheet(&args.question, &body).as_bytes())?;
     tell(&format!("wrote {}", output.display()));
     Ok(if held { Exit::Done } else { Exit::NotHeld })
+}
+
+/// Whether an argument that names no file looks like an expression.
+fn is_expression(path: &Path) -> bool {
+    let is_operator = |c: char| "<>=()".contains(c);
+    !path.exists() && path.to_string_lossy().contains(is_operator)
 }
 
 /// What a reliable ratio is.

@@ -104,7 +104,10 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
     match &file.result {
         Some(result) => {
             provenance(&mut text, result);
-            if !opened.is_sealed() {
+            if opened.is_copy() {
+                let writer = opened.created_by().unwrap_or("another program");
+                text.line("checked", format!("no: a copy that {writer} wrote"));
+            } else if !opened.is_sealed() {
                 text.line("checked", "no: it carries no digest, as files of older builds do not");
             }
             let tally = tally(&opened)?;

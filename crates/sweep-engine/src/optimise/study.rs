@@ -110,6 +110,8 @@ impl<M: Rows> Study<M> {
             M::judge(draft);
         }
         let plan = draft.map(|draft| draft.plan);
+        let axes = plan.as_ref().map_or(&[][..], |plan| &plan.axes);
+        let names: Vec<String> = axes.iter().map(|axis| axis.parameter.name().to_owned()).collect();
         let known = plan.as_ref().map_or_else(Vec::new, |plan| columns(&M::layout(plan).schema()));
         let rows = grid.as_ref().map_or(1, Plan::points);
         if rows > MOST[1] {
@@ -117,7 +119,7 @@ impl<M: Rows> Study<M> {
             report.refuse::<()>(root.at(), title, format!("expected at most {}", MOST[1]));
         }
         let goals = Goals { known, is_sound: report.is_clean(), rows, text: &text, report };
-        let objectives = objectives(&root, root.tables(objective), &goals);
+        let objectives = objectives(&root, root.tables(objective), &goals, &names);
         let conditions = root.texts(conditions).given();
         let conditions = conditions.into_iter().flat_map(|texts| texts.value);
         let conditions = conditions.filter_map(|text| goals.read(&text, Goal::excess)).collect();
@@ -285,8 +287,13 @@ fn spreads<M: Rows>(design: Option<&Design>, draft: &Option<Draft<'_, M>>) -> bo
     }
 }
 
-/// Reads every `[[objective]]`.
-fn objectives(root: &Section<'_>, sections: Vec<Section<'_>>, goals: &Goals<'_>) -> Vec<Objective> {
+/// Reads every `[[objective]]`; their columns stand beside those of the parameters.
+fn objectives(
+    root: &Section<'_>,
+    sections: Vec<Section<'_>>,
+    goals: &Goals<'_>,
+    parameters: &[String],
+) -> Vec<Objective> {
     const VERBS: [(&str, f64); 2] = [("minimise", 1.0), ("maximise", -1.0)];
     let mut objectives: Vec<Objective> = Vec::new();
     if sections.is_empty() {
@@ -308,24 +315,50 @@ fn objectives(root: &Section<'_>, sections: Vec<Section<'_>>, goals: &Goals<'_>)
         };
         let (text, sign) = text;
         let Some(goal) = goals.read(text, Goal::number) else { continue };
-        let name = column_name(text.value);
+        let is_same = |one: &Objective| spaceless(one.goal.text()) == spaceless(text.value);
         if goal.is_by_row() && goals.rows > 1 {
             let title = format!("a number of one row, and every candidate has {}", goals.rows);
             let expected = "expected max(), min(), mean() or quantile() of it";
             root.report.refuse::<()>(&text.at, title, expected);
-        } else if objectives.iter().any(|one| one.name == name) {
+        } else if objectives.iter().any(is_same) {
             root.report.refuse::<()>(&text.at, "an objective twice", "expected each once");
         } else {
+            let name = unique_name(&column_name(text.value), &objectives, parameters);
             objectives.push(Objective { name, goal, sign: *sign });
         }
     }
     objectives
 }
 
-/// An expression as the name of a column: its words.
+/// Returns an expression without its spaces.
+fn spaceless(text: &str) -> String {
+    text.split_whitespace().collect()
+}
+
+/// Returns a column's name for an expression: its words, with operators spelled out.
 fn column_name(text: &str) -> String {
-    let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+    const OPERATORS: [(&str, &str); 6] =
+        [("+", "plus"), ("-", "minus"), ("*", "times"), ("/", "over"), ("<", "lt"), (">", "gt")];
+    let mut spelled = text.to_owned();
+    for (operator, word) in OPERATORS {
+        spelled = spelled.replace(operator, &format!(" {word} "));
+    }
+    let words = spelled.split(|c: char| !c.is_alphanumeric() && c != '_');
     words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
+}
+
+/// Returns the first of `name`, `objective_name`, `objective_name_2`, ... that no other column of
+/// a study has.
+fn unique_name(name: &str, objectives: &[Objective], parameters: &[String]) -> String {
+    let is_taken = |name: &str| {
+        ["candidate", "generation", "feasible", "on_front"].contains(&name)
+            || name.starts_with("excess_")
+            || parameters.iter().any(|parameter| parameter == name)
+            || objectives.iter().any(|objective| objective.name == name)
+    };
+    let numbered = (2..).map(|number| format!("objective_{name}_{number}"));
+    let plain = [name.to_owned(), format!("objective_{name}")];
+    plain.into_iter().chain(numbered).find(|name| !is_taken(name)).unwrap_or_default()
 }
 
 /// What expressions are read over.
@@ -357,5 +390,18 @@ impl Goals<'_> {
             Location::new(found.at.source, if is_plain { span } else { found.at.span.clone() });
         self.report.push(Diagnostic::of_expression(mistake, &at));
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::column_name;
+
+    #[test]
+    fn names_of_objectives_keep_their_operators() {
+        assert_eq!(column_name("max(a + b)"), "max_a_plus_b");
+        assert_eq!(column_name("max(a - b)"), "max_a_minus_b");
+        assert_eq!(column_name("a / b"), "a_over_b");
+        assert_eq!(column_name("quantile(x, 0.95)"), "quantile_x_0_95");
     }
 }

@@ -181,7 +181,9 @@ fn listed(differences: &[PlanDifference]) -> String {
     const SHOWN: usize = 12;
     let mut text: String = differences.iter().take(SHOWN).map(|one| format!("  {one}\n")).collect();
     if differences.len() > SHOWN {
-        text += &format!("  and {} more differences\n", differences.len() - SHOWN);
+        let more = differences.len() - SHOWN;
+        let plural = if more == 1 { "" } else { "s" };
+        text += &format!("  and {more} more difference{plural}\n");
     }
     text
 }
