@@ -1,9 +1,9 @@
 //! What a fit has found out already, kept as it comes: the same question again goes on from there,
-//! and ends in the same bits. A record is a line: a hash of what follows it, the hash of what was
-//! asked, and the answer, null where there is none.
+//! and ends in the same bits. A record is a line: a hash of what follows it, the hash of the problem,
+//! the hash of what was asked, and the answer, null where there is none.
 
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -27,18 +27,35 @@ pub(crate) struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal of a problem at a path; records of others, and torn ones, do not count.
+    /// Opens and locks the journal of a problem at a path. Torn and damaged records do not count.
     ///
     /// # Errors
-    /// Of the file system.
+    /// Errors of the file system; another fit that has the lock; a file that is no journal or holds
+    /// evaluations of another problem, which stays as it is.
     pub(crate) fn open(path: &Path, problem: Hash) -> std::io::Result<Self> {
         let mut file = regular::open_or_create(path)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => return Err(refusal("another fit is writing it")),
+            locked => locked?,
+        }
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
         let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        let records: Vec<_> =
+            bytes[..whole].split(|byte| *byte == b'\n').filter_map(record).collect();
+        if records.is_empty() && !bytes.is_empty() && !is_torn_record(&bytes) {
+            return Err(refusal("it is not a journal of a fit; move it or name another output"));
+        }
+        let problem_hex = problem.to_hex();
+        if records.iter().any(|record| record.0 != problem_hex.as_str()) {
+            return Err(refusal(
+                "it holds evaluations of another fit; finish that fit, remove the file or name \
+                 another output",
+            ));
+        }
         file.set_len(whole as u64)?;
         file.seek(SeekFrom::End(0))?;
-        let known = bytes[..whole].split(|byte| *byte == b'\n').filter_map(record).collect();
+        let known = records.into_iter().map(|(_, key, answer)| (key, answer)).collect();
         Ok(Self { path: path.to_owned(), problem, state: Mutex::new((file, known)) })
     }
 
@@ -60,7 +77,7 @@ impl Journal {
         }
         let found = find()?;
         let mut state = lock();
-        let answer = json!([key, found]).to_string();
+        let answer = json!([self.problem.to_hex().as_str(), key, found]).to_string();
         let check = blake3::hash(answer.as_bytes());
         let _ = state.0.write_all(format!("{check} {answer}\n").as_bytes());
         state.1.insert(key, found.clone());
@@ -78,9 +95,21 @@ impl Journal {
     }
 }
 
-/// The question and the answer of a line.
-fn record(line: &[u8]) -> Option<(String, Option<Summary>)> {
+/// Returns the problem, the question and the answer of a line.
+fn record(line: &[u8]) -> Option<(String, String, Option<Summary>)> {
     let (check, answer) = std::str::from_utf8(line).ok()?.split_once(' ')?;
     let is_whole = blake3::hash(answer.as_bytes()).to_hex().as_str() == check;
     is_whole.then(|| serde_json::from_str(answer).ok())?
+}
+
+/// Whether bytes are the beginning of a journal whose first record a kill has cut off.
+fn is_torn_record(bytes: &[u8]) -> bool {
+    let is_one_line = !bytes.contains(&b'\n');
+    let has_check = bytes.iter().take(64).all(u8::is_ascii_hexdigit);
+    is_one_line && has_check && bytes.get(64..67) == Some(b" [\"".as_slice())
+}
+
+/// Returns the error for a file that stays as it is.
+fn refusal(reason: &str) -> std::io::Error {
+    std::io::Error::new(std::io::ErrorKind::AlreadyExists, reason)
 }

@@ -408,3 +408,26 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     assert_eq!(serde_json::json!(resumed), serde_json::json!(whole));
     assert!(!journal.exists());
 }
+
+#[test]
+fn a_journal_spares_files_and_evaluations_of_others() {
+    use super::journal::Journal;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.partial");
+    let open = |problem: &[u8]| Journal::open(&path, blake3::hash(problem));
+    for foreign in ["a thesis", "a thesis\nof two lines\n", "abc"] {
+        std::fs::write(&path, foreign).unwrap();
+        let error = open(b"a").err().unwrap().to_string();
+        assert!(error.contains("not a journal"), "{error}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), foreign);
+    }
+    std::fs::remove_file(&path).unwrap();
+    let journal = open(b"a").unwrap();
+    journal.answer(&[1.0], || Ok::<_, ()>(None)).unwrap();
+    let error = open(b"a").err().unwrap().to_string();
+    assert!(error.contains("another fit is writing"), "{error}");
+    drop(journal);
+    let error = open(b"b").err().unwrap().to_string();
+    assert!(error.contains("evaluations of another fit"), "{error}");
+    assert_eq!(open(b"a").unwrap().count(), 1);
+}
