@@ -83,6 +83,26 @@ pub struct FitOptions {
     pub draws: u32,
 }
 
+impl FitOptions {
+    /// Refuses counts beyond those that the command line takes, for callers without one.
+    ///
+    /// # Errors
+    /// An option that is out of its range.
+    pub(crate) fn check(&self) -> Result<(), sweep_engine::Error> {
+        for (option, count, least, most) in [
+            ("starts", self.starts, 1, 10_000),
+            ("bootstrap", self.bootstrap, 0, 10_000),
+            ("draws", self.draws, 0, 100_000),
+        ] {
+            if !(least..=most).contains(&count) {
+                let expected = format!("a number from {least} to {most}");
+                return Err(sweep_engine::Error::option(option, count, expected));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// A fit that was made.
 pub(crate) struct Fitted<'a> {
     pub(crate) problem: Problem<'a>,

@@ -123,6 +123,7 @@ def test_differences_are_read(sweep, tmp_path):
     (lambda plan: washer_sweep.explain(plan, POINT, speeds_rpm=[200, 210, 230]), "even distances"),
     (lambda plan: washer_sweep.explain(plan, POINT, speeds_rpm=[0, 10]), "above 0"),
     (lambda plan: washer_sweep.explain(plan, POINT, threads=0), "expected a number from 1"),
+    (lambda plan: washer_sweep.fit(plan, [], ["tub_mass_kg"]), "a table or more"),
 ])
 def test_what_makes_no_sense_is_refused(short, work, said):
     with pytest.raises(PlanError, match=said):

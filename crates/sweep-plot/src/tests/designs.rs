@@ -215,3 +215,62 @@ fn a_grid_is_no_design_and_a_list_of_a_grid_is_a_map() {
     assert!(svg(listed(), &Options::default()).contains("linear model unreliable"));
     assert!(svg(listed(), &view(View::Histogram)).contains("Share of the points (%)"));
 }
+
+/// Returns a design whose cells are numbers, null, NaN and infinite at random.
+fn broken(seed: u64, null: f64) -> Sample {
+    let mut state = seed;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let count = 1 + (random() * 40.0) as usize;
+    let mut column = |scale: f64| -> Vec<f64> {
+        let mut cell = || match random() {
+            part if part < null => f64::NAN,
+            part if part > 0.97 => f64::INFINITY,
+            part if part > 0.94 => 0.0,
+            part => scale * part,
+        };
+        (0..count).map(|_| cell()).collect()
+    };
+    let [yaw, linear, ratio, gap] = [1e-2, 1e-2, 4.0, 1e-3].map(&mut column);
+    let method = ["monte_carlo", "sobol", "list"][(seed % 3) as usize];
+    let plan = format!(
+        r#"{{ "name": "sample", "reliability": {{ "ratio_limit": 2.0 }},
+             "design": {{ "method": "{method}", "points": {count}, "seed": 0 }} }}"#
+    );
+    let axis = |step: f64| (0..count).map(move |k| (k as f64 * step).fract());
+    Sample::default()
+        .counts("point", 0..count as u64)
+        .numbers("unbalance_mass_kg", "kg", axis(0.618))
+        .numbers("damping_n_s_per_m", "N s/m", axis(0.414))
+        .numbers("nonlinear_body_yaw", "rad", yaw)
+        .numbers("linear_body_yaw", "rad", linear)
+        .numbers("ratio_body_yaw", "1", ratio.clone())
+        .numbers("ratio_max", "1", ratio.clone())
+        .flags("reliable", ratio.iter().map(|one| one.is_finite().then_some(*one < 2.0)))
+        .numbers("min_gap_nonlinear_m", "m", gap)
+        .bad("less", Some(0.0))
+        .words("status", ratio.iter().map(|one| Some(if one.is_nan() { "diverged" } else { "ok" })))
+        .metadata("sweep.plan", &plan)
+}
+
+#[test]
+fn designs_without_values_are_drawn_or_refused() {
+    let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();
+    for k in 0..60 {
+        let seed = clock.subsec_nanos() as u64 + k;
+        let null = [1.0, 0.9, 0.5][(k % 3) as usize];
+        for column in ["ratio_max", "nonlinear_body_yaw", "min_gap_nonlinear_m"] {
+            for shown in [View::Scatter, View::Histogram, View::Influence] {
+                for name in ["a.svg", "a.html", "a.png"] {
+                    let options = Options { view: Some(shown), ..showing(column) };
+                    let drawn = std::panic::catch_unwind(|| {
+                        draw(broken(seed, null), &options, name)
+                    });
+                    assert!(drawn.is_ok(), "seed {seed}, null {null}: {column}, {shown:?}, {name}");
+                }
+            }
+        }
+    }
+}

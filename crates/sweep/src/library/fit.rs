@@ -18,6 +18,10 @@ pub fn fit_tables(
     options: &FitOptions,
     effort: Effort<'_>,
 ) -> Result<Option<Explained>, Error> {
+    if tables.is_empty() {
+        return Err(Error::option("table", "[]", "a table or more"));
+    }
+    options.check()?;
     let mut cases = Vec::with_capacity(tables.len());
     for (k, (table, constants)) in tables.into_iter().enumerate() {
         let mut measured = Measured::of_columns(table.into_columns())?;
@@ -30,4 +34,42 @@ pub fn fit_tables(
     let work = Work { stop: &stop, seen: &|_| {}, journal: None };
     let found = threads::pool(effort.threads()?)?.install(|| fit::fit(cases, options, &work))?;
     Ok(found.map(|fitted| Explained { found: json!(fitted.report), text: fitted.report.text() }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sweep_engine::{Interrupt, ProgressMode};
+
+    #[test]
+    fn no_table_and_too_many_draws_are_refused() {
+        let interrupt = Interrupt::new();
+        let effort =
+            || Effort { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
+        let plain = FitOptions {
+            free: Vec::new(),
+            own: Vec::new(),
+            model: "linear".to_owned(),
+            no_shift: true,
+            starts: 1,
+            bootstrap: 0,
+            draws: 0,
+        };
+        let grid = GridInput::text("fit", String::new(), Vec::new());
+        let message = |options: &FitOptions| {
+            fit_tables(&grid, Vec::new(), options, effort()).unwrap_err().to_string()
+        };
+        assert!(message(&plain).contains("a table or more"));
+        let many = 1_000_000_000;
+        for options in [
+            FitOptions { starts: many, ..plain.clone() },
+            FitOptions { starts: 0, ..plain.clone() },
+            FitOptions { bootstrap: many, ..plain.clone() },
+            FitOptions { draws: many, ..plain.clone() },
+        ] {
+            let refused = options.check().unwrap_err().to_string();
+            assert!(refused.contains("a number from"), "{refused}");
+        }
+        assert!(plain.check().is_ok());
+    }
 }
