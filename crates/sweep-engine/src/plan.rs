@@ -54,7 +54,11 @@ pub struct Plan<M: Model> {
     pub written: WrittenIn,
 }
 
-/// The file or option in which each single number was last written, by its parameter's name. No
+/// The beginning of the source of a number that follows from others by a rule.
+pub const ASSUMED: &str = "assumed: ";
+
+/// The file or option in which each single number was last written, by its parameter's name; or the
+/// rule by which a number that was left out has its value, which begins with [`ASSUMED`]. No
 /// result depends on it, so plans that differ in nothing else are equal.
 #[derive(Clone, Debug, Default)]
 pub struct WrittenIn(pub BTreeMap<String, String>);
@@ -65,7 +69,15 @@ impl WrittenIn {
         let mut places: Vec<&str> =
             names.iter().filter_map(|name| Some(self.0.get(name.as_ref())?.as_str())).collect();
         places.dedup();
-        (!places.is_empty()).then(|| format!("given: {}", places.join(", ")))
+        let rules: Vec<&str> = places.extract_if(.., |place| place.starts_with(ASSUMED)).collect();
+        let given = (!places.is_empty()).then(|| format!("given: {}", places.join(", ")));
+        let all: Vec<&str> = given.as_deref().into_iter().chain(rules).collect();
+        (!all.is_empty()).then(|| all.join("; "))
+    }
+
+    /// Returns whether a number was left out and has its value by a rule.
+    pub fn is_assumed(&self, name: &str) -> bool {
+        self.0.get(name).is_some_and(|place| place.starts_with(ASSUMED))
     }
 }
 

@@ -1,7 +1,7 @@
 //! What computes the washing machine's rows, for the engine's commands.
 
 use sweep_engine::{Engine, Error, Estimate, Swept};
-use washer_model::{Machine, Parameter, Profile, Spin, Target, stops_at_rest_n};
+use washer_model::{Machine, Parameter, Point, Profile, Spin, Target, stops_at_rest_n};
 use washer_row::{Criterion, Demand, Metric};
 
 use crate::config::grid::lacking;
@@ -12,11 +12,18 @@ use crate::plan::{Plan, ready, timing};
 /// A stop that carries more than this share of the machine's weight at rest is told.
 const RESTS_FROM: f64 = 0.01;
 
-/// The stop that the machine of the first point rests on most, if it rests on one.
-fn resting_on(plan: &Plan) -> Option<String> {
+/// Returns the place of rest of the first point's machine in words: why it has none, or the stop on
+/// which it rests most, if it rests on one.
+fn rest(plan: &Plan) -> Option<(&'static str, String)> {
     let Washer { machine, spin, .. } = plan.scenario(0).model;
-    let point = ready(machine, spin, &timing(plan)).ok()?;
-    let pushes_n = stops_at_rest_n(&point).into_iter().map(f64::abs).zip(1..);
+    match ready(machine, spin, &timing(plan)) {
+        Ok(point) => resting_on(&point).map(|stop| ("stops", stop)),
+        Err(why) => Some(("rest", format!("{why} (first point)"))),
+    }
+}
+
+fn resting_on(point: &Point) -> Option<String> {
+    let pushes_n = stops_at_rest_n(point).into_iter().map(f64::abs).zip(1..);
     let (push_n, stop) = pushes_n.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (push_n > RESTS_FROM * point.weight_n()).then(|| {
         let [push_n, weight_n] = [push_n, point.weight_n()].map(f64::round);
@@ -58,7 +65,7 @@ impl Swept for Washer {
             let how = "from the first instant, with the suspension at rest: it begins by a jump";
             words.push(("spin", format!("{first} rpm {how}")));
         }
-        words.extend(resting_on(plan).map(|stops| ("stops", stops)));
+        words.extend(rest(plan));
         words
     }
 

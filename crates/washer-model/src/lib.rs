@@ -83,7 +83,8 @@ pub use fast::geared::{Formula, Gear, Geared};
 pub use kind::ModelKind;
 pub use linear::Matrices;
 pub use machine::parameters::{
-    ElementList, Parameter, Range, Target, UnknownParameter, decimal, unit_suffix,
+    Assumption, DataSheet, ElementList, Parameter, Range, Spread, Target, UnknownParameter,
+    decimal, unit_suffix,
 };
 pub use machine::spin::{Profile, Spin};
 pub use machine::violations::Violation;

@@ -35,9 +35,26 @@ pub struct Timing {
 const NUDGE: f64 = 1e-10;
 
 /// The machine has no static equilibrium, or none that is stable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the machine has no stable static equilibrium: its springs cannot carry it")]
-pub struct NoEquilibrium;
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("the machine has no stable static equilibrium: {}", self.reason())]
+pub struct NoEquilibrium {
+    /// The motion of tub and drum together against which springs and weight hold least, if they
+    /// push along it: its name, its stiffness and the stiffness's unit.
+    pub unstable: Option<(&'static str, f64, &'static str)>,
+}
+
+impl NoEquilibrium {
+    /// Returns the reason in words.
+    fn reason(&self) -> String {
+        match self.unstable {
+            Some((motion, stiffness, unit)) => format!(
+                "loaded springs push it {motion}, with a stiffness of {stiffness:.4} {unit} there; \
+                 give it a spring or a bushing that holds it against that"
+            ),
+            None => "its springs cannot carry its weight".to_owned(),
+        }
+    }
+}
 
 /// A machine and its spin, ready to be integrated by either model.
 #[derive(Clone, Debug)]
@@ -242,7 +259,9 @@ impl Kernel for Prepare<'_> {
             let given = zip(group, courses.by_ref());
             for (lane, (model, ((machine, _), course))) in zip(models, given).enumerate() {
                 if found >> lane & 1 == 0 {
-                    ready.push(Err(NoEquilibrium));
+                    let q = q.map(|q| q.0.get(lane));
+                    let unstable = equilibrium::unstable_motion(&model.0.0, &q);
+                    ready.push(Err(NoEquilibrium { unstable }));
                     continue;
                 }
                 let ((coefficients, linear), (linear_outputs, steepest)) = model;

@@ -8,6 +8,7 @@ use crate::config::section::counted;
 use crate::design::{Design, Distribution};
 use crate::estimate::size;
 use crate::method::{Integrator as _, Steps};
+use crate::store::read::failed;
 use crate::{Axis, AxisValues, Error, Estimate, Exit, Plan, Swept, duration, show, threads};
 use sweep_parameter::{Channel as _, Parameter as _, RatioLimits};
 
@@ -31,7 +32,10 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         return show(&format!("{:#}\n", plan.to_json()));
     }
     let estimate = M::estimate(&plan, threads::count(None, &threads::process)?)?;
-    show(&summary(&plan, &estimate))
+    show(&summary(&plan, &estimate))?;
+    let tried = estimate.sampled.values().sum::<u64>();
+    // A plan of which nothing can be computed is no plan to run.
+    Ok(if tried > 0 && failed(&estimate.sampled) == tried { Exit::Failed } else { Exit::Done })
 }
 
 /// The plan in a few lines.

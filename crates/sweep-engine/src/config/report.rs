@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::source::{Location, SourceId, Sources};
+use crate::plan::ASSUMED;
 use sweep_results::nearest;
 
 /// More mistakes than this are counted but not kept: a wrong file should not fill a terminal or the
@@ -64,6 +65,8 @@ pub struct Report {
     places: RefCell<BTreeMap<String, Location>>,
     /// Numbers that were refused or missing: a stand-in holds their place.
     doubtful: RefCell<BTreeSet<String>>,
+    /// The rules of numbers that a file leaves out, by their parameters' names.
+    assumed: RefCell<BTreeMap<String, String>>,
 }
 
 #[derive(Debug, Default)]
@@ -119,16 +122,23 @@ impl Report {
         self.doubtful.borrow_mut().insert(key.into());
     }
 
+    /// Keeps the rule by which a number has its value that a file leaves out.
+    pub fn assume(&self, name: &str, rule: &str) {
+        self.assumed.borrow_mut().insert(name.to_owned(), format!("{ASSUMED}{rule}"));
+    }
+
     /// The place of a number, if it was written.
     pub fn place(&self, key: &str) -> Option<Location> {
         self.places.borrow().get(key).cloned()
     }
 
-    /// The text in which each parameter that was written stands last.
+    /// Returns the text in which each parameter that was written stands last, and the rule of each
+    /// that was left out.
     pub fn written(&self) -> BTreeMap<String, String> {
         let (places, sources) = (self.places.borrow(), self.sources.borrow());
         let parameters = places.iter().filter(|(key, _)| !key.contains(['.', '[']));
-        parameters.map(|(key, at)| (key.clone(), sources.name(at.source).to_owned())).collect()
+        let written = parameters.map(|(key, at)| (key.clone(), sources.name(at.source).to_owned()));
+        self.assumed.borrow().clone().into_iter().chain(written).collect()
     }
 
     /// Whether it was refused or missing.

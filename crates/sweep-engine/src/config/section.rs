@@ -112,6 +112,12 @@ impl<'a> Section<'a> {
         self.table.get_key_value(key).map(|(key, _)| self.place(key.span()))
     }
 
+    /// Whether a table under a key has another key.
+    pub fn key_inside(&self, table: &str, key: &str) -> bool {
+        let table = self.table.get(table).map(Spanned::get_ref);
+        matches!(table, Some(DeValue::Table(table)) if table.contains_key(key))
+    }
+
     /// Refuses these keys with a reason of their own instead of "unknown key".
     pub fn misplace(&self, keys: &[&'static str], reason: &str) {
         // The first reason is the caller's own.

@@ -12,6 +12,9 @@ use sweep_files::{FileError, atomic};
 /// The commented grid file.
 const GRID: &str = include_str!("starter.toml");
 
+/// The commented short machine file.
+const SHORT_MACHINE: &str = include_str!("starter_machine.toml");
+
 /// Arguments of `sweep init`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -20,6 +23,9 @@ pub struct Args {
     /// Write the built-in machine as a machine file instead, to be changed and named by a grid file
     #[arg(long)]
     machine: bool,
+    /// Write a short machine file, as a data sheet fills it: the rest is assumed by rules
+    #[arg(long, requires = "machine")]
+    short: bool,
 }
 
 /// Writes the file, never over another.
@@ -27,9 +33,11 @@ pub struct Args {
 /// # Errors
 /// When the file exists or cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let text = match args.machine {
-        true => config::machine_file(&Machine::paper(), &WrittenIn::default()),
-        false => GRID.to_owned(),
+    let text = match (args.machine, args.short) {
+        (true, true) => SHORT_MACHINE.to_owned(),
+        // Without --short the whole machine: scripts read it, and no number in it is assumed anew.
+        (true, false) => config::machine_file(&Machine::paper(), &WrittenIn::default()),
+        (false, _) => GRID.to_owned(),
     };
     let default = if args.machine { "machine.toml" } else { "grid.toml" };
     let path = args.file.as_deref().unwrap_or(Path::new(default));

@@ -5,10 +5,11 @@ use std::slice;
 use std::sync::LazyLock;
 
 use serde_json::{Value, json};
-use washer_model::{Cabinet, ElementList, Machine, Parameter, Spin, Target};
+use sweep_parameter::Range;
+use washer_model::{Cabinet, DataSheet, ElementList, Machine, Parameter, Spin, Target};
 
 use sweep_engine::config::form::{Numbers, about};
-use sweep_engine::config::keys::{self};
+use sweep_engine::config::keys;
 use sweep_engine::config::schema::{document, of};
 use sweep_engine::config::source::is_blank;
 use sweep_engine::config::{Diagnostic, Field, Form, Keys, Report, Section, Walk};
@@ -35,9 +36,8 @@ struct Part {
 enum Times {
     Once,
     AtMostOnce,
-    /// As an array of tables; with the number of the first element, and what a machine needs one
-    /// for, if it does.
-    Many(usize, Option<&'static str>),
+    /// As an array of tables, with the number of the first element.
+    Many(usize),
 }
 
 /// A key of a section: a number, or three in an array.
@@ -112,15 +112,23 @@ impl Part {
     }
 
     /// Walks over the keys of element `k`.
-    fn walk(&self, own: &'static [Key], k: usize, machine: &mut Machine, keys: &mut Keys<'_>) {
+    fn walk(
+        &self,
+        own: &'static [Key],
+        k: usize,
+        machine: &mut Machine,
+        sheet: &mut Sheet,
+        keys: &mut Keys<'_>,
+    ) {
         keys.places = format!("{}.", self.section);
-        own.iter().for_each(|key| key.walk(self, k, machine, keys));
+        sheet.walk(self.section, keys);
+        own.iter().for_each(|key| key.walk(self, k, machine, sheet, keys));
     }
 
     /// What the parameters of an element begin with.
     fn prefix(&self, k: usize) -> String {
         match self.times {
-            Times::Many(first, _) => format!("{}{}_", self.prefix, k + first),
+            Times::Many(first) => format!("{}{}_", self.prefix, k + first),
             Times::Once | Times::AtMostOnce => self.prefix.clone(),
         }
     }
@@ -143,6 +151,12 @@ impl Key {
     /// Names of its parameters.
     fn names(&self, prefix: &str) -> Vec<String> {
         self.parameters.iter().map(|name| format!("{prefix}{name}")).collect()
+    }
+
+    /// Whether each of its numbers has a rule for files with a data sheet's numbers.
+    fn is_assumed(&self, part: &Part, machine: &Machine) -> bool {
+        let has_rule = |name: &String| find(name, machine)?.assumption();
+        self.names(&part.prefix(0)).iter().all(|name| has_rule(name).is_some())
     }
 
     /// Its numbers in a machine, if they say more than leaving it out.
@@ -187,8 +201,7 @@ static PARTS: LazyLock<Vec<Part>> = LazyLock::new(|| {
         fill: |machine, count| machine.cabinet = (count > 0).then(Cabinet::default),
     };
     let of_list = |&ElementList { name: section, element, first, count, fill, .. }: &_| {
-        let springs = "at least one [[springs]]: nothing else carries the machine";
-        let times = Times::Many(first, (section == "springs").then_some(springs));
+        let times = Times::Many(first);
         Part { section, prefix: format!("{element}_"), times, count, fill }
     };
     let once = ["", "tub", "shaft", "drum", "unbalance", "flexure", "bearings"].map(once);
@@ -212,6 +225,92 @@ pub(crate) fn with_one_of_each() -> Machine {
 pub(super) fn no_spin() -> Spin {
     Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() }
 }
+
+/// The numbers of a data sheet in a machine file, from which numbers follow that it leaves out.
+#[derive(Default)]
+struct Sheet {
+    /// Whether the file gives the drum's radius and depth, so that it may leave numbers out.
+    is_given: bool,
+    moving_mass_kg: Option<f64>,
+    drum_radius_m: Option<f64>,
+    drum_depth_m: Option<f64>,
+    /// The parameters that the file leaves out.
+    left_out: Vec<Parameter>,
+}
+
+/// The drum's numbers on a data sheet.
+const RADIUS: &str = "radius_m";
+const DEPTH: &str = "depth_m";
+
+impl Sheet {
+    /// Returns the data sheet of a file whose keys are not read yet.
+    fn new(keys: &Keys<'_>) -> Self {
+        let has_both = |root: &Section<'_>| {
+            let at = |key| root.key_inside("drum", key);
+            at(RADIUS) && at(DEPTH)
+        };
+        Self { is_given: keys.section().is_some_and(has_both), ..Self::default() }
+    }
+
+    /// Walks over the data sheet's keys of a section.
+    fn walk(&mut self, section: &str, keys: &mut Keys<'_>) {
+        const LENGTH: Form<'_> = Form::Number(Range::Within(1e-3, 10.0));
+        match section {
+            "" => {
+                let about =
+                    "mass of tub, shaft and drum without laundry, in place of the tub's, kg";
+                let key = keys::Key::new(MOVING_MASS, about);
+                keys.key(key, &Form::Number(Range::Positive), &mut self.moving_mass_kg);
+            }
+            "drum" => {
+                let key = keys::Key::new(RADIUS, "inner radius; other numbers follow from it, m");
+                keys.key(key, &LENGTH, &mut self.drum_radius_m);
+                let key = keys::Key::new(DEPTH, "inner depth; other numbers follow from it, m");
+                keys.key(key, &LENGTH, &mut self.drum_depth_m);
+            }
+            _ => {}
+        }
+    }
+
+    /// Puts assumed values in place of what the file leaves out, each with its rule as its source.
+    fn fill(self, machine: &mut Machine, root: &Section<'_>) {
+        let report = root.report;
+        let is_left_out = |name: &str| self.left_out.iter().any(|one| one.name() == name);
+        let needs_mass = ["tub_mass_kg", "shaft_mass_kg", "drum_mass_kg"].map(is_left_out);
+        let sheet = DataSheet {
+            moving_mass_kg: self.moving_mass_kg,
+            drum_radius_m: self.drum_radius_m.unwrap_or_default(),
+            drum_depth_m: self.drum_depth_m.unwrap_or_default(),
+        };
+        let is_whole = self.drum_radius_m.is_some() && self.drum_depth_m.is_some();
+        if sheet.moving_mass_kg.is_some() && !needs_mass[0] {
+            let title = format!("`{MOVING_MASS}` beside the tub's mass");
+            let expected =
+                "expected no `mass_kg` in [tub]: it is the moving mass less shaft and drum";
+            let at = root.key_at(MOVING_MASS).unwrap_or_else(|| root.at().clone());
+            report.refuse::<()>(&at, title, expected);
+        } else if needs_mass.contains(&true) && sheet.moving_mass_kg.is_none() {
+            let expected = "the mass of tub, shaft and drum without laundry, or `mass_kg` of each";
+            root.missing(MOVING_MASS, expected);
+        } else if is_whole {
+            sheet.fill(&self.left_out, machine);
+        }
+        for parameter in &self.left_out {
+            let Some(value) = parameter.get(machine, &no_spin()) else { continue };
+            if is_whole && !parameter.range().contains(value) {
+                let (name, range) = (parameter.name(), parameter.range());
+                let title = format!("the rule for the left-out `{name}` gives {value:.4}");
+                report.refuse::<()>(root.at(), title, format!("expected {range}: give the number"));
+            }
+            if let Some(assumption) = parameter.assumption() {
+                report.assume(parameter.name(), assumption.rule);
+            }
+        }
+    }
+}
+
+/// The data sheet's mass, at the top of a machine file.
+const MOVING_MASS: &str = "moving_mass_kg";
 
 /// Reads a machine file's text. Wrong and missing numbers keep the paper's, and their names are
 /// marked doubtful.
@@ -244,21 +343,29 @@ pub(crate) fn to_json(machine: &Machine) -> Value {
 pub(super) fn is_key(key: &str) -> bool {
     let mut parts = PARTS.iter().zip(&*KEYS);
     parts.any(|(part, own)| match part.section {
-        "" => own.iter().any(|own| own.name == key),
+        "" => key == MOVING_MASS || own.iter().any(|own| own.name == key),
         section => section == key,
     })
 }
 
 /// Walks over every section.
 fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
+    let mut sheet = Sheet::new(keys);
     for (part, own) in PARTS.iter().zip(&*KEYS) {
         let table = keys::Key::new(part.section, "");
         match part.times {
-            _ if part.section.is_empty() => part.walk(own, 0, machine, keys),
+            _ if part.section.is_empty() => part.walk(own, 0, machine, &mut sheet, keys),
             Times::Once => {
                 let expected = format!("a section {}", part.header());
-                let table = table.needed(&expected);
-                let field = keys.table(table, |keys| part.walk(own, 0, machine, keys));
+                let is_assumed = own.iter().all(|key| key.is_assumed(part, machine));
+                let is_needed = !(is_assumed && (sheet.is_given || keys.is_schema()));
+                let table = if is_needed { table.needed(&expected) } else { table };
+                let field = keys.table(table, |keys| part.walk(own, 0, machine, &mut sheet, keys));
+                if !is_needed && matches!(field, Field::Absent) && keys.section().is_some() {
+                    let names = own.iter().flat_map(|key| key.names(&part.prefix));
+                    sheet.left_out.extend(names.filter_map(|name| find(&name, machine)));
+                    continue;
+                }
                 if let (None, Some(report)) = (field.given(), keys.section().map(|it| it.report)) {
                     own.iter().for_each(|key| doubt(key.names(&part.prefix), report));
                 }
@@ -267,27 +374,30 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
                 if keys.section().is_some() {
                     (part.fill)(machine, 1);
                 }
-                (0..(part.count)(machine)).for_each(|k| part.walk(own, k, machine, keys));
+                for k in 0..(part.count)(machine) {
+                    part.walk(own, k, machine, &mut sheet, keys);
+                }
             })),
-            Times::Many(_, needed) => {
+            Times::Many(_) => {
                 let mut sections = Vec::new();
                 if let Some(root) = keys.section() {
                     sections = elements(part, root);
-                    if let (true, Some(expected)) = (sections.is_empty(), needed) {
-                        // The paper's stand in.
-                        root.missing(part.section, expected);
-                        continue;
-                    }
                     (part.fill)(machine, sections.len());
                 }
                 // The two that machines have always had are written even where there are none.
                 let count = (part.count)(machine);
                 if count > 0 || ["springs", "dampers"].contains(&part.section) {
-                    let table = needed.map_or(table, |needed| table.needed(needed));
-                    keys.tables(table, sections, count, |keys, k| part.walk(own, k, machine, keys));
+                    keys.tables(table, sections, count, |keys, k| {
+                        part.walk(own, k, machine, &mut sheet, keys);
+                    });
                 }
             }
         }
+    }
+    if let Some(root) = keys.section()
+        && sheet.is_given
+    {
+        sheet.fill(machine, root);
     }
 }
 
@@ -305,7 +415,14 @@ fn elements<'a>(part: &Part, root: &Section<'a>) -> Vec<Section<'a>> {
 
 impl Key {
     /// Walks over the key of element `k`.
-    fn walk(&'static self, part: &Part, k: usize, machine: &mut Machine, keys: &mut Keys<'_>) {
+    fn walk(
+        &'static self,
+        part: &Part,
+        k: usize,
+        machine: &mut Machine,
+        sheet: &mut Sheet,
+        keys: &mut Keys<'_>,
+    ) {
         let names = self.names(&part.prefix(k));
         let parameters: Vec<_> = names.iter().filter_map(|name| find(name, machine)).collect();
         let Some(first) = parameters.first() else { return };
@@ -332,7 +449,9 @@ impl Key {
                 (Form::Number(first.range()), about(first), expected)
             }
         };
-        let is_needed = self.left_out == LeftOut::Refused;
+        let is_assumed = keys.is_schema() || sheet.is_given;
+        let is_assumed = is_assumed && self.is_assumed(part, machine);
+        let is_needed = self.left_out == LeftOut::Refused && !is_assumed;
         let key = keys::Key::new(&self.name, &about);
         let key = if is_needed { key.needed(&expected) } else { key };
         let mut value = match self.left_out {
@@ -354,6 +473,7 @@ impl Key {
                     }
                 }
             }
+            Field::Absent if is_assumed => sheet.left_out.extend(parameters),
             Field::Absent if !is_needed => {}
             Field::Absent | Field::Bad => doubt(names, report),
         }

@@ -8,6 +8,7 @@
 mod again;
 mod bounds;
 mod points;
+mod sheet;
 
 use std::path::{Path, PathBuf};
 

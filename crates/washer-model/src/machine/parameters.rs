@@ -2,11 +2,13 @@
 //! unit-suffixed name, with its unit, meaning, source and range. Grid axes, `[set]`, `--set`,
 //! reports and the machine file's checks all read it.
 
+mod assumed;
 mod table;
 
 use std::borrow::Cow;
 use std::fmt;
 
+pub use assumed::{Assumption, DataSheet, Spread};
 pub use sweep_parameter::{Range, UnknownParameter, decimal, unit_suffix};
 
 use crate::{BumpStop, Damper, Machine, Spin, Spring};
@@ -57,6 +59,8 @@ struct Row {
     source: &'static str,
     range: Range,
     left_out: Option<f64>,
+    /// The rule where a file with a data sheet's numbers leaves it out.
+    assumption: Option<Assumption>,
     target: Target,
     get: Get,
     set: Set,
@@ -241,6 +245,11 @@ impl Parameter {
     /// What it is where a machine file leaves it out, if it may.
     pub fn left_out(&self) -> Option<f64> {
         self.row.left_out
+    }
+
+    /// Returns the rule for its value where a file with a data sheet's numbers leaves it out.
+    pub fn assumption(&self) -> Option<&'static Assumption> {
+        self.row.assumption.as_ref()
     }
 
     /// What it writes.

@@ -193,9 +193,10 @@ impl Machine {
                 format!("bearings at least {SHORTEST_M:e} m apart"),
             ));
         }
-        if self.springs.is_empty() {
-            let title = "the machine has no springs: nothing carries it".to_owned();
-            joint.push(Violation::new(title, [], "at least one spring"));
+        if self.springs.is_empty() && self.bushings.is_empty() {
+            let title = "the machine has no springs and no bushings: nothing carries it".to_owned();
+            let expected = "at least one of [[springs]] or [[bushings]] in the machine file";
+            joint.push(Violation::new(title, [], expected));
         }
         joint
     }
@@ -334,7 +335,7 @@ mod tests {
     fn nothing_carries_a_machine_without_springs() {
         assert_eq!(
             wrong(|m| m.springs.clear()),
-            ["the machine has no springs: nothing carries it"]
+            ["the machine has no springs and no bushings: nothing carries it"]
         );
         assert_eq!(wrong(|m| m.dampers.clear()), [""; 0]);
     }

@@ -1,7 +1,9 @@
 //! Static equilibrium: the place of rest under the machine's weight, unbalance up (section 4.2 of
 //! the model page).
 
-use crate::coordinates::{COORDINATES, seeded};
+use crate::coordinates::{
+    COORDINATES, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z, seeded,
+};
 use crate::lanes::Constant as _;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
@@ -95,6 +97,41 @@ pub(crate) fn find<T: Lane>(zero: N<T>, machine: &Coefficients<T>) -> ([N<T>; CO
     (q, found)
 }
 
+/// The motions of tub and drum together: the word for each, the coordinates that move, the unit of
+/// its stiffness.
+const RIGID_MOTIONS: [(&str, [usize; 2], &str); 4] = [
+    ("up or down", [TUB_Y, SHAFT_Y], "N/m"),
+    ("sideways", [TUB_Z, SHAFT_Z], "N/m"),
+    ("round the vertical (yaw)", [TUB_YAW, SHAFT_YAW], "N m/rad"),
+    ("over its front or back (pitch)", [TUB_PITCH, SHAFT_PITCH], "N m/rad"),
+];
+
+/// Returns the motion of tub and drum together that is least stable at coordinates `q`, with its
+/// stiffness and unit, if some stiffness is negative. Stiffnesses of translations and rotations are
+/// compared as shares of the greatest of their kind.
+#[inline(never)]
+pub(crate) fn unstable_motion(
+    machine: &Coefficients<f64>,
+    q: &[f64; COORDINATES],
+) -> Option<(&'static str, f64, &'static str)> {
+    let machine = machine.constant();
+    let q = q.map(N);
+    let stiffness = RIGID_MOTIONS.map(|(_, moved, _)| {
+        let pushed_back = |along: usize| {
+            let forces = static_forces(&machine, &seeded(&q, along, 1.0));
+            moved.iter().map(|&i| -forces[i].0.slope).sum::<f64>()
+        };
+        moved.into_iter().map(pushed_back).sum::<f64>()
+    });
+    let greatest = |kind: &[f64]| kind.iter().fold(0.0_f64, |most, k| most.max(k.abs()));
+    let scales = [greatest(&stiffness[..2]), greatest(&stiffness[2..])];
+    let shares = (0..RIGID_MOTIONS.len()).map(|k| (k, stiffness[k] / scales[k / 2]));
+    let (least, _) =
+        shares.filter(|(_, share)| *share < 0.0).min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let (motion, _, unit) = RIGID_MOTIONS[least];
+    Some((motion, stiffness[least], unit))
+}
+
 /// Generalised forces at rest.
 #[inline(always)]
 fn static_forces<T: Lane>(
@@ -152,6 +189,25 @@ mod tests {
             // It carries about the weight, 320 N; the springs' moment may add to that.
             assert!(into_m > -1e-4 && into_m * stiffness_n_per_m < 400.0, "{lower_m}");
         }
+    }
+
+    #[test]
+    fn a_machine_that_falls_sideways_says_so() {
+        let mut machine = Machine::paper();
+        // Upright below the tub, loaded by its weight.
+        for spring in &mut machine.springs {
+            spring.cabinet_m[1] = -0.3;
+            spring.tub_m[1] = -0.1626;
+            spring.cabinet_m[2] = spring.tub_m[2];
+        }
+        let coefficients = Coefficients::new(&machine);
+        let (q, found) = find(N(0.0), &coefficients);
+        assert_eq!(found & 1, 0);
+        let (motion, stiffness, _) = unstable_motion(&coefficients, &q.map(|q| q.0)).unwrap();
+        assert_eq!(motion, "sideways");
+        // The springs' load over their length.
+        let expected = -machine.weight_n() / 0.1374;
+        assert!((stiffness / expected - 1.0).abs() < 0.2, "{stiffness} against {expected}");
     }
 
     #[test]

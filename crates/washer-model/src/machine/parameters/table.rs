@@ -1,15 +1,25 @@
 //! The rows of the table of parameters.
 
 use super::Range::{Any, Negative, NonNegative, Positive, Within};
+use super::assumed::Spread::{Depth, Factor};
+use super::assumed::{Assumption, DataSheet, cylinder_kg_m2};
 use super::{ElementList, Get, Range, Row, Set, Target, common};
 use crate::{BumpStop, Bushing, Damper, Foot, Machine, Spin, Spring, Unbalance};
 
 /// What a row writes, how it reads it and how it writes it.
 type Access = (Target, Get, Set);
 
-/// A row: name, unit, range, source, description, then `else` and what a machine file that leaves
-/// it out means, if it may, and at last what it reads and writes.
+/// A row: name, unit, range, source, description, what it reads and writes. Before that stands what
+/// a machine file means that leaves it out, if it may: `else` and a number, or `assume` with a rule
+/// from a data sheet, the rule in words and the range in which machines are expected.
 macro_rules! row {
+    ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr,
+        assume $value:expr, $rule:literal, $spread:expr; $($access:tt)+) => {
+        Row {
+            assumption: Some(Assumption { value: $value, rule: $rule, spread: $spread }),
+            ..row!($name, $unit, $range, $source, $description, $($access)+)
+        }
+    };
     ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr,
         else $left_out:expr, $($access:tt)+) => {
         Row {
@@ -26,6 +36,7 @@ macro_rules! row {
             source: $source,
             description: $description,
             left_out: None,
+            assumption: None,
             target,
             get,
             set,
@@ -124,58 +135,155 @@ const GRID: &str = "the grid file's [spin]";
 const TIME: &str = "the grid file's [time]";
 const SPLIT: &str = "derived: the drum of Tables 2 and 3 less its 0.4 kg unbalance";
 
+/// Returns the moments of inertia of an assumed tub about its axis and across.
+fn tub_inertia_kg_m2(sheet: &DataSheet, machine: &Machine) -> [f64; 2] {
+    let radius_m = sheet.drum_radius_m + machine.radial_clearance_m;
+    cylinder_kg_m2(machine.tub.mass_kg, radius_m, 2.0 * sheet.drum_depth_m)
+}
+
+/// Returns the moments of inertia of an assumed shaft and rotor about their axis and across.
+fn shaft_inertia_kg_m2(sheet: &DataSheet, machine: &Machine) -> [f64; 2] {
+    let radius_m = sheet.drum_radius_m / 2.0;
+    cylinder_kg_m2(machine.shaft.mass_kg, radius_m, sheet.drum_depth_m / 3.0)
+}
+
+/// Returns the moments of inertia of an assumed drum about its axis and across.
+fn drum_inertia_kg_m2(sheet: &DataSheet, machine: &Machine) -> [f64; 2] {
+    cylinder_kg_m2(machine.drum.mass_kg, sheet.drum_radius_m, sheet.drum_depth_m)
+}
+
+/// Returns the stiffness at which the empty drum, turned about its hinge, has the built-in
+/// machine's natural frequency.
+fn hinge_stiffness_n_m_per_rad(machine: &Machine) -> f64 {
+    let about_hinge_kg_m2 = |machine: &Machine| {
+        let arm_m = machine.drum.centre_x_m - machine.drum.hinge_x_m;
+        machine.drum.inertia_kg_m2[1] + machine.drum.mass_kg * arm_m * arm_m
+    };
+    let built_in = Machine::paper();
+    let share = about_hinge_kg_m2(machine) / about_hinge_kg_m2(&built_in);
+    built_in.flexure.stiffness_n_m_per_rad * share
+}
+
 /// Rows with a single number each, and those that write several.
 #[rustfmt::skip]
 pub(super) static TABLE: &[Row] = &[
     row!("gravity_m_per_s2", "m/s^2", NonNegative, "convention",
-        "acceleration of gravity, downwards", machine gravity_m_per_s2),
+        "acceleration of gravity, downwards",
+        assume |_, _| 9.81,
+        "9.81, as on most of the earth",
+        Factor(0.998, 1.003); machine gravity_m_per_s2),
     row!("radial_clearance_m", "m", NonNegative, "assumed: a usual gap",
-        "radial gap between drum and tub at rest", machine radial_clearance_m),
+        "radial gap between drum and tub at rest",
+        assume |_, _| 0.010,
+        "0.010 m, as the built-in machine",
+        Factor(0.5, 2.0); machine radial_clearance_m),
     row!("tub_mass_kg", "kg", Positive, TABLE_2,
-        "mass of the tub", machine tub.mass_kg),
+        "mass of the tub",
+        assume |sheet, m| sheet.moving_mass_kg.unwrap_or(0.0) - m.shaft.mass_kg - m.drum.mass_kg,
+        "the moving mass less shaft and drum",
+        Factor(0.85, 1.1); machine tub.mass_kg),
     row!("tub_centre_x_m", "m", Any, TABLE_2,
-        "mass centre of the tub on its axis (L_T)", machine tub.centre_x_m),
+        "mass centre of the tub on its axis (L_T)",
+        assume |sheet, m| m.drum.hinge_x_m + 0.3 * sheet.drum_depth_m,
+        "0.3 of the drum's depth before the hinge, as the built-in machine",
+        Depth(-0.3, 0.3); machine tub.centre_x_m),
     row!("tub_inertia_11_kg_m2", "kg m^2", Positive, TABLE_3,
-        "tub's moment of inertia about its axis", machine tub.inertia_kg_m2[0]),
+        "tub's moment of inertia about its axis",
+        assume |sheet, m| tub_inertia_kg_m2(sheet, m)[0],
+        "a thin-walled cylinder around the drum, twice its depth long",
+        Factor(0.8, 1.5); machine tub.inertia_kg_m2[0]),
     row!("tub_inertia_22_kg_m2", "kg m^2", Positive, TABLE_3,
-        "tub's moment of inertia about the vertical", machine tub.inertia_kg_m2[1]),
+        "tub's moment of inertia about the vertical",
+        assume |sheet, m| tub_inertia_kg_m2(sheet, m)[1],
+        "a thin-walled cylinder around the drum, twice its depth long",
+        Factor(0.7, 1.4); machine tub.inertia_kg_m2[1]),
     row!("tub_inertia_33_kg_m2", "kg m^2", Positive, TABLE_3,
-        "tub's moment of inertia about the horizontal cross axis", machine tub.inertia_kg_m2[2]),
+        "tub's moment of inertia about the horizontal cross axis",
+        assume |sheet, m| tub_inertia_kg_m2(sheet, m)[1],
+        "a thin-walled cylinder around the drum, twice its depth long",
+        Factor(0.7, 1.4); machine tub.inertia_kg_m2[2]),
     row!("tub_front_x_m", "m", Any, "assumed: level with the drum's front",
-        "front centre of the tub on its axis (P_TE)", machine tub.front_x_m),
+        "front centre of the tub on its axis (P_TE)",
+        assume |_, m| m.drum.front_x_m,
+        "level with the drum's front",
+        Depth(-0.1, 0.2); machine tub.front_x_m),
     row!("shaft_mass_kg", "kg", Positive, TABLE_2,
-        "mass of shaft and rotor", machine shaft.mass_kg),
+        "mass of shaft and rotor",
+        assume |sheet, _| 0.14 * sheet.moving_mass_kg.unwrap_or(0.0),
+        "0.14 of the moving mass, as the built-in machine",
+        Factor(0.3, 1.5); machine shaft.mass_kg),
     row!("shaft_centre_x_m", "m", Any, TABLE_2,
-        "mass centre of shaft and rotor on their axis (-L_S)", machine shaft.centre_x_m),
+        "mass centre of shaft and rotor on their axis (-L_S)",
+        assume |sheet, _| -0.06 * sheet.drum_depth_m,
+        "0.06 of the drum's depth behind O, as the built-in machine",
+        Depth(-0.3, 0.1); machine shaft.centre_x_m),
     row!("shaft_inertia_11_kg_m2", "kg m^2", Positive, TABLE_3,
-        "shaft's moment of inertia about its axis", machine shaft.inertia_kg_m2[0]),
+        "shaft's moment of inertia about its axis",
+        assume |sheet, m| shaft_inertia_kg_m2(sheet, m)[0],
+        "a ring of half the drum's radius, a third of its depth long",
+        Factor(0.1, 2.0); machine shaft.inertia_kg_m2[0]),
     row!("shaft_inertia_22_kg_m2", "kg m^2", Positive, TABLE_3,
-        "shaft's moment of inertia across its axis, along s2", machine shaft.inertia_kg_m2[1]),
+        "shaft's moment of inertia across its axis, along s2",
+        assume |sheet, m| shaft_inertia_kg_m2(sheet, m)[1],
+        "a ring of half the drum's radius, a third of its depth long",
+        Factor(0.5, 3.0); machine shaft.inertia_kg_m2[1]),
     row!("shaft_inertia_33_kg_m2", "kg m^2", Positive, TABLE_3,
-        "shaft's moment of inertia across its axis, along s3", machine shaft.inertia_kg_m2[2]),
+        "shaft's moment of inertia across its axis, along s3",
+        assume |sheet, m| shaft_inertia_kg_m2(sheet, m)[1],
+        "a ring of half the drum's radius, a third of its depth long",
+        Factor(0.5, 3.0); machine shaft.inertia_kg_m2[2]),
     row!("drum_mass_kg", "kg", Positive, SPLIT,
-        "mass of the drum without unbalance (m_0)", machine drum.mass_kg),
+        "mass of the drum without unbalance (m_0)",
+        assume |sheet, _| 0.11 * sheet.moving_mass_kg.unwrap_or(0.0),
+        "0.11 of the moving mass, as the built-in machine",
+        Factor(0.7, 2.0); machine drum.mass_kg),
     row!("drum_centre_x_m", "m", Any, SPLIT,
-        "mass centre of the drum without unbalance, on its axis (x_0)", machine drum.centre_x_m),
+        "mass centre of the drum without unbalance, on its axis (x_0)",
+        assume |sheet, m| m.drum.hinge_x_m + sheet.drum_depth_m / 6.0,
+        "a sixth of the drum's depth before the hinge, as the built-in machine",
+        Depth(-0.1, 0.3); machine drum.centre_x_m),
     row!("drum_inertia_11_kg_m2", "kg m^2", Positive, SPLIT,
-        "bare drum's moment of inertia about its axis", machine drum.inertia_kg_m2[0]),
+        "bare drum's moment of inertia about its axis",
+        assume |sheet, m| drum_inertia_kg_m2(sheet, m)[0],
+        "a thin-walled cylinder of the drum's radius and depth",
+        Factor(0.8, 1.3); machine drum.inertia_kg_m2[0]),
     row!("drum_inertia_22_kg_m2", "kg m^2", Positive, SPLIT,
         "bare drum's moment of inertia along d2, towards the unbalance",
-        machine drum.inertia_kg_m2[1]),
+        assume |sheet, m| drum_inertia_kg_m2(sheet, m)[1],
+        "a thin-walled cylinder of the drum's radius and depth",
+        Factor(0.7, 1.6); machine drum.inertia_kg_m2[1]),
     row!("drum_inertia_33_kg_m2", "kg m^2", Positive, SPLIT,
-        "bare drum's moment of inertia along d3", machine drum.inertia_kg_m2[2]),
+        "bare drum's moment of inertia along d3",
+        assume |sheet, m| drum_inertia_kg_m2(sheet, m)[1],
+        "a thin-walled cylinder of the drum's radius and depth",
+        Factor(0.7, 1.6); machine drum.inertia_kg_m2[2]),
     row!("drum_hinge_x_m", "m", Any, "assumed: between front bearing and drum",
-        "where drum and shaft meet (P_D, L_D)", machine drum.hinge_x_m),
+        "where drum and shaft meet (P_D, L_D)",
+        assume |sheet, _| 0.5 * sheet.drum_depth_m,
+        "half the drum's depth before O, as the built-in machine",
+        Depth(-0.2, 0.2); machine drum.hinge_x_m),
     row!("drum_front_x_m", "m", Any, "assumed: the drum's middle is at the unbalance",
-        "front centre of the drum on its axis (P_DE, L_D + L_DE)", machine drum.front_x_m),
+        "front centre of the drum on its axis (P_DE, L_D + L_DE)",
+        assume |sheet, m| m.drum.hinge_x_m + sheet.drum_depth_m,
+        "the drum's depth before the hinge",
+        Depth(-0.1, 0.1); machine drum.front_x_m),
     row!("unbalance_mass_kg", "kg", NonNegative, TABLE_2,
         "point mass stuck to the drum's wall (m_u)", machine unbalance.mass_kg),
     row!("unbalance_x_m", "m", Any, SPLIT,
-        "position of the unbalance along the axis (x_u)", machine unbalance.x_m),
+        "position of the unbalance along the axis (x_u)",
+        assume |sheet, m| m.drum.hinge_x_m + 0.5 * sheet.drum_depth_m,
+        "the middle of the drum's depth",
+        Depth(-0.5, 0.5); machine unbalance.x_m),
     row!("unbalance_radius_m", "m", NonNegative, "paper, its text",
-        "distance of the unbalance from the axis (r_u)", machine unbalance.radius_m),
+        "distance of the unbalance from the axis (r_u)",
+        assume |sheet, _| sheet.drum_radius_m,
+        "the drum's radius",
+        Factor(0.8, 1.0); machine unbalance.radius_m),
     row!("flexure_stiffness_n_m_per_rad", "N m/rad", Positive, SECTION_3_1,
-        "bending stiffness between shaft and drum (K_D)", machine flexure.stiffness_n_m_per_rad),
+        "bending stiffness between shaft and drum (K_D)",
+        assume |_, m| hinge_stiffness_n_m_per_rad(m),
+        "the empty drum swings on the hinge at 67 Hz, as the built-in machine",
+        Factor(0.25, 16.0); machine flexure.stiffness_n_m_per_rad),
     row!("bearing_stiffness_n_per_m", "N/m", Positive, SECTION_3_1,
         "radial stiffness of both bearings (K_fb, K_rb)", Target::Bearings("stiffness_n_per_m"),
         get |Machine { bearings: b, .. }, _, _| {
@@ -185,13 +293,25 @@ pub(super) static TABLE: &[Row] = &[
             [b.front_stiffness_n_per_m, b.rear_stiffness_n_per_m] = [v; 2];
         }),
     row!("bearing_front_x_m", "m", Positive, "assumed: a usual length",
-        "front bearing centre (L_fb)", machine bearings.front_x_m),
+        "front bearing centre (L_fb)",
+        assume |sheet, _| sheet.drum_depth_m / 6.0,
+        "a sixth of the drum's depth before O, as the built-in machine",
+        Factor(0.5, 2.0); machine bearings.front_x_m),
     row!("bearing_rear_x_m", "m", Negative, "assumed: O is midway between the bearings",
-        "rear bearing centre (-L_rb)", machine bearings.rear_x_m),
+        "rear bearing centre (-L_rb)",
+        assume |_, m| -m.bearings.front_x_m,
+        "O is midway between the bearings",
+        Factor(1.0, 1.0); machine bearings.rear_x_m),
     row!("bearing_front_stiffness_n_per_m", "N/m", Positive, SECTION_3_1,
-        "radial stiffness of the front bearing (K_fb)", machine bearings.front_stiffness_n_per_m),
+        "radial stiffness of the front bearing (K_fb)",
+        assume |_, _| 2e8,
+        "2e8 N/m, as the built-in machine",
+        Factor(0.25, 4.0); machine bearings.front_stiffness_n_per_m),
     row!("bearing_rear_stiffness_n_per_m", "N/m", Positive, SECTION_3_1,
-        "radial stiffness of the rear bearing (K_rb)", machine bearings.rear_stiffness_n_per_m),
+        "radial stiffness of the rear bearing (K_rb)",
+        assume |_, _| 2e8,
+        "2e8 N/m, as the built-in machine",
+        Factor(0.25, 4.0); machine bearings.rear_stiffness_n_per_m),
     row!("spring_stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1,
         "stiffness of all springs (K_k)",
         every springs Springs stiffness_n_per_m),

@@ -1,0 +1,82 @@
+//! Machine files that leave out what a data sheet does not say.
+
+use super::*;
+
+/// The short file that `sweep init --machine --short` writes.
+const SHORT_MACHINE: &str = include_str!("../../commands/starter_machine.toml");
+
+/// The plan of a machine file's text, or what is wrong.
+fn plan_of_machine(text: &str) -> Result<Plan, String> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("machine.toml"), text).unwrap();
+    let grid = folder.path().join("grid.toml");
+    std::fs::write(&grid, format!("machine = \"machine.toml\"\n{SMALLEST}")).unwrap();
+    load(&grid, &[]).map_err(|mistakes| mistakes.to_string())
+}
+
+#[test]
+fn a_data_sheet_makes_a_machine_near_the_built_in_one() {
+    let plan = plan_of_machine(SHORT_MACHINE).unwrap();
+    let Washer { machine, spin, .. } = &plan.model;
+    assert_eq!(machine.violations(), []);
+    let built_in = Machine::paper();
+    let mut assumed = 0;
+    for parameter in washer_model::Parameter::all(machine, spin) {
+        let Some(assumption) = parameter.assumption() else { continue };
+        if !plan.written.is_assumed(parameter.name()) {
+            continue;
+        }
+        assumed += 1;
+        let source = plan.written.source(&[parameter.name()]);
+        assert_eq!(source, Some(format!("assumed: {}", assumption.rule)));
+        let [value, paper] = [machine, &built_in].map(|one| parameter.get(one, spin).unwrap());
+        let [least, most] = assumption.ends(value, machine);
+        let name = parameter.name();
+        // What the paper's machine has lies within the range about what is assumed of it.
+        let is_within = least.min(most) - 1e-9 <= paper && paper <= least.max(most) + 1e-9;
+        assert!(is_within, "{name}: {paper} is not from {least} to {most}");
+    }
+    assert_eq!(assumed, 27);
+    // The long form lists each rule.
+    let long = machine_file(machine, &plan.written);
+    assert!(long.contains("[assumed: half the drum's depth before O, as the built-in machine]"));
+    assert_eq!(plan_of_machine(&long).unwrap().model.machine, *machine);
+}
+
+#[test]
+fn a_given_number_takes_the_place_of_a_rule() {
+    let short = SHORT_MACHINE;
+    let text = short.replace("[drum]\n", "[shaft]\nmass_kg = 5\n[drum]\nmass_kg = 4\n");
+    let machine = plan_of_machine(&text).unwrap().model.machine;
+    assert_eq!((machine.shaft.mass_kg, machine.drum.mass_kg), (5.0, 4.0));
+    assert!((machine.tub.mass_kg - 22.85).abs() < 1e-12);
+}
+
+#[test]
+fn a_data_sheet_that_says_too_little_or_too_much_is_told() {
+    let short = SHORT_MACHINE;
+    let with = |from: &str, to: &str| plan_of_machine(&short.replace(from, to)).unwrap_err();
+    let found = with("moving_mass_kg = 31.85", "");
+    assert!(found.contains("`moving_mass_kg` is missing"), "{found}");
+    let found = with("[drum]\n", "[tub]\nmass_kg = 20\n[drum]\n");
+    assert!(found.contains("`moving_mass_kg` beside the tub's mass"), "{found}");
+    let found = with("[drum]\n", "[drum]\nmass_kg = 40\n");
+    assert!(found.contains("the rule for the left-out `tub_mass_kg` gives"), "{found}");
+    let found = with("depth_m = 0.30", "");
+    assert!(found.contains("`[tub]` is missing") || found.contains("[tub]"), "{found}");
+}
+
+#[test]
+fn bushings_alone_carry_a_machine() {
+    let file = include_str!("../../../../../docs/examples/industrial.toml");
+    let plan = plan_of_machine(file).unwrap();
+    assert!(plan.model.machine.springs.is_empty());
+    let (machine, spin) = (plan.model.machine.clone(), plan.model.spin.clone());
+    let point = crate::plan::ready(machine, spin, &crate::plan::timing(&plan)).unwrap();
+    // 689 kg on 1,467,056 N/m.
+    let middle_m = 689.0 * 9.81 / 1_467_056.0;
+    assert!((point.static_sag_m() / middle_m - 1.0).abs() < 0.3, "{}", point.static_sag_m());
+    let none = file.split("[[bushings]]").next().unwrap();
+    let found = plan_of_machine(none).unwrap_err();
+    assert!(found.contains("no springs and no bushings"), "{found}");
+}

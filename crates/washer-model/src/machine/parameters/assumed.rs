@@ -1,0 +1,78 @@
+//! Rules for the numbers that a data sheet or a planar model does not give.
+//!
+//! A machine file that gives the drum's radius and depth may leave these numbers out. Lengths
+//! follow by geometric similarity with the built-in machine, masses as shares of the moving mass,
+//! moments of inertia from thin-walled cylinders.
+
+use super::Parameter;
+use crate::{Machine, Spin};
+
+/// The numbers of a data sheet from which left-out numbers follow.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DataSheet {
+    /// Mass of tub, shaft and drum together, without laundry; absent where each is given.
+    pub moving_mass_kg: Option<f64>,
+    /// Inner radius of the drum (R).
+    pub drum_radius_m: f64,
+    /// Inner depth of the drum (H).
+    pub drum_depth_m: f64,
+}
+
+/// The rule for a number that a machine file may leave out.
+#[derive(Debug)]
+pub struct Assumption {
+    /// The value, from the data sheet and from numbers that are already in place.
+    pub(super) value: fn(&DataSheet, &Machine) -> f64,
+    /// The rule in words, as listings show it.
+    pub rule: &'static str,
+    /// The range in which real machines are expected.
+    pub spread: Spread,
+}
+
+/// The range about an assumed value in which real machines are expected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spread {
+    /// From the first to the second multiple of the value.
+    Factor(f64, f64),
+    /// From the first to the second share of the drum's depth beside the value.
+    Depth(f64, f64),
+}
+
+impl Assumption {
+    /// Returns the ends of the expected range about a value. The drum's depth is that of the
+    /// machine: from the hinge to the drum's front.
+    pub fn ends(&self, value: f64, machine: &Machine) -> [f64; 2] {
+        let depth_m = machine.drum.front_x_m - machine.drum.hinge_x_m;
+        match self.spread {
+            Spread::Factor(least, most) => [value * least, value * most],
+            Spread::Depth(back, forth) => [value + back * depth_m, value + forth * depth_m],
+        }
+    }
+}
+
+impl DataSheet {
+    /// Puts assumed values in place of parameters that a file leaves out. Rules read one another's
+    /// results, and no two read each other's, so that repetition ends.
+    pub fn fill(&self, left_out: &[Parameter], machine: &mut Machine) {
+        let mut no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
+        for _ in left_out {
+            let before = machine.clone();
+            for parameter in left_out {
+                if let Some(assumption) = parameter.assumption() {
+                    let value = (assumption.value)(self, machine);
+                    parameter.set(machine, &mut no_spin, value);
+                }
+            }
+            if *machine == before {
+                return;
+            }
+        }
+    }
+}
+
+/// Moments of inertia of a thin-walled open cylinder about its mass centre: about its axis, and
+/// across.
+pub(super) fn cylinder_kg_m2(mass_kg: f64, radius_m: f64, length_m: f64) -> [f64; 2] {
+    let about_axis = mass_kg * radius_m * radius_m;
+    [about_axis, about_axis / 2.0 + mass_kg * length_m * length_m / 12.0]
+}
