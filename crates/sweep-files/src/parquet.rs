@@ -275,8 +275,7 @@ mod tests {
     fn with_blank_digest(created_by: &str) -> Vec<u8> {
         let values: Float64Array = (0..300).map(f64::from).collect();
         let batch = RecordBatch::try_from_iter([("x", Arc::new(values) as _)]).unwrap();
-        let properties =
-            WriterProperties::builder().set_created_by(created_by.to_owned()).build();
+        let properties = WriterProperties::builder().set_created_by(created_by.to_owned()).build();
         let mut writer = Writer::new(Vec::new(), &batch.schema(), properties).unwrap();
         writer.write(&batch).unwrap();
         let mut writer = writer.end().unwrap();

@@ -8,8 +8,8 @@
 //! * [`sweep_engine`] computes a plan's points on all cores and keeps them as they come, traces
 //!   boundaries and runs studies; [`sweep_files`] has the rules of writing and reading. `identity`
 //!   says which builds write the same bytes.
-//! * `trace` writes one point's time histories, `stability`, `dwell`, `explain` and `fit` answer the
-//!   questions of their names. [`washer_plot`] draws any of these files.
+//! * `trace` writes one point's time histories, `stability`, `dwell`, `explain` and `fit` answer
+//!   the questions of their names. [`washer_plot`] draws any of these files.
 //! * `library` is the commands' work as functions: an [`Evaluator`] takes tables of points, a
 //!   [`MemoryTable`] holds a result in memory.
 //! * `commands` is the command line.

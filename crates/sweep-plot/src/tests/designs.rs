@@ -220,7 +220,8 @@ fn a_grid_is_no_design_and_a_list_of_a_grid_is_a_map() {
 fn broken(seed: u64, null: f64) -> Sample {
     let mut state = seed;
     let mut random = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1_u64 << 53) as f64
     };
     let count = 1 + (random() * 40.0) as usize;
@@ -265,9 +266,8 @@ fn designs_without_values_are_drawn_or_refused() {
             for shown in [View::Scatter, View::Histogram, View::Influence] {
                 for name in ["a.svg", "a.html", "a.png"] {
                     let options = Options { view: Some(shown), ..showing(column) };
-                    let drawn = std::panic::catch_unwind(|| {
-                        draw(broken(seed, null), &options, name)
-                    });
+                    let drawn =
+                        std::panic::catch_unwind(|| draw(broken(seed, null), &options, name));
                     assert!(drawn.is_ok(), "seed {seed}, null {null}: {column}, {shown:?}, {name}");
                 }
             }

@@ -20,8 +20,8 @@ pub(crate) struct Cause {
     pub(crate) time_s: f64,
     /// The drum's speed then (rpm).
     pub(crate) speed_rpm: f64,
-    /// The growth (e-folds) from the disturbance at the entry of the first tongue to that deviation;
-    /// none where no tongue is entered before it.
+    /// The growth (e-folds) from the disturbance at the entry of the first tongue to that
+    /// deviation; none where no tongue is entered before it.
     pub(crate) needed_e_folds: Option<f64>,
     /// The growth (e-folds) that the tongues make until then.
     pub(crate) made_e_folds: f64,

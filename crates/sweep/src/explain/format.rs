@@ -73,8 +73,8 @@ fn stable_speeds(found: &Explanation) -> String {
     let [from, to] = [seen.looked.from, seen.looked.to].map(decimal);
     let (count, missing) = (seen.looked.values().len(), seen.without_response);
     let unknown = format!(
-        "at {missing} of {count} speeds from {from} to {to} rpm no periodic \
-                           response was found, and whether it is stable is not known (`sweep dwell`)"
+        "at {missing} of {count} speeds from {from} to {to} rpm no periodic response was found, \
+         and whether it is stable is not known (`sweep dwell`)"
     );
     if missing == count {
         return unknown;

@@ -1,6 +1,6 @@
-//! What a fit has found out already, kept as it comes: the same question again goes on from there,
-//! and ends in the same bits. A record is a line: a hash of what follows it, the hash of the problem,
-//! the hash of what was asked, and the answer, null where there is none.
+//! The journal of a fit's evaluations, written as they come: the same fit again goes on from there,
+//! and ends in the same bits. A record is a line: a hash of what follows it, the hash of the
+//! problem, the hash of what was evaluated, and the answer, null where there is none.
 
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};

@@ -56,8 +56,10 @@ const NEAR: f64 = 0.5;
 const FARTHER: f64 = 1.02;
 
 /// The time (s) that trajectories from states of a chaotic motion have to stay in it, and the
-/// number of these. Basis: test `chaos_survives_or_is_a_transient`, whose transient ends within
-/// 240 s from each of eight states. Doubling either halves the rate of escape that is seen.
+/// number of these. Basis: a motion of 660 s of mean life ends from at least one of eight states
+/// within 240 s with a probability of 1 - exp(-8 * 240 / 660) = 0.945; test
+/// `chaos_survives_or_is_a_transient` has it. Doubling either halves the rate of escape that is
+/// seen with the same probability.
 const SURVIVAL_S: f64 = 240.0;
 const SURVIVORS: usize = 8;
 

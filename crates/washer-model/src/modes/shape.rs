@@ -33,8 +33,8 @@ pub enum Movement {
     BearingTilt,
 }
 
-/// The movement with the greatest share of a mode shape, and the shares of its kinetic energy in the motions of the machine as
-/// one rigid body.
+/// The movement with the greatest share of a mode shape, and the shares of its kinetic energy in
+/// the motions of the machine as one rigid body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// What moves.
