@@ -394,9 +394,14 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
             }
         }
     }
-    if let Some(root) = keys.section()
-        && sheet.is_given
-    {
+    let Some(root) = keys.section() else { return };
+    if machine.springs.is_empty() && machine.bushings.is_empty() {
+        let expected = "at least one [[springs]] or [[bushings]]: nothing else carries the machine";
+        root.missing("springs", expected);
+        // The built-in machine's springs keep later checks from reporting the same mistake again.
+        machine.springs = Machine::paper().springs;
+    }
+    if sheet.is_given {
         sheet.fill(machine, root);
     }
 }
