@@ -48,7 +48,7 @@ pub fn run<M: Swept>(
     model: &dyn Figures,
 ) -> Result<Exit, Error> {
     let output = args.out.clone().unwrap_or_else(|| args.result.with_extension("report.html"));
-    for path in args.further.iter().filter(|path| is_expression(path)) {
+    if let Some(path) = args.further.iter().find(|path| is_expression(path)) {
         let expected = "a file; each expression needs a `--require` of its own";
         return Err(Error::option("FILE", path.display(), expected));
     }
