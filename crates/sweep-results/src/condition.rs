@@ -1,5 +1,5 @@
-//! Conditions over the columns of a result, with the three truth values of SQL: a comparison with a
-//! missing value is neither true nor false.
+//! Evaluation of conditions over the columns of a result, with SQL's three-valued logic: a
+//! comparison with a missing value is neither true nor false.
 
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -7,145 +7,154 @@ use std::ops::Range;
 use crate::error::Result;
 use sweep_files::{Cell, ResultTable, Row};
 
-/// A mistake in the text of a condition.
+/// A syntax or type error in the text of an expression.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Mistake {
-    /// What is wrong, in a sentence.
+pub struct ExpressionError {
+    /// The error, in a sentence.
     pub title: String,
-    /// Where, in bytes of the text.
+    /// The position in the text, in bytes.
     pub span: Range<usize>,
-    /// What should stand there.
+    /// The text that was expected there.
     pub expected: String,
-    /// A word as typed, and the names that could have been meant.
+    /// A misspelt word, and the valid names.
     pub candidates: Option<(String, Vec<String>)>,
 }
 
-/// Which orders of two values keep a comparison.
+/// A comparison operator, as the predicate that the order of its operands has to satisfy.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Comparison(pub(crate) fn(Ordering) -> bool);
+pub(crate) struct ComparisonOperator(pub(crate) fn(Ordering) -> bool);
 
-/// How all rows become one number.
+/// An aggregate function: it reduces all rows to one number.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Fold {
-    /// Rows for which a condition is true.
+pub(crate) enum Aggregate {
+    /// The number of rows for which a condition is true.
     Count,
-    /// Rows for which a condition is true, as a part of those for which it is true or false.
+    /// The share of rows for which a condition is true, among those for which it is true or false.
     Share,
     Least,
     Greatest,
     Mean,
-    /// The number below which this part of the rows lies, between neighbours by a straight line.
+    /// The quantile of this probability, interpolated linearly.
     Quantile(f64),
 }
 
-/// A node of an expression; the parser has made sure of the types.
+/// A node of an expression's syntax tree, whose types the parser has checked.
 #[derive(Clone, Debug)]
-pub(crate) enum Node {
+pub(crate) enum ExpressionNode {
     Literal(Cell),
-    /// A place among the condition's columns.
+    /// A column, by its index in [`Condition::columns`].
     Column(usize),
-    /// A place among the condition's folds.
-    Folded(usize),
-    /// One number as another.
-    Changed(fn(f64) -> f64, Box<Node>),
-    Not(Box<Node>),
-    And(Box<Node>, Box<Node>),
-    Or(Box<Node>, Box<Node>),
-    IsNull(Box<Node>),
-    Compare(Comparison, Box<Node>, Box<Node>),
-    /// Two numbers as one.
-    Calculate(fn(f64, f64) -> f64, Box<Node>, Box<Node>),
+    /// An aggregate, by its index in [`Condition::aggregates`].
+    Aggregate(usize),
+    Unary(fn(f64) -> f64, Box<ExpressionNode>),
+    Binary(fn(f64, f64) -> f64, Box<ExpressionNode>, Box<ExpressionNode>),
+    Not(Box<ExpressionNode>),
+    And(Box<ExpressionNode>, Box<ExpressionNode>),
+    Or(Box<ExpressionNode>, Box<ExpressionNode>),
+    IsNull(Box<ExpressionNode>),
+    Compare(ComparisonOperator, Box<ExpressionNode>, Box<ExpressionNode>),
 }
 
-/// An expression that is true or false: of every row, or of a file as a whole.
+/// An expression that is true or false, for every row or for a file as a whole.
 #[derive(Clone, Debug)]
 pub struct Condition {
-    /// As typed.
+    /// The text as typed.
     pub text: String,
-    /// Names of the columns that it reads.
+    /// The names of the columns that the expression reads.
     pub columns: Vec<String>,
-    pub(crate) root: Node,
-    pub(crate) folds: Vec<(Fold, Node)>,
-    /// Whether it speaks of single rows, not of the folds alone.
+    pub(crate) root: ExpressionNode,
+    pub(crate) aggregates: Vec<(Aggregate, ExpressionNode)>,
+    /// Whether the expression reads columns outside of aggregates.
     pub(crate) by_row: bool,
 }
 
 impl Condition {
-    /// The columns that it reads.
-    pub(crate) fn names(&self) -> Vec<&str> {
+    /// Returns the names of the columns that the expression reads.
+    pub(crate) fn column_names(&self) -> Vec<&str> {
         self.columns.iter().map(String::as_str).collect()
     }
 
-    /// Whether it has functions over all rows.
-    pub const fn has_folds(&self) -> bool {
-        !self.folds.is_empty()
+    /// Returns whether the expression has aggregate functions.
+    pub const fn has_aggregates(&self) -> bool {
+        !self.aggregates.is_empty()
     }
 }
 
-/// What a node is evaluated on.
-pub(crate) struct Context<'a> {
+/// The values that an expression is evaluated on.
+pub(crate) struct EvaluationContext<'a> {
     pub(crate) row: Row<'a>,
-    /// Where the columns of the expression begin among the row's.
-    pub(crate) first: usize,
-    pub(crate) folded: &'a [Cell],
+    /// The index of the expression's first column in the row.
+    pub(crate) first_column: usize,
+    /// The values of the aggregates.
+    pub(crate) aggregates: &'a [Cell],
 }
 
-impl Node {
-    pub(crate) fn value(&self, at: &Context<'_>) -> Cell {
+impl ExpressionNode {
+    /// Evaluates the expression.
+    pub(crate) fn value(&self, context: &EvaluationContext<'_>) -> Cell {
         match self {
             Self::Literal(cell) => cell.clone(),
-            Self::Column(column) => match at.row.cell(at.first + *column) {
+            Self::Column(column) => match context.row.cell(context.first_column + *column) {
                 // Other writers store NaN where a value is missing.
-                Cell::Number(value) => number(Some(value)),
+                Cell::Number(value) => number_cell(Some(value)),
                 cell => cell,
             },
-            Self::Folded(fold) => at.folded.get(*fold).cloned().unwrap_or(Cell::Null),
-            Self::Changed(change, node) => number(node.number(at).map(change)),
-            Self::Calculate(operation, left, right) => {
-                let both = left.number(at).zip(right.number(at));
-                number(both.map(|(left, right)| operation(left, right)))
+            Self::Aggregate(index) => context.aggregates.get(*index).cloned().unwrap_or(Cell::Null),
+            Self::Unary(operation, node) => number_cell(node.number(context).map(operation)),
+            Self::Binary(operation, left, right) => {
+                let operands = left.number(context).zip(right.number(context));
+                number_cell(operands.map(|(left, right)| operation(left, right)))
             }
             Self::Not(_) | Self::And(..) | Self::Or(..) | Self::IsNull(_) | Self::Compare(..) => {
-                self.truth(at).map_or(Cell::Null, Cell::Flag)
+                self.truth(context).map_or(Cell::Null, Cell::Flag)
             }
         }
     }
 
-    fn number(&self, at: &Context<'_>) -> Option<f64> {
-        self.value(at).number()
+    fn number(&self, context: &EvaluationContext<'_>) -> Option<f64> {
+        self.value(context).number()
     }
 
-    /// True, false, or neither.
-    pub(crate) fn truth(&self, at: &Context<'_>) -> Option<bool> {
+    /// Evaluates the expression as a truth value; `None` is SQL's "unknown".
+    pub(crate) fn truth(&self, context: &EvaluationContext<'_>) -> Option<bool> {
         match self {
-            Self::Not(node) => node.truth(at).map(|truth| !truth),
-            Self::And(left, right) => joined([left.truth(at), right.truth(at)], true),
-            Self::Or(left, right) => joined([left.truth(at), right.truth(at)], false),
-            Self::IsNull(node) => Some(node.value(at) == Cell::Null),
-            Self::Compare(comparison, left, right) => {
-                comparison.of(&left.value(at), &right.value(at))
+            Self::Not(node) => node.truth(context).map(|truth| !truth),
+            Self::And(left, right) => and(left.truth(context), right.truth(context)),
+            // De Morgan's law holds in three-valued logic too.
+            Self::Or(left, right) => {
+                let neither = and(
+                    left.truth(context).map(|truth| !truth),
+                    right.truth(context).map(|truth| !truth),
+                );
+                neither.map(|truth| !truth)
             }
-            other => other.value(at).flag(),
+            Self::IsNull(node) => Some(node.value(context) == Cell::Null),
+            Self::Compare(operator, left, right) => {
+                operator.compare(&left.value(context), &right.value(context))
+            }
+            other => other.value(context).flag(),
         }
     }
 }
 
-/// What two parts make together: `common` if both are so, and its opposite as soon as one is.
-fn joined(parts: [Option<bool>; 2], common: bool) -> Option<bool> {
-    if parts.contains(&Some(!common)) {
-        return Some(!common);
+/// Returns the conjunction of two truth values: false if either is false, else unknown if either is
+/// unknown.
+fn and(left: Option<bool>, right: Option<bool>) -> Option<bool> {
+    if left == Some(false) || right == Some(false) {
+        return Some(false);
     }
-    parts[0].and(parts[1])
+    left.and(right)
 }
 
-/// A result that is no number has no value.
-fn number(number: Option<f64>) -> Cell {
+/// Returns a cell of a number, null for none and for NaN.
+fn number_cell(number: Option<f64>) -> Cell {
     number.filter(|number| !number.is_nan()).map_or(Cell::Null, Cell::Number)
 }
 
-impl Comparison {
-    /// How far two numbers are from keeping it; 0 where they do.
-    pub(crate) fn excess(self, left: f64, right: f64) -> f64 {
+impl ComparisonOperator {
+    /// Returns the distance of the operands from satisfying the comparison, 0 where they do. Equal
+    /// operands violate `!=` by 1.
+    pub(crate) fn violation(self, left: f64, right: f64) -> f64 {
         match [Ordering::Less, Ordering::Greater].map(self.0) {
             [true, true] => 1.0,
             [true, false] => (left - right).max(0.0),
@@ -154,7 +163,8 @@ impl Comparison {
         }
     }
 
-    fn of(self, left: &Cell, right: &Cell) -> Option<bool> {
+    /// Compares two cells, whose kinds the parser has made equal.
+    fn compare(self, left: &Cell, right: &Cell) -> Option<bool> {
         let order = match (left, right) {
             (Cell::Number(left), Cell::Number(right)) => left.partial_cmp(right)?,
             (Cell::Text(left), Cell::Text(right)) => left.cmp(right),
@@ -165,109 +175,126 @@ impl Comparison {
     }
 }
 
-/// What rows are folded into.
+/// The value of an aggregate function.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Folded {
+pub(crate) struct AggregateValue {
     /// The function over the rows that have a value.
     pub(crate) value: Cell,
-    /// How many rows have one.
-    pub(crate) over: u64,
-    /// Whether those are all rows.
-    pub(crate) whole: bool,
+    /// The number of rows that have a value.
+    pub(crate) rows: u64,
+    /// Whether every row has a value.
+    pub(crate) is_complete: bool,
 }
 
-/// The number that rows are folded into, on its way.
+/// The accumulator of an aggregate function over rows.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Folding {
+pub(crate) struct Accumulator {
     rows: u64,
-    over: u64,
-    /// Where conditions are counted, how many are true.
+    rows_with_value: u64,
+    /// The sum of the numbers; a condition counts as 1 where it is true.
     sum: f64,
     least: Option<f64>,
     greatest: Option<f64>,
-    /// All numbers, kept for a quantile alone.
+    /// All numbers, kept for quantiles only.
     numbers: Vec<f64>,
 }
 
 impl Condition {
-    /// Folds all rows that `keep` takes.
+    /// Evaluates the aggregates over all rows that a filter accepts.
     ///
     /// # Errors
     /// [`crate::ResultsError::File`].
-    pub(crate) fn fold(
+    pub(crate) fn aggregate(
         &self,
         table: &ResultTable,
-        keep: Option<&Condition>,
-    ) -> Result<Vec<Folded>> {
-        if self.folds.is_empty() {
+        filter: Option<&Condition>,
+    ) -> Result<Vec<AggregateValue>> {
+        if self.aggregates.is_empty() {
             return Ok(Vec::new());
         }
-        let mut foldings = vec![Folding::default(); self.folds.len()];
-        each_row(table, &self.names(), keep, |at| {
-            for ((fold, node), folding) in self.folds.iter().zip(&mut foldings) {
-                folding.add(*fold, node, at);
+        let mut accumulators = vec![Accumulator::default(); self.aggregates.len()];
+        for_each_row(table, &self.column_names(), filter, |context| {
+            for ((function, node), accumulator) in self.aggregates.iter().zip(&mut accumulators) {
+                accumulator.add(*function, node, context);
             }
             Ok(())
         })?;
-        let folds = self.folds.iter().zip(foldings);
-        Ok(folds.map(|((fold, _), folding)| folding.finish(*fold)).collect())
+        let functions = self.aggregates.iter().map(|(function, _)| *function);
+        Ok(functions
+            .zip(accumulators)
+            .map(|(function, accumulator)| accumulator.finish(function))
+            .collect())
     }
 }
 
-impl Folding {
-    pub(crate) fn add(&mut self, fold: Fold, node: &Node, at: &Context<'_>) {
+impl Accumulator {
+    /// Adds a row.
+    pub(crate) fn add(
+        &mut self,
+        function: Aggregate,
+        node: &ExpressionNode,
+        context: &EvaluationContext<'_>,
+    ) {
         self.rows += 1;
-        let number = match fold {
-            Fold::Count | Fold::Share => node.truth(at).map(|truth| f64::from(u8::from(truth))),
-            _ => node.number(at),
+        let number = match function {
+            Aggregate::Count | Aggregate::Share => {
+                node.truth(context).map(|truth| f64::from(u8::from(truth)))
+            }
+            _ => node.number(context),
         };
         let Some(number) = number else { return };
-        self.over += 1;
+        self.rows_with_value += 1;
         self.sum += number;
         self.least = Some(self.least.map_or(number, |least| least.min(number)));
         self.greatest = Some(self.greatest.map_or(number, |greatest| greatest.max(number)));
-        if let Fold::Quantile(_) = fold {
+        if let Aggregate::Quantile(_) = function {
             self.numbers.push(number);
         }
     }
 
-    pub(crate) fn finish(self, fold: Fold) -> Folded {
-        let value = match fold {
-            Fold::Count => Some(self.sum),
-            Fold::Share | Fold::Mean => Some(self.sum / self.over as f64),
-            Fold::Least => self.least,
-            Fold::Greatest => self.greatest,
-            Fold::Quantile(part) => quantile(self.numbers, part),
+    /// Returns the value of the function over the rows added.
+    pub(crate) fn finish(self, function: Aggregate) -> AggregateValue {
+        let value = match function {
+            Aggregate::Count => Some(self.sum),
+            Aggregate::Share | Aggregate::Mean => Some(self.sum / self.rows_with_value as f64),
+            Aggregate::Least => self.least,
+            Aggregate::Greatest => self.greatest,
+            Aggregate::Quantile(probability) => quantile(self.numbers, probability),
         };
-        Folded { value: number(value), over: self.over, whole: self.over == self.rows }
+        AggregateValue {
+            value: number_cell(value),
+            rows: self.rows_with_value,
+            is_complete: self.rows_with_value == self.rows,
+        }
     }
 }
 
-/// The quantile of numbers, as NumPy's by default.
-fn quantile(mut numbers: Vec<f64>, part: f64) -> Option<f64> {
+/// Returns a quantile with linear interpolation, as `numpy.quantile` does by default.
+fn quantile(mut numbers: Vec<f64>, probability: f64) -> Option<f64> {
     numbers.sort_by(f64::total_cmp);
-    let place = part * numbers.len().checked_sub(1)? as f64;
-    let (below, above) = (numbers[place.floor() as usize], numbers[place.ceil() as usize]);
-    Some(below + (above - below) * place.fract())
+    let position = probability * numbers.len().checked_sub(1)? as f64;
+    let below = numbers[position.floor() as usize];
+    let above = numbers[position.ceil() as usize];
+    Some(below + (above - below) * position.fract())
 }
 
-/// Calls `work` for each row that `keep` takes, with the columns of these names.
+/// Calls `work` for each row that a filter accepts, with the columns of these names.
 ///
 /// # Errors
-/// [`crate::ResultsError::File`], and whatever `work` says.
-pub(crate) fn each_row(
+/// [`crate::ResultsError::File`], and any error of `work`.
+pub(crate) fn for_each_row(
     table: &ResultTable,
     names: &[&str],
-    keep: Option<&Condition>,
-    mut work: impl FnMut(&Context<'_>) -> Result<()>,
+    filter: Option<&Condition>,
+    mut work: impl FnMut(&EvaluationContext<'_>) -> Result<()>,
 ) -> Result<()> {
-    let first = names.len();
-    let names = [names, &keep.map_or_else(Vec::new, Condition::names)].concat();
+    let filter_column = names.len();
+    let names = [names, &filter.map_or_else(Vec::new, Condition::column_names)].concat();
     table.file().each_row(&names, |row| {
-        let at = |first| Context { row, first, folded: &[] };
-        match keep.is_none_or(|keep| keep.root.truth(&at(first)) == Some(true)) {
-            true => work(&at(0)),
-            false => Ok(()),
-        }
+        let context =
+            |first_column: usize| EvaluationContext { row, first_column, aggregates: &[] };
+        let is_accepted =
+            filter.is_none_or(|filter| filter.root.truth(&context(filter_column)) == Some(true));
+        if is_accepted { work(&context(0)) } else { Ok(()) }
     })
 }

@@ -1,17 +1,17 @@
-//! What can go wrong with a result that is asked something.
+//! Errors of questions to results.
 
 use sweep_files::FileError;
 
-/// Why a result does not answer.
+/// An error of a question to a result.
 #[derive(Debug, thiserror::Error)]
 pub enum ResultsError {
     /// A file that cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// What cannot be done with a file, and why.
+    /// A request that a file cannot satisfy, with the reason.
     #[error("{0}")]
     Refused(String),
 }
 
-/// An answer, unless there is none.
+/// The result of a question to a file.
 pub(crate) type Result<T, E = ResultsError> = std::result::Result<T, E>;

@@ -1,4 +1,4 @@
-//! Results in the formats of other programs, with units.
+//! Export of results to the formats of other programs, with units.
 
 mod csv;
 mod xlsx;
@@ -11,22 +11,22 @@ use sweep_parameter::named;
 use crate::error::{Result, ResultsError};
 
 named! {
-    /// A format, named as the ending of its files.
-    pub enum Format {
-        /// Text: comments that begin with `#`, a line of names, a line per row.
+    /// A format, named by the extension of its files.
+    pub enum ExportFormat {
+        /// Text: comments that begin with `#`, a line of names, a line for each row.
         Csv = "csv",
-        /// A workbook: the rows, the columns with units and descriptions, the plan.
+        /// A workbook with three sheets: the rows, the columns with units, the plan.
         Xlsx = "xlsx",
     }
 }
 
-impl Format {
-    /// The format of a file's name.
-    pub fn of(path: &Path) -> Option<Self> {
+impl ExportFormat {
+    /// Returns the format that a file's extension names.
+    pub fn from_path(path: &Path) -> Option<Self> {
         Self::named(&path.extension()?.to_str()?.to_ascii_lowercase())
     }
 
-    /// What such a file may be written over.
+    /// Returns the kind of file that an export may overwrite.
     pub const fn kind(self) -> FileKind<'static> {
         FileKind::Exported { ending: self.name() }
     }
@@ -35,29 +35,30 @@ impl Format {
 /// Writes all rows of a result.
 ///
 /// # Errors
-/// [`ResultsError::File`], and [`ResultsError::Refused`] where the format has no room for it.
+/// [`ResultsError::File`], and [`ResultsError::Refused`] for a result beyond the format's limits.
 pub fn export(
     table: &ResultTable,
-    format: Format,
+    format: ExportFormat,
     mut output: Output<'_>,
 ) -> Result<(), ResultsError> {
-    let rest = match format {
-        Format::Csv => {
+    let remaining = match format {
+        ExportFormat::Csv => {
             csv::write(table, &mut |text| output.write(text.as_bytes()))?;
             Vec::new()
         }
-        Format::Xlsx => xlsx::bytes(table)?,
+        ExportFormat::Xlsx => xlsx::encode(table)?,
     };
-    Ok(output.finish(&rest)?)
+    Ok(output.finish(&remaining)?)
 }
 
-/// The names of all columns.
-fn names(table: &ResultTable) -> Vec<&str> {
+/// Returns the names of all columns.
+fn column_names(table: &ResultTable) -> Vec<&str> {
     table.columns.iter().map(|column| column.name.as_str()).collect()
 }
 
-/// A refusal of a format.
-fn no_room(table: &ResultTable, format: Format, reason: &str) -> ResultsError {
-    let (path, ending) = (table.path().display(), format.name());
-    ResultsError::Refused(format!("{path} cannot be exported as .{ending}: {reason}"))
+/// Returns the error of a result that a format cannot hold.
+fn export_error(table: &ResultTable, format: ExportFormat, reason: &str) -> ResultsError {
+    let path = table.path().display();
+    let extension = format.name();
+    ResultsError::Refused(format!("{path} cannot be exported as .{extension}: {reason}"))
 }

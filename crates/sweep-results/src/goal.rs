@@ -1,87 +1,105 @@
-//! Expressions over rows in memory: what a search minimises, and conditions with how far rows are
-//! from keeping them.
+//! Objectives and constraints of a search, as expressions over rows in memory.
 
 use arrow_array::RecordBatch;
 use arrow_schema::ArrowError;
 
-use crate::condition::{Condition, Context, Folding, Mistake, Node};
-use crate::parse::expression;
+use crate::condition::{
+    Accumulator, Aggregate, Condition, EvaluationContext, ExpressionError, ExpressionNode,
+};
+use crate::parse::parse_expression;
 use sweep_files::{Cell, CellKind, Column, Rows};
 
-/// A number of rows that a search drives down.
+/// An objective or a constraint of a search: a number over rows that the search reduces.
 #[derive(Clone, Debug)]
 pub struct Goal {
     expression: Condition,
     columns: Vec<Column>,
-    /// Whether it is a condition, whose number is its excess.
-    is_condition: bool,
+    /// Whether the expression is a constraint, whose number is its violation.
+    is_constraint: bool,
 }
 
 impl Goal {
-    /// A number over rows of these columns.
+    /// Parses an objective over rows of these columns.
     ///
     /// # Errors
-    /// The first mistake in it.
-    pub fn number(text: &str, columns: &[Column]) -> Result<Self, Mistake> {
-        Self::of(expression(text, columns, CellKind::Number)?, columns, false)
+    /// The first error in the text.
+    pub fn objective(text: &str, columns: &[Column]) -> Result<Self, ExpressionError> {
+        let expression = parse_expression(text, columns, CellKind::Number)?;
+        Ok(Self::new(expression, columns, false))
     }
 
-    /// How far rows of these columns are from keeping a condition, in the units of its comparisons:
-    /// 0 where all rows keep it, else the row farthest from it counts. Of comparisons joined by
-    /// `and` the excesses add up, of those joined by `or` the least counts. What is no comparison
-    /// of numbers exceeds by 1.
+    /// Parses a constraint over rows of these columns. Its number is its violation, in the units of
+    /// its comparisons: 0 where all rows satisfy it, else that of the row with the greatest one.
+    /// The violations of comparisons joined by `and` are added, of those joined by `or` the least
+    /// counts. An expression that compares no numbers is violated by 1.
     ///
     /// # Errors
-    /// The first mistake in it.
-    pub fn excess(text: &str, columns: &[Column]) -> Result<Self, Mistake> {
-        Self::of(expression(text, columns, CellKind::Flag)?, columns, true)
+    /// The first error in the text.
+    pub fn constraint(text: &str, columns: &[Column]) -> Result<Self, ExpressionError> {
+        let expression = parse_expression(text, columns, CellKind::Flag)?;
+        Ok(Self::new(expression, columns, true))
     }
 
-    fn of(expression: Condition, all: &[Column], is_condition: bool) -> Result<Self, Mistake> {
-        let used = expression.columns.iter();
-        let columns = used.filter_map(|name| all.iter().find(|column| column.name == *name));
-        let columns = columns.cloned().collect();
-        Ok(Self { expression, columns, is_condition })
+    fn new(expression: Condition, all_columns: &[Column], is_constraint: bool) -> Self {
+        let columns = expression
+            .columns
+            .iter()
+            .filter_map(|name| all_columns.iter().find(|column| column.name == *name))
+            .cloned()
+            .collect();
+        Self { expression, columns, is_constraint }
     }
 
-    /// As typed.
+    /// Returns the text as typed.
     pub fn text(&self) -> &str {
         &self.expression.text
     }
 
-    /// Whether it speaks of single rows, so that a number needs there to be one.
+    /// Returns whether the expression reads columns outside of aggregates.
     pub const fn is_by_row(&self) -> bool {
         self.expression.by_row
     }
 
-    /// The unit of the column, if it is a column's least, greatest or mean number or a quantile.
+    /// Returns the unit of a single column or of an aggregate of one, else an empty text.
     pub fn unit(&self) -> &str {
-        let of_one = |node: &Node| matches!(node, Node::Column(_));
-        let one = match (&self.expression.root, self.expression.folds.as_slice()) {
-            (root, []) => of_one(root),
-            (Node::Folded(_), [(_, node)]) => of_one(node),
+        let is_column = |node: &ExpressionNode| matches!(node, ExpressionNode::Column(_));
+        let has_unit = match (&self.expression.root, self.expression.aggregates.as_slice()) {
+            (root, []) => is_column(root),
+            // A count or a share is of a condition, which is no single number column.
+            (ExpressionNode::Aggregate(_), [(_, node)]) => is_column(node),
             _ => false,
         };
-        self.columns.first().filter(|_| one).map_or("", |column| &column.unit)
+        match self.columns.first() {
+            Some(column) if has_unit => &column.unit,
+            _ => "",
+        }
     }
 
-    /// Its number over all rows; none where a value that it needs is missing.
+    /// Evaluates the number over all rows; `None` where a value that it needs is missing.
     ///
     /// # Errors
-    /// Rows of other columns.
-    pub fn over(&self, batch: &RecordBatch) -> Result<Option<f64>, ArrowError> {
+    /// A batch without the columns of the expression.
+    pub fn evaluate(&self, batch: &RecordBatch) -> Result<Option<f64>, ArrowError> {
         let rows = Rows::of(batch, &self.columns)?;
-        let at = |row| Context { row: rows.row(row), first: 0, folded: &[] };
-        let fold = |(fold, node): &(_, Node)| {
-            let mut folding = Folding::default();
-            (0..rows.count).for_each(|row| folding.add(*fold, node, &at(row)));
-            let folded = folding.finish(*fold);
-            if folded.whole { folded.value } else { Cell::Null }
+        let context =
+            |row| EvaluationContext { row: rows.row(row), first_column: 0, aggregates: &[] };
+        let aggregate = |(function, node): &(Aggregate, ExpressionNode)| {
+            let mut accumulator = Accumulator::default();
+            for row in 0..rows.count {
+                accumulator.add(*function, node, &context(row));
+            }
+            let result = accumulator.finish(*function);
+            if result.is_complete { result.value } else { Cell::Null }
         };
-        let folded: Vec<Cell> = self.expression.folds.iter().map(fold).collect();
+        let aggregates: Vec<Cell> = self.expression.aggregates.iter().map(aggregate).collect();
         let number = |row| {
-            let (root, at) = (&self.expression.root, Context { folded: &folded, ..at(row) });
-            if self.is_condition { root.excess(&at) } else { root.value(&at).number() }
+            let root = &self.expression.root;
+            let context = EvaluationContext { aggregates: &aggregates, ..context(row) };
+            if self.is_constraint {
+                root.violation(&context)
+            } else {
+                root.value(&context).number()
+            }
         };
         let rows = if self.expression.by_row { rows.count } else { rows.count.min(1) };
         let numbers = (0..rows).map(number).collect::<Option<Vec<f64>>>();
@@ -89,23 +107,24 @@ impl Goal {
     }
 }
 
-impl Node {
-    /// How far a row is from keeping this; none where that is neither true nor false.
-    fn excess(&self, at: &Context<'_>) -> Option<f64> {
-        if self.truth(at)? {
+impl ExpressionNode {
+    /// Returns the violation of a condition by a row; `None` where the condition is neither true
+    /// nor false.
+    fn violation(&self, context: &EvaluationContext<'_>) -> Option<f64> {
+        if self.truth(context)? {
             return Some(0.0);
         }
         Some(match self {
-            Self::And(left, right) => match (left.excess(at), right.excess(at)) {
+            Self::And(left, right) => match (left.violation(context), right.violation(context)) {
                 (Some(left), Some(right)) => left + right,
-                // One is false whatever the other is.
+                // The operand that is false decides, even if the other is unknown.
                 (left, right) => left.or(right)?,
             },
-            Self::Or(left, right) => left.excess(at)?.min(right.excess(at)?),
-            Self::Compare(comparison, left, right) => {
-                match (left.value(at).number(), right.value(at).number()) {
-                    // What breaks a strict comparison by nothing breaks it.
-                    (Some(l), Some(r)) => comparison.excess(l, r).max(f64::MIN_POSITIVE),
+            Self::Or(left, right) => left.violation(context)?.min(right.violation(context)?),
+            Self::Compare(operator, left, right) => {
+                match (left.value(context).number(), right.value(context).number()) {
+                    // Equal operands violate a strict comparison by 0, which would count as none.
+                    (Some(l), Some(r)) => operator.violation(l, r).max(f64::MIN_POSITIVE),
                     _ => 1.0,
                 }
             }
@@ -141,12 +160,12 @@ mod tests {
     }
 
     #[test]
-    fn a_number_is_of_all_rows_and_missing_where_a_value_is() {
+    fn an_objective_covers_all_rows_and_is_missing_where_a_value_is() {
         let batch = batch();
-        let of = |text: &str| Goal::number(text, &columns(&batch.schema())).unwrap();
+        let parse = |text: &str| Goal::objective(text, &columns(&batch.schema())).unwrap();
         for (text, value, unit) in [
             ("max(x_m)", Some(10.0), "m"),
-            // As numpy.quantile([1, 2, 4, 8, 10], [0, 0.5, 0.6, 0.95, 1]).
+            // numpy.quantile([1, 2, 4, 8, 10], [0, 0.5, 0.6, 0.95, 1])
             ("quantile(x_m, 0)", Some(1.0), "m"),
             ("quantile(x_m, 0.5)", Some(4.0), "m"),
             ("quantile(x_m, 0.6)", Some(5.6), "m"),
@@ -156,18 +175,21 @@ mod tests {
             ("max(y)", None, ""),
             ("share(sound)", Some(0.8), ""),
         ] {
-            let (goal, near) = (of(text), |v: f64| value.is_some_and(|w| (v - w).abs() < 1e-12));
-            let found = goal.over(&batch).unwrap();
-            assert!(found == value || found.is_some_and(near), "{text}: {found:?}");
+            let goal = parse(text);
+            let found = goal.evaluate(&batch).unwrap();
+            match (found, value) {
+                (Some(found), Some(value)) => assert!((found - value).abs() < 1e-12, "{text}"),
+                _ => assert_eq!(found, value, "{text}"),
+            }
             assert_eq!((goal.unit(), goal.is_by_row()), (unit, false), "{text}");
         }
-        assert!(of("x_m").is_by_row());
+        assert!(parse("x_m").is_by_row());
     }
 
     #[test]
-    fn an_excess_says_how_far_the_worst_row_is_from_keeping_a_condition() {
+    fn a_violation_is_that_of_the_worst_row() {
         let batch = batch();
-        for (text, excess) in [
+        for (text, violation) in [
             ("x_m <= 10", Some(0.0)),
             ("x_m <= 7.5", Some(2.5)),
             ("x_m < 10", Some(f64::MIN_POSITIVE)),
@@ -178,13 +200,13 @@ mod tests {
             ("x_m > 99 and y < 9", Some(98.0)),
             ("not sound", Some(1.0)),
         ] {
-            let goal = Goal::excess(text, &columns(&batch.schema())).unwrap();
-            assert_eq!(goal.over(&batch).unwrap(), excess, "{text}");
+            let goal = Goal::constraint(text, &columns(&batch.schema())).unwrap();
+            assert_eq!(goal.evaluate(&batch).unwrap(), violation, "{text}");
         }
     }
 
     #[test]
-    fn mistakes_are_pointed_at() {
+    fn errors_have_positions() {
         let columns = columns(&batch().schema());
         for (text, at) in [
             ("quantile(x_m)", ")"),
@@ -192,8 +214,8 @@ mod tests {
             ("quantile(x_m, -1)", "-"),
             ("max(x_m) < 3", "max(x_m) < 3"),
         ] {
-            let mistake = Goal::number(text, &columns).unwrap_err();
-            assert_eq!(&text[mistake.span.clone()], at, "{mistake:?}");
+            let error = Goal::objective(text, &columns).unwrap_err();
+            assert_eq!(&text[error.span.clone()], at, "{error:?}");
         }
     }
 }

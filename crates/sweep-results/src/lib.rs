@@ -1,11 +1,12 @@
-//! Questions to finished results, from the files alone: whether conditions hold, which rows are
-//! extreme, what differs between two files. It also writes the rows in other formats.
+//! Queries of finished results, from the files alone.
 //!
-//! * [`Condition`] is an expression over a file's columns; [`check`] says which rows keep it,
-//!   [`top`] which rows come first in an order.
-//! * [`compare`] says what differs between two files, [`export`] writes one in another format.
+//! * [`Condition`] is an expression over a file's columns. [`check`] returns the rows that violate
+//!   it, [`top`] the rows that come first in an order.
+//! * [`Goal`] is an objective or a constraint of a search, over rows in memory.
+//! * [`compare`] returns the differences between two files.
+//! * [`export`] writes a file's rows in another format.
 //!
-//! Nothing here knows the model; [`sweep_files`] opens every file, so a damaged one is refused.
+//! The crate knows no model. [`sweep_files`] opens every file and refuses damaged ones.
 
 mod compare;
 mod condition;
@@ -20,11 +21,11 @@ mod sample;
 mod top;
 
 pub use compare::{
-    ColumnChange, Comparison, Crossing, Flip, Moved, PlanChange, SharedRow, compare,
+    BoundaryCrossing, BoundaryShift, ColumnChange, Comparison, Flip, PlanChange, SharedRow, compare,
 };
-pub use condition::{Condition, Mistake};
+pub use condition::{Condition, ExpressionError};
 pub use error::ResultsError;
-pub use export::{Format, export};
+pub use export::{ExportFormat, export};
 pub use goal::Goal;
 pub use nearest::nearest;
 pub use require::{Checked, Offender, check};

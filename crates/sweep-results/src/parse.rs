@@ -1,4 +1,4 @@
-//! The grammar of conditions.
+//! A recursive-descent parser of conditions.
 //!
 //! ```text
 //! condition  := and ('or' and)*
@@ -16,14 +16,16 @@
 use std::cmp::Ordering;
 use std::ops::Range;
 
-use crate::condition::{Comparison, Condition, Fold, Mistake, Node};
+use crate::condition::{Aggregate, ComparisonOperator, Condition, ExpressionError, ExpressionNode};
 use sweep_files::{Cell, CellKind, Column, ResultTable};
 
-/// Deepest nesting: what no person writes, and no stack minds.
-const DEEPEST: usize = 64;
+/// The greatest depth of nested parentheses and signs. Basis: far more than people write, and far
+/// less than the stack holds. Doubling it doubles the stack that the parser may need.
+const MAX_DEPTH: usize = 64;
 
-/// Longest text of a condition.
-const LONGEST: usize = 4096;
+/// The greatest length of a text, in bytes. Basis: far more than people write. Doubling it doubles
+/// the time and memory that a hostile text may take.
+const MAX_TEXT_BYTES: usize = 4096;
 
 #[derive(Clone, Debug, PartialEq)]
 enum Token {
@@ -34,69 +36,75 @@ enum Token {
     End,
 }
 
-/// Longer signs first.
+/// The operators and separators. A sign stands before its own beginning (`<=` before `<`), because
+/// the first match is taken.
 const SIGNS: [&str; 13] = ["<=", ">=", "==", "!=", "<", ">", "(", ")", "+", "-", "*", "/", ","];
 
-/// What other languages write, and what is meant.
+/// Operators of other languages, and the ones to use.
 const FOREIGN: [(&str, &str); 5] =
     [("&&", "and"), ("||", "or"), ("!", "not"), ("=", "=="), ("<>", "!=")];
 
-/// Words that are no columns, and how they fold all rows.
-const FUNCTIONS: [(&str, Option<Fold>); 7] = [
+/// The functions: an aggregate, or `None` for a function of single rows.
+const FUNCTIONS: [(&str, Option<Aggregate>); 7] = [
     ("abs", None),
-    ("count", Some(Fold::Count)),
-    ("share", Some(Fold::Share)),
-    ("min", Some(Fold::Least)),
-    ("max", Some(Fold::Greatest)),
-    ("mean", Some(Fold::Mean)),
-    ("quantile", Some(Fold::Quantile(f64::NAN))),
+    ("count", Some(Aggregate::Count)),
+    ("share", Some(Aggregate::Share)),
+    ("min", Some(Aggregate::Least)),
+    ("max", Some(Aggregate::Greatest)),
+    ("mean", Some(Aggregate::Mean)),
+    // The parser replaces the probability.
+    ("quantile", Some(Aggregate::Quantile(f64::NAN))),
 ];
 
-type Spanned = (Token, Range<usize>);
+type SpannedToken = (Token, Range<usize>);
 
-/// What a node is.
-struct Typed {
-    node: Node,
+/// A node with its type and its position in the text.
+struct TypedNode {
+    node: ExpressionNode,
     kind: CellKind,
     span: Range<usize>,
 }
 
-type Parsed = Result<Typed, Mistake>;
+type ParseResult = Result<TypedNode, ExpressionError>;
 
-const COMPARISONS: [(&str, Comparison); 6] = [
-    ("<", Comparison(Ordering::is_lt)),
-    ("<=", Comparison(Ordering::is_le)),
-    (">", Comparison(Ordering::is_gt)),
-    (">=", Comparison(Ordering::is_ge)),
-    ("==", Comparison(Ordering::is_eq)),
-    ("!=", Comparison(Ordering::is_ne)),
+/// The comparison operators.
+const COMPARISONS: [(&str, ComparisonOperator); 6] = [
+    ("<", ComparisonOperator(Ordering::is_lt)),
+    ("<=", ComparisonOperator(Ordering::is_le)),
+    (">", ComparisonOperator(Ordering::is_gt)),
+    (">=", ComparisonOperator(Ordering::is_ge)),
+    ("==", ComparisonOperator(Ordering::is_eq)),
+    ("!=", ComparisonOperator(Ordering::is_ne)),
 ];
 
-/// How two parts become one.
-type Joining = fn(Box<Node>, Box<Node>) -> Node;
+/// A constructor of a binary operator's node.
+type BinaryNode = fn(Box<ExpressionNode>, Box<ExpressionNode>) -> ExpressionNode;
 
-const SUMS: [(&str, Joining); 2] = [
-    ("+", |left, right| Node::Calculate(|a, b| a + b, left, right)),
-    ("-", |left, right| Node::Calculate(|a, b| a - b, left, right)),
+/// The operators of sums.
+const SUMS: [(&str, BinaryNode); 2] = [
+    ("+", |left, right| ExpressionNode::Binary(|a, b| a + b, left, right)),
+    ("-", |left, right| ExpressionNode::Binary(|a, b| a - b, left, right)),
 ];
-const PRODUCTS: [(&str, Joining); 2] = [
-    ("*", |left, right| Node::Calculate(|a, b| a * b, left, right)),
-    ("/", |left, right| Node::Calculate(|a, b| a / b, left, right)),
+/// The operators of products.
+const PRODUCTS: [(&str, BinaryNode); 2] = [
+    ("*", |left, right| ExpressionNode::Binary(|a, b| a * b, left, right)),
+    ("/", |left, right| ExpressionNode::Binary(|a, b| a / b, left, right)),
 ];
 
-fn wrong<T>(
+/// Returns an error at a position.
+fn error_at<T>(
     title: impl Into<String>,
     span: Range<usize>,
     expected: impl Into<String>,
-) -> Result<T, Mistake> {
-    let (title, expected) = (title.into(), expected.into());
-    Err(Mistake { title, span, expected, candidates: None })
+) -> Result<T, ExpressionError> {
+    Err(ExpressionError { title: title.into(), span, expected: expected.into(), candidates: None })
 }
 
-fn tokens(text: &str) -> Result<Vec<Spanned>, Mistake> {
-    if text.len() > LONGEST {
-        let expected = format!("expected at most {LONGEST} characters");
-        return wrong("the expression is too long", 0..LONGEST.min(1), expected);
+/// Splits a text into tokens, the last of which is [`Token::End`].
+fn tokenize(text: &str) -> Result<Vec<SpannedToken>, ExpressionError> {
+    if text.len() > MAX_TEXT_BYTES {
+        let expected = format!("expected at most {MAX_TEXT_BYTES} characters");
+        return error_at("the expression is too long", 0..MAX_TEXT_BYTES.min(1), expected);
     }
     let mut found = Vec::new();
     let mut at = 0;
@@ -110,7 +118,7 @@ fn tokens(text: &str) -> Result<Vec<Spanned>, Mistake> {
             let number = rest[..length].parse::<f64>().ok().filter(|number| number.is_finite());
             let Some(number) = number else {
                 let title = format!("`{}` is not a number", &rest[..length]);
-                return wrong(title, at..at + length, "expected a number such as 1.5 or 2e-3");
+                return error_at(title, at..at + length, "expected a number such as 1.5 or 2e-3");
             };
             (Token::Number(number), length)
         } else if first.is_alphabetic() || first == '_' {
@@ -120,20 +128,24 @@ fn tokens(text: &str) -> Result<Vec<Spanned>, Mistake> {
         } else if first == '"' || first == '\'' {
             let Some(end) = rest[1..].find(first) else {
                 let span = at..text.len();
-                return wrong("a text without an end", span, format!("expected a closing {first}"));
+                return error_at(
+                    "a text without an end",
+                    span,
+                    format!("expected a closing {first}"),
+                );
             };
             (Token::Text(rest[1..=end].to_owned()), end + 2)
         } else if let Some((foreign, own)) = FOREIGN.iter().find(|(foreign, _)| {
             rest.starts_with(foreign) && !(rest.starts_with("==") || rest.starts_with("!="))
         }) {
             let title = format!("`{foreign}` is not part of an expression");
-            return wrong(title, at..at + foreign.len(), format!("expected `{own}`"));
+            return error_at(title, at..at + foreign.len(), format!("expected `{own}`"));
         } else if let Some(sign) = SIGNS.iter().find(|sign| rest.starts_with(*sign)) {
             (Token::Sign(sign), sign.len())
         } else {
             let title = format!("`{first}` is not part of an expression");
             let expected = "expected columns, numbers, `<`, `and`, ...";
-            return wrong(title, at..at + first.len_utf8(), expected);
+            return error_at(title, at..at + first.len_utf8(), expected);
         };
         found.push((token, at..at + length));
         at += length;
@@ -142,52 +154,55 @@ fn tokens(text: &str) -> Result<Vec<Spanned>, Mistake> {
     Ok(found)
 }
 
-/// How far a number goes: digits, a point, an exponent.
+/// Returns the length of the number at the beginning of a text, with everything that cannot begin
+/// another token, so that `1.5.2` and `2kg` are one invalid number each.
 fn number_length(text: &str) -> usize {
-    let mut before = ' ';
+    let mut previous = ' ';
     text.find(|c: char| {
-        let sign = matches!(c, '+' | '-') && matches!(before, 'e' | 'E');
-        let part = c.is_alphanumeric() || c == '.' || c == '_' || sign;
-        before = c;
-        !part
+        let is_exponent_sign = matches!(c, '+' | '-') && matches!(previous, 'e' | 'E');
+        let continues = c.is_alphanumeric() || c == '.' || c == '_' || is_exponent_sign;
+        previous = c;
+        !continues
     })
     .unwrap_or(text.len())
 }
 
 impl Condition {
-    /// Reads a condition over the columns of a file.
+    /// Parses a condition over the columns of a file.
     ///
     /// # Errors
-    /// The first mistake in it.
-    pub fn parse(text: &str, table: &ResultTable) -> Result<Self, Mistake> {
-        expression(text, &table.columns, CellKind::Flag)
+    /// The first error in the text.
+    pub fn parse(text: &str, table: &ResultTable) -> Result<Self, ExpressionError> {
+        parse_expression(text, &table.columns, CellKind::Flag)
     }
 }
 
 #[derive(Default)]
 struct Parser<'a> {
-    tokens: Vec<Spanned>,
+    tokens: Vec<SpannedToken>,
+    /// The index of the next token.
     next: usize,
     columns: &'a [Column],
+    /// The names of the columns read so far.
     used: Vec<String>,
-    folds: Vec<(Fold, Node)>,
+    aggregates: Vec<(Aggregate, ExpressionNode)>,
     by_row: bool,
-    in_fold: bool,
+    in_aggregate: bool,
     depth: usize,
 }
 
-/// Reads an expression over these columns: true or false, or a number.
-pub(crate) fn expression(
+/// Parses an expression of a wanted type over these columns.
+pub(crate) fn parse_expression(
     text: &str,
     columns: &[Column],
     wanted: CellKind,
-) -> Result<Condition, Mistake> {
-    let mut parser = Parser { tokens: tokens(text)?, columns, ..Parser::default() };
-    let root = parser.any_of()?;
+) -> Result<Condition, ExpressionError> {
+    let mut parser = Parser { tokens: tokenize(text)?, columns, ..Parser::default() };
+    let root = parser.disjunction()?;
     let (token, span) = parser.peek().clone();
     if token != Token::End {
         let expected = "expected `and`, `or`, a comparison, or the end";
-        return wrong("the expression goes on after its end", span, expected);
+        return error_at("the expression goes on after its end", span, expected);
     }
     if root.kind != wanted {
         let (not, expected) = match wanted {
@@ -197,30 +212,36 @@ pub(crate) fn expression(
             _ => ("cannot be minimised", "expected a number, as in `max(ratio_max)`"),
         };
         let title = format!("the expression is {}, which {not}", root.kind.name());
-        return wrong(title, root.span, expected);
+        return error_at(title, root.span, expected);
     }
-    let Parser { used, folds, by_row, .. } = parser;
-    let by_row = by_row || folds.is_empty();
-    Ok(Condition { text: text.trim().to_owned(), columns: used, root: root.node, folds, by_row })
+    let Parser { used, aggregates, by_row, .. } = parser;
+    let by_row = by_row || aggregates.is_empty();
+    Ok(Condition {
+        text: text.trim().to_owned(),
+        columns: used,
+        root: root.node,
+        aggregates,
+        by_row,
+    })
 }
 
 impl Parser<'_> {
-    fn peek(&self) -> &Spanned {
+    fn peek(&self) -> &SpannedToken {
         &self.tokens[self.next.min(self.tokens.len() - 1)]
     }
 
-    fn take(&mut self) -> Spanned {
+    fn next_token(&mut self) -> SpannedToken {
         let token = self.peek().clone();
         self.next += 1;
         token
     }
 
-    fn takes_word(&mut self, word: &'static str) -> bool {
-        self.takes_one(&[(word, ())]).is_some()
+    fn accepts_word(&mut self, word: &'static str) -> bool {
+        self.accept_any(&[(word, ())]).is_some()
     }
 
-    /// The next word or sign and what it means, if it is one of these.
-    fn takes_one<T: Copy>(&mut self, known: &[(&'static str, T)]) -> Option<(&'static str, T)> {
+    /// Consumes the next token and returns its name and meaning, if it is one of these.
+    fn accept_any<T: Copy>(&mut self, known: &[(&'static str, T)]) -> Option<(&'static str, T)> {
         let next = match &self.peek().0 {
             Token::Word(word) => word.as_str(),
             Token::Sign(sign) => sign,
@@ -231,62 +252,66 @@ impl Parser<'_> {
         Some(found)
     }
 
-    fn any_of(&mut self) -> Parsed {
-        self.joined(Self::all_of, CellKind::Flag, &[("or", Node::Or)])
+    fn disjunction(&mut self) -> ParseResult {
+        self.binary_operators(Self::conjunction, CellKind::Flag, &[("or", ExpressionNode::Or)])
     }
 
-    fn all_of(&mut self) -> Parsed {
-        self.joined(Self::negated, CellKind::Flag, &[("and", Node::And)])
+    fn conjunction(&mut self) -> ParseResult {
+        self.binary_operators(Self::negation, CellKind::Flag, &[("and", ExpressionNode::And)])
     }
 
-    /// Parts of one kind, joined from the left to a part of that kind.
-    fn joined(
+    /// Parses operands of one type, joined by left-associative operators of that type.
+    fn binary_operators(
         &mut self,
-        part: fn(&mut Self) -> Parsed,
+        operand: fn(&mut Self) -> ParseResult,
         kind: CellKind,
-        known: &[(&'static str, Joining)],
-    ) -> Parsed {
-        let mut left = part(self)?;
-        while let Some((word, node)) = self.takes_one(known) {
-            let right = part(self)?;
-            let why = match kind {
+        known: &[(&'static str, BinaryNode)],
+    ) -> ParseResult {
+        let mut left = operand(self)?;
+        while let Some((word, node)) = self.accept_any(known) {
+            let right = operand(self)?;
+            let rule = match kind {
                 CellKind::Flag => format!("`{word}` joins what is true or false"),
                 _ => "only numbers are calculated with".to_owned(),
             };
             for side in [&left, &right] {
-                expect(side, kind, &why)?;
+                expect(side, kind, &rule)?;
             }
             let span = left.span.start..right.span.end;
-            left = Typed { node: node(Box::new(left.node), Box::new(right.node)), kind, span };
+            left = TypedNode { node: node(Box::new(left.node), Box::new(right.node)), kind, span };
         }
         Ok(left)
     }
 
-    fn negated(&mut self) -> Parsed {
+    fn negation(&mut self) -> ParseResult {
         let start = self.peek().1.start;
-        if !self.takes_word("not") {
+        if !self.accepts_word("not") {
             return self.comparison();
         }
-        let inner = self.deeper(Self::negated)?;
+        let inner = self.nested(Self::negation)?;
         expect(&inner, CellKind::Flag, "`not` turns true into false")?;
         let span = start..inner.span.end;
-        Ok(Typed { node: Node::Not(Box::new(inner.node)), kind: CellKind::Flag, span })
+        Ok(TypedNode {
+            node: ExpressionNode::Not(Box::new(inner.node)),
+            kind: CellKind::Flag,
+            span,
+        })
     }
 
-    fn comparison(&mut self) -> Parsed {
+    fn comparison(&mut self) -> ParseResult {
         let left = self.sum()?;
-        if self.takes_word("is") {
-            let negated = self.takes_word("not");
+        if self.accepts_word("is") {
+            let negated = self.accepts_word("not");
             let end = self.peek().1.clone();
-            if !self.takes_word("null") {
-                return wrong("`is` asks for null", end, "expected `null` or `not null`");
+            if !self.accepts_word("null") {
+                return error_at("`is` asks for null", end, "expected `null` or `not null`");
             }
             let span = left.span.start..end.end;
-            let node = Node::IsNull(Box::new(left.node));
-            let node = if negated { Node::Not(Box::new(node)) } else { node };
-            return Ok(Typed { node, kind: CellKind::Flag, span });
+            let node = ExpressionNode::IsNull(Box::new(left.node));
+            let node = if negated { ExpressionNode::Not(Box::new(node)) } else { node };
+            return Ok(TypedNode { node, kind: CellKind::Flag, span });
         }
-        let Some((_, comparison)) = self.takes_one(&COMPARISONS) else { return Ok(left) };
+        let Some((_, comparison)) = self.accept_any(&COMPARISONS) else { return Ok(left) };
         let right = self.sum()?;
         if left.kind != right.kind {
             let title = format!("{} is compared with {}", left.kind.name(), right.kind.name());
@@ -294,50 +319,52 @@ impl Parser<'_> {
                 CellKind::Text => "expected a text, as in \"ok\"".to_owned(),
                 kind => format!("expected {}", kind.name()),
             };
-            return wrong(title, right.span, expected);
+            return error_at(title, right.span, expected);
         }
-        let again = self.peek().1.clone();
-        if self.takes_one(&COMPARISONS).is_some() {
+        let second = self.peek().1.clone();
+        if self.accept_any(&COMPARISONS).is_some() {
             let expected = "expected `and`: write `a < x and x < b`";
-            return wrong("a comparison of three values", again, expected);
+            return error_at("a comparison of three values", second, expected);
         }
         let span = left.span.start..right.span.end;
-        let node = Node::Compare(comparison, Box::new(left.node), Box::new(right.node));
-        Ok(Typed { node, kind: CellKind::Flag, span })
+        let node = ExpressionNode::Compare(comparison, Box::new(left.node), Box::new(right.node));
+        Ok(TypedNode { node, kind: CellKind::Flag, span })
     }
 
-    fn sum(&mut self) -> Parsed {
-        self.joined(Self::product, CellKind::Number, &SUMS)
+    fn sum(&mut self) -> ParseResult {
+        self.binary_operators(Self::product, CellKind::Number, &SUMS)
     }
 
-    fn product(&mut self) -> Parsed {
-        self.joined(Self::factor, CellKind::Number, &PRODUCTS)
+    fn product(&mut self) -> ParseResult {
+        self.binary_operators(Self::factor, CellKind::Number, &PRODUCTS)
     }
 
-    fn factor(&mut self) -> Parsed {
-        let (token, span) = self.take();
-        let typed = |node, kind| Ok(Typed { node, kind, span: span.clone() });
+    fn factor(&mut self) -> ParseResult {
+        let (token, span) = self.next_token();
+        let typed = |node, kind| Ok(TypedNode { node, kind, span: span.clone() });
         match token {
-            Token::Number(number) => typed(Node::Literal(Cell::Number(number)), CellKind::Number),
-            Token::Text(text) => typed(Node::Literal(Cell::Text(text)), CellKind::Text),
+            Token::Number(number) => {
+                typed(ExpressionNode::Literal(Cell::Number(number)), CellKind::Number)
+            }
+            Token::Text(text) => typed(ExpressionNode::Literal(Cell::Text(text)), CellKind::Text),
             Token::Sign("-") => {
-                let inner = self.deeper(Self::factor)?;
+                let inner = self.nested(Self::factor)?;
                 expect(&inner, CellKind::Number, "only a number has a sign")?;
                 let span = span.start..inner.span.end;
-                let node = Node::Changed(|number| -number, Box::new(inner.node));
-                Ok(Typed { node, kind: CellKind::Number, span })
+                let node = ExpressionNode::Unary(|number| -number, Box::new(inner.node));
+                Ok(TypedNode { node, kind: CellKind::Number, span })
             }
             Token::Sign("(") => {
-                let inner = self.deeper(Self::any_of)?;
-                let end = self.closing()?;
-                Ok(Typed { span: span.start..end, ..inner })
+                let inner = self.nested(Self::disjunction)?;
+                let end = self.closing_parenthesis()?;
+                Ok(TypedNode { span: span.start..end, ..inner })
             }
             Token::Word(word) if word == "true" || word == "false" => {
-                typed(Node::Literal(Cell::Flag(word == "true")), CellKind::Flag)
+                typed(ExpressionNode::Literal(Cell::Flag(word == "true")), CellKind::Flag)
             }
             Token::Word(word) if self.peek().0 == Token::Sign("(") => {
                 match FUNCTIONS.iter().find(|(name, _)| *name == word) {
-                    Some((name, fold)) => self.function(name, *fold, span),
+                    Some((name, aggregate)) => self.function(name, *aggregate, span),
                     None => unknown_function(word, span),
                 }
             }
@@ -347,93 +374,103 @@ impl Parser<'_> {
                     Token::Sign(sign) => format!("`{sign}` where a value should be"),
                     _ => "the expression ends too early".to_owned(),
                 };
-                wrong(title, span, "expected a column, a number or `(`")
+                error_at(title, span, "expected a column, a number or `(`")
             }
         }
     }
 
-    fn column(&mut self, word: &str, span: Range<usize>) -> Parsed {
+    fn column(&mut self, word: &str, span: Range<usize>) -> ParseResult {
         let Some(column) = self.columns.iter().find(|column| column.name == word) else {
             let names = self.columns.iter().map(|column| column.name.clone());
             let names = names.chain(FUNCTIONS.map(|(name, _)| name.to_owned())).collect();
-            return Err(Mistake {
+            return Err(ExpressionError {
                 title: format!("unknown column `{word}`"),
                 span,
                 expected: "expected a column of the file, or a \"text\" in quotes".to_owned(),
                 candidates: Some((word.to_owned(), names)),
             });
         };
-        self.by_row |= !self.in_fold;
+        self.by_row |= !self.in_aggregate;
         let known = self.used.iter().position(|used| used == word);
         let place = known.unwrap_or_else(|| {
             self.used.push(word.to_owned());
             self.used.len() - 1
         });
-        Ok(Typed { node: Node::Column(place), kind: column.kind, span })
+        Ok(TypedNode { node: ExpressionNode::Column(place), kind: column.kind, span })
     }
 
-    fn function(&mut self, word: &str, mut fold: Option<Fold>, span: Range<usize>) -> Parsed {
+    fn function(
+        &mut self,
+        word: &str,
+        mut aggregate: Option<Aggregate>,
+        span: Range<usize>,
+    ) -> ParseResult {
         self.next += 1;
-        if fold.is_some() && self.in_fold {
+        if aggregate.is_some() && self.in_aggregate {
             let title = format!("`{word}` within another function over all rows");
-            return wrong(title, span, "expected a value of single rows");
+            return error_at(title, span, "expected a value of single rows");
         }
-        let outer = self.in_fold;
-        self.in_fold |= fold.is_some();
-        let inner = self.deeper(Self::any_of);
-        self.in_fold = outer;
+        let outer = self.in_aggregate;
+        self.in_aggregate |= aggregate.is_some();
+        let inner = self.nested(Self::disjunction);
+        self.in_aggregate = outer;
         let inner = inner?;
-        if let Some(Fold::Quantile(part)) = &mut fold {
-            *part = self.part()?;
+        if let Some(Aggregate::Quantile(probability)) = &mut aggregate {
+            *probability = self.probability()?;
         }
-        let end = self.closing()?;
-        let wanted = match fold {
-            Some(Fold::Count | Fold::Share) => CellKind::Flag,
+        let end = self.closing_parenthesis()?;
+        let wanted = match aggregate {
+            Some(Aggregate::Count | Aggregate::Share) => CellKind::Flag,
             _ => CellKind::Number,
         };
         expect(&inner, wanted, &format!("`{word}` takes {}", wanted.name()))?;
-        let node = match fold {
-            Some(fold) => {
-                self.folds.push((fold, inner.node));
-                Node::Folded(self.folds.len() - 1)
+        let node = match aggregate {
+            Some(aggregate) => {
+                self.aggregates.push((aggregate, inner.node));
+                ExpressionNode::Aggregate(self.aggregates.len() - 1)
             }
-            None => Node::Changed(f64::abs, Box::new(inner.node)),
+            None => ExpressionNode::Unary(f64::abs, Box::new(inner.node)),
         };
-        Ok(Typed { node, kind: CellKind::Number, span: span.start..end })
+        Ok(TypedNode { node, kind: CellKind::Number, span: span.start..end })
     }
 
-    /// The part of all rows that a quantile is of.
-    fn part(&mut self) -> Result<f64, Mistake> {
+    /// Parses the probability of a quantile.
+    fn probability(&mut self) -> Result<f64, ExpressionError> {
         let expected = "expected a comma and a number from 0 to 1, as in `quantile(x, 0.95)`";
-        let (sign, span) = self.take();
+        let (sign, span) = self.next_token();
         if sign != Token::Sign(",") {
-            return wrong("`quantile` takes a number and a part of all rows", span, expected);
+            return error_at("`quantile` takes a number and a part of all rows", span, expected);
         }
-        match self.take() {
-            (Token::Number(part), _) if part <= 1.0 => Ok(part),
+        match self.next_token() {
+            (Token::Number(probability), _) if probability <= 1.0 => Ok(probability),
             (Token::Number(percent), span) if percent <= 100.0 => {
                 let title = format!("`{percent}` is not a part of all rows");
-                let part = percent / 100.0;
-                wrong(title, span, format!("expected a number from 0 to 1: {part} for {percent} %"))
+                let probability = percent / 100.0;
+                error_at(
+                    title,
+                    span,
+                    format!("expected a number from 0 to 1: {probability} for {percent} %"),
+                )
             }
-            (_, span) => wrong("`quantile` takes a part of all rows", span, expected),
+            (_, span) => error_at("`quantile` takes a part of all rows", span, expected),
         }
     }
 
-    /// The end of a closing parenthesis.
-    fn closing(&mut self) -> Result<usize, Mistake> {
-        let (token, span) = self.take();
+    /// Consumes a closing parenthesis and returns its end.
+    fn closing_parenthesis(&mut self) -> Result<usize, ExpressionError> {
+        let (token, span) = self.next_token();
         if token == Token::Sign(")") {
             return Ok(span.end);
         }
-        wrong("a parenthesis without an end", span, "expected `)`")
+        error_at("a parenthesis without an end", span, "expected `)`")
     }
 
-    fn deeper(&mut self, parse: fn(&mut Self) -> Parsed) -> Parsed {
-        if self.depth == DEEPEST {
+    /// Parses a nested expression, up to the greatest depth.
+    fn nested(&mut self, parse: fn(&mut Self) -> ParseResult) -> ParseResult {
+        if self.depth == MAX_DEPTH {
             let span = self.peek().1.clone();
-            let expected = format!("expected at most {DEEPEST} levels");
-            return wrong("the expression is nested too deeply", span, expected);
+            let expected = format!("expected at most {MAX_DEPTH} levels");
+            return error_at("the expression is nested too deeply", span, expected);
         }
         self.depth += 1;
         let parsed = parse(self);
@@ -442,9 +479,9 @@ impl Parser<'_> {
     }
 }
 
-fn unknown_function(word: String, span: Range<usize>) -> Parsed {
+fn unknown_function(word: String, span: Range<usize>) -> ParseResult {
     let names = FUNCTIONS.map(|(name, _)| name.to_owned());
-    Err(Mistake {
+    Err(ExpressionError {
         title: format!("unknown function `{word}`"),
         span,
         expected: format!("expected one of {}", names.join(", ")),
@@ -452,12 +489,13 @@ fn unknown_function(word: String, span: Range<usize>) -> Parsed {
     })
 }
 
-fn expect(found: &Typed, wanted: CellKind, why: &str) -> Result<(), Mistake> {
+/// Returns an error that states a rule if a node has another type than the wanted one.
+fn expect(found: &TypedNode, wanted: CellKind, rule: &str) -> Result<(), ExpressionError> {
     if found.kind == wanted {
         return Ok(());
     }
     let expected = format!("expected {}, found {}", wanted.name(), found.kind.name());
-    wrong(why, found.span.clone(), expected)
+    error_at(rule, found.span.clone(), expected)
 }
 
 #[cfg(test)]
@@ -465,16 +503,17 @@ mod tests {
     use super::*;
     use crate::sample;
 
-    fn refused(text: &str) -> (String, String) {
+    /// Returns the text at an error's position, and its message.
+    fn parse_error(text: &str) -> (String, String) {
         let table = sample::table();
-        let mistake = Condition::parse(text, &table).unwrap_err();
-        let at = text.get(mistake.span.clone()).unwrap_or("").to_owned();
-        (at, format!("{}: {}", mistake.title, mistake.expected))
+        let error = Condition::parse(text, &table).unwrap_err();
+        let at = text.get(error.span.clone()).unwrap_or("").to_owned();
+        (at, format!("{}: {}", error.title, error.expected))
     }
 
     #[test]
-    fn mistakes_are_pointed_at() {
-        for (text, at, said) in [
+    fn errors_have_positions_and_reasons() {
+        for (text, at, part) in [
             ("ratio_mx < 1.5", "ratio_mx", "unknown column `ratio_mx`"),
             ("sqrt(ratio_max) > 0", "sqrt", "unknown function `sqrt`: expected one of abs, count"),
             ("ratio_max = 1.5", "=", "expected `==`"),
@@ -500,18 +539,18 @@ mod tests {
             ("quantile(ratio_max, 95) < 1", "95", "0.95 for 95 %"),
             ("", "", "ends too early"),
         ] {
-            let (found, message) = refused(text);
+            let (found, message) = parse_error(text);
             assert_eq!(found, at, "{text}: {message}");
-            assert!(message.contains(said), "{text}: {message}");
+            assert!(message.contains(part), "{text}: {message}");
         }
         let deep = format!("{}reliable{}", "(".repeat(100), ")".repeat(100));
-        assert!(refused(&deep).1.contains("too deeply"));
-        assert!(refused(&format!("{}reliable", "not ".repeat(900))).1.contains("too deeply"));
-        assert!(refused(&"-".repeat(5000)).1.contains("too long"));
+        assert!(parse_error(&deep).1.contains("too deeply"));
+        assert!(parse_error(&format!("{}reliable", "not ".repeat(900))).1.contains("too deeply"));
+        assert!(parse_error(&"-".repeat(5000)).1.contains("too long"));
     }
 
     #[test]
-    fn what_is_about_rows_is_told_from_what_is_about_the_file() {
+    fn expressions_by_row_differ_from_aggregates() {
         let table = sample::table();
         let by_row = |text: &str| Condition::parse(text, &table).unwrap().by_row;
         assert!(by_row("ratio_max < 1.5 and reliable"));

@@ -1,84 +1,87 @@
-//! Whether conditions hold, and where not.
+//! Checks of conditions over all rows of a result.
 
 use serde::Serialize;
 
-use crate::condition::{Condition, Context, Folded, each_row};
+use crate::condition::{AggregateValue, Condition, EvaluationContext, for_each_row};
 use crate::error::{Result, ResultsError};
-use crate::top::Worst;
+use crate::top::WorstRows;
 use sweep_files::{Cell, ResultTable};
 
-/// A row that does not keep a condition.
+/// A row that violates a condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Offender {
-    /// Its number in the file, from 0.
+    /// The row's number in the file, from 0.
     pub row: u64,
-    /// Whether the condition is neither true nor false there, because a value is missing.
+    /// Whether the condition is neither true nor false, because a value is missing.
     pub undefined: bool,
-    /// The columns that say where it is, and those that the condition reads.
+    /// The cells of the columns that identify the row, then of those that the condition reads.
     pub cells: Vec<(String, Cell)>,
 }
 
-/// What came of one condition.
+/// The result of checking a condition.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Checked {
     /// The condition as typed.
     pub expression: String,
-    /// Whether it is true: for every row, or of the file as a whole.
+    /// Whether the condition is true for every row, or for the file as a whole.
     pub holds: bool,
-    /// Whether it speaks of single rows.
+    /// Whether the condition reads columns outside of aggregates.
     pub by_row: bool,
-    /// Rows it was evaluated on.
+    /// The number of rows that were checked.
     pub rows: u64,
-    /// Rows for which it is false.
+    /// The number of rows for which the condition is false.
     pub failing: u64,
-    /// Rows for which it is neither true nor false.
+    /// The number of rows for which the condition is neither true nor false.
     pub undefined: u64,
-    /// Values of its functions over all rows, in the order of their closing parentheses; of the
-    /// rows that have a value.
+    /// The values of the aggregates over the rows that have a value, in the order of their closing
+    /// parentheses.
     pub folded: Vec<Cell>,
-    /// How many rows those are.
+    /// The number of rows that have a value, for each aggregate.
     pub folded_rows: Vec<u64>,
-    /// Rows that do not keep it: the worst in the first of its columns that can be bad.
+    /// The rows that violate the condition, the worst first: by the first of its columns that has
+    /// a bad direction.
     pub offenders: Vec<Offender>,
 }
 
-/// Checks a condition on the rows for which `keep` is true.
+/// Checks a condition on the rows that a filter accepts.
 ///
-/// A row where a value is missing does not keep a condition unless that is true or false whatever
-/// the value is, and a function over all rows has no value if it lacks one of any row. With
-/// `allow_null` such rows pass, and functions leave them out. No rows at all keep no condition.
+/// A row with a missing value violates a condition whose truth depends on it, and an aggregate
+/// without a value of every row is unknown. With `allow_null` such rows pass, and aggregates skip
+/// them. A condition never holds for no rows at all.
 ///
 /// # Errors
 /// [`ResultsError::File`].
 pub fn check(
     table: &ResultTable,
     condition: &Condition,
-    keep: Option<&Condition>,
+    filter: Option<&Condition>,
     allow_null: bool,
-    most_offenders: usize,
+    max_offenders: usize,
 ) -> Result<Checked, ResultsError> {
-    let folds = condition.fold(table, keep)?;
-    let known = |fold: &Folded| {
-        if fold.whole || allow_null { fold.value.clone() } else { Cell::Null }
+    let results = condition.aggregate(table, filter)?;
+    let known_value = |result: &AggregateValue| {
+        if result.is_complete || allow_null { result.value.clone() } else { Cell::Null }
     };
-    let folded: Vec<Cell> = folds.iter().map(known).collect();
+    let aggregates: Vec<Cell> = results.iter().map(known_value).collect();
     let mut checked = Checked {
         expression: condition.text.clone(),
         by_row: condition.by_row,
-        folded_rows: folds.iter().map(|fold| fold.over).collect(),
-        folded: folds.into_iter().map(|fold| fold.value).collect(),
+        folded_rows: results.iter().map(|result| result.rows).collect(),
+        folded: results.into_iter().map(|result| result.value).collect(),
         ..Checked::default()
     };
-    let column = |(k, name): (usize, &String)| Some((k, table.column(name)?.worse?));
-    let by = condition.columns.iter().enumerate().find_map(column);
-    let (mut whole, mut offenders) = (None, Worst::new(by.map(|(_, worse)| worse), most_offenders));
-    let places = table.places();
-    let names = [&condition.names()[..], &places].concat();
-    each_row(table, &names, keep, |at| {
+    let worse = |(k, name): (usize, &String)| Some((k, table.column(name)?.worse?));
+    let order = condition.columns.iter().enumerate().find_map(worse);
+    let mut offenders = WorstRows::new(order.map(|(_, worse)| worse), max_offenders);
+    let mut truth_of_file = None;
+    let key_columns = table.places();
+    let names = [&condition.column_names()[..], &key_columns].concat();
+    for_each_row(table, &names, filter, |context| {
         checked.rows += 1;
-        let truth = condition.root.truth(&Context { folded: &folded, ..*at });
+        let context = EvaluationContext { aggregates: &aggregates, ..*context };
+        let truth = condition.root.truth(&context);
         if !condition.by_row {
-            whole = Some(truth);
+            truth_of_file = truth;
             return Ok(());
         }
         match truth {
@@ -89,13 +92,15 @@ pub fn check(
         if allow_null && truth.is_none() {
             return Ok(());
         }
-        let value = by.and_then(|(column, _)| at.row.cell(column).number());
-        offenders.take(value, || {
-            let own = condition.columns.len();
-            let read = (0..own).filter(|&column| !places.contains(&names[column]));
-            let cells = (own..names.len()).chain(read);
-            let cells = cells.map(|column| (names[column].to_owned(), at.row.cell(column)));
-            Offender { row: at.row.index(), undefined: truth.is_none(), cells: cells.collect() }
+        let value = order.and_then(|(column, _)| context.row.cell(column).number());
+        offenders.insert(value, || {
+            let first_key = condition.columns.len();
+            let others = (0..first_key).filter(|&column| !key_columns.contains(&names[column]));
+            let columns = (first_key..names.len()).chain(others);
+            let cells = columns
+                .map(|column| (names[column].to_owned(), context.row.cell(column)))
+                .collect();
+            Offender { row: context.row.index(), undefined: truth.is_none(), cells }
         });
         Ok(())
     })?;
@@ -104,7 +109,7 @@ pub fn check(
         && if condition.by_row {
             checked.failing == 0 && (allow_null || checked.undefined == 0)
         } else {
-            whole.flatten().unwrap_or(false)
+            truth_of_file.unwrap_or(false)
         };
     Ok(checked)
 }
@@ -114,17 +119,17 @@ mod tests {
     use super::*;
     use crate::sample;
 
-    fn checked(text: &str, keep: Option<&str>, allow_null: bool) -> Checked {
+    fn checked(text: &str, filter: Option<&str>, allow_null: bool) -> Checked {
         let table = sample::table();
         let condition = Condition::parse(text, &table).unwrap();
-        let keep = keep.map(|keep| Condition::parse(keep, &table).unwrap());
-        check(&table, &condition, keep.as_ref(), allow_null, 3).unwrap()
+        let filter = filter.map(|filter| Condition::parse(filter, &table).unwrap());
+        check(&table, &condition, filter.as_ref(), allow_null, 3).unwrap()
     }
 
-    // Ratios of the sample: 1, 1.5, 2.5, null, 4, 1.2; reliable where below 2; row 3 diverged; row
-    // 4 is sensitive.
+    // The sample's ratios are 1, 1.5, 2.5, null, 4, 1.2; rows below 2 are reliable; row 3 has
+    // diverged; row 4 is sensitive.
     #[test]
-    fn rows_that_do_not_keep_a_condition_are_told_with_their_places() {
+    fn violating_rows_are_listed_with_their_keys() {
         let found = checked("ratio_max < 2", None, false);
         assert!(!found.holds && found.by_row);
         assert_eq!((found.rows, found.failing, found.undefined), (6, 2, 1));
@@ -138,15 +143,15 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_of_the_rows_that_break_a_condition_come_first() {
-        // Gaps fall with the ratio: 0.009, 0.0085, 0.0075, null, 0.006, 0.0088 m.
+    fn the_worst_offenders_come_first() {
+        // The gaps are 0.009, 0.0085, 0.0075, null, 0.006, 0.0088 m.
         let found = checked("min_gap_nonlinear_m > 0.0089", None, false);
         assert_eq!((found.failing, found.undefined), (4, 1));
         assert_eq!(found.offenders.iter().map(|o| o.row).collect::<Vec<_>>(), [4, 2, 1]);
     }
 
     #[test]
-    fn what_is_missing_keeps_nothing_unless_that_is_said() {
+    fn missing_values_violate_conditions_unless_allowed() {
         assert!(!checked("ratio_max < 9", None, false).holds);
         assert!(checked("ratio_max < 9", None, true).holds);
         assert!(checked("ratio_max < 9 or ratio_max is null", None, false).holds);
@@ -157,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_left_out_are_not_checked_and_none_left_keep_nothing() {
+    fn filtered_rows_are_not_checked_and_no_rows_violate_everything() {
         let found = checked("ratio_max < 3", Some("not sensitive and status == \"ok\""), false);
         assert!(found.holds, "{found:?}");
         assert_eq!(found.rows, 4);
@@ -166,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn functions_fold_all_rows() {
+    fn aggregates_cover_all_rows() {
         for (text, holds) in [
             ("count(true) == 6", true),
             ("count(reliable) == 3", true),
@@ -187,11 +192,11 @@ mod tests {
         let mixed = checked("ratio_max <= max(ratio_max)", None, true);
         assert!(mixed.holds && mixed.by_row);
         assert_eq!(mixed.folded, [Cell::Number(4.0)]);
-        let kept = checked("max(ratio_max) == 2.5", Some("not sensitive"), true);
-        assert!(kept.holds, "{kept:?}");
+        let filtered = checked("max(ratio_max) == 2.5", Some("not sensitive"), true);
+        assert!(filtered.holds, "{filtered:?}");
     }
 
-    // NaN is how other writers store a missing value.
+    // Other writers store a missing value as NaN.
     #[test]
     fn nan_is_null() {
         let home = tempfile::tempdir().unwrap();
@@ -199,20 +204,20 @@ mod tests {
         let ratios = [Some(1.0), Some(f64::NAN), Some(3.0), None];
         sample::write(&path, vec![("x", "1", sample::numbers(&ratios))], &[]);
         let table = ResultTable::open(&path).unwrap();
-        let passes = |text: &str, keep: Option<&str>| {
+        let checked = |text: &str, filter: Option<&str>| {
             let condition = Condition::parse(text, &table).unwrap();
-            let keep = keep.map(|keep| Condition::parse(keep, &table).unwrap());
-            check(&table, &condition, keep.as_ref(), true, 3).unwrap()
+            let filter = filter.map(|filter| Condition::parse(filter, &table).unwrap());
+            check(&table, &condition, filter.as_ref(), true, 3).unwrap()
         };
-        assert!(passes("count(x is null) == 2 and mean(x) == 2 and max(x) == 3", None).holds);
-        assert_eq!(passes("x > 0", Some("x is not null")).rows, 2);
-        assert_eq!(passes("x > 0", None).undefined, 2);
-        assert!(passes("share(x > 2) == 0.5", None).holds);
+        assert!(checked("count(x is null) == 2 and mean(x) == 2 and max(x) == 3", None).holds);
+        assert_eq!(checked("x > 0", Some("x is not null")).rows, 2);
+        assert_eq!(checked("x > 0", None).undefined, 2);
+        assert!(checked("share(x > 2) == 0.5", None).holds);
     }
 
-    // One of six rows diverged: nothing that looks at its ratio can be said of all rows.
+    // Row 3 has diverged, so no aggregate of ratios has a value of all rows.
     #[test]
-    fn a_function_that_lacks_a_row_keeps_nothing_unless_that_is_said() {
+    fn incomplete_aggregates_are_unknown_unless_allowed() {
         for text in [
             "max(ratio_max) < 9",
             "min(ratio_max) > 0",
@@ -231,7 +236,7 @@ mod tests {
         }
         assert!(checked("max(ratio_max) < 9 or count(true) == 6", None, false).holds);
         assert!(checked("share(status == \"ok\") > 0.8", None, false).holds);
-        // Not even --allow-null makes a number of nothing.
+        // An aggregate of no values is unknown even with --allow-null.
         let nothing = checked("max(ratio_max) < 9", Some("ratio_max is null"), true);
         assert!(!nothing.holds && nothing.folded_rows == [0], "{nothing:?}");
     }

@@ -1,4 +1,4 @@
-//! Files for tests.
+//! Result files for tests.
 
 use std::fs::File;
 use std::path::Path;
@@ -15,8 +15,8 @@ use serde_json::{Value, json};
 use sweep_files::{ResultTable, Writer, key};
 use sweep_parameter::Worse;
 
-/// A column of a file in the making: name, unit, cells.
-pub(crate) type Made = (&'static str, &'static str, ArrayRef);
+/// A column to be written: name, unit, cells.
+pub(crate) type ColumnData = (&'static str, &'static str, ArrayRef);
 
 pub(crate) fn numbers(values: &[Option<f64>]) -> ArrayRef {
     Arc::new(Float64Array::from(values.to_vec()))
@@ -30,9 +30,9 @@ pub(crate) fn texts(values: &[&str]) -> ArrayRef {
     Arc::new(values.iter().copied().collect::<DictionaryArray<Int32Type>>())
 }
 
-/// Writes a file of these columns with these keys.
-pub(crate) fn write(path: &Path, columns: Vec<Made>, keys: &[(&str, Value)]) {
-    let field = |(name, unit, array): &Made| {
+/// Writes a file of these columns with these metadata.
+pub(crate) fn write(path: &Path, columns: Vec<ColumnData>, keys: &[(&str, Value)]) {
+    let field = |(name, unit, array): &ColumnData| {
         let unit = ("unit".to_owned(), (*unit).to_owned());
         let is_gap = name.starts_with("min_gap");
         let worse = is_gap.then(|| (key::WORSE.to_owned(), Worse::Less.name().to_owned()));
@@ -54,7 +54,7 @@ pub(crate) fn write(path: &Path, columns: Vec<Made>, keys: &[(&str, Value)]) {
     writer.end().unwrap().close().unwrap();
 }
 
-/// The plan of the sample.
+/// Returns the plan of the sample.
 pub(crate) fn plan() -> Value {
     json!({
         "name": "sample",
@@ -67,8 +67,8 @@ pub(crate) fn plan() -> Value {
     })
 }
 
-/// The columns of a map of two masses by three dampings.
-pub(crate) fn map(ratios: &[Option<f64>]) -> Vec<Made> {
+/// Returns the columns of a map of two masses by three dampings.
+pub(crate) fn map(ratios: &[Option<f64>]) -> Vec<ColumnData> {
     let rows = ratios.len();
     let masses: Vec<_> = (0..rows).map(|i| Some(if i < 3 { 0.1 } else { 0.2 })).collect();
     let dampings: Vec<_> = (0..rows).map(|i| Some(60.0 + 10.0 * (i % 3) as f64)).collect();
@@ -92,11 +92,11 @@ pub(crate) fn map(ratios: &[Option<f64>]) -> Vec<Made> {
     ]
 }
 
-/// Ratios of the sample.
+/// The ratios of the sample.
 pub(crate) const RATIOS: [Option<f64>; 6] =
     [Some(1.0), Some(1.5), Some(2.5), None, Some(4.0), Some(1.2)];
 
-/// A map of six rows: the fourth has diverged, the fifth is sensitive.
+/// Returns a map of six rows: the fourth has diverged, the fifth is sensitive.
 pub(crate) fn table() -> ResultTable {
     let home = tempfile::tempdir().unwrap();
     let path = home.path().join("sample.parquet");

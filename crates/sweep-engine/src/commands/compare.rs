@@ -15,7 +15,7 @@ use fail_on::FailOn;
 use sweep_files::{FileKind, Output};
 use sweep_plot::capitalised;
 use sweep_results::{
-    ColumnChange, Comparison, Flip, Moved, PlanChange, ResultTable, SharedRow, compare,
+    BoundaryShift, ColumnChange, Comparison, Flip, PlanChange, ResultTable, SharedRow, compare,
 };
 
 /// Arguments of `sweep compare`.
@@ -147,7 +147,7 @@ fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
         }
         let whole = |row: &SharedRow| -> Vec<String> {
             let (sides, change) = cells(row);
-            row.place.iter().map(|value| short(*value)).chain(sides).chain(change).collect()
+            row.key.iter().map(|value| short(*value)).chain(sides).chain(change).collect()
         };
         let rows: Vec<_> = rows.into_iter().map(whole).collect();
         let headings = found.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
@@ -172,16 +172,16 @@ fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
         list(title, rows, &|row| ([0, 1].map(|side| of_verdict(row, side)), None));
     }
     for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
-        let rows = found.greatest(most, sensitive, SharedRow::ratio_by);
+        let rows = found.greatest(most, sensitive, SharedRow::ratio_deviation);
         list(format!("greatest changes of the ratio{which}"), rows, &|row| {
-            let change = row.ratio_change().map(|change| 100.0 * (change - 1.0));
+            let change = row.ratio_quotient().map(|change| 100.0 * (change - 1.0));
             let change = change.map_or_else(|| number(None), |change| format!("{change:+.3} %"));
             (row.ratio.map(number), Some(change))
         });
-        let rows = found.greatest(most, sensitive, SharedRow::gap_by_m);
+        let rows = found.greatest(most, sensitive, SharedRow::gap_deviation_m);
         list(format!("greatest changes of the least gap{which}, m"), rows, &|row| {
-            let sign = if row.gap_change_m() > Some(0.0) { "+" } else { "" };
-            let change = format!("{sign}{}", number(row.gap_change_m()));
+            let sign = if row.gap_difference_m() > Some(0.0) { "+" } else { "" };
+            let change = format!("{sign}{}", number(row.gap_difference_m()));
             (row.gap_m.map(number), Some(change))
         });
     }
@@ -191,7 +191,7 @@ fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
 /// How many rows and verdicts are shared.
 fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
     let mut facts = Vec::new();
-    let [first, second] = found.alone;
+    let [first, second] = found.unmatched_rows;
     let alone = match (first, second) {
         (0, 0) => String::new(),
         _ => format!(", {first} only in A, {second} only in B"),
@@ -201,7 +201,7 @@ fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
         let which = ["A", "B"][*place];
         facts.push(("axis", format!("{name} = {} in {which} alone, left out", short(*value))));
     }
-    for (names, which) in found.columns_alone.iter().zip(["A", "B"]) {
+    for (names, which) in found.unmatched_columns.iter().zip(["A", "B"]) {
         if !names.is_empty() {
             facts.push(("columns", format!("only in {which}: {}", names.join(", "))));
         }
@@ -238,11 +238,11 @@ fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
 }
 
 /// How far the boundary moved.
-fn boundary(moved: &Moved) -> String {
-    let Moved { axis, unit, crossings, .. } = moved;
+fn boundary(moved: &BoundaryShift) -> String {
+    let BoundaryShift { axis, unit, crossings, .. } = moved;
     let count = counted(crossings.len(), "crossing");
-    let mut told = match (moved.farthest(), moved.mean()) {
-        (Some(_), _) if crossings.iter().all(|crossing| crossing.by() == [0.0; 2]) => {
+    let mut told = match (moved.farthest(), moved.mean_range()) {
+        (Some(_), _) if crossings.iter().all(|crossing| crossing.shift_range() == [0.0; 2]) => {
             format!("{count} along {axis}, none moved")
         }
         (Some(_), _) if crossings.iter().all(|one| one.bracket[0] == one.bracket[1]) => {
@@ -253,7 +253,7 @@ fn boundary(moved: &Moved) -> String {
             let place: Vec<String> =
                 place.map(|(name, value)| format!("{name} {}", short(*value))).collect();
             let [from, to] = farthest.bracket.map(|ends| span(ends, short));
-            let (certain, place) = (moved.certain(), place.join(", "));
+            let (certain, place) = (moved.count_certain(), place.join(", "));
             format!(
                 "{count} along {axis}, {certain} moved farther than brackets explain; in the mean \
                  by {least:+.3} to {greatest:+.3} {unit}; farthest at {place}: from within {from} \
@@ -262,8 +262,8 @@ fn boundary(moved: &Moved) -> String {
         }
         _ => "no crossing in both".to_owned(),
     };
-    if !moved.unlike.is_empty() {
-        let lines = counted(moved.unlike.len(), "line");
+    if !moved.unmatched_lines.is_empty() {
+        let lines = counted(moved.unmatched_lines.len(), "line");
         let _ = write!(told, "; other numbers of crossings in {lines}");
     }
     told
@@ -354,7 +354,7 @@ fn escaped(text: &str) -> String {
 fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
     let row = |row: &SharedRow| {
         let place: serde_json::Map<String, Value> =
-            found.keys.iter().cloned().zip(row.place.iter().map(|value| json!(value))).collect();
+            found.keys.iter().cloned().zip(row.key.iter().map(|value| json!(value))).collect();
         json!({
             "rows": row.rows, "place": place, "ratio": row.ratio, "gap_m": row.gap_m,
             "flip": row.flip, "sensitive": row.sensitive,
@@ -363,7 +363,7 @@ fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
     let most = usize::from(args.rows);
     let all = |rows: Vec<&SharedRow>| rows.into_iter().map(row).collect::<Value>();
     let greatest = |sensitive| {
-        let [ratio, gap] = [SharedRow::ratio_by, SharedRow::gap_by_m]
+        let [ratio, gap] = [SharedRow::ratio_deviation, SharedRow::gap_deviation_m]
             .map(|by| all(found.greatest(most, sensitive, by)));
         json!({ "ratio": ratio, "gap": gap })
     };
@@ -376,15 +376,18 @@ fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
         "rows": {
             "in_both": found.shared.len(),
             "over_estimated": found.over_estimated,
-            "only_in_first": found.alone[0],
-            "only_in_second": found.alone[1],
+            "only_in_first": found.unmatched_rows[0],
+            "only_in_second": found.unmatched_rows[1],
             "differing": found.shared.iter().filter(|row| row.differs).count(),
         },
         "axes_left_out": found.fixed.iter().map(|(place, name, value)| json!({
             "file": (["first", "second"][*place]), "parameter": name, "value": value,
         })).collect::<Value>(),
         "columns": found.columns,
-        "columns_only_in": { "first": found.columns_alone[0], "second": found.columns_alone[1] },
+        "columns_only_in": {
+            "first": found.unmatched_columns[0],
+            "second": found.unmatched_columns[1],
+        },
         "flips": found.flips(false).map(row).collect::<Value>(),
         "greatest": greatest(false),
         "sensitive": {
@@ -394,13 +397,15 @@ fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
         "boundary": found.boundary.as_ref().map(|moved| json!({
             "axis": moved.axis,
             "unit": moved.unit,
-            "mean": moved.mean(),
-            "certain": moved.certain(),
+            "mean": moved.mean_range(),
+            "certain": moved.count_certain(),
             "crossings": moved.crossings.iter().map(|crossing| json!({
                 "place": crossing.place, "number": crossing.number, "at": crossing.at,
-                "bracket": crossing.bracket, "by": crossing.by(), "at_least": crossing.at_least(),
+                "bracket": crossing.bracket,
+                "by": crossing.shift_range(),
+                "at_least": crossing.certain_shift(),
             })).collect::<Value>(),
-            "other_numbers_of_crossings": moved.unlike.len(),
+            "other_numbers_of_crossings": moved.unmatched_lines.len(),
         })),
     })
 }

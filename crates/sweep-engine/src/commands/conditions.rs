@@ -32,7 +32,7 @@ pub fn parse(
 /// Mistakes in it; [`Error::Refused`] for one of the file as a whole.
 pub fn of_rows(text: Option<&String>, table: &ResultTable) -> Result<Option<Condition>, Error> {
     let condition = parse("--where", text.map_or(&[], std::slice::from_ref), table)?.pop();
-    if let Some(Condition { text, .. }) = condition.as_ref().filter(|one| one.has_folds()) {
+    if let Some(Condition { text, .. }) = condition.as_ref().filter(|one| one.has_aggregates()) {
         let expected =
             "an expression without count(), share(), min(), max(), mean() and quantile()";
         return Err(Error::option("--where", text, expected));

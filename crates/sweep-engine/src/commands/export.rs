@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::exit::{Error, Exit, tell};
 use sweep_files::Output;
-use sweep_results::{Format, ResultTable, export};
+use sweep_results::{ExportFormat, ResultTable, export};
 
 /// Arguments of `sweep export`.
 #[derive(Debug, clap::Args)]
@@ -24,7 +24,7 @@ pub struct Args {
 /// An ending of no format, a file that cannot be read or is too large for the format, an output
 /// that cannot be written.
 pub fn run(args: &Args) -> Result<Exit, Error> {
-    let Some(format) = Format::of(&args.out) else {
+    let Some(format) = ExportFormat::from_path(&args.out) else {
         let expected = format!("a name that ends in {}", endings());
         return Err(Error::option("OUT", args.out.display(), &expected));
     };
@@ -37,5 +37,5 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
 
 /// `.csv or .xlsx`.
 fn endings() -> String {
-    Format::ALL.map(|format| format!(".{}", format.name())).join(" or ")
+    ExportFormat::ALL.map(|format| format!(".{}", format.name())).join(" or ")
 }

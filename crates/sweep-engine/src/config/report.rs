@@ -29,7 +29,7 @@ impl Diagnostic {
     }
 
     /// A mistake in an expression, at this place.
-    pub fn of_expression(mistake: sweep_results::Mistake, at: &Location) -> Self {
+    pub fn of_expression(mistake: sweep_results::ExpressionError, at: &Location) -> Self {
         let (typed, names) = mistake.candidates.unwrap_or_default();
         let names = names.iter().map(String::as_str);
         Self::new(mistake.title).at(at, mistake.expected).nearest(&typed, names)

@@ -60,7 +60,7 @@ fn answer<M: Swept>(
         rows.push(row, study.axis_values(values, row), cells);
     }
     let batch = rows.take().map_err(defect)?;
-    let number = |goal: &Goal, sign: f64| Ok(goal.over(&batch)?.map(|number| sign * number));
+    let number = |goal: &Goal, sign: f64| Ok(goal.evaluate(&batch)?.map(|number| sign * number));
     let objectives = study.objectives.iter().map(|one| number(&one.goal, one.sign));
     let excesses = study.conditions.iter().map(|goal| number(goal, 1.0));
     let numbers = objectives.chain(excesses).collect::<Result<Vec<_>, ArrowError>>();

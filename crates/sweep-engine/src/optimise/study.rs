@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 use sweep_files::FileKind;
 use sweep_parameter::{Parameter as _, Range};
-use sweep_results::{Column, Goal, Mistake, columns};
+use sweep_results::{Column, ExpressionError, Goal, columns};
 
 use super::Evolution;
 use crate::config::axes::{add, spacing};
@@ -122,7 +122,8 @@ impl<M: Rows> Study<M> {
         let objectives = objectives(&root, root.tables(objective), &goals, &names);
         let conditions = root.texts(conditions).given();
         let conditions = conditions.into_iter().flat_map(|texts| texts.value);
-        let conditions = conditions.filter_map(|text| goals.read(&text, Goal::excess)).collect();
+        let conditions =
+            conditions.filter_map(|text| goals.read(&text, Goal::constraint)).collect();
         root.finish();
         let (mut plan, grid, seed) = (plan?, grid?, seed?);
         plan.name.clone_from(&name);
@@ -314,7 +315,7 @@ fn objectives(
             continue;
         };
         let (text, sign) = text;
-        let Some(goal) = goals.read(text, Goal::number) else { continue };
+        let Some(goal) = goals.read(text, Goal::objective) else { continue };
         let is_same = |one: &Objective| spaceless(one.goal.text()) == spaceless(text.value);
         if goal.is_by_row() && goals.rows > 1 {
             let title = format!("a number of one row, and every candidate has {}", goals.rows);
@@ -375,7 +376,7 @@ impl Goals<'_> {
     fn read(
         &self,
         found: &Located<&str>,
-        read: fn(&str, &[Column]) -> Result<Goal, Mistake>,
+        read: fn(&str, &[Column]) -> Result<Goal, ExpressionError>,
     ) -> Option<Goal> {
         let mistake = match read(found.value, &self.known) {
             Ok(goal) => return Some(goal),

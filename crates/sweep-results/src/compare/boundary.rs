@@ -1,4 +1,4 @@
-//! How far a boundary moved.
+//! The shift of a boundary between two files.
 
 use std::collections::BTreeMap;
 
@@ -8,22 +8,22 @@ use super::SharedRow;
 use crate::error::{Result, ResultsError};
 use sweep_files::ResultTable;
 
-/// One change of side along the second axis, in both files.
+/// A crossing of the limit along the second axis, in both files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Crossing {
-    /// Values of the other axes.
+pub struct BoundaryCrossing {
+    /// The values of the other axes.
     pub place: Vec<f64>,
-    /// Its number along the second axis, from 1.
+    /// The crossing's number along the second axis, from 1.
     pub number: usize,
-    /// Where it is in either file: between the ends of a bracket.
+    /// The estimated position in either file, within its bracket.
     pub at: [f64; 2],
-    /// The bracket of either file.
+    /// The bracket in either file.
     pub bracket: [[f64; 2]; 2],
 }
 
-impl Crossing {
-    /// How far it may have moved, by its brackets: the least and the greatest.
-    pub fn by(&self) -> [f64; 2] {
+impl BoundaryCrossing {
+    /// Returns the least and the greatest shift that the brackets allow.
+    pub fn shift_range(&self) -> [f64; 2] {
         let [[first_low, first_high], [second_low, second_high]] = self.bracket;
         if self.at[0] == self.at[1] && self.bracket[0] == self.bracket[1] {
             return [0.0; 2];
@@ -31,121 +31,156 @@ impl Crossing {
         [second_low - first_high, second_high - first_low]
     }
 
-    /// How far it moved at least: the distance of the brackets, 0 where they overlap.
-    pub fn at_least(&self) -> f64 {
-        let [least, greatest] = self.by();
+    /// Returns the distance of the brackets: 0 where they overlap.
+    pub fn certain_shift(&self) -> f64 {
+        let [least, greatest] = self.shift_range();
         least.max(-greatest).max(0.0)
     }
 }
 
-/// How a boundary moved along the second axis.
+/// The shift of a boundary along the second axis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Moved {
-    /// Name of the second axis.
+pub struct BoundaryShift {
+    /// The name of the second axis.
     pub axis: String,
-    /// Its unit.
+    /// The unit of the second axis.
     pub unit: String,
-    /// Names of the axes of [`Crossing::place`].
+    /// The names of the axes of [`BoundaryCrossing::place`].
     pub keys: Vec<String>,
-    /// Crossings that are in both files, in order.
-    pub crossings: Vec<Crossing>,
-    /// Lines along the second axis with other numbers of crossings: the place, and the numbers.
-    pub unlike: Vec<(Vec<f64>, [usize; 2])>,
+    /// The crossings that are in both files, in order.
+    pub crossings: Vec<BoundaryCrossing>,
+    /// The lines along the second axis that have other numbers of crossings in the two files: the
+    /// values of the other axes, and the numbers.
+    pub unmatched_lines: Vec<(Vec<f64>, [usize; 2])>,
 }
 
-impl Moved {
-    /// The crossing that moved farthest, for certain or else perhaps.
-    pub fn farthest(&self) -> Option<&Crossing> {
-        let perhaps = |crossing: &Crossing| (crossing.at[1] - crossing.at[0]).abs();
+impl BoundaryShift {
+    /// Returns the crossing with the greatest certain shift; among equals, with the greatest
+    /// estimated one.
+    pub fn farthest(&self) -> Option<&BoundaryCrossing> {
+        let estimated = |crossing: &BoundaryCrossing| (crossing.at[1] - crossing.at[0]).abs();
         self.crossings.iter().max_by(|a, b| {
-            a.at_least().total_cmp(&b.at_least()).then(perhaps(a).total_cmp(&perhaps(b)))
+            a.certain_shift()
+                .total_cmp(&b.certain_shift())
+                .then(estimated(a).total_cmp(&estimated(b)))
         })
     }
 
-    /// How far crossings moved in the mean, with sign: the least and the greatest by their
-    /// brackets; `None` without any.
-    pub fn mean(&self) -> Option<[f64; 2]> {
+    /// Returns the means of the least and of the greatest shifts that the brackets allow.
+    pub fn mean_range(&self) -> Option<[f64; 2]> {
+        if self.crossings.is_empty() {
+            return None;
+        }
         let count = self.crossings.len() as f64;
-        let mean = |end| self.crossings.iter().map(|one| one.by()[end]).sum::<f64>() / count;
-        (!self.crossings.is_empty()).then(|| [0, 1].map(mean))
+        let sum = |end: usize| self.crossings.iter().map(|one| one.shift_range()[end]).sum::<f64>();
+        Some([sum(0) / count, sum(1) / count])
     }
 
-    /// Crossings that moved farther than their brackets explain.
-    pub fn certain(&self) -> usize {
-        self.crossings.iter().filter(|crossing| crossing.at_least() > 0.0).count()
+    /// Counts the crossings that shifted farther than their brackets explain.
+    pub fn count_certain(&self) -> usize {
+        self.crossings.iter().filter(|crossing| crossing.certain_shift() > 0.0).count()
     }
 }
 
-/// Where a file crosses its limit along one line: the place and the bracket.
-type Found = (f64, [f64; 2]);
-/// The crossings of both files by line.
-type Lines = BTreeMap<Vec<u64>, (Vec<f64>, [Vec<Found>; 2])>;
+/// A crossing in one file.
+struct Bracketed {
+    at: f64,
+    bracket: [f64; 2],
+}
 
-fn moved(first: &ResultTable, axis: &str, keys: Vec<String>, lines: Lines) -> Moved {
-    let (mut crossings, mut unlike) = (Vec::new(), Vec::new());
-    for (place, [first, second]) in lines.into_values() {
+/// The crossings of both files along one line of the second axis.
+#[derive(Default)]
+struct LineCrossings {
+    place: Vec<f64>,
+    by_file: [Vec<Bracketed>; 2],
+}
+
+/// The lines, sorted by their places.
+type CrossingsByLine = BTreeMap<Vec<u64>, LineCrossings>;
+
+/// Pairs the crossings of the two files line by line.
+fn pair_crossings(
+    first: &ResultTable,
+    axis: &str,
+    keys: Vec<String>,
+    lines: CrossingsByLine,
+) -> BoundaryShift {
+    let mut crossings = Vec::new();
+    let mut unmatched_lines = Vec::new();
+    for LineCrossings { place, by_file: [first, second] } in lines.into_values() {
         if first.len() != second.len() {
-            unlike.push((place, [first.len(), second.len()]));
+            unmatched_lines.push((place, [first.len(), second.len()]));
             continue;
         }
         for (k, (first, second)) in first.into_iter().zip(second).enumerate() {
-            crossings.push(Crossing {
+            crossings.push(BoundaryCrossing {
                 place: place.clone(),
                 number: k + 1,
-                at: [first.0, second.0],
-                bracket: [first.1, second.1],
+                at: [first.at, second.at],
+                bracket: [first.bracket, second.bracket],
             });
         }
     }
     let unit = first.column(axis).map(|column| column.unit.clone()).unwrap_or_default();
-    Moved { axis: axis.to_owned(), unit, keys, crossings, unlike }
+    BoundaryShift { axis: axis.to_owned(), unit, keys, crossings, unmatched_lines }
 }
 
-/// Numbers in order, as a key.
-fn ordered(place: &[f64]) -> Vec<u64> {
+/// Returns integers that sort as the numbers do.
+fn sort_key(place: &[f64]) -> Vec<u64> {
     let key = |value: &f64| {
         let bits = (value + 0.0).to_bits();
-        // Negative numbers before positive ones, by size.
+        // Bits of negative numbers grow with the magnitude.
         if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
     };
     place.iter().map(key).collect()
 }
 
-/// From two boundary files.
-pub(super) fn of_boundaries(first: &ResultTable, second: &ResultTable) -> Result<Option<Moved>> {
-    let (names, others) = (first.axes(), second.axes());
+/// Compares two boundary files.
+pub(super) fn compare_boundaries(
+    first: &ResultTable,
+    second: &ResultTable,
+) -> Result<Option<BoundaryShift>> {
+    let names = first.axes();
+    let others = second.axes();
     let [_, axis, ..] = names[..] else { return Ok(None) };
     let keys: Vec<&str> =
         names.iter().copied().filter(|name| *name != axis && others.contains(name)).collect();
-    let mut lines = Lines::new();
-    for (side, table) in [first, second].into_iter().enumerate() {
-        let bracket = ["_low", "_high"].map(|word| {
-            let stem = table.columns.iter().find(|column| {
-                column.name.contains(word) && column.name.replacen(word, "", 1) == axis
+    let mut lines = CrossingsByLine::new();
+    for (file, table) in [first, second].into_iter().enumerate() {
+        let bracket_columns = ["_low", "_high"].map(|suffix| {
+            let column = table.columns.iter().find(|column| {
+                column.name.contains(suffix) && column.name.replacen(suffix, "", 1) == axis
             });
-            stem.map(|column| column.name.as_str()).unwrap_or_default()
+            column.map(|column| column.name.as_str()).unwrap_or_default()
         });
         let mut read = keys.clone();
-        read.extend([axis, bracket[0], bracket[1]]);
+        read.extend([axis, bracket_columns[0], bracket_columns[1]]);
         table.file().each_row(&read, |row| {
-            let number = |place: usize| row.cell(place).number();
+            let number = |column: usize| row.cell(column).number();
             let place: Option<Vec<f64>> = (0..keys.len()).map(number).collect();
             let Some(place) = place else { return Ok(()) };
-            let line = lines.entry(ordered(&place)).or_insert_with(|| (place, Default::default()));
-            let count = keys.len();
-            if let (Some(low), Some(high)) = (number(count + 1), number(count + 2)) {
-                let at = number(count).unwrap_or(f64::midpoint(low, high));
-                line.1[side].push((at, [low, high]));
+            let line = lines
+                .entry(sort_key(&place))
+                .or_insert_with(|| LineCrossings { place, ..LineCrossings::default() });
+            let axis_column = keys.len();
+            if let (Some(low), Some(high)) = (number(axis_column + 1), number(axis_column + 2)) {
+                let at = number(axis_column).unwrap_or(f64::midpoint(low, high));
+                line.by_file[file].push(Bracketed { at, bracket: [low, high] });
             }
             Ok::<(), ResultsError>(())
         })?;
     }
     let keys = keys.into_iter().map(str::to_owned).collect();
-    Ok(Some(moved(first, axis, keys, lines)))
+    Ok(Some(pair_crossings(first, axis, keys, lines)))
 }
 
-/// From the verdicts of two maps: between neighbours along the second axis whose verdicts differ.
-pub(super) fn of_maps(first: &ResultTable, keys: &[String], shared: &[SharedRow]) -> Option<Moved> {
+/// Compares the boundaries of two maps: a crossing lies between neighbours along the second axis
+/// whose verdicts differ.
+pub(super) fn compare_maps(
+    first: &ResultTable,
+    keys: &[String],
+    shared: &[SharedRow],
+) -> Option<BoundaryShift> {
     let limit = first.plan.as_ref()?["reliability"]["ratio_limit"].as_f64()?;
     // The points of a design have no neighbours along an axis.
     if keys.len() < 2 || first.plan.as_ref()?.get("design").is_some() {
@@ -153,28 +188,40 @@ pub(super) fn of_maps(first: &ResultTable, keys: &[String], shared: &[SharedRow]
     }
     let mut others = keys.to_vec();
     let axis = others.remove(1);
-    let mut rows: BTreeMap<Vec<u64>, (Vec<f64>, Vec<&SharedRow>)> = BTreeMap::new();
+    let mut rows_by_line: BTreeMap<Vec<u64>, (Vec<f64>, Vec<&SharedRow>)> = BTreeMap::new();
     for row in shared {
-        let mut place = row.place.clone();
+        let mut place = row.key.clone();
         place.remove(1);
-        rows.entry(ordered(&place)).or_insert_with(|| (place, Vec::new())).1.push(row);
+        let line = rows_by_line.entry(sort_key(&place)).or_insert_with(|| (place, Vec::new()));
+        line.1.push(row);
     }
-    let mut lines = Lines::new();
-    for (key, (place, mut line)) in rows {
-        line.sort_by(|a, b| a.place[1].total_cmp(&b.place[1]));
-        let crossings = [0, 1].map(|side| {
-            line.windows(2)
-                .filter_map(|pair| {
-                    let [below, above] = [pair[0], pair[1]];
-                    let [low, high] = [below.ratio[side]?, above.ratio[side]?];
-                    let bracket = [below.place[1], above.place[1]];
-                    let part = (limit / low).ln() / (high / low).ln();
-                    let at = bracket[0] + part * (bracket[1] - bracket[0]);
-                    ((low < limit) != (high < limit)).then_some((at, bracket))
-                })
+    let mut lines = CrossingsByLine::new();
+    for (key, (place, mut rows)) in rows_by_line {
+        rows.sort_by(|a, b| a.key[1].total_cmp(&b.key[1]));
+        let by_file = [0, 1].map(|file| {
+            rows.windows(2)
+                .filter_map(|pair| find_crossing(pair[0], pair[1], file, limit))
                 .collect()
         });
-        lines.insert(key, (place, crossings));
+        lines.insert(key, LineCrossings { place, by_file });
     }
-    Some(moved(first, &axis, others, lines))
+    Some(pair_crossings(first, &axis, others, lines))
+}
+
+/// Finds the crossing between two neighbours in one file, by a straight line through the logarithms
+/// of their ratios.
+fn find_crossing(
+    below: &SharedRow,
+    above: &SharedRow,
+    file: usize,
+    limit: f64,
+) -> Option<Bracketed> {
+    let low = below.ratio[file]?;
+    let high = above.ratio[file]?;
+    if (low < limit) == (high < limit) {
+        return None;
+    }
+    let bracket = [below.key[1], above.key[1]];
+    let part = (limit / low).ln() / (high / low).ln();
+    Some(Bracketed { at: bracket[0] + part * (bracket[1] - bracket[0]), bracket })
 }

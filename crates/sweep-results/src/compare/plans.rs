@@ -1,28 +1,27 @@
-//! Where two plans part.
+//! Comparison of the plans and versions of two files.
 
 use serde::Serialize;
 use serde_json::{Map, Value};
 use sweep_files::{ParquetFile, dotted, key, leaves};
 
-/// One place where the plans of two files part.
+/// A value that differs between the plans of two files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanChange {
-    /// Dotted path: `machine.body.mass_kg`.
+    /// The dotted path: `machine.body.mass_kg`.
     pub path: String,
-    /// Value in the first file; null if it has none there.
+    /// The value in the first file, null where the file has none.
     pub first: Value,
-    /// Value in the second.
+    /// The value in the second file, null where the file has none.
     pub second: Value,
 }
 
-/// What a file says of how it was made: its plan, versions, and of a trace or a boundary what was
-/// asked for.
-fn account(file: &ParquetFile) -> Value {
-    let own = |name: &str| {
+/// Returns a file's plan and versions, and the request behind a trace or modes, as one JSON object.
+fn provenance(file: &ParquetFile) -> Value {
+    let read = |name: &str| {
         let text = file.value(name)?;
         Some(serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned())))
     };
-    let mut account = match own(key::PLAN) {
+    let mut provenance = match read(key::PLAN) {
         Some(Value::Object(plan)) => plan,
         _ => Map::new(),
     };
@@ -32,24 +31,25 @@ fn account(file: &ParquetFile) -> Value {
         ("trace", key::TRACE),
         ("modes", key::MODES),
     ] {
-        account.extend(own(key).map(|value| (name.to_owned(), value)));
+        provenance.extend(read(key).map(|value| (name.to_owned(), value)));
     }
-    Value::Object(account)
+    Value::Object(provenance)
 }
 
-/// Every place where the accounts of two files part. Lists of other lengths, and of numbers, part
-/// as a whole.
-pub(super) fn changes(first: &ParquetFile, second: &ParquetFile) -> Vec<PlanChange> {
-    let (first, second) = (account(first), account(second));
-    let opens = |first: &[Value], second: &[Value]| {
+/// Returns every value that differs between the plans of two files. Lists of different lengths, and
+/// lists of numbers, are one value each.
+pub(super) fn compare_plans(first: &ParquetFile, second: &ParquetFile) -> Vec<PlanChange> {
+    let first = provenance(first);
+    let second = provenance(second);
+    let descends = |first: &[Value], second: &[Value]| {
         first.len() == second.len() && first.iter().any(Value::is_object)
     };
-    let mut found = Vec::new();
-    leaves([Some(&first), Some(&second)], opens, &mut Vec::new(), &mut |path, sides| {
-        let [first, second] = sides.map(|side| side.cloned().unwrap_or_default());
+    let mut changes = Vec::new();
+    leaves([Some(&first), Some(&second)], descends, &mut Vec::new(), &mut |path, values| {
+        let [first, second] = values.map(|value| value.cloned().unwrap_or_default());
         if first != second {
-            found.push(PlanChange { path: dotted(path), first, second });
+            changes.push(PlanChange { path: dotted(path), first, second });
         }
     });
-    found
+    changes
 }

@@ -1,40 +1,43 @@
-//! One of two files, in memory.
+//! One of two compared files, in memory.
 
 use super::{Flip, SharedRow};
 use crate::error::{Result, ResultsError};
 use sweep_files::{Cell, Column, ResultTable, Rows};
 
-/// Most cells of a file that are kept: two files of so many take some gigabytes.
-const MOST_CELLS: u64 = 100_000_000;
+/// The greatest number of cells that are read of one file. Basis: a cell takes some 16 bytes, so
+/// two files take a few gigabytes. Doubling it doubles that memory.
+const MAX_CELLS: u64 = 100_000_000;
 
-/// The columns that take part in a comparison, and the keys of the rows.
+/// The columns of a file that take part in a comparison.
 #[derive(Debug)]
-pub(super) struct Side {
-    /// The keys' columns first.
-    parts: Vec<Rows>,
-    /// How many rows it has.
+pub(super) struct ComparedFile {
+    /// The row groups, with the key columns first.
+    groups: Vec<Rows>,
+    /// The number of rows.
     pub(super) rows: usize,
+    /// The number of key columns.
     keys: usize,
+    /// The columns after the key columns.
     columns: Vec<Column>,
 }
 
-/// The columns by which a file's rows are told apart.
-pub(super) fn keys(table: &ResultTable, is_boundary: bool) -> Vec<String> {
+/// Returns the columns that identify a file's rows.
+pub(super) fn key_columns(table: &ResultTable, is_boundary: bool) -> Vec<String> {
     let mut names: Vec<&str> = table.places().into_iter().filter(|name| *name != "point").collect();
     if names.contains(&"time_s") {
         // The speed follows from the time.
         names = vec!["time_s"];
     }
     if is_boundary {
-        // The second axis is what was found.
+        // Values along the second axis are results of the search, not keys.
         let second = table.axes().get(1).map(|name| (*name).to_owned());
         names.retain(|name| Some(*name) != second.as_deref());
     }
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// The value of a column that has one in all rows.
-pub(super) fn only_value(table: &ResultTable, name: &str) -> Result<Option<f64>> {
+/// Returns the value of a column that has the same value in all rows.
+pub(super) fn single_value(table: &ResultTable, name: &str) -> Result<Option<f64>> {
     let mut value = None;
     for rows in table.file().read(&[name])? {
         let rows = rows?;
@@ -49,71 +52,71 @@ pub(super) fn only_value(table: &ResultTable, name: &str) -> Result<Option<f64>>
     Ok(value)
 }
 
-impl Side {
+impl ComparedFile {
     /// Reads the columns that the other file has too.
     ///
     /// # Errors
     /// [`ResultsError::Refused`], [`ResultsError::File`].
     pub(super) fn read(table: &ResultTable, other: &ResultTable, keys: &[String]) -> Result<Self> {
         let in_both = |column: &Column| {
-            let beside = other.column(&column.name);
-            let is_same = beside.is_some_and(|beside| beside.kind == column.kind);
-            is_same && column.name != "point" && !keys.contains(&column.name)
+            let counterpart = other.column(&column.name);
+            let has_same_kind = counterpart.is_some_and(|other| other.kind == column.kind);
+            has_same_kind && column.name != "point" && !keys.contains(&column.name)
         };
         let mut columns = table.columns.clone();
         columns.retain(in_both);
         let cells = table.rows().saturating_mul((columns.len() + keys.len()) as u64);
-        if cells > MOST_CELLS {
+        if cells > MAX_CELLS {
             return Err(ResultsError::Refused(format!(
-                "{} has {cells} cells, more than the {MOST_CELLS} that are kept in memory",
+                "{} has {cells} cells, more than the {MAX_CELLS} that are kept in memory",
                 table.path().display()
             )));
         }
         let names = keys.iter().chain(columns.iter().map(|column| &column.name));
         let names: Vec<&str> = names.map(String::as_str).collect();
-        let parts = table.file().read(&names)?.collect::<Result<Vec<Rows>, _>>()?;
-        let rows = parts.iter().map(|part| part.count).sum();
-        Ok(Self { parts, rows, keys: keys.len(), columns })
+        let groups = table.file().read(&names)?.collect::<Result<Vec<Rows>, _>>()?;
+        let rows = groups.iter().map(|group| group.count).sum();
+        Ok(Self { groups, rows, keys: keys.len(), columns })
     }
 
-    /// The columns, each with its place in [`Side::cell`].
+    /// Iterates over the columns, each with its position in [`ComparedFile::cell`].
     pub(super) fn columns(&self) -> impl Iterator<Item = (usize, &Column)> {
         (self.keys..).zip(&self.columns)
     }
 
-    /// The place of the column of that name.
-    pub(super) fn place(&self, name: &str) -> Option<usize> {
-        self.columns().find(|(_, column)| column.name == name).map(|(place, _)| place)
+    /// Returns the position of the column of a name.
+    pub(super) fn position(&self, name: &str) -> Option<usize> {
+        self.columns().find(|(_, column)| column.name == name).map(|(position, _)| position)
     }
 
-    /// The cell of a row in the column at a place.
-    pub(super) fn cell(&self, place: usize, row: usize) -> Cell {
-        let part = self.parts.partition_point(|part| part.first <= row as u64) - 1;
-        let part = &self.parts[part];
-        part.row(row - part.first as usize).cell(place)
+    /// Returns the cell of a row in the column at a position.
+    pub(super) fn cell(&self, position: usize, row: usize) -> Cell {
+        let group = self.groups.partition_point(|group| group.first <= row as u64) - 1;
+        let group = &self.groups[group];
+        group.row(row - group.first as usize).cell(position)
     }
 
-    /// The values by which a row is told from others.
+    /// Returns the values of a row's key columns.
     fn key_values(&self, row: usize) -> Vec<f64> {
         (0..self.keys).map(|key| self.cell(key, row).number().unwrap_or(f64::NAN)).collect()
     }
 
-    /// A row's key values, rounded to nine digits: grids of other counts meet in values that differ
-    /// by rounding alone.
+    /// Returns a row's key values rounded to nine digits, because grids of other counts have common
+    /// points whose values differ by rounding.
     pub(super) fn key(&self, row: usize) -> Vec<u64> {
-        self.key_values(row).into_iter().map(rounded).collect()
+        self.key_values(row).into_iter().map(rounded_bits).collect()
     }
 
     fn least_ratio(&self, row: usize) -> Option<f64> {
         let ratios = self.columns().filter(|(_, column)| column.name.starts_with("ratio_"));
-        ratios.filter_map(|(place, _)| self.cell(place, row).number()).reduce(f64::min)
+        ratios.filter_map(|(position, _)| self.cell(position, row).number()).reduce(f64::min)
     }
 
-    /// A pair of rows as both files have it.
-    pub(super) fn shared(&self, other: &Self, pair: [usize; 2]) -> SharedRow {
+    /// Returns a pair of matching rows as one.
+    pub(super) fn shared_row(&self, other: &Self, pair: [usize; 2]) -> SharedRow {
         let cells = |name: &str| {
-            [(self, pair[0]), (other, pair[1])].map(|(side, row)| {
-                side.place(name).map_or(Cell::Null, |place| side.cell(place, row))
+            [(self, pair[0]), (other, pair[1])].map(|(file, row)| {
+                file.position(name).map_or(Cell::Null, |position| file.cell(position, row))
             })
         };
         let numbers = |name: &str| cells(name).map(|cell| cell.number());
@@ -127,7 +130,7 @@ impl Side {
         };
         SharedRow {
             rows: pair.map(|row| row as u64),
-            place: self.key_values(pair[0]),
+            key: self.key_values(pair[0]),
             ratio: numbers("ratio_max"),
             least_ratio: [self.least_ratio(pair[0]), other.least_ratio(pair[1])],
             gap_m: numbers("min_gap_nonlinear_m"),
@@ -139,10 +142,10 @@ impl Side {
     }
 }
 
-/// Nine digits of a number, as a key.
-fn rounded(value: f64) -> u64 {
+/// Returns the bits of a number rounded to nine digits.
+fn rounded_bits(value: f64) -> u64 {
     let text = format!("{value:.8e}");
     let rounded: f64 = text.parse().unwrap_or(value);
-    // Zero has two signs and is one value.
+    // Adding zero makes -0 and 0 one value.
     (rounded + 0.0).to_bits()
 }

@@ -1,4 +1,4 @@
-//! Files with planted differences.
+//! Tests of comparisons, on files with known differences.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -8,9 +8,9 @@ use arrow_array::UInt64Array;
 use serde_json::{Value, json};
 
 use super::*;
-use crate::sample::{self, Made, RATIOS, numbers, texts};
+use crate::sample::{self, ColumnData, RATIOS, numbers, texts};
 
-fn file(columns: Vec<Made>, keys: &[(&str, Value)]) -> ResultTable {
+fn file(columns: Vec<ColumnData>, keys: &[(&str, Value)]) -> ResultTable {
     let home = tempfile::tempdir().unwrap();
     let path = home.path().join("x.parquet");
     sample::write(&path, columns, keys);
@@ -22,17 +22,20 @@ fn map(ratios: &[Option<f64>]) -> ResultTable {
 }
 
 #[test]
-fn a_file_does_not_differ_from_itself() {
+fn a_file_equals_itself() {
     let found = compare(&map(&RATIOS), &map(&RATIOS)).unwrap();
     assert!(found.is_empty(), "{found:?}");
     assert_eq!((found.shared.len(), found.flips(false).count()), (6, 0));
-    assert!(found.greatest(5, false, SharedRow::ratio_by).is_empty());
-    let moved = found.boundary.unwrap();
-    assert!(moved.unlike.is_empty() && moved.crossings.iter().all(|c| c.by() == [0.0; 2]));
+    assert!(found.greatest(5, false, SharedRow::ratio_deviation).is_empty());
+    let shift = found.boundary.unwrap();
+    assert!(
+        shift.unmatched_lines.is_empty()
+            && shift.crossings.iter().all(|c| c.shift_range() == [0.0; 2])
+    );
 }
 
 #[test]
-fn planted_flips_are_found_and_sensitive_rows_stand_apart() {
+fn flips_are_found_and_sensitive_rows_are_separate() {
     let mut ratios = RATIOS;
     ratios[1] = Some(2.25); // reliable before
     ratios[2] = Some(1.25); // not reliable before
@@ -47,18 +50,18 @@ fn planted_flips_are_found_and_sensitive_rows_stand_apart() {
     assert_eq!(lost(&found), 1);
     ratios[0] = None; // reliable before
     assert_eq!(lost(&compare(&map(&RATIOS), &map(&ratios)).unwrap()), 2);
-    let greatest = found.greatest(3, false, SharedRow::ratio_by);
+    let greatest = found.greatest(3, false, SharedRow::ratio_deviation);
     assert_eq!(greatest.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [3, 2, 1]);
-    assert!((greatest[1].ratio_by() - 1.0).abs() < 1e-12, "2.5 to 1.25 is a factor of two");
-    let gap = found.greatest(2, false, SharedRow::gap_by_m)[1];
-    assert!((gap.gap_by_m() - 1.25e-3).abs() < 1e-12, "{gap:?}");
+    assert!((greatest[1].ratio_deviation() - 1.0).abs() < 1e-12, "2.5 to 1.25 is a factor of two");
+    let gap = found.greatest(2, false, SharedRow::gap_deviation_m)[1];
+    assert!((gap.gap_deviation_m() - 1.25e-3).abs() < 1e-12, "{gap:?}");
     assert!(found.shared.iter().filter(|row| row.differs).count() == 4);
     assert!(found.columns.iter().any(|column| column.name == "ratio_max" && column.rows == 4));
     assert!(!found.is_empty());
 }
 
 #[test]
-fn rows_that_the_linear_model_over_estimates_are_counted_in_both_files() {
+fn over_estimated_rows_are_counted_in_both_files() {
     let mut ratios = RATIOS;
     ratios[0] = Some(0.4);
     let found = compare(&map(&RATIOS), &map(&ratios)).unwrap();
@@ -66,15 +69,15 @@ fn rows_that_the_linear_model_over_estimates_are_counted_in_both_files() {
 }
 
 #[test]
-fn numbers_that_came_or_went_changed_by_more_than_any_measure() {
+fn deviations_from_missing_numbers_are_infinite() {
     let mut ratios = RATIOS;
     ratios[0] = None;
     ratios[3] = Some(1.0); // failed before
     let found = compare(&map(&RATIOS), &map(&ratios)).unwrap();
-    for by in [SharedRow::ratio_by, SharedRow::gap_by_m] {
-        let rows = found.greatest(5, false, by);
+    for deviation in [SharedRow::ratio_deviation, SharedRow::gap_deviation_m] {
+        let rows = found.greatest(5, false, deviation);
         assert_eq!(rows.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [0, 3]);
-        assert!(rows.iter().all(|row| by(row) == f64::INFINITY));
+        assert!(rows.iter().all(|row| deviation(row) == f64::INFINITY));
     }
     assert!(found.has_ratios && found.has_gaps);
     let boundaries = compare(&boundary(&[Some(1.0)]), &boundary(&[Some(1.0)])).unwrap();
@@ -82,7 +85,7 @@ fn numbers_that_came_or_went_changed_by_more_than_any_measure() {
 }
 
 #[test]
-fn what_was_set_otherwise_is_named() {
+fn changed_plan_values_are_named() {
     let mut plan = sample::plan();
     plan["machine"]["body"]["mass_kg"] = json!(20.0);
     plan["set"] = json!({ "body_mass_kg": 20.0 });
@@ -94,8 +97,8 @@ fn what_was_set_otherwise_is_named() {
 }
 
 #[test]
-fn maps_of_other_grids_compare_where_they_meet() {
-    // Only the lighter mass, and dampings by other arithmetic.
+fn maps_of_different_grids_are_compared_at_common_points() {
+    // The second grid has one mass, and dampings that differ by rounding.
     let mut plan = sample::plan();
     plan["axis"][0]["values"] = json!([0.1]);
     let mut columns = sample::map(&RATIOS[..3]);
@@ -103,12 +106,12 @@ fn maps_of_other_grids_compare_where_they_meet() {
     columns[2] = ("damping_n_s_per_m", "N s/m", numbers(&dampings));
     let second = file(columns, &[(key::PLAN, plan)]);
     let found = compare(&map(&RATIOS), &second).unwrap();
-    assert_eq!((found.shared.len(), found.alone), (2, [4, 1]));
+    assert_eq!((found.shared.len(), found.unmatched_rows), (2, [4, 1]));
     assert!(found.columns.is_empty(), "{:?}", found.columns);
 }
 
 #[test]
-fn an_axis_that_one_file_lacks_is_left_out_if_it_has_one_value() {
+fn an_axis_of_one_value_may_be_missing_in_the_other_file() {
     let with_spin = |values: &[f64]| {
         let mut plan = sample::plan();
         plan["axis"].as_array_mut().unwrap().push(json!({ "parameter": "forcing_rad_per_s" }));
@@ -130,7 +133,7 @@ fn an_axis_that_one_file_lacks_is_left_out_if_it_has_one_value() {
 }
 
 #[test]
-fn what_shares_nothing_is_refused_with_the_reason() {
+fn files_without_common_rows_are_refused_with_the_reason() {
     let mut columns = sample::map(&RATIOS);
     columns[1] = ("unbalance_mass_kg", "kg", numbers(&[Some(0.7); 6]));
     let second = file(columns, &[(key::PLAN, sample::plan())]);
@@ -141,10 +144,10 @@ fn what_shares_nothing_is_refused_with_the_reason() {
 }
 
 #[test]
-fn rows_of_one_key_pair_in_order() {
+fn rows_with_equal_keys_are_paired_in_order() {
     let listed = |ratios: [f64; 2]| {
         let plan = json!({ "axis": [{ "parameter": "unbalance_mass_kg" }], "design": {} });
-        let columns: Vec<Made> = vec![
+        let columns: Vec<ColumnData> = vec![
             ("unbalance_mass_kg", "kg", numbers(&[Some(0.1); 2])),
             ("ratio_max", "1", numbers(&ratios.map(Some))),
             ("status", "", texts(&["ok"; 2])),
@@ -156,13 +159,14 @@ fn rows_of_one_key_pair_in_order() {
     assert_eq!(found.columns[0].rows, 1);
 }
 
-/// A boundary of as many masses, half a unit wide; where there is none, none in range.
+/// Returns a boundary file with a mass for each position; brackets are 0.5 wide, `None` is a line
+/// without a crossing.
 fn boundary(at: &[Option<f64>]) -> ResultTable {
     let rows = at.len();
-    let shifted = |by: f64| at.iter().map(|at| at.map(|at| at + by)).collect::<Vec<_>>();
+    let shifted = |offset: f64| at.iter().map(|at| at.map(|at| at + offset)).collect::<Vec<_>>();
     let masses: Vec<_> = (0..rows).map(|i| Some(0.1 + 0.1 * i as f64)).collect();
     let crossing = at.iter().map(|at| u64::from(at.is_some()));
-    let columns: Vec<Made> = vec![
+    let columns: Vec<ColumnData> = vec![
         ("unbalance_mass_kg", "kg", numbers(&masses)),
         ("damping_n_s_per_m", "N s/m", numbers(at)),
         ("damping_low_n_s_per_m", "N s/m", numbers(&shifted(-0.25))),
@@ -174,36 +178,36 @@ fn boundary(at: &[Option<f64>]) -> ResultTable {
 }
 
 #[test]
-fn a_boundary_that_moves_does_so_for_certain_only_past_its_brackets() {
+fn a_shift_is_certain_only_beyond_the_brackets() {
     let first = boundary(&[Some(100.0), Some(120.0), None, Some(140.0)]);
     let second = boundary(&[Some(100.3), Some(123.0), Some(150.0), Some(140.0)]);
     let found = compare(&first, &second).unwrap();
-    let moved = found.boundary.unwrap();
-    assert_eq!((moved.axis.as_str(), moved.unit.as_str()), ("damping_n_s_per_m", "N s/m"));
-    assert_eq!((moved.crossings.len(), moved.certain()), (3, 1));
-    let farthest = moved.farthest().unwrap();
-    assert_eq!((farthest.by(), farthest.at_least()), ([2.5, 3.5], 2.5));
-    // 0.3 and 3, give or take half a unit; the third is where it was.
-    let mean = moved.mean().unwrap();
+    let shift = found.boundary.unwrap();
+    assert_eq!((shift.axis.as_str(), shift.unit.as_str()), ("damping_n_s_per_m", "N s/m"));
+    assert_eq!((shift.crossings.len(), shift.count_certain()), (3, 1));
+    let farthest = shift.farthest().unwrap();
+    assert_eq!((farthest.shift_range(), farthest.certain_shift()), ([2.5, 3.5], 2.5));
+    // The shifts are 0.3 and 3, each give or take 0.5; the third crossing has not moved.
+    let mean = shift.mean_range().unwrap();
     assert!((mean[0] - 2.3 / 3.0).abs() < 1e-9 && (mean[1] - 4.3 / 3.0).abs() < 1e-9, "{mean:?}");
-    assert_eq!(moved.unlike.len(), 1);
-    assert_eq!(moved.unlike[0].1, [0, 1]);
-    let moved = compare(&first, &boundary(&[None, None, None, None])).unwrap().boundary.unwrap();
-    assert_eq!((moved.mean(), moved.unlike.len()), (None, 3));
+    assert_eq!(shift.unmatched_lines.len(), 1);
+    assert_eq!(shift.unmatched_lines[0].1, [0, 1]);
+    let shift = compare(&first, &boundary(&[None, None, None, None])).unwrap().boundary.unwrap();
+    assert_eq!((shift.mean_range(), shift.unmatched_lines.len()), (None, 3));
 }
 
 #[test]
-fn the_boundary_of_maps_lies_between_neighbours() {
-    // Along damping: 1, 1.5, 2.5 crosses 2 between 70 and 80.
+fn a_boundary_of_maps_lies_between_neighbours() {
+    // The ratios 1, 1.5, 2.5 along the damping cross 2 between 70 and 80.
     let mut ratios = RATIOS;
     ratios[1] = Some(2.2);
-    let moved = compare(&map(&RATIOS), &map(&ratios)).unwrap().boundary.unwrap();
-    let lighter = &moved.crossings[0];
+    let shift = compare(&map(&RATIOS), &map(&ratios)).unwrap().boundary.unwrap();
+    let lighter = &shift.crossings[0];
     assert_eq!(lighter.bracket, [[70.0, 80.0], [60.0, 70.0]]);
-    assert_eq!((lighter.by(), lighter.at_least()), ([-20.0, 0.0], 0.0));
+    assert_eq!((lighter.shift_range(), lighter.certain_shift()), ([-20.0, 0.0], 0.0));
 }
 
 #[test]
-fn a_file_that_is_not_there_is_an_error() {
+fn a_missing_file_is_an_error() {
     assert!(ResultTable::open(Path::new("/nonexistent.parquet")).is_err());
 }

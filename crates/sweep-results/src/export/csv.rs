@@ -1,85 +1,95 @@
-//! Text that spreadsheets, pandas (`comment="#"`) and gnuplot read.
+//! Export to text that spreadsheets, pandas (`comment="#"`) and gnuplot read.
 
 use std::fmt::Write as _;
 
 use sweep_files::{Cell, EXPORTED_CSV, FileError, ResultTable, key};
 
-use super::names;
+use super::column_names;
 
-/// Bytes of text that are written at once, at least.
-const AT_ONCE: usize = 1 << 16;
+/// The least number of bytes that one call writes. Basis: any size
+/// far above that of a row will do. Doubling it halves the number of writes.
+const WRITE_SIZE: usize = 1 << 16;
 
-/// Writes rows as they are read: one word of a small file may stand in all of its rows.
+/// Writes rows as they are read. The whole text may be far larger than the file, in which a word
+/// that all rows share is stored once.
 pub(super) fn write(
     table: &ResultTable,
-    put: &mut dyn FnMut(&str) -> Result<(), FileError>,
+    write: &mut dyn FnMut(&str) -> Result<(), FileError>,
 ) -> Result<(), FileError> {
     let version = table.file().value(key::VERSION).unwrap_or("of another version");
-    let mut text = format!("{EXPORTED_CSV}{}\n", no_cells(version));
+    let mut text = format!("{EXPORTED_CSV}{}\n", escape_comment(version));
     // Writing to a String cannot fail.
     for column in &table.columns {
         let unit = if column.unit.is_empty() { "-" } else { &column.unit };
-        let (unit, description) = (no_cells(unit), no_cells(&column.description));
-        let _ = writeln!(text, "# {} [{unit}]: {description}", no_cells(&column.name));
+        let _ = writeln!(
+            text,
+            "# {} [{}]: {}",
+            escape_comment(&column.name),
+            escape_comment(unit),
+            escape_comment(&column.description)
+        );
     }
     if let Some(plan) = table.file().value(key::PLAN) {
-        let _ = writeln!(text, "# plan: {}", no_cells(plan));
+        let _ = writeln!(text, "# plan: {}", escape_comment(plan));
     }
-    let names = names(table);
-    let headings: Vec<String> = names.iter().map(|name| quoted(name)).collect();
+    let names = column_names(table);
+    let headings: Vec<String> = names.iter().map(|name| quote(name)).collect();
     let _ = writeln!(text, "{}", headings.join(","));
     table.file().each_row(&names, |row| {
         for column in 0..names.len() {
             let _ = match row.cell(column) {
                 Cell::Null => Ok(()),
-                // The shortest digits that read back to the same number.
-                Cell::Number(number) => text.write_str(&shortest(number)),
-                Cell::Text(word) => text.write_str(&quoted(&word)),
+                Cell::Number(number) => text.write_str(&format_number(number)),
+                Cell::Text(word) => text.write_str(&quote(&word)),
                 Cell::Flag(flag) => write!(text, "{flag}"),
             };
             text.push(if column + 1 < names.len() { ',' } else { '\n' });
         }
-        if text.len() >= AT_ONCE {
-            put(&text)?;
+        if text.len() >= WRITE_SIZE {
+            write(&text)?;
             text.clear();
         }
         Ok::<(), FileError>(())
     })?;
-    put(&text)
+    write(&text)
 }
 
-/// The shortest digits of a number, with an exponent where that is shorter.
-fn shortest(number: f64) -> String {
-    let (plain, exponent) = (number.to_string(), format!("{number:e}"));
-    if plain.len() <= exponent.len() { plain } else { exponent }
+/// Formats a number by the fewest digits that read back to the same number, with an exponent where
+/// that is shorter.
+fn format_number(number: f64) -> String {
+    let plain = number.to_string();
+    let with_exponent = format!("{number:e}");
+    if plain.len() <= with_exponent.len() { plain } else { with_exponent }
 }
 
-/// A text on one line, of which a sheet makes no formula: it takes commas, semicolons and tabs of a
-/// comment for the borders of cells, and a cell that begins with a sign for a formula. Such a sign
-/// moves behind an apostrophe. A JSON number keeps its sign: it is in no text.
-fn no_cells(text: &str) -> String {
+/// Escapes a comment so that it is one line and no spreadsheet finds a formula in it.
+///
+/// A spreadsheet splits a comment into cells at commas, semicolons and tabs, and takes a cell that
+/// begins with `=`, `+`, `-` or `@` for a formula. Such a sign gets an apostrophe before it, unless
+/// it belongs to a number.
+fn escape_comment(text: &str) -> String {
     let mut line = String::with_capacity(text.len());
-    let mut begins = false;
+    let mut is_cell_start = false;
     let mut chars = text.chars().peekable();
     while let Some(c) = chars.next() {
         let c = if c.is_control() && c != '\t' { ' ' } else { c };
         let is_number = c == '-' && chars.peek().is_some_and(char::is_ascii_digit);
-        if begins && "=+-@".contains(c) && !is_number {
+        if is_cell_start && "=+-@".contains(c) && !is_number {
             line.push('\'');
         }
         line.push(c);
-        begins = ",;\t\"".contains(c) || (begins && c == ' ');
+        is_cell_start = ",;\t\"".contains(c) || (is_cell_start && c == ' ');
     }
     line
 }
 
-/// A text as a cell: in quotes where it would be taken for more than one.
-fn quoted(text: &str) -> String {
-    // A sheet takes what begins like this for a formula.
-    let formula = text.trim_start().starts_with(['=', '+', '-', '@']);
-    if formula || text.contains(['"', ',', ';', '\t', '\n', '\r', '#']) {
-        let mark = if formula { "'" } else { "" };
-        format!("\"{mark}{}\"", text.replace('"', "\"\""))
+/// Formats a text as one cell, in quotes where it contains separators. A text that a spreadsheet
+/// would take for a formula gets an apostrophe.
+fn quote(text: &str) -> String {
+    let is_formula = text.trim_start().starts_with(['=', '+', '-', '@']);
+    if is_formula || text.contains(['"', ',', ';', '\t', '\n', '\r', '#']) {
+        let apostrophe = if is_formula { "'" } else { "" };
+        format!("\"{apostrophe}{}\"", text.replace('"', "\"\""))
     } else {
         text.to_owned()
     }
@@ -91,13 +101,13 @@ mod tests {
     use crate::sample;
 
     #[test]
-    fn rows_stand_under_their_names_and_units_above() {
+    fn comments_come_first_then_names_then_rows() {
         let mut text = String::new();
-        let mut put = |more: &str| {
-            text.push_str(more);
+        let mut append = |part: &str| {
+            text.push_str(part);
             Ok(())
         };
-        write(&sample::table(), &mut put).unwrap();
+        write(&sample::table(), &mut append).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         assert!(lines[0].starts_with("# exported by sweep "), "{}", lines[0]);
         assert!(lines.iter().any(|line| line.starts_with("# damping_n_s_per_m [N s/m]")));
@@ -109,27 +119,29 @@ mod tests {
     }
 
     #[test]
-    fn a_word_of_many_rows_is_in_memory_a_few_times_at_once() {
+    fn a_long_word_in_many_rows_is_written_in_parts() {
         let home = tempfile::tempdir().unwrap();
         let path = home.path().join("x.parquet");
         let word = "a".repeat(1 << 18);
         sample::write(&path, vec![("status", "", sample::texts(&vec![word.as_str(); 100]))], &[]);
-        let (mut most, mut all) = (0, 0);
-        let mut put = |text: &str| {
-            (most, all) = (text.len().max(most), all + text.len());
+        let mut longest = 0;
+        let mut total = 0;
+        let mut count = |text: &str| {
+            longest = text.len().max(longest);
+            total += text.len();
             Ok(())
         };
-        write(&ResultTable::open(&path).unwrap(), &mut put).unwrap();
-        assert!(all > 100 << 18 && most < 2 << 18, "{all} {most}");
+        write(&ResultTable::open(&path).unwrap(), &mut count).unwrap();
+        assert!(total > 100 << 18 && longest < 2 << 18, "{total} {longest}");
     }
 
     #[test]
     fn no_cell_of_a_comment_begins_as_a_formula() {
         assert_eq!(
-            no_cells(r#"{"name":"x","values":[1.0,-2.0]}"#),
+            escape_comment(r#"{"name":"x","values":[1.0,-2.0]}"#),
             r#"{"name":"x","values":[1.0,-2.0]}"#
         );
-        for (text, mended) in [
+        for (text, escaped) in [
             (r#"{"name":"=1+1"}"#, r#"{"name":"'=1+1"}"#),
             ("a,=1+1", "a,'=1+1"),
             ("a; \t@SUM(A1)", "a; \t'@SUM(A1)"),
@@ -137,15 +149,15 @@ mod tests {
             ("a,-x()", "a,'-x()"),
             ("a\n=1\r,=2", "a =1 ,'=2"),
         ] {
-            assert_eq!(no_cells(text), mended);
+            assert_eq!(escape_comment(text), escaped);
         }
     }
 
     #[test]
-    fn texts_that_mean_more_are_quoted() {
-        assert_eq!(quoted("ok"), "ok");
-        assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
-        assert_eq!(quoted("=cmd()"), "\"'=cmd()\"");
-        assert_eq!([shortest(1e-7), shortest(0.25), shortest(1e22)], ["1e-7", "0.25", "1e22"]);
+    fn texts_with_separators_or_formulas_are_quoted() {
+        assert_eq!(quote("ok"), "ok");
+        assert_eq!(quote("a,\"b\""), "\"a,\"\"b\"\"\"");
+        assert_eq!(quote("=cmd()"), "\"'=cmd()\"");
+        assert_eq!([1e-7, 0.25, 1e22].map(format_number), ["1e-7", "0.25", "1e22"]);
     }
 }

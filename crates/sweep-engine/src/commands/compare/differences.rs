@@ -24,13 +24,13 @@ pub(super) fn table(
         let description =
             tables[0].column(name).map_or("", |column| column.description.as_str()).to_owned();
         let unit = if unit.is_empty() { "1" } else { unit };
-        table.numbers(name, unit, &description, rows().map(|row| Some(row.place[k])));
+        table.numbers(name, unit, &description, rows().map(|row| Some(row.key[k])));
     }
     let said = "greatest ratio of B over that of A; null where either has none";
-    table.numbers("ratio_change", "1", said, rows().map(SharedRow::ratio_change));
+    table.numbers("ratio_change", "1", said, rows().map(SharedRow::ratio_quotient));
     table.worse(Worse::Greater);
     let said = "least gap of the nonlinear model in B less that in A; null where either has none";
-    table.numbers("gap_change_m", "m", said, rows().map(SharedRow::gap_change_m));
+    table.numbers("gap_change_m", "m", said, rows().map(SharedRow::gap_difference_m));
     table.worse(Worse::Less);
     for (side, [suffix, which]) in [["a", "A"], ["b", "B"]].into_iter().enumerate() {
         let (name, said) = (format!("ratio_max_{suffix}"), format!("greatest ratio of {which}"));
@@ -41,7 +41,7 @@ pub(super) fn table(
     table.words("flip", said, rows().map(|row| row.flip.name()));
     let sensitive = rows().map(|row| if row.sensitive { "true" } else { "false" });
     table.words("sensitive", "true where either file calls the row chaotic", sensitive);
-    let status = rows().map(|row| if row.ratio_change().is_some() { "ok" } else { "no_ratio" });
+    let status = rows().map(|row| if row.ratio_quotient().is_some() { "ok" } else { "no_ratio" });
     table.words("status", "ok, or no_ratio where either file has none", status);
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let hashes =

@@ -78,7 +78,7 @@ impl FailOn {
             Self::Any => (!found.is_empty()).then(|| "the files differ".to_owned()),
             Self::Plan => counted("differences of the plans", found.plan.len()),
             Self::Rows => {
-                counted("rows of one file alone", found.alone.iter().sum::<u64>() as usize)
+                counted("rows of one file alone", found.unmatched_rows.iter().sum::<u64>() as usize)
             }
             Self::Flips => counted("verdicts that flipped", found.flips(false).count()),
             Self::Lost => {
@@ -91,19 +91,19 @@ impl FailOn {
             Self::Ratio(most) => {
                 let percent = short(100.0 * most);
                 let what = format!("ratios that changed by more than {percent} %, came or went");
-                counted(&what, steady().filter(|row| row.ratio_by() > most).count())
+                counted(&what, steady().filter(|row| row.ratio_deviation() > most).count())
             }
             Self::Gap(most) => {
                 let most_m = short(most);
                 let what = format!("gaps that changed by more than {most_m} m, came or went");
-                counted(&what, steady().filter(|row| row.gap_by_m() > most).count())
+                counted(&what, steady().filter(|row| row.gap_deviation_m() > most).count())
             }
             Self::Boundary(most) => {
                 let moved = found.boundary.as_ref()?;
-                let far = moved.crossings.iter().filter(|crossing| crossing.at_least() > most);
+                let far = moved.crossings.iter().filter(|crossing| crossing.certain_shift() > most);
                 let what =
                     format!("crossings that moved by more than {} {}", short(most), moved.unit);
-                counted(what.trim_end(), far.count() + moved.unlike.len())
+                counted(what.trim_end(), far.count() + moved.unmatched_lines.len())
             }
         }
     }
