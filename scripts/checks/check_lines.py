@@ -1,10 +1,14 @@
 #!/usr/bin/env python3
-"""Checks that no line of the repository is longer than 100 columns.
+"""Checks that no line is longer than 100 columns, and the rules of language.
 
-    python scripts/checks/check_lines.py
+    python scripts/checks/check_lines.py [--language [CRATE ...]]
 
-It looks at code, scripts, configuration and documents by the endings below. It excepts, because
-a line break would change what they are:
+--language counts by crate what does not follow the rules of language, and fails nothing; with names
+of crates it lists the places in these. Without it, what crates that are clean have of this is a
+mistake (`language.py`).
+
+It looks for long lines in code, scripts, configuration and documents by the endings below. It
+excepts, because a line break would change what they are:
 
 - rows of Markdown tables, and what `text` blocks of Markdown quote of the program's output,
 - a line that is too long only by an address (https://...) in it,
@@ -18,6 +22,8 @@ import pathlib
 import re
 import subprocess
 import sys
+
+import language
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 COLUMNS = 100
@@ -55,11 +61,17 @@ def long_lines(name):
 
 def main():
     """Check everything; exit with 1 if anything is wrong."""
+    if sys.argv[1:2] == ["--language"]:
+        print("\n".join(language.report(sys.argv[2:])))
+        return 0
     wrong = [(name, number) for name in checked_files() for number in long_lines(name)]
     for name, number in wrong:
         print(f"{name}:{number}: longer than {COLUMNS} columns", file=sys.stderr)
-    print(f"lines: {len(wrong)} mistakes", file=sys.stderr)
-    return 1 if wrong else 0
+    unlike = list(language.mistakes())
+    for mistake in unlike:
+        print(mistake, file=sys.stderr)
+    print(f"lines: {len(wrong) + len(unlike)} mistakes", file=sys.stderr)
+    return 1 if wrong or unlike else 0
 
 
 if __name__ == "__main__":
