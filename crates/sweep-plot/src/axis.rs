@@ -28,9 +28,14 @@ impl Scale {
         Self { log: false, from, to }
     }
 
-    /// A logarithmic scale between two positive values.
+    /// A logarithmic scale between two positive values; from 1 to 10 where one of them has no
+    /// logarithm.
     pub(crate) const fn log(from: f64, to: f64) -> Self {
-        Self { log: true, from, to }
+        if has_logarithm(from) && has_logarithm(to) {
+            Self { log: true, from, to }
+        } else {
+            Self { log: true, from: 1.0, to: 10.0 }
+        }
     }
 
     /// An even scale that holds all `values` and 0 if it is near, with some room; 0 to 1 if there
@@ -57,6 +62,11 @@ impl Scale {
         let (low, high) = (self.from.min(self.to), self.from.max(self.to));
         if self.log { log_ticks(low, high, count) } else { even_ticks(low, high, count) }
     }
+}
+
+/// Returns whether a value has a place on a logarithmic scale.
+pub(crate) const fn has_logarithm(value: f64) -> bool {
+    value > 0.0 && value < f64::INFINITY
 }
 
 /// Least and greatest of the finite values.
@@ -114,9 +124,11 @@ fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     if !(rough > 0.0 && rough.is_finite()) {
         return Vec::new();
     }
+    let finest = f64::EPSILON * low.abs().max(high.abs());
     let mut step = Step::at_least(SLACK * rough);
-    // A step can leave fewer than three ticks, which do not make a scale: shorter ones then.
-    loop {
+    // A step can leave fewer than three ticks, which do not make a scale: shorter ones then, as
+    // long as numbers at neighbouring ticks differ.
+    while step.length() > finest {
         let (length, decimals) = (step.length(), step.decimals());
         let (first, last) =
             ((low / length - 1e-9).ceil() as i64, (high / length + 1e-9).floor() as i64);
@@ -133,6 +145,7 @@ fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
         }
         step = step.shorter();
     }
+    Vec::new()
 }
 
 /// Fewer ticks do not make a scale.
@@ -141,8 +154,12 @@ pub(crate) const LEAST_TICKS: i64 = 3;
 /// A step may be this part shorter than it should be: rounding shall not double it.
 pub(crate) const SLACK: f64 = 0.999;
 
-/// Ticks of a logarithmic scale from `low` to `high`, in ever denser sets.
+/// Ticks of a logarithmic scale from `low` to `high`, in ever denser sets; none where one of them
+/// has no logarithm.
 pub(crate) fn log_sets(low: f64, high: f64) -> [Vec<Tick>; 5] {
+    if !has_logarithm(low) || !has_logarithm(high) {
+        return Default::default();
+    }
     let sets: [&[f64]; 5] = [
         &[1.0],
         &[1.0, 3.0],
@@ -215,6 +232,44 @@ mod tests {
     fn a_scale_of_many_powers_of_ten_has_no_more_ticks_than_fit() {
         assert_eq!(labels(Scale::log(1e-3, 1e12), 5).len(), 6);
         assert!(labels(Scale::log(1e-100, 1e100), 5).len() <= 6);
+    }
+
+    #[test]
+    fn a_scale_without_a_logarithm_is_one_from_1_to_10() {
+        for (from, to) in [(0.0, 1.0), (-1.0, 2.0), (1.0, f64::INFINITY), (f64::NAN, 2.0)] {
+            assert_eq!(Scale::log(from, to), Scale::log(1.0, 10.0), "{from} to {to}");
+            assert!(log_sets(from, to).iter().all(Vec::is_empty), "{from} to {to}");
+        }
+    }
+
+    #[test]
+    fn any_two_ends_have_few_ticks() {
+        let (least, tiny) = (f64::from_bits(1), f64::MIN_POSITIVE);
+        let ends = [
+            0.0,
+            least,
+            -least,
+            tiny,
+            1.0,
+            1e15,
+            1e16 + 2.0,
+            -1e300,
+            1e300,
+            f64::MAX,
+            f64::MIN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NAN,
+        ];
+        for (&from, &to) in ends.iter().flat_map(|from| ends.iter().map(move |to| (from, to))) {
+            // Neighbours, too: between them no tick has a number of its own.
+            for to in [to, from.next_up(), from * (1.0 + 1e-15), from + to] {
+                for scale in [Scale::linear(from, to), Scale::log(from, to)] {
+                    let ticks = scale.ticks(6).len();
+                    assert!(ticks <= 16, "{scale:?}: {ticks}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::axis::{Scale, extremes};
+use super::axis::{Scale, extremes, has_logarithm};
 use super::colour::{BOTH as BOTH_SIDES, ColourScale, SHADE};
 use super::decimate::envelope;
 use super::frame::{HEADING_HEIGHT, Panel, Sign, TICK_SIZE, heading, legend, legend_height};
@@ -153,6 +153,9 @@ pub(crate) fn draw(chart: &Chart) -> Scene {
         scene.clipped(panel.outline(), |scene| {
             dots = draw_panel(scene, chart, content, &panel);
         });
+        if !has_values(content) {
+            panel.say(&mut scene, NO_VALUES);
+        }
         draw_marks(&mut scene, chart, &panel, index == 0);
         draw_stars(&mut scene, content, &panel);
         let last = index + 1 == panels.len();
@@ -179,13 +182,18 @@ pub(crate) fn x_scale(chart: &Chart) -> Scale {
     if !chart.x_log && all().all(|series| series.style == Style::Dots) {
         return Scale::around(xs);
     }
+    if chart.x_log {
+        let positive = xs.filter(|x| has_logarithm(*x));
+        let (low, high) = extremes(positive).unwrap_or((1.0, 10.0));
+        return Scale::log(low, if high > low { high } else { 10.0 * low });
+    }
     let (low, high) = extremes(xs).unwrap_or((0.0, 1.0));
     // The one place of all series is in the middle, so that dots are whole.
-    if high <= low && !chart.x_log {
-        return Scale::linear(low - 0.5, low + 0.5);
+    if high <= low {
+        let half = 0.5_f64.max(1e-6 * low.abs());
+        return Scale::linear(low - half, low + half);
     }
-    let high = if high > low { high } else { low + 1.0 };
-    if chart.x_log { Scale::log(low, high) } else { Scale::linear(low, high) }
+    Scale::linear(low, high)
 }
 
 /// The scale of a panel's y axis: its range, or all that its series and levels need.
@@ -204,6 +212,22 @@ pub(crate) fn y_scale(panel: &ChartPanel) -> Scale {
     } else {
         Scale::around(values)
     }
+}
+
+/// Stands in a panel without curves, dots and stars.
+const NO_VALUES: &str = "no values to show";
+
+/// Returns whether a panel has a place for a line, a dot or a star.
+fn has_values(panel: &ChartPanel) -> bool {
+    let is_shown = |y: &f64| y.is_finite() && (!panel.log || *y > 0.0);
+    let of_series = |series: &Series| {
+        let has_any = |ys: &[f64]| ys.iter().any(is_shown);
+        match &series.style {
+            Style::Band(low, high) => has_any(&series.y) || has_any(low) || has_any(high),
+            _ => has_any(&series.y),
+        }
+    };
+    !panel.stars.is_empty() || panel.series.iter().any(of_series)
 }
 
 /// Draws shades, curves and levels; gives the dots: of series of dots, and of places that stand

@@ -138,6 +138,13 @@ impl Panel {
         scene.line(marks, stroke);
     }
 
+    /// Sets a line of text in the middle: why nothing is drawn.
+    pub(crate) fn say(&self, scene: &mut Scene, text: &str) {
+        let at = [self.x + self.width / 2.0, self.y + self.height / 2.0 + 0.35 * LABEL_SIZE];
+        let text = Text::new(text, at, LABEL_SIZE).anchor(Anchor::Middle);
+        scene.text(Text { colour: MUTED, ..text });
+    }
+
     /// What the x axis shows.
     pub(crate) fn x_label(&self, scene: &mut Scene, label: &str) {
         let at = [self.x + self.width / 2.0, self.y + self.height + 44.0];

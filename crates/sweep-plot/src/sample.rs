@@ -9,7 +9,8 @@ use std::sync::Arc;
 
 use arrow_array::types::Int32Type;
 use arrow_array::{
-    Array as _, ArrayRef, BooleanArray, DictionaryArray, Float64Array, RecordBatch, UInt64Array,
+    Array as _, ArrayRef, BooleanArray, DictionaryArray, Float64Array, RecordBatch, StringArray,
+    UInt64Array,
 };
 use arrow_schema::{Field, Schema};
 use parquet::file::metadata::KeyValue;
@@ -59,6 +60,16 @@ impl Sample {
         self
     }
 
+    /// The column of that name, with that limit in its metadata.
+    pub(crate) fn limited(mut self, name: &str, limit: &str) -> Self {
+        for (field, _) in self.columns.iter_mut().filter(|(field, _)| field.name() == name) {
+            let mut metadata = field.metadata().clone();
+            metadata.insert("limit".to_owned(), limit.to_owned());
+            *field = field.clone().with_metadata(metadata);
+        }
+        self
+    }
+
     pub(crate) fn counts(self, name: &str, values: impl IntoIterator<Item = u64>) -> Self {
         self.column(name, "1", Arc::new(UInt64Array::from_iter_values(values)))
     }
@@ -86,9 +97,63 @@ impl Sample {
         self
     }
 
+    /// Spoils cells of every column as files of other writers may have them: null, NaN, infinite,
+    /// of no size or of any. A column is spoilt in part, throughout or not at all.
+    pub(crate) fn spoilt(mut self, numbers: &mut fastrand::Rng) -> Self {
+        for (_, array) in &mut self.columns {
+            let share = [0.0, 0.0, 0.1, 0.5, 1.0][numbers.usize(..5)];
+            *array = spoilt(array, share, numbers);
+        }
+        self
+    }
+
     pub(crate) fn write(self, folder: &Path, name: &str) -> PathBuf {
         write_all(folder, name, [self])
     }
+}
+
+/// Spoils this share of a column's cells, all in one way or each in its own.
+fn spoilt(array: &ArrayRef, share: f64, numbers: &mut fastrand::Rng) -> ArrayRef {
+    const BAD: [Option<f64>; 12] = [
+        None,
+        Some(f64::NAN),
+        Some(f64::INFINITY),
+        Some(f64::NEG_INFINITY),
+        Some(0.0),
+        Some(-0.0),
+        Some(-1.0),
+        Some(f64::from_bits(1)),
+        Some(f64::MIN_POSITIVE),
+        Some(1e300),
+        Some(f64::MAX),
+        Some(f64::MIN),
+    ];
+    let common = numbers.bool().then(|| numbers.usize(..BAD.len()));
+    let mut spoil =
+        || (numbers.f64() < share).then(|| common.unwrap_or(numbers.usize(..BAD.len())));
+    if let Some(values) = array.as_any().downcast_ref::<Float64Array>() {
+        let cells = values.iter().map(|cell| spoil().map_or(cell, |bad| BAD[bad]));
+        return Arc::new(cells.collect::<Float64Array>());
+    }
+    if let Some(flags) = array.as_any().downcast_ref::<BooleanArray>() {
+        let cells = flags.iter().map(|cell| if spoil().is_some() { None } else { cell });
+        return Arc::new(cells.collect::<BooleanArray>());
+    }
+    if let Some(words) = array.as_any().downcast_ref::<DictionaryArray<Int32Type>>() {
+        let words = words.downcast_dict::<StringArray>().unwrap();
+        let said = ["", "diverged", "no_equilibrium"];
+        let cell = |cell| match spoil() {
+            Some(bad) => said.get(bad).copied(),
+            None => cell,
+        };
+        let cells = words.into_iter().map(cell);
+        return Arc::new(cells.collect::<DictionaryArray<Int32Type>>());
+    }
+    // Counts: such files have numbers of any type in their place.
+    let Some(counts) = array.as_any().downcast_ref::<UInt64Array>() else { return array.clone() };
+    let cells =
+        counts.iter().map(|cell| spoil().map_or(cell.map(|cell| cell as f64), |bad| BAD[bad]));
+    Arc::new(cells.collect::<Float64Array>())
 }
 
 /// Writes samples of the same columns to one file, one after the other; the metadata is that of the
@@ -97,7 +162,11 @@ fn write_all(folder: &Path, name: &str, samples: impl IntoIterator<Item = Sample
     let path = folder.join(name);
     let mut writer: Option<Writer<std::fs::File>> = None;
     for sample in samples {
-        let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = sample.columns.into_iter().unzip();
+        let typed = |(field, array): (Field, ArrayRef)| {
+            (field.with_data_type(array.data_type().clone()), array)
+        };
+        let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) =
+            sample.columns.into_iter().map(typed).unzip();
         let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).unwrap();
         let writer = writer.get_or_insert_with(|| {
             let properties =

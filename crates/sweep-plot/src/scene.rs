@@ -347,6 +347,9 @@ impl Scene {
             }))
         };
         let Some(((left, right), (top, bottom))) = extent(0).zip(extent(1)) else { return };
+        // Lines off the sheet are not seen, and there could be any number of them.
+        let [left, right] = [left, right].map(|x| x.clamp(0.0, self.width));
+        let [top, bottom] = [top, bottom].map(|y| y.clamp(0.0, self.height));
         if left >= right || top >= bottom {
             return;
         }

@@ -4,6 +4,7 @@ mod designs;
 mod drawing;
 mod long;
 mod metrics;
+mod spoilt;
 
 use std::path::Path;
 

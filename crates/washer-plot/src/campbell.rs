@@ -167,7 +167,8 @@ pub(crate) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
     let names =
         table.column("name").or_else(|| table.column("shape")).and_then(|column| column.words());
 
-    let mut numbers = number.to_vec();
+    // A row without a number is of no mode.
+    let mut numbers: Vec<f64> = number.iter().copied().filter(|mode| mode.is_finite()).collect();
     numbers.sort_by(f64::total_cmp);
     numbers.dedup();
     let mode = |wanted: f64| {

@@ -2,6 +2,7 @@
 
 #[path = "../../sweep-plot/src/sample.rs"]
 mod sample;
+mod spoilt;
 mod stability;
 
 use std::io::Read as _;

@@ -24,6 +24,9 @@ const MOST_PARAMETERS: usize = 24;
 /// What the outline of a bar means.
 const ANY: &str = "rising and falling alike (root of the correlation ratio)";
 
+/// Stands in a panel without bars.
+const NO_INFLUENCE: &str = "no two points have values that differ";
+
 /// The colour of what lies in the grey.
 const GREY: Colour = FAILED.with_alpha(110);
 
@@ -89,6 +92,9 @@ pub(crate) fn draw(scatter: &Scatter) -> Scene {
         let said = signed(found.rank);
         let at = [panel.x + room + 10.0, centre + 0.35 * TICK_SIZE];
         scene.text(Text::new(said, at, TICK_SIZE));
+    }
+    if places.iter().all(|&k| scatter.parameters[k].influence.is_none()) {
+        panel.say(&mut scene, NO_INFLUENCE);
     }
     panel.frame(&mut scene, true, false);
     panel.x_label(&mut scene, "Rank correlation (Spearman)");

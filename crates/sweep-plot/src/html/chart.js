@@ -90,6 +90,13 @@ function createChart(host, spec, name, pick = () => {}) {
     return [low - room, high + room];
   }
 
+  // Whether a panel has a place for a line, a dot or a star.
+  function hasValues(panel) {
+    const isShown = (y) => Number.isFinite(y) && (!panel.log || y > 0);
+    const ofSeries = ({ y, low, high }) => [y, low, high].some((values) => values?.some(isShown));
+    return panel.stars.length > 0 || panel.series.some(ofSeries);
+  }
+
   function paint(context) {
     const box = { ...area(), top: CHART.top + strip };
     drawMarkLabels(context, box);
@@ -119,6 +126,9 @@ function createChart(host, spec, name, pick = () => {}) {
       const dots = panel.series.map((series) => drawSeries(context, series, atY, box));
       for (const [value] of panel.levels) {
         drawLine(context, box.left, atY(value), right, atY(value), [3, 3], themed("ink"));
+      }
+      if (!hasValues(panel)) {
+        write(context, "no values to show", box.left + box.width / 2, top + panel.height / 2);
       }
       for (const [x] of spec.marks) {
         drawLine(context, atX(x), top, atX(x), bottom, [6, 4], themed("muted"));

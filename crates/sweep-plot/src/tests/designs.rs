@@ -6,7 +6,7 @@ use super::{carried, draw, message, showing, svg};
 
 /// Points whose ratio is 4 where the mass is above a half, whatever the damping; of the rows, the
 /// last failed and the one before it is undefined.
-fn points(count: u32) -> Sample {
+pub(super) fn points(count: u32) -> Sample {
     points_with(count, |sample| sample)
 }
 
@@ -38,6 +38,29 @@ fn points_with(count: u32, further: impl Fn(Sample) -> Sample) -> Sample {
         .numbers("min_gap_nonlinear_m", "m", of(&|k| ratio(k).map(|ratio| 0.003 - 0.001 * ratio)))
         .bad("less", Some(0.0))
         .words("status", (0..count).map(|k| Some(if k + 1 == count { "diverged" } else { "ok" })))
+        .metadata("sweep.plan", plan)
+}
+
+/// Points at random, none of which has a result.
+pub(super) fn failed(count: u32) -> Sample {
+    let none = || (0..count).map(|_| f64::NAN);
+    let plan = r#"{
+        "name": "sample", "reliability": { "ratio_limit": 2.0 },
+        "design": { "method": "monte_carlo", "points": 0, "seed": 0 }
+    }"#;
+    let part = |step: f64| (0..count).map(move |k| (f64::from(k) * step).fract());
+    Sample::default()
+        .counts("point", 0..u64::from(count))
+        .numbers("unbalance_mass_kg", "kg", part(0.618_033_988_749_895))
+        .numbers("damping_n_s_per_m", "N s/m", part(0.414_213_562_373_095))
+        .numbers("nonlinear_body_yaw", "rad", none())
+        .numbers("linear_body_yaw", "rad", none())
+        .numbers("ratio_body_yaw", "1", none())
+        .numbers("ratio_max", "1", none())
+        .flags("reliable", (0..count).map(|_| None))
+        .numbers("min_gap_nonlinear_m", "m", none())
+        .bad("less", Some(0.0))
+        .words("status", (0..count).map(|_| Some("diverged")))
         .metadata("sweep.plan", plan)
 }
 

@@ -7,7 +7,7 @@ use super::*;
 
 /// Points of these unbalances over 200 to 300 rpm. Growth is above 0 from 230 to 250 rpm, by as
 /// much as the unbalance.
-fn stability(masses: &[f64]) -> Sample {
+pub(super) fn stability(masses: &[f64]) -> Sample {
     let rows: Vec<(f64, f64)> = masses
         .iter()
         .flat_map(|&mass| (0..=20).map(move |k| (mass, 200.0 + 5.0 * f64::from(k))))
