@@ -164,7 +164,7 @@ fn every_command_writes_over_its_own_and_clears_up_after_killed_processes() {
             let mut bytes = Vec::new();
             for round in 0..2 {
                 // What a process leaves that is killed while it writes.
-                let left = home.path("new/.sweep-Xb7Qz1.tmp");
+                let left = home.path("new").join(sweep_files::atomic::temporary_name());
                 fs::write(&left, "half").expect("a leftover is written");
                 // A run has a folder of its own for such files, and clears that.
                 let is_run = writer[0] == "run";

@@ -8,13 +8,13 @@
 //! | `shards.json` | into how many shards the run was dealt, if it was (`shard`) |
 //! | `chunk-<index>.bin` | rows of neighbouring points, or some of them (`chunk`) |
 //! | `trials.bin` | the trials of a search, in place of chunks (`trials`) |
-//! | `*.damaged` | what was not as it had been written; computed again |
+//! | `*.damaged` | what was not as it had been written; kept |
 //! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
 //! | `lock`, `shard-<i>.lock` | who is at work (`lock`) |
 //!
 //! When every chunk is there they are joined into the one Parquet file (`merge`), and the folder
-//! goes. The store knows points, axis names and outcomes; it does not know the engine that makes
-//! them.
+//! goes, unless it holds what the run did not write (`own`) or has set aside. The store knows
+//! points, axis names and outcomes; it does not know the engine that makes them.
 
 mod chunk;
 mod differences;
@@ -22,6 +22,7 @@ mod error;
 mod lock;
 mod merge;
 mod open;
+mod own;
 mod plan_file;
 pub mod provenance;
 pub mod read;

@@ -4,6 +4,8 @@
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use tempfile::NamedTempFile;
 
@@ -13,12 +15,35 @@ use crate::{FileError, regular};
 const PREFIX: &str = ".sweep-";
 const SUFFIX: &str = ".tmp";
 
-/// How often a temporary file is made anew when somebody removes it before it is locked.
+/// How often a temporary file is made anew when somebody removes it before it is locked, or has
+/// taken its name.
 const ATTEMPTS: u32 = 5;
 
-/// Whether a name is that of a file in the making.
+/// Hexadecimal digits of either part of such a name: at 48 bits, two processes of a cluster do not
+/// come upon the same name, nor a user upon a name with its check.
+const DIGITS: usize = 12;
+
+/// Returns whether a name is that of a file in the making: one part of it is the check of the
+/// other, so that no file of a user's is taken for one.
 pub fn is_temporary(name: &str) -> bool {
-    name.starts_with(PREFIX) && name.ends_with(SUFFIX)
+    let parts = name.strip_prefix(PREFIX).and_then(|rest| rest.strip_suffix(SUFFIX));
+    let parts = parts.and_then(|parts| parts.split_once('-'));
+    parts.is_some_and(|(own, check)| own.len() == DIGITS && check == digits(own))
+}
+
+/// Makes a name for a file in the making that this process has not made before.
+pub fn temporary_name() -> String {
+    static MADE: AtomicU64 = AtomicU64::new(0);
+    let made = MADE.fetch_add(1, Ordering::Relaxed);
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+    let own = digits(&format!("{} {now} {made}", std::process::id()));
+    format!("{PREFIX}{own}-{}{SUFFIX}", digits(&own))
+}
+
+/// Computes the digits that stand for a text.
+fn digits(text: &str) -> String {
+    let hash = blake3::hash(text.as_bytes()).to_hex();
+    hash.chars().take(DIGITS).collect()
 }
 
 /// A file in the making inside `folder`; it disappears unless [`publish`]ed. It is locked, so that
@@ -27,16 +52,22 @@ pub fn is_temporary(name: &str) -> bool {
 /// # Errors
 /// [`FileError::Io`].
 pub fn begin(folder: &Path) -> Result<NamedTempFile, FileError> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(PREFIX).suffix(SUFFIX);
-    // Results are for sharing: the umask decides who reads them, not the private default of
-    // temporary files.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut attempt = 1;
     loop {
-        let file =
-            builder.tempfile_in(folder).map_err(FileError::io("create a file in", folder))?;
+        let name = temporary_name();
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(&name).rand_bytes(0);
+        // Results are for sharing: the umask decides who reads them, not the private default of
+        // temporary files.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let file = match builder.tempfile_in(folder) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && attempt < ATTEMPTS => {
+                attempt += 1;
+                continue;
+            }
+            made => made.map_err(FileError::io("create a file in", folder))?,
+        };
         let lost = match file.as_file().try_lock() {
             Ok(()) => !is_named(file.as_file(), file.path()),
             Err(TryLockError::WouldBlock) => true,
@@ -170,15 +201,36 @@ mod tests {
     }
 
     #[test]
+    fn names_of_files_in_the_making_are_known_by_their_check() {
+        let names = [temporary_name(), temporary_name()];
+        assert_ne!(names[0], names[1]);
+        for name in names {
+            assert!(is_temporary(&name), "{name}");
+            for at in PREFIX.len()..name.len() - SUFFIX.len() {
+                let mut other = name.clone().into_bytes();
+                other[at] ^= 1;
+                let other = String::from_utf8(other).unwrap();
+                assert!(!is_temporary(&other), "{other}");
+            }
+        }
+    }
+
+    #[test]
     fn leftovers_go_and_everything_else_stays() {
         let folder = tempfile::tempdir().unwrap();
-        let (left, held) = (folder.path().join(".sweep-1.tmp"), begin(folder.path()).unwrap());
+        let left = folder.path().join(temporary_name());
+        let held = begin(folder.path()).unwrap();
         fs::write(&left, "half a file").unwrap();
-        fs::write(folder.path().join("notes.tmp"), "mine").unwrap();
+        let others = ["notes.tmp", ".sweep-notes.tmp", ".sweep-Xb7Qz1.tmp", ".sweep-.tmp"];
+        for name in others {
+            fs::write(folder.path().join(name), "mine").unwrap();
+        }
         clear_leftovers(folder.path());
         assert!(!left.exists());
         assert!(held.path().exists(), "its process lives");
-        assert!(folder.path().join("notes.tmp").exists());
+        for name in others {
+            assert!(folder.path().join(name).exists(), "{name}");
+        }
         let path = held.path().to_owned();
         // As after a kill: the file stays, the lock goes.
         drop(held.keep().unwrap());

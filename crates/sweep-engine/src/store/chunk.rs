@@ -22,7 +22,8 @@ use std::sync::Arc;
 
 use super::{Column, Done, Layout, Row, StoreError};
 
-const MAGIC: [u8; 8] = *b"SWEEPCHK";
+/// What every chunk begins with.
+pub(super) const MAGIC: [u8; 8] = *b"SWEEPCHK";
 const FORMAT: u32 = 5;
 const HEADER: usize = 8 + 4 + 4 + 32 + 3 * 8;
 const HASH: usize = blake3::OUT_LEN;

@@ -104,11 +104,7 @@ pub(super) fn holders(folder: &Folder) -> Vec<Holder> {
 
 /// A lock holds nothing, or the name that [`sign`] writes. Anything else is somebody's file.
 fn refuse_strangers(file: &mut File, path: &Path) -> Result<(), StoreError> {
-    let mut name = Vec::new();
-    file.take(LONGEST_NAME + 1).read_to_end(&mut name).map_err(StoreError::io("read", path))?;
-    let process = name.split(|byte| *byte == b' ').next().unwrap_or_default();
-    let is_ours = name.len() as u64 <= LONGEST_NAME && process.iter().all(u8::is_ascii_digit);
-    if is_ours {
+    if holds_name(file).map_err(StoreError::io("read", path))? {
         return Ok(());
     }
     Err(FileError::Refused {
@@ -119,8 +115,24 @@ fn refuse_strangers(file: &mut File, path: &Path) -> Result<(), StoreError> {
     .into())
 }
 
+/// Returns whether a file holds nothing, or the name that [`sign`] writes and no more.
+fn holds_name(file: &mut File) -> io::Result<bool> {
+    let mut text = Vec::new();
+    file.take(LONGEST_NAME + 1).read_to_end(&mut text)?;
+    let name = std::str::from_utf8(&text).ok().and_then(|text| text.strip_suffix('\n'));
+    let is_name = name.and_then(|name| name.split_once(' ')).is_some_and(|(process, host)| {
+        process.parse::<u32>().is_ok() && !host.contains(char::is_control)
+    });
+    Ok(text.is_empty() || is_name)
+}
+
+/// Returns whether the file at a path is a lock of a shard.
+pub(super) fn is_signed(path: &Path) -> bool {
+    regular::open(path).and_then(|mut file| holds_name(&mut file)).unwrap_or(false)
+}
+
 fn take_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
-    let path = folder.file(format!("shard-{shard}.lock"));
+    let path = folder.file(shard_name(shard));
     let mut file =
         regular::open_or_create(&path).map_err(StoreError::io("open the lock", &path))?;
     refuse_strangers(&mut file, &path)?;
@@ -149,7 +161,13 @@ fn no_locks_here(error: &io::Error) -> bool {
 
 /// The shard that a lock is named after, if any.
 pub(super) fn shard_of_name(name: &str) -> Option<u64> {
-    name.strip_prefix("shard-")?.strip_suffix(".lock")?.parse().ok()
+    let shard = name.strip_prefix("shard-")?.strip_suffix(".lock")?.parse().ok()?;
+    (shard_name(shard) == name).then_some(shard)
+}
+
+/// The name of a shard's lock.
+fn shard_name(shard: u64) -> String {
+    format!("shard-{shard}.lock")
 }
 
 /// The holder named in a lock file, if someone holds it.
@@ -227,6 +245,13 @@ mod tests {
             fs::remove_file(&name).unwrap();
         }
         assert_eq!(fs::read_to_string(&mine).unwrap(), "my thesis");
+        for text in [" my thesis", "2026 pages", "2026", "12 a\nnotes\n", "12 a\n\n"] {
+            fs::write(folder.file(LOCK), text).unwrap();
+            let error = Lock::acquire(&folder, None).unwrap_err();
+            assert!(error.to_string().contains("is no lock of `sweep run`"), "{text}: {error}");
+            assert_eq!(fs::read_to_string(folder.file(LOCK)).unwrap(), text);
+        }
+        fs::write(folder.file(LOCK), "12 node-7.example\n").unwrap();
         Lock::acquire(&folder, Some(3)).unwrap();
     }
 

@@ -141,7 +141,7 @@ impl OpenRun {
         files::judge(&path, self.folder.account())?;
         atomic::write(&self.folder.path, &path, &sidecar)?;
         let mut notes = self.take_notes();
-        notes.extend(remove(&self.folder, self.lock));
+        notes.extend(remove(&self.folder, self.lock, &job.hash()));
         Ok(notes)
     }
 }

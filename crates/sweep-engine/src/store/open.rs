@@ -1,6 +1,7 @@
 //! Opening a run on an output: whose it is, what is there, what is missing.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsString;
 use std::fs;
 use std::io::{ErrorKind, Read as _};
 use std::ops::Range;
@@ -12,13 +13,14 @@ use serde_json::json;
 
 use super::chunk::{self, Damage, Place, Shape};
 use super::differences::PlanDifference;
-use super::lock::{self, Lock};
+use super::lock::Lock;
+use super::own;
 use super::plan_file::{Found, PlanFile, pretty, set_aside};
-use super::provenance::{self, Session};
+use super::provenance::Session;
 use super::read::{self, NameCounts, ResultFile, Tally};
 use super::schema::Done;
 use super::shard::{self, Shard, ShardLayout, ShardRequest};
-use super::{Folder, Job, PLAN, SHARDS, TRIALS, chunk_name, chunk_of_name, chunk_points};
+use super::{Folder, Job, PLAN, chunk_name, chunk_of_name, chunk_points};
 use crate::{Environment, StoreError};
 use sweep_files::panics::lock;
 use sweep_files::{FileError, ParquetFile, atomic, regular};
@@ -429,7 +431,7 @@ pub(super) fn claim<T>(
     let lock = Lock::acquire(folder, shard()?)?;
     let mut notes: Vec<String> = lock.note(folder).into_iter().collect();
     if fresh {
-        clear(folder)?;
+        own::clear(folder, &job.hash())?;
     }
     atomic::clear_leftovers(&folder.path);
     let ours = PlanFile::of(job);
@@ -443,7 +445,7 @@ pub(super) fn claim<T>(
         Found::Nothing => {
             if !fresh && let Some(finished) = finished()? {
                 // What dies between publishing its file and removing its folder leaves that.
-                remove(folder, lock);
+                remove(folder, lock, &job.hash());
                 return Ok(Opened::Finished(finished));
             }
             ours.freeze(folder)?;
@@ -471,39 +473,40 @@ pub(super) fn refuse_other_plan(
     })
 }
 
-/// Deletes what a run wrote, the plan first: without it a folder is no run. The lock and strangers'
-/// files stay.
-pub(super) fn clear(folder: &Folder) -> Result<(), StoreError> {
-    atomic::remove(&folder.file(PLAN))?;
-    for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
-        if name.to_str().is_some_and(is_ours) {
-            atomic::remove(&folder.path.join(name))?;
+/// Removes a folder that has served, of the run whose plan has this hash. What the run has not
+/// written, or has set aside, stays with the folder. The result does not depend on it, so a failure
+/// is only worth a note.
+pub(super) fn remove(folder: &Folder, lock: Lock, plan: &blake3::Hash) -> Option<String> {
+    let path = folder.path.display();
+    let removed = own::clear(folder, plan).and_then(|others| {
+        lock.retire()?;
+        if others.is_empty() {
+            let removed = regular::if_there(fs::remove_dir(&folder.path));
+            removed.map_err(StoreError::io("remove the folder", &folder.path))?;
         }
-    }
-    Ok(atomic::sync_folder(&folder.path)?)
-}
-
-/// Whether a run writes files of this name into its folder, the lock aside.
-fn is_ours(name: &str) -> bool {
-    let whole = name.strip_suffix(".damaged").unwrap_or(name);
-    [PLAN, SHARDS, TRIALS].contains(&whole)
-        || chunk_of_name(whole).is_some()
-        || lock::shard_of_name(name).is_some()
-        || provenance::is_session(name)
-        || atomic::is_temporary(name)
-}
-
-/// Removes a folder that has served; the result does not depend on it, so a failure is only worth a
-/// note.
-pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
-    let removed = clear(folder).and_then(|()| lock.retire()).and_then(|()| {
-        let removed = regular::if_there(fs::remove_dir(&folder.path));
-        removed.map_err(StoreError::io("remove the folder", &folder.path))
+        Ok(others)
     });
-    let error = removed.err()?.to_string();
-    Some(format!(
-        "the result is whole, but {} could not be removed; delete it by hand ({})",
-        folder.path.display(),
-        error.lines().next().unwrap_or_default()
-    ))
+    match removed {
+        Ok(others) if others.is_empty() => None,
+        Ok(others) => Some(format!(
+            "the result is whole; {path} stays, for it holds what this run did not write or has \
+             set aside: {}; delete it when you do not need that",
+            listed(&others)
+        )),
+        Err(error) => Some(format!(
+            "the result is whole, but {path} could not be removed; delete it by hand ({})",
+            error.to_string().lines().next().unwrap_or_default()
+        )),
+    }
+}
+
+/// The first of some names, and how many more there are.
+fn listed(names: &[OsString]) -> String {
+    const SHOWN: usize = 4;
+    let first: Vec<String> =
+        names.iter().take(SHOWN).map(|name| name.to_string_lossy().into_owned()).collect();
+    match names.len().saturating_sub(SHOWN) {
+        0 => first.join(", "),
+        more => format!("{} and {more} more", first.join(", ")),
+    }
 }

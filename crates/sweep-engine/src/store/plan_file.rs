@@ -1,7 +1,7 @@
 //! The frozen plan: what a run folder was begun with, and where another plan differs from it.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -121,11 +121,19 @@ fn comparable(file: &PlanFile) -> Value {
     value
 }
 
-/// Moves something unreadable out of the way, keeping it for whoever wants to look.
-pub(super) fn set_aside(path: &Path) -> Result<std::path::PathBuf, StoreError> {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".damaged");
-    let aside = std::path::PathBuf::from(name);
+/// Moves something unreadable out of the way, keeping it for whoever wants to look, under a name
+/// that nothing has yet: what was kept before stays too.
+pub(super) fn set_aside(path: &Path) -> Result<PathBuf, StoreError> {
+    let named = |number: u64| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(".damaged");
+        if number > 1 {
+            name.push(format!("-{number}"));
+        }
+        PathBuf::from(name)
+    };
+    let is_free = |aside: &PathBuf| fs::symlink_metadata(aside).is_err();
+    let aside = (1..=u64::MAX).map(named).find(is_free).unwrap_or_else(|| named(1));
     // Another shard of the same run may have set it aside first.
     let renamed = regular::if_there(fs::rename(path, &aside));
     renamed.map_err(StoreError::io("set aside", path)).map(|_| aside)

@@ -85,8 +85,8 @@ fn recorded(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     Ok(sessions)
 }
 
-/// Whether `OpenRun::record` writes files of this name.
-pub fn is_session(name: &str) -> bool {
+/// Returns whether `OpenRun::record` writes files of this name.
+pub(super) fn is_session(name: &str) -> bool {
     name.starts_with("session-") && name.ends_with(".json")
 }
 

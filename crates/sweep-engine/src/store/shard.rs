@@ -11,7 +11,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::plan_file::pretty;
+use super::plan_file::{pretty, set_aside};
 use super::{Folder, SHARDS, StoreError};
 use crate::Environment;
 use sweep_files::{atomic, regular};
@@ -117,6 +117,8 @@ impl ShardLayout {
         if let Some(frozen) = Self::read(folder)? {
             return Ok(frozen);
         }
+        // Not ours, or not as it was written.
+        set_aside(&path)?;
         atomic::write(&folder.path, &path, &text)?;
         Ok(self)
     }
