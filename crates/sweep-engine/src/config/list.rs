@@ -4,6 +4,7 @@
 //! numbers in it are bounded; each bound is checked before the memory is taken.
 
 mod csv;
+mod notation;
 mod parquet;
 
 use std::io::Read as _;

@@ -1,11 +1,13 @@
-//! Numbers under a line of names, separated by commas; or by semicolons or tabs, beside which a
-//! comma is a decimal point. Lines that are empty or begin with `#` do not count.
+//! Numbers under a line of names, separated by commas, semicolons or tabs. All numbers of a file
+//! have one decimal mark, which they show together. Lines that are empty or begin with `#` do not
+//! count.
 
 use std::ops::Range;
 
 use super::super::report::{Diagnostic, Report};
 use super::super::section::{counted, short};
 use super::super::source::{Located, Location, SourceId};
+use super::notation::{Evidence, Notation, Seen, Unclear};
 use super::{ID, ListColumn, Unreadable, fits};
 
 /// Columns, with NaN for what is refused; the byte at which each row's line begins, and what
@@ -19,30 +21,25 @@ pub(super) fn read(
     gaps: bool,
     report: &Report,
 ) -> Result<Read, Unreadable> {
-    let mut separator = ',';
-    let mut columns: Vec<ListColumn> = Vec::new();
+    let mut lines = lines(text);
+    let Some((_, line, offset)) = lines.next() else { return Ok((Vec::new(), Vec::new(), ',')) };
+    let separator = [';', '\t'].into_iter().find(|&other| line.contains(other)).unwrap_or(',');
+    fits(0, cells(line, separator, offset).count())?;
+    let column = |(name, at): (&str, _)| ListColumn {
+        name: Located { value: name.to_owned(), at: Location::new(source, at) },
+        values: Vec::new(),
+    };
+    let mut columns: Vec<ListColumn> = cells(line, separator, offset).map(column).collect();
     let mut starts: Vec<u32> = Vec::new();
-    let mut next = 0;
-    for line in text.split_inclusive('\n') {
-        let start = next;
-        next += line.len();
-        let (line, offset) = body(line, start);
-        if line.trim().is_empty() || line.trim_start().starts_with('#') {
-            continue;
+    let notation = match notation(lines.clone(), separator, &columns) {
+        Ok(notation) => notation,
+        Err(unclear) => {
+            report.push(refusal(&unclear, source));
+            return Ok((columns, starts, separator));
         }
-        if columns.is_empty() {
-            separator = [';', '\t'].into_iter().find(|&other| line.contains(other)).unwrap_or(',');
-        }
+    };
+    for (start, line, offset) in lines {
         let count = cells(line, separator, offset).count();
-        if columns.is_empty() {
-            fits(0, count)?;
-            let column = |(name, at): (&str, _)| ListColumn {
-                name: Located { value: name.to_owned(), at: Location::new(source, at) },
-                values: Vec::new(),
-            };
-            columns = cells(line, separator, offset).map(column).collect();
-            continue;
-        }
         if count != columns.len() {
             report.push_with(|_| {
                 let at = Location::new(source, offset..offset + line.len());
@@ -71,11 +68,7 @@ pub(super) fn read(
                 column.values.push(f64::NAN);
                 continue;
             }
-            let number = match separator {
-                ',' => cell.parse::<f64>(),
-                _ => cell.replace(',', ".").parse(),
-            };
-            if let Ok(value) = number
+            if let Some(value) = notation.number(cell)
                 && (gaps || !value.is_nan())
             {
                 column.values.push(value);
@@ -90,6 +83,73 @@ pub(super) fn read(
         }
     }
     Ok((columns, starts, separator))
+}
+
+/// Returns the notation of the numbers in these lines.
+fn notation<'t>(
+    lines: impl Iterator<Item = (usize, &'t str, usize)>,
+    separator: char,
+    columns: &[ListColumn],
+) -> Result<Notation, Unclear> {
+    let mut seen = Seen::default();
+    for (_, line, offset) in lines {
+        if separator == ',' && columns.len() > 1 && !line.contains('"') {
+            // Commas end cells, and so every mark within one is a decimal point.
+            continue;
+        }
+        if cells(line, separator, offset).count() != columns.len() {
+            continue;
+        }
+        for ((cell, at), column) in cells(line, separator, offset).zip(columns) {
+            if column.name.value != ID {
+                seen.note(cell, at);
+            }
+        }
+    }
+    seen.notation(separator == ',' && columns.len() > 1)
+}
+
+/// Returns the mistake of numbers that may be others.
+fn refusal(unclear: &Unclear, source: SourceId) -> Diagnostic {
+    let place = |evidence: &Evidence| Location::new(source, evidence.at.clone());
+    match unclear {
+        Unclear::TwoNotations(point, comma) => {
+            let title = format!(
+                "the file has decimal points, as in `{}`, and decimal commas, as in `{}`",
+                short(&point.cell),
+                short(&comma.cell)
+            );
+            Diagnostic::new(title)
+                .at(&place(comma), "expected one decimal mark in the whole file")
+                .at(&place(point), "the other one")
+                .help("write every number of the file with the same decimal mark")
+        }
+        Unclear::OneCell(evidence) => {
+            let [thousands, decimals] = evidence.readings();
+            let title = format!("`{}` may be {thousands} or {decimals}", short(&evidence.cell));
+            let help = format!(
+                "no other number of the file shows its decimal mark: write {thousands}, or \
+                 {decimals}0"
+            );
+            let expected = "expected a number without separators of thousands";
+            Diagnostic::new(title).at(&place(evidence), expected).help(help)
+        }
+    }
+}
+
+/// The lines that count: the byte at which each begins, and its text with the byte of that.
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str, usize)> + Clone {
+    let mut next = 0;
+    let lines = text.split_inclusive('\n').map(move |line| {
+        let start = next;
+        next += line.len();
+        let (line, offset) = body(line, start);
+        (start, line, offset)
+    });
+    lines.filter(|(_, line, _)| {
+        let line = line.trim();
+        !line.is_empty() && !line.starts_with('#')
+    })
 }
 
 /// The place of a cell in the line that begins at a byte of a text.

@@ -178,3 +178,33 @@ fn a_spreadsheet_may_have_semicolons_or_tabs_and_decimal_commas() {
     let said = report.into_diagnostics().to_string();
     assert!(said.contains("expected 2 numbers, separated by semicolons"), "{said}");
 }
+
+#[test]
+fn a_file_has_one_decimal_mark_and_a_thousand_is_no_decimal() {
+    let german = "unbalance_mass_kg;damping_n_s_per_m\n0,9;950,0\n0,9;1.050\n";
+    let american = "unbalance_mass_kg\tdamping_n_s_per_m\n0.9\t950\n0.9\t1,050\n";
+    let quoted = "unbalance_mass_kg,damping_n_s_per_m\n0.9,950\n0.9,\"1,050\"\n";
+    for text in [german, american, quoted] {
+        let (columns, ..) = csv_of(text).unwrap();
+        assert_eq!([&columns[0].values, &columns[1].values], [&[0.9, 0.9], &[950.0, 1050.0]]);
+    }
+    let commas = "a,b\n1.050,950\n\"1.100\",970\n";
+    assert_eq!(csv_of(commas).unwrap().0[0].values, [1.05, 1.1]);
+    let said = |text: &str| {
+        let report = Report::default();
+        let source = report.add("list.csv", String::new());
+        let read = csv::read(text, source, true, &report);
+        report.fill(source, text.to_owned());
+        assert!(read.unwrap().0.iter().all(|column| column.values.is_empty()));
+        report.into_diagnostics().to_string()
+    };
+    let mixed = said("a;b\n0,9;950\n0.9;1050\n");
+    for part in ["decimal points, as in `0.9`", "commas, as in `0,9`", ":2:1", ":3:1", "the same"] {
+        assert!(mixed.contains(part), "{part}: {mixed}");
+    }
+    let unclear = said("a;b\n2;950\n3;1.050\n");
+    for part in ["`1.050` may be 1050 or 1.050", ":3:3", "write 1050, or 1.0500"] {
+        assert!(unclear.contains(part), "{part}: {unclear}");
+    }
+    assert!(said("a\n950\n1.050\n").contains("may be 1050"));
+}

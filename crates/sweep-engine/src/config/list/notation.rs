@@ -1,0 +1,247 @@
+//! How a table of text writes its numbers: its decimal mark, and what separates groups of three
+//! digits. All cells decide together, because `1.050` alone may be 1.05 or 1050.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// The marks that separate decimals in some countries and thousands in others.
+const MARKS: [char; 2] = ['.', ','];
+
+/// Marks that separate thousands and never decimals: apostrophes, and spaces of several widths.
+const GROUP_MARKS: [char; 6] = ['\'', '\u{2019}', ' ', '\u{a0}', '\u{202f}', '\u{2009}'];
+
+/// Digits of a group.
+const GROUP: usize = 3;
+
+/// What a cell shows of the notation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Sign {
+    /// The cell has no mark, or is no number.
+    Nothing,
+    /// This mark separates its decimals.
+    Decimal(char),
+    /// This mark separates its thousands, and there are no decimals.
+    Thousands(char),
+    /// This mark separates either: a few digits before it, three behind.
+    Either(char),
+}
+
+/// A cell that shows something of the notation.
+#[derive(Clone, Debug)]
+pub(super) struct Evidence {
+    /// The cell's text.
+    pub(super) cell: String,
+    /// The cell's bytes.
+    pub(super) at: Range<usize>,
+}
+
+/// What the cells that were seen show: the first cell of each kind, for each mark.
+#[derive(Debug, Default)]
+pub(super) struct Seen {
+    decimal: [Option<Evidence>; 2],
+    thousands: [Option<Evidence>; 2],
+    either: [Option<Evidence>; 2],
+}
+
+/// Cells that are read only by one of two notations, and the file does not say by which.
+#[derive(Debug)]
+pub(super) enum Unclear {
+    /// One cell has decimals by the one mark, another cell has them by the other mark.
+    TwoNotations(Evidence, Evidence),
+    /// The cell may be either number, and no other cell tells.
+    OneCell(Evidence),
+}
+
+/// A decimal mark; the other mark separates thousands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Notation {
+    decimal: char,
+}
+
+impl Notation {
+    /// Decimal points.
+    pub(super) const POINT: Self = Self { decimal: '.' };
+
+    /// Decimal commas.
+    pub(super) const COMMA: Self = Self { decimal: ',' };
+
+    /// Returns the number that a cell holds, if it holds one.
+    pub(super) fn number(self, cell: &str) -> Option<f64> {
+        if self == Self::POINT && !cell.contains(',') && !cell.contains(GROUP_MARKS) {
+            return cell.parse().ok();
+        }
+        let cell = ungrouped(cell);
+        let thousands = other(self.decimal);
+        match sign(&cell) {
+            Sign::Nothing if cell.contains(MARKS) => None,
+            Sign::Decimal(mark) if mark != self.decimal => None,
+            Sign::Thousands(mark) if mark == self.decimal => None,
+            _ => cell.replace(thousands, "").replace(self.decimal, ".").parse().ok(),
+        }
+    }
+}
+
+impl Seen {
+    /// Notes what a cell shows.
+    pub(super) fn note(&mut self, cell: &str, at: Range<usize>) {
+        if !cell.contains(MARKS) {
+            return;
+        }
+        let text = ungrouped(cell);
+        let (kinds, mark) = match sign(&text) {
+            Sign::Nothing => return,
+            Sign::Decimal(mark) => (&mut self.decimal, mark),
+            Sign::Thousands(mark) => (&mut self.thousands, mark),
+            Sign::Either(mark) => (&mut self.either, mark),
+        };
+        kinds[place(mark)].get_or_insert_with(|| Evidence { cell: cell.to_owned(), at });
+    }
+
+    /// Returns the notation in which every cell is a number. `has_commas` says that commas separate
+    /// cells: such files have decimal points.
+    ///
+    /// # Errors
+    /// Cells that contradict each other, or one that may be two numbers.
+    pub(super) fn notation(self, has_commas: bool) -> Result<Notation, Unclear> {
+        let [decimal_point, decimal_comma] = self.decimal;
+        let [thousands_point, thousands_comma] = self.thousands;
+        let [either_point, either_comma] = self.either;
+        let points = decimal_point.or(thousands_comma);
+        let commas = decimal_comma.or(thousands_point);
+        match (points, commas) {
+            (Some(point), Some(comma)) => Err(Unclear::TwoNotations(point, comma)),
+            (Some(_), None) => Ok(Notation::POINT),
+            (None, Some(_)) => Ok(Notation::COMMA),
+            (None, None) => match (either_point, either_comma) {
+                (None, None) => Ok(Notation::POINT),
+                (Some(_), None) if has_commas => Ok(Notation::POINT),
+                (Some(one), _) | (None, Some(one)) => Err(Unclear::OneCell(one)),
+            },
+        }
+    }
+}
+
+impl Evidence {
+    /// Returns both numbers that a cell without other evidence may be: as thousands, as decimals.
+    pub(super) fn readings(&self) -> [String; 2] {
+        let text = ungrouped(&self.cell);
+        [text.replace(MARKS, ""), text.replace(MARKS, ".")]
+    }
+}
+
+/// Returns the place of a mark among [`MARKS`].
+fn place(mark: char) -> usize {
+    usize::from(mark == MARKS[1])
+}
+
+/// Returns the mark that separates thousands where this one separates decimals.
+fn other(mark: char) -> char {
+    MARKS[1 - place(mark)]
+}
+
+/// Returns what a cell shows of the notation.
+fn sign(cell: &str) -> Sign {
+    let number = cell.strip_prefix(['+', '-']).unwrap_or(cell);
+    let mantissa = number.split(['e', 'E']).next().unwrap_or_default();
+    let has_exponent = mantissa.len() < number.len();
+    let Some(last) = mantissa.rfind(MARKS) else { return Sign::Nothing };
+    let mark = if mantissa.as_bytes()[last] == b'.' { MARKS[0] } else { MARKS[1] };
+    let before = &mantissa[..last];
+    let after = &mantissa[last + 1..];
+    if !is_digits(after) || before.is_empty() && after.is_empty() {
+        return Sign::Nothing;
+    }
+    if before.contains(mark) {
+        let is_whole = !has_exponent && is_grouped(mantissa, mark);
+        return if is_whole { Sign::Thousands(mark) } else { Sign::Nothing };
+    }
+    if before.contains(other(mark)) {
+        let is_number = is_grouped(before, other(mark));
+        return if is_number { Sign::Decimal(mark) } else { Sign::Nothing };
+    }
+    match is_digits(before) {
+        false => Sign::Nothing,
+        true if !has_exponent && is_grouped(mantissa, mark) => Sign::Either(mark),
+        true => Sign::Decimal(mark),
+    }
+}
+
+/// Whether a text is digits, or nothing.
+fn is_digits(text: &str) -> bool {
+    text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Whether a mark separates groups of three digits: no number of thousands begins with 0.
+fn is_grouped(text: &str, mark: char) -> bool {
+    let mut groups = text.split(mark);
+    let first = groups.next().unwrap_or_default();
+    let is_first = (1..=GROUP).contains(&first.len()) && is_digits(first);
+    is_first
+        && !first.starts_with('0')
+        && groups.all(|group| group.len() == GROUP && is_digits(group))
+}
+
+/// Returns a cell without those marks that only separate thousands, where they do.
+fn ungrouped(cell: &str) -> Cow<'_, str> {
+    let Some(mark) = cell.chars().find(|mark| GROUP_MARKS.contains(mark)) else {
+        return Cow::Borrowed(cell);
+    };
+    let number = cell.strip_prefix(['+', '-']).unwrap_or(cell);
+    let whole = number.split(MARKS).next().unwrap_or_default();
+    match is_grouped(whole, mark) {
+        true => Cow::Owned(cell.replace(mark, "")),
+        false => Cow::Borrowed(cell),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(cells: &[&str], has_commas: bool) -> Result<Vec<Option<f64>>, Unclear> {
+        let mut seen = Seen::default();
+        cells.iter().for_each(|cell| seen.note(cell, 0..cell.len()));
+        let notation = seen.notation(has_commas)?;
+        Ok(cells.iter().map(|cell| notation.number(cell)).collect())
+    }
+
+    #[test]
+    fn a_file_decides_between_decimals_and_thousands() {
+        for (cells, numbers) in [
+            (["0.9", "950", "1,050"], [0.9, 950.0, 1050.0]),
+            (["0,9", "950,0", "1.050"], [0.9, 950.0, 1050.0]),
+            (["0.9", "1.050", "12.345"], [0.9, 1.05, 12.345]),
+            (["1,234,567", "1,050", "0.5"], [1_234_567.0, 1050.0, 0.5]),
+            (["1.234.567", "1.050", "-2"], [1_234_567.0, 1050.0, -2.0]),
+            (["1.234,5", "1.050", "0,125"], [1234.5, 1050.0, 0.125]),
+            (["-1'234.5", "1 050", "+3"], [-1234.5, 1050.0, 3.0]),
+            (["1\u{a0}234,5", "1e3", "2,5e-3"], [1234.5, 1e3, 2.5e-3]),
+            (["1.050e3", ".5", "7."], [1050.0, 0.5, 7.0]),
+            (["1234,567", "0,050", "1,050"], [1234.567, 0.05, 1.05]),
+        ] {
+            assert_eq!(read(&cells, false).unwrap(), numbers.map(Some), "{cells:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_clear_is_refused() {
+        for cells in [["0,9", "0.9"], ["0.9", "1.234.567"], ["1,234,567", "0,9"]] {
+            assert!(matches!(read(&cells, false), Err(Unclear::TwoNotations(..))), "{cells:?}");
+        }
+        for cells in [["950", "1,050"], ["1.050", "2"], ["1.050", "1,050"]] {
+            let Err(Unclear::OneCell(cell)) = read(&cells, false) else { panic!("{cells:?}") };
+            assert!(cells.contains(&cell.cell.as_str()));
+            assert_eq!(cell.readings(), ["1050", "1.050"]);
+        }
+        assert_eq!(read(&["1.050", "2"], true).unwrap(), [Some(1.05), Some(2.0)]);
+        assert!(matches!(read(&["1,050", "2"], true), Err(Unclear::OneCell(_))));
+    }
+
+    #[test]
+    fn what_is_no_number_shows_nothing() {
+        for cell in ["1.2.3", "12:30", "a,b", "1,05,000", "1,0,5", ".", "1,050.", "01,050.2"] {
+            let found = read(&["0.5", cell], false).unwrap();
+            assert!(found[1].is_none() || cell == "1,050.", "{cell}: {found:?}");
+        }
+    }
+}
