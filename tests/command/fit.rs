@@ -147,3 +147,46 @@ fn what_is_no_measurement_is_refused_with_its_place() {
     assert_eq!(gone.status.code(), Some(2), "{}", said(&gone));
     assert!(said(&gone).contains("cannot read gone.csv"), "{}", said(&gone));
 }
+
+#[test]
+fn a_clock_of_seconds_since_1970_begins_at_the_first_row() {
+    let home = bench();
+    let text = fs::read_to_string(home.path("run.csv")).expect("it is text");
+    let mut lines = text.lines();
+    let mut shifted = format!("{}\n", lines.next().expect("a line of names"));
+    for line in lines {
+        let (time, rest) = line.split_once(',').expect("a time");
+        let time: f64 = time.parse().expect("a number");
+        shifted += &format!("{:.3},{rest}\n", 1_700_000_000.0 + time);
+    }
+    fs::write(home.path("epoch.csv"), &shifted).expect("it is written");
+    let at = ["--draws", "0", "--json", "--at", "unbalance_mass_kg=0.35"];
+    let words = ["fit", "g.toml", "epoch.csv", "--free", "damping_n_s_per_m"];
+    let done = home.sweep(&[&words[..], &at].concat());
+    assert!(done.status.success(), "{}", said(&done));
+    let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
+    let value = found["parameters"][0]["value"].as_f64().expect("a number");
+    assert!((value / 180.0 - 1.0).abs() < 0.01, "{found}");
+    let note = found["notes"][0].as_str().expect("a note");
+    assert!(note.contains("its clock reads 1700000000 s at the first row"), "{note}");
+
+    fs::write(home.path("stray.csv"), text + "100000,9.81,0,0\n").expect("it is written");
+    let words = ["fit", "g.toml", "stray.csv", "--free", "damping_n_s_per_m"];
+    let done = home.sweep(&words);
+    assert_eq!(done.status.code(), Some(2), "{}", said(&done));
+    assert!(said(&done).contains("time jumps by 99997 s, from 3 to 100000 s"), "{}", said(&done));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_fifo_is_refused_and_not_waited_for() {
+    let home = Home::new(GRID);
+    let made = std::process::Command::new("mkfifo").arg(home.path("fifo")).status();
+    assert!(made.expect("mkfifo starts").success());
+    fs::write(home.path("machine.toml"), "machine = \"fifo\"\n").expect("it is written");
+    for words in [&["fit", "g.toml", "fifo"][..], &["check", "fifo"], &["check", "machine.toml"]] {
+        let done = home.under(&["timeout", "20"]).args(words).output().expect("timeout starts");
+        assert_eq!(done.status.code(), Some(2), "{words:?}: {}", said(&done));
+        assert!(said(&done).contains("a FIFO, not a regular file"), "{words:?}: {}", said(&done));
+    }
+}

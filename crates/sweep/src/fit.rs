@@ -35,6 +35,7 @@ use sweep_engine::{Design, Diagnostics, Distribution, Error, tell};
 use algebra::Symmetric;
 use journal::Journal;
 pub(crate) use measured::Measured;
+use measured::REST_SPEED_RATIO;
 use model::{Against, Case, Free, Problem, Summary};
 pub(crate) use report::Report;
 use search::{Descent, Ended, descend};
@@ -50,8 +51,6 @@ const SEED: u64 = 1;
 const STEP_EFFECT: f64 = 0.3;
 /// How often the step is halved.
 const HALVINGS: usize = 2;
-/// The greatest share of its greatest speed at which a record may begin.
-const MOST_AT_START: f64 = 0.1;
 
 /// What is asked of a fit.
 #[derive(Clone, Debug, clap::Args)]
@@ -128,9 +127,10 @@ pub(crate) struct Work<'a> {
 pub(crate) fn case(
     grid: &GridInput,
     constants: &[String],
-    measured: Measured,
+    mut measured: Measured,
 ) -> Result<Case, Error> {
     let (plan, _) = grid.load_point(&[&middle(grid, constants)?, constants].concat())?;
+    measured.count_from_first_row(plan.end_s);
     let smoothed = measured.speed_rpm.as_ref();
     let smoothed = smoothed.and_then(|speed| speed::smoothed(&measured.time_s, speed));
     Ok(Case { plan, measured, smoothed })
@@ -255,7 +255,7 @@ fn fitted<'a>(
     }
     for case in &problem.cases {
         let rpm = case.first_rpm().unwrap_or_default();
-        if rpm.abs() > MOST_AT_START * case.greatest_rpm() {
+        if rpm.abs() > REST_SPEED_RATIO * case.greatest_rpm() {
             let unknown = "where its unbalance was then is not known: expected the record from \
                            rest on";
             let said = format!("{} begins at {rpm:.0} rpm, and {unknown}", case.measured.name);

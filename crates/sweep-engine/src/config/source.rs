@@ -1,9 +1,10 @@
 //! Texts a user wrote (files and command-line arguments), and places in them.
 
-use std::fs::File;
 use std::io::{self, Read as _};
 use std::ops::Range;
 use std::path::Path;
+
+use sweep_files::regular;
 
 /// Longest file that is read. The longest spin table fits; a result file given by mistake does not.
 /// Two bytes may be a table of 1 kB while a file is read: a grid and its machine take up to 1 GB.
@@ -51,13 +52,13 @@ struct Source {
     text: String,
 }
 
-/// Reads a whole file of text, of bounded length. Pipes work as well as plain files.
+/// Reads a whole regular file of text, of bounded length. A FIFO might never be written to.
 ///
 /// # Errors
 /// What the system said, or why this is no file of ours.
 pub fn read(path: &Path) -> io::Result<String> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(LONGEST_BYTES + 1).read_to_end(&mut bytes)?;
+    regular::open(path)?.take(LONGEST_BYTES + 1).read_to_end(&mut bytes)?;
     let refused = |why: String| Err(io::Error::other(why));
     if bytes.starts_with(b"PAR1") {
         return refused("it is a Parquet file, not text: `sweep show` reads it".to_owned());

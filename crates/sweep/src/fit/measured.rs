@@ -14,6 +14,14 @@ const FEWEST: usize = 16;
 const TRACED: &str = "nonlinear_";
 /// Rows that are usually farther apart (s) show no turn of a drum.
 const SLOWEST_S: f64 = 0.2;
+/// The longest run that is simulated (s). Basis: a wash takes an hour, its longest spin a quarter
+/// of it; every evaluation of a fit integrates the whole run. Doubling it doubles the time that a
+/// stray row can cost before it is seen.
+pub(super) const LONGEST_RUN_S: f64 = 3600.0;
+/// The greatest part of its greatest speed at which a run counts as one from rest. Basis: forces of
+/// an unbalance grow with the square of the speed, so those at a tenth are a hundredth of the
+/// greatest. Doubling it lets a run begin with four times that.
+pub(super) const REST_SPEED_RATIO: f64 = 0.1;
 
 /// What a column measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,6 +108,9 @@ pub(crate) struct Measured {
     pub(crate) signals: Vec<Signal>,
     /// Rows before time 0, when the drum is at rest yet: they are left out.
     pub(crate) early: usize,
+    /// The reading of a clock that does not start with the run (s), at the first row. Times are
+    /// counted from it.
+    pub(crate) clock_start_s: Option<f64>,
     /// Stretches of time without any row (s).
     pub(crate) gaps_s: Vec<[f64; 2]>,
 }
@@ -125,6 +136,27 @@ impl Measured {
         let table = NumberTable::of_columns("table", columns, &report);
         let measured = judged("table".to_owned(), table, &report);
         report.finish(Some(measured))
+    }
+
+    /// Counts times from the first row if the clock does not start with the run, like one of
+    /// seconds since 1970 or since midnight: if the run would be too long to simulate, or if the
+    /// record begins at rest after the end of the grid's run and the wait would be longer than the
+    /// record.
+    pub(crate) fn count_from_first_row(&mut self, grid_end_s: f64) {
+        let Some((&first_s, &last_s)) = self.time_s.first().zip(self.time_s.last()) else { return };
+        let is_after_run = first_s > grid_end_s.max(last_s - first_s) && self.begins_at_rest();
+        if first_s > 0.0 && (last_s > LONGEST_RUN_S || is_after_run) {
+            self.time_s.iter_mut().for_each(|time_s| *time_s -= first_s);
+            self.gaps_s = gaps(&self.time_s);
+            self.clock_start_s = Some(first_s);
+        }
+    }
+
+    /// Whether the tachometer, if there is one, begins at rest.
+    fn begins_at_rest(&self) -> bool {
+        let speeds = || self.speed_rpm.iter().flatten().filter(|speed| !speed.is_nan());
+        let greatest_rpm = speeds().fold(0.0_f64, |greatest, speed| greatest.max(speed.abs()));
+        speeds().next().is_none_or(|first| first.abs() <= REST_SPEED_RATIO * greatest_rpm)
     }
 
     /// Samples of all columns together.
@@ -234,6 +266,36 @@ fn times(table: &NumberTable, column: usize, report: &Report) {
             Diagnostic::new(said).at(&table.place(sources, column, row), expected)
         });
     }
+    if seen == [false; 3] {
+        refuse_long_run(table, column, report);
+    }
+}
+
+/// Refuses a record of a longer run than is simulated, at the row after its longest gap.
+fn refuse_long_run(table: &NumberTable, column: usize, report: &Report) {
+    let values = &table.columns[column].values;
+    let begin = values.partition_point(|time_s| *time_s < 0.0);
+    let times = &values[begin..];
+    let Some((first_s, last_s)) = times.first().zip(times.last()) else { return };
+    let length_s = last_s - first_s;
+    if length_s <= LONGEST_RUN_S {
+        return;
+    }
+    let gap_s = |row: usize| times[row] - times[row - 1];
+    let Some(row) = (1..times.len()).max_by(|a, b| gap_s(*a).total_cmp(&gap_s(*b))) else { return };
+    // Two such records may be joined: half of the length is not needed for a gap to be the cause.
+    let title = if gap_s(row) > 0.1 * length_s {
+        format!("time jumps by {} s, from {} to {} s", gap_s(row), times[row - 1], times[row])
+    } else {
+        format!("the record is {length_s} s long: are these ms?")
+    };
+    report.push_with(|sources| {
+        let expected = format!(
+            "expected a run of at most {LONGEST_RUN_S} s: remove stray rows, cut the record, or \
+             convert its times to s"
+        );
+        Diagnostic::new(title).at(&table.place(sources, column, begin + row), expected)
+    });
 }
 
 /// The usual distance of two rows: the median.
@@ -303,6 +365,61 @@ mod tests {
         let rows: String = (0..20).map(|k| format!("{},{k}\n", 2 * k)).collect();
         let text = refused(&format!("time_s,tub_yaw\n{rows}"));
         assert_eq!(text.matches("rows are 2 s apart: are these ms?").count(), 1, "{text}");
+    }
+
+    #[test]
+    fn a_run_that_is_too_long_to_simulate_is_refused_at_its_longest_gap() {
+        let file = |times: &mut dyn Iterator<Item = f64>| -> String {
+            let rows = times.enumerate().map(|(k, time_s)| format!("{time_s},{k}\n"));
+            "time_s,tub_yaw\n".to_owned() + &rows.collect::<String>()
+        };
+        let steady = || (0..200).map(|k| 0.01 * f64::from(k));
+        let stray = file(&mut steady().chain([1e5]));
+        let text = refused(&stray);
+        assert!(text.contains("time jumps by 99998.01 s, from 1.99 to 100000 s"), "{text}");
+        assert!(text.contains(":202:1") && text.contains("at most 3600 s"), "{text}");
+        let gap = file(&mut steady().chain(steady().map(|time_s| 1e4 + time_s)));
+        assert!(refused(&gap).contains(":202:1"), "{}", refused(&gap));
+        let first = file(&mut [0.0].into_iter().chain(steady().map(|time_s| 1.7e9 + time_s)));
+        assert!(refused(&first).contains(":3:1"), "{}", refused(&first));
+        let milliseconds = file(&mut (0..40_000).map(|k| 0.1 * f64::from(k)));
+        let text = refused(&milliseconds);
+        assert!(text.contains("s long: are these ms?") && text.lines().count() < 12, "{text}");
+    }
+
+    #[test]
+    fn a_clock_that_does_not_start_with_the_run_counts_from_the_first_row() {
+        let record = |first_s: f64, first_rpm: f64, with_tachometer: bool| {
+            let column = |name: &str, value: &dyn Fn(f64) -> f64| {
+                (name.to_owned(), (0..100).map(|k| value(0.1 * f64::from(k))).collect::<Vec<f64>>())
+            };
+            let mut columns =
+                vec![column("time_s", &|t| first_s + t), column("tub_yaw", &|t| t.sin())];
+            if with_tachometer {
+                columns.push(column("speed_rpm", &|t| first_rpm + 20.0 * t));
+            }
+            let mut measured = Measured::of_columns(columns).unwrap();
+            measured.count_from_first_row(24.0);
+            measured
+        };
+        for (first_s, first_rpm, with_tachometer, is_clock) in [
+            (1.7e9, 0.0, true, true),
+            (1.7e9, 150.0, true, true),
+            (36_000.0, 0.0, false, true),
+            (60.0, 0.0, true, true),
+            (60.0, 0.0, false, true),
+            // A tachometer that turns already: the run began before, at time 0.
+            (60.0, 150.0, true, false),
+            // Within the grid's run.
+            (15.0, 0.0, false, false),
+            (0.5, 0.0, true, false),
+        ] {
+            let measured = record(first_s, first_rpm, with_tachometer);
+            let said = format!("{first_s} {first_rpm} {with_tachometer}");
+            assert_eq!(measured.clock_start_s, is_clock.then_some(first_s), "{said}");
+            assert!((measured.time_s[0] == 0.0) == is_clock, "{said}");
+            assert!((measured.time_s[99] - measured.time_s[0] - 9.9).abs() < 1e-6, "{said}");
+        }
     }
 
     #[test]

@@ -357,6 +357,13 @@ impl Found<'_> {
         }
         for case in &self.problem.cases {
             let measured = &case.measured;
+            if let Some(start_s) = measured.clock_start_s {
+                notes.push(format!(
+                    "{}: its clock reads {start_s} s at the first row; the run is taken to begin \
+                     there",
+                    measured.name
+                ));
+            }
             if measured.early > 0 {
                 let rows = counted(measured.early, "row");
                 notes.push(format!("{}: {rows} before time 0 left out", measured.name));
