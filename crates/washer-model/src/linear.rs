@@ -68,7 +68,7 @@ impl<T: Lane> Aside for Linearise<'_, T> {
         let zero = q[0].lit(0.0);
         let still = [zero; COORDINATES];
         let bodies = &machine.bodies;
-        let on_shaft = Deflection::new(q, &Tilt::of_tub(q), &Tilt::of_shaft(q)).load(bodies);
+        let on_shaft = Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load(bodies);
         let lifted = machine.constant();
 
         // The tub does not depend on the spin.
@@ -128,7 +128,7 @@ impl<T: Lane> Aside for Linearise<'_, T> {
             tub_stiffness,
             tub_damping,
             rotor_per_mass: bodies.rotor_per_mass,
-            rotor_axis: Tilt::of_shaft(q).axis_partials(),
+            rotor_axis: Tilt::shaft(q).axis_partials(),
         };
         (0..T::LANES)
             .map(|lane| LinearPoint {
@@ -147,7 +147,7 @@ pub(crate) fn tub_tangents<T: Lane>(
 ) -> [[[N<T>; 4]; 4]; 2] {
     let zero = q[0].lit(0.0);
     let still = [zero; COORDINATES];
-    let on_shaft = Deflection::new(q, &Tilt::of_tub(q), &Tilt::of_shaft(q)).load(&machine.bodies);
+    let on_shaft = Deflection::new(q, &Tilt::tub(q), &Tilt::shaft(q)).load(&machine.bodies);
     let on_tub = on_shaft.reaction().constant();
     let arm = tub(machine, q, &still).floating.arm;
     let lifted = machine.constant();

@@ -1,8 +1,8 @@
 //! The nonlinear equations of motion (section 4 of the model page; Eqs. 19 to 37 of the paper).
 //!
-//! Kane's equations, arranged as recursive Newton-Euler in the frames where vectors are sparse.
-//! Frame A is the shaft's before the spin (yaw q7, pitch q8), frame S spins with the shaft, frame E
-//! is S turned by q9, frame D by q10 more.
+//! Kane's equations are evaluated as recursive Newton-Euler in the frames in which vectors are
+//! sparse. Frame A is the shaft's before the spin (yaw q7, pitch q8). Frame S is A turned by the
+//! spin theta, frame E is S turned by q9, and frame D is E turned by q10.
 
 pub(crate) mod ahead;
 pub(crate) mod coefficients;
@@ -27,15 +27,15 @@ use crate::nonlinear::forces::{Deflection, flexure};
 use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
 use lane_ode::{Lane, N, Real};
 
-/// One half of the machine: its equations without the bearings, its inertia (lower triangle), and
-/// its axis.
+/// One half of the machine: the equations of motion, the lower triangle of the inertia, and the
+/// orientation.
 pub(crate) struct Half<T, const R: usize> {
     pub(crate) floating: Floating<T, R>,
     pub(crate) inertia: [[N<T>; R]; R],
     pub(crate) tilt: Tilt<T>,
 }
 
-/// Both halves, loaded by the bearings.
+/// Both halves of the machine.
 pub(crate) struct Halves<T> {
     pub(crate) tub: Half<T, 2>,
     pub(crate) rotor: Half<T, 4>,
@@ -58,7 +58,8 @@ pub(crate) fn halves<T: Lane>(
     Halves { tub, rotor }
 }
 
-/// Accelerations du/dt of all ten coordinates; `sag` at the same machine's equilibrium.
+/// Computes the accelerations du/dt of all ten coordinates. `sag` is that of the machine's
+/// equilibrium.
 #[inline(always)]
 pub(crate) fn accelerations<T: Lane>(
     machine: &Coefficients<T>,
@@ -68,16 +69,19 @@ pub(crate) fn accelerations<T: Lane>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
-    let (tub, rotor) = apart(machine, coupling, sag, spin, q, u);
+    let (tub, rotor) = uncoupled_halves(machine, coupling, sag, spin, q, u);
     let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
-    let (of_tub, of_rotor) = (Factors::new(tub.inertia), Factors::new(rotor.inertia));
-    let (tub, rotor) = ((&tub.floating, &of_tub), (&rotor.floating, &of_rotor));
+    let tub_factors = Factors::new(tub.inertia);
+    let rotor_factors = Factors::new(rotor.inertia);
+    let tub = (&tub.floating, &tub_factors);
+    let rotor = (&rotor.floating, &rotor_factors);
     coupling.accelerations(&machine.bodies, spin.speed, &deflection, &sag.bearings, tub, rotor)
 }
 
-/// What a unit of generalised force on each of the tub's coordinates adds to the accelerations.
+/// Computes the change of all accelerations per unit of generalised force on each of the tub's
+/// coordinates.
 #[inline(always)]
-pub(crate) fn by_load<T: Lane>(
+pub(crate) fn accelerations_per_load<T: Lane>(
     machine: &Coefficients<T>,
     coupling: &Coupling<T>,
     sag: &Sag<T>,
@@ -85,31 +89,36 @@ pub(crate) fn by_load<T: Lane>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; TUB.len()] {
-    let (tub, rotor) = apart(machine, coupling, sag, spin, q, u);
-    let (of_tub, of_rotor) = (Factors::new(tub.inertia), Factors::new(rotor.inertia));
+    let (tub, rotor) = uncoupled_halves(machine, coupling, sag, spin, q, u);
+    let tub_factors = Factors::new(tub.inertia);
+    let rotor_factors = Factors::new(rotor.inertia);
     let deflection = Deflection::new(q, &tub.tilt, &rotor.tilt);
-    let (b, speed, at_rest) = (&machine.bodies, spin.speed, &sag.bearings);
-    let (mut free, mut by_load) = ([speed; COORDINATES], [[speed; COORDINATES]; 4]);
-    // Without a load, then with each: a loop, for one copy of the code.
+    let b = &machine.bodies;
+    let speed = spin.speed;
+    let mut free = [speed; COORDINATES];
+    let mut per_load = [[speed; COORDINATES]; 4];
+    // The first turn of the loop is without a load, so that the code is compiled once.
     for loaded in 0..=TUB.len() {
         let mut floating = tub.floating;
         if loaded > 0 {
-            floating.push(loaded - 1);
+            floating.add_unit_force(loaded - 1);
         }
-        let (tub, rotor) = ((&floating, &of_tub), (&rotor.floating, &of_rotor));
-        let found = coupling.accelerations(b, speed, &deflection, at_rest, tub, rotor);
+        let tub = (&floating, &tub_factors);
+        let rotor = (&rotor.floating, &rotor_factors);
+        let found = coupling.accelerations(b, speed, &deflection, &sag.bearings, tub, rotor);
         if loaded == 0 {
             free = found;
         } else {
-            by_load[loaded - 1] = difference(found, &free);
+            per_load[loaded - 1] = difference(found, &free);
         }
     }
-    by_load
+    per_load
 }
 
-/// Both halves without the bearings' forces; the hinge has the mass that caps it, if it is capped.
+/// Computes both halves without the bearings' forces, and with the hinge's scaled mass where it is
+/// capped.
 #[inline(always)]
-fn apart<T: Lane>(
+fn uncoupled_halves<T: Lane>(
     machine: &Coefficients<T>,
     coupling: &Coupling<T>,
     sag: &Sag<T>,
@@ -130,7 +139,7 @@ fn apart<T: Lane>(
     (tub, rotor)
 }
 
-/// Body T about its mass centre.
+/// Computes the equations of body T about its mass centre.
 #[inline(always)]
 pub(crate) fn tub<T: Lane>(
     machine: &Coefficients<T>,
@@ -138,13 +147,14 @@ pub(crate) fn tub<T: Lane>(
     u: &[N<T>; COORDINATES],
 ) -> Half<T, 2> {
     let b = &machine.bodies;
-    let tilt = Tilt::of_tub(q);
+    let tilt = Tilt::tub(q);
     let motion = tilt.motion(u[TUB_YAW], u[TUB_PITCH]);
     let [x, y, z] = motion.rate;
-    let (midpoint, velocity) = ([q[TUB_Y], q[TUB_Z]], [u[TUB_Y], u[TUB_Z]]);
-    let tub = TubMotion::turning(tilt, motion.rate, midpoint, velocity);
-    let (force, moment) = machine.elements.on_tub(&tub);
-    // y and z, cabinet axes.
+    let midpoint = [q[TUB_Y], q[TUB_Z]];
+    let velocity = [u[TUB_Y], u[TUB_Z]];
+    let tub = TubMotion::from_rate(tilt, motion.rate, midpoint, velocity);
+    let (force, moment) = machine.elements.load_on_tub(&tub);
+    // The y and z components in cabinet axes.
     let force = [
         tilt.axis_c[1] * force[0] + tilt.second_c[1] * force[1],
         tilt.axis_c[2] * force[0] + tilt.second_c[2] * force[1] + tilt.cos_yaw * force[2],
@@ -174,7 +184,8 @@ pub(crate) fn tub<T: Lane>(
         moment[2] - force[0] * arm_pitch[1] - force[1] * arm_pitch[2] - axial * arm_pitch[0];
 
     let axial_yaw = (b.tub_mass * arm_yaw_x).v();
-    let (s, c) = (tilt.sin_pitch, tilt.cos_pitch);
+    let s = tilt.sin_pitch;
+    let c = tilt.cos_pitch;
     let zero = s.lit(0.0);
     Half {
         floating: Floating {
@@ -197,11 +208,11 @@ pub(crate) fn tub<T: Lane>(
     }
 }
 
-/// Bodies S and D about their common mass centre.
+/// Computes the equations of bodies S and D about their common mass centre.
 ///
-/// The vector between their centres, l s1 + rho, moves as if the reduced mass were at its end. Its
-/// part in rho is in the drum's inertia about the hinge (`Bodies::drum_i11` ...); the rest appears
-/// below with `mu_l` and `mu_l2`.
+/// The vector l s1 + rho between the centres of S and D moves like the arm of a point of the
+/// reduced mass mu. The terms in mu rho^2 are part of the drum's inertia about the hinge
+/// (`Bodies::drum_i11` ...); those in mu l rho and mu l^2 appear below with `mu_l` and `mu_l2`.
 #[inline(always)]
 pub(crate) fn rotor<T: Real>(
     b: &Bodies<T>,
@@ -209,9 +220,10 @@ pub(crate) fn rotor<T: Real>(
     q: &[N<T>; COORDINATES],
     u: &[N<T>; COORDINATES],
 ) -> Half<T, 4> {
-    let tilt = Tilt::of_shaft(q);
+    let tilt = Tilt::shaft(q);
     let motion = tilt.motion(u[SHAFT_YAW], u[SHAFT_PITCH]);
-    let (u9, u10) = (u[HINGE_YAW], u[HINGE_PITCH]);
+    let u9 = u[HINGE_YAW];
+    let u10 = u[HINGE_PITCH];
     let (s9, c9) = q[HINGE_YAW].sin_cos();
     let (s10, c10) = q[HINGE_PITCH].sin_cos();
 
@@ -323,7 +335,7 @@ pub(crate) fn rotor<T: Real>(
     }
 }
 
-/// The drum's inertia about the hinge in E: its 1-3 and 2-3 entries are zero.
+/// The drum's inertia K about the hinge in E. Its 1-3 and 2-3 entries are zero.
 struct DrumInertia<T> {
     k11: N<T>,
     k22: N<T>,
@@ -334,8 +346,9 @@ struct DrumInertia<T> {
 #[inline(always)]
 fn drum_inertia_in_e<T: Real>(b: &Bodies<T>, s10: N<T>, c10: N<T>) -> DrumInertia<T> {
     let difference = b.drum_i11 - b.drum_i22;
-    let (ss, cs) = ((s10 * s10).v(), (c10 * s10).v());
-    // k11 = c^2 i11 - 2 c s i12 + s^2 i22, and k22 so that the trace stays.
+    let ss = (s10 * s10).v();
+    let cs = (c10 * s10).v();
+    // k11 = c^2 i11 - 2 c s i12 + s^2 i22; k22 follows from the trace.
     let turned = difference * ss + 2.0 * (cs * b.drum_i12).v();
     DrumInertia {
         k11: b.drum_i11 - turned,
@@ -346,7 +359,7 @@ fn drum_inertia_in_e<T: Real>(b: &Bodies<T>, s10: N<T>, c10: N<T>) -> DrumInerti
 }
 
 impl<T: Real> DrumInertia<T> {
-    /// K alpha + omega x K omega.
+    /// Returns K alpha + omega x K omega.
     #[inline(always)]
     fn moment(&self, omega: &Vec3<T>, alpha: &Vec3<T>) -> Vec3<T> {
         let [x, y, z] = *omega;
@@ -359,8 +372,8 @@ impl<T: Real> DrumInertia<T> {
     }
 }
 
-/// Inertia of the rotor about its mass centre over (q7, q8, q9, q10), without the axial motion's
-/// share; lower triangle.
+/// Computes the lower triangle of the rotor's inertia about its mass centre over (q7, q8, q9, q10),
+/// without the part of the axial motion.
 #[inline(always)]
 fn rotor_inertia<T: Real>(
     b: &Bodies<T>,
@@ -379,7 +392,7 @@ fn rotor_inertia<T: Real>(
     let l33 = k.k33 - ss * difference;
     let mu_rho = scaled(b.mu_l, *rho_s);
 
-    // Whole rotor in S, then its rows turned into A.
+    // The whole rotor in S, then its rows in A.
     let across = 2.0 * mu_rho[0] + b.mu_l2;
     let j11 = l11 + b.shaft_i11;
     let j22 = k.k22 + b.shaft_i22 + across;
@@ -393,13 +406,14 @@ fn rotor_inertia<T: Real>(
     let j33_a = half_sum - turned;
     let j23_a = half_difference * spin.sin_2 + l23 * spin.cos_2;
 
-    // Angular momentum for unit speeds of q9 and q10.
+    // The angular momentum per unit speed of q9 and q10.
     let h9_y = k.k22 + mu_rho[0];
     let h9 = out_of_spin(spin, &[l12, h9_y, l23]);
     let rho_1 = c9 * mu_rho[0] - s9 * mu_rho[2];
     let h10 = out_of_spin(spin, &[(k.k33 * s9).v(), -(s9 * mu_rho[1]).v(), k.k33 * c9 + rho_1]);
 
-    let (s8, c8) = (tilt.sin_pitch, tilt.cos_pitch);
+    let s8 = tilt.sin_pitch;
+    let c8 = tilt.cos_pitch;
     let zero = s9.lit(0.0);
     [
         [s8 * (s8 * j11 + 2.0 * (c8 * j12).v()) + (c8 * c8) * j22_a, zero, zero, zero],
@@ -409,7 +423,7 @@ fn rotor_inertia<T: Real>(
     ]
 }
 
-/// Second derivative of a vector (rho_1, rho_2, 0) fixed in a body.
+/// Computes the second derivative of a vector (rho_1, rho_2, 0) fixed in a body.
 #[inline(always)]
 fn second_derivative<T: Real>(rho: &[N<T>; 2], omega: &Vec3<T>, alpha: &Vec3<T>) -> Vec3<T> {
     let [x, y, z] = *omega;
@@ -422,25 +436,25 @@ fn second_derivative<T: Real>(rho: &[N<T>; 2], omega: &Vec3<T>, alpha: &Vec3<T>)
     ]
 }
 
-/// From A to S.
+/// Transforms a vector from A to S.
 #[inline(always)]
 pub(crate) fn into_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
     [v[0], spin.cos * v[1] + spin.sin * v[2], spin.cos * v[2] - spin.sin * v[1]]
 }
 
-/// From S to A.
+/// Transforms a vector from S to A.
 #[inline(always)]
 pub(crate) fn out_of_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
     [v[0], spin.cos * v[1] - spin.sin * v[2], spin.sin * v[1] + spin.cos * v[2]]
 }
 
-/// From S to E.
+/// Transforms a vector from S to E.
 #[inline(always)]
 fn into_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
     [c9 * v[0] - s9 * v[2], v[1], s9 * v[0] + c9 * v[2]]
 }
 
-/// From E to S.
+/// Transforms a vector from E to S.
 #[inline(always)]
 pub(crate) fn out_of_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
     [c9 * v[0] + s9 * v[2], v[1], c9 * v[2] - s9 * v[0]]

@@ -12,7 +12,7 @@ use crate::machine::feet::Feet;
 use crate::machine::spin::{SpinState, SpinStretch, stretch_at};
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
-use crate::nonlinear::outputs::{Axes, Moving};
+use crate::nonlinear::outputs::{Axes, MovingCoordinates};
 use crate::point::ringing::{Decaying, Jump, Ringing, jumps};
 use crate::{COORDINATES, FrictionSpeed, Machine, Matrices, ModelKind, Spin, Swing};
 use core::iter::zip;
@@ -194,7 +194,7 @@ impl Point {
         for taken in &mut point.friction_speeds {
             if let Some(speed_m_per_s) = other(taken) {
                 taken.speed_m_per_s = speed_m_per_s;
-                point.machine.elements.take_friction_at(taken.damper, speed_m_per_s);
+                point.machine.elements.linearise_friction(taken.damper, speed_m_per_s);
             }
         }
         let tangents =
@@ -245,14 +245,14 @@ impl Kernel for Prepare<'_> {
             let machines: Vec<_> =
                 group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
             let lanes = in_lanes(zero, &machines);
-            let (q, found) = zero.0.aside(equilibrium::Find { zero, machine: &lanes });
+            let (q, found) = zero.0.aside(equilibrium::SolveEquilibrium { zero, machine: &lanes });
             let steepest = steepest(&machines, &q);
             let viscous: Vec<_> =
                 machines.iter().map(Coefficients::with_viscous_friction).collect();
             let linear = zero.0.aside(Linearise { machine: &in_lanes(zero, &viscous), q: &q });
             let linear_outputs = zero.0.aside(LineariseOutputs { bodies: &lanes.bodies, q: &q });
             let still = [zero; COORDINATES];
-            let at_rest = Moving { q, u: still, a: still };
+            let at_rest = MovingCoordinates { q, u: still, a: still };
             let unbalance_up = SpinState::new((zero, zero.lit(1.0)), zero, zero);
             let rest = Axes::new(&unbalance_up, &at_rest).channels(&lanes.bodies, &at_rest);
             let models = zip(zip(machines, linear), zip(linear_outputs, steepest));

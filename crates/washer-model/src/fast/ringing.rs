@@ -10,7 +10,7 @@ use crate::fast::{SUSPENSION_MODES, rounded_down};
 use crate::linear::outputs::LinearMotion;
 use crate::machine::spin::SpinState;
 use crate::modes::motions;
-use crate::nonlinear::outputs::Moving;
+use crate::nonlinear::outputs::MovingCoordinates;
 use crate::point::ringing::{Decaying, Jump};
 use crate::{COORDINATES, Channel, Mode, NoModes, Point, Swing, modes};
 use lane_ode::N;
@@ -100,7 +100,7 @@ fn swing(point: &Point, theta_rad: f64, mode: &Mode, load: &[f64; COORDINATES]) 
     let spin = SpinState::new(N(theta_rad).sin_cos(), N(0.0), N(0.0));
     let still = [N(0.0); COORDINATES];
     let outputs = |q: [N<f64>; COORDINATES]| {
-        let of = LinearMotion::new(&spin, &Moving { q, u: still, a: still });
+        let of = LinearMotion::new(&spin, &MovingCoordinates { q, u: still, a: still });
         let outputs = &point.linear_outputs;
         (outputs.channels(&of), outputs.radial(&of))
     };

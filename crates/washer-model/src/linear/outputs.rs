@@ -11,7 +11,7 @@ use crate::lanes::{Constant as _, InLanes as _, lane_struct};
 use crate::linear::sparse::sparse_sums;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
-use crate::nonlinear::outputs::{Axes, Moving, RADIAL};
+use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
 use core::array::from_fn;
 use lane_ode::{Aside, Lane, N, Real, Sample};
 
@@ -155,7 +155,7 @@ pub(crate) struct LinearMotion<T> {
 impl<T: Real> LinearMotion<T> {
     /// Deviations from equilibrium at an instant.
     #[inline(always)]
-    pub(crate) fn new(spin: &SpinState<T>, motion: &Moving<T>) -> Self {
+    pub(crate) fn new(spin: &SpinState<T>, motion: &MovingCoordinates<T>) -> Self {
         let zero = spin.sin.lit(0.0);
         let (n, nn, acceleration) = (spin.speed, (spin.speed * spin.speed).v(), spin.acceleration);
         let mut coordinates = [[zero; 3]; COORDINATES];
@@ -223,7 +223,7 @@ impl<T: Lane> Aside for LineariseOutputs<'_, T> {
         for (k, (cos, sin)) in SAMPLES.into_iter().enumerate() {
             let spin = SpinState::new((zero.lit(sin), zero.lit(cos)), zero, zero).constant();
             for j in 0..COORDINATES {
-                let motion = Moving { q: seeded(q, j, 1.0), u: still, a: still };
+                let motion = MovingCoordinates { q: seeded(q, j, 1.0), u: still, a: still };
                 let axes = Axes::new(&spin, &motion);
                 let (channels, radial) =
                     (axes.channels(&lifted, &motion), axes.radial(&lifted, &motion));

@@ -27,7 +27,7 @@ pub struct Parameter {
 }
 
 /// Farther than this (m) is no place on a machine, and no motion of one.
-pub(crate) const FARTHEST_M: f64 = 10.0;
+pub(crate) const MAX_COORDINATE_M: f64 = 10.0;
 
 /// What a parameter writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -236,8 +236,8 @@ impl Parameter {
     /// told.
     pub fn range(&self) -> Range {
         match (self.row.unit, self.row.range) {
-            ("m", Range::Any) => Range::Within(-FARTHEST_M, FARTHEST_M),
-            ("m", Range::NonNegative) => Range::Within(0.0, FARTHEST_M),
+            ("m", Range::Any) => Range::Within(-MAX_COORDINATE_M, MAX_COORDINATE_M),
+            ("m", Range::NonNegative) => Range::Within(0.0, MAX_COORDINATE_M),
             (_, range) => range,
         }
     }

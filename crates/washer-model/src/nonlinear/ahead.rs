@@ -1,22 +1,22 @@
-//! The equations with the springs of bearings and hinge at a state ahead: what the additive method
-//! takes implicitly.
+//! The equations with the springs of bearings and hinge at the end of a stage, for the implicit
+//! part of the additive Runge-Kutta method.
 //!
-//! With k = (u, a) for the derivative, the state ahead has u = r_u + g a and q = r_q + g r_u + g^2
-//! a. The springs, linear about a state nearby, leave J + g^2 K_D for the hinge's inertia and one
-//! system of four for the bearings' load: those of section 4.3 of the model page, with 1 / g in
-//! place of both caps.
+//! A stage solves k = f(q, u) + f_springs(r + g k). Its derivative k = (u, a) gives u = r_u + g a
+//! and q = r_q + g r_u + g^2 a there. The springs are linearised about a nearby state. This leaves
+//! J + g^2 K_D for the hinge's inertia and one 4x4 system for the bearings' load, which is that of
+//! section 4.3 of the model page with 1 / g for both caps.
 
 use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, STATES};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
-use crate::nonlinear::coupling::{mass_scaled_load, under_load};
+use crate::nonlinear::coupling::{accelerations_under_load, mass_scaled_load};
 use crate::nonlinear::floating::Factors;
 use crate::nonlinear::forces::Deflection;
 use crate::nonlinear::{rotor, tub};
 use lane_ode::{Lane, N};
 
-/// Derivative k of a state: with all forces and inertia at coordinates `q` (m, rad) and speeds `u`,
-/// but for the springs, which are at r + g k, for `g` (s).
+/// Computes the stage's derivative k. The springs are evaluated at r + g k with `g` in s, all other
+/// forces and the inertia at coordinates `q` (m, rad) and speeds `u`.
 #[inline(always)]
 pub(crate) fn derivative_ahead<T: Lane>(
     machine: &Coefficients<T>,
@@ -27,8 +27,9 @@ pub(crate) fn derivative_ahead<T: Lane>(
     g: N<T>,
 ) -> [N<T>; STATES] {
     let b = &machine.bodies;
-    let (mut tub, mut rotor) = (tub(machine, q, u), rotor(b, spin, q, u));
-    // How far ahead of `q`, but for g^2 a.
+    let mut tub = tub(machine, q, u);
+    let mut rotor = rotor(b, spin, q, u);
+    // The displacement from `q`, without g^2 a.
     let mut ahead = *q;
     for i in 0..COORDINATES {
         ahead[i] = r[i] + g * r[COORDINATES + i] - q[i];
@@ -44,17 +45,20 @@ pub(crate) fn derivative_ahead<T: Lane>(
         deflection.offset[i] += further.offset[i];
         deflection.tilt[i] += further.tilt[i];
     }
-    // The deflection is linear in the accelerations alone.
+    // The deflection depends on the accelerations only, not on terms of constant speed.
     let zero = g.lit(0.0);
     tub.floating.axis_drift = [zero; 2];
     rotor.floating.axis_drift = [zero; 2];
     let none = Deflection { offset: [zero; 2], tilt: [zero; 2] };
-    let (of_tub, of_rotor) = (Factors::new(tub.inertia), Factors::new(rotor.inertia));
-    let (tub, rotor) = (&tub.floating, &rotor.floating);
-    let (by_tub, by_rotor) = (tub.response(&of_tub), rotor.response(&of_rotor));
+    let tub_factors = Factors::new(tub.inertia);
+    let rotor_factors = Factors::new(rotor.inertia);
+    let tub = &tub.floating;
+    let rotor = &rotor.floating;
+    let tub_response = tub.response(&tub_factors);
+    let rotor_response = rotor.response(&rotor_factors);
     let squares = (g_squared.recip(), zero);
-    let on_shaft = mass_scaled_load(b, squares, &deflection, &none, &by_tub, &by_rotor);
-    let a = under_load((tub, &of_tub), (rotor, &of_rotor), &on_shaft);
+    let on_shaft = mass_scaled_load(b, squares, &deflection, &none, &tub_response, &rotor_response);
+    let a = accelerations_under_load((tub, &tub_factors), (rotor, &rotor_factors), &on_shaft);
     let mut k = *r;
     for i in 0..COORDINATES {
         k[i] = r[COORDINATES + i] + g * a[i];

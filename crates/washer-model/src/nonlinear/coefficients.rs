@@ -1,4 +1,4 @@
-//! The machine's numbers as the equations use them, one set per lane.
+//! The coefficients of the equations, one machine per lane.
 
 use crate::Machine;
 use crate::lanes::lane_struct;
@@ -6,7 +6,7 @@ use crate::nonlinear::elements::Elements;
 use lane_ode::N;
 
 lane_struct! {
-    /// A whole machine.
+    /// The coefficients of a machine.
     #[derive(Clone, Debug)]
     Coefficients { bodies: Bodies<T>, elements: Elements<T> }
 }
@@ -16,45 +16,45 @@ impl Coefficients<f64> {
         Self { bodies: Bodies::new(machine), elements: Elements::new(machine) }
     }
 
-    /// The machine of which the linear model is the first order.
+    /// Returns the machine that the linear model linearises, with viscous damping for friction.
     pub(crate) fn with_viscous_friction(&self) -> Self {
         Self { bodies: self.bodies, elements: self.elements.with_viscous_friction() }
     }
 }
 
 lane_struct! {
-    /// Bodies, flexure and bearings (model page, sections 1 to 3).
+    /// The coefficients of bodies, flexure and bearings (model page, sections 1 to 3).
     #[derive(Clone, Copy, Debug)]
     Bodies {
         gravity,
         tub_mass, tub_per_mass, tub_centre, tub_i11, tub_i22, tub_i33,
         shaft_i11, shaft_i22, shaft_i33,
-        /// Mass of shaft, drum and unbalance.
+        /// The mass of shaft, drum and unbalance.
         rotor_mass, rotor_per_mass,
-        /// Of the whole mass.
+        /// The shares of tub and rotor in the total mass.
         tub_share, rotor_share,
-        /// The rotor's centre from the bearing midpoint is `along_shaft * s1 + drum_share * rho`.
+        /// The rotor's mass centre is at `along_shaft * s1 + drum_share * rho` from P_S.
         along_shaft, drum_share,
-        /// rho, from the hinge P_D to the drum's mass centre, in drum axes: (L_DM, e, 0).
+        /// The vector rho from the hinge P_D to the drum's mass centre, in drum axes: (L_DM, e, 0).
         rho_1, rho_2,
-        /// Reduced mass of shaft and drum times the distance from the shaft's centre to the hinge.
+        /// The reduced mass mu of shaft and drum times the distance l from the shaft's mass centre
+        /// to the hinge.
         mu_l,
-        /// Likewise times the distance squared.
+        /// mu l^2.
         mu_l2,
-        /// The drum's inertia about the hinge, of its own and of the reduced mass at rho; in drum
-        /// axes.
+        /// The inertia of the drum and of the reduced mass at rho about the hinge, in drum axes.
         drum_i11, drum_i22, drum_i33, drum_i12,
         flexure_stiffness,
         bearing_front, bearing_rear, front_stiffness, rear_stiffness,
-        /// The bearings' stiffness over (offset, tilt) of their midpoint, inverted.
+        /// The inverse of the bearings' stiffness matrix over (offset, tilt) of their midpoint.
         bearing_force_compliance, bearing_mixed_compliance, bearing_moment_compliance,
         tub_front, drum_hinge, hinge_to_front, clearance,
     }
 }
 
 impl<T: Copy> Bodies<T> {
-    /// The bearings' compliance in one direction: offset by force, offset by moment, tilt by
-    /// moment.
+    /// Returns the bearings' compliances in one direction: offset by force, offset by moment, tilt
+    /// by moment.
     #[inline(always)]
     pub(crate) fn bearing_compliance(&self) -> [N<T>; 3] {
         [
@@ -68,34 +68,37 @@ impl<T: Copy> Bodies<T> {
 impl Bodies<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
         let Machine { tub, shaft, drum, flexure, bearings, .. } = machine;
-        // Section 2: the drum of Tables 2 and 3 as a function of its unbalances, one after the
-        // other.
+        // Section 2: the drum of Tables 2 and 3 with its unbalances, added one by one.
         let mut m_d = drum.mass_kg;
         let [mut x_d, mut e] = [drum.centre_x_m, 0.0];
         let [mut i11, mut i22, mut i33] = drum.inertia_kg_m2;
         let mut i12 = 0.0;
         for unbalance in machine.unbalances() {
             let m_u = unbalance.mass_kg;
-            let whole = m_d + m_u;
-            let (dx, dr) = (unbalance.x_m - x_d, unbalance.radius_m - e);
-            let reduced = m_u * m_d / whole;
+            let total = m_d + m_u;
+            let dx = unbalance.x_m - x_d;
+            let dr = unbalance.radius_m - e;
+            let reduced = m_u * m_d / total;
             i11 += reduced * dr * dr;
             i22 += reduced * dx * dx;
             i33 += reduced * (dr * dr + dx * dx);
             i12 -= reduced * dx * dr;
-            x_d += m_u / whole * dx;
-            e += m_u / whole * dr;
-            m_d = whole;
+            x_d += m_u / total * dx;
+            e += m_u / total * dr;
+            m_d = total;
         }
-        let (rho_1, rho_2) = (x_d - drum.hinge_x_m, e);
-        // Shaft and drum about their common centre: the reduced mass moves with the line between
-        // their centres.
+        let rho_1 = x_d - drum.hinge_x_m;
+        let rho_2 = e;
+        // Shaft and drum about their common mass centre: the vector between their centres moves
+        // with the reduced mass.
         let m_s = shaft.mass_kg;
         let rotor_mass = m_s + m_d;
         let mu = m_s * m_d / rotor_mass;
         let l = drum.hinge_x_m - shaft.centre_x_m;
-        let (front, rear) = (bearings.front_x_m, bearings.rear_x_m);
-        let (k_f, k_r) = (bearings.front_stiffness_n_per_m, bearings.rear_stiffness_n_per_m);
+        let front = bearings.front_x_m;
+        let rear = bearings.rear_x_m;
+        let k_f = bearings.front_stiffness_n_per_m;
+        let k_r = bearings.rear_stiffness_n_per_m;
         let span = front - rear;
         Self {
             gravity: N(machine.gravity_m_per_s2),

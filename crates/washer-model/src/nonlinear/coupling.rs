@@ -1,7 +1,7 @@
-//! How the bearings couple tub and rotor: as springs, or with the mass that caps their modes; and
-//! the mass that caps the hinge's.
+//! The coupling of tub and rotor by the bearings: springs, or springs with scaled mass, which caps
+//! their modes. The hinge's modes are capped in the same way.
 //!
-//! Section 4.3 of the model page holds the laws, their derivation and what they leave exact.
+//! Section 4.3 of the model page derives the force laws and lists the quantities that stay exact.
 
 use crate::coordinates::{
     COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH,
@@ -10,13 +10,13 @@ use crate::coordinates::{
 use crate::lanes::{InLanes as _, lane_struct};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
-use crate::nonlinear::floating::{Factors, Floating, Response};
+use crate::nonlinear::floating::{AxisResponse, Factors, Floating};
 use crate::nonlinear::forces::{AxisLoad, Deflection};
 use crate::nonlinear::frame::Tilt;
 use lane_ode::{Lane, N, Real};
 
 impl<T: Real> Deflection<T> {
-    /// Of the nonlinear model.
+    /// Computes the deflection in the nonlinear model.
     #[inline(always)]
     pub(crate) fn new(q: &[N<T>; COORDINATES], tub: &Tilt<T>, shaft: &Tilt<T>) -> Self {
         Self {
@@ -25,61 +25,62 @@ impl<T: Real> Deflection<T> {
         }
     }
 
-    /// Of the linear model, by deviations from equilibrium (or, alike, by accelerations) and the
-    /// partial derivatives of both axes.
+    /// Computes the deflection in the linear model from deviations from equilibrium, or its second
+    /// derivative from accelerations, and from the partial derivatives of both axes.
     #[inline(always)]
     pub(crate) fn linear(
         q: &[N<T>; COORDINATES],
         tub_axis: &[[N<T>; 2]; 2],
         rotor_axis: &[[N<T>; 2]; 2],
     ) -> Self {
-        let [tub, rotor] = [tub_axis, rotor_axis];
         Self {
             offset: [q[SHAFT_Y] - q[TUB_Y], q[SHAFT_Z] - q[TUB_Z]],
             tilt: [
-                rotor[1][0] * q[SHAFT_PITCH] - tub[1][0] * q[TUB_PITCH],
-                rotor[0][1] * q[SHAFT_YAW] + rotor[1][1] * q[SHAFT_PITCH]
-                    - tub[0][1] * q[TUB_YAW]
-                    - tub[1][1] * q[TUB_PITCH],
+                rotor_axis[1][0] * q[SHAFT_PITCH] - tub_axis[1][0] * q[TUB_PITCH],
+                rotor_axis[0][1] * q[SHAFT_YAW] + rotor_axis[1][1] * q[SHAFT_PITCH]
+                    - tub_axis[0][1] * q[TUB_YAW]
+                    - tub_axis[1][1] * q[TUB_PITCH],
             ],
         }
     }
 
-    /// Offset, then tilt.
+    /// Returns offset and tilt as one vector.
     #[inline(always)]
     pub(crate) fn rows(&self) -> [N<T>; 4] {
         [self.offset[0], self.offset[1], self.tilt[0], self.tilt[1]]
     }
 }
 
-/// The hinge's scaled mass is exact for a backward whirl at this share of the drum's speed.
+/// The speed of the backward whirl for which the hinge's scaled mass is exact, as a share of the
+/// drum's speed. Basis: motions of doubled period have it, which a capped hinge disturbs most.
+/// Doubling it makes a backward whirl at the drum's speed exact instead.
 pub(crate) const BACKWARD_SHARE: f64 = 0.5;
 
-/// The bearings as a model treats them.
+/// The model of the bearings.
 #[derive(Clone, Copy)]
 pub(crate) enum Coupling<T> {
-    /// Springs, as they are.
+    /// Springs.
     Springs,
-    /// Springs with mass, so that none of their modes is faster than a cap.
+    /// Springs with scaled mass, so that none of their modes is faster than a cap.
     MassScaled(Scaling<T>),
 }
 
-/// Caps on the fast modes.
+/// The caps of the fast modes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Caps {
-    /// On the modes of the bearings.
+    /// The cap of the bearings' modes.
     pub bearings_rad_per_s: f64,
-    /// On those of the hinge, if it is capped.
+    /// The cap of the hinge's modes, if they are capped.
     pub hinge_rad_per_s: Option<f64>,
 }
 
 lane_struct! {
-    /// The caps as the equations use them.
+    /// The coefficients of the caps.
     #[derive(Clone, Copy)]
     Scaling {
-        /// Square of the bearings' cap, rad^2/s^2.
+        /// The square of the bearings' cap, rad^2/s^2.
         bearings_squared,
-        /// Reciprocal square of the hinge's; 0 if the hinge is not capped.
+        /// The reciprocal square of the hinge's cap; 0 if the hinge is not capped.
         per_hinge_squared,
     }
 }
@@ -95,7 +96,7 @@ impl Scaling<f64> {
 }
 
 lane_struct! {
-    /// How weight deflects bearings and hinge at the static equilibrium, unbalance up.
+    /// The deflections of bearings and hinge by weight at the static equilibrium, unbalance up.
     #[derive(Clone, Copy, Debug)]
     Sag {
         bearings: Deflection<T>,
@@ -105,41 +106,42 @@ lane_struct! {
 }
 
 impl Sag<f64> {
-    /// At the equilibrium `q`.
+    /// Computes the deflections at the equilibrium `q`.
     pub(crate) fn new(q: &[f64; COORDINATES]) -> Self {
         let q = q.map(N);
-        let bearings = Deflection::new(&q, &Tilt::of_tub(&q), &Tilt::of_shaft(&q));
+        let bearings = Deflection::new(&q, &Tilt::tub(&q), &Tilt::shaft(&q));
         Self { bearings, hinge: [q[HINGE_YAW], q[HINGE_PITCH]] }
     }
 }
 
 /// The terms that scaled mass at the hinge adds to the rotor's equations of q9 and q10.
 pub(crate) struct HingeMass<T> {
-    /// Added to the inertia's diagonal.
+    /// The term added to the inertia's diagonal.
     pub(crate) inertia: N<T>,
-    /// Added to the torque.
+    /// The term added to the torque.
     pub(crate) torque: [N<T>; 2],
-    /// Torque about q9 per speed of q10; about q10 per speed of q9 it is the opposite.
+    /// The torque about q9 per speed of q10, and the negative torque about q10 per speed of q9.
     pub(crate) torque_per_speed: N<T>,
 }
 
 impl<T: Lane> Coupling<T> {
-    /// Springs, or mass scaled to these caps.
+    /// Creates springs, or springs with mass scaled to caps.
     #[inline(always)]
     pub(crate) fn new(zero: N<T>, caps: Option<&Caps>) -> Self {
-        // No closure: it would be compiled without the instruction set.
+        // A closure would be compiled without the lanes' instruction set.
         let Some(caps) = caps else { return Self::Springs };
         Self::MassScaled(Scaling::splat(zero, &Scaling::new(caps)))
     }
 
-    /// Sets the caps of one lane. Bearings that are springs have none.
+    /// Sets the caps of one lane; springs have none.
     pub(crate) fn set_caps(&mut self, lane: usize, caps: &Caps) {
         if let Self::MassScaled(scaling) = self {
             scaling.set_lane(lane, &Scaling::new(caps));
         }
     }
 
-    /// The hinge's scaled mass, if modes are capped. `sag_9` and `sag_10` are its angles at rest.
+    /// Computes the hinge's scaled mass, if modes are capped. `sag_9` and `sag_10` are the hinge's
+    /// angles at rest.
     #[inline(always)]
     pub(crate) fn hinge_mass(
         &self,
@@ -149,20 +151,20 @@ impl<T: Lane> Coupling<T> {
     ) -> Option<HingeMass<T>> {
         let Self::MassScaled(scaling) = self else { return None };
         let inertia = (scaling.per_hinge_squared * flexure_stiffness).v();
-        let of_sag = (BACKWARD_SHARE * (inertia * (spin.speed * spin.speed).v()).v()).v();
+        let sag_torque = (BACKWARD_SHARE * (inertia * (spin.speed * spin.speed).v()).v()).v();
         Some(HingeMass {
             inertia,
             torque: [
-                (of_sag * (spin.cos * sag_9 + spin.sin * sag_10)).v(),
-                (of_sag * (spin.cos * sag_10 - spin.sin * sag_9)).v(),
+                (sag_torque * (spin.cos * sag_9 + spin.sin * sag_10)).v(),
+                (sag_torque * (spin.cos * sag_10 - spin.sin * sag_9)).v(),
             ],
             torque_per_speed: ((1.0 + BACKWARD_SHARE) * (inertia * spin.speed).v()).v(),
         })
     }
 
-    /// Accelerations du/dt of both halves, given without the bearings' forces, at theta' = `speed`.
-    /// `sag` is the part of the deflection that does not turn with the drum. `linear/step.rs` has
-    /// those of the linear model.
+    /// Computes the accelerations du/dt of both halves, which come without the bearings' forces, at
+    /// theta' = `speed`. `sag` is the part of the deflection that does not turn with the drum.
+    /// `linear/step.rs` computes those of the linear model.
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,
@@ -176,20 +178,20 @@ impl<T: Lane> Coupling<T> {
         let on_shaft = match self {
             Self::Springs => deflection.load(bodies),
             Self::MassScaled(scaling) => {
-                let of_tub = tub.response(tub_inertia);
-                let of_rotor = rotor.response(rotor_inertia);
+                let tub_response = tub.response(tub_inertia);
+                let rotor_response = rotor.response(rotor_inertia);
                 let speed_squared = (speed * speed).v();
                 let squares = (scaling.bearings_squared, speed_squared);
-                mass_scaled_load(bodies, squares, deflection, sag, &of_tub, &of_rotor)
+                mass_scaled_load(bodies, squares, deflection, sag, &tub_response, &rotor_response)
             }
         };
-        under_load((tub, tub_inertia), (rotor, rotor_inertia), &on_shaft)
+        accelerations_under_load((tub, tub_inertia), (rotor, rotor_inertia), &on_shaft)
     }
 }
 
-/// Accelerations of both halves under a load on the shaft.
+/// Computes the accelerations of both halves under a bearing load on the shaft.
 #[inline(always)]
-pub(crate) fn under_load<T: Real>(
+pub(crate) fn accelerations_under_load<T: Real>(
     (tub, tub_inertia): (&Floating<T, 2>, &Factors<T, 2>),
     (rotor, rotor_inertia): (&Floating<T, 4>, &Factors<T, 4>),
     on_shaft: &AxisLoad<T>,
@@ -199,7 +201,8 @@ pub(crate) fn under_load<T: Real>(
     [a1, a2, a3, a4, a5, a6, a7, a8, a9, a10]
 }
 
-/// w^2 K^-1 + C, lower triangle: from the compliances of the bearings and of both halves.
+/// Computes the lower triangle of w^2 K^-1 + C from the compliances of the bearings and of both
+/// halves.
 #[inline(always)]
 pub(crate) fn mass_scaled_system<T: Real>(
     cap_squared: N<T>,
@@ -213,7 +216,7 @@ pub(crate) fn mass_scaled_system<T: Real>(
             system[row][column] += tub[row][column];
         }
     }
-    // K^-1 couples force and moment of one direction.
+    // K^-1 couples the force and the moment in one direction.
     for i in 0..2 {
         system[i][i] += cap_squared * by_force;
         system[2 + i][2 + i] += cap_squared * by_moment;
@@ -222,19 +225,21 @@ pub(crate) fn mass_scaled_system<T: Real>(
     system
 }
 
+/// Solves for the bearing load on the shaft with scaled mass.
 #[inline(always)]
 pub(crate) fn mass_scaled_load<T: Real>(
     b: &Bodies<T>,
     (cap_squared, speed_squared): (N<T>, N<T>),
     deflection: &Deflection<T>,
     sag: &Deflection<T>,
-    tub: &Response<T>,
-    rotor: &Response<T>,
+    tub: &AxisResponse<T>,
+    rotor: &AxisResponse<T>,
 ) -> AxisLoad<T> {
     let system =
         mass_scaled_system(cap_squared, b.bearing_compliance(), &tub.compliance, &rotor.compliance);
     let both_squared = cap_squared + speed_squared;
-    let (d, sag) = (deflection.rows(), sag.rows());
+    let d = deflection.rows();
+    let sag = sag.rows();
     let mut load = d;
     for i in 0..4 {
         load[i] = tub.free[i] - (both_squared * d[i] + rotor.free[i]) + speed_squared * sag[i];

@@ -1,10 +1,10 @@
-//! Force elements between cabinet and tub: the law of each, once, for the equations and for the
-//! forces that a trace reports (section 3 of the model page).
+//! Force elements between cabinet and tub. Each force law is written once, for the equations and
+//! for the forces that a trace reports (section 3 of the model page).
 //!
-//! A law ([`Law`]) of a spring or a damper is a function of the line between its ends ([`Line`]); a
-//! line says in what it measures forces. Stops and bushings ([`StopOf`], [`BushingOf`]) have laws
-//! of a tub point's motion. To change a law is to change its `push`; a further kind of element is a
-//! structure with a law, a field of [`Elements`], and a line in [`OptionalForces`].
+//! The force law ([`ForceLaw`]) of a spring or a damper is a function of the line between its ends
+//! ([`ElementLine`]), which chooses the unit of force. Stops ([`StopCoefficients`]) and bushings
+//! ([`BushingCoefficients`]) have force laws of a tub point's motion. A new kind of element is a
+//! structure with a force law, a field of [`Elements`], and a line in [`OptionalForces`].
 
 pub(crate) mod bounds;
 pub(crate) mod corners;
@@ -19,48 +19,53 @@ lane_struct! {
     /// The force elements of a machine.
     #[derive(Clone, Debug)]
     Elements {
-        springs: Vec<SpringOf<T>>,
-        dampers: Vec<DamperOf<T>>,
-        stops: Vec<StopOf<T>>,
-        bushings: Vec<BushingOf<T>>,
-        /// Whether some machine has more than springs and dampers that are linear along their
-        /// lines: springs that stiffen, friction, or any of these. Where none has, none pays.
-        stiffens: InAnyLane<T>,
-        rubs: InAnyLane<T>,
-        has_further: InAnyLane<T>,
+        springs: Vec<SpringCoefficients<T>>,
+        dampers: Vec<DamperCoefficients<T>>,
+        stops: Vec<StopCoefficients<T>>,
+        bushings: Vec<BushingCoefficients<T>>,
+        /// Whether a machine has springs with a cubic term.
+        has_cubic_springs: InAnyLane<T>,
+        /// Whether a machine has dampers with friction.
+        has_friction: InAnyLane<T>,
+        /// Whether a machine has optional forces: cubic springs, friction, stops or bushings.
+        /// Without them the equations skip their evaluation.
+        has_optional: InAnyLane<T>,
     }
 }
 
 impl Elements<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
-        let stiffens = machine.springs.iter().any(|spring| spring.cubic_n_per_m3 != 0.0);
-        let rubs = machine.dampers.iter().any(|damper| damper.friction_n != 0.0);
-        let has_more = !machine.stops.is_empty() || !machine.bushings.is_empty();
+        let has_cubic_springs = machine.springs.iter().any(|spring| spring.cubic_n_per_m3 != 0.0);
+        let has_friction = machine.dampers.iter().any(|damper| damper.friction_n != 0.0);
+        let has_optional = has_cubic_springs
+            || has_friction
+            || !machine.stops.is_empty()
+            || !machine.bushings.is_empty();
         Self {
-            springs: machine.springs.iter().map(SpringOf::new).collect(),
-            dampers: machine.dampers.iter().map(DamperOf::new).collect(),
-            stops: machine.stops.iter().map(StopOf::new).collect(),
-            bushings: machine.bushings.iter().map(BushingOf::new).collect(),
-            stiffens: InAnyLane::new(stiffens),
-            rubs: InAnyLane::new(rubs),
-            has_further: InAnyLane::new(stiffens || rubs || has_more),
+            springs: machine.springs.iter().map(SpringCoefficients::new).collect(),
+            dampers: machine.dampers.iter().map(DamperCoefficients::new).collect(),
+            stops: machine.stops.iter().map(StopCoefficients::new).collect(),
+            bushings: machine.bushings.iter().map(BushingCoefficients::new).collect(),
+            has_cubic_springs: InAnyLane::new(has_cubic_springs),
+            has_friction: InAnyLane::new(has_friction),
+            has_optional: InAnyLane::new(has_optional),
         }
     }
 
-    /// Whether its forces have corners that steps longer than they are wide do not see: friction
-    /// and stops.
+    /// Returns whether a force is not smooth, as those of friction and stops. Steps longer than
+    /// such a force's corner is wide miss it.
     pub(crate) fn are_nonsmooth(&self) -> bool {
         !self.stops.is_empty() || self.dampers.iter().any(|damper| damper.friction.0 != 0.0)
     }
 
-    /// The linear model takes a damper's friction at another speed amplitude.
-    pub(crate) fn take_friction_at(&mut self, damper: usize, speed_m_per_s: f64) {
+    /// Sets the speed amplitude at which the linear model takes a damper's friction.
+    pub(crate) fn linearise_friction(&mut self, damper: usize, speed_m_per_s: f64) {
         let damper = &mut self.dampers[damper];
-        damper.viscous = N(viscous(damper.friction.0, speed_m_per_s));
+        damper.viscous = N(equivalent_damping(damper.friction.0, speed_m_per_s));
     }
 
-    /// The elements of which the linear model is the first order: friction has become the viscous
-    /// damping that takes as much energy out of a swing.
+    /// Returns the elements that the linear model linearises: friction is replaced by equivalent
+    /// viscous damping, which dissipates the same energy in a cycle.
     pub(crate) fn with_viscous_friction(&self) -> Self {
         let mut elements = self.clone();
         for damper in &mut elements.dampers {
@@ -72,16 +77,16 @@ impl Elements<f64> {
 }
 
 impl<T: Lane> Elements<T> {
-    /// Force of all elements on the tub, and its moment about the bearing midpoint P_T; in tub
-    /// axes, where their tub ends are fixed.
+    /// Computes the force of all elements on the tub, and its moment about the bearing midpoint
+    /// P_T, in tub axes, in which the tub ends are fixed.
     #[inline(always)]
-    pub(crate) fn on_tub(&self, tub: &TubMotion<T>) -> (Vec3<T>, Vec3<T>) {
+    pub(crate) fn load_on_tub(&self, tub: &TubMotion<T>) -> (Vec3<T>, Vec3<T>) {
         let zero = tub.midpoint[0].lit(0.0);
         let mut load = ([zero; 3], [zero; 3]);
-        add(&mut load, &self.springs, tub, false);
-        add(&mut load, &self.dampers, tub, false);
-        if self.has_further.holds() {
-            // A copy: what is lent to a function must lie in memory, on every path.
+        add_forces(&mut load, &self.springs, tub, false);
+        add_forces(&mut load, &self.dampers, tub, false);
+        if self.has_optional.holds() {
+            // A copy, so that without optional forces `load` stays in registers.
             let mut whole = load;
             let motion = *tub;
             zero.0.aside(OptionalForces { elements: self, tub: &motion, load: &mut whole });
@@ -92,15 +97,16 @@ impl<T: Lane> Elements<T> {
 }
 
 impl<T: Lane> Elements<T> {
-    /// How deep a stop's tub point is in it (m; below zero it is open), and its push (N).
+    /// Computes the depth of a stop's tub point (m; the stop is open below zero), and the stop's
+    /// force (N).
     #[inline(always)]
     pub(crate) fn stop(&self, number: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let stop = &self.stops[number];
         let point = tub.point(&stop.tub);
-        [stop.depth(&point), stop.push(&point)]
+        [stop.depth(&point), stop.force(&point)]
     }
 
-    /// The speed along a damper (m/s).
+    /// Computes the speed along a damper (m/s).
     #[inline(always)]
     pub(crate) fn damper_speed(&self, number: usize, tub: &TubMotion<T>) -> N<T> {
         let ends = &self.dampers[number].ends;
@@ -110,8 +116,8 @@ impl<T: Lane> Elements<T> {
     }
 }
 
-/// What not every machine has, added to the load on the tub. A zero stiffness or friction adds a
-/// zero, so that no machine's bits depend on those in the other lanes.
+/// The evaluation of optional forces. Coefficients of zero add zeros, so that no machine's bits
+/// depend on the machines in the other lanes.
 struct OptionalForces<'a, T> {
     elements: &'a Elements<T>,
     tub: &'a TubMotion<T>,
@@ -124,16 +130,16 @@ impl<T: Lane> Aside for OptionalForces<'_, T> {
     #[inline(always)]
     fn run(self) {
         let Self { elements, tub, load } = self;
-        if elements.stiffens.holds() {
-            add(load, &elements.springs, tub, true);
+        if elements.has_cubic_springs.holds() {
+            add_forces(load, &elements.springs, tub, true);
         }
-        if elements.rubs.holds() {
-            add(load, &elements.dampers, tub, true);
+        if elements.has_friction.holds() {
+            add_forces(load, &elements.dampers, tub, true);
         }
         for stop in &elements.stops {
             let point = tub.point(&stop.tub);
-            let push = stop.push(&point);
-            add_force(load, &stop.tub, &tub.tilt.in_own_axes(&scaled(-push, stop.direction)));
+            let force = scaled(-stop.force(&point), stop.direction);
+            add_force(load, &stop.tub, &tub.tilt.in_own_axes(&force));
         }
         for bushing in &elements.bushings {
             let force = bushing.force(&tub.point(&bushing.tub));
@@ -143,12 +149,12 @@ impl<T: Lane> Aside for OptionalForces<'_, T> {
 }
 
 lane_struct! {
-    /// Where an element holds cabinet and tub (m).
+    /// The ends of an element (m).
     #[derive(Clone, Copy, Debug)]
     Ends {
-        /// Cabinet axes, from O.
+        /// The cabinet end, in cabinet axes from O.
         cabinet: [N<T>; 3],
-        /// Tub axes, from P_T.
+        /// The tub end, in tub axes from P_T.
         tub: [N<T>; 3],
     }
 }
@@ -160,9 +166,9 @@ impl Ends<f64> {
 }
 
 lane_struct! {
-    /// A spring between cabinet and tub.
+    /// The coefficients of a spring between cabinet and tub.
     #[derive(Clone, Copy, Debug)]
-    SpringOf {
+    SpringCoefficients {
         ends: Ends<T>,
         stiffness: N<T>,
         stiffness_times_free_length: N<T>,
@@ -172,7 +178,7 @@ lane_struct! {
     }
 }
 
-impl SpringOf<f64> {
+impl SpringCoefficients<f64> {
     fn new(spring: &Spring) -> Self {
         let free_length_m = spring.free_length_m.unwrap_or_else(|| spring.given_length_m());
         Self {
@@ -186,46 +192,47 @@ impl SpringOf<f64> {
 }
 
 lane_struct! {
-    /// A damper between cabinet and tub.
+    /// The coefficients of a damper between cabinet and tub.
     #[derive(Clone, Copy, Debug)]
-    DamperOf {
+    DamperCoefficients {
         ends: Ends<T>,
         damping: N<T>,
         /// F_f.
         friction: N<T>,
         /// v_s^2.
         speed_squared: N<T>,
-        /// What the linear model has in place of friction (N s/m).
+        /// The equivalent viscous damping of the linear model (N s/m).
         viscous: N<T>,
     }
 }
 
-/// The viscous damping (N s/m) that takes as much energy out of a swing as a friction does.
-fn viscous(friction_n: f64, speed_m_per_s: f64) -> f64 {
+/// Returns the viscous damping (N s/m) that dissipates as much energy in a cycle as Coulomb
+/// friction does, at a speed amplitude.
+fn equivalent_damping(friction_n: f64, speed_m_per_s: f64) -> f64 {
     4.0 * friction_n / (PI * speed_m_per_s)
 }
 
-impl DamperOf<f64> {
+impl DamperCoefficients<f64> {
     fn new(damper: &Damper) -> Self {
-        // An own speed is found later.
-        let given = damper.friction_linear_speed_m_per_s;
-        let speed_m_per_s = given.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S);
+        // `ready.rs` replaces the default by the speed of the motion.
+        let speed_m_per_s =
+            damper.friction_linear_speed_m_per_s.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S);
         Self {
             ends: Ends::new(damper.cabinet_m, damper.tub_m),
             damping: N(damper.damping_n_s_per_m),
             friction: N(damper.friction_n),
             speed_squared: N(damper.friction_speed_m_per_s * damper.friction_speed_m_per_s),
-            viscous: N(viscous(damper.friction_n, speed_m_per_s)),
+            viscous: N(equivalent_damping(damper.friction_n, speed_m_per_s)),
         }
     }
 }
 
 lane_struct! {
-    /// A stop.
+    /// The coefficients of a stop.
     #[derive(Clone, Copy, Debug)]
-    StopOf {
+    StopCoefficients {
         tub: [N<T>; 3],
-        /// Of unit length, cabinet axes.
+        /// The unit vector from the tub to the stop, in cabinet axes.
         direction: [N<T>; 3],
         clearance: N<T>,
         stiffness: N<T>,
@@ -234,7 +241,7 @@ lane_struct! {
     }
 }
 
-impl StopOf<f64> {
+impl StopCoefficients<f64> {
     fn new(stop: &BumpStop) -> Self {
         let length = stop.direction_length();
         Self {
@@ -248,39 +255,39 @@ impl StopOf<f64> {
     }
 }
 
-impl<T: Real> StopOf<T> {
-    /// How far the tub point is beyond the clearance (m); below zero the stop is open.
+impl<T: Real> StopCoefficients<T> {
+    /// Returns the depth of the tub point beyond the clearance (m). The stop is open below zero.
     #[inline(always)]
     pub(crate) fn depth(&self, point: &PointMotion<T>) -> N<T> {
         dot(&point.displacement, &self.direction) - self.clearance
     }
 
-    /// The force with which stop and tub push each other apart (N): with the depth delta, w =
-    /// sqrt(delta^2 + s^2) and the speed v along the direction, (1 + delta / w) / 2 (k w + c v).
+    /// Returns the repulsive force between stop and tub (N): (1 + delta / w) / 2 (k w + c v), with
+    /// the depth delta, w = sqrt(delta^2 + s^2) and the speed v along the direction.
     #[inline(always)]
-    pub(crate) fn push(&self, point: &PointMotion<T>) -> N<T> {
-        self.push_at(self.depth(point), self.speed(point))
+    pub(crate) fn force(&self, point: &PointMotion<T>) -> N<T> {
+        self.force_at(self.depth(point), self.speed(point))
     }
 
-    /// The speed (m/s) at which the tub point goes along the stop's direction.
+    /// Returns the tub point's speed along the stop's direction (m/s).
     #[inline(always)]
     fn speed(&self, point: &PointMotion<T>) -> N<T> {
         dot(&point.velocity, &self.direction)
     }
 
-    /// The push (N) at this depth (m) and speed (m/s).
+    /// Returns the repulsive force (N) at a depth (m) and a speed (m/s).
     #[inline(always)]
-    fn push_at(&self, depth: N<T>, speed: N<T>) -> N<T> {
-        let soft = (depth * depth + self.softness_squared).sqrt();
-        let closed = (0.5 * (1.0 + depth / soft)).v();
-        (closed * (self.stiffness * soft + self.damping * speed)).v()
+    fn force_at(&self, depth: N<T>, speed: N<T>) -> N<T> {
+        let w = (depth * depth + self.softness_squared).sqrt();
+        let contact = (0.5 * (1.0 + depth / w)).v();
+        (contact * (self.stiffness * w + self.damping * speed)).v()
     }
 }
 
 lane_struct! {
-    /// A bushing.
+    /// The coefficients of a bushing.
     #[derive(Clone, Copy, Debug)]
-    BushingOf {
+    BushingCoefficients {
         tub: [N<T>; 3],
         stiffness: [N<T>; 3],
         cubic: [N<T>; 3],
@@ -288,7 +295,7 @@ lane_struct! {
     }
 }
 
-impl BushingOf<f64> {
+impl BushingCoefficients<f64> {
     fn new(bushing: &Bushing) -> Self {
         Self {
             tub: bushing.tub_m.map(N),
@@ -299,13 +306,14 @@ impl BushingOf<f64> {
     }
 }
 
-impl<T: Real> BushingOf<T> {
-    /// Force on the tub, cabinet axes: -(k_i d_i + k_3i d_i^3 + c_i v_i).
+impl<T: Real> BushingCoefficients<T> {
+    /// Returns the force on the tub in cabinet axes: -(k_i d_i + k_3i d_i^3 + c_i v_i).
     #[inline(always)]
     pub(crate) fn force(&self, point: &PointMotion<T>) -> Vec3<T> {
         let mut force = point.displacement;
         for i in 0..3 {
-            let (d, v) = (point.displacement[i], point.velocity[i]);
+            let d = point.displacement[i];
+            let v = point.velocity[i];
             let stiffness = self.cubic[i] * (d * d).v() + self.stiffness[i];
             force[i] = -(stiffness * d + self.damping[i] * v);
         }
@@ -313,99 +321,101 @@ impl<T: Real> BushingOf<T> {
     }
 }
 
-/// A point of the tub, cabinet axes: how far it is from its place before loading, and its velocity.
+/// The displacement of a tub point from its place before loading, and its velocity, in cabinet
+/// axes.
 pub(crate) struct PointMotion<T> {
     pub(crate) displacement: Vec3<T>,
     pub(crate) velocity: Vec3<T>,
 }
 
-/// The line between an element's ends at an instant, with a measure of force of its own: newtons,
-/// or newtons per metre of the line's length, which saves the equations a root.
-pub(crate) trait Line<T> {
-    /// A force (N) less `stiffness` (N/m) times the length.
-    fn less_length(&self, force: N<T>, stiffness: N<T>) -> N<T>;
-    /// `stiffness` (N/m^3) times the cube of the length less `free_length` (m).
-    fn times_cube(&self, stiffness: N<T>, free_length: N<T>) -> N<T>;
-    /// `damping` (N s/m) times the rate at which the line grows.
-    fn times_rate(&self, damping: N<T>) -> N<T>;
-    /// `force` (N) times r / sqrt(r^2 + s^2), r the rate at which the line grows and s^2 the
-    /// `speed_squared`.
-    fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T>;
+/// The line between an element's ends at an instant. Its unit of force is the newton, or the newton
+/// per metre of the line's length, which saves the equations a square root.
+pub(crate) trait ElementLine<T> {
+    /// Returns k (l_0 - l) for the length l, the `stiffness` k (N/m) and `force` = k l_0 (N).
+    fn linear_force(&self, force: N<T>, stiffness: N<T>) -> N<T>;
+    /// Returns k_3 (l - l_0)^3 for the length l, the `stiffness` k_3 (N/m^3) and the `free_length`
+    /// l_0 (m).
+    fn cubic_force(&self, stiffness: N<T>, free_length: N<T>) -> N<T>;
+    /// Returns C l' for the `damping` C (N s/m).
+    fn damping_force(&self, damping: N<T>) -> N<T>;
+    /// Returns F_f l' / sqrt(l'^2 + v_s^2) for the `force` F_f (N) and the `speed_squared` v_s^2.
+    fn friction_force(&self, force: N<T>, speed_squared: N<T>) -> N<T>;
 }
 
-/// The laws of an element between two points: forces that drive the ends apart, by the line between
-/// them and in its measure.
-pub(crate) trait Law<T> {
-    /// The points.
+/// The force law of an element between two points. Forces are positive where they drive the ends
+/// apart, in the line's unit.
+pub(crate) trait ForceLaw<T> {
+    /// Returns the ends of the element.
     fn ends(&self) -> &Ends<T>;
-    /// What every machine has.
-    fn push<L: Line<T>>(&self, line: &L) -> N<T>;
-    /// What not every machine has.
-    fn push_further<L: Line<T>>(&self, line: &L) -> N<T>;
+    /// Returns the force that is linear along the line, which every machine has.
+    fn force<L: ElementLine<T>>(&self, line: &L) -> N<T>;
+    /// Returns the optional force.
+    fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T>;
 }
 
-/// F = -k e, and further F = -k_3 e^3, e the elongation.
-impl<T: Real> Law<T> for SpringOf<T> {
+/// F = -k e, and optionally F = -k_3 e^3, with the elongation e.
+impl<T: Real> ForceLaw<T> for SpringCoefficients<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
 
     #[inline(always)]
-    fn push<L: Line<T>>(&self, line: &L) -> N<T> {
-        line.less_length(self.stiffness_times_free_length, self.stiffness)
+    fn force<L: ElementLine<T>>(&self, line: &L) -> N<T> {
+        line.linear_force(self.stiffness_times_free_length, self.stiffness)
     }
 
     #[inline(always)]
-    fn push_further<L: Line<T>>(&self, line: &L) -> N<T> {
-        -line.times_cube(self.cubic, self.free_length)
+    fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T> {
+        -line.cubic_force(self.cubic, self.free_length)
     }
 }
 
-/// Eqs. 33 to 35: F = -C (v . n) n, and further F = -F_f v / sqrt(v^2 + v_s^2), v the speed along
-/// the damper.
-impl<T: Real> Law<T> for DamperOf<T> {
+/// Eqs. 33 to 35: F = -C (v . n) n, and optionally F = -F_f v / sqrt(v^2 + v_s^2), with the speed v
+/// along the damper.
+impl<T: Real> ForceLaw<T> for DamperCoefficients<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
         &self.ends
     }
 
     #[inline(always)]
-    fn push<L: Line<T>>(&self, line: &L) -> N<T> {
-        -line.times_rate(self.damping)
+    fn force<L: ElementLine<T>>(&self, line: &L) -> N<T> {
+        -line.damping_force(self.damping)
     }
 
     #[inline(always)]
-    fn push_further<L: Line<T>>(&self, line: &L) -> N<T> {
-        -line.times_sense(self.friction, self.speed_squared)
+    fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T> {
+        -line.friction_force(self.friction, self.speed_squared)
     }
 }
 
-/// The tub at an instant.
+/// The motion of the tub at an instant.
 #[derive(Clone, Copy)]
 pub(crate) struct TubMotion<T> {
     tilt: Tilt<T>,
-    /// P_T along c2 and c3 (m).
+    /// The displacement of P_T along c2 and c3 (m).
     pub(crate) midpoint: [N<T>; 2],
-    /// Velocity of P_T, tub axes.
+    /// The velocity of P_T, in tub axes.
     velocity: Vec3<T>,
-    /// Angular velocity, tub axes.
+    /// The angular velocity, in tub axes.
     rate: Vec3<T>,
 }
 
 impl<T: Real> TubMotion<T> {
-    /// At the tub's coordinates (m, rad) and their speeds, both in the order of
+    /// Computes the motion from the tub's coordinates (m, rad) and speeds, both in the order of
     /// [`TUB`](crate::coordinates::TUB).
     #[inline(always)]
     pub(crate) fn new(q: &[N<T>; 4], u: &[N<T>; 4]) -> Self {
         let tilt = Tilt::new(q[2], q[3]);
         let rate = tilt.motion(u[2], u[3]).rate;
-        Self::turning(tilt, rate, [q[0], q[1]], [u[0], u[1]])
+        Self::from_rate(tilt, rate, [q[0], q[1]], [u[0], u[1]])
     }
 
-    /// With a tilt and an angular velocity, at a midpoint (m) that moves along c2 and c3.
+    /// Computes the motion from a tilt, an angular velocity, and the midpoint's displacement (m)
+    /// and velocity along c2 and c3.
     #[inline(always)]
-    pub(crate) fn turning(
+    pub(crate) fn from_rate(
         tilt: Tilt<T>,
         rate: Vec3<T>,
         midpoint: [N<T>; 2],
@@ -419,13 +429,13 @@ impl<T: Real> TubMotion<T> {
         Self { tilt, midpoint, velocity, rate }
     }
 
-    /// A vector from tub axes to cabinet axes.
+    /// Transforms a vector from tub axes to cabinet axes.
     #[inline(always)]
     pub(crate) fn in_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
         self.tilt.in_cabinet_axes(v)
     }
 
-    /// A point of the tub, given in its axes from P_T.
+    /// Computes the motion of a tub point, given in tub axes from P_T.
     #[inline(always)]
     fn point(&self, tub: &Vec3<T>) -> PointMotion<T> {
         let mut displacement = difference(self.tilt.in_cabinet_axes(tub), tub);
@@ -436,9 +446,9 @@ impl<T: Real> TubMotion<T> {
     }
 }
 
-/// A line in tub axes; it measures forces in newtons per metre of its length.
+/// A line in tub axes. Its unit of force is the newton per metre of its length.
 struct TubLine<'a, T> {
-    /// From the cabinet end to the tub end.
+    /// The vector from the cabinet end to the tub end.
     span: Vec3<T>,
     /// The tub end.
     end: &'a Vec3<T>,
@@ -446,97 +456,99 @@ struct TubLine<'a, T> {
 }
 
 impl<T: Real> TubLine<'_, T> {
-    /// The rate of the length, times the length.
+    /// Returns l l' for the length l.
     #[inline(always)]
-    fn along(&self) -> N<T> {
+    fn length_times_rate(&self) -> N<T> {
         dot(&self.span, &plus_cross(&self.tub.velocity, &self.tub.rate, self.end))
     }
 }
 
-impl<T: Real> Line<T> for TubLine<'_, T> {
+impl<T: Real> ElementLine<T> for TubLine<'_, T> {
     #[inline(always)]
-    fn less_length(&self, force: N<T>, stiffness: N<T>) -> N<T> {
+    fn linear_force(&self, force: N<T>, stiffness: N<T>) -> N<T> {
         force / dot(&self.span, &self.span).sqrt() - stiffness
     }
 
     #[inline(always)]
-    fn times_cube(&self, stiffness: N<T>, free_length: N<T>) -> N<T> {
+    fn cubic_force(&self, stiffness: N<T>, free_length: N<T>) -> N<T> {
         let length = dot(&self.span, &self.span).sqrt();
         let elongation = length - free_length;
         (stiffness * (elongation * elongation).v() * elongation).v() / length
     }
 
     #[inline(always)]
-    fn times_rate(&self, damping: N<T>) -> N<T> {
-        (damping * self.along()).v() / dot(&self.span, &self.span)
+    fn damping_force(&self, damping: N<T>) -> N<T> {
+        (damping * self.length_times_rate()).v() / dot(&self.span, &self.span)
     }
 
     #[inline(always)]
-    fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T> {
-        let along = self.along();
-        let squared = dot(&self.span, &self.span);
-        // With v = along / length, by one root.
-        let root = (squared * (along * along + (speed_squared * squared).v())).v().sqrt();
-        (force * along).v() / root
+    fn friction_force(&self, force: N<T>, speed_squared: N<T>) -> N<T> {
+        let l_times_rate = self.length_times_rate();
+        let l_squared = dot(&self.span, &self.span);
+        // l sqrt(l'^2 + v_s^2), with a single square root.
+        let root = (l_squared * (l_times_rate * l_times_rate + (speed_squared * l_squared).v()))
+            .v()
+            .sqrt();
+        (force * l_times_rate).v() / root
     }
 }
 
-/// A line in cabinet axes; it measures forces in newtons.
+/// A line in cabinet axes. Its unit of force is the newton.
 pub(crate) struct CabinetLine<T> {
-    /// From the cabinet end to the tub end.
+    /// The vector from the cabinet end to the tub end.
     pub(crate) span: Vec3<T>,
     pub(crate) length: N<T>,
     /// The rate of the length.
     pub(crate) rate: N<T>,
 }
 
-impl<T: Real> Line<T> for CabinetLine<T> {
+impl<T: Real> ElementLine<T> for CabinetLine<T> {
     #[inline(always)]
-    fn less_length(&self, force: N<T>, stiffness: N<T>) -> N<T> {
+    fn linear_force(&self, force: N<T>, stiffness: N<T>) -> N<T> {
         force - stiffness * self.length
     }
 
     #[inline(always)]
-    fn times_cube(&self, stiffness: N<T>, free_length: N<T>) -> N<T> {
+    fn cubic_force(&self, stiffness: N<T>, free_length: N<T>) -> N<T> {
         let elongation = self.length - free_length;
         (stiffness * (elongation * elongation).v() * elongation).v()
     }
 
     #[inline(always)]
-    fn times_rate(&self, damping: N<T>) -> N<T> {
+    fn damping_force(&self, damping: N<T>) -> N<T> {
         (damping * self.rate).v()
     }
 
     #[inline(always)]
-    fn times_sense(&self, force: N<T>, speed_squared: N<T>) -> N<T> {
+    fn friction_force(&self, force: N<T>, speed_squared: N<T>) -> N<T> {
         (force * self.rate).v() / (self.rate * self.rate + speed_squared).sqrt()
     }
 }
 
-/// Adds force and moment of elements, by their first law or by what not every machine has.
+/// Adds the forces of elements and their moments, either the linear or the optional ones.
 #[inline(always)]
-fn add<T: Real, E: Law<T>>(
+fn add_forces<T: Real, E: ForceLaw<T>>(
     load: &mut (Vec3<T>, Vec3<T>),
     elements: &[E],
     tub: &TubMotion<T>,
-    is_further: bool,
+    is_optional: bool,
 ) {
     for element in elements {
         let ends = element.ends();
         let line = TubLine { span: span(&tub.tilt, &tub.midpoint, ends), end: &ends.tub, tub };
-        let push = if is_further { element.push_further(&line) } else { element.push(&line) };
-        add_force(load, &ends.tub, &scaled(push, line.span));
+        let force = if is_optional { element.optional_force(&line) } else { element.force(&line) };
+        add_force(load, &ends.tub, &scaled(force, line.span));
     }
 }
 
-/// Adds a force on a tub point, both in tub axes, and its moment.
+/// Adds a force on a tub point, both in tub axes, and the force's moment.
 #[inline(always)]
-fn add_force<T: Real>((all, moment): &mut (Vec3<T>, Vec3<T>), at: &Vec3<T>, force: &Vec3<T>) {
-    *all = sum(*all, force);
+fn add_force<T: Real>((total, moment): &mut (Vec3<T>, Vec3<T>), at: &Vec3<T>, force: &Vec3<T>) {
+    *total = sum(*total, force);
     *moment = plus_cross(moment, at, force);
 }
 
-/// From the cabinet end to the tub end, in tub axes. t3 has no y component.
+/// Returns the vector from the cabinet end to the tub end, in tub axes. t3 has no y component.
 #[inline(always)]
 fn span<T: Real>(tilt: &Tilt<T>, midpoint: &[N<T>; 2], ends: &Ends<T>) -> Vec3<T> {
     let [x, y, z] = [ends.cabinet[0], ends.cabinet[1] - midpoint[0], ends.cabinet[2] - midpoint[1]];

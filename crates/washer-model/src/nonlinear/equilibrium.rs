@@ -1,5 +1,10 @@
-//! Static equilibrium: the place of rest under the machine's weight, unbalance up (section 4.2 of
-//! the model page).
+//! Static equilibrium under the machine's weight, unbalance up (section 4.2 of the model page).
+//!
+//! 1. Linearise the static forces by automatic differentiation.
+//! 2. Solve for the Newton step, with a shift added to the stiffness where it is not positive
+//!    definite.
+//! 3. Shorten the step to a bound, and from a later iteration on damp it.
+//! 4. Stop when an unshifted step is below the tolerance, or when the shift exceeds its limit.
 
 use crate::coordinates::{
     COORDINATES, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z, seeded,
@@ -11,44 +16,53 @@ use crate::nonlinear::floating::Factors;
 use crate::nonlinear::{Halves, halves};
 use lane_ode::{Aside, Lane, N};
 
-/// Newton steps before giving up.
+/// The greatest number of Newton steps. Basis: twice the number of undamped ones. Doubling it costs
+/// time only where no equilibrium is found.
 const MAX_ITERATIONS: usize = 120;
-/// From here on only a part of each step is taken: stops that open and close in turn would keep
-/// whole ones going round.
-const CAUTIOUS_FROM: usize = 60;
-/// That part.
-const CAUTION: f64 = 0.6;
-/// Longest step in any coordinate (m, rad): keeps a soft machine from being thrown through itself.
-const LONGEST_STEP: f64 = 0.1;
-/// A step below this (m, rad) is the last: Newton's method squares the error, so only rounding
-/// remains.
-const LAST_STEP: f64 = 1e-12;
-/// Added to the stiffness (N/m, N m/rad) where the machine is not stable, and raised tenfold until
-/// it is. Unloaded springs that hang straight hold nothing sideways; they do once the machine has
-/// sagged.
-const LEAST_SHIFT: f64 = 10.0;
-/// A machine that needs more has no place of rest.
-const GREATEST_SHIFT: f64 = 1e9;
+/// The iteration from which steps are damped. Basis: half of all iterations.
+/// Doubling it delays the equilibria of machines whose stops open and close in turn, between which
+/// undamped steps cycle.
+const DAMPED_FROM: usize = 60;
+/// The part of a damped step that is taken. Basis: below 1, so that a cycle of two contracts.
+/// Doubling it damps nothing.
+const DAMPING_FACTOR: f64 = 0.6;
+/// The greatest step in any coordinate (m, rad). Basis: shorter than the machine, so that a soft
+/// one does not turn over on the way. Doubling it halves the steps of machines that sag far.
+const MAX_STEP: f64 = 0.1;
+/// The tolerance of the last step (m, rad). Basis: Newton's method squares the error, so that only
+/// rounding remains. Doubling it changes nothing.
+const STEP_TOLERANCE: f64 = 1e-12;
+/// The least shift of an indefinite stiffness (N/m, N m/rad), raised tenfold until the sum is
+/// positive definite. Vertical springs without load have no stiffness sideways; they get one once
+/// the machine has sagged. Basis: small beside any suspension's stiffness. Doubling it changes
+/// nothing but the path.
+const MIN_SHIFT: f64 = 10.0;
+/// The greatest shift (N/m, N m/rad). Basis: far above any suspension's stiffness, so that a
+/// machine that needs more has no equilibrium. Doubling it costs a fraction of an iteration.
+const MAX_SHIFT: f64 = 1e9;
 
-/// [`find`], aside.
-pub(crate) struct Find<'a, T> {
+/// A call of [`solve_equilibrium`] that is not inlined into kernels.
+pub(crate) struct SolveEquilibrium<'a, T> {
     pub(crate) zero: N<T>,
     pub(crate) machine: &'a Coefficients<T>,
 }
 
-impl<T: Lane> Aside for Find<'_, T> {
+impl<T: Lane> Aside for SolveEquilibrium<'_, T> {
     type Output = ([N<T>; COORDINATES], u32);
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        find(self.zero, self.machine)
+        solve_equilibrium(self.zero, self.machine)
     }
 }
 
-/// Coordinates at rest, and in which lanes they were found. A machine without a stable place of
-/// rest has none: its stiffness is not positive definite.
+/// Returns the equilibrium coordinates, and a bit for each lane in which they were found. An
+/// equilibrium has a positive definite stiffness.
 #[inline(always)]
-pub(crate) fn find<T: Lane>(zero: N<T>, machine: &Coefficients<T>) -> ([N<T>; COORDINATES], u32) {
+pub(crate) fn solve_equilibrium<T: Lane>(
+    zero: N<T>,
+    machine: &Coefficients<T>,
+) -> ([N<T>; COORDINATES], u32) {
     let one = zero.lit(1.0);
     let machine = machine.constant();
     let mut q = [zero; COORDINATES];
@@ -73,22 +87,22 @@ pub(crate) fn find<T: Lane>(zero: N<T>, machine: &Coefficients<T>) -> ([N<T>; CO
         for s in &step {
             longest = N(s.0.abs().larger(longest.0));
         }
-        let scale =
-            longest.where_less(zero.lit(LONGEST_STEP), one, zero.lit(LONGEST_STEP) / longest);
-        let scale = if iteration < CAUTIOUS_FROM { scale } else { (scale * CAUTION).v() };
-        let going = !(found | lost);
-        for lane in (0..T::LANES).filter(|lane| going >> lane & 1 == 1) {
-            let (added, longest) = (shift.0.get(lane), longest.0.get(lane));
+        let scale = longest.where_less(zero.lit(MAX_STEP), one, zero.lit(MAX_STEP) / longest);
+        let scale = if iteration < DAMPED_FROM { scale } else { (scale * DAMPING_FACTOR).v() };
+        let unfinished = !(found | lost);
+        for lane in (0..T::LANES).filter(|lane| unfinished >> lane & 1 == 1) {
+            let added = shift.0.get(lane);
+            let longest = longest.0.get(lane);
             if is_stable >> lane & 1 == 0 || !longest.is_finite() {
-                lost |= u32::from(added > GREATEST_SHIFT) << lane;
-                shift.0.set(lane, (10.0 * added).max(LEAST_SHIFT));
+                lost |= u32::from(added > MAX_SHIFT) << lane;
+                shift.0.set(lane, (10.0 * added).max(MIN_SHIFT));
                 continue;
             }
             for i in 0..COORDINATES {
                 q[i].0.set(lane, q[i].0.get(lane) + scale.0.get(lane) * step[i].0.get(lane));
             }
-            found |= u32::from(added == 0.0 && longest < LAST_STEP) << lane;
-            shift.0.set(lane, if added > LEAST_SHIFT { 0.1 * added } else { 0.0 });
+            found |= u32::from(added == 0.0 && longest < STEP_TOLERANCE) << lane;
+            shift.0.set(lane, if added > MIN_SHIFT { 0.1 * added } else { 0.0 });
         }
         if (found | lost) & ((1 << T::LANES) - 1) == (1 << T::LANES) - 1 {
             break;
@@ -97,8 +111,8 @@ pub(crate) fn find<T: Lane>(zero: N<T>, machine: &Coefficients<T>) -> ([N<T>; CO
     (q, found)
 }
 
-/// The motions of tub and drum together: the word for each, the coordinates that move, the unit of
-/// its stiffness.
+/// The rigid motions of tub and drum together: the name, the coordinates, the unit of the
+/// stiffness.
 const RIGID_MOTIONS: [(&str, [usize; 2], &str); 4] = [
     ("up or down", [TUB_Y, SHAFT_Y], "N/m"),
     ("sideways", [TUB_Z, SHAFT_Z], "N/m"),
@@ -117,11 +131,11 @@ pub(crate) fn unstable_motion(
     let machine = machine.constant();
     let q = q.map(N);
     let stiffness = RIGID_MOTIONS.map(|(_, moved, _)| {
-        let pushed_back = |along: usize| {
+        let stiffness_along = |along: usize| {
             let forces = static_forces(&machine, &seeded(&q, along, 1.0));
             moved.iter().map(|&i| -forces[i].0.slope).sum::<f64>()
         };
-        moved.into_iter().map(pushed_back).sum::<f64>()
+        moved.into_iter().map(stiffness_along).sum::<f64>()
     });
     let greatest = |kind: &[f64]| kind.iter().fold(0.0_f64, |most, k| most.max(k.abs()));
     let scales = [greatest(&stiffness[..2]), greatest(&stiffness[2..])];
@@ -132,7 +146,7 @@ pub(crate) fn unstable_motion(
     Some((motion, stiffness[least], unit))
 }
 
-/// Generalised forces at rest.
+/// Computes the generalised forces at rest.
 #[inline(always)]
 fn static_forces<T: Lane>(
     machine: &Coefficients<T>,
@@ -152,13 +166,13 @@ mod tests {
     use crate::machine::{BumpStop, Machine};
 
     #[test]
-    fn springs_that_hang_straight_hold_a_machine_once_it_has_sagged() {
+    fn vertical_springs_have_an_equilibrium() {
         let mut machine = Machine::paper();
         for spring in &mut machine.springs {
             spring.cabinet_m[2] = spring.tub_m[2];
         }
         let coefficients = Coefficients::new(&machine);
-        let (q, found) = find(N(0.0), &coefficients);
+        let (q, found) = solve_equilibrium(N(0.0), &coefficients);
         assert_eq!(found & 1, 1);
         let weight_n = (23.87 + 4.34 + 4.04) * 9.81;
         let sag_m = -(q[0].0 + 0.2068 * q[5].0);
@@ -172,49 +186,49 @@ mod tests {
     fn a_machine_rests_on_a_stop_however_stiff() {
         for stiffness_n_per_m in [4e4, 1e7, 1e9] {
             let mut machine = Machine::paper();
-            // A little below, in front: it sags by 14 mm without.
+            // The stop is 5 mm below the tub's front, which sags by 14 mm without it.
             machine.stops = vec![BumpStop {
                 tub_m: [0.3, -0.2, 0.0],
                 direction: [0.0, -1.0, 0.0],
                 clearance_m: 0.005,
                 stiffness_n_per_m,
-                // Its force before it closes, k s^2 / (4 |depth|), is to be none.
+                // Makes the force before contact, k s^2 / (4 |depth|), negligible.
                 softness_m: 1e-6,
                 ..BumpStop::default()
             }];
-            let (q, found) = find(N(0.0), &Coefficients::new(&machine));
+            let (q, found) = solve_equilibrium(N(0.0), &Coefficients::new(&machine));
             assert_eq!(found & 1, 1, "{stiffness_n_per_m:e}");
             let lower_m = -(q[0].0 + 0.3 * q[5].0.sin() - 0.2 * (q[5].0.cos() - 1.0));
             let into_m = lower_m - 0.005;
-            // It carries about the weight, 320 N; the springs' moment may add to that.
+            // The stop carries about the weight, 320 N, and a part of the springs' moment.
             assert!(into_m > -1e-4 && into_m * stiffness_n_per_m < 400.0, "{lower_m}");
         }
     }
 
     #[test]
-    fn a_machine_that_falls_names_the_motion() {
+    fn an_unstable_machine_names_its_unstable_motion() {
         let mut machine = Machine::paper();
-        // Upright below the tub, loaded by its weight.
+        // The springs stand below the tub, under its weight.
         for spring in &mut machine.springs {
             spring.cabinet_m[1] = -0.3;
             spring.tub_m[1] = -0.1626;
             spring.cabinet_m[2] = spring.tub_m[2];
         }
         let coefficients = Coefficients::new(&machine);
-        let (q, found) = find(N(0.0), &coefficients);
+        let (q, found) = solve_equilibrium(N(0.0), &coefficients);
         assert_eq!(found & 1, 0);
         let (motion, stiffness, _) = unstable_motion(&coefficients, &q.map(|q| q.0)).unwrap();
-        // About O, which the springs stand before: yaw moves them sideways.
+        // The springs stand before O, so that yaw moves them sideways.
         assert_eq!(motion, "round the vertical (yaw)");
         assert!(stiffness < 0.0, "{stiffness}");
     }
 
     #[test]
-    fn springs_that_cannot_carry_the_machine_hold_nothing() {
+    fn springs_too_soft_for_the_weight_have_no_equilibrium() {
         let mut machine = Machine::paper();
         for spring in &mut machine.springs {
             spring.stiffness_n_per_m = 1.0;
         }
-        assert_eq!(find(N(0.0), &Coefficients::new(&machine)).1 & 1, 0);
+        assert_eq!(solve_equilibrium(N(0.0), &Coefficients::new(&machine)).1 & 1, 0);
     }
 }

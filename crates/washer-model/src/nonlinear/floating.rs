@@ -1,38 +1,40 @@
-//! A body chain that floats in the cabinet's y-z plane: the form of both halves of the machine, tub
-//! (q1, q2; q5, q6) and rotor (q3, q4; q7 to q10).
+//! A chain of bodies that floats in the cabinet's y-z plane, as both halves of the machine do: the
+//! tub (q1, q2; q5, q6) and the rotor (q3, q4; q7 to q10).
 //!
-//! Written for the mass centre of the chain, its two translations decouple from the rotations
-//! (section 4.1 of the model page): J is 2x2 for the tub, 4x4 for the rotor.
+//! About the chain's mass centre the two translations decouple from the rotations (section 4.1 of
+//! the model page). J is 2x2 for the tub and 4x4 for the rotor.
 
 use crate::nonlinear::forces::AxisLoad;
 use lane_ode::{Lane, N, Real};
 
-/// How a half's midpoint (y, z) and axis (y, z) accelerate: on their own, and per unit of force (y,
-/// z) and moment (y, z).
-pub(crate) struct Response<T> {
+/// The accelerations of a half's midpoint (y, z) and axis (y, z).
+pub(crate) struct AxisResponse<T> {
+    /// The accelerations without forces on the axis.
     pub(crate) free: [N<T>; 4],
-    /// Symmetric; lower triangle.
+    /// The accelerations per unit of force (y, z) and moment (y, z): the lower triangle of a
+    /// symmetric matrix.
     pub(crate) compliance: [[N<T>; 4]; 4],
 }
 
-/// Equations of motion of one half of the machine, with `R` rotations. The first is the axis's yaw
-/// about c2, so that its partial velocities have no y component; the second is the axis's pitch.
+/// The equations of motion of one half of the machine, with `R` rotations. The first rotation is
+/// the axis's yaw about c2, whose partial velocities have no y component; the second is the axis's
+/// pitch.
 #[derive(Clone, Copy)]
 pub(crate) struct Floating<T, const R: usize> {
-    /// Reciprocal of the chain's mass.
+    /// The reciprocal of the chain's mass.
     pub(crate) per_mass: N<T>,
-    /// Force on the chain along y and z.
+    /// The force on the chain along y and z.
     pub(crate) force: [N<T>; 2],
-    /// Acceleration of the mass centre relative to the bearing midpoint at constant speeds, y and
-    /// z.
+    /// The acceleration of the mass centre relative to the bearing midpoint at constant speeds, y
+    /// and z.
     pub(crate) drift: [N<T>; 2],
-    /// Partial velocities of the mass centre relative to the bearing midpoint, y and z.
+    /// The partial velocities of the mass centre relative to the bearing midpoint, y and z.
     pub(crate) arm: [[N<T>; 2]; R],
-    /// Partial derivatives of the axis (a1) by yaw and pitch, y and z.
+    /// The partial derivatives of the axis (a1) by yaw and pitch, y and z.
     pub(crate) axis: [[N<T>; 2]; 2],
-    /// Acceleration of the axis (a1) at constant speeds, y and z.
+    /// The acceleration of the axis (a1) at constant speeds, y and z.
     pub(crate) axis_drift: [N<T>; 2],
-    /// Generalised forces less inertia forces at constant speeds, about the mass centre.
+    /// The generalised forces less the inertia forces at constant speeds, about the mass centre.
     pub(crate) torque: [N<T>; R],
 }
 
@@ -40,12 +42,12 @@ impl<T: Real, const R: usize> Floating<T, R> {
     /// Adds forces on the axis.
     #[inline(always)]
     pub(crate) fn apply(&mut self, load: &AxisLoad<T>) {
-        (self.force, self.torque) = self.under(load);
+        (self.force, self.torque) = self.with_load(load);
     }
 
-    /// Adds a unit of generalised force on a coordinate: y, z, then the rotations.
+    /// Adds a unit of generalised force on a coordinate, in the order y, z, rotations.
     #[inline(always)]
-    pub(crate) fn push(&mut self, coordinate: usize) {
+    pub(crate) fn add_unit_force(&mut self, coordinate: usize) {
         if coordinate < 2 {
             self.force[coordinate] = self.force[coordinate] + 1.0;
             for r in 0..R {
@@ -56,9 +58,9 @@ impl<T: Real, const R: usize> Floating<T, R> {
         }
     }
 
-    /// Force and torques with forces on the axis.
+    /// Returns force and torques together with forces on the axis.
     #[inline(always)]
-    fn under(&self, load: &AxisLoad<T>) -> ([N<T>; 2], [N<T>; R]) {
+    fn with_load(&self, load: &AxisLoad<T>) -> ([N<T>; 2], [N<T>; R]) {
         let [moment_y, moment_z] = load.moment;
         let mut torque = self.torque;
         torque[0] += self.axis[0][1] * moment_z;
@@ -72,12 +74,13 @@ impl<T: Real, const R: usize> Floating<T, R> {
         ([self.force[0] + load.force[0], self.force[1] + load.force[1]], torque)
     }
 
-    /// How midpoint and axis accelerate, and would under forces on the axis. `inertia` is J.
+    /// Computes the accelerations of midpoint and axis and the compliance C = 1/m + G^T J^-1 G.
+    /// `inertia` holds the factors of J.
     #[inline(always)]
-    pub(crate) fn response(&self, inertia: &Factors<T, R>) -> Response<T> {
+    pub(crate) fn response(&self, inertia: &Factors<T, R>) -> AxisResponse<T> {
         let zero = self.per_mass.lit(0.0);
-        // Rows of G: what `apply` adds to the torques per unit of force and moment; a motion's work
-        // is the same sum.
+        // The rows of G: the torques that `apply` adds per unit of force and moment, which by
+        // virtual work are also the motions of the axis per unit of rotation.
         let mut half = [[zero; 4]; R];
         for r in 0..R {
             half[r][0] = -self.arm[r][0];
@@ -88,7 +91,8 @@ impl<T: Real, const R: usize> Floating<T, R> {
             half[r][3] = self.axis[r][1];
         }
         let mut start = self.torque;
-        // C = 1/m + G^T J^-1 G with J = L D L^T: half of the solution on either side.
+        // With J = L D L^T, C = 1/m + (L^-1 G)^T D^-1 (L^-1 G): one triangular solve serves both
+        // sides.
         for j in 0..R {
             for i in j + 1..R {
                 let l = inertia.below(i, j);
@@ -116,18 +120,18 @@ impl<T: Real, const R: usize> Floating<T, R> {
                 }
             }
         }
-        Response { free, compliance }
+        AxisResponse { free, compliance }
     }
 
-    /// Accelerations with forces on the axis: y and z of the bearing midpoint, then the rotations.
-    /// `inertia` is J.
+    /// Computes the accelerations with forces on the axis: y and z of the bearing midpoint, then
+    /// the rotations. `inertia` holds the factors of J.
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,
         inertia: &Factors<T, R>,
         load: &AxisLoad<T>,
     ) -> ([N<T>; 2], [N<T>; R]) {
-        let (force, torque) = self.under(load);
+        let (force, torque) = self.with_load(load);
         let rotation = inertia.solve(torque);
         let mut translation =
             [force[0] * self.per_mass - self.drift[0], force[1] * self.per_mass - self.drift[1]];
@@ -140,8 +144,8 @@ impl<T: Real, const R: usize> Floating<T, R> {
         (translation, rotation)
     }
 
-    /// Forces that the coordinates (y and z of the bearing midpoint, then the rotations) see: `f`
-    /// in M q'' = f.
+    /// Computes the generalised forces f in M q'' = f: y and z of the bearing midpoint, then the
+    /// rotations.
     #[inline(always)]
     pub(crate) fn generalised_forces(&self) -> ([N<T>; 2], [N<T>; R]) {
         let midpoint = [
@@ -156,10 +160,10 @@ impl<T: Real, const R: usize> Floating<T, R> {
     }
 }
 
-/// L D L^T factors of a symmetric positive definite matrix.
+/// The L D L^T factors of a symmetric positive definite matrix.
 #[derive(Clone, Copy)]
 pub(crate) struct Factors<T, const R: usize> {
-    /// L below the diagonal (unit diagonal not stored), 1/D on it.
+    /// L below the diagonal, without its unit diagonal, and 1/D on the diagonal.
     packed: [[N<T>; R]; R],
 }
 
@@ -172,8 +176,8 @@ impl<T: Real, const R: usize> Factors<T, R> {
             for i in j + 1..R {
                 let l = (a[i][j] * pivot).v();
                 for k in j + 1..=i {
-                    // a[k][j] still holds the unscaled column for k = i, and l * d for those above
-                    // it.
+                    // Row i still holds the unscaled column; the rows above it hold it in their
+                    // upper triangle.
                     let unscaled = if k == i { a[i][j] } else { a[j][k] };
                     a[i][k] -= l * unscaled;
                 }
@@ -186,19 +190,19 @@ impl<T: Real, const R: usize> Factors<T, R> {
         Self { packed: a }
     }
 
-    /// Entry (row, column) of L, below its diagonal.
+    /// Returns entry (row, column) of L, below the diagonal.
     #[inline(always)]
     fn below(&self, row: usize, column: usize) -> N<T> {
         self.packed[row][column]
     }
 
-    /// 1/D.
+    /// Returns an entry of 1/D.
     #[inline(always)]
     fn reciprocal_pivot(&self, row: usize) -> N<T> {
         self.packed[row][row]
     }
 
-    /// Bit i: the matrix of lane i is positive definite.
+    /// Returns a bit for each lane whose matrix is positive definite.
     #[inline(always)]
     pub(crate) fn is_positive(&self) -> u32
     where

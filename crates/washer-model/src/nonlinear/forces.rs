@@ -1,4 +1,4 @@
-//! Forces between the bodies: bearings, and the flexure of the drum shaft (section 3 of the model
+//! The forces of the bearings, and of the flexure between drum and shaft (section 3 of the model
 //! page).
 
 use crate::lanes::lane_struct;
@@ -6,18 +6,18 @@ use crate::nonlinear::coefficients::Bodies;
 use lane_ode::{N, Real};
 
 lane_struct! {
-    /// Cabinet forces (y, z) on points of a body's axis.
+    /// The resultant of forces (y, z; cabinet axes) on points of a body's axis.
     #[derive(Clone, Copy, Debug)]
     AxisLoad {
-        /// Their sum.
+        /// The sum of the forces.
         force: [N<T>; 2],
-        /// Their sum, each times its position along the axis.
+        /// The sum of the forces times their positions along the axis.
         moment: [N<T>; 2],
     }
 }
 
 impl<T: Real> AxisLoad<T> {
-    /// The load on the other body.
+    /// Returns the load on the other body.
     #[inline(always)]
     pub(crate) fn reaction(&self) -> Self {
         let [[fy, fz], [my, mz]] = [self.force, self.moment];
@@ -26,14 +26,14 @@ impl<T: Real> AxisLoad<T> {
 }
 
 lane_struct! {
-    /// Where the shaft's bearing midpoint is from the tub's, and its axis from the tub's axis; y
-    /// and z.
+    /// The offset of the shaft's bearing midpoint from the tub's, and the tilt of the shaft's axis
+    /// against the tub's; y and z.
     #[derive(Clone, Copy, Debug)]
     Deflection { offset: [N<T>; 2], tilt: [N<T>; 2] }
 }
 
 impl<T: Real> Deflection<T> {
-    /// Bearing forces on the shaft.
+    /// Computes the bearing load on the shaft.
     #[inline(always)]
     pub(crate) fn load(&self, b: &Bodies<T>) -> AxisLoad<T> {
         let zero = b.front_stiffness.lit(0.0);
@@ -51,21 +51,21 @@ impl<T: Real> Deflection<T> {
     }
 }
 
-/// Moments of the drum shaft's flexure about q9 and q10, by their sines and cosines: derivatives of
-/// K_D phi^2 / 2 with cos phi = cos q9 cos q10.
+/// Computes the moments of the flexure about q9 and q10 from their sines and cosines: the
+/// derivatives of K_D phi^2 / 2 with cos phi = cos q9 cos q10.
 #[inline(always)]
 pub(crate) fn flexure<T: Real>(
     stiffness: N<T>,
     (s9, c9): (N<T>, N<T>),
     (s10, c10): (N<T>, N<T>),
 ) -> [N<T>; 2] {
-    // sin^2 phi without cancellation.
+    // sin^2 phi = 1 - cos^2 phi, written without cancellation.
     let sin_squared = s9 * s9 + (c9 * c9) * (s10 * s10);
     let factor = (stiffness * phi_over_sin(sin_squared, (c9 * c10).v())).v();
     [(factor * (s9 * c10)).v(), (factor * (c9 * s10)).v()]
 }
 
-/// Coefficients of asin(x)/x in powers of x^2: c_k = c_{k-1} (2k - 1)^2 / (2k (2k + 1)).
+/// The coefficients of asin(x)/x in powers of x^2: c_k = c_{k-1} (2k - 1)^2 / (2k (2k + 1)).
 const ASIN_SERIES: [f64; 22] = {
     let mut c = [1.0; 22];
     let mut k = 1;
@@ -77,10 +77,11 @@ const ASIN_SERIES: [f64; 22] = {
     c
 };
 
-/// Up to here, sin^2 phi is small enough for a short series: its first dropped term is below 2e-17.
+/// The greatest sin^2 phi for the short series of five terms. Basis: the first dropped term is
+/// below 2e-17. Doubling it makes that term 32 times as large.
 const SMALL_SIN_SQUARED: f64 = 1.0 / 1024.0;
 
-/// phi / sin phi from sin^2 phi and cos phi, for phi up to pi/2 and beyond.
+/// Computes phi / sin phi from sin^2 phi and cos phi, for phi up to pi/2 and beyond.
 #[inline(always)]
 fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
     let mut short = sin_squared.lit(ASIN_SERIES[4]);
@@ -89,7 +90,7 @@ fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
     }
     let bound = sin_squared.lit(SMALL_SIN_SQUARED);
     let is_small = sin_squared.0.less(bound.0);
-    // A folded hinge has a small sine too.
+    // Beyond pi/2 the sine is small again, so that the cosine's sign decides as well.
     let is_ahead = cos.lit(0.0).0.less(cos.0);
     if T::all(is_small) && T::all(is_ahead) {
         return short;
@@ -98,8 +99,8 @@ fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
     N(T::select(is_ahead, T::select(is_small, short.0, long.0), long.0))
 }
 
-/// The same by quarter angles: with s = sin^2(phi/4), phi / sin phi = (asin sqrt(s) / sqrt(s)) /
-/// (cos(phi/4) cos(phi/2)).
+/// Computes phi / sin phi from the quarter angle: with s = sin^2(phi/4) it is (asin sqrt(s) /
+/// sqrt(s)) / (cos(phi/4) cos(phi/2)).
 #[inline(always)]
 fn phi_over_sin_by_quarters<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
     let half = 0.5 * (sin_squared / (1.0 + cos));

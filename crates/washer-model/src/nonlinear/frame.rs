@@ -1,16 +1,16 @@
-//! A body axis tilted by yaw and pitch, as the tub's and the shaft's are (Table 1, first two
-//! angles).
+//! The frame of a body whose axis is tilted by yaw and pitch, as tub and shaft are (Table 1, first
+//! two angles).
 //!
-//! The frame is R = Ry(yaw) Rz(pitch); its columns are the axis a1, a2 and a3. Vectors are in frame
-//! axes unless a name ends in `_c`: those are in cabinet axes.
+//! The frame is R = Ry(yaw) Rz(pitch), with the columns a1 (the axis), a2 and a3. Vectors are in
+//! frame axes, or in cabinet axes where a name ends in `_c`.
 
 use crate::coordinates::{COORDINATES, SHAFT_PITCH, SHAFT_YAW, TUB_PITCH, TUB_YAW};
 use lane_ode::{N, Real};
 
-/// A vector's three components.
+/// A vector of three components.
 pub(crate) type Vec3<T> = [N<T>; 3];
 
-/// k v
+/// Returns k v.
 #[inline(always)]
 pub(crate) fn scaled<T: Real, const K: usize>(k: N<T>, mut v: [N<T>; K]) -> [N<T>; K] {
     for x in &mut v {
@@ -19,7 +19,7 @@ pub(crate) fn scaled<T: Real, const K: usize>(k: N<T>, mut v: [N<T>; K]) -> [N<T
     v
 }
 
-/// a + b
+/// Returns a + b.
 #[inline(always)]
 pub(crate) fn sum<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [N<T>; K] {
     for i in 0..K {
@@ -28,7 +28,7 @@ pub(crate) fn sum<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [
     a
 }
 
-/// a - b
+/// Returns a - b.
 #[inline(always)]
 pub(crate) fn difference<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K]) -> [N<T>; K] {
     for i in 0..K {
@@ -37,13 +37,13 @@ pub(crate) fn difference<T: Real, const K: usize>(mut a: [N<T>; K], b: &[N<T>; K
     a
 }
 
-/// j a + k b
+/// Returns j a + k b.
 #[inline(always)]
 pub(crate) fn combination<T: Real>(j: N<T>, a: &Vec3<T>, k: N<T>, b: &Vec3<T>) -> Vec3<T> {
     [j * a[0] + k * b[0], j * a[1] + k * b[1], j * a[2] + k * b[2]]
 }
 
-/// start + a x b
+/// Returns start + a x b.
 #[inline(always)]
 pub(crate) fn plus_cross<T: Real>(start: &Vec3<T>, a: &Vec3<T>, b: &Vec3<T>) -> Vec3<T> {
     [
@@ -53,35 +53,35 @@ pub(crate) fn plus_cross<T: Real>(start: &Vec3<T>, a: &Vec3<T>, b: &Vec3<T>) -> 
     ]
 }
 
-/// a . b
+/// Returns a . b.
 #[inline(always)]
 pub(crate) fn dot<T: Real>(a: &Vec3<T>, b: &Vec3<T>) -> N<T> {
     a[0] * b[0] + (a[1] * b[1] + a[2] * b[2])
 }
 
-/// Orientation of a tilted axis.
+/// The orientation of a tilted frame.
 #[derive(Clone, Copy)]
 pub(crate) struct Tilt<T> {
     pub(crate) sin_yaw: N<T>,
     pub(crate) cos_yaw: N<T>,
     pub(crate) sin_pitch: N<T>,
     pub(crate) cos_pitch: N<T>,
-    /// a1 in cabinet axes.
+    /// The axis a1 in cabinet axes.
     pub(crate) axis_c: Vec3<T>,
-    /// a2 in cabinet axes.
+    /// The vector a2 in cabinet axes.
     pub(crate) second_c: Vec3<T>,
 }
 
 impl<T: Real> Tilt<T> {
-    /// Of the tub.
+    /// Returns the tub's orientation.
     #[inline(always)]
-    pub(crate) fn of_tub(q: &[N<T>; COORDINATES]) -> Self {
+    pub(crate) fn tub(q: &[N<T>; COORDINATES]) -> Self {
         Self::new(q[TUB_YAW], q[TUB_PITCH])
     }
 
-    /// Of the shaft, before its spin.
+    /// Returns the shaft's orientation before the spin.
     #[inline(always)]
-    pub(crate) fn of_shaft(q: &[N<T>; COORDINATES]) -> Self {
+    pub(crate) fn shaft(q: &[N<T>; COORDINATES]) -> Self {
         Self::new(q[SHAFT_YAW], q[SHAFT_PITCH])
     }
 
@@ -99,7 +99,7 @@ impl<T: Real> Tilt<T> {
         }
     }
 
-    /// From frame axes to cabinet axes. a3 is (sin yaw, 0, cos yaw).
+    /// Transforms a vector from frame axes to cabinet axes. a3 is (sin yaw, 0, cos yaw).
     #[inline(always)]
     pub(crate) fn in_cabinet_axes(&self, v: &Vec3<T>) -> Vec3<T> {
         let [a1, a2] = [&self.axis_c, &self.second_c];
@@ -110,14 +110,14 @@ impl<T: Real> Tilt<T> {
         ]
     }
 
-    /// From cabinet axes to frame axes.
+    /// Transforms a vector from cabinet axes to frame axes.
     #[inline(always)]
     pub(crate) fn in_own_axes(&self, v: &Vec3<T>) -> Vec3<T> {
         [dot(&self.axis_c, v), dot(&self.second_c, v), self.sin_yaw * v[0] + self.cos_yaw * v[2]]
     }
 
-    /// Angular velocity of the frame, and the angular acceleration and the axis's second derivative
-    /// that it has at constant generalised speeds.
+    /// Computes the frame's angular velocity, and its angular acceleration and the second
+    /// derivative of its axis at constant generalised speeds.
     #[inline(always)]
     pub(crate) fn motion(&self, yaw_rate: N<T>, pitch_rate: N<T>) -> TiltMotion<T> {
         let rate = [(yaw_rate * self.sin_pitch).v(), (yaw_rate * self.cos_pitch).v(), pitch_rate];
@@ -130,27 +130,27 @@ impl<T: Real> Tilt<T> {
         }
     }
 
-    /// Derivatives of the axis by yaw and by pitch, y and z; the first one's y component is zero.
+    /// Returns the derivatives of the axis by yaw and by pitch, y and z.
     #[inline(always)]
     pub(crate) fn axis_partials(&self) -> [[N<T>; 2]; 2] {
         [[self.sin_yaw.lit(0.0), self.axis_yaw_z()], [self.second_c[1], self.second_c[2]]]
     }
 
-    /// The z component of the axis's derivative by yaw; its y component is zero.
+    /// Returns the z component of the axis's derivative by yaw, whose y component is zero.
     #[inline(always)]
     pub(crate) fn axis_yaw_z(&self) -> N<T> {
         -self.axis_c[0]
     }
 }
 
-/// Motion of a tilted axis at constant generalised speeds.
+/// The motion of a tilted frame at constant generalised speeds.
 pub(crate) struct TiltMotion<T> {
-    /// Angular velocity.
+    /// The angular velocity.
     pub(crate) rate: Vec3<T>,
-    /// Angular acceleration about a1.
+    /// The angular acceleration about a1.
     pub(crate) acceleration_x: N<T>,
-    /// Angular acceleration about a2; about a3 it is zero.
+    /// The angular acceleration about a2; that about a3 is zero.
     pub(crate) acceleration_y: N<T>,
-    /// Second derivative of a1.
+    /// The second derivative of a1.
     pub(crate) axis_acceleration: Vec3<T>,
 }

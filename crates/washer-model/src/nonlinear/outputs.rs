@@ -1,5 +1,5 @@
-//! Observed quantities of a motion: channels and gap, with their time derivatives (section 6 of the
-//! model page).
+//! The outputs of a motion: channels and gap, with their time derivatives (section 6 of the model
+//! page).
 
 use crate::channel::{CHANNELS, channels};
 use crate::coordinates::{
@@ -13,96 +13,100 @@ use crate::nonlinear::frame::{
 use crate::nonlinear::{into_spin, out_of_hinge, out_of_spin};
 use lane_ode::{N, Real, Sample};
 
-/// Components of the radial distance between drum and tub.
+/// The number of components of the radial distance between drum and tub.
 pub(crate) const RADIAL: usize = 2;
 
-/// Coordinates (m, rad) with their first and second time derivatives.
-pub(crate) struct Moving<T> {
+/// Coordinates (m, rad) with first and second time derivatives.
+pub(crate) struct MovingCoordinates<T> {
     pub(crate) q: [N<T>; COORDINATES],
     pub(crate) u: [N<T>; COORDINATES],
     pub(crate) a: [N<T>; COORDINATES],
 }
 
-/// A vector with its first and second time derivatives.
-struct Course<T> {
+/// A vector with first and second time derivatives.
+struct MovingVector<T> {
     value: Vec3<T>,
     rate: Vec3<T>,
     second: Vec3<T>,
 }
 
-/// The points that channels are taken from.
-struct Places<T> {
-    tub_front: Course<T>,
-    drum_front: Course<T>,
-    total_centre: Course<T>,
+/// The points whose motions are channels.
+struct ChannelPoints<T> {
+    tub_front: MovingVector<T>,
+    drum_front: MovingVector<T>,
+    total_centre: MovingVector<T>,
 }
 
-/// What a channel is taken from, with its derivatives.
-macro_rules! taken {
-    ($places:ident, $motion:ident, [point $place:ident $axis:literal]) => {
-        component(&$places.$place, $axis)
+/// The motion of one channel.
+macro_rules! channel_motion {
+    ($points:ident, $motion:ident, [point $point:ident $axis:literal]) => {
+        component(&$points.$point, $axis)
     };
-    ($places:ident, $motion:ident, [angle $q:ident]) => {
+    ($points:ident, $motion:ident, [angle $q:ident]) => {
         sample($motion.q[$q], $motion.u[$q], $motion.a[$q])
     };
 }
 
-macro_rules! observe {
+macro_rules! declare_outputs {
     ($($(#[$doc:meta])* $name:ident, $key:literal, $description:literal, $kind:ident,
         $from:tt, steady $steady:tt $(, turning cos $cos:tt sin $sin:tt rest $rest:tt)?;
     )+) => {
         #[inline(always)]
-        fn observed<T: Real>(places: &Places<T>, motion: &Moving<T>) -> [Sample<T>; CHANNELS] {
-            [$(taken!(places, motion, $from)),+]
+        fn channel_motions<T: Real>(
+            points: &ChannelPoints<T>,
+            motion: &MovingCoordinates<T>,
+        ) -> [Sample<T>; CHANNELS] {
+            [$(channel_motion!(points, motion, $from)),+]
         }
     };
 }
-channels!(observe);
+channels!(declare_outputs);
 
-/// j a + k b
+/// Returns j a + k b.
 #[inline(always)]
-fn blend<T: Real>(j: N<T>, a: &Course<T>, k: N<T>, b: &Course<T>) -> Course<T> {
-    Course {
+fn blend<T: Real>(j: N<T>, a: &MovingVector<T>, k: N<T>, b: &MovingVector<T>) -> MovingVector<T> {
+    MovingVector {
         value: combination(j, &a.value, k, &b.value),
         rate: combination(j, &a.rate, k, &b.rate),
         second: combination(j, &a.second, k, &b.second),
     }
 }
 
-/// Directions of the body axes and their rates, from which every output is made. Cabinet axes
+/// The body axes with their derivatives, from which every output is computed; in cabinet axes
 /// unless noted.
 pub(crate) struct Axes<T> {
     tub: Tilt<T>,
-    /// Angular velocity and acceleration of the tub, tub axes.
+    /// The angular velocity and acceleration of the tub, in tub axes.
     tub_turn: [Vec3<T>; 2],
-    tub_axis: Course<T>,
-    shaft_axis: Course<T>,
-    /// The drum's d1 and d2.
-    drum: [Course<T>; 2],
+    tub_axis: MovingVector<T>,
+    shaft_axis: MovingVector<T>,
+    /// The drum's axes d1 and d2.
+    drum: [MovingVector<T>; 2],
 }
 
 impl<T: Real> Axes<T> {
     #[inline(always)]
-    pub(crate) fn new(spin: &SpinState<T>, motion: &Moving<T>) -> Self {
-        let Moving { q, u, a } = motion;
-        let tub = Tilt::of_tub(q);
-        let of_tub = tub.motion(u[TUB_YAW], u[TUB_PITCH]);
-        let shaft = Tilt::of_shaft(q);
-        let of_shaft = shaft.motion(u[SHAFT_YAW], u[SHAFT_PITCH]);
+    pub(crate) fn new(spin: &SpinState<T>, motion: &MovingCoordinates<T>) -> Self {
+        let MovingCoordinates { q, u, a } = motion;
+        let tub = Tilt::tub(q);
+        let tub_motion = tub.motion(u[TUB_YAW], u[TUB_PITCH]);
+        let shaft = Tilt::shaft(q);
+        let shaft_motion = shaft.motion(u[SHAFT_YAW], u[SHAFT_PITCH]);
         let (s9, c9) = q[HINGE_YAW].sin_cos();
 
-        // Angular velocity and acceleration: shaft in S, then drum in E; as in `nonlinear::rotor`,
-        // with u' now.
+        // Angular velocities and accelerations of the shaft in S and of the drum in E, as in
+        // `nonlinear::rotor` but with u'.
         let omega_s = {
-            let [x, y, z] = into_spin(spin, &of_shaft.rate);
+            let [x, y, z] = into_spin(spin, &shaft_motion.rate);
             [x + spin.speed, y, z]
         };
         let alpha_s = {
-            let alpha = angular_acceleration(&shaft, &of_shaft, motion, SHAFT_YAW);
+            let alpha = angular_acceleration(&shaft, &shaft_motion, motion, SHAFT_YAW);
             let [x, y, z] = into_spin(spin, &alpha);
             [x + spin.acceleration, y + spin.speed * omega_s[2], z - spin.speed * omega_s[1]]
         };
-        let (u9, u10) = (u[HINGE_YAW], u[HINGE_PITCH]);
+        let u9 = u[HINGE_YAW];
+        let u10 = u[HINGE_PITCH];
         let [ex, ey, ez] =
             [c9 * omega_s[0] - s9 * omega_s[2], omega_s[1] + u9, s9 * omega_s[0] + c9 * omega_s[2]];
         let turn = [
@@ -116,36 +120,45 @@ impl<T: Real> Axes<T> {
         let (s10, c10) = q[HINGE_PITCH].sin_cos();
         let zero = s9.lit(0.0);
         Self {
-            tub_turn: [of_tub.rate, angular_acceleration(&tub, &of_tub, motion, TUB_YAW)],
-            tub_axis: axis_course(&tub, &of_tub, motion, TUB_YAW),
-            shaft_axis: axis_course(&shaft, &of_shaft, motion, SHAFT_YAW),
+            tub_turn: [tub_motion.rate, angular_acceleration(&tub, &tub_motion, motion, TUB_YAW)],
+            tub_axis: moving_axis(&tub, &tub_motion, motion, TUB_YAW),
+            shaft_axis: moving_axis(&shaft, &shaft_motion, motion, SHAFT_YAW),
             drum: [
-                drum_course(&shaft, spin, (s9, c9), &turn, &[c10, s10, zero]),
-                drum_course(&shaft, spin, (s9, c9), &turn, &[-s10, c10, zero]),
+                moving_drum_vector(&shaft, spin, (s9, c9), &turn, &[c10, s10, zero]),
+                moving_drum_vector(&shaft, spin, (s9, c9), &turn, &[-s10, c10, zero]),
             ],
             tub,
         }
     }
 
-    /// Position of the drum's front centre relative to the tub axis, along t2 and t3 (m).
+    /// Computes the position of the drum's front centre relative to the tub axis, along t2 and t3
+    /// (m).
     #[inline(always)]
-    pub(crate) fn radial(&self, b: &Bodies<T>, motion: &Moving<T>) -> [Sample<T>; RADIAL] {
+    pub(crate) fn radial(
+        &self,
+        b: &Bodies<T>,
+        motion: &MovingCoordinates<T>,
+    ) -> [Sample<T>; RADIAL] {
         let tub_front = point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let drum_front = self.drum_front(b, motion);
         let [omega, alpha] = &self.tub_turn;
         let apart = self.tub.in_own_axes(&difference(drum_front.value, &tub_front.value));
         let velocity = self.tub.in_own_axes(&difference(drum_front.rate, &tub_front.rate));
         let acceleration = self.tub.in_own_axes(&difference(drum_front.second, &tub_front.second));
-        // As seen from the turning tub.
+        // Derivatives in the rotating frame of the tub.
         let rate = plus_cross(&velocity, &apart, omega);
         let second =
             plus_cross(&plus_cross(&acceleration, &apart, alpha), &sum(velocity, &rate), omega);
         [sample(apart[1], rate[1], second[1]), sample(apart[2], rate[2], second[2])]
     }
 
-    /// Positions (m) and angles (rad) in the order of [`Channel::ALL`].
+    /// Computes positions (m) and angles (rad) in the order of [`Channel::ALL`].
     #[inline(always)]
-    pub(crate) fn channels(&self, b: &Bodies<T>, motion: &Moving<T>) -> [Sample<T>; CHANNELS] {
+    pub(crate) fn channels(
+        &self,
+        b: &Bodies<T>,
+        motion: &MovingCoordinates<T>,
+    ) -> [Sample<T>; CHANNELS] {
         let tub_front = point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let tub_centre = point(motion, TUB_Y, &self.tub_axis, b.tub_centre);
         let drum_front = self.drum_front(b, motion);
@@ -154,19 +167,19 @@ impl<T: Real> Axes<T> {
         let rotor_centre = blend(b.along_shaft, &self.shaft_axis, b.drum_share, &rho);
         let rotor_centre = point(motion, SHAFT_Y, &rotor_centre, one);
         let total_centre = blend(b.tub_share, &tub_centre, b.rotor_share, &rotor_centre);
-        observed(&Places { tub_front, drum_front, total_centre }, motion)
+        channel_motions(&ChannelPoints { tub_front, drum_front, total_centre }, motion)
     }
 
     #[inline(always)]
-    fn drum_front(&self, b: &Bodies<T>, motion: &Moving<T>) -> Course<T> {
+    fn drum_front(&self, b: &Bodies<T>, motion: &MovingCoordinates<T>) -> MovingVector<T> {
         let one = b.drum_hinge.lit(1.0);
         let front = blend(b.drum_hinge, &self.shaft_axis, b.hinge_to_front, &self.drum[0]);
         point(motion, SHAFT_Y, &front, one)
     }
 }
 
-/// Squared distance of the drum's front centre from the tub axis. Its square, because a distance
-/// has a kink at zero.
+/// Computes the squared distance of the drum's front centre from the tub axis. The distance itself
+/// is not smooth at zero.
 #[inline(always)]
 pub(crate) fn squared<T: Real>([y, z]: &[Sample<T>; RADIAL]) -> Sample<T> {
     sample(
@@ -185,65 +198,67 @@ fn sample<T>(value: N<T>, slope: N<T>, curvature: N<T>) -> Sample<T> {
 }
 
 #[inline(always)]
-fn component<T: Real>(course: &Course<T>, i: usize) -> Sample<T> {
-    sample(course.value[i], course.rate[i], course.second[i])
+fn component<T: Real>(vector: &MovingVector<T>, i: usize) -> Sample<T> {
+    sample(vector.value[i], vector.rate[i], vector.second[i])
 }
 
-/// Angular acceleration of a frame tilted by coordinate `yaw` and the next, in its axes.
+/// Computes the angular acceleration of a frame tilted by coordinate `yaw` and the next one, in
+/// frame axes.
 #[inline(always)]
 fn angular_acceleration<T: Real>(
     tilt: &Tilt<T>,
     at: &TiltMotion<T>,
-    motion: &Moving<T>,
+    motion: &MovingCoordinates<T>,
     yaw: usize,
 ) -> Vec3<T> {
     let [yaw, pitch] = [motion.a[yaw], motion.a[yaw + 1]];
     [at.acceleration_x + yaw * tilt.sin_pitch, at.acceleration_y + yaw * tilt.cos_pitch, pitch]
 }
 
-/// The axis of such a frame.
+/// Computes the motion of the axis of a frame tilted by coordinate `yaw` and the next one.
 #[inline(always)]
-fn axis_course<T: Real>(
+fn moving_axis<T: Real>(
     tilt: &Tilt<T>,
     at: &TiltMotion<T>,
-    Moving { u, a, .. }: &Moving<T>,
+    MovingCoordinates { u, a, .. }: &MovingCoordinates<T>,
     yaw: usize,
-) -> Course<T> {
-    let (rates, seconds) = ([u[yaw], u[yaw + 1]], [a[yaw], a[yaw + 1]]);
+) -> MovingVector<T> {
+    let rates = [u[yaw], u[yaw + 1]];
+    let seconds = [a[yaw], a[yaw + 1]];
     let zero = rates[0].lit(0.0);
     let by_yaw = [tilt.axis_c[2], zero, -tilt.axis_c[0]];
     let by_pitch = &tilt.second_c;
     let at_constant_speeds = tilt.in_cabinet_axes(&at.axis_acceleration);
     let by_accelerations = combination(seconds[0], &by_yaw, seconds[1], by_pitch);
-    Course {
+    MovingVector {
         value: tilt.axis_c,
         rate: combination(rates[0], &by_yaw, rates[1], by_pitch),
         second: sum(at_constant_speeds, &by_accelerations),
     }
 }
 
-/// A vector fixed in the drum, given in E; `turn` is the drum's angular velocity and acceleration
-/// there.
+/// Computes the motion of a vector fixed in the drum, given in E. `turn` holds the drum's angular
+/// velocity and acceleration in E.
 #[inline(always)]
-fn drum_course<T: Real>(
+fn moving_drum_vector<T: Real>(
     shaft: &Tilt<T>,
     spin: &SpinState<T>,
     hinge: (N<T>, N<T>),
     turn: &[Vec3<T>; 2],
     v: &Vec3<T>,
-) -> Course<T> {
+) -> MovingVector<T> {
     let zero = v[0].lit(0.0);
     let still = [zero; 3];
     let rate = plus_cross(&still, &turn[0], v);
     let second = plus_cross(&plus_cross(&still, &turn[1], v), &turn[0], &rate);
-    Course {
+    MovingVector {
         value: out_of_drum(shaft, spin, hinge, v),
         rate: out_of_drum(shaft, spin, hinge, &rate),
         second: out_of_drum(shaft, spin, hinge, &second),
     }
 }
 
-/// From E to cabinet axes.
+/// Transforms a vector from E to cabinet axes.
 #[inline(always)]
 fn out_of_drum<T: Real>(
     shaft: &Tilt<T>,
@@ -254,19 +269,24 @@ fn out_of_drum<T: Real>(
     shaft.in_cabinet_axes(&out_of_spin(spin, &out_of_hinge(s9, c9, v)))
 }
 
-/// A point `reach` along an axis from a bearing midpoint, whose y is coordinate `first`; midpoints
-/// do not move along x.
+/// Computes the motion of a point at `distance` along an axis from a bearing midpoint, whose y is
+/// coordinate `first`. Midpoints do not move along x.
 #[inline(always)]
-fn point<T: Real>(motion: &Moving<T>, first: usize, axis: &Course<T>, reach: N<T>) -> Course<T> {
-    let mut course = Course {
-        value: scaled(reach, axis.value),
-        rate: scaled(reach, axis.rate),
-        second: scaled(reach, axis.second),
+fn point<T: Real>(
+    motion: &MovingCoordinates<T>,
+    first: usize,
+    axis: &MovingVector<T>,
+    distance: N<T>,
+) -> MovingVector<T> {
+    let mut vector = MovingVector {
+        value: scaled(distance, axis.value),
+        rate: scaled(distance, axis.rate),
+        second: scaled(distance, axis.second),
     };
     for i in 0..2 {
-        course.value[1 + i] += motion.q[first + i];
-        course.rate[1 + i] += motion.u[first + i];
-        course.second[1 + i] += motion.a[first + i];
+        vector.value[1 + i] += motion.q[first + i];
+        vector.rate[1 + i] += motion.u[first + i];
+        vector.second[1 + i] += motion.a[first + i];
     }
-    course
+    vector
 }

@@ -116,7 +116,7 @@ impl Recorded {
         let nothing = [tub.midpoint[0].lit(0.0); 3];
         let mut on_tub = (nothing, nothing);
         if self.force || self.feet {
-            on_tub = elements.on_tub(tub);
+            on_tub = elements.load_on_tub(tub);
         }
         if self.feet {
             numbers[..LOAD].copy_from_slice(&on_cabinet(tub, &on_tub));

@@ -6,14 +6,14 @@ use crate::lanes::InLanes;
 use crate::linear::outputs::{LinearMotion, LinearOutputs};
 use crate::linear::rotor_terms::Terms;
 use crate::linear::step::{self, RotorAt, StepConstants};
-use crate::machine::parameters::FARTHEST_M;
+use crate::machine::parameters::MAX_COORDINATE_M;
 use crate::machine::spin::{SpinLanes, SpinState, SpinStretch};
 use crate::nonlinear::ahead::derivative_ahead;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::coupling::{Coupling, Sag};
 use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::elements::corners::CornerForce;
-use crate::nonlinear::outputs::{Axes, Moving, RADIAL};
+use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
 use crate::{COORDINATES, Caps, Point, nonlinear};
 use core::f64::consts::FRAC_PI_2;
 use lane_ode::{Lane, N, Sample, SemiImplicit, System, Task, Tolerance, additive, dopri5};
@@ -55,9 +55,9 @@ pub(crate) trait Model<T: Lane>: System<T, STATES> {
 
 /// Coordinates with two derivatives, from a state and its derivative.
 #[inline(always)]
-fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> Moving<T> {
+fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> MovingCoordinates<T> {
     let (q, u) = split(x);
-    Moving { q, u, a: split(dx).1 }
+    MovingCoordinates { q, u, a: split(dx).1 }
 }
 
 /// Coordinates of a state.
@@ -78,13 +78,13 @@ fn joined<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) -> [N<T>; S
 }
 
 /// The lanes whose angles are within a quarter turn and whose translations are within
-/// [`FARTHEST_M`].
+/// [`MAX_COORDINATE_M`].
 #[inline(always)]
 fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
     // One sum of squares, each over its own limit: NaN and infinity fail the comparison too.
     let mut sum = x[0].lit(0.0);
     for (i, q) in x[..COORDINATES].iter().enumerate() {
-        let limit = if i < FIRST_ANGLE { FARTHEST_M } else { FRAC_PI_2 };
+        let limit = if i < FIRST_ANGLE { MAX_COORDINATE_M } else { FRAC_PI_2 };
         let share = (*q * (1.0 / limit)).v();
         sum += share * share;
     }
@@ -153,7 +153,7 @@ impl<T: Lane> Nonlinear<T> {
         x: &[N<T>; STATES],
     ) -> [[N<T>; COORDINATES]; TUB.len()] {
         let (q, u) = split(x);
-        nonlinear::by_load(&self.machine, &self.coupling, &self.sag, spin, &q, &u)
+        nonlinear::accelerations_per_load(&self.machine, &self.coupling, &self.sag, spin, &q, &u)
     }
 }
 

@@ -7,7 +7,7 @@
 use crate::coordinates::{STATES, TUB, TUB_Y, TUB_Z};
 use crate::lanes::Constant as _;
 use crate::machine::feet::LOAD;
-use crate::nonlinear::elements::{CabinetLine, Ends, Law, PointMotion, TubMotion};
+use crate::nonlinear::elements::{CabinetLine, Ends, ForceLaw, PointMotion, TubMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
 use crate::run::model::{Model, Nonlinear};
 use crate::{COORDINATES, ModelKind, Point};
@@ -87,7 +87,7 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     }
     for stop in &elements.stops {
         let stop = stop.constant();
-        let push = first_order(model, stop.push(&tub.point(&stop.tub)));
+        let push = first_order(model, stop.force(&tub.point(&stop.tub)));
         for k in 0..3 {
             forces.cabinet_n[k] += push * stop.direction[k].0.value;
         }
@@ -152,7 +152,7 @@ pub(crate) fn load_on_cabinet(
         }
         ModelKind::Linear => (elements.with_viscous_friction().constant(), deviating(point, state)),
     };
-    let load = on_cabinet(&tub, &elements.on_tub(&tub));
+    let load = on_cabinet(&tub, &elements.load_on_tub(&tub));
     load.map(|N(first_order)| first_order.value + first_order.slope)
 }
 
@@ -173,7 +173,7 @@ pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -
 /// coordinates; in cabinet axes.
 pub(crate) fn attachments(point: &Point, q: &[f64; COORDINATES]) -> [Vec<[f64; 3]>; 2] {
     let q = q.map(N);
-    let tilt = Tilt::of_tub(&q);
+    let tilt = Tilt::tub(&q);
     let span = |ends: &Ends<f64>| from_cabinet(&tilt, &q, ends).map(|x| x.0);
     let elements = &point.machine.elements;
     [
@@ -193,13 +193,16 @@ struct Tub {
 
 impl Tub {
     /// Tension of an element, and its line.
-    fn tension(&self, element: &impl Law<Dual<f64>>) -> (N<Dual<f64>>, CabinetLine<Dual<f64>>) {
+    fn tension(
+        &self,
+        element: &impl ForceLaw<Dual<f64>>,
+    ) -> (N<Dual<f64>>, CabinetLine<Dual<f64>>) {
         let ends = element.ends();
         let span = tub_from_cabinet(&self.displaced, ends);
         let moving = tub_from_cabinet(&self.moving, ends);
         let rate = self.velocity(dot(&moving, &moving).sqrt());
         let line = CabinetLine { span, length: dot(&span, &span).sqrt(), rate };
-        (-element.push(&line) - element.push_further(&line), line)
+        (-element.force(&line) - element.optional_force(&line), line)
     }
 
     /// A tub point's motion.
@@ -237,7 +240,7 @@ fn along(q: &[f64; COORDINATES], direction: &[f64; COORDINATES]) -> [N<Dual<f64>
 
 /// From the cabinet end to the tub end, in cabinet axes.
 fn tub_from_cabinet(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> Vec3<Dual<f64>> {
-    from_cabinet(&Tilt::of_tub(q), q, ends)
+    from_cabinet(&Tilt::tub(q), q, ends)
 }
 
 /// The same of a tub that is tilted so.

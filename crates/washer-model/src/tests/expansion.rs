@@ -6,7 +6,7 @@ use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::Constant as _;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coupling::Coupling;
-use crate::nonlinear::outputs::{Axes, Moving, RADIAL};
+use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
 use crate::point::Point;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::{Channel, Equations, ModelKind, Spin};
@@ -146,7 +146,7 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         let along = |value: f64, slope: f64| N(Dual { value, slope });
         let at = core::array::from_fn(|i| along(instant.point.equilibrium[i], q[i]));
         let [u, a] = [u, a].map(|v| v.map(|v| along(0.0, v)));
-        let motion = Moving { q: at, u, a };
+        let motion = MovingCoordinates { q: at, u, a };
         let bodies = instant.point.machine.bodies.constant();
         let axes = Axes::new(&instant.spin.constant(), &motion);
         let spin_squared = instant.spin.speed.0.powi(2) + instant.spin.acceleration.0.abs();

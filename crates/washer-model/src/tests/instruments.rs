@@ -45,7 +45,7 @@ pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
             }
         }
         if machine.violations().is_empty()
-            && equilibrium::find(N(0.0), &Coefficients::new(&machine)).1 & 1 == 1
+            && equilibrium::solve_equilibrium(N(0.0), &Coefficients::new(&machine)).1 & 1 == 1
         {
             return machine;
         }

@@ -67,7 +67,7 @@ fn val_accelerations_match_an_independent_right_hand_side() {
 #[test]
 fn val_equilibrium_matches_an_independent_solution() {
     for case in reference("equilibrium.json")["cases"].as_array().unwrap() {
-        let (q, found) = equilibrium::find(N(0.0), &Coefficients::new(&machine(case)));
+        let (q, found) = equilibrium::solve_equilibrium(N(0.0), &Coefficients::new(&machine(case)));
         assert_eq!(found & 1, 1);
         let theirs: [f64; COORDINATES] = numbers(&case["q"]);
         for i in 0..COORDINATES {
@@ -86,7 +86,7 @@ fn val_equilibrium_matches_an_independent_solution() {
 fn val_linear_matrices_match_an_independent_expansion() {
     for case in reference("linear_matrices.json")["cases"].as_array().unwrap() {
         let coefficients = Coefficients::new(&machine(case));
-        let (q, _) = equilibrium::find(N(0.0), &coefficients);
+        let (q, _) = equilibrium::solve_equilibrium(N(0.0), &coefficients);
         let point = linear::Linearise { machine: &coefficients, q: &q }.run().remove(0);
         let ours = point.matrices(&coefficients.bodies, &spin(case));
         for (name, ours) in [("M", ours.mass), ("C", ours.damping), ("K", ours.stiffness)] {

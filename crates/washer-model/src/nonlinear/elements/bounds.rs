@@ -1,22 +1,24 @@
-//! The steepest that a machine's elements can be: linear ones that bound the stiffness and damping
-//! of all elements, so that the choice of steps sees friction, stops and stiffening springs.
+//! Bounds of the elements' tangents: linear elements with the greatest stiffness and damping that a
+//! machine's elements reach, from which the integrators' steps are chosen.
 
 use crate::coordinates::{COORDINATES, TUB};
-use crate::nonlinear::elements::{Elements, StopOf, TubMotion};
+use crate::nonlinear::elements::{Elements, StopCoefficients, TubMotion};
 use crate::nonlinear::frame::{difference, dot};
 use lane_ode::N;
 
-/// How far tub points move from where they rest (m): more than any machine has room for.
-const TRAVEL_M: f64 = 0.05;
+/// The greatest travel of a tub point from its place at rest (m). Basis: more than any machine has
+/// room for. Doubling it quadruples the bound of cubic stiffnesses.
+const MAX_TRAVEL_M: f64 = 0.05;
 
-/// A stop this many times its softness deep is closed but for less than a thousandth.
-const CLOSED: f64 = 20.0;
+/// The depth of a stop in contact, in softnesses. Basis: the force law is linear there to less than
+/// a thousandth. Doubling it makes that a quarter.
+const CONTACT_DEPTH: f64 = 20.0;
 
 impl Elements<f64> {
-    /// Elements whose tangents at the equilibrium `q` are the steepest that these have anywhere
-    /// near it; `None` if these are linear along their lines.
+    /// Returns linear elements with the greatest tangents that these have near the equilibrium `q`;
+    /// `None` if these are linear along their lines.
     pub(crate) fn steepest(&self, q: &[f64; COORDINATES]) -> Option<Self> {
-        if !self.has_further.holds() {
+        if !self.has_optional.holds() {
             return None;
         }
         let mut steepest = self.clone();
@@ -26,12 +28,13 @@ impl Elements<f64> {
             let place = tub.point(&ends.tub).displacement;
             let span = difference(place, &difference(ends.cabinet, &ends.tub));
             let length = dot(&span, &span).sqrt();
-            let (elongation, cubic) = (length - spring.free_length, spring.cubic);
+            let elongation = length - spring.free_length;
+            let cubic = spring.cubic;
             let tension = spring.stiffness * length - spring.stiffness_times_free_length
                 + cubic * elongation * elongation * elongation;
-            let farthest = elongation.abs() + TRAVEL_M;
+            let farthest = elongation.abs() + MAX_TRAVEL_M;
             spring.stiffness += 3.0 * (cubic * farthest * farthest).v();
-            // Its tension at rest stays, on which its stiffness across the line depends.
+            // Keeps the tension at rest, on which the stiffness across the line depends.
             spring.stiffness_times_free_length = spring.stiffness * length - tension;
             spring.cubic = N(0.0);
         }
@@ -41,13 +44,13 @@ impl Elements<f64> {
         }
         for stop in &mut steepest.stops {
             let depth = stop.depth(&tub.point(&stop.tub));
-            let StopOf { clearance, softness_squared, .. } = *stop;
-            stop.clearance = clearance + depth - CLOSED * softness_squared.sqrt();
+            let StopCoefficients { clearance, softness_squared, .. } = *stop;
+            stop.clearance = clearance + depth - CONTACT_DEPTH * softness_squared.sqrt();
         }
         for bushing in &mut steepest.bushings {
             let place = tub.point(&bushing.tub).displacement;
             for i in 0..3 {
-                let farthest = place[i].abs() + TRAVEL_M;
+                let farthest = place[i].abs() + MAX_TRAVEL_M;
                 bushing.stiffness[i] += 3.0 * (bushing.cubic[i] * farthest * farthest).v();
                 bushing.cubic[i] = N(0.0);
             }
