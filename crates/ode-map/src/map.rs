@@ -14,8 +14,8 @@ use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Steps}
 use sweep_engine::store::read::{NameCounts, add};
 use sweep_engine::store::{Done, Layout, Shape, axis_columns};
 use sweep_engine::{
-    Build, Engine, Error, Estimate, GridInput, Job, KeepRow, Listed, Model as EngineModel, NextRow,
-    Plan, Read, Rows, Scenario, Swept, Watch, methods,
+    Build, Engine, Error, Estimate, GridInput, Job, Listed, Model as EngineModel, Plan, Read,
+    RowSink, RowSource, Rows, RunContext, Scenario, Swept, methods,
 };
 use sweep_parameter::{Channel, Range, UnknownParameter};
 
@@ -399,7 +399,7 @@ fn error_left<const C: usize>(
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Engine
     for Evaluator<'_, O, C, D, P>
 {
-    fn evaluate(&self, next: &NextRow<'_>, keep: &KeepRow<'_>, watch: &Watch<'_>) {
+    fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, watch: &RunContext<'_>) {
         let columns = columns(self.plan);
         rayon::broadcast(|_| {
             while !watch.stopped() {

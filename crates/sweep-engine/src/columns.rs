@@ -1,42 +1,42 @@
-//! Columns as functions of a row: those of every comparison of a nonlinear with a linear motion,
-//! and the parts of a model's own columns.
+//! Columns as functions of a row: those that compare a nonlinear with a linear motion, and
+//! constructors for a model's own columns.
 
 use sweep_parameter::{Channel, Limit, RatioLimits, Worse};
 
 use crate::store::{Column, Holds, Row};
 
-/// The two models by name.
+/// The names of the two models.
 pub const MODELS: [&str; 2] = ["nonlinear", "linear"];
 
-/// A point at which both models have run, as every result tells of it. By channel of the plan, and
-/// by model.
+/// The comparison of both models at a point. Lists are in the order of the plan's channels, arrays
+/// in that of [`MODELS`].
 #[derive(Clone, Debug)]
 pub struct Compared {
-    /// The amplitudes of each model; empty if it failed.
+    /// The amplitudes of each model; empty for a model that failed.
     pub amplitudes: [Vec<f64>; 2],
-    /// The ratios, where there are any.
+    /// The ratios, `None` where one is not defined.
     pub ratios: Vec<Option<f64>>,
-    /// The greatest ratio with its channel; the first wins a tie.
+    /// The channel of the greatest ratio (the first of equal ones), and the ratio.
     pub greatest: Option<(usize, f64)>,
-    /// The least ratio with its channel; the first wins a tie.
+    /// The channel of the least ratio (the first of equal ones), and the ratio.
     pub least: Option<(usize, f64)>,
     /// Whether the ratios are within the limits.
     pub reliable: Option<bool>,
-    /// Whether the error left is within the accuracy asked for.
+    /// Whether the estimated error is within the accuracy.
     pub converged: Option<bool>,
     /// Whether the motion is chaotic.
     pub sensitive: Option<bool>,
-    /// The position of the method's name.
+    /// The index of the method's name.
     pub method: usize,
-    /// The relative error left.
+    /// The estimated relative error.
     pub error: Option<f64>,
-    /// The position of the status.
+    /// The index of the status.
     pub status: usize,
-    /// When a model failed.
+    /// The time at which a model failed.
     pub fail_time_s: Option<f64>,
-    /// Accepted steps.
+    /// The numbers of accepted steps.
     pub steps: [u64; 2],
-    /// Rejected steps.
+    /// The numbers of rejected steps.
     pub rejected: [u64; 2],
 }
 
@@ -46,16 +46,16 @@ impl AsRef<Self> for Compared {
     }
 }
 
-/// A column of the file.
+/// A column of a result, as a function of a row.
 pub struct ResultColumn<R> {
-    /// What the file says of it.
+    /// The column's declaration in the file.
     pub declared: Column,
-    /// Its cell of a row.
+    /// The function that returns a row's cell.
     pub cell: Box<dyn Fn(&R) -> Option<u64> + Send + Sync>,
 }
 
 impl<R> ResultColumn<R> {
-    /// A column of this kind's cells.
+    /// Creates a column with cells of a kind.
     pub fn new(
         name: impl Into<String>,
         unit: &str,
@@ -66,7 +66,7 @@ impl<R> ResultColumn<R> {
         Self { declared: Column::new(name, unit, description, kind), cell: Box::new(cell) }
     }
 
-    /// A column of numbers that hardly ever repeat, null where there is none.
+    /// Creates a column of measured numbers, which hardly ever repeat; null where there is none.
     pub fn measured(
         name: impl Into<String>,
         unit: &str,
@@ -77,7 +77,7 @@ impl<R> ResultColumn<R> {
         Self::new(name, unit, description, Holds::Measured, cell)
     }
 
-    /// A column of names, null where there is none.
+    /// Creates a column of names, null where there is none.
     pub fn name(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -88,7 +88,7 @@ impl<R> ResultColumn<R> {
         Self::new(name, "", description, Holds::Name(names), cell)
     }
 
-    /// A column of truths, null where they are not known.
+    /// Creates a column of truth values, null where they are unknown.
     pub fn flag(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -97,30 +97,31 @@ impl<R> ResultColumn<R> {
         Self::new(name, "", description, Holds::Flag, move |row| get(row).map(u64::from))
     }
 
-    /// The same, with which way it is bad.
+    /// Sets the direction in which values are worse.
     pub fn worse(mut self, worse: Worse) -> Self {
         self.declared.worse = Some(worse);
         self
     }
 
-    /// The same, with the limit that has a meaning.
+    /// Sets the limit between good and bad values.
     pub fn limit(mut self, value: f64, scale: f64) -> Self {
         self.declared.limit = Some(Limit { value, scale });
         self
     }
 }
 
-/// The cells of a row.
-pub fn row<R>(columns: &[ResultColumn<R>], of: &R) -> Row {
-    columns.iter().map(|column| (column.cell)(of)).collect()
+/// Returns the cells of a row.
+pub fn row<R>(columns: &[ResultColumn<R>], row: &R) -> Row {
+    columns.iter().map(|column| (column.cell)(row)).collect()
 }
 
-/// What the file says of these columns.
+/// Returns the declarations of columns.
 pub fn declared<R>(columns: Vec<ResultColumn<R>>) -> Vec<Column> {
     columns.into_iter().map(|column| column.declared).collect()
 }
 
-/// Amplitudes of both models and ratios. `amplitude` and `ratio` are what these are of.
+/// Creates the columns of both models' amplitudes and of the ratios. `amplitude` and `ratio`
+/// describe them.
 pub fn amplitude_columns<R: AsRef<Compared>, C: Channel>(
     channels: &[C],
     limits: RatioLimits,
@@ -130,35 +131,35 @@ pub fn amplitude_columns<R: AsRef<Compared>, C: Channel>(
     let mut columns = Vec::new();
     for (k, model) in MODELS.into_iter().enumerate() {
         for (i, channel) in channels.iter().enumerate() {
-            let what = channel.description();
-            let text = format!("{what}: {amplitude}, {model} model; null if it failed");
+            let motion = channel.description();
+            let text = format!("{motion}: {amplitude}, {model} model; null if it failed");
             let name = format!("{model}_{}", channel.name());
-            let of = move |row: &R| row.as_ref().amplitudes[k].get(i).copied();
-            let column = ResultColumn::measured(name, channel.unit(), text, of);
+            let get = move |row: &R| row.as_ref().amplitudes[k].get(i).copied();
+            let column = ResultColumn::measured(name, channel.unit(), text, get);
             columns.push(column.worse(Worse::Greater));
         }
     }
     for (i, channel) in channels.iter().enumerate() {
         let text = format!("{}: {ratio}", channel.description());
         let name = format!("ratio_{}", channel.name());
-        let of = move |row: &R| row.as_ref().ratios.get(i).copied().flatten();
-        let column = ResultColumn::measured(name, "1", text, of);
+        let get = move |row: &R| row.as_ref().ratios.get(i).copied().flatten();
+        let column = ResultColumn::measured(name, "1", text, get);
         columns.push(column.worse(Worse::Greater).limit(limits.most, 1.0));
     }
     columns
 }
 
-/// The verdict, and how far it can be trusted; the greatest ratio and its channel come first.
-/// `methods` are the names of methods, `told` what they are.
+/// Creates the columns of the greatest ratio and its channel, of the verdict, and of the estimated
+/// error. `methods` are the names of methods, `method_description` describes the column of them.
 pub fn verdict_columns<R: AsRef<Compared>, C: Channel>(
     channels: &[C],
     limits: RatioLimits,
     methods: Vec<&'static str>,
-    told: &str,
+    method_description: &str,
 ) -> Vec<ResultColumn<R>> {
-    let (greatest, most) = (|row: &Compared| row.greatest, limits.most);
-    let mut columns = extreme_ratio(channels, "max", greatest, Worse::Greater, most);
-    let mut rule = format!("ratio_max below {most}");
+    let mut columns =
+        extreme_ratio(channels, "max", |row| row.greatest, Worse::Greater, limits.most);
+    let mut rule = format!("ratio_max below {}", limits.most);
     if let Some(limit) = limits.least {
         columns.extend(extreme_ratio(channels, "min", |row| row.least, Worse::Less, limit));
         rule.push_str(&format!(" and ratio_min above {limit}"));
@@ -174,7 +175,9 @@ pub fn verdict_columns<R: AsRef<Compared>, C: Channel>(
     columns.extend([
         ResultColumn::flag("reliable", rule, |row: &R| row.as_ref().reliable),
         ResultColumn::flag("sensitive", sensitive, |row: &R| row.as_ref().sensitive),
-        ResultColumn::name("method", told, methods, |row: &R| Some(row.as_ref().method)),
+        ResultColumn::name("method", method_description, methods, |row: &R| {
+            Some(row.as_ref().method)
+        }),
         ResultColumn::measured("error", "1", error, |row: &R| row.as_ref().error)
             .worse(Worse::Greater),
         ResultColumn::flag("converged", converged, |row: &R| row.as_ref().converged),
@@ -182,17 +185,17 @@ pub fn verdict_columns<R: AsRef<Compared>, C: Channel>(
     columns
 }
 
-/// The greatest or the least ratio, and its channel.
+/// Creates the columns of the greatest or the least ratio and of its channel.
 fn extreme_ratio<R: AsRef<Compared>, C: Channel>(
     channels: &[C],
     name: &str,
-    of: fn(&Compared) -> Option<(usize, f64)>,
+    extreme: fn(&Compared) -> Option<(usize, f64)>,
     worse: Worse,
     limit: f64,
 ) -> Vec<ResultColumn<R>> {
     let names = channels.iter().map(|channel| channel.name()).collect();
-    let ratio = move |row: &R| of(row.as_ref()).map(|(_, ratio)| ratio);
-    let channel = move |row: &R| of(row.as_ref()).map(|(channel, _)| channel);
+    let ratio = move |row: &R| extreme(row.as_ref()).map(|(_, ratio)| ratio);
+    let channel = move |row: &R| extreme(row.as_ref()).map(|(channel, _)| channel);
     let text = format!("{} of the defined ratios; null if none is", worse.extreme());
     let tie = format!("channel of ratio_{name}; the first of the plan's channels wins a tie");
     vec![
@@ -203,15 +206,15 @@ fn extreme_ratio<R: AsRef<Compared>, C: Channel>(
     ]
 }
 
-/// Columns about the two integrations, the same for every plan.
+/// Creates the columns of status and steps of the two integrations, which every plan has.
 pub fn run_columns<R: AsRef<Compared>>(statuses: Vec<&'static str>) -> Vec<ResultColumn<R>> {
     let status =
         "ok, or why the nonlinear model failed, or behind linear_ why the linear model alone did";
     let fail_time = "when the model named by status failed; null if none did or it never started";
-    let of_fail_time = |row: &R| row.as_ref().fail_time_s.map(f64::to_bits);
+    let fail_time_cell = |row: &R| row.as_ref().fail_time_s.map(f64::to_bits);
     let mut columns = vec![
         ResultColumn::name("status", status, statuses, |row: &R| Some(row.as_ref().status)),
-        ResultColumn::new("fail_time_s", "s", fail_time, Holds::Time, of_fail_time)
+        ResultColumn::new("fail_time_s", "s", fail_time, Holds::Time, fail_time_cell)
             .worse(Worse::Less),
     ];
     let counts: [(&str, &str, fn(&Compared) -> [u64; 2]); 2] =

@@ -1,24 +1,25 @@
-//! The effort of a search or an evaluation: its threads and its interruption.
+//! The threads, the progress and the interrupt of a search or an evaluation.
 
 use crate::threads::{self};
 use crate::{Interrupt, ProgressMode, ThreadsError};
 
-/// How a search or an evaluation is to be done.
+/// The resources of a search or an evaluation.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort<'a> {
-    /// Worker threads; if `None`, what Slurm gave this task, else the cores of this machine.
+    /// The number of worker threads; if `None`, the cores that Slurm gave this task, else those of
+    /// this machine.
     pub threads: Option<usize>,
-    /// How progress is shown, on standard error.
+    /// The form in which progress is shown on standard error.
     pub progress: ProgressMode,
-    /// Ends the work early.
+    /// The interrupt that ends the work early.
     pub interrupt: &'a Interrupt,
 }
 
 impl Effort<'_> {
-    /// The threads to work with.
+    /// Returns the number of worker threads.
     ///
     /// # Errors
-    /// A number that is none, asked for or of a scheduler.
+    /// An invalid number, given by the caller or by a scheduler.
     pub fn threads(&self) -> Result<usize, ThreadsError> {
         match self.threads {
             Some(threads) => threads::checked(threads),
@@ -27,7 +28,7 @@ impl Effort<'_> {
     }
 }
 
-/// The same as a command's options.
+/// The options of a command for threads and progress.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct EffortArgs {
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
@@ -45,7 +46,7 @@ pub struct EffortArgs {
 }
 
 impl EffortArgs {
-    /// Until the interrupt is raised.
+    /// Returns the resources with an interrupt.
     pub fn with(self, interrupt: &Interrupt) -> Effort<'_> {
         Effort { threads: self.threads, progress: self.progress, interrupt }
     }

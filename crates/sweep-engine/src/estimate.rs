@@ -1,33 +1,33 @@
-//! What a run will take, as `check` tells it.
+//! The estimate of a run's time and memory, as `check` shows it.
 
 use crate::store::read::NameCounts;
 
-/// What a run will take. Every number is an estimate.
+/// The estimated time, memory and disk space of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// Instruction set.
+    /// The instruction set.
     pub simd: String,
-    /// Worker threads.
+    /// The number of worker threads.
     pub threads: usize,
-    /// Time from start to end, if the threads have a core each to themselves.
+    /// The time from start to end, if each thread has a core for itself.
     pub wall_s: f64,
-    /// Time of one core for one point.
+    /// The time of one core for one point.
     pub core_s_per_point: f64,
-    /// Points that were integrated for it, by status.
+    /// The numbers of points that were integrated for the estimate, by status.
     pub sampled: NameCounts,
-    /// How far, of the plan's `end_s`.
+    /// The time up to which they were integrated; at most the plan's `end_s`.
     pub sampled_s: f64,
-    /// Memory at its peak.
+    /// The peak memory.
     pub memory_bytes: f64,
-    /// Disk for the run's folder.
+    /// The disk space of the run's folder.
     pub disk_bytes: f64,
-    /// Disk for the result, at most.
+    /// An upper bound of the disk space of the result.
     pub result_bytes: f64,
-    /// How the method goes about it, in words.
+    /// The steps of the method, in words.
     pub method: String,
 }
 
-/// A size with three digits.
+/// Formats a size with three digits.
 pub fn size(bytes: f64) -> String {
     const UNITS: [&str; 5] = ["bytes", "kB", "MB", "GB", "TB"];
     let mut scaled = bytes;
@@ -45,10 +45,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_read_as_people_say_them() {
-        let said = [0.0, 999.0, 1234.0, 56.7e6, 999.96e6, 2e9, 3e15].map(size);
+    fn sizes_have_readable_units() {
+        let formatted = [0.0, 999.0, 1234.0, 56.7e6, 999.96e6, 2e9, 3e15].map(size);
         assert_eq!(
-            said,
+            formatted,
             ["0 bytes", "999 bytes", "1.2 kB", "56.7 MB", "1.0 GB", "2.0 GB", "3000 TB"]
         );
     }

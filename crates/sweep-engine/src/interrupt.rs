@@ -1,5 +1,5 @@
-//! SIGINT, SIGTERM and SIGHUP: the first asks the run to stop where nothing is lost, the second
-//! leaves at once.
+//! Handling of SIGINT, SIGTERM and SIGHUP. The first signal stops the run after its rows are
+//! stored, the second ends the process at once.
 
 use std::io;
 use std::sync::Arc;
@@ -8,18 +8,18 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// Takes SIGXFSZ, whose default is death, so that a file-size limit (`ulimit -f`) is met as a
-/// failed write with a path and advice.
+/// Installs a handler of SIGXFSZ, which by default ends the process, so that exceeding a limit on
+/// file size (`ulimit -f`) is an error of a write.
 ///
 /// # Errors
-/// When the system refuses a handler.
+/// The system's refusal of a handler.
 pub fn survive_file_size_limits() -> io::Result<()> {
     #[cfg(unix)]
     flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     Ok(())
 }
 
-/// The stop flag, shared with whoever has work to put down.
+/// A stop flag that signals set, shared by all threads.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
     stop: Arc<AtomicBool>,
@@ -27,28 +27,28 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// A flag that only [`Interrupt::raise`] sets.
+    /// Creates a flag that only [`Interrupt::raise`] sets.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Installs the handlers for this process. A second SIGINT or SIGTERM ends it at once with 130
-    /// or 143.
+    /// Installs the handlers of this process. A second SIGINT or SIGTERM ends it at once with exit
+    /// code 130 or 143.
     ///
     /// # Errors
-    /// When the system refuses a handler.
+    /// The system's refusal of a handler.
     pub fn install() -> io::Result<Self> {
         let interrupt = Self::new();
         for signal in [SIGINT, SIGTERM] {
-            // Order matters: the shutdown looks at the flag before this signal's own registration
-            // sets it.
+            // The shutdown is registered first, so that it reads the flag before this signal sets
+            // it.
             flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.stop))?;
             flag::register_usize(signal, Arc::clone(&interrupt.signal), signal as usize)?;
             flag::register(signal, Arc::clone(&interrupt.stop))?;
         }
-        // A terminal that closes may send it twice, so that a second one changes nothing.
+        // A closing terminal may send SIGHUP twice, so that a second one must not end the process.
         #[cfg(target_os = "linux")]
-        if hears_hangups() {
+        if !ignores_hangups() {
             use signal_hook::consts::SIGHUP;
             flag::register_usize(SIGHUP, Arc::clone(&interrupt.signal), SIGHUP as usize)?;
             flag::register(SIGHUP, Arc::clone(&interrupt.stop))?;
@@ -56,28 +56,29 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// Asks for a stop, as a signal of this number would.
+    /// Sets the flag, as a signal of this number does.
     pub fn raise(&self, signal: usize) {
         self.signal.store(signal, Ordering::Relaxed);
         self.stop.store(true, Ordering::Release);
     }
 
-    /// Whether a stop was asked for.
+    /// Returns whether the flag is set.
     pub fn stopped(&self) -> bool {
         self.stop.load(Ordering::Acquire)
     }
 
-    /// The signal that asked (1 for SIGHUP, 2 for SIGINT, 15 for SIGTERM).
+    /// Returns the signal that set the flag (1 for SIGHUP, 2 for SIGINT, 15 for SIGTERM).
     pub fn signal(&self) -> Option<u8> {
         if self.stopped() { u8::try_from(self.signal.load(Ordering::Relaxed)).ok() } else { None }
     }
 }
 
-/// Whether SIGHUP is not ignored, as `nohup` has it.
+/// Returns whether this process ignores SIGHUP, as one started by `nohup` does.
 #[cfg(target_os = "linux")]
-fn hears_hangups() -> bool {
+fn ignores_hangups() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    // The lowest bit is signal 1.
-    ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|it| it & 1 == 0)
+    let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    // SIGHUP is signal 1, the lowest bit. Without a mask, the process is taken to ignore it.
+    mask.is_none_or(|mask| mask & 1 == 1)
 }

@@ -7,10 +7,9 @@
 //!   `store` is the folder on disk meanwhile, and the result file; [`sweep_files`] has the rules of
 //!   writing and reading.
 //! * `boundary` traces the curve where a quantity is at its limit; `optimise` looks for the least
-//!   of some numbers. Both ask the engine through `asking`.
+//!   of some numbers. Both ask the engine through `evaluator`.
 //! * `commands` is the command line; `progress`, `interrupt` and `exit` serve it.
 
-pub mod asking;
 pub mod boundary;
 pub mod build;
 pub mod columns;
@@ -19,6 +18,7 @@ pub mod config;
 pub mod design;
 pub mod effort;
 pub mod estimate;
+pub mod evaluator;
 pub mod exit;
 pub mod interrupt;
 pub mod method;
@@ -49,6 +49,6 @@ pub use store::{Job, Rows, StoreError};
 pub use swept::{Listed, Swept};
 pub use table::Table;
 pub use threads::{Environment, ThreadsError};
-pub use watch::{Engine, KeepRow, KnownRow, NextRow, Watch};
+pub use watch::{Engine, RowLookup, RowSink, RowSource, RunContext};
 
 pub use sweep_results::nearest;

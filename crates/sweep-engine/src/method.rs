@@ -1,24 +1,24 @@
-//! The methods of integration of a model, in one table: what a grid file may write, what the schema
-//! and the reference page say, what a plan's JSON carries.
+//! The table of a model's integration methods, from which the grid file's keys, the schema, the
+//! reference page and the plan's JSON are made.
 
 use std::fmt;
 
 use serde_json::{Value, json};
 use sweep_parameter::Range;
 
-/// A number that a method takes, under a key of `[integrator]`.
+/// A setting of a method: a number under a key of `[integrator]`.
 pub struct Setting {
-    /// As in grid files.
+    /// The key in grid files.
     pub key: &'static str,
-    /// Values that are accepted.
+    /// The range of accepted values.
     pub range: Range,
-    /// Where the grid file leaves it out.
+    /// The value where the grid file leaves it out.
     pub default: f64,
-    /// One line, with the unit.
+    /// The description in one line, with the unit.
     pub description: &'static str,
 }
 
-/// Fixed steps (s).
+/// The step of methods with fixed steps.
 pub const STEP_S: Setting =
     Setting { key: "step_s", range: Range::Positive, default: 2e-4, description: "fixed step, s" };
 /// The relative tolerance of adaptive methods.
@@ -35,7 +35,7 @@ pub const ATOL: Setting = Setting {
     default: 1e-9,
     description: "absolute tolerance per component",
 };
-/// The accuracy of methods whose rungs check one another.
+/// The accuracy of methods that estimate their error by refinement.
 pub const ACCURACY: Setting = Setting {
     key: "accuracy",
     range: Range::Within(1e-9, 1e-1),
@@ -43,47 +43,46 @@ pub const ACCURACY: Setting = Setting {
     description: "relative error of the amplitudes",
 };
 
-/// A row of the table.
+/// A row of the table of methods.
 pub struct Entry<I: 'static> {
-    /// As in grid files, in results and in messages.
+    /// The name in grid files, results and messages.
     pub name: &'static str,
-    /// One line.
+    /// The description in one line.
     pub description: &'static str,
-    /// What it takes.
+    /// The settings.
     pub settings: &'static [Setting],
-    /// The method with its settings' values, each asked for once.
+    /// The constructor, which requests the value of each setting once.
     pub with: fn(&mut dyn FnMut(&Setting) -> f64) -> I,
 }
 
-/// How a method chooses its steps.
+/// The step control of a method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steps {
-    /// All of this length, but for those that end at an edge of the window (s).
+    /// Fixed steps of this length (s), except those that end at an edge of the window.
     Fixed(f64),
-    /// Chosen by the error; stability bounds them.
+    /// Adaptive steps that stability bounds.
     Explicit,
-    /// Chosen by the error alone; one trajectory at a time, not in lanes.
+    /// Adaptive steps of an implicit method, for one trajectory at a time, not in lanes.
     Implicit,
-    /// Taken by rungs that check one another, until two agree to this relative accuracy.
+    /// Fixed steps, refined until two levels agree to this relative accuracy.
     Checked(f64),
 }
 
-/// How a trajectory is integrated: one of a model's methods with its settings. [`crate::methods!`]
-/// declares them.
+/// An integration method with its settings. [`crate::methods!`] declares a model's methods.
 pub trait Integrator: Copy + PartialEq + fmt::Debug + fmt::Display + Send + Sync + 'static {
-    /// Every method, in the order of messages and pages; the last is the default.
+    /// Returns every method, in the order of messages and pages; the last is the default.
     fn methods() -> &'static [Entry<Self>];
 
-    /// Name in grid files.
+    /// Returns the name in grid files.
     fn name(&self) -> &'static str;
 
-    /// Each setting's key and value, in the order of the table.
+    /// Returns each setting's key and value, in the order of the table.
     fn settings(&self) -> Vec<(&'static str, f64)>;
 
-    /// How it chooses its steps.
+    /// Returns the step control.
     fn steps(&self) -> Steps;
 
-    /// As grid files and plans write it.
+    /// Returns the method as plans write it in JSON.
     fn to_json(self) -> Value {
         let mut json = json!({ "method": self.name() });
         for (key, value) in self.settings() {
@@ -93,14 +92,14 @@ pub trait Integrator: Copy + PartialEq + fmt::Debug + fmt::Display + Send + Sync
     }
 }
 
-/// Declares the methods of a model: an enum with a variant a method, and a table with their names,
+/// Declares the methods of a model: an enum with a variant for each method, and a table with names,
 /// descriptions and settings. A row ends with the method's [`Steps`].
 #[macro_export]
 macro_rules! methods {
     ($($method:ident = $name:literal, $description:literal {
         $($key:ident: $setting:expr),+
     } $steps:expr;)+) => {
-        /// How a trajectory is integrated.
+        /// An integration method with its settings.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum Integrator {
             $(
@@ -145,7 +144,7 @@ macro_rules! methods {
             }
         }
 
-        /// Name and settings: `dopri5, rtol 1e-6, atol 1e-9`.
+        /// Formats name and settings: `dopri5, rtol 1e-6, atol 1e-9`.
         impl std::fmt::Display for Integrator {
             fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
                 use $crate::method::Integrator as _;
@@ -157,18 +156,18 @@ macro_rules! methods {
     };
 }
 
-/// The method that is taken where a grid file names none.
+/// Returns the method of grid files that name none.
 pub fn default_method<I: Integrator>() -> &'static Entry<I> {
     &I::methods()[I::methods().len() - 1]
 }
 
 impl<I> Entry<I> {
-    /// Whether it takes a setting.
+    /// Returns whether the method has a setting.
     pub fn has(&self, key: &str) -> bool {
         self.settings.iter().any(|setting| setting.key == key)
     }
 
-    /// The method with every setting at its default.
+    /// Returns the method with every setting at its default.
     pub fn with_defaults(&self) -> I {
         (self.with)(&mut |setting| setting.default)
     }

@@ -1,4 +1,4 @@
-//! What is swept: named parameters with values.
+//! The trait of models: named parameters with values.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -8,41 +8,40 @@ use sweep_parameter::{Channel, Parameter, UnknownParameter};
 use crate::build::Build;
 use crate::method::Integrator;
 
-/// What can be swept. A value of this type is what a grid file sets of the model, the same at every
-/// point but for the axes.
+/// A model that can be swept. A value holds the model's parameters as a grid file sets them; the
+/// points of a plan differ from it in the values of the axes only.
 ///
-/// Further traits ask for the rest: [`crate::config::Read`] for its part of a grid file,
-/// [`crate::store::Rows`] for the columns of its rows, [`crate::swept::Swept`] for the engine that
-/// computes them.
+/// [`crate::config::Read`] reads the model's part of a grid file, [`crate::store::Rows`] declares
+/// the columns of its rows, and [`crate::swept::Swept`] creates the engine that computes them.
 pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static {
-    /// A number that can be set and swept.
+    /// The type of parameters, which can be set and swept.
     type Parameter: Parameter;
-    /// A motion that is compared.
+    /// The type of channels, the compared motions.
     type Channel: Channel;
-    /// The methods of integration.
+    /// The type of integration methods.
     type Integrator: Integrator;
 
-    /// Which build writes a result.
+    /// The build that results name.
     const BUILD: Build;
 
-    /// Every channel.
+    /// Returns every channel.
     fn channels() -> &'static [Self::Channel];
 
-    /// Channels that are compared if the grid file names none.
+    /// Returns the channels that are compared if the grid file names none.
     fn default_channels() -> Vec<Self::Channel> {
         Self::channels().to_vec()
     }
 
-    /// Every parameter there is.
+    /// Returns every parameter.
     fn parameters(&self) -> Vec<Self::Parameter>;
 
-    /// The parameter of this name.
+    /// Returns the parameter of a name.
     ///
     /// # Errors
-    /// Why there is none.
+    /// An unknown name, with the reason.
     fn find(&self, name: &str) -> Result<Self::Parameter, UnknownParameter>;
 
-    /// Names of the single numbers that a parameter writes; one, its own, unless it writes several.
+    /// Returns the names of the single numbers that a parameter writes; by default its own name.
     fn parts(&self, parameter: &Self::Parameter) -> Vec<Cow<'static, str>> {
         vec![parameter.name().to_owned().into()]
     }

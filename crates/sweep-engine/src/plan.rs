@@ -1,5 +1,5 @@
-//! A run with every value resolved and checked. The configuration makes it; engine, store and
-//! reports read it.
+//! The plan of a run, with every value resolved and checked. The configuration makes it; engine,
+//! store and reports read it.
 
 use std::collections::BTreeMap;
 
@@ -8,63 +8,66 @@ use sweep_parameter::{Parameter as _, Range, RatioLimits};
 
 use crate::{Design, Distribution, Model};
 
-/// Most grid points that are accepted. A hundred thousand points a second would take four months.
-pub const MOST_POINTS: u64 = 1_000_000_000_000;
+/// The greatest number of grid points that is accepted. Basis: four months at a hundred thousand
+/// points per second. Doubling it accepts runs of eight months.
+pub const MAX_POINTS: u64 = 1_000_000_000_000;
 
-/// Longest integration that is accepted: eleven days.
-pub const LONGEST_S: f64 = 1e6;
+/// The greatest `end_s` that is accepted, s. Basis: eleven days, far beyond any spin cycle.
+/// Doubling it accepts twice the longest trajectory.
+pub const MAX_END_S: f64 = 1e6;
 
-/// What `ratio_min` may be.
+/// The range of `ratio_min`: a ratio, up to that of equal amplitudes.
 pub const RATIO_MIN: Range = Range::Within(0.0, 1.0);
 
-/// Most steps that a trajectory may need by a method whose steps are bounded by its stability; at
-/// this many, one point takes an hour or more.
-pub const MOST_STEPS: f64 = 1e10;
+/// The greatest number of steps of a trajectory by a method whose steps are bounded by stability.
+/// Basis: one such point takes an hour or more. Doubling it accepts points of twice that time.
+pub const MAX_STEPS: f64 = 1e10;
 
-/// The shortest step with which a trajectory to `end_s` takes at most [`MOST_STEPS`].
+/// Returns the shortest step (s) with which a trajectory to `end_s` takes at most [`MAX_STEPS`].
 pub fn shortest_step_s(end_s: f64) -> f64 {
-    end_s / MOST_STEPS
+    end_s / MAX_STEPS
 }
 
-/// A validated run: every grid point of every axis, and how each is integrated.
+/// A validated plan: the points, and the method by which each is integrated.
 ///
-/// A plan can only be made by the configuration, which refuses bad input, so the rest of the
-/// program takes its numbers as they are.
+/// Only the configuration makes plans, and refuses invalid input. The rest of the program does not
+/// check the numbers again.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan<M: Model> {
-    /// Name of the run; the output defaults to `results/<name>.parquet`.
+    /// The name of the run; the output defaults to `results/<name>.parquet`.
     pub name: String,
     /// The model after `[set]` and `--set`, before the axes.
     pub model: M,
-    /// Integration runs over `0..=end_s`.
+    /// The end of the integration, which begins at 0.
     pub end_s: f64,
-    /// Amplitudes are taken over this closed interval.
+    /// The closed interval over which amplitudes are taken.
     pub window_s: [f64; 2],
-    /// Method and its settings.
+    /// The method and its settings.
     pub integrator: M::Integrator,
-    /// The grid's axes; the first varies slowest. Of a design, what its points are spread over.
+    /// The axes of the grid, the first of which varies slowest, or the parameters of the design.
     pub axes: Vec<Axis<M>>,
     /// The design of the points, if they are not the grid of the axes.
     pub design: Option<Design>,
-    /// What counts as reliable.
+    /// The rule of the verdict.
     pub reliability: Reliability<M>,
-    /// What `--set` has changed, by name.
+    /// The values of `--set`, by name.
     pub set: Vec<(String, Value)>,
-    /// Where numbers were written.
+    /// The sources of the numbers.
     pub written: WrittenIn,
 }
 
-/// The beginning of the source of a number that follows from others by a rule.
+/// The beginning of the source of an assumed number, which follows from others by a rule.
 pub const ASSUMED: &str = "assumed: ";
 
-/// The file or option in which each single number was last written, by its parameter's name; or the
-/// rule by which a number that was left out has its value, which begins with [`ASSUMED`]. No
-/// result depends on it, so plans that differ in nothing else are equal.
+/// The source of each number, by its parameter's name: the file or option that wrote it last, or
+/// the rule of an assumed number, which begins with [`ASSUMED`]. Results do not depend on sources,
+/// so that plans which differ only in them are equal.
 #[derive(Clone, Debug, Default)]
 pub struct WrittenIn(pub BTreeMap<String, String>);
 
 impl WrittenIn {
-    /// Where single numbers of these names were written, in words; `None` of what was not.
+    /// Returns the sources of the numbers of these names, in words; `None` where nothing wrote
+    /// them.
     pub fn source(&self, names: &[impl AsRef<str>]) -> Option<String> {
         let mut places: Vec<&str> =
             names.iter().filter_map(|name| Some(self.0.get(name.as_ref())?.as_str())).collect();
@@ -75,7 +78,7 @@ impl WrittenIn {
         (!all.is_empty()).then(|| all.join("; "))
     }
 
-    /// Returns whether a number was left out and has its value by a rule.
+    /// Returns whether a number is assumed.
     pub fn is_assumed(&self, name: &str) -> bool {
         self.0.get(name).is_some_and(|place| place.starts_with(ASSUMED))
     }
@@ -87,64 +90,65 @@ impl PartialEq for WrittenIn {
     }
 }
 
-/// One swept parameter.
+/// A swept parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis<M: Model> {
-    /// From the model's table.
+    /// The parameter.
     pub parameter: M::Parameter,
-    /// The values along it.
+    /// The values along the axis.
     pub values: AxisValues,
 }
 
-/// Values of an axis, made on demand: an axis of a million values takes no memory.
+/// The values of an axis, computed on demand, so that an axis of a million values takes no memory.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AxisValues {
-    /// As listed.
+    /// Listed values.
     List(Vec<f64>),
-    /// Evenly spaced, both ends included.
+    /// Evenly spaced values, with both ends.
     Linear {
-        /// First value.
+        /// The first value.
         from: f64,
-        /// Last value.
+        /// The last value.
         to: f64,
-        /// How many, at least 1.
+        /// The number of values, at least 1.
         count: u64,
     },
-    /// In a design: by a distribution, between its bounds.
+    /// In a design, values by a distribution between its bounds.
     Distributed(Distribution),
-    /// Evenly spaced in the logarithm, both ends included.
+    /// Values evenly spaced in the logarithm, with both ends.
     Log {
-        /// First value.
+        /// The first value.
         from: f64,
-        /// Last value.
+        /// The last value.
         to: f64,
-        /// How many, at least 1.
+        /// The number of values, at least 1.
         count: u64,
     },
 }
 
 impl AxisValues {
-    /// How many values.
+    /// Returns the number of values.
     pub fn len(&self) -> u64 {
         match self {
             Self::List(values) => values.len() as u64,
             Self::Linear { count, .. } | Self::Log { count, .. } => *count,
-            // The bounds; a design finds the points between.
+            // The two bounds; the design chooses the points between them.
             Self::Distributed(_) => 2,
         }
     }
 
-    /// Whether there are none; never in a plan.
+    /// Returns whether there are no values, which never holds in a plan.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Value `i`, from 0; beyond the last, the last. Both ends are exact and every value is the
-    /// same on all machines: a linear one has the bits of NumPy's `linspace`, a logarithmic one
-    /// takes no platform's `pow`.
+    /// Returns value `i`, from 0, or the last value beyond it.
+    ///
+    /// Both ends are exact, and every value is the same on all machines: linear values have the
+    /// bits of NumPy's `linspace`, and logarithmic ones use no platform's `pow`.
     ///
     /// # Panics
-    /// If there are no values.
+    /// On an axis without values.
     pub fn value(&self, i: u64) -> f64 {
         let (from, to, count) = match *self {
             Self::List(ref values) => {
@@ -154,7 +158,8 @@ impl AxisValues {
             Self::Linear { from, to, count } | Self::Log { from, to, count } => (from, to, count),
             Self::Distributed(Distribution { from, to, .. }) => (from, to, 2),
         };
-        let (step, last) = (i as f64, (count - 1) as f64);
+        let step = i as f64;
+        let last = (count - 1) as f64;
         match self {
             _ if i == 0 => from,
             _ if i + 1 >= count => to,
@@ -163,8 +168,8 @@ impl AxisValues {
         }
     }
 
-    /// The value a part `place` (0 to 1) of the way from the first to the last, evenly or by the
-    /// logarithm; a list has no values between its own, and gives the nearest.
+    /// Returns the value at a relative position `place` (0 to 1) between the first and the last
+    /// value, evenly or by the logarithm. A list returns one of its own values.
     pub fn between(&self, place: f64) -> f64 {
         match *self {
             Self::List(ref values) => {
@@ -176,27 +181,29 @@ impl AxisValues {
         }
     }
 
-    /// The least and the greatest value.
+    /// Returns the least and the greatest value.
     ///
     /// # Panics
-    /// If there are no values.
+    /// On an axis without values.
     pub fn extremes(&self) -> [f64; 2] {
         let ends = [0, self.len() - 1].map(|i| self.value(i));
-        let all = if let Self::List(values) = self { values } else { &ends[..] };
-        let all = || all.iter().copied();
-        let found = [all().min_by(f64::total_cmp), all().max_by(f64::total_cmp)];
-        found.map(Option::unwrap_or_default)
+        let values = if let Self::List(values) = self { values } else { &ends[..] };
+        let least = values.iter().copied().min_by(f64::total_cmp);
+        let greatest = values.iter().copied().max_by(f64::total_cmp);
+        [least, greatest].map(Option::unwrap_or_default)
     }
 }
 
 impl<M: Model> Plan<M> {
-    /// Axes beyond this many are held at their least value by [`Plan::corners`].
+    /// The number of axes of which [`Plan::corners`] takes both ends; further ones stay at their
+    /// least value. Basis: 2^8 corners. Each axis more doubles the corners.
     const CORNER_AXES: usize = 8;
 
-    /// Most corners at which machines are made ready before a run.
-    const MOST_PREPARED: u64 = 256;
+    /// The greatest number of corners at which machines are prepared before a run. Basis: it
+    /// bounds the preparation of long lists. Doubling it doubles that time.
+    const MAX_PREPARED: u64 = 256;
 
-    /// Number of points, of the design or of the grid; 1 without axes.
+    /// Returns the number of points of the design or grid; 1 without axes.
     pub fn points(&self) -> u64 {
         if let Some(design) = &self.design {
             return design.points();
@@ -204,7 +211,7 @@ impl<M: Model> Plan<M> {
         self.axes.iter().map(|axis| axis.values.len()).product()
     }
 
-    /// Value of each axis at a point; of a grid, the first axis varies slowest.
+    /// Returns the value of each axis at a point. The first axis of a grid varies slowest.
     pub fn axis_values(&self, point: u64) -> Vec<f64> {
         if let Some(design) = &self.design {
             let value = |(k, axis): (usize, &Axis<M>)| match design.place(point, k) {
@@ -222,29 +229,29 @@ impl<M: Model> Plan<M> {
         values
     }
 
-    /// The model at a grid point.
+    /// Returns the scenario of a point.
     pub fn scenario(&self, point: u64) -> Scenario<M> {
         self.scenario_at(&self.axis_values(point))
     }
 
-    /// The model at the given value of each axis, on the grid or between its points.
+    /// Returns the scenario at values of the axes, on the grid or between its points.
     pub fn scenario_at(&self, axis_values: &[f64]) -> Scenario<M> {
         let mut scenario = Scenario { model: self.model.clone(), window_s: self.window_s };
         self.place(&mut scenario, axis_values);
         scenario
     }
 
-    /// Makes any scenario of this plan the one at these values of the axes: those are all that
-    /// differs.
+    /// Writes values of the axes into a scenario of this plan. Scenarios of a plan differ in
+    /// nothing else.
     pub fn place(&self, scenario: &mut Scenario<M>, axis_values: &[f64]) {
         for (axis, &value) in self.axes.iter().zip(axis_values) {
             scenario.write(&axis.parameter, value);
         }
     }
 
-    /// Number of corners: places where a condition that is monotonic along each axis is hardest to
-    /// meet. Every axis is at its least or greatest value there; the corners of a list are all of
-    /// its points. One without axes.
+    /// Returns the number of corners: the points at which every axis has its least or greatest
+    /// value, where conditions that are monotonic along each axis are hardest to meet. The corners
+    /// of a list are all of its points. A plan without axes has one.
     pub fn corners(&self) -> u64 {
         match &self.design {
             Some(Design::List { points, .. }) => *points,
@@ -252,7 +259,7 @@ impl<M: Model> Plan<M> {
         }
     }
 
-    /// Values of the axes at corner `corner`, from 0.
+    /// Returns the values of the axes at a corner, from 0.
     pub fn corner(&self, corner: u64) -> Vec<f64> {
         if matches!(self.design, Some(Design::List { .. })) {
             return self.axis_values(corner);
@@ -264,34 +271,34 @@ impl<M: Model> Plan<M> {
         self.axes.iter().enumerate().map(end).collect()
     }
 
-    /// At most 256 of the corners, spread evenly. The corners of a list are all of its points, and
-    /// a machine's modes are expensive.
+    /// Returns at most [`Self::MAX_PREPARED`] corners, spread evenly, because a list may have many
+    /// and a machine's modes are expensive.
     pub fn some_corners(&self) -> Vec<Vec<f64>> {
-        let every = self.corners().div_ceil(Self::MOST_PREPARED);
+        let every = self.corners().div_ceil(Self::MAX_PREPARED);
         (0..self.corners().div_ceil(every)).map(|k| self.corner(k * every)).collect()
     }
 }
 
-/// The verdict's rule.
+/// The rule of the verdict.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reliability<M: Model> {
-    /// A point is reliable when its ratios are between these.
+    /// The limits between which the ratios of a reliable point are.
     pub limits: RatioLimits,
-    /// The channels that are compared, in column order.
+    /// The compared channels, in column order.
     pub channels: Vec<M::Channel>,
 }
 
-/// One grid point's input: the model and the window with that point's axis values in place.
+/// The input of a point: the model and the window, with the values of the axes written into them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenario<M> {
     /// The model.
     pub model: M,
-    /// Amplitudes are taken over this closed interval.
+    /// The closed interval over which amplitudes are taken.
     pub window_s: [f64; 2],
 }
 
 impl<M: Model> Scenario<M> {
-    /// Writes a parameter wherever it belongs.
+    /// Writes a parameter into the model or the window.
     pub fn write(&mut self, parameter: &M::Parameter, value: f64) {
         match parameter.window_edge() {
             Some(edge) => self.window_s[edge] = value,
@@ -305,9 +312,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn linear_values_are_numpys_linspace() {
-        // linspace is i * step + start with the last value replaced by the end; these are its
-        // doubles in Python.
+    fn linear_values_equal_numpy_linspace() {
+        // The values of numpy.linspace(0.05, 1.0, 39), which computes i * step + start and replaces
+        // the last value by the end.
         let masses = AxisValues::Linear { from: 0.05, to: 1.0, count: 39 };
         let numpy = [
             (0, 0.05),
@@ -328,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithmic_values_hit_the_decades_and_both_ends() {
+    fn logarithmic_values_have_exact_decades_and_ends() {
         let log = AxisValues::Log { from: 1e4, to: 1e9, count: 6 };
         let values: Vec<_> = (0..6).map(|i| log.value(i)).collect();
         assert_eq!(values, [1e4, 1e5, 1e6, 1e7, 1e8, 1e9]);
@@ -339,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_of_a_million_million_values_takes_no_memory() {
+    fn an_axis_of_1e12_values_takes_no_memory() {
         let axis = AxisValues::Linear { from: 0.0, to: 1.0, count: 1_000_000_000_000 };
         assert_eq!([axis.value(0), axis.value(999_999_999_999)], [0.0, 1.0]);
         let middle = axis.value(500_000_000_000);

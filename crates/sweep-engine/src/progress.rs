@@ -1,4 +1,4 @@
-//! Progress of a run: a bar on a terminal, a line now and then elsewhere, or nothing.
+//! The display of progress: a bar on a terminal, a line from time to time elsewhere, or nothing.
 
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
@@ -8,7 +8,7 @@ use crate::config::section::counted;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sweep_files::panics::lock;
 
-/// What `--progress` said.
+/// A value of `--progress`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ProgressMode {
     /// A bar on a terminal; elsewhere a line a minute, which suits the log of a batch job.
@@ -20,81 +20,83 @@ pub enum ProgressMode {
     None,
 }
 
-/// Something that shows how far the run is, on stderr; any thread may have it do so.
+/// A display of progress on stderr, which any thread may update.
 pub struct Progress {
-    shown: Mutex<Shown>,
+    display: Mutex<Display>,
     total: u64,
-    /// What the total is of.
-    parts: &'static str,
-    /// Points that were there at the start: they count as done, but not towards the rate.
+    /// The plural noun for the units of the total.
+    noun: &'static str,
+    /// The number of points that were stored at the start. They count as done, but not in the rate.
     start: u64,
     began: Instant,
 }
 
-enum Shown {
+/// The form of the display.
+enum Display {
     Bar(ProgressBar),
     Lines { every: Duration, next: Instant },
     Nothing,
 }
 
 impl Progress {
-    /// The progress of a run.
+    /// Creates the display of a run and shows it.
     pub fn new(mode: ProgressMode, total: u64, start: u64) -> Self {
-        let progress = Self::of_search(mode, total, "points", start);
+        let progress = Self::for_search(mode, total, "points", start);
         progress.show(start);
         progress
     }
 
-    /// The progress of a search, whose points nobody can count beforehand. It counts parts up to
-    /// this total, which are called so, if there are any. `start` points were there at the start.
-    pub fn of_search(mode: ProgressMode, total: u64, parts: &'static str, start: u64) -> Self {
+    /// Creates the display of a search, whose number of points is not known beforehand. It counts
+    /// units up to a total, or only points where the total is 0. `noun` is the plural noun for the
+    /// units, `start` the number of points that were stored at the start.
+    pub fn for_search(mode: ProgressMode, total: u64, noun: &'static str, start: u64) -> Self {
         let lines = |seconds| {
             let every = Duration::from_secs(seconds);
-            Shown::Lines { every, next: Instant::now() + every }
+            Display::Lines { every, next: Instant::now() + every }
         };
-        let shown = match mode {
-            ProgressMode::None => Shown::Nothing,
+        let display = match mode {
+            ProgressMode::None => Display::Nothing,
             ProgressMode::Plain => lines(5),
             ProgressMode::Auto if std::io::stderr().is_terminal() => {
                 let target = ProgressDrawTarget::stderr_with_hz(8);
                 let bar = ProgressBar::with_draw_target(Some(total), target);
                 bar.enable_steady_tick(Duration::from_millis(125));
-                Shown::Bar(bar.with_style(style(if total == 0 { POINTS } else { BAR })))
+                Display::Bar(bar.with_style(style(if total == 0 { SPINNER } else { BAR })))
             }
             ProgressMode::Auto => lines(60),
         };
-        Self { shown: Mutex::new(shown), total, parts, start, began: Instant::now() }
+        Self { display: Mutex::new(display), total, noun, start, began: Instant::now() }
     }
 
-    /// Shows that `done` points of the total are there.
+    /// Shows that `done` points are done.
     pub fn show(&self, done: u64) {
-        self.tell(done, || self.line(done));
+        self.update(done, || self.line(done));
     }
 
-    /// Shows that so many parts of a search are done, with so many points.
+    /// Shows that `done` units of a search are done, with a number of points.
     pub fn show_search(&self, done: u64, points: u64) {
-        self.tell(done, || self.search_line(done, points));
+        self.update(done, || self.search_line(done, points));
     }
 
     fn search_line(&self, done: u64, points: u64) -> String {
         let rate = per_second(self.rate(points));
         let points = format!("{}, {rate}", counted(points as usize, "point"));
-        match (self.total, self.parts) {
+        match (self.total, self.noun) {
             (0, _) => points,
-            (total, parts) => format!("{done} of {total} {parts}, {points}"),
+            (total, noun) => format!("{done} of {total} {noun}, {points}"),
         }
     }
 
-    /// Says it beside the bar; or in a line, and then none for a while.
-    fn tell(&self, position: u64, text: impl FnOnce() -> String) {
-        // A thread that finds another saying it goes on.
-        let Ok(mut shown) = self.shown.try_lock() else { return };
-        match &mut *shown {
-            Shown::Bar(bar) => {
+    /// Updates the bar, or writes a line if the last one is old enough.
+    fn update(&self, position: u64, text: impl FnOnce() -> String) {
+        // A thread does not wait while another one updates the display.
+        let Ok(mut display) = self.display.try_lock() else { return };
+        match &mut *display {
+            Display::Bar(bar) => {
                 bar.set_position(position);
                 bar.set_message(text());
             }
-            Shown::Lines { every, next } if Instant::now() >= *next => {
+            Display::Lines { every, next } if Instant::now() >= *next => {
                 // A log that cannot be written to must not end the run.
                 let _ = writeln!(std::io::stderr(), "{}", text());
                 *next = Instant::now() + *every;
@@ -103,22 +105,22 @@ impl Progress {
         }
     }
 
-    /// Points a second of this process.
+    /// Returns the points per second of this process.
     fn rate(&self, done: u64) -> f64 {
         done.saturating_sub(self.start) as f64 / self.began.elapsed().as_secs_f64().max(1e-9)
     }
 
-    /// Says that the chunks are being joined.
+    /// Shows that the chunks are being joined.
     pub fn joining(&self) {
-        if let Shown::Bar(bar) = &*lock(&self.shown) {
+        if let Display::Bar(bar) = &*lock(&self.display) {
             bar.set_style(style("{spinner} joining {human_len} points"));
             bar.tick();
         }
     }
 
-    /// Clears the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
-        if let Shown::Bar(bar) = &*lock(&self.shown) {
+        if let Display::Bar(bar) = &*lock(&self.display) {
             bar.finish_and_clear();
         }
     }
@@ -126,32 +128,32 @@ impl Progress {
     fn line(&self, done: u64) -> String {
         let rate = self.rate(done);
         let percent = 100.0 * done as f64 / self.total.max(1) as f64;
-        let so_far = format!("{done} of {} points ({percent:.1} %)", self.total);
-        // Before the first points are there, a rate of 0 and a time left would be no estimates.
+        let position = format!("{done} of {} points ({percent:.1} %)", self.total);
+        // Before the first point, neither the rate nor the time left can be estimated.
         if rate == 0.0 {
-            return so_far;
+            return position;
         }
         let left = duration(self.total.saturating_sub(done) as f64 / rate);
-        format!("{so_far}, {}, {left} left", per_second(rate))
+        format!("{position}, {}, {left} left", per_second(rate))
     }
 }
 
-/// The bar with its numbers.
+/// The template of a bar with its numbers.
 const BAR: &str = "{wide_bar} {msg}";
 
-/// The bar of a search of unknown length.
-const POINTS: &str = "{spinner} {msg}";
+/// The template of a search without a total.
+const SPINNER: &str = "{spinner} {msg}";
 
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
-/// A duration as people say it: `0.42 s`, `12 s`, `3 min 20 s`, `5 h 02 min`.
+/// Formats a duration: `0.42 s`, `12 s`, `3 min 20 s`, `5 h 02 min`.
 pub fn duration(seconds: f64) -> String {
     if seconds < 10.0 {
         return format!("{seconds:.2} s");
     }
-    // Saturates; nobody waits for 1e19 s.
+    // Saturates beyond 1e19 s.
     let whole = seconds.round() as u64;
     match whole {
         0..60 => format!("{whole} s"),
@@ -161,7 +163,7 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// A rate with three digits.
+/// Formats a rate with three digits.
 pub fn per_second(rate: f64) -> String {
     if rate >= 100.0 { format!("{rate:.0} points/s") } else { format!("{rate:.3} points/s") }
 }
@@ -171,15 +173,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn durations_read_as_people_say_them() {
-        let said: Vec<String> =
+    fn durations_have_readable_units() {
+        let formatted: Vec<String> =
             [0.416, 12.2, 200.0, 18_120.0, 1e6, f64::INFINITY].into_iter().map(duration).collect();
-        assert_eq!(said[..5], ["0.42 s", "12 s", "3 min 20 s", "5 h 02 min", "11 days"]);
-        assert!(said[5].ends_with("days"));
+        assert_eq!(formatted[..5], ["0.42 s", "12 s", "3 min 20 s", "5 h 02 min", "11 days"]);
+        assert!(formatted[5].ends_with("days"));
     }
 
     #[test]
-    fn a_resumed_run_counts_what_is_there_but_not_towards_the_rate() {
+    fn stored_points_count_as_done_but_not_in_the_rate() {
         let mut progress = Progress::new(ProgressMode::Plain, 1000, 900);
         progress.began = Instant::now() - Duration::from_secs(10);
         let line = progress.line(950);
@@ -194,8 +196,8 @@ mod tests {
     }
 
     #[test]
-    fn a_search_counts_its_rows_and_the_rate_of_its_new_points() {
-        let mut progress = Progress::of_search(ProgressMode::Plain, 39, "speeds", 100);
+    fn a_search_counts_units_and_the_rate_of_new_points() {
+        let mut progress = Progress::for_search(ProgressMode::Plain, 39, "speeds", 100);
         progress.began = Instant::now() - Duration::from_secs(10);
         let line = progress.search_line(7, 200);
         assert!(line.starts_with("7 of 39 speeds, 200 points, "), "{line}");

@@ -1,10 +1,14 @@
-//! The runner: takes missing chunks, has the engine compute them on all cores, keeps each as it
-//! comes, and joins the whole. Of chunks that a signal or an error cuts short it keeps the rows
-//! that are there.
+//! The runner of a job:
 //!
-//! Memory: a chunk (at most 4096 points, about 2 MB) in hand for each thread and as many again on
-//! their way to the disk, then about 40 MB for the join; nothing grows with the number of points
-//! but one set entry a chunk.
+//! 1. Open or create the run's folder, and find the missing chunks.
+//! 2. Have the engine evaluate their rows on all cores.
+//! 3. Write each chunk when its rows are complete, and at the end the rows of incomplete chunks,
+//!    which a signal or an error leaves.
+//! 4. Join the chunks to the result file.
+//!
+//! Memory: at most a chunk for each thread (4096 points, about 2 MB) and as many that wait for the
+//! disk, then about 40 MB for the join. Only the set of missing chunks grows with the number of
+//! points.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -20,62 +24,67 @@ use crate::store::{
     Done, OpenOptions, OpenRun, Opened, ResultFile, Shard, ShardRequest, Tally, idle_shards,
 };
 use crate::threads::{self};
-use crate::watch::Parts;
-use crate::{Engine, Environment, Interrupt, Job, Progress, ProgressMode, StoreError, Watch};
+use crate::watch::IncompleteGroups;
+use crate::{Engine, Environment, Interrupt, Job, Progress, ProgressMode, RunContext, StoreError};
 use sweep_files::panics::{self, lock, unlocked};
 
-/// How to run.
+/// The interval between updates of the progress. Basis: a bar that moves smoothly. Doubling it
+/// makes the bar jerk.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
+
+/// The options of a run.
 #[derive(Clone, Copy)]
 pub struct RunOptions<'a> {
-    /// Worker threads (`threads::count`).
+    /// The number of worker threads (`threads::count`).
     pub threads: usize,
-    /// Start over.
+    /// Whether to discard what an earlier run has computed.
     pub fresh: bool,
-    /// Which part.
+    /// The shard to compute, if not everything.
     pub shard: Option<ShardRequest>,
-    /// How progress is shown.
+    /// The form in which progress is shown.
     pub progress: ProgressMode,
     /// Looks up the scheduler's variables.
     pub environment: Environment<'a>,
-    /// Shows a user what matters before the work starts.
+    /// Shows messages to the user before the work starts.
     pub tell: &'a dyn Fn(&str),
 }
 
-/// How a run ended, other than by an error.
+/// The end of a run, other than an error.
 #[derive(Debug)]
 pub enum Ended {
-    /// The output was there already.
+    /// The output existed already.
     Already(Box<ResultFile>, Box<Tally>),
-    /// The output is in place.
+    /// The output was completed.
     Finished(Box<Tally>),
-    /// This shard's part is there, with so many rows by status; the merge comes when all are.
+    /// The shard was completed, with these numbers of rows by status. `sweep merge` joins all
+    /// shards.
     Shard(Shard, NameCounts),
-    /// A signal stopped it; what is done is kept.
+    /// A signal stopped the run. Its rows are stored.
     Interrupted {
         /// The signal.
         signal: u8,
-        /// Points that are there.
+        /// The number of stored points.
         kept: u64,
-        /// Points in all.
+        /// The number of all points.
         points: u64,
     },
 }
 
-/// The outcome of a run, for a user.
+/// The outcome of a run.
 #[derive(Debug)]
 pub struct RunReport {
-    /// How it ended.
+    /// The end of the run.
     pub ended: Ended,
-    /// This process's work; absent if there was none to do.
+    /// The work of this process, if there was any to do.
     pub session: Option<Session>,
-    /// Notes for the user.
+    /// The notes for the user.
     pub notes: Vec<String>,
 }
 
-/// Runs a job on an output, resuming what is there.
+/// Runs a job for an output, and resumes an earlier run of it.
 ///
 /// # Errors
-/// Everything of [`StoreError`]; finished chunks are kept whatever it is.
+/// Any [`StoreError`]. Complete chunks are stored before.
 pub fn run(
     engine: &dyn Engine,
     job: &Job<'_>,
@@ -91,7 +100,7 @@ pub fn run(
         }
         Opened::Open(run) => run,
     };
-    let (points, there) = run.own_points();
+    let (points, stored) = run.own_points();
     if let Some(shard) = run.shard() {
         (options.tell)(&format!("shard {} of {}", shard.index, shard.of));
         idle_shards(job.points, shard.of).iter().for_each(|note| (options.tell)(note));
@@ -99,16 +108,17 @@ pub fn run(
     for note in run.take_notes() {
         (options.tell)(&note);
     }
-    if there > 0 {
-        (options.tell)(&format!("going on: {there} of {points} points are there"));
+    if stored > 0 {
+        (options.tell)(&format!("going on: {stored} of {points} points are there"));
     }
-    let (began, started_unix_s) = (Instant::now(), provenance::now_unix_s());
-    let progress = Progress::new(options.progress, points, there);
-    let work = Work { engine, job, threads, progress: &progress, interrupt };
+    let began = Instant::now();
+    let started_unix_s = provenance::now_unix_s();
+    let progress = Progress::new(options.progress, points, stored);
+    let work = Runner { engine, job, threads, progress: &progress, interrupt };
     let result = work.compute_and_join(&mut run);
     progress.finish();
     let wall_s = began.elapsed().as_secs_f64();
-    let computed = run.own_points().1.saturating_sub(there);
+    let computed = run.own_points().1.saturating_sub(stored);
     let session = Session {
         started_unix_s,
         wall_s,
@@ -131,7 +141,7 @@ pub fn run(
         }
         Ok(None) => {
             let mut notes = run.take_notes();
-            // Only the sidecar's account of the work would miss this; the work itself is kept.
+            // A failure concerns the sidecar's list of sessions only, not the rows.
             notes.extend(run.record(&session).err().map(|error| error.to_string()));
             let (points, kept) = run.own_points();
             let ended = match (interrupt.signal(), run.shard()) {
@@ -143,15 +153,15 @@ pub fn run(
             Ok(RunReport { ended, session: Some(session), notes })
         }
         Err(error) => {
-            // The error counts; whether its session can be recorded on the same disk does not.
+            // The first error is the one to report, not one of recording the session.
             let _ = run.record(&session);
             Err(error)
         }
     }
 }
 
-/// What works on a run, and for whom.
-struct Work<'a> {
+/// The parts of a run that do not change while it runs.
+struct Runner<'a> {
     engine: &'a dyn Engine,
     job: &'a Job<'a>,
     threads: usize,
@@ -159,9 +169,8 @@ struct Work<'a> {
     interrupt: &'a Interrupt,
 }
 
-impl Work<'_> {
-    /// Computes what is missing and joins the whole; `None` for a shard, or when a signal stopped
-    /// it.
+impl Runner<'_> {
+    /// Computes the missing chunks and joins all; `None` for a shard, or after a signal.
     fn compute_and_join(&self, run: &mut OpenRun) -> Result<Option<Tally>, StoreError> {
         let stopped = || self.interrupt.stopped();
         let mut attempts_left = 2;
@@ -172,110 +181,118 @@ impl Work<'_> {
             }
             self.progress.joining();
             match run.join(self.job, &stopped) {
-                // A chunk that was whole a moment ago is not any more: compute it again, but not
-                // for ever.
+                // A chunk became unreadable after it was counted. It is computed again, twice at
+                // most.
                 Err(StoreError::Incomplete { .. }) if attempts_left > 0 => attempts_left -= 1,
                 result => return result,
             }
         }
     }
 
-    /// Computes and keeps every missing chunk of this process's part, or as many as a signal or an
-    /// error lets.
+    /// Computes and writes the missing chunks of this process's shard, until a signal or an error.
     fn compute(&self, run: &OpenRun) -> Result<(), StoreError> {
         let pool = threads::pool(self.threads)?;
         let known = |point| run.known(point);
-        let watch = Watch::knowing(self.interrupt, &known);
+        let context = RunContext::with_known_rows(self.interrupt, &known);
         let (_, start) = run.own_points();
-        // Bounded, so that a disk slower than the engine holds the engine up instead of filling
-        // memory.
+        // A bounded channel makes the engine wait for a slower disk instead of filling memory.
         let (sender, receiver) = sync_channel(self.threads);
-        let hand = Hand::new(self, run, &watch, sender);
-        let filled = Mutex::new(Ok(()));
-        let kept = pool.in_place_scope(|scope| {
-            scope.spawn(|_| *lock(&filled) = hand.fill());
-            let mut kept = Ok(());
+        let collector = ChunkCollector::new(self, run, &context, sender);
+        let collected = Mutex::new(Ok(()));
+        let written = pool.in_place_scope(|scope| {
+            scope.spawn(|_| *lock(&collected) = collector.run());
+            let mut written = Ok(());
             loop {
-                match receiver.recv_timeout(Duration::from_millis(100)) {
-                    Ok((chunk, outcomes)) => {
-                        if let Err(error) = run.write_chunk(chunk, outcomes) {
-                            // A chunk that makes no sense costs itself; a disk that fails would
-                            // cost them all.
+                match receiver.recv_timeout(PROGRESS_INTERVAL) {
+                    Ok((chunk, rows)) => {
+                        if let Err(error) = run.write_chunk(chunk, rows) {
+                            // Invalid rows lose one chunk; a failing disk would lose all further
+                            // ones.
                             if !matches!(error, StoreError::Engine { .. }) {
-                                watch.abort();
+                                context.abort();
                             }
-                            kept = kept.and(Err(error));
+                            written = written.and(Err(error));
                         }
                     }
                     Err(RecvTimeoutError::Timeout) => {}
-                    Err(RecvTimeoutError::Disconnected) => return kept,
+                    Err(RecvTimeoutError::Disconnected) => return written,
                 }
-                self.progress.show(start + watch.points_done());
+                self.progress.show(start + context.points_done());
             }
         });
-        kept.and(unlocked(filled))
+        written.and(unlocked(collected))
     }
 }
 
-/// Chunks in hand: points go out one by one, outcomes come back in any order, whole chunks go on.
-struct Hand<'a> {
-    work: &'a Work<'a>,
+/// A source of the points of missing chunks and a sink of their rows, which sends each chunk to the
+/// writer when it is complete.
+struct ChunkCollector<'a> {
+    runner: &'a Runner<'a>,
     run: &'a OpenRun,
-    watch: &'a Watch<'a>,
-    /// Points of missing chunks that have not gone out.
-    left: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
-    /// Outcomes of chunks that are not whole, those of an interrupted process among them.
-    parts: Parts,
-    whole: SyncSender<(u64, Vec<Done>)>,
+    context: &'a RunContext<'a>,
+    /// The queue of points that have not been evaluated.
+    queue: Mutex<Box<dyn Iterator<Item = u64> + Send + 'a>>,
+    /// The rows of incomplete chunks, including those that an interrupted process has stored.
+    incomplete: IncompleteGroups,
+    writer: SyncSender<(u64, Vec<Done>)>,
 }
 
-impl<'a> Hand<'a> {
+impl<'a> ChunkCollector<'a> {
     fn new(
-        work: &'a Work<'a>,
+        runner: &'a Runner<'a>,
         run: &'a OpenRun,
-        watch: &'a Watch<'a>,
-        whole: SyncSender<(u64, Vec<Done>)>,
+        context: &'a RunContext<'a>,
+        writer: SyncSender<(u64, Vec<Done>)>,
     ) -> Self {
-        let parts = run.take_parts();
-        let there: BTreeSet<u64> = parts.values().flatten().map(|outcome| outcome.point).collect();
+        let incomplete = run.take_parts();
+        let stored: BTreeSet<u64> = incomplete.values().flatten().map(|row| row.point).collect();
         let chunks = run.chunks();
-        let stride = if work.engine.is_helped_by_neighbours() { 1 } else { stride(chunks) };
-        let order = (0..chunks)
-            .map(move |k| (u128::from(k) * u128::from(stride) % u128::from(chunks)) as u64);
-        let missing = order.filter(|&chunk| run.is_missing(chunk));
-        let left = missing.flat_map(|chunk| run.chunk_range(chunk));
-        let left = left.filter(move |point| !there.contains(point));
-        let (left, parts) = (Mutex::new(Box::new(left) as Box<_>), Parts(Mutex::new(parts)));
-        Self { work, run, watch, left, parts, whole }
+        let stride = if runner.engine.is_helped_by_neighbours() { 1 } else { stride(chunks) };
+        let queue = (0..chunks)
+            .map(move |k| (u128::from(k) * u128::from(stride) % u128::from(chunks)) as u64)
+            .filter(|&chunk| run.is_missing(chunk))
+            .flat_map(|chunk| run.chunk_range(chunk))
+            .filter(move |point| !stored.contains(point));
+        Self {
+            runner,
+            run,
+            context,
+            queue: Mutex::new(Box::new(queue)),
+            incomplete: IncompleteGroups(Mutex::new(incomplete)),
+            writer,
+        }
     }
 
-    /// Has the engine evaluate everything that is missing, and keeps what there is of chunks that
-    /// did not become whole.
-    fn fill(self) -> Result<(), StoreError> {
-        let evaluated = self.evaluate();
-        // A part that makes no sense costs itself.
-        let parts = std::mem::take(&mut *lock(&self.parts.0));
-        let kept = parts.into_iter().map(|(chunk, part)| self.run.write_chunk(chunk, part));
-        kept.fold(evaluated, Result::and)
+    /// Has the engine evaluate all missing rows, then writes the rows of incomplete chunks. Returns
+    /// the first error.
+    fn run(self) -> Result<(), StoreError> {
+        let mut result = self.evaluate();
+        let incomplete = std::mem::take(&mut *lock(&self.incomplete.0));
+        for (chunk, rows) in incomplete {
+            // An error in one chunk does not keep the others from being written.
+            let written = self.run.write_chunk(chunk, rows);
+            result = result.and(written);
+        }
+        result
     }
 
     fn evaluate(&self) -> Result<(), StoreError> {
-        let Work { engine, job, .. } = self.work;
-        let next = || {
-            let point = if self.watch.stopped() { None } else { lock(&self.left).next() }?;
+        let Runner { engine, job, .. } = self.runner;
+        let source = || {
+            let point = if self.context.stopped() { None } else { lock(&self.queue).next() }?;
             Some((point, (job.axis_values)(point)))
         };
-        let keep = |outcome| self.keep(outcome);
-        let evaluate = || engine.evaluate(&next, &keep, self.watch);
+        let sink = |row| self.collect(row);
+        let evaluate = || engine.evaluate(&source, &sink, self.context);
         let reason = match catch_unwind(AssertUnwindSafe(evaluate)) {
             Err(panic) => format!("the engine panicked: {}", panics::text(panic.as_ref())),
-            Ok(()) if self.watch.stopped() => return Ok(()),
+            Ok(()) if self.context.stopped() => return Ok(()),
             Ok(()) => "the engine put its work down unasked".to_owned(),
         };
-        let parts = lock(&self.parts.0);
-        let unfinished = parts.keys().next().map(|&chunk| self.run.chunk_range(chunk));
-        let untouched = lock(&self.left).next().map(|point| point..point + 1);
-        match unfinished.or(untouched) {
+        let incomplete = lock(&self.incomplete.0);
+        let unfinished = incomplete.keys().next().map(|&chunk| self.run.chunk_range(chunk));
+        let unstarted = lock(&self.queue).next().map(|point| point..point + 1);
+        match unfinished.or(unstarted) {
             None => Ok(()),
             Some(Range { start: first, end }) => {
                 Err(StoreError::Engine { first, last: end.saturating_sub(1), reason })
@@ -283,30 +300,35 @@ impl<'a> Hand<'a> {
         }
     }
 
-    fn keep(&self, outcome: Done) {
-        self.watch.done(1);
-        let chunk = self.run.chunk_of(outcome.point);
+    /// Adds a row to its chunk, and sends the chunk to the writer if it is complete.
+    fn collect(&self, row: Done) {
+        self.context.add_points(1);
+        let chunk = self.run.chunk_of(row.point);
         let points = self.run.chunk_range(chunk);
-        if let Some(outcomes) = self.parts.add(chunk, points.end - points.start, outcome) {
+        if let Some(rows) = self.incomplete.add(chunk, points.end - points.start, row) {
             // The receiver outlives the engine's work.
-            let _ = self.whole.send((chunk, outcomes));
+            let _ = self.writer.send((chunk, rows));
         }
     }
 }
 
-/// Of so many chunks, the step from each to the next that takes all of them, those that follow one
-/// another far apart. Points that take long lie side by side in a grid: so some come early, and
-/// threads have others to work on meanwhile; and what is done is a sample of what is left.
+/// Returns a step through chunks that visits all of them, with consecutive ones far apart.
+///
+/// Expensive rows lie side by side in a grid. With this order some of them start early, beside
+/// cheap ones that keep the other threads busy, and the rows done are a sample of those left.
 fn stride(chunks: u64) -> u64 {
-    const GOLDEN: f64 = 0.618_033_988_749_895;
-    let is_coprime = |stride: &u64| {
-        let (mut a, mut b) = (*stride, chunks);
-        while b > 0 {
-            (a, b) = (b, a % b);
-        }
-        a == 1
-    };
-    ((GOLDEN * chunks as f64) as u64..=chunks).find(is_coprime).unwrap_or(1)
+    // Multiples of the golden ratio spread most evenly (Knuth, TAOCP 3, section 6.4).
+    const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
+    let is_coprime = |stride: &u64| greatest_common_divisor(*stride, chunks) == 1;
+    ((GOLDEN_RATIO * chunks as f64) as u64..=chunks).find(is_coprime).unwrap_or(1)
+}
+
+/// Computes the greatest common divisor by Euclid's algorithm.
+fn greatest_common_divisor(mut a: u64, mut b: u64) -> u64 {
+    while b > 0 {
+        (a, b) = (b, a % b);
+    }
+    a
 }
 
 #[cfg(test)]

@@ -1,49 +1,51 @@
-//! What computes a model's rows.
+//! The trait of models whose rows can be computed.
 
 use crate::{Engine, Error, Estimate, Model, Plan, Rows};
 
-/// A model whose rows can be computed: all that commands need.
+/// A model whose rows can be computed, as commands need it.
 pub trait Swept: Rows {
-    /// What computes the rows of a plan. If one column alone is asked for, the others may be
-    /// anything, and a ratio need only be good for telling on which side of the plan's limit it is,
-    /// and near the limit for its value.
+    /// Creates the engine that computes the rows of a plan.
+    ///
+    /// With `only` the caller reads a single column, and the others may hold anything. If the
+    /// column is a ratio, it has to be on the correct side of the plan's limit, and accurate near
+    /// the limit only.
     ///
     /// # Errors
-    /// No engine for it.
+    /// A plan that has no engine.
     fn engine<'a>(plan: &'a Plan<Self>, only: Option<&str>) -> Result<Box<dyn Engine + 'a>, Error>;
 
-    /// What a run of a plan will take, on so many threads.
+    /// Estimates the time and memory of a run on a number of threads.
     ///
     /// # Errors
-    /// As [`Self::engine`].
+    /// The errors of [`Self::engine`].
     fn estimate(plan: &Plan<Self>, threads: usize) -> Result<Estimate, Error>;
 
-    /// Lines that `check` shows of the model's own.
+    /// Returns the lines that `check` adds for this model.
     fn words(_: &Plan<Self>) -> Vec<(&'static str, String)> {
         Vec::new()
     }
 
-    /// Words behind "below 2" in summaries, where ratios are not of the largest deviations.
+    /// Returns the words after "below 2" in summaries, where ratios are not those of the largest
+    /// deviations.
     fn criterion(&self) -> &'static str {
         ""
     }
 
-    /// What a message about a column that no row has says of those that a grid file can ask for.
+    /// The sentence on optional columns in the message about an unknown column.
     const FURTHER: &'static str = "";
 
-    /// What a column needs, if it is one of a kind that not every plan's rows have.
+    /// Returns the setting that a column requires, if not every plan has the column.
     fn needed(_column: &str) -> Option<&'static str> {
         None
     }
 
-    /// Plans of the same points whose rows hold further columns, which this one does not ask for:
-    /// one plan for each thing that can be measured.
+    /// Returns plans of the same points whose rows have further columns, one plan for each kind of
+    /// measurement that this plan lacks.
     fn variants(_: &Plan<Self>) -> Vec<Plan<Self>> {
         Vec::new()
     }
 
-    /// Every parameter with its value, as `parameters` lists them; without a plan those that need
-    /// no grid file.
+    /// Returns the lines of `parameters`; without a plan, those that need no grid file.
     fn listed(plan: Option<&Plan<Self>>) -> Vec<Listed<Self>>;
 }
 
@@ -53,6 +55,6 @@ pub struct Listed<M: Model> {
     pub parameter: M::Parameter,
     /// Its value, if there is one.
     pub value: Option<f64>,
-    /// Where that comes from.
+    /// The source of the value.
     pub source: String,
 }

@@ -1,5 +1,5 @@
-//! A small result file: columns with units and descriptions, metadata as in the map's file
-//! (`store::schema`), in one piece.
+//! A writer of small result files: columns with units and descriptions, and the metadata of a map's
+//! file (`store::schema`), in one row group.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -20,7 +20,7 @@ use sweep_files::batches::of_arrow;
 use sweep_files::{Writer, key, panics, seal};
 use sweep_parameter::{Parameter, Worse};
 
-/// Columns on their way to a file.
+/// A result file under construction.
 pub struct Table {
     build: Build,
     columns: Vec<(Column, ArrayRef)>,
@@ -28,12 +28,12 @@ pub struct Table {
 }
 
 impl Table {
-    /// Without columns, by this build.
+    /// Creates a table without columns.
     pub fn new(build: Build) -> Self {
         Self { build, columns: Vec::new(), metadata: Vec::new() }
     }
 
-    /// Adds numbers; unknown ones are null.
+    /// Adds a column of numbers, null where there is none.
     pub fn numbers(
         &mut self,
         name: &str,
@@ -45,29 +45,29 @@ impl Table {
         self.add(name, unit, description, Holds::Measured, Arc::new(array));
     }
 
-    /// Adds values of a parameter.
+    /// Adds a column of a parameter's values.
     pub fn parameter(
         &mut self,
-        of: &impl Parameter,
+        parameter: &impl Parameter,
         values: impl IntoIterator<Item = Option<f64>>,
     ) {
-        self.numbers(of.name(), of.unit(), of.description(), values);
+        self.numbers(parameter.name(), parameter.unit(), parameter.description(), values);
     }
 
-    /// Says of the last column which way it is bad.
+    /// Sets the direction in which values of the last column are worse.
     pub fn worse(&mut self, worse: Worse) {
         if let Some((column, _)) = self.columns.last_mut() {
             column.worse = Some(worse);
         }
     }
 
-    /// Adds counts.
+    /// Adds a column of counts.
     pub fn counts(&mut self, name: &str, description: &str, values: impl IntoIterator<Item = u64>) {
         let array = UInt64Array::from_iter_values(values);
         self.add(name, "1", description, Holds::Count, Arc::new(array));
     }
 
-    /// Adds words from a short list.
+    /// Adds a column of words, of which a file has few different ones.
     pub fn words<'a>(
         &mut self,
         name: &str,
@@ -78,7 +78,7 @@ impl Table {
         self.add(name, "", description, Holds::Name(Vec::new()), Arc::new(array));
     }
 
-    /// Adds truth values.
+    /// Adds a column of truth values.
     pub fn flags(&mut self, name: &str, description: &str, values: impl Iterator<Item = bool>) {
         let array: BooleanArray = values.map(Some).collect();
         self.add(name, "", description, Holds::Flag, Arc::new(array));
@@ -88,35 +88,35 @@ impl Table {
         self.columns.push((Column::new(name, unit, description, kind), array));
     }
 
-    /// Adds an entry to the file's key-value metadata.
+    /// Adds a JSON value to the file's key-value metadata.
     pub fn metadata(&mut self, key: &str, value: &Value) {
         self.text(key, value.to_string());
     }
 
-    /// Adds an entry that is not JSON.
+    /// Adds a text to the file's key-value metadata.
     pub fn text(&mut self, key: &str, value: String) {
         self.metadata.push(KeyValue::new(key.to_owned(), value));
     }
 
-    /// The plan that was added to the metadata; null if none was.
+    /// Returns the plan in the metadata, null if there is none.
     pub fn plan(&self) -> Value {
         let plan = self.metadata.iter().find(|pair| pair.key == key::PLAN);
         let plan = plan.and_then(|pair| serde_json::from_str(pair.value.as_deref()?).ok());
         plan.unwrap_or_default()
     }
 
-    /// The bytes of a file at `path`.
+    /// Returns the bytes of the file; `path` is named in errors.
     ///
     /// # Errors
-    /// As [`Self::finish`].
+    /// The errors of [`Self::finish`].
     pub fn into_bytes(self, path: &Path) -> Result<Vec<u8>, StoreError> {
         self.finish().map(|(_, bytes)| bytes).map_err(StoreError::parquet("write", path))
     }
 
-    /// The columns, and the bytes of their file.
+    /// Returns the columns, and the bytes of their file.
     ///
     /// # Errors
-    /// What the Parquet library refuses: a defect of whoever filled the table.
+    /// A table that the Parquet library refuses, such as one with columns of different lengths.
     pub fn finish(mut self) -> Result<(RecordBatch, Vec<u8>), ParquetError> {
         let Build { version, numerics } = self.build;
         self.text(key::VERSION, version.to_owned());

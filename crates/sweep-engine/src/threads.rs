@@ -1,98 +1,102 @@
-//! How many threads work, and the pool of them.
+//! The number of worker threads, and their pool.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Looks up a variable of a scheduler; the process environment outside tests.
+/// A lookup of environment variables.
 pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
 
-/// Whether to end early, asked by any thread.
+/// A check by which any thread learns whether to end early.
 pub type Cancel<'a> = &'a (dyn Fn() -> bool + Sync);
 
-/// Looks up a variable of this process.
+/// Looks up an environment variable of this process.
 pub fn process(name: &str) -> Option<String> {
     std::env::var(name).ok()
 }
 
-/// As many threads as a process can sensibly ask for.
-const MOST: usize = 4096;
+/// The greatest number of threads that is accepted. Basis: more than any machine has cores.
+/// Doubling it accepts as many more.
+const MAX_THREADS: usize = 4096;
 
-/// Slurm's variable with the cores of a task.
+/// The environment variable in which Slurm gives the number of a task's cores.
 const SLURM_CORES: &str = "SLURM_CPUS_PER_TASK";
 
-/// Why there are no threads to work with.
+/// An error of choosing or starting worker threads.
 #[derive(Debug, thiserror::Error)]
 pub enum ThreadsError {
-    /// The system would not start them.
+    /// The system refused to start the threads.
     #[error("cannot start {threads} threads: {reason}\n  = help: try fewer with --threads")]
     Start {
-        /// How many were asked for.
+        /// The number requested.
         threads: usize,
-        /// What the system answered.
+        /// The system's message.
         reason: String,
     },
-    /// The scheduler's number is none, or beyond reason.
+    /// The scheduler's variable holds no valid number.
     #[error(
-        "{SLURM_CORES} is `{given}`: expected a number of cores from 1 to {MOST}\n  = help: give \
-         --threads"
+        "{SLURM_CORES} is `{given}`: expected a number of cores from 1 to {MAX_THREADS}\n  = help: \
+         give --threads"
     )]
     Scheduler {
-        /// The variable's value.
+        /// The value of the variable.
         given: String,
     },
-    /// A program asks for none, or beyond reason.
-    #[error("{threads} threads: expected a number from 1 to {MOST}")]
+    /// A caller requests an invalid number.
+    #[error("{threads} threads: expected a number from 1 to {MAX_THREADS}")]
     Asked {
-        /// How many.
+        /// The number requested.
         threads: usize,
     },
 }
 
 impl ThreadsError {
-    /// Whether the number asked for, or the scheduler's variable, is wrong.
+    /// Returns whether the requested number or the scheduler's variable is invalid.
     pub fn is_refusal(&self) -> bool {
         matches!(self, Self::Scheduler { .. } | Self::Asked { .. })
     }
 }
 
-/// A value of `--threads`.
+/// Parses a value of `--threads`.
 ///
 /// # Errors
-/// What was expected instead.
+/// A text with the expected values.
 pub fn parse(text: &str) -> Result<usize, String> {
     match text.parse() {
-        Ok(threads @ 1..=MOST) => Ok(threads),
-        _ => Err(format!("expected a number of threads from 1 to {MOST}; got `{text}`")),
+        Ok(threads @ 1..=MAX_THREADS) => Ok(threads),
+        _ => Err(format!("expected a number of threads from 1 to {MAX_THREADS}; got `{text}`")),
     }
 }
 
-/// A number of threads that a program asks for.
+/// Checks a number of threads that a program requests.
 ///
 /// # Errors
 /// [`ThreadsError::Asked`].
 pub fn checked(threads: usize) -> Result<usize, ThreadsError> {
-    let is_sensible = (1..=MOST).contains(&threads);
-    if is_sensible { Ok(threads) } else { Err(ThreadsError::Asked { threads }) }
+    let is_valid = (1..=MAX_THREADS).contains(&threads);
+    if is_valid { Ok(threads) } else { Err(ThreadsError::Asked { threads }) }
 }
 
-/// The threads to work with: those asked for by `--threads`, else the cores that Slurm gave this
+/// Returns the number of worker threads: that of `--threads`, else the cores that Slurm gave this
 /// task, else those that the process may use.
 ///
 /// # Errors
 /// [`ThreadsError::Scheduler`].
-pub fn count(asked: Option<usize>, environment: Environment<'_>) -> Result<usize, ThreadsError> {
-    match (asked, environment(SLURM_CORES)) {
+pub fn count(
+    requested: Option<usize>,
+    environment: Environment<'_>,
+) -> Result<usize, ThreadsError> {
+    match (requested, environment(SLURM_CORES)) {
         (Some(threads), _) => Ok(threads),
         (None, Some(given)) => parse(&given).map_err(|_| ThreadsError::Scheduler { given }),
         (None, None) => Ok(cores()),
     }
 }
 
-/// The cores that this process may use.
+/// Returns the number of cores that this process may use.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// A pool of so many threads.
+/// Builds a pool of threads.
 ///
 /// # Errors
 /// [`ThreadsError::Start`].
@@ -109,16 +113,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn threads_are_those_asked_for_or_what_slurm_gave_or_the_cores() {
+    fn the_option_comes_before_slurm_and_slurm_before_the_cores() {
         let slurm =
             |cores: &'static str| move |name: &str| (name == SLURM_CORES).then(|| cores.to_owned());
         assert_eq!(count(None, &slurm("3")).unwrap(), 3);
         assert_eq!(count(Some(2), &slurm("3")).unwrap(), 2);
         assert_eq!(count(None, &|_| None).unwrap(), cores());
-        for nonsense in ["0", "x", "", "4097", "99999999"] {
-            let error = count(None, &slurm(nonsense)).unwrap_err().to_string();
-            assert!(error.contains(&format!("SLURM_CPUS_PER_TASK is `{nonsense}`")), "{error}");
-            assert_eq!(count(Some(2), &slurm(nonsense)).unwrap(), 2);
+        for invalid in ["0", "x", "", "4097", "99999999"] {
+            let error = count(None, &slurm(invalid)).unwrap_err().to_string();
+            assert!(error.contains(&format!("SLURM_CPUS_PER_TASK is `{invalid}`")), "{error}");
+            assert_eq!(count(Some(2), &slurm(invalid)).unwrap(), 2);
         }
     }
 }

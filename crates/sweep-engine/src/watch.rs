@@ -1,4 +1,5 @@
-//! What passes between the engine and its caller: whether to stop, and how many points are done.
+//! The interface between an engine and the run it serves: rows come from a source, results go to a
+//! sink, and a context carries cancellation, progress and known rows.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -8,106 +9,116 @@ use crate::interrupt::Interrupt;
 use crate::store::Done;
 use sweep_files::panics::lock;
 
-/// Gives a row: what it is known by, and the values of the plan's axes there.
-pub type NextRow<'a> = dyn Fn() -> Option<(u64, Vec<f64>)> + Sync + 'a;
+/// A source of rows: returns a row's number and the values of the plan's axes there.
+pub type RowSource<'a> = dyn Fn() -> Option<(u64, Vec<f64>)> + Sync + 'a;
 
-/// Takes what came of a row.
-pub type KeepRow<'a> = dyn Fn(Done) + Sync + 'a;
+/// A sink of evaluated rows.
+pub type RowSink<'a> = dyn Fn(Done) + Sync + 'a;
 
-/// Recalls what came of a row.
-pub type KnownRow<'a> = dyn Fn(u64) -> Option<Done> + Sync + 'a;
+/// A lookup of a row that was evaluated before.
+pub type RowLookup<'a> = dyn Fn(u64) -> Option<Done> + Sync + 'a;
 
-/// What computes points.
+/// An engine, which evaluates the rows of a plan.
 pub trait Engine: Sync {
-    /// Evaluates points until `next` gives none, each with what it is known by and the values of
-    /// the plan's axes there, on the grid or between its points. Hands each outcome to `keep`, in
-    /// any order; fewer if it stopped because [`Watch::stopped`] said so. Works on all threads of
-    /// the rayon pool that it is called in, and calls both from any of them.
+    /// Evaluates rows until the source is empty, on the grid or between its points, and passes each
+    /// result to the sink, in any order. Leaves rows unevaluated only if [`RunContext::stopped`]
+    /// holds. Works on all threads of the rayon pool that it is called in, and calls source and
+    /// sink from any of them.
     ///
-    /// A point that fails, even by a panic, is an outcome; a panic that leaves this function costs
-    /// all that is in hand.
-    fn evaluate(&self, next: &NextRow<'_>, keep: &KeepRow<'_>, watch: &Watch<'_>);
+    /// A row that fails, even by a panic, is a result. A panic that leaves this function loses all
+    /// rows that have left the source and not reached the sink.
+    fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>);
 
-    /// The instruction set in use.
+    /// Returns the name of the instruction set in use.
     fn simd(&self) -> &str;
 
-    /// Whether rows that come one after another share work: `next` then keeps to the grid's order,
-    /// and otherwise takes chunks that are far apart.
+    /// Returns whether consecutive rows share work. The source then keeps to the grid's order, and
+    /// otherwise takes chunks that are far apart.
     fn is_helped_by_neighbours(&self) -> bool {
         false
     }
 }
 
-/// The engine's view of the run it serves.
-pub struct Watch<'a> {
+/// The state of a run that an engine shares with its caller.
+pub struct RunContext<'a> {
     interrupt: &'a Interrupt,
-    /// Set when a chunk could not be kept: what is in hand would be lost too.
-    abort: AtomicBool,
-    done: AtomicU64,
+    /// Whether a result could not be stored, so that further ones would be lost as well.
+    is_aborted: AtomicBool,
+    points_done: AtomicU64,
     is_late: Option<&'a (dyn Fn() -> bool + Sync)>,
-    known: Option<&'a KnownRow<'a>>,
+    known: Option<&'a RowLookup<'a>>,
 }
 
-impl<'a> Watch<'a> {
-    /// A watch over nothing but the stop flag.
+impl<'a> RunContext<'a> {
+    /// Creates a context without known rows or a time limit.
     pub const fn new(interrupt: &'a Interrupt) -> Self {
-        let (abort, done) = (AtomicBool::new(false), AtomicU64::new(0));
-        Self { interrupt, abort, done, is_late: None, known: None }
+        Self {
+            interrupt,
+            is_aborted: AtomicBool::new(false),
+            points_done: AtomicU64::new(0),
+            is_late: None,
+            known: None,
+        }
     }
 
-    /// The same, and over what earlier processes have kept.
-    pub const fn knowing(interrupt: &'a Interrupt, known: &'a KnownRow<'a>) -> Self {
+    /// Creates a context with the rows that earlier processes have stored.
+    pub const fn with_known_rows(interrupt: &'a Interrupt, known: &'a RowLookup<'a>) -> Self {
         Self { known: Some(known), ..Self::new(interrupt) }
     }
 
-    /// The same, and over a time that the work may take.
-    pub const fn until(interrupt: &'a Interrupt, is_late: &'a (dyn Fn() -> bool + Sync)) -> Self {
+    /// Creates a context that stops the engine once `is_late` returns true.
+    pub const fn with_time_limit(
+        interrupt: &'a Interrupt,
+        is_late: &'a (dyn Fn() -> bool + Sync),
+    ) -> Self {
         Self { is_late: Some(is_late), ..Self::new(interrupt) }
     }
 
-    /// What has been kept of a row, by whichever process.
+    /// Returns a row that any process has stored.
     pub fn known(&self, row: u64) -> Option<Done> {
         self.known.and_then(|known| known(row))
     }
 
-    /// Counts points done, for the bar.
-    pub fn done(&self, points: u64) {
-        self.done.fetch_add(points, Ordering::Relaxed);
+    /// Adds to the number of points done, which progress shows.
+    pub fn add_points(&self, points: u64) {
+        self.points_done.fetch_add(points, Ordering::Relaxed);
     }
 
-    /// Points done so far.
+    /// Returns the number of points done.
     pub fn points_done(&self) -> u64 {
-        self.done.load(Ordering::Relaxed)
+        self.points_done.load(Ordering::Relaxed)
     }
 
     /// Stops the engine.
     pub fn abort(&self) {
-        self.abort.store(true, Ordering::Relaxed);
+        self.is_aborted.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the engine is to stop.
+    /// Returns whether the engine has to stop.
     pub fn stopped(&self) -> bool {
-        let is_late = || self.is_late.is_some_and(|is_late| is_late());
-        self.interrupt.stopped() || self.abort.load(Ordering::Relaxed) || is_late()
+        self.interrupt.stopped()
+            || self.is_aborted.load(Ordering::Relaxed)
+            || self.is_late.is_some_and(|is_late| is_late())
     }
 }
 
-/// Outcomes in groups that are not whole, by the group's number.
+/// Results in incomplete groups, by the group's number.
 #[derive(Debug, Default)]
-pub struct Parts(pub Mutex<BTreeMap<u64, Vec<Done>>>);
+pub struct IncompleteGroups(pub Mutex<BTreeMap<u64, Vec<Done>>>);
 
-impl Parts {
-    /// Adds an outcome to its group; where that makes it whole, of so many, all of them in order.
-    pub fn add(&self, group: u64, whole: u64, outcome: Done) -> Option<Vec<Done>> {
-        let mut parts = lock(&self.0);
-        let part = parts.entry(group).or_default();
-        part.push(outcome);
-        if (part.len() as u64) < whole {
+impl IncompleteGroups {
+    /// Adds a result to a group of `size` results. Returns the group's results, sorted by point, if
+    /// that completes it.
+    pub fn add(&self, group: u64, size: u64, result: Done) -> Option<Vec<Done>> {
+        let mut groups = lock(&self.0);
+        let results = groups.entry(group).or_default();
+        results.push(result);
+        if (results.len() as u64) < size {
             return None;
         }
-        let mut outcomes = parts.remove(&group)?;
-        drop(parts);
-        outcomes.sort_by_key(|outcome| outcome.point);
-        Some(outcomes)
+        let mut complete = groups.remove(&group)?;
+        drop(groups);
+        complete.sort_by_key(|result| result.point);
+        Some(complete)
     }
 }

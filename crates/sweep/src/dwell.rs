@@ -19,7 +19,7 @@ use crate::plan::Plan;
 use columns::{DwellColumn, RowOf};
 use sweep_engine::columns::{declared, row};
 use sweep_engine::store::{Column, Done};
-use sweep_engine::{Error, Watch};
+use sweep_engine::{Error, RunContext};
 
 /// Rows that a thread takes at once, at most: their starts fill lanes. Where rows have more starts
 /// than these, they are fewer: what is kept of a trajectory is 0.1 MB.
@@ -204,7 +204,7 @@ impl Motions {
         speeds_rpm: &[f64],
         asked: &[(u64, Dwell<'_>)],
         keep: &dyn Fn(Done),
-        watch: &Watch<'_>,
+        watch: &RunContext<'_>,
     ) {
         let is_stopped = || watch.stopped();
         let Some(carry) = self.search.carry else {
@@ -284,7 +284,7 @@ mod tests {
 
     use super::*;
     use crate::stability::Held;
-    use sweep_engine::{Engine as _, Interrupt, KnownRow};
+    use sweep_engine::{Engine as _, Interrupt, RowLookup};
     use sweep_files::panics::{lock, unlocked};
 
     #[test]
@@ -295,10 +295,14 @@ mod tests {
         let search = Search { starts: 8, kick: 6.0, carry, threshold: false, sections: 0, longest };
         let held = Held { plan: &plan, speeds_rpm: &[300.0, 305.0, 310.0], search: Some(search) };
         let (engine, calm) = (held.engine().unwrap(), Interrupt::new());
-        let found = |rows: std::ops::Range<u64>, known: &KnownRow<'_>| {
+        let found = |rows: std::ops::Range<u64>, known: &RowLookup<'_>| {
             let (left, done) = (Mutex::new(rows), Mutex::new(Vec::new()));
             let next = || lock(&left).next().map(|row| (row, Vec::new()));
-            engine.evaluate(&next, &|one| lock(&done).push(one), &Watch::knowing(&calm, known));
+            engine.evaluate(
+                &next,
+                &|one| lock(&done).push(one),
+                &RunContext::with_known_rows(&calm, known),
+            );
             let mut done = unlocked(done);
             done.sort_by_key(|one: &Done| one.point);
             done

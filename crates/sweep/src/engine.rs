@@ -6,7 +6,7 @@ mod pool;
 
 pub(crate) use growth::{Carried, motions, of_speeds, responses};
 pub(crate) use ladder::{reference, reference_step_s};
-pub(crate) use sweep_engine::{Engine, Watch};
+pub(crate) use sweep_engine::{Engine, RunContext};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex};
@@ -21,7 +21,7 @@ use washer_row::{Demand, Ladder, Level, Outcome, Rule, RungRun, Status, runs};
 use crate::columns::Columns;
 use crate::plan::{Plan, Scenario};
 use sweep_engine::method::{Integrator as _, Steps};
-use sweep_engine::{Error, Interrupt, KeepRow, NextRow};
+use sweep_engine::{Error, Interrupt, RowSink, RowSource};
 use sweep_files::panics::{lock, unlocked};
 
 /// Parts of a run at whose ends two runs of a trajectory are compared.
@@ -103,7 +103,7 @@ impl<'a> ModelEngine<'a> {
     }
 
     /// As [`Self::ladders`]; `None` if `watch` says to stop before they are found.
-    fn ladders_under(&self, watch: &Watch<'_>) -> Option<&[Ladder; 2]> {
+    fn ladders_under(&self, watch: &RunContext<'_>) -> Option<&[Ladder; 2]> {
         // The standard library's cell has no `get_or_try_init` yet.
         let find = || {
             let found = self.find_ladders(&|| watch.stopped());
@@ -144,7 +144,7 @@ impl<'a> ModelEngine<'a> {
     /// called in, if in one.
     pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
         let interrupt = Interrupt::new();
-        let watch = Watch::new(&interrupt);
+        let watch = RunContext::new(&interrupt);
         self.evaluate_under(axis_values, &watch).unwrap_or_default()
     }
 
@@ -152,7 +152,7 @@ impl<'a> ModelEngine<'a> {
     pub fn evaluate_under(
         &self,
         axis_values: &[Vec<f64>],
-        watch: &Watch<'_>,
+        watch: &RunContext<'_>,
     ) -> Option<Vec<Outcome>> {
         let next = Mutex::new(0..axis_values.len());
         let feed = |most: usize| {
@@ -172,7 +172,7 @@ impl<'a> ModelEngine<'a> {
     }
 
     /// Rows from a feed to a keeper, on all threads of the rayon pool this is called in.
-    fn through_lanes(&self, feed: &Feed<'_>, keep: &Keep<'_>, watch: &Watch<'_>) {
+    fn through_lanes(&self, feed: &Feed<'_>, keep: &Keep<'_>, watch: &RunContext<'_>) {
         let (state, changed) = (Mutex::default(), Condvar::new());
         let pool = Pool { engine: self, feed, keep, watch, state, changed };
         match rayon::current_thread_index() {
@@ -216,7 +216,7 @@ impl<'a> ModelEngine<'a> {
         model: usize,
         method: &Method,
         points: &[&Point],
-        watch: &Watch<'_>,
+        watch: &RunContext<'_>,
     ) -> Vec<RungRun> {
         let stop = || watch.stopped();
         let together = |points: &[&Point]| {
@@ -261,7 +261,7 @@ pub(crate) fn together_or_alone<I, R>(
 }
 
 impl Engine for ModelEngine<'_> {
-    fn evaluate(&self, next: &NextRow<'_>, keep: &KeepRow<'_>, watch: &Watch<'_>) {
+    fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, watch: &RunContext<'_>) {
         let columns = Columns::of_run(self.plan);
         let keep = |outcome: Outcome| keep(columns.done(outcome));
         let feed = |most: usize| {

@@ -11,7 +11,7 @@ use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::plan::shortest_step_s;
 use sweep_engine::store::read::{NameCounts, add};
 use sweep_engine::store::{Shape, chunk_points};
-use sweep_engine::{Engine, Error, Estimate, Interrupt, Job, Watch};
+use sweep_engine::{Engine, Error, Estimate, Interrupt, Job, RunContext};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long,
 /// in seconds.
@@ -173,7 +173,8 @@ fn cost_within(most_s: f64, engine: &ModelEngine<'_>, points: u64) -> Option<(f6
     let began_s = busy_s();
     let is_late = || busy_s() - began_s > most_s;
     let interrupt = Interrupt::new();
-    let outcomes = engine.evaluate_under(&axis_values, &Watch::until(&interrupt, &is_late))?;
+    let outcomes =
+        engine.evaluate_under(&axis_values, &RunContext::with_time_limit(&interrupt, &is_late))?;
     let cost_s = busy_s() - began_s;
     let mut sampled = NameCounts::new();
     outcomes.iter().for_each(|outcome| add(&mut sampled, ROW_STATUSES[row_status(outcome).0]));

@@ -19,7 +19,7 @@ use crate::engine::{ModelEngine, reference_step_s, simd_from_environment};
 use crate::plan::{self, Plan, Scenario};
 use crate::speeds::Speeds;
 use sweep_engine::config::NamedValues;
-use sweep_engine::{Effort, Error, Interrupt, Progress, Watch, threads};
+use sweep_engine::{Effort, Error, Interrupt, Progress, RunContext, threads};
 
 pub(crate) use cause::Cause;
 use sweep_parameter::RatioLimits;
@@ -127,7 +127,7 @@ fn explained(
     };
     // Behind those that are looked at come speeds that nobody can count beforehand.
     let (total, done) = (looked.values().len() as u64, AtomicU64::new(0));
-    let progress = Progress::of_search(progress, total, "speeds looked at", 0);
+    let progress = Progress::for_search(progress, total, "speeds looked at", 0);
     let counted = |speeds: usize| {
         let done = done.fetch_add(speeds as u64, Ordering::Relaxed) + speeds as u64;
         progress.show_search(done.min(total), done);
@@ -195,7 +195,7 @@ fn looked(point: &Point, fastest_rpm: f64) -> Result<Speeds, Error> {
 fn swept(plan: &Plan, interrupt: &Interrupt) -> Result<Swept, Error> {
     let scenario = plan.scenario(0);
     let channels = plan.reliability.channels.clone();
-    let (engine, watch) = (ModelEngine::new(plan)?, Watch::new(interrupt));
+    let (engine, watch) = (ModelEngine::new(plan)?, RunContext::new(interrupt));
     let outcomes = engine.evaluate_under(&[Vec::new()], &watch);
     let outcome = outcomes.and_then(|mut outcomes| outcomes.pop());
     // Where it was stopped: nothing.

@@ -15,10 +15,10 @@ use washer_row::{Growth, Outcome, Status, Trajectory};
 
 use crate::columns::Columns;
 use crate::dwell::{Motions, Search};
-use crate::engine::{Engine, Watch, responses, simd_from_environment, together_or_alone};
+use crate::engine::{Engine, RunContext, responses, simd_from_environment, together_or_alone};
 use crate::plan::{Plan, timing};
 use sweep_engine::store::{Column, Holds, Layout, axis_columns};
-use sweep_engine::{Error, Job, KeepRow, NextRow};
+use sweep_engine::{Error, Job, RowSink, RowSource};
 use sweep_files::{FileKind, key};
 
 /// Rows that a thread takes at once: those of enough points to fill lanes, because a point's rows
@@ -157,7 +157,7 @@ pub(crate) struct DwellEngine<'a> {
 
 impl DwellEngine<'_> {
     /// Keeps these rows, those of neighbouring points and speeds in lanes together, as they come.
-    fn rows(&self, rows: &[u64], keep: &KeepRow<'_>, watch: &Watch<'_>) {
+    fn rows(&self, rows: &[u64], keep: &RowSink<'_>, watch: &RunContext<'_>) {
         // What comes of a search that was stopped means nothing.
         let is_stopped = || watch.stopped();
         let keep = |done| {
@@ -225,7 +225,7 @@ impl DwellEngine<'_> {
 }
 
 impl Engine for DwellEngine<'_> {
-    fn evaluate(&self, next: &NextRow<'_>, keep: &KeepRow<'_>, watch: &Watch<'_>) {
+    fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, watch: &RunContext<'_>) {
         let speeds = self.held.speeds_rpm.len() as u64;
         // All threads have some of few rows.
         let share =

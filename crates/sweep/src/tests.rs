@@ -4,10 +4,10 @@ use crate::config;
 use crate::engine::ModelEngine;
 use crate::model::Washer;
 use crate::plan::Plan;
-use sweep_engine::asking::{Asking, Stopped};
 use sweep_engine::boundary::{
     BoundaryOptions, BoundaryTask, Edge, EdgeKind, Traced, quantity, trace,
 };
+use sweep_engine::evaluator::{CachedEvaluator, Stopped};
 use sweep_engine::store::{Opened, Rows as _, Trials};
 use sweep_engine::{Interrupt, Swept as _};
 use sweep_parameter::Worse;
@@ -64,7 +64,7 @@ fn asked(tolerance: Option<f64>, lattice: u16) -> BoundaryOptions {
 
 fn traced(task: &Task, threads: usize, interrupt: &Interrupt) -> Result<Traced, Stopped> {
     let engine = Washer::engine(&task.plan, Some(&task.quantity.name)).unwrap();
-    let asking = Asking::new(engine, threads, interrupt, None, &|_| {}).unwrap();
+    let asking = CachedEvaluator::new(engine, threads, interrupt, None, &|_| {}).unwrap();
     trace(&task.distances(&asking), &task.firsts, task.curves, &task.search, &mut |_| {})
 }
 
@@ -211,11 +211,11 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
             }
         };
         let engine = Washer::engine(&task.plan, Some(&task.quantity.name)).unwrap();
-        let asking = Asking::new(engine, 2, &interrupt, Some(trials), &tell).unwrap();
+        let asking = CachedEvaluator::new(engine, 2, &interrupt, Some(trials), &tell).unwrap();
         let distances = task.distances(&asking);
         let found = trace(&distances, &task.firsts, task.curves, &task.search, &mut |_| {});
         drop(distances);
-        let trials = asking.into_trials().unwrap();
+        let trials = asking.into_cache().unwrap();
         match found {
             Ok(found) => break (found, trials),
             Err(Stopped::Interrupted) => assert!(trials.count() > there),

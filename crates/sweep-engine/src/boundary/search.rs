@@ -2,8 +2,8 @@
 
 use super::quantity::traced;
 use super::{Search, TracedQuantity, Trial};
-use crate::asking::{Asking, Stopped};
 use crate::config::written::finite;
+use crate::evaluator::{CachedEvaluator, Stopped};
 use crate::store::{Done, Key, Rows};
 use crate::{AxisValues, Error, Model, Plan, Swept};
 use sweep_parameter::Parameter as _;
@@ -121,7 +121,7 @@ impl<M: Rows + Swept> BoundaryTask<M> {
     /// The distances at trial points, by what is asked of the plan's engine.
     pub fn distances<'a>(
         &'a self,
-        asking: &'a Asking<'_>,
+        asking: &'a CachedEvaluator<'_>,
     ) -> impl Fn(&[Trial]) -> Result<Vec<Option<f64>>, Stopped> + 'a {
         let columns = M::layout(&self.plan).columns;
         let place = columns.iter().position(|column| column.name == self.quantity.name);
@@ -139,7 +139,7 @@ impl<M: Rows + Swept> BoundaryTask<M> {
                 values
             };
             let answer = |_, points: Vec<Done>| Ok(points.iter().map(&distance).collect());
-            Ok(asking.ask(&keys, 1, &values, &answer)?.concat())
+            Ok(asking.evaluate(&keys, 1, &values, &answer)?.concat())
         }
     }
 }

@@ -6,10 +6,10 @@ use std::time::Instant;
 
 use super::grid::typed;
 use super::{GridArgs, Lines as _, installed, short};
-use crate::asking::{Asking, Stopped};
 use crate::boundary::quantity::offered;
 use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, TracedRow, trace};
 use crate::config::section::counted;
+use crate::evaluator::{CachedEvaluator, Stopped};
 use crate::store::{Column, Opened, Trials};
 use crate::{Axis, Effort, EffortArgs, Error, Exit, Plan, Progress, Swept, duration, show, tell};
 use sweep_files::{FileKind, Output};
@@ -192,15 +192,15 @@ pub fn search<M: Swept>(
     let there = trials.as_ref().map_or(0, |trials| trials.count() as u64);
     let rows = (task.firsts.len() * task.curves) as u64;
     let rows_done = AtomicU64::new(0);
-    let progress = Progress::of_search(effort.progress, rows, "rows", there);
+    let progress = Progress::for_search(effort.progress, rows, "rows", there);
     let shown = |points| progress.show_search(rows_done.load(Ordering::Relaxed), points);
     let (threads, interrupt) = (effort.threads()?, effort.interrupt);
     let engine = M::engine(&task.plan, Some(&task.quantity.name))?;
-    let asking = Asking::new(engine, threads, interrupt, trials, &shown)?;
+    let asking = CachedEvaluator::new(engine, threads, interrupt, trials, &shown)?;
     let mut standing = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
     let distances = task.distances(&asking);
     let found = trace(&distances, &task.firsts, task.curves, &task.search, &mut standing);
     drop(distances);
     progress.finish();
-    Ok((Stopped::found(found)?, asking.into_trials()))
+    Ok((Stopped::interrupted_to_none(found)?, asking.into_cache()))
 }

@@ -8,7 +8,7 @@ use super::parameters::find;
 use super::report::{Diagnostic, Report};
 use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number};
 use crate::design::{MOST_AXES, REACH, Rule, Shape};
-use crate::plan::MOST_POINTS;
+use crate::plan::MAX_POINTS;
 use crate::{Axis, AxisValues, Design, Distribution};
 
 /// Takes note that an axis writes this parameter's numbers; not if another one does.
@@ -81,11 +81,11 @@ pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Dra
         if design.is_none() {
             let count = values.as_ref().map_or(1, |values| values.value.len());
             let product = points.and_then(|points| points.checked_mul(count));
-            let product = product.filter(|&points| points <= MOST_POINTS);
+            let product = product.filter(|&points| points <= MAX_POINTS);
             if let (Some(points), None, Some(values)) = (points, product, &values) {
                 let title =
                     format!("too many grid points: {points} before this axis, times {count}");
-                let expected = format!("expected at most {MOST_POINTS} in all");
+                let expected = format!("expected at most {MAX_POINTS} in all");
                 report.refuse::<()>(&values.at, title, expected);
             }
             points = product;
@@ -239,7 +239,7 @@ const CLOSEST: f64 = 8.0 * f64::EPSILON;
 fn most_distinct(from: f64, to: f64) -> Option<u64> {
     let steps = ((to - from).abs() / (CLOSEST * from.abs().max(to.abs()))).floor();
     // Both ends are exact, however close.
-    (steps < MOST_POINTS as f64).then_some((steps as u64 + 1).max(2))
+    (steps < MAX_POINTS as f64).then_some((steps as u64 + 1).max(2))
 }
 
 /// The values of an axis: listed, or a range.
@@ -301,7 +301,7 @@ pub fn spacing(
     let count = match points {
         None => {
             let expected = "the number of values, both ends included";
-            section.require(section.whole("count", &(1..=MOST_POINTS)), "count", expected)
+            section.require(section.whole("count", &(1..=MAX_POINTS)), "count", expected)
         }
         Some(value) => {
             let reason = "the number of points belongs in [design], as `points`";

@@ -4,7 +4,7 @@ use super::keys::Variants;
 use super::{Field, Form, Key, Keys, Walk};
 use crate::Design;
 use crate::design::Rule;
-use crate::plan::MOST_POINTS;
+use crate::plan::MAX_POINTS;
 
 /// `seed` when the grid names none.
 pub const DEFAULT_SEED: u64 = 0;
@@ -65,7 +65,7 @@ fn spread(rule: Rule, design: &mut Option<Design>, keys: &mut Keys<'_>) {
     };
     // Stand-ins for what is refused, so that the axes are read all the same.
     let (mut points, mut seed) = numbers.unwrap_or((1, DEFAULT_SEED));
-    let most = if rule == Rule::Sobol { MOST_SOBOL } else { MOST_POINTS };
+    let most = if rule == Rule::Sobol { MOST_SOBOL } else { MAX_POINTS };
     let key = Key::new("points", "how many").needed("the number of points").set();
     let points_found = keys.key(key, &Form::Whole(1..=most), &mut points);
     let key = Key::new("seed", "another seed, another draw").set();

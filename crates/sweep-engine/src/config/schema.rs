@@ -9,7 +9,7 @@ use super::form::{about, number};
 use super::keys::table;
 use super::sections::described;
 use super::{Form, Key, Read};
-use crate::plan::MOST_POINTS;
+use crate::plan::MAX_POINTS;
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
@@ -82,7 +82,7 @@ fn distribution() -> Value {
 
 fn axis() -> Value {
     let parameter = json!({ "type": "string", "description": "a name of `sweep parameters`" });
-    let mut count = Form::Whole(1..=MOST_POINTS).schema();
+    let mut count = Form::Whole(1..=MAX_POINTS).schema();
     count["description"] = "how many, both ends included".into();
     let spacing = json!({ "enum": ["linear", "log"], "default": "linear" });
     let ends = ["from", "to"].map(|key| (key, number(Range::Any)));

@@ -13,7 +13,7 @@ use super::{
     design,
 };
 use crate::method::{Integrator, Setting, default_method};
-use crate::plan::{LONGEST_S, Plan, RATIO_MIN, Reliability, WrittenIn};
+use crate::plan::{MAX_END_S, Plan, RATIO_MIN, Reliability, WrittenIn};
 
 impl<M: Read> Plan<M> {
     /// A plan of which nothing is read: what is left out stays so.
@@ -121,7 +121,7 @@ pub fn name(root: &Section<'_>, path: &Path, over: Option<&str>, help: &str) -> 
 fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     let about = Key::new("end_s", "end of the integration, s").set();
     let key = about.needed("the end of the integration in s");
-    let described = json!({ "type": "number", "exclusiveMinimum": 0, "maximum": LONGEST_S });
+    let described = json!({ "type": "number", "exclusiveMinimum": 0, "maximum": MAX_END_S });
     let (kind, expected) = match &keys.walk {
         Walk::Read(_) => (Form::Number(Range::Any), "a time greater than 0, "),
         Walk::Set(_) => (Form::Number(Range::Positive), ""),
@@ -129,11 +129,11 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     };
     let mut value = *end_s;
     let end = keys.key(key, &kind, &mut value).given().and_then(|Located { at, .. }| {
-        if 0.0 < value && value <= LONGEST_S {
+        if 0.0 < value && value <= MAX_END_S {
             return Some(Located { value, at });
         }
         let title = format!("`end_s` = {} is out of range", decimal(value));
-        keys.report()?.refuse(&at, title, format!("expected {expected}at most {LONGEST_S:e} s"))
+        keys.report()?.refuse(&at, title, format!("expected {expected}at most {MAX_END_S:e} s"))
     });
     let is_window_written = |report: &Report| report.place(WINDOW[1]).is_some();
     if let Some(end) = &end {

@@ -7,7 +7,7 @@ use sweep_parameter::decimal;
 
 use super::{Diagnostic, Draft, Location, Sources};
 use crate::method::{Integrator as _, Steps};
-use crate::plan::{MOST_STEPS, shortest_step_s};
+use crate::plan::{MAX_STEPS, shortest_step_s};
 use crate::{Model, Scenario};
 
 /// A window that is none, at any corner of the grid.
@@ -87,7 +87,7 @@ pub fn steps<M: Model>(draft: &Draft<'_, M>) {
     let [step, end] = [step_s, end_s].map(decimal);
     let title = if step_s > end_s {
         format!("a step of {step} s is longer than the whole run, {end} s")
-    } else if steps > MOST_STEPS {
+    } else if steps > MAX_STEPS {
         format!("a step of {step} s makes {steps:.1e} steps to {end} s")
     } else {
         return;

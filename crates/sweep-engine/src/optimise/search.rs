@@ -3,7 +3,7 @@
 use arrow_schema::ArrowError;
 
 use super::{Candidate, Study, evolve};
-use crate::asking::{Answer, Asking, Stopped};
+use crate::evaluator::{CachedEvaluator, Response, Stopped};
 use crate::store::{Done, Key, Layout, ResultRows, Row, Trials};
 use crate::{Effort, Error, Progress, StoreError, Swept};
 use sweep_results::Goal;
@@ -22,7 +22,7 @@ pub fn search<M: Swept>(
     let progress = Progress::new(effort.progress, study.evolution.candidates, there);
     let shown = |candidates| progress.show(candidates);
     let (threads, engine) = (effort.threads()?, M::engine(&study.plan, None)?);
-    let asking = Asking::new(engine, threads, effort.interrupt, trials, &shown)?;
+    let asking = CachedEvaluator::new(engine, threads, effort.interrupt, trials, &shown)?;
     let layout = M::layout(&study.plan);
     let mut count = 0;
     let found = evolve(&study.evolution, &mut |places| {
@@ -34,12 +34,12 @@ pub fn search<M: Swept>(
         count += places.len() as u64;
         let values = |k: usize, row| study.axis_values(&candidates[k], row);
         let answer = |k: usize, points| answer(study, &layout, &candidates[k], points);
-        let found = asking.ask(&keys, study.rows(), &values, &answer)?;
+        let found = asking.evaluate(&keys, study.rows(), &values, &answer)?;
         // Without one number there are none.
         Ok(found.into_iter().map(|numbers| numbers.into_iter().collect()).collect())
     });
     progress.finish();
-    Ok((Stopped::found(found)?, asking.into_trials()))
+    Ok((Stopped::interrupted_to_none(found)?, asking.into_cache()))
 }
 
 /// The objectives of a candidate as they are minimised, then its excesses, by its points.
@@ -48,7 +48,7 @@ fn answer<M: Swept>(
     layout: &Layout,
     values: &[f64],
     points: Vec<Done>,
-) -> Result<Answer, StoreError> {
+) -> Result<Response, StoreError> {
     let defect =
         |error: ArrowError| StoreError::Engine { first: 0, last: 0, reason: error.to_string() };
     let mut rows = ResultRows::new(layout);

@@ -1,5 +1,5 @@
-//! The runner with an engine that is a formula: threads, shards, interruptions, panics, a disk that
-//! fails.
+//! Tests of the runner with an engine that evaluates a formula: threads, shards, interruptions,
+//! panics, a failing disk.
 
 use std::fs;
 use std::path::PathBuf;
@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::*;
 use crate::store::synthetic;
+use crate::{RowSink, RowSource};
 
 const POINTS: u64 = 81;
 
@@ -23,20 +24,15 @@ impl<F: Fn(u64) + Sync> Formula<F> {
 }
 
 impl<F: Fn(u64) + Sync> Engine for Formula<F> {
-    fn evaluate(
-        &self,
-        next: &(dyn Fn() -> Option<(u64, Vec<f64>)> + Sync),
-        keep: &(dyn Fn(Done) + Sync),
-        watch: &Watch<'_>,
-    ) {
+    fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
         rayon::broadcast(|_| {
-            while let Some((point, _)) = next() {
+            while let Some((point, _)) = source() {
                 (self.on_point)(point);
-                if watch.stopped() {
+                if context.stopped() {
                     return;
                 }
                 self.evaluated.fetch_add(1, Ordering::Relaxed);
-                keep(synthetic::done(point));
+                sink(synthetic::done(point));
             }
         });
     }

@@ -64,7 +64,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let begun = curves.iter().map(|path| Output::begin(path, FileKind::Fit));
     let begun = begun.collect::<Result<Vec<_>, _>>()?;
     let interrupt = Interrupt::install().map_err(Error::signals)?;
-    let progress = Progress::of_search(args.effort.progress, 0, "", 0);
+    let progress = Progress::for_search(args.effort.progress, 0, "", 0);
     let seen = |made: usize| progress.show_search(0, made as u64);
     let journal = args.out.as_ref().map(|out| {
         let mut name = out.as_os_str().to_owned();

@@ -15,7 +15,7 @@ use crate::plan::{Plan, Scenario, timing};
 use sweep_engine::config::whole::{refuse, refuse_step, window};
 use sweep_engine::config::{Diagnostic, Draft};
 use sweep_engine::method::{Integrator as _, Steps};
-use sweep_engine::plan::{MOST_STEPS, shortest_step_s};
+use sweep_engine::plan::{MAX_STEPS, shortest_step_s};
 
 /// Most turns of the drum in a window that are compared one by one: 20 minutes at 1000 rpm. They
 /// stay in memory for a group of points.
@@ -181,7 +181,7 @@ pub(crate) fn stability(draft: &Draft<'_, Washer>) {
         let place =
             ["integrator", "time.end_s"].into_iter().find_map(|key| draft.report.place(key));
         let refusal = place.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
-            diagnostic.at(&at, format!("expected at most {MOST_STEPS:e} steps"))
+            diagnostic.at(&at, format!("expected at most {MAX_STEPS:e} steps"))
         });
         draft.report.push(refusal.help(format!(
             "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mass, a moment \

@@ -19,7 +19,7 @@ use lane_ode::MAX_LANES;
 use washer_model::{Method, Point};
 use washer_row::{Climbs, Next, Outcome, Status, Terms};
 
-use super::{ModelEngine, Watch, growth};
+use super::{ModelEngine, RunContext, growth};
 use crate::plan::Scenario;
 use sweep_files::panics::lock;
 
@@ -112,7 +112,7 @@ pub(super) struct Pool<'a> {
     pub(super) engine: &'a ModelEngine<'a>,
     pub(super) feed: &'a Feed<'a>,
     pub(super) keep: &'a Keep<'a>,
-    pub(super) watch: &'a Watch<'a>,
+    pub(super) watch: &'a RunContext<'a>,
     pub(super) state: Mutex<PoolState>,
     pub(super) changed: Condvar,
 }

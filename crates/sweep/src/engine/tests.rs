@@ -66,8 +66,8 @@ fn rungs_whose_choice_was_cut_short_are_chosen_anew() {
     let engine = ModelEngine::new(&plan).unwrap();
     let (stopped, calm) = (Interrupt::new(), Interrupt::new());
     stopped.raise(15);
-    assert!(engine.ladders_under(&Watch::new(&stopped)).is_none());
-    let found = engine.ladders_under(&Watch::new(&calm)).unwrap();
+    assert!(engine.ladders_under(&RunContext::new(&stopped)).is_none());
+    let found = engine.ladders_under(&RunContext::new(&calm)).unwrap();
     assert_eq!(found, ModelEngine::new(&plan).unwrap().ladders());
 }
 

@@ -16,8 +16,8 @@ use super::run::Task;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use sweep_engine::store::{BATCH_ROWS, Done, Layout, ResultRows};
-use sweep_engine::watch::Parts;
-use sweep_engine::{Error, Job, Progress, StoreError, Watch, threads};
+use sweep_engine::watch::IncompleteGroups;
+use sweep_engine::{Error, Job, Progress, RunContext, StoreError, threads};
 use sweep_files::panics::{self, lock};
 use washer_row::Ladder;
 
@@ -80,7 +80,7 @@ impl Task<'_> {
     pub fn in_memory(&self, effort: Effort<'_>) -> Result<MemoryTable, Error> {
         let Self { job, engine } = self;
         let pool = threads::pool(effort.threads()?)?;
-        let watch = Watch::new(effort.interrupt);
+        let watch = RunContext::new(effort.interrupt);
         let rows = Mutex::new(0..job.points);
         let next = || {
             let row = if watch.stopped() { None } else { lock(&rows).next() }?;
@@ -112,17 +112,17 @@ struct Gathered<'a> {
     job: &'a Job<'a>,
     /// The schema of every batch.
     schema: SchemaRef,
-    parts: Parts,
+    parts: IncompleteGroups,
     batches: Mutex<BTreeMap<u64, Result<RecordBatch, ArrowError>>>,
 }
 
 impl<'a> Gathered<'a> {
     fn new(job: &'a Job<'a>) -> Self {
         let schema = job.layout.schema();
-        Self { job, schema, parts: Parts::default(), batches: Mutex::default() }
+        Self { job, schema, parts: IncompleteGroups::default(), batches: Mutex::default() }
     }
 
-    fn keep(&self, outcome: Done, watch: &Watch<'_>) {
+    fn keep(&self, outcome: Done, watch: &RunContext<'_>) {
         const ROWS: u64 = BATCH_ROWS as u64;
         let place = outcome.point / ROWS;
         let wanted = ROWS.min(self.job.points - place * ROWS);
@@ -130,7 +130,7 @@ impl<'a> Gathered<'a> {
             let batch = self.batch(outcomes);
             lock(&self.batches).insert(place, batch);
         }
-        watch.done(1);
+        watch.add_points(1);
     }
 
     fn batch(&self, mut outcomes: Vec<Done>) -> Result<RecordBatch, ArrowError> {
