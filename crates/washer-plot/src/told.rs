@@ -57,7 +57,7 @@ fn machine(machine: &Value) -> Option<String> {
     if let Some(gap) = quantity(machine, "radial_clearance_m") {
         parts.push(format!("a gap of {gap} between drum and tub"));
     }
-    Some(format!("{}; what the axes name is each point's own", parts.join("; ")))
+    Some(format!("{}; each point has its own values of the axes' parameters", parts.join("; ")))
 }
 
 fn spin(spin: &Value) -> Option<String> {
