@@ -60,7 +60,7 @@ pub use written::Written;
 
 use serde_json::Value;
 
-use crate::plan::{Plan, WrittenIn};
+use crate::plan::{Aside, Plan, WrittenIn};
 
 /// A grid as a user gives it: a file or a text, with the constants `NAME=VALUE` over those it sets.
 #[derive(Clone, Debug)]
@@ -150,7 +150,9 @@ fn resolve<M: Read, T>(
         let finished = finish(&mut draft);
         whole::steps(&draft);
         M::judge(&draft);
-        (Plan { written: WrittenIn(report.written()), ..draft.plan }, finished)
+        let written = WrittenIn(report.written());
+        let aside = Aside { notes: report.take_notes(), ..draft.plan.aside };
+        (Plan { written, aside, ..draft.plan }, finished)
     });
     report.finish(read)
 }

@@ -54,6 +54,24 @@ pub struct Plan<M: Model> {
     pub set: Vec<(String, Value)>,
     /// The sources of the numbers.
     pub written: WrittenIn,
+    /// What is said beside the plan.
+    pub aside: Aside,
+}
+
+/// What a grid file says beside the plan, and what was noticed when it was read. No result depends
+/// on it, so plans that differ in nothing else are equal.
+#[derive(Clone, Debug, Default)]
+pub struct Aside {
+    /// Headers of lists and measurements with the names of what they hold.
+    pub columns: Vec<(String, String)>,
+    /// What a user should know, a line each.
+    pub notes: Vec<String>,
+}
+
+impl PartialEq for Aside {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// The beginning of the source of an assumed number, which follows from others by a rule.

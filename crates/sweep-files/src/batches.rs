@@ -60,6 +60,7 @@ fn data_type(declared: &Declared) -> DataType {
     match (declared.get_physical_type(), about.converted_type()) {
         (Type::BOOLEAN, _) => DataType::Boolean,
         (Type::FLOAT | Type::DOUBLE, _) => DataType::Float64,
+        (Type::INT32 | Type::INT64 | Type::FIXED_LEN_BYTE_ARRAY, As::DECIMAL) => DataType::Float64,
         (_, As::INT_8 | As::INT_16 | As::INT_32 | As::INT_64) => DataType::Int64,
         (_, As::UINT_8 | As::UINT_16 | As::UINT_32 | As::UINT_64) => DataType::UInt64,
         // Nanoseconds are said by a logical type alone.
@@ -81,6 +82,8 @@ pub struct Batches<R> {
     schema: SchemaRef,
     /// Where each column is among those of a row group.
     leaves: Vec<usize>,
+    /// The decimal places of each column of decimals.
+    scales: Vec<Option<i32>>,
     /// The next row group.
     group: usize,
     /// Rows left in this one.
@@ -109,9 +112,14 @@ impl<R: ChunkReader + 'static> Batches<R> {
         let about = file.file_metadata().schema_descr();
         let mut leaves = vec![0; about.root_schema().get_fields().len()];
         (0..about.num_columns()).for_each(|leaf| leaves[about.get_column_root_idx(leaf)] = leaf);
-        let leaves = fields.into_iter().map(|field| leaves[field]).collect();
+        let leaves: Vec<usize> = fields.into_iter().map(|field| leaves[field]).collect();
+        let scale = |leaf: &usize| {
+            let column = about.column(*leaf);
+            (column.converted_type() == ConvertedType::DECIMAL).then(|| column.type_scale())
+        };
+        let scales = leaves.iter().map(scale).collect();
         let (source, columns) = (Arc::new(source), Vec::new());
-        Ok(Self { source, file, schema, leaves, group: 0, left: 0, columns })
+        Ok(Self { source, file, schema, leaves, scales, group: 0, left: 0, columns })
     }
 
     /// The next rows; `None` behind the last.
@@ -134,7 +142,10 @@ impl<R: ChunkReader + 'static> Batches<R> {
         let rows = self.left.min(BATCH_ROWS);
         self.left -= rows;
         let columns = self.columns.iter_mut().zip(self.schema.fields());
-        let arrays = columns.map(|(column, field)| array(column, field.data_type(), rows));
+        let arrays = columns.zip(&self.scales).map(|((column, field), scale)| match scale {
+            Some(scale) => decimals(column, *scale, rows),
+            None => array(column, field.data_type(), rows),
+        });
         let arrays = arrays.collect::<Result<Vec<_>, _>>()?;
         // There may be no column.
         let count = RecordBatchOptions::new().with_row_count(Some(rows));
@@ -207,6 +218,35 @@ fn numbers<T: Physical, A: ArrowPrimitiveType>(
     } else {
         cells((levels, values)).collect()
     }))
+}
+
+/// Most bytes of a decimal that is read: 38 digits.
+const MOST_DECIMAL_BYTES: usize = 16;
+
+/// Decimals as numbers: whole numbers of so many decimal places.
+fn decimals(column: &mut ColumnReader, scale: i32, rows: usize) -> Result<ArrayRef, ParquetError> {
+    let size = 10_f64.powi(scale);
+    match column {
+        ColumnReader::Int32ColumnReader(column) => {
+            numbers::<_, Float64Type>(column, rows, |cell| f64::from(cell) / size)
+        }
+        ColumnReader::Int64ColumnReader(column) => {
+            numbers::<_, Float64Type>(column, rows, |cell| cell as f64 / size)
+        }
+        ColumnReader::FixedLenByteArrayColumnReader(column) => {
+            numbers::<_, Float64Type>(column, rows, |cell| whole(cell.data()) as f64 / size)
+        }
+        _ => Err(ParquetError::General("a column of decimals holds something else".to_owned())),
+    }
+}
+
+/// Returns the whole number of a decimal's bytes, the most significant first; of more than fit, the
+/// last.
+fn whole(bytes: &[u8]) -> i128 {
+    let sign = bytes.first().is_some_and(|first| *first >= 0x80);
+    let filled: i128 = if sign { -1 } else { 0 };
+    let last = bytes.len().saturating_sub(MOST_DECIMAL_BYTES);
+    bytes[last..].iter().fold(filled, |sum, byte| (sum << 8) | i128::from(*byte))
 }
 
 fn words(

@@ -86,6 +86,7 @@ mod tests {
             reliability: Reliability { limits: 2.0.into(), channels: Channel::ALL.to_vec() },
             set: Vec::new(),
             written: Default::default(),
+            aside: Default::default(),
         }
     }
 

@@ -46,7 +46,7 @@ impl GridArgs {
     /// Every mistake in the grid file and the constants.
     pub fn load<M: Read>(&self) -> Result<Plan<M>, Diagnostics> {
         let plan = self.input().fixing(&self.at).load()?;
-        self.tell_window(&plan);
+        self.tell_aside(&plan);
         Ok(plan)
     }
 
@@ -59,12 +59,14 @@ impl GridArgs {
         at: &[String],
     ) -> Result<(Plan<M>, NamedValues), Diagnostics> {
         let (plan, at) = self.input().load_point(at)?;
-        self.tell_window(&plan);
+        self.tell_aside(&plan);
         Ok((plan, at))
     }
 
-    /// Says so where `--set end_s` leaves the window's end where the grid file puts it.
-    fn tell_window<M: Read>(&self, plan: &Plan<M>) {
+    /// Tells what was noticed when the grid was read; and that `--set end_s` leaves the window
+    /// where the grid file puts it.
+    fn tell_aside<M: Read>(&self, plan: &Plan<M>) {
+        plan.aside.notes.iter().for_each(|note| tell(note));
         let is_set = |name| self.sets.iter().any(|set| name_of(set) == name);
         let ([from, to], end_s) = (plan.window_s, plan.end_s);
         if is_set("end_s") && !is_set("window_to_s") && to < end_s {

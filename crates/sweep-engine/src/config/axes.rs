@@ -1,10 +1,11 @@
 //! Axes: parameters with the values that a grid, a design or a list gives them.
 
 use sweep_parameter::{Parameter as _, Range, decimal};
+use sweep_results::nearest;
 
 use super::draft::Claimed;
 use super::list::{self, List};
-use super::parameters::find;
+use super::parameters::{COMPARED, find};
 use super::report::{Diagnostic, Report};
 use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number};
 use crate::design::{MOST_AXES, REACH, Rule, Shape};
@@ -116,9 +117,10 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
         report.refuse::<()>(section.at(), "an [[axis]] beside a list of points", expected);
     }
     let mut swept = Claimed::default();
-    for (k, column) in std::mem::take(&mut list.table.columns).into_iter().enumerate() {
+    list.table.notes().into_iter().for_each(|note| report.note(format!("the list: {note}")));
+    for column in std::mem::take(&mut list.table.columns) {
         let name = Located { value: column.name.value.as_str(), at: column.name.at.clone() };
-        if name.value == list::ID {
+        if name.value == list::ID || !column.is_known && is_foreign(&name, draft) {
             continue;
         }
         let Some(parameter) = find(&name, draft) else { continue };
@@ -133,7 +135,7 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
             }
             report.push_with(|sources| {
                 let what = format!("value {} of {}", row + 1, quoted(name.value));
-                refused_number(&what, value, &list.table.place(sources, k, row), range)
+                refused_number(&what, value, &list.table.place(sources, column.place, row), range)
             });
         }
         if claim(&name, &parameter, &mut swept, draft) && sound {
@@ -141,7 +143,20 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
             add(axis, name.at.clone(), draft);
         }
     }
+    if draft.plan.axes.is_empty() && report.is_clean() {
+        let refusal = Diagnostic::new("the list of points has no column of a parameter");
+        report.push(refusal.help("`[columns]` in the grid file may name what its columns hold"));
+    }
     draft.plan.design = Some(list.design);
+}
+
+/// Whether a name is near no parameter's: a column of it is about something else.
+fn is_foreign<M: Read>(name: &Located<&str>, draft: &Draft<'_, M>) -> bool {
+    let model = &draft.plan.model;
+    let Err(error) = model.find(name.value) else { return false };
+    let all = model.parameters();
+    let near = nearest(name.value, all.iter().take(COMPARED).map(|one| one.name()));
+    error.is_strange && near.is_none()
 }
 
 /// The kinds of distributions by name, with their numbers; "uniform" is a range by another name.

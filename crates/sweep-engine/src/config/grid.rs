@@ -7,9 +7,11 @@ use super::source::{Location, SourceId, is_blank};
 use super::syntax::{self, parse};
 use super::written::name_of;
 use super::{
-    Diagnostic, Field, GridInput, Keys, Read, Report, Section, Walk, axes, design, list, parameters,
+    Diagnostic, Field, GridInput, Keys, Located, Read, Report, Section, Walk, axes, design, list,
+    parameters,
 };
 use crate::{Design, Plan, program};
+use sweep_parameter::Parameter as _;
 use toml::de::DeTable;
 
 /// Reads the grid file and puts the constants in place. `None` if the grid file has no text.
@@ -40,13 +42,22 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
     let (options, sets): (Vec<&String>, _) =
         sets.iter().partition(|set| set.contains('=') && names.contains(&name_of(set)));
     parameters::constants(keys.section()?, sets, at, &mut draft);
+    draft.plan.aside.columns = columns(keys.section()?);
     let written = design::walk(&mut draft.plan.design, &mut keys);
     let root = keys.section()?;
     match (written, draft.plan.design.take()) {
-        (_, Some(Design::List { file, .. })) => match list::read(&file, path, report) {
-            Some(list) => axes::listed_axes(root, list, &mut draft),
-            None => drop(root.tables("axis")),
-        },
+        (_, Some(Design::List { file, .. })) => {
+            let model = draft.plan.model.clone();
+            let known = |name: &str| {
+                let parameter = model.find(name).ok()?;
+                Some((parameter.name().to_owned(), parameter.unit().to_owned()))
+            };
+            let names = list::Names { known: &known, renamed: &draft.plan.aside.columns };
+            match list::read(&file, path, &names, report) {
+                Some(list) => axes::listed_axes(root, list, &mut draft),
+                None => drop(root.tables("axis")),
+            }
+        }
         // The right axes depend on a design that is no table.
         (Field::Bad, None) => drop(root.tables("axis")),
         (_, design) => axes::axes(root, design, &mut draft),
@@ -56,6 +67,17 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
     walk(&mut draft.plan, &mut Keys::new(Walk::Set(&options)));
     draft.plan.set.extend(options.changed.into_inner());
     Some(draft)
+}
+
+/// Reads `[columns]`: headers of lists and measurements with the names of what they hold.
+fn columns(root: &Section<'_>) -> Vec<(String, String)> {
+    let Some(section) = root.table("columns", "[columns]").given() else { return Vec::new() };
+    let section = section.value;
+    let named = |header: Located<&str>| {
+        let name = section.text_named(header.value)?;
+        Some((header.value.to_owned(), name.value.to_owned()))
+    };
+    section.names().into_iter().filter_map(named).collect()
 }
 
 /// The keys of study files.
@@ -72,7 +94,9 @@ pub fn is_another<M: Read>(
 ) -> bool {
     let grid = described::<M>().finish();
     let has = |kind: &str, key: &str| match kind {
-        "grid" => ["set", "axis"].contains(&key) || grid["properties"].get(key).is_some(),
+        "grid" => {
+            ["set", "axis", "columns"].contains(&key) || grid["properties"].get(key).is_some()
+        }
         "study" => STUDY.contains(&key),
         _ => M::is_own_key(key),
     };

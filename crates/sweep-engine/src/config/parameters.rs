@@ -11,7 +11,7 @@ use crate::{Plan, program};
 
 /// Names offered as the nearest one; a machine of thousands of springs has more than a reader wants
 /// compared.
-const COMPARED: usize = 400;
+pub(super) const COMPARED: usize = 400;
 
 /// Reads `[set]`, then `--set` and `--at`, which override it, and writes all into the plan.
 pub fn constants<M: Read>(

@@ -67,6 +67,8 @@ pub struct Report {
     doubtful: RefCell<BTreeSet<String>>,
     /// The rules of numbers that a file leaves out, by their parameters' names.
     assumed: RefCell<BTreeMap<String, String>>,
+    /// What is no mistake, but was read otherwise than it stands.
+    notes: RefCell<Vec<String>>,
 }
 
 #[derive(Debug, Default)]
@@ -125,6 +127,16 @@ impl Report {
     /// Keeps the rule by which a number has its value that a file leaves out.
     pub fn assume(&self, name: &str, rule: &str) {
         self.assumed.borrow_mut().insert(name.to_owned(), format!("{ASSUMED}{rule}"));
+    }
+
+    /// Keeps what a user should know of what was read, a line.
+    pub fn note(&self, note: impl Into<String>) {
+        self.notes.borrow_mut().push(note.into());
+    }
+
+    /// Takes the notes that were kept.
+    pub fn take_notes(&self) -> Vec<String> {
+        self.notes.take()
     }
 
     /// The place of a number, if it was written.

@@ -18,6 +18,9 @@ pub fn grid<M: Read>() -> Value {
     let mut described = described::<M>();
     let key = Key::new("set", "constants, by the names of `sweep parameters`");
     described.add(key, M::schema_of_set());
+    let about = "headers of lists and measurements with the names of what they hold";
+    let names = json!({ "type": "object", "additionalProperties": { "type": "string" } });
+    described.add(Key::new("columns", about), names);
     let axes = json!({ "type": "array", "items": axis() });
     let about = "swept parameters; the first varies slowest. With [design] each has a range \
                  without a count";

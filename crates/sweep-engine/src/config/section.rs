@@ -299,6 +299,11 @@ impl<'a> Section<'a> {
         self.number_of(&quoted(name), self.table.get(name)?, range)
     }
 
+    /// The string under a name from [`Section::names`].
+    pub fn text_named(&self, name: &str) -> Option<Located<&'a str>> {
+        self.text_of(&quoted(name), self.table.get(name)?)
+    }
+
     fn text_of(&self, what: &str, value: &'a Value<'a>) -> Option<Located<&'a str>> {
         match value.get_ref() {
             DeValue::String(text) => Some(Located { value: text, at: self.place(value.span()) }),

@@ -13,7 +13,7 @@ use super::{
     design,
 };
 use crate::method::{Integrator, Setting, default_method};
-use crate::plan::{MAX_END_S, Plan, RATIO_MIN, Reliability, WrittenIn};
+use crate::plan::{Aside, MAX_END_S, Plan, RATIO_MIN, Reliability, WrittenIn};
 
 impl<M: Read> Plan<M> {
     /// A plan of which nothing is read: what is left out stays so.
@@ -30,6 +30,7 @@ impl<M: Read> Plan<M> {
             reliability: Reliability { limits: 2.0.into(), channels: M::default_channels() },
             set: Vec::new(),
             written: WrittenIn::default(),
+            aside: Aside::default(),
         }
     }
 }

@@ -19,6 +19,10 @@ pub struct Args {
     /// units; after @ constants of its own
     #[arg(value_name = "FILE[@NAME=VALUE,...]", required = true)]
     measured: Vec<String>,
+    /// A column of the files and what it holds, as 'Acc front [g]=tub_front_y_m_per_s2'; over
+    /// [columns] of the grid file; may be repeated
+    #[arg(long = "column", value_name = "HEADER=NAME", value_parser = header_and_name)]
+    columns: Vec<(String, String)>,
     #[command(flatten)]
     options: FitOptions,
     /// Machine file to write
@@ -38,9 +42,10 @@ pub struct Args {
 /// What `--help` adds.
 const LONG: &str = "\
 Columns are channels of `sweep trace` with their units: tub_front_y_m, tub_yaw_rad, rates \
-(tub_yaw_rad_per_s), accelerations (tub_front_y_m_per_s2), cabinet_force_y_n. A missing sample is \
-empty. The run begins at time 0, at rest; with speed_rpm the spin is the measured one, else the \
-grid's. An offset of every column is fitted beside the parameters.
+(tub_yaw_rad_per_s), accelerations (tub_front_y_m_per_s2), cabinet_force_y_n. Other units are \
+converted: 'Tub yaw [deg]', time_ms. Further columns are left out. A missing sample is empty. The \
+run begins at time 0, at rest; with speed_rpm the spin is the measured one, else the grid's. An \
+offset of every column is fitted beside the parameters.
 
 With --out, what an interrupted fit has found out stays in FILE.partial, and the same command goes \
 on from there. docs/fit.md explains every line.";
@@ -53,9 +58,22 @@ on from there. docs/fit.md explains every line.";
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let grid: GridInput = args.grid.input().fixing(&args.grid.at);
     let mut cases = Vec::new();
+    let columns = [args.columns.clone(), grid.load()?.aside.columns].concat();
     for text in &args.measured {
         let (path, constants) = parted(text);
-        cases.push(fit::case(&grid, &constants, Measured::read(path)?)?);
+        let measured = Measured::read(path, &columns)?;
+        measured.notes.iter().for_each(|note| tell(&format!("{}: {note}", measured.name)));
+        cases.push(fit::case(&grid, &constants, measured)?);
+    }
+    for (header, _) in &args.columns {
+        let has =
+            |case: &fit::Case| case.measured.headers.iter().any(|own| own.starts_with(header));
+        if !cases.iter().any(has) {
+            let all: Vec<&String> =
+                cases.iter().flat_map(|case| &case.measured.headers).take(20).collect();
+            let expected = format!("one of the files' columns, as in {all:?}");
+            return Err(Error::option("--column", header, expected));
+        }
     }
     let out = args.out.as_deref().map(|path| Output::begin(path, FileKind::Own)).transpose()?;
     let count = cases.len();
@@ -95,6 +113,15 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     }
     let report = &fitted.report;
     show(&if args.json { format!("{:#}\n", serde_json::json!(report)) } else { report.text() })
+}
+
+/// Returns a header and the name of what its column holds. Headers may have an equals sign.
+fn header_and_name(text: &str) -> Result<(String, String), String> {
+    match text.rsplit_once('=') {
+        Some((header, name)) if Measured::is_name(name) => Ok((header.to_owned(), name.to_owned())),
+        Some((_, name)) => Err(format!("`{name}` is no channel with its unit")),
+        None => Err("expected HEADER=NAME".to_owned()),
+    }
 }
 
 /// The file of curves of a case: the first has the name itself.

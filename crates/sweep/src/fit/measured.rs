@@ -4,8 +4,9 @@ use std::path::Path;
 
 use super::algebra::{centred, quantile};
 use sweep_engine::Diagnostics;
-use sweep_engine::config::list::NumberTable;
+use sweep_engine::config::list::{ListColumn, Names, NumberTable};
 use sweep_engine::config::report::{Diagnostic, Report};
+use sweep_results::nearest;
 use washer_model::Channel;
 
 /// Fewest samples of a column: fewer say nothing of their noise.
@@ -113,17 +114,23 @@ pub(crate) struct Measured {
     pub(crate) clock_start_s: Option<f64>,
     /// Stretches of time without any row (s).
     pub(crate) gaps_s: Vec<[f64; 2]>,
+    /// What of the file was read otherwise than it stands, or not at all.
+    pub(crate) notes: Vec<String>,
+    /// The names of its columns in the file.
+    pub(crate) headers: Vec<String>,
 }
 
 impl Measured {
-    /// Reads a file.
+    /// Reads a file. `renamed` are headers of its columns with the names of what they hold.
     ///
     /// # Errors
     /// Every mistake in it, with its place.
-    pub(crate) fn read(path: &Path) -> Result<Self, Diagnostics> {
+    pub(crate) fn read(path: &Path, renamed: &[(String, String)]) -> Result<Self, Diagnostics> {
         let report = Report::default();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let found = NumberTable::read(path, &report).map(|table| judged(name, table, &report));
+        let names = Names { known: &known, renamed };
+        let table = NumberTable::read(path, &names, &report);
+        let found = table.map(|table| judged(name, table, &report));
         report.finish(found)
     }
 
@@ -133,7 +140,8 @@ impl Measured {
     /// As [`Self::read`].
     pub(crate) fn of_columns(columns: Vec<(String, Vec<f64>)>) -> Result<Self, Diagnostics> {
         let report = Report::default();
-        let table = NumberTable::of_columns("table", columns, &report);
+        let names = Names { known: &known, renamed: &[] };
+        let table = NumberTable::of_columns("table", columns, &names, &report);
         let measured = judged("table".to_owned(), table, &report);
         report.finish(Some(measured))
     }
@@ -159,23 +167,65 @@ impl Measured {
         speeds().next().is_none_or(|first| first.abs() <= REST_SPEED_RATIO * greatest_rpm)
     }
 
+    /// Whether a column may have this name.
+    pub(crate) fn is_name(name: &str) -> bool {
+        known(name).is_some()
+    }
+
     /// Samples of all columns together.
     pub(crate) fn count(&self) -> usize {
         self.signals.iter().map(|signal| signal.samples().count()).sum()
     }
 }
 
+/// Returns the name of a quantity that a header names, and its unit.
+fn known(header: &str) -> Option<(String, String)> {
+    let name = header.strip_prefix(TRACED).unwrap_or(header);
+    let [name, unit] = match name {
+        "time_s" | "t_s" | "zeit_s" => ["time_s", "s"].map(str::to_owned),
+        "speed_rpm" | "rpm" | "drehzahl_rpm" => ["speed_rpm", "rpm"].map(str::to_owned),
+        _ => [name.to_owned(), Quantity::named(name)?.units().0],
+    };
+    Some((name, unit))
+}
+
+/// Returns every name that a column may have.
+fn all_names() -> Vec<String> {
+    let names = Quantity::all().map(Quantity::column);
+    names.chain(["time_s", "speed_rpm"].map(str::to_owned)).collect()
+}
+
+/// Returns the mistake of a column whose name is near that of a channel: it is meant to be read.
+fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
+    // Other words, such as drum, are near many names; names of channels have underscores.
+    let names = all_names();
+    let is_written_so = column.header.contains('_');
+    nearest(&column.header, names.iter().map(String::as_str)).filter(|_| is_written_so)?;
+    let title = format!("the column `{}` is no channel", column.header);
+    let expected = "expected a channel of `sweep trace` with its unit, as in \
+                    tub_front_y_m_per_s2, tub_yaw_rad or cabinet_force_y_n";
+    let refusal = Diagnostic::new(title).at(&column.name.at, expected);
+    Some(refusal.nearest(&column.header, names.iter().map(String::as_str)))
+}
+
 /// The table as a measurement; what is wrong with it is reported.
 fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
     let clock = table.columns.iter().find(|column| column.name.value == "time_s");
     let early = clock.map_or(0, |clock| clock.values.iter().take_while(|t| **t < 0.0).count());
-    let mut measured = Measured { name, early, ..Measured::default() };
-    let mut seen: Vec<&str> = Vec::new();
     // Of a file of `sweep trace` the nonlinear motion is taken.
-    let is_trace = table.columns.iter().any(|column| column.name.value.starts_with(TRACED));
-    for (k, column) in table.columns.iter().enumerate() {
-        let (name, at) = (column.name.value.as_str(), &column.name.at);
-        let name = name.strip_prefix(TRACED).unwrap_or(name);
+    let is_trace = table.columns.iter().any(|column| column.header.starts_with(TRACED));
+    let notes = if is_trace { Vec::new() } else { table.notes() };
+    let headers = table.columns.iter().map(|column| column.header.clone()).collect();
+    let mut measured = Measured { name, early, notes, headers, ..Measured::default() };
+    let mut seen: Vec<&str> = Vec::new();
+    for column in &table.columns {
+        if !column.is_known {
+            let mistake = if is_trace { None } else { misspelt(column) };
+            mistake.into_iter().for_each(|mistake| report.push(mistake));
+            continue;
+        }
+        let name = column.name.value.as_str();
+        let at = &column.name.at;
         if seen.contains(&name) {
             let title = format!("the column `{name}` is given twice");
             report.push(Diagnostic::new(title).at(at, "expected each column once"));
@@ -186,7 +236,7 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
             report.push_with(|sources| {
                 let title = format!("`{name}` is infinite in row {}", row + 1);
                 let expected = "expected a number, or nothing where no sample is";
-                Diagnostic::new(title).at(&table.place(sources, k, row), expected)
+                Diagnostic::new(title).at(&table.place(sources, column.place, row), expected)
             });
         }
         let values = &column.values[early..];
@@ -194,10 +244,9 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
         match (name, Quantity::named(name)) {
             ("time_s", _) => {
                 measured.time_s = values.to_vec();
-                times(&table, k, report);
+                times(&table, column, report);
             }
             ("speed_rpm", _) => measured.speed_rpm = Some(values.to_vec()),
-            (_, None) if is_trace => {}
             (_, Some(_)) if samples >= FEWEST && is_still(values) => {
                 let title = format!("the column `{name}` never changes");
                 report.push(Diagnostic::new(title).at(at, "expected what a sensor measured"));
@@ -209,14 +258,7 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
                 let title = format!("the column `{name}` has {samples} samples");
                 report.push(Diagnostic::new(title).at(at, format!("expected {FEWEST} at least")));
             }
-            (_, None) => report.push_with(|_| {
-                let known: Vec<String> = Quantity::all().map(Quantity::column).collect();
-                let known = known.iter().map(String::as_str).chain(["time_s", "speed_rpm"]);
-                let title = format!("the column `{name}` is no channel");
-                let expected = "expected a channel of `sweep trace` with its unit, as in \
-                                tub_front_y_m_per_s2, tub_yaw_rad or cabinet_force_y_n";
-                Diagnostic::new(title).at(at, expected).nearest(name, known)
-            }),
+            (_, None) => {}
         }
     }
     let whole = report.is_clean();
@@ -227,7 +269,16 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
             let title = format!("{} has no column of {name}", measured.name);
             let help = "expected time_s, and channels of `sweep trace` with their units, as in \
                         tub_front_y_m_per_s2";
-            report.push(Diagnostic::new(title).help(help));
+            let refusal = Diagnostic::new(title).help(help);
+            let unknown = table.columns.iter().find(|column| !column.is_known);
+            let naming = unknown.map(|column| {
+                format!(
+                    "say what a column holds: --column '{}=tub_front_y_m_per_s2', or [columns] in \
+                     the grid file",
+                    column.header
+                )
+            });
+            report.push(naming.into_iter().fold(refusal, Diagnostic::help));
         }
     }
     measured.gaps_s = gaps(&measured.time_s);
@@ -242,8 +293,8 @@ fn is_still(values: &[f64]) -> bool {
 }
 
 /// Judges the column of times. Of each mistake the first row is shown: often all rows have it.
-fn times(table: &NumberTable, column: usize, report: &Report) {
-    let values = &table.columns[column].values;
+fn times(table: &NumberTable, column: &ListColumn, report: &Report) {
+    let values = &column.values;
     let mut last = f64::NEG_INFINITY;
     let mut seen = [false; 3];
     let usual = usual_step(values).unwrap_or_default();
@@ -263,7 +314,7 @@ fn times(table: &NumberTable, column: usize, report: &Report) {
         }
         report.push_with(|sources| {
             let expected = "expected times in s that rise from row to row, 0 where the run begins";
-            Diagnostic::new(said).at(&table.place(sources, column, row), expected)
+            Diagnostic::new(said).at(&table.place(sources, column.place, row), expected)
         });
     }
     if seen == [false; 3] {
@@ -272,8 +323,8 @@ fn times(table: &NumberTable, column: usize, report: &Report) {
 }
 
 /// Refuses a record of a longer run than is simulated, at the row after its longest gap.
-fn refuse_long_run(table: &NumberTable, column: usize, report: &Report) {
-    let values = &table.columns[column].values;
+fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
+    let values = &column.values;
     let begin = values.partition_point(|time_s| *time_s < 0.0);
     let times = &values[begin..];
     let Some((first_s, last_s)) = times.first().zip(times.last()) else { return };
@@ -294,7 +345,7 @@ fn refuse_long_run(table: &NumberTable, column: usize, report: &Report) {
             "expected a run of at most {LONGEST_RUN_S} s: remove stray rows, cut the record, or \
              convert its times to s"
         );
-        Diagnostic::new(title).at(&table.place(sources, column, begin + row), expected)
+        Diagnostic::new(title).at(&table.place(sources, column.place, begin + row), expected)
     });
 }
 
@@ -318,7 +369,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
         std::fs::write(&path, text).unwrap();
-        Measured::read(&path).unwrap_err().to_string()
+        Measured::read(&path, &[]).unwrap_err().to_string()
     }
 
     #[test]
@@ -420,6 +471,28 @@ mod tests {
             assert!((measured.time_s[0] == 0.0) == is_clock, "{said}");
             assert!((measured.time_s[99] - measured.time_s[0] - 9.9).abs() < 1e-6, "{said}");
         }
+    }
+
+    #[test]
+    fn a_loggers_file_is_read_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bench.csv");
+        let rows: String =
+            (0..20).map(|k| format!("{};{};{};21,5\n", 20 * k, k % 5, 100 * k)).collect();
+        let text = format!("Bench 3;\nTime;Acc front;Drum;Temp\nms;g;Hz;\u{b0}C\n{rows}");
+        std::fs::write(&path, &text).unwrap();
+        let renamed = [("Acc front", "tub_front_y_m_per_s2"), ("Drum", "speed_rpm")];
+        let renamed = renamed.map(|(header, name)| (header.to_owned(), name.to_owned()));
+        let measured = Measured::read(&path, &renamed).unwrap();
+        assert_eq!(measured.time_s[19], 0.38);
+        assert_eq!(measured.speed_rpm.expect("it is there")[2], 12_000.0);
+        let columns: Vec<String> = measured.signals.iter().map(|it| it.quantity.column()).collect();
+        assert_eq!(columns, ["tub_front_y_m_per_s2"]);
+        assert_eq!(measured.signals[0].values[4], 4.0 * 9.80665);
+        assert!(measured.notes.join(";").contains("left out the column `Temp`"));
+        // Without the user's names nothing is measured, and what to do is said.
+        let refused = Measured::read(&path, &[]).unwrap_err().to_string();
+        assert!(refused.contains("--column 'Acc front=tub_front_y_m_per_s2'"), "{refused}");
     }
 
     #[test]

@@ -27,7 +27,7 @@ const FRICTION: [(&str, f64); 5] = [
 /// A reference file up to a time.
 fn reference(name: &str, end_s: f64) -> Measured {
     let path = format!("{}/testdata/fit/{name}.csv", env!("CARGO_MANIFEST_DIR"));
-    let mut measured = Measured::read(Path::new(&path)).unwrap();
+    let mut measured = Measured::read(Path::new(&path), &[]).unwrap();
     let rows = measured.time_s.partition_point(|time| *time <= end_s);
     measured.time_s.truncate(rows);
     measured.speed_rpm.iter_mut().for_each(|speed| speed.truncate(rows));

@@ -7,6 +7,7 @@ use arrow_schema::Schema;
 
 use crate::config::{Diagnostics, check_columns, not_numbers};
 use crate::plan::Plan;
+use sweep_engine::config::list::is_index;
 use sweep_files::cells;
 
 /// A table of points, column by column.
@@ -23,10 +24,14 @@ impl PointTable {
     /// # Errors
     /// [`Diagnostics`] for a column that holds no numbers.
     pub fn new(schema: &Schema, batches: &[RecordBatch]) -> Result<Self, Diagnostics> {
-        let names: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
+        // A data frame that was filtered or sorted brings the numbers of its rows along.
+        let is_taken = |k: &usize| !is_index(schema.field(*k).name());
+        let taken: Vec<usize> = (0..schema.fields().len()).filter(is_taken).collect();
+        let names: Vec<String> = taken.iter().map(|k| schema.field(*k).name().clone()).collect();
         let mut columns = Vec::with_capacity(names.len());
-        for (k, field) in schema.fields().iter().enumerate() {
-            let refused = || not_numbers(&names, k, &field.data_type().to_string());
+        for (place, k) in taken.into_iter().enumerate() {
+            let field = schema.field(k);
+            let refused = || not_numbers(&names, place, &field.data_type().to_string());
             if !cells::is_number(field.data_type()) {
                 return Err(refused());
             }
@@ -111,5 +116,25 @@ impl PointsOnAxes<'_> {
             }
         }
         hasher.finalize().to_hex().to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow_array::{ArrayRef, Int64Array};
+
+    use super::*;
+
+    #[test]
+    fn the_index_of_a_data_frame_is_no_column() {
+        let masses: ArrayRef = Arc::new(Float64Array::from(vec![0.3, 0.5]));
+        let index: ArrayRef = Arc::new(Int64Array::from(vec![7, 2]));
+        let columns = [("unbalance_mass_kg", masses), ("__index_level_0__", index)];
+        let batch = RecordBatch::try_from_iter(columns).expect("it is whole");
+        let table = PointTable::new(&batch.schema(), &[batch]).expect("it holds numbers");
+        assert_eq!(table.names, ["unbalance_mass_kg"]);
+        assert_eq!(table.rows(), 2);
     }
 }

@@ -1,77 +1,89 @@
-//! Numbers under a line of names, separated by commas, semicolons or tabs. All numbers of a file
-//! have one decimal mark, which they show together. Lines that are empty or begin with `#` do not
-//! count.
-
-use std::ops::Range;
+//! Numbers under a line of names, separated by commas, semicolons, tabs or spaces. All numbers of a
+//! file have one decimal mark, which they show together. Lines that are empty or begin with `#` do
+//! not count.
 
 use super::super::report::{Diagnostic, Report};
 use super::super::section::{counted, short};
 use super::super::source::{Located, Location, SourceId};
+use super::layout::{Layout, Line, lines, said};
+use super::names::Names;
 use super::notation::{Evidence, Notation, Seen, Unclear};
-use super::{ID, ListColumn, Unreadable, fits};
+use super::units::Scale;
+use super::{ID, ListColumn, Unreadable, fits, is_index};
 
-/// Columns, with NaN for what is refused; the byte at which each row's line begins, and what
-/// separates cells.
-pub(super) type Read = (Vec<ListColumn>, Vec<u32>, char);
+/// What is read of a table in text.
+#[derive(Default)]
+pub(super) struct Read {
+    /// The columns, with NaN for what is refused.
+    pub(super) columns: Vec<ListColumn>,
+    /// The byte at which each row's line begins.
+    pub(super) starts: Vec<u32>,
+    /// What separates cells.
+    pub(super) separator: char,
+    /// Lines before the line of names.
+    pub(super) preamble: usize,
+}
+
+/// Texts of cells that hold no sample, in small letters.
+const MISSING: [&str; 9] = ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "<na>"];
 
 /// Reads a text; mistakes are reported.
 pub(super) fn read(
     text: &str,
     source: SourceId,
     gaps: bool,
+    names: &Names<'_>,
     report: &Report,
 ) -> Result<Read, Unreadable> {
-    let mut lines = lines(text);
-    let Some((_, line, offset)) = lines.next() else { return Ok((Vec::new(), Vec::new(), ',')) };
-    let separator = [';', '\t'].into_iter().find(|&other| line.contains(other)).unwrap_or(',');
-    fits(0, cells(line, separator, offset).count())?;
-    let column = |(name, at): (&str, _)| ListColumn {
-        name: Located { value: name.to_owned(), at: Location::new(source, at) },
-        values: Vec::new(),
+    let Some(layout) = Layout::find(text, names)? else {
+        return Ok(Read { separator: ',', ..Read::default() });
     };
-    let mut columns: Vec<ListColumn> = cells(line, separator, offset).map(column).collect();
-    let mut starts: Vec<u32> = Vec::new();
-    let notation = match notation(lines.clone(), separator, &columns) {
+    let separator = layout.separator;
+    let headers = headers(&layout)?;
+    let width = headers.len();
+    let mut read = Read { separator, preamble: layout.preamble, ..Read::default() };
+    let mut scales: Vec<Option<Scale>> = Vec::new();
+    for (place, (header, at)) in headers.into_iter().enumerate() {
+        let unit = layout.units.get(place).map(String::as_str);
+        let (column, scale) = column(header, place, unit, Location::new(source, at), names, report);
+        read.columns.push(column);
+        scales.push(scale);
+    }
+    let rows = lines(text, layout.rows);
+    let notation = match layout.notation.map_or_else(|| notation(rows.clone(), &read), Ok) {
         Ok(notation) => notation,
         Err(unclear) => {
             report.push(refusal(&unclear, source));
-            return Ok((columns, starts, separator));
+            return Ok(read);
         }
     };
-    for (start, line, offset) in lines {
-        let count = cells(line, separator, offset).count();
-        if count != columns.len() {
-            report.push_with(|_| {
-                let at = Location::new(source, offset..offset + line.len());
-                let [names, numbers] = ["name", "number"].map(|what| counted(columns.len(), what));
-                let title = format!("a row of {} under {names}", counted(count, "number"));
-                let by = match separator {
-                    ';' => "semicolons",
-                    '\t' => "tabs",
-                    _ => "commas",
-                };
-                let expected = format!("expected {numbers}, separated by {by}");
-                Diagnostic::new(title).at(&at, expected)
-            });
+    for line in rows {
+        let cells = line.cells(separator);
+        let count = cells.clone().count();
+        // Spreadsheets end rows with separators, and write rows that were emptied.
+        let is_padded = (2..=2 * width).contains(&count);
+        if is_padded && cells.clone().all(|(cell, _)| cell.is_empty()) {
             continue;
         }
-        fits(starts.len() as u64 + 1, count)?;
+        let mut further = cells.clone().skip(width);
+        let ends_empty = is_padded && further.all(|(cell, _)| cell.is_empty());
+        if count < width || !(count == width || ends_empty || layout.is_labview) {
+            report.push_with(|_| wrong_row(line, count, width, separator, source));
+            continue;
+        }
+        fits(read.starts.len() as u64 + 1, width)?;
         // Fits: no list is as long as 4 GiB.
-        starts.push(start as u32);
-        for ((cell, at), column) in cells(line, separator, offset).zip(&mut columns) {
-            if column.name.value == ID {
-                // Whatever it says; a number holds its place.
-                column.values.push(0.0);
-                continue;
-            }
-            if gaps && cell.is_empty() {
+        read.starts.push(line.start as u32);
+        for (((cell, at), column), scale) in cells.zip(&mut read.columns).zip(&scales) {
+            let Some(scale) = scale else { continue };
+            if gaps && is_missing(cell) {
                 column.values.push(f64::NAN);
                 continue;
             }
             if let Some(value) = notation.number(cell)
                 && (gaps || !value.is_nan())
             {
-                column.values.push(value);
+                column.values.push(scale.apply(value));
                 continue;
             }
             column.values.push(f64::NAN);
@@ -82,31 +94,109 @@ pub(super) fn read(
             });
         }
     }
-    Ok((columns, starts, separator))
+    let rows = read.starts.len();
+    for (column, scale) in read.columns.iter_mut().zip(&scales) {
+        // A number holds the place of whatever tells people which row is which.
+        if scale.is_none() && column.name.value == ID {
+            column.values = vec![0.0; rows];
+        }
+    }
+    read.columns.retain(|column| column.is_known || !is_index(&column.name.value));
+    Ok(read)
+}
+
+/// Returns the names in the line of names, with their places; those without a name at its end do
+/// not count.
+fn headers<'t>(layout: &Layout<'t>) -> Result<Vec<(&'t str, std::ops::Range<usize>)>, Unreadable> {
+    let cells = layout.header.cells(layout.separator);
+    fits(0, cells.clone().count())?;
+    let mut headers: Vec<_> = cells.collect();
+    while headers.len() > 1 && headers.last().is_some_and(|(name, _)| name.is_empty()) {
+        headers.pop();
+    }
+    if layout.is_labview && headers.last().is_some_and(|(name, _)| *name == "Comment") {
+        headers.pop();
+    }
+    if let (true, Some((name, _))) = (layout.is_labview, headers.first_mut())
+        && *name == "X_Value"
+    {
+        *name = "time_s";
+    }
+    Ok(headers)
+}
+
+/// Returns a column without its numbers, and the factor to its name's unit; no factor if it is left
+/// out.
+fn column(
+    header: &str,
+    place: usize,
+    unit: Option<&str>,
+    at: Location,
+    names: &Names<'_>,
+    report: &Report,
+) -> (ListColumn, Option<Scale>) {
+    let of_name = |name: String, is_known| ListColumn {
+        name: Located { value: name, at: at.clone() },
+        header: header.to_owned(),
+        place,
+        is_known,
+        values: Vec::new(),
+    };
+    if header == ID {
+        return (of_name(header.to_owned(), true), None);
+    }
+    match names.find(header, unit) {
+        Ok(Some(found)) => (of_name(found.name, true), Some(found.scale)),
+        Ok(None) => (of_name(header.to_owned(), false), None),
+        Err([title, expected]) => {
+            report.refuse::<()>(&at, title, expected);
+            (of_name(header.to_owned(), true), None)
+        }
+    }
+}
+
+/// Whether a cell says that there is no sample.
+fn is_missing(cell: &str) -> bool {
+    cell.len() <= 4 && MISSING.contains(&cell.to_lowercase().as_str())
+}
+
+/// Returns the mistake of a row of too few or too many cells.
+fn wrong_row(
+    line: Line<'_>,
+    count: usize,
+    width: usize,
+    separator: char,
+    source: SourceId,
+) -> Diagnostic {
+    let at = Location::new(source, line.offset..line.offset + line.text.len());
+    let [names, numbers] = ["name", "number"].map(|what| counted(width, what));
+    let title = format!("a row of {} under {names}", counted(count, "number"));
+    let expected = format!("expected {numbers}, separated by {}", said(separator));
+    let refusal = Diagnostic::new(title).at(&at, expected);
+    let help = "commas separate cells here: if they separate decimals or thousands too, write the \
+                file with semicolons or tabs between cells";
+    if separator == ',' && count > width { refusal.help(help) } else { refusal }
 }
 
 /// Returns the notation of the numbers in these lines.
 fn notation<'t>(
-    lines: impl Iterator<Item = (usize, &'t str, usize)>,
-    separator: char,
-    columns: &[ListColumn],
+    rows: impl Iterator<Item = Line<'t>> + Clone,
+    read: &Read,
 ) -> Result<Notation, Unclear> {
+    // Commas end cells, and so every mark within one is a decimal point.
+    let is_by_commas = read.separator == ',' && read.columns.len() > 1;
     let mut seen = Seen::default();
-    for (_, line, offset) in lines {
-        if separator == ',' && columns.len() > 1 && !line.contains('"') {
-            // Commas end cells, and so every mark within one is a decimal point.
-            continue;
-        }
-        if cells(line, separator, offset).count() != columns.len() {
-            continue;
-        }
-        for ((cell, at), column) in cells(line, separator, offset).zip(columns) {
+    if is_by_commas && !rows.clone().any(|line| line.text.contains('"')) {
+        return Ok(Notation::POINT);
+    }
+    for line in rows {
+        for ((cell, at), column) in line.cells(read.separator).zip(&read.columns) {
             if column.name.value != ID {
                 seen.note(cell, at);
             }
         }
     }
-    seen.notation(separator == ',' && columns.len() > 1)
+    seen.notation(is_by_commas)
 }
 
 /// Returns the mistake of numbers that may be others.
@@ -135,54 +225,4 @@ fn refusal(unclear: &Unclear, source: SourceId) -> Diagnostic {
             Diagnostic::new(title).at(&place(evidence), expected).help(help)
         }
     }
-}
-
-/// The lines that count: the byte at which each begins, and its text with the byte of that.
-fn lines(text: &str) -> impl Iterator<Item = (usize, &str, usize)> + Clone {
-    let mut next = 0;
-    let lines = text.split_inclusive('\n').map(move |line| {
-        let start = next;
-        next += line.len();
-        let (line, offset) = body(line, start);
-        (start, line, offset)
-    });
-    lines.filter(|(_, line, _)| {
-        let line = line.trim();
-        !line.is_empty() && !line.starts_with('#')
-    })
-}
-
-/// The place of a cell in the line that begins at a byte of a text.
-pub(super) fn cell_span(text: &str, start: usize, separator: char, column: usize) -> Range<usize> {
-    let line = text.get(start..).unwrap_or_default();
-    let line = line.split_inclusive('\n').next().unwrap_or_default();
-    let (line, offset) = body(line, start);
-    cells(line, separator, offset).nth(column).map_or(start..start, |(_, at)| at)
-}
-
-/// A line that begins at byte `start`, without byte order mark and line end, and where that begins.
-fn body(line: &str, start: usize) -> (&str, usize) {
-    let body = line.trim_end_matches(['\n', '\r']);
-    let plain = if start == 0 { body.trim_start_matches('\u{feff}') } else { body };
-    (plain, start + body.len() - plain.len())
-}
-
-/// The cells of a line without white space and quotation marks, and their places.
-fn cells(line: &str, separator: char, offset: usize) -> impl Iterator<Item = (&str, Range<usize>)> {
-    let (mut next, mut is_quoted, mut may_begin) = (offset, false, true);
-    // A separator between quotation marks, which may begin a cell, is none.
-    let ends = move |c: char| {
-        is_quoted ^= c == '"' && (is_quoted || may_begin);
-        let ends = c == separator && !is_quoted;
-        may_begin = ends || c == '"' || may_begin && c.is_whitespace();
-        ends
-    };
-    line.split(ends).map(move |cell| {
-        let start = next + (cell.len() - cell.trim_start().len());
-        next += cell.len() + 1;
-        let trimmed = cell.trim();
-        let quoted = trimmed.len() >= 2 && trimmed.starts_with('"') && trimmed.ends_with('"');
-        let inner = if quoted { &trimmed[1..trimmed.len() - 1] } else { trimmed };
-        (inner, start..start + trimmed.len())
-    })
 }

@@ -15,52 +15,90 @@ use sweep_files::pages::{self, Unpacked};
 use sweep_files::{Refused, cells, footer, panics};
 
 use super::super::section::short;
-use super::{LONGEST_BYTES, Unreadable, fits};
+use super::names::{Match, Names};
+use super::units::Scale;
+use super::{LONGEST_BYTES, Unreadable, fits, is_index};
 
 /// How a list may be compressed, for a message.
 const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
 
-/// Names and values of the columns. With `gaps`, a null is NaN.
-pub(super) fn columns(bytes: Vec<u8>, gaps: bool) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
-    let panicked = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
-    panics::caught(|| read(bytes.into(), gaps)).unwrap_or_else(panicked)
+/// A column of a file.
+#[derive(Debug, PartialEq)]
+pub(super) struct Column {
+    /// The name of what it holds, or the file's if it is not known.
+    pub(super) name: String,
+    /// The name in the file.
+    pub(super) header: String,
+    /// The numbers, if it is known.
+    pub(super) values: Option<Vec<f64>>,
 }
 
-fn read(bytes: Bytes, gaps: bool) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
+/// Returns the columns of a file but its index. With `gaps`, a null is NaN.
+pub(super) fn columns(
+    bytes: Vec<u8>,
+    gaps: bool,
+    names: &Names<'_>,
+) -> Result<Vec<Column>, Unreadable> {
+    let panicked = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
+    panics::caught(|| read(bytes.into(), gaps, names)).unwrap_or_else(panicked)
+}
+
+fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<Column>, Unreadable> {
     footer::check(&mut Cursor::new(&bytes)).map_err(refused)?;
     let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes).map_err(damaged)?;
     let schema = batches::schema(&metadata);
     let fields = schema.fields();
     fits(0, fields.len())?;
-    if let Some(field) = fields.iter().find(|field| !cells::is_number(field.data_type())) {
-        let found = match field.data_type() {
-            DataType::Boolean => "true and false",
-            text if cells::is_text(text) => "text",
-            _ => "dates, times, lists or bytes",
-        };
-        return Err(format!("its column `{}` holds no numbers but {found}", short(field.name())));
+    let mut columns: Vec<Column> = Vec::new();
+    let mut known: Vec<(usize, usize, Scale)> = Vec::new();
+    for (place, field) in fields.iter().enumerate() {
+        let header = field.name().clone();
+        let found = names.find(&header, None);
+        match found.map_err(|[title, expected]| format!("{title}: {expected}"))? {
+            Some(Match { name, scale }) => {
+                if !cells::is_number(field.data_type()) {
+                    return Err(no_numbers(&header, field.data_type()));
+                }
+                known.push((columns.len(), place, scale));
+                columns.push(Column { name, header, values: Some(Vec::new()) });
+            }
+            None if is_index(&header) => {}
+            None => columns.push(Column { name: header.clone(), header, values: None }),
+        }
     }
     check_sizes(&metadata, &bytes, fields.len())?;
-    let mut columns: Vec<(String, Vec<f64>)> =
-        fields.iter().map(|field| (field.name().clone(), Vec::new())).collect();
     let mut rows = 0;
-    let all = (0..fields.len()).collect();
-    let reader = Batches::new(bytes, Arc::new(metadata), &schema, all);
+    let fields = known.iter().map(|(_, place, _)| *place).collect();
+    let reader = Batches::new(bytes, Arc::new(metadata), &schema, fields);
     let mut reader = reader.map_err(damaged)?;
     while let Some(batch) = reader.batch().map_err(damaged)? {
-        fits((rows + batch.num_rows()) as u64, columns.len())?;
-        for ((name, values), array) in columns.iter_mut().zip(batch.columns()) {
+        fits((rows + batch.num_rows()) as u64, known.len())?;
+        for ((column, _, scale), array) in known.iter().zip(batch.columns()) {
+            let Column { header, values: Some(values), .. } = &mut columns[*column] else {
+                continue;
+            };
             let numbers = cells::numbers(array).map_err(|error| error.to_string())?;
             for (k, value) in numbers.into_iter().enumerate() {
                 let row = rows + k + 1;
-                let no_value = || format!("its column `{}` has no value in row {row}", short(name));
+                let no_value =
+                    || format!("its column `{}` has no value in row {row}", short(header));
                 let value = if gaps { value.or(Some(f64::NAN)) } else { value };
-                values.push(value.ok_or_else(no_value)?);
+                values.push(scale.apply(value.ok_or_else(no_value)?));
             }
         }
         rows += batch.num_rows();
     }
     Ok(columns)
+}
+
+/// Returns the mistake of a column of other things.
+fn no_numbers(header: &str, data_type: &DataType) -> Unreadable {
+    let found = match data_type {
+        DataType::Boolean => "true and false",
+        text if cells::is_text(text) => "text",
+        _ => "dates, times, lists or bytes",
+    };
+    format!("its column `{}` holds no numbers but {found}", short(header))
 }
 
 /// Refuses what could not be held, or not be unpacked, before any of it is.

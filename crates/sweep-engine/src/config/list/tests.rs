@@ -12,6 +12,16 @@ use super::*;
 
 const NAME: &str = "unbalance_mass_kg";
 
+/// Names that are all known, and have no unit.
+const ANY: Names<'_> =
+    Names { known: &|name: &str| Some((name.to_owned(), String::new())), renamed: &[] };
+
+/// The known columns of a Parquet file.
+fn parquet_of(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
+    let columns = parquet::columns(bytes, false, &ANY)?;
+    Ok(columns.into_iter().map(|it| (it.name, it.values.unwrap_or_default())).collect())
+}
+
 fn readable() -> [Compression; 5] {
     [
         Compression::UNCOMPRESSED,
@@ -48,17 +58,17 @@ fn small(codec: Compression, version: WriterVersion) -> Vec<u8> {
 }
 
 fn refusal(bytes: Vec<u8>) -> String {
-    parquet::columns(bytes, false).expect_err("not a list").to_string()
+    parquet_of(bytes).expect_err("not a list")
 }
 
 #[test]
 fn every_usual_compression_reads_alike() {
     let plain = small(Compression::UNCOMPRESSED, WriterVersion::PARQUET_1_0);
-    let plain = parquet::columns(plain, false).unwrap();
+    let plain = parquet_of(plain).unwrap();
     assert_eq!((plain[0].1[49], plain[1].1[6]), (0.1 + 0.001 * 49.0, 26.0));
     for codec in readable() {
         for version in [WriterVersion::PARQUET_1_0, WriterVersion::PARQUET_2_0] {
-            let read = parquet::columns(small(codec, version), false);
+            let read = parquet_of(small(codec, version));
             assert_eq!(read.unwrap(), plain, "{codec}, {version:?}");
         }
     }
@@ -103,16 +113,13 @@ fn damage_is_an_error_or_another_list_and_nothing_else() {
     for codec in readable() {
         let whole = small(codec, WriterVersion::PARQUET_2_0);
         for length in (0..whole.len()).step_by(7) {
-            assert!(
-                parquet::columns(whole[..length].to_vec(), false).is_err(),
-                "{codec}: {length} bytes"
-            );
+            assert!(parquet_of(whole[..length].to_vec()).is_err(), "{codec}: {length} bytes");
         }
         for at in 0..whole.len() {
             for bit in [0, 3, 7] {
                 let mut flipped = whole.clone();
                 flipped[at] ^= 1 << bit;
-                if let Ok(columns) = parquet::columns(flipped, false) {
+                if let Ok(columns) = parquet_of(flipped) {
                     assert!(columns.iter().all(|(_, values)| values.len() as u64 <= MOST_NUMBERS));
                 }
             }
@@ -120,16 +127,21 @@ fn damage_is_an_error_or_another_list_and_nothing_else() {
     }
 }
 
+/// The place of a cell in the line that begins at a byte of a text.
+fn cell_span(text: &str, start: usize, by: char, column: usize) -> std::ops::Range<usize> {
+    Line::at(text, start).cells(by).nth(column).expect("it is there").1
+}
+
 fn csv_of(text: &str) -> Result<csv::Read, Unreadable> {
     let report = Report::default();
     let source = report.add("list.csv", String::new());
-    csv::read(text, source, false, &report)
+    csv::read(text, source, false, &ANY, &report)
 }
 
 #[test]
 fn a_text_of_too_many_numbers_or_columns_is_refused() {
     let rows = "1,2\n".repeat((MOST_NUMBERS / 2) as usize);
-    let (columns, starts, _) = csv_of(&format!("a,b\n{rows}")).unwrap();
+    let csv::Read { columns, starts, .. } = csv_of(&format!("a,b\n{rows}")).unwrap();
     assert_eq!((columns[1].values.len(), starts.len()), (10_000_000, 10_000_000));
     let refused = |text: &str| csv_of(text).map(|_| ()).unwrap_err().to_string();
     assert!(refused(&format!("a,b\n{rows}1,2\n")).contains("more than 20000000 numbers"));
@@ -141,16 +153,16 @@ fn a_row_of_too_many_numbers_is_one_mistake() {
     let report = Report::default();
     let source = report.add("list.csv", String::new());
     let text = format!("a,b\n{}\n1,2\n", ",".repeat(100_000_000));
-    assert!(csv::read(&text, source, false, &report).is_ok());
+    assert!(csv::read(&text, source, false, &ANY, &report).is_ok());
     assert_eq!(report.into_diagnostics().count(), 1);
 }
 
 #[test]
 fn a_value_is_found_where_it_stands() {
     let text = "\u{feff}# by hand\r\n a , \"b\"\r\n\r\n 1,2 \r\n3 , \"4\"\r\n";
-    let (columns, starts, by) = csv_of(text).unwrap();
+    let csv::Read { columns, starts, separator: by, .. } = csv_of(text).unwrap();
     assert_eq!([&columns[0].values, &columns[1].values], [&[1.0, 3.0], &[2.0, 4.0]]);
-    let found = |row: usize, column| &text[csv::cell_span(text, starts[row] as usize, by, column)];
+    let found = |row: usize, column| &text[cell_span(text, starts[row] as usize, by, column)];
     assert_eq!([found(0, 0), found(0, 1), found(1, 0), found(1, 1)], ["1", "2", "3", "\"4\""]);
     assert_eq!(
         [&text[columns[0].name.at.span.clone()], &text[columns[1].name.at.span.clone()]],
@@ -161,20 +173,20 @@ fn a_value_is_found_where_it_stands() {
 #[test]
 fn a_cell_between_quotation_marks_may_hold_what_separates_cells() {
     let text = "id,b\n\"a,b\",2\n\"5\"\" pipe, short\",3\n5\" pipe,4\n";
-    let (columns, ..) = csv_of(text).unwrap();
+    let csv::Read { columns, .. } = csv_of(text).unwrap();
     assert_eq!(columns[1].values, [2.0, 3.0, 4.0]);
 }
 
 #[test]
 fn a_spreadsheet_may_have_semicolons_or_tabs_and_decimal_commas() {
     for text in ["a;b\n1,5;2\n3;-4,25e2\n", "a\tb\n1.5\t2\n3\t-425\n"] {
-        let (columns, starts, by) = csv_of(text).unwrap();
+        let csv::Read { columns, starts, separator: by, .. } = csv_of(text).unwrap();
         assert_eq!([&columns[0].values, &columns[1].values], [&[1.5, 3.0], &[2.0, -425.0]]);
-        assert_eq!(text[csv::cell_span(text, starts[0] as usize, by, 1)], *"2");
+        assert_eq!(text[cell_span(text, starts[0] as usize, by, 1)], *"2");
     }
     let report = Report::default();
     let source = report.add("list.csv", String::new());
-    assert!(csv::read("a;b\n1;2;3\n", source, false, &report).is_ok());
+    assert!(csv::read("a;b\n1;2;3\n", source, false, &ANY, &report).is_ok());
     let said = report.into_diagnostics().to_string();
     assert!(said.contains("expected 2 numbers, separated by semicolons"), "{said}");
 }
@@ -185,17 +197,17 @@ fn a_file_has_one_decimal_mark_and_a_thousand_is_no_decimal() {
     let american = "unbalance_mass_kg\tdamping_n_s_per_m\n0.9\t950\n0.9\t1,050\n";
     let quoted = "unbalance_mass_kg,damping_n_s_per_m\n0.9,950\n0.9,\"1,050\"\n";
     for text in [german, american, quoted] {
-        let (columns, ..) = csv_of(text).unwrap();
+        let csv::Read { columns, .. } = csv_of(text).unwrap();
         assert_eq!([&columns[0].values, &columns[1].values], [&[0.9, 0.9], &[950.0, 1050.0]]);
     }
     let commas = "a,b\n1.050,950\n\"1.100\",970\n";
-    assert_eq!(csv_of(commas).unwrap().0[0].values, [1.05, 1.1]);
+    assert_eq!(csv_of(commas).unwrap().columns[0].values, [1.05, 1.1]);
     let said = |text: &str| {
         let report = Report::default();
         let source = report.add("list.csv", String::new());
-        let read = csv::read(text, source, true, &report);
+        let read = csv::read(text, source, true, &ANY, &report);
         report.fill(source, text.to_owned());
-        assert!(read.unwrap().0.iter().all(|column| column.values.is_empty()));
+        assert!(read.unwrap().columns.iter().all(|column| column.values.is_empty()));
         report.into_diagnostics().to_string()
     };
     let mixed = said("a;b\n0,9;950\n0.9;1050\n");
@@ -207,4 +219,138 @@ fn a_file_has_one_decimal_mark_and_a_thousand_is_no_decimal() {
         assert!(unclear.contains(part), "{part}: {unclear}");
     }
     assert!(said("a\n950\n1.050\n").contains("may be 1050"));
+}
+
+/// Columns of a file of a logger, as a reader of these names takes them: names with their units.
+fn logged(bytes: &[u8]) -> (Vec<(String, Vec<f64>)>, Vec<String>) {
+    const KNOWN: [(&str, &str); 4] =
+        [("time_s", "s"), ("speed_rpm", "rpm"), ("arm_yaw_rad", "rad"), ("acc_m_per_s2", "m/s^2")];
+    let known = |name: &str| {
+        let found = KNOWN.iter().find(|(known, _)| *known == name);
+        found.map(|(name, unit)| ((*name).to_owned(), (*unit).to_owned()))
+    };
+    let renamed = [("Acc front".to_owned(), "acc_m_per_s2".to_owned())];
+    let names = Names { known: &known, renamed: &renamed };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("logger.csv");
+    std::fs::write(&path, bytes).unwrap();
+    let report = Report::default();
+    let table = NumberTable::read(&path, &names, &report);
+    let Some(table) = table else { panic!("{}", report.into_diagnostics()) };
+    let notes = table.notes();
+    let known = table.columns.into_iter().filter(|column| column.is_known);
+    (known.map(|column| (column.name.value, column.values)).collect(), notes)
+}
+
+#[test]
+fn files_of_loggers_and_spreadsheets_are_read_as_they_are() {
+    let plain = "time_s,arm_yaw_rad\n0,0.5\n0.02,-0.25\n";
+    let utf16 = format!("\u{feff}{}", plain.replace(',', "\t"));
+    let utf16: Vec<u8> = utf16.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let texts = [
+        plain.to_owned(),
+        plain.replace('\n', "\r"),
+        plain.replace('\n', "\r\n"),
+        format!("Logger 7\nRate,50 Hz\n\n{plain}"),
+        format!("Name,abc\nRate,50\n{plain}"),
+        plain.replace("rad\n", "rad\ns,rad\n"),
+        plain.replace("rad\n", "rad\n[s],[rad]\n"),
+        plain.replace('\n', ",\n"),
+        format!("{plain},\n,\n"),
+        format!("sep=;\n{}", plain.replace(',', ";").replace('.', ",")),
+        "time_s,arm_yaw_rad\n\"0\",\"0,5\"\n\"0,02\",\"-0,25\"\n".to_owned(),
+        plain.replace(',', "  "),
+        format!("# {plain}"),
+        ",time_s,arm_yaw_rad\n0,0,0.5\n1,0.02,-0.25\n".to_owned(),
+        "time_s,temp_c,arm_yaw_rad,note\n0,21,0.5,a b\n0.02,warm,-0.25,\n".to_owned(),
+        "Time [ms],Arm yaw [rad]\n0,0.5\n20,-0.25\n".to_owned(),
+        "Time;Arm yaw\nms;rad\n0;0,5\n20;-0,25\n".to_owned(),
+    ];
+    let all = texts.iter().map(|text| text.as_bytes().to_vec()).chain([utf16]);
+    for bytes in all {
+        let shown = String::from_utf8_lossy(&bytes).into_owned();
+        let (columns, _) = logged(&bytes);
+        let expected = [("time_s", vec![0.0, 0.02]), ("arm_yaw_rad", vec![0.5, -0.25])];
+        let expected = expected.map(|(name, values)| (name.to_owned(), values));
+        assert_eq!(columns, expected, "{shown}");
+    }
+}
+
+#[test]
+fn a_name_of_several_words_is_one_column() {
+    let (columns, _) = logged(b"Arm yaw [rad]\n0.5\n-0.25\n");
+    assert_eq!(columns, [("arm_yaw_rad".to_owned(), vec![0.5, -0.25])]);
+}
+
+#[test]
+fn what_is_read_otherwise_than_it_stands_is_said() {
+    let text = "Logger 7\nTime [s];Acc front [g];Temp [\u{b0}C];n (Hz)\n0,0;1,0;21,5;2\n";
+    let latin: Vec<u8> = text.chars().map(|letter| letter as u8).collect();
+    let (columns, notes) = logged(&latin);
+    assert_eq!(columns[1], ("acc_m_per_s2".to_owned(), vec![9.80665]));
+    let notes = notes.join("\n");
+    for said in ["1 line before the names", "`Temp [\u{b0}C]`, `n (Hz)`", "`Acc front [g]` is acc"]
+    {
+        assert!(notes.contains(said), "{said}: {notes}");
+    }
+}
+
+#[test]
+fn a_labview_file_is_read_with_its_units_and_its_decimal_mark() {
+    let header = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\n\
+        Decimal_Separator\t,\nMulti_Headings\tNo\nX_Columns\tOne\nTime_Pref\tRelative\n\
+        Date\t2026/03/01\n***End_of_Header***\t\n\t\nChannels\t2\t\t\nSamples\t2\t2\t\n\
+        Y_Unit_Label\tg\tVolts\t\nX_Dimension\tTime\tTime\t\nX0\t0,0\t0,0\t\n\
+        Delta_X\t0,001\t0,001\t\n***End_of_Header***\t\t\t\n\
+        X_Value\tAcc front\tVoltage\tComment\n";
+    let text = format!("{header}0,000000\t1,500\t2,0\n0,001000\t-1,250\t2,0\tstart\n");
+    let (columns, _) = logged(text.as_bytes());
+    let expected = [1.5, -1.25].map(|g| g * 9.80665).to_vec();
+    assert_eq!(columns[0], ("time_s".to_owned(), vec![0.0, 0.001]));
+    assert_eq!(columns[1], ("acc_m_per_s2".to_owned(), expected));
+    let refused = |text: &str| csv_of(text).map(|_| ()).unwrap_err();
+    assert!(refused(&header.replace("X_Columns\tOne", "X_Columns\tMulti")).contains("Multi"));
+    assert!(refused(&format!("{text}{header}")).contains("several segments"));
+}
+
+#[test]
+fn an_index_and_what_is_unknown_are_left_out_of_a_parquet_list() {
+    let masses: ArrayRef = Arc::new(Float64Array::from(vec![300.0, 400.0]));
+    let index: ArrayRef = Arc::new(UInt64Array::from(vec![3, 7]));
+    let words: ArrayRef = Arc::new(["a", "b"].into_iter().collect::<DictionaryArray<Int32Type>>());
+    let columns = [("unbalance_mass_g", masses), ("note", words), ("__index_level_0__", index)];
+    let bytes = file(&columns, 1, WriterProperties::default());
+    let known = |name: &str| (name == NAME).then(|| (NAME.to_owned(), "kg".to_owned()));
+    let names = Names { known: &known, renamed: &[] };
+    let read = parquet::columns(bytes, false, &names).unwrap();
+    assert_eq!((read[0].name.as_str(), read[0].values.as_deref()), (NAME, Some(&[0.3, 0.4][..])));
+    assert_eq!((read.len(), read[1].name.as_str(), &read[1].values), (2, "note", &None));
+}
+
+#[test]
+fn decimals_are_numbers() {
+    use ::parquet::data_type::{FixedLenByteArrayType, Int32Type, Int64Type};
+    use ::parquet::file::writer::SerializedFileWriter;
+    use ::parquet::schema::parser::parse_message_type;
+    let schema = "message m { required int32 a (DECIMAL(4,1)); required int64 b (DECIMAL(18,3)); \
+        required fixed_len_byte_array(5) c (DECIMAL(10,2)); }";
+    let schema = Arc::new(parse_message_type(schema).unwrap());
+    let mut bytes = Vec::new();
+    let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::default()).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    column.typed::<Int32Type>().write_batch(&[1205, -5], None, None).unwrap();
+    column.close().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    column.typed::<Int64Type>().write_batch(&[300, 12_345], None, None).unwrap();
+    column.close().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    let cells = [vec![0, 0, 0, 1, 0], vec![255, 255, 255, 255, 156]].map(Into::into);
+    column.typed::<FixedLenByteArrayType>().write_batch(&cells, None, None).unwrap();
+    column.close().unwrap();
+    group.close().unwrap();
+    writer.close().unwrap();
+    let read: Vec<Vec<f64>> =
+        parquet_of(bytes).unwrap().into_iter().map(|(_, values)| values).collect();
+    assert_eq!(read, [vec![120.5, -0.5], vec![0.3, 12.345], vec![2.56, -1.0]]);
 }

@@ -1,0 +1,358 @@
+//! The parts of a table in text: what stands before its line of names, what separates its cells, a
+//! row of units, and where its rows begin.
+
+use std::ops::Range;
+
+use super::names::Names;
+use super::notation::Notation;
+use super::units::is_unit;
+use super::{MOST_COLUMNS, Unreadable};
+
+/// Lines among which the line of names is looked for.
+const LOOKED_AT: usize = 200;
+
+/// The separator of cells that stand apart by any white space.
+pub(super) const WHITE_SPACE: char = ' ';
+
+/// What separates the cells of a file, for messages.
+pub(super) fn said(separator: char) -> &'static str {
+    match separator {
+        ';' => "semicolons",
+        '\t' => "tabs",
+        WHITE_SPACE => "spaces",
+        _ => "commas",
+    }
+}
+
+/// A line that counts.
+#[derive(Clone, Copy)]
+pub(super) struct Line<'t> {
+    /// The byte at which it begins.
+    pub(super) start: usize,
+    /// Its text without byte order mark and line end.
+    pub(super) text: &'t str,
+    /// The byte at which that begins.
+    pub(super) offset: usize,
+}
+
+impl<'t> Line<'t> {
+    /// Returns the line that begins at a byte of a text.
+    pub(super) fn at(text: &'t str, start: usize) -> Self {
+        let line = text.get(start..).unwrap_or_default();
+        let line = line.split_inclusive('\n').next().unwrap_or_default();
+        let body = line.trim_end_matches(['\n', '\r']);
+        let plain = if start == 0 { body.trim_start_matches('\u{feff}') } else { body };
+        Self { start, text: plain, offset: start + body.len() - plain.len() }
+    }
+
+    /// The cells of the line without white space and quotation marks, and their places.
+    pub(super) fn cells(self, separator: char) -> Cells<'t> {
+        Cells { line: self, separator, next: Some(0) }
+    }
+}
+
+/// The lines of a text from a byte on that are not empty and no comments.
+pub(super) fn lines(text: &str, from: usize) -> impl Iterator<Item = Line<'_>> + Clone {
+    let mut next = from;
+    let all = text[from..].split_inclusive('\n').map(move |line| {
+        let start = next;
+        next += line.len();
+        Line::at(text, start)
+    });
+    all.filter(|line| {
+        let line = line.text.trim();
+        !line.is_empty() && !line.starts_with('#')
+    })
+}
+
+/// The cells of a line.
+#[derive(Clone)]
+pub(super) struct Cells<'t> {
+    line: Line<'t>,
+    separator: char,
+    /// The byte of the line at which the next cell begins.
+    next: Option<usize>,
+}
+
+impl<'t> Iterator for Cells<'t> {
+    type Item = (&'t str, Range<usize>);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let mut from = self.next?;
+        let text = self.line.text;
+        if self.separator == WHITE_SPACE {
+            from += text[from..].len() - text[from..].trim_start().len();
+            if from == text.len() {
+                self.next = None;
+                return None;
+            }
+        }
+        let rest = &text[from..];
+        let end = end_of_cell(rest, self.separator);
+        self.next = (end < rest.len()).then_some(from + end + 1);
+        let cell = &rest[..end];
+        let start = self.line.offset + from + (cell.len() - cell.trim_start().len());
+        let trimmed = cell.trim();
+        let quoted = trimmed.len() >= 2 && trimmed.starts_with('"') && trimmed.ends_with('"');
+        let inner = if quoted { &trimmed[1..trimmed.len() - 1] } else { trimmed };
+        Some((inner, start..start + trimmed.len()))
+    }
+}
+
+/// Returns the length of the first cell of a text. A separator between quotation marks, which may
+/// begin a cell, is none.
+fn end_of_cell(text: &str, separator: char) -> usize {
+    let is_separator = |letter: char| match separator {
+        WHITE_SPACE => letter == ' ' || letter == '\t',
+        separator => letter == separator,
+    };
+    let mut is_quoted = false;
+    let mut may_begin = true;
+    let found = text.find(|letter: char| {
+        is_quoted ^= letter == '"' && (is_quoted || may_begin);
+        may_begin = letter == '"' || may_begin && letter.is_whitespace();
+        is_separator(letter) && !is_quoted
+    });
+    found.unwrap_or(text.len())
+}
+
+/// The parts of a table in text.
+pub(super) struct Layout<'t> {
+    /// What separates its cells.
+    pub(super) separator: char,
+    /// The line of names.
+    pub(super) header: Line<'t>,
+    /// The units of its columns, in order; shorter where none follow.
+    pub(super) units: Vec<String>,
+    /// The decimal mark that the file states.
+    pub(super) notation: Option<Notation>,
+    /// The byte at which its rows begin.
+    pub(super) rows: usize,
+    /// Whether it is a LabVIEW file: its first column is the time, its last one remarks, which rows
+    /// leave out.
+    pub(super) is_labview: bool,
+    /// Lines before the line of names that count for nothing.
+    pub(super) preamble: usize,
+}
+
+impl<'t> Layout<'t> {
+    /// Finds the parts of a table; none if the text has no line.
+    ///
+    /// # Errors
+    /// A kind of LabVIEW's files that is not read.
+    pub(super) fn find(text: &'t str, names: &Names<'_>) -> Result<Option<Self>, Unreadable> {
+        let mut first: Vec<Line<'_>> = lines(text, 0).take(LOOKED_AT).collect();
+        let Some(opening) = first.first().copied() else { return Ok(None) };
+        if opening.text.starts_with("LabVIEW Measurement") {
+            return Self::labview(text, &first).map(Some);
+        }
+        let stated = stated_separator(opening.text);
+        if stated.is_some() {
+            first.remove(0);
+        }
+        let Some(opening) = first.first().copied() else { return Ok(None) };
+        let by_line = |line: &Line<'_>| stated.unwrap_or_else(|| separator(line.text));
+        let words = |line: &Line<'_>| line.cells(WHITE_SPACE).count();
+        // A single name may be of several words; cells apart by spaces are so in every row.
+        let by = |k: usize| match by_line(&first[k]) {
+            WHITE_SPACE if first.get(k + 1).map(words) != Some(words(&first[k])) => ',',
+            found => found,
+        };
+        // The line with known names above rows of numbers; what fits less is taken for want of it.
+        let rank = |k: usize| {
+            let by = by(k);
+            let Some(cells) = texts(first[k], by) else { return (0, false, 0) };
+            let known =
+                cells.into_iter().filter(|cell| !is_number(cell) && names.has(cell)).count();
+            (known.min(1), is_above_rows(&first[k..], by), known)
+        };
+        let mut place = 0;
+        let mut best = rank(0);
+        for k in 1..first.len() {
+            // Rows follow: nothing but numbers can stand below the names.
+            if best.0 == 1 && best.1 {
+                break;
+            }
+            let next = rank(k);
+            if next > best {
+                (place, best) = (k, next);
+            }
+        }
+        let header = first.get(place).copied().unwrap_or(opening);
+        if let Some(commented) = commented_header(text, header, &by_line) {
+            return Ok(Some(commented));
+        }
+        let separator = by(place);
+        let below = first.get(place + 1);
+        let count = texts(header, separator).map_or(0, |names| names.len());
+        let units = below.and_then(|line| units(*line, separator, count));
+        let last = if units.is_some() { below.copied().unwrap_or(header) } else { header };
+        Ok(Some(Self {
+            separator,
+            header,
+            units: units.unwrap_or_default(),
+            notation: None,
+            rows: after(text, last),
+            is_labview: false,
+            preamble: place,
+        }))
+    }
+
+    /// Finds the parts of a LabVIEW measurement file (.lvm).
+    fn labview(text: &'t str, first: &[Line<'t>]) -> Result<Self, Unreadable> {
+        const END: &str = "***End_of_Header***";
+        let ends = |line: &Line<'_>| line.text.starts_with(END);
+        let value = |key: &str| {
+            let rest = first.iter().find_map(|line| line.text.strip_prefix(key));
+            rest.map(|rest| rest.trim_matches([',', '\t', ';']).to_owned())
+        };
+        let separator = match value("Separator").as_deref() {
+            Some("Comma") => ',',
+            _ => '\t',
+        };
+        let notation = match value("Decimal_Separator").as_deref() {
+            // A comma that ends the line is the value where commas separate cells.
+            Some(",") => Notation::COMMA,
+            Some("") if separator == '\t' => Notation::COMMA,
+            _ => Notation::POINT,
+        };
+        let layout = value("X_Columns").unwrap_or_default();
+        if layout != "One" && !layout.is_empty() {
+            return Err(format!(
+                "it is a LabVIEW file with X_Columns {layout}: write it again with one column of \
+                 times"
+            ));
+        }
+        const SEGMENTS: &str = "it is a LabVIEW file of several segments: export one of them";
+        let all: Vec<usize> = (0..first.len()).filter(|k| ends(&first[*k])).collect();
+        // One of the file, one of its segment.
+        let end = match all.as_slice() {
+            [] => return Err("it is a LabVIEW file whose header has no end".to_owned()),
+            [end] | [_, end] => *end,
+            _ => return Err(SEGMENTS.to_owned()),
+        };
+        let Some(header) = first.get(end + 1).copied() else {
+            return Err("it is a LabVIEW file without signals".to_owned());
+        };
+        let rows = after(text, header);
+        if text[rows..].contains(END) {
+            return Err(SEGMENTS.to_owned());
+        }
+        let mut units = vec!["s".to_owned()];
+        let labels = first.iter().find(|line| line.text.starts_with("Y_Unit_Label"));
+        let labels = labels.into_iter().flat_map(|line| line.cells(separator).skip(1));
+        units.extend(labels.map(|(unit, _)| unit.to_owned()));
+        Ok(Self {
+            separator,
+            header,
+            units,
+            notation: Some(notation),
+            rows,
+            is_labview: true,
+            preamble: end + 1,
+        })
+    }
+}
+
+/// Returns the layout of a table whose line of names is a comment above its first row, as numpy
+/// writes it.
+fn commented_header<'t>(
+    text: &'t str,
+    row: Line<'t>,
+    separator: &dyn Fn(&Line<'_>) -> char,
+) -> Option<Layout<'t>> {
+    let above = text[..row.start].trim_end();
+    let start = above.rfind('\n').map_or(0, |end| end + 1);
+    let line = Line::at(text, start);
+    let names = line.text.trim_start().strip_prefix('#')?;
+    let offset = line.offset + line.text.len() - names.len();
+    let header = Line { start, text: names, offset };
+    let by = separator(&header);
+    let count = texts(header, by)?.len();
+    let numbers = texts(row, by)?;
+    let is_row = numbers.len() == count && numbers.into_iter().all(is_number);
+    is_row.then_some(Layout {
+        separator: by,
+        header,
+        units: Vec::new(),
+        notation: None,
+        rows: row.start,
+        is_labview: false,
+        preamble: 0,
+    })
+}
+
+/// Returns the cells of a line, unless they are more than any table has.
+fn texts(line: Line<'_>, separator: char) -> Option<Vec<&str>> {
+    let cells = line.cells(separator).take(MOST_COLUMNS + 2).map(|(cell, _)| cell);
+    let cells: Vec<&str> = cells.collect();
+    (cells.len() <= MOST_COLUMNS + 1).then_some(cells)
+}
+
+/// Returns the byte after a line.
+fn after(text: &str, line: Line<'_>) -> usize {
+    let end = text[line.start..].find('\n');
+    end.map_or(text.len(), |end| line.start + end + 1)
+}
+
+/// Returns the separator that a first line `sep=;` states, as Excel writes and reads it.
+fn stated_separator(line: &str) -> Option<char> {
+    let stated = line.trim().trim_matches('"').strip_prefix("sep=")?;
+    let mut letters = stated.chars();
+    let separator = letters.next().unwrap_or('\t');
+    letters.next().is_none().then_some(separator)
+}
+
+/// Returns what separates the cells of a line of names.
+fn separator(line: &str) -> char {
+    let is_there = |wanted: &char| {
+        let mut is_quoted = false;
+        line.chars().any(|letter| {
+            is_quoted ^= letter == '"';
+            letter == *wanted && !is_quoted
+        })
+    };
+    let found = [';', '\t', ','].into_iter().find(is_there);
+    let has_words = line.split_whitespace().nth(1).is_some() && !line.contains('"');
+    found.unwrap_or(if has_words { WHITE_SPACE } else { ',' })
+}
+
+/// Whether a cell is a number by any notation.
+fn is_number(cell: &str) -> bool {
+    cell.contains(|letter: char| letter.is_ascii_digit())
+        && [Notation::POINT, Notation::COMMA].into_iter().any(|by| by.number(cell).is_some())
+}
+
+/// Whether the first of these lines has as many names as the next row has numbers.
+fn is_above_rows(lines: &[Line<'_>], separator: char) -> bool {
+    let [header, below @ ..] = lines else { return false };
+    let Some(names) = texts(*header, separator) else { return false };
+    if names.iter().any(|name| is_number(name)) {
+        return false;
+    }
+    let has_units = |line: &&Line<'_>| units(**line, separator, names.len()).is_some();
+    let below = if below.first().as_ref().is_some_and(has_units) { &below[1..] } else { below };
+    let Some(row) = below.first() else { return false };
+    let Some(row) = texts(*row, separator) else { return false };
+    let names = names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
+    row.len() >= names
+        && row[names..].iter().all(|cell| cell.is_empty())
+        && row.iter().any(|cell| is_number(cell))
+}
+
+/// Returns the units in a row of units of so many columns, if it is one: units and empty cells, in
+/// brackets or not.
+fn units(line: Line<'_>, separator: char, columns: usize) -> Option<Vec<String>> {
+    let plain = |cell: &str| cell.trim_matches(['[', ']', '(', ')', ' ']).to_owned();
+    let cells: Vec<String> = texts(line, separator)?.into_iter().map(plain).collect();
+    let is_empty = |cell: &String| ["", "-", "1"].contains(&cell.as_str());
+    let is_row = cells.len() == columns
+        && cells.iter().all(|cell| is_empty(cell) || !is_number(cell))
+        && cells.iter().any(|cell| is_unit(cell));
+    let known = cells.iter().filter(|cell| is_empty(cell) || is_unit(cell)).count();
+    // Units of columns that nobody reads may be unknown: volts, degrees of temperature.
+    let is_row = is_row && 2 * known > cells.len();
+    is_row.then(|| {
+        cells.into_iter().map(|cell| if is_empty(&cell) { String::new() } else { cell }).collect()
+    })
+}

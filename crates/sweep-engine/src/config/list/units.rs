@@ -1,0 +1,188 @@
+//! Units as people and loggers write them, and how a number in one is a number in another.
+
+/// A factor from one unit to another, as a quotient: 300 g are exactly 0.3 kg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scale {
+    times: f64,
+    by: f64,
+}
+
+impl Scale {
+    /// The same unit.
+    pub(super) const ONE: Self = Self { times: 1.0, by: 1.0 };
+
+    /// Returns the number in the other unit.
+    pub(super) fn apply(self, value: f64) -> f64 {
+        value * self.times / self.by
+    }
+}
+
+/// A unit: its names in small letters without spaces, its base unit, and its size as a quotient.
+struct Unit {
+    names: &'static [&'static str],
+    base: &'static str,
+    size: Scale,
+}
+
+const fn unit(names: &'static [&'static str], base: &'static str, times: f64, by: f64) -> Unit {
+    Unit { names, base, size: Scale { times, by } }
+}
+
+/// Standard gravity, the unit of accelerometers (m/s^2), exact by definition.
+const G: f64 = 9.806_65;
+const PI: f64 = std::f64::consts::PI;
+
+/// The units that are read. `g` stands twice: what is measured says whether it is a mass.
+static UNITS: &[Unit] = &[
+    unit(&["s", "sec", "secs", "second", "seconds", "sek"], "s", 1.0, 1.0),
+    unit(&["ms", "msec", "millisecond", "milliseconds"], "s", 1.0, 1e3),
+    unit(&["us", "usec", "microseconds"], "s", 1.0, 1e6),
+    unit(&["min", "mins", "minute", "minutes"], "s", 60.0, 1.0),
+    unit(&["h", "hour", "hours"], "s", 3600.0, 1.0),
+    unit(&["m"], "m", 1.0, 1.0),
+    unit(&["mm"], "m", 1.0, 1e3),
+    unit(&["cm"], "m", 1.0, 1e2),
+    unit(&["um"], "m", 1.0, 1e6),
+    unit(&["in", "inch"], "m", 0.0254, 1.0),
+    unit(&["rad"], "rad", 1.0, 1.0),
+    unit(&["mrad"], "rad", 1.0, 1e3),
+    unit(&["deg", "degree", "degrees", "grad"], "rad", PI, 180.0),
+    unit(&["hz", "1/s", "rev/s", "rps"], "turn/s", 1.0, 1.0),
+    unit(&["rpm", "1/min", "min^-1", "min-1", "u/min", "r/min", "rev/min"], "turn/s", 1.0, 60.0),
+    unit(&["rad/s"], "turn/s", 1.0, 2.0 * PI),
+    unit(&["deg/s"], "turn/s", 1.0, 360.0),
+    unit(&["rad/s^2"], "rad/s^2", 1.0, 1.0),
+    unit(&["deg/s^2"], "rad/s^2", PI, 180.0),
+    unit(&["m/s"], "m/s", 1.0, 1.0),
+    unit(&["mm/s"], "m/s", 1.0, 1e3),
+    unit(&["m/s^2"], "m/s^2", 1.0, 1.0),
+    unit(&["mm/s^2"], "m/s^2", 1.0, 1e3),
+    unit(&["g", "gn", "g_n", "gee"], "m/s^2", G, 1.0),
+    unit(&["mg"], "m/s^2", G, 1e3),
+    unit(&["kg"], "kg", 1.0, 1.0),
+    unit(&["g", "gram", "grams"], "kg", 1.0, 1e3),
+    unit(&["t"], "kg", 1e3, 1.0),
+    unit(&["lb", "lbs"], "kg", 0.453_592_37, 1.0),
+    unit(&["n"], "n", 1.0, 1.0),
+    unit(&["kn"], "n", 1e3, 1.0),
+    unit(&["n/m"], "n/m", 1.0, 1.0),
+    unit(&["n/mm"], "n/m", 1e3, 1.0),
+    unit(&["kn/m"], "n/m", 1e3, 1.0),
+    unit(&["n/m^3"], "n/m^3", 1.0, 1.0),
+    unit(&["n/mm^3"], "n/m^3", 1e9, 1.0),
+    unit(&["ns/m", "kg/s"], "ns/m", 1.0, 1.0),
+    unit(&["ns/mm"], "ns/m", 1e3, 1.0),
+    unit(&["kns/m"], "ns/m", 1e3, 1.0),
+    unit(&["kgm^2"], "kgm^2", 1.0, 1.0),
+    unit(&["kgmm^2"], "kgm^2", 1.0, 1e6),
+    unit(&["gm^2"], "kgm^2", 1.0, 1e3),
+    unit(&["nm/rad"], "nm/rad", 1.0, 1.0),
+    unit(&["nm/deg"], "nm/rad", 180.0, PI),
+];
+
+/// Returns a unit's name as the table has it.
+fn plain(name: &str) -> String {
+    let letters = name.chars().flat_map(char::to_lowercase);
+    let letter = |letter: char| match letter {
+        ' ' | '\u{a0}' | '*' | '·' | '⋅' | '.' => String::new(),
+        'µ' | 'μ' => "u".to_owned(),
+        '°' => "deg".to_owned(),
+        '²' => "^2".to_owned(),
+        '³' => "^3".to_owned(),
+        other => other.to_string(),
+    };
+    let name: String = letters.map(letter).collect();
+    let name = name.replace("**", "^");
+    // m/s2 and kg m2 are written for want of exponents.
+    match name.strip_suffix(['2', '3']) {
+        Some(rest) if rest.ends_with(['s', 'm']) => format!("{rest}^{}", &name[rest.len()..]),
+        _ => name,
+    }
+}
+
+/// Returns every unit of this name.
+fn named(name: &str) -> impl Iterator<Item = &'static Unit> {
+    let name = plain(name);
+    UNITS.iter().filter(move |unit| unit.names.contains(&name.as_str()))
+}
+
+/// Whether a text is the name of a unit.
+pub(super) fn is_unit(name: &str) -> bool {
+    named(name).next().is_some()
+}
+
+/// Returns the factor from one unit to another, if both are of one kind.
+pub(super) fn scale(from: &str, to: &str) -> Option<Scale> {
+    let mut pairs = named(from).flat_map(|from| named(to).map(move |to| (from, to)));
+    let (from, to) = pairs.find(|(from, to)| from.base == to.base)?;
+    if from.size == to.size {
+        return Some(Scale::ONE);
+    }
+    Some(Scale { times: from.size.times * to.size.by, by: from.size.by * to.size.times })
+}
+
+/// The endings of names that say each base unit.
+const ENDINGS: [(&str, &[&str]); 14] = [
+    ("s", &["s"]),
+    ("m", &["m"]),
+    ("rad", &["rad"]),
+    ("turn/s", &["rpm", "rad_per_s"]),
+    ("rad/s^2", &["rad_per_s2"]),
+    ("m/s", &["m_per_s"]),
+    ("m/s^2", &["m_per_s2"]),
+    ("kg", &["kg"]),
+    ("n", &["n"]),
+    ("n/m", &["n_per_m"]),
+    ("n/m^3", &["n_per_m3"]),
+    ("ns/m", &["n_s_per_m"]),
+    ("kgm^2", &["kg_m2"]),
+    ("nm/rad", &["n_m_per_rad"]),
+];
+
+/// Returns the endings of names whose numbers a unit converts to.
+pub(super) fn endings(name: &str) -> Vec<&'static str> {
+    let bases: Vec<&str> = named(name).map(|unit| unit.base).collect();
+    let all = ENDINGS.iter().filter(|(base, _)| bases.contains(base));
+    all.flat_map(|(_, endings)| endings.iter().copied()).collect()
+}
+
+/// Returns the name of a unit that stands at the end of a name, as `m_per_s2` does.
+pub(super) fn of_suffix(suffix: &str) -> String {
+    suffix.replace("_per_", "/").replace('_', "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn converted(value: f64, from: &str, to: &str) -> f64 {
+        scale(from, to).unwrap_or_else(|| panic!("{from} to {to}")).apply(value)
+    }
+
+    #[test]
+    fn numbers_are_converted_between_units_of_one_kind() {
+        assert_eq!(converted(300.0, "g", "kg"), 0.3);
+        assert_eq!(converted(700.0, "mm", "m"), 0.7);
+        assert_eq!(converted(2.0, "g", "m/s^2"), 2.0 * 9.80665);
+        assert_eq!(converted(180.0, "°", "rad"), std::f64::consts::PI);
+        assert_eq!(converted(5.0, "Hz", "rpm"), 300.0);
+        assert!((converted(10.0, "rad/s", "rpm") - 95.492_965_855_137_2).abs() < 1e-12);
+        assert_eq!(converted(1200.0, "U/min", "rpm"), 1200.0);
+        assert_eq!(converted(1.5, "min", "s"), 90.0);
+        assert_eq!(converted(0.12, "N s/mm", "N s/m"), 120.0);
+        assert_eq!(converted(8.0, "N/mm", "N/m"), 8000.0);
+        assert_eq!(converted(3.0, "m/s²", "m/s2"), 3.0);
+        assert_eq!(converted(5.0, "kg·m²", "kg m^2"), 5.0);
+    }
+
+    #[test]
+    fn units_of_different_kinds_do_not_convert() {
+        for (from, to) in [("g", "rad"), ("mm", "s"), ("parsec", "m"), ("", "m"), ("rad", "rad/s")]
+        {
+            assert_eq!(scale(from, to), None, "{from} to {to}");
+        }
+        assert!(is_unit("[g]".trim_matches(['[', ']'])) && !is_unit("front"));
+        assert_eq!(of_suffix("m_per_s2"), "m/s2");
+        assert!(scale(&of_suffix("n_s_per_mm"), "N s/m").is_some());
+    }
+}
