@@ -46,6 +46,11 @@ pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static 
         vec![parameter.name().to_owned().into()]
     }
 
+    /// Returns the model's own value of a parameter, if it has one number for it.
+    fn value(&self, _: &Self::Parameter) -> Option<f64> {
+        None
+    }
+
     /// Writes a parameter's value, which is in its range.
     fn write(&mut self, parameter: &Self::Parameter, value: f64);
 }

@@ -60,6 +60,10 @@ impl Model for Washer {
         parameter.parts(&self.machine)
     }
 
+    fn value(&self, parameter: &Parameter) -> Option<f64> {
+        parameter.get(&self.machine, &self.spin)
+    }
+
     fn write(&mut self, parameter: &Parameter, value: f64) {
         parameter.set(&mut self.machine, &mut self.spin, value);
     }

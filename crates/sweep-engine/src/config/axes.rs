@@ -7,16 +7,19 @@ use super::draft::Claimed;
 use super::list::{self, List};
 use super::parameters::{COMPARED, find};
 use super::report::{Diagnostic, Report};
-use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number};
+use super::section::check_number;
+use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number, short};
 use crate::design::{MOST_AXES, REACH, Rule, Shape};
 use crate::plan::MAX_POINTS;
 use crate::{Axis, AxisValues, Design, Distribution};
 
-/// Takes note that an axis writes this parameter's numbers; not if another one does.
+/// Takes note that an axis writes this parameter's numbers, perhaps about the model's own; not if
+/// another axis does.
 fn claim<M: Read>(
     name: &Located<&str>,
     parameter: &M::Parameter,
     swept: &mut Claimed,
+    is_about: bool,
     draft: &Draft<'_, M>,
 ) -> bool {
     let report = draft.report;
@@ -24,7 +27,8 @@ fn claim<M: Read>(
     if !swept.claim(name, parts.clone(), report) {
         return false;
     }
-    for constant in &draft.constants {
+    // An axis about the model's own number lies about the constant.
+    for constant in draft.constants.iter().filter(|_| !is_about) {
         if constant.parts.iter().all(|part| parts.contains(part)) {
             let title = format!(
                 "`{}` is swept by an axis: this constant has no effect",
@@ -70,11 +74,14 @@ pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Dra
         let field = section.text("parameter");
         let name = section.require(field, "parameter", "the name of a parameter");
         let parameter = name.as_ref().and_then(|name| find(name, draft));
-        let range = parameter.as_ref().map_or(Range::Any, |parameter| parameter.range());
+        let own = parameter.as_ref().map(|parameter| Own::of(parameter, draft));
+        let own = own.unwrap_or(Own { name: "", range: Range::Any, value: None });
         let values = match &design {
-            Some(design) => extent(&section, range, design.points()),
-            None => values(&section, range),
+            Some(design) => extent(&section, &own, design.points()),
+            None => values(&section, &own),
         };
+        let is_about = section.key_at("tolerance").is_some()
+            || section.key_inside("distribution", "tolerance");
         section.finish();
         if parameter.as_ref().is_some_and(|parameter| is_fixed(parameter, draft)) {
             continue;
@@ -92,7 +99,7 @@ pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Dra
             points = product;
         }
         if let (Some(name), Some(parameter)) = (name, parameter)
-            && claim(&name, &parameter, &mut swept, draft)
+            && claim(&name, &parameter, &mut swept, is_about, draft)
             && let (Some(values), Some(_)) = (values, points)
         {
             add(Axis { parameter, values: values.value }, values.at, draft);
@@ -138,7 +145,7 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
                 refused_number(&what, value, &list.table.place(sources, column.place, row), range)
             });
         }
-        if claim(&name, &parameter, &mut swept, draft) && sound {
+        if claim(&name, &parameter, &mut swept, false, draft) && sound {
             let axis = Axis { parameter, values: AxisValues::List(column.values) };
             add(axis, name.at.clone(), draft);
         }
@@ -166,9 +173,101 @@ pub const DISTRIBUTIONS: [(&str, &[(&str, Range)]); 3] = [
     ("uniform", &[]),
 ];
 
+/// What the model itself has of a swept parameter.
+struct Own<'p> {
+    /// The parameter's name; empty if there is none, which has been reported.
+    name: &'p str,
+    /// The values that it may take.
+    range: Range,
+    /// Its value without the axis, if the model has one number for it.
+    value: Option<f64>,
+}
+
+impl<'p> Own<'p> {
+    fn of<M: Read>(parameter: &'p M::Parameter, draft: &Draft<'_, M>) -> Self {
+        let plan = &draft.plan;
+        let value = match parameter.window_edge() {
+            Some(edge) => Some(plan.window_s[edge]),
+            None => plan.model.value(parameter),
+        };
+        Self { name: parameter.name(), range: parameter.range(), value }
+    }
+
+    /// Reads `tolerance`: the ends of a range about the model's own number, so far from it or so
+    /// many percent of it.
+    fn tolerance(&self, section: &Section<'_>) -> Field<Tolerance> {
+        section.text_or_number("tolerance").then(|found| {
+            let report = section.report;
+            let at = found.at;
+            let text = found.value.trim();
+            let percent = text.strip_suffix('%').map(str::trim_end);
+            let number = percent.unwrap_or(text).parse().ok();
+            let Some(number) = number.filter(|number| Range::Positive.contains(*number)) else {
+                let title = format!("`tolerance` = \"{}\" is no tolerance", short(text));
+                let expected = "expected a positive number in the parameter's unit, or percent of \
+                    its value as in \"5 %\"";
+                return report.refuse(&at, title, expected);
+            };
+            if self.name.is_empty() {
+                return None;
+            }
+            let Some(middle) = self.value else {
+                let title = format!("`{}` has no single number to be about", self.name);
+                let expected = "expected a range: the numbers that it sets differ, or are none";
+                return report.refuse(&at, title, expected);
+            };
+            // 120 less 5 % is exactly 114.
+            let [from, to] = match percent {
+                Some(_) => [100.0 - number, 100.0 + number].map(|part| middle * part / 100.0),
+                None => [middle - number, middle + number],
+            };
+            let [from, to] = [from.min(to), from.max(to)];
+            for end in [from, to] {
+                check_number(&quoted(self.name), end, at.clone(), self.range, report)?;
+            }
+            if from == to {
+                let title = format!("`{}` is 0, of which percents are 0", self.name);
+                return report.refuse(&at, title, "expected a tolerance in the parameter's unit");
+            }
+            Some(Located { value: Tolerance { from, middle, to }, at })
+        })
+    }
+}
+
+/// A range about the model's own number.
+#[derive(Clone, Copy)]
+struct Tolerance {
+    from: f64,
+    middle: f64,
+    to: f64,
+}
+
+/// Standard deviations from the middle of a tolerance to its ends: of a process that just keeps it
+/// (capability 1), 99.7 % lies within. Twice as many make parts that are twice as near the middle.
+const DEVIATIONS: f64 = 3.0;
+
+impl Tolerance {
+    /// Returns the shape of a distribution within the tolerance, by its place among
+    /// [`DISTRIBUTIONS`]; none for one without a middle.
+    fn shape(self, kind: usize) -> Option<Shape> {
+        match kind {
+            0 => Some(Shape::Normal {
+                mean: self.middle,
+                sd: (self.to - self.from) / 2.0 / DEVIATIONS,
+            }),
+            1 => Some(Shape::Lognormal {
+                median: self.middle,
+                sigma: libm::log(self.to / self.middle) / DEVIATIONS,
+            }),
+            _ => None,
+        }
+    }
+}
+
 /// A distribution, cut at `from` and `to`.
-fn distribution(section: Section<'_>, range: Range, points: u64) -> Option<Located<AxisValues>> {
+fn distribution(section: Section<'_>, own: &Own<'_>, points: u64) -> Option<Located<AxisValues>> {
     let (at, report) = (section.at().clone(), section.report);
+    let range = own.range;
     let field = section.choice("kind", &DISTRIBUTIONS.map(|(kind, _)| kind));
     let kind = section.require(field, "kind", "`normal`, `lognormal` or `uniform`");
     let kind = kind.map(|kind| kind.value);
@@ -177,20 +276,35 @@ fn distribution(section: Section<'_>, range: Range, points: u64) -> Option<Locat
         let field = section.expect(field, key, needed.then_some("a number"));
         field.given().map(|number| number.value)
     };
-    // An unknown kind has no list of keys, but each key has its range.
-    let own = kind.map_or(&DISTRIBUTIONS[..], |kind| &DISTRIBUTIONS[kind..=kind]);
-    let own = own.iter().flat_map(|(_, numbers)| *numbers);
-    let numbers: Vec<_> = own.map(|&(key, range)| number(key, range, kind.is_some())).collect();
-    let shape = match (kind, numbers.as_slice()) {
-        (Some(0), &[Some(mean), Some(sd)]) => Some(Shape::Normal { mean, sd }),
-        (Some(1), &[Some(median), Some(sigma)]) => Some(Shape::Lognormal { median, sigma }),
-        _ => None,
-    };
-    let [from, to] = ["from", "to"].map(|key| number(key, range, kind == Some(2)));
-    section.finish();
-    let bounds = match shape {
-        Some(shape) => [from.unwrap_or(shape.at(-REACH)), to.unwrap_or(shape.at(REACH))],
-        None => [from?, to?],
+    let tolerance = own.tolerance(&section);
+    let (shape, bounds) = if let Field::Absent = tolerance {
+        // An unknown kind has no list of keys, but each key has its range.
+        let keys = kind.map_or(&DISTRIBUTIONS[..], |kind| &DISTRIBUTIONS[kind..=kind]);
+        let keys = keys.iter().flat_map(|(_, numbers)| *numbers);
+        let numbers: Vec<_> =
+            keys.map(|&(key, range)| number(key, range, kind.is_some())).collect();
+        let shape = match (kind, numbers.as_slice()) {
+            (Some(0), &[Some(mean), Some(sd)]) => Some(Shape::Normal { mean, sd }),
+            (Some(1), &[Some(median), Some(sigma)]) => Some(Shape::Lognormal { median, sigma }),
+            _ => None,
+        };
+        let [from, to] = ["from", "to"].map(|key| number(key, range, kind == Some(2)));
+        section.finish();
+        let bounds = match shape {
+            Some(shape) => [from.unwrap_or(shape.at(-REACH)), to.unwrap_or(shape.at(REACH))],
+            None => [from?, to?],
+        };
+        (shape, bounds)
+    } else {
+        let reason = "`tolerance` gives it, about the machine's own number";
+        section.misplace(&["mean", "sd", "median", "sigma", "from", "to"], reason);
+        section.finish();
+        let tolerance = tolerance.given()?.value;
+        if kind? == 1 && tolerance.from <= 0.0 {
+            let title = format!("a tolerance down to {} has no logarithm", decimal(tolerance.from));
+            return report.refuse(&at, title, "expected a positive range, or kind = \"normal\"");
+        }
+        (tolerance.shape(kind?), [tolerance.from, tolerance.to])
     };
     let [from, to] = bounds;
     let [from_said, to_said] = bounds.map(decimal);
@@ -230,21 +344,31 @@ fn distribution(section: Section<'_>, range: Range, points: u64) -> Option<Locat
 }
 
 /// What a design spreads so many points over: a distribution, or a range without a count.
-fn extent(section: &Section<'_>, range: Range, points: u64) -> Option<Located<AxisValues>> {
+fn extent(section: &Section<'_>, own: &Own<'_>, points: u64) -> Option<Located<AxisValues>> {
     let reason = "a design spreads its points over `range = { from = ..., to = ... }`";
     section.misplace(&["values"], reason);
+    let tolerance = own.tolerance(section);
+    if !matches!(tolerance, Field::Absent) {
+        section.misplace(&["range", "distribution"], BESIDE_TOLERANCE);
+        section.misplace(&["count"], "the number of points belongs in [design], as `points`");
+        let Located { value: Tolerance { from, to, .. }, at } = tolerance.given()?;
+        return Some(Located { value: AxisValues::Linear { from, to, count: 2 }, at });
+    }
     match section.table("distribution", "distribution = { kind, ... }").given() {
         Some(distributed) => {
             section.misplace(&["range"], "the distribution has its own `from` and `to`");
-            distribution(distributed.value, range, points)
+            distribution(distributed.value, own, points)
         }
         None => {
             let field = section.table("range", "range = { from, to }");
             let spaced = section.require(field, "range", "`range = { from = ..., to = ... }`")?;
-            spacing(spaced.value, range, Some(points))
+            spacing(spaced.value, own.range, Some(points))
         }
     }
 }
+
+/// Why other keys are refused beside a tolerance.
+const BESIDE_TOLERANCE: &str = "`tolerance` gives the ends, about the machine's own number";
 
 /// Neighbours on a range are apart by at least this share of the greater end, or else rounding
 /// would put some on one number.
@@ -258,7 +382,22 @@ fn most_distinct(from: f64, to: f64) -> Option<u64> {
 }
 
 /// The values of an axis: listed, or a range.
-fn values(section: &Section<'_>, range: Range) -> Option<Located<AxisValues>> {
+fn values(section: &Section<'_>, own: &Own<'_>) -> Option<Located<AxisValues>> {
+    let range = own.range;
+    let tolerance = own.tolerance(section);
+    if !matches!(tolerance, Field::Absent) {
+        section.misplace(&["values", "range"], BESIDE_TOLERANCE);
+        let expected = "the number of values, both ends included";
+        let count = section.whole("count", &(2..=MAX_POINTS));
+        let count = section.require(count, "count", expected);
+        let Located { value: Tolerance { from, to, .. }, at } = tolerance.given()?;
+        let count = count?.value;
+        if let Some(most) = most_distinct(from, to).filter(|&most| most < count) {
+            let title = format!("a tolerance has no {count} different values");
+            return section.report.refuse(&at, title, format!("expected at most {most}"));
+        }
+        return Some(Located { value: AxisValues::Linear { from, to, count }, at });
+    }
     let listed = section.right_numbers("values", range);
     let spaced = section.table("range", "range = { from, to, count }");
     match (listed, spaced) {

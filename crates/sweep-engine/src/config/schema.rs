@@ -74,12 +74,25 @@ fn distribution() -> Value {
             [] => required.extend(["from", "to"]),
             numbers => required.extend(numbers.iter().map(|(key, _)| *key)),
         }
-        table([("kind", json!({ "const": kind }))].into_iter().chain(own).chain(ends), &required)
+        let kind = || ("kind", json!({ "const": kind }));
+        let given = table([kind()].into_iter().chain(own).chain(ends), &required);
+        let about = table([kind(), ("tolerance", tolerance())], &["kind", "tolerance"]);
+        [given, about]
     };
     json!({
         "description": "of a design, cut at `from` and `to`; left out, they lie six standard \
-                        deviations from the middle",
-        "oneOf": DISTRIBUTIONS.iter().map(one).collect::<Value>(),
+                        deviations from the middle. A tolerance is three",
+        "oneOf": DISTRIBUTIONS.iter().flat_map(one).collect::<Value>(),
+    })
+}
+
+fn tolerance() -> Value {
+    json!({
+        "description": "about the machine's own number: a number in its unit, or as \"5 %\"",
+        "anyOf": [
+            { "type": "number", "exclusiveMinimum": 0 },
+            { "type": "string", "pattern": "^[0-9.eE+-]+ *%?$" },
+        ],
     })
 }
 
@@ -89,12 +102,19 @@ fn axis() -> Value {
     count["description"] = "how many, both ends included".into();
     let spacing = json!({ "enum": ["linear", "log"], "default": "linear" });
     let ends = ["from", "to"].map(|key| (key, number(Range::Any)));
-    let further = [("count", count), ("spacing", spacing)];
+    let further = [("count", count.clone()), ("spacing", spacing)];
     let range = table(ends.into_iter().chain(further), &["from", "to"]);
+    let about = json!({
+        "type": "object",
+        "properties": { "parameter": parameter, "tolerance": tolerance(), "count": count },
+        "required": ["parameter", "tolerance"],
+        "additionalProperties": false,
+    });
     let values =
         json!({ "type": "array", "items": number(Range::Any), "minItems": 1, "uniqueItems": true });
     let given =
         |(key, value)| table([("parameter", parameter.clone()), (key, value)], &["parameter", key]);
     let ways = [("values", values), ("range", range), ("distribution", distribution())];
-    json!({ "oneOf": ways.map(given) })
+    let ways: Vec<Value> = ways.map(given).into_iter().chain([about]).collect();
+    json!({ "oneOf": ways })
 }

@@ -11,6 +11,7 @@ mod points;
 mod sheet;
 
 use std::path::{Path, PathBuf};
+mod tolerance;
 
 use proptest::prelude::*;
 use washer_model::{Machine, Profile, Spin};
