@@ -1,5 +1,7 @@
 //! The washing machine in grid files.
 
+use std::path::Path;
+
 use serde_json::Value;
 use sweep_engine::config::{Draft, Form, Key, Keys, Read, Walk};
 use washer_model::Machine;
@@ -26,7 +28,8 @@ impl Read for Washer {
     fn walk(&mut self, keys: &mut Keys<'_>, input: Option<&GridInput>) {
         let Self { machine, spin, measures, held_speeds } = self;
         grid::machine(machine, keys, input);
-        spin::walk(spin, keys);
+        let path = input.map_or(Path::new(""), |input| &input.path);
+        spin::walk(spin, path, keys);
         let key = Key::new("metrics", "further columns of the result").set();
         let found = keys.words(key, "metric", &Metric::ALL, Metric::name, &mut measures.metrics);
         measures.stops = machine.stops.len();

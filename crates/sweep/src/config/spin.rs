@@ -1,9 +1,16 @@
 //! `[spin]`: the profiles by name, and what each is given by.
 
+mod cycle;
+
+use std::path::Path;
+
 use sweep_engine::config::form::{Numbers, about};
 use sweep_engine::config::keys::Variants;
+use sweep_engine::config::source::beside;
 use sweep_engine::config::{Field, Form, Key, Keys};
 use washer_model::{Machine, Parameter, Profile, Range, Spin};
+
+use cycle::Joints;
 
 /// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are
 /// made ready together.
@@ -25,8 +32,14 @@ const fn about_profile(profile: Profile) -> &'static str {
 /// The profile that is given as a table.
 const TABLE: &str = "table";
 
-/// Walks over the section.
-pub(super) fn walk(spin: &mut Spin, keys: &mut Keys<'_>) {
+/// The profile that is read from a file.
+const FILE: &str = "file";
+
+/// Why keys of a file are refused beside another profile.
+const ONLY_FILE: &str = "only the profile \"file\" has it, which needs no `profile`";
+
+/// Walks over the section of the grid file at `path`.
+pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     keys.table(Key::new("spin", "").needed("a section [spin]"), |keys| {
         keys.places = "spin_".to_owned();
         let said = (
@@ -34,10 +47,20 @@ pub(super) fn walk(spin: &mut Spin, keys: &mut Keys<'_>) {
             "linear between given points, constant after the last; a first speed other than 0 is \
              there at once",
         );
+        let from_file = (
+            FILE,
+            "a cycle from a file with columns of time and speed; constant after its last row",
+        );
         let all = Profile::ALL.map(|profile| (profile.name(), about_profile(profile)));
         let set = all.len();
-        let variants =
-            Variants { all: all.into_iter().chain([said]).collect(), default: None, set };
+        // A file says by itself that it is meant.
+        let has_file = keys.section().is_some_and(|section| section.key_at(FILE).is_some());
+        let is_default = has_file || keys.is_schema();
+        let variants = Variants {
+            all: all.into_iter().chain([said, from_file]).collect(),
+            default: is_default.then_some(set + 1),
+            set,
+        };
         let now = match spin {
             Spin::Ramped { profile, .. } => *profile as usize,
             Spin::Table { .. } => set,
@@ -46,7 +69,8 @@ pub(super) fn walk(spin: &mut Spin, keys: &mut Keys<'_>) {
         let chosen =
             keys.variants(key, &variants, Some(now), |keys, k| match Profile::ALL.get(k) {
                 Some(&profile) => ramped(profile, spin, keys),
-                None => table(spin, keys),
+                None if k == set => table(spin, keys),
+                None => file(spin, path, keys),
             });
         if chosen.is_none() && keys.section().is_some() {
             *spin = BLANK;
@@ -54,10 +78,45 @@ pub(super) fn walk(spin: &mut Spin, keys: &mut Keys<'_>) {
     });
 }
 
+/// A cycle in a file of its own: the plan has its rows, as of a table.
+fn file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
+    let reason = "the file gives times and speeds";
+    keys.misplace(&["time_s", "speed_rpm", "peak_rpm", "ramp_s"], reason);
+    let about = "CSV or Parquet file with columns of time and speed and their units, relative to \
+                 this file";
+    let mut named = String::new();
+    let key = Key::new(FILE, about).needed("a CSV or Parquet file of times and speeds");
+    let found = keys.key(key, &Form::Text, &mut named);
+    let about = "straight lines between the rows, or monotone cubics";
+    let names = Joints::ALL.map(|(_, name)| name);
+    let mut word = names[0].to_owned();
+    keys.key(Key::new("joints", about), &Form::Word(&names), &mut word);
+    let (Field::Given(found), Some(report)) = (found, keys.report()) else {
+        if keys.section().is_some() {
+            *spin = BLANK;
+        }
+        return;
+    };
+    let joints = Joints::ALL.into_iter().find(|(_, name)| *name == word);
+    let joints = joints.map_or(Joints::Straight, |(joints, _)| joints);
+    *spin = match cycle::read(&beside(path, &named), joints, &found.at, report) {
+        Some((time_s, speed_rpm)) => {
+            for (column, values) in [("time_s", &time_s), ("speed_rpm", &speed_rpm)] {
+                for k in 0..values.len() {
+                    report.put(format!("spin_{column}[{k}]"), found.at.clone());
+                }
+            }
+            Spin::Table { time_s, speed_rpm }
+        }
+        None => BLANK,
+    };
+}
+
 /// Peak and ramp.
 fn ramped(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
     let reason = format!("only the profile \"{TABLE}\" has it, not \"{}\"", profile.name());
     keys.misplace(&["time_s", "speed_rpm"], &reason);
+    keys.misplace(&["file", "joints"], ONLY_FILE);
     let Spin::Ramped { profile: now, peak_rpm, ramp_s } = spin else {
         let title = "the grid's spin is a table, which has no peak and no ramp";
         keys.refuse("profile", title, "expected a grid file with `peak_rpm` and `ramp_s`");
@@ -84,6 +143,7 @@ fn ramped(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
 /// Speeds at times.
 fn table(spin: &mut Spin, keys: &mut Keys<'_>) {
     keys.misplace(&["peak_rpm", "ramp_s"], "a table gives `time_s` and `speed_rpm` instead");
+    keys.misplace(&["file", "joints"], ONLY_FILE);
     let (mut time_s, mut speed_rpm) = match std::mem::replace(spin, BLANK) {
         Spin::Table { time_s, speed_rpm } => (time_s, speed_rpm),
         _ => Default::default(),

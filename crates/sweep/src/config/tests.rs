@@ -7,6 +7,8 @@
 
 mod again;
 mod bounds;
+mod cycle;
+mod plausible;
 mod points;
 mod sheet;
 

@@ -1,0 +1,241 @@
+//! A cycle from a file: the drum's speed over time, with straight or smooth joints.
+
+use std::path::Path;
+
+use sweep_engine::config::list::{ListColumn, Names, NumberTable};
+use sweep_engine::config::section::counted;
+use sweep_engine::config::{Diagnostic, Location, Report};
+use washer_model::{Range, decimal};
+
+use super::MOST_ROWS;
+
+/// Speeds that a cycle may have (rpm), as those of a table in the grid file.
+const SPEEDS_RPM: Range = Range::Within(-1e5, 1e5);
+
+/// The greatest distance of the straight pieces from a smooth joint, as a part of the greatest
+/// speed. At 1e-4 a joint from rest to full speed has some 60 pieces and the speed is off by less
+/// than a tachometer's digit; half of it takes 1.4 times as many pieces, each a leg of every run.
+const OFF_CURVE: f64 = 1e-4;
+
+/// The joints between a cycle's points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Joints {
+    /// Straight lines.
+    Straight,
+    /// Monotone cubics, cut into straight pieces.
+    Smooth,
+}
+
+impl Joints {
+    /// All of them, with their names in grid files.
+    pub(super) const ALL: [(Self, &'static str); 2] =
+        [(Self::Straight, "straight"), (Self::Smooth, "smooth")];
+}
+
+/// Times (s) and speeds (rpm).
+pub(super) type Points = (Vec<f64>, Vec<f64>);
+
+/// Reads a cycle's points and joins them; mistakes are reported. The file is named at `at`.
+pub(super) fn read(path: &Path, joints: Joints, at: &Location, report: &Report) -> Option<Points> {
+    let table = NumberTable::read(path, &Names { known: &known, renamed: &[] }, report)?;
+    table.notes().into_iter().for_each(|note| report.note(format!("the cycle: {note}")));
+    let times = column(&table, "time_s", "time", at, report);
+    let speeds = column(&table, "speed_rpm", "speed", at, report);
+    let (times, speeds) = (times?, speeds?);
+    if !judge(&table, times, speeds, report) {
+        return None;
+    }
+    let points = match joints {
+        Joints::Straight => (times.values.clone(), speeds.values.clone()),
+        Joints::Smooth => smooth(&times.values, &speeds.values),
+    };
+    if points.0.len() > MOST_ROWS {
+        let rows = counted(points.0.len(), "row");
+        let title = format!("the cycle has {rows} with its joints");
+        let expected = format!(
+            "expected at most {MOST_ROWS}: leave out rows between which the \
+            speed is straight"
+        );
+        return report.refuse(at, title, expected);
+    }
+    Some(points)
+}
+
+/// Returns the name of a quantity that a header names, and its unit.
+fn known(header: &str) -> Option<(String, String)> {
+    let [name, unit] = match header {
+        "time_s" | "t_s" | "zeit_s" => ["time_s", "s"],
+        "speed_rpm" | "spin_speed_rpm" | "drum_speed_rpm" | "drehzahl_rpm" | "n_rpm" | "rpm" => {
+            ["speed_rpm", "rpm"]
+        }
+        _ => return None,
+    };
+    Some((name.to_owned(), unit.to_owned()))
+}
+
+/// Returns the column of a name, if the table has it once.
+fn column<'t>(
+    table: &'t NumberTable,
+    name: &str,
+    what: &str,
+    at: &Location,
+    report: &Report,
+) -> Option<&'t ListColumn> {
+    let mut found = table.columns.iter().filter(|column| column.name.value == name);
+    let first = found.next();
+    if let Some(second) = found.next() {
+        let title = format!("the cycle's file has two columns of {what}");
+        return report.refuse(&second.name.at, title, "expected one");
+    }
+    if first.is_none() {
+        let headers: Vec<&str> = table.columns.iter().map(|it| it.header.as_str()).collect();
+        let title = format!("the cycle's file has no column of {what} with its unit");
+        let expected = "expected a header such as `time_s` or `Time [min]`, and one such as \
+            `speed_rpm`, `Speed [Hz]` or `n (rad/s)`";
+        let refusal = Diagnostic::new(title).at(at, expected);
+        report.push(refusal.help(format!("its columns are {headers:?}")));
+    }
+    first
+}
+
+/// Whether times rise from 0 and every speed is there and in its range; what is not is reported, of
+/// each mistake the first row.
+fn judge(table: &NumberTable, times: &ListColumn, speeds: &ListColumn, report: &Report) -> bool {
+    let refuse = |column: &ListColumn, row: usize, title: String, expected: &str| {
+        report.push_with(|sources| {
+            let at = table.place(sources, column.place, row);
+            Diagnostic::new(title).at(&at, expected)
+        });
+    };
+    let values = &times.values;
+    let expected = "expected times that rise from row to row, from 0 on";
+    let first_s = values.first().copied().unwrap_or(f64::NAN);
+    if values.is_empty() {
+        refuse(times, 0, "the cycle's file has no rows".to_owned(), expected);
+    } else if first_s != 0.0 {
+        let title = format!("the cycle begins at {} s", decimal(first_s));
+        refuse(times, 0, title, "expected 0 in the first row");
+    }
+    if let Some(row) = values
+        .windows(2)
+        .position(|pair| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater))
+    {
+        let [before_s, after_s] = [values[row], values[row + 1]].map(decimal);
+        let title = format!("the cycle's time goes from {before_s} s to {after_s} s");
+        refuse(times, row + 1, title, expected);
+    }
+    if let Some(row) = speeds.values.iter().position(|speed| !SPEEDS_RPM.contains(*speed)) {
+        let title = match speeds.values[row] {
+            missing if missing.is_nan() => "the cycle has a row without its speed".to_owned(),
+            speed_rpm => format!("the cycle's speed {} rpm is out of range", decimal(speed_rpm)),
+        };
+        refuse(speeds, row, title, &format!("expected {SPEEDS_RPM}"));
+    }
+    report.is_clean()
+}
+
+/// Returns monotone cubics through points as straight pieces: between two speeds there is none
+/// beyond them. The drum is at rest before, and keeps its speed behind.
+///
+/// F. N. Fritsch, R. E. Carlson, Monotone piecewise cubic interpolation, SIAM Journal on Numerical
+/// Analysis 17 (1980), 238-246.
+fn smooth(time_s: &[f64], speed_rpm: &[f64]) -> Points {
+    let slopes = slopes(time_s, speed_rpm);
+    let greatest = speed_rpm.iter().fold(0.0, |most: f64, speed| most.max(speed.abs()));
+    let off = OFF_CURVE * greatest;
+    let mut points = (vec![time_s[0]], vec![speed_rpm[0]]);
+    for k in 1..time_s.len() {
+        let length_s = time_s[k] - time_s[k - 1];
+        let change = speed_rpm[k] - speed_rpm[k - 1];
+        let [begin, end] = [slopes[k - 1] * length_s, slopes[k] * length_s];
+        // The second derivative is straight between its ends, by which a chord is off.
+        let bends =
+            [6.0 * change - 4.0 * begin - 2.0 * end, 2.0 * begin + 4.0 * end - 6.0 * change];
+        let bend = bends[0].abs().max(bends[1].abs());
+        let pieces = if off > 0.0 { (bend / (8.0 * off)).sqrt().ceil().max(1.0) } else { 1.0 };
+        // More than any cycle may have are counted and refused.
+        let pieces = (pieces as usize).min(MOST_ROWS + 1);
+        for piece in 1..pieces {
+            let part = piece as f64 / pieces as f64;
+            let rest = 1.0 - part;
+            let risen = part * part * (3.0 - 2.0 * part);
+            let bent = part * rest * (rest * begin - part * end);
+            points.0.push(time_s[k - 1] + part * length_s);
+            points.1.push(speed_rpm[k - 1] + risen * change + bent);
+        }
+        points.0.push(time_s[k]);
+        points.1.push(speed_rpm[k]);
+    }
+    points
+}
+
+/// Returns the slopes of monotone cubics at points (rpm/s).
+fn slopes(time_s: &[f64], speed_rpm: &[f64]) -> Vec<f64> {
+    let chords: Vec<f64> = (1..time_s.len())
+        .map(|k| (speed_rpm[k] - speed_rpm[k - 1]) / (time_s[k] - time_s[k - 1]))
+        .collect();
+    let mut slopes = vec![0.0; time_s.len()];
+    for k in 1..chords.len() {
+        let is_turn = chords[k - 1] * chords[k] <= 0.0;
+        slopes[k] = if is_turn { 0.0 } else { 0.5 * (chords[k - 1] + chords[k]) };
+    }
+    for (k, chord) in chords.iter().copied().enumerate() {
+        if chord == 0.0 {
+            continue;
+        }
+        let [begin, end] = [slopes[k] / chord, slopes[k + 1] / chord];
+        let size = (begin * begin + end * end).sqrt();
+        // Within this circle the cubic does not turn.
+        if size > 3.0 {
+            slopes[k] = 3.0 / size * begin * chord;
+            slopes[k + 1] = 3.0 / size * end * chord;
+        }
+    }
+    slopes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Speeds of a spin cycle with steep and flat parts, a wait and a reversal.
+    const TIMES_S: [f64; 8] = [0.0, 5.0, 20.0, 22.0, 40.0, 60.0, 61.0, 80.0];
+    const SPEEDS: [f64; 8] = [0.0, 50.0, 50.0, 90.0, 800.0, 1200.0, 0.0, -45.0];
+
+    #[test]
+    fn smooth_joints_stay_between_their_ends_and_pass_through_the_points() {
+        let (times, speeds) = smooth(&TIMES_S, &SPEEDS);
+        assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
+        for (time_s, speed) in TIMES_S.iter().zip(SPEEDS) {
+            let place = times.iter().position(|time| time == time_s).expect("it is kept");
+            assert_eq!(speeds[place], speed);
+        }
+        for k in 1..TIMES_S.len() {
+            let inside = |time: &f64| (TIMES_S[k - 1]..=TIMES_S[k]).contains(time);
+            let own: Vec<f64> =
+                times.iter().zip(&speeds).filter(|(t, _)| inside(t)).map(|(_, s)| *s).collect();
+            let [least, most] = [SPEEDS[k - 1].min(SPEEDS[k]), SPEEDS[k - 1].max(SPEEDS[k])];
+            assert!(own.iter().all(|speed| (least..=most).contains(speed)), "{k}: {own:?}");
+            let rises = own.windows(2).all(|pair| pair[0] <= pair[1]);
+            let falls = own.windows(2).all(|pair| pair[0] >= pair[1]);
+            assert!(rises || falls, "{k}: {own:?}");
+        }
+        assert!(times.len() < 60 * TIMES_S.len(), "{}", times.len());
+    }
+
+    #[test]
+    fn pieces_are_as_near_to_the_cubic_as_promised() {
+        // From rest to rest the cubic is 3 x^2 - 2 x^3.
+        let (times, speeds) = smooth(&[0.0, 10.0], &[0.0, 1000.0]);
+        let mut off: f64 = 0.0;
+        for k in 1..times.len() {
+            for step in 0..=20 {
+                let share = f64::from(step) / 20.0;
+                let part = (times[k - 1] + share * (times[k] - times[k - 1])) / 10.0;
+                let cubic = 1000.0 * part * part * (3.0 - 2.0 * part);
+                off = off.max((speeds[k - 1] + share * (speeds[k] - speeds[k - 1]) - cubic).abs());
+            }
+        }
+        assert!((0.5e-4 * 1000.0..1e-4 * 1000.0 + 1e-9).contains(&off), "{off}");
+    }
+}
