@@ -9,6 +9,7 @@
 
 pub(crate) mod grid;
 pub(crate) mod machine;
+mod plausible;
 mod read;
 mod schema;
 mod spin;

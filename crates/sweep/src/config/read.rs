@@ -7,7 +7,7 @@ use sweep_engine::config::{Draft, Form, Key, Keys, Read, Walk};
 use washer_model::Machine;
 use washer_row::{Criterion, Measures, Metric};
 
-use super::{GridInput, grid, machine, schema, spin, validate};
+use super::{GridInput, grid, machine, plausible, schema, spin, validate};
 use crate::model::Washer;
 
 impl Read for Washer {
@@ -62,6 +62,7 @@ impl Read for Washer {
     fn judge(draft: &Draft<'_, Self>) {
         validate::scenarios(draft);
         validate::stability(draft);
+        plausible::note(draft);
     }
 
     fn schema_of_set() -> Value {

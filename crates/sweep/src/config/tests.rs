@@ -11,9 +11,9 @@ mod cycle;
 mod plausible;
 mod points;
 mod sheet;
+mod tolerance;
 
 use std::path::{Path, PathBuf};
-mod tolerance;
 
 use proptest::prelude::*;
 use washer_model::{Machine, Profile, Spin};

@@ -1,0 +1,40 @@
+//! Numbers that no machine has.
+
+use super::super::GridInput;
+
+fn notes(more: &str, sets: &[&str]) -> Vec<String> {
+    let grid =
+        "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[time]\nend_s = 2\n".to_owned();
+    let sets = sets.iter().map(|set| (*set).to_owned()).collect();
+    let input = GridInput::text("plan", format!("{grid}{more}"), sets);
+    input.load().unwrap_or_else(|mistakes| panic!("{mistakes}")).aside.notes
+}
+
+#[test]
+fn what_is_in_another_unit_is_told_with_the_number_that_it_would_be() {
+    for (set, said) in [
+        ("tub_mass_kg=23870", "23870 g would be 23.87 kg"),
+        ("radial_clearance_m=10", "10 mm would be 0.01 m"),
+        ("unbalance_mass_kg=400", "400 g would be 0.4 kg"),
+        ("spring_stiffness_n_per_m=8.35", "8.35 N/mm would be 8350 N/m"),
+        ("damping_n_s_per_m=0.12", "0.12 N s/mm would be 120 N s/m"),
+        ("spin_peak_rpm=30000", "machines have 0 to 5000"),
+    ] {
+        let found = notes("", &[set]);
+        assert!(!found.is_empty() && found[0].contains(said), "{set}: {found:?}");
+    }
+    let axis = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [100, 400, 800]\n";
+    assert!(notes(axis, &[])[0].contains("800 g would be 0.8 kg"));
+    assert!(notes("", &["unbalance_mass_kg=60"])[0].contains("more than tub, shaft and drum"));
+}
+
+#[test]
+fn usual_numbers_are_not_told() {
+    assert_eq!(notes("", &[]), [""; 0]);
+    assert_eq!(notes("", &["damping_n_s_per_m=0", "unbalance_mass_kg=1.5"]), [""; 0]);
+    let [compact, industrial] = ["compact_grid", "industrial_grid"].map(|name| {
+        let path = format!("{}/../../docs/examples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        GridInput::file(path.into(), Vec::new()).load().expect("it is right").aside.notes
+    });
+    assert_eq!((compact, industrial), (Vec::new(), Vec::new()));
+}
