@@ -1,5 +1,6 @@
 //! The command line: one module a subcommand, each with its arguments and `run`.
 
+mod check;
 mod completions;
 mod explain;
 mod fit;
@@ -22,7 +23,7 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use crate::dwell::Search;
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::{
-    boundary, check, compare, examples, export, merge, optimise, parameters, report, require,
+    boundary, compare, examples, export, merge, optimise, parameters, report, require,
     show as show_engine, status,
 };
 use sweep_engine::{Error, Exit, nearest};
@@ -207,7 +208,7 @@ impl Command {
     pub fn run(&self) -> Result<Exit, Error> {
         match self {
             Self::Run(args) => run::run(args),
-            Self::Check(args) => check::run::<crate::Washer>(args),
+            Self::Check(args) => check::run(args),
             Self::Merge(args) => args.merge(),
             Self::Status(args) => args.status(),
             Self::Slurm(args) => slurm::run(args),

@@ -15,8 +15,9 @@ use sweep_parameter::{Channel as _, Parameter as _, RatioLimits};
 /// Arguments of `sweep check`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// The grid.
     #[command(flatten)]
-    grid: GridArgs,
+    pub grid: GridArgs,
     /// Print the plan as JSON, with every default and constant in place
     #[arg(long)]
     json: bool,

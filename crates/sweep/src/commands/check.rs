@@ -1,0 +1,321 @@
+//! `sweep check GRID.toml`: what a run would do; and which assumed numbers of its machine matter.
+
+use arrow_array::Array;
+use sweep_engine::commands::check as engine_check;
+use sweep_engine::{AxisValues, Design, Effort, Error, Exit, Interrupt, ProgressMode, show, tell};
+use sweep_files::cells;
+use washer_model::{Parameter, Range, decimal};
+use washer_row::Metric;
+
+use crate::library::Evaluator;
+use crate::model::Washer;
+use crate::plan::Plan;
+
+/// Arguments of `sweep check`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    check: engine_check::Args,
+    /// Vary each number that the machine file leaves out within its expected range, and list them
+    /// by what they move, first those that turn the verdict
+    #[arg(long, conflicts_with = "json")]
+    assumed: bool,
+}
+
+/// Points of a grid at which assumed numbers are varied. Twice as many take twice the time.
+const POINTS: u64 = 9;
+
+/// Checks a grid and shows its plan, or ranks its assumed numbers.
+///
+/// # Errors
+/// Mistakes in the grid file, no engine for it, or standard output that cannot be written.
+pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
+    if !args.assumed {
+        return engine_check::run::<Washer>(&args.check);
+    }
+    let plan: Plan = args.check.grid.load()?;
+    let assumed = Assumed::all(&plan);
+    if assumed.is_empty() {
+        return show("the machine file leaves out no number: nothing is assumed\n");
+    }
+    let trial = Trial::new(&plan, assumed);
+    tell(&format!("{} rows are computed", trial.rows()));
+    let interrupt = Interrupt::install().map_err(Error::signals)?;
+    let effort = Effort { threads: None, progress: ProgressMode::default(), interrupt: &interrupt };
+    let Some(outcomes) = trial.outcomes(effort)? else {
+        return Ok(Exit::interrupted(interrupt.signal()));
+    };
+    show(&trial.table(&outcomes))
+}
+
+/// A number that the machine file leaves out.
+struct Assumed {
+    parameter: Parameter,
+    value: f64,
+    /// The ends of its expected range at which there is such a machine.
+    ends: Vec<f64>,
+}
+
+impl Assumed {
+    /// Returns every assumed number of a plan's machine that no axis sweeps.
+    fn all(plan: &Plan) -> Vec<Self> {
+        let Washer { machine, spin, .. } = &plan.model;
+        let mut all = Vec::new();
+        for parameter in Parameter::all(machine, spin) {
+            let is_swept = plan.axes.iter().any(|axis| {
+                axis.parameter.parts(machine).iter().any(|part| part == parameter.name())
+            });
+            let Some(assumption) = parameter.assumption() else { continue };
+            if is_swept || !plan.written.is_assumed(parameter.name()) {
+                continue;
+            }
+            let Some(value) = parameter.get(machine, spin) else { continue };
+            let can_be = |end: &f64| {
+                let mut other = machine.clone();
+                parameter.set(&mut other, &mut spin.clone(), *end);
+                parameter.range().contains(*end) && other.violations().is_empty()
+            };
+            let ends = assumption.ends(value, machine).into_iter().filter(can_be).collect();
+            all.push(Self { parameter, value, ends });
+        }
+        all
+    }
+}
+
+/// Points of a plan, with assumed numbers as they are and at the ends of their ranges.
+struct Trial {
+    /// The plan as a list: for each point the machine as it is, then each number at its ends.
+    plan: Plan,
+    assumed: Vec<Assumed>,
+    /// Rows of a point.
+    stride: usize,
+    /// The speed at which growth is looked at (rpm).
+    plateau_rpm: f64,
+}
+
+/// What a row says.
+#[derive(Clone, Copy, Debug, Default)]
+struct Outcome {
+    /// Whether it was reliable.
+    verdict: Option<bool>,
+    ratio: Option<f64>,
+    growth_per_s: Option<f64>,
+}
+
+/// What an assumed number moves, at most over points and ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+struct Moved {
+    /// Points whose verdict turns, or which cannot be computed any more.
+    verdicts: usize,
+    /// Change of the greatest ratio, as a part of it.
+    ratio: f64,
+    growth_per_s: f64,
+}
+
+impl Trial {
+    fn new(plan: &Plan, assumed: Vec<Assumed>) -> Self {
+        let count = plan.points().min(POINTS);
+        let step = |k: u64| if count > 1 { k * (plan.points() - 1) / (count - 1) } else { 0 };
+        let points: Vec<Vec<f64>> = (0..count).map(|k| plan.axis_values(step(k))).collect();
+        let stride = 1 + assumed.iter().map(|number| number.ends.len()).sum::<usize>();
+        let mut trial = plan.clone();
+        let plateau_rpm =
+            plan.model.spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / std::f64::consts::TAU;
+        if !plan.model.measures.metrics.contains(&Metric::Growth) {
+            trial.model.measures.metrics.push(Metric::Growth);
+        }
+        trial.model.held_speeds = format!("{plateau_rpm}").parse().ok();
+        if trial.model.held_speeds.is_none() {
+            trial.model.measures.metrics.retain(|metric| !metric.is_of_speeds());
+        }
+        for (k, axis) in trial.axes.iter_mut().enumerate() {
+            let values = points.iter().flat_map(|point| std::iter::repeat_n(point[k], stride));
+            axis.values = AxisValues::List(values.collect());
+        }
+        let mut first = 1;
+        for number in &assumed {
+            let mut row = vec![number.value; stride];
+            for (place, end) in number.ends.iter().enumerate() {
+                row[first + place] = *end;
+            }
+            first += number.ends.len();
+            let values = AxisValues::List(row.repeat(points.len()));
+            trial.axes.push(sweep_engine::Axis { parameter: number.parameter.clone(), values });
+        }
+        let rows = (stride * points.len()) as u64;
+        let (file, hash) = ("assumed numbers".to_owned(), String::new());
+        trial.design = Some(Design::List { file, points: rows, hash });
+        Self { plan: trial, assumed, stride, plateau_rpm }
+    }
+
+    fn rows(&self) -> u64 {
+        self.plan.points()
+    }
+
+    /// Computes every row; `None` if it was interrupted.
+    fn outcomes(&self, effort: Effort<'_>) -> Result<Option<Vec<Outcome>>, Error> {
+        let evaluator = Evaluator::new(self.plan.clone());
+        let found = evaluator.whole()?.in_memory(effort)?;
+        let mut outcomes: Vec<Outcome> = Vec::new();
+        for batch in found.batches() {
+            let numbers = |name: &str| {
+                let column = batch.column_by_name(name);
+                let numbers = column.and_then(|column| cells::numbers(column).ok());
+                numbers.unwrap_or_else(|| vec![None; batch.num_rows()])
+            };
+            let [ratios, growths] = ["ratio_max", "growth_per_s"].map(numbers);
+            let verdicts = batch.column_by_name("reliable");
+            let verdicts = verdicts.and_then(|column| cells::flags(column).ok());
+            for row in 0..batch.num_rows() {
+                let known = verdicts.filter(|column| !column.is_null(row));
+                outcomes.push(Outcome {
+                    verdict: known.map(|column| column.value(row)),
+                    ratio: ratios[row],
+                    growth_per_s: growths[row],
+                });
+            }
+        }
+        Ok((outcomes.len() as u64 == self.rows()).then_some(outcomes))
+    }
+
+    /// Returns what each assumed number moves, the most first.
+    fn ranked(&self, outcomes: &[Outcome]) -> Vec<(&Assumed, Moved)> {
+        let mut first = 1;
+        let mut ranked = Vec::new();
+        for number in &self.assumed {
+            let mut moved = Moved::default();
+            for rows in outcomes.chunks(self.stride) {
+                let ends = &rows[first..first + number.ends.len()];
+                moved.add(rows[0], ends);
+            }
+            first += number.ends.len();
+            ranked.push((number, moved));
+        }
+        ranked.sort_by(|(_, a), (_, b)| b.partial_cmp(a).unwrap_or(std::cmp::Ordering::Equal));
+        ranked
+    }
+
+    /// Returns the table that is printed.
+    fn table(&self, outcomes: &[Outcome]) -> String {
+        let ranked = self.ranked(outcomes);
+        let name = |number: &Assumed| number.parameter.name().to_owned();
+        let width = ranked.iter().map(|(number, _)| name(number).len()).max().unwrap_or(0);
+        let points = outcomes.len() / self.stride;
+        let growth = format!("growth at {} rpm", decimal(rounded(self.plateau_rpm)));
+        let mut text = format!(
+            "{:width$}  {:>10}  {:>22}  {:>12}  {:>9}  {growth}\n",
+            "assumed", "value", "expected", "verdicts", "ratio"
+        );
+        for (number, moved) in &ranked {
+            let expected: Vec<String> =
+                number.ends.iter().map(|end| decimal(rounded(*end))).collect();
+            let expected = match expected.as_slice() {
+                [] => "no other can be".to_owned(),
+                ends => ends.join(" to "),
+            };
+            let verdicts = format!("{} of {points}", moved.verdicts);
+            let ratio = format!("{:.1} %", 100.0 * moved.ratio);
+            text += &format!(
+                "{:width$}  {:>10}  {expected:>22}  {verdicts:>12}  {ratio:>9}  {:.2e} /s\n",
+                name(number),
+                decimal(rounded(number.value)),
+                moved.growth_per_s
+            );
+        }
+        let turning: Vec<String> = ranked
+            .iter()
+            .filter(|(_, moved)| moved.verdicts > 0)
+            .map(|(number, _)| name(number))
+            .collect();
+        text + &match turning.as_slice() {
+            [] => format!("none of them turns a verdict at {points} points of the plan\n"),
+            [one] => format!("measure {one}: it turns verdicts\n"),
+            many => format!("measure these first, which turn verdicts: {}\n", many.join(", ")),
+        }
+    }
+}
+
+impl Moved {
+    /// Notes the ends of a number's range at a point.
+    fn add(&mut self, own: Outcome, ends: &[Outcome]) {
+        let turns = ends.iter().any(|end| end.verdict != own.verdict);
+        self.verdicts += usize::from(turns);
+        for end in ends {
+            if let (Some(own), Some(end)) = (own.ratio, end.ratio) {
+                self.ratio = self.ratio.max((end / own - 1.0).abs());
+            }
+            if let (Some(own), Some(end)) = (own.growth_per_s, end.growth_per_s) {
+                self.growth_per_s = self.growth_per_s.max((end - own).abs());
+            }
+        }
+    }
+}
+
+/// Returns a number of four digits, for a table.
+fn rounded(value: f64) -> f64 {
+    let text = format!("{value:.3e}");
+    let number = text.parse().unwrap_or(value);
+    if Range::Any.contains(number) { number } else { value }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::GridInput;
+
+    const SHEET: &str = include_str!("starter_machine.toml");
+
+    /// A plan of a machine from a data sheet.
+    fn plan(more: &str) -> Plan {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("m.toml"), SHEET).expect("it is written");
+        let grid = format!(
+            "machine = \"m.toml\"\n[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 1\n\
+             [time]\nend_s = 1.5\n{more}"
+        );
+        let path = folder.path().join("g.toml");
+        std::fs::write(&path, grid).expect("it is written");
+        GridInput::file(path, Vec::new()).load().unwrap_or_else(|mistakes| panic!("{mistakes}"))
+    }
+
+    #[test]
+    fn every_left_out_number_is_varied_and_ranked() {
+        let plan = plan("[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.3]\n");
+        let trial = Trial::new(&plan, Assumed::all(&plan));
+        assert!(trial.assumed.len() > 10, "{}", trial.assumed.len());
+        let interrupt = Interrupt::new();
+        let effort =
+            || Effort { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
+        let outcomes = trial.outcomes(effort()).unwrap().expect("nobody interrupts");
+        assert_eq!(outcomes.len(), 2 * trial.stride);
+        // The rows of the machine as it is are those of the plan itself, but for their steps.
+        let own = Evaluator::new(plan.clone());
+        let own = own.whole().unwrap().in_memory(effort()).unwrap();
+        let column = own.batches()[0].column_by_name("ratio_max").expect("it is there");
+        let ratios = cells::numbers(column).unwrap();
+        for (point, ratio) in ratios.into_iter().enumerate() {
+            let [own, tried] = [ratio, outcomes[point * trial.stride].ratio].map(Option::unwrap);
+            assert!((tried / own - 1.0).abs() < 0.01, "{own} {tried}");
+        }
+        let ranked = trial.ranked(&outcomes);
+        assert!(ranked.windows(2).all(|pair| pair[0].1 >= pair[1].1));
+        assert!(ranked[0].1.ratio > ranked[ranked.len() - 1].1.ratio, "{:?}", ranked[0].1);
+        let text = trial.table(&outcomes);
+        assert!(text.contains("tub_inertia_11_kg_m2") && text.contains("300 rpm"), "{text}");
+    }
+
+    #[test]
+    fn what_turns_a_verdict_comes_first() {
+        let outcome = |verdict, ratio| Outcome {
+            verdict: Some(verdict),
+            ratio: Some(ratio),
+            growth_per_s: Some(-1.0),
+        };
+        let mut turned = Moved::default();
+        turned.add(outcome(true, 1.9), &[outcome(true, 1.8), outcome(false, 2.1)]);
+        let mut moved = Moved::default();
+        moved.add(outcome(true, 1.0), &[outcome(true, 1.9)]);
+        assert_eq!((turned.verdicts, moved.verdicts), (1, 0));
+        assert!(turned > moved && moved.ratio > turned.ratio);
+    }
+}
