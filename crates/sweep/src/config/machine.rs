@@ -121,7 +121,7 @@ impl Part {
         keys: &mut Keys<'_>,
     ) {
         keys.places = format!("{}.", self.section);
-        sheet.walk(self.section, keys);
+        sheet.walk(self, k, keys);
         own.iter().for_each(|key| key.walk(self, k, machine, sheet, keys));
     }
 
@@ -236,7 +236,36 @@ struct Sheet {
     drum_depth_m: Option<f64>,
     /// The parameters that the file leaves out.
     left_out: Vec<Parameter>,
+    /// The positions along the axis that the file gives by the name of a plane.
+    planes: Vec<(Parameter, Plane)>,
 }
+
+/// A plane of the drum in which an unbalance lies.
+#[derive(Clone, Copy, PartialEq)]
+enum Plane {
+    /// The drum's front, where its motion is observed.
+    Front,
+    /// The drum's back, where it is fixed to the shaft.
+    Rear,
+}
+
+impl Plane {
+    const ALL: [(Self, &'static str); 2] = [(Self::Front, "front"), (Self::Rear, "rear")];
+
+    /// Returns its place along the axis.
+    fn x_m(self, machine: &Machine) -> f64 {
+        match self {
+            Self::Front => machine.drum.front_x_m,
+            Self::Rear => machine.drum.hinge_x_m,
+        }
+    }
+}
+
+/// Sections of unbalances, and the key of their place along the axis.
+const UNBALANCES: [&str; 2] = ["unbalance", "further_unbalances"];
+const ALONG_AXIS: &str = "x_m";
+/// The key that gives that place by a name.
+const PLANE: &str = "plane";
 
 /// The drum's numbers on a data sheet.
 const RADIUS: &str = "radius_m";
@@ -252,10 +281,10 @@ impl Sheet {
         Self { is_given: keys.section().is_some_and(has_both), ..Self::default() }
     }
 
-    /// Walks over the data sheet's keys of a section.
-    fn walk(&mut self, section: &str, keys: &mut Keys<'_>) {
+    /// Walks over the data sheet's keys of element `k` of a section.
+    fn walk(&mut self, part: &Part, k: usize, keys: &mut Keys<'_>) {
         const LENGTH: Form<'_> = Form::Number(Range::Within(1e-3, 10.0));
-        match section {
+        match part.section {
             "" => {
                 let about =
                     "mass of tub, shaft and drum without laundry, in place of the tub's, kg";
@@ -268,8 +297,36 @@ impl Sheet {
                 let key = keys::Key::new(DEPTH, "inner depth; other numbers follow from it, m");
                 keys.key(key, &LENGTH, &mut self.drum_depth_m);
             }
+            section if UNBALANCES.contains(&section) => self.walk_plane(part, k, keys),
             _ => {}
         }
+    }
+
+    /// Walks over the name of an unbalance's plane, which stands for its place along the axis.
+    fn walk_plane(&mut self, part: &Part, k: usize, keys: &mut Keys<'_>) {
+        let about = "the drum's front, or its rear where it is fixed: in place of x_m";
+        let mut word: Option<String> = None;
+        let names = Plane::ALL.map(|(_, name)| name);
+        let found = keys.key(keys::Key::new(PLANE, about), &Form::Word(&names), &mut word);
+        let plane = Plane::ALL.into_iter().find(|(_, name)| word.as_deref() == Some(name));
+        let (Field::Given(found), Some((plane, _))) = (found, plane) else { return };
+        let Some(section) = keys.section() else { return };
+        if section.key_at(ALONG_AXIS).is_some() {
+            let title = format!("`{PLANE}` beside `{ALONG_AXIS}`");
+            let expected = "expected only one of them: both say where the unbalance is";
+            section.report.refuse::<()>(&found.at, title, expected);
+        }
+        let name = format!("{}{ALONG_AXIS}", part.prefix(k));
+        section.report.put(name.as_str(), found.at);
+        // The paper's machine has none of the elements that a file may have more of.
+        let machine = with_unbalances(k + 1);
+        self.planes.extend(find(&name, &machine).map(|parameter| (parameter, plane)));
+    }
+
+    /// Whether the place of element `k` along the axis is that of a plane.
+    fn has_plane(&self, part: &Part, k: usize, key: &str) -> bool {
+        let name = format!("{}{ALONG_AXIS}", part.prefix(k));
+        key == ALONG_AXIS && self.planes.iter().any(|(parameter, _)| parameter.name() == name)
     }
 
     /// Puts assumed values in place of what the file leaves out, each with its rule as its source.
@@ -307,6 +364,13 @@ impl Sheet {
             }
         }
     }
+}
+
+/// Returns the paper's machine with so many further unbalances.
+fn with_unbalances(count: usize) -> Machine {
+    let mut machine = Machine::paper();
+    machine.further_unbalances = vec![Default::default(); count];
+    machine
 }
 
 /// The data sheet's mass, at the top of a machine file.
@@ -401,8 +465,13 @@ fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
         // The built-in machine's springs keep later checks from reporting the same mistake again.
         machine.springs = Machine::paper().springs;
     }
+    let planes = std::mem::take(&mut sheet.planes);
     if sheet.is_given {
         sheet.fill(machine, root);
+    }
+    for (parameter, plane) in planes {
+        let x_m = plane.x_m(machine);
+        parameter.set(machine, &mut no_spin(), x_m);
     }
 }
 
@@ -456,7 +525,10 @@ impl Key {
         };
         let is_assumed = keys.is_schema() || sheet.is_given;
         let is_assumed = is_assumed && self.is_assumed(part, machine);
-        let is_needed = self.left_out == LeftOut::Refused && !is_assumed;
+        let may_have_plane = keys.is_schema() && UNBALANCES.contains(&part.section);
+        let has_plane =
+            sheet.has_plane(part, k, &self.name) || may_have_plane && self.name == ALONG_AXIS;
+        let is_needed = self.left_out == LeftOut::Refused && !is_assumed && !has_plane;
         let key = keys::Key::new(&self.name, &about);
         let key = if is_needed { key.needed(&expected) } else { key };
         let mut value = match self.left_out {
@@ -478,6 +550,7 @@ impl Key {
                     }
                 }
             }
+            Field::Absent if has_plane => {}
             Field::Absent if is_assumed => sheet.left_out.extend(parameters),
             Field::Absent if !is_needed => {}
             Field::Absent | Field::Bad => doubt(names, report),

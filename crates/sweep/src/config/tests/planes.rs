@@ -1,0 +1,55 @@
+//! Unbalances in planes of the drum by their names.
+
+use washer_model::Machine;
+
+use super::super::GridInput;
+use super::super::machine_file;
+use sweep_engine::plan::WrittenIn;
+
+/// The machine of a file that is the built-in one's with changed unbalances.
+fn load(change: impl Fn(String) -> String) -> Result<Machine, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let machine = change(machine_file(&Machine::paper(), &WrittenIn::default()));
+    std::fs::write(folder.path().join("m.toml"), machine).unwrap();
+    let grid = "machine = \"m.toml\"\n[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n\
+        [time]\nend_s = 2\n";
+    let path = folder.path().join("g.toml");
+    std::fs::write(&path, grid).unwrap();
+    let plan = GridInput::file(path, Vec::new()).load();
+    plan.map(|plan| plan.model.machine).map_err(|mistakes| mistakes.to_string())
+}
+
+const FURTHER: &str =
+    "\n[[further_unbalances]]\nplane = \"front\"\nmass_kg = 0.2\nradius_m = -0.2\n";
+
+/// The file with the unbalance's place by the name of a plane.
+fn rear(file: &str) -> String {
+    let lines = file.lines().scan(false, |is_unbalance, line| {
+        *is_unbalance = if line.starts_with('[') { line == "[unbalance]" } else { *is_unbalance };
+        let is_place = *is_unbalance && line.starts_with("x_m");
+        Some(if is_place { "plane = \"rear\"\n".to_owned() } else { format!("{line}\n") })
+    });
+    lines.collect()
+}
+
+#[test]
+fn loads_of_two_planes_are_given_by_their_names() {
+    let machine = load(|file| rear(&file) + FURTHER).unwrap();
+    let paper = Machine::paper();
+    assert_eq!(machine.unbalance.x_m, paper.drum.hinge_x_m);
+    assert_eq!(machine.further_unbalances[0].x_m, paper.drum.front_x_m);
+    assert_eq!(machine.further_unbalances[0].radius_m, -0.2);
+}
+
+#[test]
+fn a_plane_and_a_place_contradict_each_other() {
+    let both = FURTHER.replace("mass_kg", "x_m = 0.1\nmass_kg");
+    let refused = load(|file| file + &both).unwrap_err();
+    assert!(refused.contains("`plane` beside `x_m`"), "{refused}");
+    let neither = FURTHER.replace("plane = \"front\"\n", "");
+    let refused = load(|file| file + &neither).unwrap_err();
+    assert!(refused.contains("`x_m` is missing"), "{refused}");
+    let wrong = FURTHER.replace("front", "middle");
+    let refused = load(|file| file + &wrong).unwrap_err();
+    assert!(refused.contains("unknown plane \"middle\""), "{refused}");
+}
