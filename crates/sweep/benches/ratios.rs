@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use lane_ode::Simd;
 use washer_model::{
-    BumpStop, Bushing, Cases, Dwell, Machine, Method, ModelKind, Point, Profile, Spin, Starts,
-    Timing, endings, prepare, respond, simulate,
+    BumpStop, Bushing, Dwell, Machine, Method, ModelKind, Point, Profile, Spin, Starts,
+    StepSelector, Timing, capped_method, endings, prepare, respond, simulate,
 };
 
 /// As many as the widest lanes hold.
@@ -124,18 +124,15 @@ fn methods(rounds: usize) -> f64 {
             .collect();
     let last = points.len() - 1;
     let corners = [0, 32, last - 32, last].map(|corner| (&points[corner], &spin));
-    let cases = Cases::new(corners, end_s);
+    let steps = StepSelector::new(corners, end_s);
     let models = [("nonlinear", ModelKind::Nonlinear), ("linear", ModelKind::Linear)];
-    let fast = |accuracy| {
-        models.map(|(_, model)| {
-            let geared = cases.choose(model, accuracy).expect("the paper's machine has modes");
-            Method::Geared(geared.expect("its bearings are stiff"))
-        })
-    };
+    let capped = models.map(|(_, model)| {
+        let step_s = steps.capped_step_s(model).expect("the paper's machine has modes");
+        capped_method(model, step_s.expect("its bearings are stiff"))
+    });
     let methods = [
         (format!("rk4, {STEP_S:e} s"), [Method::Rk4 { step_s: STEP_S }; 2]),
-        ("rk4-mass-scaled, 1e-3".to_owned(), fast(1e-3)),
-        ("rk4-mass-scaled, 1e-6".to_owned(), fast(1e-6)),
+        ("capped_0".to_owned(), capped),
     ];
     let subjects: Vec<_> = methods
         .iter()

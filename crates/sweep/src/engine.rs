@@ -1,22 +1,23 @@
-//! The engine: points through both models, in lanes, as far up the ladder of methods as each needs.
+//! The engine: points through both models, in lanes, each at as many refinement levels as it needs.
 
 mod growth;
-mod ladder;
 mod pool;
+mod reference;
 
 pub(crate) use growth::{Carried, motions, of_speeds, responses};
-pub(crate) use ladder::{reference, reference_step_s};
+pub(crate) use reference::{reference, reference_step_s};
 pub(crate) use sweep_engine::{Engine, RunContext};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex};
 
-use ladder::ladder;
 use lane_ode::Simd;
 use once_cell::sync::OnceCell;
-use pool::{Feed, Keep, Pool};
-use washer_model::{Cases, Machine, Method, ModelKind, Point, Spin, Timing, prepare};
-use washer_row::{Demand, Ladder, Level, Outcome, Rule, RungRun, Status, runs};
+use pool::{Pool, Sink, Source};
+use washer_model::{Machine, Method, ModelKind, Point, Spin, StepSelector, Timing, prepare};
+use washer_row::{
+    Demand, Level, LevelRun, Outcome, RefinementLevels, Rule, Status, refinement_levels, runs,
+};
 
 use crate::columns::Columns;
 use crate::plan::{Plan, Scenario};
@@ -24,7 +25,7 @@ use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::{Error, Interrupt, RowSink, RowSource};
 use sweep_files::panics::{lock, unlocked};
 
-/// Parts of a run at whose ends two runs of a trajectory are compared.
+/// Parts of a run at whose ends a perturbed run is compared with its original.
 pub(crate) const CHECKPOINTS: u32 = 128;
 
 /// What a row by capped modes came from.
@@ -33,7 +34,7 @@ pub(crate) struct CappedRun {
     pub(crate) level: Level,
     /// The nonlinear model's, the linear one's.
     pub(crate) methods: [Method; 2],
-    /// Steps end at so many parts of the run, and gears change there.
+    /// Steps end at so many parts of the run.
     pub(crate) checkpoints: u32,
 }
 
@@ -46,8 +47,8 @@ pub struct ModelEngine<'a> {
     forced: Option<Simd>,
     timing: Timing,
     rule: Rule,
-    /// The ladders of both models; found when first asked for.
-    pub(crate) ladders: Arc<OnceCell<[Ladder; 2]>>,
+    /// The refinement levels of both models; found when first asked for.
+    pub(crate) levels: Arc<OnceCell<[RefinementLevels; 2]>>,
 }
 
 /// The instruction set that `SWEEP_SIMD` asks for, else the best.
@@ -82,14 +83,14 @@ impl<'a> ModelEngine<'a> {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
-        let (demand, ladders) = (Demand::Row, Arc::default());
-        Self { plan, demand, forced, timing, rule: rule(plan), ladders }
+        let levels = Arc::default();
+        Self { plan, demand: Demand::Row, forced, timing, rule: rule(plan), levels }
     }
 
-    /// An engine for another plan, with the instruction set and the rungs of this one.
+    /// Returns an engine for another plan, with the instruction set and the levels of this one.
     pub(crate) fn over<'b>(&self, plan: &'b Plan) -> ModelEngine<'b> {
-        self.ladders();
-        ModelEngine { ladders: Arc::clone(&self.ladders), ..ModelEngine::on(self.forced, plan) }
+        self.levels();
+        ModelEngine { levels: Arc::clone(&self.levels), ..ModelEngine::on(self.forced, plan) }
     }
 
     /// What it computes.
@@ -97,20 +98,20 @@ impl<'a> ModelEngine<'a> {
         self.plan
     }
 
-    /// The rungs of both models.
-    pub(crate) fn ladders(&self) -> &[Ladder; 2] {
-        self.ladders.get_or_init(|| self.find_ladders(&|| false))
+    /// Returns the refinement levels of both models.
+    pub(crate) fn levels(&self) -> &[RefinementLevels; 2] {
+        self.levels.get_or_init(|| self.find_levels(&|| false))
     }
 
-    /// As [`Self::ladders`]; `None` if `watch` says to stop before they are found.
-    fn ladders_under(&self, watch: &RunContext<'_>) -> Option<&[Ladder; 2]> {
+    /// Returns [`Self::levels`], or `None` if `watch` stops the search.
+    fn levels_under(&self, watch: &RunContext<'_>) -> Option<&[RefinementLevels; 2]> {
         // The standard library's cell has no `get_or_try_init` yet.
         let find = || {
-            let found = self.find_ladders(&|| watch.stopped());
+            let found = self.find_levels(&|| watch.stopped());
             // They may have been cut short.
             if watch.stopped() { Err(()) } else { Ok(found) }
         };
-        self.ladders.get_or_try_init(find).ok()
+        self.levels.get_or_try_init(find).ok()
     }
 
     /// How the trajectories of a row of this level were integrated; `None` where modes were not
@@ -119,14 +120,14 @@ impl<'a> ModelEngine<'a> {
         if !level.is_capped() {
             return None;
         }
-        let [nonlinear, linear] = self.ladders();
+        let [nonlinear, linear] = self.levels();
         let methods = [nonlinear.capped(level)?, linear.capped(level)?];
         Some(CappedRun { level, methods, checkpoints: self.timing.checkpoints })
     }
 
-    fn find_ladders(&self, is_stopped: &dyn Fn() -> bool) -> [Ladder; 2] {
+    fn find_levels(&self, is_stopped: &dyn Fn() -> bool) -> [RefinementLevels; 2] {
         if let Some((level, method)) = self.plan.integrator.direct() {
-            return ModelKind::ALL.map(|_| Ladder::direct(level, method));
+            return ModelKind::ALL.map(|_| RefinementLevels::direct(level, method));
         }
         // The fast method's, by the corners of the grid.
         let scenarios: Vec<_> =
@@ -135,8 +136,8 @@ impl<'a> ModelEngine<'a> {
         let ready = prepared.iter().zip(&scenarios);
         let ready = ready
             .filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.model.spin)));
-        let cases = Cases::until(ready, self.plan.end_s, is_stopped);
-        ModelKind::ALL.map(|model| ladder(&cases, model, self.rule.accuracy))
+        let steps = StepSelector::until(ready, self.plan.end_s, is_stopped);
+        ModelKind::ALL.map(|model| refinement_levels(&steps, model, self.rule.accuracy))
     }
 
     /// One row per point given by the values of its axes, on the grid or between its points;
@@ -155,7 +156,7 @@ impl<'a> ModelEngine<'a> {
         watch: &RunContext<'_>,
     ) -> Option<Vec<Outcome>> {
         let next = Mutex::new(0..axis_values.len());
-        let feed = |most: usize| {
+        let source = |most: usize| {
             let mut next = lock(&next);
             let positions: Vec<usize> = next.by_ref().take(most).collect();
             positions
@@ -164,17 +165,19 @@ impl<'a> ModelEngine<'a> {
                 .collect()
         };
         let found = Mutex::new(Vec::with_capacity(axis_values.len()));
-        let keep = |outcome: Outcome| lock(&found).push(outcome);
-        self.through_lanes(&feed, &keep, watch);
+        let sink = |outcome: Outcome| lock(&found).push(outcome);
+        self.integrate_rows(&source, &sink, watch);
         let mut found = unlocked(found);
         found.sort_by_key(|outcome| outcome.point);
         (found.len() == axis_values.len()).then_some(found)
     }
 
-    /// Rows from a feed to a keeper, on all threads of the rayon pool this is called in.
-    fn through_lanes(&self, feed: &Feed<'_>, keep: &Keep<'_>, watch: &RunContext<'_>) {
-        let (state, changed) = (Mutex::default(), Condvar::new());
-        let pool = Pool { engine: self, feed, keep, watch, state, changed };
+    /// Computes rows from a source and gives them to a sink, on all threads of the rayon pool this
+    /// is called in.
+    fn integrate_rows(&self, source: &Source<'_>, sink: &Sink<'_>, watch: &RunContext<'_>) {
+        let state = Mutex::default();
+        let changed = Condvar::new();
+        let pool = Pool { engine: self, source, sink, watch, state, changed };
         match rayon::current_thread_index() {
             Some(_) => drop(rayon::broadcast(|_| pool.work())),
             // An estimate is of one thread.
@@ -217,13 +220,13 @@ impl<'a> ModelEngine<'a> {
         method: &Method,
         points: &[&Point],
         watch: &RunContext<'_>,
-    ) -> Vec<RungRun> {
+    ) -> Vec<LevelRun> {
         let stop = || watch.stopped();
         let together = |points: &[&Point]| {
             let simd = self.simd_for(points.len());
             runs(simd, ModelKind::ALL[model], method, points, &self.rule, &stop).unwrap_or_default()
         };
-        let panicked = || RungRun::failed(Status::Panicked);
+        let panicked = || LevelRun::failed(Status::Panicked);
         together_or_alone(points, together, panicked)
     }
 }
@@ -263,12 +266,12 @@ pub(crate) fn together_or_alone<I, R>(
 impl Engine for ModelEngine<'_> {
     fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, watch: &RunContext<'_>) {
         let columns = Columns::of_run(self.plan);
-        let keep = |outcome: Outcome| keep(columns.done(outcome));
-        let feed = |most: usize| {
+        let sink = |outcome: Outcome| keep(columns.done(outcome));
+        let source = |most: usize| {
             let rows = std::iter::from_fn(next).take(most);
             rows.map(|(row, values)| (row, self.plan.scenario_at(&values))).collect()
         };
-        self.through_lanes(&feed, &keep, watch);
+        self.integrate_rows(&source, &sink, watch);
     }
 
     fn simd(&self) -> &str {

@@ -3,7 +3,7 @@
 
 use lane_ode::MAX_LANES;
 use washer_model::ModelKind;
-use washer_row::{Deviations, Ladder, Metric, Outcome, ROW_STATUSES, row_status};
+use washer_row::{Deviations, Metric, Outcome, ROW_STATUSES, RefinementLevels, row_status};
 
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
@@ -56,8 +56,8 @@ pub(crate) fn of(plan: &Plan, threads: usize) -> Result<Estimate, Error> {
 /// As [`of`], where whole trajectories are given up after a time.
 fn reckoned(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate, Error> {
     let engine = ModelEngine::new(plan)?;
-    // Finding the rungs is no cost of points.
-    engine.ladders();
+    // The search for levels is no cost of points.
+    engine.levels();
     let first = Measured::take(&engine, whole_s);
     let Measured { core_s_per_point, sampled, integrated_s } =
         Measured::spread(&engine, &first).unwrap_or(first);
@@ -78,7 +78,7 @@ fn reckoned(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate, Error
         memory_bytes: memory_bytes(&engine, threads),
         disk_bytes,
         result_bytes: disk_bytes + columns * RESULT_COLUMN_BYTES,
-        method: method(plan, &engine.ladders()[0]),
+        method: method(plan, &engine.levels()[0]),
     })
 }
 
@@ -109,7 +109,7 @@ impl Measured {
         loop {
             cut.end_s = end_s;
             cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
-            // The cut plan's own rungs would be of slower spin, and longer steps.
+            // The cut plan's own levels would be of slower spin, and longer steps.
             let (cost_s, sampled) = cost_of(&engine.over(&cut), points);
             let of_length = |metric: &Metric| !matches!(metric, Metric::Growth | Metric::Dwell);
             if !cut.model.measures.metrics.iter().all(of_length) {
@@ -130,8 +130,8 @@ impl Measured {
         }
     }
 
-    /// Whole trajectories of more points, integrated together: the rows that are left to a slower
-    /// rung then share its lanes, as in the run. Few points leave such lanes empty, and cost
+    /// Whole trajectories of more points, integrated together: the rows that are left to a finer
+    /// level then share its lanes, as in the run. Few points leave such lanes empty, and cost
     /// several times as much each.
     fn spread(engine: &ModelEngine<'_>, first: &Self) -> Option<Self> {
         let plan = engine.plan();
@@ -217,12 +217,12 @@ fn turn_bytes(engine: &ModelEngine<'_>, threads: usize) -> f64 {
         return 0.0;
     }
     let turns = plan.model.spin.turns_within(plan.window_s);
-    let rows = engine.most_on_their_way(threads) as f64;
+    let rows = engine.max_rows_in_flight(threads) as f64;
     rows * 2.0 * turns * size_of::<Deviations>() as f64
 }
 
 /// How the method goes about it, in words.
-fn method(plan: &Plan, ladder: &Ladder) -> String {
+fn method(plan: &Plan, levels: &RefinementLevels) -> String {
     let steps = match plan.integrator.steps() {
         Steps::Fixed(step_s) => {
             // Both window edges and the end are hit exactly, so each stretch rounds up.
@@ -234,11 +234,12 @@ fn method(plan: &Plan, ladder: &Ladder) -> String {
         Steps::Explicit => ": steps as it needs".to_owned(),
         Steps::Implicit => ": steps as it needs, one trajectory at a time".to_owned(),
         Steps::Checked(_) => {
-            let rungs = ladder.rungs.iter().skip(1);
-            let rungs: Vec<_> = rungs.map(|rung| rung.describe(ModelKind::Nonlinear)).collect();
-            let why = ladder.held_back.as_ref().map(|why| format!("\n            {why}"));
-            let rungs = rungs.join("\n            then ");
-            format!(", until two rungs agree: {rungs}{}", why.unwrap_or_default())
+            let first = levels.levels[0].describe(ModelKind::Nonlinear);
+            let last = levels.levels[levels.levels.len() - 1].describe(ModelKind::Nonlinear);
+            let count = levels.levels.len();
+            let note = levels.note.as_ref().map(|note| format!("\n            {note}"));
+            let note = note.unwrap_or_default();
+            format!(", until two of {count} levels agree: {first}\n            to {last}{note}")
         }
     };
     format!("{}{steps}", plan.integrator)

@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use washer_model::{
-    Cases, Channel, Crossed, Crossing, LeftRange, NoEquilibrium, Point, Response, Timing, cross,
-    modes, peaks_without_departures,
+    Channel, Crossed, Crossing, LeftRange, NoEquilibrium, Point, Response, StepSelector, Timing,
+    cross, modes, peaks_without_departures,
 };
 
 use crate::engine::{ModelEngine, reference_step_s, simd_from_environment};
@@ -151,7 +151,7 @@ fn explained(
     );
     let (passages, without_departures) = crossings;
     let spin = &scenario.model.spin;
-    let step_s = reference_step_s(&Cases::new([(&point, spin)], plan.end_s));
+    let step_s = reference_step_s(&StepSelector::new([(&point, spin)], plan.end_s));
     let growing = found.iter().zip(&passages).flat_map(|(tongue, passages)| {
         passages.iter().map(|passage| (passage, tongue.growths.as_slice()))
     });
@@ -249,7 +249,7 @@ fn crossings(
     if asker.interrupt.stopped() {
         return (Vec::new(), None);
     }
-    let step_s = reference_step_s(&Cases::new([(asker.point, spin)], end_s));
+    let step_s = reference_step_s(&StepSelector::new([(asker.point, spin)], end_s));
     let before_end = |crossing: &&Crossing<'_>| crossing.from_to_s[0] < swept.window_s[1];
     let (crossed, peaks) = rayon::join(
         || cross(asker.point, step_s, &crossings),

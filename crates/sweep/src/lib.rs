@@ -80,4 +80,4 @@ pub use sweep_engine::store::{
 pub use sweep_engine::{Error, Exit, Interrupt, survive_file_size_limits, tell};
 pub use trace::Extras as TraceExtras;
 pub use washer_model::Starts;
-pub use washer_row::{CREEPING_M_PER_S, Floor, Level, Outcome, Status, Trajectory, Verdict};
+pub use washer_row::{CREEPING_M_PER_S, Level, Outcome, Status, Trajectory, Verdict};

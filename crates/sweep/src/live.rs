@@ -31,7 +31,7 @@ const OFFERED: [&str; 6] = [
 /// How far their values go either way, as a share.
 const SPREAD: f64 = 0.3;
 
-/// Most sliders beside the axes: rungs are chosen for every corner of their ranges.
+/// The greatest number of sliders beside the axes: levels are chosen for every corner of their ranges.
 const MOST_SLIDERS: usize = 6;
 
 /// Time between two instants of a history (s): at 1200 rpm five to a turn.
@@ -235,17 +235,17 @@ fn widened(plan: &Plan, sliders: &[Axis]) -> Plan {
     Plan { axes: [&plan.axes, sliders].concat(), ..plan.clone() }
 }
 
-/// The setup, and the rungs of both models in words.
+/// Returns the setup, and the refinement levels of both models in words.
 fn setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Error> {
     // By the fast method, whatever the map's; as accurate as that, or as usual.
     let own = rule(plan).accuracy;
     let accuracy = if own.is_finite() { own } else { ACCURACY.default };
     let plan = &Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
-    let ladders = ModelEngine::new(plan)?.ladders().clone();
+    let levels = ModelEngine::new(plan)?.levels().clone();
     let wide = widened(plan, sliders);
-    let wide_ladders = ModelEngine::new(&wide)?.ladders().clone();
+    let wide_levels = ModelEngine::new(&wide)?.levels().clone();
     let words = ModelKind::ALL.map(|model| {
-        ladders[model as usize].rungs.iter().map(|rung| rung.describe(model)).collect()
+        levels[model as usize].levels.iter().map(|level| level.describe(model)).collect()
     });
     let parameters = wide.axes.iter().map(|axis| axis.parameter.clone()).collect();
     let setup = Setup {
@@ -254,8 +254,8 @@ fn setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Err
         checkpoints: CHECKPOINTS,
         rule: rule(plan),
         sliders: Sliders { parameters, axes: plan.axes.len() },
-        ladders,
-        wide_ladders,
+        levels,
+        wide_levels,
     };
     Ok((setup, words))
 }

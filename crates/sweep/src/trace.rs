@@ -12,8 +12,8 @@ use rayon::iter::{
 };
 use serde_json::{Value, json};
 use washer_model::{
-    Asked, COORDINATES, Cases, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium,
-    Point, Spin, Start, Timing, histories, instants, together,
+    Asked, COORDINATES, Channel, Forces, History, Instant, Method, ModelKind, NoEquilibrium, Point,
+    Spin, Start, StepSelector, Timing, histories, instants, together,
 };
 
 use crate::engine::{CappedRun, ModelEngine, reference};
@@ -460,8 +460,8 @@ fn methods(
     match plan.integrator.direct() {
         Some((level, method)) => ([method; 2], level, plan.integrator.to_json()),
         None => {
-            let cases = Cases::new([(point, spin)], plan.end_s);
-            let methods = ModelKind::ALL.map(|model| reference(&cases, model));
+            let steps = StepSelector::new([(point, spin)], plan.end_s);
+            let methods = ModelKind::ALL.map(|model| reference(&steps, model));
             match methods[0] {
                 Method::Rk4 { step_s } => {
                     (methods, Level::Rk4, Integrator::Rk4 { step_s }.to_json())

@@ -5,7 +5,7 @@
 //! equilibrium; whether it is sensitive; a record of each model, the nonlinear one first; the ratio
 //! of each channel; the static sag (m). What is not there is NaN.
 //!
-//! A record is the rung and its level, the error left, `failure` (0 none, 1 diverged, 2 step too
+//! A record is the level's place and name, the error left, `failure` (0 none, 1 diverged, 2 step too
 //! small, 3 step limit), its time (s), `steps`, the least gap (m), the amplitude of each channel
 //! and the map's metrics of the model.
 #![allow(unsafe_code)]
@@ -75,7 +75,7 @@ fn answer(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize {
     output.len()
 }
 
-/// Both models by the quick rung at points of so many values each: an answer for each point.
+/// Both models at the quick level at points of so many values each: an answer for each point.
 #[unsafe(no_mangle)]
 pub extern "C" fn quick(values: usize) -> usize {
     answer(|setup, input, output| {
@@ -92,13 +92,13 @@ pub extern "C" fn checked() -> usize {
     answer(|setup, input, output| write_answer(output, &check(setup, input), setup))
 }
 
-/// The motion of a model (0 nonlinear, 1 linear) at a point by a rung, or by the quick one if there
+/// The motion of a model (0 nonlinear, 1 linear) at a point at a refinement level, or at the quick one if there
 /// is none of this number: 1, 0 or -1 as above, the failure and its time, how many instants; of
 /// each, the channels and the gap.
 #[unsafe(no_mangle)]
-pub extern "C" fn history(model: usize, rung: usize, every_s: f64) -> usize {
+pub extern "C" fn history(model: usize, place: usize, every_s: f64) -> usize {
     let model = if model == 0 { ModelKind::Nonlinear } else { ModelKind::Linear };
-    answer(|setup, input, output| match motion(setup, input, model, Some(rung), every_s) {
+    answer(|setup, input, output| match motion(setup, input, model, Some(place), every_s) {
         Err(why) => output.push(code(Some(&why))),
         Ok(motion) => {
             let [failure, time_s] = failure(motion.failure);
@@ -185,11 +185,11 @@ fn write_answer(output: &mut Vec<f64>, found: &Result<Answer, NoPoint>, setup: &
         output.resize(output.len() + width, f64::NAN);
         return;
     };
-    let Answer { outcome, amplitudes, ratios, rungs, levels, errors } = answer;
+    let Answer { outcome, amplitudes, ratios, places, levels, errors } = answer;
     output.push(f64::from(u8::from(outcome.sensitive == Some(true))));
     for (model, run) in [&outcome.nonlinear, &outcome.linear].into_iter().enumerate() {
         let error = errors[model].unwrap_or(f64::NAN);
-        output.extend([rungs[model] as f64, f64::from(levels[model] as u8), error]);
+        output.extend([places[model] as f64, f64::from(levels[model] as u8), error]);
         let Trajectory { status, fail_time_s, steps, min_gap_m, metrics: found, .. } = run;
         // Those of runs come first, in the order of `Failure`.
         let failure = f64::from((*status as u8).min(Status::StepLimit as u8));

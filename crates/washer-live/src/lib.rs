@@ -1,10 +1,10 @@
 //! Both models at single points, behind plain exports for a page.
 //!
-//! `sweep plot --live` writes a [`Setup`] into a page: the machine, its spin and the ladders of the
+//! `sweep plot --live` writes a [`Setup`] into a page: the machine, its spin and the refinement levels of the
 //! fast method, as the program chose them for the map and for the sliders. The page's workers load
 //! this crate as a WebAssembly module, and ask for
 //!
-//! * [`quick`]: both models at some points by one rung, which is quick and not checked;
+//! * [`quick`]: both models at some points at one level, which is quick and not checked;
 //! * [`check`]: a point as a row of the map has it, by runs that agree;
 //! * [`motion`]: the time history of one model at a point;
 //! * [`growth`]: how fast disturbances grow there while the drum turns at constant speeds;

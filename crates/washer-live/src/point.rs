@@ -1,4 +1,4 @@
-//! One point, ready to run, and its runs by one rung.
+//! One point, ready to run, and its runs at one refinement level.
 
 use lane_ode::{Failure, Simd};
 use sweep_parameter::RatioLimits;
@@ -7,8 +7,8 @@ use washer_model::{
     Target, Timing, endings, history, prepare, respond,
 };
 use washer_row::{
-    Climbs, Demand, Deviations, Dwelt, Ladder, Level, Next, Outcome, Rule, RungRun, Status, Terms,
-    Trajectory, Verdict, runs,
+    Demand, Deviations, Dwelt, Level, LevelRun, Next, Outcome, RefinementLevels, RefinementRule,
+    RowRefinement, Rule, Status, Trajectory, Verdict, runs,
 };
 
 use crate::setup::Setup;
@@ -31,9 +31,9 @@ pub struct Answer {
     pub amplitudes: [Deviations; 2],
     /// Their ratios, as if every channel was compared.
     pub ratios: Vec<Option<f64>>,
-    /// The rungs that the models' numbers come from, by their places on the ladders.
-    pub rungs: [usize; 2],
-    /// What the program calls these rungs.
+    /// The places of the refinement levels that the models' numbers come from.
+    pub places: [usize; 2],
+    /// The names of these levels.
     pub levels: [Level; 2],
     /// The errors left, relative; absent where nothing says so.
     pub errors: [Option<f64>; 2],
@@ -43,8 +43,8 @@ impl Answer {
     fn new(
         outcome: Outcome,
         amplitudes: [Deviations; 2],
-        rungs: [usize; 2],
-        ladders: &[Ladder; 2],
+        places: [usize; 2],
+        refinement: &[RefinementLevels; 2],
         limits: RatioLimits,
     ) -> Self {
         let every = |of: &Trajectory, amplitudes: &Deviations| match of.status {
@@ -56,8 +56,8 @@ impl Answer {
         let mut compared = Outcome::new(outcome.point, nonlinear, linear);
         compared.compare_turns(&Channel::ALL);
         let Verdict { ratios, .. } = Verdict::new(&compared, Channel::ALL.len(), limits);
-        let levels = [0, 1].map(|model| ladders[model].rungs[rungs[model]].level);
-        Self { outcome, amplitudes, ratios, rungs, levels, errors: [None; 2] }
+        let levels = [0, 1].map(|model| refinement[model].levels[places[model]].level);
+        Self { outcome, amplitudes, ratios, places, levels, errors: [None; 2] }
     }
 }
 
@@ -110,46 +110,48 @@ impl Scenario {
     }
 }
 
-/// The rungs of both models that hold at these values.
-fn ladders<'a>(setup: &'a Setup, values: &[f64]) -> &'a [Ladder; 2] {
+/// Returns the refinement levels of both models at these values.
+fn refinement_levels<'a>(setup: &'a Setup, values: &[f64]) -> &'a [RefinementLevels; 2] {
     let further = setup.sliders.parameters.iter().zip(values).skip(setup.sliders.axes);
     let has_moved = |(parameter, value): (&washer_model::Parameter, &f64)| {
         parameter.get(&setup.machine, &setup.spin) != Some(*value)
     };
-    if further.into_iter().any(has_moved) { &setup.wide_ladders } else { &setup.ladders }
+    if further.into_iter().any(has_moved) { &setup.wide_levels } else { &setup.levels }
 }
 
-/// A point made ready.
+/// Prepares a point.
 ///
 /// # Errors
 /// [`NoPoint`].
-fn ready(setup: &Setup, values: &[f64]) -> Result<Point, NoPoint> {
+fn ready_point(setup: &Setup, values: &[f64]) -> Result<Point, NoPoint> {
     let scenario = Scenario::new(setup, values)?;
     let timing = scenario.timing(setup);
     let mut points = prepare(Simd::Scalar, &[(scenario.machine, scenario.spin)], &timing);
     points.pop().and_then(Result::ok).ok_or(NoPoint::NoEquilibrium)
 }
 
-/// Both models at points by the quick rung, in lanes. Nothing is compared with these runs.
+/// Integrates both models at points at the quick level, in lanes. Nothing is compared with these
+/// runs.
 pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
-    let ready = points.iter().map(|values| (ladders(setup, values), ready(setup, values)));
+    let ready = points.iter();
+    let ready = ready.map(|values| (refinement_levels(setup, values), ready_point(setup, values)));
     let ready: Vec<_> = ready.collect();
     let rule = Rule { accuracy: f64::INFINITY, ..setup.rule.clone() };
     let mut found: Vec<Result<Answer, NoPoint>> = Vec::with_capacity(points.len());
-    // Runs of the same rungs go through the lanes together.
+    // Runs at the same levels go through the lanes together.
     for alike in ready.chunk_by(|(a, _), (b, _)| core::ptr::eq(*a, *b)) {
-        let ladders = alike[0].0;
+        let levels = alike[0].0;
         let sound: Vec<&Point> =
             alike.iter().filter_map(|(_, ready)| ready.as_ref().ok()).collect();
-        let rungs = [0, 1].map(|model| quick_rung(&ladders[model]));
+        let places = [0, 1].map(|model| quick_place(&levels[model]));
         let [nonlinear, linear] = [0, 1]
-            .map(|model| by_method(model, ladders[model].method(rungs[model]), &sound, &rule));
+            .map(|model| by_method(model, levels[model].method(places[model]), &sound, &rule));
         let mut pairs = nonlinear.into_iter().zip(linear);
-        let answer = |(nonlinear, linear): (RungRun, RungRun)| {
+        let answer = |(nonlinear, linear): (LevelRun, LevelRun)| {
             let amplitudes = [nonlinear.amplitudes, linear.amplitudes];
             let mut outcome = Outcome::new(0, nonlinear.trajectory, linear.trajectory);
             outcome.compare_turns(&rule.channels);
-            Answer::new(outcome, amplitudes, rungs, ladders, rule.limits)
+            Answer::new(outcome, amplitudes, places, levels, rule.limits)
         };
         found.extend(alike.iter().map(|(_, ready)| match ready {
             Ok(_) => pairs.next().map(answer).ok_or(NoPoint::NoEquilibrium),
@@ -159,51 +161,53 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
     found
 }
 
-/// A point as a row of the map has it: each model by finer and finer rungs, until two runs agree.
+/// Computes a point as a row of the map: each model at finer and finer levels, until two agree.
 ///
 /// # Errors
 /// [`NoPoint`].
 pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
-    let point = ready(setup, values)?;
-    let (ladders, rule) = (ladders(setup, values), &setup.rule);
-    let terms = Terms { ladders, demand: Demand::Row, rule };
-    let mut climbs = Climbs::default();
+    let point = ready_point(setup, values)?;
+    let levels = refinement_levels(setup, values);
+    let rule = &setup.rule;
+    let with = RefinementRule { levels, demand: Demand::Row, rule };
+    let mut refinement = RowRefinement::default();
     let outcome = loop {
-        match climbs.next(0, &point, terms) {
+        match refinement.next(0, &point, with) {
             Next::Done(outcome) => break *outcome,
             Next::Runs(wanted) => {
-                for (model, rung) in wanted {
-                    let ladder = &ladders[model];
-                    let twin = (rung == ladder.twin()).then(|| point.nudged());
-                    let started = twin.as_ref().unwrap_or(&point);
-                    for run in by_method(model, ladder.method(rung), &[started], rule) {
-                        climbs.take((model, rung), run, &point, terms);
+                for (model, place) in wanted {
+                    let of_model = &levels[model];
+                    let perturbed = of_model.is_perturbed(place).then(|| point.nudged());
+                    let started = perturbed.as_ref().unwrap_or(&point);
+                    for run in by_method(model, of_model.method(place), &[started], rule) {
+                        refinement.take((model, place), run, &point, with);
                     }
                 }
             }
         }
     };
-    let last = [0, 1].map(|model| climbs.last(model, &ladders[model]));
-    let [Some(nonlinear), Some(linear)] = last else { return Err(NoPoint::NoEquilibrium) };
-    let last = [nonlinear, linear];
-    let (amplitudes, rungs) = (last.map(|(run, ..)| run.amplitudes), last.map(|(_, at, _)| at));
-    let answer = Answer::new(outcome, amplitudes, rungs, ladders, rule.limits);
-    Ok(Answer { errors: last.map(|(.., error)| error), ..answer })
+    let finest = [0, 1].map(|model| refinement.finest(model, &point, with));
+    let [Some(nonlinear), Some(linear)] = finest else { return Err(NoPoint::NoEquilibrium) };
+    let finest = [nonlinear, linear];
+    let amplitudes = finest.map(|(run, ..)| run.amplitudes);
+    let places = finest.map(|(_, place, _)| place);
+    let answer = Answer::new(outcome, amplitudes, places, levels, rule.limits);
+    Ok(Answer { errors: finest.map(|(.., error)| error), ..answer })
 }
 
-fn by_method(model: usize, method: &Method, points: &[&Point], rule: &Rule) -> Vec<RungRun> {
+fn by_method(model: usize, method: &Method, points: &[&Point], rule: &Rule) -> Vec<LevelRun> {
     let found = runs(Simd::best(), ModelKind::ALL[model], method, points, rule, &|| false);
     found.unwrap_or_default()
 }
 
-/// The rung of quick answers: the lowest that a row may hold, because the one below only shows its
-/// error. Where there is nothing but plain RK4, its longest step.
-fn quick_rung(ladder: &Ladder) -> usize {
-    usize::from(ladder.rungs.get(1).is_some_and(|second| second.level.is_capped()))
+/// Returns the place of the level of quick answers: the second, at which most rows are done. With
+/// nothing capped, the first.
+fn quick_place(levels: &RefinementLevels) -> usize {
+    usize::from(levels.levels.get(1).is_some_and(|second| second.level.is_capped()))
 }
 
-/// The motion of one model at a point by a rung of its ladder, or by the quick one, every `every_s`
-/// from 0 to the end.
+/// Integrates the motion of one model at a point at a refinement level, or at the quick one, every
+/// `every_s` from 0 to the end.
 ///
 /// # Errors
 /// [`NoPoint`].
@@ -211,14 +215,14 @@ pub fn motion(
     setup: &Setup,
     values: &[f64],
     model: ModelKind,
-    rung: Option<usize>,
+    place: Option<usize>,
     every_s: f64,
 ) -> Result<PointHistory, NoPoint> {
-    let point = ready(setup, values)?;
-    let ladder = &ladders(setup, values)[model as usize];
-    let rung = rung.and_then(|rung| ladder.rungs.get(rung));
-    let rung = rung.unwrap_or(&ladder.rungs[quick_rung(ladder)]);
-    let history = history(model, &rung.method, &point, &Start::default(), every_s);
+    let point = ready_point(setup, values)?;
+    let levels = &refinement_levels(setup, values)[model as usize];
+    let level = place.and_then(|place| levels.levels.get(place));
+    let level = level.unwrap_or(&levels.levels[quick_place(levels)]);
+    let history = history(model, &level.method, &point, &Start::default(), every_s);
     let instants = (0..history.len()).filter_map(|k| history.instant(k));
     let (channels, gaps_m) = instants.map(|instant| (instant.channels, instant.gap_m)).unzip();
     Ok(PointHistory { failure: history.failure, channels, gaps_m })
@@ -235,7 +239,7 @@ pub fn growth(
     values: &[f64],
     speeds_rpm: &[f64],
 ) -> Result<Vec<Option<(Disturbance, bool)>>, NoPoint> {
-    let point = ready(setup, values)?;
+    let point = ready_point(setup, values)?;
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
     let told = |first: &Response| (first.disturbance(), first.is_on_curve);
@@ -249,7 +253,7 @@ pub fn growth(
 /// # Errors
 /// [`NoPoint`].
 pub fn dwell(setup: &Setup, values: &[f64], speeds_rpm: &[f64]) -> Result<Option<Dwelt>, NoPoint> {
-    let point = ready(setup, values)?;
+    let point = ready_point(setup, values)?;
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
     let carried = vec![None; dwells.len()];

@@ -3,9 +3,9 @@
 use lane_ode::Tolerance;
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    Channel, ElementList, Gear, Geared, Machine, Method, MethodNumbers, Parameter, Profile, Spin,
+    Channel, ElementList, Machine, Method, MethodNumbers, Parameter, Profile, Spin,
 };
-use washer_row::{Convergence, Criterion, Ladder, Level, Measures, Metric, Rule, Rung};
+use washer_row::{Criterion, Level, Measures, Metric, RefinementLevel, RefinementLevels, Rule};
 
 use crate::numbers::Walk;
 
@@ -22,11 +22,11 @@ pub struct Setup {
     pub rule: Rule,
     /// What a point gives values.
     pub sliders: Sliders,
-    /// Rungs of the nonlinear and of the linear model while only axes move. What holds the quick
-    /// ones back, in words, does not go with the numbers.
-    pub ladders: [Ladder; 2],
+    /// The refinement levels of the nonlinear and of the linear model while only axes move. Their
+    /// notes do not go with the numbers.
+    pub levels: [RefinementLevels; 2],
     /// The same while any slider may be anywhere in its range.
-    pub wide_ladders: [Ladder; 2],
+    pub wide_levels: [RefinementLevels; 2],
 }
 
 /// The parameters that a point gives values.
@@ -50,7 +50,8 @@ impl Setup {
 
     /// From [`Self::to_numbers`]; `None` from anything else.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
-        let ladders = [0, 1].map(|_| Ladder::direct(Level::Rk4, Method::of(Level::Rk4)));
+        let direct = || RefinementLevels::direct(Level::Rk4, Method::of(Level::Rk4));
+        let levels = [0, 1].map(|_| direct());
         let mut setup = Self {
             machine: Machine::paper(),
             spin: Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() },
@@ -64,8 +65,8 @@ impl Setup {
                 measures: Measures::default(),
             },
             sliders: Sliders { parameters: Vec::new(), axes: 0 },
-            wide_ladders: ladders.clone(),
-            ladders,
+            wide_levels: levels.clone(),
+            levels,
         };
         setup.walk(&mut Walk::Read(numbers))?;
         Some(setup)
@@ -102,8 +103,8 @@ impl Setup {
         measures.dampers = machine.dampers.len();
         walk.choices(&mut self.sliders.parameters, &parameters)?;
         self.sliders.axes = walk.count(self.sliders.axes)?;
-        let mut ladders = self.ladders.iter_mut().chain(&mut self.wide_ladders);
-        ladders.try_for_each(|ladder| walk_ladder(walk, ladder))
+        let mut all = self.levels.iter_mut().chain(&mut self.wide_levels);
+        all.try_for_each(|levels| walk_levels(walk, levels))
     }
 }
 
@@ -135,33 +136,29 @@ fn walk_rule(walk: &mut Walk<'_>, rule: &mut Rule) -> Option<()> {
     walk.choices(&mut measures.metrics, &Metric::ALL)
 }
 
-/// At least two rungs, and the place of the one that the others are checked by.
-fn walk_ladder(walk: &mut Walk<'_>, ladder: &mut Ladder) -> Option<()> {
-    let mut rungs = ladder.rungs.clone();
-    walk.sized(&mut rungs, &ladder.rungs[0])?;
-    let reference = walk.count(ladder.reference().unwrap_or(0))?;
-    rungs.iter_mut().try_for_each(|rung| walk_rung(walk, rung))?;
-    let finer = (1..rungs.len()).contains(&reference).then(|| rungs.split_off(reference + 1))?;
-    *ladder = Ladder::checked(rungs, None).with_finer(finer);
+/// Reads or writes at least two levels.
+fn walk_levels(walk: &mut Walk<'_>, levels: &mut RefinementLevels) -> Option<()> {
+    let mut list = levels.levels.clone();
+    walk.sized(&mut list, &levels.levels[0])?;
+    list.iter_mut().try_for_each(|level| walk_level(walk, level))?;
+    if list.len() < 2 {
+        return None;
+    }
+    *levels = RefinementLevels::checked(list, None);
     Some(())
 }
 
-fn walk_rung(walk: &mut Walk<'_>, rung: &mut Rung) -> Option<()> {
-    walk.choice(&mut rung.level, &Level::ALL)?;
-    let Convergence { contraction, of_caps, of_earlier, believed_to, own_error, expected } =
-        &mut rung.convergence;
-    walk.numbers([contraction, of_caps, of_earlier, believed_to, own_error, expected])?;
-    walk.numbers(rung.left_out.each_mut())?;
+fn walk_level(walk: &mut Walk<'_>, level: &mut RefinementLevel) -> Option<()> {
+    walk.choice(&mut level.level, &Level::ALL)?;
     if walk.is_reading() {
-        rung.method = Method::of(rung.level);
+        level.method = Method::of(level.level);
     }
-    match rung.method.numbers() {
+    match level.method.numbers() {
         MethodNumbers::Step(step_s) => walk.numbers([step_s]),
-        MethodNumbers::Gears(Geared { gears }) => gears.iter_mut().try_for_each(|gear| {
-            let Gear { up_to_rad_per_s, step_s, caps } = gear;
-            walk.numbers([up_to_rad_per_s, step_s, &mut caps.bearings_rad_per_s])?;
+        MethodNumbers::Capped(step_s, caps) => {
+            walk.numbers([step_s, &mut caps.bearings_rad_per_s])?;
             walk.optional(&mut caps.hinge_rad_per_s)
-        }),
+        }
         MethodNumbers::Tolerance(Tolerance { relative, absolute, max_steps }) => {
             let mut steps = *max_steps as f64;
             walk.numbers([relative, absolute, &mut steps])?;

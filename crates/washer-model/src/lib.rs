@@ -63,7 +63,6 @@ pub mod bench;
 mod channel;
 mod coordinates;
 mod dwell;
-mod fast;
 mod kind;
 mod lanes;
 mod linear;
@@ -74,12 +73,11 @@ mod point;
 mod ready;
 mod run;
 mod stability;
+mod steps;
 
 pub use channel::Channel;
 pub use coordinates::COORDINATES;
 pub use dwell::{Ending, Endings, Exponent, Settled, Starts, State, endings, endings_beside};
-pub use fast::Cases;
-pub use fast::geared::{Formula, Gear, Geared};
 pub use kind::ModelKind;
 pub use linear::Matrices;
 pub use machine::parameters::{
@@ -97,7 +95,7 @@ pub use modes::shape::{Motion, Movement, Plane};
 pub use modes::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
 pub use nonlinear::coupling::Caps;
 pub use point::friction::FrictionSpeed;
-pub use point::ringing::Swing;
+pub use point::ringing::{LeftOut, Swing};
 pub use point::{NoEquilibrium, Point, Timing};
 pub use ready::prepare;
 pub use run::equations::{Equations, STATE_LEN};
@@ -111,6 +109,8 @@ pub use stability::{
     Beyond, Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant,
     Response, Responses, cross, exact_motions, peaks_without_departures, respond,
 };
+pub use steps::formula::Formula;
+pub use steps::{StepSelector, capped_method};
 
 #[cfg(test)]
 mod tests;

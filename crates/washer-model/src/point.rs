@@ -13,11 +13,11 @@ use crate::machine::spin::{SpinState, SpinStretch, stretch_at};
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, MovingCoordinates};
-use crate::point::ringing::{Decaying, Jump, Ringing, jumps};
-use crate::{COORDINATES, FrictionSpeed, Machine, Matrices, ModelKind, Spin, Swing};
+use crate::point::ringing::{Ringing, jumps_rad_per_s2};
+use crate::{COORDINATES, FrictionSpeed, LeftOut, Machine, Matrices, ModelKind, Spin, Swing};
 use core::iter::zip;
 use lane_ode::{Kernel, Lane, N, Simd};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// When a trajectory ends, and when its amplitudes are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,10 +73,6 @@ pub struct Point {
     pub(crate) stretches: Arc<[SpinStretch]>,
     pub(crate) legs: Arc<[PlannedLeg]>,
     pub(crate) ringing: Ringing,
-    /// The same by modes, of hinge and bearings, once it was asked for.
-    pub(crate) ringing_by_modes: OnceLock<Option<[Decaying; 2]>>,
-    /// Of the drum's acceleration, until the run ends.
-    pub(crate) jumps: Arc<[Jump]>,
     /// By how much the nonlinear model starts beside its equilibrium, in every coordinate (m, rad).
     pub(crate) nudge: f64,
     /// When all outputs are recorded, if they are (s).
@@ -113,19 +109,10 @@ impl Point {
         -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[TUB_Y])).0
     }
 
-    /// A bound on what steps leave out of the swing of hinge and bearings after all jumps of the
-    /// drum's acceleration: these shares of each. Steps longer than their periods leave all of it
-    /// out.
-    pub fn ringing(&self, left_out: [f64; 2]) -> Swing {
-        let ringing = self.ringing.share(left_out);
-        Swing { channels: ringing.channels(), gap_m: ringing.gap_m() }
-    }
-
-    /// How far each channel (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) is
-    /// where it is because the weight of drum and unbalance bends the hinge. Seen from the shaft
-    /// that bend turns backwards, where a cap on the hinge is not exact.
-    pub fn hinge_sag(&self) -> [f64; CHANNELS] {
-        self.ringing.sag()
+    /// Returns a bound on the swing of hinge and bearings after all jumps of the drum's
+    /// acceleration, which steps longer than their periods leave out.
+    pub fn ringing(&self, left_out: LeftOut) -> Swing {
+        self.ringing.swing(left_out)
     }
 
     /// The same point, started 1e-10 (m, rad) beside its equilibrium in every coordinate of the
@@ -267,9 +254,7 @@ impl Kernel for Prepare<'_> {
                 let ((coefficients, linear), (linear_outputs, steepest)) = model;
                 let steepest = steepest.map(|tangents| Box::new(linear.with_tub(tangents)));
                 ready.push(Ok(Point {
-                    ringing: Ringing::new(machine, ringing::sum_rad_per_s2(&course.jumps)),
-                    ringing_by_modes: OnceLock::new(),
-                    jumps: course.jumps,
+                    ringing: Ringing::new(machine, course.jumps_rad_per_s2),
                     nudge: 0.0,
                     instants_s: [].into(),
                     machine: coefficients,
@@ -319,7 +304,8 @@ fn steepest<T: Lane>(
 struct Course {
     stretches: Arc<[SpinStretch]>,
     legs: Arc<[PlannedLeg]>,
-    jumps: Arc<[Jump]>,
+    /// All jumps of the drum's acceleration, added.
+    jumps_rad_per_s2: f64,
 }
 
 /// One per point. Neighbours with the same spin share it, because a table may have thousands of
@@ -330,9 +316,9 @@ fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<Course> {
         let shared = if k > 0 && points[k - 1].1 == *spin { courses.last().cloned() } else { None };
         courses.push(shared.unwrap_or_else(|| {
             let stretches = spin.stretches();
-            let jumps = jumps(&stretches, timing.end_s).into();
+            let jumps_rad_per_s2 = jumps_rad_per_s2(&stretches, timing.end_s);
             let legs = legs(&stretches, timing).into();
-            Course { legs, jumps, stretches: stretches.into() }
+            Course { legs, jumps_rad_per_s2, stretches: stretches.into() }
         }));
     }
     courses

@@ -9,12 +9,12 @@
 //! Friction that moves more slowly than 4 v_s / pi is viscous by its own law, with F / v_s. That is
 //! the least speed: a damper that the drum cannot move against its friction is taken at it.
 
-use crate::fast::to_bits;
 use crate::modes::fastest_rigid_rad_per_s;
 use crate::point::{self, legs};
+use crate::steps::to_bits;
 use crate::{
-    Caps, FrictionSpeed, Gauge, Geared, Machine, Method, ModelKind, NoEquilibrium, Point,
-    Recorders, Spin, Timing, simulate_with,
+    Caps, FrictionSpeed, Gauge, Machine, Method, ModelKind, NoEquilibrium, Point, Recorders, Spin,
+    Timing, simulate_with,
 };
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
@@ -179,7 +179,7 @@ pub fn prepare(
             let step_s = alike[0].step_s;
             let cap = STEP_TIMES_CAP * RK4_STABILITY_LIMIT / step_s;
             let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
-            let method = Method::Geared(Geared::steady(step_s, caps));
+            let method = Method::Capped { step_s, caps };
             let runs: Vec<&Point> = alike.iter().map(|one| &one.point).collect();
             let simd = simd.narrowed(runs.len());
             let (_, extras) = simulate_with(simd, ModelKind::Linear, &method, &runs, wanted);

@@ -43,8 +43,6 @@ pub type Course = Vec<Waypoint>;
 pub struct Waypoint {
     /// Coordinates (m, rad).
     pub coordinates: [f64; COORDINATES],
-    /// Greatest distance so far of the drum's front centre from the tub's axis (m).
-    pub radial_m: f64,
 }
 
 /// The record of one trajectory.
@@ -191,8 +189,7 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
         let point = self.points[state.point];
         if let Some(course) = self.courses.get_mut(state.point) {
             let coordinates = core::array::from_fn(|i| x[i].0.get(lane));
-            let [radial_squared] = self.radial.lane(lane);
-            course.push(Waypoint { coordinates, radial_m: radial_squared.sqrt() });
+            course.push(Waypoint { coordinates });
         }
         if failure.is_none() && state.leg + 1 < point.legs.len() {
             state.leg += 1;

@@ -5,6 +5,13 @@ use washer_model::{Channel, Gauge, Reading, Recorders};
 
 use crate::outcome::{Deviations, Outcome};
 
+/// The greatest deviation of a machine at rest, as a share of the clearance between drum and tub
+/// (angles: of the clearance over a lever of one metre).
+///
+/// Basis: rounding of an equilibrium leaves some 1e-15 of the clearance, and no machine feels a
+/// billionth of it. Doubling it is without effect.
+pub(crate) const REST_SHARE: f64 = 1e-9;
+
 /// Deviations below this count as this (m, rad) where turns are compared: neither 0 over 0 nor what
 /// no machine feels decides.
 pub(crate) const TURN_FLOOR: f64 = 1e-5;
@@ -112,6 +119,17 @@ impl Metric {
         column(self.name(), if self.is_of_model() { model } else { "" }, self.facts().unit)
     }
 
+    /// Returns the scale that differences of the metric are measured against where its value is
+    /// less, in the metric's unit.
+    pub fn scale(self, window_s: [f64; 2], weight_n: f64) -> f64 {
+        match self.facts().scale {
+            Scale::Value => 0.0,
+            Scale::Window => window_s[1] - window_s[0],
+            Scale::Weight => weight_n,
+            Scale::Creeping => CREEPING_M_PER_S,
+        }
+    }
+
     /// What there is to say of it.
     pub const fn facts(self) -> Facts {
         match self {
@@ -124,10 +142,9 @@ impl Metric {
             },
             Self::ClashTime => Facts {
                 unit: "s",
-                description: "time in the window with a gap between drum and tub below zero",
-                floor: Floor::PartOfWindow,
-                // Of the gap, which the hinge bends.
-                left: Left::OfCaps,
+                description: "time in the window with a gap between drum and tub below zero; its error is \
+                              a share of the window",
+                scale: Scale::Window,
                 ..PLAIN
             },
             Self::StaticSag => Facts {
@@ -147,7 +164,7 @@ impl Metric {
                     "greatest push of the stop in the window; the linear model has its tangent at \
                      equilibrium, next to nothing while it is open",
                 ]),
-                floor: Floor::PartOfWeight,
+                scale: Scale::Weight,
                 ..PLAIN
             },
             Self::StopContact => Facts {
@@ -155,7 +172,7 @@ impl Metric {
                 description: "longest time in the window for which any one stop is closed",
                 part: Some(Part::Stop),
                 of_each: Some(["contact", "time in the window for which the stop is closed"]),
-                floor: Floor::PartOfWindow,
+                scale: Scale::Window,
                 ..PLAIN
             },
             Self::FootLoad => Facts {
@@ -195,10 +212,7 @@ impl Metric {
                               `friction_linear_speed_m_per_s` should be near",
                 part: Some(Part::Damper),
                 of_each: Some(["speed", "greatest speed along the damper in the window"]),
-                floor: Floor::Creeping,
-                // What capped modes ring is more of a speed than of a motion, by their frequency
-                // over the drum's, and is hardly less at the next cap: 0.54 of it was seen.
-                left: Left::All,
+                scale: Scale::Creeping,
                 ..PLAIN
             },
             // Each channel has a column of its own, in its unit.
@@ -229,31 +243,17 @@ named! {
     }
 }
 
-/// What two values of a metric are compared by where both are less: what no machine feels decides
-/// nothing.
+/// The scale that differences of a metric are measured against where its value is less.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Floor {
-    /// They are compared by themselves.
-    None,
-    /// A part of the window: a clash that just happens is a time that just is not zero.
-    PartOfWindow,
-    /// The weight of what moves: it may pass through zero.
+enum Scale {
+    /// The value itself.
+    Value,
+    /// The window's length.
+    Window,
+    /// The weight of everything that moves.
     Weight,
-    /// A part of that weight: of open stops no more is left than rounding.
-    PartOfWeight,
-    /// Of [`CREEPING_M_PER_S`].
+    /// [`CREEPING_M_PER_S`].
     Creeping,
-}
-
-/// How much of the difference of two runs is left as an error of the finer one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Left {
-    /// As much as of the motion.
-    OfMotion,
-    /// As much as is left by caps, which move it more than the motion.
-    OfCaps,
-    /// All of it.
-    All,
 }
 
 /// What there is to say of a metric, once.
@@ -266,10 +266,8 @@ pub struct Facts {
     pub part: Option<Part>,
     /// In the column of one part, and what that holds; none if parts have no columns.
     of_each: Option<[&'static str; 2]>,
-    /// What differences of it are compared with where it is less.
-    pub floor: Floor,
-    /// How much of a difference is left.
-    pub(crate) left: Left,
+    /// The scale of its differences.
+    scale: Scale,
     /// Which way it is bad: of several parts, the worst stands for all.
     pub worse: Worse,
     /// Up to where it is good, if that has a meaning of its own.
@@ -282,8 +280,7 @@ const PLAIN: Facts = Facts {
     description: "",
     part: None,
     of_each: None,
-    floor: Floor::None,
-    left: Left::OfMotion,
+    scale: Scale::Value,
     worse: Worse::Greater,
     limit: None,
 };
@@ -291,7 +288,7 @@ const PLAIN: Facts = Facts {
 /// What the metrics of the cabinet's stand have in common.
 const OF_FEET: Facts = Facts {
     part: Some(Part::Foot),
-    floor: Floor::Weight,
+    scale: Scale::Weight,
     worse: Worse::Less,
     limit: Some(Limit { value: 0.0, scale: 100.0 }),
     ..PLAIN

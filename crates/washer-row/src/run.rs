@@ -1,4 +1,4 @@
-//! One model's trajectories by one rung, and what a row takes from each.
+//! One model's trajectories at one refinement level, and what a row takes from each.
 
 use lane_ode::{Failure, Simd};
 use sweep_parameter::RatioLimits;
@@ -6,6 +6,7 @@ use washer_model::{
     Channel, Course, Gauge, Method, ModelKind, Point, Reading, Record, Recorders, simulate_until,
 };
 
+use crate::measures::REST_SHARE;
 use crate::{Criterion, Deviations, Measures, Status, Trajectory};
 
 /// What rows take from trajectories, and what they must be good for.
@@ -32,34 +33,33 @@ impl Rule {
     }
 }
 
-/// A trajectory as a rung gave it.
+/// A trajectory at one refinement level.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct RungRun {
+pub struct LevelRun {
     /// What a row takes from it.
     pub trajectory: Trajectory,
     /// Amplitudes by the rule's criterion, of channels that it does not compare too.
     pub amplitudes: Deviations,
     /// The motion at the ends of the run's parts, if anything is compared.
     pub course: Course,
-    /// How far the time of clash may be off for what capped rungs leave out (s).
-    pub clash_doubt_s: Option<f64>,
 }
 
-impl RungRun {
+impl LevelRun {
     /// Nothing but a status.
     pub fn failed(status: Status) -> Self {
         Self { trajectory: Trajectory::failed(status), ..Self::default() }
     }
 
-    fn new(record: &Record, mut extra: Reading, rule: &Rule) -> Self {
+    fn new(record: &Record, mut extra: Reading, rule: &Rule, point: &Point) -> Self {
         let course = std::mem::take(&mut extra.course);
-        let clash_doubt_s = extra.clash_doubt_s;
         let amplitudes = match rule.measures.criterion {
             Criterion::Peak | Criterion::Envelope => record.amplitudes,
             Criterion::Rms => extra.root_mean_squares.unwrap_or(record.amplitudes),
         };
+        let at_rest = REST_SHARE * point.clearance_m();
+        let amplitudes = amplitudes.map(|one| if one < at_rest { 0.0 } else { one });
         let trajectory = trajectory(record, extra, &amplitudes, rule);
-        Self { trajectory, amplitudes, course, clash_doubt_s }
+        Self { trajectory, amplitudes, course }
     }
 }
 
@@ -71,7 +71,7 @@ pub fn runs(
     points: &[&Point],
     rule: &Rule,
     is_stopped: &dyn Fn() -> bool,
-) -> Option<Vec<RungRun>> {
+) -> Option<Vec<LevelRun>> {
     let mut taken = points.iter().flat_map(|point| point.friction_speeds());
     let mut wanted = rule.wanted();
     wanted.gauges[Gauge::DamperSpeed as usize] |=
@@ -82,7 +82,7 @@ pub fn runs(
     let run = |(record, point): (&Record, &&Point)| {
         let extra = extras.next().unwrap_or_default();
         let off = point.friction_speed_off(model, extra.gauge(Gauge::DamperSpeed));
-        let mut run = RungRun::new(record, extra, rule);
+        let mut run = LevelRun::new(record, extra, rule, point);
         run.trajectory.friction_speed_off = off.filter(|_| record.failure.is_none());
         run
     };

@@ -9,7 +9,7 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use rayon::slice::ParallelSlice as _;
 use serde::{Deserialize, Serialize};
 use washer_model::{
-    Cases, Machine, Method, ModelKind, Parameter, Point, Recorders, Snapshot, Spin, Timing,
+    Machine, Method, ModelKind, Parameter, Point, Recorders, Snapshot, Spin, StepSelector, Timing,
     prepare, simulate_until,
 };
 
@@ -138,7 +138,8 @@ impl Problem<'_> {
             let (end_s, machine) = (case.end_s(), case.plan.model.machine.clone());
             let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
             let point = ready(machine, case.spin().clone(), &timing)?;
-            step_s = step_s.min(reference_step_s(&Cases::new([(&point, case.spin())], end_s)));
+            step_s =
+                step_s.min(reference_step_s(&StepSelector::new([(&point, case.spin())], end_s)));
         }
         Ok(Method::Rk4 { step_s })
     }

@@ -19,18 +19,18 @@ use sweep_engine::store::{BATCH_ROWS, Done, Layout, ResultRows};
 use sweep_engine::watch::IncompleteGroups;
 use sweep_engine::{Error, Job, Progress, RunContext, StoreError, threads};
 use sweep_files::panics::{self, lock};
-use washer_row::Ladder;
+use washer_row::RefinementLevels;
 
 /// A plan that is evaluated any number of times. The steps of its method are found once.
 pub struct Evaluator {
     plan: Plan,
-    ladders: Arc<OnceCell<[Ladder; 2]>>,
+    levels: Arc<OnceCell<[RefinementLevels; 2]>>,
 }
 
 impl Evaluator {
     /// An evaluator of this plan.
     pub fn new(plan: Plan) -> Self {
-        Self { plan, ladders: Arc::default() }
+        Self { plan, levels: Arc::default() }
     }
 
     /// The plan.
@@ -67,7 +67,7 @@ impl Evaluator {
 
     fn task<'a>(&'a self, job: Job<'a>) -> Result<Task<'a>, Error> {
         let mut engine = ModelEngine::new(&self.plan)?;
-        engine.ladders = Arc::clone(&self.ladders);
+        engine.levels = Arc::clone(&self.levels);
         Ok(Task { job, engine: Box::new(engine) })
     }
 }

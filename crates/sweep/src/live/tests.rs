@@ -1,4 +1,4 @@
-//! A page's checked points against the program's rows: the same rungs, errors and bits.
+//! A page's checked points against the program's rows: the same levels, errors and bits.
 
 use washer_row::{Criterion, Outcome, Status, Verdict};
 
@@ -121,8 +121,8 @@ fn a_setup_comes_back_from_its_numbers() {
     let (mut setup, _) = setup(&plan, &[]).unwrap();
     let numbers = setup.to_numbers();
     // Words do not go with them.
-    for ladder in setup.ladders.iter_mut().chain(&mut setup.wide_ladders) {
-        assert!(ladder.held_back.take().is_some() || ladder.rungs.len() > 3);
+    for levels in setup.levels.iter_mut().chain(&mut setup.wide_levels) {
+        assert!(levels.note.take().is_some() || levels.levels.len() > 3);
     }
     assert_eq!(Setup::from_numbers(&numbers), Some(setup));
     assert_eq!(Setup::from_numbers(&numbers[..numbers.len() - 1]), None);

@@ -1,9 +1,9 @@
 //! Where trajectories start: beside a periodic response, and kicked off it.
 
 use crate::coordinates::{STATES, TUB, TUB_PITCH, TUB_YAW};
-use crate::fast::SUSPENSION_MODES;
 use crate::modes::shape;
 use crate::stability::rounded;
+use crate::steps::SUSPENSION_MODES;
 use crate::{COORDINATES, Modes, Point};
 
 /// A start is off the periodic response by this share of its greatest coordinate, in each of the

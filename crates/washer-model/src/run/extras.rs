@@ -24,23 +24,21 @@ const SHORTEST_PART_S: f64 = 1e-3;
 pub(crate) struct Instants {
     /// Parts into which they cut a step.
     parts: u32,
-    /// Clearances by which they time a clash.
-    clearances: usize,
 }
 
 impl Instants {
     /// Of steps that are held short by the bearings, or of longer ones.
     pub(crate) const fn of_steps(are_short: bool) -> Self {
-        Self { parts: if are_short { 1 } else { PARTS_OF_A_LONG_STEP }, clearances: 1 }
+        Self { parts: if are_short { 1 } else { PARTS_OF_A_LONG_STEP } }
     }
 
     /// Of a method's steps.
     pub(crate) fn of(method: &Method) -> Self {
         match method {
             Method::Rk4 { .. } => Self::of_steps(true),
-            Method::Geared(geared) => {
-                let parts = (geared.top().step_s / SHORTEST_PART_S).ceil() as u32;
-                Self { parts: parts.clamp(1, PARTS_OF_A_LONG_STEP), clearances: 3 }
+            Method::Capped { step_s, .. } => {
+                let parts = (step_s / SHORTEST_PART_S).ceil() as u32;
+                Self { parts: parts.clamp(1, PARTS_OF_A_LONG_STEP) }
             }
             _ => Self::of_steps(false),
         }
@@ -53,12 +51,8 @@ pub(crate) struct Extras<T> {
     squares: SquareIntegrals<T, CHANNELS>,
     turns: PartPeaks<T, CHANNELS>,
     loads: Option<Loads<T>>,
-    /// With the clearance as it is; where modes are capped, also with less and more, by what
-    /// ringing may add to the gap.
-    clash: [TimeAbove<T>; 3],
-    clearances_squared: [N<T>; 3],
-    /// How many of these are in use.
-    clearances: usize,
+    clash: TimeAbove<T>,
+    clearance_squared: N<T>,
     snapshots: Option<Snapshots<T>>,
     /// Of every point, as far as they have ended.
     pub(crate) found: Vec<Reading>,
@@ -78,16 +72,15 @@ impl<T: Lane> Extras<T> {
         if !wanted.anything() {
             return None;
         }
-        let Instants { parts, clearances } = instants;
+        let Instants { parts } = instants;
         let snapshots = if wanted.snapshots { Some(Snapshots::new(zero)) } else { None };
         Some(Self {
             wanted,
             squares: SquareIntegrals::new(zero),
             turns: PartPeaks::new(zero),
             loads: Loads::new(zero, wanted.gauges, model, point, parts),
-            clash: [TimeAbove::new(zero); 3],
-            clearances_squared: [zero; 3],
-            clearances,
+            clash: TimeAbove::new(zero),
+            clearance_squared: zero,
             snapshots,
             found: vec![Reading::default(); count],
         })
@@ -97,12 +90,8 @@ impl<T: Lane> Extras<T> {
     pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
         self.squares.reset(lane);
         let clearance_m = point.machine.bodies.clearance.0;
-        let swing_m = point.ringing.gap_m();
-        let clearances_m = [clearance_m, (clearance_m - swing_m).max(0.0), clearance_m + swing_m];
-        for (k, clearance_m) in clearances_m.into_iter().enumerate() {
-            self.clash[k].reset(lane);
-            self.clearances_squared[k].0.set(lane, clearance_m * clearance_m);
-        }
+        self.clash.reset(lane);
+        self.clearance_squared.0.set(lane, clearance_m * clearance_m);
         if self.wanted.turns {
             self.turns.reset(lane, &cuts_s(&point.stretches, point.window_s()));
         }
@@ -125,10 +114,9 @@ impl<T: Lane> Extras<T> {
         // Rounding can leave a tiny integral just below zero.
         let mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let wanted = self.wanted;
-        let [clash_s, longer_s, shorter_s] = self.clash.map(|clash| clash.lane(lane));
         let gauges = Gauge::ALL.map(|gauge| match &self.loads {
             _ if !wanted.reads(gauge) => Vec::new(),
-            _ if gauge == Gauge::ClashTime => vec![clash_s],
+            _ if gauge == Gauge::ClashTime => vec![self.clash.lane(lane)],
             Some(loads) => loads.of(gauge, lane, point),
             None => Vec::new(),
         });
@@ -136,8 +124,6 @@ impl<T: Lane> Extras<T> {
             root_mean_squares: wanted.root_mean_squares.then(|| self.squares.lane(lane).map(mean)),
             turns,
             gauges,
-            clash_doubt_s: (wanted.reads(Gauge::ClashTime) && self.clearances > 1)
-                .then_some((longer_s - clash_s).max(clash_s - shorter_s)),
             course: Vec::new(),
             snapshots,
         };
@@ -183,14 +169,11 @@ impl<T: Lane> Aside for Seen<'_, T> {
             snapshots.see(step, (x, dx), channels);
         }
         if wanted.reads(Gauge::ClashTime) {
-            let distance_squared = squared(radial);
-            for k in 0..extras.clearances {
-                let mut overlap = distance_squared;
-                overlap.value -= extras.clearances_squared[k];
-                match step {
-                    Some((_, length_s)) => extras.clash[k].advance(length_s, &overlap, inside),
-                    None => extras.clash[k].begin(&overlap),
-                }
+            let mut overlap = squared(radial);
+            overlap.value -= extras.clearance_squared;
+            match step {
+                Some((_, length_s)) => extras.clash.advance(length_s, &overlap, inside),
+                None => extras.clash.begin(&overlap),
             }
         }
     }

@@ -8,7 +8,7 @@ use crate::coordinates::STATES;
 use crate::nonlinear::coupling::Coupling;
 use crate::point::PlannedLeg;
 use crate::run::model::{Linear, Model, Nonlinear};
-use crate::{Caps, Formula, Geared, ModelKind, Point};
+use crate::{Caps, Formula, ModelKind, Point};
 use lane_ode::{Lane, Leg, N, Task, Tolerance, dop853, dopri5, rk4};
 
 /// How trajectories are integrated.
@@ -19,9 +19,15 @@ pub enum Method {
         /// Longest step.
         step_s: f64,
     },
-    /// An explicit formula on the machine whose bearings and hinge have scaled mass, so that none
-    /// of their modes is faster than a cap (section 4.3 of the model page).
-    Geared(Geared),
+    /// The model's formula ([`Formula::for_model`]) on the machine whose bearings, and hinge if it
+    /// has a cap, have scaled mass, so that none of their modes is faster than a cap (section 4.3
+    /// of the model page).
+    Capped {
+        /// The longest step.
+        step_s: f64,
+        /// The caps.
+        caps: Caps,
+    },
     /// Dormand and Prince's formula of order 8, bearings and hinge as they are. The linear model
     /// takes RK4 in its place.
     Dop853 {
@@ -40,16 +46,22 @@ pub enum Method {
 }
 
 sweep_parameter::named! {
-    /// Which method a row's numbers come from, and which rung if it has several. The position is
-    /// its code in chunk files, so new ones go to the end.
+    /// The method that a row's numbers come from, with its refinement level if modes are capped.
+    /// The position is its code in unfinished files, so new ones go to the end.
     #[derive(Default)]
     pub enum Level {
-        /// The lowest rung that a row may hold: bearings and hinge with capped modes.
-        Fast = "fast",
-        /// The same with less error.
-        Fine = "fine",
-        /// The same with shorter steps and higher caps.
-        Finest = "finest",
+        /// Capped bearing modes, the longest stable steps.
+        Capped0 = "capped_0",
+        /// Capped bearing modes, the second level.
+        Capped1 = "capped_1",
+        /// Capped bearing modes, the third level.
+        Capped2 = "capped_2",
+        /// Capped bearing modes, the fourth level.
+        Capped3 = "capped_3",
+        /// Capped bearing modes, the fifth level.
+        Capped4 = "capped_4",
+        /// Capped bearing modes, the shortest steps.
+        Capped5 = "capped_5",
         /// Plain RK4.
         #[default]
         Rk4 = "rk4",
@@ -59,15 +71,19 @@ sweep_parameter::named! {
         Rodas5p = "rodas5p",
         /// The additive method, for forces with corners.
         Additive = "additive",
-        /// Dormand and Prince's formula of order 8, for the same.
+        /// Dormand and Prince's formula of order 8 with nothing capped.
         Dop853 = "dop853",
     }
 }
 
 impl Level {
-    /// Whether it is a rung on which modes of bearings and hinge are capped.
-    pub const fn is_capped(self) -> bool {
-        matches!(self, Self::Fast | Self::Fine | Self::Finest)
+    /// The levels with capped bearing modes, coarsest first.
+    pub const CAPPED: [Self; 6] =
+        [Self::Capped0, Self::Capped1, Self::Capped2, Self::Capped3, Self::Capped4, Self::Capped5];
+
+    /// Returns whether modes of the bearings are capped.
+    pub fn is_capped(self) -> bool {
+        Self::CAPPED.contains(&self)
     }
 }
 
@@ -76,8 +92,8 @@ impl Level {
 pub enum MethodNumbers<'a> {
     /// Longest step (s).
     Step(&'a mut f64),
-    /// Steps and caps.
-    Gears(&'a mut Geared),
+    /// Longest step (s) and caps.
+    Capped(&'a mut f64, &'a mut Caps),
     /// Of steps that an adaptive method chooses.
     Tolerance(&'a mut Tolerance),
 }
@@ -95,7 +111,12 @@ impl Method {
         const CAPS: Caps = Caps { bearings_rad_per_s: 0.0, hinge_rad_per_s: None };
         const TOLERANCE: Tolerance = Tolerance { relative: 0.0, absolute: 0.0, max_steps: 0 };
         match level {
-            Level::Fast | Level::Fine | Level::Finest => Self::Geared(Geared::steady(0.0, CAPS)),
+            Level::Capped0
+            | Level::Capped1
+            | Level::Capped2
+            | Level::Capped3
+            | Level::Capped4
+            | Level::Capped5 => Self::Capped { step_s: 0.0, caps: CAPS },
             Level::Rk4 => Self::Rk4 { step_s: 0.0 },
             Level::Dopri5 => Self::Dopri5(TOLERANCE),
             Level::Rodas5p => Self::Rodas5p(TOLERANCE),
@@ -108,7 +129,7 @@ impl Method {
     pub const fn numbers(&mut self) -> MethodNumbers<'_> {
         match self {
             Self::Rk4 { step_s } | Self::Dop853 { step_s } => MethodNumbers::Step(step_s),
-            Self::Geared(geared) => MethodNumbers::Gears(geared),
+            Self::Capped { step_s, caps } => MethodNumbers::Capped(step_s, caps),
             Self::Dopri5(tolerance) | Self::Additive(tolerance) | Self::Rodas5p(tolerance) => {
                 MethodNumbers::Tolerance(tolerance)
             }
@@ -123,10 +144,10 @@ impl Method {
     /// Does something by the integrator of this method.
     pub(crate) fn choose<F: Family, B: ByMethod<F>>(&self, task: B) -> B::Output {
         // A match on the formula would compile both of its arms.
-        const { assert!(F::Geared::FORMULA as u8 == Formula::of(F::KIND) as u8) };
+        const { assert!(F::Capped::FORMULA as u8 == Formula::for_model(F::KIND) as u8) };
         match *self {
             Self::Rk4 { .. } => task.by(ByRk4),
-            Self::Geared(_) | Self::Dop853 { .. } => task.by(F::Geared::NEW),
+            Self::Capped { .. } | Self::Dop853 { .. } => task.by(F::Capped::NEW),
             Self::Dopri5(tolerance) => task.by(ByDopri5(tolerance)),
             Self::Additive(tolerance) => task.by(F::ADDITIVE(tolerance)),
             Self::Rodas5p(tolerance) => task.by_rodas(ByRodas(tolerance)),
@@ -137,7 +158,7 @@ impl Method {
 /// First step that an adaptive method tries.
 const FIRST_STEP_S: f64 = 1e-5;
 
-/// Starts a leg in a lane: with its spin, its step, and its caps if modes are capped.
+/// Starts a leg in a lane with its spin and its step.
 pub(crate) fn enter<T: Lane, M: Model<T>>(
     model: &mut M,
     lane: usize,
@@ -147,12 +168,7 @@ pub(crate) fn enter<T: Lane, M: Model<T>>(
 ) -> Leg {
     model.set_spin(lane, &point.stretches[leg.stretch]);
     let step_s = match method.numbers() {
-        MethodNumbers::Step(step_s) => *step_s,
-        MethodNumbers::Gears(geared) => {
-            let gear = geared.gear(leg.fastest_rad_per_s);
-            model.set_caps(lane, &gear.caps);
-            gear.step_s
-        }
+        MethodNumbers::Step(step_s) | MethodNumbers::Capped(step_s, _) => *step_s,
         MethodNumbers::Tolerance(_) => FIRST_STEP_S,
     };
     Leg { start_s: leg.start_s, end_s: leg.end_s, step_s }
@@ -161,15 +177,15 @@ pub(crate) fn enter<T: Lane, M: Model<T>>(
 /// How bearings and hinge act where a trajectory starts.
 #[inline(always)]
 pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
-    let Method::Geared(geared) = method else { return Coupling::Springs };
-    Coupling::new(zero, Some(&geared.top().caps))
+    let Method::Capped { caps, .. } = method else { return Coupling::Springs };
+    Coupling::new(zero, Some(caps))
 }
 
 /// A model before the lanes' type is known, and what integrates it.
 pub(crate) trait Family {
     type Over<T: Lane>: Model<T>;
-    /// [`Method::Geared`] and [`Method::Dop853`], by the model's formula.
-    type Geared: Fixed;
+    /// [`Method::Capped`] and [`Method::Dop853`], by the model's formula.
+    type Capped: Fixed;
     /// [`Method::Additive`].
     type Additive: Stepper;
     const ADDITIVE: fn(Tolerance) -> Self::Additive;
@@ -180,14 +196,14 @@ pub(crate) enum OfNonlinear {}
 pub(crate) enum OfLinear {}
 impl Family for OfNonlinear {
     type Over<T: Lane> = Nonlinear<T>;
-    type Geared = ByDop853;
+    type Capped = ByDop853;
     type Additive = ByAdditive;
     const ADDITIVE: fn(Tolerance) -> ByAdditive = ByAdditive;
     const KIND: ModelKind = ModelKind::Nonlinear;
 }
 impl Family for OfLinear {
     type Over<T: Lane> = Linear<T>;
-    type Geared = ByRk4;
+    type Capped = ByRk4;
     type Additive = ByDopri5;
     const ADDITIVE: fn(Tolerance) -> ByDopri5 = ByDopri5;
     const KIND: ModelKind = ModelKind::Linear;
@@ -197,7 +213,7 @@ pub(crate) trait Stepper {
     fn integrate<T: Lane, P: Task<T, STATES, System: Model<T>>>(self, zero: T, task: &mut P);
 }
 
-/// One of fixed steps, as gears have it.
+/// A stepper of fixed steps.
 pub(crate) trait Fixed: Stepper {
     const NEW: Self;
     const FORMULA: Formula;

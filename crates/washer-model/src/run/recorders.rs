@@ -34,10 +34,6 @@ pub struct Reading {
     pub turns: Vec<[f64; CHANNELS]>,
     /// By [`Gauge`]: of each part in the machine's order, or the only one; empty unless asked for.
     pub gauges: [Vec<f64>; Gauge::ALL.len()],
-    /// By how much more or less the time of clash would be, with the gap off by as much as ringing
-    /// can make it (s). Where drum and tub only just touch, it is much of the time itself. Absent
-    /// where modes are not capped, because such runs follow the ringing.
-    pub clash_doubt_s: Option<f64>,
     /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed.
     /// Empty unless asked for.
     pub course: Course,

@@ -9,11 +9,11 @@ use super::search::{Solve, finish, missing};
 use super::settings::{Case, Settings};
 use super::{Beyond, Dwell, Kind, NoAnswer, Response, rounded};
 use crate::coordinates::{COORDINATES, STATES};
-use crate::fast::SUSPENSION_MODES;
 use crate::modes::modes;
 use crate::point::Point;
 use crate::run::model::{Model, Nonlinear};
 use crate::run::suspension::attachments;
+use crate::steps::SUSPENSION_MODES;
 use core::f64::consts::TAU;
 use faer::{Mat, c64};
 

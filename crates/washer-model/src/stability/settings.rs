@@ -4,10 +4,10 @@ use super::NoAnswer;
 use super::monodromy::{INSTANTS, INSTANTS_AT_CORNERS};
 use super::orbit::{Row, caps};
 use crate::coordinates::COORDINATES;
-use crate::fast::{HINGE_TO_DRUM, SUSPENSION_MODES, hinge_shift};
-use crate::modes::{Modes, highest_frequency_rad_per_s, modes, motions};
-use crate::nonlinear::coupling::Caps;
+use crate::modes::{Mode, Modes, highest_frequency_rad_per_s, modes, motions};
+use crate::nonlinear::coupling::{BACKWARD_SHARE, Caps};
 use crate::point::Point;
+use crate::steps::{HINGE_TO_DRUM, SUSPENSION_MODES};
 use core::f64::consts::TAU;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -15,6 +15,10 @@ use std::sync::Arc;
 
 /// By how much there are more steps where so many are not enough.
 const MORE_STEPS: f64 = 1.5;
+
+/// The part of a capped hinge's shift that affects motions: its law is exact for motion that turns
+/// with the drum.
+const FREE_SHARE: f64 = 0.1;
 
 /// Step times the fastest mode, where none is capped.
 const PLAIN_PHASE: f64 = 1.0;
@@ -245,7 +249,7 @@ impl<'a> Settings<'a> {
 
     /// As many steps a turn as the suspension's modes ask for in a range of speeds, and caps as
     /// high as these steps allow. Where these would move the suspension's modes, there are more
-    /// steps; where the drum is not slow beside the hinge, there are no caps (`fast.rs`).
+    /// steps; where the drum is not slow beside the hinge, there are no caps.
     fn setting(&mut self, range: i64, care: &Care) -> Result<Setting, NoAnswer> {
         let point = self.point;
         let ends_rpm = [range, range + 1].map(begins_rpm);
@@ -280,6 +284,23 @@ impl<'a> Settings<'a> {
         let [frozen, _] = frozen;
         Ok(Setting { frozen, steps, is_capped })
     }
+}
+
+/// Returns the weighted shift (rad/s) of a suspension mode by the hinge's cap, if it has one, while
+/// the drum turns.
+fn hinge_shift(
+    point: &Point,
+    mode: &Mode,
+    turning_rad_per_s: f64,
+    cap_rad_per_s: Option<f64>,
+) -> f64 {
+    let Some(cap_rad_per_s) = cap_rad_per_s else { return 0.0 };
+    let frequency = mode.magnitude_rad_per_s;
+    let softening =
+        (frequency * frequency - BACKWARD_SHARE * turning_rad_per_s * turning_rad_per_s).abs()
+            + (1.0 - BACKWARD_SHARE) * frequency * turning_rad_per_s;
+    let in_hinge = softening / (cap_rad_per_s * cap_rad_per_s);
+    FREE_SHARE * 0.5 * mode.hinge_share(point) * frequency * in_hinge
 }
 
 /// How far caps move the suspension's modes.

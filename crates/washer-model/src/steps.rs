@@ -1,0 +1,189 @@
+//! Step sizes: the longest stable steps of the explicit formulas, with and without capped bearing
+//! modes.
+//!
+//! Bearings hold an explicit method to steps of some 0.4 ms, though they hardly move. Caps on
+//! their modes (section 4.3 of the model page) leave the hinge as the fastest motion, and steps may
+//! be twenty times as long. The cap follows from the step: the formula's limit of stability,
+//! less a reserve, over the step. Where that is above the bearings' own modes, nothing is capped.
+
+pub(crate) mod formula;
+
+use crate::highest_frequency_rad_per_s;
+use crate::modes::{highest_with_caps, motions};
+use crate::{Caps, Formula, Method, ModelKind, NoModes, Point, Spin};
+
+/// Modes of the suspension: yaw, pitch, two translations.
+pub(crate) const SUSPENSION_MODES: usize = 4;
+
+/// The least ratio of the hinge's frequency to the drum's speed at which modes are capped.
+///
+/// Derived: at drum speeds near (f + f_i) / 3, f being a frequency of the hinge and f_i one of the
+/// suspension, whirls of the hinge grow from the ringing of the bearings, which caps leave out.
+/// The rest is for f_i. Doubling it caps nothing above 600 rpm on the paper's machine.
+pub(crate) const HINGE_TO_DRUM: f64 = 3.2;
+
+/// The product of step and cap as a share of [`Formula::limit`].
+///
+/// The rest is for the hinge, whose modes a cap near them pushes up. Basis: `sweep check` finds the
+/// longest stable step with it; with 0.84 caps are lower and errors larger, with 0.99 steps are
+/// shorter. Doubling it leaves no step stable.
+const CAP_SHARE: f64 = 0.85;
+
+/// Bits of a step's fraction that are kept: the last digits of an eigenvalue depend on the
+/// processor and on the system's mathematical library; a step must not. 1e-6 of the step.
+const STEP_BITS: u32 = 20;
+
+/// Bisections of the interval that holds the longest step: 2^-10 of its logarithm, about 0.6 %.
+const BISECTIONS: usize = 10;
+
+/// The machines of a run with the frequencies that bound their steps.
+pub struct StepSelector<'a> {
+    machines: Vec<Result<Frequencies<'a>, NoModes>>,
+    is_stopped: &'a dyn Fn() -> bool,
+}
+
+/// One machine's frequencies.
+struct Frequencies<'a> {
+    point: &'a Point,
+    /// The greatest speed of the drum.
+    top_rad_per_s: f64,
+    /// The fastest mode of the suspension at rest.
+    suspension_rad_per_s: f64,
+    /// The slower mode of the hinge at rest.
+    hinge_rad_per_s: f64,
+    /// The fastest of all modes, at rest and at the drum's greatest speed.
+    fastest_rad_per_s: f64,
+}
+
+impl<'a> Frequencies<'a> {
+    fn new(point: &'a Point, spin: &Spin, end_s: f64) -> Result<Self, NoModes> {
+        let top_rad_per_s = spin.greatest_speed_rad_per_s(end_s);
+        let at_rest = motions(point, 0.0, None)?;
+        let fastest_at_rest = highest_frequency_rad_per_s(point, 0.0)?;
+        let fastest_at_top = highest_frequency_rad_per_s(point, top_rad_per_s)?;
+        Ok(Self {
+            point,
+            top_rad_per_s,
+            suspension_rad_per_s: at_rest[SUSPENSION_MODES - 1].magnitude_rad_per_s,
+            hinge_rad_per_s: at_rest[SUSPENSION_MODES].magnitude_rad_per_s,
+            fastest_rad_per_s: fastest_at_rest.max(fastest_at_top),
+        })
+    }
+
+    /// Returns whether a capped step is stable, at rest and at the drum's greatest speed.
+    fn is_stable(&self, model: ModelKind, step_s: f64) -> Result<bool, NoModes> {
+        let caps = caps(model, step_s);
+        let limit = Formula::for_model(model).limit();
+        for speed_rad_per_s in [self.top_rad_per_s, 0.0] {
+            let highest = highest_with_caps(self.point, model, speed_rad_per_s, Some(&caps))?;
+            if step_s * highest > limit {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// Returns the bearings' cap for a step; the hinge has none.
+fn caps(model: ModelKind, step_s: f64) -> Caps {
+    let bearings_rad_per_s = CAP_SHARE * Formula::for_model(model).limit() / step_s;
+    Caps { bearings_rad_per_s, hinge_rad_per_s: None }
+}
+
+/// Returns the method that integrates a model in these steps with capped bearing modes.
+pub fn capped_method(model: ModelKind, step_s: f64) -> Method {
+    Method::Capped { step_s, caps: caps(model, step_s) }
+}
+
+impl<'a> StepSelector<'a> {
+    /// Creates a selector for points with their spins, which last until `end_s`.
+    pub fn new(points: impl IntoIterator<Item = (&'a Point, &'a Spin)>, end_s: f64) -> Self {
+        Self::until(points, end_s, &|| false)
+    }
+
+    /// Creates a selector that asks `is_stopped` before it finds a machine's eigenvalues.
+    ///
+    /// Once `is_stopped` returns true, the selector's answers mean nothing.
+    pub fn until(
+        points: impl IntoIterator<Item = (&'a Point, &'a Spin)>,
+        end_s: f64,
+        is_stopped: &'a dyn Fn() -> bool,
+    ) -> Self {
+        let points = points.into_iter().take_while(|_| !is_stopped());
+        let machines = points.map(|(point, spin)| Frequencies::new(point, spin, end_s)).collect();
+        Self { machines, is_stopped }
+    }
+
+    /// Returns the longest step (s) at which a formula is stable at all points with nothing
+    /// capped; `None` if there are no points. Machines without modes are left out.
+    pub fn plain_step_s(&self, formula: Formula) -> Option<f64> {
+        let machines = self.machines.iter().flatten();
+        let steps = machines.map(|machine| formula.limit() / machine.fastest_rad_per_s);
+        steps.reduce(f64::min).map(rounded_down)
+    }
+
+    /// Returns the longest stable step (s) of a model's formula with nothing capped.
+    pub fn uncapped_step_s(&self, model: ModelKind) -> Option<f64> {
+        self.plain_step_s(Formula::for_model(model))
+    }
+
+    /// Returns whether some machine's forces have corners: friction and stops. There errors do not
+    /// shrink with the step by the order of a formula.
+    pub fn are_nonsmooth(&self) -> bool {
+        let mut machines = self.machines.iter().flatten();
+        machines.any(|machine| machine.point.machine.elements.are_nonsmooth())
+    }
+
+    /// Returns the longest stable step (s) of a model's formula with capped bearing modes, over all
+    /// points; `None` if it is not longer than the uncapped one, or if the search was stopped.
+    ///
+    /// # Errors
+    /// [`NoModes`] of a machine that has none.
+    pub fn capped_step_s(&self, model: ModelKind) -> Result<Option<f64>, NoModes> {
+        let Some(uncapped_s) = self.uncapped_step_s(model) else { return Ok(None) };
+        let mut machines = Vec::with_capacity(self.machines.len());
+        for machine in &self.machines {
+            machines.push(machine.as_ref().map_err(|none| *none)?);
+        }
+        let is_whirling = |machine: &&Frequencies<'_>| {
+            machine.hinge_rad_per_s < HINGE_TO_DRUM * machine.top_rad_per_s
+        };
+        if machines.iter().any(is_whirling) {
+            return Ok(None);
+        }
+        let slowest = |fastest: f64, machine: &&Frequencies<'_>| {
+            fastest.max(machine.suspension_rad_per_s).max(machine.top_rad_per_s)
+        };
+        let followed_rad_per_s = machines.iter().fold(0.0, slowest);
+        let mut stable_s = uncapped_s;
+        let mut unstable_s = Formula::for_model(model).limit() / followed_rad_per_s;
+        for _ in 0..BISECTIONS {
+            let between_s = (stable_s * unstable_s).sqrt();
+            let mut is_stable = true;
+            for machine in &machines {
+                if (self.is_stopped)() {
+                    return Ok(None);
+                }
+                is_stable = is_stable && machine.is_stable(model, between_s)?;
+            }
+            if is_stable {
+                stable_s = between_s;
+            } else {
+                unstable_s = between_s;
+            }
+        }
+        Ok((stable_s > uncapped_s).then(|| rounded_down(stable_s)))
+    }
+}
+
+/// Returns a number of few digits. The last digits of an eigenvalue depend on the processor and on
+/// the system's mathematical library; a result must not.
+pub(crate) fn rounded_down(number: f64) -> f64 {
+    to_bits(number, STEP_BITS)
+}
+
+/// Returns a positive number with so many binary digits behind the first; the others are dropped.
+pub(crate) fn to_bits(number: f64, bits: u32) -> f64 {
+    let dropped = f64::MANTISSA_DIGITS - 1 - bits;
+    f64::from_bits(number.to_bits() >> dropped << dropped)
+}

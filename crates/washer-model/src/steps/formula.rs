@@ -1,0 +1,44 @@
+//! The explicit Runge-Kutta formulas that run in fixed steps, and the longest steps they bear.
+
+use crate::ModelKind;
+use lane_ode::dop853::DOP853_STABILITY_LIMIT;
+use lane_ode::rk4::RK4_STABILITY_LIMIT;
+
+/// The part of a formula's limit of stability in use.
+///
+/// Basis: random machines (`examples/differential_test.rs`) stay within their errors. Halving it
+/// doubles the cost of every level.
+const STABILITY_SHARE: f64 = 0.97;
+
+/// An explicit Runge-Kutta formula with a fixed step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Formula {
+    /// The classical formula of order 4.
+    Rk4,
+    /// The formula of order 8 of Dormand and Prince.
+    Dop853,
+}
+
+impl Formula {
+    /// Returns the formula that integrates a model with capped modes.
+    ///
+    /// The linear model spends most of its time in its matrices at every instant that a formula
+    /// asks for: two a step for order 4, eleven for order 8. So order 4 takes less time.
+    pub const fn for_model(model: ModelKind) -> Self {
+        match model {
+            ModelKind::Nonlinear => Self::Dop853,
+            ModelKind::Linear => Self::Rk4,
+        }
+    }
+
+    /// Returns the greatest product of step and frequency (rad) in use.
+    ///
+    /// A share of the limit of stability; the rest is for what eigenvalues about an equilibrium do
+    /// not say of large motions.
+    pub const fn limit(self) -> f64 {
+        match self {
+            Self::Rk4 => STABILITY_SHARE * RK4_STABILITY_LIMIT,
+            Self::Dop853 => STABILITY_SHARE * DOP853_STABILITY_LIMIT,
+        }
+    }
+}

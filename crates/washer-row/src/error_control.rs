@@ -1,0 +1,261 @@
+//! Error control: the refinement levels of a trajectory, and the error of a level.
+//!
+//! A row is integrated at finer and finer levels h_0 > h_1 > ... Let d_k be the greatest relative
+//! difference of the row's numbers between level k and level k - 1. The error of level k is
+//!
+//! ```text
+//! e_k = 2 max(d_k, d_(k-1) / 5)
+//! ```
+//!
+//! and the trajectory is done at the first level where e_k is at most the accuracy. The rule is
+//! Richardson's (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, II.4) without
+//! its extrapolation: the difference of two levels bounds the error of the finer one where the step
+//! shrinks by enough. The second term is for two levels that agree by chance.
+//!
+//! 1. With smooth forces, levels 0 to 5 cap the bearings' modes ([`StepSelector`]). The hinge is as
+//!    it is, and bounds the first step.
+//! 2. Two more levels cap nothing.
+//! 3. With friction and stops, no modes are capped: the first levels are the additive method's at
+//!    falling tolerances, then come three of order 8 at falling steps.
+//! 4. The last two levels resolve the bearings' modes. They are for rows in which bearings that ring
+//!    after a jump of the drum's acceleration matter.
+//!
+//! Levels that leave out the same ringing agree on an error that no difference shows. The static
+//! deflection under the jump bounds it ([`Point::ringing`](washer_model::Point::ringing)), and a
+//! motion whose first difference is beyond the accuracy amplifies it as much. A row goes to the
+//! first level that leaves out no more than the accuracy.
+//!
+//! All numbers that decide `error`, `converged` and `sensitive` stand here, but for the three of
+//! chaos (`separation.rs`), the shares of the limit of stability (`STABILITY_SHARE`, `CAP_SHARE`
+//! and `HINGE_TO_DRUM` beside [`StepSelector`]) and each metric's scale.
+
+use lane_ode::Tolerance;
+use washer_model::{Level, Method, ModelKind, StepSelector, capped_method};
+
+use crate::levels::{RefinementLevel, RefinementLevels};
+
+/// The error of a level over its difference from the level before.
+///
+/// Basis: 2 is the least whole number at which steps may shrink by less than a half from level to
+/// level ([`step_ratio`]). Doubling it doubles every `error`, and sends twice as many rows on.
+const SAFETY_FACTOR: f64 = 2.0;
+
+/// The absolute tolerance (m, rad, m/s, rad/s) of the additive method over the relative one.
+///
+/// Basis: a motion of 2 cm has both alike. Doubling it lengthens the steps of smaller motions.
+const ABSOLUTE_TO_RELATIVE: f64 = 2e-2;
+
+/// The first level's relative tolerance per step at corners, and the ratio from level to level,
+/// in parts of the accuracy.
+///
+/// Basis: `sweeps/friction.toml`, where the error of a trajectory is some ten times its tolerance
+/// per step. Doubling it saves a third of the first level and sends more rows on.
+const TOLERANCE_RATIO: f64 = 0.1;
+
+/// The number of the additive method's levels.
+const ADDITIVE_LEVELS: i32 = 3;
+
+/// The least relative tolerance of the additive method.
+///
+/// Basis: at 1e-6 it takes 22 ms a row of `sweeps/friction.toml`, at 1e-7 40 ms, and order 8 at
+/// [`CORNER_STEP_S`] 31 ms. Doubling it leaves a level out at an accuracy of 1e-3.
+const LEAST_TOLERANCE: f64 = 1e-6;
+
+/// The longest step (s) of order 8 where forces have corners.
+///
+/// Basis: corners are 3 ms wide, and order 8 needs some six steps for one. Doubling it makes the
+/// first of these levels useless: its median error grows from 7e-8 to that of the levels before.
+const CORNER_STEP_S: f64 = 5e-4;
+
+/// The number of levels with nothing capped: of smooth forces, and of order 8 at corners.
+///
+/// Basis: two make one difference, and chaos is told by a perturbed run; corners leave errors of
+/// first order, which a third difference settles. Each further one costs a row that does not
+/// converge as much as all others together.
+const UNCAPPED_LEVELS: [i32; 2] = [2, 3];
+
+/// The first step that resolves the bearings' modes, over the longest stable one.
+///
+/// Basis: order 8 errs by 5e-5 a radian where step times frequency is 1.44 rad, so that ringing
+/// keeps its amplitude over a run. Doubling it damps the ringing away.
+const RESOLVING_SHARE: f64 = 0.25;
+
+/// The steps of an adaptive trajectory between two instants, at most.
+const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
+
+/// The order in which errors shrink with the step where modes are capped: a cap's error is as its
+/// inverse square, and the cap as the inverse step.
+const CAPPED_ORDER: f64 = 2.0;
+
+/// The order where steps cross corners.
+const CORNER_ORDER: f64 = 1.0;
+
+/// The order of the formula of the nonlinear model: no error shrinks faster.
+const GREATEST_ORDER: f64 = 8.0;
+
+/// Returns the ratio of one level's step to the next one's.
+///
+/// Derived: of two levels with errors E and r^-p E the difference is (1 - r^-p) E, and
+/// [`SAFETY_FACTOR`] s times that is at least r^-p E where r^p is at least 1 + 1 / s.
+fn step_ratio(order: f64) -> f64 {
+    (1.0 + 1.0 / SAFETY_FACTOR).powf(1.0 / order)
+}
+
+/// Returns the greatest contraction of the error from one level to the next: a difference that
+/// shrinks by more is chance. 5.06.
+fn greatest_contraction() -> f64 {
+    step_ratio(CAPPED_ORDER).powf(GREATEST_ORDER)
+}
+
+/// Returns the error of a level from its difference and the one before; `None` if there is no
+/// difference, or none that is a number.
+pub(crate) fn error_of_level(differences: &[Option<f64>]) -> Option<f64> {
+    let (last, earlier) = differences.split_last()?;
+    let difference = (*last)?;
+    let before = match earlier.last() {
+        Some(before) => (*before)?,
+        None => 0.0,
+    };
+    let error = SAFETY_FACTOR * difference.max(before / greatest_contraction());
+    error.is_finite().then_some(error)
+}
+
+/// Returns the amplification of what a level leaves out, from the difference of the first two
+/// levels.
+///
+/// A motion that amplifies nothing differs there by less than the accuracy, because the levels are
+/// chosen so; one that differs by more amplifies by at least the quotient.
+pub(crate) fn amplification(first_difference: f64, accuracy: f64) -> f64 {
+    (first_difference / accuracy).max(1.0)
+}
+
+/// Returns the error of a chaotic trajectory from its difference and that of a perturbed run.
+pub(crate) fn error_of_chaos(difference: f64, perturbed: f64) -> Option<f64> {
+    let error = SAFETY_FACTOR * difference.max(perturbed);
+    error.is_finite().then_some(error)
+}
+
+/// Returns the refinement levels of a model for these machines.
+pub fn refinement_levels(
+    steps: &StepSelector<'_>,
+    model: ModelKind,
+    accuracy: f64,
+) -> RefinementLevels {
+    if model == ModelKind::Nonlinear && steps.are_nonsmooth() {
+        return levels_at_corners(steps, accuracy);
+    }
+    let mut levels = Vec::new();
+    let uncapped_s = steps.uncapped_step_s(model).unwrap_or(CORNER_STEP_S);
+    let ratio = step_ratio(CAPPED_ORDER);
+    // A machine without modes has rows that say so.
+    if let Ok(Some(longest_s)) = steps.capped_step_s(model) {
+        let mut step_s = longest_s;
+        for level in Level::CAPPED {
+            if step_s < ratio * uncapped_s {
+                break;
+            }
+            levels.push(RefinementLevel { level, method: capped_method(model, step_s) });
+            step_s /= ratio;
+        }
+    }
+    let mut step_s = uncapped_s;
+    for _ in 0..UNCAPPED_LEVELS[0] {
+        levels.push(uncapped(model, step_s));
+        step_s /= ratio;
+    }
+    push_resolving(&mut levels, model, uncapped_s, step_s, ratio);
+    RefinementLevels::checked(levels, None)
+}
+
+/// Returns the levels of the nonlinear model where friction and stops give forces corners.
+fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevels {
+    let mut levels = Vec::new();
+    for k in 1..=ADDITIVE_LEVELS {
+        let relative = accuracy * TOLERANCE_RATIO.powi(k);
+        // The product of powers of ten may come out a hair below the least.
+        if relative < 0.999 * LEAST_TOLERANCE {
+            break;
+        }
+        let absolute = ABSOLUTE_TO_RELATIVE * relative;
+        let tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
+        let method = Method::Additive(tolerance);
+        levels.push(RefinementLevel { level: Level::Additive, method });
+    }
+    let stable_s = steps.uncapped_step_s(ModelKind::Nonlinear).unwrap_or(CORNER_STEP_S);
+    let mut step_s = CORNER_STEP_S.min(stable_s);
+    for _ in 0..UNCAPPED_LEVELS[1] {
+        levels.push(uncapped(ModelKind::Nonlinear, step_s));
+        step_s /= step_ratio(CORNER_ORDER);
+    }
+    push_resolving(&mut levels, ModelKind::Nonlinear, stable_s, step_s, step_ratio(CAPPED_ORDER));
+    RefinementLevels::checked(levels, Some(AT_CORNERS.to_owned()))
+}
+
+/// Adds two levels whose steps resolve the bearings' modes.
+fn push_resolving(
+    levels: &mut Vec<RefinementLevel>,
+    model: ModelKind,
+    uncapped_s: f64,
+    step_s: f64,
+    ratio: f64,
+) {
+    let mut step_s = (RESOLVING_SHARE * uncapped_s).min(step_s);
+    for _ in 0..2 {
+        levels.push(uncapped(model, step_s));
+        step_s /= ratio;
+    }
+}
+
+/// Returns a level with nothing capped.
+fn uncapped(model: ModelKind, step_s: f64) -> RefinementLevel {
+    match model {
+        ModelKind::Nonlinear => {
+            RefinementLevel { level: Level::Dop853, method: Method::Dop853 { step_s } }
+        }
+        ModelKind::Linear => RefinementLevel { level: Level::Rk4, method: Method::Rk4 { step_s } },
+    }
+}
+
+/// The reason why a machine with friction or stops has no levels with capped modes.
+const AT_CORNERS: &str =
+    "no modes are capped, because friction and stops give forces corners, which shake the hinge";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_level_has_no_error() {
+        assert_eq!(error_of_level(&[]), None);
+    }
+
+    #[test]
+    fn the_error_is_twice_the_difference_and_not_less_than_a_contraction_of_the_one_before() {
+        assert_eq!(error_of_level(&[Some(1e-4)]), Some(2e-4));
+        assert_eq!(error_of_level(&[Some(1e-4), Some(2e-4)]), Some(4e-4));
+        let by_chance = error_of_level(&[Some(1e-2), Some(1e-6)]).unwrap();
+        assert!((by_chance / (2e-2 / 5.0625) - 1.0).abs() < 1e-9, "{by_chance}");
+    }
+
+    #[test]
+    fn levels_that_do_not_compare_leave_no_error() {
+        assert_eq!(error_of_level(&[Some(1e-3), None]), None);
+        assert_eq!(error_of_level(&[None, Some(1e-3)]), None);
+        assert_eq!(error_of_level(&[Some(f64::INFINITY)]), None);
+    }
+
+    /// Levels of any error that shrinks at least as the ratio says are never further off than
+    /// their error says.
+    #[test]
+    fn the_ratio_bounds_errors_of_its_order() {
+        for order in [CAPPED_ORDER, CORNER_ORDER] {
+            let ratio = step_ratio(order);
+            for steeper in [0.0, 0.5, 1.0, 4.0, 8.0] {
+                let error = |level: i32| ratio.powf(-f64::from(level) * (order + steeper));
+                let differences = [1, 2].map(|level| Some(error(level - 1) - error(level)));
+                assert!(error_of_level(&differences[..1]).unwrap() >= 0.999_999 * error(1));
+                assert!(error_of_level(&differences).unwrap() >= 0.999_999 * error(2));
+            }
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Refinement levels: the methods by which a trajectory is integrated, coarsest first.
+
+use washer_model::{Formula, LeftOut, Level, Method, MethodNumbers, ModelKind};
+
+/// One refinement level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RefinementLevel {
+    /// The row's `method`.
+    pub level: Level,
+    /// The integrator with its numbers.
+    pub method: Method,
+}
+
+impl RefinementLevel {
+    /// Returns a line on the level, as one of this model's.
+    pub fn describe(&self, model: ModelKind) -> String {
+        let name = self.level.name();
+        let mut method = self.method;
+        match method.numbers() {
+            MethodNumbers::Capped(step_s, caps) => {
+                let order = match Formula::for_model(model) {
+                    Formula::Rk4 => 4,
+                    Formula::Dop853 => 8,
+                };
+                let cap = caps.bearings_rad_per_s;
+                format!(
+                    "{name} (order {order}, step {:.3} ms, bearings capped at {cap:.0} rad/s)",
+                    1e3 * *step_s
+                )
+            }
+            MethodNumbers::Step(step_s) => format!("{name} (step {:.3} ms)", 1e3 * *step_s),
+            MethodNumbers::Tolerance(tolerance) => {
+                format!("{name} (tolerance {:.0e})", tolerance.relative)
+            }
+        }
+    }
+}
+
+/// The refinement levels of one model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RefinementLevels {
+    /// Coarsest first; at least one.
+    pub levels: Vec<RefinementLevel>,
+    /// Whether each is compared with the one before.
+    is_checked: bool,
+    /// The reason why no modes are capped, if there is one.
+    pub note: Option<String>,
+}
+
+impl RefinementLevels {
+    /// Creates the single level of a method that is compared with nothing.
+    pub fn direct(level: Level, method: Method) -> Self {
+        Self { levels: vec![RefinementLevel { level, method }], is_checked: false, note: None }
+    }
+
+    /// Creates levels that are compared with one another; at least two.
+    pub const fn checked(levels: Vec<RefinementLevel>, note: Option<String>) -> Self {
+        Self { levels, is_checked: true, note }
+    }
+
+    /// Returns whether each level is compared with the one before.
+    pub const fn is_checked(&self) -> bool {
+        self.is_checked
+    }
+
+    /// Returns the place of the first level with nothing capped.
+    pub fn first_uncapped(&self) -> usize {
+        let is_capped = |level: &RefinementLevel| level.level.is_capped();
+        self.levels.iter().take_while(|level| is_capped(level)).count()
+    }
+
+    /// Returns whether the level at a place is another method than the one before: capped modes, the
+    /// additive method and the formulas with nothing capped err by different terms.
+    pub fn begins_family(&self, place: usize) -> bool {
+        let family = |place: usize| {
+            let level = self.levels[place].level;
+            if level.is_capped() { Level::Capped0 } else { level }
+        };
+        place > 0 && family(place) != family(place - 1)
+    }
+
+    /// Returns the place of the first level whose steps resolve the bearings' modes: the last but
+    /// one.
+    pub const fn first_resolving(&self) -> usize {
+        self.levels.len().saturating_sub(2)
+    }
+
+    /// Returns the parts whose ringing a level leaves out.
+    pub fn left_out(&self, place: usize) -> Option<LeftOut> {
+        if self.levels[place].level.is_capped() {
+            Some(LeftOut::HingeAndBearings)
+        } else if place < self.first_resolving() {
+            Some(LeftOut::Bearings)
+        } else {
+            None
+        }
+    }
+
+    /// Returns the place that stands for the perturbed run of a level: the same method from a start
+    /// beside the row's own ([`Point::nudged`](washer_model::Point::nudged)).
+    pub const fn perturbed(&self, place: usize) -> usize {
+        self.levels.len() + place
+    }
+
+    /// Returns whether a place stands for a perturbed run.
+    pub const fn is_perturbed(&self, place: usize) -> bool {
+        place >= self.levels.len()
+    }
+
+    /// Returns the method of a level, or of its perturbed run.
+    pub fn method(&self, place: usize) -> &Method {
+        &self.levels[place % self.levels.len()].method
+    }
+
+    /// Returns the method of the rows that capped modes of this level hold; of a model without that
+    /// level, the finest capped one below it.
+    pub fn capped(&self, level: Level) -> Option<Method> {
+        let is_within = |one: &&RefinementLevel| one.level.is_capped() && one.level <= level;
+        self.levels.iter().rfind(is_within).map(|one| one.method)
+    }
+}

@@ -1,0 +1,314 @@
+//! A row under refinement: both models' trajectories, each at the finest level that it needed so
+//! far.
+
+use washer_model::{LeftOut, ModelKind, Point};
+
+use crate::error_control::{amplification, error_of_chaos, error_of_level};
+use crate::levels::RefinementLevels;
+use crate::measures::{Metric, TURN_FLOOR};
+use crate::outcome::{Outcome, Status, Trajectory};
+use crate::run::{LevelRun, Rule};
+use crate::separation::Separation;
+use crate::verdict::Verdict;
+
+/// The purpose of an outcome, which says how exact it must be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Demand {
+    /// A row: every number within the accuracy, and the verdict.
+    Row,
+    /// The side of the limit on which the ratio is, and the ratio if it is near the limit.
+    Side,
+    /// The growth of disturbances at constant speeds, and nothing of the run.
+    Growth,
+}
+
+/// The rules by which all rows of a run are refined.
+#[derive(Clone, Copy, Debug)]
+pub struct RefinementRule<'a> {
+    /// The levels of both models, in the order of [`ModelKind::ALL`].
+    pub levels: &'a [RefinementLevels; 2],
+    /// The purpose of outcomes.
+    pub demand: Demand,
+    /// The numbers that rows take from trajectories, and their accuracy.
+    pub rule: &'a Rule,
+}
+
+/// One model's trajectory under refinement.
+#[derive(Clone, Debug, Default)]
+struct ModelRefinement {
+    /// The level of `run`.
+    level: usize,
+    /// The finest run, but for a perturbed one.
+    run: Option<LevelRun>,
+    /// The relative difference of each run from the one before; `None` where they do not compare.
+    differences: Vec<Option<f64>>,
+    /// The difference of the first two levels; before it, zero.
+    first_difference: f64,
+    /// The outcome of a perturbed run, once there was one.
+    perturbed: Option<Perturbed>,
+}
+
+/// A perturbed run beside its original.
+#[derive(Clone, Copy, Debug)]
+struct Perturbed {
+    is_chaotic: bool,
+    /// The relative difference of its numbers from the original's; `None` if one of them failed.
+    difference: Option<f64>,
+}
+
+impl ModelRefinement {
+    fn take(
+        &mut self,
+        level: usize,
+        run: LevelRun,
+        point: &Point,
+        with: RefinementRule<'_>,
+        model: usize,
+    ) {
+        let Some(before) = self.run.take() else {
+            self.level = level;
+            self.run = Some(run);
+            return;
+        };
+        let difference = difference(&before.trajectory, &run.trajectory, point, with.rule);
+        if with.levels[model].is_perturbed(level) {
+            let separation = Separation::new(&point.departure(&before.course, &run.course));
+            let is_chaotic = separation.is_exponential();
+            self.perturbed = Some(Perturbed { is_chaotic, difference });
+            self.run = Some(before);
+            return;
+        }
+        // The difference before is of another method's error, which this one need not have.
+        if with.levels[model].begins_family(self.level) {
+            self.differences.clear();
+        }
+        self.differences.push(difference);
+        if self.differences.len() == 1 && self.level == 0 {
+            self.first_difference = difference.unwrap_or(f64::INFINITY);
+        }
+        self.level = level;
+        self.run = Some(run);
+    }
+
+    fn is_chaotic(&self) -> bool {
+        self.perturbed.is_some_and(|perturbed| perturbed.is_chaotic)
+    }
+
+    fn has_failed(&self) -> bool {
+        self.run.as_ref().is_some_and(|run| run.trajectory.status != Status::Ok)
+    }
+
+    /// Returns the error of the finest run; `None` where nothing says how large it is.
+    fn error(&self, point: &Point, with: RefinementRule<'_>, model: usize) -> Option<f64> {
+        if let Some(Perturbed { is_chaotic: true, difference }) = self.perturbed {
+            return error_of_chaos((*self.differences.last()?)?, difference?);
+        }
+        let error = error_of_level(&self.differences)?;
+        Some(error.max(self.ringing(self.level, point, with, model)))
+    }
+
+    /// Returns the ringing that a level leaves out, as a share of the motion and amplified as the
+    /// motion amplifies.
+    fn ringing(&self, level: usize, point: &Point, with: RefinementRule<'_>, model: usize) -> f64 {
+        let Some(run) = &self.run else { return 0.0 };
+        let Some(left_out) = with.levels[model].left_out(level) else { return 0.0 };
+        let swing = point.ringing(left_out);
+        let mut greatest = swing.gap_m / point.clearance_m();
+        for (channel, amplitude) in with.rule.channels.iter().zip(&run.trajectory.amplitudes) {
+            let swing = swing.channels[channel.index()];
+            if swing > 0.0 {
+                greatest = greatest.max(swing / amplitude);
+            }
+        }
+        match left_out {
+            LeftOut::HingeAndBearings => {
+                amplification(self.first_difference, with.rule.accuracy) * greatest
+            }
+            LeftOut::Bearings => greatest,
+        }
+    }
+
+    /// Returns the level to run next, if the error is above the accuracy or `is_in_doubt`; `None`
+    /// if the run is fine enough, or if no further one would help.
+    fn next_level(
+        &self,
+        point: &Point,
+        with: RefinementRule<'_>,
+        model: usize,
+        is_in_doubt: bool,
+    ) -> Option<usize> {
+        let levels = &with.levels[model];
+        if self.run.is_none() {
+            return Some(0);
+        }
+        if !levels.is_checked() || self.is_chaotic() {
+            return None;
+        }
+        let error = self.error(point, with, model);
+        let is_converged = error.is_some_and(|error| error <= with.rule.accuracy);
+        if is_converged && !is_in_doubt {
+            return None;
+        }
+        let accuracy = with.rule.accuracy;
+        let leaves_out_little =
+            |level: &usize| self.ringing(*level, point, with, model) <= accuracy;
+        let is_last = self.level + 1 == levels.levels.len()
+            || self.level + 1 == levels.first_resolving() && leaves_out_little(&self.level);
+        if is_last {
+            // What the finest steps leave in doubt may be chaos, which no step settles.
+            let may_be_chaos = !is_converged && ModelKind::ALL[model] == ModelKind::Nonlinear;
+            let is_asked = may_be_chaos && self.perturbed.is_none();
+            return is_asked.then(|| levels.perturbed(self.level));
+        }
+        let mut next = self.level + 1;
+        // It may be the capped modes that fail.
+        if self.has_failed() {
+            next = next.max(levels.first_uncapped());
+        }
+        // Levels that leave out as much would agree on an error that none shows.
+        (next..levels.levels.len()).find(leaves_out_little)
+    }
+}
+
+/// A row under refinement.
+#[derive(Clone, Debug, Default)]
+pub struct RowRefinement([ModelRefinement; 2]);
+
+/// The next step of a row.
+#[derive(Clone, Debug)]
+pub enum Next {
+    /// Runs to do: positions in [`ModelKind::ALL`] and among that model's levels.
+    Runs(Vec<(usize, usize)>),
+    /// The row is done.
+    Done(Box<Outcome>),
+}
+
+impl RowRefinement {
+    /// Takes a run that [`Self::next`] asked for.
+    pub fn take(
+        &mut self,
+        (model, level): (usize, usize),
+        run: LevelRun,
+        point: &Point,
+        with: RefinementRule<'_>,
+    ) {
+        self.0[model].take(level, run, point, with, model);
+    }
+
+    /// Returns the finest run of a model with its level and its error, once there is one. The error
+    /// is absent where nothing says how large it is.
+    pub fn finest(
+        &self,
+        model: usize,
+        point: &Point,
+        with: RefinementRule<'_>,
+    ) -> Option<(&LevelRun, usize, Option<f64>)> {
+        let refinement = &self.0[model];
+        let error = refinement.error(point, with, model);
+        refinement.run.as_ref().map(|run| (run, refinement.level, error))
+    }
+
+    /// Returns the steps of a model's finest run; none before it.
+    pub fn steps(&self, model: usize) -> u64 {
+        self.0[model].run.as_ref().map_or(0, |run| run.trajectory.steps)
+    }
+
+    /// Returns the next step once every run that was asked for is there. `id` is the outcome's
+    /// point.
+    pub fn next(&self, id: u64, point: &Point, with: RefinementRule<'_>) -> Next {
+        if with.demand == Demand::Growth {
+            return Next::Done(Box::new(Outcome::failed(id, Status::Ok)));
+        }
+        let errors = [0, 1].map(|model| self.0[model].error(point, with, model));
+        let outcome = self.outcome(id, point, with, errors);
+        let margin = outcome.as_ref().and_then(|outcome| margin(outcome, with.rule));
+        let error = errors[0].zip(errors[1]).map(|(nonlinear, linear)| nonlinear + linear);
+        let is_on_its_side = margin.zip(error).is_some_and(|(margin, error)| error < margin);
+        let mut runs = Vec::new();
+        if !(with.demand == Demand::Side && is_on_its_side) {
+            // An error beyond the margin could turn the verdict.
+            let is_in_doubt = margin.is_some() && error.is_some() && !is_on_its_side;
+            for (model, refinement) in self.0.iter().enumerate() {
+                let next = refinement.next_level(point, with, model, is_in_doubt);
+                runs.extend(next.map(|level| (model, level)));
+            }
+        }
+        match outcome {
+            Some(outcome) if runs.is_empty() => Next::Done(Box::new(outcome)),
+            _ => Next::Runs(runs),
+        }
+    }
+
+    /// Returns the row as it is now, once both models have run.
+    fn outcome(
+        &self,
+        id: u64,
+        point: &Point,
+        with: RefinementRule<'_>,
+        errors: [Option<f64>; 2],
+    ) -> Option<Outcome> {
+        let RefinementRule { levels, rule, .. } = with;
+        let [nonlinear, linear] = &self.0;
+        let trajectory = |refinement: &ModelRefinement| {
+            refinement.run.as_ref().map(|run| run.trajectory.clone())
+        };
+        let mut outcome = Outcome::new(id, trajectory(nonlinear)?, trajectory(linear)?);
+        outcome.compare_turns(&rule.channels);
+        outcome.method = levels[0].levels[nonlinear.level].level;
+        if rule.measures.metrics.contains(&Metric::StaticSag) {
+            outcome.static_sag_m = Some(point.static_sag_m());
+        }
+        if levels.iter().all(RefinementLevels::is_checked) {
+            let [of_nonlinear, of_linear] = errors;
+            outcome.error = of_nonlinear.zip(of_linear).map(|(one, other)| one.max(other));
+            outcome.converged = Some(outcome.error.is_some_and(|error| error <= rule.accuracy));
+            // Two levels that agree leave an error by a perturbed run, and no chaos.
+            let last = nonlinear.differences.last().copied().flatten();
+            let disagrees = last.is_none_or(|difference| difference > rule.accuracy);
+            outcome.sensitive = Some(nonlinear.is_chaotic() && disagrees);
+        }
+        Some(outcome)
+    }
+}
+
+/// Returns the distance of the ratios from a limit, as a share of the limit.
+fn margin(outcome: &Outcome, rule: &Rule) -> Option<f64> {
+    let Verdict { least, greatest, .. } = Verdict::new(outcome, rule.channels.len(), rule.limits);
+    Some(rule.limits.margin(least?.1, greatest?.1))
+}
+
+/// Returns the greatest relative difference of what a row takes from two trajectories; `None` if
+/// one of them failed. Of two that failed the times differ, as a share of the run.
+fn difference(a: &Trajectory, b: &Trajectory, point: &Point, rule: &Rule) -> Option<f64> {
+    if a.status != b.status {
+        return None;
+    }
+    if b.status != Status::Ok {
+        let (a_s, b_s) = a.fail_time_s.zip(b.fail_time_s)?;
+        return Some((a_s - b_s).abs() / rule.end_s);
+    }
+    let mut greatest = 0.0_f64;
+    let mut compare = |a: f64, b: f64, scale: f64| {
+        if a != b {
+            let share = (a - b).abs() / b.abs().max(scale);
+            // A quotient that is no number must not pass for none.
+            greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
+        }
+    };
+    for (a, b) in a.amplitudes.iter().zip(&b.amplitudes) {
+        compare(*a, *b, 0.0);
+    }
+    if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
+        compare(a, b, point.clearance_m());
+    }
+    for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(rule.measures.of_model()) {
+        compare(*a, *b, number.metric.scale(rule.window_s, point.weight_n()));
+    }
+    for (a, b) in a.turns.iter().zip(&b.turns) {
+        for channel in &rule.channels {
+            let i = channel.index();
+            compare(a[i], b[i], TURN_FLOOR);
+        }
+    }
+    Some(greatest)
+}
