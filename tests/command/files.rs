@@ -240,7 +240,7 @@ fn kept_traces_are_the_trajectories_of_their_rows() {
     for point in 0..3 {
         let bytes = fs::read(home.path(&format!("x.traces/point-{point}.parquet")));
         let bytes = bytes.expect("the point has a trace");
-        assert!(String::from_utf8_lossy(&bytes).contains(r#""row":"fast""#), "point {point}");
+        assert!(String::from_utf8_lossy(&bytes).contains(r#""row":"capped_1""#), "point {point}");
     }
 }
 

@@ -73,7 +73,7 @@ fn rows(from: u64, to: u64, side: u64, rough: f64) -> RecordBatch {
         ("ratio_max_channel", names(&["tub_yaw", "tub_pitch"], channels)),
         ("reliable", flags(&|point| Some(ratio(point)? < 2.0))),
         ("sensitive", flags(&|point| (!failed(point)).then_some(noise(11 * point) < 0.3 * rough))),
-        ("method", names(&["fast", "fine", "finest", "rk4"], methods)),
+        ("method", names(&["capped_1", "capped_2", "dop853", "rk4"], methods)),
         ("error", numbers(&|point| Some(1e-3 * noise(13 * point)))),
         ("min_gap_nonlinear_m", numbers(&gap)),
         ("min_gap_linear_m", numbers(&gap)),

@@ -166,10 +166,10 @@ pub fn verdict_columns<R: AsRef<Compared>, C: Channel>(
     }
     let rule = format!("{rule}; null where ratio_max is");
     let sensitive = "true where the motion is chaotic, and the row's digits are those of one \
-                     trajectory: plain rk4 does not agree with itself at two steps, and a near \
-                     twin departs exponentially; null where nothing was compared";
-    let error = "greatest relative error left in the row's numbers, from comparing two rungs of \
-                 its method; null where nothing was compared";
+                     trajectory: the finest levels differ by more than the accuracy, and a \
+                     perturbed run separates exponentially; null where nothing was compared";
+    let error = "greatest relative error of the row's numbers, from the differences of its \
+                 method's levels; null where nothing was compared";
     let converged =
         "true where error is within the accuracy asked for; null where nothing was compared";
     columns.extend([

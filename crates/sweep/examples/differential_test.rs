@@ -95,7 +95,7 @@ const ELEMENTS: [(&str, f64, f64); 17] = [
 
 /// What varies in a grid beside the machine's proportions.
 #[derive(Clone, Copy, PartialEq)]
-enum TrialKind {
+pub(crate) enum TrialKind {
     Plain,
     Grazing,
     Elements,
@@ -190,13 +190,13 @@ fn grid(seed: u64) -> String {
 
 /// What was found; counts of rows.
 #[derive(Clone, Debug, Default)]
-struct Found {
-    rows: u64,
-    refused: u64,
+pub(crate) struct Found {
+    pub(crate) rows: u64,
+    pub(crate) refused: u64,
     sensitive: u64,
     /// Sensitive although RK4 at both steps agrees within the accuracy.
     needlessly: u64,
-    unconverged: u64,
+    pub(crate) unconverged: u64,
     /// Unconverged although right.
     doubted: u64,
     failed: u64,
@@ -210,7 +210,7 @@ struct Found {
     by_method: [u64; Level::ALL.len()],
     /// The greatest error as a share of what the row says, by method.
     of_said: [f64; Level::ALL.len()],
-    exceptions: Vec<String>,
+    pub(crate) exceptions: Vec<String>,
 }
 
 impl Found {
@@ -465,9 +465,30 @@ fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
 }
 
 /// Returns a seed that no constant was set by.
-fn seed_from_clock() -> u64 {
+pub(crate) fn seed_from_clock() -> u64 {
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     since.map_or(0, |since| since.as_secs() % 1_000_000)
+}
+
+/// Tries grids of nine rows, from a seed, or the one grid that a seed of its own names.
+pub(crate) fn try_grids(rows: u64, first: u64, kind: TrialKind) -> Found {
+    let name = format!("sweep-differential-test-{}-{}", std::process::id(), kind as u8);
+    let folder = std::env::temp_dir().join(name);
+    std::fs::create_dir_all(&folder).expect("a temporary folder");
+    let grids = rows.div_ceil(9);
+    // A seed of a grid by itself, or so many from the first.
+    let seeds = if first < 1_000_000 {
+        first * 1_000_000..first * 1_000_000 + grids
+    } else {
+        first..first + grids
+    };
+    let found = seeds
+        .into_par_iter()
+        .map(|seed| tried(seed, kind, &folder))
+        .reduce(Found::default, Found::plus);
+    // What is left in the temporary folder harms nobody.
+    let _ = std::fs::remove_dir_all(&folder);
+    found
 }
 
 fn main() -> ExitCode {
@@ -493,22 +514,8 @@ fn main() -> ExitCode {
     // A thread that waits for rows of its grid takes another grid, on the same stack.
     let pool = rayon::ThreadPoolBuilder::new().stack_size(1 << 28).build_global();
     pool.expect("nothing has used the pool");
-    let folder =
-        std::env::temp_dir().join(format!("sweep-differential-test-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a temporary folder");
+    let found = try_grids(rows, first, kind);
     let grids = rows.div_ceil(9);
-    // A seed of a grid by itself, or so many from the first.
-    let seeds = if first < 1_000_000 {
-        first * 1_000_000..first * 1_000_000 + grids
-    } else {
-        first..first + grids
-    };
-    let found = seeds
-        .into_par_iter()
-        .map(|seed| tried(seed, kind, &folder))
-        .reduce(Found::default, Found::plus);
-    // What is left in the temporary folder harms nobody.
-    let _ = std::fs::remove_dir_all(&folder);
     eprintln!("{} rows of {grids} grids ({} refused), seed {first}", found.rows, found.refused);
     eprintln!("  by method {:?}: {:?}", Level::ALL.map(Level::name), found.by_method);
     eprintln!(

@@ -174,9 +174,9 @@ pub struct Outcome {
     pub nonlinear: Trajectory,
     /// The linear model.
     pub linear: Trajectory,
-    /// Which rung of which method the nonlinear model's numbers come from.
+    /// The method and level of the nonlinear model's numbers.
     pub method: Level,
-    /// The relative error left in the row's numbers, at most, as seen by comparing rungs; `None`
+    /// The relative error left in the row's numbers, at most, from the differences of its levels; `None`
     /// where nothing was compared.
     pub error: Option<f64>,
     /// Whether that is within the accuracy asked for. `None` where nothing was compared.

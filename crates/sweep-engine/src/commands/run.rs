@@ -273,7 +273,10 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         text.line("failed", failed);
     }
     if *sensitive > 0 {
-        text.line("sensitive", format!("{sensitive}: chaotic, a near twin departs exponentially"));
+        text.line(
+            "sensitive",
+            format!("{sensitive}: chaotic, a perturbed run separates exponentially"),
+        );
     }
     if *unconverged > 0 {
         let told = format!("all but {unconverged}, whose error is above the accuracy or unknown");
@@ -321,10 +324,10 @@ mod tests {
     #[test]
     fn an_error_that_nothing_has_is_left_out() {
         let greatest_error = Some(Extreme { value: f64::INFINITY, point: 0 });
-        let by_method = [("fast".to_owned(), 1)].into();
+        let by_method = [("capped_1".to_owned(), 1)].into();
         let tally = Tally { points: 1, greatest_error, by_method, ..Tally::default() };
         let said = counts(&tally, 2.0.into(), &|_| String::new());
-        assert!(said.contains("error  rows by method: 1 fast"), "{said}");
+        assert!(said.contains("error  rows by method: 1 capped_1"), "{said}");
     }
 
     #[test]

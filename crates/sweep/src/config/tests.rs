@@ -139,7 +139,7 @@ fn what_is_left_out_has_its_default() {
         method("method = \"rodas5p\"\nrtol = 1e-8"),
         Integrator::Rodas5p { rtol: 1e-8, atol: 1e-9 }
     );
-    assert_eq!(method("accuracy = 1e-5"), Integrator::Rk4MassScaled { accuracy: 1e-5 });
+    assert_eq!(method("accuracy = 1e-4"), Integrator::Rk4MassScaled { accuracy: 1e-4 });
 }
 
 #[test]

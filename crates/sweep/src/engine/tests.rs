@@ -60,15 +60,15 @@ fn a_failed_point_is_a_row_and_leaves_the_others_bits_alone() {
 }
 
 #[test]
-fn rungs_whose_choice_was_cut_short_are_chosen_anew() {
+fn levels_are_found_anew_after_a_stop() {
     let fast = GRID.replace("\"rk4\"", "\"rk4-mass-scaled\"");
     let plan = plan(&fast.replace("[1, 500, 7000]", "[6000, 7000]"));
     let engine = ModelEngine::new(&plan).unwrap();
     let (stopped, calm) = (Interrupt::new(), Interrupt::new());
     stopped.raise(15);
-    assert!(engine.ladders_under(&RunContext::new(&stopped)).is_none());
-    let found = engine.ladders_under(&RunContext::new(&calm)).unwrap();
-    assert_eq!(found, ModelEngine::new(&plan).unwrap().ladders());
+    assert!(engine.levels_under(&RunContext::new(&stopped)).is_none());
+    let found = engine.levels_under(&RunContext::new(&calm)).unwrap();
+    assert_eq!(found, ModelEngine::new(&plan).unwrap().levels());
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::search::{Solve, finish};
 use super::settings::Settings;
 use super::*;
 use crate::coordinates::COORDINATES;
-use crate::fast::SUSPENSION_MODES;
+use crate::steps::SUSPENSION_MODES;
 use crate::tests::reference::reference;
 use crate::{BumpStop, Channel, Machine, Method, ModelKind, Spin, Start, Timing, history, prepare};
 use faer::{Mat, c64};

@@ -2,8 +2,8 @@
 
 use super::instruments::{EVERYTHING, paper, random_machine, random_spin};
 use crate::{
-    Caps, Gear, Geared, Machine, Method, ModelKind, Point, Profile, Reading, Record, Recorders,
-    Spin, Timing, prepare, simulate_until, simulate_with,
+    Caps, Machine, Method, ModelKind, Point, Profile, Reading, Record, Recorders, Spin, Timing,
+    prepare, simulate_until, simulate_with,
 };
 use core::cell::Cell;
 use lane_ode::{STEPS_AT_ONCE, Simd, Tolerance};
@@ -14,15 +14,9 @@ const END_S: f64 = 1.0;
 const TIMING: Timing = Timing { end_s: END_S, window_s: [0.4, 0.9], checkpoints: 8 };
 const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
 const CAPS: Caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: Some(1200.0) };
-/// Two gears, of which spins of all kinds see both.
-const GEARED: Geared = {
-    let mut geared = Geared::steady(1e-3, CAPS);
-    geared.gears[0] = Gear { up_to_rad_per_s: 15.0, step_s: 1.3e-3, caps: CAPS };
-    geared
-};
 const METHODS: [Method; 5] = [
     Method::Rk4 { step_s: 1e-4 },
-    Method::Geared(GEARED),
+    Method::Capped { step_s: 1e-3, caps: CAPS },
     Method::Dop853 { step_s: 4e-4 },
     Method::Dopri5(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
     Method::Additive(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
@@ -56,16 +50,14 @@ fn bits((record, extra): (&Record, &Reading)) -> Vec<u64> {
         root_mean_squares,
         turns,
         gauges,
-        clash_doubt_s,
         course,
         // Compared by `run/snapshots.rs`.
         snapshots: _,
     } = extra;
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
-    let waypoints = course.iter().flat_map(|at| at.coordinates.iter().chain([&at.radial_m]));
+    let waypoints = course.iter().flat_map(|at| at.coordinates.iter());
     bits.extend(waypoints.map(|of| of.to_bits()));
-    let gauges = gauges.iter().flatten().chain(clash_doubt_s);
-    bits.extend(gauges.map(|number| number.to_bits()));
+    bits.extend(gauges.iter().flatten().map(|number| number.to_bits()));
     bits
 }
 
@@ -173,7 +165,7 @@ fn a_leg_is_cut_where_no_bit_shows_it() {
     let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
     let all: Vec<_> = points.iter().collect();
-    let dop853 = Method::Geared(Geared::steady(2e-5, CAPS));
+    let dop853 = Method::Capped { step_s: 2e-5, caps: CAPS };
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853] {
         for model in MODELS {
             let together = simulate_with(simd, model, &method, &all, EVERYTHING);
@@ -198,7 +190,7 @@ fn a_stop_is_answered_within_a_leg_by_every_method() {
         (paper(0.4, 90.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 });
     let point = prepare(Simd::best(), &[scenario], &timing).remove(0).unwrap();
     let tolerance = Tolerance { relative: 1e-9, absolute: 1e-12, max_steps: 1_000_000 };
-    let dop853 = Method::Geared(Geared::steady(2e-5, CAPS));
+    let dop853 = Method::Capped { step_s: 2e-5, caps: CAPS };
     let stiff = Method::Rodas5p(tolerance);
     let adaptive = [Method::Dopri5(tolerance), Method::Additive(tolerance), stiff];
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853].into_iter().chain(adaptive) {

@@ -4,8 +4,8 @@
 use super::instruments::{EVERYTHING, paper};
 use crate::machine::spin::cuts_s;
 use crate::{
-    Caps, Channel, Gauge, Geared, Machine, Method, ModelKind, Point, Profile, Recorders, Spin,
-    Start, Timing, history, prepare, simulate, simulate_with,
+    Caps, Channel, Gauge, Machine, Method, ModelKind, Point, Profile, Recorders, Spin, Start,
+    Timing, history, prepare, simulate, simulate_with,
 };
 use lane_ode::{Simd, Tolerance};
 
@@ -145,7 +145,7 @@ fn methods_whose_steps_lie_elsewhere_find_the_same() {
 fn only_what_is_asked_for_is_there() {
     let point = point();
     let caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: None };
-    let method = Method::Geared(Geared::steady(1e-3, caps));
+    let method = Method::Capped { step_s: 1e-3, caps };
     let run =
         |wanted| simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], wanted);
     assert!(run(Recorders::default()).1.is_empty());

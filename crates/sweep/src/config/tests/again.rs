@@ -10,7 +10,7 @@ name = "again"
 set = { tub_mass_kg = 24.5 }
 spin = { profile = "table", time_s = [0, 10, 50], speed_rpm = [0, 300, 1e2] }
 time = { end_s = 50, window_s = [30, 50] }
-integrator = { accuracy = 1e-5 }
+integrator = { accuracy = 1e-4 }
 reliability = { ratio_limit = 1.5, channels = ["tub_yaw", "tub_pitch"], criterion = "rms" }
 metrics = ["static_sag", "growth"]
 stability = { speed_rpm = "200:240:20" }
