@@ -154,7 +154,6 @@ def files(sweep, folder):
     rows, per_core_s, shares = [], [], []
     methods = {
         "`rk4-mass-scaled`, accuracy 1e-3, checks included": f"run sweeps/{FAST}.toml",
-        "the same, accuracy 1e-6": f"run sweeps/{FAST}.toml --set accuracy=1e-6",
         "`rk4`, step 2e-4 s": f"run sweeps/{PLAIN}.toml",
     }
     for method, words in methods.items():
