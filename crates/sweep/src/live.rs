@@ -31,7 +31,8 @@ const OFFERED: [&str; 6] = [
 /// How far their values go either way, as a share.
 const SPREAD: f64 = 0.3;
 
-/// The greatest number of sliders beside the axes: levels are chosen for every corner of their ranges.
+/// The greatest number of sliders beside the axes: levels are chosen for every corner of their
+/// ranges.
 const MOST_SLIDERS: usize = 6;
 
 /// Time between two instants of a history (s): at 1200 rpm five to a turn.

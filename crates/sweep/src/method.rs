@@ -28,14 +28,15 @@ methods! {
     Dopri5 = "dopri5", "Dormand-Prince 5(4), adaptive" { rtol: RTOL, atol: ATOL } Steps::Explicit;
     Rodas5p = "rodas5p", "Rodas5P, adaptive and linearly implicit: for machines too stiff for the \
                           others" { rtol: RTOL, atol: ATOL } Steps::Implicit;
-    Rk4MassScaled = "rk4-mass-scaled", "the fast method: capped modes of bearings and hinge, in \
-                                        finer and finer runs until two agree" { accuracy: LEVELS_ACCURACY }
-        Steps::Checked(accuracy);
+    Rk4MassScaled = "rk4-mass-scaled", "the fast method: capped modes of the bearings, at finer and \
+                                        finer levels until two agree" {
+        accuracy: LEVELS_ACCURACY
+    } Steps::Checked(accuracy);
 }
 
 impl Integrator {
-    /// What integrates a trajectory, and what a row says of it; `None` where levels of other methods
-    /// are compared. Of those a trace takes the reference, `rk4`.
+    /// What integrates a trajectory, and what a row says of it; `None` where levels of other
+    /// methods are compared. Of those a trace takes the reference, `rk4`.
     pub fn direct(&self) -> Option<(Level, Method)> {
         let level = Level::named(self.name())?;
         let mut method = Method::of(level);

@@ -1,7 +1,8 @@
 //! Random machines of every kind against plain RK4, with a seed from the clock.
 //!
-//! `SEED=7 cargo test --release -p sweep --test random_rows` repeats a run; `ROWS=900` asks for more
-//! rows of each kind. The generator and the promise are those of `examples/differential_test.rs`.
+//! `SEED=7 cargo test --release -p sweep --test random_rows` repeats a run; `ROWS=900` asks for
+//! more rows of each kind. The generator and the promise are those of
+//! `examples/differential_test.rs`.
 
 #[path = "../examples/differential_test.rs"]
 #[allow(dead_code, reason = "the example's own command line")]
@@ -22,7 +23,8 @@ fn holds(kind: TrialKind, greatest_unconverged_share: f64) {
     let rows = from_environment("ROWS").unwrap_or(72);
     let seed = from_environment("SEED").unwrap_or_else(seed_from_clock);
     let found: Found = try_grids(rows, seed, kind);
-    println!("seed {seed}: {found:?}");
+    // `cargo test` shows it of a test that fails.
+    eprintln!("seed {seed}: {found:?}");
     let allowed = 1 + (found.rows / 1000) as usize;
     assert!(found.exceptions.len() <= allowed, "seed {seed}: {:#?}", found.exceptions);
     let unconverged = found.unconverged as f64 / found.rows.max(1) as f64;

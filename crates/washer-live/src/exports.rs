@@ -5,9 +5,9 @@
 //! equilibrium; whether it is sensitive; a record of each model, the nonlinear one first; the ratio
 //! of each channel; the static sag (m). What is not there is NaN.
 //!
-//! A record is the level's place and name, the error left, `failure` (0 none, 1 diverged, 2 step too
-//! small, 3 step limit), its time (s), `steps`, the least gap (m), the amplitude of each channel
-//! and the map's metrics of the model.
+//! A record is the level's place and name, the error left, `failure` (0 none, 1 diverged, 2 step
+//! too small, 3 step limit), its time (s), `steps`, the least gap (m), the amplitude of each
+//! channel and the map's metrics of the model.
 #![allow(unsafe_code)]
 // A module's exports are not this crate's.
 #![allow(unreachable_pub)]
@@ -92,9 +92,9 @@ pub extern "C" fn checked() -> usize {
     answer(|setup, input, output| write_answer(output, &check(setup, input), setup))
 }
 
-/// The motion of a model (0 nonlinear, 1 linear) at a point at a refinement level, or at the quick one if there
-/// is none of this number: 1, 0 or -1 as above, the failure and its time, how many instants; of
-/// each, the channels and the gap.
+/// The motion of a model (0 nonlinear, 1 linear) at a point at a refinement level, or at the quick
+/// one if there is none of this number: 1, 0 or -1 as above, the failure and its time, how many
+/// instants; of each, the channels and the gap.
 #[unsafe(no_mangle)]
 pub extern "C" fn history(model: usize, place: usize, every_s: f64) -> usize {
     let model = if model == 0 { ModelKind::Nonlinear } else { ModelKind::Linear };

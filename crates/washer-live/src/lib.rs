@@ -1,8 +1,8 @@
 //! Both models at single points, behind plain exports for a page.
 //!
-//! `sweep plot --live` writes a [`Setup`] into a page: the machine, its spin and the refinement levels of the
-//! fast method, as the program chose them for the map and for the sliders. The page's workers load
-//! this crate as a WebAssembly module, and ask for
+//! `sweep plot --live` writes a [`Setup`] into a page: the machine, its spin and the refinement
+//! levels of the fast method, as the program chose them for the map and for the sliders. The page's
+//! workers load this crate as a WebAssembly module, and ask for
 //!
 //! * [`quick`]: both models at some points at one level, which is quick and not checked;
 //! * [`check`]: a point as a row of the map has it, by runs that agree;

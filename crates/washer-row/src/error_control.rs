@@ -17,8 +17,8 @@
 //! 2. Two more levels cap nothing.
 //! 3. With friction and stops, no modes are capped: the first levels are the additive method's at
 //!    falling tolerances, then come three of order 8 at falling steps.
-//! 4. The last two levels resolve the bearings' modes. They are for rows in which bearings that ring
-//!    after a jump of the drum's acceleration matter.
+//! 4. The last two levels resolve the bearings' modes. They are for rows in which bearings that
+//!    ring after a jump of the drum's acceleration matter.
 //!
 //! Levels that leave out the same ringing agree on an error that no difference shows. The static
 //! deflection under the jump bounds it ([`Point::ringing`](washer_model::Point::ringing)), and a

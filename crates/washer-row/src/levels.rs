@@ -69,8 +69,8 @@ impl RefinementLevels {
         self.levels.iter().take_while(|level| is_capped(level)).count()
     }
 
-    /// Returns whether the level at a place is another method than the one before: capped modes, the
-    /// additive method and the formulas with nothing capped err by different terms.
+    /// Returns whether the level at a place is another method than the one before: capped modes,
+    /// the additive method and the formulas with nothing capped err by different terms.
     pub fn begins_family(&self, place: usize) -> bool {
         let family = |place: usize| {
             let level = self.levels[place].level;

@@ -176,8 +176,8 @@ pub struct Outcome {
     pub linear: Trajectory,
     /// The method and level of the nonlinear model's numbers.
     pub method: Level,
-    /// The relative error left in the row's numbers, at most, from the differences of its levels; `None`
-    /// where nothing was compared.
+    /// The relative error left in the row's numbers, at most, from the differences of its levels;
+    /// `None` where nothing was compared.
     pub error: Option<f64>,
     /// Whether that is within the accuracy asked for. `None` where nothing was compared.
     pub converged: Option<bool>,
