@@ -28,8 +28,8 @@ methods! {
     Dopri5 = "dopri5", "Dormand-Prince 5(4), adaptive" { rtol: RTOL, atol: ATOL } Steps::Explicit;
     Rodas5p = "rodas5p", "Rodas5P, adaptive and linearly implicit: for machines too stiff for the \
                           others" { rtol: RTOL, atol: ATOL } Steps::Implicit;
-    Rk4MassScaled = "rk4-mass-scaled", "the fast method: capped modes of the bearings, at finer and \
-                                        finer levels until two agree" {
+    Rk4MassScaled = "rk4-mass-scaled", "the fast method: capped modes of the bearings, at finer \
+                                        and finer levels until two agree" {
         accuracy: LEVELS_ACCURACY
     } Steps::Checked(accuracy);
 }

@@ -142,8 +142,8 @@ impl Metric {
             },
             Self::ClashTime => Facts {
                 unit: "s",
-                description: "time in the window with a gap between drum and tub below zero; its error is \
-                              a share of the window",
+                description: "time in the window with a gap between drum and tub below zero; its \
+                              error is a share of the window",
                 scale: Scale::Window,
                 ..PLAIN
             },
