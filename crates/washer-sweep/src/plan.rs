@@ -19,12 +19,31 @@ const UNNAMED: &str = "plan";
 pub(crate) struct PyPlan {
     pub(crate) input: GridInput,
     pub(crate) evaluator: Evaluator,
+    written: Written,
+}
+
+/// What a plan was read from, by which another process reads it again.
+#[derive(Clone)]
+struct Written {
+    /// The text of a grid file; of a file its path from the root.
+    text: String,
+    is_file: bool,
+    sets: Vec<String>,
+}
+
+impl Written {
+    fn input(&self) -> GridInput {
+        match self.is_file {
+            true => GridInput::file(self.text.clone().into(), self.sets.clone()),
+            false => GridInput::text(UNNAMED, self.text.clone(), self.sets.clone()),
+        }
+    }
 }
 
 impl PyPlan {
-    fn load(py: Python<'_>, input: GridInput) -> PyResult<Self> {
+    fn load(py: Python<'_>, input: GridInput, written: Written) -> PyResult<Self> {
         let plan = py.detach(|| input.load()).map_err(|wrong| errors::plan_error(py, &wrong))?;
-        Ok(Self { input, evaluator: Evaluator::new(plan) })
+        Ok(Self { input, evaluator: Evaluator::new(plan), written })
     }
 }
 
@@ -35,8 +54,9 @@ impl PyPlan {
     #[pyo3(signature = (grid, *, set=None))]
     fn new(grid: &Bound<'_, PyMapping>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
         let py = grid.py();
-        let text = mappings::text(grid)?;
-        Self::load(py, GridInput::text(UNNAMED, text, assignments(set)?))
+        let (text, sets) = (mappings::text(grid)?, assignments(set)?);
+        let written = Written { text, is_file: false, sets };
+        Self::load(py, written.input(), written)
     }
 
     /// A plan from a grid file, or from the text of one.
@@ -48,11 +68,44 @@ impl PyPlan {
         // A path has no line of its own with an assignment or a table.
         let text = source.cast::<PyString>().ok().map(|text| text.to_string());
         let text = text.filter(|text| text.contains('\n') || text.contains('='));
-        let input = match text {
-            Some(text) => GridInput::text(UNNAMED, text, sets),
-            None => GridInput::file(source.extract()?, sets),
+        let (input, written) = match text {
+            Some(text) => {
+                let written = Written { text, is_file: false, sets };
+                (written.input(), written)
+            }
+            None => {
+                let path: PathBuf = source.extract()?;
+                // Another process may work in another folder.
+                let whole = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
+                let text = whole.to_string_lossy().into_owned();
+                let written = Written { text, is_file: true, sets: sets.clone() };
+                (GridInput::file(path, sets), written)
+            }
         };
-        Self::load(py, input)
+        Self::load(py, input, written)
+    }
+
+    /// A plan that another process has pickled.
+    #[staticmethod]
+    fn _unpickled(
+        py: Python<'_>,
+        text: String,
+        is_file: bool,
+        sets: Vec<String>,
+    ) -> PyResult<Self> {
+        let written = Written { text, is_file, sets };
+        Self::load(py, written.input(), written)
+    }
+
+    /// How pickle makes it again: from its text, or from its file and those that the file names,
+    /// which have to be there.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (String, bool, Vec<String>))> {
+        let again = py.get_type::<Self>().getattr("_unpickled")?;
+        let Written { text, is_file, sets } = self.written.clone();
+        Ok((again, (text, is_file, sets)))
     }
 
     /// Rows of designs in, rows of results out.

@@ -1,7 +1,7 @@
 //! `Result`: rows as columns, for whoever speaks Arrow.
 
 use std::collections::HashSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow_array::ArrayRef;
@@ -10,7 +10,7 @@ use arrow_array::types::UInt64Type;
 use arrow_schema::{DataType, Field};
 use pyo3::exceptions::{PyKeyError, PyOSError};
 use pyo3::prelude::*;
-use pyo3::types::{PyByteArray, PyCapsule, PyDict, PyList};
+use pyo3::types::{PyByteArray, PyBytes, PyCapsule, PyDict, PyList};
 use sweep::MemoryTable;
 use sweep_files::{FileKind, cells};
 
@@ -171,12 +171,40 @@ impl PyResultTable {
         drawn.map_err(|error| PyOSError::new_err(format!("cannot draw: {error}")))
     }
 
+    /// How pickle makes it again: from the bytes of its file.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let bytes = in_temporary_file(|path| {
+            self.0.save(path).map_err(|error| errors::error(py, &error))?;
+            Ok(std::fs::read(path)?)
+        })?;
+        let again = py.get_type::<Self>().getattr("_unpickled")?;
+        Ok((again, (PyBytes::new(py, &bytes),)))
+    }
+
+    /// A result that another process has pickled.
+    #[staticmethod]
+    fn _unpickled(py: Python<'_>, bytes: &[u8]) -> PyResult<Self> {
+        in_temporary_file(|path| {
+            std::fs::write(path, bytes)?;
+            read(py, path.to_path_buf())
+        })
+    }
+
     fn __repr__(&self) -> String {
         let name = self.0.plan()["name"].as_str().unwrap_or("unnamed");
         let (kind, rows) = (self.0.kind().word(), self.0.rows());
         let columns = self.0.schema().fields().len();
         format!("<washer_sweep.Result: {kind} of {name}, {rows} rows, {columns} columns>")
     }
+}
+
+/// Works with the path of a result file that goes afterwards.
+fn in_temporary_file<T>(work: impl FnOnce(&Path) -> PyResult<T>) -> PyResult<T> {
+    let folder = tempfile::tempdir()?;
+    work(&folder.path().join("result.parquet"))
 }
 
 /// Adds flags or words to a list, none as `None`.
