@@ -30,6 +30,16 @@ pub enum PlotError {
     /// An option or a name that does not fit the file, or the kind of output.
     #[error("{0}")]
     Unfit(String),
+    /// A name that the file does not have.
+    #[error("{refusal}")]
+    NotThere {
+        /// What was asked for, where it is not, and what there is.
+        refusal: String,
+        /// The name as typed.
+        given: String,
+        /// The names that there are.
+        valid: Vec<String>,
+    },
     /// The figure cannot be drawn.
     #[error("cannot draw the figure: {0}")]
     Drawing(String),

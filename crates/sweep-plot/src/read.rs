@@ -176,9 +176,12 @@ impl Source {
         known: impl fmt::Display,
     ) -> PlotError {
         let path = self.path.display();
-        PlotError::Unfit(format!(
-            "`{option} {given}`: {path}: there is no such {what}; it has {known}"
-        ))
+        let given = given.to_string();
+        let known = known.to_string();
+        let valid = known.split(", ").map(str::to_owned).collect();
+        let refusal =
+            format!("`{option} {given}`: {path}: there is no such {what}; it has {known}");
+        PlotError::NotThere { refusal, given, valid }
     }
 
     fn undrawable(&self, reason: String) -> PlotError {

@@ -54,6 +54,8 @@ pub(crate) struct Scatter {
     pub(crate) label: Label,
     /// The same where there is little room.
     pub(crate) short: Label,
+    /// The channel of the quantity, in words; empty without one.
+    pub(crate) channel: String,
     /// The value that divides the points, if one does.
     pub(crate) level: Option<Level>,
     /// Better shown by the logarithm.
@@ -160,6 +162,7 @@ impl Scatter {
             title,
             label,
             short,
+            channel: shown.channel.as_deref().map_or_else(String::new, label::channel),
             level,
             log,
             parameters,

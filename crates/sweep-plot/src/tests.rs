@@ -209,6 +209,41 @@ fn one_axis_is_drawn_as_curves_with_failures_marked() {
 }
 
 #[test]
+fn titles_name_the_channel() {
+    for (column, title) in [
+        ("nonlinear_body_yaw", "Amplitudes of both models: body yaw"),
+        ("ratio_body_pitch", "Ratio of amplitudes: body pitch"),
+        ("ratio_max", "Where the linear model can be trusted"),
+    ] {
+        let figure = svg(one_axis(), &showing(column));
+        assert!(figure.contains(&format!(">{title}<")), "{column}: {figure}");
+    }
+    let two = ["nonlinear_body_yaw", "nonlinear_body_pitch"].map(str::to_owned);
+    let figure = svg(one_axis(), &Options { quantity: two.to_vec(), ..Options::default() });
+    assert!(figure.contains(">Amplitudes of both models<"), "{figure}");
+}
+
+#[test]
+fn a_boundary_that_is_not_drawn_has_no_legend() {
+    let of_limit = |limit: f64| {
+        let sample = MapSample {
+            axes: vec![
+                ("unbalance_mass_kg", vec![0.2, 0.4, 0.6]),
+                ("damping_n_s_per_m", vec![60.0, 100.0, 140.0]),
+            ],
+            limit,
+            yaw: &|at| Some([0.02 + 0.05 * at[0], 0.01]),
+            chaotic: &|_| false,
+        };
+        svg(sample.sample(), &Options::default())
+    };
+    assert!(of_limit(4.0).contains(">boundary: ratio 4<"));
+    let reliable = of_limit(40.0);
+    assert!(!reliable.contains(">boundary: ratio 40<"), "{reliable}");
+    assert!(reliable.contains(">reliable: below 40<"), "{reliable}");
+}
+
+#[test]
 fn a_boundary_is_drawn_with_its_bracket() {
     assert!(svg(boundary(), &Options::default()).contains(">boundary: ratio 2, bracket shaded<"));
 }

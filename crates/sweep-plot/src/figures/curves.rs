@@ -7,12 +7,31 @@ use crate::error::{PlotError, Result};
 use crate::gather::Map;
 use crate::label::{self, Label};
 use crate::layer::{self, Group, Shown};
-use crate::read::ColumnFacts;
+use crate::read::{ColumnFacts, Source};
 use crate::scene::{Colour, INK};
 use crate::table::Column;
 
 /// Most failed points that are marked: as many lines as a figure has room for.
 const MOST_MARKS: usize = 400;
+
+/// The title over what is asked for first; with its channel, where no other is asked for too.
+fn title(source: &Source, asked: &[Shown]) -> String {
+    let Some(first) = asked.first() else { return TRUSTED.to_owned() };
+    let is_alone = asked.iter().all(|shown| shown.channel == first.channel);
+    match (first.group, first.channel.as_ref().filter(|_| is_alone)) {
+        (Group::Nonlinear | Group::Linear, Some(channel)) => {
+            format!("{BOTH}: {}", label::channel(channel))
+        }
+        (Group::Nonlinear | Group::Linear, None) => BOTH.to_owned(),
+        (Group::Other, _) => label::quantity(first.column()),
+        (Group::Ratio, Some(_)) => first.words(source).0,
+        (Group::Ratio, None) => TRUSTED.to_owned(),
+    }
+}
+
+/// Titles of charts of amplitudes, and of ratios.
+const BOTH: &str = "Amplitudes of both models";
+const TRUSTED: &str = "Where the linear model can be trusted";
 
 /// The chart of a map file of one axis.
 ///
@@ -78,11 +97,7 @@ pub(crate) fn chart(map: &Map, options: &Options) -> Result<Chart> {
         format!("failed: no result; one of {each} places is marked")
     };
     Ok(Chart {
-        title: match asked.first().map(|shown| (shown.group, shown)) {
-            Some((Group::Nonlinear | Group::Linear, _)) => "Amplitudes of both models".to_owned(),
-            Some((Group::Other, of)) => label::quantity(of.column()),
-            _ => "Where the linear model can be trusted".to_owned(),
-        },
+        title: title(source, &asked),
         subtitle: super::map::subtitle(map, &[]),
         x_label: Label::new(&axis.swept.words, &axis.swept.unit),
         x_log: axis.swept.log,

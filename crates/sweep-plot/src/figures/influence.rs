@@ -46,7 +46,11 @@ pub(crate) fn draw(scatter: &Scatter) -> Scene {
     let of_legend = legend_height(&entries, WIDTH - 60.0);
     let height = ROW * places.len() as f64 + 12.0;
     let total = HEADING_HEIGHT + height + BELOW + of_legend + 8.0;
-    let title = format!("What it depends on: {}", scatter.label.words.to_lowercase());
+    let channel = match scatter.channel.as_str() {
+        "" => String::new(),
+        channel => format!(": {channel}"),
+    };
+    let title = format!("What it depends on: {}{channel}", scatter.label.words.to_lowercase());
     let (valued, all) = (scatter.valued(), scatter.parameters.len());
     let mut notes = Vec::new();
     if valued < scatter.points.len() {

@@ -64,7 +64,8 @@ pub(crate) fn draw(
     let all = || (0..xs).flat_map(|x| (0..ys).map(move |y| (x, y)));
     let drawn = cuts.cuts.iter().flat_map(|cut| all().map(|(x, y)| grid.cell(x, y, &cut.rest)));
     let mut entries = cells.legend(&drawn.collect::<Vec<_>>());
-    if let Some(overlay) = overlay {
+    let scales = [0, 1].map(|k| grid.axes[k].scale());
+    if let Some(overlay) = overlay.filter(|overlay| is_within(overlay, scales)) {
         entries.push((Sign::Line(overlay_stroke()), overlay.name.clone()));
     }
     let of_legend = legend_height(&entries, WIDTH - LEFT - 20.0);
@@ -140,6 +141,14 @@ fn draw_overlay(scene: &mut Scene, panel: &Panel, overlay: &Overlay) {
         scene.fill(Outline::circle(place, 4.5), PAPER);
         scene.fill(Outline::circle(place, 3.5), OVERLAY);
     }
+}
+
+/// Returns whether some place of the line of another file is within these scales, across and up.
+fn is_within(overlay: &Overlay, [xs, ys]: [Scale; 2]) -> bool {
+    let is_inside = |&[x, y]: &[f64; 2]| {
+        [xs.position(x), ys.position(y)].iter().all(|part| (0.0..=1.0).contains(part))
+    };
+    overlay.lines.iter().flatten().any(is_inside)
 }
 
 /// Where a line's places are in a panel, px; none of those outside, and where it has a gap.
@@ -433,7 +442,13 @@ impl<'a> Cells<'a> {
         let filled = |fill: Fill| shown(&|cell| self.fills[cell] == Some(fill));
         if let Some(Layer { level: Some(level), scale, .. }) = &self.layer {
             let quarter = |part: usize| scale.colour(part * LEVELS / 4);
-            entries.push((Sign::Line(Stroke::solid(INK, 2.6)), level.line.clone()));
+            // Between cells of one side no line is drawn.
+            let offset = |cell: usize| {
+                self.layer.as_ref().map_or(f64::NAN, |layer| level.offset(layer.typical(cell)))
+            };
+            if shown(&|cell| offset(cell) >= 0.0) && shown(&|cell| offset(cell) < 0.0) {
+                entries.push((Sign::Line(Stroke::solid(INK, 2.6)), level.line.clone()));
+            }
             entries.push((Sign::Area(quarter(3)), level.above[1].clone()));
             entries.push((Sign::Area(quarter(1)), level.below[1].clone()));
             if filled(Fill::Both) {

@@ -5,6 +5,7 @@ use crate::chart::level_stroke;
 use crate::colour::{CALM, HARSH};
 use crate::frame::{HEADING_HEIGHT, LABEL_SIZE, Panel, Sign, heading, legend, legend_height};
 use crate::label::Label;
+use crate::layer::Level;
 use crate::raster::text_width;
 use crate::scatter::{Scatter, Side};
 use crate::scene::{Colour, INK, MUTED, Outline, Scene, Stroke};
@@ -253,7 +254,9 @@ fn entries(scatter: &Scatter) -> Vec<(Sign, String)> {
             entries.push((sign(side), words));
         }
     }
-    if let Some(level) = &scatter.level {
+    let quantity = scale(&scatter.quantity, scatter.log);
+    let is_drawn = |level: &&Level| (0.0..=1.0).contains(&quantity.position(level.value));
+    if let Some(level) = scatter.level.as_ref().filter(is_drawn) {
         entries.push((Sign::Line(level_stroke()), level.line.clone()));
     }
     entries

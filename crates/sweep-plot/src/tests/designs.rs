@@ -207,6 +207,14 @@ fn influence_puts_first_what_matters() {
 }
 
 #[test]
+fn an_influence_names_its_channel() {
+    let options = Options { view: Some(View::Influence), ..showing("nonlinear_body_yaw") };
+    let figure = svg(points(102), &options);
+    let title = ">What it depends on: amplitude, nonlinear model: body yaw<";
+    assert!(figure.contains(title), "{figure}");
+}
+
+#[test]
 fn many_points_are_picked_not_all_drawn_and_all_counted() {
     let page = carried(&draw(points(250_002), &Options::default(), "a.html").unwrap());
     let scatter = &page["scatter"];
