@@ -4,6 +4,8 @@ use std::ffi::OsString;
 use std::fs::{self, File, FileType, OpenOptions};
 use std::io::{self, Read as _};
 use std::path::Path;
+#[cfg(unix)]
+use std::time::{Duration, Instant};
 
 /// Opens a regular file for reading. Anything else is an error that says what it is.
 ///
@@ -15,6 +17,72 @@ pub fn open(path: &Path) -> io::Result<File> {
     let file = careful(OpenOptions::new().read(true), true).open(path)?;
     expect_regular(file.metadata()?.file_type())?;
     Ok(file)
+}
+
+/// How long a named pipe may stay without a writer. Basis: a program that a script starts beside
+/// this one opens its pipe within milliseconds. Doubling it doubles the time until a pipe that
+/// nobody writes to is refused.
+#[cfg(unix)]
+const WRITER_WAIT: Duration = Duration::from_secs(2);
+
+/// How often a pipe without data is looked at again.
+#[cfg(unix)]
+const LOOK_AGAIN: Duration = Duration::from_millis(5);
+
+/// Reads at most so many bytes of a text that a user names: of a regular file, or of a pipe, as a
+/// shell's `<(...)` and `/dev/stdin` are. A named pipe that nobody writes to is an error, which
+/// comes after two seconds.
+///
+/// # Errors
+/// What the system answers, or that the path leads to something else, in words.
+#[cfg(unix)]
+pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    use std::os::unix::fs::FileTypeExt as _;
+    // Descriptors that somebody passed: the other end of such a pipe was opened before.
+    let is_passed = path.starts_with("/dev/fd")
+        || path.starts_with("/proc/self/fd")
+        || path == Path::new("/dev/stdin");
+    let found = fs::metadata(path)?.file_type();
+    if !found.is_fifo() && !is_passed {
+        let mut bytes = Vec::new();
+        open(path)?.take(most).read_to_end(&mut bytes)?;
+        return Ok(bytes);
+    }
+    // Opening to read waits for nobody this way, and lets writers that wait for a reader go on.
+    let file = careful(OpenOptions::new().read(true), true).open(path)?;
+    let begun = Instant::now();
+    let mut bytes = Vec::new();
+    while (bytes.len() as u64) < most {
+        let mut part = [0; 1 << 16];
+        let room = usize::try_from(most - bytes.len() as u64).unwrap_or(usize::MAX);
+        let room = room.min(part.len());
+        match (&file).read(&mut part[..room]) {
+            Ok(0) if is_passed || !bytes.is_empty() => break,
+            Ok(0) if begun.elapsed() >= WRITER_WAIT => {
+                let reason = "it is a FIFO that nobody writes to";
+                return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
+            }
+            Ok(0) => std::thread::sleep(LOOK_AGAIN),
+            Ok(count) => bytes.extend_from_slice(&part[..count]),
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                std::thread::sleep(LOOK_AGAIN);
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(bytes)
+}
+
+/// Reads at most so many bytes of a text that a user names.
+///
+/// # Errors
+/// What the system answers, or that the path leads to something else, in words.
+#[cfg(not(unix))]
+pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.take(most).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// What was found; nothing where there is nothing.
@@ -178,6 +246,46 @@ mod tests {
         assert_eq!(error.to_string(), "it is a symbolic link, not a regular file");
         open_or_create(&target).unwrap();
         assert_eq!(read_json(&target).unwrap(), b"mine");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_read_to_its_end_and_one_without_a_writer_is_refused() {
+        use std::io::Write as _;
+        use std::os::fd::AsRawFd as _;
+
+        let folder = tempfile::tempdir().unwrap();
+        let fifo = folder.path().join("fifo");
+        let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+        rustix::fs::mkfifoat(rustix::fs::CWD, &fifo, mode).unwrap();
+        let error = read_text(&fifo, 1000).unwrap_err();
+        assert_eq!(error.to_string(), "it is a FIFO that nobody writes to");
+
+        // A writer that comes late and writes slowly.
+        let writer = std::thread::spawn({
+            let fifo = fifo.clone();
+            move || {
+                std::thread::sleep(Duration::from_millis(100));
+                let mut pipe = OpenOptions::new().write(true).open(fifo).unwrap();
+                for part in ["name = ", "\"a\"\n"] {
+                    std::thread::sleep(Duration::from_millis(100));
+                    pipe.write_all(part.as_bytes()).unwrap();
+                }
+            }
+        });
+        assert_eq!(read_text(&fifo, 1000).unwrap(), b"name = \"a\"\n");
+        writer.join().unwrap();
+
+        // As a shell's `<(...)`: the writer is done before this is opened.
+        let (reader, mut writer) = io::pipe().unwrap();
+        writer.write_all(b"name").unwrap();
+        drop(writer);
+        let passed = format!("/dev/fd/{}", reader.as_raw_fd());
+        assert_eq!(read_text(Path::new(&passed), 1000).unwrap(), b"name");
+        assert_eq!(read_text(Path::new(&passed), 1000).unwrap(), b"");
+        assert!(read_text(folder.path(), 1000).is_err());
+        let device = read_text(Path::new("/dev/zero"), 1000).unwrap_err();
+        assert_eq!(device.to_string(), "it is a device, not a regular file");
     }
 
     #[test]

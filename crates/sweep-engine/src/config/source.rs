@@ -1,6 +1,6 @@
 //! Texts a user wrote (files and command-line arguments), and places in them.
 
-use std::io::{self, Read as _};
+use std::io;
 use std::ops::Range;
 use std::path::Path;
 
@@ -52,13 +52,13 @@ struct Source {
     text: String,
 }
 
-/// Reads a whole regular file of text, of bounded length. A FIFO might never be written to.
+/// Reads a whole file of text, of bounded length. Pipes that have a writer work as well as plain
+/// files.
 ///
 /// # Errors
 /// What the system said, or why this is no file of ours.
 pub fn read(path: &Path) -> io::Result<String> {
-    let mut bytes = Vec::new();
-    regular::open(path)?.take(LONGEST_BYTES + 1).read_to_end(&mut bytes)?;
+    let bytes = regular::read_text(path, LONGEST_BYTES + 1)?;
     let refused = |why: String| Err(io::Error::other(why));
     if bytes.starts_with(b"PAR1") {
         return refused("it is a Parquet file, not text: `sweep show` reads it".to_owned());
