@@ -325,6 +325,22 @@ fn a_flipped_bit_and_a_truncation_are_told_and_mended() {
 
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
+fn a_system_without_random_numbers_is_told() {
+    for error in ["ENOSYS", "ENOLCK", "EIO"] {
+        let home = fresh_home();
+        let inject = format!("inject=getrandom:error={error}");
+        let run = output(&mut home.tampered(&["trace=getrandom", &inject]));
+        let text = said(&run);
+        assert!(!text.contains("panicked"), "{error}: {text}");
+        // Another source may take the place of a call that is not there.
+        let is_told = text.contains("cannot draw random numbers for this process");
+        assert!(run.status.success() || is_told, "{error}: {text}");
+        home.assert_mends(error);
+    }
+}
+
+#[test]
+#[ignore = "needs strace; .ci/run runs it"]
 fn a_second_runner_is_sent_away_with_the_first_ones_process_and_a_killed_one_blocks_nobody() {
     let home = fresh_home();
     let mut first = held_up(&home, 3);

@@ -24,7 +24,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::program::call_program;
-use crate::{Error, Exit, Swept, survive_file_size_limits};
+use crate::{Error, Exit, Swept, expect_random_numbers, survive_file_size_limits};
 use cells::{Lines, clipped, short, span, table, word};
 use grid::{GridArgs, ResultArgs, quoted};
 use run::installed;
@@ -83,6 +83,7 @@ pub fn main<M: Swept>(name: &'static str) -> ExitCode {
 
 fn run<M: Swept>(command: &Command) -> Result<Exit, Error> {
     survive_file_size_limits().map_err(Error::signals)?;
+    expect_random_numbers()?;
     match command {
         Command::Run(args) => run::run::<M>(args),
         Command::Check(args) => check::run::<M>(args),

@@ -1,12 +1,16 @@
 //! Handling of SIGINT, SIGTERM and SIGHUP. The first signal stops the run after its rows are
 //! stored, the second ends the process at once.
 
+use std::hash::RandomState;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
+
+use crate::Error;
+use sweep_files::panics;
 
 /// Installs a handler of SIGXFSZ, which by default ends the process, so that exceeding a limit on
 /// file size (`ulimit -f`) is an error of a write.
@@ -17,6 +21,20 @@ pub fn survive_file_size_limits() -> io::Result<()> {
     #[cfg(unix)]
     flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     Ok(())
+}
+
+/// Draws the random numbers that the standard library's maps begin with, while a failure can be
+/// told: later it would be a panic.
+///
+/// # Errors
+/// A system that gives none.
+pub fn expect_random_numbers() -> Result<(), Error> {
+    let drawn = panics::caught(|| drop(RandomState::new()));
+    drawn.map_err(|panic| Error::File {
+        action: "draw random numbers for",
+        path: "this process".into(),
+        source: io::Error::other(panic),
+    })
 }
 
 /// A stop flag that signals set, shared by all threads.

@@ -40,7 +40,7 @@ pub use design::{Design, Distribution};
 pub use effort::{Effort, EffortArgs};
 pub use estimate::Estimate;
 pub use exit::{Error, Exit, print, show, tell};
-pub use interrupt::{Interrupt, survive_file_size_limits};
+pub use interrupt::{Interrupt, expect_random_numbers, survive_file_size_limits};
 pub use model::Model;
 pub use plan::{Axis, AxisValues, Plan, Reliability, Scenario};
 pub use program::program;

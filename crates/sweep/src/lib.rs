@@ -77,7 +77,9 @@ pub use sweep_engine::run::{Ended, RunOptions, run};
 pub use sweep_engine::store::{
     Job, OpenOptions, OpenRun, Opened, Shard, ShardRequest, State, StoreError, status,
 };
-pub use sweep_engine::{Error, Exit, Interrupt, survive_file_size_limits, tell};
+pub use sweep_engine::{
+    Error, Exit, Interrupt, expect_random_numbers, survive_file_size_limits, tell,
+};
 pub use trace::Extras as TraceExtras;
 pub use washer_model::Starts;
 pub use washer_row::{CREEPING_M_PER_S, Level, Outcome, Status, Trajectory, Verdict};
