@@ -107,6 +107,34 @@ fn columns_of_a_study_differ_and_its_best_is_in_the_table() {
 }
 
 #[test]
+fn the_condition_that_binds_and_the_nearest_candidate_are_told() {
+    let folder = folder_with("2", STUDY);
+    let text = does(&folder, "optimise study.toml");
+    let binds = text.lines().find(|line| line.trim_start().starts_with("binds  "));
+    let binds = binds.unwrap_or_else(|| panic!("no line `binds` in {text}"));
+    assert!(binds.contains(": slack ") && binds.ends_with(" %"), "{binds}");
+    assert!(!text.contains("nearest"), "{text}");
+
+    let study = STUDY.replace("max(ratio_max) < 50", "max(ratio_max) < 1e-3");
+    let folder = folder_with("2", &study);
+    let none = sweep(&folder, "optimise study.toml").output().expect("it starts");
+    assert_eq!(none.status.code(), Some(4), "{}", said(&none));
+    let text = said(&none);
+    let told = text.split_once("nearest  candidate ").expect("the nearest").1;
+    assert!(told.contains("max(ratio_max) < 1e-3 by "), "{text}");
+    let candidate = told.split(',').next().expect("its number");
+    let show = format!("show results/study.parquet --json --columns candidate --where feasible");
+    assert_eq!(does(&folder, &show).trim(), "[]");
+    let excess = |file: &str| number(&folder, file, "excess_2");
+    let own = excess(&format!(
+        "show results/study.parquet --json --columns excess_2 --where candidate=={candidate}"
+    ));
+    let least =
+        excess("show results/study.parquet --json --by excess_2 --ascending --columns excess_2");
+    assert!(own >= least && own < 2.0 * least, "{own} and {least}");
+}
+
+#[test]
 fn an_objective_that_is_a_parameter_has_a_column_of_its_own() {
     let study = STUDY.replace("max(cabinet_force_nonlinear_n)", "damping_n_s_per_m");
     let folder = folder_with("2", &study);

@@ -101,6 +101,29 @@ pub struct ColumnChange {
     pub rows: u64,
     /// The greatest difference of numbers.
     pub greatest: f64,
+    /// The rows in which numbers differ most, the farthest apart first, without sensitive ones; at
+    /// most [`MAX_WORST`].
+    pub worst: Vec<ColumnRow>,
+}
+
+/// The greatest number of rows that are kept of a column. Basis: what a table shows. Doubling it
+/// doubles the rows that a table of a column can show.
+pub const MAX_WORST: usize = 20;
+
+/// A row in which a column's numbers differ.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ColumnRow {
+    /// The index of the row in [`Comparison::shared`].
+    pub row: usize,
+    /// The number in either file.
+    pub values: [Option<f64>; 2],
+}
+
+impl ColumnRow {
+    /// Returns the distance of the two numbers; infinite where one file alone has one.
+    pub fn deviation(&self) -> f64 {
+        deviation(self.values, |first, second| (second - first).abs())
+    }
 }
 
 /// The differences between two files.
@@ -303,8 +326,9 @@ fn compare_columns(
             unit: column.unit.clone(),
             rows: 0,
             greatest: 0.0,
+            worst: Vec::new(),
         };
-        for (pair, row) in pairs.iter().zip(shared.iter_mut()) {
+        for (index, (pair, row)) in pairs.iter().zip(shared.iter_mut()).enumerate() {
             let first_cell = files[0].cell(first, pair[0]);
             let second_cell = files[1].cell(second, pair[1]);
             if first_cell == second_cell {
@@ -312,8 +336,17 @@ fn compare_columns(
             }
             change.rows += 1;
             row.differs = true;
-            if let (Cell::Number(first), Cell::Number(second)) = (first_cell, second_cell) {
+            // Other writers store NaN where a value is missing.
+            let number = |cell: Cell| cell.number().filter(|number| !number.is_nan());
+            let found = ColumnRow { row: index, values: [number(first_cell), number(second_cell)] };
+            if let [Some(first), Some(second)] = found.values {
                 change.greatest = change.greatest.max((second - first).abs());
+            }
+            let deviation = found.deviation();
+            if deviation > 0.0 && !row.sensitive {
+                let place = change.worst.partition_point(|kept| kept.deviation() >= deviation);
+                change.worst.insert(place, found);
+                change.worst.truncate(MAX_WORST);
             }
         }
         if change.rows > 0 {

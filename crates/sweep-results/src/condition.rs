@@ -163,6 +163,17 @@ impl ComparisonOperator {
         }
     }
 
+    /// Returns how far two numbers are from breaking the comparison, below 0 where they break it;
+    /// `None` for `!=`, which has no limit.
+    pub(crate) fn slack(self, left: f64, right: f64) -> Option<f64> {
+        match [Ordering::Less, Ordering::Greater].map(self.0) {
+            [true, true] => None,
+            [true, false] => Some(right - left),
+            [false, true] => Some(left - right),
+            [false, false] => Some(-(left - right).abs()),
+        }
+    }
+
     /// Compares two cells, whose kinds the parser has made equal.
     fn compare(self, left: &Cell, right: &Cell) -> Option<bool> {
         let order = match (left, right) {
@@ -184,6 +195,16 @@ pub(crate) struct AggregateValue {
     pub(crate) rows: u64,
     /// Whether every row has a value.
     pub(crate) is_complete: bool,
+    /// Whether the function is a share.
+    pub(crate) is_share: bool,
+}
+
+impl AggregateValue {
+    /// Returns the number of rows for which the condition of a share is true.
+    pub(crate) fn share_count(&self) -> Option<u64> {
+        let share = self.value.number().filter(|_| self.is_share)?;
+        Some((share * self.rows as f64).round() as u64)
+    }
 }
 
 /// The accumulator of an aggregate function over rows.
@@ -265,6 +286,7 @@ impl Accumulator {
             value: number_cell(value),
             rows: self.rows_with_value,
             is_complete: self.rows_with_value == self.rows,
+            is_share: function == Aggregate::Share,
         }
     }
 }

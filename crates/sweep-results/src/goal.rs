@@ -75,11 +75,38 @@ impl Goal {
         }
     }
 
+    /// Computes how far the rows are from violating a constraint, in the units of its comparison,
+    /// and that over the greater operand: of the row and the comparison with the least. Below 0
+    /// where they violate it; `None` where it compares no numbers or one of them is missing.
+    ///
+    /// # Errors
+    /// A batch without the columns of the expression.
+    pub fn slack(&self, batch: &RecordBatch) -> Result<Option<Slack>, ArrowError> {
+        self.least(
+            batch,
+            |root, context| root.slack(context),
+            |a, b| if b.part < a.part { b } else { a },
+        )
+    }
+
     /// Evaluates the number over all rows; `None` where a value that it needs is missing.
     ///
     /// # Errors
     /// A batch without the columns of the expression.
     pub fn evaluate(&self, batch: &RecordBatch) -> Result<Option<f64>, ArrowError> {
+        let number = |root: &ExpressionNode, context: &EvaluationContext<'_>| {
+            if self.is_constraint { root.violation(context) } else { root.value(context).number() }
+        };
+        self.least(batch, number, f64::max)
+    }
+
+    /// Reduces what `of` finds of every row to one; `None` where it finds nothing of one of them.
+    fn least<T>(
+        &self,
+        batch: &RecordBatch,
+        of: impl Fn(&ExpressionNode, &EvaluationContext<'_>) -> Option<T>,
+        reduce: impl Fn(T, T) -> T,
+    ) -> Result<Option<T>, ArrowError> {
         let rows = Rows::of(batch, &self.columns)?;
         let context =
             |row| EvaluationContext { row: rows.row(row), first_column: 0, aggregates: &[] };
@@ -92,22 +119,47 @@ impl Goal {
             if result.is_complete { result.value } else { Cell::Null }
         };
         let aggregates: Vec<Cell> = self.expression.aggregates.iter().map(aggregate).collect();
-        let number = |row| {
-            let root = &self.expression.root;
+        let found = |row| {
             let context = EvaluationContext { aggregates: &aggregates, ..context(row) };
-            if self.is_constraint {
-                root.violation(&context)
-            } else {
-                root.value(&context).number()
-            }
+            of(&self.expression.root, &context)
         };
         let rows = if self.expression.by_row { rows.count } else { rows.count.min(1) };
-        let numbers = (0..rows).map(number).collect::<Option<Vec<f64>>>();
-        Ok(numbers.and_then(|numbers| numbers.into_iter().reduce(f64::max)))
+        let found = (0..rows).map(found).collect::<Option<Vec<T>>>();
+        Ok(found.and_then(|found| found.into_iter().reduce(reduce)))
     }
 }
 
+/// A distance from a constraint's limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slack {
+    /// The distance, in the units of the comparison; below 0 beyond the limit.
+    pub distance: f64,
+    /// The same over the magnitude of the greater operand.
+    pub part: f64,
+}
+
 impl ExpressionNode {
+    /// Returns the distance of a row from the limit of a condition; `None` where it compares no
+    /// numbers.
+    fn slack(&self, context: &EvaluationContext<'_>) -> Option<Slack> {
+        match self {
+            Self::And(left, right) | Self::Or(left, right) => {
+                let is_and = matches!(self, Self::And(..));
+                let [left, right] = [left.slack(context)?, right.slack(context)?];
+                // The nearer limit decides of both, the farther of either.
+                Some(if (left.part < right.part) == is_and { left } else { right })
+            }
+            Self::Compare(operator, left, right) => {
+                let left = left.value(context).number()?;
+                let right = right.value(context).number()?;
+                let distance = operator.slack(left, right)?;
+                let size = left.abs().max(right.abs()).max(f64::MIN_POSITIVE);
+                Some(Slack { distance, part: distance / size })
+            }
+            _ => None,
+        }
+    }
+
     /// Returns the violation of a condition by a row; `None` where the condition is neither true
     /// nor false.
     fn violation(&self, context: &EvaluationContext<'_>) -> Option<f64> {
@@ -184,6 +236,27 @@ mod tests {
             assert_eq!((goal.unit(), goal.is_by_row()), (unit, false), "{text}");
         }
         assert!(parse("x_m").is_by_row());
+    }
+
+    #[test]
+    fn slack_is_the_distance_of_the_worst_row_from_the_limit() {
+        let batch = batch();
+        for (text, distance, part) in [
+            ("x_m <= 12.5", 2.5, 0.2),
+            ("x_m <= 8", -2.0, -0.2),
+            ("x_m > 0.5", 0.5, 0.5),
+            ("max(x_m) <= 12.5 and min(x_m) >= 0.9", 0.1, 0.1),
+            ("max(x_m) <= 12.5 or min(x_m) >= 0.9", 2.5, 0.2),
+        ] {
+            let goal = Goal::constraint(text, &columns(&batch.schema())).unwrap();
+            let found = goal.slack(&batch).unwrap().unwrap();
+            assert!((found.distance - distance).abs() < 1e-12, "{text}: {found:?}");
+            assert!((found.part - part).abs() < 1e-12, "{text}: {found:?}");
+        }
+        for text in ["sound", "y < 9", "x_m != 3", "not (x_m > 12)"] {
+            let goal = Goal::constraint(text, &columns(&batch.schema())).unwrap();
+            assert_eq!(goal.slack(&batch).unwrap(), None, "{text}");
+        }
     }
 
     #[test]

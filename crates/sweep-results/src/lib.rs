@@ -21,12 +21,13 @@ mod sample;
 mod top;
 
 pub use compare::{
-    BoundaryCrossing, BoundaryShift, ColumnChange, Comparison, Flip, PlanChange, SharedRow, compare,
+    BoundaryCrossing, BoundaryShift, ColumnChange, ColumnRow, Comparison, Flip, MAX_WORST,
+    PlanChange, SharedRow, compare,
 };
 pub use condition::{Condition, ExpressionError};
 pub use error::ResultsError;
 pub use export::{ExportFormat, export};
-pub use goal::Goal;
+pub use goal::{Goal, Slack};
 pub use nearest::nearest;
 pub use require::{Checked, Offender, check};
 pub use sweep_files::{Cell, CellKind, Column, ResultTable, columns, ratio_limits};

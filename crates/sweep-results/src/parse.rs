@@ -175,6 +175,29 @@ impl Condition {
     pub fn parse(text: &str, table: &ResultTable) -> Result<Self, ExpressionError> {
         parse_expression(text, &table.columns, CellKind::Flag)
     }
+
+    /// Returns the conditions that the expression joins by `and`; the whole text where it joins
+    /// none, or joins by `or` too.
+    pub fn conjuncts(&self) -> Vec<&str> {
+        let Ok(tokens) = tokenize(&self.text) else { return vec![&self.text] };
+        let mut depth = 0_usize;
+        let mut parts = Vec::new();
+        let mut start = 0;
+        for (token, span) in tokens {
+            match token {
+                Token::Sign("(") => depth += 1,
+                Token::Sign(")") => depth = depth.saturating_sub(1),
+                Token::Word(word) if depth == 0 && word == "or" => return vec![&self.text],
+                Token::Word(word) if depth == 0 && word == "and" => {
+                    parts.push(self.text[start..span.start].trim());
+                    start = span.end;
+                }
+                _ => {}
+            }
+        }
+        parts.push(self.text[start..].trim());
+        parts
+    }
 }
 
 #[derive(Default)]

@@ -38,6 +38,8 @@ pub struct Checked {
     pub folded: Vec<Cell>,
     /// The number of rows that have a value, for each aggregate.
     pub folded_rows: Vec<u64>,
+    /// For each aggregate that is a share, the number of rows for which its condition is true.
+    pub share_counts: Vec<Option<u64>>,
     /// The rows that violate the condition, the worst first: by the first of its columns that has
     /// a bad direction.
     pub offenders: Vec<Offender>,
@@ -67,6 +69,7 @@ pub fn check(
         expression: condition.text.clone(),
         by_row: condition.by_row,
         folded_rows: results.iter().map(|result| result.rows).collect(),
+        share_counts: results.iter().map(AggregateValue::share_count).collect(),
         folded: results.into_iter().map(|result| result.value).collect(),
         ..Checked::default()
     };
@@ -194,6 +197,35 @@ mod tests {
         assert_eq!(mixed.folded, [Cell::Number(4.0)]);
         let filtered = checked("max(ratio_max) == 2.5", Some("not sensitive"), true);
         assert!(filtered.holds, "{filtered:?}");
+    }
+
+    #[test]
+    fn shares_come_with_their_counts() {
+        let found = checked("share(reliable) > 0.5 and mean(ratio_max) < 9", None, true);
+        assert_eq!(found.share_counts, [Some(3), None]);
+        assert_eq!(found.folded_rows, [5, 5]);
+    }
+
+    #[test]
+    fn a_conjunction_is_split_at_its_own_ands() {
+        let table = sample::table();
+        for (text, parts) in [
+            ("ratio_max < 2", &["ratio_max < 2"][..]),
+            ("ratio_max < 2 and reliable", &["ratio_max < 2", "reliable"]),
+            (
+                "not (reliable and sensitive) and count(reliable and sensitive) == 0 and reliable",
+                &["not (reliable and sensitive)", "count(reliable and sensitive) == 0", "reliable"],
+            ),
+            ("reliable and sensitive or reliable", &["reliable and sensitive or reliable"]),
+            ("(reliable and sensitive)", &["(reliable and sensitive)"]),
+            ("status == ' and ' and reliable", &["status == ' and '", "reliable"]),
+        ] {
+            let condition = Condition::parse(text, &table).unwrap();
+            assert_eq!(condition.conjuncts(), parts);
+            for part in condition.conjuncts() {
+                Condition::parse(part, &table).unwrap();
+            }
+        }
     }
 
     // Other writers store a missing value as NaN.

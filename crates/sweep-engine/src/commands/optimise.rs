@@ -8,13 +8,13 @@ use super::grid::typed;
 use super::{Lines as _, installed, short, word};
 use crate::config::section::counted;
 use crate::optimise::file::{own_file, parameters, table};
-use crate::optimise::search::search;
+use crate::optimise::search::{search, slacks};
 use crate::optimise::study::{Objective, Sought, Study};
 use crate::store::{Opened, Trials};
-use crate::{EffortArgs, Error, Exit, Swept, duration, tell};
+use crate::{Effort, EffortArgs, Error, Exit, Swept, duration, tell};
 use sweep_files::{FileKind, OWN_FILE, Output, atomic, key};
 use sweep_parameter::Parameter as _;
-use sweep_results::{Cell, ResultTable};
+use sweep_results::{Cell, ResultTable, Slack};
 
 /// Arguments of `sweep optimise`.
 #[derive(Debug, clap::Args)]
@@ -73,7 +73,8 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         Opened::Open(trials) => trials,
         Opened::Finished(()) => {
             let how = "it is there already (--fresh searches again)";
-            return told(&study, args.candidate, own, &output, how);
+            let effort = args.effort.with(&interrupt);
+            return told(&study, args.candidate, own, &output, how, effort);
         }
     };
     trials.take_notes().iter().for_each(|note| tell(note));
@@ -99,7 +100,58 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         duration(wall_s),
         (candidates * rows) as f64 / wall_s
     );
-    told(&study, args.candidate, own, &output, &how)
+    told(&study, args.candidate, own, &output, &how, args.effort.with(&interrupt))
+}
+
+/// How far a candidate is from breaking each condition, the one with the least slack first; beyond
+/// a limit the slack is negative.
+fn slack_lines<M: Swept>(
+    study: &Study<M>,
+    values: &[f64],
+    effort: Effort<'_>,
+) -> Result<Option<String>, Error> {
+    let Some(slacks) = slacks(study, values, effort)? else { return Ok(None) };
+    let known = study.conditions.iter().zip(slacks);
+    let mut known: Vec<(&str, Slack)> =
+        known.filter_map(|(goal, slack)| Some((goal.text(), slack?))).collect();
+    known.sort_by(|a, b| a.1.part.total_cmp(&b.1.part));
+    let mut text = String::new();
+    for (k, (condition, Slack { distance, part })) in known.into_iter().enumerate() {
+        let percent = short(100.0 * part);
+        let name = if k == 0 { "binds" } else { "" };
+        text.line(name, format!("{condition}: slack {}, {percent} %", short(distance)));
+    }
+    Ok(Some(text))
+}
+
+/// The candidate that is nearest to keeping the conditions, and what it breaks, where none keeps
+/// them: each excess over the greatest of all candidates, added. Nothing where no candidate has
+/// numbers.
+fn nearest<M: Swept>(study: &Study<M>, file: &ResultTable) -> Result<Option<String>, Error> {
+    let names: Vec<String> = (1..=study.conditions.len()).map(|k| format!("excess_{k}")).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let mut rows: Vec<(u64, Vec<f64>)> = Vec::new();
+    file.file().each_row(&names, |row| {
+        let excesses: Vec<f64> = (0..names.len()).map(|column| row.value(column)).collect();
+        if excesses.iter().all(|excess| excess.is_finite()) {
+            rows.push((row.index(), excesses));
+        }
+        Ok::<(), Error>(())
+    })?;
+    let greatest: Vec<f64> = (0..names.len())
+        .map(|k| rows.iter().map(|(_, all)| all[k]).fold(f64::MIN_POSITIVE, f64::max))
+        .collect();
+    let broken =
+        |all: &[f64]| -> f64 { all.iter().zip(&greatest).map(|(own, most)| own / most).sum() };
+    let least = rows.iter().min_by(|a, b| broken(&a.1).total_cmp(&broken(&b.1)));
+    let Some((candidate, excesses)) = least else { return Ok(None) };
+    let mut text = String::new();
+    text.line("nearest", format!("candidate {candidate}, which breaks"));
+    for (goal, excess) in study.conditions.iter().zip(excesses).filter(|(_, excess)| **excess > 0.0)
+    {
+        text.line("", format!("{} by {}", goal.text(), short(*excess)));
+    }
+    Ok(Some(text))
 }
 
 /// Claims the path of the model's own file, if one is asked for, before the search.
@@ -135,6 +187,7 @@ fn told<M: Swept>(
     own: Option<(&Path, Output<'_>)>,
     output: &Path,
     how: &str,
+    effort: Effort<'_>,
 ) -> Result<Exit, Error> {
     let mut text = format!("{}: {how}\n", study.name);
     let file = ResultTable::open(output)?;
@@ -173,8 +226,12 @@ fn told<M: Swept>(
         _ => String::new(),
     };
     text.line("feasible", format!("{feasible} of {all}{ended}"));
-    if let Some(best) = about["best"].as_u64() {
-        text.line("best", format!("candidate {best}"));
+    match about["best"].as_u64() {
+        Some(best) => text.line("best", format!("candidate {best}")),
+        None => text.extend(nearest(study, &file)?),
+    }
+    if let Some(values) = values.as_ref().filter(|_| !study.conditions.is_empty()) {
+        text.extend(slack_lines(study, values, effort)?);
     }
     if least[0].is_finite() && first_late < all {
         let Objective { name, sign, .. } = &study.objectives[0];

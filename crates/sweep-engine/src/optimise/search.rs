@@ -1,12 +1,16 @@
 //! Candidates through a model's engine, with a memory.
 
+use std::sync::Mutex;
+
+use arrow_array::RecordBatch;
 use arrow_schema::ArrowError;
 
 use super::{Candidate, Study, evolve};
 use crate::evaluator::{CachedEvaluator, Response, Stopped};
 use crate::store::{Done, Key, Layout, ResultRows, Row, Trials};
 use crate::{Effort, Error, Progress, StoreError, Swept};
-use sweep_results::Goal;
+use sweep_files::panics::{lock, unlocked};
+use sweep_results::{Goal, Slack};
 
 /// Everything that a study tries, with a memory of trials if there is one, which it gives back;
 /// nothing where the interrupt was raised.
@@ -42,6 +46,38 @@ pub fn search<M: Swept>(
     Ok((Stopped::interrupted_to_none(found)?, asking.into_cache()))
 }
 
+/// Computes how far the points of a candidate are from the limit of each condition; nothing where
+/// the interrupt was raised.
+///
+/// # Errors
+/// No engine, no threads.
+pub fn slacks<M: Swept>(
+    study: &Study<M>,
+    values: &[f64],
+    effort: Effort<'_>,
+) -> Result<Option<Vec<Option<Slack>>>, Error> {
+    let (threads, engine) = (effort.threads()?, M::engine(&study.plan, None)?);
+    let silent = |_: u64| {};
+    let asking = CachedEvaluator::new(engine, threads, effort.interrupt, None, &silent)?;
+    let layout = M::layout(&study.plan);
+    let found = Mutex::new(Vec::new());
+    let answer = |_: usize, points: Vec<Done>| -> Result<Response, StoreError> {
+        let batch = batch(study, &layout, values, points)?;
+        let slacks = study.conditions.iter().map(|goal| goal.slack(&batch));
+        *lock(&found) = slacks.collect::<Result<Vec<_>, ArrowError>>().map_err(defect)?;
+        Ok(Response::new())
+    };
+    let keys = [vec![key(0, 0, values)]];
+    let asked =
+        asking.evaluate(&keys, study.rows(), &|_, row| study.axis_values(values, row), &answer);
+    Ok(Stopped::interrupted_to_none(asked)?.map(|_| unlocked(found)))
+}
+
+/// A defect of the program: its own rows do not fit its own columns.
+fn defect(error: ArrowError) -> StoreError {
+    StoreError::Engine { first: 0, last: 0, reason: error.to_string() }
+}
+
 /// The objectives of a candidate as they are minimised, then its excesses, by its points.
 fn answer<M: Swept>(
     study: &Study<M>,
@@ -49,8 +85,23 @@ fn answer<M: Swept>(
     values: &[f64],
     points: Vec<Done>,
 ) -> Result<Response, StoreError> {
-    let defect =
-        |error: ArrowError| StoreError::Engine { first: 0, last: 0, reason: error.to_string() };
+    let batch = batch(study, layout, values, points)?;
+    let number = |goal: &Goal, sign: f64| Ok(goal.evaluate(&batch)?.map(|number| sign * number));
+    let objectives = study.objectives.iter().map(|one| number(&one.goal, one.sign));
+    let excesses = study.conditions.iter().map(|goal| number(goal, 1.0));
+    let numbers = objectives.chain(excesses).collect::<Result<Vec<_>, ArrowError>>();
+    // An infinite number is as good as none.
+    let finite = |number: Option<f64>| number.filter(|number| number.is_finite());
+    Ok(numbers.map_err(defect)?.into_iter().map(finite).collect())
+}
+
+/// The rows of a candidate's points.
+fn batch<M: Swept>(
+    study: &Study<M>,
+    layout: &Layout,
+    values: &[f64],
+    points: Vec<Done>,
+) -> Result<RecordBatch, StoreError> {
     let mut rows = ResultRows::new(layout);
     let of = |done: Done| {
         let row = done.point % study.rows();
@@ -59,14 +110,7 @@ fn answer<M: Swept>(
     for (row, cells) in points.into_iter().flat_map(of) {
         rows.push(row, study.axis_values(values, row), cells);
     }
-    let batch = rows.take().map_err(defect)?;
-    let number = |goal: &Goal, sign: f64| Ok(goal.evaluate(&batch)?.map(|number| sign * number));
-    let objectives = study.objectives.iter().map(|one| number(&one.goal, one.sign));
-    let excesses = study.conditions.iter().map(|goal| number(goal, 1.0));
-    let numbers = objectives.chain(excesses).collect::<Result<Vec<_>, ArrowError>>();
-    // An infinite number is as good as none.
-    let finite = |number: Option<f64>| number.filter(|number| number.is_finite());
-    Ok(numbers.map_err(defect)?.into_iter().map(finite).collect())
+    rows.take().map_err(defect)
 }
 
 /// The key under which an answer is stored: the candidate's number, the answer's, the candidate.
