@@ -233,6 +233,26 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
 }
 
 #[test]
+fn any_column_can_be_a_gate_between_two_maps() {
+    let home = mapped();
+    let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--out", "light.parquet"];
+    let done = home.sweep(&light);
+    assert_eq!(code(&done), Some(0), "{}", said(&done));
+    let compared = |gate: &str| home.sweep(&["compare", MAP, "light.parquet", "--fail-on", gate]);
+    assert_eq!(code(&compared("nonlinear_tub_yaw=1e9")), Some(0));
+    let failed = compared("nonlinear_tub_yaw=0");
+    assert_eq!(code(&failed), Some(4), "{}", said(&failed));
+    let text = printed(&failed);
+    assert!(text.contains("--fail-on: nonlinear_tub_yaw changed by up to "), "{text}");
+    assert!(text.contains("greatest changes of nonlinear_tub_yaw, rad"), "{text}");
+    for unfit in ["nonlinear_tub_yow=1", "unbalance_mass_kg=1", "status=1"] {
+        let refused = compared(unfit);
+        assert_eq!(code(&refused), Some(2), "{unfit}");
+        assert!(said(&refused).contains("a column of numbers in both files"), "{unfit}");
+    }
+}
+
+#[test]
 fn a_verdict_that_flipped_shows_both_of_its_ratios() {
     let home = Home::new(&grid(3, 2));
     for (name, least, mass) in [("a", "ratio_min=0.5", "20"), ("b", "ratio_min=1", "22")] {
@@ -393,9 +413,67 @@ fn a_list_says_its_axes_and_an_unfinished_run_what_it_is() {
     assert!(shown.contains("design  file list.csv"), "{shown}");
     assert!(shown.contains("axis  unbalance_mass_kg\n"), "{shown}");
 
+    // Of 32 rows a shard has every second chunk of 8.
+    fs::write(home.path("g.toml"), grid(8, 4)).expect("written");
+    let part = home.sweep(&["run", "g.toml", "--out", "part.parquet", "--shard", "1/2"]);
+    assert_eq!(code(&part), Some(0), "{}", said(&part));
+    for path in ["part.parquet", "part.parquet.partial"] {
+        let shown = printed(&home.sweep(&["show", path]));
+        assert!(shown.contains("unfinished: 16 of 32 points done (50.0 %)"), "{shown}");
+        let told = parsed(&home.sweep(&["show", path, "--json"]));
+        assert_eq!((&told["points"], &told["points_done"]), (&json!(32), &json!(16)));
+    }
+    for words in [
+        &["show", "part.parquet", "--top", "3"][..],
+        &["report", "part.parquet"],
+        &["require", "part.parquet", "ratio_max < 2"],
+        &["plot", "part.parquet"],
+        &["export", "part.parquet", "part.csv"],
+        &["compare", MAP, "part.parquet"],
+    ] {
+        let refused = home.sweep(words);
+        assert_eq!(code(&refused), Some(2), "{words:?}");
+        let text = said(&refused);
+        assert!(text.contains("is not finished: 16 of 32 points done"), "{words:?}: {text}");
+    }
+
     fs::create_dir(home.path("x.parquet.partial")).expect("made");
     let folder = home.sweep(&["show", "x.parquet.partial"]);
     assert!(said(&folder).contains("a run that is not finished"), "{}", said(&folder));
+}
+
+#[test]
+fn a_gate_says_which_part_fails_and_how_sure_a_share_is() {
+    let home = Home::new(&designed("monte_carlo"));
+    let done = home.sweep(&["run", "g.toml", "--progress", "none"]);
+    assert_eq!(code(&done), Some(0), "{}", said(&done));
+    let text = "share(unbalance_mass_kg < 0.5) > 0.99 and count(true) == 32";
+    let closed = home.sweep(&["require", MAP, text]);
+    assert_eq!(code(&closed), Some(4), "{}", said(&closed));
+    let told = parsed(&home.sweep(&["require", MAP, text, "--json"]));
+    let whole = &told["expressions"][0];
+    let share = whole["folded"][0].as_f64().expect("a share");
+    let ends = [0, 1].map(|end| whole["intervals"][0][end].as_f64().expect("an interval"));
+    assert!(ends[0] < share && share < ends[1] && ends[1] - ends[0] < 0.4, "{ends:?}");
+    let holds: Vec<&Value> =
+        whole["parts"].as_array().expect("parts").iter().map(|part| &part["holds"]).collect();
+    assert_eq!(holds, [&json!(false), &json!(true)]);
+    let text = printed(&closed);
+    assert!(text.contains("95 % confidence"), "{text}");
+    assert!(text.contains("       FAILS  share(unbalance_mass_kg < 0.5) > 0.99"), "{text}");
+    assert!(text.contains("       holds  count(true) == 32"), "{text}");
+    // The share of a grid is no estimate.
+    let grid = mapped();
+    let open = printed(&grid.sweep(&["require", MAP, "share(unbalance_mass_kg < 0.5) > 0"]));
+    assert!(!open.contains("confidence"), "{open}");
+}
+
+#[test]
+fn a_misspelt_quantity_of_a_figure_is_told_the_nearest() {
+    let home = mapped();
+    let refused = home.sweep(&["plot", MAP, "--quantity", "ratio_mx"]);
+    assert_eq!(code(&refused), Some(2));
+    assert!(said(&refused).contains("is `ratio_max` meant?"), "{}", said(&refused));
 }
 
 #[test]

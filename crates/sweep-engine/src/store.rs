@@ -34,6 +34,7 @@ pub mod synthetic;
 #[cfg(test)]
 mod tests;
 mod trials;
+mod unfinished;
 
 use std::path::{Path, PathBuf};
 
@@ -51,6 +52,7 @@ pub use schema::{BATCH_ROWS, Column, Done, Holds, Layout, ResultRows, Row};
 pub use shard::{Shard, ShardRequest, list as shard_list};
 pub use status::{FolderStatus, State, status};
 pub use trials::{Key, Trials};
+pub use unfinished::{Unfinished, refuse_unfinished, unfinished};
 
 use sweep_parameter::{Parameter as _, RatioLimits};
 

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use super::{Lines as _, quoted, short, span, table};
 use crate::config::section::{counted, cut};
+use crate::store::refuse_unfinished;
 use crate::{Build, Error, Exit, show, tell};
 use fail_on::FailOn;
 use sweep_files::{FileKind, Output};
@@ -37,8 +38,8 @@ pub struct Args {
     /// Write the differences of maps, row by row, to a Parquet file that `sweep plot` draws
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Exit with 4 if this differs: any, plan, flips, lost, sensitive, rows, ratio=PART, gap=M or
-    /// boundary=WIDTH; may be repeated
+    /// Exit with 4 if this differs: any, plan, flips, lost, sensitive, rows, ratio=PART, gap=M,
+    /// boundary=WIDTH or COLUMN=CHANGE; may be repeated
     #[arg(long, value_name = "WHAT", value_parser = str::parse::<FailOn>)]
     fail_on: Vec<FailOn>,
     /// Show at most this many rows of each kind
@@ -65,7 +66,9 @@ What --fail-on takes:
   ratio=0.05      a ratio changed by more than 5 % either way, or is in one file only
   gap=0.001       a least gap changed by more than 1 mm, or is in one file only
   boundary=2      the boundary moved by more than 2 in the second axis's unit, whatever the brackets
-                  leave open, or has other numbers of crossings";
+                  leave open, or has other numbers of crossings
+  COLUMN=0.1      any column of numbers changed by more than this in its unit, in a row that is not
+                  sensitive, or has a value in one file only; its greatest changes are shown too";
 
 /// Compares the files.
 ///
@@ -73,11 +76,14 @@ What --fail-on takes:
 /// Files that cannot be read or compared, and an output that cannot be written.
 pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
     let files = [&args.first, &args.second];
+    files.into_iter().try_for_each(|path| refuse_unfinished(path))?;
     let tables = [ResultTable::open(files[0])?, ResultTable::open(files[1])?];
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Differences)).transpose()?;
     let found = compare(&tables[0], &tables[1])?;
-    if let Some([given, of]) = args.fail_on.iter().find_map(|fail_on| fail_on.lacks(&found)) {
+    if let Some([given, of]) =
+        args.fail_on.iter().find_map(|fail_on| fail_on.lacks(&found, &tables))
+    {
         return Err(Error::option("--fail-on", given, of));
     }
     if let (Some(output), Some(path)) = (output, &args.out) {
@@ -185,7 +191,28 @@ fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
             (row.gap_m.map(number), Some(change))
         });
     }
+    lists.extend(args.fail_on.iter().filter_map(|fail_on| column_list(fail_on, found, most)));
     lists
+}
+
+/// The greatest changes of a column that `--fail-on` names.
+fn column_list(fail_on: &FailOn, found: &Comparison, most: usize) -> Option<Listed> {
+    let FailOn::Column(name, _) = fail_on else { return None };
+    let column = found.columns.iter().find(|column| column.name == *name)?;
+    let rows = column.worst.iter().take(most).map(|worst| {
+        let [first, second] = worst.values;
+        let change = first.zip(second).map(|(first, second)| second - first);
+        let sign = if change > Some(0.0) { "+" } else { "" };
+        let key = found.shared[worst.row].key.iter().map(|value| short(*value));
+        let own = [number(first), number(second), format!("{sign}{}", number(change))];
+        key.chain(own).collect()
+    });
+    let rows: Vec<Vec<String>> = rows.collect();
+    let unit = if column.unit.is_empty() { "" } else { ", " };
+    let title = format!("greatest changes of {name}{unit}{}", column.unit);
+    let headings = found.keys.iter().map(String::as_str).chain(["A", "B", "change"]);
+    let headings = headings.map(str::to_owned).collect();
+    (!rows.is_empty()).then_some(Listed { title, headings, rows })
 }
 
 /// How many rows and verdicts are shared.

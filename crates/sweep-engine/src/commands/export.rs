@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::exit::{Error, Exit, tell};
+use crate::store::refuse_unfinished;
 use sweep_files::Output;
 use sweep_results::{ExportFormat, ResultTable, export};
 
@@ -28,6 +29,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         let expected = format!("a name that ends in {}", endings());
         return Err(Error::option("OUT", args.out.display(), &expected));
     };
+    refuse_unfinished(&args.file)?;
     let file = ResultTable::open(&args.file)?;
     let output = Output::begin(&args.out, format.kind())?;
     export(&file, format, output)?;

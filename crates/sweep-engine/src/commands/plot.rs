@@ -6,8 +6,10 @@ use clap::ValueEnum;
 
 use crate::config::written::finite;
 use crate::exit::{Error, Exit, tell};
+use crate::store::refuse_unfinished;
 use sweep_files::beside;
-use sweep_plot::{CommonFigures, Figures, Options, View, render};
+use sweep_plot::{CommonFigures, Figures, Options, PlotError, View, render};
+use sweep_results::nearest;
 
 /// Arguments of `plot`, of a model with these views.
 #[derive(Debug, clap::Args)]
@@ -64,9 +66,19 @@ pub fn draw<V: ValueEnum + Send + Sync>(
         boundary: args.boundary.clone(),
         ..further
     };
-    render(&args.file, &options, model, &output)?;
+    refuse_unfinished(&args.file)?;
+    render(&args.file, &options, model, &output).map_err(told_near)?;
     tell(&format!("wrote {}", output.display()));
     Ok(Exit::Done)
+}
+
+/// Adds the nearest valid name to the refusal of a misspelt one.
+fn told_near(error: PlotError) -> PlotError {
+    let PlotError::NotThere { refusal, given, valid } = &error else { return error };
+    match nearest(given, valid.iter().map(String::as_str)) {
+        Some(near) => PlotError::Unfit(format!("{refusal}\n  = help: is `{near}` meant?")),
+        None => error,
+    }
 }
 
 fn assignment(text: &str) -> Result<(String, f64), String> {

@@ -6,6 +6,7 @@ use super::show::Further;
 use super::{conditions, short, word};
 use crate::columns::MODELS;
 use crate::store::read::{Tally, tally};
+use crate::store::refuse_unfinished;
 use crate::{Error, Exit, GridInput, Plan, Swept, tell};
 use sweep_files::{FileKind, Output, ParquetFile, key};
 use sweep_parameter::RatioLimits;
@@ -52,6 +53,7 @@ pub fn run<M: Swept>(
         let expected = "a file; each expression needs a `--require` of its own";
         return Err(Error::option("FILE", path.display(), expected));
     }
+    refuse_unfinished(&args.result)?;
     let file = ResultTable::open(&args.result)?;
     let page = Output::begin(&output, FileKind::Html)?;
     if file.file().kind() != Some(FileKind::Map) {
@@ -67,7 +69,9 @@ pub fn run<M: Swept>(
     let mut body = format!("<header><h1>{question}</h1><p>{}</p></header>\n", escape(name));
     let tally = tally(file.file())?;
     let limits = ratio_limits(&plan);
-    let share = 100.0 * tally.reliable as f64 / (tally.points as f64).max(1.0);
+    // Nulls are counted as share() counts them: they are on neither side.
+    let judged = tally.points.saturating_sub(tally.undefined);
+    let share = 100.0 * tally.reliable as f64 / (judged as f64).max(1.0);
     let Tally { reliable, points, sensitive, undefined, over_estimated, .. } = &tally;
     let range = limits.map_or_else(String::new, within);
     let over = |limits: RatioLimits| {
@@ -76,9 +80,9 @@ pub fn run<M: Swept>(
     };
     let over = limits.filter(|_| *over_estimated > 0).map_or_else(String::new, over);
     body += &format!(
-        "<p class=\"share\">{share:.1} %</p>\n<p>{reliable} of {points} points are reliable: every \
-         ratio of the nonlinear model to the linear one is {range}. {sensitive} are chaotic, \
-         {undefined} have no verdict.{over}</p>\n"
+        "<p class=\"share\">{share:.1} %</p>\n<p>{reliable} of {judged} points with a verdict are \
+         reliable: every ratio of the nonlinear model to the linear one is {range}. Of all \
+         {points} points, {sensitive} are chaotic, and {undefined} have no verdict.{over}</p>\n"
     );
     let heads = ["", "worst", "limit", "at"];
     body += &table("The worst of it", &heads, &worst(&file)?);

@@ -3,11 +3,14 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
+use serde::Serialize;
 use serde_json::json;
 
 use super::{conditions, table, word};
+use crate::store::refuse_unfinished;
 use crate::{Error, Exit, show};
-use sweep_results::{Checked, ResultTable, check};
+use sweep_plot::Share;
+use sweep_results::{Cell, Checked, Condition, ResultTable, check};
 
 /// Arguments of `sweep require`.
 #[derive(Debug, clap::Args)]
@@ -48,6 +51,10 @@ neither does not keep the expression: a point that failed does not pass a gate u
 a function over all rows a value where one of them has none. --allow-null lets such rows pass, and \
 lets functions leave them out. If there is no row to check, nothing holds.
 
+Of an expression that fails and joins others by `and`, it says which of them fail. A share of \
+points that a design places at random comes with the interval in which that of all such points \
+lies with 95 % confidence (Wilson's).
+
 The exit code is 0 where every expression holds, else 4.";
 
 /// Checks the expressions.
@@ -55,15 +62,21 @@ The exit code is 0 where every expression holds, else 4.";
 /// # Errors
 /// A file that cannot be read, and every mistake in the expressions.
 pub fn run(args: &Args) -> Result<Exit, Error> {
+    refuse_unfinished(&args.file)?;
     let file = ResultTable::open(&args.file)?;
     let conditions = conditions::parse("EXPRESSION", &args.expressions, &file)?;
     let keep = conditions::of_rows(args.keep.as_ref(), &file)?;
     let shown = usize::from(args.rows);
+    let is_random = is_random(&file);
     let checked = conditions
         .iter()
-        .map(|condition| check(&file, condition, keep.as_ref(), args.allow_null, shown))
-        .collect::<Result<Vec<_>, _>>()?;
-    let holds = checked.iter().all(|checked| checked.holds);
+        .map(|condition| {
+            let whole = check(&file, condition, keep.as_ref(), args.allow_null, shown)?;
+            let parts = parts(&file, condition, keep.as_ref(), args.allow_null, whole.holds)?;
+            Ok(Gate { intervals: intervals(&whole, is_random), whole, parts })
+        })
+        .collect::<Result<Vec<Gate>, Error>>()?;
+    let holds = checked.iter().all(|gate| gate.whole.holds);
     if args.json {
         let said = json!({
             "file": args.file.display().to_string(),
@@ -73,13 +86,81 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
         });
         show(&format!("{said:#}\n"))?;
     } else {
-        show(&checked.iter().map(|checked| format_checked(args, checked)).collect::<String>())?;
+        show(&checked.iter().map(|gate| format_gate(args, gate, is_random)).collect::<String>())?;
     }
     Ok(if holds { Exit::Done } else { Exit::NotHeld })
 }
 
+/// An expression with what came of it.
+#[derive(Serialize)]
+struct Gate {
+    #[serde(flatten)]
+    whole: Checked,
+    /// For each function over all rows that is a share of points at random, the interval in which
+    /// the share of all such points lies with 95 % confidence.
+    intervals: Vec<Option<[f64; 2]>>,
+    /// Of an expression that fails, what it joins by `and`.
+    parts: Vec<Checked>,
+}
+
+/// Returns whether a file's rows are points at random, so that a share of them is known to an
+/// interval. Points of a sequence or a hypercube are spread more evenly: their interval is no
+/// wider.
+fn is_random(file: &ResultTable) -> bool {
+    let method = file.plan.as_ref().and_then(|plan| plan["design"]["method"].as_str());
+    method.is_some_and(|method| method != "list")
+}
+
+/// Computes Wilson's interval of every share.
+fn intervals(checked: &Checked, is_random: bool) -> Vec<Option<[f64; 2]>> {
+    let of = |(count, rows): (&Option<u64>, &u64)| {
+        let share = Share::of((*count)?, *rows).filter(|_| is_random)?;
+        Some([share.low, share.high])
+    };
+    checked.share_counts.iter().zip(&checked.folded_rows).map(of).collect()
+}
+
+/// Checks what an expression that fails joins by `and`, each by itself.
+fn parts(
+    file: &ResultTable,
+    condition: &Condition,
+    keep: Option<&Condition>,
+    allow_null: bool,
+    holds: bool,
+) -> Result<Vec<Checked>, Error> {
+    let texts = condition.conjuncts();
+    if holds || texts.len() < 2 {
+        return Ok(Vec::new());
+    }
+    let texts: Vec<String> = texts.into_iter().map(str::to_owned).collect();
+    let parts = conditions::parse("EXPRESSION", &texts, file)?;
+    let checked = parts.iter().map(|part| check(file, part, keep, allow_null, 0));
+    Ok(checked.collect::<Result<Vec<_>, _>>()?)
+}
+
+/// What came of an expression, and of what it joins by `and` where it fails.
+fn format_gate(args: &Args, gate: &Gate, is_random: bool) -> String {
+    let mut text = format_checked(args, &gate.whole, &gate.intervals);
+    for part in &gate.parts {
+        let own = format_checked(args, part, &intervals(part, is_random));
+        text.push_str(&format!("       {own}"));
+    }
+    text
+}
+
+/// A share with its interval.
+fn with_interval(cell: &Cell, interval: Option<&Option<[f64; 2]>>) -> String {
+    match interval {
+        Some(Some([low, high])) => {
+            let [low, high] = [low, high].map(|end| format!("{end:.3}"));
+            format!("{} (95 % confidence {low} to {high}, Wilson)", word(cell))
+        }
+        _ => word(cell),
+    }
+}
+
 /// What came of an expression: a line, and the rows that do not keep it.
-fn format_checked(args: &Args, checked: &Checked) -> String {
+fn format_checked(args: &Args, checked: &Checked, intervals: &[Option<[f64; 2]>]) -> String {
     let verdict = if checked.holds { "holds" } else { "FAILS" };
     let mut text = format!("{verdict}  {}", checked.expression);
     // Writing to a String cannot fail.
@@ -97,7 +178,9 @@ fn format_checked(args: &Args, checked: &Checked) -> String {
             writeln!(text, ": {} of {rows} rows false{undefined}", checked.failing)
         }
         (rows, false) => {
-            let values: Vec<String> = checked.folded.iter().map(word).collect();
+            let values = checked.folded.iter().enumerate();
+            let values = values.map(|(k, cell)| with_interval(cell, intervals.get(k)));
+            let values: Vec<String> = values.collect();
             let values = values.join(", ");
             match checked.folded_rows.iter().min() {
                 Some(&over) if over < rows => {

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::run::counts;
 use super::{Lines as _, clipped, conditions, short, span, table, word};
 use crate::store::read::{ColumnRange, Overview, ResultFile, Tally, overview, tally};
+use crate::store::{Holder, Unfinished, refuse_unfinished, unfinished};
 use crate::{Error, Exit, show};
 use sweep_files::{ParquetFile, key};
 use sweep_parameter::Worse;
@@ -22,7 +23,8 @@ const MOST_LISTED: usize = 12;
 /// Arguments of `sweep show`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A result, trace, modes, stability or boundary file
+    /// A result, trace, modes, stability or boundary file; of one that is not finished, how far it
+    /// is
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Show this many rows, and no summary [default: 10 with --by or --where]
@@ -86,11 +88,16 @@ impl Further<'_> {
 /// file its columns and their ranges; or some of its rows.
 ///
 /// # Errors
-/// A file that cannot be read, or is not Parquet; a column that it does not have.
+/// A file that cannot be read, or is not Parquet; a column that it does not have; rows of a result
+/// that is not finished.
 pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
     let asks_for_rows = args.top.is_some() || args.by.is_some() || args.keep.is_some();
     if asks_for_rows || !args.columns.is_empty() {
+        refuse_unfinished(&args.file)?;
         return rows(args);
+    }
+    if let Some(found) = unfinished(&args.file)? {
+        return show(&if args.json { format!("{:#}\n", json!(found)) } else { progress(&found) });
     }
     let opened = ParquetFile::open(&args.file)?;
     let file = overview(&opened)?;
@@ -137,6 +144,23 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
     }
     columns(&mut text, &file, args.all || file.result.is_none(), further.is_of_a_metric);
     show(&text)
+}
+
+/// How far a run or a search without a result is.
+fn progress(found: &Unfinished) -> String {
+    let mut text = String::new();
+    text.line("file", found.output.display());
+    text.line("state", format!("unfinished: {}", found.progress()));
+    text.line("name", &found.name);
+    text.line("kept in", found.folder.display());
+    for Holder { pid, host, shard } in &found.running {
+        let shard = shard.map_or(String::new(), |shard| format!(", shard {shard}"));
+        text.line("running", format!("process {pid} on {host}{shard}"));
+    }
+    if found.running.is_empty() {
+        text.line("next", "the command again that began it: it goes on from there");
+    }
+    text
 }
 
 /// Some rows of the file.

@@ -47,8 +47,13 @@ impl Shape {
 
     /// Bytes of a record.
     pub fn bytes_a_row(&self) -> usize {
-        8 + self.columns.len().div_ceil(8) + 8 * self.columns.len()
+        record_bytes(self.columns.len())
     }
+}
+
+/// Computes the bytes of a record of so many columns.
+const fn record_bytes(columns: usize) -> usize {
+    8 + columns.div_ceil(8) + 8 * columns
 }
 
 /// What a chunk's header must say to be the chunk that is looked for.
@@ -154,6 +159,25 @@ pub(super) fn decode(place: &Place, bytes: &[u8]) -> Result<Vec<Done>, Damage> {
         }
     }
     if are_of(place, &outcomes) { Ok(outcomes) } else { Err(Damage::Record) }
+}
+
+/// Counts the points in a chunk of the plan with this hash, whatever its columns are; none are in
+/// what is not as it was written.
+pub(super) fn count_points(plan: &blake3::Hash, bytes: &[u8]) -> u64 {
+    let Some((body, hash)) = bytes.split_last_chunk::<HASH>() else { return 0 };
+    let Some((header, records)) = body.split_at_checked(HEADER) else { return 0 };
+    let [format, columns] = [8, 12].map(|at| {
+        let word = header[at..].first_chunk().copied().unwrap_or_default();
+        u32::from_le_bytes(word)
+    });
+    let is_ours =
+        header.starts_with(&MAGIC) && format == FORMAT && header[16..48] == *plan.as_bytes();
+    if !is_ours || blake3::hash(body) != *hash {
+        return 0;
+    }
+    let points = records.chunks_exact(record_bytes(columns as usize)).map(|record| &record[..8]);
+    let points: Vec<&[u8]> = points.collect();
+    points.chunk_by(|a, b| a == b).count() as u64
 }
 
 fn header(place: &Place) -> Vec<u8> {

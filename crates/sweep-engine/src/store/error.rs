@@ -3,6 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::Unfinished;
 use super::differences::PlanDifference;
 use crate::threads::ThreadsError;
 use sweep_files::FileError;
@@ -75,6 +76,11 @@ pub enum StoreError {
         /// Its run folder.
         folder: PathBuf,
     },
+    /// A result that is asked for before it is whole.
+    #[error("{} is not finished: {}, in {}\n  = help: give the command again that began it, and it \
+             goes on from there",
+        .0.output.display(), .0.progress(), .0.folder.display())]
+    Unfinished(Box<Unfinished>),
     /// The engine handed over something that cannot be a chunk; a defect of this program.
     #[error(
         "internal error in points {first} to {last}: {reason}\n  = help: \
@@ -143,7 +149,10 @@ impl StoreError {
     /// Whether nothing was begun, because the request does not fit what is there.
     pub fn is_refusal(&self) -> bool {
         match self {
-            Self::PlanDiffers { .. } | Self::OutputDiffers { .. } | Self::Refused(_) => true,
+            Self::PlanDiffers { .. }
+            | Self::OutputDiffers { .. }
+            | Self::Refused(_)
+            | Self::Unfinished(_) => true,
             Self::Threads(error) => error.is_refusal(),
             Self::File(error) => error.is_refusal(),
             Self::Parquet { action, .. } => *action == "read",

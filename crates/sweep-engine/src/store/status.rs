@@ -62,7 +62,7 @@ pub struct FolderStatus {
 }
 
 /// A path as people see it: JSON holds no other bytes than text.
-fn shown<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+pub(super) fn shown<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&path.display())
 }
 

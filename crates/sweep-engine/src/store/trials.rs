@@ -147,15 +147,22 @@ fn contents(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> Result<(File, usize, K
 
 /// Returns whether a file holds a trial of the plan with this hash.
 pub(super) fn has_any(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> bool {
-    let Ok(file) = regular::open(path) else { return false };
-    let mut records = BufReader::new(file);
-    let mut record = [0; RECORD_BYTES];
-    while records.read_exact(&mut record).is_ok() {
-        if decode(plan, &record).is_some() {
-            return true;
-        }
-    }
-    false
+    records(path).any(|record| decode(plan, &record).is_some())
+}
+
+/// Counts the trials of the plan with this hash in a file.
+pub(super) fn count(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> u64 {
+    records(path).filter(|record| decode(plan, record).is_some()).count() as u64
+}
+
+/// Iterates over the records of a file, whosesoever they are; none are in what cannot be read.
+fn records(path: &Path) -> impl Iterator<Item = [u8; RECORD_BYTES]> {
+    let mut file = regular::open(path).ok().map(BufReader::new);
+    std::iter::from_fn(move || {
+        let mut record = [0; RECORD_BYTES];
+        file.as_mut()?.read_exact(&mut record).ok()?;
+        Some(record)
+    })
 }
 
 fn encode(plan: &[u8; blake3::OUT_LEN], key: Key, answer: Option<f64>) -> Vec<u8> {

@@ -3,10 +3,11 @@
 use std::str::FromStr;
 
 use super::short;
-use sweep_results::Comparison;
+use sweep_files::CellKind;
+use sweep_results::{Comparison, ResultTable};
 
 /// What makes the comparison fail.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum FailOn {
     Any,
     Plan,
@@ -17,6 +18,8 @@ pub(super) enum FailOn {
     Ratio(f64),
     Gap(f64),
     Boundary(f64),
+    /// A column of numbers, and how far it may change.
+    Column(String, f64),
 }
 
 impl FromStr for FailOn {
@@ -24,7 +27,8 @@ impl FromStr for FailOn {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || {
-            "expected any, plan, rows, flips, lost, sensitive, ratio=PART, gap=M or boundary=WIDTH"
+            "expected any, plan, rows, flips, lost, sensitive, ratio=PART, gap=M, boundary=WIDTH \
+             or COLUMN=CHANGE"
                 .to_owned()
         };
         let (name, value) = match text.split_once('=') {
@@ -47,6 +51,8 @@ impl FromStr for FailOn {
             ("ratio", _) => Ok(Self::Ratio(number()?)),
             ("gap", _) => Ok(Self::Gap(number()?)),
             ("boundary", _) => Ok(Self::Boundary(number()?)),
+            ("any" | "plan" | "rows" | "flips" | "lost" | "sensitive" | "", _) => Err(expected()),
+            (column, Some(_)) => Ok(Self::Column(column.to_owned(), number()?)),
             _ => Err(expected()),
         }
     }
@@ -55,7 +61,7 @@ impl FromStr for FailOn {
 impl FailOn {
     /// Its name and the kind of files that it needs, where these are of another kind: the gate
     /// would never close.
-    pub(super) fn lacks(self, found: &Comparison) -> Option<[&'static str; 2]> {
+    pub(super) fn lacks(&self, found: &Comparison, tables: &[ResultTable; 2]) -> Option<[&str; 2]> {
         let (has, lacks) = match self {
             Self::Any | Self::Plan | Self::Rows => return None,
             Self::Flips => (found.has_verdicts, ["flips", "two files with verdicts"]),
@@ -66,12 +72,19 @@ impl FailOn {
             Self::Boundary(_) => {
                 (found.boundary.is_some(), ["boundary", "two boundaries, or maps of two axes"])
             }
+            Self::Column(name, _) => {
+                let is_number = |table: &ResultTable| {
+                    table.column(name).is_some_and(|column| column.kind == CellKind::Number)
+                };
+                let has = tables.iter().all(is_number) && !found.keys.contains(name);
+                (has, [name.as_str(), "a column of numbers in both files that is no axis"])
+            }
         };
         (!has).then_some(lacks)
     }
 
     /// The differences that it forbids, in words; `None` without any.
-    pub(super) fn found(self, found: &Comparison) -> Option<String> {
+    pub(super) fn found(&self, found: &Comparison) -> Option<String> {
         let steady = || found.shared.iter().filter(|row| !row.sensitive);
         let counted = |what: &str, count: usize| (count > 0).then(|| format!("{what}: {count}"));
         match self {
@@ -88,21 +101,32 @@ impl FailOn {
             Self::Sensitive => {
                 counted("sensitive verdicts that flipped", found.flips(true).count())
             }
+            Self::Column(name, most) => {
+                let column = found.columns.iter().find(|column| column.name == *name)?;
+                let worst = column.worst.first().filter(|worst| worst.deviation() > *most)?;
+                let unit = column.unit.as_str();
+                let change = match worst.deviation() {
+                    far if far.is_finite() => format!("changed by up to {}", short(far)),
+                    _ => "came or went".to_owned(),
+                };
+                Some(format!("{name} {change} {unit}, and may by {}", short(*most)))
+            }
             Self::Ratio(most) => {
                 let percent = short(100.0 * most);
                 let what = format!("ratios that changed by more than {percent} %, came or went");
-                counted(&what, steady().filter(|row| row.ratio_deviation() > most).count())
+                counted(&what, steady().filter(|row| row.ratio_deviation() > *most).count())
             }
             Self::Gap(most) => {
-                let most_m = short(most);
+                let most_m = short(*most);
                 let what = format!("gaps that changed by more than {most_m} m, came or went");
-                counted(&what, steady().filter(|row| row.gap_deviation_m() > most).count())
+                counted(&what, steady().filter(|row| row.gap_deviation_m() > *most).count())
             }
             Self::Boundary(most) => {
                 let moved = found.boundary.as_ref()?;
-                let far = moved.crossings.iter().filter(|crossing| crossing.certain_shift() > most);
+                let far =
+                    moved.crossings.iter().filter(|crossing| crossing.certain_shift() > *most);
                 let what =
-                    format!("crossings that moved by more than {} {}", short(most), moved.unit);
+                    format!("crossings that moved by more than {} {}", short(*most), moved.unit);
                 counted(what.trim_end(), far.count() + moved.unmatched_lines.len())
             }
         }
@@ -118,11 +142,15 @@ mod tests {
         assert_eq!("flips".parse(), Ok(FailOn::Flips));
         assert_eq!("ratio=0.05".parse(), Ok(FailOn::Ratio(0.05)));
         assert_eq!("boundary=2".parse(), Ok(FailOn::Boundary(2.0)));
+        let column = FailOn::Column("growth_per_s".to_owned(), 0.5);
+        assert_eq!("growth_per_s = 0.5".parse(), Ok(column));
         for (text, said) in [
             ("flip", "expected any, plan"),
             ("flips=3", "expected any, plan"),
             ("ratio", "as in ratio=0.05"),
             ("gap=-1", "at least 0"),
+            ("growth_per_s=", "as in growth_per_s=0.05"),
+            ("=1", "expected any, plan"),
             ("ratio=nan", "at least 0"),
         ] {
             let refused = text.parse::<FailOn>().unwrap_err();

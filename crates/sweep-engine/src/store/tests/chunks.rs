@@ -218,6 +218,47 @@ fn a_part_is_gone_on_from_until_its_chunk_is_whole() {
 }
 
 #[test]
+fn an_unfinished_run_is_found_by_its_result_and_by_its_folder() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    assert_eq!(unfinished(&home.output()).unwrap(), None);
+    let run = open(&home.output(), &job);
+    write(&run, 0);
+    run.write_chunk(3, outcomes([30, 25, 27].into_iter())).unwrap();
+    write(&run, 5);
+    // What is not as it was written does not count.
+    fs::write(home.partial().join(chunk_name(5)), write_bytes(&job, 5).split_off(1)).unwrap();
+    for path in [home.output(), home.partial()] {
+        let found = unfinished(&path).unwrap().unwrap();
+        assert_eq!((found.points, found.points_done), (Some(POINTS), 8 + 3));
+        assert_eq!((&found.output, &found.folder), (&home.output(), &home.partial()));
+        assert_eq!((found.name.as_str(), found.running.len()), ("synthetic", 1));
+        assert_eq!(found.progress(), "11 of 81 points done (13.6 %)");
+    }
+    let error = refuse_unfinished(&home.output()).unwrap_err();
+    assert!(error.is_refusal());
+    assert!(error.to_string().contains("is not finished: 11 of 81 points done"), "{error}");
+    fs::remove_file(home.partial().join(chunk_name(5))).unwrap();
+    drop(run);
+    let run = open(&home.output(), &job);
+    write_missing(&run);
+    finish(run, &job);
+    assert_eq!(unfinished(&home.output()).unwrap(), None);
+    assert_eq!(unfinished(&home.partial()).unwrap(), None);
+}
+
+#[test]
+fn an_unfinished_search_counts_its_trials() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let Ok(Opened::Open(mut trials)) = Trials::open(&home.output(), &job, false) else { panic!() };
+    for k in 0..5 {
+        trials.keep([k, 0, 0], Some(1.0)).unwrap();
+    }
+    let found = unfinished(&home.output()).unwrap().unwrap();
+    assert_eq!((found.points, found.points_done), (None, 5));
+    assert_eq!(found.progress(), "5 trials of a search kept");
+}
+
+#[test]
 fn a_damaged_part_is_set_aside_and_a_whole_chunk_takes_its_place() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     let run = open(&home.output(), &job);
