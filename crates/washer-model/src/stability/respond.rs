@@ -37,6 +37,11 @@ const FARTHEST_FROM_GUESS: f64 = 5e-3;
 /// Responses that are nearer than this (m, rad) are one.
 const SAME: f64 = 1e-6;
 
+/// The distance (m, rad) from which on two guesses of a curve are two branches. Basis: it is ten
+/// times the distance of responses that are one. Doubling it leaves neighbours this close to a fold
+/// as they were found.
+const APART_GUESSES: f64 = 10.0 * SAME;
+
 /// The longest step (m, rad) of the damped search that follows an undamped one without success.
 /// Basis: it is a fifth of the distance within which a result belongs to its guess. Doubling it
 /// loses responses beside folds to their neighbours; halving it doubles the turns.
@@ -183,6 +188,9 @@ impl<'a> Responses<'a> {
             return stopped();
         }
         forget_known(&looked, &mut found);
+        if !find_lost_branches(&looked, &mut found, is_stopped) {
+            return stopped();
+        }
         // What is close to an edge, or moved by the caps, is asked of the machine as it is.
         let are_moved = are_moved(&looked, &found, is_stopped);
         let mut close = Vec::new();
@@ -221,6 +229,9 @@ impl<'a> Responses<'a> {
             if !take_found(&looked, &mut found, searches, is_stopped) {
                 return stopped();
             }
+        }
+        if !find_lost_branches(&looked, &mut found, is_stopped) {
+            return stopped();
         }
         let none = |case: Result<Case<'_>, NoAnswer>| case.err().unwrap_or(NoAnswer::NoResponse);
         let mut answers: Vec<Result<Vec<Response>, NoAnswer>> =
@@ -308,6 +319,67 @@ fn search_again(
         }
     }
     take_found(looked, found, again, is_stopped)
+}
+
+/// Finds branches that were lost to their neighbours.
+///
+/// A curve that passes a speed rises through it and falls through it in turn, so that branches
+/// that are neighbours there have an even and an odd number, and branches vanish in pairs, at
+/// folds. Where an odd number of a curve's guesses has no response of its own, one was lost:
+/// searches that are repelled by the responses known at that speed find it. Returns false once
+/// `is_stopped` says so.
+fn find_lost_branches(
+    looked: &[Look<'_>],
+    found: &mut [Result<Response, NoAnswer>],
+    is_stopped: &dyn Fn() -> bool,
+) -> bool {
+    forget_twice_found(looked, found);
+    let mut searches: Vec<(usize, Solve<'_>)> = Vec::new();
+    let places: Vec<usize> =
+        (0..looked.len()).filter(|&place| looked[place].guess.is_followed()).collect();
+    let curve = |place: usize| (looked[place].number, looked[place].guess.is_on_curve);
+    for of_curve in places.chunk_by(|&a, &b| curve(a) == curve(b)) {
+        let lost = of_curve.iter().filter(|&&place| is_missing(&found[place]));
+        let lost: Vec<usize> = lost.copied().collect();
+        if lost.len().is_multiple_of(2) {
+            continue;
+        }
+        let known: Vec<[f64; STATES]> =
+            of_curve.iter().filter_map(|&place| Some(found[place].as_ref().ok()?.start)).collect();
+        for place in lost {
+            let Look { case, guess, .. } = &looked[place];
+            let solve = Solve::deflated(case.row, guess.state, DAMPED_STEP, known.clone());
+            searches.push((place, solve));
+        }
+    }
+    let is_whole = take_found(looked, found, searches, is_stopped);
+    forget_twice_found(looked, found);
+    is_whole
+}
+
+/// Leaves out all but one of a curve's responses at a speed that are one: the nearest to its guess
+/// stays.
+fn forget_twice_found(looked: &[Look<'_>], found: &mut [Result<Response, NoAnswer>]) {
+    let farthest = |a: &[f64; STATES], b: &[f64; STATES]| {
+        (0..COORDINATES).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max)
+    };
+    for place in 0..found.len() {
+        for other in place + 1..found.len() {
+            let (Look { guess, number, .. }, of_other) = (&looked[place], &looked[other]);
+            if of_other.number != *number {
+                break;
+            }
+            let are_of_curve = guess.is_followed() && of_other.guess.is_followed();
+            let are_apart = farthest(&guess.state, &of_other.guess.state) > APART_GUESSES;
+            let (Ok(a), Ok(b)) = (&found[place], &found[other]) else { continue };
+            if are_of_curve && are_apart && farthest(&a.start, &b.start) < SAME {
+                let from_first = farthest(&a.start, &guess.state);
+                let from_second = farthest(&b.start, &of_other.guess.state);
+                let farther = if from_first > from_second { place } else { other };
+                found[farther] = Err(NoAnswer::NoResponse);
+            }
+        }
+    }
 }
 
 fn is_missing(response: &Result<Response, NoAnswer>) -> bool {
@@ -480,5 +552,48 @@ fn beyond(point: &Point, seen: &Seen) -> Option<Beyond> {
         Some(Beyond::Clearance)
     } else {
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::channel::CHANNELS;
+    use crate::stability::tests::{prepared, with};
+
+    /// The paper's machine with little damping has three responses at 255 rpm. One that its search
+    /// did not find, or found in another's place, is found again.
+    #[test]
+    fn a_branch_that_was_lost_is_found_again() {
+        let point = prepared(with(0.3, 30.0), 100.0);
+        let mut followed = Responses::follow(&[(&point, 255.0)], None, &|| false).remove(0);
+        let case = followed.up.settings.case(255.0).unwrap();
+        let guesses = followed.guesses(255.0).into_iter();
+        let looked: Vec<Look<'_>> = guesses
+            .map(|guess| Look { number: 0, case: case.clone(), guess, linear: [0.0; CHANNELS] })
+            .collect();
+        let searches = looked.iter();
+        let searches = searches.map(|look| Solve::new(look.case.row, look.guess.state, None));
+        let mut solves: Vec<Solve<'_>> = searches.collect();
+        assert!(finish(&mut solves, &|| false));
+        let answers = looked.iter().zip(solves).map(|(look, solve)| look.answer(solve));
+        let found: Vec<Result<Response, NoAnswer>> = answers.collect();
+        let branches = found.iter().map(|response| response.as_ref().unwrap().branch);
+        assert_eq!(branches.collect::<Vec<_>>(), [0, 1, 2]);
+        for place in 0..3 {
+            for instead in [Err(NoAnswer::NoResponse), found[(place + 1) % 3].clone()] {
+                let mut lost = found.clone();
+                lost[place] = instead;
+                assert!(find_lost_branches(&looked, &mut lost, &|| false));
+                let [again, before] =
+                    [&lost, &found].map(|found| found[place].as_ref().unwrap().start);
+                let apart = (0..COORDINATES).map(|i| (again[i] - before[i]).abs());
+                assert!(apart.fold(0.0, f64::max) < SAME, "{place}");
+            }
+        }
+        // An even number may have vanished together, at a fold: they are not searched for.
+        let mut none = vec![Err(NoAnswer::NoResponse), found[1].clone(), Err(NoAnswer::NoResponse)];
+        assert!(find_lost_branches(&looked, &mut none, &|| false));
+        assert!(is_missing(&none[0]) && is_missing(&none[2]));
     }
 }

@@ -57,6 +57,17 @@ const FAST_ENOUGH: f64 = 0.2;
 /// Less than this is missing no more after a correction by a state's own matrix.
 const NEXT_IS_LAST: f64 = 1e-3;
 
+/// The distance (m, rad; of speeds, times the drum's) within which a known response repels a
+/// search. Basis: neighbours beside a fold are some millimetres apart, as in test
+/// `a_branch_that_was_lost_is_found_again`. Doubling it makes searches pass neighbours that they
+/// are meant to find.
+const REPULSION_RANGE: f64 = 5e-3;
+
+/// The largest difference from 1 of a step's factor with which a search may end. Basis: a search
+/// that has converged takes steps of 1e-7 of a known response's distance, whose factor differs from
+/// 1 by as much. Doubling it changes nothing there.
+const DEFLATION_LEFT: f64 = 1e-3;
+
 /// How far a turn is from closing, as a share of its deviation; not finite if it left the model's
 /// range.
 pub(crate) fn missing(
@@ -116,6 +127,8 @@ pub(super) struct Solve<'a> {
     transient_turns: usize,
     /// The largest correction of a coordinate (m, rad).
     longest_step: f64,
+    /// Responses that it is not to find, because they are known.
+    known: Vec<[f64; STATES]>,
     missing: f64,
     is_last: bool,
     is_over: bool,
@@ -132,6 +145,7 @@ impl<'a> Solve<'a> {
             turns: 0,
             transient_turns: 0,
             longest_step: f64::INFINITY,
+            known: Vec::new(),
             missing: f64::INFINITY,
             is_last: false,
             is_over: false,
@@ -143,6 +157,38 @@ impl<'a> Solve<'a> {
     /// rad). It stays near its start where another response is close by.
     pub(super) fn damped(row: Row<'a>, state: [f64; STATES], longest_step: f64) -> Self {
         Self { longest_step, ..Self::new(row, state, None) }
+    }
+
+    /// Returns the damped search by deflated Newton steps (Farrell, Birkisson and Funke 2015):
+    /// known responses repel it, so that it finds another.
+    pub(super) fn deflated(
+        row: Row<'a>,
+        state: [f64; STATES],
+        longest_step: f64,
+        known: Vec<[f64; STATES]>,
+    ) -> Self {
+        Self { known, ..Self::damped(row, state, longest_step) }
+    }
+
+    /// Returns the factor that deflation puts on a Newton step: with the residual multiplied by
+    /// m(x) = product over known responses r of 1 + 1 / |x - r|^2, the step d becomes
+    /// d / (1 - d ln m), where d ln m is the derivative of ln m along d.
+    fn deflation(&self, step: &[N<f64>; STATES]) -> f64 {
+        let speed_rad_per_s = self.row.speed_rpm * TAU / 60.0;
+        let unit = |i: usize| {
+            if i < COORDINATES { REPULSION_RANGE } else { REPULSION_RANGE * speed_rad_per_s }
+        };
+        let mut along = 0.0;
+        for known in &self.known {
+            let (mut squared, mut product) = (0.0, 0.0);
+            for i in 0..STATES {
+                let offset = (self.state[i] - known[i]) / unit(i);
+                squared += offset * offset;
+                product += offset * step[i].0 / unit(i);
+            }
+            along -= 2.0 * product / (squared * (1.0 + squared));
+        }
+        1.0 / (1.0 - along)
     }
 
     /// Returns the search that integrates the transient over a number of turns before it corrects.
@@ -172,9 +218,11 @@ impl<'a> Search<'a> for Solve<'a> {
         }
         let is_seen = self.is_last || self.factors.is_none();
         let mut row = self.row;
-        if !(self.is_last || row.is_stepwise()) {
+        let is_careful = self.is_last || self.longest_step.is_finite();
+        if !(is_careful || row.is_stepwise()) {
             // To come nearer, derivatives at half the instants are enough: of what was missing they
-            // leave some 1e-7.
+            // leave some 1e-7. But where motions have many harmonics they may lead past a response
+            // for ever, from side to side: a damped search takes them at all instants.
             row.instants /= 2;
         }
         vec![Asked { row, start: self.state, is_seen }]
@@ -208,14 +256,16 @@ impl<'a> Search<'a> for Solve<'a> {
             let gap = core::array::from_fn(|i| N(end[i] - self.state[i]));
             let correction = factors.solve(&gap);
             let longest = correction[..COORDINATES].iter().map(|by| by.0.abs()).fold(0.0, f64::max);
-            let share = (self.longest_step / longest).min(1.0);
+            let factor = self.deflation(&correction);
+            let share = factor * (self.longest_step / (factor.abs() * longest)).min(1.0);
             for i in 0..STATES {
                 self.state[i] += share * correction[i].0;
             }
             // The next correction leaves as much less as the last one did.
             let rate = if self.missing.is_finite() { missing / self.missing } else { 1.0 };
             let is_close = missing * rate.min(1.0) < CLOSE || is_own && missing < NEXT_IS_LAST;
-            self.is_last = is_close && share == 1.0;
+            // A search that known responses still push is not there.
+            self.is_last = is_close && (share - 1.0).abs() < DEFLATION_LEFT;
             if is_borrowed {
                 self.factors = None;
             }
@@ -223,5 +273,33 @@ impl<'a> Search<'a> for Solve<'a> {
             self.missing = missing;
         }
         self.is_over |= self.state.iter().any(|x| !x.is_finite());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stability::settings::Settings;
+    use crate::stability::tests::{prepared, with};
+
+    /// A step towards a known response is turned round; far from all of them it stays as it is.
+    #[test]
+    fn known_responses_repel() {
+        let point = prepared(with(0.4, 140.0), 100.0);
+        let row = Settings::new(&point).case(250.0).unwrap().row;
+        let known = [0.0; STATES];
+        // Newton's step from beside a known response leads to it; the deflated one is so many times
+        // as long.
+        let factor = |distance_m: f64| {
+            let mut state = known;
+            state[0] = distance_m;
+            let mut step = [N(0.0); STATES];
+            step[0] = N(-distance_m);
+            Solve::deflated(row, state, f64::INFINITY, vec![known]).deflation(&step)
+        };
+        assert!((factor(1e-6) + 1.0).abs() < 1e-3, "{}", factor(1e-6));
+        assert!((factor(1.0) - 1.0).abs() < 1e-3, "{}", factor(1.0));
+        let plain = Solve::new(row, known, None).deflation(&[N(1.0); STATES]);
+        assert_eq!(plain, 1.0);
     }
 }
