@@ -208,26 +208,67 @@ fn simulated(machine: Machine, response: &Response, end_s: f64) -> Vec<[f64; COO
 fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
     // A thousandfold at most: after that the disturbance is not small.
     let moved = simulated(machine, response, 7.0 / response.growth_per_s());
-    // Once the others have decayed, two multipliers are left: least squares of d[k + 2] = a d[k +
-    // 1] + b d[k].
+    let turns_per_s = response.speed_rpm / 60.0;
+    largest_multiplier(&moved).ln() * turns_per_s
+}
+
+/// Returns the size of the multiplier that these moves of once a turn grow by.
+///
+/// Once the others have decayed, a pair of multipliers is left, or a single real one. With a pair,
+/// least squares of d[k + 2] = a d[k + 1] + b d[k] give it; with one, d[k + 1] = mu d[k], and the
+/// equations of the pair are singular: their solution is rounding. So the pair is fitted only where
+/// one multiplier leaves more than a millionth: rounding leaves less.
+fn largest_multiplier(moved: &[[f64; COORDINATES]]) -> f64 {
+    const SINGLE: f64 = 1e-6;
     let (mut g, mut h) = ([[0.0; 2]; 2], [0.0; 2]);
+    let mut after = 0.0;
     for k in moved.len().div_ceil(2)..moved.len() - 2 {
+        // Every turn counts alike, or the last ones alone would count.
+        let size = |d: &[f64; COORDINATES]| d.iter().map(|d| d * d).sum::<f64>();
+        let weight = 1.0 / size(&moved[k + 1]);
         for i in 0..COORDINATES {
             let [d0, d1, d2] = [moved[k][i], moved[k + 1][i], moved[k + 2][i]];
-            g[0][0] += d1 * d1;
-            g[0][1] += d1 * d0;
-            g[1][1] += d0 * d0;
-            h[0] += d1 * d2;
-            h[1] += d0 * d2;
+            g[0][0] += weight * d1 * d1;
+            g[0][1] += weight * d1 * d0;
+            g[1][1] += weight * d0 * d0;
+            h[0] += weight * d1 * d2;
+            h[1] += weight * d0 * d2;
+            after += weight * d2 * d2;
         }
+    }
+    let single = h[0] / g[0][0];
+    let left = ((after - single * h[0]) / after).max(0.0).sqrt();
+    if left < SINGLE {
+        return single.abs();
     }
     let determinant = g[0][0] * g[1][1] - g[0][1] * g[0][1];
     let a = (h[0] * g[1][1] - h[1] * g[0][1]) / determinant;
     let b = (g[0][0] * h[1] - g[0][1] * h[0]) / determinant;
     let discriminant = 0.25 * a * a + b;
-    let largest =
-        if discriminant < 0.0 { (-b).sqrt() } else { (0.5 * a).abs() + discriminant.sqrt() };
-    largest.ln() * response.speed_rpm / 60.0
+    if discriminant < 0.0 { (-b).sqrt() } else { (0.5 * a).abs() + discriminant.sqrt() }
+}
+
+/// A single multiplier, beside which another has decayed to rounding, and a pair.
+#[test]
+fn the_largest_multiplier_is_found_of_one_and_of_two() {
+    let shape: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (1.0 + i as f64));
+    let other: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (i as f64 - 4.3));
+    let moves = |of: &dyn Fn(i32) -> [f64; 2]| -> Vec<[f64; COORDINATES]> {
+        let at = |k: i32| {
+            let [a, b] = of(k);
+            core::array::from_fn(|i| a * shape[i] + b * other[i])
+        };
+        (0..60).map(at).collect()
+    };
+    let single = moves(&|k| [(-1.09_f64).powi(k), 0.3_f64.powi(k)]);
+    assert!((largest_multiplier(&single) - 1.09).abs() < 1e-6, "{}", largest_multiplier(&single));
+    let pair = moves(&|k| {
+        let size = 1.07_f64.powi(k);
+        [size * (2.1 * f64::from(k)).cos(), size * (2.1 * f64::from(k)).sin()]
+    });
+    assert!((largest_multiplier(&pair) - 1.07).abs() < 1e-6, "{}", largest_multiplier(&pair));
+    let two = moves(&|k| [(-1.09_f64).powi(k), 1.05_f64.powi(k)]);
+    assert!((largest_multiplier(&two) - 1.09).abs() < 1e-6, "{}", largest_multiplier(&two));
 }
 
 #[test]
@@ -425,7 +466,13 @@ fn random_machines_do_what_is_said() {
     let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
     let mut numbers = fastrand::Rng::with_seed(given("SEED", 2026));
     let (mut grown, mut decayed, mut worst) = ([0, 0], [0, 0], [0.0_f64; 2]);
-    for number in 0..given("MACHINES", 3) {
+    let machines = given("MACHINES", 3);
+    // Few machines may have no growing response: more are drawn until there is one of either kind.
+    let lacks = |counts: &[i32]| counts.contains(&0);
+    for number in 0..machines + 40 {
+        if number >= machines && !lacks(&grown) && !lacks(&decayed) {
+            break;
+        }
         let kind = (number % 2) as usize;
         let mut machine = random(&mut numbers);
         if kind == 1 {
@@ -447,16 +494,52 @@ fn random_machines_do_what_is_said() {
         for response in there().filter(|it| it.growth_per_s() < -0.3).take(1) {
             let moved = simulated(machine.clone(), response, 20.0);
             let size = |d: &[f64; COORDINATES]| d[4].abs().max(d[5].abs());
-            let most = moved.iter().map(size).fold(0.0, f64::max);
-            let left = moved[moved.len() * 4 / 5..].iter().map(size).fold(0.0, f64::max) / most;
+            let largest = |moved: &[[f64; COORDINATES]]| moved.iter().map(size).fold(0.0, f64::max);
+            // Against the disturbance itself: what had left for another motion would have moved
+            // farthest on its way, and rest in the end.
+            let [begin, end] = [moved.len() / 5, moved.len() * 4 / 5];
+            let disturbance = largest(&moved[..begin]);
+            let left = largest(&moved[end..]) / disturbance;
             println!("machine {number}, {} rpm: {left:e} left", response.speed_rpm);
+            assert!(disturbance < 1e-4, "machine {number}: {response:?}");
             assert!(left < 0.1, "machine {number}: {response:?}");
             decayed[kind] += 1;
         }
     }
     println!("{grown:?} grown, worst {worst:?}; {decayed:?} decayed");
     assert!(worst[0] < 0.02 && worst[1] < 0.05, "{worst:?}");
-    assert!(grown[0] > 0 && grown[1] > 0 && decayed[0] > 0 && decayed[1] > 0);
+    assert!(!lacks(&grown) && !lacks(&decayed), "{grown:?} grown, {decayed:?} decayed");
+}
+
+/// A curve rises through a speed and falls through it in turn: of random machines with little
+/// damping, neighbouring branches have an even and an odd number. SEED and MACHINES choose others.
+#[test]
+fn no_branch_is_lost_between_two_others() {
+    let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
+    let mut numbers = fastrand::Rng::with_seed(given("SEED", 61));
+    let (mut folded, mut lost) = (0, Vec::new());
+    for number in 0..given("MACHINES", 4) {
+        let mut machine = random(&mut numbers);
+        let damping_n_s_per_m = 10.0 + 50.0 * numbers.f64();
+        machine.dampers.iter_mut().for_each(|it| it.damping_n_s_per_m = damping_n_s_per_m);
+        machine.springs.iter_mut().for_each(|it| it.cubic_n_per_m3 = 5e6 * numbers.f64());
+        let point = prepared(machine, 100.0);
+        let speeds: Vec<f64> = (0..120).map(|_| 90.0 + 250.0 * numbers.f64()).collect();
+        let dwells: Vec<_> =
+            speeds.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+        for (responses, speed_rpm) in all(&dwells).into_iter().zip(speeds) {
+            let Ok(responses) = responses else { continue };
+            let on_curve = responses.iter().filter(|response| response.is_on_curve);
+            let branches: Vec<u32> = on_curve.map(|response| response.branch).collect();
+            let alternates = |pair: &[u32]| pair[0] % 2 != pair[1] % 2;
+            folded += usize::from(branches.len() > 1);
+            if !branches.windows(2).all(alternates) {
+                lost.push((number, speed_rpm, branches));
+            }
+        }
+    }
+    println!("{folded} speeds with several responses");
+    assert!(folded > 0 && lost.is_empty(), "{lost:?}");
 }
 
 /// Responses of random machines are those that steps of 0.05 rpm lead to, until these are lost; and
