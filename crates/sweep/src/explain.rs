@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use washer_model::{
-    Channel, Crossed, Crossing, LeftRange, NoEquilibrium, Point, Response, StepSelector, Timing,
-    cross, modes, peaks_without_departures,
+    Channel, Crossed, Crossing, Ending, LeftRange, NoEquilibrium, Point, Response, Spin,
+    StepSelector, Timing, cross, modes, peaks_without_departures,
 };
 
 use crate::engine::{ModelEngine, reference_step_s, simd_from_environment};
@@ -42,9 +42,9 @@ pub(crate) struct Explanation {
     pub(crate) at: NamedValues,
     /// The swept verdict.
     pub(crate) swept: Swept,
-    /// What is seen beside tongues.
-    pub(crate) seen: Seen,
-    /// From lowest to fastest speed of the profile within the run (rpm).
+    /// What is seen beside tongues, by the way in which the drum turns: forwards first.
+    pub(crate) seen: Vec<Seen>,
+    /// From lowest to fastest speed of the profile within the run (rpm), below 0 backwards.
     pub(crate) profile_rpm: [f64; 2],
     /// Each, with the times at which the run crosses it.
     pub(crate) tongues: Vec<(Tongue, Vec<Passage>)>,
@@ -119,43 +119,65 @@ fn explained(
 ) -> Result<Explanation, Error> {
     let simd = simd_from_environment()?;
     let scenario = plan.scenario(0);
-    let profile_rpm = profile::range(&scenario.model.spin, plan.end_s)?;
+    let spin = &scenario.model.spin;
+    let profile_rpm = profile::range(spin, plan.end_s);
     let point = ready(plan, &scenario).map_err(Error::model)?;
-    let looked = match speeds {
-        Some(speeds) => speeds,
-        None => looked(&point, profile_rpm[1])?,
-    };
+    let directions = directions(plan, &scenario, &point, profile_rpm, speeds)?;
     // Behind those that are looked at come speeds that nobody can count beforehand.
-    let (total, done) = (looked.values().len() as u64, AtomicU64::new(0));
+    let speeds_of = |direction: &Direction| direction.looked.values().len() as u64;
+    let total: u64 = directions.iter().map(speeds_of).sum();
+    let done = AtomicU64::new(0);
     let progress = Progress::for_search(progress, total, "speeds looked at", 0);
     let counted = |speeds: usize| {
         let done = done.fetch_add(speeds as u64, Ordering::Relaxed) + speeds as u64;
         progress.show_search(done.min(total), done);
     };
     counted(0);
-    let mut asker = Asker {
-        simd,
-        plan,
-        scenario: &scenario,
-        point: &point,
-        interrupt,
-        counted: &counted,
-        followed: Vec::new(),
+    let mut askers = Vec::with_capacity(directions.len());
+    for direction in &directions {
+        let mut asker = Asker {
+            simd,
+            plan,
+            scenario: &direction.scenario,
+            point: &direction.point,
+            is_backward: direction.is_backward,
+            interrupt,
+            counted: &counted,
+            followed: Vec::new(),
+        };
+        asker.follow(direction.looked.to.max(direction.fastest_rpm));
+        askers.push(asker);
+    }
+    let look = || {
+        let each = askers.iter().zip(&directions);
+        each.map(|(asker, direction)| tongues(asker, direction.looked)).collect::<Vec<_>>()
     };
-    asker.follow(looked.to.max(profile_rpm[1]));
-    let (seen, swept) = rayon::join(|| tongues(&asker, looked), || swept(plan, interrupt));
-    let ((found, seen), swept) = (seen, swept?);
-    let ((crossings, ends_in), closings) = rayon::join(
-        || rayon::join(|| crossings(&asker, &found, &swept), || tongue::ends_in(&asker, &found)),
-        || found.par_iter().map(|tongue| tongue.closing(&asker)).collect::<Vec<_>>(),
-    );
+    let (looked, swept) = rayon::join(look, || swept(plan, interrupt));
+    let (found, seen): (Vec<Vec<Tongue>>, Vec<Seen>) = looked.into_iter().unzip();
+    let found: Vec<Tongue> = found.into_iter().flatten().collect();
+    let swept = swept?;
+    let asker_of = |tongue: &Tongue| {
+        let asks = |asker: &&Asker<'_>| asker.is_backward == tongue.is_backward;
+        askers.iter().find(asks).unwrap_or(&askers[0])
+    };
+    let ends_in = || -> Vec<Option<Ending>> {
+        let directions = found.chunk_by(|a, b| a.is_backward == b.is_backward);
+        directions.flat_map(|found| tongue::ends_in(asker_of(&found[0]), found)).collect()
+    };
+    let crossings = || crossings(plan, (&point, spin), &askers, &found, &swept);
+    let closings = || found.par_iter().map(|tongue| tongue.closing(asker_of(tongue)));
+    let ((crossings, ends_in), closings) =
+        rayon::join(|| rayon::join(crossings, ends_in), || closings().collect::<Vec<_>>());
     let (passages, without_departures) = crossings;
-    let spin = &scenario.model.spin;
     let step_s = reference_step_s(&StepSelector::new([(&point, spin)], plan.end_s));
     let growing = found.iter().zip(&passages).flat_map(|(tongue, passages)| {
         passages.iter().map(|passage| (passage, tongue.growths.as_slice()))
     });
-    let cause = cause::cause((&point, spin), step_s, &swept, growing);
+    let keeps_limit = |amplitudes: &Vec<f64>| {
+        swept.greatest_of(amplitudes).is_some_and(|(ratio, _)| ratio < swept.limits.most)
+    };
+    let has_passed = matches!(&without_departures, Some(Ok(amplitudes)) if keeps_limit(amplitudes));
+    let cause = cause::cause((&point, spin), step_s, &swept, has_passed, growing);
     let tongues = found.into_iter().zip(closings).zip(ends_in).zip(passages);
     let tongues = tongues.map(|(((tongue, closing), ends_in), passages)| {
         (Tongue { closing: Some(closing), ends_in, ..tongue }, passages)
@@ -172,24 +194,69 @@ fn explained(
     })
 }
 
+/// A way in which a run's drum turns. Backwards it moves as the mirrored machine does forwards.
+struct Direction {
+    is_backward: bool,
+    /// The machine and its spin, mirrored if the drum turns backwards.
+    scenario: Scenario,
+    point: Point,
+    looked: Speeds,
+    /// The profile's fastest speed in this direction (rpm).
+    fastest_rpm: f64,
+}
+
+/// Returns the ways in which a profile between two speeds (rpm) turns the drum, with the speeds to
+/// look at: those that were asked for, or from half of the slowest mode's frequency up.
+///
+/// # Errors
+/// A machine without modes, and a profile that has no speed to look at.
+fn directions(
+    plan: &Plan,
+    scenario: &Scenario,
+    point: &Point,
+    [least_rpm, most_rpm]: [f64; 2],
+    asked: Option<Speeds>,
+) -> Result<Vec<Direction>, Error> {
+    let slowest_rpm = modes(point, 0.0, 0.0).map_err(Error::model)?.modes[0].frequency_rpm();
+    let from_rpm = (LOWEST_SHARE * slowest_rpm).floor().max(1.0);
+    let mut directions = Vec::new();
+    for (is_backward, fastest_rpm) in [(false, most_rpm), (true, -least_rpm)] {
+        let is_turned = fastest_rpm > 0.0 || !is_backward && least_rpm >= 0.0;
+        let looked = match asked {
+            Some(asked) if is_turned => asked,
+            None if fastest_rpm > from_rpm => Speeds::new(from_rpm, fastest_rpm, STEP_RPM),
+            _ => continue,
+        };
+        let scenario = if is_backward { mirrored(scenario) } else { scenario.clone() };
+        let point = ready(plan, &scenario).map_err(Error::model)?;
+        directions.push(Direction { is_backward, scenario, point, looked, fastest_rpm });
+    }
+    if directions.is_empty() {
+        let fastest_rpm = most_rpm.max(-least_rpm);
+        let expected = format!(
+            "a profile that exceeds {from_rpm} rpm, half of the slowest mode's frequency, within \
+             the run; to look at other speeds, give --speed FROM:TO:STEP"
+        );
+        return Err(Error::option("[spin]", format!("at most {fastest_rpm:.3} rpm"), expected));
+    }
+    Ok(directions)
+}
+
+/// Returns the mirror image of a machine and its spin.
+fn mirrored(scenario: &Scenario) -> Scenario {
+    let mut mirrored = scenario.clone();
+    mirrored.model.machine = scenario.model.machine.mirrored();
+    match &mut mirrored.model.spin {
+        Spin::Ramped { peak_rpm, .. } => *peak_rpm = -*peak_rpm,
+        Spin::Table { speed_rpm, .. } => speed_rpm.iter_mut().for_each(|speed| *speed = -*speed),
+    }
+    mirrored
+}
+
 /// A machine with its spin, ready to be integrated.
 fn ready(plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilibrium> {
     let timing = Timing { window_s: scenario.window_s, ..plan::timing(plan) };
     plan::ready(scenario.model.machine.clone(), scenario.model.spin.clone(), &timing)
-}
-
-/// The profile's speeds from half of the slowest mode's frequency up.
-fn looked(point: &Point, fastest_rpm: f64) -> Result<Speeds, Error> {
-    let slowest_rpm = modes(point, 0.0, 0.0).map_err(Error::model)?.modes[0].frequency_rpm();
-    let from_rpm = (LOWEST_SHARE * slowest_rpm).floor().max(1.0);
-    if fastest_rpm > from_rpm {
-        return Ok(Speeds::new(from_rpm, fastest_rpm, STEP_RPM));
-    }
-    let expected = format!(
-        "a profile that exceeds {from_rpm} rpm, half of the slowest mode's frequency, within the \
-         run; to look at other speeds, give --speed FROM:TO:STEP"
-    );
-    Err(Error::option("[spin]", format!("at most {fastest_rpm:.3} rpm"), expected))
 }
 
 fn swept(plan: &Plan, interrupt: &Interrupt) -> Result<Swept, Error> {
@@ -218,15 +285,18 @@ type WithoutDepartures = Option<Result<Vec<f64>, LeftRange>>;
 /// When the run crosses each tongue and what comes of it; and the amplitudes of the run that enters
 /// them on their periodic responses.
 fn crossings(
-    asker: &Asker<'_>,
+    plan: &Plan,
+    (point, spin): (&Point, &Spin),
+    askers: &[Asker<'_>],
     tongues: &[Tongue],
     swept: &Swept,
 ) -> (Vec<Vec<Passage>>, WithoutDepartures) {
-    let spin = &asker.scenario.model.spin;
-    let end_s = asker.plan.end_s;
+    let end_s = plan.end_s;
     // In order of time, with the tongue of each.
     let times = tongues.iter().enumerate().flat_map(|(k, tongue)| {
-        let inside = profile::times_inside_s(spin, end_s, tongue.from_to_rpm);
+        let [from, to] = tongue.from_to_rpm;
+        let band_rpm = if tongue.is_backward { [-to, -from] } else { [from, to] };
+        let inside = profile::times_inside_s(spin, end_s, band_rpm);
         inside.into_iter().map(move |from_to_s| (k, from_to_s))
     });
     let mut times: Vec<(usize, [f64; 2])> = times.collect();
@@ -235,27 +305,37 @@ fn crossings(
         // Neighbours share an edge, found twice.
         times[i].1[0] = times[i].1[0].max(times[i - 1].1[1]);
     }
-    let speeds: Vec<f64> =
-        spin.speeds_rpm(times.iter().flat_map(|(_, from_to_s)| *from_to_s)).collect();
-    let responses: Vec<Option<Response>> = asker.responses(&speeds);
+    let mut responses: Vec<[Option<Response>; 2]> = vec![[None, None]; times.len()];
+    for asker in askers {
+        let is_of_asker =
+            |number: &usize| tongues[times[*number].0].is_backward == asker.is_backward;
+        let numbers: Vec<usize> = (0..times.len()).filter(is_of_asker).collect();
+        let ends_s = numbers.iter().flat_map(|&number| times[number].1);
+        let speeds: Vec<f64> = spin.speeds_rpm(ends_s).map(f64::abs).collect();
+        let mut found = asker.responses(&speeds).into_iter();
+        for number in numbers {
+            responses[number] = [found.next().flatten(), found.next().flatten()];
+        }
+    }
     let crossings: Vec<Crossing<'_>> = times
         .iter()
-        .zip(responses.chunks(2))
-        .map(|((_, from_to_s), responses)| Crossing {
+        .zip(&responses)
+        .map(|((k, from_to_s), [entry, exit])| Crossing {
             from_to_s: *from_to_s,
-            responses: [responses[0].as_ref(), responses[1].as_ref()],
+            responses: [entry.as_ref(), exit.as_ref()],
+            is_backward: tongues[*k].is_backward,
         })
         .collect();
-    if asker.interrupt.stopped() {
+    if askers.iter().any(|asker| asker.interrupt.stopped()) {
         return (Vec::new(), None);
     }
-    let step_s = reference_step_s(&StepSelector::new([(asker.point, spin)], end_s));
+    let step_s = reference_step_s(&StepSelector::new([(point, spin)], end_s));
     let before_end = |crossing: &&Crossing<'_>| crossing.from_to_s[0] < swept.window_s[1];
     let (crossed, peaks) = rayon::join(
-        || cross(asker.point, step_s, &crossings),
+        || cross(point, step_s, &crossings),
         || {
             crossings.iter().find(before_end)?;
-            let peaks = peaks_without_departures(asker.point, step_s, &crossings, swept.window_s);
+            let peaks = peaks_without_departures(point, step_s, &crossings, swept.window_s);
             Some(peaks.map(|peaks| swept.of_plan(&peaks)))
         },
     );

@@ -41,6 +41,20 @@ pub(crate) const TUB_TURNS: [usize; 2] = [TUB_YAW, TUB_PITCH];
 /// The coordinates that turn the rotor. Its forces depend on q3 and q4 through the bearings alone.
 pub(crate) const ROTOR_TURNS: [usize; 4] = [SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];
 
+/// The coordinates that change their sign in the mirror image of a state, by the vertical plane
+/// through the drum's axis.
+const MIRRORED: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, HINGE_YAW];
+
+/// Returns a state's mirror image: that of a mirrored machine whose drum turns the other way.
+pub(crate) fn mirrored(state: &[f64; STATES]) -> [f64; STATES] {
+    let mut mirrored = *state;
+    for i in MIRRORED {
+        mirrored[i] = -mirrored[i];
+        mirrored[COORDINATES + i] = -mirrored[COORDINATES + i];
+    }
+    mirrored
+}
+
 /// `values` with a unit derivative (times `slope`) along coordinate `j`.
 #[inline(always)]
 pub(crate) fn seeded<T: Lane>(

@@ -221,6 +221,37 @@ impl Damper {
 }
 
 impl Machine {
+    /// Returns the machine's mirror image in the vertical plane through the drum's axis: what it
+    /// does while its drum turns forwards, this machine does mirrored while its drum turns
+    /// backwards.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let mut mirrored = self.clone();
+        let flip = |place: &mut [f64; 3]| place[2] = -place[2];
+        for spring in &mut mirrored.springs {
+            flip(&mut spring.cabinet_m);
+            flip(&mut spring.tub_m);
+        }
+        for damper in &mut mirrored.dampers {
+            flip(&mut damper.cabinet_m);
+            flip(&mut damper.tub_m);
+        }
+        for stop in &mut mirrored.stops {
+            flip(&mut stop.tub_m);
+            flip(&mut stop.direction);
+        }
+        for bushing in &mut mirrored.bushings {
+            flip(&mut bushing.tub_m);
+        }
+        for foot in &mut mirrored.feet {
+            flip(&mut foot.foot_m);
+        }
+        if let Some(cabinet) = &mut mirrored.cabinet {
+            flip(&mut cabinet.centre_m);
+        }
+        mirrored
+    }
+
     /// All unbalances, the one that every machine has first.
     pub(crate) fn unbalances(&self) -> impl Iterator<Item = &Unbalance> {
         core::iter::once(&self.unbalance).chain(&self.further_unbalances)

@@ -4,7 +4,7 @@ use washer_model::{Channel, Ending, Kind, LeftRange, Settled, State, decimal};
 
 use sweep_engine::commands::cells::short;
 
-use super::{Cause, Closing, End, Explanation, Passage, Resonance, Swept, Tongue};
+use super::{Cause, Closing, End, Explanation, Passage, Resonance, Seen, Swept, Tongue};
 
 /// Where a line ends.
 const WIDTH: usize = 96;
@@ -35,26 +35,8 @@ pub(crate) fn of(found: &Explanation) -> String {
     text += format!("{}{place}", found.name).trim_end();
     text.push('\n');
     verdict(&mut text, &found.swept);
-    line(&mut text, "dwells", stable_speeds(found));
-    for rpm in &found.seen.jumps_rpm {
-        let words = format!(
-            "at {rpm:.2} rpm the response folds back: a machine that runs up jumps to another there"
-        );
-        line(&mut text, "jump", words);
-    }
-    if let Some(words) = off_curve(&found.seen.off_curve_rpm) {
-        line(&mut text, "off curve", words);
-    }
-    if let (Some((from, what)), Some((to, _))) =
-        (found.seen.beyond.first(), found.seen.beyond.last())
-    {
-        let [from, to] = [from, to].map(|rpm| short(*rpm));
-        let (count, what) = (found.seen.beyond.len(), what.name().replace('_', " "));
-        let words = format!(
-            "at {count} of the speeds, from {from} to {to} rpm, the response passes what no \
-             machine can ({what}): there growth says nothing of a machine"
-        );
-        line(&mut text, "beyond", words);
+    for seen in &found.seen {
+        beside_tongues(&mut text, found, seen);
     }
     for (tongue, passages) in &found.tongues {
         text.push('\n');
@@ -66,10 +48,39 @@ pub(crate) fn of(found: &Explanation) -> String {
     text
 }
 
+/// Adds what is seen over the speeds of one way of turning beside tongues.
+fn beside_tongues(text: &mut String, found: &Explanation, seen: &Seen) {
+    let way = way(seen.is_backward);
+    line(text, "dwells", format!("{way}{}", stable_speeds(found, seen)));
+    for rpm in &seen.jumps_rpm {
+        let words = format!(
+            "{way}at {rpm:.2} rpm the response folds back: a machine that runs up jumps to another \
+             there"
+        );
+        line(text, "jump", words);
+    }
+    if let Some(words) = off_curve(&seen.off_curve_rpm) {
+        line(text, "off curve", format!("{way}{words}"));
+    }
+    if let (Some((from, what)), Some((to, _))) = (seen.beyond.first(), seen.beyond.last()) {
+        let [from, to] = [from, to].map(|rpm| short(*rpm));
+        let (count, what) = (seen.beyond.len(), what.name().replace('_', " "));
+        let words = format!(
+            "{way}at {count} of the speeds, from {from} to {to} rpm, the response passes what no \
+             machine can ({what}): there growth says nothing of a machine"
+        );
+        line(text, "beyond", words);
+    }
+}
+
+/// Returns the beginning of what is said of a way of turning.
+const fn way(is_backward: bool) -> &'static str {
+    if is_backward { "backwards, " } else { "" }
+}
+
 /// Returns at which of the speeds that were looked at the response is stable. Speeds without a
 /// response are no evidence.
-fn stable_speeds(found: &Explanation) -> String {
-    let seen = &found.seen;
+fn stable_speeds(found: &Explanation, seen: &Seen) -> String {
     let [from, to] = [seen.looked.from, seen.looked.to].map(decimal);
     let (count, missing) = (seen.looked.values().len(), seen.without_response);
     let unknown = format!(
@@ -79,8 +90,10 @@ fn stable_speeds(found: &Explanation) -> String {
     if missing == count {
         return unknown;
     }
-    if !found.tongues.is_empty() {
-        let unstable = bands(found.tongues.iter().map(|(tongue, _)| tongue.ends));
+    let tongues = found.tongues.iter().filter(|(it, _)| it.is_backward == seen.is_backward);
+    let ends: Vec<[End; 2]> = tongues.map(|(tongue, _)| tongue.ends).collect();
+    if !ends.is_empty() {
+        let unstable = bands(ends.into_iter());
         let unstable =
             format!("the periodic response is unstable in {unstable} from {from} to {to} rpm");
         return if missing == 0 {
@@ -193,7 +206,8 @@ fn of_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages: 
     };
     let [from, to] = tongue.from_to_rpm;
     let grows = format!("{kind}, at up to {:.4} /s at {:.2} rpm", at.growth_per_s(), at.speed_rpm);
-    let words = format!("{from:.2} to {to:.2} rpm: {grows}{}", ends(tongue));
+    let way = way(tongue.is_backward);
+    let words = format!("{way}{from:.2} to {to:.2} rpm: {grows}{}", ends(tongue));
     line(text, "tongue", words);
     let (low, high) = (at.frequency_cpm(), at.speed_rpm - at.frequency_cpm());
     let lines = match at.kind() {
@@ -364,7 +378,7 @@ fn judgement(text: &mut String, found: &Explanation) {
                     channel.name()
                 );
                 let grows = growth_until(found.cause.as_ref());
-                let is_cause = found.cause.is_some_and(|cause| cause.is_enough());
+                let is_cause = found.cause.is_some_and(|cause| cause.is_enough);
                 match (is_within, ratio < swept.limits.most) {
                     (false, true) if is_cause => format!(
                         "{same}, within the limit: the verdict rests on motion left over from \
@@ -397,18 +411,17 @@ fn judgement(text: &mut String, found: &Explanation) {
     line(text, "so", words);
 }
 
-/// Returns how much of the growth that the deviation needs the tongues before it make.
+/// Returns when the motion deviates, and what the tongues before that have to do with it.
 fn growth_until(cause: Option<&Cause>) -> String {
     let Some(cause) = cause else { return "the deviation's time is not known".to_owned() };
-    let at = format!("the motion deviates at {:.2} s and {:.0} rpm", cause.time_s, cause.speed_rpm);
-    match cause.needed_e_folds {
-        Some(needed) => format!(
-            "{at}, which takes {needed:.2} e-folds from the difference of the models at the first \
-             tongue; the tongues make {:.2} of them",
-            cause.made_e_folds
-        ),
-        None => format!("{at}, before any tongue is entered"),
-    }
+    format!(
+        "the motion deviates from {:.2} s and {:.0} rpm on; until it is greatest the tongues make \
+         {:.2} e-folds, and without what they add the ratio is {}",
+        cause.time_s,
+        cause.speed_rpm,
+        cause.e_folds,
+        significant(cause.ratio_without)
+    )
 }
 
 fn limits(text: &mut String, found: &Explanation) {
@@ -416,9 +429,9 @@ fn limits(text: &mut String, found: &Explanation) {
         "a tongue narrower than {} rpm may be missed. E-folds hold the speed still at each \
          instant; equal e-folds do not mean equal ratios, and a map's boundary is not the edge of \
          a tongue",
-        decimal(found.seen.looked.step)
+        found.seen.first().map_or_else(String::new, |seen| decimal(seen.looked.step))
     );
-    let without = found.seen.without_response;
+    let without: usize = found.seen.iter().map(|seen| seen.without_response).sum();
     if without > 0 {
         words += &format!(". No response was found at {without} of the speeds, which are left out");
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use washer_model::{Channel, Ending, LeftRange, Participant};
 
-use super::{Explanation, Passage, Swept, Tongue};
+use super::{Explanation, Passage, Seen, Swept, Tongue};
 
 /// Everything that was found; units stand in the names.
 pub(crate) fn of(found: &Explanation) -> Value {
@@ -22,31 +22,40 @@ pub(crate) fn of(found: &Explanation) -> Value {
         }
         Err(LeftRange { time_s }) => json!({ "left_range_at_s": time_s }),
     });
+    let seen = |is_backward: bool| {
+        found.seen.iter().find(|seen| seen.is_backward == is_backward).map(of_seen)
+    };
     json!({
         "name": found.name,
         "at": found.at.iter().cloned().collect::<BTreeMap<_, _>>(),
         "swept": of_swept(&found.swept),
-        "speeds": {
-            "from_rpm": found.seen.looked.from,
-            "to_rpm": found.seen.looked.to,
-            "step_rpm": found.seen.looked.step,
-            "without_response": found.seen.without_response,
-            "jumps_rpm": found.seen.jumps_rpm,
-            "off_curve_rpm": found.seen.off_curve_rpm,
-            "beyond": found.seen.beyond.iter().map(|(rpm, what)| {
-                json!({ "speed_rpm": rpm, "passes": what.name() })
-            }).collect::<Value>(),
-        },
+        "speeds": seen(false),
+        "speeds_backwards": seen(true),
         "profile_rpm": found.profile_rpm,
         "tongues": tongues.collect::<Value>(),
         "entered_on_responses": without,
         "deviation": found.cause.map(|cause| json!({
             "time_s": cause.time_s,
             "speed_rpm": cause.speed_rpm,
-            "e_folds_needed": cause.needed_e_folds,
-            "e_folds_of_tongues": cause.made_e_folds,
-            "tongues_are_the_cause": cause.is_enough(),
+            "e_folds_of_tongues": cause.e_folds,
+            "ratio_without_tongues": cause.ratio_without,
+            "tongues_are_the_cause": cause.is_enough,
         })),
+    })
+}
+
+/// The speeds that were looked at in one way of turning.
+fn of_seen(seen: &Seen) -> Value {
+    let beyond = seen.beyond.iter();
+    let beyond = beyond.map(|(rpm, what)| json!({ "speed_rpm": rpm, "passes": what.name() }));
+    json!({
+        "from_rpm": seen.looked.from,
+        "to_rpm": seen.looked.to,
+        "step_rpm": seen.looked.step,
+        "without_response": seen.without_response,
+        "jumps_rpm": seen.jumps_rpm,
+        "off_curve_rpm": seen.off_curve_rpm,
+        "beyond": beyond.collect::<Value>(),
     })
 }
 
@@ -78,6 +87,7 @@ fn of_swept(swept: &Swept) -> Value {
 fn of_tongue(tongue: &Tongue, passages: &[Passage], swept: &Swept) -> Value {
     let at = &tongue.at;
     json!({
+        "is_backward": tongue.is_backward,
         "from_rpm": tongue.from_to_rpm[0],
         "to_rpm": tongue.from_to_rpm[1],
         "ends": tongue.ends,

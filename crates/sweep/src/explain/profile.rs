@@ -1,8 +1,6 @@
 //! The spin profile in time: its range, and when it is within a band of speeds.
 
-use washer_model::{Profile, Spin, decimal};
-
-use sweep_engine::Error;
+use washer_model::{Profile, Spin};
 
 /// Even instants at which a profile is looked at; it is smooth between kinks.
 const INSTANTS: usize = 4000;
@@ -13,29 +11,15 @@ const HALVINGS: usize = 50;
 /// Parts of a passage over which growth is integrated.
 const PARTS: usize = 1000;
 
-/// Lowest and fastest speed (rpm) up to the run's end.
-///
-/// # Errors
-/// [`Error::Refused`] where the drum turns backwards.
-pub(super) fn range(spin: &Spin, end_s: f64) -> Result<[f64; 2], Error> {
-    let times = instants_s(spin, end_s);
-    let speeds = spin.speeds_rpm(times.iter().copied());
-    let (mut least, mut most, mut least_at_s) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
-    for (speed, &at_s) in speeds.zip(&times) {
-        if speed < least {
-            (least, least_at_s) = (speed, at_s);
-        }
+/// Returns the lowest and the fastest speed (rpm) up to the run's end, below 0 backwards.
+pub(super) fn range(spin: &Spin, end_s: f64) -> [f64; 2] {
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for speed in spin.speeds_rpm(instants_s(spin, end_s)) {
+        least = least.min(speed);
         most = most.max(speed);
     }
-    if least < 0.0 {
-        let given = format!("{least:.3} rpm at {} s", decimal(least_at_s));
-        let expected = "a drum that turns forwards or stands, at 0 rpm or more: the machine is not \
-                        the same backwards, and responses are found for forward speeds; explain a \
-                        profile that turns one way";
-        return Err(Error::option("[spin]", given, expected));
-    }
     // As they were written, without the last bits of the way through rad/s.
-    Ok([least, most].map(|rpm| (1e9 * rpm).round() / 1e9))
+    [least, most].map(|rpm| (1e9 * rpm).round() / 1e9)
 }
 
 /// Even instants, and the kinks between them.
@@ -94,15 +78,16 @@ fn turning_s(holds: &dyn Fn(f64) -> bool, mut from_s: f64, mut to_s: f64) -> f64
     0.5 * (from_s + to_s)
 }
 
-/// The integral over time of the growth at the speed of each instant; of `growths` (rpm, 1/s) in
-/// order of speed, straight between them.
+/// The integral over time of the growth at the speed of each instant, either way; of `growths`
+/// (rpm, 1/s) in order of speed, straight between them.
 pub(super) fn e_folds(spin: &Spin, [from_s, to_s]: [f64; 2], growths: &[[f64; 2]]) -> f64 {
     let part_s = (to_s - from_s) / PARTS as f64;
     let middles = (0..PARTS).map(|k| from_s + (k as f64 + 0.5) * part_s);
-    spin.speeds_rpm(middles).map(|speed| part_s * growth_at(growths, speed)).sum()
+    spin.speeds_rpm(middles).map(|speed| part_s * growth_at(growths, speed.abs())).sum()
 }
 
-fn growth_at(growths: &[[f64; 2]], speed_rpm: f64) -> f64 {
+/// Returns the growth (1/s) at a speed (rpm).
+pub(super) fn growth_at(growths: &[[f64; 2]], speed_rpm: f64) -> f64 {
     let above = growths.partition_point(|[rpm, _]| *rpm < speed_rpm);
     match (above.checked_sub(1).map(|below| growths[below]), growths.get(above)) {
         (Some([low, at_low]), Some([high, at_high])) if high > &low => {
@@ -164,10 +149,16 @@ mod tests {
     }
 
     #[test]
-    fn backwards_is_refused_with_its_time() {
-        let refused = range(&table(&[(0.0, 0.0), (3.0, 100.0), (6.0, -50.0)]), 10.0).unwrap_err();
-        let text = refused.to_string();
-        assert!(text.contains("-50.000 rpm at 6 s") && text.contains("forwards"), "{text}");
-        assert_eq!(range(&table(&[(0.0, 0.0), (3.0, 100.0)]), 10.0).unwrap(), [0.0, 100.0]);
+    fn a_profile_may_turn_either_way_and_wait() {
+        let spin = table(&[(0.0, 0.0), (3.0, 100.0), (6.0, -50.0), (8.0, -50.0), (9.0, 0.0)]);
+        assert_eq!(range(&spin, 12.0), [-50.0, 100.0]);
+        assert_eq!(range(&spin, 3.0), [0.0, 100.0]);
+        let inside = times_inside_s(&spin, 12.0, [-40.0, -25.0]);
+        assert_eq!(inside.len(), 2);
+        for (found, meant) in inside.iter().flatten().zip([5.5, 5.8, 8.2, 8.5]) {
+            assert!(close(*found, meant), "{found} {meant}");
+        }
+        let growths = [[25.0, 0.5], [40.0, 0.5]];
+        assert!((e_folds(&spin, inside[0], &growths) - 0.15).abs() < 1e-9);
     }
 }

@@ -63,6 +63,8 @@ pub(crate) struct Asker<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) scenario: &'a Scenario,
     pub(crate) point: &'a Point,
+    /// Whether these are the mirror image of a machine whose drum turns backwards.
+    pub(crate) is_backward: bool,
     /// Once it is raised, no response is found, and what is made of that means nothing.
     pub(crate) interrupt: &'a Interrupt,
     /// Told of so many more speeds that are answered.
@@ -113,6 +115,8 @@ pub(crate) enum End {
 
 /// A run of speeds at which the response is unstable in one way.
 pub(crate) struct Tongue {
+    /// Whether the drum turns backwards.
+    pub(crate) is_backward: bool,
     /// Edges (rpm).
     pub(crate) from_to_rpm: [f64; 2],
     /// What they are.
@@ -170,6 +174,8 @@ pub(crate) enum Closing {
 
 /// What is seen over a range of speeds beside tongues.
 pub(crate) struct Seen {
+    /// Whether the drum turns backwards.
+    pub(crate) is_backward: bool,
     /// The speeds that were looked at.
     pub(crate) looked: Speeds,
     /// How many of them have no response.
@@ -215,7 +221,8 @@ pub(crate) fn tongues(asker: &Asker<'_>, looked: Speeds) -> (Vec<Tongue>, Seen) 
     let beyond = there().filter_map(|it| Some((it.speed_rpm, it.beyond?))).collect();
     let off_curve = there().filter(|response| !response.is_on_curve);
     let off_curve_rpm = off_curve.map(|response| response.speed_rpm).collect();
-    (tongues, Seen { looked, without_response, jumps_rpm, off_curve_rpm, beyond })
+    let is_backward = asker.is_backward;
+    (tongues, Seen { is_backward, looked, without_response, jumps_rpm, off_curve_rpm, beyond })
 }
 
 /// What the drum ends in that is held where each of these grows most, slightly disturbed.
@@ -245,6 +252,7 @@ fn tongue(asker: &Asker<'_>, kind: Kind, run: &[&Response], [from, to]: [(f64, E
     }
     let resonance = resonance(asker.point, &at);
     Tongue {
+        is_backward: asker.is_backward,
         from_to_rpm: [from.0, to.0],
         ends: [from.1, to.1],
         growths,

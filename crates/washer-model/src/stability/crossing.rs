@@ -4,7 +4,7 @@
 use super::Response;
 use super::turn::step;
 use crate::channel::CHANNELS;
-use crate::coordinates::{COORDINATES, STATES};
+use crate::coordinates::{COORDINATES, STATES, mirrored};
 use crate::machine::spin::{SpinStretch, stretch_at};
 use crate::nonlinear::coupling::Coupling;
 use crate::point::Point;
@@ -19,8 +19,11 @@ use lane_ode::{Aside, Kernel, Lane, N, Simd, System};
 pub struct Crossing<'a> {
     /// When it enters the band and when it leaves it (s).
     pub from_to_s: [f64; 2],
-    /// The periodic responses at the speeds of those two times, where there are any.
+    /// The periodic responses at the speeds of those two times, where there are any; where the drum
+    /// turns backwards, those of the mirrored machine, whose drum turns forwards.
     pub responses: [Option<&'a Response>; 2],
+    /// Whether the drum turns backwards.
+    pub is_backward: bool,
 }
 
 /// What a crossing does to disturbances, measured by their energy: kinetic, and that of the linear
@@ -75,7 +78,8 @@ pub fn cross(
             let energies = crossing.from_to_s.map(|at_s| Energy::new(point, at_s));
             let departure = |end: usize, state: &[f64; STATES]| {
                 let response = crossing.responses[end]?;
-                let at = response_at(point, step_s, response, crossing.from_to_s[end]);
+                let at_s = crossing.from_to_s[end];
+                let at = response_at(point, step_s, response, crossing.is_backward, at_s);
                 let apart = core::array::from_fn(|i| state[i] - at[i]);
                 Some(energies[end].of(&apart))
             };
@@ -129,7 +133,7 @@ pub fn peaks_without_departures(
         }
         follow(from_s, &mut state)?;
         if let Some(response) = crossing.responses[0] {
-            state = response_at(point, step_s, response, from_s);
+            state = response_at(point, step_s, response, crossing.is_backward, from_s);
         }
     }
     follow(window_s[1], &mut state)?;
@@ -295,21 +299,31 @@ impl Kernel for Tangent<'_> {
 }
 
 /// The periodic response at the drum's angle of a time.
-fn response_at(point: &Point, step_s: f64, response: &Response, at_s: f64) -> [f64; STATES] {
+fn response_at(
+    point: &Point,
+    step_s: f64,
+    response: &Response,
+    is_backward: bool,
+    at_s: f64,
+) -> [f64; STATES] {
     let speed_rad_per_s = response.speed_rpm * TAU / 60.0;
-    let angle = theta_rad(point, at_s).rem_euclid(TAU);
+    let (start, direction) = match is_backward {
+        true => (mirrored(&response.start), -1.0),
+        false => (response.start, 1.0),
+    };
+    let angle = (direction * theta_rad(point, at_s)).rem_euclid(TAU);
     let end_s = angle / speed_rad_per_s;
     if end_s <= 0.0 {
-        return response.start;
+        return start;
     }
     let steps = (end_s / step_s).ceil().max(1.0);
     let leg = Leg {
-        stretch: SpinStretch::steady(response.speed_rpm),
+        stretch: SpinStretch::steady(direction * response.speed_rpm),
         start_s: 0.0,
         step_s: end_s / steps,
         steps: steps as usize,
     };
-    Simd::one_lane(Run { point, legs: &[leg], start: &response.start }).end
+    Simd::one_lane(Run { point, legs: &[leg], start: &start }).end
 }
 
 /// The drum's angle (rad) at a time, up to whole turns.
