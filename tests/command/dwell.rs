@@ -193,3 +193,81 @@ fn what_makes_no_sense_is_refused() {
         assert!(said(&refused).contains(expected), "{more:?}: {}", said(&refused));
     }
 }
+
+/// A line a motion, from which starts, and whether a push leads elsewhere.
+#[test]
+fn each_motion_is_told_in_a_line() {
+    let folder = folder();
+    let dwell = ["dwell", "grid.toml", "--speed", "250,280", "--at", "unbalance_mass_kg=0.4"];
+    let told = said(&sweep(&folder, &[&dwell[..], &["--starts", "6"]].concat(), None));
+    let lines = |name: &str| {
+        let named = told.lines().filter(|line| line.trim_start().starts_with(&format!("{name} ")));
+        named.map(str::to_owned).collect::<Vec<_>>()
+    };
+    let motions = lines("motion");
+    assert_eq!(motions.len(), 2, "{told}");
+    for (line, kind, speed, yaw) in [
+        (&motions[0], "quasi periodic at", "250 rpm", "tub yaw 152.3 mrad"),
+        (&motions[1], "periodic at", "280 rpm", "tub yaw 4.9 mrad"),
+    ] {
+        for part in [kind, speed, yaw, "from 6 of 6 starts, the disturbed periodic response among"]
+        {
+            assert!(line.contains(part), "{part}: {line}");
+        }
+    }
+    let pushes = lines("push");
+    assert_eq!(pushes.len(), 2, "{told}");
+    for (line, speed) in pushes.iter().zip(["250 rpm", "280 rpm"]) {
+        let expected = "no push up to 6 rad/s that was tried leads elsewhere at";
+        assert!(line.contains(expected) && line.contains(speed), "{line}");
+    }
+}
+
+/// A cycle that reverses and waits is no hindrance: speeds are held whatever the profile.
+#[test]
+fn a_cycle_that_reverses_and_waits_may_be_held() {
+    let folder = folder();
+    let table = "profile = \"table\"\ntime_s = [0, 9, 12, 20]\nspeed_rpm = [0, 0, 200, -200]";
+    let ramp = "profile = \"ramp\"\npeak_rpm = 350.0\nramp_s = 50.0";
+    fs::write(folder.path().join("grid.toml"), GRID.replace(ramp, table)).expect("it is written");
+    let dwell = ["dwell", "grid.toml", "--speed", "250", "--starts", "1"];
+    let told = said(&sweep(&folder, &dwell, None));
+    assert!(told.contains("tub yaw 152.3 mrad, quasi periodic"), "{told}");
+}
+
+/// The dots of a single speed stand in the middle of the figure, not cut by its frame.
+#[test]
+fn dots_of_one_speed_are_whole() {
+    let folder = folder();
+    let dwell = ["dwell", "grid.toml", "--speed", "280", "--at", "unbalance_mass_kg=0.4"];
+    let done = sweep(&folder, &[&dwell[..], &["--starts", "1"]].concat(), None);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    let drawn = sweep(&folder, &["plot", "results/grid-dwell.parquet", "-o", "one.svg"], None);
+    assert_eq!(drawn.status.code(), Some(0), "{}", said(&drawn));
+    let picture = fs::read_to_string(folder.path().join("one.svg")).expect("it is there");
+    let number = |text: &str| -> f64 {
+        let end = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+        text[..end].parse().expect("a number")
+    };
+    let path = |text: &str| text.split_once("d=\"M").map(|(_, path)| path.to_owned());
+    let after = |text: &str, mark: char| text.split_once(mark).map(|(_, rest)| number(rest));
+    // The frame of a panel is M LEFT TOP h WIDTH v HEIGHT.
+    let frames = picture.lines().filter(|line| line.contains("<clipPath")).filter_map(path);
+    let frames: Vec<[f64; 4]> = frames
+        .map(|frame| {
+            let sizes = ['h', 'v'].map(|mark| after(&frame, mark).expect("a size"));
+            [number(&frame), after(&frame, ' ').expect("its top"), sizes[0], sizes[1]]
+        })
+        .collect();
+    let middle = frames[0][0] + 0.5 * frames[0][2];
+    let is_dot = |line: &&str| !line.contains("stroke") && line.ends_with("z\" fill=\"#0072b2\"/>");
+    let dots = picture.lines().filter(is_dot).filter_map(path);
+    // The legend's stand below all frames.
+    let is_framed = |y: f64| frames.iter().any(|[_, top, _, height]| y > *top && y < top + height);
+    let dots = dots.filter(|path| after(path, ' ').is_some_and(is_framed));
+    let dots: Vec<f64> = dots.map(|path| number(&path)).collect();
+    assert!(dots.len() >= frames.len(), "{picture}");
+    for x in dots {
+        assert!((x - middle).abs() < 1.0, "{x}, not {middle}");
+    }
+}

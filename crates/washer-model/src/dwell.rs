@@ -23,7 +23,8 @@ use hold::{Held, hold, recorded};
 use lane_ode::Simd;
 use multipliers::{Orbit, growths_per_s};
 use starts::{
-    Directions, Kick, MODE_DIRECTIONS, directions, disturbed, kicked, kicks, random_kicks,
+    Directions, Kick, MODE_DIRECTIONS, directions, disturbed, is_from_rest, kicked, kicks,
+    random_kicks,
 };
 use std::sync::Arc;
 
@@ -114,8 +115,8 @@ pub struct Ending {
     pub settled: Option<Settled>,
     /// How many starts ended in it; none where only a transient did.
     pub starts: u32,
-    /// The smallest kick (rad/s) that led to it: 0 where a disturbed response did, none where only
-    /// a transient or a carried state did.
+    /// The smallest kick (rad/s) off the response that led to it: 0 where a disturbed response did,
+    /// none where only a kick of the machine at rest, a transient or a carried state did.
     pub least_kick_rad_per_s: Option<f64>,
     /// Largest deviation from equilibrium over its last turns (32 where it repeats, 128 with two
     /// frequencies, else 256), in the order of [`Channel::ALL`](crate::Channel::ALL) (m, rad).
@@ -306,6 +307,21 @@ fn finish(
     }
 }
 
+/// From where a trajectory starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Origin {
+    /// A periodic response, disturbed.
+    Response,
+    /// A periodic response, kicked.
+    Kicked(Kick),
+    /// The machine at rest, kicked, whose drum is at speed at once.
+    Rest,
+    /// The state that another speed ended in.
+    Carried,
+    /// A state of another trajectory.
+    Trajectory,
+}
+
 /// The search at one dwell.
 struct Hunt<'a> {
     case: Case<'a>,
@@ -313,11 +329,9 @@ struct Hunt<'a> {
     from: [f64; STATES],
     directions: Directions,
     longest_s: f64,
-    /// Whether the one start is the state that another speed ended in.
-    is_carried: bool,
     courses: Vec<Course<'a>>,
-    /// Of each course its kick, if it has one.
-    kicks: Vec<Option<Kick>>,
+    /// The origin of each course.
+    origins: Vec<Origin>,
     /// Courses that are starts; the others look for the threshold, or try whether chaos survives.
     starts: usize,
     /// The number of a chaotic course, and those of the courses from its states.
@@ -339,18 +353,23 @@ impl<'a> Hunt<'a> {
         let frozen: Arc<Modes> = Arc::clone(&case.frozen);
         let rest = <Nonlinear<f64> as Model<f64>>::at_rest(point);
         let from = responses.first().map_or(rest, |response| response.start);
-        let mut states: Vec<([f64; STATES], Option<Kick>)> = Vec::new();
+        let mut states: Vec<([f64; STATES], Origin)> = Vec::new();
         let directions = directions(point, &frozen, random_kicks(starts.count));
         if let Some(carried) = carried {
-            states.push((disturbed(point, &frozen, &carried), None));
+            states.push((disturbed(point, &frozen, &carried), Origin::Carried));
         } else {
             let firsts = responses.iter().map(|response| response.start);
             let firsts: Vec<_> = if responses.is_empty() { vec![from] } else { firsts.collect() };
-            states.extend(firsts.iter().map(|first| (disturbed(point, &frozen, first), None)));
-            let kicks = kicks(starts.count.saturating_sub(states.len()), starts.kick_rad_per_s);
-            states.extend(
-                kicks.into_iter().map(|kick| (kicked(&from, &directions, kick), Some(kick))),
-            );
+            let beside = |first| (disturbed(point, &frozen, first), Origin::Response);
+            states.extend(firsts.iter().map(beside));
+            let count = starts.count.saturating_sub(states.len());
+            for kick in kicks(count, starts.kick_rad_per_s) {
+                let (off, origin) = match is_from_rest(kick) {
+                    true => (&rest, Origin::Rest),
+                    false => (&from, Origin::Kicked(kick)),
+                };
+                states.push((kicked(off, &directions, kick), origin));
+            }
         }
         let mut hunt = Self {
             case,
@@ -358,27 +377,26 @@ impl<'a> Hunt<'a> {
             from,
             directions,
             longest_s: starts.longest_s,
-            is_carried: carried.is_some(),
             courses: Vec::new(),
-            kicks: Vec::new(),
+            origins: Vec::new(),
             starts: states.len(),
             survivors: Vec::new(),
             brackets: [None; MODE_DIRECTIONS],
             random_gone: None,
         };
-        for (state, kick) in states {
-            hunt.start(state, kick);
+        for (state, origin) in states {
+            hunt.start(state, origin);
         }
         hunt
     }
 
-    fn start(&mut self, state: [f64; STATES], kick: Option<Kick>) {
+    fn start(&mut self, state: [f64; STATES], origin: Origin) {
         let held = Held { row: self.case.row, state };
         let grows = |response: &&Response| response.growth_per_s() > 0.0;
         let unstable = self.responses.iter().filter(grows);
         let leaves = unstable.map(|response| vec![response.start]).collect();
         self.courses.push(Course::new(held, leaves, self.longest_s));
-        self.kicks.push(kick);
+        self.origins.push(origin);
     }
 
     /// Starts trajectories from states of each chaotic motion that starts ended in.
@@ -392,7 +410,7 @@ impl<'a> Hunt<'a> {
             for state in self.courses[chaotic].own_states() {
                 let held = Held { row: self.case.row, state };
                 self.courses.push(Course::survivor(held, leaves.clone()));
-                self.kicks.push(None);
+                self.origins.push(Origin::Trajectory);
             }
             self.survivors.push((chaotic, first..self.courses.len()));
         }
@@ -432,8 +450,8 @@ impl<'a> Hunt<'a> {
 
     /// Of every direction the kicks between which some stop coming back.
     fn bracket(&mut self) {
-        for (course, kick) in self.kicks.iter().enumerate() {
-            if let Some((direction, size)) = *kick
+        for (course, origin) in self.origins.iter().enumerate() {
+            if let Origin::Kicked((direction, size)) = *origin
                 && direction >= MODE_DIRECTIONS
                 && !self.comes_back(course)
             {
@@ -442,11 +460,11 @@ impl<'a> Hunt<'a> {
         }
         for direction in 0..MODE_DIRECTIONS {
             let mut kicks: Vec<(f64, bool)> = Vec::new();
-            for (course, kick) in self.kicks.iter().enumerate() {
-                if let Some((of, size)) = kick
-                    && *of == direction
+            for (course, origin) in self.origins.iter().enumerate() {
+                if let Origin::Kicked((of, size)) = *origin
+                    && of == direction
                 {
-                    kicks.push((*size, self.comes_back(course)));
+                    kicks.push((size, self.comes_back(course)));
                 }
             }
             kicks.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -463,7 +481,7 @@ impl<'a> Hunt<'a> {
         for direction in 0..MODE_DIRECTIONS {
             if let Some([back, gone]) = self.brackets[direction] {
                 let kick = (direction, 0.5 * (back + gone));
-                self.start(kicked(&self.from, &self.directions, kick), Some(kick));
+                self.start(kicked(&self.from, &self.directions, kick), Origin::Kicked(kick));
             }
         }
     }
@@ -473,7 +491,7 @@ impl<'a> Hunt<'a> {
         let asked = self.brackets.iter().flatten().count();
         for course in self.courses.len() - asked..self.courses.len() {
             let comes_back = self.comes_back(course);
-            if let Some((direction, size)) = self.kicks[course]
+            if let Origin::Kicked((direction, size)) = self.origins[course]
                 && let Some(bracket) = &mut self.brackets[direction]
             {
                 bracket[usize::from(!comes_back)] = size;
@@ -483,11 +501,12 @@ impl<'a> Hunt<'a> {
 
     fn found(self) -> (Endings, Row<'a>) {
         let mut motions: Vec<Ending> = Vec::new();
-        for (course, kick) in self.courses[..self.starts].iter().zip(&self.kicks) {
+        for (course, origin) in self.courses[..self.starts].iter().zip(&self.origins) {
             let mut ending = course.ending();
-            ending.least_kick_rad_per_s = match kick {
-                Some((_, size)) => Some(*size),
-                None => (!self.is_carried).then_some(0.0),
+            ending.least_kick_rad_per_s = match origin {
+                Origin::Response => Some(0.0),
+                Origin::Kicked((_, size)) => Some(*size),
+                Origin::Rest | Origin::Carried | Origin::Trajectory => None,
             };
             match motions.iter_mut().find(|motion| are_same(motion, &ending)) {
                 Some(known) => known.also(&ending),

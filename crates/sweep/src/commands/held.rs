@@ -57,8 +57,9 @@ command goes on from there.";
 pub(super) const MOTIONS_LONG: &str = "\
 A row for every point of the grid, every speed and every motion that was found there while the \
 drum turns at that speed. Trajectories start from the periodic response, slightly disturbed, and \
-from kicks in the two modes that rock most, one by one and together, each a third of a decade \
-harder. They are followed until their largest deviations no longer change. It is a search, not a \
+from kicks: two thirds of these in the two modes that rock most, one by one and together, the \
+others in random directions, every other one of the machine at rest. They are followed until their \
+largest deviations no longer change. It is a search, not a \
 proof: a motion that no start leads to is not found.
 
 The result is written to results/NAME-dwell.parquet unless --out names a file. The file is a pure \

@@ -147,10 +147,12 @@ pub(crate) fn columns(
     let text = "how many starts ended in it; 0 where only a transient did";
     columns.push(counts("starts", text, |row| Some(u64::from(row.motion()?.starts))));
     let text = "how many starts there were: the disturbed periodic responses, then kicks, two \
-                thirds of them along the modes that rock most, the others in random directions";
+                thirds of them along the modes that rock most, the others in random directions, \
+                every other one of the machine at rest";
     columns.push(counts("starts_made", text, |row| Some(u64::from(row.found()?.starts))));
-    let text = "smallest kick that led to it; 0: a disturbed periodic response did; null where \
-                only a transient or the last speed's motion did";
+    let text = "smallest kick off the periodic response that led to it; 0: a disturbed periodic \
+                response did; null where only a kick of the machine at rest, a transient or the \
+                last speed's motion did";
     columns.push(ResultColumn::measured("least_kick_rad_per_s", "rad/s", text, |row: &RowOf| {
         row.motion()?.least_kick_rad_per_s
     }));

@@ -119,6 +119,10 @@ impl Listed {
                 text += ", the disturbed periodic response among them";
             } else if self.least_kick > 0.0 {
                 text += &format!(", the weakest a kick of {:.2} rad/s", self.least_kick);
+            } else if ended > 0.0 {
+                text += ", of the machine at rest";
+            } else {
+                text += ", where a transient ended";
             }
         }
         text
@@ -144,7 +148,7 @@ fn pushes(file: &ParquetFile, axes: &[String], listed: &[Listed]) -> Vec<String>
         }
         lines.push(match kicks.reduce(f64::min) {
             Some(kick) => format!("a kick of {kick:.2} rad/s leads elsewhere at {at}"),
-            None => format!("no push up to {hardest} rad/s leads elsewhere at {at}"),
+            None => format!("no push up to {hardest} rad/s that was tried leads elsewhere at {at}"),
         });
     }
     lines

@@ -30,7 +30,7 @@ fn a_textbook_machine_has_a_response_at_every_speed() {
 /// Branches between two others are not lost to them.
 #[test]
 fn branches_of_a_folded_curve_are_all_found() {
-    let speeds_rpm: Vec<f64> = (0..15).map(|k| 144.7 + 0.05 * f64::from(k)).collect();
+    let speeds_rpm: Vec<f64> = (0..25).map(|k| 144.2 + 0.05 * f64::from(k)).collect();
     for (found, rpm) in responses(&point("fine17"), &speeds_rpm).iter().zip(&speeds_rpm) {
         let branches: Vec<u32> = found.iter().map(|response| response.branch).collect();
         assert_eq!(branches, [2, 3, 4], "{rpm} rpm");
@@ -70,4 +70,46 @@ fn chaos_survives_or_is_a_transient() {
     assert!(found.motions.iter().all(|motion| motion.settled != Some(Settled::Chaotic)));
     let is_transient = |state| matches!(state, State::Transient { life_s } if life_s > 0.0);
     assert!(found.motions.iter().any(|motion| is_transient(motion.state)));
+}
+
+/// Motions of period 4, 0.1166 and 0.1471 rad, that kicks off the wide periodic response do not
+/// lead to, but those of the machine at rest do.
+#[test]
+#[ignore = "half a minute"]
+fn a_basin_beside_the_response_is_found_from_rest() {
+    let point = point("74001_11");
+    let dwells = [Dwell { point: &point, speed_rpm: 404.1 }];
+    let found = endings(Simd::best(), &dwells, &[], &Starts::default(), &|| false);
+    let found = found.into_iter().next().unwrap().unwrap();
+    let is_it = |motion: &&washer_model::Ending| {
+        motion.settled == Some(Settled::Periodic { turns: 4 })
+            && (motion.peaks[Channel::TubYaw.index()] / 0.1166 - 1.0).abs() < 0.02
+            && (motion.peaks[Channel::TubPitch.index()] / 0.1471 - 1.0).abs() < 0.02
+    };
+    let motion = found.motions.iter().find(is_it);
+    let motion = motion.unwrap_or_else(|| panic!("{:?}", found.motions));
+    assert!(motion.exponent.is_some_and(|exponent| exponent.per_s < 0.0), "{motion:?}");
+}
+
+/// Where the textbook machine had no response by `sweep stability`, the periodic motion that it
+/// ends in is the one of the row.
+#[test]
+fn a_textbook_machine_ends_in_its_response() {
+    let point = point("textbook");
+    let speeds_rpm = [500.0, 700.0];
+    let dwells: Vec<Dwell<'_>> =
+        speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+    let starts = Starts { count: 3, ..Starts::default() };
+    let all = endings(Simd::best(), &dwells, &[], &starts, &|| false);
+    for (found, rpm) in all.into_iter().zip(speeds_rpm) {
+        let found = found.unwrap();
+        let motion = &found.motions[0];
+        assert_eq!(motion.settled, Some(Settled::Periodic { turns: 1 }), "{rpm} rpm");
+        let yaw = Channel::TubYaw.index();
+        let yaws_rad = found.responses.iter().map(|response| response.nonlinear[yaw]);
+        let nearest = yaws_rad
+            .map(|yaw_rad| (yaw_rad / motion.peaks[yaw] - 1.0).abs())
+            .fold(f64::INFINITY, f64::min);
+        assert!(nearest < 1e-3, "{rpm} rpm: {nearest}");
+    }
 }

@@ -95,6 +95,13 @@ pub(super) const fn random_kicks(count: usize) -> usize {
     count / 3
 }
 
+/// Whether a kick is given to the machine at rest: every other one in a random direction is. Kicks
+/// off a response stay in its basin where that is wide; the machine at rest is far from a large
+/// response.
+pub(super) const fn is_from_rest((direction, _): Kick) -> bool {
+    direction >= MODE_DIRECTIONS && (direction - MODE_DIRECTIONS).is_multiple_of(2)
+}
+
 /// Returns a number of kicks up to a size (rad/s): those along mode shapes first, the hardest in
 /// all directions before weaker ones, then random ones, from the hardest to the weakest.
 pub(super) fn kicks(count: usize, greatest_rad_per_s: f64) -> Vec<Kick> {

@@ -215,6 +215,78 @@ fn random_motions_go_on_in_short_steps() {
     assert!(worst.iter().all(|worst| *worst < 1e-2), "{worst:?}");
 }
 
+/// Kicks of random machines in any direction, off the response and off the machine at rest, that
+/// classical Runge-Kutta without caps follows for three minutes, end in motions that the search
+/// found, all but one in fifty. SEED, MACHINES and KICKS choose others.
+#[test]
+#[ignore = "minutes"]
+fn plain_kicks_end_in_motions_that_are_found() {
+    const FOLLOWED_S: f64 = 180.0;
+    let mut numbers = fastrand::Rng::with_seed(given("SEED", 404));
+    let (mut settled, mut missed) = (0, Vec::new());
+    for number in 0..given("MACHINES", 6) {
+        let (keys, speed_rpm) = random(number, &mut numbers);
+        let point = at(&keys, 100.0, 1.0);
+        let dwells = [Dwell { point: &point, speed_rpm }];
+        let starts = Starts::default();
+        let found = endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0).unwrap();
+        let case = Settings::new(&point).case(speed_rpm).unwrap().without_caps().unwrap();
+        let rest = <Nonlinear<f64> as Model<f64>>::at_rest(&point);
+        let response = found.responses.first().map_or(rest, |response| response.start);
+        let held: Vec<Held<'_>> = (0..given("KICKS", 16))
+            .map(|kick| {
+                let mut state = if kick % 2 == 0 { rest } else { response };
+                let size_rad_per_s = 0.3 * 20.0_f64.powf(numbers.f64());
+                let parts: [f64; 4] = core::array::from_fn(|_| 2.0 * numbers.f64() - 1.0);
+                let length = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
+                // Tub and shaft together; a quarter of a metre is an arm of the tub's.
+                let arms_m = [0.25, 0.25, 1.0, 1.0];
+                for (k, (part, arm_m)) in parts.iter().zip(arms_m).enumerate() {
+                    let of_tub = if k < 2 { k } else { k + 2 };
+                    for coordinate in [of_tub, of_tub + 2] {
+                        state[COORDINATES + coordinate] += size_rad_per_s * arm_m * part / length;
+                    }
+                }
+                Held { row: case.row, state }
+            })
+            .collect();
+        let turns = (FOLLOWED_S / case.row.turn_s()) as usize;
+        for (kick, turned) in hold(Simd::best(), &held, turns).into_iter().enumerate() {
+            let peaks = |turns: &[hold::Turn]| -> [f64; CHANNELS] {
+                core::array::from_fn(|i| turns.iter().map(|turn| turn.peaks[i]).fold(0.0, f64::max))
+            };
+            let place = format!("machine {number}, kick {kick}, {speed_rpm:.2} rpm {keys}");
+            if turned.len() < turns {
+                settled += 1;
+                let left = |motion: &Ending| matches!(motion.state, State::LeftRange { .. });
+                if !found.motions.iter().any(left) {
+                    missed.push(format!("{place}: leaves the range"));
+                }
+                continue;
+            }
+            let (before, last) = turned[turns - 2 * WINDOW..].split_at(WINDOW);
+            let before = peaks(before);
+            let last = peaks(last);
+            if !are_alike(&before, &last, SAME) {
+                continue;
+            }
+            settled += 1;
+            let is_it = |motion: &Ending| {
+                let share = match motion.settled {
+                    Some(Settled::Chaotic) | None => SAME_ROUGHLY,
+                    Some(_) => 2.0 * SAME,
+                };
+                are_alike(&motion.peaks, &last, share)
+            };
+            if !found.motions.iter().any(is_it) {
+                missed.push(format!("{place}: {last:.4?}"));
+            }
+        }
+    }
+    println!("{settled} kicks settled, {} in no motion that was found: {missed:#?}", missed.len());
+    assert!(settled > 0 && 50 * missed.len() <= settled);
+}
+
 /// A motion in 256 further turns by plain RK4: largest deviations in the last half, and the
 /// coordinates once a turn.
 fn in_short_steps(
