@@ -88,3 +88,196 @@ fn same_bytes_for_1_2_and_4_threads_on_every_instruction_set_dopri5() {
 fn same_bytes_for_1_2_and_4_threads_on_every_instruction_set_mass_scaled() {
     same_bytes("method = \"rk4-mass-scaled\"\naccuracy = 1e-3\n");
 }
+
+/// Random numbers (Marsaglia's xorshift).
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+}
+
+/// Returns a number that the environment gives, or another.
+fn given(name: &str, or: u64) -> u64 {
+    std::env::var(name).map_or(or, |it| it.parse().expect("it is a number"))
+}
+
+/// Returns a random machine's file, with the elements of `kinds`' bits: friction, stops, bushings,
+/// stiffening springs, a second unbalance.
+fn machine(kinds: u64, numbers: &mut Numbers) -> String {
+    let of_file = include_str!("../../crates/sweep/tests/held/m_fine17.toml");
+    let (bare, _) = of_file.split_once("[[bushings]]").expect("the file's last element");
+    let is_kept = |line: &&str| !line.starts_with("cubic");
+    let mut text: String = bare.lines().filter(is_kept).map(|line| format!("{line}\n")).collect();
+    let mut number = |low: f64, high: f64| format!("{}", numbers.between(low, high));
+    if kinds & 1 != 0 {
+        let friction = format!("[[dampers]]\nfriction_n = {}", number(5.0, 60.0));
+        text = text.replace("[[dampers]]", &friction);
+    }
+    if kinds & 8 != 0 {
+        let cubic = format!("[[springs]]\ncubic_n_per_m3 = {}", number(1e5, 3e6));
+        text = text.replace("[[springs]]", &cubic);
+    }
+    if kinds & 2 != 0 {
+        for side in [1, -1] {
+            let (clearance, stiffness) = (number(0.004, 0.02), number(1e4, 1e5));
+            text += &format!(
+                "\n[[stops]]\ntub_m = [0.35, 0.0, {}]\ndirection = [0.0, 0.1, {side}]\n\
+                 clearance_m = {clearance}\nstiffness_n_per_m = {stiffness}\n\
+                 damping_n_s_per_m = {}\n",
+                0.28 * f64::from(side),
+                number(0.0, 300.0)
+            );
+        }
+    }
+    if kinds & 4 != 0 {
+        text += &format!(
+            "\n[[bushings]]\ntub_m = [0.45, 0.0, 0.0]\nstiffness_n_per_m = [0.0, {}, {}]\n\
+             cubic_n_per_m3 = [0.0, 1e7, 5e6]\ndamping_n_s_per_m = [0.0, 10.0, 15.0]\n",
+            number(500.0, 2e3),
+            number(500.0, 2e3)
+        );
+    }
+    if kinds & 16 != 0 {
+        text += &format!(
+            "\n[[further_unbalances]]\nmass_kg = {}\nx_m = {}\nradius_m = 0.18\n",
+            number(0.05, 0.3),
+            number(0.1, 0.3)
+        );
+    }
+    text
+}
+
+/// The rows of a result as text, by what follows the point's number.
+fn rows(folder: &std::path::Path, name: &str) -> Vec<String> {
+    let done = Command::new(sweep_binary())
+        .current_dir(folder)
+        .args(["export", name, "rows.csv"])
+        .output()
+        .expect("the command starts");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let text = fs::read_to_string(folder.join("rows.csv")).expect("it was written");
+    let lines = text.lines().filter(|line| !line.starts_with('#'));
+    let without_point = |line: &str| line.split_once(',').map(|(_, rest)| rest.to_owned());
+    lines.filter_map(without_point).collect()
+}
+
+/// Bytes of random machines with random elements do not depend on the number of threads, nor rows
+/// on the points and speeds that are asked for beside them. SEED chooses other machines, and
+/// SECONDS how long to go on; from 60 s on, every command and the metrics that take long are tried.
+#[test]
+fn random_machines_have_the_same_rows_in_any_company() {
+    let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let seed = given("SEED", clock.expect("it is after 1970").as_secs());
+    let seconds = given("SECONDS", 15);
+    println!("SEED={seed} SECONDS={seconds}");
+    let begin = std::time::Instant::now();
+    let mut numbers = Numbers(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let mut compared = 0;
+    let is_thorough = seconds >= 60;
+    while compared == 0 || begin.elapsed().as_secs() < seconds {
+        let kinds = (32.0 * numbers.next()) as u64;
+        let home = tempfile::tempdir().expect("a temporary folder");
+        fs::write(home.path().join("m.toml"), machine(kinds, &mut numbers)).expect("it is written");
+        let masses: [f64; 3] = core::array::from_fn(|k| {
+            let third = 0.2 + 0.2 * k as f64;
+            numbers.between(third, third + 0.15)
+        });
+        let speeds: [f64; 3] = core::array::from_fn(|k| {
+            let fast = if is_thorough { 230.0 } else { 80.0 };
+            (fast + 15.0 * (k as f64 + numbers.next())).round()
+        });
+        let mut metrics = vec!["cabinet_force", "clash_time", "static_sag", "damper_speed"];
+        if kinds & 2 != 0 {
+            metrics.extend(["stop_force", "stop_contact"]);
+        }
+        if is_thorough {
+            metrics.extend(["growth", "dwell"]);
+        }
+        // The section is there for the metrics that take long.
+        let stability = match is_thorough {
+            true => format!("[stability]\nspeed_rpm = \"{}\"\n", speeds[1]),
+            false => String::new(),
+        };
+        let grid = |masses: &[f64]| {
+            format!(
+                "machine = \"m.toml\"\nmetrics = {metrics:?}\n[spin]\nprofile = \"ramp\"\n\
+                 peak_rpm = 250.0\nramp_s = 2.0\n[time]\nend_s = 2.5\nwindow_s = [1.0, 2.5]\n\
+                 {stability}[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = {masses:?}\n"
+            )
+        };
+        fs::write(home.path().join("all.toml"), grid(&masses)).expect("it is written");
+        let few = [masses[0], masses[2]];
+        fs::write(home.path().join("few.toml"), grid(&few)).expect("it is written");
+        let second = "[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [40.0, 150.0, 260.0]\n";
+        let plane =
+            grid(&masses).replace(&format!("metrics = {metrics:?}\n"), "").replace(&stability, "");
+        let plane = plane + second;
+        fs::write(home.path().join("plane.toml"), plane).expect("it is written");
+        let three = speeds.map(|speed| speed.to_string()).join(",");
+        let one = speeds[1].to_string();
+        let search = ["--starts", "2", "--longest", "2"];
+        // Each command is asked with company, then alone where its rows are of points and speeds.
+        let commands: [(&str, Vec<&str>, Vec<&str>); 4] = [
+            ("run", vec!["all.toml"], vec!["few.toml"]),
+            ("stability", vec!["all.toml", "--speed", &three], vec!["few.toml", "--speed", &one]),
+            (
+                "dwell",
+                [&["all.toml", "--speed", three.as_str()][..], &search].concat(),
+                [&["few.toml", "--speed", one.as_str()][..], &search].concat(),
+            ),
+            ("boundary", vec!["plane.toml"], Vec::new()),
+        ];
+        let first = (4.0 * numbers.next()) as usize;
+        for k in 0..commands.len() {
+            if compared > 0 && begin.elapsed().as_secs() >= seconds {
+                break;
+            }
+            let (verb, together, alone) = &commands[(first + k) % commands.len()];
+            let make = |asked: &[&str], threads: &str, name: &str| {
+                let out = &format!("{verb}-{name}.parquet");
+                let done = Command::new(sweep_binary())
+                    .current_dir(home.path())
+                    .arg(verb)
+                    .args(asked)
+                    .args(["--fresh", "--progress", "none", "--threads", threads, "--out", out])
+                    .env_remove("SLURM_ARRAY_TASK_ID")
+                    .env_remove("JOB_COMPLETION_INDEX")
+                    .output()
+                    .expect("the command starts");
+                let said = String::from_utf8_lossy(&done.stderr);
+                assert!(done.status.success(), "{verb} {asked:?} of {kinds:05b}: {said}");
+                fs::read(home.path().join(out)).expect("it was written")
+            };
+            let whole = make(together, "1", "one");
+            for threads in ["2", "5"] {
+                let other = make(together, threads, "other");
+                assert!(other == whole, "{verb} of {kinds:05b} on {threads} threads, SEED={seed}");
+            }
+            if alone.is_empty() {
+                compared += 1;
+                continue;
+            }
+            make(alone, "2", "alone");
+            let [all, alone] =
+                ["one", "alone"].map(|name| rows(home.path(), &format!("{verb}-{name}.parquet")));
+            assert!(alone.len() > 1, "{verb} has rows");
+            for row in &alone {
+                assert!(
+                    all.contains(row),
+                    "{verb} of {kinds:05b} beside others, SEED={seed}: {row}"
+                );
+            }
+            compared += alone.len() - 1;
+        }
+    }
+    println!("{compared} rows are the same in {:.0} s", begin.elapsed().as_secs_f64());
+}
