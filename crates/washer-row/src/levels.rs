@@ -74,7 +74,8 @@ impl RefinementLevels {
     pub fn begins_family(&self, place: usize) -> bool {
         let family = |place: usize| {
             let level = self.levels[place].level;
-            if level.is_capped() { Level::Capped0 } else { level }
+            let kind = if level.is_capped() { Level::Capped0 } else { level };
+            (kind, self.left_out(place))
         };
         place > 0 && family(place) != family(place - 1)
     }

@@ -60,8 +60,15 @@ fn hold_against_rk4(plan: &Plan, accuracy: f64) -> Vec<Outcome> {
 fn hold_against_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> {
     let fast = Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
     let at = |step_s: f64| by_rk4(plan, step_s);
-    let (rows, expected) = (rows(&fast), at(step_s));
-    for (row, expected) in rows.iter().zip(&expected) {
+    let rows = rows(&fast);
+    let expected = at(step_s);
+    let mut finer = None;
+    for (place, (row, expected)) in rows.iter().zip(&expected).enumerate() {
+        // It may be RK4 that errs, where a violent motion amplifies what its step leaves.
+        let expected = match error(row, expected) > accuracy {
+            true => &finer.get_or_insert_with(|| at(step_s / 8.0))[place],
+            false => expected,
+        };
         assert_eq!(row.nonlinear.status, expected.nonlinear.status, "{row:?}");
         if row.converged == Some(false) {
             continue;
