@@ -222,18 +222,16 @@ fn largest_multiplier(moved: &[[f64; COORDINATES]]) -> f64 {
     const SINGLE: f64 = 1e-6;
     let (mut g, mut h) = ([[0.0; 2]; 2], [0.0; 2]);
     let mut after = 0.0;
+    // The last turns count most: there the others have decayed farthest.
     for k in moved.len().div_ceil(2)..moved.len() - 2 {
-        // Every turn counts alike, or the last ones alone would count.
-        let size = |d: &[f64; COORDINATES]| d.iter().map(|d| d * d).sum::<f64>();
-        let weight = 1.0 / size(&moved[k + 1]);
         for i in 0..COORDINATES {
             let [d0, d1, d2] = [moved[k][i], moved[k + 1][i], moved[k + 2][i]];
-            g[0][0] += weight * d1 * d1;
-            g[0][1] += weight * d1 * d0;
-            g[1][1] += weight * d0 * d0;
-            h[0] += weight * d1 * d2;
-            h[1] += weight * d0 * d2;
-            after += weight * d2 * d2;
+            g[0][0] += d1 * d1;
+            g[0][1] += d1 * d0;
+            g[1][1] += d0 * d0;
+            h[0] += d1 * d2;
+            h[1] += d0 * d2;
+            after += d2 * d2;
         }
     }
     let single = h[0] / g[0][0];
