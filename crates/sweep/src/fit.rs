@@ -3,7 +3,8 @@
 //!
 //! `measured` and `speed` read a measurement. `model` compares it with the model and its
 //! derivatives, `search` finds the least cost, `statistics` says how well the numbers are known,
-//! and `report` holds all of it. `journal` keeps what a fit has found out.
+//! and `report` holds all of it. `units` tries other units where the model follows nothing.
+//! `journal` keeps what a fit has found out.
 
 mod algebra;
 mod curves;
@@ -16,6 +17,7 @@ mod search;
 mod spectrum;
 mod speed;
 mod statistics;
+mod units;
 #[cfg(test)]
 mod tests;
 
@@ -39,7 +41,7 @@ use measured::REST_SPEED_RATIO;
 pub(crate) use model::Case;
 use model::{Against, Free, Problem, Summary};
 pub(crate) use report::Report;
-use search::{Descent, Ended, descend};
+use search::{Descent, Ended, MAX_EVALUATIONS, descend};
 use statistics::Statistics;
 
 /// Shares of a start between which further starts lie, where no range is given.
@@ -310,8 +312,13 @@ fn fitted<'a>(
     if options.bootstrap > 0 && best.is_settled {
         repeated = Some(bootstrap(&mut problem, &best.x, &against, options.bootstrap, work)?);
     }
+    let suspicions = match statistics.unexplained() {
+        Some(_) => units::suspicions(&problem)?,
+        None => Vec::new(),
+    };
     let found = report::Found {
         problem: &problem,
+        suspicions: &suspicions,
         minima: &minima,
         against: &against,
         at_start: &at_start,
@@ -474,7 +481,7 @@ impl Search<'_> {
     fn from(&self, start: &[f64]) -> Result<Option<Descent>, Ended> {
         let ranges: Vec<[f64; 2]> =
             (0..self.problem.unknowns()).map(|k| self.problem.range(k)).collect();
-        descend(start, &ranges, &|x| self.evaluate(x))
+        descend(start, &ranges, MAX_EVALUATIONS, &|x| self.evaluate(x))
     }
 
     /// Every minimum that is found from so many starts, the least first.

@@ -14,7 +14,7 @@ const FEWEST: usize = 16;
 /// What names of the nonlinear model's channels begin with in a file of `sweep trace`.
 const TRACED: &str = "nonlinear_";
 /// Rows that are usually farther apart (s) show no turn of a drum.
-const SLOWEST_S: f64 = 0.2;
+pub(super) const SLOWEST_S: f64 = 0.2;
 /// The longest run that is simulated (s). Basis: a wash takes an hour, its longest spin a quarter
 /// of it; every evaluation of a fit integrates the whole run. Doubling it doubles the time that a
 /// stray row can cost before it is seen.

@@ -102,6 +102,8 @@ pub(crate) struct OfFile {
     /// By how much the model's clock is ahead (s).
     pub(crate) shift_s: Option<f64>,
     pub(crate) residual_rms: ByColumn<f64>,
+    /// The part of the variance that the model explains.
+    pub(crate) explained: ByColumn<f64>,
     /// Correlation of neighbouring residuals.
     pub(crate) autocorrelation: ByColumn<f64>,
     /// By how much that widens variances.
@@ -147,6 +149,8 @@ pub(crate) struct Minimum {
 /// What a report is made of.
 pub(super) struct Found<'a> {
     pub(super) problem: &'a Problem<'a>,
+    /// Columns that seem to be in another unit, each a clause.
+    pub(super) suspicions: &'a [String],
     pub(super) minima: &'a [Descent],
     pub(super) against: &'a [Against],
     pub(super) at_start: &'a [Against],
@@ -164,7 +168,10 @@ impl Found<'_> {
         let Self { problem, statistics, .. } = *self;
         let best = &self.minima[0];
         let unsettled = (!best.is_settled).then(|| UNSETTLED.to_owned());
-        let objection = unsettled.or_else(|| statistics.objection(problem));
+        let objection = unsettled.or_else(|| statistics.objection(problem)).map(|reason| {
+            let clauses = std::iter::once(&reason).chain(self.suspicions);
+            clauses.map(String::as_str).collect::<Vec<_>>().join("; ")
+        });
         let follows = objection.is_none();
         let covariance = statistics.of_free(problem);
         let error = |k: usize| covariance[k][k].max(0.0).sqrt();
@@ -243,6 +250,7 @@ impl Found<'_> {
             offset: by(&|_, one| one.offset),
             shift_s: problem.with_shift.then(|| problem.shift_s(case, x)),
             residual_rms: by(&|_, one| rms(one)),
+            explained: by(&|k, _| self.statistics.explained[k]),
             autocorrelation: by(&|k, _| self.statistics.neighbours[k]),
             widening: by(&|k, _| self.statistics.widening[k]),
             iso18571: own()

@@ -1,6 +1,7 @@
 //! How well numbers are known, and whether the model follows the data at all.
 
 use super::algebra::{Symmetric, centred, dot, inverse, scaled};
+use super::measured::Signal;
 use super::model::{Against, Problem, Summary};
 
 /// Most lags of a residual's autocorrelation that are looked at.
@@ -16,10 +17,28 @@ const PARTS: usize = 24;
 /// By how much more parts of the record may disagree than noise makes them, before the model is
 /// said not to follow.
 const DISAGREEMENT: f64 = 4.0;
+/// The least part of a signal's variance that a model explains which follows it. Basis: a motion of
+/// the right size that lags by an angle explains the square of the angle's cosine at best. A half
+/// is an eighth of a turn; a model farther off is nearer to none, which is a quarter. Of the test
+/// `a_wrong_unit_of_speed_or_time_is_named`, wrong units explain less than a quarter, right ones
+/// more than three. Doubling it refuses every record with noise.
+pub(super) const EXPLAINED_RATIO: f64 = 0.5;
+/// The number of correlations that tell white noise from other residuals. Basis: a motion of a
+/// suspension lasts longer than twenty samples, unless it is sampled twice a turn. Doubling it sees
+/// slower motions in more noise.
+const WHITE_LAGS: usize = 20;
 /// How large a motion may be left over, as a share of the signal.
 const MOTION: f64 = 0.1;
 /// By how many standard errors the nonlinear model may move a number of the linear one.
 const BIAS: f64 = 1.0;
+/// The least part of a sample's freedom that is left beside its leverage. Basis: a sample that
+/// alone determines a number has none, and its residual says nothing of its noise. Doubling it
+/// halves how much such a sample can widen intervals.
+const LEAST_FREEDOM: f64 = 0.1;
+/// The least part of a noise's variance that does not grow with the motion. Basis: without any,
+/// rows at rest would be exact, and their noise called a disagreement. Doubling it doubles the
+/// noise that a record of a resting machine may have.
+const STEADY_RATIO: f64 = 0.1;
 /// A direction is unknown along which numbers may move by more than this share (95 %).
 const UNKNOWN: f64 = 0.5;
 /// Numbers with a correlation beyond this are known together rather than each.
@@ -34,6 +53,10 @@ pub(crate) struct Statistics {
     pub(crate) widening: Vec<f64>,
     /// Of each signal: the correlation of neighbouring residuals.
     pub(crate) neighbours: Vec<f64>,
+    /// The part of each signal's variance that the model explains.
+    pub(crate) explained: Vec<f64>,
+    /// Whether each signal's residual is white noise.
+    pub(crate) is_white: Vec<bool>,
     /// How much more the parts of the records disagree on the unknowns than noise makes them.
     pub(crate) disagreement: f64,
     /// Of each signal: the residual that is a motion, as a share of the residual and of the signal,
@@ -51,7 +74,11 @@ impl Statistics {
         let n = problem.unknowns();
         let bread = inverse(&summary.normal);
         let mut meat = vec![vec![0.0; n]; n];
+        let mut own_meat = vec![vec![0.0; n]; n];
+        let mut own_white_meat = vec![vec![0.0; n]; n];
         let (mut widening, mut neighbours, mut motion) = (Vec::new(), Vec::new(), Vec::new());
+        let mut explained = Vec::new();
+        let mut is_white = Vec::new();
         let (mut disagreement, mut freedom) = (0.0, 0.0);
         let mut worst = (0, [0.0; 2], 0.0);
         for (k, (((_, _, signal), one), sigma)) in
@@ -67,11 +94,20 @@ impl Statistics {
             let narrower = (0..n).any(|i| of_signal[i][i] < plain[i][i]);
             let own = if narrower { &plain } else { &of_signal };
             add(&mut meat, own, if narrower { wider } else { 1.0 });
+            let window = lag_window(&one.residual);
+            let scores = scores(one, &bread, *sigma);
+            add(&mut own_meat, &correlated(&scores, &window, 1.0), 1.0);
+            add(&mut own_white_meat, &correlated(&scores, &[1.0], 1.0), 1.0);
+            let noise = noise_scale(one, signal);
             let square = dot(&one.residual, &one.residual);
             let swing = signal.swing();
             let case = &problem.cases[one.case];
-            let share = swinging(&one.residual, case.rate_hz(signal), 60.0 / case.greatest_rpm());
+            // Noise that grows is made even: its few greatest values swing by chance.
+            let even: Vec<f64> = one.residual.iter().zip(&noise).map(|(r, s)| r / s).collect();
+            let share = swinging(&even, case.rate_hz(signal), 60.0 / case.greatest_rpm());
             motion.push([share, share * square / dot(&swing, &swing)]);
+            explained.push(1.0 - square / dot(&swing, &swing));
+            is_white.push(is_white_noise(&one.residual));
             neighbours.push(correlation(&one.residual, 1));
             widening.push(wider);
             // What each part of the record alone would pull at the unknowns.
@@ -79,14 +115,24 @@ impl Statistics {
             for part in 0..PARTS {
                 let range = part * count / PARTS..(part + 1) * count / PARTS;
                 let Some(rows) = one.residual.get(range.clone()) else { continue };
-                let of = |slopes: &Vec<f64>| slopes.get(range.clone()).unwrap_or_default().to_vec();
-                let slopes: Vec<Vec<f64>> = one.slopes.iter().map(of).collect();
-                let information = correlated(&slopes, &[1.0], wider / (sigma * sigma));
-                let pull: Vec<f64> =
-                    slopes.iter().map(|slope| dot(slope, rows) / (sigma * sigma)).collect();
+                let slopes: Vec<&[f64]> = one
+                    .slopes
+                    .iter()
+                    .map(|slope| slope.get(range.clone()).unwrap_or_default())
+                    .collect();
+                let noise = &noise[range.clone()];
+                let noisy: Vec<Vec<f64>> = slopes
+                    .iter()
+                    .map(|slope| slope.iter().zip(noise).map(|(g, s)| g * s).collect())
+                    .collect();
+                let information = correlated(&noisy, &[1.0], wider / (sigma * sigma));
                 let (unit, scale) = scaled(&information);
                 let eigen = Symmetric::of(&unit);
-                let pull: Vec<f64> = pull.iter().zip(&scale).map(|(p, s)| p / s).collect();
+                let pull: Vec<f64> = slopes
+                    .iter()
+                    .zip(&scale)
+                    .map(|(slope, scale)| dot(slope, rows) / (sigma * sigma) / scale)
+                    .collect();
                 for (value, vector) in eigen.values.iter().zip(&eigen.vectors) {
                     if *value > 1e-6 {
                         disagreement += dot(vector, &pull).powi(2) / value;
@@ -103,14 +149,36 @@ impl Statistics {
             }
         }
         let disagreement = disagreement / (freedom - n as f64).max(1.0);
-        let middle = product(&product(&bread, &meat), &bread);
+        let sandwich = |meat: &[Vec<f64>]| product(&product(&bread, meat), &bread);
+        let middle = widened(sandwich(&meat), &sandwich(&own_meat));
+        let middle = widened(middle, &sandwich(&own_white_meat));
         // What parts of the record disagree on beyond their noise is not known any better.
         let covariance = middle
             .iter()
             .map(|row| row.iter().map(|x| x * disagreement.max(1.0)).collect())
             .collect();
         let worst = (worst.0, worst.1);
-        Self { covariance, widening, neighbours, disagreement, motion, worst, bias: None }
+        Self {
+            covariance,
+            widening,
+            neighbours,
+            explained,
+            is_white,
+            disagreement,
+            motion,
+            worst,
+            bias: None,
+        }
+    }
+
+    /// Returns the signal of which the model explains least, and how much: if that is less than
+    /// half of the variance and the rest is more than white noise.
+    pub(super) fn unexplained(&self) -> Option<(usize, f64)> {
+        let signals = self.explained.iter().zip(&self.is_white).enumerate();
+        signals
+            .filter(|(_, (ratio, is_white))| **ratio < EXPLAINED_RATIO && !**is_white)
+            .map(|(k, (ratio, _))| (k, *ratio))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// Why the model does not follow, if it does not.
@@ -119,6 +187,10 @@ impl Statistics {
         let named = |k: usize| {
             problem.signals().nth(k).map_or_else(String::new, |(.., it)| it.quantity.column())
         };
+        if let Some((k, ratio)) = self.unexplained() {
+            let percent = 100.0 * ratio.max(0.0);
+            reasons.push(format!("the model explains {percent:.0} % of {}'s variance", named(k)));
+        }
         let shares = self.motion.iter().map(|[_, of_signal]| of_signal.sqrt()).enumerate();
         if let Some((k, share)) = shares.max_by(|a, b| a.1.total_cmp(&b.1))
             && share > MOTION
@@ -214,6 +286,58 @@ pub(super) fn add(sum: &mut [Vec<f64>], part: &[Vec<f64>], factor: f64) {
     }
 }
 
+/// Returns the covariance with every variance that is smaller than another estimate's raised to it,
+/// and the correlations kept.
+fn widened(mut covariance: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let ratio = |k: usize| {
+        let variance = covariance[k][k];
+        if variance > 0.0 { (other[k][k] / variance).max(1.0).sqrt() } else { 1.0 }
+    };
+    let ratios: Vec<f64> = (0..covariance.len()).map(ratio).collect();
+    for (row, of_row) in covariance.iter_mut().zip(&ratios) {
+        row.iter_mut().zip(&ratios).for_each(|(entry, ratio)| *entry *= of_row * ratio);
+    }
+    covariance
+}
+
+/// Computes the score of every unknown at every sample, slope times residual over the variance,
+/// with the residual that the sample would have in a fit without it.
+///
+/// J. G. MacKinnon, H. White, Journal of Econometrics 29 (1985), 305-325: HC3.
+fn scores(one: &Against, bread: &[Vec<f64>], sigma: f64) -> Vec<Vec<f64>> {
+    let variance = sigma * sigma;
+    let known = || one.slopes.iter().zip(bread).filter(|(slope, _)| !slope.is_empty());
+    let predicted: Vec<f64> = (0..one.residual.len())
+        .map(|sample| {
+            let along = |row: &[f64]| -> f64 {
+                one.slopes.iter().zip(row).filter_map(|(g, b)| Some(g.get(sample)? * b)).sum()
+            };
+            let leverage: f64 = known().map(|(slope, row)| slope[sample] * along(row)).sum();
+            one.residual[sample] / (1.0 - leverage / variance).max(LEAST_FREEDOM) / variance
+        })
+        .collect();
+    let score = |slope: &Vec<f64>| slope.iter().zip(&predicted).map(|(g, r)| g * r).collect();
+    one.slopes.iter().map(score).collect()
+}
+
+/// Estimates the standard deviation of a residual's noise at every sample, over its mean: its
+/// variance as a constant and a part that grows with the square of the model's motion, by least
+/// squares.
+fn noise_scale(one: &Against, signal: &Signal) -> Vec<f64> {
+    let motion = centred(signal.samples().map(|(row, _)| one.model[row]).collect()).0;
+    let (energy, mean_energy) = centred(motion.iter().map(|m| m * m).collect());
+    let (square, mean_square) = centred(one.residual.iter().map(|r| r * r).collect());
+    let growth = dot(&energy, &square) / dot(&energy, &energy).max(f64::MIN_POSITIVE);
+    let most = (1.0 - STEADY_RATIO) * mean_square / mean_energy.max(f64::MIN_POSITIVE);
+    // Not by `clamp`, which panics where squares of what was measured overflow.
+    let growth = growth.min(most).max(0.0);
+    if mean_square == 0.0 {
+        return vec![1.0; energy.len()];
+    }
+    let variance = |energy: &f64| 1.0 + growth * energy / mean_square;
+    energy.iter().map(|energy| variance(energy).sqrt()).collect()
+}
+
 fn product(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
     // The second is symmetric.
     a.iter().map(|row| b.iter().map(|column| dot(row, column)).collect()).collect()
@@ -244,23 +368,43 @@ fn correlation(values: &[f64], lag: usize) -> f64 {
     dot(values, &values[lag..]) / dot(values, values).max(f64::MIN_POSITIVE)
 }
 
+/// Whether a residual's correlations are no greater than chance makes those of white noise.
+///
+/// G. E. P. Box, D. A. Pierce, Journal of the American Statistical Association 65 (1970),
+/// 1509-1526.
+fn is_white_noise(residual: &[f64]) -> bool {
+    let lags = WHITE_LAGS.min(residual.len() / 4);
+    let squares: f64 = (1..=lags).map(|lag| correlation(residual, lag).powi(2)).sum();
+    let expected = lags as f64;
+    residual.len() as f64 * squares <= expected + CHANCE * (2.0 * expected).sqrt()
+}
+
 /// The autocorrelation by lag, tapered to nothing where it is no more than chance. The taper's flat
 /// top keeps what slow noise has: Bartlett's would take a third.
 ///
 /// D. N. Politis, J. P. Romano, Journal of Time Series Analysis 16 (1995), 67-103.
 fn autocorrelation(residual: &[f64]) -> Vec<f64> {
-    let chance = 2.0 / (residual.len() as f64).sqrt();
+    let window = lag_window(residual);
+    window.iter().enumerate().map(|(lag, taper)| taper * correlation(residual, lag)).collect()
+}
+
+/// Returns the weights of the autocorrelation by lag: 1 as far as it is more than chance, and down
+/// to nothing over as many lags again.
+fn lag_window(residual: &[f64]) -> Vec<f64> {
+    let squares: Vec<f64> = residual.iter().map(|value| value * value).collect();
+    let total = squares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    // White's variance of a correlation: of noise that is greater at times fewer values count.
+    let chance = |lag: usize| 2.0 * dot(&squares, &squares[lag..]).sqrt() / total;
     let most = MOST_LAGS.min(residual.len() / 4);
     let (mut last, mut lag) = (0, 1);
     while lag < most && lag <= last + 5 {
-        if correlation(residual, lag).abs() > chance {
+        if correlation(residual, lag).abs() > chance(lag) {
             last = lag;
         }
         lag += 1;
     }
-    let tapered =
-        |lag: usize| correlation(residual, lag) * (2.0 - lag as f64 / last as f64).min(1.0);
-    std::iter::once(1.0).chain((1..most.min(2 * last)).map(tapered)).collect()
+    let taper = |lag: usize| (2.0 - lag as f64 / last as f64).min(1.0);
+    std::iter::once(1.0).chain((1..most.min(2 * last)).map(taper)).collect()
 }
 
 /// The share of a residual's mean square that is a motion: as much as it swings back, if that is
@@ -296,6 +440,17 @@ mod tests {
             assert!((wider / endless - 1.0).abs() < 0.2, "{correlation}: {wider}, not {endless}");
         }
         assert_eq!(autocorrelation(&noise(11, 1, 20_000, 0.0)), [1.0]);
+    }
+
+    #[test]
+    fn white_noise_is_told_from_correlated_noise_and_motions() {
+        for seed in 0..50 {
+            assert!(is_white_noise(&noise(seed, 0, 1200, 0.0)), "{seed}");
+            assert!(!is_white_noise(&noise(seed, 0, 1200, 0.3)), "{seed}");
+            let motion = (0..1200).map(|k| (0.4 * f64::from(k)).sin());
+            let both = motion.zip(noise(seed, 1, 1200, 0.0)).map(|(a, b)| a + b);
+            assert!(!is_white_noise(&both.collect::<Vec<f64>>()), "{seed}");
+        }
     }
 
     #[test]

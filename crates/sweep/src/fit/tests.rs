@@ -157,6 +157,7 @@ fn a_search_that_came_to_no_end_gives_no_intervals() {
         let (x, summary) = (x.clone(), summary.clone());
         let found = report::Found {
             problem: &problem,
+            suspicions: &[],
             minima: &[Descent { x, summary, evaluations: 1, is_settled }],
             against: &against,
             at_start: &against,
@@ -233,8 +234,13 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     assert!(held.iter().all(|held| *held >= 43), "{held:?}");
 }
 
+/// A seed of draws: that of the environment, or this.
+fn seed() -> u64 {
+    std::env::var("SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(0)
+}
+
 #[test]
-fn intervals_know_that_noise_is_correlated() {
+fn intervals_know_that_noise_is_correlated_or_grows() {
     const DRAWS: u64 = 50;
     for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
         let names: Vec<&str> = truth.iter().map(|(name, _)| *name).collect();
@@ -245,14 +251,37 @@ fn intervals_know_that_noise_is_correlated() {
         let with_shift = true;
         let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
         let exact = problem.against(&problem.start()).unwrap();
-        for correlation in [0.0, 0.6, 0.9] {
+        // Growth is by the motion itself, or by its envelope over half a second.
+        for (correlation, growth, by_envelope) in [
+            (0.0, 0.0, false),
+            (0.6, 0.0, false),
+            (0.9, 0.0, false),
+            (0.0, 2.0, false),
+            (0.6, 2.0, false),
+            (0.0, 2.0, true),
+            (0.6, 2.0, true),
+            (0.9, 2.0, true),
+        ] {
             let mut held = vec![0; truth.len()];
+            let mut objections = 0;
             for draw in 0..DRAWS {
                 let mut against = exact.clone();
-                for one in &mut against {
+                for (one, (.., signal)) in against.iter_mut().zip(problem.signals()) {
+                    let motion = signal.samples().map(|(row, _)| one.model[row]);
+                    let mut size = algebra::centred(motion.collect()).0;
+                    if by_envelope {
+                        let square = |near: &[f64]| algebra::dot(near, near) / near.len() as f64;
+                        let count = size.len();
+                        let near = |k: usize| &size[k.saturating_sub(12)..(k + 13).min(count)];
+                        size = (0..count).map(|k| square(near(k)).sqrt()).collect();
+                    }
+                    let usual = (algebra::dot(&size, &size) / size.len() as f64).sqrt();
+                    let draw = DRAWS * seed() + draw;
                     let noise = noise(draw, one.signal, one.residual.len(), correlation);
-                    let noise = noise.iter().map(|noise| NOISE[one.signal] * noise).collect();
-                    one.residual = algebra::centred(noise).0;
+                    let noise = noise.iter().zip(&size).map(|(noise, size)| {
+                        NOISE[one.signal] * noise * (1.0 + growth * (size / usual).abs())
+                    });
+                    one.residual = algebra::centred(noise.collect()).0;
                 }
                 // So close to the truth the model is straight: one step of Gauss and Newton's.
                 let summary = problem.summary(&against);
@@ -266,14 +295,18 @@ fn intervals_know_that_noise_is_correlated() {
                 }
                 let summary = problem.summary(&against);
                 let statistics = Statistics::of(&problem, &against, &summary);
-                assert_eq!(statistics.objection(&problem), None, "{name}, {correlation}: {draw}");
+                objections += u64::from(statistics.objection(&problem).is_some());
                 for (k, held) in held.iter_mut().enumerate() {
                     *held += u64::from(moved[k].abs() < 1.96 * statistics.covariance[k][k].sqrt());
                 }
             }
             let share = held.iter().sum::<u64>() as f64 / (DRAWS * truth.len() as u64) as f64;
-            println!("{name}, {correlation}: {held:?} of {DRAWS} intervals hold the truth");
-            assert!((0.90..=0.99).contains(&share), "{name}, {correlation}: {held:?}");
+            let kind = format!("{name}, {correlation}, {growth}, {by_envelope}");
+            println!("{kind}: {held:?} of {DRAWS} hold the truth: {share:.3}; {objections} object");
+            assert!(growth > 0.0 || objections == 0, "{kind}: {objections}");
+            // Noise that grows leaves fewer rows that count: the share is known less well.
+            let expected = if growth > 0.0 { 0.88..=1.0 } else { 0.90..=0.99 };
+            assert!(expected.contains(&share), "{kind}: {held:?}");
         }
     }
 }
@@ -378,6 +411,59 @@ fn a_number_that_does_not_count_at_the_start_is_found_from_others() {
     options.starts = 6;
     let report = fitted(cases(), &options);
     assert!((report.parameters[0].value / 34.0 - 1.0).abs() < 0.1, "{}", report.text());
+}
+
+#[test]
+fn a_wrong_unit_of_speed_or_time_is_named() {
+    let record = |speed_factor: f64, time_factor: f64| {
+        let mut measured = reference("viscous", 8.0);
+        let speeds = measured.speed_rpm.iter_mut().flatten();
+        speeds.for_each(|speed| *speed *= speed_factor);
+        measured.time_s.iter_mut().for_each(|time_s| *time_s *= time_factor);
+        measured
+    };
+    let start = [("unbalance_mass_kg", 0.34), ("damping_n_s_per_m", 120.0), VISCOUS[2]];
+    let free = options(&["unbalance_mass_kg", "damping_n_s_per_m"]);
+    for (speed_factor, time_factor, said) in [
+        (std::f64::consts::TAU / 60.0, 1.0, "speed_rpm of viscous.csv seems to be in rad/s"),
+        (1.0 / 60.0, 1.0, "speed_rpm of viscous.csv seems to be in Hz"),
+        (0.1, 1.0, "speed_rpm of viscous.csv seems to be in tens of rpm"),
+        (6.0, 1.0, "speed_rpm of viscous.csv seems to be in degrees per s"),
+        (1.0, 1.0 / 60.0, "time_s of viscous.csv seems to be in min"),
+        (1.0, 0.1, "time_s of viscous.csv seems to be in tens of s"),
+        (1.0, 10.0, "time_s of viscous.csv seems to be in tenths of s"),
+    ] {
+        let cases = vec![case_at(&start, 1.0, record(speed_factor, time_factor))];
+        let report = fitted(cases, &free);
+        let objection = report.objection.clone().unwrap_or_default();
+        println!("{} {said}: {:?} {objection}", report.evaluations, report.first.explained);
+        assert!(!report.follows && objection.contains(said), "{said}: {}", report.text());
+        assert!(objection.contains("converted, a short fit explains"), "{objection}");
+        assert!(report.first.explained.values().all(|ratio| *ratio < 0.25), "{report:?}");
+    }
+    let report = fitted(vec![case_at(&start, 1.0, record(1.0, 1.0))], &free);
+    println!("right units: {:?}", report.first.explained);
+    assert!(report.first.explained.values().all(|ratio| *ratio > 0.75), "{report:?}");
+    // Another machine in the right units: none is named.
+    let report = fitted(vec![case_at(&VISCOUS, 0.8, record(1.0, 1.0))], &options(&[start[0].0]));
+    let objection = report.objection.unwrap_or_default();
+    assert!(objection.contains("the model explains") && !objection.contains("seems to be"));
+}
+
+#[test]
+fn a_signal_in_white_noise_is_followed() {
+    let mut measured = reference("viscous_exact", 8.0);
+    measured.signals.drain(..2);
+    for (s, signal) in measured.signals.iter_mut().enumerate() {
+        let size = 2.0 * algebra::dot(&signal.swing(), &signal.swing()).sqrt();
+        let size = size / (signal.values.len() as f64).sqrt();
+        let noise = noise(3, s, signal.values.len(), 0.0);
+        signal.values.iter_mut().zip(noise).for_each(|(value, z)| *value += size * z);
+    }
+    let report = fitted(vec![case_at(&VISCOUS, 0.9, measured)], &options(&["unbalance_mass_kg"]));
+    assert!(report.first.explained.values().all(|ratio| *ratio < 0.5), "{report:?}");
+    assert!(report.follows, "{}", report.text());
+    assert!(off(&report, &VISCOUS)[0].abs() < 3.0, "{}", report.text());
 }
 
 #[test]

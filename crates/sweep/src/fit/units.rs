@@ -1,0 +1,237 @@
+//! Wrong units of speed and time, tried where the model follows nothing.
+//!
+//! An unbalance shakes the tub once a turn. So a record turns with the drum's angle in the right
+//! units, whatever the machine's numbers are; in wrong ones it turns with another. Units in which
+//! the record turns with the drum are tried by a short fit each, and the best is named.
+
+use std::f64::consts::TAU;
+
+use super::algebra::{Symmetric, centred, dot, scaled};
+use super::measured::{LONGEST_RUN_S, SLOWEST_S, Signal, usual_step};
+use super::model::{Case, Free, Problem};
+use super::search::{Descent, Ended, descend};
+use super::speed;
+use super::statistics::EXPLAINED_RATIO;
+
+/// Turns of the drum over which a record's amplitude and phase are taken as constant. Basis: a
+/// resonance of a suspension with a tenth of the critical damping is five turns wide. Doubling it
+/// blurs resonances; halving it tells fewer units apart.
+const BLOCK_TURNS: f64 = 2.0;
+/// The least number of samples of such a block: four for each of its three numbers. Doubling it
+/// makes blocks of coarse records longer than [`BLOCK_TURNS`].
+const BLOCK_SAMPLES: usize = 12;
+/// The least number of samples of a turn. Basis: with two, a motion cannot be told from one that
+/// turns backwards. Doubling it leaves fast parts of coarse records out.
+const SAMPLES_PER_TURN: f64 = 4.0;
+/// The least part of a record's variance that turns with the drum in a unit that is tried. Basis:
+/// of noise none does; and in a band of instability most of a record turns otherwise, in any unit.
+/// Doubling it leaves out such records.
+const TURNING_RATIO: f64 = 0.1;
+/// How many times that of the unit as given. Basis: a right unit's part is no such multiple of it
+/// in another. Doubling it leaves out records that turn a little in wrong units too.
+const TURNING_GAIN: f64 = 2.0;
+/// The greatest number of evaluations of a short fit. Basis: test
+/// `a_wrong_unit_of_speed_or_time_is_named`. Doubling it makes a trial as long as a fit.
+const TRIAL_EVALUATIONS: usize = 8;
+/// The number of free parameters of a short fit: those that the record depends on most.
+const TRIAL_PARAMETERS: usize = 2;
+
+/// The column whose unit may be wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Column {
+    Speed,
+    Time,
+}
+
+/// A unit other than the column's own.
+#[derive(Clone, Copy, Debug)]
+struct Unit {
+    column: Column,
+    name: &'static str,
+    /// The size of the unit in the column's own.
+    factor: f64,
+}
+
+/// Units in which speeds and times are recorded by mistake.
+const UNITS: [Unit; 12] = [
+    Unit { column: Column::Speed, name: "rad/s", factor: 60.0 / TAU },
+    Unit { column: Column::Speed, name: "Hz", factor: 60.0 },
+    Unit { column: Column::Speed, name: "degrees per s", factor: 1.0 / 6.0 },
+    Unit { column: Column::Speed, name: "tenths of rpm", factor: 0.1 },
+    Unit { column: Column::Speed, name: "tens of rpm", factor: 10.0 },
+    Unit { column: Column::Speed, name: "thousands of rpm", factor: 1e3 },
+    Unit { column: Column::Time, name: "min", factor: 60.0 },
+    Unit { column: Column::Time, name: "h", factor: 3600.0 },
+    Unit { column: Column::Time, name: "ms", factor: 1e-3 },
+    Unit { column: Column::Time, name: "hundredths of s", factor: 1e-2 },
+    Unit { column: Column::Time, name: "tenths of s", factor: 0.1 },
+    Unit { column: Column::Time, name: "tens of s", factor: 10.0 },
+];
+
+/// Returns for each file whose columns seem to be in another unit a clause that says so.
+pub(super) fn suspicions(problem: &Problem<'_>) -> Result<Vec<String>, Ended> {
+    let mut found = Vec::new();
+    for case in 0..problem.cases.len() {
+        found.extend(suspicion(problem, case)?);
+    }
+    Ok(found)
+}
+
+fn suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, Ended> {
+    let as_given = &problem.cases[case];
+    let least_ratio = TURNING_RATIO.max(TURNING_GAIN * turning_ratio(as_given));
+    let mut best: Option<(Unit, f64)> = None;
+    for unit in UNITS {
+        let Some(converted) = converted(as_given, unit) else { continue };
+        let turning = turning_ratio(&converted);
+        if turning < least_ratio {
+            continue;
+        }
+        let explained = explained_by_short_fit(problem, case, converted)?;
+        // Half, as for the model itself: less is no evidence of this unit.
+        let is_evident = explained.max(turning) > EXPLAINED_RATIO;
+        if is_evident && best.is_none_or(|(_, best)| explained > best) {
+            best = Some((unit, explained));
+        }
+    }
+    Ok(best.map(|(unit, ratio)| {
+        let (column, own) = match unit.column {
+            Column::Speed => ("speed_rpm", "rpm"),
+            Column::Time => ("time_s", "s"),
+        };
+        let (name, factor, file) = (unit.name, unit.factor, &as_given.measured.name);
+        let gain = if ratio > EXPLAINED_RATIO {
+            format!("converted, a short fit explains {:.0} % of the record", 100.0 * ratio)
+        } else {
+            "converted, the record turns with the drum".to_owned()
+        };
+        format!(
+            "{column} of {file} seems to be in {name}, expected {own} (times {factor:.5}): {gain}"
+        )
+    }))
+}
+
+/// Returns a case whose column is converted from a unit; none if there is no such column, the run
+/// would be too long, or its rows would show no turn of a drum.
+fn converted(case: &Case, unit: Unit) -> Option<Case> {
+    let mut measured = case.measured.clone();
+    let column = match unit.column {
+        Column::Speed => measured.speed_rpm.as_mut()?,
+        Column::Time => &mut measured.time_s,
+    };
+    column.iter_mut().for_each(|value| *value *= unit.factor);
+    let end_s = *measured.time_s.last()?;
+    if end_s > LONGEST_RUN_S || usual_step(&measured.time_s)? > SLOWEST_S {
+        return None;
+    }
+    let speed = measured.speed_rpm.as_ref();
+    let smoothed = speed.and_then(|speed| speed::smoothed(&measured.time_s, speed));
+    Some(Case { plan: case.plan.clone(), measured, smoothed })
+}
+
+/// Computes the part of a record's variance that turns with the drum, the mean of its signals: by
+/// least squares, block by block, a constant and the drum's sine and cosine.
+fn turning_ratio(case: &Case) -> f64 {
+    let turns = turns(case);
+    let signals = &case.measured.signals;
+    let ratio = |signal: &Signal| {
+        let samples: Vec<[f64; 2]> =
+            signal.samples().map(|(row, value)| [turns[row], value]).collect();
+        let swing = signal.swing();
+        turning_square(&samples) / dot(&swing, &swing)
+    };
+    signals.iter().map(ratio).sum::<f64>() / signals.len() as f64
+}
+
+/// Computes the turns of the drum up to every row, by the trapezoidal rule.
+fn turns(case: &Case) -> Vec<f64> {
+    let times = &case.measured.time_s;
+    let speeds: Vec<f64> = case.spin().speeds_rpm(times.iter().copied()).collect();
+    let mut turns = vec![0.0; times.len()];
+    for row in 1..times.len() {
+        let mean_rpm = 0.5 * (speeds[row] + speeds[row - 1]);
+        turns[row] = turns[row - 1] + mean_rpm.abs() / 60.0 * (times[row] - times[row - 1]);
+    }
+    turns
+}
+
+/// Computes the sum of squares that turns, of samples of turns and value: beyond what three numbers
+/// a block explain of noise.
+fn turning_square(samples: &[[f64; 2]]) -> f64 {
+    let mut sum = 0.0;
+    let mut rest = samples;
+    while let Some(&[first, _]) = rest.first() {
+        let by_turns = rest.partition_point(|[turn, _]| *turn < first + BLOCK_TURNS);
+        let count = by_turns.max(BLOCK_SAMPLES);
+        if count > rest.len() {
+            break;
+        }
+        let (block, later) = rest.split_at(count);
+        rest = later;
+        if count as f64 >= SAMPLES_PER_TURN * (block[count - 1][0] - first) {
+            sum += block_square(block);
+        }
+    }
+    sum
+}
+
+/// Computes the part of a block's sum of squares about its mean that sine and cosine explain.
+fn block_square(block: &[[f64; 2]]) -> f64 {
+    let values = centred(block.iter().map(|[_, value]| *value).collect()).0;
+    let wave = |wave: fn(f64) -> f64| {
+        centred(block.iter().map(|[turn, _]| wave(TAU * turn.fract())).collect()).0
+    };
+    let waves = [wave(libm::cos), wave(libm::sin)];
+    let normal: Vec<Vec<f64>> =
+        waves.iter().map(|a| waves.iter().map(|b| dot(a, b)).collect()).collect();
+    let (unit, scale) = scaled(&normal);
+    let pull: Vec<f64> =
+        waves.iter().zip(&scale).map(|(wave, scale)| dot(wave, &values) / scale).collect();
+    // A block of a hundredth of a turn has a parabola, but no wave.
+    let inverse = |value: f64| if value > 1e-3 { 1.0 / value } else { 0.0 };
+    let explained = dot(&Symmetric::of(&unit).apply(&pull, inverse), &pull);
+    let noise = (dot(&values, &values) - explained) / (block.len() as f64 - 3.0);
+    explained - 2.0 * noise
+}
+
+/// Fits the leading free parameters to a converted case alone, in few evaluations, and returns the
+/// part of its variance that the model explains, the mean of its signals; 0 if it does not get
+/// through.
+fn explained_by_short_fit(
+    problem: &Problem<'_>,
+    case: usize,
+    converted: Case,
+) -> Result<f64, Ended> {
+    let cases = vec![converted];
+    let Ok(method) = Problem::method(&cases) else { return Ok(0.0) };
+    let own = problem.free.iter().filter(|free| free.is_of(case));
+    let free = own.map(|free| Free { case: None, ..free.clone() }).collect();
+    let trial = Problem { cases, free, with_shift: false, method, ..*problem };
+    let start = trial.start();
+    let evaluate = |x: &[f64]| {
+        let against = trial.against(x);
+        if (trial.stop)() {
+            return Err(Ended::Stopped);
+        }
+        Ok(against.map(|against| trial.summary(&against)))
+    };
+    let Some(summary) = evaluate(&start)? else { return Ok(0.0) };
+    let influence = |k: usize| summary.normal[k][k] * start[k] * start[k];
+    let mut order: Vec<usize> = (0..start.len()).collect();
+    order.sort_by(|&a, &b| influence(b).total_cmp(&influence(a)));
+    let mut ranges: Vec<[f64; 2]> = start.iter().map(|&value| [value; 2]).collect();
+    for &k in order.iter().take(TRIAL_PARAMETERS) {
+        ranges[k] = trial.range(k);
+    }
+    let found = descend(&start, &ranges, TRIAL_EVALUATIONS, &evaluate)?;
+    Ok(found.map_or(0.0, |found| mean_explained_ratio(&trial, &found)))
+}
+
+fn mean_explained_ratio(problem: &Problem<'_>, found: &Descent) -> f64 {
+    let signals = problem.signals().zip(&found.summary.sigma);
+    let ratio = |((.., signal), sigma): ((usize, usize, &Signal), &f64)| {
+        let swing = signal.swing();
+        1.0 - sigma * sigma * swing.len() as f64 / dot(&swing, &swing)
+    };
+    signals.map(ratio).sum::<f64>() / found.summary.sigma.len() as f64
+}
