@@ -3,13 +3,15 @@
 //!
 //! `measured` and `speed` read a measurement. `model` compares it with the model and its
 //! derivatives, `search` finds the least cost, `statistics` says how well the numbers are known,
-//! and `report` holds all of it. `units` tries other units where the model follows nothing.
-//! `journal` keeps what a fit has found out.
+//! `known` how they depend on the others, `verdict` what the map says of the machine, and `report`
+//! holds all of it. `units` tries other units where the model follows nothing. `journal` keeps what
+//! a fit has found out.
 
 mod algebra;
 mod curves;
 mod iso18571;
 mod journal;
+mod known;
 mod measured;
 mod model;
 mod report;
@@ -17,9 +19,9 @@ mod search;
 mod spectrum;
 mod speed;
 mod statistics;
-mod units;
 #[cfg(test)]
 mod tests;
+mod units;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -36,6 +38,7 @@ use sweep_engine::{Design, Diagnostics, Distribution, Error, tell};
 
 use algebra::Symmetric;
 use journal::Journal;
+use known::Known;
 pub(crate) use measured::Measured;
 use measured::REST_SPEED_RATIO;
 pub(crate) use model::Case;
@@ -79,6 +82,10 @@ pub struct FitOptions {
     #[arg(long, value_name = "N", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub bootstrap: u32,
+    /// Standard deviations of fixed numbers, which widen intervals; `gain` is that of the sensors,
+    /// `default` takes those by kind for all others, and `none` takes fixed numbers as exact
+    #[arg(long, value_name = "NAME=TOLERANCE[%],...", value_delimiter = ',')]
+    pub known: Vec<String>,
     /// Rows of the map over the fitted distribution, for the verdict's probability; 0 for none
     #[arg(long, value_name = "N", default_value_t = 64)]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=100_000))]
@@ -244,6 +251,7 @@ fn fitted<'a>(
     work: &Work<'a>,
 ) -> Result<Fitted<'a>, Ended> {
     let free = free(options, &cases)?;
+    let known = Known::read(&options.known, &cases[0], &free)?;
     let method = Problem::method(&cases).map_err(Error::model)?;
     let model = ModelKind::named(&options.model).unwrap_or(ModelKind::Nonlinear);
     let simd = simd_from_environment()?;
@@ -312,6 +320,10 @@ fn fitted<'a>(
     if options.bootstrap > 0 && best.is_settled {
         repeated = Some(bootstrap(&mut problem, &best.x, &against, options.bootstrap, work)?);
     }
+    if best.is_settled && statistics.objection(&problem).is_none() {
+        let influences = known.influences(&problem, &best.x, &against, &best.summary);
+        statistics.take_influences(influences, known.is_widening);
+    }
     let suspicions = match statistics.unexplained() {
         Some(_) => units::suspicions(&problem)?,
         None => Vec::new(),
@@ -362,20 +374,6 @@ fn open(path: &Path, problem: &Problem<'_>) -> Result<Journal, Error> {
     Ok(journal)
 }
 
-/// By how much the unknowns would move if signals of the model were other by so much.
-fn moved<'a>(
-    bread: &[Vec<f64>],
-    apart: impl Iterator<Item = (&'a Against, f64, Vec<f64>)>,
-) -> Vec<f64> {
-    let mut pull = vec![0.0; bread.len()];
-    for (at, sigma, apart) in apart {
-        for (pull, slope) in pull.iter_mut().zip(&at.slopes) {
-            *pull -= algebra::dot(slope, &apart) / (sigma * sigma);
-        }
-    }
-    bread.iter().map(|row| algebra::dot(row, &pull)).collect()
-}
-
 /// By how many standard errors another model would move each unknown.
 fn effect(
     covariance: &[Vec<f64>],
@@ -383,16 +381,21 @@ fn effect(
     model: &[Against],
     other: &[Against],
 ) -> Vec<f64> {
-    let apart = model.iter().zip(other).zip(&summary.sigma).map(|((model, other), sigma)| {
+    let mut pull = vec![0.0; covariance.len()];
+    for ((model, other), sigma) in model.iter().zip(other).zip(&summary.sigma) {
         let pairs = model.residual.iter().zip(&other.residual);
-        (model, *sigma, pairs.map(|(model, other)| model - other).collect::<Vec<f64>>())
-    });
-    let moved = moved(&algebra::inverse(&summary.normal), apart);
+        let apart: Vec<f64> = pairs.map(|(model, other)| model - other).collect();
+        for (pull, slope) in pull.iter_mut().zip(&model.slopes) {
+            *pull -= algebra::dot(slope, &apart) / (sigma * sigma);
+        }
+    }
+    let bread = algebra::inverse(&summary.normal);
     let share = |k: usize| {
         let size = covariance[k][k];
-        if size > 0.0 { moved[k].abs() / size.sqrt() } else { 0.0 }
+        let moved = algebra::dot(&bread[k], &pull);
+        if size > 0.0 { moved.abs() / size.sqrt() } else { 0.0 }
     };
-    (0..moved.len()).map(share).collect()
+    (0..pull.len()).map(share).collect()
 }
 
 /// The covariance that noise of the tachometers gives the unknowns.
@@ -400,16 +403,16 @@ fn by_tachometer(problem: &Problem<'_>, best: &Descent, against: &[Against]) -> 
     let n = problem.unknowns();
     let bread = algebra::inverse(&best.summary.normal);
     let mut covariance = vec![vec![0.0; n]; n];
-    for case in 0..problem.cases.len() {
-        let drawn = problem.by_spin(case, &best.x, against);
-        for signals in &drawn {
-            let own = against.iter().zip(&best.summary.sigma).filter(|(one, _)| one.case == case);
-            let apart = own.zip(signals).map(|((one, sigma), apart)| (one, *sigma, apart.clone()));
-            let moved = moved(&bread, apart);
-            for (row, a) in covariance.iter_mut().zip(&moved) {
-                let share = a / drawn.len() as f64;
-                row.iter_mut().zip(&moved).for_each(|(sum, b)| *sum += share * b);
-            }
+    for (case, of_case) in problem.cases.iter().enumerate() {
+        let drawn = of_case.smoothed.as_ref().map(|it| &it.drawn[..]).unwrap_or_default();
+        let sigma = &best.summary.sigma[..];
+        let pulls = problem.pulls(case, &best.x, (against, sigma), drawn.len(), |k, _, spin| {
+            *spin = drawn[k].clone();
+        });
+        let pulls: Vec<Vec<f64>> = pulls.into_iter().flatten().collect();
+        for pull in &pulls {
+            let moved: Vec<f64> = bread.iter().map(|row| algebra::dot(row, pull)).collect();
+            statistics::add_outer(&mut covariance, &moved, 1.0 / pulls.len() as f64);
         }
     }
     covariance

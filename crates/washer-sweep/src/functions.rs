@@ -131,7 +131,7 @@ pub(crate) fn explain<'py>(
 #[pyfunction]
 #[pyo3(signature = (
     plan, table, free, *, own=Vec::new(), at=None, linear=false, shift=true, starts=1, bootstrap=0,
-    draws=64, threads=None
+    known=Vec::new(), draws=64, threads=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 pub(crate) fn fit<'py>(
@@ -144,6 +144,7 @@ pub(crate) fn fit<'py>(
     shift: bool,
     starts: u32,
     bootstrap: u32,
+    known: Vec<String>,
     draws: u32,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
@@ -163,7 +164,8 @@ pub(crate) fn fit<'py>(
     let tables = tables.iter().enumerate().map(|(k, table)| Ok((points(table)?, constants(k)?)));
     let tables = tables.collect::<PyResult<Vec<_>>>()?;
     let model = if linear { "linear" } else { "nonlinear" }.to_owned();
-    let options = FitOptions { free, own, model, no_shift: !shift, starts, bootstrap, draws };
+    let no_shift = !shift;
+    let options = FitOptions { free, own, model, no_shift, starts, bootstrap, known, draws };
     let input = plan.get().input.clone();
     let fitted = abandonable(py, threads, move |effort| {
         sweep::fit_tables(&input, tables, &options, effort)

@@ -317,26 +317,41 @@ impl Problem<'_> {
         Some(self.signals().map(of).collect())
     }
 
-    /// By how much each signal of a case would differ with each spin that noise of the tachometer
-    /// might have made, at the samples that there are.
-    pub(crate) fn by_spin(
+    /// Computes for each of so many changes of a case's machine and spin the pull at the unknowns
+    /// of what it does to the signals; none where the changed run fails. `against` is the
+    /// comparison without a change, with the noise of each signal.
+    pub(crate) fn pulls(
         &self,
         case: usize,
         x: &[f64],
-        against: &[Against],
-    ) -> Vec<Vec<Vec<f64>>> {
-        let drawn = self.cases[case].smoothed.as_ref().map(|it| &it.drawn[..]).unwrap_or_default();
-        let (machine, _, shift_s) = self.run(case, x);
-        let run = |k: usize| (machine.clone(), drawn[k].clone(), shift_s);
-        let signals = || against.iter().filter(|one| one.case == case);
-        let apart = |values: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
-            let of = |(values, one): (&Vec<f64>, &Against)| -> Vec<f64> {
-                let signal = &self.cases[case].measured.signals[one.signal];
-                signal.samples().map(|(row, _)| values[row] - one.model[row]).collect()
-            };
-            values.iter().zip(signals()).map(of).collect()
+        (against, sigma): (&[Against], &[f64]),
+        count: usize,
+        change: impl Fn(usize, &mut Machine, &mut Spin) + Sync,
+    ) -> Vec<Option<Vec<f64>>> {
+        let run = |k: usize| {
+            let (mut machine, mut spin, shift_s) = self.run(case, x);
+            change(k, &mut machine, &mut spin);
+            (machine, spin, shift_s)
         };
-        self.seen(case, drawn.len(), run, apart).into_iter().flatten().collect()
+        let own: Vec<(&Against, f64)> = against
+            .iter()
+            .zip(sigma)
+            .filter(|(one, _)| one.case == case)
+            .map(|(one, sigma)| (one, *sigma))
+            .collect();
+        let pull = |values: Vec<Vec<f64>>| {
+            let mut pull = vec![0.0; self.unknowns()];
+            for (values, (one, sigma)) in values.iter().zip(&own) {
+                let signal = &self.cases[case].measured.signals[one.signal];
+                let apart: Vec<f64> =
+                    signal.samples().map(|(row, _)| values[row] - one.model[row]).collect();
+                for (pull, slope) in pull.iter_mut().zip(&one.slopes) {
+                    *pull += dot(slope, &apart) / (sigma * sigma);
+                }
+            }
+            pull
+        };
+        self.seen(case, count, run, pull)
     }
 
     /// The cost of many sets of unknowns, without derivatives; infinite where there is no answer.

@@ -47,6 +47,10 @@ pub(crate) struct Report {
     pub(crate) correlations: Vec<Vec<f64>>,
     /// What the data cannot tell, in words.
     pub(crate) untold: Vec<String>,
+    /// The number of fixed numbers that have a tolerance.
+    pub(crate) fixed_numbers: usize,
+    /// Whether these tolerances widen intervals.
+    pub(crate) is_widened: bool,
     /// The first file's entries, as in `files`.
     #[serde(flatten)]
     pub(crate) first: OfFile,
@@ -74,13 +78,29 @@ pub(crate) struct Fit {
     pub(crate) file: Option<String>,
     pub(crate) start: f64,
     pub(crate) value: f64,
+    /// By the measurement's noise and the tolerances of the fixed numbers.
     pub(crate) standard_error: Option<f64>,
+    /// By the measurement's noise alone.
+    pub(crate) noise_error: Option<f64>,
+    /// The fixed number whose tolerance moves it most.
+    pub(crate) depends_on: Option<Dependence>,
     /// No farther than its range.
     pub(crate) interval_95: Option<[f64; 2]>,
     /// By the fits of resampled residuals, if they were asked for.
     pub(crate) bootstrap_95: Option<[f64; 2]>,
     /// Whether it is at an end of its range.
     pub(crate) at_bound: bool,
+}
+
+/// The dependence of a fitted number on a fixed one.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Dependence {
+    pub(crate) name: String,
+    pub(crate) unit: String,
+    /// The standard deviation of the fixed number.
+    pub(crate) tolerance: f64,
+    /// The change of the fitted number by an error of the fixed one of one standard deviation.
+    pub(crate) moves_by: f64,
 }
 
 impl Fit {
@@ -174,7 +194,9 @@ impl Found<'_> {
         });
         let follows = objection.is_none();
         let covariance = statistics.of_free(problem);
+        let by_noise = statistics.by_noise(problem);
         let error = |k: usize| covariance[k][k].max(0.0).sqrt();
+        let noise_error = |k: usize| by_noise[k][k].max(0.0).sqrt();
         let free = problem.free.len();
         let correlation = |i: usize, j: usize| match error(i) * error(j) {
             _ if i == j => 1.0,
@@ -185,7 +207,7 @@ impl Found<'_> {
         let files = (0..problem.cases.len()).map(|case| self.of_file(case, follows));
         let files = files.collect::<Result<Vec<OfFile>, Error>>()?;
         let parameters: Vec<Fit> =
-            (0..free).map(|k| self.parameter(k, error(k), follows)).collect();
+            (0..free).map(|k| self.parameter(k, [error(k), noise_error(k)], follows)).collect();
         let minimum = |descent: &Descent| Minimum {
             values: parameters.iter().map(Fit::label).zip(descent.x.iter().copied()).collect(),
             cost_above: descent.summary.cost - best.summary.cost,
@@ -196,6 +218,8 @@ impl Found<'_> {
             objection,
             correlations: (0..free).map(correlations).collect(),
             untold: statistics.untold(problem, &best.x),
+            fixed_numbers: statistics.influences.len(),
+            is_widened: statistics.is_widened,
             first: files[0].clone(),
             files,
             minima: self.minima.iter().map(minimum).collect(),
@@ -211,7 +235,7 @@ impl Found<'_> {
         })
     }
 
-    fn parameter(&self, k: usize, error: f64, follows: bool) -> Fit {
+    fn parameter(&self, k: usize, [error, noise_error]: [f64; 2], follows: bool) -> Fit {
         let free = &self.problem.free[k];
         let value = self.minima[0].x[k];
         let at_bound = free.range.contains(&value);
@@ -225,10 +249,24 @@ impl Found<'_> {
             start: free.start,
             value,
             standard_error: known.then_some(error),
+            noise_error: known.then_some(noise_error),
+            depends_on: known.then(|| self.dependence(k)).flatten(),
             interval_95: known.then_some(reached),
             bootstrap_95: self.repeated.and_then(|sets| middle_95(sets.iter().map(|x| x[k]))),
             at_bound,
         }
+    }
+
+    /// Returns the strongest dependence of a free number on a fixed one.
+    fn dependence(&self, k: usize) -> Option<Dependence> {
+        let influences = self.statistics.influences.iter();
+        let strongest = influences.max_by(|a, b| a.moves[k].abs().total_cmp(&b.moves[k].abs()))?;
+        Some(Dependence {
+            name: strongest.name.clone(),
+            unit: strongest.unit.to_owned(),
+            tolerance: strongest.tolerance,
+            moves_by: strongest.moves[k],
+        })
     }
 
     fn of_file(&self, case: usize, follows: bool) -> Result<OfFile, Error> {
@@ -435,6 +473,29 @@ impl Report {
         }
         let mut say = |what: &str, said: &str| text.line(what, said);
         self.untold.iter().for_each(|untold| say("untold", untold));
+        for fit in &self.parameters {
+            let Some(on) = &fit.depends_on else { continue };
+            let error = format!("{} {}", short(on.tolerance), on.unit);
+            let effect = format!(
+                "{} on {}: an error of {} moves it by {} {}, most of {}",
+                fit.label(),
+                on.name,
+                error.trim_end(),
+                short(on.moves_by.abs()),
+                fit.unit,
+                counted(self.fixed_numbers, "fixed number"),
+            );
+            let noise = fit.noise_error.map_or_else(|| "-".to_owned(), short);
+            let interval = if self.is_widened {
+                format!("; by noise alone its standard error is {noise}")
+            } else {
+                "; intervals take these as exact (`--known`)".to_owned()
+            };
+            say("depends", &(effect + &interval));
+        }
+        if self.follows && self.fixed_numbers == 0 && !self.parameters.is_empty() {
+            say("depends", "on nothing: fixed numbers are taken as exact");
+        }
         for file in &self.files {
             let column = |(column, noise): (&String, &f64)| {
                 let rating = file.iso18571.get(column).map_or(0.0, |rating| rating.overall);

@@ -1,6 +1,7 @@
 //! How well numbers are known, and whether the model follows the data at all.
 
 use super::algebra::{Symmetric, centred, dot, inverse, scaled};
+use super::known::Influence;
 use super::measured::Signal;
 use super::model::{Against, Problem, Summary};
 
@@ -48,6 +49,10 @@ const TOGETHER: f64 = 0.95;
 pub(crate) struct Statistics {
     /// Covariance of the unknowns, by the residuals' own correlation in time.
     pub(crate) covariance: Vec<Vec<f64>>,
+    /// The dependence of the unknowns on fixed numbers, the strongest first.
+    pub(crate) influences: Vec<Influence>,
+    /// Whether these widen intervals.
+    pub(crate) is_widened: bool,
     /// By how much autocorrelation widens intervals: of each signal, the variance of a mean over
     /// that of independent samples.
     pub(crate) widening: Vec<f64>,
@@ -160,6 +165,8 @@ impl Statistics {
         let worst = (worst.0, worst.1);
         Self {
             covariance,
+            influences: Vec::new(),
+            is_widened: false,
             widening,
             neighbours,
             explained,
@@ -221,15 +228,37 @@ impl Statistics {
         Some(reasons.join(", and ") + &place)
     }
 
-    /// The covariance of the free numbers.
+    /// Takes up what errors of the fixed numbers do to the unknowns, and whether that widens
+    /// intervals.
+    pub(super) fn take_influences(&mut self, influences: Vec<Influence>, is_widening: bool) {
+        self.influences = influences;
+        self.is_widened = is_widening;
+    }
+
+    /// Returns the dependences on fixed numbers that widen intervals.
+    pub(super) fn widening_influences(&self) -> &[Influence] {
+        if self.is_widened { &self.influences } else { &[] }
+    }
+
+    /// Returns the covariance of the free numbers by the measurement's noise and the tolerances of
+    /// the fixed numbers.
     pub(crate) fn of_free(&self, problem: &Problem<'_>) -> Vec<Vec<f64>> {
+        let mut covariance = self.by_noise(problem);
+        for influence in self.widening_influences() {
+            add_outer(&mut covariance, &influence.moves[..problem.free.len()], 1.0);
+        }
+        covariance
+    }
+
+    /// Returns the covariance of the free numbers by the measurement's noise alone.
+    pub(super) fn by_noise(&self, problem: &Problem<'_>) -> Vec<Vec<f64>> {
         let free = problem.free.len();
         self.covariance[..free].iter().map(|row| row[..free].to_vec()).collect()
     }
 
     /// What the data cannot tell, in words.
     pub(crate) fn untold(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<String> {
-        let covariance = self.of_free(problem);
+        let covariance = self.by_noise(problem);
         let names: Vec<&str> = problem.free.iter().map(|free| free.parameter.name()).collect();
         // Of a number that is 0 nothing is relative.
         let greater = problem.free.iter().zip(x).map(|(free, x)| x.abs().max(free.start.abs()));
@@ -336,6 +365,13 @@ fn noise_scale(one: &Against, signal: &Signal) -> Vec<f64> {
     }
     let variance = |energy: &f64| 1.0 + growth * energy / mean_square;
     energy.iter().map(|energy| variance(energy).sqrt()).collect()
+}
+
+/// Adds the outer product of a vector with itself, times a factor.
+pub(super) fn add_outer(sum: &mut [Vec<f64>], vector: &[f64], factor: f64) {
+    for (row, a) in sum.iter_mut().zip(vector) {
+        row.iter_mut().zip(vector).for_each(|(sum, b)| *sum += factor * a * b);
+    }
 }
 
 fn product(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {

@@ -1,5 +1,7 @@
 //! Fits of reference data: run-ups by an independent program, with known numbers.
 
+mod fixed;
+
 use std::path::Path;
 
 use super::*;
@@ -49,6 +51,7 @@ fn options(free: &[&str]) -> FitOptions {
         no_shift: false,
         starts: 1,
         bootstrap: 0,
+        known: vec!["none".to_owned()],
         draws: 0,
     }
 }

@@ -53,6 +53,7 @@ mod tests {
             no_shift: true,
             starts: 1,
             bootstrap: 0,
+            known: Vec::new(),
             draws: 0,
         };
         let grid = GridInput::text("fit", String::new(), Vec::new());

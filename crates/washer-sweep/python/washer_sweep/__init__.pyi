@@ -279,6 +279,7 @@ def fit(
     shift: bool = True,
     starts: int = 1,
     bootstrap: int = 0,
+    known: Sequence[str] = ...,
     draws: int = 64,
     threads: int | None = None,
 ) -> Explanation:
@@ -286,7 +287,8 @@ def fit(
 
     A table has `time_s`, perhaps `speed_rpm`, and channels with their units, such as
     `tub_front_y_m_per_s2`; NaN where no sample is. `free` are names, or `name=from:to`; every table
-    has its `own`, and its constants in `at`. The keys are those of `sweep fit --json`.
+    has its `own`, and its constants in `at`. `known` are tolerances of fixed numbers, such as
+    `tub_mass_kg=2%`, `default` or `none`. The keys are those of `sweep fit --json`.
     """
 
 def parameters(plan: Plan | None = None) -> list[Parameter]:
