@@ -107,6 +107,11 @@ pub(super) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f
     values.get((part * (values.len() as f64 - 1.0)).round() as usize).copied()
 }
 
+/// Returns the quantiles between which 95 % of some numbers lie; `None` of none.
+pub(super) fn middle_95(values: impl Iterator<Item = f64> + Clone) -> Option<[f64; 2]> {
+    Some([quantile(values.clone(), 0.025)?, quantile(values, 0.975)?])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,35 +1,28 @@
 //! What a fit has to say: one structure, as text and as JSON.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 
 use serde::Serialize;
 use serde_json::Value;
-use washer_model::{Dwell, Method};
-use washer_row::{Growth, Outcome, Verdict as RowVerdict};
+use washer_model::Method;
 
-use super::algebra::{centred, dot, quantile};
+use super::algebra::{centred, dot, middle_95};
 use super::iso18571::{Rating, rate};
 use super::model::{Against, Problem};
 use super::search::Descent;
 use super::speed::Smoothed;
-use super::statistics::Statistics;
+use super::statistics::{Statistics, Z_975};
+use super::verdict::{OnMap, Verdict};
 use crate::config;
-use crate::engine::{ModelEngine, of_speeds, responses};
-use crate::plan::{Axis, AxisValues, Plan, between, ready, timing};
 use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, span, table};
 use sweep_engine::config::section::counted;
 
-/// Standard errors to either end of a 95 % interval.
-const REACH: f64 = 1.959_964;
 /// Between which share of two units a signal is taken for one in the other.
 const UNIT_SLACK: f64 = 1.5;
 /// What is said of a search that came to no end.
 const UNSETTLED: &str = "not known: the search did not come to its end, so no intervals; expected \
                          a nearer start (`--set NAME=VALUE`), ranges, or fewer `--free`";
-/// Speeds at which the fitted machine's stability is looked at.
-const SPEEDS: u32 = 120;
 
 /// Numbers by the name of their column.
 type ByColumn<T> = BTreeMap<String, T>;
@@ -137,26 +130,6 @@ pub(crate) struct OfFile {
     pub(crate) verdict: Option<Verdict>,
 }
 
-/// The map's row at the fitted machine.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct Verdict {
-    pub(crate) reliable: Option<bool>,
-    pub(crate) ratio_max: Option<f64>,
-    pub(crate) ratio_limit: f64,
-    /// Share of rows over the fitted distribution that are reliable.
-    pub(crate) probability_reliable: Option<f64>,
-    /// Between which the greatest ratio lies in 95 % of them.
-    pub(crate) ratio_max_95: Option<[f64; 2]>,
-    /// How many there are.
-    pub(crate) draws: usize,
-    /// The fastest growing disturbance of the periodic responses up to the fastest speed: below
-    /// zero, the machine is outside every band of instability, by so much.
-    pub(crate) growth_per_s: Option<f64>,
-    pub(crate) growth_at_rpm: Option<f64>,
-    /// Whether the responses at all these speeds are on the curve of a machine that runs up.
-    pub(crate) growth_on_curve: Option<bool>,
-}
-
 /// One minimum.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Minimum {
@@ -241,7 +214,7 @@ impl Found<'_> {
         let at_bound = free.range.contains(&value);
         let known = follows && !at_bound && error > 0.0;
         let [least, most] = self.problem.range(k);
-        let reached = [(value - REACH * error).max(least), (value + REACH * error).min(most)];
+        let reached = [(value - Z_975 * error).max(least), (value + Z_975 * error).min(most)];
         Fit {
             name: free.parameter.name().to_owned(),
             unit: free.parameter.unit().to_owned(),
@@ -273,6 +246,7 @@ impl Found<'_> {
         let problem = self.problem;
         let x = &self.minima[0].x;
         let measured = &problem.cases[case].measured;
+        let on_map = OnMap { problem, x, statistics: self.statistics, draws: self.draws };
         let own = || {
             problem.signals().zip(self.against).enumerate().filter(move |(_, (at, _))| at.0 == case)
         };
@@ -301,70 +275,8 @@ impl Found<'_> {
             spin: problem.cases[case].smoothed.clone(),
             gaps_s: measured.gaps_s.clone(),
             machine: config::machine_json(&problem.machine(case, x).0),
-            verdict: (self.draws > 0).then(|| self.verdict(case, follows)).transpose()?,
+            verdict: (self.draws > 0).then(|| on_map.verdict(case, follows)).transpose()?,
         })
-    }
-
-    /// The row of a case's map at its fitted machine, and over the fitted distribution.
-    fn verdict(&self, case: usize, follows: bool) -> Result<Verdict, Error> {
-        let problem = self.problem;
-        let x = &self.minima[0].x;
-        // The map's spin is the grid's, of which a measured one has no numbers.
-        let mut plan = Plan { axes: Vec::new(), design: None, ..problem.cases[case].plan.clone() };
-        let own: Vec<usize> =
-            (0..problem.free.len()).filter(|&k| problem.free[k].is_of(case)).collect();
-        let covariance = self.statistics.of_free(problem);
-        let mut sets = vec![x.clone()];
-        if follows {
-            sets.extend(super::draws(problem, x, &covariance, self.draws));
-        }
-        for &k in &own {
-            let values = || sets.iter().map(|set| set[k]);
-            let from = values().fold(f64::INFINITY, f64::min);
-            let to = values().fold(f64::NEG_INFINITY, f64::max);
-            let parameter = problem.free[k].parameter.clone();
-            plan.axes.push(match from < to {
-                true => between(parameter, from, to),
-                false => Axis { parameter, values: AxisValues::List(vec![from]) },
-            });
-        }
-        let points: Vec<Vec<f64>> =
-            sets.iter().map(|set| own.iter().map(|&k| set[k]).collect()).collect();
-        let engine = ModelEngine::new(&plan)?;
-        let outcomes = if (problem.stop)() { Vec::new() } else { engine.evaluate_at(&points) };
-        let (channels, limits) = (plan.reliability.channels.len(), plan.reliability.limits);
-        let verdict = |outcome: &Outcome| RowVerdict::new(outcome, channels, limits);
-        let verdicts: Vec<RowVerdict> = outcomes.iter().map(verdict).collect();
-        let ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
-        let drawn = verdicts.get(1..).unwrap_or_default();
-        let reliable = drawn.iter().filter(|it| it.reliable == Some(true)).count();
-        let growth = self.growth(case, &plan);
-        Ok(Verdict {
-            reliable: verdicts.first().and_then(|verdict| verdict.reliable),
-            ratio_max: verdicts.first().and_then(ratio),
-            ratio_limit: limits.most,
-            probability_reliable: (!drawn.is_empty()).then(|| reliable as f64 / drawn.len() as f64),
-            ratio_max_95: middle_95(drawn.iter().filter_map(ratio)),
-            draws: drawn.len(),
-            growth_per_s: growth.map(|growth| growth.fastest.growth_per_s()),
-            growth_at_rpm: growth.map(|growth| growth.fastest.speed_rpm),
-            growth_on_curve: growth.map(|growth| growth.is_on_curve),
-        })
-    }
-
-    /// The fastest growing disturbance of the fitted machine at speeds up to its fastest.
-    fn growth(&self, case: usize, plan: &Plan) -> Option<Growth> {
-        let (machine, spin) = self.problem.machine(case, &self.minima[0].x);
-        let most_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
-        let point = ready(machine, spin, &timing(plan)).ok()?;
-        let speeds: Vec<f64> = (SPEEDS / 5..=SPEEDS)
-            .map(|k| most_rpm * f64::from(k) / f64::from(SPEEDS))
-            .filter(|speed| *speed > 0.0)
-            .collect();
-        let dwell = |&speed_rpm: &f64| Dwell { point: &point, speed_rpm };
-        let found =
-            responses(&speeds.iter().map(dwell).collect::<Vec<_>>(), &|| (self.problem.stop)());
-        of_speeds(&found)
     }
 
     /// What else a reader should know.
@@ -427,11 +339,6 @@ impl Found<'_> {
         }
         notes
     }
-}
-
-/// Between which 95 % of some numbers lie; `None` of none.
-fn middle_95(values: impl Iterator<Item = f64> + Clone) -> Option<[f64; 2]> {
-    Some([quantile(values.clone(), 0.025)?, quantile(values, 0.975)?])
 }
 
 impl Report {
@@ -530,21 +437,8 @@ impl Report {
                     _ => "; no probability, because the intervals are not known".to_owned(),
                 };
                 say("verdict", &format!("{what}{ratio}{chance}"));
-                if let (Some(growth), Some(speed)) = (verdict.growth_per_s, verdict.growth_at_rpm) {
-                    let side = if growth > 0.0 {
-                        "inside a band of instability: disturbances grow"
-                    } else {
-                        "outside every band of instability: disturbances die away"
-                    };
-                    let rate = short(growth.abs());
-                    let off = match verdict.growth_on_curve {
-                        Some(false) => {
-                            "; off the curve of responses at some speeds, where it may \
-                                        be in another motion (`sweep stability`)"
-                        }
-                        _ => "",
-                    };
-                    say("margin", &format!("{side} by {rate} /s at {speed:.0} rpm{off}"));
+                if let Some(margin) = verdict.margin(&short) {
+                    say("margin", &margin);
                 }
             }
         }

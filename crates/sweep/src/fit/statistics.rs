@@ -45,6 +45,9 @@ const UNKNOWN: f64 = 0.5;
 /// Numbers with a correlation beyond this are known together rather than each.
 const TOGETHER: f64 = 0.95;
 
+/// Standard errors to either end of a 95 % interval: the normal distribution's quantile of 0.975.
+pub(super) const Z_975: f64 = 1.959_964;
+
 /// What the residuals at a fit say.
 pub(crate) struct Statistics {
     /// Covariance of the unknowns, by the residuals' own correlation in time.

@@ -1,0 +1,296 @@
+//! What the map says of a fitted machine, and its margin to instability.
+
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+use washer_model::{Dwell, Response};
+use washer_row::{Growth, Outcome, Status, Verdict as RowVerdict};
+
+use super::algebra::{dot, middle_95};
+use super::draws;
+use super::known::Influence;
+use super::model::Problem;
+use super::statistics::{Statistics, Z_975};
+use crate::engine::{ModelEngine, of_speeds, responses};
+use crate::plan::{Axis, AxisValues, Plan, between, ready, timing};
+use sweep_engine::Error;
+use sweep_engine::commands::cells::span;
+
+/// Speeds at which the fitted machine's stability is looked at.
+const SPEEDS: u32 = 120;
+
+/// The number of fixed numbers whose errors count in a margin, those that move the estimates most.
+/// Basis: the tolerance of the eighth adds some percent to an interval. Doubling it doubles the
+/// time that the interval takes.
+const MARGIN_NUMBERS: usize = 8;
+
+/// The map's row at the fitted machine.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Verdict {
+    pub(crate) reliable: Option<bool>,
+    pub(crate) ratio_max: Option<f64>,
+    pub(crate) ratio_limit: f64,
+    /// Share of rows over the fitted distribution that are reliable.
+    pub(crate) probability_reliable: Option<f64>,
+    /// Between which the greatest ratio lies in 95 % of them.
+    pub(crate) ratio_max_95: Option<[f64; 2]>,
+    /// How many there are.
+    pub(crate) draws: usize,
+    /// The fastest growing disturbance of the periodic responses up to the fastest speed: below
+    /// zero, the machine is outside every band of instability, by so much.
+    pub(crate) growth_per_s: Option<f64>,
+    pub(crate) growth_at_rpm: Option<f64>,
+    /// The 95 % interval of that growth, by the fitted numbers' errors and the speeds' distance.
+    pub(crate) growth_95: Option<[f64; 2]>,
+    /// Whether the responses at all these speeds are on the curve of a machine that runs up.
+    pub(crate) growth_on_curve: Option<bool>,
+}
+
+impl Verdict {
+    /// Says on which side of a band of instability the machine is, if its growth is known; at the
+    /// edge, if the interval of its growth holds 0.
+    pub(super) fn margin(&self, short: &dyn Fn(f64) -> String) -> Option<String> {
+        let growth = self.growth_per_s?;
+        let speed = self.growth_at_rpm?;
+        let is_growing = growth > 0.0;
+        let side = match self.growth_95 {
+            Some([from, to]) if from <= 0.0 && 0.0 <= to => {
+                "at the edge of a band of instability, within its error"
+            }
+            _ if is_growing => "inside a band of instability",
+            _ => "outside every band of instability",
+        };
+        let way = if is_growing { "grow" } else { "die away" };
+        let interval = self.growth_95.map_or_else(String::new, |ends| {
+            let [from, to] = if is_growing { ends } else { [-ends[1], -ends[0]] };
+            format!(" ({} in 95 %)", span([from, to], short))
+        });
+        let off = match self.growth_on_curve {
+            Some(false) => {
+                "; off the curve of responses at some speeds, where it may be in another motion \
+                 (`sweep stability`)"
+            }
+            _ => "",
+        };
+        let rate = short(growth.abs());
+        Some(format!("{side}: disturbances {way} by {rate} /s{interval} at {speed:.0} rpm{off}"))
+    }
+}
+
+/// A fit whose machine is put on the map.
+pub(super) struct OnMap<'a> {
+    pub(super) problem: &'a Problem<'a>,
+    /// The unknowns.
+    pub(super) x: &'a [f64],
+    pub(super) statistics: &'a Statistics,
+    /// Rows of the map over the fitted distribution.
+    pub(super) draws: u64,
+}
+
+impl OnMap<'_> {
+    /// The row of a case's map at its fitted machine, and over the fitted distribution.
+    pub(super) fn verdict(&self, case: usize, follows: bool) -> Result<Verdict, Error> {
+        let problem = self.problem;
+        let x = self.x;
+        // The map's spin is the grid's, of which a measured one has no numbers.
+        let mut plan = Plan { axes: Vec::new(), design: None, ..problem.cases[case].plan.clone() };
+        let own: Vec<usize> =
+            (0..problem.free.len()).filter(|&k| problem.free[k].is_of(case)).collect();
+        // Free numbers make up for errors of the fixed ones, so those errors would count twice.
+        let covariance = self.statistics.by_noise(problem);
+        let mut sets = vec![x.to_vec()];
+        if follows {
+            sets.extend(draws(problem, x, &covariance, self.draws));
+        }
+        for &k in &own {
+            let values = || sets.iter().map(|set| set[k]);
+            let from = values().fold(f64::INFINITY, f64::min);
+            let to = values().fold(f64::NEG_INFINITY, f64::max);
+            let parameter = problem.free[k].parameter.clone();
+            plan.axes.push(match from < to {
+                true => between(parameter, from, to),
+                false => Axis { parameter, values: AxisValues::List(vec![from]) },
+            });
+        }
+        let points: Vec<Vec<f64>> =
+            sets.iter().map(|set| own.iter().map(|&k| set[k]).collect()).collect();
+        let engine = ModelEngine::new(&plan)?;
+        let outcomes = if (problem.stop)() { Vec::new() } else { engine.evaluate_at(&points) };
+        let (channels, limits) = (plan.reliability.channels.len(), plan.reliability.limits);
+        let verdict = |outcome: &Outcome| RowVerdict::new(outcome, channels, limits);
+        let verdicts: Vec<RowVerdict> = outcomes.iter().map(verdict).collect();
+        let ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
+        let drawn = verdicts.get(1..).unwrap_or_default();
+        let reliable = drawn.iter().filter(|it| it.reliable == Some(true)).count();
+        let errors = follows.then_some(&covariance[..]);
+        let (growth, growth_95) = match self.growth(case, &plan, errors) {
+            Some((growth, interval)) => (Some(growth), interval),
+            None => (None, None),
+        };
+        Ok(Verdict {
+            reliable: verdicts.first().and_then(|verdict| verdict.reliable),
+            ratio_max: verdicts.first().and_then(ratio),
+            ratio_limit: limits.most,
+            probability_reliable: (!drawn.is_empty()).then(|| reliable as f64 / drawn.len() as f64),
+            ratio_max_95: middle_95(drawn.iter().filter_map(ratio)),
+            draws: drawn.len(),
+            growth_per_s: growth.map(|growth| growth.fastest.growth_per_s()),
+            growth_at_rpm: growth.map(|growth| growth.fastest.speed_rpm),
+            growth_95,
+            growth_on_curve: growth.map(|growth| growth.is_on_curve),
+        })
+    }
+
+    /// Returns the fastest growing disturbance of the fitted machine at speeds up to its fastest,
+    /// and the 95 % interval of its growth by the covariance of the free numbers, where that is
+    /// known.
+    fn growth(
+        &self,
+        case: usize,
+        plan: &Plan,
+        covariance: Option<&[Vec<f64>]>,
+    ) -> Option<(Growth, Option<[f64; 2]>)> {
+        let x = self.x;
+        let (_, spin) = self.problem.machine(case, x);
+        let step_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU / f64::from(SPEEDS);
+        let speeds: Vec<f64> = (SPEEDS / 5..=SPEEDS)
+            .map(|k| step_rpm * f64::from(k))
+            .filter(|speed| *speed > 0.0)
+            .collect();
+        let growth = of_speeds(&self.responses_at(case, plan, (x, None), &speeds)?)?;
+        let interval = covariance
+            .and_then(|covariance| self.growth_95(case, plan, (&growth, step_rpm), covariance));
+        Some((growth, interval))
+    }
+
+    /// Returns the responses of a case's machine at some speeds, with another fixed number perhaps.
+    fn responses_at(
+        &self,
+        case: usize,
+        plan: &Plan,
+        (x, fixed): (&[f64], Option<&Influence>),
+        speeds: &[f64],
+    ) -> Option<Vec<Result<Vec<Response>, Status>>> {
+        let (mut machine, mut spin) = self.problem.machine(case, x);
+        if let Some(fixed) = fixed
+            && let Some(parameter) = &fixed.parameter
+            && let Some(value) = parameter.get(&machine, &spin)
+        {
+            parameter.set(&mut machine, &mut spin, value + fixed.tolerance);
+        }
+        let point = ready(machine, spin, &timing(plan)).ok()?;
+        let dwells: Vec<Dwell<'_>> =
+            speeds.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
+        Some(responses(&dwells, &|| (self.problem.stop)()))
+    }
+
+    /// Computes the 95 % interval of the growth at the speed where it is greatest: to first order
+    /// in the free numbers' noise, in errors of the fixed numbers that move them most, together
+    /// with what the free numbers make up for; and by how much it may be greater between two
+    /// speeds. None where a machine beside the fitted one has no response.
+    fn growth_95(
+        &self,
+        case: usize,
+        plan: &Plan,
+        (growth, step_rpm): (&Growth, f64),
+        covariance: &[Vec<f64>],
+    ) -> Option<[f64; 2]> {
+        let x = self.x;
+        let middle_rpm = growth.fastest.speed_rpm;
+        let speeds = [middle_rpm - step_rpm, middle_rpm, middle_rpm + step_rpm];
+        let growths = |x: &[f64], fixed: Option<&Influence>| -> Option<Vec<f64>> {
+            let found = self.responses_at(case, plan, (x, fixed), &speeds)?;
+            found.iter().map(|found| Some(found.as_ref().ok()?.first()?.growth_per_s())).collect()
+        };
+        let greatest = |growths: &[f64]| growths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let here = growths(x, None)?;
+        let mut slopes = vec![0.0; covariance.len()];
+        for (k, free) in self.problem.free.iter().enumerate() {
+            let error = covariance[k][k].max(0.0).sqrt();
+            if !free.is_of(case) || error == 0.0 {
+                continue;
+            }
+            let mut beside = x.to_vec();
+            let step = if x[k] + error > free.range[1] { -error } else { error };
+            beside[k] = (x[k] + step).max(free.range[0]);
+            let change = greatest(&growths(&beside, None)?) - greatest(&here);
+            if beside[k] != x[k] {
+                slopes[k] = change / (beside[k] - x[k]);
+            }
+        }
+        let mut variance: f64 =
+            covariance.iter().zip(&slopes).map(|(row, slope)| slope * dot(row, &slopes)).sum();
+        for fixed in self.statistics.widening_influences().iter().take(MARGIN_NUMBERS) {
+            let moved = |(k, (x, by)): (usize, (&f64, &f64))| {
+                let [from, to] = self.problem.range(k);
+                (x - by).clamp(from, to)
+            };
+            let beside: Vec<f64> = x.iter().zip(&fixed.moves).enumerate().map(moved).collect();
+            let change = greatest(&growths(&beside, Some(fixed))?) - greatest(&here);
+            variance += change * change;
+        }
+        let reach = Z_975 * variance.max(0.0).sqrt();
+        // The vertex of the parabola through three neighbours is at most this far above the middle.
+        let bend = (2.0 * here[1] - here[0] - here[2]).max(0.0) / 8.0;
+        let value = growth.fastest.growth_per_s();
+        Some([value - reach, value + reach + bend])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_margin_within_its_error_is_at_the_edge() {
+        let said = |growth: f64, interval: Option<[f64; 2]>| {
+            let verdict = Verdict {
+                reliable: None,
+                ratio_max: None,
+                ratio_limit: 1.2,
+                probability_reliable: None,
+                ratio_max_95: None,
+                draws: 0,
+                growth_per_s: Some(growth),
+                growth_at_rpm: Some(250.0),
+                growth_95: interval,
+                growth_on_curve: Some(true),
+            };
+            verdict.margin(&|value| format!("{value:.1}")).unwrap()
+        };
+        for (growth, interval, expected) in [
+            (
+                0.1,
+                Some([-0.1, 0.3]),
+                "at the edge of a band of instability, within its error: \
+                disturbances grow by 0.1 /s (-0.1 to 0.3 in 95 %) at 250 rpm",
+            ),
+            (
+                -0.1,
+                Some([-0.3, 0.1]),
+                "at the edge of a band of instability, within its error: \
+                disturbances die away by 0.1 /s (-0.1 to 0.3 in 95 %) at 250 rpm",
+            ),
+            (
+                0.2,
+                Some([0.1, 0.3]),
+                "inside a band of instability: disturbances grow by 0.2 /s \
+                (0.1 to 0.3 in 95 %) at 250 rpm",
+            ),
+            (
+                -0.2,
+                Some([-0.3, -0.1]),
+                "outside every band of instability: disturbances die away \
+                by 0.2 /s (0.1 to 0.3 in 95 %) at 250 rpm",
+            ),
+            (
+                -0.2,
+                None,
+                "outside every band of instability: disturbances die away by 0.2 /s at \
+                250 rpm",
+            ),
+        ] {
+            assert_eq!(said(growth, interval), expected);
+        }
+    }
+}
