@@ -134,13 +134,16 @@ impl Measured {
         report.finish(found)
     }
 
-    /// A measurement in memory.
+    /// A measurement in memory; `renamed` as of [`Self::read`].
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub(crate) fn of_columns(columns: Vec<(String, Vec<f64>)>) -> Result<Self, Diagnostics> {
+    pub(crate) fn of_columns(
+        columns: Vec<(String, Vec<f64>)>,
+        renamed: &[(String, String)],
+    ) -> Result<Self, Diagnostics> {
         let report = Report::default();
-        let names = Names { known: &known, renamed: &[] };
+        let names = Names { known: &known, renamed };
         let table = NumberTable::of_columns("table", columns, &names, &report);
         let measured = judged("table".to_owned(), table, &report);
         report.finish(Some(measured))
@@ -389,7 +392,7 @@ mod tests {
         let column = |name: &str| {
             (name.to_owned(), (0..20).map(|k| 0.01 * f64::from(k)).collect::<Vec<f64>>())
         };
-        let measured = Measured::of_columns(names.map(column).to_vec()).unwrap();
+        let measured = Measured::of_columns(names.map(column).to_vec(), &[]).unwrap();
         let columns: Vec<String> =
             measured.signals.iter().map(|signal| signal.quantity.column()).collect();
         assert_eq!(columns, ["tub_yaw_rad"]);
@@ -449,7 +452,7 @@ mod tests {
             if with_tachometer {
                 columns.push(column("speed_rpm", &|t| first_rpm + 20.0 * t));
             }
-            let mut measured = Measured::of_columns(columns).unwrap();
+            let mut measured = Measured::of_columns(columns, &[]).unwrap();
             measured.count_from_first_row(24.0);
             measured
         };
@@ -502,7 +505,7 @@ mod tests {
             let named = |(name, by): (&str, f64)| (name.to_owned(), numbers(by));
             [("time_s", 0.01), ("tub_yaw", 1.0), ("speed_rpm", 2.0)].map(named).to_vec()
         };
-        let [whole, early] = [0, -30].map(|from| Measured::of_columns(columns(from)).unwrap());
+        let [whole, early] = [0, -30].map(|from| Measured::of_columns(columns(from), &[]).unwrap());
         assert_eq!(early, Measured { early: 30, ..whole });
     }
 
@@ -514,7 +517,7 @@ mod tests {
         };
         let (time_s, yaw) = (0..40).map(row).unzip();
         let columns = vec![("time_s".to_owned(), time_s), ("tub_yaw".to_owned(), yaw)];
-        let measured = Measured::of_columns(columns).unwrap();
+        let measured = Measured::of_columns(columns, &[]).unwrap();
         assert_eq!(measured.count(), 26);
         assert_eq!(measured.gaps_s.len(), 1);
         assert!((measured.gaps_s[0][1] - 5.1).abs() < 1e-12);

@@ -22,9 +22,10 @@ pub fn fit_tables(
         return Err(Error::option("table", "[]", "a table or more"));
     }
     options.check()?;
+    let columns = grid.load()?.aside.columns;
     let mut cases = Vec::with_capacity(tables.len());
     for (k, (table, constants)) in tables.into_iter().enumerate() {
-        let mut measured = Measured::of_columns(table.into_columns())?;
+        let mut measured = Measured::of_columns(table.into_columns(), &columns)?;
         if k > 0 {
             measured.name = format!("table {}", k + 1);
         }
