@@ -3,6 +3,7 @@
 //! A list is read into memory as a whole. The bytes of its file, packed and unpacked, and the
 //! numbers in it are bounded; each bound is checked before the memory is taken.
 
+mod clock;
 mod csv;
 mod layout;
 mod names;

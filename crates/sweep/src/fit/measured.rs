@@ -185,7 +185,9 @@ impl Measured {
 fn known(header: &str) -> Option<(String, String)> {
     let name = header.strip_prefix(TRACED).unwrap_or(header);
     let [name, unit] = match name {
-        "time_s" | "t_s" | "zeit_s" => ["time_s", "s"].map(str::to_owned),
+        "time_s" | "time" | "timestamp" | "t_s" | "zeit" | "zeit_s" => {
+            ["time_s", "s"].map(str::to_owned)
+        }
         "speed_rpm" | "rpm" | "drehzahl_rpm" => ["speed_rpm", "rpm"].map(str::to_owned),
         _ => [name.to_owned(), Quantity::named(name)?.units().0],
     };
@@ -493,6 +495,12 @@ mod tests {
         assert_eq!(columns, ["tub_front_y_m_per_s2"]);
         assert_eq!(measured.signals[0].values[4], 4.0 * 9.80665);
         assert!(measured.notes.join(";").contains("left out the column `Temp`"));
+        // Times of a clock are seconds since midnight.
+        let rows: String = (0..20).map(|k| format!("12:00:0{}.{},{k}\n", k / 10, k % 10)).collect();
+        std::fs::write(&path, format!("Time,tub_yaw [deg]\n{rows}")).unwrap();
+        let clock = Measured::read(&path, &[]).unwrap();
+        assert_eq!((clock.time_s[0], clock.time_s[19]), (43_200.0, 43_201.9));
+        std::fs::write(&path, &text).unwrap();
         // Without the user's names nothing is measured, and what to do is said.
         let refused = Measured::read(&path, &[]).unwrap_err().to_string();
         assert!(refused.contains("--column 'Acc front=tub_front_y_m_per_s2'"), "{refused}");

@@ -5,6 +5,7 @@
 use super::super::report::{Diagnostic, Report};
 use super::super::section::{counted, short};
 use super::super::source::{Located, Location, SourceId};
+use super::clock;
 use super::layout::{Layout, Line, lines, said};
 use super::names::Names;
 use super::notation::{Evidence, Notation, Seen, Unclear};
@@ -23,6 +24,9 @@ pub(super) struct Read {
     /// Lines before the line of names.
     pub(super) preamble: usize,
 }
+
+/// The name of a column of times (s), which may be those of a clock.
+const TIME: &str = "time_s";
 
 /// Texts of cells that hold no sample, in small letters.
 const MISSING: [&str; 9] = ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "<na>"];
@@ -80,7 +84,9 @@ pub(super) fn read(
                 column.values.push(f64::NAN);
                 continue;
             }
-            if let Some(value) = notation.number(cell)
+            let is_time = column.name.value == TIME;
+            let clock = || clock::seconds(cell).filter(|_| is_time);
+            if let Some(value) = notation.number(cell).or_else(clock)
                 && (gaps || !value.is_nan())
             {
                 column.values.push(scale.apply(value));
@@ -120,7 +126,7 @@ fn headers<'t>(layout: &Layout<'t>) -> Result<Vec<(&'t str, std::ops::Range<usiz
     if let (true, Some((name, _))) = (layout.is_labview, headers.first_mut())
         && *name == "X_Value"
     {
-        *name = "time_s";
+        *name = TIME;
     }
     Ok(headers)
 }

@@ -1,0 +1,82 @@
+//! Times of a clock, as loggers write them: 12:34:56.789, perhaps behind a date.
+
+/// Seconds of a day.
+const DAY_S: f64 = 86_400.0;
+/// Days from the first of March of the year 0 to the first of January 1970, counted from 1.
+const BEFORE_1970: f64 = 719_469.0;
+
+/// Returns the seconds of a clock's time since midnight, or with a date since 1970.
+pub(super) fn seconds(cell: &str) -> Option<f64> {
+    let cell = cell.trim().trim_end_matches('Z');
+    let (date, time) = match cell.rsplit_once([' ', 'T']) {
+        Some((date, time)) => (Some(date.trim()), time),
+        None => (None, cell),
+    };
+    let days = date.map_or(Some(0.0), days)?;
+    let mut parts = time.split(':');
+    let hours = whole(parts.next()?, 24)?;
+    let minutes = whole(parts.next()?, 59)?;
+    let seconds = parts.next().unwrap_or("0").replace(',', ".");
+    let begins_right = seconds.starts_with(|letter: char| letter.is_ascii_digit());
+    let seconds: f64 = seconds.parse().ok()?;
+    let is_time = begins_right && (0.0..61.0).contains(&seconds) && parts.next().is_none();
+    is_time.then_some(days * DAY_S + hours * 3600.0 + minutes * 60.0 + seconds)
+}
+
+/// Returns a whole number of at most four digits, if it is no greater than `most`.
+fn whole(text: &str, most: u32) -> Option<f64> {
+    let is_plain = (1..=4).contains(&text.len()) && text.bytes().all(|it| it.is_ascii_digit());
+    let number: u32 = text.parse().ok().filter(|_| is_plain)?;
+    (number <= most).then_some(f64::from(number))
+}
+
+/// Returns the days since 1970 of a date: year, month, day with `-` or `/`, or day, month, year
+/// with points. Dates that may be read in two ways are none.
+fn days(date: &str) -> Option<f64> {
+    let parts: Vec<&str> = date.split(['-', '/', '.']).collect();
+    let [first, month, last] = parts.as_slice() else { return None };
+    let (year, day) = match (first.len(), last.len(), date.contains('.')) {
+        (4, _, false) => (first, last),
+        (_, 4, true) => (last, first),
+        _ => return None,
+    };
+    let year = whole(year, 9999)?;
+    let month = whole(month, 12).filter(|month| *month > 0.0)?;
+    let day = whole(day, 31).filter(|day| *day > 0.0)?;
+    // Years begin in March, so that the leap day is the last.
+    let is_early = month <= 2.0;
+    let year = if is_early { year - 1.0 } else { year };
+    let month = if is_early { month + 9.0 } else { month - 3.0 };
+    let of_years = 365.0 * year + (year / 4.0).floor() - (year / 100.0).floor();
+    let of_months = ((153.0 * month + 2.0) / 5.0).floor();
+    Some(of_years + (year / 400.0).floor() + of_months + day - BEFORE_1970)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_with_and_without_dates_are_read() {
+        for (cell, expected) in [
+            ("12:34:56.5", 45_296.5),
+            ("00:00:01,250", 1.25),
+            ("7:05", 25_500.0),
+            ("1970-01-02 00:00:00", 86_400.0),
+            ("2000-02-29T12:00:00Z", 951_825_600.0),
+            ("01.03.2000 00:00:00", 951_868_800.0),
+            ("2026/11/29 10:30:45.125", 1_795_948_245.125),
+        ] {
+            assert_eq!(seconds(cell), Some(expected), "{cell}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_time_is_not_read() {
+        for cell in
+            ["", "12", "25:00:00", "1:60", "1:2:-3", "1:2:3:4", "03/04/2026 1:00", "a 1:00", "1:+2"]
+        {
+            assert_eq!(seconds(cell), None, "{cell}");
+        }
+    }
+}
