@@ -151,8 +151,11 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
         }
     }
     if draft.plan.axes.is_empty() && report.is_clean() {
-        let refusal = Diagnostic::new("the list of points has no column of a parameter");
-        report.push(refusal.help("`[columns]` in the grid file may name what its columns hold"));
+        let refusal = Diagnostic::new("the list of points has no column of a parameter")
+            .help("`[columns]` in the grid file may name what its columns hold");
+        let expected = "expected a file whose header names parameters";
+        let at = report.place("design.file");
+        report.push(at.into_iter().fold(refusal, |refusal, at| refusal.at(&at, expected)));
     }
     draft.plan.design = Some(list.design);
 }

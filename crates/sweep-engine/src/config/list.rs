@@ -230,13 +230,16 @@ pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) 
     if points == 0 && !report.is_clean() {
         return None;
     }
-    if table.columns.iter().any(|column| !column.is_known) {
-        // What is wrong with their names is said when they are looked for.
-    } else if points == 0 {
+    let is_parameter = |column: &ListColumn| column.is_known && column.name.value != ID;
+    let has_parameter = table.columns.iter().any(is_parameter);
+    let has_unknown = table.columns.iter().any(|column| !column.is_known);
+    if points == 0 && (has_parameter || !has_unknown) {
         let title = format!("the list of points {shown} is empty");
         let expected = "expected a line of parameter names, and under it a row of numbers a point";
         return report.refuse(&at, title, expected);
-    } else if table.columns.iter().all(|column| column.name.value == ID) {
+    }
+    // What is wrong with unknown names is said when they are looked for.
+    if !has_parameter && !has_unknown {
         let title = format!("the list of points {shown} has no column but `{ID}`");
         return report.refuse(&at, title, "expected a column of a parameter");
     }

@@ -8,6 +8,7 @@
 mod again;
 mod bounds;
 mod cycle;
+mod lists;
 mod planes;
 mod plausible;
 mod points;

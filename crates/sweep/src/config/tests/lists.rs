@@ -1,0 +1,56 @@
+//! Lists of points as loggers and spreadsheets write them.
+
+use super::super::load;
+use crate::plan::Plan;
+
+const GRID: &str = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[time]\nend_s = 2\n\
+    [design]\nmethod = \"list\"\nfile = \"points.csv\"\n";
+
+/// A grid beside a list of points.
+fn load_list(more: &str, list: &str) -> Result<Plan, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grid.toml");
+    std::fs::write(folder.path().join("points.csv"), list).unwrap();
+    std::fs::write(&path, format!("{GRID}{more}")).unwrap();
+    load(&path, &[]).map_err(|mistakes| mistakes.to_string())
+}
+
+#[test]
+fn units_are_converted_and_further_columns_are_named() {
+    let list = "Unbalance mass [g];weather;damping_n_s_per_mm\n300;fair;0,12\n450;foul;0,1\n";
+    let plan = load_list("", list).unwrap();
+    let names: Vec<&str> = plan.axes.iter().map(|axis| axis.parameter.name()).collect();
+    assert_eq!(names, ["unbalance_mass_kg", "damping_n_s_per_m"]);
+    assert_eq!([plan.axis_values(0), plan.axis_values(1)], [[0.3, 120.0], [0.45, 100.0]]);
+    let notes = plan.aside.notes.join("\n");
+    assert!(notes.contains("left out the column `weather`"), "{notes}");
+    assert!(notes.contains("`Unbalance mass [g]` is unbalance_mass_kg"), "{notes}");
+}
+
+#[test]
+fn the_grid_file_may_name_what_columns_hold() {
+    let columns = "[columns]\n\"m_u [g]\" = \"unbalance_mass_kg\"\n";
+    let plan = load_list(columns, "m_u [g]\n300\n").unwrap();
+    assert_eq!(plan.axis_values(0), [0.3]);
+    let wrong = columns.replace("unbalance_mass_kg", "laundry");
+    let refused = load_list(&wrong, "m_u [g]\n300\n").unwrap_err();
+    assert!(refused.contains("is called `laundry`"), "{refused}");
+    let refused = load_list("[columns]\nx = 5\n", "m_u [g]\n300\n").unwrap_err();
+    assert!(refused.contains("wrong type"), "{refused}");
+}
+
+#[test]
+fn a_list_without_points_or_parameters_is_refused() {
+    for (list, said) in [
+        ("unbalance_mass_kg,weather\n", "is empty"),
+        ("weather,height\n1,2\n", "no column of a parameter"),
+        ("weather\n", "no column of a parameter"),
+        ("mass,id\n1,2\n", "did you mean"),
+        ("id\n2\n", "no column but `id`"),
+        ("", "is empty"),
+        ("sep=;\n", "is empty"),
+    ] {
+        let refused = load_list("", list).unwrap_err();
+        assert!(refused.contains(said), "{list}: {refused}");
+    }
+}
