@@ -45,16 +45,16 @@ pub(super) fn read(path: &Path, joints: Joints, at: &Location, report: &Report) 
     if !judge(&table, times, speeds, report) {
         return None;
     }
+    // Joints multiply rows by up to a hundred: too many are not joined at all.
+    let is_short = |rows: usize| rows <= MOST_ROWS;
     let points = match joints {
-        Joints::Straight => (times.values.clone(), speeds.values.clone()),
-        Joints::Smooth => smooth(&times.values, &speeds.values),
+        Joints::Smooth if is_short(times.values.len()) => smooth(&times.values, &speeds.values),
+        _ => (times.values.clone(), speeds.values.clone()),
     };
-    if points.0.len() > MOST_ROWS {
-        let rows = counted(points.0.len(), "row");
-        let title = format!("the cycle has {rows} with its joints");
+    if !is_short(points.0.len()) {
+        let title = format!("the cycle has {} with its joints", counted(points.0.len(), "row"));
         let expected = format!(
-            "expected at most {MOST_ROWS}: leave out rows between which the \
-            speed is straight"
+            "expected at most {MOST_ROWS}: leave out rows between which the speed is straight"
         );
         return report.refuse(at, title, expected);
     }
@@ -153,8 +153,7 @@ fn smooth(time_s: &[f64], speed_rpm: &[f64]) -> Points {
             [6.0 * change - 4.0 * begin - 2.0 * end, 2.0 * begin + 4.0 * end - 6.0 * change];
         let bend = bends[0].abs().max(bends[1].abs());
         let pieces = if off > 0.0 { (bend / (8.0 * off)).sqrt().ceil().max(1.0) } else { 1.0 };
-        // More than any cycle may have are counted and refused.
-        let pieces = (pieces as usize).min(MOST_ROWS + 1);
+        let pieces = pieces as usize;
         for piece in 1..pieces {
             let part = piece as f64 / pieces as f64;
             let rest = 1.0 - part;
