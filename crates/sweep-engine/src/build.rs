@@ -1,17 +1,17 @@
 //! The build of the program that made a file. With the plan it decides the file's bytes.
 
-/// A build. Builds alike in both write the same bytes for the same input; unfinished work of others
-/// is never mixed with theirs.
+/// A build of the program. Builds that agree in both numbers write the same bytes for the same
+/// input. Unfinished work of other builds is never resumed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Build {
-    /// Version of the program.
+    /// The version of the program.
     pub version: &'static str,
-    /// Version of everything that decides a byte of a result: the model, the methods, what is
-    /// derived from motions, the columns.
+    /// The version of everything that a byte of a result depends on: the model, the methods, the
+    /// numbers derived from motions, the columns.
     pub numerics: u32,
 }
 
-/// Version and numerics, as `show` prints them.
+/// Formats version and numerics as `show` prints them.
 pub fn words(version: &str, numerics: u32) -> String {
     format!("sweep {version}, numerics {numerics}")
 }

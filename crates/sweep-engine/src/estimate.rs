@@ -29,6 +29,7 @@ pub struct Estimate {
 
 /// Formats a size with three digits.
 pub fn size(bytes: f64) -> String {
+    /// The units, each 1000 times the one before.
     const UNITS: [&str; 5] = ["bytes", "kB", "MB", "GB", "TB"];
     let mut scaled = bytes;
     let mut unit = 0;

@@ -1,4 +1,4 @@
-//! How the program ends, and why it could not go on.
+//! The ends of the program: exit codes, errors, and what goes to standard output and error.
 
 use std::fmt::{Display, Write as _};
 use std::io::{self, Write as _};
@@ -10,32 +10,32 @@ use sweep_files::FileError;
 use sweep_plot::PlotError;
 use sweep_results::ResultsError;
 
-/// Exit codes, a contract with scripts.
+/// The exit codes, a contract with scripts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
-    /// Done.
+    /// The command succeeded.
     Done = 0,
-    /// Something failed that the input is not to blame for.
+    /// The system or the program failed.
     Failed = 1,
-    /// Bad input; nothing was done.
+    /// The input was refused before any work.
     BadInput = 2,
-    /// Done, but some points failed and `--fail-on-error` was given.
+    /// The command succeeded, but some points failed with `--fail-on-error`.
     PointsFailed = 3,
-    /// What `require`, `report` or `compare --fail-on` asks does not hold, or `optimise` found
-    /// nothing that keeps its conditions.
+    /// A condition of `require`, `report` or `compare --fail-on` is violated, or `optimise` found
+    /// no feasible candidate.
     NotHeld = 4,
-    /// Another run holds this output.
+    /// Another run has locked the output.
     Busy = 75,
-    /// Hung up (SIGHUP).
+    /// SIGHUP ended the command.
     HungUp = 129,
-    /// Interrupted (SIGINT).
+    /// SIGINT ended the command.
     Interrupted = 130,
-    /// Asked to stop (SIGTERM).
+    /// SIGTERM ended the command.
     Terminated = 143,
 }
 
 impl Exit {
-    /// Every exit code, with what it means to a script.
+    /// The exit codes with their meanings.
     pub const ALL: [(Self, &'static str); 9] = [
         (Self::Done, "done"),
         (Self::Failed, "a failure of the system or of this program"),
@@ -48,7 +48,7 @@ impl Exit {
         (Self::Terminated, "terminated; finished work is kept"),
     ];
 
-    /// What a process ends with that this signal has interrupted.
+    /// Returns the exit code of a process that a signal has interrupted.
     pub fn interrupted(signal: Option<u8>) -> Self {
         match signal {
             Some(1) => Self::HungUp,
@@ -57,7 +57,7 @@ impl Exit {
         }
     }
 
-    /// All codes with their meanings, and what goes where, for `--help`.
+    /// Formats all codes with their meanings for `--help`.
     pub fn table() -> String {
         let line = |(exit, meaning)| format!("\n  {:>3}  {meaning}", exit as u8);
         let outputs = "Answers go to standard output, all else to standard error.";
@@ -71,41 +71,41 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Why a command ended early.
+/// The error of a command.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Mistakes in what the user wrote.
+    /// Errors in the input.
     #[error(transparent)]
     Input(#[from] Diagnostics),
-    /// What cannot be done with what the user gave, and why.
+    /// A request that cannot be satisfied, with the reason.
     #[error("{0}")]
     Refused(String),
-    /// A run's files.
+    /// An error of a run's files.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// A figure.
+    /// An error of a figure.
     #[error(transparent)]
     Plot(#[from] PlotError),
-    /// A result that does not answer.
+    /// An error of a query of a result.
     #[error(transparent)]
     Results(#[from] ResultsError),
-    /// A model that cannot do what was asked.
+    /// An error of the model.
     #[error(transparent)]
     Model(Box<dyn std::error::Error + Send + Sync>),
-    /// A file of this program's.
+    /// An error of a file of this program.
     #[error(transparent)]
     Files(#[from] FileError),
-    /// No threads.
+    /// An error of starting threads.
     #[error(transparent)]
     Threads(#[from] ThreadsError),
     /// A file that could not be read or written.
     #[error("cannot {action} {}: {source}", path.display())]
     File {
-        /// What was attempted: `"write"`.
+        /// The attempted action: `"write"`.
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// Standard output could not be written.
@@ -114,22 +114,22 @@ pub enum Error {
 }
 
 impl Error {
-    /// An option (`"--every"`) whose value, as typed, makes no sense here.
+    /// Creates the error of an option (`"--every"`) with an invalid value.
     pub fn option(option: &str, given: impl Display, expected: impl Display) -> Self {
         Self::Refused(format!("`{option} {given}`: expected {expected}"))
     }
 
-    /// The process cannot listen to signals.
+    /// Creates the error of signal handlers that cannot be installed.
     pub fn signals(source: std::io::Error) -> Self {
         Self::File { action: "install signal handlers for", path: "this process".into(), source }
     }
 
-    /// What a model says that it cannot do.
+    /// Creates the error of a model.
     pub fn model(error: impl std::error::Error + Send + Sync + 'static) -> Self {
         Self::Model(Box::new(error))
     }
 
-    /// The exit code it ends with.
+    /// Returns the exit code.
     pub fn exit(&self) -> Exit {
         let is_refusal = match self {
             Self::Files(error)
@@ -144,14 +144,15 @@ impl Error {
         if is_refusal { Exit::BadInput } else { Exit::Failed }
     }
 
-    /// Tells the user, on standard error, in colour on a terminal unless `NO_COLOR` is set.
+    /// Writes the error to standard error, in colour on a terminal unless `NO_COLOR` is set.
     pub fn report(&self) {
         match self {
             Self::Input(diagnostics) => {
                 let text = diagnostics.styled();
-                // Its own escapes are colours, and its renderer replaces those of what it quotes.
+                // The escapes in this text are colours; the renderer has replaced those of quoted
+                // input.
                 let text = escaped(&text, |c| c != '\x1b' && is_unsafe(c));
-                // With standard error gone there is nobody left to tell; the exit code still does.
+                // Without standard error, only the exit code reports the error.
                 let _ = writeln!(anstream::stderr(), "{text}");
             }
             other => tell(&format!("error: {other}")),
@@ -159,13 +160,13 @@ impl Error {
     }
 }
 
-/// Whether a character can do something to a terminal, or to the order of the text in it.
+/// Returns whether a character can control a terminal, or change the order of its text.
 fn is_unsafe(c: char) -> bool {
     let is_control = c.is_control() && !matches!(c, '\n' | '\t');
     is_control || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// A text with some characters written as `\u001b`, which is their form in JSON too.
+/// Returns a text with some characters written as `\u001b`, which is their form in JSON too.
 fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -179,20 +180,20 @@ fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> String {
     safe
 }
 
-/// Writes the answer that was asked for, as people read it or as JSON, to standard output. What a
-/// file has put into it that is no text cannot reach the terminal.
+/// Writes an answer, for people or as JSON, to standard output. Control characters that come from
+/// files are escaped.
 ///
 /// # Errors
-/// As [`print()`].
+/// The errors of [`print()`].
 pub fn show(text: &str) -> Result<Exit, Error> {
     print(&escaped(text, is_unsafe))
 }
 
-/// Writes a command's product to standard output, as it is: a script, a file. A reader that has
-/// seen enough (`| head`) is no failure.
+/// Writes a product of a command (a script, a file) to standard output without changes. A reader
+/// that closes the pipe (`| head`) is not an error.
 ///
 /// # Errors
-/// When standard output cannot be written for any other reason.
+/// Any other error of writing to standard output.
 pub fn print(text: &str) -> Result<Exit, Error> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
@@ -201,9 +202,9 @@ pub fn print(text: &str) -> Result<Exit, Error> {
     }
 }
 
-/// Writes what else people should hear to standard error; as in `show`, text only.
+/// Writes a message to standard error, with control characters escaped.
 pub fn tell(text: &str) {
-    // As in `Error::report`: nobody is left to tell.
+    // Without standard error, the message is lost.
     let _ = writeln!(anstream::stderr(), "{}", escaped(text, is_unsafe));
 }
 

@@ -54,17 +54,17 @@ pub struct Plan<M: Model> {
     pub set: Vec<(String, Value)>,
     /// The sources of the numbers.
     pub written: WrittenIn,
-    /// What is said beside the plan.
+    /// The notes of reading the grid file.
     pub aside: Aside,
 }
 
-/// What a grid file says beside the plan, and what was noticed when it was read. No result depends
-/// on it, so plans that differ in nothing else are equal.
+/// The notes of reading a grid file. Results do not depend on them, so that plans which differ only
+/// in them are equal.
 #[derive(Clone, Debug, Default)]
 pub struct Aside {
-    /// Headers of lists and measurements with the names of what they hold.
+    /// The headers of columns in lists and measurements, with the names that they stand for.
     pub columns: Vec<(String, String)>,
-    /// What a user should know, a line each.
+    /// The notes for the user, a line each.
     pub notes: Vec<String>,
 }
 

@@ -1,15 +1,16 @@
-//! The name of the program, for the commands that messages advise.
+//! The name of the program, for commands that messages advise.
 
 use std::sync::OnceLock;
 
+/// The name, if [`call_program`] has set it.
 static PROGRAM: OnceLock<&str> = OnceLock::new();
 
-/// The program's name.
+/// Returns the program's name.
 pub fn program() -> &'static str {
     PROGRAM.get().copied().unwrap_or("sweep")
 }
 
-/// Says once how the program is called; `sweep` unless somebody does.
+/// Sets the program's name, which is `sweep` by default; only the first call has an effect.
 pub fn call_program(name: &'static str) {
     let _ = PROGRAM.set(name);
 }

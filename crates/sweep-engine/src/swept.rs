@@ -53,7 +53,7 @@ pub trait Swept: Rows {
 pub struct Listed<M: Model> {
     /// The parameter.
     pub parameter: M::Parameter,
-    /// Its value, if there is one.
+    /// The value, if there is one.
     pub value: Option<f64>,
     /// The source of the value.
     pub source: String,

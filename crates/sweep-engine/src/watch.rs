@@ -42,7 +42,8 @@ pub trait Engine: Sync {
 /// The state of a run that an engine shares with its caller.
 pub struct RunContext<'a> {
     interrupt: &'a Interrupt,
-    /// Whether a result could not be stored, so that further ones would be lost as well.
+    /// The flag that is set when a result could not be stored, because further ones would be lost
+    /// as well.
     is_aborted: AtomicBool,
     points_done: AtomicU64,
     is_late: Option<&'a (dyn Fn() -> bool + Sync)>,

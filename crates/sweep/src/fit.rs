@@ -3,9 +3,7 @@
 //!
 //! `measured` and `speed` read a measurement. `model` compares it with the model and its
 //! derivatives, `search` finds the least cost, `statistics` says how well the numbers are known,
-//! `known` how they depend on the others, `verdict` what the map says of the machine, and `report`
-//! holds all of it. `units` tries other units where the model follows nothing. `journal` keeps what
-//! a fit has found out.
+//! and `report` holds all of it. `journal` keeps what a fit has found out.
 
 mod algebra;
 mod curves;

@@ -1,17 +1,20 @@
-//! Output channels: what is compared between the two models.
+//! The channels: motions that are compared between the two models.
 
 use core::ffi::CStr;
 
-/// The table of channels, in the order of the models' output vectors: all that the crate knows of a
-/// channel is a row of it. Passes the rows to the macro `$then`.
+/// Passes the table of channels to the macro `$then`, in the order of the models' output vectors. A
+/// row is all that the crate knows of a channel:
 ///
-/// A row holds the variant; its name and description; what it is of ([`ChannelKind`]); what the
-/// nonlinear model takes it from (`point`: an entry of `outputs::Places` and its axis, `angle`: a
-/// coordinate); and which coordinates the linear model's output depends on. `turning` says that the
-/// output has harmonics of theta as well: the coordinates of the cosine's and of the sine's part,
-/// and which of the parts (0: steady, 1: cosine, 2: sine) are there at rest. The equilibrium has
-/// the unbalance up and the hinge bent in the vertical plane alone, so that nothing moves along c2
-/// with the sine then.
+/// - the variant, the name and the description;
+/// - the kind ([`ChannelKind`]);
+/// - the output of the nonlinear model: `point` with an entry of `outputs::ChannelPoints` and an
+///   axis, or `angle` with a coordinate;
+/// - `steady`: the coordinates on which the linear model's output depends;
+/// - `turning`, if the output has harmonics of theta: the coordinates of the cosine's and of the
+///   sine's part, and the parts (0: steady, 1: cosine, 2: sine) that exist at rest.
+///
+/// At the equilibrium the unbalance is up and the hinge is bent in the vertical plane only, so that
+/// no output along c2 has a sine at rest.
 macro_rules! channels {
     ($then:ident) => {
         $then! {
@@ -55,7 +58,7 @@ macro_rules! channels {
 }
 pub(crate) use channels;
 
-/// What a channel is of.
+/// The kind of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ChannelKind {
     /// A point that moves with the tub, or mostly so.
@@ -71,7 +74,7 @@ macro_rules! declare {
         $(#[$doc:meta])* $name:ident, $key:literal, $description:literal, $kind:ident,
         $from:tt, steady $steady:tt $(, turning cos $cos:tt sin $sin:tt rest $rest:tt)?;
     )+) => {
-        /// One observed motion, always as deviation from the static equilibrium.
+        /// A compared motion, as deviation from the static equilibrium.
         ///
         /// `y` is along c2 (up), `z` along c3 (horizontal). P_TE and P_DE are the front centres of
         /// tub and drum.
@@ -84,28 +87,28 @@ macro_rules! declare {
             /// Every channel, in the order of the model's output vector.
             pub const ALL: [Self; [$($key),+].len()] = [$(Self::$name),+];
 
-            /// Name in grid files and column names.
+            /// Returns the name in grid files and column names.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => $key,)+
                 }
             }
 
-            /// The name for C, with its zero byte.
+            /// Returns the name for C, with its zero byte.
             pub const fn c_name(self) -> &'static CStr {
                 match self {
                     $(Self::$name => terminated(concat!($key, "\0")),)+
                 }
             }
 
-            /// One line for column dictionaries and docs.
+            /// Returns the description in one line.
             pub const fn description(self) -> &'static str {
                 match self {
                     $(Self::$name => $description,)+
                 }
             }
 
-            /// What it is of.
+            /// Returns the kind.
             pub(crate) const fn kind(self) -> ChannelKind {
                 match self {
                     $(Self::$name => ChannelKind::$kind,)+
@@ -130,7 +133,7 @@ impl sweep_parameter::Channel for Channel {
     }
 }
 
-/// A name that ends with its only zero byte.
+/// Returns a name that ends with a zero byte as a C string.
 const fn terminated(name: &'static str) -> &'static CStr {
     match CStr::from_bytes_with_nul(name.as_bytes()) {
         Ok(name) => name,
@@ -138,16 +141,16 @@ const fn terminated(name: &'static str) -> &'static CStr {
     }
 }
 
-/// Number of channels.
+/// The number of channels.
 pub(crate) const CHANNELS: usize = Channel::ALL.len();
 
 impl Channel {
-    /// Position in [`Channel::ALL`] and in the model's output vector.
+    /// Returns the position in [`Channel::ALL`] and in the model's output vector.
     pub const fn index(self) -> usize {
         self as usize
     }
 
-    /// `"m"` or `"rad"`.
+    /// Returns the unit, `"m"` or `"rad"`.
     pub const fn unit(self) -> &'static str {
         match self.kind() {
             ChannelKind::TubPoint | ChannelKind::DrumPoint => "m",

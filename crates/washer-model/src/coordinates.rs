@@ -2,27 +2,27 @@
 
 use lane_ode::{Dual, Lane, N};
 
-/// Number of generalised coordinates.
+/// The number of generalised coordinates.
 pub const COORDINATES: usize = 10;
 
-/// States: the coordinates, then their speeds.
+/// The number of states: the coordinates, then their speeds.
 pub(crate) const STATES: usize = 2 * COORDINATES;
 
 /// q1: the tub's bearing midpoint P_T along c2 (m).
 pub(crate) const TUB_Y: usize = 0;
-/// q2: the same along c3 (m).
+/// q2: the tub's bearing midpoint P_T along c3 (m).
 pub(crate) const TUB_Z: usize = 1;
 /// q3: the shaft's bearing midpoint P_S along c2 (m).
 pub(crate) const SHAFT_Y: usize = 2;
-/// q4: the same along c3 (m).
+/// q4: the shaft's bearing midpoint P_S along c3 (m).
 pub(crate) const SHAFT_Z: usize = 3;
 /// q5: yaw of the tub about c2 (rad).
 pub(crate) const TUB_YAW: usize = 4;
-/// q6: its pitch (rad).
+/// q6: pitch of the tub (rad).
 pub(crate) const TUB_PITCH: usize = 5;
 /// q7: yaw of the shaft about c2 (rad).
 pub(crate) const SHAFT_YAW: usize = 6;
-/// q8: its pitch (rad).
+/// q8: pitch of the shaft (rad).
 pub(crate) const SHAFT_PITCH: usize = 7;
 /// q9: first angle of the hinge between shaft and drum (rad).
 pub(crate) const HINGE_YAW: usize = 8;
@@ -34,11 +34,11 @@ pub(crate) const FIRST_ANGLE: usize = TUB_YAW;
 
 /// The coordinates of the tub.
 pub(crate) const TUB: [usize; 4] = [TUB_Y, TUB_Z, TUB_YAW, TUB_PITCH];
-/// The same of the shaft.
+/// The coordinates of the shaft.
 pub(crate) const SHAFT: [usize; 4] = [SHAFT_Y, SHAFT_Z, SHAFT_YAW, SHAFT_PITCH];
-/// Those that turn the tub.
+/// The coordinates that turn the tub.
 pub(crate) const TUB_TURNS: [usize; 2] = [TUB_YAW, TUB_PITCH];
-/// The coordinates that turn the rotor. Its forces depend on q3 and q4 through the bearings alone.
+/// The coordinates that turn the rotor, whose forces depend on q3 and q4 through the bearings only.
 pub(crate) const ROTOR_TURNS: [usize; 4] = [SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];
 
 /// The coordinates that change their sign in the mirror image of a state, by the vertical plane
@@ -55,7 +55,7 @@ pub(crate) fn mirrored(state: &[f64; STATES]) -> [f64; STATES] {
     mirrored
 }
 
-/// `values` with a unit derivative (times `slope`) along coordinate `j`.
+/// Returns `values` as dual numbers with the derivative `slope` in coordinate `j` and 0 elsewhere.
 #[inline(always)]
 pub(crate) fn seeded<T: Lane>(
     values: &[N<T>; COORDINATES],

@@ -1,11 +1,11 @@
-//! The two models by name.
+//! The names of the two models.
 
 sweep_parameter::named! {
-    /// Which of the two models.
+    /// A model.
     pub enum ModelKind {
-        /// Section 4 of the model page.
+        /// The nonlinear model, section 4 of the model page.
         Nonlinear = "nonlinear",
-        /// Its first-order expansion.
+        /// The linear model, section 5 of the model page.
         Linear = "linear",
     }
 }

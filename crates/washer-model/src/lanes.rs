@@ -1,4 +1,4 @@
-//! Structures of lane values: filled from plain numbers, and read, lane by lane.
+//! Structures of lane values, written and read lane by lane as plain numbers.
 
 use core::marker::PhantomData;
 use lane_ode::{Dual, Lane, N, Real};
@@ -7,11 +7,11 @@ use lane_ode::{Dual, Lane, N, Real};
 pub(crate) trait InLanes<T: Lane> {
     /// The structure of plain numbers.
     type One;
-    /// The same numbers in every lane; `zero` is any value.
+    /// Returns a structure with the same numbers in every lane. `zero` is any value of the lanes.
     fn splat(zero: N<T>, one: &Self::One) -> Self;
-    /// Overwrites lane `lane`.
+    /// Overwrites a lane.
     fn set_lane(&mut self, lane: usize, one: &Self::One);
-    /// Reads lane `lane`.
+    /// Returns the numbers of a lane.
     fn get_lane(&self, lane: usize) -> Self::One;
 }
 
@@ -19,7 +19,7 @@ pub(crate) trait InLanes<T: Lane> {
 pub(crate) trait Constant {
     /// The structure of dual numbers.
     type Dual;
-    /// As constants of a dual number.
+    /// Returns the structure with derivatives of zero.
     fn constant(&self) -> Self::Dual;
 }
 
@@ -79,8 +79,8 @@ impl<A: Constant<Dual: Copy>, const K: usize> Constant for [A; K] {
     }
 }
 
-// Loops, not closures, where a vector type's first value is at hand: only what is inlined into an
-// instruction set's entry function is compiled for it.
+// These functions have loops instead of closures, because only code that is inlined into an entry
+// function is compiled for its instruction set.
 impl<T: Lane, A: InLanes<T>> InLanes<T> for Vec<A> {
     type One = Vec<A::One>;
     #[inline(always)]
@@ -91,7 +91,7 @@ impl<T: Lane, A: InLanes<T>> InLanes<T> for Vec<A> {
         }
         list
     }
-    /// Both lists have the same length.
+    /// Overwrites a lane; both lists have the same length.
     #[inline(always)]
     fn set_lane(&mut self, lane: usize, one: &Vec<A::One>) {
         self.iter_mut().zip(one).for_each(|(to, from)| to.set_lane(lane, from));
@@ -114,7 +114,7 @@ impl<A: Constant> Constant for Vec<A> {
     }
 }
 
-/// Something that holds of some machines: whether it does of any that the lanes have held.
+/// A property of machines that holds if any machine that the lanes have held has it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InAnyLane<T>(bool, PhantomData<T>);
 
@@ -124,7 +124,7 @@ impl<T> InAnyLane<T> {
         Self(is_so, PhantomData)
     }
 
-    /// Whether it holds of any.
+    /// Returns whether any machine has the property.
     #[inline(always)]
     pub(crate) fn holds(self) -> bool {
         self.0

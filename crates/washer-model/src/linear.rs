@@ -1,9 +1,10 @@
-//! The linear model: exact first order about the static equilibrium (section 5 of the model page,
-//! Eq. 41).
+//! The linear model: the exact linearisation about the static equilibrium (section 5 of the model
+//! page, Eq. 41).
 //!
-//! Every coefficient comes from the nonlinear source by automatic differentiation, once per grid
-//! point. Five angles determine its trigonometric polynomial in theta. Like the nonlinear model it
-//! is solved by halves, each about its mass centre; only the bearings couple them.
+//! Every coefficient is a trigonometric polynomial in theta. It is computed once per grid point
+//! from the nonlinear source, by automatic differentiation at five angles, which determine it. As
+//! in the nonlinear model, the two halves are solved about their mass centres, and only the
+//! bearings couple them.
 
 pub(crate) mod harmonics;
 pub(crate) mod outputs;
@@ -26,16 +27,16 @@ use crate::nonlinear::frame::Tilt;
 use crate::nonlinear::{Half, rotor, tub};
 use lane_ode::{Aside, Dual, Lane, N, Real};
 
-/// Entries of all arrays of the rotor, its inertia after all others.
+/// The number of entries of all arrays of the rotor. Those of the inertia come last.
 const ALL_ENTRIES: usize = ENTRIES + INERTIA_ENTRIES;
 
 lane_struct! {
-    /// The parts that do not depend on the spin. Rows are forces (y, z) and torques about a half's
-    /// mass centre, columns those of `TUB`.
+    /// The coefficients that do not depend on the spin. Rows are forces (y, z) and torques about a
+    /// half's mass centre, columns the coordinates of `TUB`.
     #[derive(Clone, Copy, Debug)]
     Constants {
         tub_per_mass: N<T>,
-        /// Partial velocities of the tub's mass centre.
+        /// The partial velocities of the tub's mass centre.
         tub_arm: [[N<T>; 2]; 2],
         tub_axis: [[N<T>; 2]; 2],
         tub_inertia: [[N<T>; 2]; 2],
@@ -46,14 +47,14 @@ lane_struct! {
     }
 }
 
-/// The linear model of one machine.
+/// The linear model of a machine.
 #[derive(Clone, Debug)]
 pub(crate) struct LinearPoint {
     pub(crate) constants: Constants<f64>,
     pub(crate) terms: Terms<f64>,
 }
 
-/// Linearises one machine per lane about the equilibrium `q`.
+/// The linearisation of one machine per lane about the equilibrium `q`.
 pub(crate) struct Linearise<'a, T> {
     pub(crate) machine: &'a Coefficients<T>,
     pub(crate) q: &'a [N<T>; COORDINATES],
@@ -87,8 +88,8 @@ impl<T: Lane> Aside for Linearise<'_, T> {
                 let (force, torque) = floating.generalised_forces();
                 let arm = floating.arm;
                 let lifted_spin = spin.constant();
-                // Stiffness at every kind of spin, damping only at unit speed: without spin the
-                // rotor has none.
+                // The stiffness depends on speed and acceleration. The damping is proportional to
+                // the speed, so that a unit speed determines it.
                 let directions = if kind == 1 { 8 } else { 4 };
                 for direction in 0..directions {
                     let column = direction % 4;
@@ -139,7 +140,7 @@ impl<T: Lane> Aside for Linearise<'_, T> {
     }
 }
 
-/// Stiffness and damping of the tub about the equilibrium `q`, as in [`Constants`].
+/// Computes stiffness and damping of the tub about the equilibrium `q`, as in [`Constants`].
 #[inline(always)]
 pub(crate) fn tub_tangents<T: Lane>(
     machine: &Coefficients<T>,
@@ -165,8 +166,8 @@ pub(crate) fn tub_tangents<T: Lane>(
     tangents
 }
 
-/// Slopes of generalised forces, from the bearing midpoint's rows to the mass centre's: the inverse
-/// of what `Floating::generalised_forces` does, at the equilibrium's arms.
+/// Transforms the slopes of generalised forces from the bearing midpoint to the mass centre, with
+/// the equilibrium's arms: the inverse of `Floating::generalised_forces`.
 #[inline(always)]
 fn about_centre<T: Real, const R: usize, const ROWS: usize>(
     (midpoint, rotation): ([N<Dual<T>>; 2], [N<Dual<T>>; R]),
@@ -181,7 +182,7 @@ fn about_centre<T: Real, const R: usize, const ROWS: usize>(
     rows
 }
 
-/// Terms of one lane, from samples at no spin, unit speed and unit acceleration.
+/// Computes the terms of one lane from samples at rest, at unit speed and at unit acceleration.
 fn terms_of_lane<T: Lane>(
     samples: &[[[N<T>; HARMONICS]; ALL_ENTRIES]; 3],
     lane: usize,
@@ -207,21 +208,21 @@ fn terms_of_lane<T: Lane>(
     }
 }
 
-/// M, C, K and F of Eq. 41 in the coordinates q, as full matrices; for one machine, at one instant.
+/// The matrices M, C, K and F of Eq. 41 in the coordinates q, for one machine at one instant.
 #[derive(Clone, Debug)]
 pub struct Matrices {
-    /// Mass matrix.
+    /// The mass matrix.
     pub mass: [[f64; COORDINATES]; COORDINATES],
-    /// Damping and gyroscopic matrix.
+    /// The damping and gyroscopic matrix.
     pub damping: [[f64; COORDINATES]; COORDINATES],
-    /// Stiffness matrix.
+    /// The stiffness matrix.
     pub stiffness: [[f64; COORDINATES]; COORDINATES],
-    /// Force.
+    /// The force.
     pub force: [f64; COORDINATES],
 }
 
 impl LinearPoint {
-    /// With another stiffness and damping of the tub.
+    /// Returns the model with another stiffness and damping of the tub.
     pub(crate) fn with_tub(&self, [tub_stiffness, tub_damping]: [[[N<f64>; 4]; 4]; 2]) -> Self {
         let mut other = self.clone();
         other.constants.tub_stiffness = tub_stiffness;
@@ -229,7 +230,7 @@ impl LinearPoint {
         other
     }
 
-    /// The bearings' share of the stiffness matrix, without that of their static load.
+    /// Computes the bearings' part of the stiffness matrix, without the part of their static load.
     pub(crate) fn bearing_stiffness(
         &self,
         bodies: &Bodies<f64>,
@@ -255,7 +256,7 @@ impl LinearPoint {
         stiffness
     }
 
-    /// The matrices at one instant; `bodies` is the same machine's.
+    /// Computes the matrices at an instant. `bodies` are those of the same machine.
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let c = &self.constants;
         let (inertia, e) = self.terms.at(&harmonics::functions(spin));

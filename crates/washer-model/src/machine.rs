@@ -10,138 +10,138 @@ pub(crate) mod violations;
 /// horizontal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machine {
-    /// Acceleration of gravity along -y.
+    /// The acceleration of gravity along -y.
     pub gravity_m_per_s2: f64,
-    /// Radial clearance between drum and tub at rest.
+    /// The radial clearance between drum and tub at rest.
     pub radial_clearance_m: f64,
-    /// Body T.
+    /// The tub, body T.
     pub tub: Tub,
-    /// Body S.
+    /// The shaft with its rotor, body S.
     pub shaft: Shaft,
-    /// Body D without its unbalance.
+    /// The drum without unbalance, body D.
     pub drum: Drum,
-    /// The laundry stuck to the drum's wall, a point mass.
+    /// The unbalance that every machine has: laundry stuck to the drum's wall, as a point mass.
     pub unbalance: Unbalance,
-    /// More such point masses, any number: laundry in further planes, or counterweights.
+    /// Further unbalances: laundry in other planes, or counterweights.
     pub further_unbalances: Vec<Unbalance>,
-    /// Bending flexibility between shaft and drum.
+    /// The bending flexibility between shaft and drum.
     pub flexure: Flexure,
     /// The two radial bearings between tub and shaft.
     pub bearings: Bearings,
-    /// Springs between cabinet and tub, any number.
+    /// The springs between cabinet and tub.
     pub springs: Vec<Spring>,
-    /// Dampers between cabinet and tub, any number.
+    /// The dampers between cabinet and tub.
     pub dampers: Vec<Damper>,
-    /// Stops between cabinet and tub, any number.
+    /// The stops between cabinet and tub.
     pub stops: Vec<BumpStop>,
-    /// Bushings between cabinet and tub, any number; a door gasket is one.
+    /// The bushings between cabinet and tub, such as a door gasket.
     pub bushings: Vec<Bushing>,
-    /// The cabinet, if it is described; only the loads of its feet depend on it.
+    /// The cabinet, if it is described. Only the loads of its feet depend on it.
     pub cabinet: Option<Cabinet>,
-    /// Where the cabinet stands: three or four feet, if it is described.
+    /// The three or four feet of the cabinet, if it is described.
     pub feet: Vec<Foot>,
 }
 
-/// Body T, which the springs hold.
+/// The tub, body T, which hangs on the springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tub {
-    /// Mass.
+    /// The mass.
     pub mass_kg: f64,
-    /// Mass centre on the tub axis (L_T).
+    /// The mass centre on the tub axis (L_T).
     pub centre_x_m: f64,
-    /// Principal moments of inertia about the mass centre, in body axes.
+    /// The principal moments of inertia about the mass centre, in body axes.
     pub inertia_kg_m2: [f64; 3],
-    /// Front centre P_TE on the tub axis.
+    /// The front centre P_TE on the tub axis.
     pub front_x_m: f64,
 }
 
-/// Body S: shaft and rotor.
+/// The shaft with its rotor, body S.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shaft {
-    /// Mass.
+    /// The mass.
     pub mass_kg: f64,
-    /// Mass centre on the shaft axis, negative behind O (-L_S).
+    /// The mass centre on the shaft axis, negative behind O (-L_S).
     pub centre_x_m: f64,
-    /// Principal moments of inertia about the mass centre, in body axes.
+    /// The principal moments of inertia about the mass centre, in body axes.
     pub inertia_kg_m2: [f64; 3],
 }
 
-/// Body D without the unbalance mass.
+/// The drum without unbalance, body D.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drum {
-    /// Mass m_0.
+    /// The mass m_0.
     pub mass_kg: f64,
-    /// Mass centre x_0 on the axis.
+    /// The mass centre x_0 on the axis.
     pub centre_x_m: f64,
-    /// Principal moments of inertia about the mass centre, in body axes.
+    /// The principal moments of inertia about the mass centre, in body axes.
     pub inertia_kg_m2: [f64; 3],
-    /// P_D, where drum and shaft meet (L_D).
+    /// The hinge P_D between drum and shaft (L_D).
     pub hinge_x_m: f64,
-    /// Front centre P_DE (L_D + L_DE).
+    /// The front centre P_DE (L_D + L_DE).
     pub front_x_m: f64,
 }
 
 /// An unbalance: a point mass fixed to the drum, along d2.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Unbalance {
-    /// Mass m_u.
+    /// The mass m_u.
     pub mass_kg: f64,
-    /// Position x_u along the axis.
+    /// The position x_u along the axis.
     pub x_m: f64,
-    /// Distance r_u from the axis; that of a further unbalance is negative where it is opposite.
+    /// The distance r_u from the axis; negative for a further unbalance on the opposite side.
     pub radius_m: f64,
 }
 
 /// The drum shaft's bending stiffness K_D.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flexure {
-    /// Stiffness against the angle between the axes of S and D.
+    /// The stiffness against the angle between the axes of S and D.
     pub stiffness_n_m_per_rad: f64,
 }
 
 /// Two radial bearings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bearings {
-    /// Front bearing centre (L_fb).
+    /// The front bearing centre (L_fb).
     pub front_x_m: f64,
-    /// Rear bearing centre, negative (-L_rb).
+    /// The rear bearing centre, negative (-L_rb).
     pub rear_x_m: f64,
-    /// Radial stiffness K_fb.
+    /// The radial stiffness K_fb.
     pub front_stiffness_n_per_m: f64,
-    /// Radial stiffness K_rb.
+    /// The radial stiffness K_rb.
     pub rear_stiffness_n_per_m: f64,
 }
 
 /// A spring between a cabinet point and a tub point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spring {
-    /// End at the cabinet, in cabinet axes from O.
+    /// The end at the cabinet, in cabinet axes from O.
     pub cabinet_m: [f64; 3],
-    /// End at the tub, in tub axes from P_T.
+    /// The end at the tub, in tub axes from P_T.
     pub tub_m: [f64; 3],
-    /// Stiffness.
+    /// The stiffness.
     pub stiffness_n_per_m: f64,
-    /// Length without force; the distance between the ends as given if absent.
+    /// The length without force; if absent, the distance between the given ends.
     pub free_length_m: Option<f64>,
-    /// Tension per cube of the elongation (k_3), beside that of the stiffness.
+    /// The tension per cube of the elongation (k_3), added to that of the stiffness.
     pub cubic_n_per_m3: f64,
 }
 
 /// A damper between a cabinet point and a tub point, viscous, with friction, or both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Damper {
-    /// End at the cabinet, in cabinet axes from O.
+    /// The end at the cabinet, in cabinet axes from O.
     pub cabinet_m: [f64; 3],
-    /// End at the tub, in tub axes from P_T.
+    /// The end at the tub, in tub axes from P_T.
     pub tub_m: [f64; 3],
-    /// Damping along the line between the ends.
+    /// The damping along the line between the ends.
     pub damping_n_s_per_m: f64,
-    /// Friction F_f: its force at speeds well above `friction_speed_m_per_s`.
+    /// The friction F_f: the force at speeds well above `friction_speed_m_per_s`.
     pub friction_n: f64,
-    /// Speed v_s below which friction fades to zero.
+    /// The speed v_s below which friction fades to zero.
     pub friction_speed_m_per_s: f64,
-    /// Speed amplitude V at which the linear model's viscous damping takes as much energy out of a
-    /// swing as friction does: 4 F_f / (pi V). Where it is absent, that of the linear motion.
+    /// The speed amplitude V at which the linear model's viscous damping 4 F_f / (pi V) dissipates
+    /// as much energy in a cycle as friction does; if absent, the amplitude of the linear motion.
     pub friction_linear_speed_m_per_s: Option<f64>,
 }
 
@@ -150,25 +150,26 @@ pub struct Damper {
 pub struct BumpStop {
     /// The tub point, in tub axes from P_T.
     pub tub_m: [f64; 3],
-    /// The way from the tub to the stop, in cabinet axes; of any length but 0.
+    /// The direction from the tub to the stop, in cabinet axes; a vector of any length but 0.
     pub direction: [f64; 3],
-    /// How far the tub point may move that way from its place before loading.
+    /// The distance that the tub point may move in that direction from its place before loading.
     pub clearance_m: f64,
-    /// Stiffness in contact.
+    /// The stiffness in contact.
     pub stiffness_n_per_m: f64,
-    /// Damping in contact.
+    /// The damping in contact.
     pub damping_n_s_per_m: f64,
-    /// Depth s over which contact sets in.
+    /// The depth s over which contact sets in.
     pub softness_m: f64,
 }
 
 impl BumpStop {
-    /// Softness of a stop that gives none.
+    /// The default softness. Basis: a tenth of a millimetre of rubber. Doubling it makes the force
+    /// set in over twice the depth.
     pub const SOFTNESS_M: f64 = 1e-4;
 }
 
 impl Default for BumpStop {
-    /// Without stiffness, above the bearings' midpoint.
+    /// Returns a stop without stiffness above the bearings' midpoint.
     fn default() -> Self {
         Self {
             tub_m: [0.0; 3],
@@ -181,42 +182,44 @@ impl Default for BumpStop {
     }
 }
 
-/// A bushing: springs and dampers along the cabinet's three axes on one tub point. It is without
-/// force where that point is before loading.
+/// A bushing: springs and dampers along the cabinet's three axes on one tub point. Its force is
+/// zero while that point is in its place before loading.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bushing {
     /// The tub point, in tub axes from P_T.
     pub tub_m: [f64; 3],
-    /// Stiffness along c1, c2 and c3.
+    /// The stiffness along c1, c2 and c3.
     pub stiffness_n_per_m: [f64; 3],
-    /// Force per cube of the displacement along each, beside that of the stiffness.
+    /// The force per cube of the displacement along each axis, added to that of the stiffness.
     pub cubic_n_per_m3: [f64; 3],
-    /// Damping along each.
+    /// The damping along each axis.
     pub damping_n_s_per_m: [f64; 3],
 }
 
 /// The cabinet with everything fixed to it. It does not move.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cabinet {
-    /// Mass.
+    /// The mass.
     pub mass_kg: f64,
-    /// Mass centre.
+    /// The mass centre.
     pub centre_m: [f64; 3],
-    /// Coefficient of friction between feet and floor.
+    /// The coefficient of friction between feet and floor.
     pub friction: f64,
 }
 
 /// A foot of the cabinet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Foot {
-    /// Where it meets the floor.
+    /// The point at which the foot meets the floor.
     pub foot_m: [f64; 3],
 }
 
 impl Damper {
-    /// Speed v_s of a damper that gives none.
+    /// The default of v_s. Basis: a usual value of suspension dampers. Doubling it makes friction
+    /// viscous up to twice the speed.
     pub const FRICTION_SPEED_M_PER_S: f64 = 0.01;
-    /// Where the search begins for a speed V that is the motion's: a usual one.
+    /// The start of the search for V. Basis: a usual speed amplitude. Doubling it changes the
+    /// number of iterations only.
     pub(crate) const FIRST_LINEAR_SPEED_M_PER_S: f64 = 0.1;
 }
 
@@ -252,12 +255,12 @@ impl Machine {
         mirrored
     }
 
-    /// All unbalances, the one that every machine has first.
+    /// Iterates over all unbalances, first the one that every machine has.
     pub(crate) fn unbalances(&self) -> impl Iterator<Item = &Unbalance> {
         core::iter::once(&self.unbalance).chain(&self.further_unbalances)
     }
 
-    /// Weight of tub, shaft, drum and unbalances (N).
+    /// Returns the weight of tub, shaft, drum and unbalances (N).
     pub fn weight_n(&self) -> f64 {
         let of_bodies = self.tub.mass_kg + self.shaft.mass_kg + self.drum.mass_kg;
         let of_laundry = self.further_unbalances.iter().map(|unbalance| unbalance.mass_kg);
@@ -265,10 +268,10 @@ impl Machine {
         self.gravity_m_per_s2 * mass_kg
     }
 
-    /// The machine of Park, Jeong and Yoo (Machines 2021, 9(11), 289): Tables 2 to 4 and section
-    /// 3.1, the bare drum and unbalance split of the equations page, and this project's assumptions
-    /// where the paper is silent (bearing positions, hinge, fronts, clearance, free lengths of the
-    /// springs).
+    /// Returns the machine of Park, Jeong and Yoo (Machines 2021, 9(11), 289): Tables 2 to 4 and
+    /// section 3.1, the bare drum and unbalance split of the equations page, and this project's
+    /// assumptions where the paper is silent (bearing positions, hinge, fronts, clearance, free
+    /// lengths of the springs).
     pub fn paper() -> Self {
         let [unbalance_mass_kg, drum_mass_kg, drum_x_m] = [0.4, 3.64, 0.200];
         let unbalance = Unbalance { mass_kg: unbalance_mass_kg, x_m: 0.300, radius_m: 0.200 };

@@ -1,7 +1,7 @@
-//! Complex modal analysis of the linear model at one instant of the spin (Eqs. 43 to 45).
+//! Complex modal analysis of the linear model at an instant of the spin (Eqs. 43 to 45).
 //!
-//! With theta, its speed and so M, C and K frozen, M q'' + C q' + K q = 0 has solutions q = phi
-//! exp(s t).
+//! With theta and the spin speed frozen, M, C and K are constant, and M q'' + C q' + K q = 0 has
+//! the solutions q = phi exp(s t).
 
 pub(crate) mod campbell;
 pub(crate) mod shape;
@@ -16,20 +16,20 @@ use faer::linalg::solvers::{Llt, Solve as _};
 use faer::{Mat, Side, c64};
 use lane_ode::N;
 
-/// Coordinates of the hinge: q9, q10.
+/// The coordinates of the hinge, q9 and q10.
 const HINGE: [usize; 2] = [HINGE_YAW, HINGE_PITCH];
 
-/// Angles over a turn at which the highest frequency is looked for: M and K hold harmonics 0 to 2
-/// of theta.
+/// The number of angles over a turn at which the highest frequency is computed. Basis: M and K have
+/// harmonics 0 to 2 of theta. Doubling it costs twice the time for nothing.
 const ANGLES: usize = 8;
 
-/// The eigenvalues of a machine could not be found.
+/// A failure to compute the modes of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoModes {
     /// A body has no inertia.
     #[error("the mass matrix is not positive definite: some body has no inertia")]
     Mass,
-    /// They are not finite, or too far apart for double precision.
+    /// The eigenvalues are not finite, or too far apart for double precision.
     #[error(
         "the eigenvalues cannot be found: masses and stiffnesses are too far apart for double \
          precision"
@@ -37,29 +37,28 @@ pub enum NoModes {
     Eigenvalues,
 }
 
-/// One natural motion, q = Re(shape exp(s t)).
+/// A mode, the natural motion q = Re(shape exp(s t)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
-    /// Real part of s (1/s); negative when the motion decays.
+    /// The real part of s (1/s), negative if the motion decays.
     pub re_per_s: f64,
-    /// Imaginary part of s (rad/s), the damped natural frequency; 0 for a motion that does not
-    /// swing.
+    /// The imaginary part of s (rad/s), the damped natural frequency; 0 for an overdamped motion.
     pub im_rad_per_s: f64,
-    /// Undamped natural frequency |s| (rad/s): for a motion that does not swing, the root of the
-    /// product of its two rates.
+    /// The undamped natural frequency |s| (rad/s); for an overdamped motion, the geometric mean of
+    /// its two rates.
     pub magnitude_rad_per_s: f64,
-    /// Coordinates q1 to q10 (m, rad) as real and imaginary part, of unit modal mass: shape^H M
-    /// shape = 1.
+    /// The coordinates q1 to q10 (m, rad) as real and imaginary part, normalised to unit modal
+    /// mass: shape^H M shape = 1.
     pub shape: [[f64; 2]; COORDINATES],
 }
 
 impl Mode {
-    /// Share of critical damping: below 1 the motion swings, below 0 it grows.
+    /// Returns the damping ratio: below 1 the motion oscillates, below 0 it grows.
     pub fn damping_ratio(&self) -> f64 {
         -self.re_per_s / self.magnitude_rad_per_s
     }
 
-    /// Share of the hinge in the strain energy at a motion's outermost points.
+    /// Returns the hinge's share of the strain energy at the greatest deflection.
     pub(crate) fn hinge_share(&self, point: &Point) -> f64 {
         let squared = HINGE
             .map(|q| self.shape[q][0] * self.shape[q][0] + self.shape[q][1] * self.shape[q][1]);
@@ -68,23 +67,23 @@ impl Mode {
             / (self.magnitude_rad_per_s * self.magnitude_rad_per_s)
     }
 
-    /// Damped natural frequency in cycles per minute.
+    /// Returns the damped natural frequency in cycles per minute.
     pub fn frequency_rpm(&self) -> f64 {
         self.im_rad_per_s * 60.0 / TAU
     }
 }
 
-/// Every natural motion at one instant, the slowest first, and the mass matrix by which their
-/// shapes compare.
+/// The modes at an instant, the slowest first, and the mass matrix by which shapes are compared.
 #[derive(Clone, Debug)]
 pub struct Modes {
-    /// One per coordinate: pairs of conjugate eigenvalues count once, real ones two by two.
+    /// The modes, one for each coordinate: conjugate eigenvalues give one mode, and so do two real
+    /// ones.
     pub modes: [Mode; COORDINATES],
     pub(crate) mass: [[f64; COORDINATES]; COORDINATES],
 }
 
-/// Modal assurance criterion of two shapes of unit modal mass, with the mass matrix as weight: 1
-/// for the same motion, 0 for motions that share none.
+/// Returns the modal assurance criterion of two shapes of unit modal mass, weighted by the mass
+/// matrix: 1 for equal shapes, 0 for orthogonal ones.
 pub(crate) fn assurance(
     mass: &[[f64; COORDINATES]; COORDINATES],
     a: &[[f64; 2]; COORDINATES],
@@ -94,7 +93,7 @@ pub(crate) fn assurance(
     product[0] * product[0] + product[1] * product[1]
 }
 
-/// a^H M b, real and imaginary part.
+/// Returns a^H M b as real and imaginary part.
 pub(crate) fn inner(
     mass: &[[f64; COORDINATES]; COORDINATES],
     a: &[[f64; 2]; COORDINATES],
@@ -111,16 +110,16 @@ pub(crate) fn inner(
     sum
 }
 
-/// The natural motions with theta frozen at `theta_rad` while the drum turns at `speed_rad_per_s`.
+/// Computes the modes at a frozen angle and a spin speed.
 ///
 /// # Errors
-/// [`NoModes`] when the matrices are singular or not finite.
+/// [`NoModes`] for singular or infinite matrices.
 pub fn modes(point: &Point, theta_rad: f64, speed_rad_per_s: f64) -> Result<Modes, NoModes> {
     modes_with_caps(point, theta_rad, speed_rad_per_s, None)
 }
 
-/// The same, with caps on the modes of bearings and hinge if any are given (section 4.3 of the
-/// model page).
+/// Computes the modes, with caps on those of bearings and hinge if any are given (section 4.3 of
+/// the model page).
 pub(crate) fn modes_with_caps(
     point: &Point,
     theta_rad: f64,
@@ -143,7 +142,8 @@ pub(crate) fn modes_with_caps(
     Ok(Modes { modes, mass })
 }
 
-/// The eigenvalues of these motions alone, in a third of the time unless several of them creep.
+/// Computes the eigenvalues of the modes without their shapes, in a third of the time unless
+/// several modes are overdamped.
 pub(crate) fn motions(
     point: &Point,
     speed_rad_per_s: f64,
@@ -152,7 +152,7 @@ pub(crate) fn motions(
     let system = first_order(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
     let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
     if values.iter().filter(|s| s.im == 0.0).count() > 2 {
-        // Which rates belong together is told by shapes.
+        // Shapes decide which two real rates belong to one mode.
         return Ok(modes_with_caps(point, 0.0, speed_rad_per_s, caps)?.modes.map(|mode| Root {
             s: c64::new(mode.re_per_s, mode.im_rad_per_s),
             magnitude_rad_per_s: mode.magnitude_rad_per_s,
@@ -162,12 +162,12 @@ pub(crate) fn motions(
     Ok(natural_motions(values, &|_, _| 1.0)?.map(|(motion, _)| motion))
 }
 
-/// A natural motion by its eigenvalue.
+/// The eigenvalue of a mode.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Root {
-    /// s (1/s); its imaginary part is not negative.
+    /// The eigenvalue s (1/s), whose imaginary part is not negative.
     pub(crate) s: c64,
-    /// As in [`Mode`].
+    /// The undamped natural frequency, as in [`Mode`].
     pub(crate) magnitude_rad_per_s: f64,
 }
 
@@ -203,13 +203,13 @@ fn natural_motions(
     swinging.try_into().map_err(|_| NoModes::Eigenvalues)
 }
 
-/// |s| from operations that round the same everywhere; `hypot` is each system's own.
+/// Returns |s|. The system's `hypot` would round differently on other systems.
 fn magnitude(s: c64) -> f64 {
     s.norm_sqr().sqrt()
 }
 
-/// The vector scaled to unit modal mass and turned so that its largest entry is real and positive:
-/// phases then read as lags behind that entry.
+/// Normalises a vector to unit modal mass, with the phase at which the largest entry is real and
+/// positive, so that other phases are relative to that entry.
 fn unit_mass(
     mass: &[[f64; COORDINATES]; COORDINATES],
     vector: &[c64; COORDINATES],
@@ -223,18 +223,19 @@ fn unit_mass(
     pairs.map(|[re, im]| [re / scale, im / scale])
 }
 
-/// The largest |s| (rad/s) of a machine while its drum turns at `speed_rad_per_s`, over a turn of
-/// theta: about the equilibrium, and with every element as steep as it can be (friction at standing
-/// still, stops closed). It limits the step of an explicit method.
+/// Computes the largest |s| (rad/s) of a machine at a spin speed, over a turn of theta: about the
+/// equilibrium, and with the steepest tangent of every element (friction at zero speed, closed
+/// stops). It limits the step of an explicit method.
 ///
 /// # Errors
-/// As [`modes`].
+/// The errors of [`modes`].
 pub fn highest_frequency_rad_per_s(point: &Point, speed_rad_per_s: f64) -> Result<f64, NoModes> {
     highest_with_caps(point, ModelKind::Nonlinear, speed_rad_per_s, None)
 }
 
-/// The same of a model, whose elements are as at rest in the linear one, with caps on the modes of
-/// bearings and hinge if any are given (section 4.3 of the model page).
+/// Computes the largest |s| (rad/s) of a model, with caps on the modes of bearings and hinge if any
+/// are given (section 4.3 of the model page). The elements of the linear model have the tangents of
+/// the equilibrium.
 pub(crate) fn highest_with_caps(
     point: &Point,
     model: ModelKind,
@@ -258,11 +259,10 @@ pub(crate) fn highest_with_caps(
     Ok(highest)
 }
 
-/// The fastest swing (rad/s) of the tub with the rotor rigid in it, undamped, by a linear model's
-/// stiffness.
+/// Computes the highest undamped natural frequency (rad/s) of tub and rotor as one rigid body.
 ///
 /// # Errors
-/// As [`modes`].
+/// The errors of [`modes`].
 pub(crate) fn fastest_rigid_rad_per_s(point: &Point, model: &LinearPoint) -> Result<f64, NoModes> {
     let still = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
     let Matrices { mass, stiffness, .. } = model.matrices(&point.machine.bodies, &still);
@@ -281,15 +281,16 @@ pub(crate) fn fastest_rigid_rad_per_s(point: &Point, model: &LinearPoint) -> Res
     if fastest.is_finite() { Ok(fastest) } else { Err(NoModes::Eigenvalues) }
 }
 
-/// x' = unit A x over x = (q, q' / unit).
+/// The first-order form x' = unit A x with x = (q, q' / unit).
 struct FirstOrder {
     matrix: Mat<f64>,
-    /// A rate (1/s) that brings all blocks of the matrix to one size. Eigenvalues are then as
-    /// precise as the fastest of them, not as its square.
+    /// The rate (1/s) that balances the blocks of the matrix, so that errors of eigenvalues are
+    /// relative to the greatest eigenvalue, not to its square.
     unit_per_s: f64,
     mass: [[f64; COORDINATES]; COORDINATES],
 }
 
+/// Computes the first-order form at a frozen angle and a spin speed.
 fn first_order(
     point: &Point,
     model: &LinearPoint,

@@ -27,7 +27,7 @@ use crate::nonlinear::forces::{Deflection, flexure};
 use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
 use lane_ode::{Lane, N, Real};
 
-/// One half of the machine: the equations of motion, the lower triangle of the inertia, and the
+/// A half of the machine: the equations of motion, the lower triangle of the inertia, and the
 /// orientation.
 pub(crate) struct Half<T, const R: usize> {
     pub(crate) floating: Floating<T, R>,

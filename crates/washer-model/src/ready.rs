@@ -1,13 +1,13 @@
-//! The speed amplitudes at which the linear model takes friction, where a machine leaves them to
-//! its motion: of each damper that which the linear motion itself has.
+//! The speed amplitudes at which the linear model takes friction, for machines that do not give
+//! them: each damper has the amplitude of its own linear motion.
 //!
-//! Speeds and motion depend on each other. A resonance that a force drives against the dampings c
-//! and 4 F / (pi V) has a speed whose reciprocal is linear in that of V. So a fixed point is looked
-//! for in reciprocals, by Broyden's secants (Math. Comp. 19, 1965), and mostly found by three or
-//! four linear runs.
+//! Speed amplitudes and motion depend on each other, which is a fixed-point problem. At a resonance
+//! that a force drives against the dampings c and 4 F / (pi V), the reciprocal of the speed is
+//! linear in that of V. The unknowns are therefore reciprocals. Broyden's method (Math. Comp. 19,
+//! 1965) mostly finds the fixed point with three or four linear runs.
 //!
-//! Friction that moves more slowly than 4 v_s / pi is viscous by its own law, with F / v_s. That is
-//! the least speed: a damper that the drum cannot move against its friction is taken at it.
+//! Friction at speeds below 4 v_s / pi is viscous by its force law, with F / v_s. That is the least
+//! speed amplitude, which a damper has that the drum cannot move against its friction.
 
 use crate::modes::fastest_rigid_rad_per_s;
 use crate::point::{self, legs};
@@ -25,8 +25,8 @@ const FOUND_WITHIN: f64 = 5e-3;
 /// Most motions that are tried.
 pub(crate) const MOST_MOTIONS: usize = 24;
 
-/// Phase of the fastest motion in a step of the runs, and how much shorter steps are tried where
-/// one is not stable. Steps of 0.4 rad give speeds within half a percent.
+/// The phase of the fastest motion in a step of the runs, rad. Basis: it gives speeds within half a
+/// percent. Doubling it gives errors 16 times as large.
 const STEP_RAD: f64 = 0.4;
 const SHORTER: f64 = 0.7;
 
@@ -36,22 +36,24 @@ const MOST_SHORTENED: f64 = 0.01;
 /// The bearings' cap times the step, as a share of the limit of stability.
 const STEP_TIMES_CAP: f64 = 0.9;
 
-/// Binary digits of a step behind the first: the last ones of an eigenvalue are the processor's.
+/// The number of binary digits of a step after the first. Basis: the last digits of an eigenvalue
+/// depend on the processor. Doubling it would keep more of them.
 const STEP_BITS: u32 = 8;
 
-/// A search for the own speeds of a point.
+/// A search for the speed amplitudes of a point.
 pub(crate) struct Search {
-    /// Reciprocals of the speeds (s/m), and the greatest that they may be.
+    /// The reciprocals of the speeds (s/m).
     reciprocals: Vec<f64>,
+    /// The greatest reciprocals (s/m).
     most: Vec<f64>,
-    /// The last reciprocals, and how far those of their motion were from them.
+    /// The last reciprocals, and their residuals.
     last: Option<[Vec<f64>; 2]>,
-    /// The inverse of the Jacobian of that difference, by rows.
+    /// The inverse of the residuals' Jacobian, by rows.
     inverse: Vec<Vec<f64>>,
 }
 
 impl Search {
-    /// `None` where there is nothing to look for.
+    /// Starts a search at the point's speeds; `None` if all are given.
     pub(crate) fn new(point: &Point) -> Option<Self> {
         let own: Vec<_> = point.friction_speeds.iter().filter(|taken| taken.is_own).collect();
         let count = own.len();
@@ -67,12 +69,12 @@ impl Search {
         })
     }
 
-    /// From the least speeds, so that a run that gave the point others has no say.
+    /// Starts a search at the least speeds, so that it does not depend on the point's.
     pub(crate) fn from_least(point: &Point) -> Option<Self> {
         Self::new(point).map(|search| Self { reciprocals: search.most.clone(), ..search })
     }
 
-    /// The speeds to take friction at (m/s).
+    /// Returns the speeds at which the next run takes friction (m/s).
     pub(crate) fn speeds_m_per_s(&self) -> Vec<f64> {
         self.reciprocals.iter().map(|reciprocal| 1.0 / reciprocal).collect()
     }
@@ -112,7 +114,8 @@ impl Search {
             let (step, missing, most) = (steps[k], missing[k], self.most[k]);
             let next = match (step * missing > 0.0, missing > 0.0) {
                 (true, _) => *now + step,
-                // Slower than it is taken, and the more so the slower it is taken: it is stuck.
+                // The motion is slower than assumed, the more so the slower that is: the damper
+                // sticks.
                 (false, true) => most,
                 (false, false) => *now + missing,
             };
@@ -130,7 +133,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Of the speeds of all dampers those that friction is taken at.
+/// Selects the speeds of the dampers whose amplitude is that of the motion.
 pub(crate) fn own(point: &Point, speeds_m_per_s: &[f64]) -> Vec<f64> {
     let own = point.friction_speeds.iter().filter(|taken| taken.is_own);
     own.map(|taken| speeds_m_per_s[taken.damper]).collect()
@@ -147,12 +150,12 @@ struct Open {
     is_done: bool,
 }
 
-/// Makes points ready, on lanes. Where a machine leaves the speeds at which its linear model takes
-/// friction to the motion, they are found, by runs up to the window's end. What a point has does
-/// not depend on the others.
+/// Prepares points on lanes: equilibrium, linear model, and the speed amplitudes of friction that
+/// the machine does not give, by runs up to the window's end. A point does not depend on the
+/// others.
 ///
 /// # Errors
-/// Per point: [`NoEquilibrium`].
+/// [`NoEquilibrium`] for each point without one.
 pub fn prepare(
     simd: Simd,
     points: &[(Machine, Spin)],

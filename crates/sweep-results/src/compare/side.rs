@@ -1,4 +1,4 @@
-//! One of two compared files, in memory.
+//! A compared file, in memory.
 
 use super::{Flip, SharedRow};
 use crate::error::{Result, ResultsError};

@@ -71,7 +71,6 @@ pub(crate) struct Fit {
     pub(crate) file: Option<String>,
     pub(crate) start: f64,
     pub(crate) value: f64,
-    /// By the measurement's noise and the tolerances of the fixed numbers.
     pub(crate) standard_error: Option<f64>,
     /// By the measurement's noise alone.
     pub(crate) noise_error: Option<f64>,

@@ -3,10 +3,10 @@
 use crate::machine::spin::SpinState;
 use lane_ode::{N, Real};
 
-/// Harmonics 0 to 2: 1, cos, sin, cos 2, sin 2.
+/// The number of harmonics 0 to 2: 1, cos, sin, cos 2, sin 2.
 pub(crate) const HARMONICS: usize = 5;
 
-/// Angles at which a polynomial of harmonics 0 to 2 is sampled: cos and sin of 2 pi k / 5.
+/// The sampling angles 2 pi k / 5 of a polynomial of harmonics 0 to 2, by cosine and sine.
 pub(crate) const SAMPLES: [(f64, f64); HARMONICS] = [
     (1.0, 0.0),
     (0.309_016_994_374_947_45, 0.951_056_516_295_153_5),
@@ -15,7 +15,8 @@ pub(crate) const SAMPLES: [(f64, f64); HARMONICS] = [
     (0.309_016_994_374_947_45, -0.951_056_516_295_153_5),
 ];
 
-/// Coefficients of 1, cos, sin, cos 2, sin 2 from values at [`SAMPLES`].
+/// Computes the coefficients of 1, cos, sin, cos 2, sin 2 from values at [`SAMPLES`] (a discrete
+/// Fourier transform).
 pub(crate) fn coefficients(values: [f64; HARMONICS]) -> [f64; HARMONICS] {
     let mut c = [0.0; HARMONICS];
     for (k, value) in values.into_iter().enumerate() {
@@ -28,30 +29,43 @@ pub(crate) fn coefficients(values: [f64; HARMONICS]) -> [f64; HARMONICS] {
     c
 }
 
-// The functions of an instant: harmonics, ...
+/// The index of 1.
 pub(crate) const ONE: usize = 0;
+/// The index of cos theta.
 pub(crate) const COS: usize = 1;
+/// The index of sin theta.
 pub(crate) const SIN: usize = 2;
+/// The index of cos 2 theta.
 pub(crate) const COS_2: usize = 3;
+/// The index of sin 2 theta.
 pub(crate) const SIN_2: usize = 4;
-// ... times theta', ...
+/// The index of theta'.
 pub(crate) const SPEED: usize = 5;
+/// The index of theta' cos theta.
 pub(crate) const SPEED_COS: usize = 6;
+/// The index of theta' sin theta.
 pub(crate) const SPEED_SIN: usize = 7;
+/// The index of theta' cos 2 theta.
 pub(crate) const SPEED_COS_2: usize = 8;
+/// The index of theta' sin 2 theta.
 pub(crate) const SPEED_SIN_2: usize = 9;
-// ... and as theta'^2 and theta'' bring them.
+/// The index of theta'^2.
 pub(crate) const SPIN: usize = 10;
+/// The index of theta'^2 cos theta + theta'' sin theta.
 pub(crate) const SPIN_COS: usize = 11;
+/// The index of theta'^2 sin theta - theta'' cos theta.
 pub(crate) const SPIN_SIN: usize = 12;
+/// The index of theta'^2 cos 2 theta + theta'' sin 2 theta.
 pub(crate) const SPIN_COS_2: usize = 13;
+/// The index of theta'^2 sin 2 theta - theta'' cos 2 theta.
 pub(crate) const SPIN_SIN_2: usize = 14;
+/// The index of theta''.
 pub(crate) const ACCELERATION: usize = 15;
-/// How many there are.
+/// The number of functions.
 pub(crate) const FUNCTIONS: usize = 16;
 
-/// All functions at one instant. The model page (section 5) says why theta'^2 and theta'' come in
-/// pairs.
+/// Computes all functions at an instant. The model page (section 5) derives the pairs of theta'^2
+/// and theta''.
 #[inline(always)]
 pub(crate) fn functions<T: Real>(spin: &SpinState<T>) -> [N<T>; FUNCTIONS] {
     let SpinState { sin, cos, sin_2, cos_2, speed, acceleration, .. } = *spin;

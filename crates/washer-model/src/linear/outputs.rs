@@ -1,6 +1,8 @@
-//! The linear model's outputs: exact first order in the coordinates, harmonics 0 and 1 in theta.
+//! The outputs of the linear model: exact first order in the coordinates, with harmonics 0 and 1 in
+//! theta.
 //!
-//! The part of order zero turns with the drum while the machine rests at its equilibrium.
+//! The part of order zero is the motion of the turning drum while the machine is at its
+//! equilibrium.
 
 use crate::channel::{CHANNELS, Channel, channels};
 use crate::coordinates::{
@@ -15,19 +17,22 @@ use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
 use core::array::from_fn;
 use lane_ode::{Aside, Lane, N, Real, Sample};
 
-/// Columns of an expansion: the slope along each coordinate, then the value at equilibrium.
+/// The number of columns of an expansion: the slope along each coordinate, then the value at
+/// equilibrium.
 const COLUMNS: usize = COORDINATES + 1;
+/// The column of the value at equilibrium.
 const AT_REST: usize = COORDINATES;
 
-/// Every channel, then the two components of the radial distance.
+/// The number of outputs: every channel, then the two components of the radial distance.
 const OUTPUTS: usize = CHANNELS + RADIAL;
 
-/// Angles that determine harmonics 0 and 1: cos and sin of 2 pi k / 3.
+/// The sampling angles 2 pi k / 3 of harmonics 0 and 1, by cosine and sine.
 const SAMPLES: [(f64, f64); 3] =
     [(1.0, 0.0), (-0.5, 0.866_025_403_784_438_6), (-0.5, -0.866_025_403_784_438_6)];
 
-/// Entry of a part (0: steady, 1: of theta's cosine, 2: of its sine) of an output, among the terms
-/// of `outputs` outputs. Steady parts come first; the outputs of `turning` alone have the others.
+/// Returns the entry of a part (0: steady, 1: cosine, 2: sine of theta) of an output, among the
+/// terms of `outputs` outputs. Steady parts come first. Only the outputs in `turning` have the
+/// other parts.
 const fn entry(output: usize, part: usize, turning: &[usize], outputs: usize) -> usize {
     if part == 0 {
         return output;
@@ -44,15 +49,15 @@ macro_rules! expand {
         steady [$($steady:ident)+]
         $(, turning cos [$($cos:ident)+] sin [$($sin:ident)+] rest [$($part:literal)+])?;
     )+) => {
-        /// The channels that turn.
+        /// The channels with harmonics of theta.
         const TURNING: &[usize] = &[$($(turns!($name $($part)+),)?)+];
 
-        /// Entries of the channels that hold a part of order zero.
+        /// The entries of the channels' parts of order zero.
         const CHANNELS_AT_REST: &[usize] =
             &[$($($(channel_entry(Channel::$name, $part),)+)?)+];
 
         sparse_sums! {
-            /// Coefficients of the channels.
+            /// The coefficients of the channels.
             ChannelTerms: COORDINATES => CHANNEL_ENTRIES;
             $(channel_entry(Channel::$name, 0) => $($steady)+;)+
             $($(
@@ -69,18 +74,18 @@ macro_rules! turns {
 }
 channels!(expand);
 
-/// Entries of the channels' terms.
+/// The number of entries of the channels' terms.
 const CHANNEL_ENTRIES: usize = CHANNELS + 2 * TURNING.len();
 
 const fn channel_entry(channel: Channel, part: usize) -> usize {
     entry(channel.index(), part, TURNING, CHANNELS)
 }
 
-/// Both components of the radial distance turn.
+/// The components of the radial distance with harmonics of theta: both.
 const RADIAL_TURNING: [usize; RADIAL] = [0, 1];
-/// Entries of their terms.
+/// The number of entries of the radial distance's terms.
 const RADIAL_ENTRIES: usize = 3 * RADIAL;
-/// All of them hold a part of order zero.
+/// The entries of the radial distance's parts of order zero: all.
 const RADIAL_AT_REST: [usize; RADIAL_ENTRIES] = [0, 1, 2, 3, 4, 5];
 
 const fn radial_entry(component: usize, part: usize) -> usize {
@@ -88,7 +93,7 @@ const fn radial_entry(component: usize, part: usize) -> usize {
 }
 
 sparse_sums! {
-    /// Coefficients of the radial distance.
+    /// The coefficients of the radial distance.
     RadialTerms: COORDINATES => RADIAL_ENTRIES;
     radial_entry(0, 0) => TUB_Y TUB_Z SHAFT_Y SHAFT_Z TUB_YAW TUB_PITCH SHAFT_YAW SHAFT_PITCH
         HINGE_PITCH;
@@ -100,7 +105,7 @@ sparse_sums! {
 }
 
 lane_struct! {
-    /// The outputs of one machine in `f64`, of one per lane in `T`.
+    /// The coefficients of the outputs, of one machine in `f64`, of one machine per lane in `T`.
     #[derive(Clone, Copy, Debug)]
     LinearOutputs {
         channels: ChannelTerms<T>,
@@ -111,7 +116,7 @@ lane_struct! {
 }
 
 impl<T: Lane> LinearOutputs<T> {
-    /// Deviations of the channels from equilibrium, unbalance up.
+    /// Computes the deviations of the channels from equilibrium, unbalance up.
     #[inline(always)]
     pub(crate) fn channels(&self, of: &LinearMotion<T>) -> [Sample<T>; CHANNELS] {
         let mut sums = [[of.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
@@ -120,7 +125,7 @@ impl<T: Lane> LinearOutputs<T> {
         of.turned::<CHANNEL_ENTRIES, CHANNELS>(sums, TURNING)
     }
 
-    /// The drum's front centre from the tub axis, along t2 and t3.
+    /// Computes the position of the drum's front centre relative to the tub axis, along t2 and t3.
     #[inline(always)]
     pub(crate) fn radial(&self, of: &LinearMotion<T>) -> [Sample<T>; RADIAL] {
         let mut sums = [[of.cos[0].lit(0.0); 3]; RADIAL_ENTRIES];
@@ -130,8 +135,8 @@ impl<T: Lane> LinearOutputs<T> {
     }
 }
 
-/// Adds the parts of order zero, which have no derivatives of their own: an entry's turn brings
-/// them.
+/// Adds the parts of order zero. They are constants in the drum's frame; the turn adds their
+/// derivatives.
 #[inline(always)]
 fn add_at_rest<T: Real, const ENTRIES: usize, const K: usize>(
     sums: &mut [[N<T>; 3]; ENTRIES],
@@ -143,17 +148,18 @@ fn add_at_rest<T: Real, const ENTRIES: usize, const K: usize>(
     }
 }
 
-/// What the outputs are made of, each with two time derivatives.
+/// The coordinates and the functions of theta, each with two time derivatives.
 pub(crate) struct LinearMotion<T> {
-    /// Deviations from equilibrium.
+    /// The deviations from equilibrium.
     coordinates: [[N<T>; 3]; COORDINATES],
-    /// Of theta.
+    /// The cosine of theta.
     cos: [N<T>; 3],
+    /// The sine of theta.
     sin: [N<T>; 3],
 }
 
 impl<T: Real> LinearMotion<T> {
-    /// Deviations from equilibrium at an instant.
+    /// Computes the functions at an instant; `motion` holds deviations from equilibrium.
     #[inline(always)]
     pub(crate) fn new(spin: &SpinState<T>, motion: &MovingCoordinates<T>) -> Self {
         let zero = spin.sin.lit(0.0);
@@ -169,7 +175,7 @@ impl<T: Real> LinearMotion<T> {
         }
     }
 
-    /// Outputs from their sums, cos and sin parts after all others.
+    /// Combines steady, cosine and sine parts to outputs.
     #[inline(always)]
     fn turned<const ENTRIES: usize, const M: usize>(
         &self,
@@ -196,7 +202,7 @@ impl<T: Real> LinearMotion<T> {
     }
 }
 
-/// A product with its two derivatives.
+/// Computes a product with its two derivatives.
 #[inline(always)]
 fn product<T: Real>(a: &[N<T>; 3], b: &[N<T>; 3]) -> [N<T>; 3] {
     let slope = a[0] * b[1] + a[1] * b[0];
@@ -204,7 +210,7 @@ fn product<T: Real>(a: &[N<T>; 3], b: &[N<T>; 3]) -> [N<T>; 3] {
     [(a[0] * b[0]).v(), slope, curvature]
 }
 
-/// Expands the nonlinear outputs of one machine per lane about the equilibrium `q`.
+/// The linearisation of the outputs of one machine per lane about the equilibrium `q`.
 pub(crate) struct LineariseOutputs<'a, T> {
     pub(crate) bodies: &'a Bodies<T>,
     pub(crate) q: &'a [N<T>; COORDINATES],
@@ -248,8 +254,7 @@ fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64> {
             let mean = (values[0] + values[1] + values[2]) / 3.0;
             let cos = (2.0 * values[0] - values[1] - values[2]) / 3.0;
             let sin = (values[1] - values[2]) * 2.0 * SAMPLES[1].1 / 3.0;
-            // Channels are deviations from their values at theta = 0, where the cosine's part is
-            // whole.
+            // Channels are deviations from their values at theta = 0, where the cosine is 1.
             let steady = if column == AT_REST && output < CHANNELS { -cos } else { mean };
             for (part, coefficient) in [steady, cos, sin].into_iter().enumerate() {
                 let (entry, terms, at_rest) = if output >= CHANNELS {

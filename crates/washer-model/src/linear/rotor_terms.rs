@@ -1,9 +1,9 @@
-//! Which terms the rotor's linear equations have: the nonzero harmonics of its arrays, by entry.
+//! The sparsity pattern of the rotor's linear equations: the nonzero harmonics of each entry.
 //!
-//! Rows are those of one half: y, z of its midpoint, then its rotations about the mass centre.
-//! Columns are q7 to q10, because the rotor's forces depend on q3 and q4 through the bearings
-//! alone. The places are the same for every machine: the drum's mass centre lies in the plane of d1
-//! and d2, which is upright at rest.
+//! Rows are y and z of the midpoint, then the rotations about the mass centre. Columns are q7 to
+//! q10, because the rotor's forces depend on q3 and q4 through the bearings only. The pattern is
+//! the same for every machine, because the drum's mass centre lies in the plane of d1 and d2, which
+//! is upright at rest.
 
 use crate::lanes::lane_struct;
 use crate::linear::harmonics::{
@@ -13,61 +13,65 @@ use crate::linear::harmonics::{
 use crate::linear::sparse::sparse_sums;
 use lane_ode::N;
 
-/// Rows of the rotor.
+/// The number of the rotor's rows.
 pub(crate) const ROWS: usize = 6;
-/// Its rotations.
+/// The number of the rotor's rotations.
 pub(crate) const TURNS: usize = 4;
 
+/// The first entry of the partial velocities.
 const ARM: usize = 0;
+/// The first entry of the force.
 const FORCE: usize = ARM + 2 * TURNS;
+/// The first entry of the stiffness.
 const STIFFNESS: usize = FORCE + ROWS;
+/// The first entry of the damping.
 const DAMPING: usize = STIFFNESS + ROWS * TURNS;
 
-/// Entries of all arrays of the rotor together but its inertia.
+/// The number of entries of all arrays of the rotor except the inertia.
 pub(crate) const ENTRIES: usize = DAMPING + ROWS * TURNS;
-/// Entries of its inertia: the lower triangle.
+/// The number of entries of the inertia's lower triangle.
 pub(crate) const INERTIA_ENTRIES: usize = TURNS * (TURNS + 1) / 2;
 
-/// Entry of the inertia matrix about the mass centre, `row` not less than `column`, among those of
-/// the inertia.
+/// Returns the entry of the inertia about the mass centre, for `row` not less than `column`.
 pub(crate) const fn inertia(row: usize, column: usize) -> usize {
     row * (row + 1) / 2 + column
 }
 
-/// Entry of the mass centre's partial velocity by a rotation, along y (0) or z (1).
+/// Returns the entry of the mass centre's partial velocity by a rotation, along y (0) or z (1).
 pub(crate) const fn arm(rotation: usize, direction: usize) -> usize {
     ARM + 2 * rotation + direction
 }
 
-/// Entry of the force.
+/// Returns the entry of the force.
 pub(crate) const fn force(row: usize) -> usize {
     FORCE + row
 }
 
-/// Whether a force depends on a rotation and its speed. The midpoint's y does not depend on the
-/// yaw.
+/// Returns whether a force depends on a rotation and its speed. The midpoint's y does not depend on
+/// the yaw.
 pub(crate) const fn moves(row: usize, column: usize) -> bool {
     row > 0 || column > 0
 }
 
-/// Entry of the stiffness matrix.
+/// Returns the entry of the stiffness matrix.
 pub(crate) const fn stiffness(row: usize, column: usize) -> usize {
     STIFFNESS + row * TURNS + column
 }
 
-/// Entry of the damping and gyroscopic matrix.
+/// Returns the entry of the damping and gyroscopic matrix.
 pub(crate) const fn damping(row: usize, column: usize) -> usize {
     DAMPING + row * TURNS + column
 }
 
 lane_struct! {
-    /// Coefficients of all terms of the rotor, of one machine in `f64`, of one per lane in `T`.
+    /// The coefficients of all terms of the rotor, of one machine in `f64`, of one machine per lane
+    /// in `T`.
     #[derive(Clone, Copy, Debug)]
     Terms { inertia: InertiaTerms<T>, others: RotorTerms<T> }
 }
 
 impl Terms<f64> {
-    /// The inertia's entries and all others, at the functions of an instant.
+    /// Evaluates the inertia's entries and all others at the functions of an instant.
     pub(crate) fn at(
         &self,
         functions: &[N<f64>; FUNCTIONS],
@@ -79,7 +83,7 @@ impl Terms<f64> {
     }
 }
 
-/// Partial velocities of the mass centre, among all entries.
+/// Returns the partial velocities of the mass centre.
 #[inline(always)]
 pub(crate) fn arms<T: Copy>(entries: &[N<T>; ENTRIES]) -> [[N<T>; 2]; TURNS] {
     let mut arms = [[entries[0]; 2]; TURNS];
@@ -90,7 +94,7 @@ pub(crate) fn arms<T: Copy>(entries: &[N<T>; ENTRIES]) -> [[N<T>; 2]; TURNS] {
 }
 
 sparse_sums! {
-    /// Coefficients of the inertia's terms.
+    /// The coefficients of the inertia's terms.
     InertiaTerms: FUNCTIONS => INERTIA_ENTRIES;
     inertia(0, 0) => ONE COS SIN COS_2 SIN_2;
     inertia(1, 0) => ONE COS SIN COS_2 SIN_2;
@@ -105,7 +109,7 @@ sparse_sums! {
 }
 
 sparse_sums! {
-    /// Coefficients of all other terms.
+    /// The coefficients of all other terms.
     RotorTerms: FUNCTIONS => ENTRIES;
     arm(0, 1) => ONE COS SIN;
     arm(1, 0) => ONE COS;

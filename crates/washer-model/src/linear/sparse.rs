@@ -1,7 +1,7 @@
-//! Sums of few terms each, whose places are known at compile time.
+//! Sparse linear combinations whose pattern is known at compile time.
 //!
 //! Most coefficients of the linear model vanish for every machine. A table in the source names the
-//! others and compiles to code without loops, indices or branches: one multiplication per term.
+//! others. It compiles to code without loops, indices or branches: one multiplication per term.
 
 /// Declares a set of coefficients, and the entries as sums of coefficients times functions:
 /// `entry => function function ...;`.
@@ -20,17 +20,17 @@ macro_rules! sparse_sums {
             $(#[$doc])*
             #[derive(Clone, Copy, Debug)]
             $name {
-                /// By entry, then function.
+                /// The coefficients, by entry, then function.
                 terms: [lane_ode::N<T>; [$($first $(, $other)*),+].len()],
             }
         }
 
         impl $name<f64> {
-            /// Entry and function of each term.
+            /// The entry and the function of each term.
             const PLACES: [(usize, usize); [$($first $(, $other)*),+].len()] =
                 [$(($entry, $first) $(, ($entry, $other))*),+];
 
-            /// The terms that the table names, of all coefficients: by entry, then function.
+            /// Selects the coefficients that the table names.
             pub(crate) fn gather(all: &[[f64; $functions]; $entries]) -> Self {
                 let coefficient = |(entry, function): (usize, usize)| all[entry][function];
                 Self { terms: Self::PLACES.map(|place| lane_ode::N(coefficient(place))) }
@@ -38,7 +38,7 @@ macro_rules! sparse_sums {
         }
 
         impl<T: lane_ode::Lane> $name<T> {
-            /// The sums.
+            /// Computes the entries that the table names.
             #[inline(always)]
             pub(crate) fn sum<V: $crate::linear::sparse::Summand<T>>(
                 &self,
@@ -53,7 +53,7 @@ macro_rules! sparse_sums {
                         let coefficient = next(&self.terms, &mut place);
                         let sum = sum.plus_scaled(coefficient, functions[$other]);
                     )*
-                    // Found when compiling, whatever expression it is.
+                    // Evaluates the entry's expression at compile time.
                     sums[const { $entry }] = sum;
                 )+
             }
@@ -62,19 +62,19 @@ macro_rules! sparse_sums {
 }
 pub(crate) use sparse_sums;
 
-/// The next coefficient.
+/// Returns the next coefficient.
 #[inline(always)]
 pub(crate) fn next<T: Copy>(coefficients: &[N<T>], place: &mut usize) -> N<T> {
     *place += 1;
     coefficients[*place - 1]
 }
 
-/// What is summed: a number, or one with its first two derivatives. No loops: a model has
-/// hundreds of terms, and each loop costs the compiler more than the term.
+/// A summand: a number, or a number with its first two derivatives. Implementations have no loops,
+/// because a model has hundreds of terms, and a loop costs the compiler more than the term.
 pub(crate) trait Summand<T>: Copy {
-    /// A coefficient times this.
+    /// Returns the coefficient times this summand.
     fn scaled(self, coefficient: N<T>) -> Self;
-    /// This plus a coefficient times another.
+    /// Returns this summand plus the coefficient times another one.
     fn plus_scaled(self, coefficient: N<T>, other: Self) -> Self;
 }
 

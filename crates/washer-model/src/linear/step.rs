@@ -1,9 +1,9 @@
-//! The linear model as an integrator evaluates it.
+//! The linear model in the form that an integrator evaluates.
 //!
-//! Constants of a trajectory are computed once, functions of theta alone once per instant. The
-//! stages only multiply known matrices with coordinates, speeds and loads. Coordinates come before
-//! speeds: a stage's coordinates are known one stage earlier, so that few operations wait for the
-//! accelerations of the stage before.
+//! The constants of a trajectory are computed once, and functions of theta once per instant. A
+//! stage only multiplies known matrices with coordinates, speeds and loads. The terms of the
+//! coordinates are computed before those of the speeds: a stage's coordinates are known one stage
+//! earlier, so that few operations wait for the accelerations of the stage before.
 
 use crate::COORDINATES;
 use crate::coordinates::{ROTOR_TURNS, TUB};
@@ -29,7 +29,7 @@ lane_struct! {
         tub_per_position: [[N<T>; 4]; 4],
         tub_per_speed: [[N<T>; 4]; 4],
         tub_per_load: [[N<T>; 4]; 4],
-        /// Deflection by these accelerations; lower triangle.
+        /// The lower triangle of the bearings' deflections by the tub's accelerations under loads.
         tub_compliance: [[N<T>; 4]; 4],
         tub_axis: [[N<T>; 2]; 2],
         rotor_per_mass: N<T>,
@@ -37,17 +37,17 @@ lane_struct! {
         /// The bearings' stiffness in one direction: force by offset, force by tilt, moment by
         /// tilt.
         bearing_stiffness: [N<T>; 3],
-        /// Its inverse.
+        /// The inverse of the bearings' stiffness.
         bearing_compliance: [N<T>; 3],
     }
 }
 
 impl StepConstants<f64> {
-    /// Of one machine.
+    /// Computes the constants of a machine.
     pub(crate) fn new(b: &Bodies<f64>, c: &Constants<f64>) -> Self {
         let zero = N(0.0);
         let inertia = Factors::new(c.tub_inertia);
-        // Accelerations under forces and torques about the mass centre, and under loads of the
+        // Computes accelerations by forces and torques about the mass centre and by loads on the
         // axis.
         let under = |[y, z, yaw, pitch]: [N<f64>; 4], load: [N<f64>; 4]| {
             let floating = Floating {
@@ -101,13 +101,14 @@ impl StepConstants<f64> {
 }
 
 impl<T: Lane> StepConstants<T> {
-    /// Offset (y, z) and tilt (y, z) that the bearings feel of coordinates; of accelerations alike.
+    /// Computes the bearings' offset (y, z) and tilt (y, z) from coordinates, or their second
+    /// derivatives from accelerations.
     #[inline(always)]
     fn deflection(&self, q: &[N<T>; COORDINATES]) -> [N<T>; 4] {
         Deflection::linear(q, &self.tub_axis, &self.rotor_axis).rows()
     }
 
-    /// Load of the bearings, as springs, on the shaft.
+    /// Computes the load of the bearings' springs on the shaft.
     #[inline(always)]
     fn spring_load(&self, [y, z, tilt_y, tilt_z]: &[N<T>; 4]) -> [N<T>; 4] {
         let [by_offset, mixed, by_tilt] = self.bearing_stiffness;
@@ -125,26 +126,25 @@ impl<T: Lane> StepConstants<T> {
 #[derive(Clone, Copy)]
 pub(crate) struct RotorAt<T> {
     entries: [N<T>; ENTRIES],
-    /// Of the inertia about the mass centre.
+    /// The inverse of the inertia about the mass centre.
     inverse: Symmetric4<T>,
     bearings: BearingsAt<T>,
 }
 
-/// The bearings with mass at an instant (`nonlinear/coupling.rs`); not computed where they are
-/// springs.
+/// The bearings with scaled mass at an instant (`nonlinear/coupling.rs`); not computed for springs.
 #[derive(Clone, Copy)]
 struct BearingsAt<T> {
-    /// Inverse of w^2 K^-1 + C.
+    /// The inverse of w^2 K^-1 + C.
     system_inverse: Symmetric4<T>,
-    /// Factor of the deflection beside its second derivative: w^2 + theta'^2.
+    /// The factor of the deflection, w^2 + theta'^2.
     per_deflection: N<T>,
-    /// Accelerations of the rotor by loads: its midpoint (y, z), and its rotations.
+    /// The accelerations of the rotor's midpoint (y, z) and of its rotations by loads.
     translation_per_load: [[N<T>; 4]; 2],
     rotation_per_load: [[N<T>; 4]; 4],
 }
 
 impl<T: Lane> RotorAt<T> {
-    /// At one instant.
+    /// Computes the arrays at an instant.
     #[inline(always)]
     pub(crate) fn new(
         constants: &StepConstants<T>,
@@ -179,8 +179,8 @@ impl<T: Lane> RotorAt<T> {
         let functions = harmonics::functions(spin);
         let zero = spin.sin.lit(0.0);
         terms.others.sum(&functions, &mut self.entries);
-        // The inverse comes last: it is a long chain of operations, and a stage begins with
-        // operations that do not need it.
+        // The inverse is a long chain of dependent operations. It comes last, because a stage
+        // begins with operations that do not need it.
         let mut sums = [zero; INERTIA_ENTRIES];
         terms.inertia.sum(&functions, &mut sums);
         let mut inertia = [[zero; 4]; 4];
@@ -208,7 +208,8 @@ impl<T: Lane> RotorAt<T> {
 }
 
 impl<T: Lane> BearingsAt<T> {
-    /// From the inverse of the rotor's inertia and the partial velocities of its mass centre.
+    /// Computes the arrays from the inverse of the rotor's inertia and the partial velocities of
+    /// its mass centre.
     #[inline(always)]
     fn new(
         c: &StepConstants<T>,
@@ -234,7 +235,7 @@ impl<T: Lane> BearingsAt<T> {
                 [(by_pitch * axis[1][0]).v(), by_yaw * axis[0][1] + by_pitch * axis[1][1]];
             rotation[row] = [by_force[0], by_force[1], by_moment[0], by_moment[1]];
         }
-        // C: how midpoint and axis accelerate by loads, on the rotor's side.
+        // C: the accelerations of midpoint and axis by loads, on the rotor's side.
         let mut compliance = [[zero; 4]; 4];
         compliance[0][0] = c.rotor_per_mass;
         compliance[1][1] = c.rotor_per_mass;
@@ -269,7 +270,7 @@ impl<T: Lane> BearingsAt<T> {
         }
     }
 
-    /// The load on the tub, from a deflection and its second derivative in absence of loads.
+    /// Computes the load on the tub from a deflection and its second derivative without loads.
     #[inline(always)]
     fn reaction(&self, deflection: &[N<T>; 4], second: &[N<T>; 4]) -> [N<T>; 4] {
         let mut sum = *second;
@@ -280,7 +281,7 @@ impl<T: Lane> BearingsAt<T> {
     }
 }
 
-/// Accelerations du/dt at deviations `q` from equilibrium and speeds `u`.
+/// Computes the accelerations du/dt at deviations `q` from equilibrium and speeds `u`.
 #[inline(always)]
 pub(crate) fn accelerations<T: Lane>(
     c: &StepConstants<T>,
@@ -365,8 +366,8 @@ pub(crate) fn accelerations<T: Lane>(
     in_order(&tub, &midpoint, &rotation)
 }
 
-/// Accelerations of the tub, of the rotor's midpoint and of its rotations, as coordinates are
-/// numbered.
+/// Arranges the accelerations of the tub, of the rotor's midpoint and of the rotor's rotations in
+/// the order of the coordinates.
 #[inline(always)]
 fn in_order<T: Copy>(
     tub: &[N<T>; 4],

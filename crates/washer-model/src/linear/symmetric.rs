@@ -1,19 +1,19 @@
-//! Inverses of small symmetric matrices.
+//! Inversion of small symmetric matrices.
 
 use lane_ode::{N, Real};
 
-/// A symmetric 4x4 matrix; its lower triangle.
+/// A symmetric 4x4 matrix, stored by the lower triangle.
 #[derive(Clone, Copy)]
 pub(crate) struct Symmetric4<T>(pub(crate) [[N<T>; 4]; 4]);
 
 impl<T: Real> Symmetric4<T> {
-    /// Entry (row, column) of either triangle.
+    /// Returns entry (row, column) of either triangle.
     #[inline(always)]
     pub(crate) fn at(&self, row: usize, column: usize) -> N<T> {
         if row < column { self.0[column][row] } else { self.0[row][column] }
     }
 
-    /// Product with a vector.
+    /// Returns the product with a vector.
     #[inline(always)]
     pub(crate) fn times(&self, v: &[N<T>; 4]) -> [N<T>; 4] {
         let mut product = *v;
@@ -26,10 +26,9 @@ impl<T: Real> Symmetric4<T> {
         product
     }
 
-    /// Inverse of a positive definite matrix: two divisions, and no chain of operations as long as
-    /// in four pivots.
-    ///
-    /// In blocks of 2x2, with M = [A, B^T; B, D] and S = D - B A^-1 B^T.
+    /// Inverts a positive definite matrix by 2x2 blocks, with M = [A, B^T; B, D] and the Schur
+    /// complement S = D - B A^-1 B^T. Two divisions make a shorter chain of dependent operations
+    /// than four pivots.
     #[inline(always)]
     pub(crate) fn inverse(&self) -> Self {
         let m = &self.0;
@@ -68,7 +67,7 @@ impl<T: Real> Symmetric4<T> {
     }
 }
 
-/// Inverse of a symmetric 2x2 matrix; entries (0, 0), (1, 0) and (1, 1).
+/// Inverts a symmetric 2x2 matrix, given and returned by its entries (0, 0), (1, 0) and (1, 1).
 #[inline(always)]
 fn inverse_2<T: Real>([a, b, d]: [N<T>; 3]) -> [N<T>; 3] {
     let per_determinant = (a * d - (b * b).v()).recip();
@@ -83,7 +82,7 @@ mod tests {
     fn val_inverse_undoes_the_matrix() {
         let mut random = fastrand::Rng::with_seed(7);
         for _ in 0..100 {
-            // G G^T with some distance from singular.
+            // G G^T + 0.1 is positive definite and not nearly singular.
             let g: [[f64; 4]; 4] =
                 core::array::from_fn(|_| core::array::from_fn(|_| random.f64() - 0.5));
             let matrix = Symmetric4(core::array::from_fn(|i| {

@@ -1,16 +1,16 @@
-//! What the cabinet's feet carry: the floor holds a cabinet that does not move against its own
-//! weight and the forces of the suspension.
+//! The loads of the cabinet's feet. The cabinet does not move; the floor balances its weight and
+//! the forces of the suspension.
 
 use lane_ode::{N, Real};
 
 use crate::Machine;
 use crate::lanes::lane_struct;
 
-/// Most feet.
+/// The greatest number of feet.
 pub(crate) const FEET: usize = 4;
 
-/// Components of a load on the cabinet: its force along c1, c2 and c3 (N), and its moment about O
-/// (N m).
+/// The number of components of a load on the cabinet: the force along c1, c2 and c3 (N), then the
+/// moment about O (N m).
 pub(crate) const LOAD: usize = 6;
 
 /// Added to the sum of the feet's loads (N), which may be none.
@@ -23,38 +23,39 @@ const LEAST_ARM_M: f64 = 0.01;
 /// Feet closer to one line than this share of their distances hold no cabinet upright.
 const IN_LINE: f64 = 1e-6;
 
-/// How loads on the cabinet spread over its feet.
+/// The distribution of loads on the cabinet over its feet.
 ///
-/// Three feet carry what statics says. Four are taken as equally stiff under a rigid cabinet: then
-/// the loads are the linear function of x and z that balances forces and moments. The horizontal
-/// force is taken by the feet together, at their mean height.
+/// The loads of three feet follow from statics. Four feet are taken as equally stiff under a rigid
+/// cabinet, so that the loads are the linear function of x and z that balances forces and moments.
+/// The horizontal force acts on the feet together, at their mean height.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Feet {
-    /// How many there are, 3 or 4.
+    /// The number of feet, 3 or 4.
     pub(crate) count: usize,
     pub(crate) spread: Spread<f64>,
 }
 
 lane_struct! {
-    /// The numbers by which loads spread. Beyond the last foot is the first again, which carries
-    /// nothing.
+    /// The coefficients of the distribution. Entries beyond the last foot repeat the place of the
+    /// first and carry nothing.
     #[derive(Clone, Copy, Debug)]
     Spread {
         /// Vertical load of each foot by the cabinet's own weight (N).
         own: [N<T>; FEET],
-        /// What each takes of a load on the cabinet.
+        /// The vertical load of each foot per component of a load on the cabinet.
         shares: [[N<T>; LOAD]; FEET],
-        /// Where each is along c1 and c3 (m).
+        /// The position of each foot along c1 and c3 (m).
         places: [[N<T>; 2]; FEET],
-        /// Coefficient of friction.
+        /// The coefficient of friction.
         friction: N<T>,
-        /// Weight of the cabinet (N).
+        /// The weight of the cabinet (N).
         weight: N<T>,
     }
 }
 
 impl Feet {
-    /// Those of a machine; `None` if it has no cabinet, not three or four feet, or all in a line.
+    /// Computes the distribution of a machine; `None` without a cabinet, with other than three or
+    /// four feet, or with all feet in a line.
     pub(crate) fn new(machine: &Machine) -> Option<Self> {
         let cabinet = machine.cabinet?;
         let count = machine.feet.len();
@@ -104,7 +105,7 @@ impl Feet {
         Some(Self { count, spread: Spread { own, shares, places, friction, weight } })
     }
 
-    /// The vertical loads of the feet (N) under a load on the cabinet.
+    /// Returns the vertical loads of the feet (N) under a load on the cabinet.
     pub(crate) fn loads_n(&self, load: &[f64; LOAD]) -> Vec<f64> {
         let of_foot = |k: usize| {
             let shares = self.spread.shares[k].iter().zip(load);
@@ -113,15 +114,15 @@ impl Feet {
         (0..self.count).map(of_foot).collect()
     }
 
-    /// The margin against slipping (N) under a load on the cabinet.
+    /// Returns the margin against slipping (N) under a load on the cabinet.
     pub(crate) fn slip_margin_n(&self, load: &[f64; LOAD]) -> f64 {
         let [along_x, along_y, along_z, ..] = *load;
         let Spread { friction: N(friction), weight: N(weight_n), .. } = self.spread;
         friction * (weight_n - along_y) - (along_x * along_x + along_z * along_z).sqrt()
     }
 
-    /// The margin against walking (N) under a load on the cabinet: against slipping, turning or
-    /// both.
+    /// Returns the margin against walking (N) under a load on the cabinet: against slipping,
+    /// turning or both.
     pub(crate) fn walk_margin_n(&self, load: &[f64; LOAD]) -> f64 {
         let mut carried = [N(0.0); FEET];
         for (carried, load_n) in carried.iter_mut().zip(self.loads_n(load)) {
@@ -130,7 +131,7 @@ impl Feet {
         self.slip_margin_n(load) - turning_n(&self.spread.places, &carried, &load.map(N)).0
     }
 
-    /// The loads before the machine sags.
+    /// Returns the vertical loads of the feet (N) before the machine sags.
     pub(crate) fn at_rest_n(&self, machine: &Machine) -> Vec<f64> {
         let bodies = [
             (machine.tub.mass_kg, machine.tub.centre_x_m),
@@ -147,12 +148,14 @@ impl Feet {
     }
 }
 
-/// What a load's moment about the vertical takes of the margin against slipping (N).
+/// Returns the part of the margin against slipping (N) that a load's moment about the vertical
+/// uses.
 ///
-/// Floor forces hold the cabinet if each is within the friction of its foot. Those that share the
-/// horizontal force by the feet's loads leave the moment about the centre of the loads; forces
-/// across the arms from there, by load and arm, take it, and add up to no force. The foot with the
-/// longest arm has most of both.
+/// The cabinet stays in place if the floor force of each foot is within the foot's friction. The
+/// feet share the horizontal force in proportion to their loads, which balances it with a moment
+/// about the centre of the loads left over. Forces across the arms from that centre, in proportion
+/// to load and arm, balance the moment and have no resultant. The sum of both is greatest, relative
+/// to the load, at the foot with the longest arm.
 #[inline(always)]
 pub(crate) fn turning_n<T: Real>(
     places: &[[N<T>; 2]; FEET],
@@ -163,7 +166,7 @@ pub(crate) fn turning_n<T: Real>(
     let (mut sum, mut moments) = (load[0].lit(LEAST_N), [nothing; 2]);
     let mut loaded = *carried;
     for k in 0..FEET {
-        // A foot that would lift holds nothing.
+        // A foot that would lift has no friction.
         loaded[k] = carried[k].where_less(nothing, nothing, carried[k]);
         sum += loaded[k];
         moments[0] += loaded[k] * places[k][0];
@@ -235,8 +238,8 @@ mod tests {
         }
     }
 
-    // The floor's forces, foot by foot: they hold the cabinet, and the margin is zero where the
-    // first of them, its parts taken by their sizes, is all that its foot's friction gives.
+    // The floor's forces, foot by foot, balance the load. The margin is zero where the first of
+    // them, with its two parts added by magnitude, reaches the friction of its foot.
     #[test]
     fn a_cabinet_with_a_margin_against_walking_is_held_within_the_friction_of_every_foot() {
         let mut decided = 0;
@@ -308,7 +311,7 @@ mod tests {
         let loads_n = Feet::new(&machine).unwrap().at_rest_n(&machine);
         let weight_n = 9.81 * (30.0 + 23.87 + 4.34 + 3.64 + 0.4);
         assert!((loads_n.iter().sum::<f64>() - weight_n).abs() < 1e-9, "{loads_n:?}");
-        // The cabinet's centre is off to c3: the feet there carry more.
+        // The cabinet's centre is towards c3, so that the feet there carry more.
         assert!(loads_n[0] > loads_n[1] && loads_n[2] > loads_n[3], "{loads_n:?}");
     }
 

@@ -1,6 +1,6 @@
-//! The one table of parameters: every number of machine, spin and window under one flat,
-//! unit-suffixed name, with its unit, meaning, source and range. Grid axes, `[set]`, `--set`,
-//! reports and the machine file's checks all read it.
+//! The table of parameters: every number of machine, spin and window under a flat name with a unit
+//! suffix, with unit, description, source and range. Grid axes, `[set]`, `--set`, reports and the
+//! machine file's checks read it.
 
 mod assumed;
 mod table;
@@ -16,8 +16,8 @@ use table::{LISTS, TABLE};
 
 /// A number of the machine, the spin or the window that a user can name, set and sweep.
 ///
-/// Most write one number. Some write several at once, such as `spring_stiffness_n_per_m` that of
-/// all springs; see [`Parameter::parts`].
+/// Most parameters write one number. Some write several: `spring_stiffness_n_per_m` writes the
+/// stiffness of all springs; see [`Parameter::parts`].
 #[derive(Clone)]
 pub struct Parameter {
     name: Cow<'static, str>,
@@ -26,30 +26,32 @@ pub struct Parameter {
     index: usize,
 }
 
-/// Farther than this (m) is no place on a machine, and no motion of one.
+/// The greatest coordinate of a point on a machine, and of a motion, m. Basis: larger than any
+/// washing machine, smaller than millimetres taken for metres. Doubling it accepts twice as large
+/// machines.
 pub(crate) const MAX_COORDINATE_M: f64 = 10.0;
 
-/// What a parameter writes.
+/// The target of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
-    /// One number of the machine.
+    /// A number of the machine.
     Machine,
     /// A number of the cabinet, which not every machine has.
     Cabinet,
-    /// A number of both bearings, by its name after `bearing_front_` and `bearing_rear_`.
+    /// A number of both bearings, by the name after `bearing_front_` and `bearing_rear_`.
     Bearings(&'static str),
-    /// A number of every spring, by its name after `spring_1_`.
+    /// A number of every spring, by the name after `spring_1_`.
     Springs(&'static str),
-    /// A number of every damper, by its name after `damper_1_`.
+    /// A number of every damper, by the name after `damper_1_`.
     Dampers(&'static str),
-    /// A number of the spin: of its profile, or of a point of its table.
+    /// A number of the spin's profile, or of a point of the spin's table.
     Spin,
     /// An edge of the window (0: the beginning, 1: the end), which neither machine nor spin holds:
     /// [`Parameter::get`] finds nothing and [`Parameter::set`] writes nothing.
     Window(usize),
 }
 
-/// One line of the table.
+/// A row of the table.
 #[derive(Debug)]
 struct Row {
     /// The whole name, or what follows `spring_1_` and the like.
@@ -58,39 +60,40 @@ struct Row {
     description: &'static str,
     source: &'static str,
     range: Range,
+    /// The value where a machine file leaves the number out, if it may.
     left_out: Option<f64>,
-    /// The rule where a file with a data sheet's numbers leaves it out.
+    /// The rule for the value where a file with a data sheet's numbers leaves it out.
     assumption: Option<Assumption>,
     target: Target,
     get: Get,
     set: Set,
 }
 
-/// Reads the number, of which element.
+/// A function that reads the number of an element.
 type Get = fn(&Machine, &Spin, usize) -> Option<f64>;
 
-/// Writes it.
+/// A function that writes the number of an element.
 type Set = fn(&mut Machine, &mut Spin, usize, f64);
 
-/// A list of the machine's elements, in machine files an array of tables; or the points of a spin's
-/// table.
+/// A list of the machine's elements, which is an array of tables in machine files, or the points of
+/// a spin's table.
 #[derive(Debug)]
 pub struct ElementList {
-    /// Key in machine files; none of a spin's table.
+    /// The key in machine files; empty for a spin's table.
     pub name: &'static str,
-    /// What names of parameters begin with; the number and the row's name follow.
+    /// The beginning of the parameters' names, before the number and the row's name.
     pub element: &'static str,
-    /// Number of the first element.
+    /// The number of the first element.
     pub first: usize,
-    /// How many a machine has.
+    /// The function that returns the number of elements of a machine.
     pub count: fn(&Machine) -> usize,
-    /// Gives a machine so many, each with what may be left out left out.
+    /// The function that gives a machine a number of elements, with default values.
     pub fill: fn(&mut Machine, usize),
     rows: &'static [&'static [Row]],
 }
 
 impl ElementList {
-    /// Every one of a machine, in the order of machine files.
+    /// Iterates over the lists of a machine, in the order of machine files.
     pub fn all() -> impl Iterator<Item = &'static Self> {
         LISTS.iter().filter(|list| !list.name.is_empty())
     }
@@ -110,7 +113,7 @@ impl ElementList {
 }
 
 impl Target {
-    /// Whether these are several numbers at once.
+    /// Returns whether the target is several numbers.
     pub const fn is_several(self) -> bool {
         matches!(self, Self::Bearings(_) | Self::Springs(_) | Self::Dampers(_))
     }
@@ -169,8 +172,8 @@ impl fmt::Debug for Parameter {
 }
 
 impl Parameter {
-    /// Every parameter of this machine and spin, in the table's order, numbered elements one by
-    /// one.
+    /// Returns every parameter of a machine and a spin in the table's order, those of lists element
+    /// by element.
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
         let is_there = |row: &&Row| row.target.is_of(machine, spin).is_ok();
         let single = TABLE.iter().filter(is_there).map(Self::single);
@@ -181,10 +184,10 @@ impl Parameter {
         single.chain(numbered).collect()
     }
 
-    /// The parameter of this name.
+    /// Returns the parameter of a name.
     ///
     /// # Errors
-    /// When the table has no such row, or this machine or spin no such number.
+    /// A name that the table does not have, or a number that the machine or the spin does not have.
     pub fn find(name: &str, machine: &Machine, spin: &Spin) -> Result<Self, UnknownParameter> {
         if let Some(row) = TABLE.iter().find(|row| row.name == name) {
             return row.target.is_of(machine, spin).map(|()| Self::single(row));
@@ -211,29 +214,29 @@ impl Parameter {
         Err(UnknownParameter::strange())
     }
 
-    /// Name in grid files, on the command line and of the result's column.
+    /// Returns the name in grid files, on the command line and of the result's column.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// SI unit (rpm for speeds), as in the name's suffix but readable.
+    /// Returns the SI unit (rpm for speeds of the spin).
     pub fn unit(&self) -> &'static str {
         self.row.unit
     }
 
-    /// What it is, in a phrase.
+    /// Returns the description.
     pub fn description(&self) -> &'static str {
         self.row.description
     }
 
-    /// Where the built-in machine's value comes from: the paper and where in it, `derived` or
-    /// `assumed` and how, a convention, or the grid file.
+    /// Returns the source of the built-in machine's value: a place in the paper, `derived` or
+    /// `assumed` with the reason, a convention, or the grid file.
     pub fn source(&self) -> &'static str {
         self.row.source
     }
 
-    /// Values it may take. No place on a machine is farther than 10 m: who writes millimetres is
-    /// told.
+    /// Returns the range of values. Coordinates are at most [`MAX_COORDINATE_M`], so that
+    /// millimetres are refused.
     pub fn range(&self) -> Range {
         match (self.row.unit, self.row.range) {
             ("m", Range::Any) => Range::Within(-MAX_COORDINATE_M, MAX_COORDINATE_M),
@@ -242,35 +245,34 @@ impl Parameter {
         }
     }
 
-    /// What it is where a machine file leaves it out, if it may.
+    /// Returns the value where a machine file leaves the number out, if it may.
     pub fn left_out(&self) -> Option<f64> {
         self.row.left_out
     }
 
-    /// Returns the rule for its value where a file with a data sheet's numbers leaves it out.
+    /// Returns the rule for the value where a file with a data sheet's numbers leaves it out.
     pub fn assumption(&self) -> Option<&'static Assumption> {
         self.row.assumption.as_ref()
     }
 
-    /// What it writes.
+    /// Returns the target.
     pub fn target(&self) -> Target {
         self.row.target
     }
 
-    /// Its value; `None` if it writes several numbers and they differ, or if the machine has no
-    /// such number.
+    /// Returns the value; `None` for several numbers that differ, and for a number that the machine
+    /// does not have.
     pub fn get(&self, machine: &Machine, spin: &Spin) -> Option<f64> {
         (self.row.get)(machine, spin, self.index)
     }
 
-    /// Writes the value, unchecked: [`Machine::violations`] judges the whole. Nothing is written if
-    /// the machine has no such number, which [`Parameter::find`] rules out.
+    /// Writes the value without a check: [`Machine::violations`] checks the machine as a whole. A
+    /// number that the machine does not have is ignored; [`Parameter::find`] refuses it.
     pub fn set(&self, machine: &mut Machine, spin: &mut Spin, value: f64) {
         (self.row.set)(machine, spin, self.index, value);
     }
 
-    /// Names of the single numbers this parameter writes: its own name, unless it writes several at
-    /// once.
+    /// Returns the names of the single numbers that the parameter writes.
     pub fn parts(&self, machine: &Machine) -> Vec<Cow<'static, str>> {
         let of_every = |count: usize, element: &str, number: &str| {
             (1..=count).map(|k| format!("{element}_{k}_{number}").into()).collect()
@@ -292,7 +294,7 @@ impl Parameter {
     }
 }
 
-/// A noun of so many.
+/// Returns a noun in the form for a count.
 fn plural(noun: &str, count: usize) -> String {
     match (noun, count) {
         (_, 1) => noun.to_owned(),
@@ -301,7 +303,7 @@ fn plural(noun: &str, count: usize) -> String {
     }
 }
 
-/// Points of a spin given as a table.
+/// Returns the number of points of a spin's table.
 fn table_points(spin: &Spin) -> usize {
     match spin {
         Spin::Table { time_s, speed_rpm } => time_s.len().min(speed_rpm.len()),
@@ -318,28 +320,28 @@ fn numbered<'a>(name: &'a str, element: &str) -> Option<(usize, &'a str)> {
     Some((number, rest))
 }
 
-/// The value all items share.
+/// Returns the value that all items share.
 fn common<T>(items: &[T], value: fn(&T) -> f64) -> Option<f64> {
     let first = value(items.first()?);
     items.iter().all(|item| value(item).to_bits() == first.to_bits()).then_some(first)
 }
 
 impl Spring {
-    /// Distance between the ends as given, before the machine sags, in m.
+    /// Returns the distance between the given ends, before the machine sags, m.
     pub fn given_length_m(&self) -> f64 {
         distance_m(self.cabinet_m, self.tub_m)
     }
 }
 
 impl Damper {
-    /// Distance between the ends as given, before the machine sags, in m.
+    /// Returns the distance between the given ends, before the machine sags, m.
     pub fn given_length_m(&self) -> f64 {
         distance_m(self.cabinet_m, self.tub_m)
     }
 }
 
 impl BumpStop {
-    /// Length of the direction as given.
+    /// Returns the length of the given direction vector.
     pub fn direction_length(&self) -> f64 {
         distance_m(self.direction, [0.0; 3])
     }

@@ -8,57 +8,59 @@ use crate::lanes::lane_struct;
 use core::f64::consts::TAU;
 use lane_ode::{Lane, N, Real, trig};
 
-/// Speed of the drum over time, as a user describes it. Speeds in rpm, times in s.
+/// The speed of the drum over time, as a user describes it. Speeds are in rpm, times in s.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Spin {
-    /// Up over a ramp, and on from there.
+    /// A profile with a ramp to a peak.
     Ramped {
-        /// How it goes up, and on.
+        /// The shape of the profile.
         profile: Profile,
-        /// Speed at the end of the ramp.
+        /// The speed at the end of the ramp.
         peak_rpm: f64,
-        /// Duration of the ramp.
+        /// The duration of the ramp.
         ramp_s: f64,
     },
-    /// Linear between the given points; constant beyond the last.
+    /// A piecewise linear speed between points, constant beyond the last one.
     Table {
-        /// Times, increasing, the first 0.
+        /// The increasing times, the first of which is 0.
         time_s: Vec<f64>,
-        /// Speeds at these times.
+        /// The speeds at these times.
         speed_rpm: Vec<f64>,
     },
 }
 
 sweep_parameter::named! {
-    /// How a drum is run up to a peak.
+    /// The shape of a spin profile with a ramp to a peak.
     pub enum Profile {
-        /// Cycloidal, then constant (Eq. 42): w = peak (t/ramp - sin(2 pi t/ramp) / 2 pi).
+        /// A cycloidal ramp, then constant speed (Eq. 42): w = peak (t/ramp - sin(2 pi t/ramp) / 2
+        /// pi).
         Cycloidal = "cycloidal",
-        /// Linear up, linear down in as long, then at rest.
+        /// A linear ramp up, a linear ramp down of the same duration, then rest.
         Triangular = "triangular",
-        /// Linear up, then constant.
+        /// A linear ramp up, then constant speed.
         Ramp = "ramp",
     }
 }
 
 lane_struct! {
-    /// The spin at one instant, as the equations read it.
+    /// The spin at an instant, as the equations read it.
     #[derive(Clone, Copy, Debug)]
     SpinState {
         sin,
         cos,
-        /// Of twice the angle.
+        /// The sine of 2 theta.
         sin_2,
+        /// The cosine of 2 theta.
         cos_2,
-        /// theta', rad/s.
+        /// The speed theta', rad/s.
         speed,
-        /// theta'', rad/s^2.
+        /// The acceleration theta'', rad/s^2.
         acceleration,
     }
 }
 
 impl<T: Real> SpinState<T> {
-    /// From the sine and cosine of theta.
+    /// Computes the state from the sine and cosine of theta, the speed and the acceleration.
     #[inline(always)]
     pub(crate) fn new((sin, cos): (N<T>, N<T>), speed: N<T>, acceleration: N<T>) -> Self {
         let sin_2 = (2.0 * (sin * cos).v()).v();
@@ -68,47 +70,47 @@ impl<T: Real> SpinState<T> {
 }
 
 lane_struct! {
-    /// A stretch of a spin profile over which one formula holds:
-    /// turns = turns_at_start + a t + b t^2 + c (cos(2 pi f t) - 1), t from the stretch's start.
+    /// A segment of a spin profile over which one formula holds:
+    /// turns = turns_at_start + a t + b t^2 + c (cos(2 pi f t) - 1), t from the segment's start.
     #[derive(Clone, Copy, Debug)]
     SpinLanes {
-        /// Where it starts; it holds until the next one starts.
+        /// The start time; a segment ends where the next one starts.
         start_s,
-        /// Turns made before, whole ones dropped.
+        /// The fractional part of the turns made before.
         turns_at_start,
-        /// a
+        /// The coefficient a.
         turns_per_s,
-        /// b
+        /// The coefficient b.
         turns_per_s2,
-        /// c
+        /// The coefficient c.
         wave_turns,
-        /// f
+        /// The frequency f.
         wave_hz,
     }
 }
 
-/// That of one machine.
+/// A segment of one machine's spin.
 pub(crate) type SpinStretch = SpinLanes<f64>;
 
 impl SpinStretch {
-    /// A drum that turns at one speed, its unbalance up at time 0.
+    /// Returns the segment of a drum at constant speed, with its unbalance up at time 0.
     pub(crate) fn steady(speed_rpm: f64) -> Self {
         Self { turns_per_s: N(speed_rpm / 60.0), ..Self::at_rest(0.0, 0.0) }
     }
 
-    /// Acceleration at a time within the stretch.
+    /// Returns the acceleration at a time within the segment.
     pub(crate) fn acceleration_rad_per_s2(&self, t_s: f64) -> f64 {
         self.at(N(t_s)).acceleration.0
     }
 
-    /// Speed at a time within the stretch.
+    /// Returns the speed at a time within the segment.
     pub(crate) fn speed_rad_per_s(&self, t_s: f64) -> f64 {
         self.at(N(t_s)).speed.0
     }
 }
 
 impl Spin {
-    /// The profile as stretches in order of time, the first from 0.
+    /// Returns the profile as segments in order of time, the first from 0.
     pub(crate) fn stretches(&self) -> Vec<SpinStretch> {
         let per_s = |rpm: f64| rpm / 60.0;
         match self {
@@ -140,19 +142,19 @@ impl Spin {
         }
     }
 
-    /// The fastest speed from 0 to `end_s`, rad/s.
+    /// Returns the greatest speed from 0 to `end_s`, rad/s.
     pub fn greatest_speed_rad_per_s(&self, end_s: f64) -> f64 {
         let starts: Vec<f64> = self.stretches().iter().map(|stretch| stretch.start_s.0).collect();
         let times_s = starts.into_iter().chain([end_s]).filter(|&t_s| t_s <= end_s);
         self.speeds_rpm(times_s).map(f64::abs).fold(0.0, f64::max) * TAU / 60.0
     }
 
-    /// Speeds at times (rpm).
+    /// Returns the speeds at times (rpm).
     pub fn speeds_rpm(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = f64> {
         self.at(times_s).map(|spin| spin.speed.0 * 60.0 / TAU)
     }
 
-    /// Angles of the drum at times, from 0 where the unbalance is up to a turn (rad).
+    /// Returns the angles of the drum at times (rad), from 0, where the unbalance is up, to a turn.
     pub fn angles_rad(&self, times_s: impl IntoIterator<Item = f64>) -> impl Iterator<Item = f64> {
         self.at(times_s).map(|spin| spin.sin.0.atan2(spin.cos.0).rem_euclid(TAU))
     }
@@ -163,7 +165,7 @@ impl Spin {
     }
 }
 
-/// Which of these stretches, in order of time, holds at a time; before all of them, the first.
+/// Returns the index of the segment that contains a time; before all segments, that of the first.
 pub(crate) fn stretch_at(stretches: &[SpinStretch], t_s: f64) -> usize {
     stretches.partition_point(|stretch| stretch.start_s.0 <= t_s).saturating_sub(1)
 }
@@ -172,11 +174,12 @@ pub(crate) fn stretch_at(stretches: &[SpinStretch], t_s: f64) -> usize {
 fn turns_of_ramp(from: f64, to: f64, duration_s: f64) -> f64 {
     let mean = 0.5 * (from + to);
     let turns = mean * duration_s;
-    // The product's rounding error is added after whole turns are dropped, which would absorb it.
+    // The rounding error of the product is added to the fractional part, because it is too small to
+    // change the whole product.
     (turns - turns.round_ties_even()) + mean.mul_add(duration_s, -turns)
 }
 
-/// Stretches between points (s, turns/s), constant beyond the last.
+/// Returns the segments between points (s, turns/s), with constant speed beyond the last.
 fn linear_stretches(points: &[(f64, f64)]) -> Vec<SpinStretch> {
     let mut turns = 0.0;
     let mut stretches = Vec::with_capacity(points.len());
@@ -202,12 +205,12 @@ impl SpinStretch {
 }
 
 impl<T: Lane> SpinLanes<T> {
-    /// The spin at time `t_s`.
+    /// Computes the spin at a time.
     #[inline(always)]
     pub(crate) fn at(&self, t_s: N<T>) -> SpinState<T> {
         let t = t_s - self.start_s;
-        // turns = t (a + b t) with the rounding errors of both products and the sum carried along,
-        // so that whole turns drop out exactly, however many.
+        // turns = t (a + b t) in twofold arithmetic, with the rounding errors of both products and
+        // of the sum, so that the fractional part is exact for any number of turns.
         let bt = (self.turns_per_s2 * t).v();
         let bt_error = self.turns_per_s2 * t - bt;
         let slope = self.turns_per_s + bt;
@@ -221,7 +224,7 @@ impl<T: Lane> SpinLanes<T> {
         let mut turn_rate = slope + bt;
         let mut turn_acceleration = self.turns_per_s2 + self.turns_per_s2;
         let zero = t.lit(0.0);
-        // Only a cycloidal ramp has a wave; without one in any lane its terms are zero.
+        // Only cycloidal ramps have a wave; without one in any lane its terms are zero.
         if T::bits(zero.0.less(self.wave_hz.0)) != 0 {
             let phase = (self.wave_hz * t).v();
             let (sin, cos) = trig::sin_cos_turns(phase);

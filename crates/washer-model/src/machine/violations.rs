@@ -1,5 +1,5 @@
-//! Checks of machines and spins: everything impossible about them, found in one pass and named by
-//! parameter, so that a report can point at each number where it was written.
+//! Checks of machines and spins. One pass finds every violation and names its parameters, so that a
+//! report can point at the places where the numbers were written.
 
 use crate::machine::feet::{FEET, Feet};
 use crate::{Machine, Parameter, Range, Spin, decimal};
@@ -8,20 +8,21 @@ use crate::{Machine, Parameter, Range, Spin, decimal};
 /// angle.
 const SHORTEST_M: f64 = 1e-6;
 
-/// Times and speeds (rpm) accepted of a spin table: as of `spin_peak_rpm`.
+/// The range of times of a spin table, s.
 const TIMES: Range = Range::NonNegative;
+/// The range of speeds of a spin table, rpm; that of `spin_peak_rpm`.
 const SPEEDS: Range = Range::Within(-1e5, 1e5);
 
-/// One reason why a machine or a spin is impossible.
+/// A reason why a machine or a spin is impossible.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{title}")]
 pub struct Violation {
-    /// What is wrong.
+    /// The violation, in a sentence.
     pub title: String,
-    /// The numbers to look at: parameter names, or `spin_time_s[3]` and the like in a spin's table.
-    /// Empty where the missing thing has no number.
+    /// The parameters concerned, or `spin_time_s[3]` and the like in a spin's table. Empty where a
+    /// whole element is missing.
     pub concerns: Vec<String>,
-    /// What would be accepted instead.
+    /// The values that are accepted.
     pub expected: String,
 }
 
@@ -52,7 +53,7 @@ fn of_table(times: usize, speeds: usize) -> String {
     }
 }
 
-/// Names of a vector's components.
+/// Returns the names of a vector's components.
 fn components(before: &str, after: &str) -> [String; 3] {
     ["x", "y", "z"].map(|axis| format!("{before}{axis}{after}"))
 }
@@ -63,20 +64,20 @@ fn rounded(value: f64) -> String {
 }
 
 impl Machine {
-    /// Everything impossible about this machine; empty for a sound one.
+    /// Returns every violation of the machine.
     pub fn violations(&self) -> Vec<Violation> {
-        // The spin's own parameters are the spin's to judge; any table has none.
+        // A table without points has no parameters, so that only the machine is checked.
         let no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
         let mut found = out_of_range(self, &no_spin);
         let mut joint = self.joint_violations();
-        // A number refused by itself says all there is to say about what depends on it.
+        // A violation of several numbers is not reported if one of them is out of range by itself.
         let refused = |name: &String| found.iter().any(|one| one.concerns.contains(name));
         joint.retain(|violation| !violation.concerns.iter().any(refused));
         found.append(&mut joint);
         found
     }
 
-    /// Combinations of numbers that are impossible although each number is in its range.
+    /// Returns the violations by combinations of numbers, each of which is in its range.
     pub fn joint_violations(&self) -> Vec<Violation> {
         let mut joint = Vec::new();
         for (body, moments_kg_m2) in [
@@ -87,7 +88,7 @@ impl Machine {
             let greatest =
                 (1..3).fold(0, |g, i| if moments_kg_m2[i] > moments_kg_m2[g] { i } else { g });
             let sum: f64 = moments_kg_m2.iter().sum();
-            // A thin disc reaches equality: rounding must not refuse it.
+            // A thin disc reaches equality, which rounding must not violate.
             if moments_kg_m2[greatest] > (sum - moments_kg_m2[greatest]) * (1.0 + 1e-9) {
                 let (ii, moment) = (11 * (greatest + 1), decimal(moments_kg_m2[greatest]));
                 let others = rounded(sum - moments_kg_m2[greatest]);
@@ -202,7 +203,8 @@ impl Machine {
     }
 }
 
-/// Every single number outside its range. Parameters of several numbers are judged by their parts.
+/// Returns the violations of single numbers. Parameters of several numbers are checked part by
+/// part.
 fn out_of_range(machine: &Machine, spin: &Spin) -> Vec<Violation> {
     let judge = |parameter: Parameter| {
         let (name, value, range) =
@@ -217,7 +219,7 @@ fn out_of_range(machine: &Machine, spin: &Spin) -> Vec<Violation> {
 }
 
 impl Spin {
-    /// Everything impossible about this spin; empty for a sound one.
+    /// Returns every violation of the spin.
     pub fn violations(&self) -> Vec<Violation> {
         match self {
             Self::Table { .. } => self.joint_violations(),
@@ -225,7 +227,8 @@ impl Spin {
         }
     }
 
-    /// Everything impossible about a table. The numbers of a profile are independent.
+    /// Returns the violations by combinations of a table's numbers. Those of a profile are
+    /// independent.
     pub fn joint_violations(&self) -> Vec<Violation> {
         let Self::Table { time_s, speed_rpm } = self else { return Vec::new() };
         let mut found = Vec::new();

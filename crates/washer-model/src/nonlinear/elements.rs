@@ -23,12 +23,12 @@ lane_struct! {
         dampers: Vec<DamperCoefficients<T>>,
         stops: Vec<StopCoefficients<T>>,
         bushings: Vec<BushingCoefficients<T>>,
-        /// Whether a machine has springs with a cubic term.
+        /// A flag of machines that have springs with a cubic term.
         has_cubic_springs: InAnyLane<T>,
-        /// Whether a machine has dampers with friction.
+        /// A flag of machines that have dampers with friction.
         has_friction: InAnyLane<T>,
-        /// Whether a machine has optional forces: cubic springs, friction, stops or bushings.
-        /// Without them the equations skip their evaluation.
+        /// A flag of machines that have optional forces: cubic springs, friction, stops or
+        /// bushings. Without them the equations skip their evaluation.
         has_optional: InAnyLane<T>,
     }
 }

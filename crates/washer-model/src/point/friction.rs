@@ -1,23 +1,23 @@
-//! At which speed amplitudes the linear model of a point takes friction.
+//! The speed amplitudes at which the linear model of a point takes friction.
 
 use crate::{Damper, Machine};
 use core::f64::consts::PI;
 
-/// At which speed amplitude the linear model takes the friction of a damper.
+/// The speed amplitude at which the linear model takes the friction of a damper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionSpeed {
-    /// Position of the damper in the machine.
+    /// The index of the damper.
     pub damper: usize,
     /// The speed amplitude (m/s).
     pub speed_m_per_s: f64,
-    /// Whether it is that of the linear motion, not a given one.
+    /// Whether the speed is that of the linear motion, not a given one.
     pub is_own: bool,
-    /// Below this (m/s) friction is viscous by its own law.
+    /// The speed (m/s) below which friction is viscous by its force law.
     pub(crate) least_m_per_s: f64,
 }
 
 impl FrictionSpeed {
-    /// Of every damper with friction; own ones not found yet.
+    /// Returns the speeds of every damper with friction, with a default for those of the motion.
     pub(crate) fn all(machine: &Machine) -> Vec<Self> {
         let of_damper = |(damper, of): (usize, &Damper)| {
             let given = of.friction_linear_speed_m_per_s;

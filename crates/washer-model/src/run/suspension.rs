@@ -1,8 +1,8 @@
-//! Forces of the elements between cabinet and tub, their sum on the cabinet, and what its feet
-//! carry of it.
+//! The forces of the elements between cabinet and tub, their sum on the cabinet, and the loads of
+//! the feet.
 //!
-//! The laws are those of the equations (`nonlinear/elements.rs`). The linear model's forces are
-//! first order in its deviations, by automatic differentiation at the equilibrium.
+//! The force laws are those of the equations (`nonlinear/elements.rs`). The linear model's forces
+//! are first order in its deviations, by automatic differentiation at the equilibrium.
 
 use crate::coordinates::{STATES, TUB, TUB_Y, TUB_Z};
 use crate::lanes::Constant as _;
@@ -14,24 +14,25 @@ use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Dual, Lane, N, Real};
 use std::borrow::Cow;
 
-/// Forces of the suspension at one instant.
+/// The forces of the suspension at an instant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Forces {
-    /// Tension of each spring (N); below zero it pushes.
+    /// The tension of each spring (N), negative under compression.
     pub springs_n: Vec<f64>,
-    /// Tension of each damper (N); above zero while it is drawn out.
+    /// The tension of each damper (N), positive while the damper lengthens.
     pub dampers_n: Vec<f64>,
-    /// Push of each stop (N), along its direction from the tub.
+    /// The force of each stop (N), along the direction from the tub.
     pub stops_n: Vec<f64>,
-    /// Force of each bushing on the cabinet (N), along c1, c2 and c3.
+    /// The force of each bushing on the cabinet (N), along c1, c2 and c3.
     pub bushings_n: Vec<[f64; 3]>,
-    /// Sum of all forces on the cabinet (N), along c1, c2 and c3: at rest it is the weight.
+    /// The sum of all forces on the cabinet (N), along c1, c2 and c3: the weight at rest.
     pub cabinet_n: [f64; 3],
-    /// Vertical load of each foot (N), below zero where it would lift; empty without a cabinet.
+    /// The vertical load of each foot (N), negative where the foot would lift; empty without a
+    /// cabinet.
     pub feet_n: Vec<f64>,
-    /// Margin of the cabinet against slipping (N); absent without a cabinet.
+    /// The margin of the cabinet against slipping (N); absent without a cabinet.
     pub slip_margin_n: Option<f64>,
-    /// Margin of the cabinet against walking (N); absent without a cabinet.
+    /// The margin of the cabinet against walking (N); absent without a cabinet.
     pub walk_margin_n: Option<f64>,
 }
 
@@ -51,7 +52,8 @@ impl Forces {
     }
 }
 
-/// The forces at a state: whole coordinates of the nonlinear model, deviations of the linear one.
+/// Computes the forces at a state: coordinates of the nonlinear model, deviations from equilibrium
+/// of the linear one.
 pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> Forces {
     let elements = match model {
         ModelKind::Nonlinear => Cow::Borrowed(&point.machine.elements),
@@ -68,7 +70,8 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
         displaced: along(&q, &core::array::from_fn(|i| state[i])),
     };
     let mut forces = Forces::default();
-    // How the force is divided among the axes differs by a rounding: results on record have it so.
+    // Springs and dampers divide the force among the axes in different orders. Another order would
+    // change the last bits of stored results.
     for spring in &elements.springs {
         let (tension, line) = tub.tension(&spring.constant());
         let share = tension / line.length;
@@ -111,8 +114,8 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
     forces
 }
 
-/// Force (N) and moment about O (N m) of the suspension on the cabinet, cabinet axes, from what is
-/// on the tub.
+/// Computes the force (N) and the moment about O (N m) of the suspension on the cabinet, in cabinet
+/// axes, from the load on the tub.
 #[inline(always)]
 pub(super) fn on_cabinet<T: Lane>(
     tub: &TubMotion<T>,
@@ -121,15 +124,16 @@ pub(super) fn on_cabinet<T: Lane>(
     let [fx, fy, fz] = tub.in_cabinet_axes(force);
     let [mx, my, mz] = tub.in_cabinet_axes(moment);
     let [y, z] = tub.midpoint;
-    // What is on the tub, turned round; P_T is at (0, y, z).
+    // The reaction of the load on the tub, with P_T at (0, y, z).
     [-fx, -fy, -fz, -(mx + (y * fz - z * fy)), -(my + z * fx), -(mz - y * fx)]
 }
 
+/// Returns a dual number.
 pub(super) fn dual(value: f64, slope: f64) -> N<Dual<f64>> {
     N(Dual { value, slope })
 }
 
-/// The tub at equilibrium, with its first-order deviation.
+/// Returns the tub's motion at equilibrium with a first-order deviation.
 pub(super) fn deviating(point: &Point, deviations: &[f64; STATES]) -> TubMotion<Dual<f64>> {
     TubMotion::new(
         &TUB.map(|q| dual(point.equilibrium[q], deviations[q])),
@@ -137,8 +141,8 @@ pub(super) fn deviating(point: &Point, deviations: &[f64; STATES]) -> TubMotion<
     )
 }
 
-/// What the suspension puts on the cabinet at a state: whole coordinates of the nonlinear model,
-/// deviations of the linear one.
+/// Computes the suspension's load on the cabinet at a state: coordinates of the nonlinear model,
+/// deviations from equilibrium of the linear one.
 pub(crate) fn load_on_cabinet(
     point: &Point,
     model: ModelKind,
@@ -156,12 +160,12 @@ pub(crate) fn load_on_cabinet(
     load.map(|N(first_order)| first_order.value + first_order.slope)
 }
 
-/// Push of each stop (N) at equilibrium.
+/// Computes the force of each stop (N) at equilibrium.
 pub fn stops_at_rest_n(point: &Point) -> Vec<f64> {
     forces(point, ModelKind::Nonlinear, &<Nonlinear<f64> as Model<f64>>::at_rest(point)).stops_n
 }
 
-/// The speed along each damper (m/s) by the linear model, at deviations from equilibrium.
+/// Computes the speed along each damper (m/s) in the linear model, at deviations from equilibrium.
 pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -> Vec<f64> {
     let elements = point.machine.elements.constant();
     let tub = deviating(point, deviations);
@@ -169,8 +173,8 @@ pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -
     (0..elements.dampers.len()).map(speed).collect()
 }
 
-/// From the cabinet end of each spring to its tub end (m), then of each damper, at some
-/// coordinates; in cabinet axes.
+/// Computes the vectors from cabinet end to tub end (m) of each spring and of each damper at
+/// coordinates, in cabinet axes.
 pub(crate) fn attachments(point: &Point, q: &[f64; COORDINATES]) -> [Vec<[f64; 3]>; 2] {
     let q = q.map(N);
     let tilt = Tilt::tub(&q);
@@ -185,9 +189,9 @@ pub(crate) fn attachments(point: &Point, q: &[f64; COORDINATES]) -> [Vec<[f64; 3
 /// The tub at a state.
 struct Tub {
     model: ModelKind,
-    /// Coordinates with their derivative in time.
+    /// The coordinates with time derivatives.
     moving: [N<Dual<f64>>; COORDINATES],
-    /// Coordinates with their first-order deviation.
+    /// The coordinates with first-order deviations.
     displaced: [N<Dual<f64>>; COORDINATES],
 }
 
@@ -205,7 +209,7 @@ impl Tub {
         (-element.force(&line) - element.optional_force(&line), line)
     }
 
-    /// A tub point's motion.
+    /// Computes the motion of a tub point.
     fn point(&self, tub: &Vec3<Dual<f64>>) -> PointMotion<Dual<f64>> {
         let at_first = Ends { cabinet: *tub, tub: *tub };
         PointMotion {
@@ -214,18 +218,18 @@ impl Tub {
         }
     }
 
-    /// The rate of what has its derivative in time with it.
+    /// Returns the time derivative of a number as a dual number of the model's order.
     fn velocity(&self, moving: N<Dual<f64>>) -> N<Dual<f64>> {
         let rate = moving.0.slope;
         N(match self.model {
             ModelKind::Nonlinear => Dual { value: rate, slope: 0.0 },
-            // Zero at equilibrium.
+            // Velocities are zero at equilibrium, so that they are first-order terms.
             ModelKind::Linear => Dual { value: 0.0, slope: rate },
         })
     }
 }
 
-/// The value itself, or for the linear model its first-order expansion.
+/// Returns the value, or for the linear model the first-order expansion.
 fn first_order(model: ModelKind, value: N<Dual<f64>>) -> f64 {
     match model {
         ModelKind::Nonlinear => value.0.value,
@@ -238,12 +242,12 @@ fn along(q: &[f64; COORDINATES], direction: &[f64; COORDINATES]) -> [N<Dual<f64>
     core::array::from_fn(|i| N(Dual { value: q[i], slope: direction[i] }))
 }
 
-/// From the cabinet end to the tub end, in cabinet axes.
+/// Computes the vector from the cabinet end to the tub end, in cabinet axes.
 fn tub_from_cabinet(q: &[N<Dual<f64>>; COORDINATES], ends: &Ends<Dual<f64>>) -> Vec3<Dual<f64>> {
     from_cabinet(&Tilt::tub(q), q, ends)
 }
 
-/// The same of a tub that is tilted so.
+/// Computes the vector from the cabinet end to the tub end of a tilted tub, in cabinet axes.
 fn from_cabinet<T: Real>(tilt: &Tilt<T>, q: &[N<T>; COORDINATES], ends: &Ends<T>) -> Vec3<T> {
     let tub = tilt.in_cabinet_axes(&ends.tub);
     [

@@ -222,7 +222,6 @@ fn largest_multiplier(moved: &[[f64; COORDINATES]]) -> f64 {
     const SINGLE: f64 = 1e-6;
     let (mut g, mut h) = ([[0.0; 2]; 2], [0.0; 2]);
     let mut after = 0.0;
-    // The last turns count most: there the others have decayed farthest.
     for k in moved.len().div_ceil(2)..moved.len() - 2 {
         for i in 0..COORDINATES {
             let [d0, d1, d2] = [moved[k][i], moved[k + 1][i], moved[k + 2][i]];

@@ -1,5 +1,5 @@
-//! Energy of the machine without spin, and what leaves it, written down apart from the equations of
-//! motion.
+//! Tests of the energy balance of the machine without spin. Energy and losses are written down
+//! independently of the equations of motion.
 
 use super::elements::with_every_element;
 use super::instruments::{mass_matrix, ready};
@@ -12,13 +12,13 @@ use lane_ode::N;
 
 type Vec3 = [f64; 3];
 
-/// The first two columns of Ry(yaw) Rz(pitch), and the third (Table 1).
+/// Returns the columns of Ry(yaw) Rz(pitch) (Table 1).
 pub(super) fn axes(yaw: f64, pitch: f64) -> [Vec3; 3] {
     let ((sy, cy), (sp, cp)) = (yaw.sin_cos(), pitch.sin_cos());
     [[cy * cp, sp, -sy * cp], [-cy * sp, cp, sy * sp], [sy, 0.0, cy]]
 }
 
-/// start + sum of components times axes.
+/// Returns start + the sum of components times axes.
 pub(super) fn place(start: Vec3, axes: &[Vec3; 3], components: Vec3) -> Vec3 {
     std::array::from_fn(|i| start[i] + (0..3).map(|k| components[k] * axes[k][i]).sum::<f64>())
 }
@@ -27,8 +27,8 @@ fn length(a: Vec3, b: Vec3) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Potential energy (J) at theta = 0: gravity, springs, bearings, flexure, stops, bushings (model
-/// page, section 3).
+/// Computes the potential energy (J) at theta = 0: gravity, springs, bearings, flexure, stops,
+/// bushings (model page, section 3).
 fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     let tub = axes(q[4], q[5]);
     let shaft = axes(q[6], q[7]);
@@ -81,17 +81,17 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     energy + 0.5 * m.flexure.stiffness_n_m_per_rad * phi * phi
 }
 
-/// How deep (m) the tub point of a stop is in it.
+/// Returns the depth (m) of a stop's tub point.
 fn depth_m(stop: &BumpStop, displacement: Vec3) -> f64 {
     along(displacement, stop.direction) - stop.clearance_m
 }
 
-/// The component along a direction of any length.
+/// Returns the component along a direction of any length.
 fn along(a: Vec3, direction: Vec3) -> f64 {
     (0..3).map(|i| a[i] * direction[i]).sum::<f64>() / length(direction, [0.0; 3])
 }
 
-/// What dampers, friction, stops and bushings take out of the machine (W).
+/// Computes the power (W) that dampers, friction, stops and bushings dissipate.
 fn losses_w(m: &Machine, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 {
     let tub = axes(q[4], q[5]);
     let place_of = |at: Vec3| place([0.0, q[0], q[1]], &tub, at);
@@ -126,7 +126,7 @@ fn losses_w(m: &Machine, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 
     losses
 }
 
-/// Kinetic energy (J): u M u / 2 without spin.
+/// Computes the kinetic energy (J) without spin, u M u / 2.
 fn kinetic_j(machine: &Coefficients<f64>, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 {
     let still = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
     let mass = mass_matrix(machine, &still, q);
@@ -134,7 +134,7 @@ fn kinetic_j(machine: &Coefficients<f64>, q: &[f64; COORDINATES], u: &[f64; COOR
     0.5 * (0..COORDINATES).map(of_row).sum::<f64>()
 }
 
-/// A machine thrown from its equilibrium without spin: its history.
+/// Returns the history of a machine without spin that starts at its equilibrium with a velocity.
 fn thrown(machine: &Machine, end_s: f64, step_s: f64, every_s: f64) -> Vec<Instant> {
     let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     let point = ready(machine.clone(), still, end_s);
@@ -152,9 +152,9 @@ fn thrown(machine: &Machine, end_s: f64, step_s: f64, every_s: f64) -> Vec<Insta
     (0..history.len()).map(whole).collect()
 }
 
-/// The paper's machine without dampers, thrown from its equilibrium: tub and rotor move alike, so
-/// that the bearing modes, which a step of 2e-4 s damps on purpose, are left asleep. Energies (J)
-/// over 10 s, the first the one given to it.
+/// Returns the energies (J) over 10 s of the paper's machine without dampers, which starts at its
+/// equilibrium with a velocity. Tub and rotor have the same velocity, so that it does not excite
+/// the bearing modes, which a step of 2e-4 s damps.
 fn energies_j(step_s: f64) -> Vec<f64> {
     let mut machine = Machine::paper();
     machine.dampers.clear();
@@ -184,9 +184,9 @@ fn energy_drifts_by_less_than_1e_9_in_10_s_at_the_default_step() {
 #[test]
 fn what_dampers_friction_stops_and_bushings_take_out_is_what_the_energy_loses() {
     let mut machine = with_every_element();
-    // Wide enough for the trapezoidal rule.
+    // A softness that is wide enough for the trapezoidal rule.
     machine.stops.iter_mut().for_each(|stop| stop.softness_m = 1e-3);
-    // Within reach of the throw, which friction ends after some 4 mm.
+    // A clearance within the motion, which friction ends after some 4 mm.
     machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.001);
     machine.dampers.iter_mut().for_each(|damper| damper.friction_speed_m_per_s = 0.05);
     let coefficients = Coefficients::new(&machine);
@@ -205,10 +205,10 @@ fn what_dampers_friction_stops_and_bushings_take_out_is_what_the_energy_loses() 
     }
     let given = kinetic_j(&coefficients, &instants[0].deviations, &instants[0].speeds);
     eprintln!("of {given:.3} J given, {lost:.3} J lost; the balance is off by {worst:.1e}");
-    // Most of it within 3 s.
+    // Most of the energy is dissipated within 3 s.
     assert!(lost > 0.5 * given && lost < given * (1.0 + 1e-6), "{lost} of {given} J");
     assert!(worst < 1e-6, "{worst:e}");
-    // The stop that the throw goes to takes part.
+    // A stop is hit.
     let closes = |stop: &BumpStop| {
         let depth = |at: &Instant| {
             let q = &at.deviations;

@@ -1,5 +1,5 @@
-//! The linear model is the first-order expansion of the nonlinear one: against automatic
-//! differentiation of the equations of motion, for random machines at random spins.
+//! Tests of the linear model against automatic differentiation of the nonlinear equations of
+//! motion, for random machines at random spins.
 
 use super::instruments::{equations, paper, random_machine, ready};
 use crate::coordinates::{COORDINATES, STATES};
@@ -12,7 +12,7 @@ use crate::run::model::{Linear, Model, Nonlinear};
 use crate::{Channel, Equations, ModelKind, Spin};
 use lane_ode::{Dual, N, System};
 
-/// Random machines, each at one instant.
+/// The number of random machines, each at one instant.
 const INSTANTS: usize = 100;
 
 type Vector = [f64; COORDINATES];
@@ -36,7 +36,7 @@ impl Instant {
         Self { point, t_s, model, spin }
     }
 
-    /// M a - f at equilibrium, and its derivative along deviations `q`, speeds `u` and
+    /// Computes M a - f at equilibrium, and its derivative along deviations `q`, speeds `u` and
     /// accelerations `a`.
     fn residual(&self, q: &Vector, u: &Vector, a: &Vector) -> [Vector; 2] {
         let along = |value: f64, slope: f64| N(Dual { value, slope });
@@ -58,7 +58,7 @@ fn at_random_instants(seed: u64, mut check: impl FnMut(&Instant, &mut fastrand::
     }
 }
 
-/// Numbers between -size and size.
+/// Returns random numbers between -size and size.
 fn random(rng: &mut fastrand::Rng, size: f64) -> Vector {
     core::array::from_fn(|_| size * (2.0 * rng.f64() - 1.0))
 }
@@ -90,7 +90,7 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
             let difference = ours.iter().flatten().zip(theirs.iter().flatten());
             worst[kind] = difference.fold(worst[kind], |m, (a, b)| m.max((a - b).abs() / largest));
         }
-        // Of F, the weight is what the bearings' load leaves over.
+        // The entries of F may be far below the weight, of which they are differences.
         let bodies = &instant.point.machine.bodies;
         let weight = bodies.gravity.0 * bodies.rotor_mass.0;
         let largest = force.iter().fold(weight, |m, a| m.max(a.abs()));
@@ -132,7 +132,7 @@ fn accelerations_solve_the_expanded_equations() {
 
 #[test]
 fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
-    // Values, rates and second derivatives. Their part of order zero turns with the drum.
+    // The greatest errors of values, rates and second derivatives.
     let mut worst = [0.0_f64; 3];
     let mut turning = 0.0_f64;
     at_random_instants(23, |instant, rng| {
@@ -151,7 +151,7 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         let axes = Axes::new(&instant.spin.constant(), &motion);
         let spin_squared = instant.spin.speed.0.powi(2) + instant.spin.acceleration.0.abs();
         let scales = [1.0, 1.0 + spin_squared.sqrt(), 1.0 + spin_squared];
-        // The radial distance is whole, channels are deviations from equilibrium.
+        // Channels are deviations from equilibrium; the radial distance is not.
         let rest = instant.point.rest.into_iter().chain([0.0; RADIAL]);
         let ours = channels.unwrap().into_iter().chain(radial);
         let theirs =
@@ -190,7 +190,7 @@ fn a_linear_machine_at_rest_moves_as_its_drum_turns() {
         let [drum_kg, drum_x_m] = [machine.drum.mass_kg, machine.drum.centre_x_m];
         let [hinge_x_m, front_x_m] = [machine.drum.hinge_x_m, machine.drum.front_x_m];
         let unbalance = machine.unbalance;
-        // One turn a second.
+        // The drum makes one turn per second.
         let spin = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![60.0, 60.0] };
         let point = ready(machine, spin, 1.0);
         let mut equations = Equations::new(&point, ModelKind::Linear);
@@ -229,7 +229,7 @@ fn a_linear_machine_at_rest_moves_as_its_drum_turns() {
         {
             assert_eq!(at(0.5, channel), 0.0);
         }
-        // At a half turn; bent by its weight, the drum's front goes up.
+        // At a half turn the front of the drum, which weight has bent, is higher.
         for (channel, expected_m) in
             [(Channel::TotalCentreY, -1e-3 * centre_mm), (Channel::DrumFrontY, 1e-6 * front_um)]
         {
@@ -244,8 +244,7 @@ fn a_linear_machine_at_rest_moves_as_its_drum_turns() {
 
 #[test]
 fn the_models_differ_by_second_order_in_the_deviation() {
-    // Half the deviation, a quarter of what the expansion leaves out, over the whole right-hand
-    // side of M a = f.
+    // Half the deviation leaves a quarter of the remainder of M a = f.
     let mut slopes = Vec::new();
     at_random_instants(24, |instant, rng| {
         let (q, u, a) = (random(rng, 1.0), random(rng, 10.0), random(rng, 100.0));

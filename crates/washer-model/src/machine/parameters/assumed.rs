@@ -10,18 +10,18 @@ use crate::{Machine, Spin};
 /// The numbers of a data sheet from which left-out numbers follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DataSheet {
-    /// Mass of tub, shaft and drum together, without laundry; absent where each is given.
+    /// The mass of tub, shaft and drum together, without laundry; absent if each is given.
     pub moving_mass_kg: Option<f64>,
-    /// Inner radius of the drum (R).
+    /// The inner radius of the drum (R).
     pub drum_radius_m: f64,
-    /// Inner depth of the drum (H).
+    /// The inner depth of the drum (H).
     pub drum_depth_m: f64,
 }
 
 /// The rule for a number that a machine file may leave out.
 #[derive(Debug)]
 pub struct Assumption {
-    /// The value, from the data sheet and from numbers that are already in place.
+    /// The function of the data sheet and of the other numbers that returns the value.
     pub(super) value: fn(&DataSheet, &Machine) -> f64,
     /// The rule in words, as listings show it.
     pub rule: &'static str,
@@ -32,9 +32,9 @@ pub struct Assumption {
 /// The range about an assumed value in which real machines are expected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Spread {
-    /// From the first to the second multiple of the value.
+    /// A range from the first to the second multiple of the value.
     Factor(f64, f64),
-    /// From the first to the second share of the drum's depth beside the value.
+    /// A range from the first to the second share of the drum's depth, added to the value.
     Depth(f64, f64),
 }
 
@@ -51,8 +51,8 @@ impl Assumption {
 }
 
 impl DataSheet {
-    /// Puts assumed values in place of parameters that a file leaves out. Rules read one another's
-    /// results, and no two read each other's, so that repetition ends.
+    /// Sets the parameters that a file leaves out to their assumed values. Rules read results of
+    /// other rules, without cycles, so that the iteration ends.
     pub fn fill(&self, left_out: &[Parameter], machine: &mut Machine) {
         let mut no_spin = Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() };
         for _ in left_out {
@@ -70,8 +70,8 @@ impl DataSheet {
     }
 }
 
-/// Moments of inertia of a thin-walled open cylinder about its mass centre: about its axis, and
-/// across.
+/// Returns the moments of inertia of a thin-walled open cylinder about its mass centre, along and
+/// across its axis.
 pub(super) fn cylinder_kg_m2(mass_kg: f64, radius_m: f64, length_m: f64) -> [f64; 2] {
     let about_axis = mass_kg * radius_m * radius_m;
     [about_axis, about_axis / 2.0 + mass_kg * length_m * length_m / 12.0]

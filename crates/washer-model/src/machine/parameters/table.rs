@@ -6,12 +6,12 @@ use super::assumed::{Assumption, DataSheet, cylinder_kg_m2};
 use super::{ElementList, Get, Range, Row, Set, Target, common};
 use crate::{BumpStop, Bushing, Damper, Foot, Machine, Spin, Spring, Unbalance};
 
-/// What a row writes, how it reads it and how it writes it.
+/// The target of a row, and the functions that read and write it.
 type Access = (Target, Get, Set);
 
-/// A row: name, unit, range, source, description, what it reads and writes. Before that stands what
-/// a machine file means that leaves it out, if it may: `else` and a number, or `assume` with a rule
-/// from a data sheet, the rule in words and the range in which machines are expected.
+/// Declares a row: name, unit, range, source, description, access. Before the access, `else` gives
+/// the value where a machine file leaves the number out, or `assume` gives a rule from a data
+/// sheet, the rule in words, and the range in which machines are expected.
 macro_rules! row {
     ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr,
         assume $value:expr, $rule:literal, $spread:expr; $($access:tt)+) => {
@@ -44,7 +44,7 @@ macro_rules! row {
     }};
 }
 
-/// The last part of a row.
+/// Expands the access of a row to its target and functions.
 macro_rules! access {
     (machine $($field:tt)+) => {
         (Target::Machine, |m, _, _| Some(m.$($field)+), |m, _, _, v| m.$($field)+ = v)
@@ -106,8 +106,8 @@ macro_rules! access {
     };
 }
 
-/// Rows of the three components of a vector: what their names have before and after the axis, then
-/// as [`row!`]. Descriptions end with the way along the axis.
+/// Declares the rows of a vector's three components: the parts of the names before and after the
+/// axis, then the arguments of [`row!`]. Descriptions end with the direction of the axis.
 macro_rules! axes {
     ($before:literal $after:literal, $unit:literal, $range:expr, $source:expr, $what:literal,
         $($vector:tt)+) => {
@@ -122,17 +122,27 @@ macro_rules! axes {
     };
 }
 
+/// The source of masses and mass centres.
 const TABLE_2: &str = "paper, Table 2";
+/// The source of moments of inertia.
 const TABLE_3: &str = "paper, Table 3";
+/// The source of the ends of springs and dampers.
 const TABLE_4: &str = "paper, Table 4";
+/// The source of stiffnesses and dampings.
 const SECTION_3_1: &str = "paper, section 3.1";
+/// The source of numbers that the paper's machine does not have.
 const NONE: &str = "assumed: none unless given";
+/// The source of v_s.
 const USUAL_SPEED: &str = "assumed: a usual value";
+/// The source of V.
 const OWN_SPEED: &str = "assumed: that of the linear motion";
-/// Speeds at which friction is taken: what divides by them stays finite.
+/// The range of v_s and V (m/s), in which friction over speed is finite.
 const SPEED: Range = Within(1e-6, 1e3);
+/// The source of the spin's numbers.
 const GRID: &str = "the grid file's [spin]";
+/// The source of the window.
 const TIME: &str = "the grid file's [time]";
+/// The source of the bare drum and of its unbalance.
 const SPLIT: &str = "derived: the drum of Tables 2 and 3 less its 0.4 kg unbalance";
 
 /// Returns the moments of inertia of an assumed tub about its axis and across.
@@ -164,7 +174,7 @@ fn hinge_stiffness_n_m_per_rad(machine: &Machine) -> f64 {
     built_in.flexure.stiffness_n_m_per_rad * share
 }
 
-/// Rows with a single number each, and those that write several.
+/// The rows that are not of a list.
 #[rustfmt::skip]
 pub(super) static TABLE: &[Row] = &[
     row!("gravity_m_per_s2", "m/s^2", NonNegative, "convention",
@@ -356,7 +366,7 @@ pub(super) static TABLE: &[Row] = &[
         "when amplitudes cease to be taken", window 1),
 ];
 
-/// Rows of each spring, after `spring_1_`.
+/// The rows of each spring, after `spring_1_`.
 #[rustfmt::skip]
 static SPRING: &[&[Row]] = &[
     &[
@@ -376,7 +386,7 @@ static SPRING: &[&[Row]] = &[
     axes!("tub_" "_m", "m", Any, TABLE_4, "tub end of this spring, ", of springs tub_m),
 ];
 
-/// Rows of each damper, after `damper_1_`.
+/// The rows of each damper, after `damper_1_`.
 #[rustfmt::skip]
 static DAMPER: &[&[Row]] = &[
     &[
@@ -399,7 +409,7 @@ static DAMPER: &[&[Row]] = &[
     axes!("tub_" "_m", "m", Any, TABLE_4, "tub end of this damper, ", of dampers tub_m),
 ];
 
-/// Rows of each stop, after `stop_1_`.
+/// The rows of each stop, after `stop_1_`.
 #[rustfmt::skip]
 static STOP: &[&[Row]] = &[
     &[
@@ -417,7 +427,7 @@ static STOP: &[&[Row]] = &[
     axes!("direction_" "", "", Any, NONE, "way from the tub to this stop, ", of stops direction),
 ];
 
-/// Rows of each bushing, after `bushing_1_`.
+/// The rows of each bushing, after `bushing_1_`.
 #[rustfmt::skip]
 static BUSHING: &[&[Row]] = &[
     axes!("tub_" "_m", "m", Any, NONE, "tub point of this bushing, ", of bushings tub_m),
@@ -436,7 +446,7 @@ static BUSHING: &[&[Row]] = &[
         else 0.0, of bushings damping_n_s_per_m),
 ];
 
-/// Rows of each further unbalance, after `unbalance_2_`.
+/// The rows of each further unbalance, after `unbalance_2_`.
 #[rustfmt::skip]
 static UNBALANCE: &[&[Row]] = &[&[
     row!("mass_kg", "kg", NonNegative, NONE,
@@ -448,12 +458,12 @@ static UNBALANCE: &[&[Row]] = &[&[
         of further_unbalances radius_m),
 ]];
 
-/// Rows of each foot, after `foot_1_`.
+/// The rows of each foot, after `foot_1_`.
 #[rustfmt::skip]
 static FOOT: &[&[Row]] =
     &[axes!("" "_m", "m", Any, NONE, "place of this foot, ", of feet foot_m)];
 
-/// Rows of each point of a spin's table, after `spin_table_1_`.
+/// The rows of each point of a spin's table, after `spin_table_1_`.
 #[rustfmt::skip]
 static SPIN_POINT: &[&[Row]] = &[&[
     row!("time_s", "s", NonNegative, GRID,
@@ -462,7 +472,8 @@ static SPIN_POINT: &[&[Row]] = &[&[
         "speed at this point of the spin's table", table speed_rpm),
 ]];
 
-/// A list of the machine, of elements like this one: the number of the first, the rows of each.
+/// Declares a list of the machine: the field with a default element, the element's name, the number
+/// of the first, and the rows.
 macro_rules! list {
     ($name:ident = $like:expr, $element:literal $first:literal $rows:ident) => {
         ElementList {
@@ -476,14 +487,14 @@ macro_rules! list {
     };
 }
 
-/// Every list, and the points of a spin's table.
+/// The lists of the machine, and the points of a spin's table.
 pub(super) static LISTS: &[ElementList] = &[
     list!(springs = Spring { free_length_m: None, ..Machine::paper().springs[0] },
         "spring" 1 SPRING),
     list!(dampers = Machine::paper().dampers[0], "damper" 1 DAMPER),
     list!(stops = BumpStop::default(), "stop" 1 STOP),
     list!(bushings = Bushing::default(), "bushing" 1 BUSHING),
-    // The first is that of every machine.
+    // Number 1 is the unbalance that every machine has.
     list!(further_unbalances = Unbalance::default(), "unbalance" 2 UNBALANCE),
     list!(feet = Foot::default(), "foot" 1 FOOT),
     ElementList {

@@ -1,4 +1,4 @@
-//! Names, ranges and what each parameter writes.
+//! Tests of the names, ranges and targets of parameters.
 
 use super::Range::{Any, Negative, NonNegative, Positive};
 use super::*;
@@ -18,7 +18,7 @@ fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
             continue;
         }
         let Some(before) = parameter.get(&machine, &spin) else {
-            // It may be left out.
+            // This number may be left out.
             assert!(parameter.name().ends_with("friction_linear_speed_m_per_s"), "{parameter:?}");
             parameter.set(&mut machine, &mut spin, 0.125);
             assert_eq!(parameter.get(&machine, &spin), Some(0.125), "{parameter:?}");

@@ -1,4 +1,4 @@
-//! Whole turns of the drum: when each is completed, and how they divide the window.
+//! The times at which the drum completes turns, and the division of the window into turns.
 
 use super::{Spin, SpinStretch};
 use core::f64::consts::TAU;
@@ -7,7 +7,8 @@ use lane_ode::{N, trig};
 /// Limit of halvings and Newton steps in the search for an instant; a few are enough.
 const MOST_STEPS: usize = 64;
 
-/// A piece of a stretch in which the drum turns one way; times from the stretch's start.
+/// A piece of a segment in which the drum turns in one direction; times are from the segment's
+/// start.
 struct Piece<'a> {
     stretch: &'a SpinStretch,
     from: f64,
@@ -15,24 +16,24 @@ struct Piece<'a> {
 }
 
 impl Spin {
-    /// Turns of the drum from one time to another (s), counted by the angle that it travels in
-    /// either direction.
+    /// Returns the turns of the drum within a window (s), in either direction.
     pub fn turns_within(&self, window_s: [f64; 2]) -> f64 {
         let stretches = self.stretches();
         let pieces = pieces(&stretches, window_s);
         pieces.iter().filter(|piece| piece.start_s() >= window_s[0]).map(Piece::turns).sum()
     }
 
-    /// The times from 0 to `end_s` at which the drum has made a whole number of turns; at least 0.
+    /// Returns the times from 0 to `end_s` at which the drum has made a whole number of turns; the
+    /// first is 0.
     pub fn whole_turns_s(&self, end_s: f64) -> Vec<f64> {
         whole_turns_s(&self.stretches(), [0.0, end_s])
     }
 }
 
-/// Where a window is cut so that every part holds one whole turn of the drum, counted from the
-/// start of the run by the angle it travels (theta = 2 pi k where it never turns back). Parts of
-/// turns at the window's ends go with the whole turn beside them, so that a window with less than
-/// two whole turns is not cut.
+/// Returns the times at which a window is cut into whole turns of the drum, counted from the start
+/// of the run in either direction (at theta = 2 pi k if the drum never reverses). Partial turns at
+/// the window's ends belong to the whole turn beside them, so that a window with less than two
+/// whole turns is not cut.
 pub(crate) fn cuts_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
     let mut whole = whole_turns_s(stretches, window_s);
     whole.pop();
@@ -42,7 +43,7 @@ pub(crate) fn cuts_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> 
     whole
 }
 
-/// The times in the window, its edges included, at which the drum has made a whole number of turns.
+/// Returns the times in the closed window at which the drum has made a whole number of turns.
 fn whole_turns_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
     let mut times = Vec::new();
     let mut travelled = 0.0_f64;
@@ -63,7 +64,7 @@ fn whole_turns_s(stretches: &[SpinStretch], window_s: [f64; 2]) -> Vec<f64> {
     times
 }
 
-/// The run to the window's end, cut where the window begins and where the drum reverses.
+/// Cuts the run up to the window's end at the window's beginning and where the drum reverses.
 fn pieces(stretches: &[SpinStretch], [from_s, to_s]: [f64; 2]) -> Vec<Piece<'_>> {
     let mut pieces = Vec::new();
     for (k, stretch) in stretches.iter().enumerate().filter(|(_, stretch)| stretch.start_s.0 < to_s)
@@ -77,7 +78,7 @@ fn pieces(stretches: &[SpinStretch], [from_s, to_s]: [f64; 2]) -> Vec<Piece<'_>>
             }
         };
         cut(from_s - stretch.start_s.0);
-        // A cycloidal ramp turns one way.
+        // A cycloidal ramp does not reverse.
         if stretch.wave_turns.0 == 0.0 {
             cut(-stretch.turns_per_s.0 / (2.0 * stretch.turns_per_s2.0));
         }
@@ -88,22 +89,23 @@ fn pieces(stretches: &[SpinStretch], [from_s, to_s]: [f64; 2]) -> Vec<Piece<'_>>
 }
 
 impl Piece<'_> {
-    /// When it begins, from the start of the run.
+    /// Returns the time at which the piece begins, from the start of the run.
     fn start_s(&self) -> f64 {
         self.stretch.start_s.0 + self.from
     }
 
-    /// Turns made in it.
+    /// Returns the turns made in the piece.
     fn turns(&self) -> f64 {
         self.turns_by(self.to)
     }
 
-    /// Turns made in it up to a time.
+    /// Returns the turns made in the piece up to a time.
     fn turns_by(&self, t: f64) -> f64 {
         (self.stretch.turns(t) - self.stretch.turns(self.from)).abs()
     }
 
-    /// The time at which so many turns have been made in it; not before `earliest`.
+    /// Returns the time at which a number of turns has been made in the piece, not before
+    /// `earliest`.
     fn when(&self, turns: f64, earliest: f64) -> f64 {
         let stretch = self.stretch;
         if stretch.wave_turns.0 == 0.0 {
@@ -135,13 +137,13 @@ impl Piece<'_> {
 }
 
 impl SpinStretch {
-    /// Turns made `t` after its start, whole ones included; below zero backwards.
+    /// Returns the turns made up to `t` after the start; negative for backward turns.
     fn turns(&self, t: f64) -> f64 {
         let (_, cos) = trig::sin_cos_turns(N(self.wave_hz.0 * t));
         t * (self.turns_per_s.0 + self.turns_per_s2.0 * t) + self.wave_turns.0 * (cos.0 - 1.0)
     }
 
-    /// Turns per second there.
+    /// Returns the turns per second at `t` after the start.
     fn rate(&self, t: f64) -> f64 {
         let (sin, _) = trig::sin_cos_turns(N(self.wave_hz.0 * t));
         self.turns_per_s.0 + 2.0 * self.turns_per_s2.0 * t
@@ -154,7 +156,7 @@ mod tests {
     use super::*;
     use crate::Profile;
 
-    /// The angle in turns, whole ones dropped, as the equations of motion see it.
+    /// Returns the fractional part of the angle in turns, from the equations' sine and cosine.
     fn phase(spin: &Spin, t_s: f64) -> f64 {
         let stretches = spin.stretches();
         let stretch = stretches.iter().rev().find(|stretch| stretch.start_s.0 <= t_s).unwrap();
@@ -200,7 +202,7 @@ mod tests {
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
         };
         near(cuts([2.5, 6.5]), &[4.0, 5.0]);
-        // Edges on whole turns: no part of a turn to be given away.
+        // A window from whole turn to whole turn has no partial turns.
         near(cuts([2.0, 5.0]), &[3.0, 4.0]);
         near(cuts([2.5, 4.5]), &[]);
         near(cuts([2.5, 3.4]), &[]);
