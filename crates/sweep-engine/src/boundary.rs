@@ -1,46 +1,38 @@
 //! The boundary: for each value of the first axis, the places along the second where a quantity
 //! passes its limit, without filling the grid.
 //!
-//! The quantity enters as a signed distance from its limit, negative on the reliable side;
-//! nothing here knows a machine. Trials are evaluated in batches, and what a batch costs is counted
-//! in lane groups (`batch.rs`): nine trials cost as much as sixteen.
+//! The quantity enters as a signed distance from its limit, negative on the reliable side; nothing
+//! here knows a machine. A line is a value of the first axis, along which the second is searched.
 //!
-//! 1. A lattice: evenly spread values of the second axis, in evenly spread rows. It finds every
-//!    island wider than its cells.
-//! 2. In those rows, nets around where the side should change (`net`), until they catch a bracket
-//!    within tolerance (`row`). Distances that hint at more are followed (`look`).
-//! 3. The rows between start from the places that their neighbours' roots predict (`warm`), from
-//!    the middle of each gap outwards. Where the curve is smooth, two trials a row are enough.
-//! 4. Where neighbouring rows disagree, both are looked at until the pocket that one has is found
-//!    in the other, or closes between them (`pockets`).
+//! 1. The lattice (`lattice`): evenly spread lines are evaluated at evenly spread columns. Every
+//!    change of side between neighbouring samples is a bracket, narrowed by the ITP method (`itp`).
+//!    Gaps in which two roots may hide are searched by Piyavskii's method (`lipschitz`).
+//! 2. The lines between are predicted by continuation (`continuation`), those in the middle of the
+//!    gaps first. A line whose neighbours disagree, or whose sides are not as predicted, is
+//!    evaluated at the lattice's columns instead.
+//! 3. Intervals on whose side neighbouring lines disagree are subdivided in both.
 //!
-//! All rows at work share a batch, and rows begin in whole lane groups. The trials that fill up the
-//! last group make the widest nets closer (`batch`).
+//! Islands wider than a cell of the lattice are found in every line that passes them; `trace` has
+//! the proof.
 //!
-//! Which trials are made depends on values alone, never on threads or lanes, so the result is a
-//! pure function of the input.
+//! Positions depend on values alone, never on threads or lanes, so the result is a pure function of
+//! the input.
 
-mod batch;
+mod continuation;
 pub mod file;
-mod neighbour;
-mod net;
-mod pockets;
+mod itp;
+mod lattice;
+mod line;
+mod lipschitz;
 pub mod quantity;
-mod refine;
-mod row;
+mod sample;
 pub mod search;
-mod span;
 #[cfg(test)]
 mod tests;
 mod trace;
-mod warm_start;
 
-use neighbour::{Neighbour, hint, nearest, shared};
-use net::{Net, Want};
 pub use quantity::TracedQuantity;
-use row::RowSearch;
 pub use search::{BoundaryOptions, BoundaryTask};
-use span::{Hint, Question, Side, SideRange, Span, Tried};
 pub use trace::trace;
 
 use sweep_parameter::named;
@@ -48,34 +40,34 @@ use sweep_parameter::named;
 /// A point to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
-    /// Which curve: a combination of the axes beyond the second.
+    /// The number of the curve: a combination of the axes beyond the second.
     pub curve: usize,
-    /// Value of the first axis.
+    /// The value of the first axis.
     pub first: f64,
-    /// Value of the second axis.
+    /// The value of the second axis.
     pub second: f64,
 }
 
-/// The stretch of the second axis that is searched.
+/// The range of the second axis that is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Search {
-    /// Least value.
+    /// The least value.
     pub least: f64,
-    /// Greatest value.
+    /// The greatest value.
     pub greatest: f64,
-    /// The first axis is even in its logarithm, so roots are carried along that.
+    /// Whether crossings are predicted along the logarithm of the first axis.
     pub first_log: bool,
-    /// The second axis is searched in its logarithm.
+    /// Whether the second axis is searched in its logarithm.
     pub second_log: bool,
-    /// Brackets end no wider than this: in the second axis's unit, or as a fraction of its value if
-    /// that axis is logarithmic.
+    /// The greatest width of a final bracket: in the second axis's unit, or as a fraction of its
+    /// value if that axis is logarithmic.
     pub tolerance: f64,
-    /// Cells of the lattice along each axis, at least 1.
+    /// The number of cells of the lattice along each axis, at least 1.
     pub lattice: usize,
 }
 
 named! {
-    /// What a row of the boundary file says, in the order of the file's dictionary.
+    /// The kind of a row of the boundary file, in the order of the file's dictionary.
     pub enum EdgeKind {
         /// The quantity passes its limit continuously within the bracket.
         Crossing = "crossing",
@@ -84,21 +76,22 @@ named! {
         /// On one side of the bracket the quantity is not defined (a model failed, or there is
         /// nothing to compare).
         Undefined = "undefined",
-        /// On the reliable side wherever it was evaluated.
+        /// The quantity is on the reliable side wherever it was evaluated.
         NoneReliable = "none_in_range_reliable",
-        /// Not on the reliable side wherever it was evaluated.
+        /// The quantity is not on the reliable side wherever it was evaluated.
         NoneUnreliable = "none_in_range_unreliable",
-        /// Not defined wherever it was evaluated.
+        /// The quantity is not defined wherever it was evaluated.
         NoneUndefined = "none_in_range_undefined",
     }
 }
 
-/// One place where the side changes, or the news that there is none.
+/// A place where the side changes, or the news that there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
-    /// What it is.
+    /// The kind.
     pub kind: EdgeKind,
-    /// Where the quantity is at its limit; only a crossing has such a place.
+    /// The value of the second axis at which the quantity is at its limit; `None` unless it is a
+    /// crossing.
     pub at: Option<f64>,
     /// The values of the second axis between which the side changes, the lower first.
     pub bracket: Option<[f64; 2]>,
@@ -109,23 +102,21 @@ pub struct Edge {
 /// All that is known about one value of the first axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TracedRow {
-    /// Value of the first axis.
+    /// The value of the first axis.
     pub first: f64,
-    /// From the least to the greatest value of the second axis; never empty.
+    /// The edges from the least to the greatest value of the second axis; never empty.
     pub edges: Vec<Edge>,
-    /// Trial points it took.
+    /// The number of points evaluated.
     pub trials: usize,
 }
 
 /// The traced curves.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Traced {
-    /// Per curve, its rows in the first axis's order.
+    /// The rows of each curve, in the first axis's order.
     pub curves: Vec<Vec<TracedRow>>,
-    /// Trial points in all.
+    /// The number of points evaluated.
     pub trials: usize,
-    /// Lane groups that they filled, the last of every batch perhaps in part.
-    pub lane_groups: usize,
-    /// Batches they went in.
+    /// The number of batches in which they were evaluated.
     pub rounds: usize,
 }

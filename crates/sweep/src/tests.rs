@@ -181,6 +181,58 @@ fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
     }
 }
 
+/// A bracket that a search before found: the value of the first axis, and both ends.
+struct ReferenceBracket {
+    first: f64,
+    low: f64,
+    high: f64,
+}
+
+/// Returns the brackets of a grid in `testdata/boundary/brackets.csv`.
+fn reference_brackets(grid: &str) -> Vec<ReferenceBracket> {
+    let mut brackets = Vec::new();
+    for line in include_str!("../testdata/boundary/brackets.csv").lines() {
+        let cells: Vec<&str> = line.split(',').collect();
+        if cells[0] == grid {
+            let number = |k: usize| cells[k].parse().unwrap();
+            brackets.push(ReferenceBracket { first: number(1), low: number(3), high: number(4) });
+        }
+    }
+    brackets
+}
+
+#[test]
+fn committed_grids_have_the_brackets_of_the_search_before() {
+    let grids = [
+        ("fig12", include_str!("../../../sweeps/fig12.toml"), 400),
+        ("fig12_envelope", include_str!("../../../sweeps/fig12_envelope.toml"), 120),
+        ("fig12_rms", include_str!("../../../sweeps/fig12_rms.toml"), 120),
+        ("quick", include_str!("../../../sweeps/quick.toml"), 170),
+    ];
+    for (name, text, most_trials) in grids {
+        let task = Task::new(&plan(text), &asked(None, 6)).unwrap();
+        let found = traced(&task, 2, &Interrupt::new()).unwrap();
+        println!("{name}: {} points in {} rounds", found.trials, found.rounds);
+        assert!(found.trials <= most_trials, "{name}: {} points", found.trials);
+        let mut brackets = Vec::new();
+        for row in &found.curves[0] {
+            for edge in row.edges.iter().filter(|edge| edge.bracket.is_some()) {
+                assert_eq!(edge.kind, EdgeKind::Crossing, "{name}: {row:?}");
+                brackets.push((row.first, edge.bracket.unwrap()));
+            }
+        }
+        let expected = reference_brackets(name);
+        assert_eq!(brackets.len(), expected.len(), "{name}: {brackets:?}");
+        for ((first, [low, high]), expected) in brackets.iter().zip(expected) {
+            assert!((first - expected.first).abs() < 1e-4 && high - low <= 0.5);
+            // An error of 1e-3 in the ratio moves the flattest of these crossings by so much.
+            let margin = 0.05;
+            let is_same = *low <= expected.high + margin && expected.low <= high + margin;
+            assert!(is_same, "{name} at {first} kg: {low} to {high}");
+        }
+    }
+}
+
 #[test]
 fn a_stop_is_heeded_before_the_next_group() {
     let plan = plan(&format!("{HEAD}{GRID}"));

@@ -8,25 +8,25 @@ use super::{BoundaryTask, Edge, Traced, TracedQuantity, TracedRow};
 use crate::{Job, Rows, Table};
 use sweep_files::{FileKind, key};
 
-/// One line of the file.
-struct Line<'a> {
+/// A row of the file.
+struct EdgeRow<'a> {
     curve: usize,
     row: &'a TracedRow,
-    /// From 1; 0 where there is none in range.
+    /// The number from 1; 0 where there is none in range.
     number: usize,
     edge: &'a Edge,
 }
 
-/// A name with something before its unit's suffix: `damping_n_s_per_m` and `low` give
-/// `damping_low_n_s_per_m`.
-fn within(name: &str, unit: &str, word: &str) -> String {
+/// Returns a name with a word before its unit's suffix: `damping_low_n_s_per_m` for
+/// `damping_n_s_per_m` and `low`.
+fn insert_word(name: &str, unit: &str, word: &str) -> String {
     let suffix = unit_suffix(unit).unwrap_or_default();
     let stem = name.strip_suffix(suffix).unwrap_or(name);
     format!("{stem}_{word}{}", &name[stem.len()..])
 }
 
 impl<M: Rows> BoundaryTask<M> {
-    /// What the store must know of it: its plan, with what is asked of it beside the grid.
+    /// Returns the job of the store: the plan, with what is asked beside the grid.
     pub fn job(&self) -> Job<'_> {
         let mut job = Job::of(&self.plan);
         job.layout.kind = FileKind::Boundary;
@@ -43,7 +43,7 @@ impl<M: Rows> BoundaryTask<M> {
         })
     }
 
-    /// The file of what was found.
+    /// Returns the table of the traced curves.
     pub fn table(&self, traced: &Traced) -> Table {
         let mut about = self.asked();
         about["worse"] = self.quantity.worse.name().into();
@@ -65,7 +65,7 @@ impl<M: Rows> BoundaryTask<M> {
             for row in rows {
                 for (k, edge) in row.edges.iter().enumerate() {
                     let number = if edge.bracket.is_some() { k + 1 } else { 0 };
-                    lines.push(Line { curve, row, number, edge });
+                    lines.push(EdgeRow { curve, row, number, edge });
                 }
             }
         }
@@ -90,17 +90,18 @@ impl<M: Rows> BoundaryTask<M> {
         for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
             let name = format!("quantity_{word}");
             let said = format!("{of} at the bracket's {side} end; null where not defined");
-            let value = |line: &Line<'_>| Some(self.quantity.value(line.edge.distances[end]?));
+            let value = |line: &EdgeRow<'_>| Some(self.quantity.value(line.edge.distances[end]?));
             table.numbers(&name, unit, &said, lines.iter().map(value));
         }
         let trials = lines.iter().map(|line| line.row.trials as u64);
         table.counts("points", "points evaluated at this value of the first axis", trials);
     }
 
-    /// Where the boundary is: both axes, the bracket, and the axes beyond the second.
-    fn add_axes(&self, table: &mut Table, lines: &[Line<'_>]) {
+    /// Adds both axes, the bracket, and the axes beyond the second.
+    fn add_axes(&self, table: &mut Table, lines: &[EdgeRow<'_>]) {
         let [first, second, further @ ..] = self.plan.axes.as_slice() else { return };
-        let (name, unit) = (second.parameter.name(), second.parameter.unit());
+        let name = second.parameter.name();
+        let unit = second.parameter.unit();
         table.parameter(&first.parameter, lines.iter().map(|line| Some(line.row.first)));
         let what = second.parameter.description();
         let TracedQuantity { name: of, limit, .. } = &self.quantity;
@@ -110,8 +111,8 @@ impl<M: Rows> BoundaryTask<M> {
             let said = format!(
                 "{side} end of the bracket in which the side changes; null where none is in range"
             );
-            let value = |line: &Line<'_>| Some(line.edge.bracket?[end]);
-            table.numbers(&within(name, unit, word), unit, &said, lines.iter().map(value));
+            let value = |line: &EdgeRow<'_>| Some(line.edge.bracket?[end]);
+            table.numbers(&insert_word(name, unit, word), unit, &said, lines.iter().map(value));
         }
         for (k, axis) in further.iter().enumerate() {
             let values = lines
@@ -128,8 +129,8 @@ mod tests {
 
     #[test]
     fn the_word_stands_before_the_unit() {
-        assert_eq!(within("damping_n_s_per_m", "N s/m", "low"), "damping_low_n_s_per_m");
-        assert_eq!(within("front_x_m", "m", "high"), "front_x_high_m");
-        assert_eq!(within("plain", "1", "low"), "plain_low");
+        assert_eq!(insert_word("damping_n_s_per_m", "N s/m", "low"), "damping_low_n_s_per_m");
+        assert_eq!(insert_word("front_x_m", "m", "high"), "front_x_high_m");
+        assert_eq!(insert_word("plain", "1", "low"), "plain_low");
     }
 }

@@ -6,7 +6,7 @@ use sweep_parameter::{Channel as _, Worse};
 use crate::store::{Column, Holds};
 use crate::{Error, Plan, Swept, nearest};
 
-/// What the columns of ratios start with.
+/// The prefix of the columns of ratios.
 const RATIO: &str = "ratio_";
 /// The column of the least ratio.
 const LEAST_RATIO: &str = "ratio_min";
@@ -16,17 +16,17 @@ const LEAST_RATIO: &str = "ratio_min";
 pub struct TracedQuantity {
     /// The column's name.
     pub name: String,
-    /// Its unit.
+    /// The unit.
     pub unit: String,
     /// The value at which the boundary runs.
     pub limit: f64,
     /// The side of the limit that is bad.
     pub worse: Worse,
-    /// What its distances from the limit are.
+    /// The scale of distances from the limit.
     pub scale: Scale,
 }
 
-/// What a distance from a limit is.
+/// The scale of distances from a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scale {
     /// The logarithm of the quantity over its limit.
@@ -36,7 +36,7 @@ pub enum Scale {
 }
 
 impl TracedQuantity {
-    /// Signed distance of a value from the limit, negative on the good side.
+    /// Returns the signed distance of a value from the limit, negative on the good side.
     pub fn distance(&self, value: f64) -> f64 {
         match (self.scale, self.worse) {
             (Scale::Logarithm, worse) => {
@@ -49,7 +49,7 @@ impl TracedQuantity {
         }
     }
 
-    /// The quantity at a distance from its limit.
+    /// Returns the quantity at a signed distance from the limit.
     pub fn value(&self, distance: f64) -> f64 {
         let away = self.worse.by(distance, 0.0);
         match self.scale {
@@ -59,20 +59,20 @@ impl TracedQuantity {
     }
 }
 
-/// Every column that a boundary of this plan can be drawn through, each with the plan that computes
-/// it: a channel is compared even if the grid file leaves it out, and so is a metric measured that
-/// the model can have.
+/// Returns every column that a boundary of this plan can be drawn through, each with the plan that
+/// computes it: a channel is compared even if the grid file leaves it out, and so is a metric
+/// measured that the model can have.
 pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
     // A search of one channel does not make sure of the others.
-    let of_one = |channel: &M::Channel| {
+    let channel_plan = |channel: &M::Channel| {
         let mut plan = plan.clone();
         plan.reliability.channels = vec![*channel];
-        (plan, Some(of_channel(channel.name())))
+        (plan, Some(channel_columns(channel.name())))
     };
     let mut least = plan.clone();
     least.reliability.limits.least = Some(plan.reliability.limits.over_estimate());
     let further = [plan.clone(), least].into_iter().chain(M::variants(plan));
-    let plans = M::channels().iter().map(of_one).chain(further.map(|plan| (plan, None)));
+    let plans = M::channels().iter().map(channel_plan).chain(further.map(|plan| (plan, None)));
     let mut offered: Vec<(Column, Plan<M>)> = Vec::new();
     for (plan, only) in plans {
         for column in M::layout(&plan).columns {
@@ -89,12 +89,13 @@ pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
     offered
 }
 
-/// The columns of a channel.
-fn of_channel(name: &str) -> [String; 3] {
+/// Returns the names of a channel's columns.
+fn channel_columns(name: &str) -> [String; 3] {
     [RATIO, "nonlinear_", "linear_"].map(|kind| format!("{kind}{name}"))
 }
 
-/// The column of this name at a limit, its own if none is given, and the plan that computes it.
+/// Returns the column of this name at a limit, its own if none is given, and the plan that computes
+/// it.
 ///
 /// # Errors
 /// A column that the plan's rows cannot have, or that has no limit of its own where none is given.
@@ -113,12 +114,13 @@ pub fn traced<M: Swept>(
         }
         let meant = nearest(name, names());
         let meant = meant.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
-        let of_channels: Vec<String> =
-            M::channels().iter().flat_map(|channel| of_channel(channel.name())).collect();
-        let is_of_channel = |name: &&str| of_channels.iter().any(|known| known == name);
+        let known_columns: Vec<String> =
+            M::channels().iter().flat_map(|channel| channel_columns(channel.name())).collect();
+        let is_of_channel = |name: &&str| known_columns.iter().any(|known| known == name);
         let names: Vec<&str> = names().filter(|name| !is_of_channel(name)).collect();
-        let [ratio, nonlinear, linear] = of_channel("CHANNEL");
-        let (names, further) = (names.join(", "), M::FURTHER);
+        let names = names.join(", ");
+        let [ratio, nonlinear, linear] = channel_columns("CHANNEL");
+        let further = M::FURTHER;
         let expected = format!("one of {names}, {ratio}, {nonlinear}, {linear}{further}{meant}");
         return Err(Error::option("--quantity", name, expected));
     };

@@ -1,5 +1,6 @@
 //! The task of a plan, and a model's distances at trial points.
 
+use super::lattice::{columns, lattice_ranks};
 use super::quantity::traced;
 use super::{Search, TracedQuantity, Trial};
 use crate::config::written::finite;
@@ -8,16 +9,19 @@ use crate::store::{Done, Key, Rows};
 use crate::{AxisValues, Error, Model, Plan, Swept};
 use sweep_parameter::Parameter as _;
 
-/// Rows of all curves together that are accepted: what is known of them stays in memory.
-const MOST_ROWS: u64 = 1_000_000;
+/// The most lines of all curves together. Basis: the traced rows of so many stay below a gigabyte
+/// of memory. Doubling it doubles that.
+const MAX_LINES: u64 = 1_000_000;
 
-/// The narrowest tolerance, as a part of the range: below it, rounding decides.
-const FINEST: f64 = 1e-9;
+/// The least tolerance, as a part of the range. Basis: a bracket as narrow still holds thousands of
+/// numbers. Doubling it refuses tolerances that work.
+const LEAST_TOLERANCE: f64 = 1e-9;
 
-/// Parts of the range in the default tolerance.
+/// Parts of the range in the default tolerance. Basis: 0.5 N s/m in `sweeps/fig12.toml`. Doubling
+/// it takes about one more trial per crossing.
 const DEFAULT_PARTS: f64 = 480.0;
 
-/// What is asked of a boundary.
+/// The options of a boundary.
 #[derive(Clone, Debug, clap::Args)]
 pub struct BoundaryOptions {
     /// What is at its limit: any column of numbers that the grid's rows can have, such as
@@ -40,27 +44,27 @@ pub struct BoundaryOptions {
     pub lattice: u16,
 }
 
-/// A boundary that is looked for: where, and of what.
+/// A boundary that is searched: its plan, its quantity and its range.
 #[derive(Clone, Debug)]
 pub struct BoundaryTask<M: Model> {
-    /// Computes the quantity.
+    /// The plan that computes the quantity.
     pub plan: Plan<M>,
-    /// What is at its limit.
+    /// The quantity that is at its limit.
     pub quantity: TracedQuantity,
-    /// Values of the first axis, in grid order.
+    /// The values of the first axis, in grid order.
     pub firsts: Vec<f64>,
-    /// Number of curves: combinations of the axes beyond the second.
+    /// The number of curves: combinations of the axes beyond the second.
     pub curves: usize,
     /// The search along the second axis.
     pub search: Search,
 }
 
 impl<M: Rows + Swept> BoundaryTask<M> {
-    /// The task of a plan.
+    /// Returns the task of a plan.
     ///
     /// # Errors
-    /// As [`traced`], and [`Error::Refused`] for a plan without a boundary or a tolerance that
-    /// cannot be met or means nothing.
+    /// The errors of [`traced`], and [`Error::Refused`] for a plan without a boundary or a
+    /// tolerance that cannot be met or means nothing.
     pub fn new(plan: &Plan<M>, options: &BoundaryOptions) -> Result<Self, Error> {
         let (quantity, plan) = traced(plan, &options.quantity, options.limit)?;
         let refused = |why: String| Err(Error::Refused(why));
@@ -90,20 +94,20 @@ impl<M: Rows + Swept> BoundaryTask<M> {
         // Plans hold at most 1e12 points, so the products fit.
         let curves: u64 = further.iter().map(|axis| axis.values.len()).product();
         let rows = first.values.len() * curves;
-        if rows > MOST_ROWS {
+        if rows > MAX_LINES {
             return refused(format!(
                 "{rows} rows (values of the first axis, times the combinations of the axes beyond \
-                 the second) are more than {MOST_ROWS}: trace parts of them"
+                 the second) are more than {MAX_LINES}: trace parts of them"
             ));
         }
         let second_log = matches!(second.values, AxisValues::Log { .. });
         let extent = if second_log { libm::log(greatest / least) } else { greatest - least };
         let given = options.tolerance.unwrap_or(extent / DEFAULT_PARTS);
-        if !(extent * FINEST..=extent).contains(&given) {
+        if !(extent * LEAST_TOLERANCE..=extent).contains(&given) {
             return refused(format!(
                 "--tolerance {given} is out of range: expected from {:e} to {extent} for the \
                  second axis",
-                extent * FINEST
+                extent * LEAST_TOLERANCE
             ));
         }
         let search = Search {
@@ -118,7 +122,24 @@ impl<M: Rows + Swept> BoundaryTask<M> {
         Ok(Self { plan, quantity, firsts, curves: curves as usize, search })
     }
 
-    /// The distances at trial points, by what is asked of the plan's engine.
+    /// Returns the largest size of a cell of the lattice along the first and the second axis, in
+    /// their units.
+    pub fn cell(&self) -> [f64; 2] {
+        let mut firsts = self.firsts.clone();
+        firsts.sort_by(f64::total_cmp);
+        let lines: Vec<f64> = lattice_ranks(firsts.len(), self.search.lattice)
+            .into_iter()
+            .map(|rank| firsts[rank])
+            .collect();
+        let columns: Vec<f64> = columns(&self.search.span(), self.search.lattice)
+            .into_iter()
+            .map(|at| self.search.value(at))
+            .collect();
+        [lines, columns]
+            .map(|marks| marks.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max))
+    }
+
+    /// Returns the function that evaluates the distances at trial points.
     pub fn distances<'a>(
         &'a self,
         asking: &'a CachedEvaluator<'_>,
@@ -144,7 +165,7 @@ impl<M: Rows + Swept> BoundaryTask<M> {
     }
 }
 
-/// The key under which a trial is stored.
+/// Returns the key under which a trial is stored.
 const fn key(trial: &Trial) -> Key {
     [trial.curve as u64, trial.first.to_bits(), trial.second.to_bits()]
 }

@@ -1,26 +1,42 @@
-//! Rows in their order: the lattice first, then the rows between, each as soon as its neighbours
-//! tell where to begin, and again where they announce something.
+//! The trace of all lines: the lattice first, then the lines between, each as soon as the lines
+//! that it is predicted from are traced, and again where neighbours disagree.
+//!
+//! Every line that passes a rectangle shows its side there, if the rectangle is as large as a cell
+//! of the lattice, along both axes, and all on one side. The proof is by induction over the order
+//! in which lines begin:
+//!
+//! - A line that is evaluated at the lattice's columns has a sample in the rectangle. Lattice lines
+//!   are, and at least one of them passes the rectangle.
+//! - Any other line has been predicted, and is on the predicted sides around every crossing. Its
+//!   nearest parent towards that lattice line passes the rectangle too. So the parent shows the
+//!   rectangle's side on an interval that spans the rectangle, because no crossing is inside. The
+//!   sides around the interval's ends are predicted within a cell of the parent's: those around
+//!   the lower end below the rectangle's top, those around the upper end above its bottom. Of each
+//!   two the outer is on another side, so it is outside of the rectangle, and the crossing between
+//!   the two is as well. So the interval between these crossings spans the rectangle.
 
-use super::batch::{LANES, deal, lane_groups};
-use super::pockets::Beside;
-use super::span::{Question, SideRange, Span, Tried};
-use super::warm_start::{self, HEARD};
-use super::{Neighbour, RowSearch, Search, Traced, TracedRow, Trial, Want};
+use super::continuation::{DISPUTED_PART, LinePair, Neighbour, PredictedSide, predict};
+use super::lattice::{PlannedLine, columns, plan_lines};
+use super::line::LineSearch;
+use super::lipschitz;
+use super::sample::{LineSample, SideInterval, Span, position};
+use super::{Search, Traced, TracedRow, Trial};
 
-/// Rows that are worked on at once, in whole curves: bounds memory, and is plenty to fill lanes.
-const ROWS_AT_ONCE: usize = 1 << 14;
-/// Most places that a row tries because of what its neighbours announce: whatever the function
-/// does, it ends.
-const MOST_ASKED: usize = 64;
-/// How far a pocket is announced, in rows: from one place to many in a few rounds.
-const ANNOUNCED: [isize; 6] = [-1, 1, -2, 2, -4, 4];
-/// Where rows disagree, no gap between trials is wider than this part of a cell of the lattice.
-const GAP: f64 = 0.25;
+/// Lines that are traced at once, in whole curves. Basis: some ten megabytes, and plenty to fill
+/// lanes. Doubling it doubles the memory.
+const LINES_AT_ONCE: usize = 1 << 14;
+/// The most samples that a line takes because its neighbours disagree with it. Basis: whatever the
+/// function, a trace ends (test `whatever_the_function_it_ends`). Doubling it doubles what noise
+/// takes.
+const DISPUTED_MAX: usize = 64;
+/// The narrowest gap on a lattice line that is searched for pairs of roots, as a part of a lattice
+/// cell. Basis: three bisections. Doubling it loses the folds of `sweeps/fig12.toml`.
+const FINEST_PART: f64 = 0.125;
 
-/// Traces `curves` curves over these values of the first axis. `evaluate` gives one signed distance
-/// from the limit a trial, in the same order: negative on the reliable side, `None` where the
-/// quantity is not defined. Before every batch `tell` hears how many rows are done, unless a
-/// neighbour will announce something.
+/// Traces `curves` curves over these values of the first axis. `evaluate` returns one signed
+/// distance from the limit per trial, in the same order: negative on the reliable side, `None`
+/// where the quantity is not defined. Before every batch `tell` hears how many lines are traced,
+/// unless a neighbour will disagree.
 ///
 /// # Errors
 /// Whatever stopped the evaluation.
@@ -32,20 +48,23 @@ pub fn trace<E>(
     tell: &mut dyn FnMut(usize),
 ) -> Result<Traced, E> {
     let mut traced = Traced { curves: Vec::with_capacity(curves), ..Traced::default() };
-    let at_once = (ROWS_AT_ONCE / firsts.len().max(1)).max(1);
+    let at_once = (LINES_AT_ONCE / firsts.len().max(1)).max(1);
     while traced.curves.len() < curves {
         let begun = traced.curves.len();
         let end = (begun + at_once).min(curves);
         let mut block = Block::new(begun..end, firsts, search);
-        while let Some(batch) = block.next() {
-            let trials: Vec<Trial> = batch.iter().map(|(trial, ..)| *trial).collect();
-            tell(begun * firsts.len() + block.rows_done());
+        loop {
+            let batch = block.next_batch();
+            if batch.is_empty() {
+                break;
+            }
+            tell(begun * firsts.len() + block.lines_traced());
+            let trials: Vec<Trial> = batch.iter().map(|request| request.trial).collect();
             let distances = evaluate(&trials)?;
-            for ((_, place, at), distance) in batch.iter().zip(distances) {
-                block.insert(*place, *at, distance);
+            for (request, distance) in batch.iter().zip(distances) {
+                block.insert(request, distance);
             }
             traced.trials += trials.len();
-            traced.lane_groups += lane_groups(trials.len());
             traced.rounds += 1;
         }
         traced.curves.extend(block.finish());
@@ -53,10 +72,14 @@ pub fn trace<E>(
     Ok(traced)
 }
 
-/// A row's place: its curve within the block, its rank along the first axis.
-type Place = (usize, usize);
-/// A trial, the place that asked for it, and its position.
-type Asked = (Trial, Place, f64);
+/// A trial, with the line that needs it: its curve within the block, its rank along the first axis,
+/// and the position on it.
+struct TrialRequest {
+    trial: Trial,
+    curve: usize,
+    rank: usize,
+    at: f64,
+}
 
 /// Curves that are traced together.
 struct Block<'a> {
@@ -64,281 +87,200 @@ struct Block<'a> {
     firsts: &'a [f64],
     search: Search,
     span: Span,
-    order: Vec<Rank>,
-    curves: Vec<Vec<Slot>>,
-    /// Widest gap where rows disagree.
-    gap: f64,
+    columns: Vec<f64>,
+    /// The width of a lattice cell along the second axis.
+    cell: f64,
+    lines: Vec<PlannedLine>,
+    /// The states of the lines, by curve and rank.
+    curves: Vec<Vec<LineState>>,
 }
 
-/// A row's rank along the first axis, the same in every curve.
-struct Rank {
-    /// Value or logarithm of the first axis.
-    at: f64,
-    /// Index among the values of the first axis.
-    index: usize,
-    /// When it begins.
-    level: usize,
-    /// Ranks of earlier levels that it begins from, to its left and to its right, the nearest
-    /// first.
-    heard: [Vec<usize>; 2],
-}
-
-/// A row of a curve.
+/// The state of one line of a curve.
 #[derive(Clone, Default)]
-struct Slot {
-    row: Option<RowSearch>,
-    /// It wanted nothing when it was last asked, and nothing has come since.
-    is_settled: bool,
-    /// Whether its roots are known well enough for others to begin from.
-    is_placed: bool,
-    /// What is known of it, while it is placed.
-    runs: Vec<SideRange>,
-    /// Places it tried because of its neighbours.
-    asked: usize,
+struct LineState {
+    /// The search, once it has begun.
+    search: Option<LineSearch>,
+    /// The sides of its first samples by its parents, until they are compared.
+    predicted: Vec<PredictedSide>,
+    /// The intervals of one side, while all brackets are narrow.
+    intervals: Option<Vec<SideInterval>>,
+    /// Whether it needs nothing more, unless a neighbour disagrees.
+    is_traced: bool,
+    /// The number of samples taken because neighbours disagree.
+    disputed: usize,
 }
 
 impl<'a> Block<'a> {
     fn new(curves: std::ops::Range<usize>, firsts: &'a [f64], search: &Search) -> Self {
-        let position = |value: f64, log: bool| if log { libm::log(value) } else { value };
-        let ends = [search.least, search.greatest];
-        let [least, greatest] = ends.map(|value| position(value, search.second_log));
+        let span = search.span();
         let cells = search.lattice.max(1);
-        let places = firsts.iter().map(|first| position(*first, search.first_log));
-        let order = ranks(places.collect(), cells);
-        let rows = order.iter().filter(|rank| rank.level == 0).count().max(1);
-        // More columns fill up the last lane group.
-        let columns = (lane_groups(rows * (cells + 1)) * LANES / rows).max(cells + 1);
-        let width = (greatest - least) / (columns - 1) as f64;
-        let lattice: Vec<f64> = (0..columns)
-            .map(|k| if k + 1 == columns { greatest } else { least + width * k as f64 })
-            .collect();
-        let slot = |rank: &Rank| {
-            let row = (rank.level == 0)
-                .then(|| RowSearch::new(Question::places(lattice.clone()), [None; 2]));
-            Slot { row, ..Slot::default() }
-        };
-        let slots: Vec<Slot> = order.iter().map(slot).collect();
+        let places: Vec<f64> =
+            firsts.iter().map(|first| position(*first, search.first_log)).collect();
         Self {
             first_curve: curves.start,
             firsts,
             search: *search,
-            span: Span { least, greatest, tolerance: search.tolerance },
-            order,
-            curves: vec![slots; curves.len()],
-            gap: GAP * width,
+            span,
+            columns: columns(&span, cells),
+            cell: (span.greatest - span.least) / cells as f64,
+            lines: plan_lines(&places, cells),
+            curves: vec![vec![LineState::default(); firsts.len()]; curves.len()],
         }
     }
 
-    /// The next batch; `None` when all is done.
-    fn next(&mut self) -> Option<Vec<Asked>> {
-        loop {
-            let mut wants = self.wants();
-            self.begin(&mut wants);
-            if wants.is_empty() {
-                return None;
-            }
-            wants.sort_by_key(|(place, _)| *place);
-            let batch = self.deal(&wants);
-            // With all of it known by now, the rows go on from there.
-            if !batch.is_empty() {
-                return Some(batch);
-            }
-        }
-    }
-
-    /// What rows at work want tried next, and what settled rows are asked by their neighbours.
-    fn wants(&mut self) -> Vec<(Place, Want)> {
-        let mut wants = Vec::new();
-        for (curve, slots) in self.curves.iter_mut().enumerate() {
-            for (rank, slot) in slots.iter_mut().enumerate() {
-                let Some(row) = slot.row.as_mut().filter(|_| !slot.is_settled) else { continue };
-                let of_row = row.wants(&self.span);
-                slot.is_settled = of_row.is_empty();
-                slot.is_placed = slot.is_settled || row.is_placed(&self.span);
-                slot.runs = if slot.is_placed { row.runs(&self.span) } else { Vec::new() };
-                wants.extend(of_row.into_iter().map(|want| ((curve, rank), want)));
-            }
-            let questions = announced(slots, &self.order, self.gap, &self.span);
-            for (rank, question) in questions {
-                let slot = &mut slots[rank];
-                let Some(row) = &mut slot.row else { continue };
-                slot.asked += question.places.len();
-                slot.is_settled = false;
-                row.ask(question);
-            }
-            for (rank, slot) in slots.iter_mut().enumerate() {
-                let Some(row) = slot.row.as_mut().filter(|row| row.is_asked()) else { continue };
-                wants.extend(row.wants(&self.span).into_iter().map(|want| ((curve, rank), want)));
-            }
-        }
-        wants
-    }
-
-    /// Begins rows whose neighbours are placed: as many as make whole lane groups together with
-    /// what the others want, in the order of their levels; the rest waits for the next batch.
-    fn begin(&mut self, wants: &mut Vec<(Place, Want)>) {
-        let mut ready: Vec<(Place, RowSearch, Vec<Want>)> = Vec::new();
-        for (curve, slots) in self.curves.iter().enumerate() {
-            for (rank, _) in slots.iter().enumerate().filter(|(_, slot)| slot.row.is_none()) {
-                let Rank { at, heard, .. } = &self.order[rank];
-                if !heard.iter().flatten().all(|rank| slots[*rank].is_placed) {
-                    continue;
-                }
-                let seen = |rank: &usize| neighbour(slots, &self.order, *rank);
-                let [left, right] =
-                    heard.each_ref().map(|ranks| ranks.iter().map(seen).collect::<Vec<_>>());
-                let mut row = warm_start::start(*at, &left, &right, &self.span);
-                let of_row = row.wants(&self.span);
-                ready.push(((curve, rank), row, of_row));
-            }
-        }
-        ready.sort_by_key(|((curve, rank), ..)| (self.order[*rank].level, *curve, *rank));
-        let count = |wants: &[Want]| wants.iter().map(Want::needed).sum::<usize>();
-        let mut needed: usize = wants.iter().map(|(_, want)| want.needed()).sum();
-        let all = needed + ready.iter().map(|(.., of_row)| count(of_row)).sum::<usize>();
-        let whole = (all / LANES).max(lane_groups(needed)) * LANES;
-        for (place, row, of_row) in ready {
-            needed += count(&of_row);
-            if needed > whole && !wants.is_empty() {
-                break;
-            }
-            self.curves[place.0][place.1].row = Some(row);
-            wants.extend(of_row.into_iter().map(|want| (place, want)));
-        }
-    }
-
-    /// The trials of these wants, in the order of their rows, each once.
-    fn deal(&mut self, wants: &[(Place, Want)]) -> Vec<Asked> {
-        let counts = deal(&wants.iter().map(|(_, want)| want).collect::<Vec<_>>(), &self.span);
+    /// Returns the trials of the next batch, in the order of their lines; none when all is traced.
+    fn next_batch(&mut self) -> Vec<TrialRequest> {
         let mut batch = Vec::new();
-        let with_counts: Vec<_> = wants.iter().zip(counts).collect();
-        for of_row in with_counts.chunk_by(|a, b| a.0.0 == b.0.0) {
-            let (curve, rank) = of_row[0].0.0;
-            let Some(row) = &mut self.curves[curve][rank].row else { continue };
-            let mut positions: Vec<f64> = Vec::new();
-            for ((_, want), count) in of_row {
-                let places = want.places(*count, &self.span);
-                if let (Want::Net(_), [first, .., last]) = (want, places.as_slice()) {
-                    row.note([*first, *last]);
-                }
-                positions.extend(places);
+        for curve in 0..self.curves.len() {
+            for rank in 0..self.lines.len() {
+                self.advance(curve, rank, &mut batch);
             }
-            positions.retain(|at| !row.knows(*at));
-            positions.sort_by(f64::total_cmp);
-            positions.dedup();
-            let first = self.firsts[self.order[rank].index];
-            for at in positions {
-                let second = value(&self.search, &self.span, at);
-                let trial = Trial { curve: self.first_curve + curve, first, second };
-                batch.push((trial, (curve, rank), at));
+            for rank in 0..self.lines.len() {
+                if self.curves[curve][rank].search.is_none() && self.may_begin(curve, rank) {
+                    self.begin(curve, rank);
+                    self.advance(curve, rank, &mut batch);
+                }
+            }
+            for (rank, places) in self.disputes(curve) {
+                let state = &mut self.curves[curve][rank];
+                let Some(search) = &mut state.search else { continue };
+                state.disputed += places.len();
+                state.is_traced = false;
+                search.request(places, &self.span);
+                self.advance(curve, rank, &mut batch);
             }
         }
         batch
     }
 
-    fn insert(&mut self, (curve, rank): Place, at: f64, distance: Option<f64>) {
-        let slot = &mut self.curves[curve][rank];
-        slot.is_settled = false;
-        if let Some(row) = &mut slot.row {
-            row.insert(Tried { at, distance: distance.filter(|distance| !distance.is_nan()) });
+    /// Adds the trials that a line needs next to the batch.
+    fn advance(&mut self, curve: usize, rank: usize, batch: &mut Vec<TrialRequest>) {
+        let first = self.firsts[self.lines[rank].index];
+        for at in self.next_places(curve, rank) {
+            let second = self.search.value(at);
+            let trial = Trial { curve: self.first_curve + curve, first, second };
+            batch.push(TrialRequest { trial, curve, rank, at });
         }
     }
 
-    fn rows_done(&self) -> usize {
-        self.curves.iter().flatten().filter(|slot| slot.is_settled).count()
-    }
-
-    fn finish(self) -> Vec<Vec<TracedRow>> {
-        let value = |at: f64| value(&self.search, &self.span, at);
-        let mut ranks: Vec<usize> = (0..self.order.len()).collect();
-        ranks.sort_by_key(|rank| self.order[*rank].index);
-        let traced = |slots: &Vec<Slot>| {
-            let rows = ranks.iter().filter_map(|rank| {
-                let row = slots[*rank].row.as_ref()?;
-                let first = self.firsts[self.order[*rank].index];
-                let edges = row.edges(&self.span, &value);
-                Some(TracedRow { first, edges, trials: row.trials() })
-            });
-            rows.collect()
+    /// Returns the positions that a line needs next: those requested, the columns of the lattice if
+    /// a prediction failed, steps in brackets, or else those of the search for pairs of roots.
+    fn next_places(&mut self, curve: usize, rank: usize) -> Vec<f64> {
+        let span = self.span;
+        let state = &mut self.curves[curve][rank];
+        let Some(search) = state.search.as_mut().filter(|_| !state.is_traced) else {
+            return Vec::new();
         };
-        self.curves.iter().map(traced).collect()
-    }
-}
-
-/// The value of the second axis at a position.
-fn value(search: &Search, span: &Span, at: f64) -> f64 {
-    // The ends are exact whatever the logarithm rounds to.
-    if at <= span.least {
-        search.least
-    } else if at >= span.greatest {
-        search.greatest
-    } else if search.second_log {
-        libm::exp(at)
-    } else {
-        at
-    }
-}
-
-fn neighbour<'s>(slots: &'s [Slot], order: &[Rank], rank: usize) -> Neighbour<'s> {
-    Neighbour { at: order[rank].at, runs: &slots[rank].runs }
-}
-
-/// What settled rows are asked because of settled rows beside them.
-fn announced(slots: &[Slot], order: &[Rank], gap: f64, span: &Span) -> Vec<(usize, Question)> {
-    let settled = |rank: Option<usize>| {
-        let rank = rank.filter(|rank| slots.get(*rank).is_some_and(|slot| slot.is_settled))?;
-        Some(neighbour(slots, order, rank))
-    };
-    let mut questions = Vec::new();
-    for (rank, slot) in slots.iter().enumerate() {
-        let (Some(row), Some(own)) = (&slot.row, settled(Some(rank))) else { continue };
-        if slot.asked >= MOST_ASKED {
-            continue;
-        }
-        for step in ANNOUNCED {
-            let beside = |step: isize| settled(rank.checked_add_signed(step));
-            let Some(neighbour) = beside(step) else { continue };
-            let beside = Beside {
-                own,
-                before: beside(-step.signum()),
-                neighbour,
-                beyond: beside(step + step.signum()),
-                is_adjacent: step.abs() == 1,
-            };
-            let question = beside.question(row, gap, span);
-            if !question.is_empty() {
-                questions.push((rank, question));
+        if !search.has_requests() {
+            let predicted = std::mem::take(&mut state.predicted);
+            if !predicted.iter().all(|predicted| search.confirms(predicted)) {
+                search.request(self.columns.iter().copied(), &span);
             }
         }
+        let places = search.take_places(&span);
+        if !places.is_empty() {
+            state.intervals = None;
+            return places;
+        }
+        // Other lines begin from these intervals while the search for pairs of roots goes on.
+        state.intervals = Some(search.intervals(&span));
+        if self.lines[rank].is_lattice_line() {
+            let finest = (FINEST_PART * self.cell).max(span.tolerance);
+            search.request(lipschitz::candidates(search.samples(), finest), &span);
+        }
+        let places = search.take_places(&span);
+        state.is_traced = places.is_empty();
+        places
     }
-    questions
-}
 
-/// Rows by their places along the first axis, with the order in which they begin: the lattice's
-/// rows, evenly spread with both ends, then again and again the middle of every gap.
-fn ranks(places: Vec<f64>, cells: usize) -> Vec<Rank> {
-    let rank = |(index, at): (usize, f64)| Rank { at, index, level: 0, heard: Default::default() };
-    let mut order: Vec<Rank> = places.into_iter().enumerate().map(rank).collect();
-    order.sort_by(|a, b| a.at.total_cmp(&b.at));
-    let Some(last) = order.len().checked_sub(1) else { return order };
-    let mut known: Vec<usize> = (0..=cells).map(|k| (k * last + cells / 2) / cells).collect();
-    known.dedup();
-    for level in 1.. {
-        let is_wide = |k: &usize| known[k + 1] - known[*k] > 1;
-        let gaps: Vec<usize> = (0..known.len() - 1).filter(is_wide).collect();
-        if gaps.is_empty() {
-            break;
-        }
-        let mut middles = Vec::with_capacity(gaps.len());
-        for k in gaps {
-            let middle = known[k] + (known[k + 1] - known[k]) / 2;
-            let left = known[..=k].iter().rev().take(HEARD).copied().collect();
-            let right = known[k + 1..].iter().take(HEARD).copied().collect();
-            order[middle] = Rank { level, heard: [left, right], ..order[middle] };
-            middles.push(middle);
-        }
-        known.extend(middles);
-        known.sort_unstable();
+    /// Whether all brackets are narrow on the lines that a line is predicted from.
+    fn may_begin(&self, curve: usize, rank: usize) -> bool {
+        let mut parents = self.lines[rank].parents.iter().flatten();
+        parents.all(|parent| self.neighbour(curve, *parent).is_some())
     }
-    order
+
+    /// Begins a line: around the crossings that its parents predict, or else at the columns of the
+    /// lattice.
+    fn begin(&mut self, curve: usize, rank: usize) {
+        let line = &self.lines[rank];
+        let traced = |ranks: &Vec<usize>| {
+            ranks.iter().filter_map(|rank| self.neighbour(curve, *rank)).collect()
+        };
+        let parents = line.parents.each_ref().map(traced);
+        let mut search = LineSearch::default();
+        let predicted = predict(line.at, &parents, self.cell, &self.span);
+        match &predicted {
+            Some(sides) => search.request(sides.iter().map(|predicted| predicted.at), &self.span),
+            None => search.request(self.columns.iter().copied(), &self.span),
+        }
+        let state = &mut self.curves[curve][rank];
+        state.search = Some(search);
+        state.predicted = predicted.unwrap_or_default();
+    }
+
+    /// Returns a line as others see it, if all its brackets are narrow.
+    fn neighbour(&self, curve: usize, rank: usize) -> Option<Neighbour<'_>> {
+        let intervals = self.curves[curve].get(rank)?.intervals.as_ref()?;
+        Some(Neighbour { at: self.lines[rank].at, intervals })
+    }
+
+    /// Returns the positions that subdivide the intervals that neighbours dispute, by rank.
+    fn disputes(&self, curve: usize) -> Vec<(usize, Vec<f64>)> {
+        let mut disputes = Vec::new();
+        for (rank, state) in self.curves[curve].iter().enumerate() {
+            if !state.is_traced || state.disputed >= DISPUTED_MAX {
+                continue;
+            }
+            let Some(search) = &state.search else { continue };
+            let Some(own) = self.neighbour(curve, rank) else { continue };
+            let mut places = Vec::new();
+            for step in [-1, 1] {
+                let at_offset = |by| self.neighbour(curve, rank.checked_add_signed(by)?);
+                let Some(neighbour) = at_offset(step) else { continue };
+                let pair = LinePair { own, neighbour, beyond: at_offset(2 * step) };
+                for interval in pair.disputed(self.cell, &self.span) {
+                    let width = interval[1] - interval[0];
+                    let widest = DISPUTED_PART * self.cell.min(width);
+                    let widest = widest.max(0.5 * self.span.tolerance);
+                    places.extend(search.subdivide(interval, widest, &self.span));
+                }
+            }
+            if !places.is_empty() {
+                disputes.push((rank, places));
+            }
+        }
+        disputes
+    }
+
+    fn insert(&mut self, request: &TrialRequest, distance: Option<f64>) {
+        let distance = distance.filter(|distance| !distance.is_nan());
+        if let Some(search) = &mut self.curves[request.curve][request.rank].search {
+            search.insert(LineSample { at: request.at, distance });
+        }
+    }
+
+    fn lines_traced(&self) -> usize {
+        self.curves.iter().flatten().filter(|state| state.is_traced).count()
+    }
+
+    /// Returns the traced rows of every curve, in the order of the first axis's values.
+    fn finish(self) -> Vec<Vec<TracedRow>> {
+        let value = |at: f64| self.search.value(at);
+        let mut ranks: Vec<usize> = (0..self.lines.len()).collect();
+        ranks.sort_by_key(|rank| self.lines[*rank].index);
+        let mut curves = Vec::with_capacity(self.curves.len());
+        for states in &self.curves {
+            let mut rows = Vec::with_capacity(ranks.len());
+            for &rank in &ranks {
+                let Some(search) = &states[rank].search else { continue };
+                rows.push(TracedRow {
+                    first: self.firsts[self.lines[rank].index],
+                    edges: search.edges(&self.span, &value),
+                    trials: search.samples().len(),
+                });
+            }
+            curves.push(rows);
+        }
+        curves
+    }
 }

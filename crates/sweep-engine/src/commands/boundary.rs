@@ -11,7 +11,7 @@ use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, TracedRow
 use crate::config::section::counted;
 use crate::evaluator::{CachedEvaluator, Stopped};
 use crate::store::{Column, Opened, Trials};
-use crate::{Axis, Effort, EffortArgs, Error, Exit, Plan, Progress, Swept, duration, show, tell};
+use crate::{Effort, EffortArgs, Error, Exit, Plan, Progress, Swept, duration, show, tell};
 use sweep_files::{FileKind, Output};
 use sweep_parameter::{Parameter as _, Worse};
 
@@ -25,10 +25,10 @@ pub struct Args {
     /// Boundary file [default: results/NAME-boundary.parquet]
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// What is looked for.
+    /// The quantity, its limit, and the search.
     #[command(flatten)]
     pub options: BoundaryOptions,
-    /// How it goes about it.
+    /// Threads and progress.
     #[command(flatten)]
     pub effort: EffortArgs,
     /// Start over, even if the boundary is there or another plan was begun
@@ -36,7 +36,7 @@ pub struct Args {
     pub fresh: bool,
 }
 
-/// What `--help` adds.
+/// The text that `--help` adds.
 const LONG: &str = "\
 For each value of the first axis, the places along the second where the quantity passes its \
 limit, each with the bracket it is known to lie in. Where there is no such place, or the quantity \
@@ -67,7 +67,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         Opened::Open(trials) => trials,
         Opened::Finished(()) => {
             let there = "the boundary is there already (--fresh traces it again)";
-            return Ok(told(format!("{}: {there}\n", plan.name), &output));
+            return Ok(print_summary(format!("{}: {there}\n", plan.name), &output));
         }
     };
     trials.take_notes().iter().for_each(|note| tell(note));
@@ -91,10 +91,10 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         tell(&note);
     }
     let text = summary(&task, &found, began.elapsed().as_secs_f64());
-    Ok(told(text, &output))
+    Ok(print_summary(text, &output))
 }
 
-/// Every column that a boundary can be drawn through: unit, bad side, limit, meaning.
+/// Lists every column that a boundary can be drawn through: unit, bad side, limit, meaning.
 fn listing<M: Swept>(plan: &Plan<M>) -> String {
     let columns = offered(plan);
     let width = columns.iter().map(|(column, _)| column.name.len()).max().unwrap_or(0);
@@ -108,8 +108,8 @@ fn listing<M: Swept>(plan: &Plan<M>) -> String {
     columns.iter().map(row).collect()
 }
 
-/// Says it, with the file and what to do with it.
-fn told(mut text: String, output: &Path) -> Exit {
+/// Prints a summary, with the file and the command that draws it.
+fn print_summary(mut text: String, output: &Path) -> Exit {
     text.line("file", output.display());
     text.next("plot", output);
     tell(text.trim_end());
@@ -129,14 +129,15 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
         duration(wall_s)
     );
     let rows = || traced.curves.iter().flatten();
-    let of_kind = |row: &TracedRow, kind| row.edges.iter().filter(|edge| edge.kind == kind).count();
+    let count_kind =
+        |row: &TracedRow, kind| row.edges.iter().filter(|edge| edge.kind == kind).count();
     let found = EdgeKind::ALL.into_iter().filter_map(|kind| {
-        let count: usize = rows().map(|row| of_kind(row, kind)).sum();
+        let count: usize = rows().map(|row| count_kind(row, kind)).sum();
         let [noun, rest] = in_words(kind);
         (count > 0).then(|| counted(count, noun) + rest)
     });
     text.line("found", found.collect::<Vec<_>>().join(", "));
-    let several = rows().filter(|row| of_kind(row, EdgeKind::Crossing) > 1).count();
+    let several = rows().filter(|row| count_kind(row, EdgeKind::Crossing) > 1).count();
     if several > 0 {
         let values = counted(several, "value");
         text.line("folds", format!("several crossings at {values} of the first axis"));
@@ -151,23 +152,21 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
             true => "of its value",
             false => plan.axes.get(1).map_or("", |axis| axis.parameter.unit()),
         };
-        let (widest, asked) = (short(widest), short(search.tolerance));
+        let widest = short(widest);
+        let asked = short(search.tolerance);
         let told = format!("at most {widest} {unit} wide (asked: {asked})");
         text.line("brackets", told);
     }
-    // Cells of a logarithmic axis grow: the largest counts.
-    let cell = |axis: &Axis<M>| {
-        let edge = |k: usize| axis.values.between(k as f64 / search.lattice as f64);
-        let cells = (0..search.lattice).map(|k| (edge(k + 1) - edge(k)).abs());
-        format!("{:.3} {}", cells.fold(0.0, f64::max), axis.parameter.unit())
-    };
-    let cell = plan.axes.iter().map(cell).collect::<Vec<_>>().join(" by ");
+    let cell = task.cell().into_iter().zip(&plan.axes);
+    let cell: Vec<String> =
+        cell.map(|(size, axis)| format!("{size:.3} {}", axis.parameter.unit())).collect();
+    let cell = cell.join(" by ");
     let told = format!("every island of {cell}; smaller ones may be missed (--lattice)");
     text.line("promises", told);
     text
 }
 
-/// An edge of this kind: a noun, and what follows it.
+/// Returns an edge of this kind in words: a noun, and the words that follow it.
 const fn in_words(kind: EdgeKind) -> [&'static str; 2] {
     match kind {
         EdgeKind::Crossing => ["crossing", ""],
@@ -179,8 +178,8 @@ const fn in_words(kind: EdgeKind) -> [&'static str; 2] {
     }
 }
 
-/// Searches, with a memory of trials if there is one, and gives it back; nothing is found where the
-/// interrupt was raised.
+/// Searches, with a memory of trials if there is one, and returns the memory; nothing is found if
+/// the interrupt was raised.
 ///
 /// # Errors
 /// No threads; `SWEEP_SIMD` naming nothing this machine has; trials that could not be kept.
@@ -194,9 +193,9 @@ pub fn search<M: Swept>(
     let rows_done = AtomicU64::new(0);
     let progress = Progress::for_search(effort.progress, rows, "rows", there);
     let shown = |points| progress.show_search(rows_done.load(Ordering::Relaxed), points);
-    let (threads, interrupt) = (effort.threads()?, effort.interrupt);
+    let threads = effort.threads()?;
     let engine = M::engine(&task.plan, Some(&task.quantity.name))?;
-    let asking = CachedEvaluator::new(engine, threads, interrupt, trials, &shown)?;
+    let asking = CachedEvaluator::new(engine, threads, effort.interrupt, trials, &shown)?;
     let mut standing = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
     let distances = task.distances(&asking);
     let found = trace(&distances, &task.firsts, task.curves, &task.search, &mut standing);

@@ -1,48 +1,49 @@
-//! The search against fields drawn at random, whose edges are known everywhere: a boundary with
-//! islands, tongues and folds of either kind, smooth or with a jump. Which pockets does it miss?
+//! The search against level sets drawn at random, whose sides are known everywhere: a boundary with
+//! islands, tongues and folds of either kind, smooth or with a jump.
 
+use super::super::lattice::lattice_ranks;
 use super::super::*;
 use super::{SEARCH, check_edges, traced};
 
-/// How many fields are drawn.
-const FIELDS: u64 = 1000;
+/// The number of level sets that are drawn. Basis: a second of tests. Doubling it doubles that.
+const LEVEL_SETS: u64 = 400;
 const ROWS: u32 = 39;
-/// The truth is sampled at this distance, half a tolerance.
+/// The distance of samples of the truth, half a tolerance. The lattice's columns are among them.
 const STEP: f64 = 0.25;
 
 /// A stretch of a row on one side.
 #[derive(Clone, Copy, Debug)]
-struct Stretch {
+struct RowStretch {
     from: f64,
     to: f64,
     is_reliable: bool,
 }
 
-impl Stretch {
+impl RowStretch {
     fn width(&self) -> f64 {
         self.to - self.from
     }
 
-    /// How much of it lies beside another on the same side.
+    /// Returns the width of the part that lies beside another on the same side.
     fn common(&self, other: &Self) -> f64 {
         let common = self.to.min(other.to) - self.from.max(other.from);
         if self.is_reliable == other.is_reliable { common } else { f64::NEG_INFINITY }
     }
 }
 
-/// A region of either side laid over a field: an ellipse, or a parabola's inside, sheared.
+/// A region of either side laid over a level set: an ellipse, or a parabola's inside, sheared.
 struct Pocket {
     at: [f64; 2],
     size: [f64; 2],
     shear: f64,
     depth: f64,
-    /// Towards which end of the first axis it opens; an ellipse opens nowhere.
+    /// The end of the first axis towards which it opens; 0 for an ellipse.
     opens: f64,
     is_reliable: bool,
 }
 
-/// A field over `0..=1` and the second axis of [`SEARCH`].
-struct Field {
+/// A function over `0..=1` and the second axis of [`SEARCH`].
+struct LevelSet {
     line: [f64; 5],
     widths: [f64; 2],
     reliable_below: bool,
@@ -50,7 +51,7 @@ struct Field {
     jump: Option<[f64; 3]>,
 }
 
-impl Field {
+impl LevelSet {
     fn draw(seed: u64) -> Self {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut between = |from: f64, to: f64| from + (to - from) * random.f64();
@@ -74,7 +75,7 @@ impl Field {
         Self { line, widths, reliable_below, pockets, jump }
     }
 
-    /// Saturates far on both sides of its line, as a ratio does.
+    /// Returns the distance, which saturates far on both sides of the line, as a ratio does.
     fn distance(&self, x: f64, y: f64) -> f64 {
         let [offset, slope, bend, waves, phase] = self.line;
         let line = offset + slope * x + bend * (waves * x + phase).sin();
@@ -89,8 +90,9 @@ impl Field {
             distance += if y < offset + slope * x { 0.5 * height } else { -0.5 * height };
         }
         for pocket in &self.pockets {
-            let (u, v) = (x - pocket.at[0], y - pocket.at[1] - pocket.shear * (x - pocket.at[0]));
-            let (u, v) = (u / pocket.size[0], v / pocket.size[1]);
+            let u = x - pocket.at[0];
+            let v = (y - pocket.at[1] - pocket.shear * u) / pocket.size[1];
+            let u = u / pocket.size[0];
             let along = if pocket.opens == 0.0 { 1.0 - u * u } else { pocket.opens * u };
             let inside = (along - v * v) * pocket.depth;
             distance = match pocket.is_reliable {
@@ -101,29 +103,41 @@ impl Field {
         distance.clamp(-0.7, 2.6)
     }
 
-    fn truth(&self, x: f64) -> Vec<Stretch> {
-        let steps = ((SEARCH.greatest - SEARCH.least) / STEP) as u32;
-        let at = |k: u32| SEARCH.least + STEP * f64::from(k);
-        let sides: Vec<bool> = (0..=steps).map(|k| self.distance(x, at(k)) < 0.0).collect();
-        let changes = (1..=steps).filter(|k| sides[*k as usize] != sides[*k as usize - 1]);
-        let marks = changes.map(|k| (at(k) - 0.5 * STEP, sides[k as usize]));
-        stretches(sides[0], marks)
+    /// Returns whether the samples of a row are reliable.
+    fn sides(&self, x: f64) -> Vec<bool> {
+        (0..=samples()).map(|k| self.distance(x, position(k)) < 0.0).collect()
     }
 }
 
-/// The stretches by the side at the least value and the changes of side behind it.
-fn stretches(first: bool, changes: impl Iterator<Item = (f64, bool)>) -> Vec<Stretch> {
-    let mut found = vec![Stretch { from: SEARCH.least, to: SEARCH.greatest, is_reliable: first }];
+fn samples() -> usize {
+    ((SEARCH.greatest - SEARCH.least) / STEP) as usize
+}
+
+fn position(sample: usize) -> f64 {
+    SEARCH.least + STEP * sample as f64
+}
+
+/// Returns the stretches of one side in a row of samples.
+fn true_stretches(sides: &[bool]) -> Vec<RowStretch> {
+    let changes = (1..sides.len()).filter(|k| sides[*k] != sides[*k - 1]);
+    stretches(sides[0], changes.map(|k| (position(k) - 0.5 * STEP, sides[k])))
+}
+
+/// Returns the stretches by the side at the least value and the changes of side behind it.
+fn stretches(first: bool, changes: impl Iterator<Item = (f64, bool)>) -> Vec<RowStretch> {
+    let whole = RowStretch { from: SEARCH.least, to: SEARCH.greatest, is_reliable: first };
+    let mut found = vec![whole];
     for (at, is_reliable) in changes {
         if let Some(last) = found.last_mut() {
             last.to = at;
         }
-        found.push(Stretch { from: at, to: SEARCH.greatest, is_reliable });
+        found.push(RowStretch { from: at, to: SEARCH.greatest, is_reliable });
     }
     found
 }
 
-fn found(row: &TracedRow) -> Vec<Stretch> {
+/// Returns the stretches of a traced row.
+fn traced_stretches(row: &TracedRow) -> Vec<RowStretch> {
     let is_reliable = |distance: Option<f64>| distance.is_some_and(|distance| distance < 0.0);
     let first = match row.edges[0].bracket {
         Some(_) => is_reliable(row.edges[0].distances[0]),
@@ -136,53 +150,98 @@ fn found(row: &TracedRow) -> Vec<Stretch> {
     stretches(first, changes)
 }
 
+/// Returns, for each run of `rows` rows, the stretches that are on one side in all of them.
+fn common_stretches(sides: &[Vec<bool>], rows: usize) -> Vec<(usize, Vec<RowStretch>)> {
+    let mut found = Vec::new();
+    for (first, run) in sides.windows(rows).enumerate() {
+        let mut common = Vec::new();
+        for is_reliable in [false, true] {
+            let all: Vec<bool> =
+                (0..=samples()).map(|k| run.iter().all(|row| row[k] == is_reliable)).collect();
+            // A stretch ends at its last sample, not halfway to the next.
+            let mut from = None;
+            for k in 0..=samples() + 1 {
+                let is_on = all.get(k).copied().unwrap_or(false);
+                if let Some(start) = from.filter(|_| !is_on) {
+                    let to = position(k - 1);
+                    common.push(RowStretch { from: position(start), to, is_reliable });
+                    from = None;
+                } else if is_on && from.is_none() {
+                    from = Some(k);
+                }
+            }
+        }
+        found.push((first, common));
+    }
+    found
+}
+
+/// Islands as large as a cell of the lattice are promised in every row that passes them; smaller
+/// ones are counted.
 #[test]
-fn no_wide_pocket_is_missed_that_a_neighbour_announces() {
+fn random_level_sets() {
+    let clock = std::time::SystemTime::UNIX_EPOCH.elapsed().map_or(0, |now| now.as_nanos() as u64);
+    let seed = std::env::var("SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(clock);
     let firsts: Vec<f64> = (0..ROWS).map(|k| f64::from(k) / f64::from(ROWS - 1)).collect();
-    let (mut pockets, mut lane_groups) = (0, 0);
-    // Widths of what was missed, announced or not.
-    let (mut announced, mut unannounced) = (Vec::new(), Vec::new());
-    for seed in 0..FIELDS {
-        let field = Field::draw(seed);
-        let of = |x, y| Some(field.distance(x, y));
+    let lattice = lattice_ranks(firsts.len(), SEARCH.lattice);
+    let cell_rows = lattice.windows(2).map(|pair| pair[1] - pair[0] + 1).max().unwrap_or(1);
+    let cell_width = (SEARCH.greatest - SEARCH.least) / SEARCH.lattice as f64;
+    let mut promised = 0;
+    let mut pockets = 0;
+    let mut trials = 0;
+    let mut missed_beside_neighbour = Vec::new();
+    let mut missed_others = Vec::new();
+    for k in 0..LEVEL_SETS {
+        let level_set = LevelSet::draw(seed.wrapping_add(k));
+        let of = |x, y| Some(level_set.distance(x, y));
         let traced = traced(of, &firsts, &SEARCH);
         check_edges(&traced, of, SEARCH.tolerance);
-        lane_groups += traced.lane_groups;
-        let rows: Vec<Vec<Stretch>> = traced.curves[0].iter().map(found).collect();
-        for (k, first) in firsts.iter().enumerate() {
-            let beside = [k.checked_sub(1), Some(k + 1)].into_iter().flatten();
-            let beside: Vec<&Stretch> = beside.filter_map(|k| rows.get(k)).flatten().collect();
-            for pocket in field.truth(*first) {
+        trials += traced.trials;
+        let found: Vec<Vec<RowStretch>> = traced.curves[0].iter().map(traced_stretches).collect();
+        let sides: Vec<Vec<bool>> = firsts.iter().map(|first| level_set.sides(*first)).collect();
+        for (first, islands) in common_stretches(&sides, cell_rows) {
+            for island in islands.iter().filter(|island| island.width() >= cell_width) {
+                for (row, found) in found.iter().enumerate().skip(first).take(cell_rows) {
+                    promised += 1;
+                    let is_found = found.iter().any(|other| island.common(other) > 0.0);
+                    assert!(is_found, "SEED={seed}, level set {k}, row {row}: {island:?}");
+                }
+            }
+        }
+        for (row, sides) in sides.iter().enumerate() {
+            let beside = [row.checked_sub(1), Some(row + 1)].into_iter().flatten();
+            let beside: Vec<&RowStretch> = beside.filter_map(|k| found.get(k)).flatten().collect();
+            for pocket in true_stretches(sides) {
                 if pocket.width() <= SEARCH.tolerance {
                     continue;
                 }
                 pockets += 1;
-                let is_in = |other: &Stretch, by: f64| pocket.common(other) > by;
-                if rows[k].iter().any(|other| is_in(other, 0.0)) {
+                if found[row].iter().any(|other| pocket.common(other) > 0.0) {
                     continue;
                 }
-                let is_announced = beside.iter().any(|other| is_in(other, SEARCH.tolerance));
-                if is_announced { &mut announced } else { &mut unannounced }.push(pocket.width());
+                let is_beside = beside.iter().any(|other| pocket.common(other) > SEARCH.tolerance);
+                let missed =
+                    if is_beside { &mut missed_beside_neighbour } else { &mut missed_others };
+                missed.push(pocket.width());
             }
         }
     }
     let widest = |widths: &[f64]| widths.iter().copied().fold(0.0, f64::max);
-    let said = format!(
-        "{FIELDS} fields, {pockets} stretches of one side wider than {} N s/m, \
-         {:.1} lane groups a field; missed: {} that \
-         a neighbour announces, at most {} wide, and {} others, at most {} wide",
+    let summary = format!(
+        "SEED={seed}: {LEVEL_SETS} level sets, {} trials each; {promised} islands as large as a \
+         cell, all found; of {pockets} stretches of one side wider than {} N s/m, missed {} beside \
+         a neighbour's, at most {} wide, and {} others, at most {} wide",
+        trials / LEVEL_SETS as usize,
         SEARCH.tolerance,
-        lane_groups as f64 / FIELDS as f64,
-        announced.len(),
-        widest(&announced),
-        unannounced.len(),
-        widest(&unannounced)
+        missed_beside_neighbour.len(),
+        widest(&missed_beside_neighbour),
+        missed_others.len(),
+        widest(&missed_others)
     );
-    println!("{said}");
-    // A quarter of a cell of the lattice is 8.6 N s/m, and what lies partly beside the neighbour's
-    // pocket may be twice as wide.
-    assert!(widest(&announced) <= 17.2, "{said}");
-    assert!(announced.len() * 1000 <= pockets, "{said}");
-    assert!(unannounced.len() * 50 <= pockets, "{said}");
-    assert!(lane_groups <= 40 * FIELDS as usize, "{said}");
+    println!("{summary}");
+    assert!(promised > 10 * LEVEL_SETS, "{summary}");
+    // Over 60 seeds: 1 in 1,800 and 1 in 160, at most 1 in 940 and 1 in 97 for one seed.
+    assert!(missed_beside_neighbour.len() * 400 <= pockets, "{summary}");
+    assert!(missed_others.len() * 50 <= pockets, "{summary}");
+    assert!(trials <= 400 * LEVEL_SETS as usize, "{summary}");
 }

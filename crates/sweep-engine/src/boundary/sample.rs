@@ -1,0 +1,90 @@
+//! The samples of a line and the sides of the limit that they are on.
+//!
+//! Positions are coordinates of the second axis: its values, or their logarithms. Distances are
+//! signed distances from the limit, of order one (a logarithm of a ratio).
+
+use super::Search;
+
+/// Returns the coordinate of an axis's value.
+pub(super) fn position(value: f64, is_log: bool) -> f64 {
+    if is_log { libm::log(value) } else { value }
+}
+
+impl Search {
+    /// Returns the range that is searched, in coordinates.
+    pub(super) fn span(&self) -> Span {
+        Span {
+            least: position(self.least, self.second_log),
+            greatest: position(self.greatest, self.second_log),
+            tolerance: self.tolerance,
+        }
+    }
+
+    /// Returns the value of the second axis at a position.
+    pub(super) fn value(&self, at: f64) -> f64 {
+        let span = self.span();
+        // The ends are exact whatever the logarithm rounds to.
+        if at <= span.least {
+            self.least
+        } else if at >= span.greatest {
+            self.greatest
+        } else if self.second_log {
+            libm::exp(at)
+        } else {
+            at
+        }
+    }
+}
+
+/// The side of the limit that a sample is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum LimitSide {
+    Reliable,
+    Unreliable,
+    Undefined,
+}
+
+/// An evaluated position on a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LineSample {
+    pub at: f64,
+    pub distance: Option<f64>,
+}
+
+impl LineSample {
+    pub(super) fn side(&self) -> LimitSide {
+        match self.distance {
+            Some(distance) if distance < 0.0 => LimitSide::Reliable,
+            Some(_) => LimitSide::Unreliable,
+            None => LimitSide::Undefined,
+        }
+    }
+
+    pub(super) fn finite_distance(&self) -> Option<f64> {
+        self.distance.filter(|distance| distance.is_finite())
+    }
+}
+
+/// The range that is searched, in coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    pub least: f64,
+    pub greatest: f64,
+    /// The greatest width of a final bracket.
+    pub tolerance: f64,
+}
+
+/// An interval of a line on one side, as far as its samples show. It ends where the side changes,
+/// or at the range's end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SideInterval {
+    pub from: f64,
+    pub to: f64,
+    pub side: LimitSide,
+}
+
+/// Returns the side of a line at a position; `None` before its first samples.
+pub(super) fn side_at(intervals: &[SideInterval], at: f64) -> Option<LimitSide> {
+    let found = intervals.iter().find(|interval| interval.from <= at && at <= interval.to);
+    found.map(|interval| interval.side)
+}
