@@ -35,7 +35,7 @@ impl Stopped {
 }
 
 /// The response to a request: a number for each of its keys, `None` where it is null.
-pub type Response = Vec<Option<f64>>;
+pub type RequestValues = Vec<Option<f64>>;
 
 /// An engine with a cache of responses.
 pub struct CachedEvaluator<'a> {
@@ -88,9 +88,10 @@ impl<'a> CachedEvaluator<'a> {
         keys: &[Vec<Key>],
         rows: u64,
         axis_values: &(dyn Fn(usize, u64) -> Vec<f64> + Sync),
-        respond: &(dyn Fn(usize, Vec<Done>) -> Result<Response, StoreError> + Sync),
-    ) -> Result<Vec<Response>, Stopped> {
-        let cached: Vec<Option<Response>> = keys.iter().map(|keys| self.look_up(keys)).collect();
+        respond: &(dyn Fn(usize, Vec<Done>) -> Result<RequestValues, StoreError> + Sync),
+    ) -> Result<Vec<RequestValues>, Stopped> {
+        let cached: Vec<Option<RequestValues>> =
+            keys.iter().map(|keys| self.look_up(keys)).collect();
         let missing: Vec<usize> = (0..keys.len()).filter(|&k| cached[k].is_none()).collect();
         self.count_responses((keys.len() - missing.len()) as u64);
         // The points of all requests are one queue, so that they fill lanes together.
@@ -130,12 +131,12 @@ impl<'a> CachedEvaluator<'a> {
         unlocked(responses).into_iter().collect::<Option<_>>().ok_or(Stopped::Interrupted)
     }
 
-    fn look_up(&self, keys: &[Key]) -> Option<Response> {
+    fn look_up(&self, keys: &[Key]) -> Option<RequestValues> {
         let cache = lock(&self.cache);
         keys.iter().map(|key| cache.as_ref()?.recall(key)).collect()
     }
 
-    fn store(&self, keys: &[Key], response: &Response) -> Result<(), StoreError> {
+    fn store(&self, keys: &[Key], response: &RequestValues) -> Result<(), StoreError> {
         let mut cache = lock(&self.cache);
         let Some(cache) = cache.as_mut() else { return Ok(()) };
         for (&key, &number) in keys.iter().zip(response) {

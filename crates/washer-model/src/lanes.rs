@@ -119,9 +119,9 @@ impl<A: Constant> Constant for Vec<A> {
 pub(crate) struct InAnyLane<T>(bool, PhantomData<T>);
 
 impl<T> InAnyLane<T> {
-    /// Whether it holds of this machine.
-    pub(crate) fn new(is_so: bool) -> Self {
-        Self(is_so, PhantomData)
+    /// Creates the property of one machine.
+    pub(crate) fn new(holds: bool) -> Self {
+        Self(holds, PhantomData)
     }
 
     /// Returns whether any machine has the property.

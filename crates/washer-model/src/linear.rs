@@ -95,10 +95,8 @@ impl<T: Lane> Aside for Linearise<'_, T> {
                     let column = direction % 4;
                     let entry = if direction < 4 { entry::stiffness } else { entry::damping };
                     let (dq, du) = if direction < 4 { (1.0, 0.0) } else { (0.0, 1.0) };
-                    let (q, u) = (
-                        seeded(q, ROTOR_TURNS[column], dq),
-                        seeded(&still, ROTOR_TURNS[column], du),
-                    );
+                    let q = seeded(q, ROTOR_TURNS[column], dq);
+                    let u = seeded(&still, ROTOR_TURNS[column], du);
                     let Half { mut floating, .. } = rotor(&lifted.bodies, &lifted_spin, &q, &u);
                     floating.apply(&on_shaft.constant());
                     let rows: [_; ROWS] = about_centre(floating.generalised_forces(), &arm);
@@ -189,8 +187,11 @@ fn terms_of_lane<T: Lane>(
 ) -> Terms<f64> {
     let coefficients = |entry: usize| {
         let mut functions = [0.0; FUNCTIONS];
-        let of = |kind: usize| harmonics::coefficients(samples[kind][entry].map(|v| v.0.get(lane)));
-        let [rest, at_speed, accelerated] = [of(0), of(1), of(2)];
+        let harmonics_at =
+            |kind: usize| harmonics::coefficients(samples[kind][entry].map(|v| v.0.get(lane)));
+        let rest = harmonics_at(0);
+        let at_speed = harmonics_at(1);
+        let accelerated = harmonics_at(2);
         functions[harmonics::ONE..harmonics::SPEED].copy_from_slice(&rest);
         if (entry::damping(0, 0)..ENTRIES).contains(&entry) {
             functions[harmonics::SPEED..harmonics::SPIN].copy_from_slice(&at_speed);
@@ -236,19 +237,19 @@ impl LinearPoint {
         bodies: &Bodies<f64>,
     ) -> [[f64; COORDINATES]; COORDINATES] {
         let Constants { tub_axis, rotor_axis, .. } = &self.constants;
-        let by_unit = |i: usize| {
+        let unit_deflection = |i: usize| {
             let mut unit = [N(0.0); COORDINATES];
             unit[i] = N(1.0);
             Deflection::linear(&unit, tub_axis, rotor_axis)
         };
         let work = |i: usize, load: &AxisLoad<f64>| {
-            let Deflection { offset, tilt } = by_unit(i);
+            let Deflection { offset, tilt } = unit_deflection(i);
             let force = load.force[0] * offset[0] + load.force[1] * offset[1];
             -(force + (load.moment[0] * tilt[0] + load.moment[1] * tilt[1])).0
         };
         let mut stiffness = [[0.0; COORDINATES]; COORDINATES];
         for j in 0..COORDINATES {
-            let load = by_unit(j).load(bodies);
+            let load = unit_deflection(j).load(bodies);
             for (i, row) in stiffness.iter_mut().enumerate() {
                 row[j] = work(i, &load);
             }
@@ -260,14 +261,14 @@ impl LinearPoint {
     pub(crate) fn matrices(&self, bodies: &Bodies<f64>, spin: &SpinState<f64>) -> Matrices {
         let c = &self.constants;
         let (inertia, e) = self.terms.at(&harmonics::functions(spin));
-        let tub = About { midpoint: [TUB_Y, TUB_Z], turns: TUB_TURNS, arm: c.tub_arm };
+        let tub = HalfMap { midpoint: [TUB_Y, TUB_Z], turns: TUB_TURNS, arm: c.tub_arm };
         let rotor =
-            About { midpoint: [SHAFT_Y, SHAFT_Z], turns: ROTOR_TURNS, arm: entry::arms(&e) };
+            HalfMap { midpoint: [SHAFT_Y, SHAFT_Z], turns: ROTOR_TURNS, arm: entry::arms(&e) };
         let mut matrices = Matrices {
             mass: [[0.0; COORDINATES]; COORDINATES],
             damping: [[0.0; COORDINATES]; COORDINATES],
             stiffness: self.bearing_stiffness(bodies),
-            force: rotor.felt(|row| e[entry::force(row)]),
+            force: rotor.generalised_forces(|row| e[entry::force(row)]),
         };
         let mut add = |j: usize, stiffness: [f64; COORDINATES], damping: [f64; COORDINATES]| {
             for i in 0..COORDINATES {
@@ -276,28 +277,34 @@ impl LinearPoint {
             }
         };
         for column in 0..4 {
-            let stiffness = tub.felt(|row| c.tub_stiffness[row][column]);
-            add(TUB[column], stiffness, tub.felt(|row| c.tub_damping[row][column]));
-            let stiffness = rotor.felt(|row| e[entry::stiffness(row, column)]);
-            add(ROTOR_TURNS[column], stiffness, rotor.felt(|row| e[entry::damping(row, column)]));
+            let stiffness = tub.generalised_forces(|row| c.tub_stiffness[row][column]);
+            add(TUB[column], stiffness, tub.generalised_forces(|row| c.tub_damping[row][column]));
+            let stiffness = rotor.generalised_forces(|row| e[entry::stiffness(row, column)]);
+            add(
+                ROTOR_TURNS[column],
+                stiffness,
+                rotor.generalised_forces(|row| e[entry::damping(row, column)]),
+            );
         }
-        tub.fill(&mut matrices.mass, c.tub_per_mass, |r, s| c.tub_inertia[r][s]);
-        rotor.fill(&mut matrices.mass, c.rotor_per_mass, |r, s| inertia[entry::inertia(r, s)]);
+        tub.write_mass(&mut matrices.mass, c.tub_per_mass, |r, s| c.tub_inertia[r][s]);
+        rotor
+            .write_mass(&mut matrices.mass, c.rotor_per_mass, |r, s| inertia[entry::inertia(r, s)]);
         matrices
     }
 }
 
-/// A half's coordinates, and how its mass centre moves with those that turn.
-struct About<const R: usize> {
+/// The map between a half's mass centre and the coordinates: the positions of the coordinates, and
+/// the partial velocities of the mass centre.
+struct HalfMap<const R: usize> {
     midpoint: [usize; 2],
     turns: [usize; R],
     arm: [[N<f64>; 2]; R],
 }
 
-impl<const R: usize> About<R> {
-    /// Forces that the coordinates see, from the half's force (y, z) and torques about its mass
+impl<const R: usize> HalfMap<R> {
+    /// Computes the generalised forces from the half's force (y, z) and torques about its mass
     /// centre: the inverse of `about_centre`.
-    fn felt(&self, rows: impl Fn(usize) -> N<f64>) -> [f64; COORDINATES] {
+    fn generalised_forces(&self, rows: impl Fn(usize) -> N<f64>) -> [f64; COORDINATES] {
         let mut forces = [0.0; COORDINATES];
         let force = [rows(0), rows(1)];
         for i in 0..2 {
@@ -309,14 +316,16 @@ impl<const R: usize> About<R> {
         forces
     }
 
-    /// The half's block of the mass matrix: J^T M J of the transformation in `floating`.
-    fn fill(
+    /// Writes the half's block of the mass matrix: J^T M J with the Jacobian J of the map.
+    fn write_mass(
         &self,
         mass: &mut [[f64; COORDINATES]; COORDINATES],
         per_mass: N<f64>,
         inertia: impl Fn(usize, usize) -> N<f64>,
     ) {
-        let (m, arm, turns) = (1.0 / per_mass.0, &self.arm, &self.turns);
+        let m = 1.0 / per_mass.0;
+        let arm = &self.arm;
+        let turns = &self.turns;
         for (i, midpoint) in self.midpoint.into_iter().enumerate() {
             mass[midpoint][midpoint] = m;
             for r in 0..R {
@@ -326,8 +335,8 @@ impl<const R: usize> About<R> {
         }
         for r in 0..R {
             for s in 0..=r {
-                let of_arms = arm[r][0].0 * arm[s][0].0 + arm[r][1].0 * arm[s][1].0;
-                let entry = inertia(r, s).0 + m * of_arms;
+                let product = arm[r][0].0 * arm[s][0].0 + arm[r][1].0 * arm[s][1].0;
+                let entry = inertia(r, s).0 + m * product;
                 mass[turns[r]][turns[s]] = entry;
                 mass[turns[s]][turns[r]] = entry;
             }

@@ -262,9 +262,9 @@ impl Machine {
 
     /// Returns the weight of tub, shaft, drum and unbalances (N).
     pub fn weight_n(&self) -> f64 {
-        let of_bodies = self.tub.mass_kg + self.shaft.mass_kg + self.drum.mass_kg;
-        let of_laundry = self.further_unbalances.iter().map(|unbalance| unbalance.mass_kg);
-        let mass_kg = of_bodies + self.unbalance.mass_kg + of_laundry.sum::<f64>();
+        let bodies_kg = self.tub.mass_kg + self.shaft.mass_kg + self.drum.mass_kg;
+        let further_kg: f64 = self.further_unbalances.iter().map(|one| one.mass_kg).sum();
+        let mass_kg = bodies_kg + self.unbalance.mass_kg + further_kg;
         self.gravity_m_per_s2 * mass_kg
     }
 
@@ -278,7 +278,8 @@ impl Machine {
         // Tables 2 and 3 print the drum with its 0.4 kg unbalance; take the point mass out (model
         // page, section 2).
         let reduced_mass_kg = unbalance_mass_kg * drum_mass_kg / (unbalance_mass_kg + drum_mass_kg);
-        let (dx, r) = (unbalance.x_m - drum_x_m, unbalance.radius_m);
+        let dx = unbalance.x_m - drum_x_m;
+        let r = unbalance.radius_m;
         let with_unbalance = [0.196, 0.162, 0.177];
         let point = [r * r, dx * dx, r * r + dx * dx];
         let bare = std::array::from_fn(|i| with_unbalance[i] - reduced_mass_kg * point[i]);

@@ -6,7 +6,7 @@ use arrow_array::RecordBatch;
 use arrow_schema::ArrowError;
 
 use super::{Candidate, Study, evolve};
-use crate::evaluator::{CachedEvaluator, Response, Stopped};
+use crate::evaluator::{CachedEvaluator, RequestValues, Stopped};
 use crate::store::{Done, Key, Layout, ResultRows, Row, Trials};
 use crate::{Effort, Error, Progress, StoreError, Swept};
 use sweep_files::panics::{lock, unlocked};
@@ -84,7 +84,7 @@ fn answer<M: Swept>(
     layout: &Layout,
     values: &[f64],
     points: Vec<Done>,
-) -> Result<Response, StoreError> {
+) -> Result<RequestValues, StoreError> {
     let batch = batch(study, layout, values, points)?;
     let number = |goal: &Goal, sign: f64| Ok(goal.evaluate(&batch)?.map(|number| sign * number));
     let objectives = study.objectives.iter().map(|one| number(&one.goal, one.sign));

@@ -98,7 +98,8 @@ fn same_bytes_for_1_2_and_4_threads() {
 fn same_bytes_for_any_number_of_shards() {
     let bytes = whole(POINTS, 1);
     for of in [1, 2, 3, 20] {
-        let (home, job) = (tempfile::tempdir().unwrap(), synthetic::job(POINTS));
+        let home = tempfile::tempdir().unwrap();
+        let job = synthetic::job(POINTS);
         for index in (1..=of).rev() {
             let shard = Some(ShardRequest::Given(Shard { index, of }));
             let engine = Formula::new(|_| {});
@@ -151,7 +152,8 @@ fn interrupted_at_any_point_it_goes_on_and_ends_in_the_same_bytes() {
 
 #[test]
 fn done_is_done() {
-    let (home, job) = (tempfile::tempdir().unwrap(), synthetic::job(POINTS));
+    let home = tempfile::tempdir().unwrap();
+    let job = synthetic::job(POINTS);
     run(&Formula::new(|_| {}), &job, &output(&home), options(2), &Interrupt::new()).unwrap();
     let again = Formula::new(|_| {});
     let report = run(&again, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
@@ -161,7 +163,8 @@ fn done_is_done() {
 
 #[test]
 fn a_panic_that_leaves_the_engine_costs_what_it_had_not_handed_over() {
-    let (home, job) = (tempfile::tempdir().unwrap(), synthetic::job(POINTS));
+    let home = tempfile::tempdir().unwrap();
+    let job = synthetic::job(POINTS);
     let engine = Formula::new(|point| assert_ne!(point, 20, "twenty is too much"));
     let error = run(&engine, &job, &output(&home), options(1), &Interrupt::new()).unwrap_err();
     let there = engine.evaluated.into_inner();
@@ -177,8 +180,10 @@ fn a_panic_that_leaves_the_engine_costs_what_it_had_not_handed_over() {
 
 #[test]
 fn a_folder_that_vanishes_ends_the_run_with_its_path_and_advice() {
-    let (home, job) = (tempfile::tempdir().unwrap(), synthetic::job(1000));
-    let (partial, gone) = (home.path().join("x.parquet.partial"), home.path().join("gone"));
+    let home = tempfile::tempdir().unwrap();
+    let job = synthetic::job(1000);
+    let partial = home.path().join("x.parquet.partial");
+    let gone = home.path().join("gone");
     let engine = Formula::new(|point| {
         if point == 40 {
             while !partial.join("chunk-00000000.bin").exists() {

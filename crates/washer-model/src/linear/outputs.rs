@@ -118,20 +118,20 @@ lane_struct! {
 impl<T: Lane> LinearOutputs<T> {
     /// Computes the deviations of the channels from equilibrium, unbalance up.
     #[inline(always)]
-    pub(crate) fn channels(&self, of: &LinearMotion<T>) -> [Sample<T>; CHANNELS] {
-        let mut sums = [[of.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
-        self.channels.sum(&of.coordinates, &mut sums);
+    pub(crate) fn channels(&self, motion: &LinearMotion<T>) -> [Sample<T>; CHANNELS] {
+        let mut sums = [[motion.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
+        self.channels.sum(&motion.coordinates, &mut sums);
         add_at_rest(&mut sums, CHANNELS_AT_REST, &self.channels_at_rest);
-        of.turned::<CHANNEL_ENTRIES, CHANNELS>(sums, TURNING)
+        motion.turned::<CHANNEL_ENTRIES, CHANNELS>(sums, TURNING)
     }
 
     /// Computes the position of the drum's front centre relative to the tub axis, along t2 and t3.
     #[inline(always)]
-    pub(crate) fn radial(&self, of: &LinearMotion<T>) -> [Sample<T>; RADIAL] {
-        let mut sums = [[of.cos[0].lit(0.0); 3]; RADIAL_ENTRIES];
-        self.radial.sum(&of.coordinates, &mut sums);
+    pub(crate) fn radial(&self, motion: &LinearMotion<T>) -> [Sample<T>; RADIAL] {
+        let mut sums = [[motion.cos[0].lit(0.0); 3]; RADIAL_ENTRIES];
+        self.radial.sum(&motion.coordinates, &mut sums);
         add_at_rest(&mut sums, &RADIAL_AT_REST, &self.radial_at_rest);
-        of.turned::<RADIAL_ENTRIES, RADIAL>(sums, &RADIAL_TURNING)
+        motion.turned::<RADIAL_ENTRIES, RADIAL>(sums, &RADIAL_TURNING)
     }
 }
 
@@ -163,7 +163,9 @@ impl<T: Real> LinearMotion<T> {
     #[inline(always)]
     pub(crate) fn new(spin: &SpinState<T>, motion: &MovingCoordinates<T>) -> Self {
         let zero = spin.sin.lit(0.0);
-        let (n, nn, acceleration) = (spin.speed, (spin.speed * spin.speed).v(), spin.acceleration);
+        let n = spin.speed;
+        let nn = (spin.speed * spin.speed).v();
+        let acceleration = spin.acceleration;
         let mut coordinates = [[zero; 3]; COORDINATES];
         for j in 0..COORDINATES {
             coordinates[j] = [motion.q[j], motion.u[j], motion.a[j]];
@@ -231,19 +233,20 @@ impl<T: Lane> Aside for LineariseOutputs<'_, T> {
             for j in 0..COORDINATES {
                 let motion = MovingCoordinates { q: seeded(q, j, 1.0), u: still, a: still };
                 let axes = Axes::new(&spin, &motion);
-                let (channels, radial) =
-                    (axes.channels(&lifted, &motion), axes.radial(&lifted, &motion));
+                let channels = axes.channels(&lifted, &motion);
+                let radial = axes.radial(&lifted, &motion);
                 for (output, y) in channels.iter().chain(&radial).enumerate() {
                     samples[k][output][AT_REST] = N(y.value.0.value);
                     samples[k][output][j] = N(y.value.0.slope);
                 }
             }
         }
-        (0..T::LANES).map(|lane| of_lane(&samples.get_lane(lane))).collect()
+        (0..T::LANES).map(|lane| gather_lane(&samples.get_lane(lane))).collect()
     }
 }
 
-fn of_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64> {
+/// Computes the coefficients of one lane from samples at three angles.
+fn gather_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64> {
     let mut channels = [[0.0; COORDINATES]; CHANNEL_ENTRIES];
     let mut channels_at_rest = [0.0; CHANNEL_ENTRIES];
     let mut radial = [[0.0; COORDINATES]; RADIAL_ENTRIES];

@@ -76,7 +76,8 @@ impl Terms<f64> {
         &self,
         functions: &[N<f64>; FUNCTIONS],
     ) -> ([N<f64>; INERTIA_ENTRIES], [N<f64>; ENTRIES]) {
-        let (mut inertia, mut others) = ([N(0.0); INERTIA_ENTRIES], [N(0.0); ENTRIES]);
+        let mut inertia = [N(0.0); INERTIA_ENTRIES];
+        let mut others = [N(0.0); ENTRIES];
         self.inertia.sum(functions, &mut inertia);
         self.others.sum(functions, &mut others);
         (inertia, others)

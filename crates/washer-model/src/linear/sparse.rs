@@ -97,11 +97,12 @@ impl<T: Real> Summand<T> for [N<T>; 3] {
     }
     #[inline(always)]
     fn plus_scaled(self, coefficient: N<T>, other: Self) -> Self {
-        let ([value, first, second], [by_value, by_first, by_second]) = (self, other);
+        let [value, first, second] = self;
+        let [other_value, other_first, other_second] = other;
         [
-            value.plus_scaled(coefficient, by_value),
-            first.plus_scaled(coefficient, by_first),
-            second.plus_scaled(coefficient, by_second),
+            value.plus_scaled(coefficient, other_value),
+            first.plus_scaled(coefficient, other_first),
+            second.plus_scaled(coefficient, other_second),
         ]
     }
 }

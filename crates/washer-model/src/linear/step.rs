@@ -80,20 +80,20 @@ impl StepConstants<f64> {
             bearing_compliance: b.bearing_compliance(),
         };
         for column in 0..4 {
-            let of_matrix = |matrix: &[[N<f64>; 4]; 4]| matrix.map(|row| -row[column]);
+            let force_by_column = |matrix: &[[N<f64>; 4]; 4]| matrix.map(|row| -row[column]);
             let mut reaction = [zero; 4];
             reaction[column] = N(-1.0);
-            let by_position = under(of_matrix(&c.tub_stiffness), [zero; 4]);
-            let by_speed = under(of_matrix(&c.tub_damping), [zero; 4]);
+            let by_position = under(force_by_column(&c.tub_stiffness), [zero; 4]);
+            let by_speed = under(force_by_column(&c.tub_damping), [zero; 4]);
             let by_load = under([zero; 4], reaction);
             for row in 0..4 {
                 constants.tub_per_position[row][column] = by_position[row];
                 constants.tub_per_speed[row][column] = by_speed[row];
                 constants.tub_per_load[row][column] = by_load[row];
             }
-            let felt = constants.deflection(&in_order(&by_load, &[zero; 2], &[zero; 4]));
+            let deflection = constants.deflection(&in_order(&by_load, &[zero; 2], &[zero; 4]));
             for row in 0..4 {
-                constants.tub_compliance[row][column] = felt[row];
+                constants.tub_compliance[row][column] = deflection[row];
             }
         }
         constants
@@ -222,8 +222,9 @@ impl<T: Lane> BearingsAt<T> {
         let axis = &c.rotor_axis;
         let mut rotation = [[zero; 4]; 4];
         for row in 0..4 {
-            let (by_yaw, by_pitch) = (inverse.at(row, 0), inverse.at(row, 1));
-            // The yaw moves nothing along y.
+            let by_yaw = inverse.at(row, 0);
+            let by_pitch = inverse.at(row, 1);
+            // The partial velocity by the yaw has no y component.
             let mut by_force =
                 [zero - by_pitch * arm[1][0], zero - by_yaw * arm[0][1] - by_pitch * arm[1][1]];
             for r in 2..4 {

@@ -13,15 +13,18 @@ pub(crate) const FEET: usize = 4;
 /// moment about O (N m).
 pub(crate) const LOAD: usize = 6;
 
-/// Added to the sum of the feet's loads (N), which may be none.
-const LEAST_N: f64 = 1e-9;
+/// A number added to the sum of the feet's loads (N), by which other numbers are divided. Basis:
+/// negligible beside any load. Doubling it changes nothing.
+const SMALL_LOAD_N: f64 = 1e-9;
 
-/// Arm at which the floor takes a moment at least (m): about the radius of a foot's pad. A foot
-/// that carries alone has no other.
-const LEAST_ARM_M: f64 = 0.01;
+/// The least arm at which the floor takes a moment (m). Basis: the radius of a foot's pad, at which
+/// a single loaded foot takes it. Doubling it halves the force that a moment takes from that foot.
+const MIN_ARM_M: f64 = 0.01;
 
-/// Feet closer to one line than this share of their distances hold no cabinet upright.
-const IN_LINE: f64 = 1e-6;
+/// The least determinant of the feet's second moments, relative to the square of their trace, below
+/// which the feet are in a line. Basis: far below that of any cabinet, far above rounding. Doubling
+/// it refuses feet that are 1.4 times as far from a line.
+const COLLINEARITY_TOLERANCE: f64 = 1e-6;
 
 /// The distribution of loads on the cabinet over its feet.
 ///
@@ -32,15 +35,15 @@ const IN_LINE: f64 = 1e-6;
 pub(crate) struct Feet {
     /// The number of feet, 3 or 4.
     pub(crate) count: usize,
-    pub(crate) spread: Spread<f64>,
+    pub(crate) spread: LoadDistribution<f64>,
 }
 
 lane_struct! {
     /// The coefficients of the distribution. Entries beyond the last foot repeat the place of the
     /// first and carry nothing.
     #[derive(Clone, Copy, Debug)]
-    Spread {
-        /// Vertical load of each foot by the cabinet's own weight (N).
+    LoadDistribution {
+        /// The vertical load of each foot by the cabinet's own weight (N).
         own: [N<T>; FEET],
         /// The vertical load of each foot per component of a load on the cabinet.
         shares: [[N<T>; LOAD]; FEET],
@@ -75,49 +78,53 @@ impl Feet {
         let [xx, xz, zz] = [sum(|p| p[0] * p[0]), sum(|p| p[0] * p[1]), sum(|p| p[1] * p[1])];
         let det = xx * zz - xz * xz;
         let span = xx + zz;
-        if det.is_nan() || det <= IN_LINE * span * span {
+        if det.is_nan() || det <= COLLINEARITY_TOLERANCE * span * span {
             return None;
         }
         let weight_n = cabinet.mass_kg * machine.gravity_m_per_s2;
         let [centre_x, _, centre_z] = cabinet.centre_m;
-        let (mut own, mut shares) = ([N(0.0); FEET], [[N(0.0); LOAD]; FEET]);
+        let mut own = [N(0.0); FEET];
+        let mut shares = [[N(0.0); LOAD]; FEET];
         for (k, [x, z]) in places.into_iter().enumerate() {
-            // Of the sum of loads, and of their first moments about the feet's mean place.
-            let of_sum = 1.0 / count as f64;
-            let of_x = (zz * x - xz * z) / det;
-            let of_z = (xx * z - xz * x) / det;
+            // The foot's shares of the sum of loads, and of their first moments about the feet's
+            // mean position.
+            let per_sum = 1.0 / count as f64;
+            let per_x = (zz * x - xz * z) / det;
+            let per_z = (xx * z - xz * x) / det;
             own[k] =
-                N(weight_n * (of_sum + of_x * (centre_x - mean_x) + of_z * (centre_z - mean_z)));
-            // The sum is -F_y, the moments of x and z are -M_z - y F_x and M_x - y F_z.
+                N(weight_n * (per_sum + per_x * (centre_x - mean_x) + per_z * (centre_z - mean_z)));
+            // The sum of loads is -F_y, their first moments in x and z are -M_z - y F_x and M_x - y
+            // F_z.
             shares[k] = [
-                -of_x * mean_y,
-                of_x * mean_x + of_z * mean_z - of_sum,
-                -of_z * mean_y,
-                of_z,
+                -per_x * mean_y,
+                per_x * mean_x + per_z * mean_z - per_sum,
+                -per_z * mean_y,
+                per_z,
                 0.0,
-                -of_x,
+                -per_x,
             ]
             .map(N);
         }
         let place = |k: usize| machine.feet[if k < count { k } else { 0 }].foot_m;
         let places = core::array::from_fn(|k| [place(k)[0], place(k)[2]].map(N));
-        let (friction, weight) = (N(cabinet.friction), N(weight_n));
-        Some(Self { count, spread: Spread { own, shares, places, friction, weight } })
+        let friction = N(cabinet.friction);
+        let weight = N(weight_n);
+        Some(Self { count, spread: LoadDistribution { own, shares, places, friction, weight } })
     }
 
     /// Returns the vertical loads of the feet (N) under a load on the cabinet.
     pub(crate) fn loads_n(&self, load: &[f64; LOAD]) -> Vec<f64> {
-        let of_foot = |k: usize| {
+        let foot_load_n = |k: usize| {
             let shares = self.spread.shares[k].iter().zip(load);
-            self.spread.own[k].0 + shares.map(|(share, of)| share.0 * of).sum::<f64>()
+            self.spread.own[k].0 + shares.map(|(share, load)| share.0 * load).sum::<f64>()
         };
-        (0..self.count).map(of_foot).collect()
+        (0..self.count).map(foot_load_n).collect()
     }
 
     /// Returns the margin against slipping (N) under a load on the cabinet.
     pub(crate) fn slip_margin_n(&self, load: &[f64; LOAD]) -> f64 {
         let [along_x, along_y, along_z, ..] = *load;
-        let Spread { friction: N(friction), weight: N(weight_n), .. } = self.spread;
+        let LoadDistribution { friction: N(friction), weight: N(weight_n), .. } = self.spread;
         friction * (weight_n - along_y) - (along_x * along_x + along_z * along_z).sqrt()
     }
 
@@ -128,7 +135,7 @@ impl Feet {
         for (carried, load_n) in carried.iter_mut().zip(self.loads_n(load)) {
             *carried = N(load_n);
         }
-        self.slip_margin_n(load) - turning_n(&self.spread.places, &carried, &load.map(N)).0
+        self.slip_margin_n(load) - turning_force_n(&self.spread.places, &carried, &load.map(N)).0
     }
 
     /// Returns the vertical loads of the feet (N) before the machine sags.
@@ -139,7 +146,8 @@ impl Feet {
             (machine.drum.mass_kg, machine.drum.centre_x_m),
         ];
         let unbalances = machine.unbalances().map(|u| (u.mass_kg, u.x_m));
-        let (mut weight_n, mut moment_n_m) = (0.0, 0.0);
+        let mut weight_n = 0.0;
+        let mut moment_n_m = 0.0;
         for (mass_kg, x_m) in bodies.into_iter().chain(unbalances) {
             weight_n += machine.gravity_m_per_s2 * mass_kg;
             moment_n_m += machine.gravity_m_per_s2 * mass_kg * x_m;
@@ -157,13 +165,14 @@ impl Feet {
 /// to load and arm, balance the moment and have no resultant. The sum of both is greatest, relative
 /// to the load, at the foot with the longest arm.
 #[inline(always)]
-pub(crate) fn turning_n<T: Real>(
+pub(crate) fn turning_force_n<T: Real>(
     places: &[[N<T>; 2]; FEET],
     carried: &[N<T>; FEET],
     load: &[N<T>; LOAD],
 ) -> N<T> {
     let nothing = load[0].lit(0.0);
-    let (mut sum, mut moments) = (load[0].lit(LEAST_N), [nothing; 2]);
+    let mut sum = load[0].lit(SMALL_LOAD_N);
+    let mut moments = [nothing; 2];
     let mut loaded = *carried;
     for k in 0..FEET {
         // A foot that would lift has no friction.
@@ -173,7 +182,8 @@ pub(crate) fn turning_n<T: Real>(
         moments[1] += loaded[k] * places[k][1];
     }
     let [x, z] = [moments[0] / sum, moments[1] / sum];
-    let (mut second, mut farthest) = (load[0].lit(LEAST_N), nothing);
+    let mut second = load[0].lit(SMALL_LOAD_N);
+    let mut farthest = nothing;
     for k in 0..FEET {
         let [arm_x, arm_z] = [places[k][0] - x, places[k][1] - z];
         let squared = arm_x * arm_x + arm_z * arm_z;
@@ -181,7 +191,7 @@ pub(crate) fn turning_n<T: Real>(
         farthest = farthest.where_less(squared, squared, farthest);
     }
     let farthest_m = farthest.sqrt();
-    let least = (load[0].lit(LEAST_ARM_M) * farthest_m * sum).v();
+    let least = (load[0].lit(MIN_ARM_M) * farthest_m * sum).v();
     let moment = load[4] - (z * load[0] - x * load[2]);
     moment.abs() * farthest_m * sum / second.where_less(least, least, second)
 }
@@ -191,7 +201,7 @@ mod tests {
     use super::*;
     use crate::machine::{Cabinet, Foot};
 
-    fn on(feet: &[[f64; 3]]) -> Machine {
+    fn machine_on(feet: &[[f64; 3]]) -> Machine {
         let mut machine = Machine::paper();
         machine.cabinet =
             Some(Cabinet { mass_kg: 30.0, centre_m: [0.2, -0.1, 0.01], friction: 0.4 });
@@ -199,8 +209,8 @@ mod tests {
         machine
     }
 
-    /// Force and moment about O that are left when the floor's forces are added.
-    fn left(machine: &Machine, load: &[f64; LOAD]) -> [f64; LOAD] {
+    /// Computes the force and the moment about O that remain after adding the floor's forces.
+    fn residual(machine: &Machine, load: &[f64; LOAD]) -> [f64; LOAD] {
         let feet = Feet::new(machine).unwrap();
         let cross = |a: [f64; 3], b: [f64; 3]| {
             [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
@@ -229,11 +239,12 @@ mod tests {
     fn loads_of_feet_balance_forces_and_moments() {
         let load = [30.0, -350.0, 40.0, 12.0, 5.0, -70.0];
         for feet in [&CORNERS[..], &[[0.5, -0.5, 0.2], [0.45, -0.5, -0.3], [-0.1, -0.5, 0.1]]] {
-            let machine = on(feet);
-            let left = left(&machine, &load);
-            // What turns the cabinet about the vertical is the friction of single feet.
+            let machine = machine_on(feet);
+            let residual = residual(&machine, &load);
+            // The moment about the vertical (component 4) is balanced by friction, not by these
+            // loads.
             for i in [0, 1, 2, 3, 5] {
-                assert!(left[i].abs() < 1e-10, "{i}: {}", left[i]);
+                assert!(residual[i].abs() < 1e-10, "{i}: {}", residual[i]);
             }
         }
     }
@@ -241,10 +252,10 @@ mod tests {
     // The floor's forces, foot by foot, balance the load. The margin is zero where the first of
     // them, with its two parts added by magnitude, reaches the friction of its foot.
     #[test]
-    fn a_cabinet_with_a_margin_against_walking_is_held_within_the_friction_of_every_foot() {
+    fn a_margin_against_walking_keeps_every_foot_within_its_friction() {
         let mut decided = 0;
         for feet in [&CORNERS[..], &[[0.5, -0.5, 0.2], [0.45, -0.5, -0.3], [-0.1, -0.5, 0.1]]] {
-            let machine = on(feet);
+            let machine = machine_on(feet);
             let feet_of = Feet::new(&machine).unwrap();
             for seed in 0..200_u32 {
                 let draw = |k: u32| f64::from((seed * 7919 + k * 104_729) % 2003) / 1001.5 - 1.0;
@@ -266,12 +277,14 @@ mod tests {
                     arms.iter().zip(&loads_n).map(|([x, z], n)| n * (x * x + z * z)).sum();
                 let about = |force: [f64; 2], at: [f64; 2]| at[1] * force[0] - at[0] * force[1];
                 let moment = load[4] - about([load[0], load[2]], [mean(0), mean(2)]);
-                let (mut sum, mut held, mut most) = ([0.0; 2], 0.0, 0.0_f64);
+                let mut sum = [0.0; 2];
+                let mut moment_held = 0.0;
+                let mut most = 0.0_f64;
                 for (([x, z], foot), n) in arms.iter().zip(feet).zip(&loads_n) {
                     let [shared, turned] = [n / all_n, moment * n / second];
                     let force = [-load[0] * shared - turned * z, -load[2] * shared + turned * x];
                     sum = [sum[0] + force[0], sum[1] + force[1]];
-                    held += about(force, [foot[0], foot[2]]);
+                    moment_held += about(force, [foot[0], foot[2]]);
                     assert!(
                         (0.4 * n - force[0].hypot(force[1])) / n * all_n
                             >= feet_of.walk_margin_n(&load) - 1e-9
@@ -280,7 +293,7 @@ mod tests {
                     most = most.max(both / n);
                 }
                 assert!((sum[0] + load[0]).abs() < 1e-9 && (sum[1] + load[2]).abs() < 1e-9);
-                assert!((held + load[4]).abs() < 1e-9, "{held} for {}", load[4]);
+                assert!((moment_held + load[4]).abs() < 1e-9, "{moment_held} for {}", load[4]);
                 let margin_n = (0.4 - most) * all_n;
                 let found_n = feet_of.walk_margin_n(&load);
                 assert!((found_n - margin_n).abs() < 1e-6, "{found_n} for {margin_n}");
@@ -292,8 +305,8 @@ mod tests {
     }
 
     #[test]
-    fn a_foot_that_carries_alone_takes_a_moment_at_the_radius_of_its_pad() {
-        let feet = Feet::new(&on(&CORNERS)).unwrap();
+    fn a_single_loaded_foot_takes_moments_at_the_radius_of_its_pad() {
+        let feet = Feet::new(&machine_on(&CORNERS)).unwrap();
         let mut alone = 0;
         for tilt_n_m in (0..200).map(f64::from) {
             let load = [20.0, 400.0, 30.0, 50.0, 25.0, -tilt_n_m];
@@ -307,7 +320,7 @@ mod tests {
 
     #[test]
     fn at_rest_feet_carry_the_weight() {
-        let machine = on(&CORNERS);
+        let machine = machine_on(&CORNERS);
         let loads_n = Feet::new(&machine).unwrap().at_rest_n(&machine);
         let weight_n = 9.81 * (30.0 + 23.87 + 4.34 + 3.64 + 0.4);
         assert!((loads_n.iter().sum::<f64>() - weight_n).abs() < 1e-9, "{loads_n:?}");
@@ -316,9 +329,9 @@ mod tests {
     }
 
     #[test]
-    fn feet_in_a_line_hold_nothing() {
+    fn feet_in_a_line_are_refused() {
         let line = [[0.0, -0.5, 0.0], [0.1, -0.5, 0.1], [0.3, -0.5, 0.3]];
-        assert!(Feet::new(&on(&line)).is_none());
-        assert!(Feet::new(&on(&CORNERS[..2])).is_none());
+        assert!(Feet::new(&machine_on(&line)).is_none());
+        assert!(Feet::new(&machine_on(&CORNERS[..2])).is_none());
     }
 }

@@ -21,8 +21,8 @@ use table::{LISTS, TABLE};
 #[derive(Clone)]
 pub struct Parameter {
     name: Cow<'static, str>,
-    row: &'static Row,
-    /// Which numbered element, from 0; 0 where the row has only one.
+    row: &'static ParameterRow,
+    /// The index of the element, from 0; 0 for a number that is not of a list.
     index: usize,
 }
 
@@ -53,8 +53,8 @@ pub enum Target {
 
 /// A row of the table.
 #[derive(Debug)]
-struct Row {
-    /// The whole name, or what follows `spring_1_` and the like.
+struct ParameterRow {
+    /// The name, or the part of the name after `spring_1_` and the like.
     name: &'static str,
     unit: &'static str,
     description: &'static str,
@@ -89,7 +89,7 @@ pub struct ElementList {
     pub count: fn(&Machine) -> usize,
     /// The function that gives a machine a number of elements, with default values.
     pub fill: fn(&mut Machine, usize),
-    rows: &'static [&'static [Row]],
+    rows: &'static [&'static [ParameterRow]],
 }
 
 impl ElementList {
@@ -102,11 +102,11 @@ impl ElementList {
         if self.name.is_empty() { table_points(spin) } else { (self.count)(machine) }
     }
 
-    fn rows(&self) -> impl Iterator<Item = &'static Row> {
+    fn rows(&self) -> impl Iterator<Item = &'static ParameterRow> {
         self.rows.iter().copied().flatten()
     }
 
-    fn parameter(&self, row: &'static Row, index: usize) -> Parameter {
+    fn parameter(&self, row: &'static ParameterRow, index: usize) -> Parameter {
         let name = Cow::Owned(format!("{}_{}_{}", self.element, index + self.first, row.name));
         Parameter { name, row, index }
     }
@@ -118,8 +118,8 @@ impl Target {
         matches!(self, Self::Bearings(_) | Self::Springs(_) | Self::Dampers(_))
     }
 
-    /// Whether machine and spin have it, for what is not one of numbered elements.
-    fn is_of(self, machine: &Machine, spin: &Spin) -> Result<(), UnknownParameter> {
+    /// Checks that machine and spin have a number that is not of a list.
+    fn check_exists(self, machine: &Machine, spin: &Spin) -> Result<(), UnknownParameter> {
         match self {
             Self::Spin if matches!(spin, Spin::Table { .. }) => {
                 Err(UnknownParameter::not_here("a spin given as a table has no such number"))
@@ -175,8 +175,8 @@ impl Parameter {
     /// Returns every parameter of a machine and a spin in the table's order, those of lists element
     /// by element.
     pub fn all(machine: &Machine, spin: &Spin) -> Vec<Self> {
-        let is_there = |row: &&Row| row.target.is_of(machine, spin).is_ok();
-        let single = TABLE.iter().filter(is_there).map(Self::single);
+        let exists = |row: &&ParameterRow| row.target.check_exists(machine, spin).is_ok();
+        let single = TABLE.iter().filter(exists).map(Self::single);
         let numbered = LISTS.iter().flat_map(|list| {
             (0..list.count_in(machine, spin))
                 .flat_map(move |k| list.rows().map(move |row| list.parameter(row, k)))
@@ -190,12 +190,14 @@ impl Parameter {
     /// A name that the table does not have, or a number that the machine or the spin does not have.
     pub fn find(name: &str, machine: &Machine, spin: &Spin) -> Result<Self, UnknownParameter> {
         if let Some(row) = TABLE.iter().find(|row| row.name == name) {
-            return row.target.is_of(machine, spin).map(|()| Self::single(row));
+            return row.target.check_exists(machine, spin).map(|()| Self::single(row));
         }
         for list in LISTS {
-            if let Some((number, rest)) = numbered(name, list.element) {
-                let row = list.rows().find(|row| row.name == rest);
-                let row = row.ok_or_else(UnknownParameter::strange)?;
+            if let Some((number, rest)) = split_numbered(name, list.element) {
+                let row = list
+                    .rows()
+                    .find(|row| row.name == rest)
+                    .ok_or_else(UnknownParameter::strange)?;
                 let count = list.count_in(machine, spin);
                 return match number.checked_sub(list.first) {
                     Some(k) if k < count => Ok(list.parameter(row, k)),
@@ -274,22 +276,22 @@ impl Parameter {
 
     /// Returns the names of the single numbers that the parameter writes.
     pub fn parts(&self, machine: &Machine) -> Vec<Cow<'static, str>> {
-        let of_every = |count: usize, element: &str, number: &str| {
+        let numbered = |count: usize, element: &str, number: &str| {
             (1..=count).map(|k| format!("{element}_{k}_{number}").into()).collect()
         };
         match self.row.target {
             Target::Bearings(number) => {
                 ["front", "rear"].map(|end| format!("bearing_{end}_{number}").into()).into()
             }
-            Target::Springs(number) => of_every(machine.springs.len(), "spring", number),
-            Target::Dampers(number) => of_every(machine.dampers.len(), "damper", number),
+            Target::Springs(number) => numbered(machine.springs.len(), "spring", number),
+            Target::Dampers(number) => numbered(machine.dampers.len(), "damper", number),
             Target::Machine | Target::Cabinet | Target::Spin | Target::Window(_) => {
                 vec![self.name.clone()]
             }
         }
     }
 
-    fn single(row: &'static Row) -> Self {
+    fn single(row: &'static ParameterRow) -> Self {
         Self { name: Cow::Borrowed(row.name), row, index: 0 }
     }
 }
@@ -311,9 +313,9 @@ fn table_points(spin: &Spin) -> usize {
     }
 }
 
-/// `"spring_2_tub_x_m"` with `"spring"` gives 2 and `"tub_x_m"`. Only the canonical
-/// spelling counts (no `spring_02_`), so that one number has one name.
-fn numbered<'a>(name: &'a str, element: &str) -> Option<(usize, &'a str)> {
+/// Splits the name of a list's parameter: `"spring_2_tub_x_m"` with `"spring"` gives 2 and
+/// `"tub_x_m"`. It refuses `spring_02_`, so that each number has one name.
+fn split_numbered<'a>(name: &'a str, element: &str) -> Option<(usize, &'a str)> {
     let (digits, rest) = name.strip_prefix(element)?.strip_prefix('_')?.split_once('_')?;
     let canonical = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
     let number: usize = if canonical { digits.parse().ok()? } else { return None };

@@ -123,7 +123,7 @@ impl Spin {
                     wave_hz: N(1.0 / ramp_s),
                     ..SpinStretch::at_rest(0.0, 0.0)
                 };
-                let turns = up.turns_at_start.0 + turns_of_ramp(0.0, peak, *ramp_s);
+                let turns = up.turns_at_start.0 + ramp_turns(0.0, peak, *ramp_s);
                 let level =
                     SpinStretch { turns_per_s: N(peak), ..SpinStretch::at_rest(*ramp_s, turns) };
                 vec![up, level]
@@ -170,8 +170,8 @@ pub(crate) fn stretch_at(stretches: &[SpinStretch], t_s: f64) -> usize {
     stretches.partition_point(|stretch| stretch.start_s.0 <= t_s).saturating_sub(1)
 }
 
-/// Turns, whole ones dropped, of a ramp between two speeds (1/s).
-fn turns_of_ramp(from: f64, to: f64, duration_s: f64) -> f64 {
+/// Returns the fractional part of the turns of a ramp between two speeds (1/s).
+fn ramp_turns(from: f64, to: f64, duration_s: f64) -> f64 {
     let mean = 0.5 * (from + to);
     let turns = mean * duration_s;
     // The rounding error of the product is added to the fractional part, because it is too small to
@@ -188,7 +188,7 @@ fn linear_stretches(points: &[(f64, f64)]) -> Vec<SpinStretch> {
             SpinStretch { turns_per_s: N(speed), ..SpinStretch::at_rest(start_s, turns) };
         if let Some(&(end_s, end_speed)) = points.get(i + 1) {
             stretch.turns_per_s2 = N(0.5 * (end_speed - speed) / (end_s - start_s));
-            turns += turns_of_ramp(speed, end_speed, end_s - start_s);
+            turns += ramp_turns(speed, end_speed, end_s - start_s);
             turns -= turns.round_ties_even();
         }
         stretches.push(stretch);
@@ -198,9 +198,15 @@ fn linear_stretches(points: &[(f64, f64)]) -> Vec<SpinStretch> {
 
 impl SpinStretch {
     fn at_rest(start_s: f64, turns_at_start: f64) -> Self {
-        let [turns_per_s, turns_per_s2, wave_turns, wave_hz] = [N(0.0); 4];
-        let [start_s, turns_at_start] = [start_s, turns_at_start].map(N);
-        Self { start_s, turns_at_start, turns_per_s, turns_per_s2, wave_turns, wave_hz }
+        let zero = N(0.0);
+        Self {
+            start_s: N(start_s),
+            turns_at_start: N(turns_at_start),
+            turns_per_s: zero,
+            turns_per_s2: zero,
+            wave_turns: zero,
+            wave_hz: zero,
+        }
     }
 }
 
@@ -215,8 +221,9 @@ impl<T: Lane> SpinLanes<T> {
         let bt_error = self.turns_per_s2 * t - bt;
         let slope = self.turns_per_s + bt;
         let slope_error = {
-            let of_bt = slope - self.turns_per_s;
-            (self.turns_per_s - (slope - of_bt)) + (bt - of_bt)
+            // Knuth's two-sum.
+            let rounded_bt = slope - self.turns_per_s;
+            (self.turns_per_s - (slope - rounded_bt)) + (bt - rounded_bt)
         };
         let whole = (slope * t).v();
         let rest = (slope * t - whole) + (bt_error + slope_error) * t;

@@ -4,9 +4,9 @@
 use crate::machine::feet::{FEET, Feet};
 use crate::{Machine, Parameter, Range, Spin, decimal};
 
-/// Ends of a spring or damper closer than this have no direction; bearings closer than this hold no
-/// angle.
-const SHORTEST_M: f64 = 1e-6;
+/// The least distance between the ends of a spring or damper, and between the bearings, m. Basis:
+/// far below any machine's, far above rounding of directions. Doubling it changes nothing.
+const MIN_DISTANCE_M: f64 = 1e-6;
 
 /// The range of times of a spin table, s.
 const TIMES: Range = Range::NonNegative;
@@ -36,17 +36,17 @@ impl Violation {
     }
 }
 
-/// Why so many feet do not hold a cabinet, or that they have none to hold.
-fn of_feet(count: usize, has_cabinet: bool) -> String {
+/// Describes the violation of a number of feet.
+fn describe_feet(count: usize, has_cabinet: bool) -> String {
     match count {
         _ if !has_cabinet => "feet without a cabinet".to_owned(),
         3..=FEET => format!("the cabinet's {count} feet are in a line and do not hold it"),
-        _ => format!("the cabinet stands on {count} feet, and loads are reckoned for 3 or 4"),
+        _ => format!("the cabinet stands on {count} feet, and loads are computed for 3 or 4"),
     }
 }
 
-/// What is wrong with so many entries of a spin table.
-fn of_table(times: usize, speeds: usize) -> String {
+/// Describes the violation of the lengths of a spin table.
+fn describe_table(times: usize, speeds: usize) -> String {
     match (times, speeds) {
         (0, 0) => "the spin table is empty".to_owned(),
         _ => format!("the spin table has {times} times but {speeds} speeds"),
@@ -58,8 +58,8 @@ fn components(before: &str, after: &str) -> [String; 3] {
     ["x", "y", "z"].map(|axis| format!("{before}{axis}{after}"))
 }
 
-/// A computed number for a message, without the last digits' rounding error.
-fn rounded(value: f64) -> String {
+/// Formats a computed number for a message with 13 digits, without rounding errors.
+fn format_rounded(value: f64) -> String {
     decimal(format!("{value:.12e}").parse().unwrap_or(value))
 }
 
@@ -90,8 +90,9 @@ impl Machine {
             let sum: f64 = moments_kg_m2.iter().sum();
             // A thin disc reaches equality, which rounding must not violate.
             if moments_kg_m2[greatest] > (sum - moments_kg_m2[greatest]) * (1.0 + 1e-9) {
-                let (ii, moment) = (11 * (greatest + 1), decimal(moments_kg_m2[greatest]));
-                let others = rounded(sum - moments_kg_m2[greatest]);
+                let ii = 11 * (greatest + 1);
+                let moment = decimal(moments_kg_m2[greatest]);
+                let others = format_rounded(sum - moments_kg_m2[greatest]);
                 joint.push(Violation::new(
                     format!(
                         "no rigid body has the {body}'s inertia: I{ii} = {moment} exceeds the \
@@ -105,20 +106,21 @@ impl Machine {
         let springs = self.springs.iter().map(|s| ("spring", s.given_length_m())).enumerate();
         let dampers = self.dampers.iter().map(|d| ("damper", d.given_length_m())).enumerate();
         for (k, (element, length_m)) in springs.chain(dampers) {
-            if length_m < SHORTEST_M {
-                let (number, length_m) = (k + 1, rounded(length_m));
+            if length_m < MIN_DISTANCE_M {
+                let number = k + 1;
+                let length_m = format_rounded(length_m);
                 let end = |end: &str| components(&format!("{element}_{number}_{end}_"), "_m");
                 joint.push(Violation::new(
                     format!(
                         "the ends of {element} {number} are {length_m} m apart: it has no direction"
                     ),
                     ["tub", "cabinet"].into_iter().flat_map(end),
-                    format!("ends at least {SHORTEST_M:e} m apart"),
+                    format!("ends at least {MIN_DISTANCE_M:e} m apart"),
                 ));
             }
         }
         for (k, stop) in self.stops.iter().enumerate() {
-            if stop.direction_length() < SHORTEST_M {
+            if stop.direction_length() < MIN_DISTANCE_M {
                 let number = k + 1;
                 joint.push(Violation::new(
                     format!("stop {number} has no direction"),
@@ -134,8 +136,9 @@ impl Machine {
                 let first_y_m = self.feet[0].foot_m[1];
                 for (k, foot) in self.feet.iter().enumerate() {
                     let higher_m = foot.foot_m[1] - first_y_m;
-                    if higher_m.abs() > SHORTEST_M {
-                        let (number, by_m) = (k + 1, rounded(higher_m.abs()));
+                    if higher_m.abs() > MIN_DISTANCE_M {
+                        let number = k + 1;
+                        let by_m = format_rounded(higher_m.abs());
                         let way = if higher_m > 0.0 { "higher" } else { "lower" };
                         joint.push(Violation::new(
                             format!("foot {number} stands {by_m} m {way} than foot 1"),
@@ -164,7 +167,7 @@ impl Machine {
                     }
                 };
                 let feet = (1..=count).flat_map(|foot| components(&format!("foot_{foot}_"), "_m"));
-                joint.push(Violation::new(of_feet(count, has_cabinet), feet, expected));
+                joint.push(Violation::new(describe_feet(count, has_cabinet), feet, expected));
             }
             None => {}
         }
@@ -186,12 +189,12 @@ impl Machine {
             }
         }
         let distance_m = self.bearings.front_x_m - self.bearings.rear_x_m;
-        if distance_m < SHORTEST_M {
-            let distance_m = rounded(distance_m);
+        if distance_m < MIN_DISTANCE_M {
+            let distance_m = format_rounded(distance_m);
             joint.push(Violation::new(
                 format!("front and rear bearing are {distance_m} m apart and hold no angle"),
                 ["rear", "front"].map(|end| format!("bearing_{end}_x_m")),
-                format!("bearings at least {SHORTEST_M:e} m apart"),
+                format!("bearings at least {MIN_DISTANCE_M:e} m apart"),
             ));
         }
         if self.springs.is_empty() && self.bushings.is_empty() {
@@ -206,16 +209,17 @@ impl Machine {
 /// Returns the violations of single numbers. Parameters of several numbers are checked part by
 /// part.
 fn out_of_range(machine: &Machine, spin: &Spin) -> Vec<Violation> {
-    let judge = |parameter: Parameter| {
-        let (name, value, range) =
-            (parameter.name(), parameter.get(machine, spin)?, parameter.range());
-        let single = !parameter.target().is_several();
-        (single && !range.contains(value)).then(|| {
-            let title = format!("{name} = {} is out of range", decimal(value));
-            Violation::new(title, [name.to_owned()], range.instead_of(value))
-        })
+    let check = |parameter: Parameter| {
+        let name = parameter.name();
+        let value = parameter.get(machine, spin)?;
+        let range = parameter.range();
+        if parameter.target().is_several() || range.contains(value) {
+            return None;
+        }
+        let title = format!("{name} = {} is out of range", decimal(value));
+        Some(Violation::new(title, [name.to_owned()], range.instead_of(value)))
     };
-    Parameter::all(machine, spin).into_iter().filter_map(judge).collect()
+    Parameter::all(machine, spin).into_iter().filter_map(check).collect()
 }
 
 impl Spin {
@@ -234,7 +238,7 @@ impl Spin {
         let mut found = Vec::new();
         if time_s.len() != speed_rpm.len() || time_s.is_empty() {
             found.push(Violation::new(
-                of_table(time_s.len(), speed_rpm.len()),
+                describe_table(time_s.len(), speed_rpm.len()),
                 ["spin_speed_rpm", "spin_time_s"].map(str::to_owned),
                 "as many speeds as times, at least one of each",
             ));
@@ -243,13 +247,16 @@ impl Spin {
         {
             let bad = values.iter().enumerate().filter(|(_, value)| !range.contains(**value));
             found.extend(bad.map(|(index, &value)| {
-                let (said, entry) = (decimal(value), index + 1);
+                let number = decimal(value);
+                let entry = index + 1;
                 let expected = match column {
                     "time_s" => range.instead_of(value),
                     _ => range.to_string(),
                 };
                 Violation::new(
-                    format!("{column} = {said} (entry {entry}) of the spin table is out of range"),
+                    format!(
+                        "{column} = {number} (entry {entry}) of the spin table is out of range"
+                    ),
                     [format!("spin_{column}[{index}]")],
                     expected,
                 )
@@ -287,21 +294,21 @@ mod tests {
     use super::*;
     use crate::Profile;
 
-    /// What `change` makes wrong with the paper's machine, as text.
-    fn wrong(change: impl FnOnce(&mut Machine)) -> Vec<String> {
+    /// Returns the violations of the changed paper's machine, as text.
+    fn violations_after(change: impl FnOnce(&mut Machine)) -> Vec<String> {
         let mut machine = Machine::paper();
         change(&mut machine);
         machine.violations().iter().map(ToString::to_string).collect()
     }
 
     #[test]
-    fn the_papers_machine_is_sound() {
+    fn the_papers_machine_has_no_violations() {
         assert_eq!(Machine::paper().violations(), []);
     }
 
     #[test]
     fn every_violation_is_returned_at_once() {
-        let found = wrong(|m| {
+        let found = violations_after(|m| {
             m.tub.mass_kg = -1.0;
             m.shaft.inertia_kg_m2 = [0.1, 0.02, 0.02];
             m.springs[2].tub_m = m.springs[2].cabinet_m;
@@ -323,24 +330,24 @@ mod tests {
 
     #[test]
     fn a_thin_disc_is_a_rigid_body() {
-        assert_eq!(wrong(|m| m.shaft.inertia_kg_m2 = [0.3, 0.1, 0.2]), [""; 0]);
+        assert_eq!(violations_after(|m| m.shaft.inertia_kg_m2 = [0.3, 0.1, 0.2]), [""; 0]);
     }
 
     #[test]
     fn a_number_out_of_range_is_reported_once() {
         assert_eq!(
-            wrong(|m| m.tub.inertia_kg_m2[1] = -1.61),
+            violations_after(|m| m.tub.inertia_kg_m2[1] = -1.61),
             ["tub_inertia_22_kg_m2 = -1.61 is out of range"]
         );
     }
 
     #[test]
-    fn nothing_carries_a_machine_without_springs() {
+    fn a_machine_without_springs_is_refused() {
         assert_eq!(
-            wrong(|m| m.springs.clear()),
+            violations_after(|m| m.springs.clear()),
             ["the machine has no springs and no bushings: nothing carries it"]
         );
-        assert_eq!(wrong(|m| m.dampers.clear()), [""; 0]);
+        assert_eq!(violations_after(|m| m.dampers.clear()), [""; 0]);
     }
 
     #[test]
@@ -359,19 +366,19 @@ mod tests {
     }
 
     #[test]
-    fn spins_are_judged_whole() {
-        let judge =
+    fn spins_are_checked_as_a_whole() {
+        let violations =
             |spin: Spin| spin.violations().iter().map(ToString::to_string).collect::<Vec<_>>();
         assert_eq!(
-            judge(Spin::Ramped { profile: Profile::Ramp, peak_rpm: -350.0, ramp_s: 50.0 }),
+            violations(Spin::Ramped { profile: Profile::Ramp, peak_rpm: -350.0, ramp_s: 50.0 }),
             [""; 0]
         );
         assert_eq!(
-            judge(Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 9.0] }),
+            violations(Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![0.0, 9.0] }),
             [""; 0]
         );
         assert_eq!(
-            judge(Spin::Ramped {
+            violations(Spin::Ramped {
                 profile: Profile::Cycloidal,
                 peak_rpm: f64::INFINITY,
                 ramp_s: 0.0
@@ -379,7 +386,10 @@ mod tests {
             ["spin_peak_rpm = inf is out of range", "spin_ramp_s = 0 is out of range"]
         );
         assert_eq!(
-            judge(Spin::Table { time_s: vec![1.0, 3.0, 2.0, f64::NAN], speed_rpm: vec![0.0, 1e6] }),
+            violations(Spin::Table {
+                time_s: vec![1.0, 3.0, 2.0, f64::NAN],
+                speed_rpm: vec![0.0, 1e6]
+            }),
             [
                 "the spin table has 4 times but 2 speeds",
                 "time_s = NaN (entry 4) of the spin table is out of range",
@@ -389,7 +399,7 @@ mod tests {
             ]
         );
         assert_eq!(
-            judge(Spin::Table { time_s: vec![], speed_rpm: vec![] }),
+            violations(Spin::Table { time_s: vec![], speed_rpm: vec![] }),
             ["the spin table is empty"]
         );
     }

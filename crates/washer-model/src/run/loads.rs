@@ -6,7 +6,7 @@
 use super::suspension::{deviating, dual, forces, on_cabinet};
 use crate::coordinates::{STATES, TUB};
 use crate::lanes::{Constant as _, InLanes as _};
-use crate::machine::feet::{FEET, LOAD, Spread, turning_n};
+use crate::machine::feet::{FEET, LOAD, LoadDistribution, turning_force_n};
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::{Vec3, dot};
 use crate::run::model::tub_samples;
@@ -191,7 +191,7 @@ pub(crate) struct Loads<T> {
     force_squared: Peaks<T, 1>,
     /// How far the loads of the feet are below [`FAR_N`], and then the two margins.
     below: Peaks<T, { FEET + 2 }>,
-    spread: Option<Spread<T>>,
+    spread: Option<LoadDistribution<T>>,
     stops: Vec<SeenStop<T>>,
     /// The speed of each damper; none unless asked for.
     speeds: Vec<Peaks<T, 1>>,
@@ -238,7 +238,7 @@ impl<T: Lane> Loads<T> {
             stops.push(SeenStop { push: Peaks::new(zero), contact: TimeAbove::new(zero) });
         }
         let spread = match &point.feet {
-            Some(feet) if recorded.feet => Some(Spread::splat(zero, &feet.spread)),
+            Some(feet) if recorded.feet => Some(LoadDistribution::splat(zero, &feet.spread)),
             _ => None,
         };
         let mut loads = Self {
@@ -379,7 +379,7 @@ impl<T: Lane> Loads<T> {
 /// Of each foot how far its load is below [`FAR_N`], then of both margins, by the load on the
 /// cabinet.
 #[inline(always)]
-fn below<T: Lane>(spread: &Spread<T>, load: &[N<Dual<T>>]) -> [Sample<T>; FEET + 2] {
+fn below<T: Lane>(spread: &LoadDistribution<T>, load: &[N<Dual<T>>]) -> [Sample<T>; FEET + 2] {
     let spread = spread.constant();
     let far = load[0].lit(FAR_N);
     let mut cabinet = [far; LOAD];
@@ -396,7 +396,7 @@ fn below<T: Lane>(spread: &Spread<T>, load: &[N<Dual<T>>]) -> [Sample<T>; FEET +
     let squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(LEAST_SQUARED_N2);
     let margin = spread.friction * (spread.weight - load[1]) - squared.sqrt();
     below[SLIP] = sample(far - margin);
-    below[WALK] = sample(far - (margin - turning_n(&spread.places, &loads, load)));
+    below[WALK] = sample(far - (margin - turning_force_n(&spread.places, &loads, load)));
     below
 }
 

@@ -3,7 +3,7 @@
 use super::Range::{Any, Negative, NonNegative, Positive, Within};
 use super::assumed::Spread::{Depth, Factor};
 use super::assumed::{Assumption, DataSheet, cylinder_kg_m2};
-use super::{ElementList, Get, Range, Row, Set, Target, common};
+use super::{ElementList, Get, ParameterRow, Range, Set, Target, common};
 use crate::{BumpStop, Bushing, Damper, Foot, Machine, Spin, Spring, Unbalance};
 
 /// The target of a row, and the functions that read and write it.
@@ -15,21 +15,21 @@ type Access = (Target, Get, Set);
 macro_rules! row {
     ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr,
         assume $value:expr, $rule:literal, $spread:expr; $($access:tt)+) => {
-        Row {
+        ParameterRow {
             assumption: Some(Assumption { value: $value, rule: $rule, spread: $spread }),
             ..row!($name, $unit, $range, $source, $description, $($access)+)
         }
     };
     ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr,
         else $left_out:expr, $($access:tt)+) => {
-        Row {
+        ParameterRow {
             left_out: Some($left_out),
             ..row!($name, $unit, $range, $source, $description, $($access)+)
         }
     };
     ($name:expr, $unit:literal, $range:expr, $source:expr, $description:expr, $($access:tt)+) => {{
         let (target, get, set): Access = access!($($access)+);
-        Row {
+        ParameterRow {
             name: $name,
             unit: $unit,
             range: $range,
@@ -176,7 +176,7 @@ fn hinge_stiffness_n_m_per_rad(machine: &Machine) -> f64 {
 
 /// The rows that are not of a list.
 #[rustfmt::skip]
-pub(super) static TABLE: &[Row] = &[
+pub(super) static TABLE: &[ParameterRow] = &[
     row!("gravity_m_per_s2", "m/s^2", NonNegative, "convention",
         "acceleration of gravity, downwards",
         assume |_, _| 9.81,
@@ -368,7 +368,7 @@ pub(super) static TABLE: &[Row] = &[
 
 /// The rows of each spring, after `spring_1_`.
 #[rustfmt::skip]
-static SPRING: &[&[Row]] = &[
+static SPRING: &[&[ParameterRow]] = &[
     &[
         row!("stiffness_n_per_m", "N/m", NonNegative, SECTION_3_1,
             "stiffness of this spring", of springs stiffness_n_per_m),
@@ -388,7 +388,7 @@ static SPRING: &[&[Row]] = &[
 
 /// The rows of each damper, after `damper_1_`.
 #[rustfmt::skip]
-static DAMPER: &[&[Row]] = &[
+static DAMPER: &[&[ParameterRow]] = &[
     &[
         row!("damping_n_s_per_m", "N s/m", NonNegative, SECTION_3_1,
             "damping of this damper", of dampers damping_n_s_per_m),
@@ -411,7 +411,7 @@ static DAMPER: &[&[Row]] = &[
 
 /// The rows of each stop, after `stop_1_`.
 #[rustfmt::skip]
-static STOP: &[&[Row]] = &[
+static STOP: &[&[ParameterRow]] = &[
     &[
         row!("clearance_m", "m", Any, NONE,
             "how far the tub may move before it meets this stop", of stops clearance_m),
@@ -429,7 +429,7 @@ static STOP: &[&[Row]] = &[
 
 /// The rows of each bushing, after `bushing_1_`.
 #[rustfmt::skip]
-static BUSHING: &[&[Row]] = &[
+static BUSHING: &[&[ParameterRow]] = &[
     axes!("tub_" "_m", "m", Any, NONE, "tub point of this bushing, ", of bushings tub_m),
     axes!("stiffness_" "_n_per_m", "N/m", NonNegative, NONE, "stiffness of this bushing ",
         of bushings stiffness_n_per_m),
@@ -448,7 +448,7 @@ static BUSHING: &[&[Row]] = &[
 
 /// The rows of each further unbalance, after `unbalance_2_`.
 #[rustfmt::skip]
-static UNBALANCE: &[&[Row]] = &[&[
+static UNBALANCE: &[&[ParameterRow]] = &[&[
     row!("mass_kg", "kg", NonNegative, NONE,
         "mass of this further unbalance", of further_unbalances mass_kg),
     row!("x_m", "m", Any, NONE,
@@ -460,12 +460,12 @@ static UNBALANCE: &[&[Row]] = &[&[
 
 /// The rows of each foot, after `foot_1_`.
 #[rustfmt::skip]
-static FOOT: &[&[Row]] =
+static FOOT: &[&[ParameterRow]] =
     &[axes!("" "_m", "m", Any, NONE, "place of this foot, ", of feet foot_m)];
 
 /// The rows of each point of a spin's table, after `spin_table_1_`.
 #[rustfmt::skip]
-static SPIN_POINT: &[&[Row]] = &[&[
+static SPIN_POINT: &[&[ParameterRow]] = &[&[
     row!("time_s", "s", NonNegative, GRID,
         "time of this point of the spin's table; the first is 0", table time_s),
     row!("speed_rpm", "rpm", Range::Within(-1e5, 1e5), GRID,

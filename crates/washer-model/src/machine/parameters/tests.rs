@@ -11,7 +11,8 @@ fn spin() -> Spin {
 #[test]
 fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
     for parameter in Parameter::all(&Machine::paper(), &spin()) {
-        let (mut machine, mut spin) = (Machine::paper(), spin());
+        let mut machine = Machine::paper();
+        let mut spin = spin();
         assert_eq!(Parameter::find(parameter.name(), &machine, &spin).as_ref(), Ok(&parameter));
         if matches!(parameter.target(), Target::Window(_)) {
             assert_eq!(parameter.get(&machine, &spin), None);
@@ -34,7 +35,8 @@ fn every_parameter_is_found_by_its_name_and_reads_back_what_was_written() {
 fn each_parameter_writes_its_parts_and_nothing_else() {
     let everything = Parameter::all(&Machine::paper(), &spin());
     for parameter in &everything {
-        let (mut machine, mut spin) = (Machine::paper(), spin());
+        let mut machine = Machine::paper();
+        let mut spin = spin();
         let before: Vec<_> = everything.iter().map(|p| p.get(&machine, &spin)).collect();
         parameter.set(&mut machine, &mut spin, 0.875);
         let parts = parameter.parts(&machine);
@@ -67,7 +69,7 @@ fn names_end_with_their_unit_and_are_unique() {
 }
 
 #[test]
-fn sources_are_the_papers_own_places() {
+fn sources_cite_the_paper() {
     let silent = [
         "tub_front_x_m",
         "drum_hinge_x_m",
@@ -75,12 +77,12 @@ fn sources_are_the_papers_own_places() {
         "bearing_front_x_m",
         "bearing_rear_x_m",
     ];
-    // What the paper's machine has none of.
-    let is_further = |name: &str| name.contains("friction") || name.contains("cubic");
+    // The paper's machine has no friction and no cubic stiffness.
+    let is_absent = |name: &str| name.contains("friction") || name.contains("cubic");
     let mut counts = [0; 5];
     for parameter in Parameter::all(&Machine::paper(), &spin()) {
         let name = parameter.name();
-        if is_further(name) {
+        if is_absent(name) {
             assert!(parameter.source().starts_with("assumed: "), "{parameter:?}");
             continue;
         }
@@ -110,8 +112,9 @@ fn sources_are_the_papers_own_places() {
 }
 
 #[test]
-fn numbers_beyond_the_machine_are_told_from_misspellings() {
-    let (machine, spin) = (Machine::paper(), spin());
+fn numbers_that_a_machine_lacks_differ_from_misspellings() {
+    let machine = Machine::paper();
+    let spin = spin();
     let find = |name: &str| Parameter::find(name, &machine, &spin).map(|p| p.index);
     let not_here = |reason: &str| Err(UnknownParameter::not_here(reason));
     assert_eq!(find("spring_4_tub_z_m"), Ok(3));
@@ -175,7 +178,8 @@ fn numbers_beyond_the_machine_are_told_from_misspellings() {
 
 #[test]
 fn a_parameter_of_several_numbers_has_no_value_when_they_differ() {
-    let (mut machine, spin) = (Machine::paper(), spin());
+    let mut machine = Machine::paper();
+    let spin = spin();
     let all = Parameter::find("damping_n_s_per_m", &machine, &spin).unwrap();
     assert_eq!(all.get(&machine, &spin), Some(140.0));
     machine.dampers[1].damping_n_s_per_m = 100.0;
@@ -183,7 +187,7 @@ fn a_parameter_of_several_numbers_has_no_value_when_they_differ() {
 }
 
 #[test]
-fn ranges_refuse_what_is_not_a_number() {
+fn ranges_refuse_nan_and_infinity() {
     for range in [Any, Positive, NonNegative, Negative, Range::Within(-1e5, 1e5)] {
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e13, -1e13] {
             assert!(!range.contains(value), "{range:?} {value}");

@@ -4,8 +4,9 @@ use super::{Spin, SpinStretch};
 use core::f64::consts::TAU;
 use lane_ode::{N, trig};
 
-/// Limit of halvings and Newton steps in the search for an instant; a few are enough.
-const MOST_STEPS: usize = 64;
+/// The greatest number of bisections and Newton steps in the search for an instant. Basis:
+/// bisection reaches the spacing of floating-point numbers in 64. Doubling it changes nothing.
+const MAX_ITERATIONS: usize = 64;
 
 /// A piece of a segment in which the drum turns in one direction; times are from the segment's
 /// start.
@@ -109,16 +110,17 @@ impl Piece<'_> {
     fn when(&self, turns: f64, earliest: f64) -> f64 {
         let stretch = self.stretch;
         if stretch.wave_turns.0 == 0.0 {
-            let way = if stretch.turns(self.to) < stretch.turns(self.from) { -1.0 } else { 1.0 };
-            let rate = way * stretch.rate(self.from);
-            // The root of turns = rate t + way b t^2 that does not cancel.
-            let root = (rate * rate + 4.0 * way * stretch.turns_per_s2.0 * turns).max(0.0).sqrt();
+            let sign = if stretch.turns(self.to) < stretch.turns(self.from) { -1.0 } else { 1.0 };
+            let rate = sign * stretch.rate(self.from);
+            // Solves turns = rate t + sign b t^2 by the formula without cancellation.
+            let root = (rate * rate + 4.0 * sign * stretch.turns_per_s2.0 * turns).max(0.0).sqrt();
             let after = if turns > 0.0 { 2.0 * turns / (rate + root) } else { 0.0 };
             return (self.from + after).clamp(earliest, self.to);
         }
-        let (mut low, mut high) = (earliest, self.to);
+        let mut low = earliest;
+        let mut high = self.to;
         let mut t = low;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_ITERATIONS {
             let missing = turns - self.turns_by(t);
             if missing > 0.0 {
                 low = t;
@@ -165,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_turns_are_where_theta_is_a_multiple_of_two_pi() {
+    fn whole_turns_end_at_multiples_of_two_pi() {
         for spin in [
             Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 },
             Spin::Ramped { profile: Profile::Cycloidal, peak_rpm: 1200.0, ramp_s: 20.0 },
@@ -193,8 +195,8 @@ mod tests {
     }
 
     #[test]
-    fn ends_of_turns_go_with_the_whole_turn_beside_them() {
-        // One turn a second after the first.
+    fn partial_turns_belong_to_the_whole_turn_beside_them() {
+        // The drum makes one turn per second after the first turn.
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 2.0 };
         let cuts = |window_s| cuts_s(&spin.stretches(), window_s);
         let near = |found: Vec<f64>, expected: &[f64]| {
@@ -212,8 +214,8 @@ mod tests {
     }
 
     #[test]
-    fn a_drum_that_turns_back_travels_on() {
-        // A turn a second forwards, then through rest to a turn a second backwards.
+    fn backward_turns_are_counted_too() {
+        // The drum makes a turn per second forwards, then through rest a turn per second backwards.
         let spin = Spin::Table {
             time_s: vec![0.0, 3.0, 7.0, 8.0],
             speed_rpm: vec![60.0, 60.0, -60.0, -60.0],
