@@ -550,15 +550,17 @@ impl<'a> Columns<'a> {
         };
         let Some(first) = forces.first().and_then(Option::as_ref) else { return };
         let axes = ["x", "y", "z"];
-        for (kind, (element, force, description, count)) in Forces::KINDS.into_iter().enumerate() {
-            for k in 0..first.of_kinds()[kind].len() {
+        for (kind, (element, force, description, count)) in
+            Forces::ELEMENT_KINDS.into_iter().enumerate()
+        {
+            for k in 0..first.by_kind()[kind].len() {
                 let (mut name, mut description) =
                     (format!("{element}_{}_{force}", k / count + 1), description.to_owned());
                 if count > 1 {
                     name += &format!("_{}", axes[k % count]);
                     description += &(k % count + 1).to_string();
                 }
-                add(&name, &description, &|at| at.of_kinds()[kind][k]);
+                add(&name, &description, &|at| at.by_kind()[kind][k]);
             }
         }
         let all = match first.stops_n.is_empty() && first.bushings_n.is_empty() {

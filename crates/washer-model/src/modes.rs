@@ -129,10 +129,11 @@ pub(crate) fn modes_with_caps(
     let system = first_order(point, &point.linear, theta_rad, speed_rad_per_s, caps)?;
     let mass = system.mass;
     let decomposition = system.matrix.eigen().map_err(|_| NoModes::Eigenvalues)?;
-    let (values, vectors) = (decomposition.S().column_vector(), decomposition.U());
+    let values = decomposition.S().column_vector();
+    let vectors = decomposition.U();
     let shape = |state: usize| unit_mass(&mass, &core::array::from_fn(|i| vectors[(i, state)]));
-    let likeness = |a: usize, b: usize| assurance(&mass, &shape(a), &shape(b));
-    let motions = natural_motions((0..STATES).map(|k| values[k] * system.unit_per_s), &likeness)?;
+    let similarity = |a: usize, b: usize| assurance(&mass, &shape(a), &shape(b));
+    let motions = sort_into_modes((0..STATES).map(|k| values[k] * system.unit_per_s), &similarity)?;
     let modes = motions.map(|(Root { s, magnitude_rad_per_s }, state)| Mode {
         re_per_s: s.re,
         im_rad_per_s: s.im,
@@ -159,7 +160,7 @@ pub(crate) fn motions(
         }));
     }
     let values = values.into_iter().map(|s| s * system.unit_per_s);
-    Ok(natural_motions(values, &|_, _| 1.0)?.map(|(motion, _)| motion))
+    Ok(sort_into_modes(values, &|_, _| 1.0)?.map(|(motion, _)| motion))
 }
 
 /// The eigenvalue of a mode.
@@ -171,36 +172,39 @@ pub(crate) struct Root {
     pub(crate) magnitude_rad_per_s: f64,
 }
 
-/// The natural motions of all eigenvalues, the slowest first, each with the place of its eigenvalue
-/// or of the slower of its two rates; `likeness` compares the shapes at two places.
-fn natural_motions(
+/// Sorts eigenvalues into modes, the slowest first. Each mode comes with the index of its
+/// eigenvalue, or of the slower one of two real ones. `similarity` compares the shapes of two
+/// indices.
+fn sort_into_modes(
     values: impl Iterator<Item = c64>,
-    likeness: &dyn Fn(usize, usize) -> f64,
+    similarity: &dyn Fn(usize, usize) -> f64,
 ) -> Result<[(Root, usize); COORDINATES], NoModes> {
-    let mut swinging = Vec::with_capacity(COORDINATES);
-    let mut steady = Vec::new();
+    let mut modes = Vec::with_capacity(COORDINATES);
+    let mut real = Vec::new();
     for (state, s) in values.enumerate() {
         if !(s.re.is_finite() && s.im.is_finite()) {
             return Err(NoModes::Eigenvalues);
         }
         if s.im > 0.0 {
-            swinging.push((Root { s, magnitude_rad_per_s: magnitude(s) }, state));
+            modes.push((Root { s, magnitude_rad_per_s: magnitude(s) }, state));
         } else if s.im == 0.0 {
-            steady.push((s.re, state));
+            real.push((s.re, state));
         }
     }
-    // The two rates of one motion have nearly one shape. Of several motions that creep, the slow
-    // rates may all lie below the fast ones, so that neighbours do not belong together.
-    steady.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
-    while let Some((slow, state)) = steady.pop() {
-        let alike = |&at: &usize| likeness(state, steady[at].1);
-        let most = (0..steady.len()).rev().max_by(|a, b| alike(a).total_cmp(&alike(b)));
-        let (fast, _) = steady.remove(most.ok_or(NoModes::Eigenvalues)?);
+    // The two rates of an overdamped mode have similar shapes. They need not be neighbours in
+    // order: the slow rates of several modes may all lie below the fast ones.
+    real.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+    while let Some((slow, state)) = real.pop() {
+        let similarity_to_slow = |&index: &usize| similarity(state, real[index].1);
+        let partner = (0..real.len())
+            .rev()
+            .max_by(|a, b| similarity_to_slow(a).total_cmp(&similarity_to_slow(b)));
+        let (fast, _) = real.remove(partner.ok_or(NoModes::Eigenvalues)?);
         let s = c64::new(0.5 * (slow + fast), 0.0);
-        swinging.push((Root { s, magnitude_rad_per_s: (slow * fast).abs().sqrt() }, state));
+        modes.push((Root { s, magnitude_rad_per_s: (slow * fast).abs().sqrt() }, state));
     }
-    swinging.sort_by(|a, b| a.0.magnitude_rad_per_s.total_cmp(&b.0.magnitude_rad_per_s));
-    swinging.try_into().map_err(|_| NoModes::Eigenvalues)
+    modes.sort_by(|a, b| a.0.magnitude_rad_per_s.total_cmp(&b.0.magnitude_rad_per_s));
+    modes.try_into().map_err(|_| NoModes::Eigenvalues)
 }
 
 /// Returns |s|. The system's `hypot` would round differently on other systems.
@@ -214,9 +218,12 @@ fn unit_mass(
     mass: &[[f64; COORDINATES]; COORDINATES],
     vector: &[c64; COORDINATES],
 ) -> [[f64; 2]; COORDINATES] {
-    let largest = vector
-        .iter()
-        .fold(c64::new(0.0, 0.0), |m, v| if v.norm_sqr() > m.norm_sqr() { *v } else { m });
+    let mut largest = c64::new(0.0, 0.0);
+    for entry in vector {
+        if entry.norm_sqr() > largest.norm_sqr() {
+            largest = *entry;
+        }
+    }
     let turned = vector.map(|v| v * largest.conj() / largest.norm_sqr());
     let pairs = turned.map(|v| [v.re, v.im]);
     let scale = inner(mass, &pairs, &pairs)[0].sqrt();
@@ -267,10 +274,10 @@ pub(crate) fn fastest_rigid_rad_per_s(point: &Point, model: &LinearPoint) -> Res
     let still = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
     let Matrices { mass, stiffness, .. } = model.matrices(&point.machine.bodies, &still);
     let together = |matrix: &[[f64; COORDINATES]; COORDINATES]| {
-        let with = |i: usize, j: usize| matrix[i][j];
         Mat::from_fn(TUB.len(), TUB.len(), |i, j| {
-            let ([i, k], [j, l]) = ([TUB[i], SHAFT[i]], [TUB[j], SHAFT[j]]);
-            with(i, j) + with(i, l) + with(k, j) + with(k, l)
+            let [i, k] = [TUB[i], SHAFT[i]];
+            let [j, l] = [TUB[j], SHAFT[j]];
+            matrix[i][j] + matrix[i][l] + matrix[k][j] + matrix[k][l]
         })
     };
     let mass = together(&mass);

@@ -19,22 +19,28 @@ use crate::{
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 
-/// A speed is found when that of the motion differs from it by no more than this share.
-const FOUND_WITHIN: f64 = 5e-3;
+/// The relative tolerance of a speed amplitude. Basis: the equivalent damping is as accurate, and
+/// its idealisation is coarser. Doubling it saves less than a run.
+const SPEED_TOLERANCE: f64 = 5e-3;
 
-/// Most motions that are tried.
-pub(crate) const MOST_MOTIONS: usize = 24;
+/// The greatest number of linear runs. Basis: several times the usual three or four. Doubling it
+/// costs time for points without a fixed point.
+pub(crate) const MAX_RUNS: usize = 24;
 
 /// The phase of the fastest motion in a step of the runs, rad. Basis: it gives speeds within half a
 /// percent. Doubling it gives errors 16 times as large.
 const STEP_RAD: f64 = 0.4;
-const SHORTER: f64 = 0.7;
+/// The factor of the step after an unstable run. Basis: a compromise between failed runs and
+/// short steps, not measured. Doubling it would lengthen steps.
+const STEP_REDUCTION: f64 = 0.7;
 
-/// How much shorter steps are tried, as a share of the first.
-const MOST_SHORTENED: f64 = 0.01;
+/// The shortest step, as a share of the first. Basis: thirteen reductions. Doubling it allows two
+/// fewer.
+const MIN_STEP_SHARE: f64 = 0.01;
 
-/// The bearings' cap times the step, as a share of the limit of stability.
-const STEP_TIMES_CAP: f64 = 0.9;
+/// The bearings' cap times the step, as a share of the stability limit. Basis: a margin of a tenth.
+/// Doubling it is unstable.
+const STABILITY_SHARE: f64 = 0.9;
 
 /// The number of binary digits of a step after the first. Basis: the last digits of an eigenvalue
 /// depend on the processor. Doubling it would keep more of them.
@@ -79,45 +85,47 @@ impl Search {
         self.reciprocals.iter().map(|reciprocal| 1.0 / reciprocal).collect()
     }
 
-    /// Takes the speeds (m/s) of the motion by the present ones, and changes these; says whether
-    /// that was needless, because both agree.
-    pub(crate) fn take(&mut self, occurred_m_per_s: &[f64]) -> bool {
-        let occurred = occurred_m_per_s.iter().zip(&self.most);
-        let missing: Vec<f64> = occurred
+    /// Updates the speeds by those of the motion (m/s) that they caused. Returns true if both
+    /// agree, and then keeps them.
+    pub(crate) fn update(&mut self, motion_m_per_s: &[f64]) -> bool {
+        let motion = motion_m_per_s.iter().zip(&self.most);
+        let residuals: Vec<f64> = motion
             .zip(&self.reciprocals)
-            .map(|((occurred, most), now)| (1.0 / occurred).min(*most) - now)
+            .map(|((speed, most), now)| (1.0 / speed).min(*most) - now)
             .collect();
-        let is_found = |(missing, now): (&f64, &f64)| missing.abs() <= FOUND_WITHIN * now;
-        if missing.iter().zip(&self.reciprocals).all(is_found) {
+        let is_found = |(residual, now): (&f64, &f64)| residual.abs() <= SPEED_TOLERANCE * now;
+        if residuals.iter().zip(&self.reciprocals).all(is_found) {
             return true;
         }
-        if let Some([before, missed]) = &self.last {
-            let moved: Vec<f64> = difference(&self.reciprocals, before);
-            let changed = difference(&missing, missed);
-            let expected = self.inverse.iter().map(|row| dot(row, &changed)).collect::<Vec<_>>();
-            let along: Vec<f64> = (0..moved.len())
-                .map(|j| self.inverse.iter().zip(&moved).map(|(row, moved)| moved * row[j]).sum())
+        if let Some([last_reciprocals, last_residuals]) = &self.last {
+            // Broyden's update of the inverse B by the step s and the change y of the residuals:
+            // B += (s - B y) (s^T B) / (s^T B y).
+            let s: Vec<f64> = difference(&self.reciprocals, last_reciprocals);
+            let y = difference(&residuals, last_residuals);
+            let b_y = self.inverse.iter().map(|row| dot(row, &y)).collect::<Vec<_>>();
+            let s_b: Vec<f64> = (0..s.len())
+                .map(|j| self.inverse.iter().zip(&s).map(|(row, s)| s * row[j]).sum())
                 .collect();
-            let scale = dot(&along, &changed);
-            if scale != 0.0 {
-                for (row, (moved, expected)) in
-                    self.inverse.iter_mut().zip(moved.iter().zip(&expected))
-                {
-                    let by = (moved - expected) / scale;
-                    row.iter_mut().zip(&along).for_each(|(entry, along)| *entry += by * along);
+            let s_b_y = dot(&s_b, &y);
+            if s_b_y != 0.0 {
+                for (row, (s, b_y)) in self.inverse.iter_mut().zip(s.iter().zip(&b_y)) {
+                    let factor = (s - b_y) / s_b_y;
+                    row.iter_mut().zip(&s_b).for_each(|(entry, s_b)| *entry += factor * s_b);
                 }
             }
         }
-        let steps: Vec<f64> = self.inverse.iter().map(|row| -dot(row, &missing)).collect();
-        self.last = Some([self.reciprocals.clone(), missing.clone()]);
+        let steps: Vec<f64> = self.inverse.iter().map(|row| -dot(row, &residuals)).collect();
+        self.last = Some([self.reciprocals.clone(), residuals.clone()]);
         for (k, now) in self.reciprocals.iter_mut().enumerate() {
-            let (step, missing, most) = (steps[k], missing[k], self.most[k]);
-            let next = match (step * missing > 0.0, missing > 0.0) {
+            let step = steps[k];
+            let residual = residuals[k];
+            let most = self.most[k];
+            let next = match (step * residual > 0.0, residual > 0.0) {
                 (true, _) => *now + step,
                 // The motion is slower than assumed, the more so the slower that is: the damper
                 // sticks.
                 (false, true) => most,
-                (false, false) => *now + missing,
+                (false, false) => *now + residual,
             };
             *now = if next > 0.0 { next.min(most) } else { 0.5 * *now };
         }
@@ -139,10 +147,11 @@ pub(crate) fn own(point: &Point, speeds_m_per_s: &[f64]) -> Vec<f64> {
     own.map(|taken| speeds_m_per_s[taken.damper]).collect()
 }
 
-/// A point whose own speeds are looked for.
-struct Open {
-    place: usize,
-    /// With the run up to the window's end.
+/// A point in a search.
+struct OpenPoint {
+    /// The index among all points.
+    index: usize,
+    /// The point, with a run up to the window's end.
     point: Point,
     search: Search,
     step_s: f64,
@@ -161,54 +170,56 @@ pub fn prepare(
     points: &[(Machine, Spin)],
     timing: &Timing,
 ) -> Vec<Result<Point, NoEquilibrium>> {
-    let mut ready = point::prepare(points, timing);
+    let mut prepared = point::prepare(points, timing);
     let to_window = Timing { end_s: timing.window_s[1], checkpoints: 0, ..*timing };
-    let open = |(place, point): (usize, &Result<Point, NoEquilibrium>)| {
+    let open = |(index, point): (usize, &Result<Point, NoEquilibrium>)| {
         let point = point.as_ref().ok()?;
         let search = Search::new(point)?;
         let legs = legs(&point.stretches, &to_window).into();
         let point = Point { legs, ..point.at_own_speeds(&search.speeds_m_per_s()) };
-        let swing = fastest_rigid_rad_per_s(&point, &point.linear).ok()?;
-        let step_s = to_bits(STEP_RAD / swing.max(point.legs.last()?.fastest_rad_per_s), STEP_BITS);
-        let shortest_s = MOST_SHORTENED * step_s;
-        Some(Open { place, point, search, step_s, shortest_s, is_done: false })
+        let fastest = fastest_rigid_rad_per_s(&point, &point.linear).ok()?;
+        let step_s =
+            to_bits(STEP_RAD / fastest.max(point.legs.last()?.fastest_rad_per_s), STEP_BITS);
+        let shortest_s = MIN_STEP_SHARE * step_s;
+        Some(OpenPoint { index, point, search, step_s, shortest_s, is_done: false })
     };
-    let mut all: Vec<Open> = ready.iter().enumerate().filter_map(open).collect();
-    let wanted = Recorders::gauge(Gauge::DamperSpeed);
-    for _ in 0..MOST_MOTIONS {
-        let mut open: Vec<&mut Open> = all.iter_mut().filter(|one| !one.is_done).collect();
+    let mut all: Vec<OpenPoint> = prepared.iter().enumerate().filter_map(open).collect();
+    let recorders = Recorders::gauge(Gauge::DamperSpeed);
+    for _ in 0..MAX_RUNS {
+        let mut open: Vec<&mut OpenPoint> = all.iter_mut().filter(|one| !one.is_done).collect();
         open.sort_by(|a, b| a.step_s.total_cmp(&b.step_s));
-        for alike in open.chunk_by_mut(|a, b| a.step_s == b.step_s) {
-            let step_s = alike[0].step_s;
-            let cap = STEP_TIMES_CAP * RK4_STABILITY_LIMIT / step_s;
+        // Points with equal steps run in one batch.
+        for batch in open.chunk_by_mut(|a, b| a.step_s == b.step_s) {
+            let step_s = batch[0].step_s;
+            let cap = STABILITY_SHARE * RK4_STABILITY_LIMIT / step_s;
             let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
             let method = Method::Capped { step_s, caps };
-            let runs: Vec<&Point> = alike.iter().map(|one| &one.point).collect();
+            let runs: Vec<&Point> = batch.iter().map(|one| &one.point).collect();
             let simd = simd.narrowed(runs.len());
-            let (_, extras) = simulate_with(simd, ModelKind::Linear, &method, &runs, wanted);
-            for (one, extra) in alike.iter_mut().zip(extras) {
-                one.take(extra.gauge(Gauge::DamperSpeed));
+            let (_, extras) = simulate_with(simd, ModelKind::Linear, &method, &runs, recorders);
+            for (one, extra) in batch.iter_mut().zip(extras) {
+                one.update(extra.gauge(Gauge::DamperSpeed));
             }
         }
     }
-    for Open { place, search, .. } in all {
-        if let Ok(point) = &mut ready[place] {
+    for OpenPoint { index, search, .. } in all {
+        if let Ok(point) = &mut prepared[index] {
             *point = point.at_own_speeds(&search.speeds_m_per_s());
         }
     }
-    ready
+    prepared
 }
 
-impl Open {
-    /// Takes the speeds (m/s) of all dampers in a run; none if it failed.
-    fn take(&mut self, speeds_m_per_s: &[f64]) {
+impl OpenPoint {
+    /// Updates the search by the speeds (m/s) of all dampers in a run, which are none if it failed.
+    fn update(&mut self, speeds_m_per_s: &[f64]) {
         if speeds_m_per_s.is_empty() {
-            // A hinge under its cap, or friction at a low speed, is too stiff for the step.
-            self.step_s = to_bits(SHORTER * self.step_s, STEP_BITS);
+            // A hinge below its cap, or friction at a low speed, is too stiff for the step.
+            self.step_s = to_bits(STEP_REDUCTION * self.step_s, STEP_BITS);
             self.is_done = self.step_s < self.shortest_s;
             return;
         }
-        self.is_done = self.search.take(&own(&self.point, speeds_m_per_s));
+        self.is_done = self.search.update(&own(&self.point, speeds_m_per_s));
         self.point = self.point.at_own_speeds(&self.search.speeds_m_per_s());
     }
 }

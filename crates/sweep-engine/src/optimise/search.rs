@@ -61,11 +61,11 @@ pub fn slacks<M: Swept>(
     let asking = CachedEvaluator::new(engine, threads, effort.interrupt, None, &silent)?;
     let layout = M::layout(&study.plan);
     let found = Mutex::new(Vec::new());
-    let answer = |_: usize, points: Vec<Done>| -> Result<Response, StoreError> {
+    let answer = |_: usize, points: Vec<Done>| -> Result<RequestValues, StoreError> {
         let batch = batch(study, &layout, values, points)?;
         let slacks = study.conditions.iter().map(|goal| goal.slack(&batch));
         *lock(&found) = slacks.collect::<Result<Vec<_>, ArrowError>>().map_err(defect)?;
-        Ok(Response::new())
+        Ok(RequestValues::new())
     };
     let keys = [vec![key(0, 0, values)]];
     let asked =

@@ -16,8 +16,9 @@ use core::f64::consts::TAU;
 /// cos(pi / 36), or 0.4 %, of the variation. Doubling it reduces that to 0.1 %.
 const ANGLES: usize = 36;
 
-/// Two shapes are the same mode from this likeness (modal assurance criterion) on.
-const CLEAR: f64 = 0.9;
+/// The least MAC of shapes of one mode. Basis: the usual threshold of modal analysis. Doubling it
+/// halves every interval to the end.
+const MIN_ASSURANCE: f64 = 0.9;
 
 /// The greatest number of halvings of an interval. Basis: modes of a shaft without a preferred
 /// direction are not told apart at any distance. Doubling it takes up to 64 times as long for them.
@@ -101,7 +102,7 @@ pub fn campbell_until(
                 modes(point, 0.0, rad_per_s(rpm))
             })?;
         }
-        followed.push((over_turn(point, speed, &current)?, current.clone()));
+        followed.push((average_over_turn(point, speed, &current)?, current.clone()));
     }
     let over_speed = (0..COORDINATES)
         .map(|mode| {
@@ -112,7 +113,7 @@ pub fn campbell_until(
                 if (excess[0] > 0.0) != (excess[1] > 0.0) && excess[0] != 0.0 {
                     let from = &followed[k - 1].1;
                     let between = [speeds_rpm[k - 1], speeds_rpm[k]];
-                    resonances.extend(resonance(point, mode, from, between, excess)?);
+                    resonances.extend(find_resonance(point, mode, from, between, excess)?);
                 }
             }
             let at_speed: Vec<_> = followed.iter().map(|(turn, _)| turn[mode]).collect();
@@ -151,8 +152,8 @@ fn follow_halving(
     end: Modes,
     halvings: u32,
 ) -> Result<Modes, NoModes> {
-    let (order, likeness) = matched(start, &end);
-    if likeness >= CLEAR || halvings == 0 {
+    let (order, assurance) = match_modes(start, &end);
+    if assurance >= MIN_ASSURANCE || halvings == 0 {
         return Ok(Modes { modes: order.map(|k| end.modes[k]), ..end });
     }
     let middle = 0.5 * (from + to);
@@ -160,9 +161,9 @@ fn follow_halving(
     follow_halving(&between, middle, to, at, end, halvings - 1)
 }
 
-/// For each mode of `start` the mode of `end` that continues it, the likest pairs first; and the
-/// likeness of the least like pair.
-fn matched(start: &Modes, end: &Modes) -> ([usize; COORDINATES], f64) {
+/// Returns for each mode of `start` the index of the mode of `end` that continues it, and the least
+/// MAC of a pair. Pairs are formed in the order of falling MAC.
+fn match_modes(start: &Modes, end: &Modes) -> ([usize; COORDINATES], f64) {
     let mut pairs = Vec::with_capacity(COORDINATES * COORDINATES);
     for (i, before) in start.modes.iter().enumerate() {
         for (j, after) in end.modes.iter().enumerate() {
@@ -172,17 +173,17 @@ fn matched(start: &Modes, end: &Modes) -> ([usize; COORDINATES], f64) {
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut order = [usize::MAX; COORDINATES];
     let mut least = 1.0_f64;
-    for (likeness, i, j) in pairs {
+    for (assurance, i, j) in pairs {
         if order[i] == usize::MAX && !order.contains(&j) {
             order[i] = j;
-            least = least.min(likeness);
+            least = least.min(assurance);
         }
     }
     (order, least)
 }
 
-/// Every mode at one speed over a turn; `start` holds them at theta = 0.
-fn over_turn(
+/// Averages every mode at a speed over a turn. `start` holds the modes at theta = 0.
+fn average_over_turn(
     point: &Point,
     speed_rpm: f64,
     start: &Modes,
@@ -197,9 +198,10 @@ fn over_turn(
     let rpm = |rad_per_s: f64| rad_per_s * 60.0 / TAU;
     Ok(core::array::from_fn(|mode| {
         let all = turn.iter().map(|modes| &modes.modes[mode]);
-        let mean = |of: fn(&Mode) -> f64| all.clone().map(of).sum::<f64>() / ANGLES as f64;
+        let mean = |value: fn(&Mode) -> f64| all.clone().map(value).sum::<f64>() / ANGLES as f64;
         let frequencies = all.clone().map(|mode| mode.im_rad_per_s);
-        let (re_per_s, im_rad_per_s) = (mean(|mode| mode.re_per_s), mean(|mode| mode.im_rad_per_s));
+        let re_per_s = mean(|mode| mode.re_per_s);
+        let im_rad_per_s = mean(|mode| mode.im_rad_per_s);
         ModeAtSpeed {
             re_per_s,
             im_rad_per_s,
@@ -212,23 +214,24 @@ fn over_turn(
     }))
 }
 
-/// The speed between two at which the mode's frequency less the speed, of different sign at both,
-/// vanishes; by the Illinois method (M. Dowell, P. Jarratt, BIT 11 (1971) 168), which keeps the
-/// root between its two ends. `None` where the sign changes by a jump, as where a motion begins or
-/// stops to swing.
-fn resonance(
+/// Finds the speed between two at which the mode's frequency equals the speed, by the Illinois
+/// method (M. Dowell, P. Jarratt, BIT 11 (1971) 168), which keeps the root bracketed. Returns
+/// `None` for a change of sign by a jump, where a motion becomes or ceases to be overdamped.
+fn find_resonance(
     point: &Point,
     mode: usize,
     from: &Modes,
     [start, end]: [f64; 2],
     [mut low_excess, mut high_excess]: [f64; 2],
 ) -> Result<Option<Resonance>, NoModes> {
-    let (mut low, mut high) = (start, end);
+    let mut low = start;
+    let mut high = end;
     let mut side = 0;
     for _ in 0..MAX_SEARCH {
         let speed_rpm = (low * high_excess - high * low_excess) / (high_excess - low_excess);
         let there = follow(from, start, speed_rpm, &|rpm| modes(point, 0.0, rad_per_s(rpm)))?;
-        let found = Resonance { speed_rpm, mode: over_turn(point, speed_rpm, &there)?[mode] };
+        let found =
+            Resonance { speed_rpm, mode: average_over_turn(point, speed_rpm, &there)?[mode] };
         let excess = found.mode.frequency_rpm - speed_rpm;
         if excess.abs() < RESONANCE_RPM {
             return Ok(Some(found));

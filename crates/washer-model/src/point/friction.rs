@@ -19,15 +19,15 @@ pub struct FrictionSpeed {
 impl FrictionSpeed {
     /// Returns the speeds of every damper with friction, with a default for those of the motion.
     pub(crate) fn all(machine: &Machine) -> Vec<Self> {
-        let of_damper = |(damper, of): (usize, &Damper)| {
-            let given = of.friction_linear_speed_m_per_s;
-            (of.friction_n != 0.0).then(|| Self {
-                damper,
+        let friction_speed = |(index, damper): (usize, &Damper)| {
+            let given = damper.friction_linear_speed_m_per_s;
+            (damper.friction_n != 0.0).then(|| Self {
+                damper: index,
                 speed_m_per_s: given.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S),
                 is_own: given.is_none(),
-                least_m_per_s: 4.0 * of.friction_speed_m_per_s / PI,
+                least_m_per_s: 4.0 * damper.friction_speed_m_per_s / PI,
             })
         };
-        machine.dampers.iter().enumerate().filter_map(of_damper).collect()
+        machine.dampers.iter().enumerate().filter_map(friction_speed).collect()
     }
 }

@@ -37,17 +37,17 @@ pub struct Forces {
 }
 
 impl Forces {
-    /// Every kind of element: its name, what its force is called and is, in how many
-    /// directions: of several, their number follows.
-    pub const KINDS: [(&str, &str, &str, usize); 4] = [
+    /// The kinds of elements: the name, the name of the force, its description, and the number of
+    /// components, which is appended to the description of more than one.
+    pub const ELEMENT_KINDS: [(&str, &str, &str, usize); 4] = [
         ("spring", "tension", "tension of the spring, negative where it pushes", 1),
         ("damper", "tension", "tension of the damper, positive while it is drawn out", 1),
         ("stop", "force", "push between the tub and the stop", 1),
         ("bushing", "force", "force of the bushing on the cabinet along c", 3),
     ];
 
-    /// The forces of all elements of each kind.
-    pub fn of_kinds(&self) -> [&[f64]; Self::KINDS.len()] {
+    /// Returns the forces of all elements of each kind.
+    pub fn by_kind(&self) -> [&[f64]; Self::ELEMENT_KINDS.len()] {
         [&self.springs_n, &self.dampers_n, &self.stops_n, self.bushings_n.as_flattened()]
     }
 }
@@ -64,10 +64,10 @@ pub(crate) fn forces(point: &Point, model: ModelKind, state: &[f64; STATES]) -> 
         ModelKind::Nonlinear => core::array::from_fn(|i| state[i]),
         ModelKind::Linear => point.equilibrium,
     };
-    let tub = Tub {
+    let tub = TubState {
         model,
-        moving: along(&q, &u),
-        displaced: along(&q, &core::array::from_fn(|i| state[i])),
+        moving: with_derivative(&q, &u),
+        displaced: with_derivative(&q, &core::array::from_fn(|i| state[i])),
     };
     let mut forces = Forces::default();
     // Springs and dampers divide the force among the axes in different orders. Another order would
@@ -186,8 +186,8 @@ pub(crate) fn attachments(point: &Point, q: &[f64; COORDINATES]) -> [Vec<[f64; 3
     ]
 }
 
-/// The tub at a state.
-struct Tub {
+/// The state of the tub as dual numbers.
+struct TubState {
     model: ModelKind,
     /// The coordinates with time derivatives.
     moving: [N<Dual<f64>>; COORDINATES],
@@ -195,8 +195,8 @@ struct Tub {
     displaced: [N<Dual<f64>>; COORDINATES],
 }
 
-impl Tub {
-    /// Tension of an element, and its line.
+impl TubState {
+    /// Computes the tension of an element, and its line.
     fn tension(
         &self,
         element: &impl ForceLaw<Dual<f64>>,
@@ -237,8 +237,11 @@ fn first_order(model: ModelKind, value: N<Dual<f64>>) -> f64 {
     }
 }
 
-/// `q` with its derivative along `direction`.
-fn along(q: &[f64; COORDINATES], direction: &[f64; COORDINATES]) -> [N<Dual<f64>>; COORDINATES] {
+/// Returns coordinates as dual numbers with derivatives.
+fn with_derivative(
+    q: &[f64; COORDINATES],
+    direction: &[f64; COORDINATES],
+) -> [N<Dual<f64>>; COORDINATES] {
     core::array::from_fn(|i| N(Dual { value: q[i], slope: direction[i] }))
 }
 

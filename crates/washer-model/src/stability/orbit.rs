@@ -14,7 +14,7 @@ use crate::nonlinear::coupling::{Caps, Coupling};
 use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::outputs::squared;
 use crate::point::Point;
-use crate::ready::{MOST_MOTIONS, Search, own};
+use crate::ready::{MAX_RUNS, Search, own};
 use crate::run::everywhere;
 use crate::run::extras::{Extras, Seen as Recorded};
 use crate::run::model::{Linear, Model, Nonlinear};
@@ -298,7 +298,7 @@ pub(super) fn linear_responses(
     let mut found = together(rows, is_stopped);
     let searched = |(k, row): (usize, &Row<'_>)| Some((k, Search::from_least(row.point)?));
     let mut open: Vec<(usize, Search)> = rows.iter().enumerate().filter_map(searched).collect();
-    for _ in 0..MOST_MOTIONS {
+    for _ in 0..MAX_RUNS {
         let at_speeds =
             |(k, search): &(usize, Search)| rows[*k].point.at_own_speeds(&search.speeds_m_per_s());
         let points: Vec<Point> = open.iter().map(at_speeds).collect();
@@ -309,7 +309,7 @@ pub(super) fn linear_responses(
         }
         let mut left = Vec::new();
         for (((k, mut search), point), response) in open.into_iter().zip(&points).zip(responses) {
-            if !search.take(&own(point, &response.damper_speeds_m_per_s(point))) {
+            if !search.update(&own(point, &response.damper_speeds_m_per_s(point))) {
                 left.push((k, search));
             }
             found[k] = response;
