@@ -213,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_codes_are_the_contract() {
+    fn exit_codes_do_not_change() {
         assert_eq!(Exit::ALL.map(|(exit, _)| exit as u8), [0, 1, 2, 3, 4, 75, 129, 130, 143]);
         for (_, meaning) in Exit::ALL {
             assert!(Exit::table().contains(meaning));
@@ -221,9 +221,9 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_a_cursor_is_written_out_and_text_stays() {
-        let told = escaped("a\x1b[2J\u{9b}3m\r\u{202e}é\tb\n", is_unsafe);
-        assert_eq!(told, "a\\u001b[2J\\u009b3m\\u000d\\u202eé\tb\n");
+    fn control_characters_are_escaped_and_text_stays() {
+        let text = escaped("a\x1b[2J\u{9b}3m\r\u{202e}é\tb\n", is_unsafe);
+        assert_eq!(text, "a\\u001b[2J\\u009b3m\\u000d\\u202eé\tb\n");
         let json = serde_json::json!({ "host": "a\u{9b}\x07b" }).to_string();
         let back: serde_json::Value = serde_json::from_str(&escaped(&json, is_unsafe)).unwrap();
         assert_eq!(back["host"], "a\u{9b}\x07b");
@@ -231,8 +231,9 @@ mod tests {
     }
 
     #[test]
-    fn a_store_that_is_busy_refuses_or_fails_has_a_code_each() {
-        let (output, folder) = (PathBuf::from("x.parquet"), PathBuf::from("x.parquet.partial"));
+    fn store_errors_have_exit_codes() {
+        let output = PathBuf::from("x.parquet");
+        let folder = PathBuf::from("x.parquet.partial");
         let differs = StoreError::PlanDiffers { folder: folder.clone(), differences: Vec::new() };
         for (error, exit) in [
             (StoreError::Busy { output: output.clone(), holders: Vec::new() }, Exit::Busy),
@@ -245,9 +246,10 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_cannot_be_read_is_bad_input_and_a_disk_that_fails_is_not() {
+    fn unreadable_files_are_bad_input_but_failing_disks_are_not() {
         let io = |action, kind: io::ErrorKind| {
-            let (path, source) = (PathBuf::from("x.parquet"), kind.into());
+            let path = PathBuf::from("x.parquet");
+            let source = kind.into();
             Error::from(FileError::Io { action, path, source }).exit()
         };
         assert_eq!(io("open", io::ErrorKind::NotFound), Exit::BadInput);

@@ -12,7 +12,7 @@ use sweep_files::{Cell, FileKind, ResultTable, ratio_limits};
 pub use boundary::{BoundaryCrossing, BoundaryShift};
 pub use plans::PlanChange;
 
-use crate::error::{Result, ResultsError};
+use crate::error::ResultsError;
 use side::ComparedFile;
 use sweep_parameter::named;
 

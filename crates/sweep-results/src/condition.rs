@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 use std::ops::Range;
 
-use crate::error::Result;
+use crate::error::ResultsError;
 use sweep_files::{Cell, ResultTable, Row};
 
 /// A syntax or type error in the text of an expression.
@@ -229,7 +229,7 @@ impl Condition {
         &self,
         table: &ResultTable,
         filter: Option<&Condition>,
-    ) -> Result<Vec<AggregateValue>> {
+    ) -> Result<Vec<AggregateValue>, ResultsError> {
         if self.aggregates.is_empty() {
             return Ok(Vec::new());
         }
@@ -308,8 +308,8 @@ pub(crate) fn for_each_row(
     table: &ResultTable,
     names: &[&str],
     filter: Option<&Condition>,
-    mut work: impl FnMut(&EvaluationContext<'_>) -> Result<()>,
-) -> Result<()> {
+    mut work: impl FnMut(&EvaluationContext<'_>) -> Result<(), ResultsError>,
+) -> Result<(), ResultsError> {
     let filter_column = names.len();
     let names = [names, &filter.map_or_else(Vec::new, Condition::column_names)].concat();
     table.file().each_row(&names, |row| {

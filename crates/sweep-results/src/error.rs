@@ -12,6 +12,3 @@ pub enum ResultsError {
     #[error("{0}")]
     Refused(String),
 }
-
-/// The result of a question to a file.
-pub(crate) type Result<T, E = ResultsError> = std::result::Result<T, E>;

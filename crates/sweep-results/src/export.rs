@@ -8,7 +8,7 @@ use std::path::Path;
 use sweep_files::{FileKind, Output, ResultTable};
 use sweep_parameter::named;
 
-use crate::error::{Result, ResultsError};
+use crate::error::ResultsError;
 
 named! {
     /// A format, named by the extension of its files.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::condition::{AggregateValue, Condition, EvaluationContext, for_each_row};
-use crate::error::{Result, ResultsError};
+use crate::error::ResultsError;
 use crate::top::WorstRows;
 use sweep_files::{Cell, ResultTable};
 

@@ -1,7 +1,7 @@
 //! The selection of rows that come first in an order.
 
 use crate::condition::{Condition, for_each_row};
-use crate::error::{Result, ResultsError};
+use crate::error::ResultsError;
 use crate::nearest::nearest;
 use sweep_files::{Cell, CellKind, ResultTable};
 use sweep_parameter::Worse;

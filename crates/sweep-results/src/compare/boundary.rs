@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::SharedRow;
-use crate::error::{Result, ResultsError};
+use crate::error::ResultsError;
 use sweep_files::ResultTable;
 
 /// A crossing of the limit along the second axis, in both files.
@@ -139,7 +139,7 @@ fn sort_key(place: &[f64]) -> Vec<u64> {
 pub(super) fn compare_boundaries(
     first: &ResultTable,
     second: &ResultTable,
-) -> Result<Option<BoundaryShift>> {
+) -> Result<Option<BoundaryShift>, ResultsError> {
     let names = first.axes();
     let others = second.axes();
     let [_, axis, ..] = names[..] else { return Ok(None) };

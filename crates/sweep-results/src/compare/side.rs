@@ -1,7 +1,7 @@
 //! A compared file, in memory.
 
 use super::{Flip, SharedRow};
-use crate::error::{Result, ResultsError};
+use crate::error::ResultsError;
 use sweep_files::{Cell, Column, ResultTable, Rows};
 
 /// The greatest number of cells that are read of one file. Basis: a cell takes some 16 bytes, so
@@ -37,7 +37,7 @@ pub(super) fn key_columns(table: &ResultTable, is_boundary: bool) -> Vec<String>
 }
 
 /// Returns the value of a column that has the same value in all rows.
-pub(super) fn single_value(table: &ResultTable, name: &str) -> Result<Option<f64>> {
+pub(super) fn single_value(table: &ResultTable, name: &str) -> Result<Option<f64>, ResultsError> {
     let mut value = None;
     for rows in table.file().read(&[name])? {
         let rows = rows?;
@@ -57,7 +57,11 @@ impl ComparedFile {
     ///
     /// # Errors
     /// [`ResultsError::Refused`], [`ResultsError::File`].
-    pub(super) fn read(table: &ResultTable, other: &ResultTable, keys: &[String]) -> Result<Self> {
+    pub(super) fn read(
+        table: &ResultTable,
+        other: &ResultTable,
+        keys: &[String],
+    ) -> Result<Self, ResultsError> {
         let in_both = |column: &Column| {
             let counterpart = other.column(&column.name);
             let has_same_kind = counterpart.is_some_and(|other| other.kind == column.kind);

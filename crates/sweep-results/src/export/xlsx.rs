@@ -8,7 +8,7 @@ use serde_json::Value;
 use sweep_files::{Cell, Column, ResultTable, dotted, key, leaves, panics};
 
 use super::{ExportFormat, column_names, export_error};
-use crate::error::{Result, ResultsError};
+use crate::error::ResultsError;
 
 /// The number of rows of a sheet (a limit of the format), less two rows of headings.
 const MAX_ROWS: u64 = (1 << 20) - 2;
@@ -26,7 +26,7 @@ const MAX_WIDTH: usize = 60;
 const FILTER_BUTTON_WIDTH: usize = 3;
 
 /// Encodes a table as a workbook.
-pub(super) fn encode(table: &ResultTable) -> Result<Vec<u8>> {
+pub(super) fn encode(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
     // The library panics where the system refuses its temporary files.
     panics::caught(|| write_workbook(table)).unwrap_or_else(|panic| {
         let reason = format!("the system refused a temporary file: {panic}");
@@ -34,7 +34,7 @@ pub(super) fn encode(table: &ResultTable) -> Result<Vec<u8>> {
     })
 }
 
-fn write_workbook(table: &ResultTable) -> Result<Vec<u8>> {
+fn write_workbook(table: &ResultTable) -> Result<Vec<u8>, ResultsError> {
     let export_error = |reason: String| export_error(table, ExportFormat::Xlsx, &reason);
     if table.rows() > MAX_ROWS {
         let reason = format!("{} rows, and a sheet has room for {MAX_ROWS}", table.rows());
@@ -112,7 +112,7 @@ fn write_rows(
     sheet: &mut SheetWriter<'_>,
     table: &ResultTable,
     from_xlsx: impl Fn(XlsxError) -> ResultsError + Copy,
-) -> Result<()> {
+) -> Result<(), ResultsError> {
     let names = column_names(table);
     let units = table.columns.iter().map(|column| text_cell(&column.unit));
     sheet.set_widths(names.iter().copied()).map_err(from_xlsx)?;
