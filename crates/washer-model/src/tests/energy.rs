@@ -32,7 +32,8 @@ fn length(a: Vec3, b: Vec3) -> f64 {
 fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     let tub = axes(q[4], q[5]);
     let shaft = axes(q[6], q[7]);
-    let (p_t, p_s) = ([0.0, q[0], q[1]], [0.0, q[2], q[3]]);
+    let p_t = [0.0, q[0], q[1]];
+    let p_s = [0.0, q[2], q[3]];
     // D's axes are those of S turned by q9 about s2, then by q10.
     let turned = axes(q[8], q[9]);
     let drum: [Vec3; 3] = std::array::from_fn(|k| place([0.0; 3], &shaft, turned[k]));
@@ -57,10 +58,12 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
         std::array::from_fn(|i| place[i] - at[i])
     };
     for s in &m.stops {
-        let (depth, softness) = (depth_m(s, displacement(s.tub_m)), s.softness_m);
-        let soft = depth.hypot(softness);
-        let of_root = depth * soft + softness * softness * (depth / softness).asinh();
-        energy += 0.25 * s.stiffness_n_per_m * (depth * depth + of_root);
+        // The integral of (depth + w) / 2 with w = sqrt(depth^2 + softness^2).
+        let depth = depth_m(s, displacement(s.tub_m));
+        let softness = s.softness_m;
+        let w = depth.hypot(softness);
+        let integral_of_w = depth * w + softness * softness * (depth / softness).asinh();
+        energy += 0.25 * s.stiffness_n_per_m * (depth * depth + integral_of_w);
     }
     for b in &m.bushings {
         for (i, d) in displacement(b.tub_m).into_iter().enumerate() {
@@ -72,10 +75,11 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     for (x_m, stiffness) in
         [(b.front_x_m, b.front_stiffness_n_per_m), (b.rear_x_m, b.rear_stiffness_n_per_m)]
     {
-        let (on_tub, on_shaft) =
-            (place(p_t, &tub, [x_m, 0.0, 0.0]), place(p_s, &shaft, [x_m, 0.0, 0.0]));
-        let apart = (on_shaft[1] - on_tub[1]).powi(2) + (on_shaft[2] - on_tub[2]).powi(2);
-        energy += 0.5 * stiffness * apart;
+        let on_tub = place(p_t, &tub, [x_m, 0.0, 0.0]);
+        let on_shaft = place(p_s, &shaft, [x_m, 0.0, 0.0]);
+        let deflection_squared =
+            (on_shaft[1] - on_tub[1]).powi(2) + (on_shaft[2] - on_tub[2]).powi(2);
+        energy += 0.5 * stiffness * deflection_squared;
     }
     let phi = (q[8].cos() * q[9].cos()).acos();
     energy + 0.5 * m.flexure.stiffness_n_m_per_rad * phi * phi
@@ -94,30 +98,31 @@ fn along(a: Vec3, direction: Vec3) -> f64 {
 /// Computes the power (W) that dampers, friction, stops and bushings dissipate.
 fn losses_w(m: &Machine, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 {
     let tub = axes(q[4], q[5]);
-    let place_of = |at: Vec3| place([0.0, q[0], q[1]], &tub, at);
+    let tub_point = |at: Vec3| place([0.0, q[0], q[1]], &tub, at);
     // Angular velocity: yaw about c2, pitch about t3.
     let turn: Vec3 = [u[5] * tub[2][0], u[4], u[5] * tub[2][2]];
     let velocity = |at: Vec3| -> Vec3 {
         let arm = place([0.0; 3], &tub, at);
-        let of_turn: Vec3 = std::array::from_fn(|i| {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let rotation: Vec3 = std::array::from_fn(|i| {
+            let j = (i + 1) % 3;
+            let k = (i + 2) % 3;
             turn[j] * arm[k] - turn[k] * arm[j]
         });
-        [of_turn[0], of_turn[1] + u[0], of_turn[2] + u[1]]
+        [rotation[0], rotation[1] + u[0], rotation[2] + u[1]]
     };
     let mut losses = 0.0;
     for d in &m.dampers {
-        let end = place_of(d.tub_m);
+        let end = tub_point(d.tub_m);
         let v = along(velocity(d.tub_m), std::array::from_fn(|i| end[i] - d.cabinet_m[i]));
         losses += d.damping_n_s_per_m * v * v;
         losses += d.friction_n * v * v / v.hypot(d.friction_speed_m_per_s);
     }
     for s in &m.stops {
-        let place = place_of(s.tub_m);
+        let place = tub_point(s.tub_m);
         let depth = depth_m(s, std::array::from_fn(|i| place[i] - s.tub_m[i]));
         let v = along(velocity(s.tub_m), s.direction);
-        let closed = 0.5 * (1.0 + depth / depth.hypot(s.softness_m));
-        losses += s.damping_n_s_per_m * closed * v * v;
+        let contact = 0.5 * (1.0 + depth / depth.hypot(s.softness_m));
+        losses += s.damping_n_s_per_m * contact * v * v;
     }
     for b in &m.bushings {
         let v = velocity(b.tub_m);
@@ -130,8 +135,8 @@ fn losses_w(m: &Machine, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 
 fn kinetic_j(machine: &Coefficients<f64>, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 {
     let still = SpinState::new((N(0.0), N(1.0)), N(0.0), N(0.0));
     let mass = mass_matrix(machine, &still, q);
-    let of_row = |i: usize| (0..COORDINATES).map(|j| u[i] * mass[i][j] * u[j]).sum::<f64>();
-    0.5 * (0..COORDINATES).map(of_row).sum::<f64>()
+    let row_sum = |i: usize| (0..COORDINATES).map(|j| u[i] * mass[i][j] * u[j]).sum::<f64>();
+    0.5 * (0..COORDINATES).map(row_sum).sum::<f64>()
 }
 
 /// Returns the history of a machine without spin that starts at its equilibrium with a velocity.
@@ -182,7 +187,7 @@ fn energy_drifts_by_less_than_1e_9_in_10_s_at_the_default_step() {
 }
 
 #[test]
-fn what_dampers_friction_stops_and_bushings_take_out_is_what_the_energy_loses() {
+fn the_energy_falls_by_what_the_elements_dissipate() {
     let mut machine = with_every_element();
     // A softness that is wide enough for the trapezoidal rule.
     machine.stops.iter_mut().for_each(|stop| stop.softness_m = 1e-3);
@@ -196,7 +201,8 @@ fn what_dampers_friction_stops_and_bushings_take_out_is_what_the_energy_loses() 
         potential_j(&machine, &at.deviations) + kinetic_j(&coefficients, &at.deviations, &at.speeds)
     };
     let first = energy(&instants[0]);
-    let (mut lost, mut worst) = (0.0, 0.0_f64);
+    let mut lost = 0.0;
+    let mut worst = 0.0_f64;
     for pair in instants.windows(2) {
         let [before, after] =
             [&pair[0], &pair[1]].map(|at| losses_w(&machine, &at.deviations, &at.speeds));

@@ -76,11 +76,13 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
         for j in 0..COORDINATES {
             let mut unit = STILL;
             unit[j] = 1.0;
-            let [at_rest, of_a] = instant.residual(&STILL, &STILL, &unit);
-            let [_, of_u] = instant.residual(&STILL, &unit, &STILL);
-            let [_, of_q] = instant.residual(&unit, &STILL, &STILL);
+            let [at_rest, by_a] = instant.residual(&STILL, &STILL, &unit);
+            let [_, by_u] = instant.residual(&STILL, &unit, &STILL);
+            let [_, by_q] = instant.residual(&unit, &STILL, &STILL);
             for i in 0..COORDINATES {
-                (mass[i][j], damping[i][j], stiffness[i][j]) = (of_a[i], of_u[i], of_q[i]);
+                mass[i][j] = by_a[i];
+                damping[i][j] = by_u[i];
+                stiffness[i][j] = by_q[i];
                 force[i] = -at_rest[i];
             }
         }
@@ -109,8 +111,9 @@ fn matrices_are_the_derivatives_of_the_nonlinear_equations() {
 fn accelerations_solve_the_expanded_equations() {
     let mut worst = 0.0_f64;
     at_random_instants(22, |instant, rng| {
-        let (mut q, u) = (random(rng, 0.02), random(rng, 0.5));
-        // Tub and shaft move alike within the bearings' play.
+        let mut q = random(rng, 0.02);
+        let u = random(rng, 0.5);
+        // Shaft and tub differ by a small deflection of the bearings.
         for (rotor, tub) in [(2, 0), (3, 1), (6, 4), (7, 5)] {
             q[rotor] = q[tub] + 1e-5 * (rng.f64() - 0.5);
         }
@@ -157,16 +160,16 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
         let theirs =
             axes.channels(&bodies, &motion).into_iter().chain(axes.radial(&bodies, &motion));
         for ((ours, theirs), rest) in ours.zip(theirs).zip(rest) {
-            let of_order_zero = theirs.value.0.value - rest;
+            let order_zero = theirs.value.0.value - rest;
             let pairs = [
-                (ours.value.0, of_order_zero + theirs.value.0.slope),
+                (ours.value.0, order_zero + theirs.value.0.slope),
                 (ours.slope.0, theirs.slope.0.value + theirs.slope.0.slope),
                 (ours.curvature.0, theirs.curvature.0.value + theirs.curvature.0.slope),
             ];
             for (k, (ours, theirs)) in pairs.into_iter().enumerate() {
                 worst[k] = worst[k].max((ours - theirs).abs() / scales[k]);
             }
-            turning = turning.max(of_order_zero.abs());
+            turning = turning.max(order_zero.abs());
         }
     });
     eprintln!(
@@ -180,9 +183,9 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
 }
 
 #[test]
-fn a_linear_machine_at_rest_moves_as_its_drum_turns() {
-    // (kg, mm at the mass centre, micrometres at the drum's front): what the independent linear
-    // histories of these two machines changed by when they took this part in.
+fn the_outputs_of_a_linear_machine_at_rest_turn_with_the_drum() {
+    // (kg, mm at the mass centre, micrometres at the drum's front): from independent linear
+    // histories of these two machines, with this part and without.
     for (unbalance_mass_kg, centre_mm, front_um) in [(0.4, 4.960, 47.96), (0.7, 8.600, 56.86)] {
         let machine = paper(unbalance_mass_kg, 140.0);
         let mass =
@@ -196,8 +199,9 @@ fn a_linear_machine_at_rest_moves_as_its_drum_turns() {
         let mut equations = Equations::new(&point, ModelKind::Linear);
         let mut at =
             |t_s: f64, channel: Channel| equations.channels(t_s, &[0.0; STATES]).0[channel.index()];
-        // Shaft and drum lean by q8 and q10 as weight has it; what the second one tilts turns too.
-        let (lean, bend) = (point.equilibrium[7].cos(), point.equilibrium[9]);
+        // Weight tilts the shaft by q8 and bends the hinge by q10, which turns with the drum.
+        let lean = point.equilibrium[7].cos();
+        let bend = point.equilibrium[9];
         let along =
             drum_kg * (drum_x_m - hinge_x_m) + unbalance_mass_kg * (unbalance.x_m - hinge_x_m);
         let across = unbalance_mass_kg * unbalance.radius_m;
@@ -247,8 +251,10 @@ fn the_models_differ_by_second_order_in_the_deviation() {
     // Half the deviation leaves a quarter of the remainder of M a = f.
     let mut slopes = Vec::new();
     at_random_instants(24, |instant, rng| {
-        let (q, u, a) = (random(rng, 1.0), random(rng, 10.0), random(rng, 100.0));
-        let left_out = |size: f64| {
+        let q = random(rng, 1.0);
+        let u = random(rng, 10.0);
+        let a = random(rng, 100.0);
+        let remainder = |size: f64| {
             let [q, u, a] = [&q, &u, &a].map(|v| v.map(|v| size * v));
             let [at_rest, slope] = instant.residual(&q, &u, &a);
             let at = core::array::from_fn(|i| N(instant.point.equilibrium[i] + q[i]));
@@ -257,10 +263,10 @@ fn the_models_differ_by_second_order_in_the_deviation() {
             let difference = |i: usize| (inertia[i] - force[i]).0 - at_rest[i] - slope[i];
             (0..COORDINATES).fold(0.0_f64, |m, i| m.max(difference(i).abs()))
         };
-        slopes.push((left_out(2e-3) / left_out(1e-3)).log2());
+        slopes.push((remainder(2e-3) / remainder(1e-3)).log2());
     });
     let (least, greatest) =
         slopes.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), &s| (l.min(s), g.max(s)));
-    eprintln!("order of what the expansion leaves out: {least:.3} to {greatest:.3}");
+    eprintln!("order of the remainder: {least:.3} to {greatest:.3}");
     assert!((1.9..2.1).contains(&least) && (1.9..2.1).contains(&greatest));
 }
