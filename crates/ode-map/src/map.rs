@@ -399,22 +399,22 @@ fn error_left<const C: usize>(
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Engine
     for Evaluator<'_, O, C, D, P>
 {
-    fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, watch: &RunContext<'_>) {
+    fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
         let columns = columns(self.plan);
         rayon::broadcast(|_| {
-            while !watch.stopped() {
-                let (points, at): (Vec<u64>, Vec<Vec<f64>>) =
-                    std::iter::from_fn(next).take(MAX_LANES).unzip();
+            while !context.stopped() {
+                let (points, axis_values): (Vec<u64>, Vec<Vec<f64>>) =
+                    std::iter::from_fn(source).take(MAX_LANES).unzip();
                 if points.is_empty() {
                     break;
                 }
-                let rows = self.compared(&at, &|| watch.stopped());
-                // They may have been cut short.
-                if watch.stopped() {
+                let rows = self.compared(&axis_values, &|| context.stopped());
+                // A stop may have cut the rows short.
+                if context.stopped() {
                     break;
                 }
-                for (&point, of) in points.iter().zip(&rows) {
-                    keep(Done { point, rows: vec![row(&columns, of)] });
+                for (&point, compared) in points.iter().zip(&rows) {
+                    sink(Done { point, rows: vec![row(&columns, compared)] });
                 }
             }
         });
