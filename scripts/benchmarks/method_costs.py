@@ -28,7 +28,7 @@ METHODS = [
     *(f'method = "rk4"\nstep_s = {step_s}' for step_s in ("2e-4", "1e-4")),
     *(f'method = "dopri5"\nrtol = {rtol}\natol = {atol}'
       for rtol, atol in (("1e-6", "1e-9"), ("1e-9", "1e-12"))),
-    *(f'method = "rodas5p"\nrtol = {rtol}\natol = {atol}'
+    *(f'method = "additive"\nrtol = {rtol}\natol = {atol}'
       for rtol, atol in (("1e-4", "1e-7"), ("1e-6", "1e-9"))),
 ]
 

@@ -53,11 +53,11 @@ fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-for name in fast rk4 dopri5 rodas5p; do
+for name in fast rk4 dopri5 additive; do
     scripts/tools/short_grid.sh "$name" > "$work/$name.toml"
 done
 cp sweeps/quick.toml "$work/quick.toml"
-for name in quick fast rk4 dopri5 rodas5p; do
+for name in quick fast rk4 dopri5 additive; do
     "$here" run "$work/$name.toml" --out "$work/$name.here.parquet" --progress none
     for simd in neon scalar; do
         [ "$simd $name" != "scalar quick" ] || continue

@@ -28,7 +28,7 @@ fi
 # library could have a hand in.
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-for name in fast dopri5 rodas5p; do
+for name in fast dopri5 additive; do
     scripts/tools/short_grid.sh "$name" > "$work/$name.toml"
 done
 sed -e 's/, count = 3//' "$work/fast.toml" > "$work/sobol.toml"
@@ -37,7 +37,7 @@ for sweep in "$ordinary" "$static"; do
     out=$work/$(if [ "$sweep" = "$static" ]; then echo static; else echo ordinary; fi)
     mkdir "$out"
     "$sweep" run sweeps/quick.toml --out "$out/quick.parquet" --progress none
-    for name in fast dopri5 rodas5p sobol; do
+    for name in fast dopri5 additive sobol; do
         "$sweep" run "$work/$name.toml" --out "$out/$name.parquet" --progress none
     done
     "$sweep" boundary "$work/fast.toml" --out "$out/boundary.parquet"

@@ -1,14 +1,14 @@
 #!/bin/sh
 # Prints sweeps/quick.toml as a grid of 9 points and 4 s by a method:
 #
-#   scripts/tools/short_grid.sh fast|rk4|dopri5|rodas5p
+#   scripts/tools/short_grid.sh fast|rk4|dopri5|additive
 set -eu
 case $1 in
     fast) method='method = "rk4-mass-scaled"\naccuracy = 1e-3' ;;
     rk4) method='method = "rk4"\nstep_s = 2e-4' ;;
     dopri5) method='method = "dopri5"\nrtol = 1e-6\natol = 1e-9' ;;
-    rodas5p) method='method = "rodas5p"\nrtol = 1e-4\natol = 1e-7' ;;
-    *) echo "no method $1: expected fast, rk4, dopri5 or rodas5p" >&2 && exit 2 ;;
+    additive) method='method = "additive"\nrtol = 1e-4\natol = 1e-7' ;;
+    *) echo "no method $1: expected fast, rk4, dopri5 or additive" >&2 && exit 2 ;;
 esac
 cd "$(dirname "$0")/../.."
 exec sed -e '

@@ -85,7 +85,7 @@ fn hashes() -> BTreeMap<&'static str, String> {
     BTreeMap::from([
         ("map by rk4", map("method = \"rk4\", step_s = 2e-4")),
         ("map by dopri5", map("method = \"dopri5\", rtol = 1e-5, atol = 1e-8")),
-        ("map by rodas5p", map("method = \"rodas5p\", rtol = 1e-4, atol = 1e-7")),
+        ("map by additive", map("method = \"additive\", rtol = 1e-4, atol = 1e-7")),
         ("map by rk4-mass-scaled", map("method = \"rk4-mass-scaled\", accuracy = 1e-3")),
         ("map by envelopes, with every metric", judged("envelope")),
         ("map by root mean squares, with every metric", judged("rms")),

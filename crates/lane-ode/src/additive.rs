@@ -19,7 +19,7 @@ use crate::{Lane, N, SemiImplicit, Step, System as _, Task, Tolerance};
 const STAGES: usize = 8;
 
 /// The implicit coefficient of every stage but the first.
-const GAMMA: f64 = 41.0 / 200.0;
+pub const GAMMA: f64 = 41.0 / 200.0;
 
 /// Nodes c.
 const NODE: [f64; STAGES] = [

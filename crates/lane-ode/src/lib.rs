@@ -18,9 +18,8 @@
 //!    runs it on one.
 //!
 //! The methods are [`rk4`] (classical, fixed step), [`dop853`] (order 8, fixed step), [`dopri5`]
-//! (Dormand-Prince 5(4), adaptive, with dense output), [`additive`] (Kennedy and Carpenter's
-//! ARK5(4), adaptive, for systems with a stiff linear part) and [`rodas`] (Rodas5P, linearly
-//! implicit, for stiff systems).
+//! (Dormand-Prince 5(4), adaptive, with dense output) and [`additive`] (Kennedy and Carpenter's
+//! ARK5(4), adaptive, for systems with a stiff linear part).
 //!
 //! # Example
 //!
@@ -128,7 +127,6 @@ mod peaks;
 mod quintic;
 mod real;
 pub mod rk4;
-pub mod rodas;
 mod scalar;
 mod simd;
 mod squares;

@@ -3,7 +3,7 @@
 
 use crate::{Dual, Lane, N, System};
 
-/// How the accelerations of a system of `C` coordinates change with its state and with time.
+/// How the accelerations of a system of `C` coordinates change with its state.
 ///
 /// The state is C coordinates q, then their speeds u, so that q' = u and only u' = a(t, q, u) has
 /// derivatives worth storing.
@@ -13,14 +13,12 @@ pub struct Partials<const C: usize> {
     pub by_coordinate: [[N<f64>; C]; C],
     /// Row i, column j: by speed j.
     pub by_speed: [[N<f64>; C]; C],
-    /// By time alone.
-    pub by_time: [N<f64>; C],
 }
 
 impl<const C: usize> Partials<C> {
     /// All zero.
     pub const fn zero() -> Self {
-        Self { by_coordinate: [[N(0.0); C]; C], by_speed: [[N(0.0); C]; C], by_time: [N(0.0); C] }
+        Self { by_coordinate: [[N(0.0); C]; C], by_speed: [[N(0.0); C]; C] }
     }
 
     /// The derivatives at time `t_s` and state `x`. `system` has the same parameters in every lane;
@@ -35,33 +33,21 @@ impl<const C: usize> Partials<C> {
     ) {
         const { assert!(D == 2 * C, "a state is the coordinates and their speeds") };
         let zero = N(zero);
-        let mut time = zero.lit(t_s).constant();
-        let still = system.forcing_aside(time);
-        time.0.slope = zero.lit(1.0).0;
-        let moving = system.forcing_aside(time);
+        let forcing = system.forcing_aside(zero.lit(t_s).constant());
         let mut constant = [zero.constant(); D];
         for i in 0..D {
             constant[i] = zero.lit(x[i].0).constant();
         }
-        let groups = D.div_ceil(T::LANES);
-        // One copy of the right-hand side for all directions; the last group is time.
-        for group in 0..=groups {
+        // One copy of the right-hand side for all directions.
+        for group in 0..D.div_ceil(T::LANES) {
             let first = group * T::LANES;
             let mut seeded = constant;
-            let mut forcing = &moving;
-            if group < groups {
-                forcing = &still;
-                for lane in 0..T::LANES.min(D - first) {
-                    seeded[first + lane].0.slope.set(lane, 1.0);
-                }
+            for lane in 0..T::LANES.min(D - first) {
+                seeded[first + lane].0.slope.set(lane, 1.0);
             }
-            let slopes = system.derivative_aside(forcing, &seeded);
+            let slopes = system.derivative_aside(&forcing, &seeded);
             for i in 0..C {
                 let slope = slopes[C + i].0.slope;
-                if group == groups {
-                    self.by_time[i] = N(slope.get(0));
-                    continue;
-                }
                 for lane in 0..T::LANES.min(D - first) {
                     let direction = first + lane;
                     if direction < C {
@@ -69,6 +55,59 @@ impl<const C: usize> Partials<C> {
                     } else {
                         self.by_speed[i][direction - C] = N(slope.get(lane));
                     }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::array::Array;
+
+    /// A driven pendulum, and a mass on a spring of stiffness `stiffness` (1/s^2) to it.
+    struct SprungPendulum {
+        stiffness: f64,
+    }
+
+    impl<T: Lane> System<T, 4> for SprungPendulum {
+        type Forcing = N<T>;
+
+        fn forcing(&self, t_s: N<T>) -> N<T> {
+            let (sin, _) = t_s.sin_cos();
+            sin
+        }
+
+        fn derivative(&self, push: &N<T>, x: &[N<T>; 4]) -> [N<T>; 4] {
+            let [angle, place, rate, speed] = *x;
+            let pull = (place - angle) * self.stiffness;
+            let (sin, _) = angle.sin_cos();
+            [rate, speed, pull - 9.0 * sin - 0.1 * rate + *push, 4.0 * *push - 2.0 * pull.v()]
+        }
+
+        fn in_range(&self, x: &[N<T>; 4]) -> T::Mask {
+            x[0].abs().0.less(x[0].lit(1.5).0)
+        }
+    }
+
+    #[test]
+    fn derivatives_are_exact_and_do_not_depend_on_the_lanes() {
+        let pendulum = SprungPendulum { stiffness: 50.0 };
+        let x = [0.4, 0.5, -1.0, 2.0].map(N);
+        let mut one = Partials::<2>::zero();
+        one.find(0.0, &pendulum, 2.0, &x);
+        let mut four = Partials::<2>::zero();
+        four.find(Array([0.0; 4]), &pendulum, 2.0, &x);
+        assert_eq!(format!("{one:?}"), format!("{four:?}"));
+        let by_coordinate = [[-50.0 - 9.0 * 0.4_f64.cos(), 50.0], [100.0, -100.0]];
+        let by_speed = [[-0.1, 0.0], [0.0, 0.0]];
+        for i in 0..2 {
+            for j in 0..2 {
+                let by_coordinate = (one.by_coordinate[i][j].0, by_coordinate[i][j]);
+                let by_speed = (one.by_speed[i][j].0, by_speed[i][j]);
+                for (found, expected) in [by_coordinate, by_speed] {
+                    assert!((found - expected).abs() < 1e-13, "{i}, {j}: {found} {expected}");
                 }
             }
         }

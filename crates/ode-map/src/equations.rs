@@ -71,7 +71,7 @@ impl<const C: usize, const P: usize> Case<C, P> {
     }
 }
 
-/// The derivatives of the free motion at a state, by dual numbers; none by time.
+/// The derivatives of the free motion at a state, by dual numbers.
 fn tangent<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
     p: &[f64; P],
     q: &[f64; C],
@@ -127,24 +127,9 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
     pub(crate) fn take(&mut self, lane: usize, case: &Case<C, P>) {
         set(&mut self.p, lane, &case.p.map(N));
         set(&mut self.equilibrium, lane, &case.equilibrium.map(N));
-        let Partials { by_coordinate, by_speed, .. } = &case.tangent;
+        let Partials { by_coordinate, by_speed } = &case.tangent;
         set(self.by_coordinate.as_flattened_mut(), lane, by_coordinate.as_flattened());
         set(self.by_speed.as_flattened_mut(), lane, by_speed.as_flattened());
-    }
-
-    /// The derivatives of a point's accelerations at a time and a state.
-    pub(crate) fn partials(&self, case: &Case<C, P>, t_s: f64, x: &[N<f64>; D]) -> Partials<C> {
-        let p = case.p.map(|value| N(value).constant());
-        let driven = O::forcing(&p, N(Dual { value: t_s, slope: 1.0 }));
-        let free = match self.model {
-            Model::Nonlinear => {
-                let (q, u) = halves(&x.map(|value| value.0));
-                let place = std::array::from_fn(|i| q[i] + case.equilibrium[i]);
-                tangent::<O, C, D, P>(&case.p, &place, &u)
-            }
-            Model::Linear => case.tangent.clone(),
-        };
-        Partials { by_time: driven.map(|driven| N(driven.0.slope)), ..free }
     }
 }
 

@@ -3,7 +3,7 @@
 //!
 //! An [`Oscillator`] declares its parameters, coordinates and accelerations. The linear model comes
 //! from dual numbers at the equilibrium. Both models run through lanes, by fixed steps that are
-//! halved until two runs agree, or by one of three methods.
+//! halved until two runs agree, or by one of two methods.
 
 mod equations;
 mod map;

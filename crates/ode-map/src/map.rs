@@ -26,10 +26,7 @@ use crate::{Coordinate, Oscillator, Parameter};
 methods! {
     Rk4 = "rk4", "classical Runge-Kutta of order 4, in fixed steps" { step_s: STEP_S }
         Steps::Fixed(step_s);
-    Dopri5 = "dopri5", "Dormand-Prince 5(4), adaptive" { rtol: RTOL, atol: ATOL } Steps::Explicit;
-    Rodas5p = "rodas5p", "Rodas5P, adaptive and linearly implicit: for stiff oscillators" {
-        rtol: RTOL, atol: ATOL
-    } Steps::Implicit;
+    Dopri5 = "dopri5", "Dormand-Prince 5(4), adaptive" { rtol: RTOL, atol: ATOL } Steps::ByError;
     Rk4Halved = "rk4-halved", "rk4 in steps that are halved until two runs agree" {
         accuracy: ACCURACY
     } Steps::Checked(accuracy);
@@ -45,7 +42,7 @@ const CONTRACTION: f64 = 1.0 / 15.0;
 const FLOOR: f64 = 1e-9;
 
 /// Names of methods in results.
-const METHODS: [&str; 3] = ["rk4", "dopri5", "rodas5p"];
+const METHODS: [&str; 2] = ["rk4", "dopri5"];
 /// Values of `status`: those of the nonlinear model, with `Failure`'s in their order behind the
 /// first, then those of the linear one alone.
 const STATUSES: [&str; 8] = [
@@ -190,7 +187,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
         let steps = match plan.integrator.steps() {
             Steps::Checked(_) => ", until two runs agree",
             Steps::Fixed(_) => ", two trajectories per point",
-            Steps::Explicit | Steps::Implicit => ": steps as it needs",
+            Steps::ByError => ": steps as it needs",
         };
         Ok(Estimate {
             simd: Simd::best().name().to_owned(),
@@ -311,7 +308,6 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         match self.plan.integrator {
             Integrator::Rk4 { step_s } => (Some(Method::Rk4(step_s)), 0),
             Integrator::Dopri5 { rtol, atol } => (Some(Method::Dopri5(rtol, atol)), 1),
-            Integrator::Rodas5p { rtol, atol } => (Some(Method::Rodas5p(rtol, atol)), 2),
             Integrator::Rk4Halved { .. } => (None, 0),
         }
     }

@@ -2,10 +2,9 @@
 
 use std::marker::PhantomData;
 
-use lane_ode::rodas::{self, Stiff};
 use lane_ode::{
-    Ended, Forcing, Kernel, Lane, Leg, MAX_LANES, N, Partials, Peaks, Sample, Simd, Step, Task,
-    Tolerance, dopri5, rk4,
+    Ended, Forcing, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, Task, Tolerance,
+    dopri5, rk4,
 };
 
 use crate::Oscillator;
@@ -27,8 +26,6 @@ pub(crate) enum Method {
     Rk4(f64),
     /// Dormand-Prince, relative and absolute tolerance.
     Dopri5(f64, f64),
-    /// Rodas5P, the same.
-    Rodas5p(f64, f64),
 }
 
 /// What came of a trajectory.
@@ -61,11 +58,7 @@ pub(crate) struct Work<'a, O, const C: usize, const D: usize, const P: usize> {
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Work<'_, O, C, D, P> {
     /// What comes of every point.
     pub(crate) fn runs(self) -> Vec<Run<C>> {
-        match self.method {
-            // The stiff method goes trajectory by trajectory.
-            Method::Rodas5p(..) => Simd::Scalar.dispatch(self),
-            _ => Simd::best().dispatch(self),
-        }
+        Simd::best().dispatch(self)
     }
 }
 
@@ -86,11 +79,6 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Ker
             Method::Dopri5(relative, absolute) => {
                 let mut task = Trajectories::new(zero, &self, FIRST_STEP * self.end_s);
                 dopri5::integrate(zero, &mut task, &of(relative, absolute));
-                task.runs
-            }
-            Method::Rodas5p(relative, absolute) => {
-                let mut task = Trajectories::new(0.0, &self, FIRST_STEP * self.end_s);
-                rodas::integrate::<D, C, _>(&mut task, &of(relative, absolute));
                 task.runs
             }
         }
@@ -203,13 +191,5 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
 
     fn is_stopped(&self) -> bool {
         (self.work.is_stopped)()
-    }
-}
-
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Stiff<D, C>
-    for Trajectories<'_, O, f64, C, D, P>
-{
-    fn partials(&self, t_s: f64, x: &[N<f64>; D], partials: &mut Partials<C>) {
-        *partials = self.system.partials(self.work.cases[self.held[0].0], t_s, x);
     }
 }

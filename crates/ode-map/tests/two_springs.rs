@@ -97,7 +97,6 @@ fn every_method_meets_the_independent_program() {
     for integrator in [
         "{ method = \"rk4\", step_s = 5e-3 }",
         "{ method = \"dopri5\", rtol = 1e-11, atol = 1e-15 }",
-        "{ method = \"rodas5p\", rtol = 1e-10, atol = 1e-15 }",
         "{ method = \"rk4-halved\", accuracy = 1e-8 }",
     ] {
         let off = off(integrator);

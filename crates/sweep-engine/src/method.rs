@@ -60,10 +60,8 @@ pub struct Entry<I: 'static> {
 pub enum Steps {
     /// Fixed steps of this length (s), except those that end at an edge of the window.
     Fixed(f64),
-    /// Adaptive steps that stability bounds.
-    Explicit,
-    /// Adaptive steps of an implicit method, for one trajectory at a time, not in lanes.
-    Implicit,
+    /// Steps that follow the error estimate.
+    ByError,
     /// Fixed steps, refined until two levels agree to this relative accuracy.
     Checked(f64),
 }

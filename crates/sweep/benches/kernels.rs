@@ -70,11 +70,10 @@ fn second_by_dopri5(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) 
     trajectory(bencher, model, simd, 1.0, &Method::Dopri5(tolerance));
 }
 
-/// The stiff method runs one trajectory at a time on any instruction set.
-#[divan::bench(args = MODELS)]
-fn second_by_rodas5p(bencher: Bencher<'_, '_>, model: ModelKind) {
+#[divan::bench(args = kernels())]
+fn second_by_additive(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     let tolerance = Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: u64::MAX };
-    trajectory(bencher, model, Simd::Scalar, 1.0, &Method::Rodas5p(tolerance));
+    trajectory(bencher, model, simd, 1.0, &Method::Additive(tolerance));
 }
 
 /// The whole of the paper's 50 s.

@@ -236,7 +236,7 @@ pub(crate) fn rule(plan: &Plan) -> Rule {
     let accuracy = match plan.integrator.steps() {
         Steps::Checked(accuracy) => accuracy,
         // A single method has no accuracy to reach.
-        Steps::Fixed(_) | Steps::Explicit | Steps::Implicit => f64::INFINITY,
+        Steps::Fixed(_) | Steps::ByError => f64::INFINITY,
     };
     Rule {
         end_s: plan.end_s,

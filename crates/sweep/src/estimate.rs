@@ -151,7 +151,7 @@ impl Measured {
 fn first_end_s(plan: &Plan) -> f64 {
     let short_s = match plan.integrator.steps() {
         Steps::Fixed(step_s) => 100.0 * step_s,
-        Steps::Explicit | Steps::Implicit | Steps::Checked(_) => {
+        Steps::ByError | Steps::Checked(_) => {
             FIRST_END_S.min(FIRST_STEPS * shortest_step_s(plan.end_s))
         }
     };
@@ -231,8 +231,7 @@ fn method(plan: &Plan, levels: &RefinementLevels) -> String {
                 edges.windows(2).map(|edge| ((edge[1] - edge[0]) / step_s).ceil()).sum();
             format!(": about {steps} steps per trajectory, two trajectories per point")
         }
-        Steps::Explicit => ": steps as it needs".to_owned(),
-        Steps::Implicit => ": steps as it needs, one trajectory at a time".to_owned(),
+        Steps::ByError => ": steps as it needs".to_owned(),
         Steps::Checked(_) => {
             let first = levels.levels[0].describe(ModelKind::Nonlinear);
             let last = levels.levels[levels.levels.len() - 1].describe(ModelKind::Nonlinear);

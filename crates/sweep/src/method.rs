@@ -25,9 +25,10 @@ const LEVELS_ACCURACY: Setting = Setting {
 methods! {
     Rk4 = "rk4", "classical Runge-Kutta of order 4, in fixed steps" { step_s: STEP_S }
         Steps::Fixed(step_s);
-    Dopri5 = "dopri5", "Dormand-Prince 5(4), adaptive" { rtol: RTOL, atol: ATOL } Steps::Explicit;
-    Rodas5p = "rodas5p", "Rodas5P, adaptive and linearly implicit: for machines too stiff for the \
-                          others" { rtol: RTOL, atol: ATOL } Steps::Implicit;
+    Dopri5 = "dopri5", "Dormand-Prince 5(4), adaptive" { rtol: RTOL, atol: ATOL } Steps::ByError;
+    Additive = "additive", "ARK5(4)8L[2]SA, adaptive, the springs of bearings and hinge implicit: \
+                            for bearings too stiff for the others" { rtol: RTOL, atol: ATOL }
+        Steps::ByError;
     Rk4MassScaled = "rk4-mass-scaled", "the fast method: capped modes of the bearings, at finer \
                                         and finer levels until two agree" {
         accuracy: LEVELS_ACCURACY

@@ -92,7 +92,9 @@ pub use machine::{
 };
 pub use modes::campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell, campbell_until};
 pub use modes::shape::{Motion, Movement, Plane};
-pub use modes::{Mode, Modes, NoModes, highest_frequency_rad_per_s, modes};
+pub use modes::{
+    Mode, Modes, NoModes, highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s, modes,
+};
 pub use nonlinear::coupling::Caps;
 pub use point::friction::FrictionSpeed;
 pub use point::ringing::{LeftOut, Swing};

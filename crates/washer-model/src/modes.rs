@@ -15,6 +15,7 @@ use core::f64::consts::TAU;
 use faer::linalg::solvers::{Llt, Solve as _};
 use faer::{Mat, Side, c64};
 use lane_ode::N;
+use lane_ode::additive::GAMMA;
 
 /// The coordinates of the hinge, q9 and q10.
 const HINGE: [usize; 2] = [HINGE_YAW, HINGE_PITCH];
@@ -240,9 +241,29 @@ pub fn highest_frequency_rad_per_s(point: &Point, speed_rad_per_s: f64) -> Resul
     highest_with_caps(point, ModelKind::Nonlinear, speed_rad_per_s, None)
 }
 
-/// Computes the largest |s| (rad/s) of a model, with caps on the modes of bearings and hinge if any
-/// are given (section 4.3 of the model page). The elements of the linear model have the tangents of
-/// the equilibrium.
+/// Step of the additive method (s) that resolves the motion of interest: a fortieth of a swing of
+/// 25 Hz. Its length hardly matters: half of it lets the springs of bearings and hinge, which it
+/// makes slow, be twice as fast.
+const STEP_OF_INTEREST_S: f64 = 1e-3;
+
+/// Returns the largest |s| (rad/s) that limits the step of the additive method, as
+/// [`highest_frequency_rad_per_s`] does for an explicit method. In its steps the springs of
+/// bearings and hinge act as mass, which caps their modes at the reciprocal of its implicit
+/// coefficient times the step.
+///
+/// # Errors
+/// As [`modes`].
+pub fn highest_explicit_frequency_rad_per_s(
+    point: &Point,
+    speed_rad_per_s: f64,
+) -> Result<f64, NoModes> {
+    let cap = 1.0 / (GAMMA * STEP_OF_INTEREST_S);
+    let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
+    highest_with_caps(point, ModelKind::Nonlinear, speed_rad_per_s, Some(&caps))
+}
+
+/// The same of a model, whose elements are as at rest in the linear one, with caps on the modes of
+/// bearings and hinge if any are given (section 4.3 of the model page).
 pub(crate) fn highest_with_caps(
     point: &Point,
     model: ModelKind,

@@ -9,9 +9,7 @@ pub(crate) mod method;
 pub(crate) mod model;
 pub(crate) mod recorders;
 mod snapshots;
-pub(crate) mod stiff;
 pub(crate) mod suspension;
-mod tangent;
 
 pub use loads::Gauge;
 pub use method::{Level, Method, MethodNumbers};
@@ -21,9 +19,7 @@ pub use snapshots::Snapshot;
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::nonlinear::outputs::{RADIAL, squared};
-use crate::run::method::{
-    ByMethod, ByRodas, Family, OfLinear, OfNonlinear, Stepper, coupling, enter,
-};
+use crate::run::method::{ByMethod, Family, OfLinear, OfNonlinear, Stepper, coupling, enter};
 use crate::run::model::Model;
 use crate::{COORDINATES, ModelKind, Point};
 use core::marker::PhantomData;
@@ -111,10 +107,6 @@ impl<F: Family> ByMethod<F> for (Order<'_>, Simd) {
 
     fn by<S: Stepper>(self, stepper: S) -> Self::Output {
         self.1.dispatch(Simulate(self.0, stepper, PhantomData::<F>))
-    }
-
-    fn by_rodas(self, stepper: ByRodas) -> Self::Output {
-        Simd::dispatch_narrow(Simulate(self.0, stepper, PhantomData::<F>))
     }
 }
 

@@ -15,3 +15,4 @@ mod long_tables;
 mod mass;
 mod observation;
 pub(crate) mod reference;
+mod stiff;

@@ -44,7 +44,7 @@ fn home() -> &'static Home {
         let path = |name: &str| folder.path().join(name);
         let grid = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\n\
             time = { end_s = 1 }\n\
-            integrator = { method = \"rodas5p\" }\n\
+            integrator = { method = \"additive\" }\n\
             design = { method = \"list\", file = \"list\" }\n";
         fs::write(path("g.toml"), grid).expect("the grid is written");
         Home { list: path("list"), grid: path("g.toml"), _folder: folder }

@@ -361,11 +361,36 @@ pub fn twice(second: &Located<impl AsRef<str>>, first: &Located<impl AsRef<str>>
         .at(&first.at, "first written here")
 }
 
+/// A word that files of earlier versions have.
+struct RemovedWord {
+    /// The key that had it.
+    key: &'static str,
+    word: &'static str,
+    /// The word that serves in its place, where a model has that.
+    successor: &'static str,
+    reason: &'static str,
+}
+
+const REMOVED_WORDS: [RemovedWord; 1] = [RemovedWord {
+    key: "method",
+    word: "rodas5p",
+    successor: "additive",
+    reason: "it has the same keys and takes stiff bearings in steps as long",
+}];
+
 /// Refuses a word that is not among the choices.
 pub fn unknown_word(what: &str, found: &Located<&str>, choices: &[&str]) -> Diagnostic {
-    Diagnostic::new(format!("unknown {what} \"{}\"", short(found.value)))
-        .at(&found.at, format!("expected {}", listed(choices)))
-        .nearest(found.value, choices.iter().copied())
+    let removed = REMOVED_WORDS.iter().find(|removed| {
+        removed.key == what && removed.word == found.value && choices.contains(&removed.successor)
+    });
+    let refusal = Diagnostic::new(format!("unknown {what} \"{}\"", short(found.value)))
+        .at(&found.at, format!("expected {}", listed(choices)));
+    match removed {
+        Some(RemovedWord { key, word, successor, reason }) => refusal.help(format!(
+            "\"{word}\" was removed: write {key} = \"{successor}\" in its place; {reason}"
+        )),
+        None => refusal.nearest(found.value, choices.iter().copied()),
+    }
 }
 
 /// `a`, `a or b`, `one of a, b, c`.

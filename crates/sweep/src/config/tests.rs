@@ -137,8 +137,8 @@ fn what_is_left_out_has_its_default() {
     assert_eq!(method("method = \"rk4\""), Integrator::Rk4 { step_s: 2e-4 });
     assert_eq!(method("method = \"dopri5\""), Integrator::Dopri5 { rtol: 1e-6, atol: 1e-9 });
     assert_eq!(
-        method("method = \"rodas5p\"\nrtol = 1e-8"),
-        Integrator::Rodas5p { rtol: 1e-8, atol: 1e-9 }
+        method("method = \"additive\"\nrtol = 1e-8"),
+        Integrator::Additive { rtol: 1e-8, atol: 1e-9 }
     );
     assert_eq!(method("accuracy = 1e-4"), Integrator::Rk4MassScaled { accuracy: 1e-4 });
 }

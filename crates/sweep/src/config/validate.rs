@@ -5,11 +5,12 @@ use std::collections::BTreeSet;
 use lane_ode::Simd;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 use washer_model::{
-    ElementList, Spin, Target, Violation, decimal, highest_frequency_rad_per_s, prepare,
+    ElementList, NoModes, Point, Spin, Target, Violation, decimal,
+    highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s, prepare,
 };
 use washer_row::Criterion;
 
-use crate::method::REFERENCE_SHARE;
+use crate::method::{Integrator, REFERENCE_SHARE};
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, timing};
 use sweep_engine::config::whole::{refuse, refuse_step, window};
@@ -20,6 +21,11 @@ use sweep_engine::plan::{MAX_STEPS, shortest_step_s};
 /// Most turns of the drum in a window that are compared one by one: 20 minutes at 1000 rpm. They
 /// stay in memory for a group of points.
 const MOST_TURNS: f64 = 20_000.0;
+
+/// Greatest frequency in the steps of the additive method, as a share of the machine's, at which a
+/// user is pointed to that method. Basis: below it stiff bearings or a stiff hinge make the
+/// machine's frequency. A value twice as large would point everybody there.
+const MOSTLY_BY_BEARINGS: f64 = 0.9;
 
 /// Elements and rows of a spin's table that are looked at before a run, over all points of a list:
 /// some seconds' worth.
@@ -155,37 +161,50 @@ fn turns(draft: &Draft<'_, Washer>, scenario: &Scenario, reported: &mut BTreeSet
     draft.report.push(Diagnostic::new(title).at(&criterion, expected));
 }
 
-/// A machine whose fastest motion is too fast for an explicit method: for any number of steps that
+/// Refuses a machine whose fastest motion is too fast for the method: for any number of steps that
 /// is accepted, or for the plan's own step. Only a sound plan can be judged.
 pub(crate) fn stability(draft: &Draft<'_, Washer>) {
     // As a share of the longest stable step: that which the method takes at its slowest.
     let (step_s, share) = match draft.plan.integrator.steps() {
         Steps::Fixed(step_s) => (Some(step_s), 1.0),
-        Steps::Explicit => (None, 1.0),
+        Steps::ByError => (None, 1.0),
         Steps::Checked(_) => (None, REFERENCE_SHARE),
-        // Stable at any step.
-        Steps::Implicit => return,
     };
     if !draft.report.is_clean() {
         return;
     }
-    let frequency = highest_frequency_of_corners_rad_per_s(draft);
-    let limit_s = RK4_STABILITY_LIMIT / frequency;
     let end_s = draft.plan.end_s;
+    let is_too_fast =
+        |frequency: f64| share * RK4_STABILITY_LIMIT / frequency < shortest_step_s(end_s);
+    let is_additive = matches!(draft.plan.integrator, Integrator::Additive { .. });
+    let by_method = if is_additive {
+        highest_explicit_frequency_rad_per_s
+    } else {
+        highest_frequency_rad_per_s
+    };
+    let frequency = highest_of_corners_rad_per_s(draft, by_method);
+    let limit_s = RK4_STABILITY_LIMIT / frequency;
     let axes = draft.plan.axes.iter().any(|axis| axis.values.len() > 1);
     let at = if axes { ", at the grid's hardest corner" } else { "" };
-    if share * limit_s < shortest_step_s(end_s) {
-        let (steps, end_s) = (end_s / (share * limit_s), decimal(end_s));
-        let needs = format!("an explicit method needs {steps:.1e} steps to {end_s} s");
+    if is_too_fast(frequency) {
+        let steps = end_s / (share * limit_s);
+        let end_s = decimal(end_s);
+        let name = draft.plan.integrator.name();
+        let needs = format!("\"{name}\" needs {steps:.1e} steps to {end_s} s");
         let title = format!("the machine is too stiff: {needs}");
         let place =
             ["integrator", "time.end_s"].into_iter().find_map(|key| draft.report.place(key));
         let refusal = place.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
             diagnostic.at(&at, format!("expected at most {MAX_STEPS:e} steps"))
         });
+        let way_out = if is_too_fast(by_additive(draft)) {
+            ""
+        } else {
+            ", or use method = \"additive\", which takes stiff bearings in long steps"
+        };
         draft.report.push(refusal.help(format!(
             "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mass, a moment \
-             of inertia or a stiffness that is not meant so, or use method = \"rodas5p\""
+             of inertia or a stiffness that is not meant so{way_out}"
         )));
     } else if let Some(step_s) = step_s.filter(|&step_s| step_s > limit_s) {
         let title = format!(
@@ -193,17 +212,30 @@ pub(crate) fn stability(draft: &Draft<'_, Washer>) {
             decimal(step_s)
         );
         let expected = format!("expected a step of at most {limit_s:.2e} s");
+        let way_out = if by_additive(draft) > MOSTLY_BY_BEARINGS * frequency {
+            ""
+        } else {
+            "; method = \"additive\" takes stiff bearings in longer steps"
+        };
         draft.report.push(refuse_step(draft, title, &expected).help(format!(
             "the limit is 2.83 / w with w = {frequency:.0} rad/s, the machine's highest natural \
-             frequency{at}"
+             frequency{at}{way_out}"
         )));
     }
 }
 
-/// The highest natural frequency of any corner's machine, at rest and turning at its greatest
-/// speed. As a rule it is that of undamped bearings against their mass. A machine without
-/// equilibrium has none, and its rows will say so.
-fn highest_frequency_of_corners_rad_per_s(draft: &Draft<'_, Washer>) -> f64 {
+/// Returns the highest frequency that limits the steps of the additive method.
+fn by_additive(draft: &Draft<'_, Washer>) -> f64 {
+    highest_of_corners_rad_per_s(draft, highest_explicit_frequency_rad_per_s)
+}
+
+/// Returns the highest natural frequency of any corner's machine, turning at its greatest speed. As
+/// a rule it is that of undamped bearings against their mass. A machine without equilibrium has
+/// none, and its rows will say so.
+fn highest_of_corners_rad_per_s(
+    draft: &Draft<'_, Washer>,
+    highest_rad_per_s: fn(&Point, f64) -> Result<f64, NoModes>,
+) -> f64 {
     let plan = &draft.plan;
     let timing = timing(plan);
     let mut highest = 0.0_f64;
@@ -217,7 +249,7 @@ fn highest_frequency_of_corners_rad_per_s(draft: &Draft<'_, Washer>) -> f64 {
         for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
             // Matrices without eigenvalues leave it to the run to tell whether the machine can
             // move.
-            highest = highest.max(highest_frequency_rad_per_s(&point, speed).unwrap_or(0.0));
+            highest = highest.max(highest_rad_per_s(&point, speed).unwrap_or(0.0));
         }
     }
     highest

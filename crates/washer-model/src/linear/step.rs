@@ -6,7 +6,7 @@
 //! earlier, so that few operations wait for the accelerations of the stage before.
 
 use crate::COORDINATES;
-use crate::coordinates::{ROTOR_TURNS, TUB};
+use crate::coordinates::{HINGE_PITCH, HINGE_YAW, ROTOR_TURNS, STATES, TUB};
 use crate::lanes::lane_struct;
 use crate::linear::rotor_terms::{self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, Terms};
 use crate::linear::symmetric::Symmetric4;
@@ -138,9 +138,15 @@ struct BearingsAt<T> {
     system_inverse: Symmetric4<T>,
     /// The factor of the deflection, w^2 + theta'^2.
     per_deflection: N<T>,
-    /// The accelerations of the rotor's midpoint (y, z) and of its rotations by loads.
-    translation_per_load: [[N<T>; 4]; 2],
-    rotation_per_load: [[N<T>; 4]; 4],
+    rotor: RotorPerLoad<T>,
+}
+
+/// The accelerations of the rotor by loads of its axis: of its midpoint (y, z), and of its
+/// rotations.
+#[derive(Clone, Copy)]
+struct RotorPerLoad<T> {
+    translation: [[N<T>; 4]; 2],
+    rotation: [[N<T>; 4]; 4],
 }
 
 impl<T: Lane> RotorAt<T> {
@@ -158,8 +164,7 @@ impl<T: Lane> RotorAt<T> {
         let bearings = BearingsAt {
             system_inverse: nothing,
             per_deflection: zero,
-            translation_per_load: [[zero; 4]; 2],
-            rotation_per_load: [[zero; 4]; 4],
+            rotor: RotorPerLoad { translation: [[zero; 4]; 2], rotation: [[zero; 4]; 4] },
         };
         let mut rotor = Self { entries: [zero; ENTRIES], inverse: nothing, bearings };
         rotor.renew(constants, coupling, terms, spin, hinge_mass);
@@ -199,26 +204,29 @@ impl<T: Lane> RotorAt<T> {
         }
         self.inverse = Symmetric4(inertia).inverse();
         if let Coupling::MassScaled(scaling) = coupling {
-            let arms = entry::arms(&self.entries);
             let cap_squared = scaling.bearings_squared;
-            self.bearings =
-                BearingsAt::new(constants, cap_squared, spin.speed, &self.inverse, &arms);
+            let arms = entry::arms(&self.entries);
+            let (rotor, compliance) = RotorPerLoad::new(constants, &self.inverse, &arms);
+            let system = bearing_system(constants, cap_squared, &compliance);
+            self.bearings = BearingsAt {
+                system_inverse: Symmetric4(system).inverse(),
+                per_deflection: cap_squared + spin.speed * spin.speed,
+                rotor,
+            };
         }
     }
 }
 
-impl<T: Lane> BearingsAt<T> {
-    /// Computes the arrays from the inverse of the rotor's inertia and the partial velocities of
-    /// its mass centre.
+impl<T: Lane> RotorPerLoad<T> {
+    /// Computes them, and the rotor's C, from the inverse of its inertia and the partial velocities
+    /// of its mass centre.
     #[inline(always)]
     fn new(
         c: &StepConstants<T>,
-        cap_squared: N<T>,
-        speed: N<T>,
         inverse: &Symmetric4<T>,
         arm: &[[N<T>; 2]; 4],
-    ) -> Self {
-        let zero = cap_squared.lit(0.0);
+    ) -> (Self, Symmetric4<T>) {
+        let zero = c.rotor_per_mass.lit(0.0);
         let axis = &c.rotor_axis;
         let mut rotation = [[zero; 4]; 4];
         for row in 0..4 {
@@ -255,23 +263,28 @@ impl<T: Lane> BearingsAt<T> {
                 axis[0][1] * rotation[0][column] + axis[1][1] * rotation[1][column];
         }
         let compliance = Symmetric4(compliance);
-        let system =
-            mass_scaled_system(cap_squared, c.bearing_compliance, &c.tub_compliance, &compliance.0);
         let mut translation = [[zero; 4]; 2];
         for i in 0..2 {
             for column in 0..4 {
                 translation[i][column] = compliance.at(i, column);
             }
         }
-        Self {
-            system_inverse: Symmetric4(system).inverse(),
-            per_deflection: cap_squared + speed * speed,
-            translation_per_load: translation,
-            rotation_per_load: rotation,
-        }
+        (Self { translation, rotation }, compliance)
     }
+}
 
-    /// Computes the load on the tub from a deflection and its second derivative without loads.
+/// Computes w^2 K^-1 + C of both halves, from the rotor's C; its lower triangle.
+#[inline(always)]
+fn bearing_system<T: Lane>(
+    c: &StepConstants<T>,
+    cap_squared: N<T>,
+    rotor: &Symmetric4<T>,
+) -> [[N<T>; 4]; 4] {
+    mass_scaled_system(cap_squared, c.bearing_compliance, &c.tub_compliance, &rotor.0)
+}
+
+impl<T: Lane> BearingsAt<T> {
+    /// The load on the tub, from a deflection and its second derivative in absence of loads.
     #[inline(always)]
     fn reaction(&self, deflection: &[N<T>; 4], second: &[N<T>; 4]) -> [N<T>; 4] {
         let mut sum = *second;
@@ -292,79 +305,166 @@ pub(crate) fn accelerations<T: Lane>(
     u: &[N<T>; COORDINATES],
 ) -> [N<T>; COORDINATES] {
     let deflection = c.deflection(q);
-    let mut tub = [q[0]; 4];
-    for row in 0..4 {
-        tub[row] = (c.tub_per_position[row][0] * q[TUB[0]]).v();
-        for column in 1..4 {
-            tub[row] += c.tub_per_position[row][column] * q[TUB[column]];
+    match coupling {
+        Coupling::Springs => {
+            let load = c.spring_load(&deflection);
+            Halves::new(c, rotor_at, Some(load), q, u).in_order()
+        }
+        Coupling::MassScaled(_) => {
+            let bearings = &rotor_at.bearings;
+            let mut halves = Halves::new(c, rotor_at, None, q, u);
+            let second = c.deflection(&halves.in_order());
+            let reaction = bearings.reaction(&deflection, &second);
+            halves.push_apart(c, &bearings.rotor, &reaction);
+            halves.in_order()
         }
     }
-    let e = &rotor_at.entries;
-    let arm = entry::arms(e);
-    let mut rotor = [q[0]; ROWS];
-    for row in 0..ROWS {
-        rotor[row] = e[entry::force(row)];
-        for column in 0..4 {
-            if entry::moves(row, column) {
-                rotor[row] -= e[entry::stiffness(row, column)] * q[ROTOR_TURNS[column]];
+}
+
+/// Computes the derivative k of a state with all forces and inertia at deviations `q` from
+/// equilibrium and speeds `u`, but for the springs of bearings and hinge, which are at r + g k:
+/// `nonlinear/ahead.rs` for the linear model. `g` is in s.
+#[inline(always)]
+pub(crate) fn derivative_ahead<T: Lane>(
+    c: &StepConstants<T>,
+    terms: &Terms<T>,
+    flexure_stiffness: N<T>,
+    spin: &SpinState<T>,
+    (q, u): (&[N<T>; COORDINATES], &[N<T>; COORDINATES]),
+    r: &[N<T>; STATES],
+    g: N<T>,
+) -> [N<T>; STATES] {
+    // The coordinates ahead but for g^2 a.
+    let mut ahead = *q;
+    for i in 0..COORDINATES {
+        ahead[i] = r[i] + g * r[COORDINATES + i];
+    }
+    let g_squared = (g * g).v();
+    let hinge_mass = HingeMass {
+        inertia: (g_squared * flexure_stiffness).v(),
+        torque: [
+            (flexure_stiffness * (q[HINGE_YAW] - ahead[HINGE_YAW])).v(),
+            (flexure_stiffness * (q[HINGE_PITCH] - ahead[HINGE_PITCH])).v(),
+        ],
+        torque_per_speed: g.lit(0.0),
+    };
+    let rotor_at = RotorAt::new(c, &Coupling::Springs, terms, spin, Some(hinge_mass));
+    let mut halves = Halves::new(c, &rotor_at, None, q, u);
+    let arms = entry::arms(&rotor_at.entries);
+    let (by_load, compliance) = RotorPerLoad::new(c, &rotor_at.inverse, &arms);
+    let per_g_squared = g_squared.recip();
+    let deflection = c.deflection(&ahead);
+    let mut sum = c.deflection(&halves.in_order());
+    for i in 0..4 {
+        sum[i] += per_g_squared * deflection[i];
+    }
+    // By pivots: determinants overflow in idle lanes, whose g is next to nothing.
+    let reaction = Factors::new(bearing_system(c, per_g_squared, &compliance)).solve(sum);
+    halves.push_apart(c, &by_load, &reaction);
+    let a = halves.in_order();
+    let mut k = *r;
+    for i in 0..COORDINATES {
+        k[i] = r[COORDINATES + i] + g * a[i];
+        k[COORDINATES + i] = a[i];
+    }
+    k
+}
+
+/// The accelerations of both halves: of the tub, of the rotor's midpoint and of its rotations.
+struct Halves<T> {
+    tub: [N<T>; 4],
+    midpoint: [N<T>; 2],
+    rotation: [N<T>; 4],
+}
+
+impl<T: Lane> Halves<T> {
+    /// Computes them, under a load of the bearings on the shaft if one is given.
+    #[inline(always)]
+    fn new(
+        c: &StepConstants<T>,
+        rotor_at: &RotorAt<T>,
+        load: Option<[N<T>; 4]>,
+        q: &[N<T>; COORDINATES],
+        u: &[N<T>; COORDINATES],
+    ) -> Self {
+        let mut tub = [q[0]; 4];
+        for row in 0..4 {
+            tub[row] = (c.tub_per_position[row][0] * q[TUB[0]]).v();
+            for column in 1..4 {
+                tub[row] += c.tub_per_position[row][column] * q[TUB[column]];
             }
         }
-    }
-    if let Coupling::Springs = coupling {
-        let load = c.spring_load(&deflection);
+        let e = &rotor_at.entries;
+        let arm = entry::arms(e);
+        let mut rotor = [q[0]; ROWS];
+        for row in 0..ROWS {
+            rotor[row] = e[entry::force(row)];
+            for column in 0..4 {
+                if entry::moves(row, column) {
+                    rotor[row] -= e[entry::stiffness(row, column)] * q[ROTOR_TURNS[column]];
+                }
+            }
+        }
+        if let Some(load) = load {
+            for row in 0..4 {
+                for column in 0..4 {
+                    tub[row] += c.tub_per_load[row][column] * load[column];
+                }
+            }
+            let [force_y, force_z, moment_y, moment_z] = load;
+            for r in 0..4 {
+                if r > 0 {
+                    rotor[2 + r] -= arm[r][0] * force_y;
+                }
+                rotor[2 + r] -= arm[r][1] * force_z;
+            }
+            let axis = &c.rotor_axis;
+            rotor[2] += axis[0][1] * moment_z;
+            rotor[3] = rotor[3] + axis[1][0] * moment_y + axis[1][1] * moment_z;
+            rotor[0] += force_y;
+            rotor[1] += force_z;
+        }
         for row in 0..4 {
             for column in 0..4 {
-                tub[row] += c.tub_per_load[row][column] * load[column];
+                tub[row] += c.tub_per_speed[row][column] * u[TUB[column]];
             }
         }
-        let [force_y, force_z, moment_y, moment_z] = load;
+        for row in 0..ROWS {
+            for column in 0..4 {
+                if entry::moves(row, column) {
+                    rotor[row] -= e[entry::damping(row, column)] * u[ROTOR_TURNS[column]];
+                }
+            }
+        }
+        let rotation = rotor_at.inverse.times(&[rotor[2], rotor[3], rotor[4], rotor[5]]);
+        let mut midpoint = [(rotor[0] * c.rotor_per_mass).v(), (rotor[1] * c.rotor_per_mass).v()];
         for r in 0..4 {
             if r > 0 {
-                rotor[2 + r] -= arm[r][0] * force_y;
+                midpoint[0] -= arm[r][0] * rotation[r];
             }
-            rotor[2 + r] -= arm[r][1] * force_z;
+            midpoint[1] -= arm[r][1] * rotation[r];
         }
-        let axis = &c.rotor_axis;
-        rotor[2] += axis[0][1] * moment_z;
-        rotor[3] = rotor[3] + axis[1][0] * moment_y + axis[1][1] * moment_z;
-        rotor[0] += force_y;
-        rotor[1] += force_z;
+        Self { tub, midpoint, rotation }
     }
-    for row in 0..4 {
-        for column in 0..4 {
-            tub[row] += c.tub_per_speed[row][column] * u[TUB[column]];
-        }
-    }
-    for row in 0..ROWS {
-        for column in 0..4 {
-            if entry::moves(row, column) {
-                rotor[row] -= e[entry::damping(row, column)] * u[ROTOR_TURNS[column]];
-            }
-        }
-    }
-    let mut rotation = rotor_at.inverse.times(&[rotor[2], rotor[3], rotor[4], rotor[5]]);
-    let mut midpoint = [(rotor[0] * c.rotor_per_mass).v(), (rotor[1] * c.rotor_per_mass).v()];
-    for r in 0..4 {
-        if r > 0 {
-            midpoint[0] -= arm[r][0] * rotation[r];
-        }
-        midpoint[1] -= arm[r][1] * rotation[r];
-    }
-    if let Coupling::MassScaled(_) = coupling {
-        let bearings = &rotor_at.bearings;
-        let second = c.deflection(&in_order(&tub, &midpoint, &rotation));
-        let reaction = bearings.reaction(&deflection, &second);
+
+    /// Adds the accelerations by a load of the bearings on the tub, and its opposite on the rotor.
+    #[inline(always)]
+    fn push_apart(&mut self, c: &StepConstants<T>, rotor: &RotorPerLoad<T>, on_tub: &[N<T>; 4]) {
         for column in 0..4 {
             for row in 0..4 {
-                tub[row] -= c.tub_per_load[row][column] * reaction[column];
-                rotation[row] -= bearings.rotation_per_load[row][column] * reaction[column];
+                self.tub[row] -= c.tub_per_load[row][column] * on_tub[column];
+                self.rotation[row] -= rotor.rotation[row][column] * on_tub[column];
             }
             for i in 0..2 {
-                midpoint[i] -= bearings.translation_per_load[i][column] * reaction[column];
+                self.midpoint[i] -= rotor.translation[i][column] * on_tub[column];
             }
         }
     }
-    in_order(&tub, &midpoint, &rotation)
+
+    #[inline(always)]
+    fn in_order(&self) -> [N<T>; COORDINATES] {
+        in_order(&self.tub, &self.midpoint, &self.rotation)
+    }
 }
 
 /// Arranges the accelerations of the tub, of the rotor's midpoint and of the rotor's rotations in

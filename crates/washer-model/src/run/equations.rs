@@ -6,7 +6,6 @@ use crate::coordinates::STATES;
 use crate::machine::spin::{SpinStretch, stretch_at};
 use crate::nonlinear::coupling::Coupling;
 use crate::run::model::{Linear, Model, Nonlinear};
-use crate::run::tangent::Tangent;
 use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Aside, Dual, N, Partials, Simd};
 use std::sync::Arc;
@@ -24,10 +23,10 @@ pub struct Equations {
     stretch: usize,
 }
 
-/// A model and its derivatives.
+/// A model over plain and over dual numbers.
 struct Differentiable<M, J> {
     model: M,
-    tangent: Tangent<f64, J>,
+    dual: J,
 }
 
 enum Either {
@@ -75,8 +74,8 @@ impl Equations {
     pub fn jacobian(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [[f64; STATE_LEN]; STATE_LEN] {
         self.move_to(t_s);
         let partials = match &self.model {
-            Either::Nonlinear(of) => Simd::one_lane(Jacobian { tangent: &of.tangent, t_s, x }),
-            Either::Linear(of) => Simd::one_lane(Jacobian { tangent: &of.tangent, t_s, x }),
+            Either::Nonlinear(of) => Simd::one_lane(Jacobian { dual: &of.dual, t_s, x }),
+            Either::Linear(of) => Simd::one_lane(Jacobian { dual: &of.dual, t_s, x }),
         };
         let mut rows = [[0.0; STATES]; STATES];
         for i in 0..COORDINATES {
@@ -122,13 +121,13 @@ impl<M: Model<f64>, J: Model<Dual<f64>>> Differentiable<M, J> {
     fn new(point: &Point) -> Box<Self> {
         Box::new(Self {
             model: M::splat(N(0.0), point, Coupling::Springs),
-            tangent: Tangent::new(0.0, point),
+            dual: J::splat(N(0.0).constant(), point, Coupling::Springs),
         })
     }
 
     fn set_spin(&mut self, stretch: &SpinStretch) {
         self.model.set_spin(0, stretch);
-        self.tangent.set_spin(stretch);
+        self.dual.set_spin(0, stretch);
     }
 }
 
@@ -148,7 +147,7 @@ impl<M: Model<f64>> Aside for Derivative<'_, M> {
 }
 
 struct Jacobian<'a, J> {
-    tangent: &'a Tangent<f64, J>,
+    dual: &'a J,
     t_s: f64,
     x: &'a [f64; STATES],
 }
@@ -158,7 +157,7 @@ impl<J: Model<Dual<f64>>> Aside for Jacobian<'_, J> {
     #[inline(always)]
     fn run(self) -> Partials<COORDINATES> {
         let mut partials = Partials::zero();
-        self.tangent.partials(self.t_s, &self.x.map(N), &mut partials);
+        partials.find(0.0, self.dual, self.t_s, &self.x.map(N));
         partials
     }
 }

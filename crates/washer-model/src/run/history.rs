@@ -12,17 +12,15 @@ use crate::machine::spin::stretch_at;
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::squared;
 use crate::run::method::{
-    ByMethod, ByRk4, ByRodas, Family, OfLinear, OfNonlinear, Stepper, coupling, enter,
+    ByMethod, ByRk4, Family, OfLinear, OfNonlinear, Stepper, coupling, enter,
 };
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::run::snapshots::share_of_step;
-use crate::run::stiff::{OnLeg, StiffTask};
 use crate::run::suspension::forces;
 use crate::{COORDINATES, Forces, Method, ModelKind, Point, Stop};
 use core::marker::PhantomData;
 use lane_ode::{
-    Aside, Dual, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, Simd, Step,
-    Task, rodas,
+    Aside, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, Simd, Step, Task,
 };
 
 /// One trajectory at some instants.
@@ -144,11 +142,6 @@ impl<F: Family> ByMethod<F> for Sample<'_, F, ()> {
         let Self { asked, stop, family, .. } = self;
         Simd::one_lane(Sample { asked, stop, stepper, family })
     }
-
-    fn by_rodas(self, stepper: ByRodas) -> Vec<States> {
-        let Self { asked, stop, family, .. } = self;
-        Simd::one_lane(Sample { asked, stop, stepper, family })
-    }
 }
 
 fn of(model: ModelKind, asked: Asked<'_>, sampled: States) -> History<'_> {
@@ -249,20 +242,6 @@ impl<F: Family, S: Stepper> Aside for Sample<'_, F, S> {
     }
 }
 
-/// The same by the stiff method, which wants derivatives.
-impl<F: Family> Aside for Sample<'_, F, ByRodas> {
-    type Output = Vec<States>;
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        let sampling = Sampling::<f64, F::Over<f64>>::new(N(0.0), self.asked, self.stop);
-        let point = self.asked[0].point;
-        let mut task = StiffTask::<f64, _, F::Over<Dual<f64>>>::new(0.0, sampling, point);
-        rodas::integrate(&mut task, &self.stepper.0);
-        task.task.found
-    }
-}
-
 /// The task: a trajectory in each lane, its states kept where instants fall.
 struct Sampling<'a, T, M> {
     model: M,
@@ -292,12 +271,6 @@ impl<'a, T: Lane, M: Model<T>> Sampling<'a, T, M> {
         };
         let found = asked.iter().map(begun).collect();
         Self { model, zero, asked, stop, legs: [None; MAX_LANES], found }
-    }
-}
-
-impl<M: Model<f64>> OnLeg for Sampling<'_, f64, M> {
-    fn place(&self) -> (&Point, usize) {
-        (self.asked[0].point, self.legs[0].unwrap_or(0))
     }
 }
 

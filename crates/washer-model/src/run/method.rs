@@ -9,7 +9,7 @@ use crate::nonlinear::coupling::Coupling;
 use crate::point::PlannedLeg;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::{Caps, Formula, ModelKind, Point};
-use lane_ode::{Lane, Leg, N, Task, Tolerance, dop853, dopri5, rk4};
+use lane_ode::{Lane, Leg, N, Task, Tolerance, additive, dop853, dopri5, rk4};
 
 /// How trajectories are integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,13 +36,9 @@ pub enum Method {
     },
     /// Dormand-Prince 5(4).
     Dopri5(Tolerance),
-    /// Kennedy and Carpenter's additive method of order 5(4), bearings and hinge implicit, for
-    /// forces with corners: its steps see these, and neither bearings nor hinge hold them short.
-    /// The linear model takes Dormand-Prince in its place.
+    /// Kennedy and Carpenter's additive method of order 5(4), the springs of bearings and hinge
+    /// implicit: however stiff these are, they do not hold its steps short.
     Additive(Tolerance),
-    /// Rodas5P, linearly implicit with exact derivatives: for machines too stiff for the others.
-    /// One trajectory at a time.
-    Rodas5p(Tolerance),
 }
 
 sweep_parameter::named! {
@@ -67,9 +63,7 @@ sweep_parameter::named! {
         Rk4 = "rk4",
         /// Dormand-Prince 5(4).
         Dopri5 = "dopri5",
-        /// Rodas5P.
-        Rodas5p = "rodas5p",
-        /// The additive method, for forces with corners.
+        /// The additive method.
         Additive = "additive",
         /// Dormand and Prince's formula of order 8 with nothing capped.
         Dop853 = "dop853",
@@ -102,7 +96,6 @@ pub enum MethodNumbers<'a> {
 pub(crate) trait ByMethod<F: Family>: Sized {
     type Output;
     fn by<S: Stepper>(self, stepper: S) -> Self::Output;
-    fn by_rodas(self, stepper: ByRodas) -> Self::Output;
 }
 
 impl Method {
@@ -119,7 +112,6 @@ impl Method {
             | Level::Capped5 => Self::Capped { step_s: 0.0, caps: CAPS },
             Level::Rk4 => Self::Rk4 { step_s: 0.0 },
             Level::Dopri5 => Self::Dopri5(TOLERANCE),
-            Level::Rodas5p => Self::Rodas5p(TOLERANCE),
             Level::Additive => Self::Additive(TOLERANCE),
             Level::Dop853 => Self::Dop853 { step_s: 0.0 },
         }
@@ -130,7 +122,7 @@ impl Method {
         match self {
             Self::Rk4 { step_s } | Self::Dop853 { step_s } => MethodNumbers::Step(step_s),
             Self::Capped { step_s, caps } => MethodNumbers::Capped(step_s, caps),
-            Self::Dopri5(tolerance) | Self::Additive(tolerance) | Self::Rodas5p(tolerance) => {
+            Self::Dopri5(tolerance) | Self::Additive(tolerance) => {
                 MethodNumbers::Tolerance(tolerance)
             }
         }
@@ -149,8 +141,7 @@ impl Method {
             Self::Rk4 { .. } => task.by(ByRk4),
             Self::Capped { .. } | Self::Dop853 { .. } => task.by(F::Capped::NEW),
             Self::Dopri5(tolerance) => task.by(ByDopri5(tolerance)),
-            Self::Additive(tolerance) => task.by(F::ADDITIVE(tolerance)),
-            Self::Rodas5p(tolerance) => task.by_rodas(ByRodas(tolerance)),
+            Self::Additive(tolerance) => task.by(ByAdditive(tolerance)),
         }
     }
 }
@@ -186,9 +177,6 @@ pub(crate) trait Family {
     type Over<T: Lane>: Model<T>;
     /// [`Method::Capped`] and [`Method::Dop853`], by the model's formula.
     type Capped: Fixed;
-    /// [`Method::Additive`].
-    type Additive: Stepper;
-    const ADDITIVE: fn(Tolerance) -> Self::Additive;
     const KIND: ModelKind;
 }
 
@@ -197,15 +185,11 @@ pub(crate) enum OfLinear {}
 impl Family for OfNonlinear {
     type Over<T: Lane> = Nonlinear<T>;
     type Capped = ByDop853;
-    type Additive = ByAdditive;
-    const ADDITIVE: fn(Tolerance) -> ByAdditive = ByAdditive;
     const KIND: ModelKind = ModelKind::Nonlinear;
 }
 impl Family for OfLinear {
     type Over<T: Lane> = Linear<T>;
     type Capped = ByRk4;
-    type Additive = ByDopri5;
-    const ADDITIVE: fn(Tolerance) -> ByDopri5 = ByDopri5;
     const KIND: ModelKind = ModelKind::Linear;
 }
 
@@ -241,12 +225,8 @@ steppers! {
     ByRk4 = |self, zero, task| rk4::integrate(zero, task);
     ByDop853 = |self, zero, task| dop853::integrate(zero, task);
     ByDopri5(Tolerance) = |self, zero, task| dopri5::integrate(zero, task, &self.0);
-    ByAdditive(Tolerance) =
-        |self, zero, task| P::System::integrate_additive(zero, task, &self.0);
+    ByAdditive(Tolerance) = |self, zero, task| additive::integrate(zero, task, &self.0);
 }
-
-/// In place of a stepper: it wants derivatives (`stiff.rs`).
-pub(crate) struct ByRodas(pub(crate) Tolerance);
 
 impl Fixed for ByRk4 {
     const NEW: Self = Self;

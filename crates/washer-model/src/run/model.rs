@@ -16,10 +16,10 @@ use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
 use crate::{COORDINATES, Caps, Point, nonlinear};
 use core::f64::consts::FRAC_PI_2;
-use lane_ode::{Lane, N, Sample, SemiImplicit, System, Task, Tolerance, additive, dopri5};
+use lane_ode::{Lane, N, Sample, SemiImplicit, System};
 
-/// One of the two models, over lanes.
-pub(crate) trait Model<T: Lane>: System<T, STATES> {
+/// One of the two models, over lanes. The springs of bearings and hinge are its stiff part.
+pub(crate) trait Model<T: Lane>: SemiImplicit<T, STATES> {
     /// The same point in every lane.
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self;
     /// Puts a point into one lane.
@@ -30,16 +30,6 @@ pub(crate) trait Model<T: Lane>: System<T, STATES> {
     fn set_caps(&mut self, lane: usize, caps: &Caps);
     /// State at rest.
     fn at_rest(point: &Point) -> [f64; STATES];
-    /// Runs a task by the additive method, or by Dormand-Prince where the model has no stiff part
-    /// apart.
-    #[inline(always)]
-    fn integrate_additive<P: Task<T, STATES, System = Self>>(
-        zero: T,
-        task: &mut P,
-        tolerance: &Tolerance,
-    ) {
-        dopri5::integrate(zero, task, tolerance);
-    }
     /// Adds the forces with corners at a state to a list, if the model has any.
     fn corner_forces(&self, _x: &[N<T>; STATES], _forces: &mut Vec<CornerForce<T>>) {}
     /// Position of the drum's front centre relative to the tub axis, and the channels' deviations
@@ -122,7 +112,7 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
     }
 }
 
-/// The springs of bearings and hinge, which must not be capped, are the stiff part.
+/// Bearings and hinge must not be capped.
 impl<T: Lane> SemiImplicit<T, STATES> for Nonlinear<T> {
     #[inline(always)]
     fn derivative_ahead(
@@ -186,15 +176,6 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
     fn at_rest(point: &Point) -> [f64; STATES] {
         let nudged = |i: usize| point.equilibrium[i] + point.nudge;
         core::array::from_fn(|i| if i < COORDINATES { nudged(i) } else { 0.0 })
-    }
-
-    #[inline(always)]
-    fn integrate_additive<P: Task<T, STATES, System = Self>>(
-        zero: T,
-        task: &mut P,
-        tolerance: &Tolerance,
-    ) {
-        additive::integrate(zero, task, tolerance);
     }
 
     #[inline(always)]
@@ -272,6 +253,30 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     #[inline(always)]
     fn in_range(&self, x: &[N<T>; STATES]) -> T::Mask {
         in_range(x)
+    }
+}
+
+/// Bearings and hinge must not be capped.
+impl<T: Lane> SemiImplicit<T, STATES> for Linear<T> {
+    #[inline(always)]
+    fn derivative_ahead(
+        &self,
+        forcing: &LinearForcing<T>,
+        x: &[N<T>; STATES],
+        r: &[N<T>; STATES],
+        g_s: N<T>,
+    ) -> [N<T>; STATES] {
+        let (q, u) = split(x);
+        let Self { constants, terms, flexure_stiffness, .. } = self;
+        step::derivative_ahead(
+            constants,
+            terms,
+            *flexure_stiffness,
+            &forcing.spin,
+            (&q, &u),
+            r,
+            g_s,
+        )
     }
 }
 

@@ -113,7 +113,7 @@ fn methods_whose_steps_lie_elsewhere_find_the_same() {
         let run =
             |method| simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING).1.remove(0);
         let reference = run(Method::Rk4 { step_s: 2e-4 });
-        for other in [run(Method::Dopri5(tolerance)), run(Method::Rodas5p(tolerance))] {
+        for other in [run(Method::Dopri5(tolerance)), run(Method::Additive(tolerance))] {
             let rms = [&other, &reference].map(|extra| extra.root_mean_squares.unwrap());
             rms[0]
                 .iter()

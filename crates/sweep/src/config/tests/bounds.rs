@@ -86,10 +86,29 @@ fn a_machine_too_stiff_for_any_number_of_steps_is_refused_by_every_explicit_meth
     for method in ["rk4-mass-scaled", "dopri5", "rk4"] {
         let refused = light(1e-9, 50.0, &format!("method = \"{method}\"")).unwrap_err();
         assert!(refused.contains("the machine is too stiff"), "{refused}");
-        assert!(refused.contains("rodas5p"), "{refused}");
+        assert!(refused.contains("use method = \"additive\""), "{refused}");
     }
-    assert!(light(1e-9, 50.0, "method = \"rodas5p\"").is_ok());
+    assert!(light(1e-9, 50.0, "method = \"additive\"").is_ok());
     assert!(light(1e-6, 1.0, "method = \"rk4-mass-scaled\"").is_ok());
+}
+
+#[test]
+fn a_machine_whose_dampers_are_too_stiff_is_refused_by_the_additive_method_too() {
+    for method in ["dopri5", "additive"] {
+        let set = "[set]\ndamping_n_s_per_m = 1e12\n";
+        let grid = format!("{SMALLEST}{set}[integrator]\nmethod = \"{method}\"\n");
+        let refused = load_text(grid, &[]).unwrap_err();
+        assert!(refused.contains("the machine is too stiff"), "{refused}");
+        assert!(!refused.contains("use method"), "it is of no use: {refused}");
+    }
+}
+
+#[test]
+fn a_step_above_the_limit_of_stability_is_refused_with_the_method_that_takes_it() {
+    let grid = format!("{SMALLEST}[integrator]\nmethod = \"rk4\"\nstep_s = 1e-3\n");
+    let refused = load_text(grid, &[]).unwrap_err();
+    assert!(refused.contains("past the stability limit of rk4"), "{refused}");
+    assert!(refused.contains("method = \"additive\""), "{refused}");
 }
 
 #[test]

@@ -74,7 +74,7 @@ fn a_trajectory_does_not_depend_on_how_often_it_is_read() {
     );
     let adaptive = lane_ode::Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: 1_000_000 };
     for method in
-        [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(adaptive), Method::Rodas5p(adaptive)]
+        [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(adaptive), Method::Additive(adaptive)]
     {
         let read = |every_s: f64| {
             history(ModelKind::Nonlinear, &method, &point, &Start::default(), every_s)

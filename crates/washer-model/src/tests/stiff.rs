@@ -1,0 +1,96 @@
+//! Bearings of any stiffness, by the method that takes them implicitly.
+
+use crate::{
+    Channel, Machine, Method, ModelKind, Point, Record, Spin, Timing,
+    highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s, prepare, simulate,
+};
+use lane_ode::{Simd, Tolerance};
+
+const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.7, 2.9], checkpoints: 0 };
+
+/// Returns a run-up past the resonances, with kinks inside and outside of the window.
+fn point(bearing_stiffness_n_per_m: f64) -> Point {
+    let mut machine = Machine::paper();
+    machine.bearings.front_stiffness_n_per_m = bearing_stiffness_n_per_m;
+    machine.bearings.rear_stiffness_n_per_m = bearing_stiffness_n_per_m;
+    let spin =
+        Spin::Table { time_s: vec![0.0, 0.5, 1.5, 2.5], speed_rpm: vec![0.0, 100.0, 400.0, 300.0] };
+    prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
+}
+
+fn tolerance(relative: f64) -> Tolerance {
+    Tolerance { relative, absolute: 1e-3 * relative, max_steps: 1_000_000 }
+}
+
+fn run(model: ModelKind, method: &Method, point: &Point) -> Record {
+    simulate(Simd::best(), model, method, &[point]).remove(0)
+}
+
+/// Returns the greatest relative difference of two records' amplitudes and least gaps.
+fn difference(a: &Record, b: &Record) -> f64 {
+    assert_eq!((a.failure, b.failure), (None, None));
+    let gap = (a.min_gap_m - b.min_gap_m).abs() / b.min_gap_m;
+    Channel::ALL.iter().map(|channel| channel.index()).fold(gap, |greatest, i| {
+        greatest.max((a.amplitudes[i] - b.amplitudes[i]).abs() / b.amplitudes[i])
+    })
+}
+
+#[test]
+fn the_additive_method_agrees_with_converged_rk4() {
+    let point = point(2e8);
+    for model in ModelKind::ALL {
+        let reference = run(model, &Method::Rk4 { step_s: 5e-5 }, &point);
+        for (relative, allowed) in [(1e-5, 1e-4), (1e-7, 1e-6)] {
+            let found = run(model, &Method::Additive(tolerance(relative)), &point);
+            let error = difference(&found, &reference);
+            eprintln!("{model:?} at {relative:e}: {error:.1e} in {} steps", found.steps);
+            assert!(error < allowed, "{model:?} at {relative:e}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn the_additive_method_takes_bearings_on_which_explicit_ones_crawl() {
+    let points = [2e9, 1e11, 1e14].map(point);
+    for model in ModelKind::ALL {
+        // Bearings give way by a tenth of a micrometre, so rigid ones change little.
+        let reference = run(model, &Method::Rk4 { step_s: 5e-5 }, &points[0]);
+        for stiffer in &points[1..] {
+            assert!(run(model, &Method::Rk4 { step_s: 5e-5 }, stiffer).failure.is_some());
+            let found = run(model, &Method::Additive(tolerance(1e-4)), stiffer);
+            let error = difference(&found, &reference);
+            let tried = found.steps + found.rejected;
+            eprintln!("{model:?}: {error:.1e} in {tried} steps");
+            assert!(error < 5e-4, "{model:?}: {error:e}");
+            // Dormand-Prince would need 3e5 and 1e7.
+            assert!(tried < 10_000, "{model:?}: {tried} steps");
+        }
+    }
+}
+
+#[test]
+fn records_of_stiff_bearings_do_not_depend_on_company() {
+    let points = [2e8, 1e11, 1e7, 1e8].map(point);
+    let all: Vec<&Point> = points.iter().collect();
+    // One lane takes the points one after another; another instruction set may have them side by
+    // side.
+    let method = Method::Additive(tolerance(1e-5));
+    for model in ModelKind::ALL {
+        let together = simulate(Simd::Scalar, model, &method, &all);
+        assert_eq!(simulate(Simd::best(), model, &method, &all), together, "{model:?}");
+        for (point, record) in all.iter().zip(together) {
+            assert_eq!(run(model, &method, point), record, "{model:?}");
+        }
+    }
+}
+
+#[test]
+fn stiff_bearings_do_not_limit_the_steps_of_the_additive_method() {
+    let [soft, stiff] = [2e9, 1e14].map(point);
+    let by_all = highest_frequency_rad_per_s(&stiff, 40.0).unwrap();
+    let by_explicit = highest_explicit_frequency_rad_per_s(&stiff, 40.0).unwrap();
+    assert!(by_all > 1e6, "{by_all}");
+    assert!(by_explicit < 1e4, "{by_explicit}");
+    let softer = highest_explicit_frequency_rad_per_s(&soft, 40.0).unwrap();
+    assert!((softer / by_explicit - 1.0).abs() < 0.1, "{softer} and {by_explicit}");
+}
