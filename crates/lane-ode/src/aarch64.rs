@@ -38,7 +38,7 @@ vector!(
     }
 );
 
-/// `-x`, in an instruction of its own.
+/// Returns `-x`, by an instruction of its own.
 ///
 /// LLVM 22 turns the negative of a fused a b + c into one `fnmadd`, which is -a b - c: 0 in place
 /// of -0 where the terms cancel. NEON's vectors have no such instruction.

@@ -16,13 +16,14 @@ use crate::adaptive::Lanes;
 use crate::control::padded;
 use crate::{Lane, N, SemiImplicit, Step, System as _, Task, Tolerance};
 
+/// Number of stages.
 const STAGES: usize = 8;
 
-/// The implicit coefficient of every stage but the first.
+/// Diagonal coefficient of the implicit matrix, in every row but the first.
 pub const GAMMA: f64 = 41.0 / 200.0;
 
-/// Nodes c.
-const NODE: [f64; STAGES] = [
+/// Nodes.
+const C: [f64; STAGES] = [
     0.0,
     41.0 / 100.0,
     2_935_347_310_677.0 / 11_292_855_782_101.0,
@@ -33,8 +34,8 @@ const NODE: [f64; STAGES] = [
     1.0,
 ];
 
-/// The matrix of the explicit part.
-const EXPLICIT: [[f64; STAGES]; STAGES] = padded([
+/// Matrix of the explicit part.
+const A_EXPLICIT: [[f64; STAGES]; STAGES] = padded([
     &[],
     &[41.0 / 100.0],
     &[367_902_744_464.0 / 2_072_280_473_677.0, 677_623_207_551.0 / 8_224_143_866_563.0],
@@ -72,7 +73,7 @@ const EXPLICIT: [[f64; STAGES]; STAGES] = padded([
 ]);
 
 /// Weights of order 5, of both parts.
-const WEIGHT: [f64; STAGES] = [
+const B: [f64; STAGES] = [
     -872_700_587_467.0 / 9_133_579_230_613.0,
     0.0,
     0.0,
@@ -83,8 +84,8 @@ const WEIGHT: [f64; STAGES] = [
     41.0 / 200.0,
 ];
 
-/// The matrix of the implicit part below its diagonal; its last row is the weights.
-const IMPLICIT: [[f64; STAGES]; STAGES] = padded([
+/// Matrix of the implicit part below its diagonal. Its last row is the weights.
+const A_IMPLICIT: [[f64; STAGES]; STAGES] = padded([
     &[],
     &[41.0 / 200.0],
     &[41.0 / 400.0, -567_603_406_766.0 / 11_931_857_230_679.0],
@@ -110,11 +111,11 @@ const IMPLICIT: [[f64; STAGES]; STAGES] = padded([
         -211_217_309_593.0 / 5_846_859_502_534.0,
         -4_269_925_059_573.0 / 7_827_059_040_749.0,
     ],
-    &WEIGHT,
+    &B,
 ]);
 
-/// Those of order 4.
-const COMPANION: [f64; STAGES] = [
+/// Weights of the embedded formula of order 4.
+const B_HAT: [f64; STAGES] = [
     -975_461_918_565.0 / 9_796_059_967_033.0,
     0.0,
     0.0,
@@ -125,7 +126,7 @@ const COMPANION: [f64; STAGES] = [
     4_035_322_873_751.0 / 18_575_991_585_200.0,
 ];
 
-/// Runs every trajectory that the task has; no lane waits for another's error.
+/// Integrates every trajectory that the task has. No lane waits for another's error.
 #[inline(always)]
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     zero: T,
@@ -141,7 +142,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     let mut before = x;
     let mut slope_before = x;
     let mut length = zero;
-    let mut is_fresh = lanes.take_up(task, &mut x);
+    let mut is_fresh = lanes.start_pending_lanes(task, &mut x);
     while lanes.are_active() && !task.is_stopped() {
         let forcing = task.system().forcing_aside(lanes.time);
         k[0] = task.system().derivative(&forcing, &x);
@@ -160,7 +161,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
                     dense: None,
                 },
             );
-            is_fresh = lanes.take_up(task, &mut x);
+            is_fresh = lanes.start_pending_lanes(task, &mut x);
             if is_fresh {
                 continue;
             }
@@ -168,31 +169,34 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         is_fresh = false;
 
         let h = lanes.steps();
-        // Of any length in an idle lane.
+        // An idle lane needs some g above zero.
         let g = N((h * GAMMA).v().0.larger(zero.lit(f64::MIN_POSITIVE.sqrt()).0));
-        let (mut y, mut r) = (x, x);
+        let mut y = x;
+        let mut r = x;
         for stage in 1..STAGES {
             for i in 0..D {
-                let (mut explicit, mut implicit) = (zero, zero);
+                let mut explicit = zero;
+                let mut implicit = zero;
                 for j in 0..stage {
-                    explicit += k[j][i] * EXPLICIT[stage][j];
-                    implicit += k[j][i] * IMPLICIT[stage][j];
+                    explicit += k[j][i] * A_EXPLICIT[stage][j];
+                    implicit += k[j][i] * A_IMPLICIT[stage][j];
                 }
                 y[i] = x[i] + h * explicit;
                 r[i] = x[i] + h * implicit;
             }
-            let forcing = task.system().forcing(h * NODE[stage] + lanes.time);
+            let forcing = task.system().forcing(h * C[stage] + lanes.time);
             k[stage] = task.system().derivative_ahead(&forcing, &y, &r, g);
         }
         let mut error = [zero; D];
         for i in 0..D {
-            let (mut sum, mut off) = (zero, zero);
+            let mut sum = zero;
+            let mut difference = zero;
             for j in 0..STAGES {
-                sum += k[j][i] * WEIGHT[j];
-                off += k[j][i] * (WEIGHT[j] - COMPANION[j]);
+                sum += k[j][i] * B[j];
+                difference += k[j][i] * (B[j] - B_HAT[j]);
             }
             y[i] = x[i] + h * sum;
-            error[i] = (h * off).v();
+            error[i] = (h * difference).v();
         }
 
         let in_range = task.system().in_range(&y);
@@ -203,6 +207,6 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         for i in 0..D {
             x[i] = N(T::select(accepted, y[i].0, x[i].0));
         }
-        length = lanes.settle(h, error, [accepted, in_range], tolerance);
+        length = lanes.accept_or_reject(h, error, [accepted, in_range], tolerance);
     }
 }

@@ -9,13 +9,13 @@ pub struct Tolerance {
     pub relative: f64,
     /// Absolute error per component and step, in the component's unit.
     pub absolute: f64,
-    /// Steps, accepted and rejected, that one leg may take.
+    /// Greatest number of steps of one segment, accepted and rejected ones together.
     pub max_steps: u64,
 }
 
 impl Tolerance {
-    /// The largest component of the error over its tolerance; NaN if any is not finite. Below 1 the
-    /// step is good.
+    /// Returns the largest component of the error over its tolerance. A step is good below 1. The
+    /// result is NaN if any component is not finite.
     #[inline(always)]
     pub(crate) fn norm<T: Lane, const D: usize>(
         &self,
@@ -37,7 +37,7 @@ impl Tolerance {
     }
 }
 
-/// The matrix of a formula from its rows, which end where zeros follow.
+/// Returns a formula's matrix from its rows. Zeros at the end of a row may be left out.
 pub(crate) const fn padded<const ROWS: usize, const COLUMNS: usize>(
     rows: [&[f64]; ROWS],
 ) -> [[f64; COLUMNS]; ROWS] {
@@ -65,25 +65,33 @@ pub(crate) struct StepControl<T> {
     was_rejected: u32,
 }
 
-/// What each lane's step would be.
+/// The next step of each lane, for an accepted and for a rejected step.
 pub(crate) struct Proposals<T> {
     accepted: N<T>,
     rejected: N<T>,
     memory: N<T>,
 }
 
-/// A step's factor between the shrink limit and `most`.
+/// Returns a step's factor within the shrink limit and `greatest`.
 #[inline(always)]
-fn clamped<T: Lane>(factor: N<T>, most: f64) -> N<T> {
-    let (least, most) = (factor.lit(SHRINK_LIMIT), factor.lit(most));
-    let factor = factor.where_less(most, factor, most);
+fn clamped<T: Lane>(factor: N<T>, greatest: f64) -> N<T> {
+    let least = factor.lit(SHRINK_LIMIT);
+    let greatest = factor.lit(greatest);
+    let factor = factor.where_less(greatest, factor, greatest);
     least.where_less(factor, factor, least)
 }
 
+/// Factor of a step beside the one whose error would be the tolerance. Basis: `dopri5.f` (0.9).
+/// Twice as much would have nearly every step rejected.
 const SAFETY: f64 = 0.9;
+/// Least factor from one step to the next. Basis: `dopri5.f` (0.2). Twice as much takes more
+/// rejected steps where the motion suddenly becomes faster.
 const SHRINK_LIMIT: f64 = 0.2;
+/// Greatest factor from one step to the next. Basis: half of `dopri5.f`'s 10. Twice as much has
+/// more steps rejected after the first one of a segment.
 const GROWTH_LIMIT: f64 = 5.0;
-/// Below this the error says nothing about the step.
+/// Least error, in tolerances, that the next step is computed from. Basis: the factor of such an
+/// error is far above [`GROWTH_LIMIT`], so twice as much changes no step.
 const LEAST_ERROR: f64 = 1e-10;
 
 impl<T: Lane> StepControl<T> {
@@ -92,7 +100,7 @@ impl<T: Lane> StepControl<T> {
         Self { step: zero, memory: zero.lit(1.0), was_rejected: 0 }
     }
 
-    /// Begins a leg. Nothing is kept of the lane's earlier trajectories, so that results do not
+    /// Starts a segment. Nothing is kept of the lane's earlier trajectories, so that results do not
     /// depend on them.
     #[inline(always)]
     pub(crate) fn start(&mut self, lane: usize, first_step_s: f64) {
@@ -101,7 +109,7 @@ impl<T: Lane> StepControl<T> {
         self.was_rejected &= !(1 << lane);
     }
 
-    /// The next steps after error `error` over step `h`.
+    /// Computes the next steps after error `error` over step `h`.
     #[inline(always)]
     pub(crate) fn proposals(&self, error: N<T>, h: N<T>) -> Proposals<T> {
         // NaN is far too large.
@@ -122,9 +130,9 @@ impl<T: Lane> StepControl<T> {
         }
     }
 
-    /// Takes up a lane's proposal, after a step that was accepted or not.
+    /// Sets a lane's next step, after a step that was accepted or not.
     #[inline(always)]
-    pub(crate) fn settle(&mut self, lane: usize, is_accepted: bool, next: &Proposals<T>) {
+    pub(crate) fn update(&mut self, lane: usize, is_accepted: bool, next: &Proposals<T>) {
         let bit = 1 << lane;
         if is_accepted {
             let mut step = next.accepted.0.get(lane);

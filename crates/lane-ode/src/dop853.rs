@@ -8,18 +8,18 @@
 //! classical Runge-Kutta. It is cheaper where accuracy, not stability, limits the steps of the
 //! latter.
 
-use crate::fixed::Legs;
+use crate::fixed::FixedSegments;
 use crate::{Lane, N, Step, System as _, Task};
 use core::hint::black_box;
 
 /// On the imaginary axis the method is stable up to |h w| = 5.96.
 pub const DOP853_STABILITY_LIMIT: f64 = 5.96;
 
-/// Stages, and evaluations of the right-hand side, of a step.
+/// Number of stages, and of evaluations of the right-hand side, in a step.
 pub const DOP853_STAGES: usize = 12;
 
-/// When each stage is, in steps.
-const TIMES: [f64; DOP853_STAGES] = [
+/// Nodes.
+const C: [f64; DOP853_STAGES] = [
     0.0,
     0.526001519587677318785587544488e-1,
     0.789002279381515978178381316732e-1,
@@ -34,11 +34,11 @@ const TIMES: [f64; DOP853_STAGES] = [
     1.0,
 ];
 
-/// Weights that do not vanish, each with its stage.
-type Row = &'static [(usize, f64)];
+/// The coefficients of a row that do not vanish, each with its stage.
+type SparseRow = &'static [(usize, f64)];
 
-/// Along which slopes each stage but the first goes to its state.
-const STAGES: [Row; DOP853_STAGES - 1] = [
+/// Rows of the matrix, from the second stage on.
+const A: [SparseRow; DOP853_STAGES - 1] = [
     &[(0, 5.26001519587677318785587544488e-2)],
     &[(0, 1.97250569845378994544595329183e-2), (1, 5.91751709536136983633785987549e-2)],
     &[(0, 2.95875854768068491816892993775e-2), (2, 8.87627564304205475450678981324e-2)],
@@ -105,8 +105,8 @@ const STAGES: [Row; DOP853_STAGES - 1] = [
     ],
 ];
 
-/// Along which slopes the step goes.
-const STEP: Row = &[
+/// Weights of order 8.
+const B: SparseRow = &[
     (0, 5.42937341165687622380535766363e-2),
     (5, 4.450_312_892_752_408_881_441_139_505_66),
     (6, 1.891_517_899_314_500_383_042_815_990_44),
@@ -117,15 +117,15 @@ const STEP: Row = &[
     (11, 4.47106157277725905176885569043e-2),
 ];
 
-/// Runs every trajectory that the task has, lanes full as long as there are any.
+/// Integrates every trajectory that the task has. A lane takes the next one as soon as it is free.
 #[inline(always)]
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) {
     let zero = N(zero);
     let mut x = [zero; D];
-    let mut legs = Legs::new(zero);
-    while let Some(mut run) = legs.take_up(task, &mut x) {
-        let clock = legs.clock;
-        let mut index = legs.index;
+    let mut segments = FixedSegments::new(zero);
+    while let Some(mut run) = segments.start_pending_lanes(task, &mut x) {
+        let clock = segments.clock;
+        let mut index = segments.index;
         let h = clock.h;
         let mut time = clock.at(index);
         // Hidden from the compiler, which would copy it from place to place.
@@ -135,9 +135,12 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         // the last step's first slope, which observers want, after this step's.
         let mut states = [x; 3];
         let mut slopes = [x; DOP853_STAGES + 1];
+        // The place of a stage's state among states.
         const STAGE: usize = 2;
+        // The place of the last step's first slope among slopes.
         const BEFORE: usize = DOP853_STAGES;
-        let (mut now, mut last) = (0, 1);
+        let mut now = 0;
+        let mut last = 1;
         let mut is_fresh = true;
         let mut done = 0;
         loop {
@@ -171,79 +174,80 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                     slopes[BEFORE] = slopes[0];
                     continue;
                 }
-                let stage_time = clock.at(index + TIMES[stage]);
+                let stage_time = clock.at(index + C[stage]);
                 task.system().renew(
                     if stage == DOP853_STAGES - 1 { next_time } else { stage_time },
                     forcing,
                 );
-                along(h, STAGES[stage - 1], &slopes, &mut states, now, STAGE);
+                add_slopes(h, A[stage - 1], &slopes, &mut states, now, STAGE);
                 slopes[stage] = task.system().derivative(forcing, &states[STAGE]);
             }
             if is_last {
                 break;
             }
-            along(h, STEP, &slopes, &mut states, now, last);
+            add_slopes(h, B, &slopes, &mut states, now, last);
             (now, last) = (last, now);
             index = index + 1.0;
             time = next_time;
             done += 1;
             let in_range = task.system().in_range(&states[now]);
-            if !T::all(in_range) && legs.fail(in_range, time, done) {
+            if !T::all(in_range) && segments.fail(in_range, time, done) {
                 run = done;
             }
         }
         x = states[now];
-        legs.index = index;
-        legs.arrive(done);
+        segments.index = index;
+        segments.count_steps(done);
     }
 }
 
-/// Sums that are kept in registers; AVX2 has sixteen.
-const SUMS: usize = 10;
+/// Number of sums that are kept in registers. Basis: AVX2 has sixteen registers. Twice as many are
+/// kept in memory.
+const SUMS_IN_REGISTERS: usize = 10;
 
-/// A state some weighted slopes away from another.
+/// Computes a stage's state: another one plus a row's sum of slopes.
 #[expect(clippy::manual_memcpy, reason = "sums are registers, not memory")]
 #[inline(always)]
-fn along<T: Lane, const D: usize, const K: usize, const S: usize>(
+fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
     h: N<T>,
-    row: Row,
+    row: SparseRow,
     slopes: &[[N<T>; D]; K],
     states: &mut [[N<T>; D]; S],
     from: usize,
     to: usize,
 ) {
-    // As many coordinates at once as registers hold sums: each weight is then read once for all of
-    // them, and no sum waits for itself.
-    for first in (0..D).step_by(SUMS) {
-        let mut x = [h; SUMS];
-        for i in 0..SUMS.min(D - first) {
+    // So many coordinates at once that their sums stay in registers: each weight is read once for
+    // all of them, and no sum waits for itself.
+    for first in (0..D).step_by(SUMS_IN_REGISTERS) {
+        let mut x = [h; SUMS_IN_REGISTERS];
+        for i in 0..SUMS_IN_REGISTERS.min(D - first) {
             x[i] = states[from][first + i];
         }
         for (stage, weight) in row {
             let reach = (h * *weight).v();
-            for i in 0..SUMS.min(D - first) {
+            for i in 0..SUMS_IN_REGISTERS.min(D - first) {
                 x[i] += reach * slopes[*stage][first + i];
             }
         }
-        for i in 0..SUMS.min(D - first) {
+        for i in 0..SUMS_IN_REGISTERS.min(D - first) {
             states[to][first + i] = x[i];
         }
     }
 }
 
-/// By what factor a step of z' = i y z, of length 1, changes the magnitude of z.
+/// Returns the factor by which a step of z' = i y z, of length 1, changes the magnitude of z.
 #[cfg(test)]
 pub(crate) fn amplification(y: f64) -> f64 {
-    let along = |row: Row, slopes: &[[f64; 2]]| {
+    let along = |row: SparseRow, slopes: &[[f64; 2]]| {
         row.iter().fold([1.0, 0.0], |[re, im], (stage, weight)| {
             [re + weight * slopes[*stage][0], im + weight * slopes[*stage][1]]
         })
     };
     let slope = |[re, im]: [f64; 2]| [-y * im, y * re];
     let mut slopes = vec![slope([1.0, 0.0])];
-    for row in STAGES {
+    for row in A {
         slopes.push(slope(along(row, &slopes)));
     }
-    let [re, im] = along(STEP, &slopes);
+    let [re, im] = along(B, &slopes);
     re.hypot(im)
 }

@@ -8,12 +8,13 @@ use crate::adaptive::Lanes;
 use crate::control::padded;
 use crate::{Lane, N, Step, System as _, Task, Tolerance};
 
+/// Number of stages.
 const STAGES: usize = 7;
 
-/// Nodes c.
-const NODE: [f64; STAGES] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
+/// Nodes.
+const C: [f64; STAGES] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
 
-/// The matrix A; its last row is also the weights of order 5.
+/// Matrix. Its last row is also the weights of order 5.
 const A: [[f64; 6]; STAGES] = padded([
     &[],
     &[1.0 / 5.0],
@@ -25,7 +26,7 @@ const A: [[f64; 6]; STAGES] = padded([
 ]);
 
 /// Weights of order 5 less those of order 4.
-const ERROR: [f64; STAGES] = [
+const E: [f64; STAGES] = [
     71.0 / 57600.0,
     0.0,
     -71.0 / 16695.0,
@@ -35,7 +36,7 @@ const ERROR: [f64; STAGES] = [
     -1.0 / 40.0,
 ];
 
-/// The dense output's fourth-order term (Hairer's `dopri5.f`, d1 to d7).
+/// Coefficients of the dense output's fourth-order term (Hairer's `dopri5.f`, d1 to d7).
 const DENSE: [f64; STAGES] = [
     -12_715_105_075.0 / 11_282_082_432.0,
     0.0,
@@ -46,7 +47,7 @@ const DENSE: [f64; STAGES] = [
     69_997_945.0 / 29_380_423.0,
 ];
 
-/// h times a weighted sum of the stages' slopes.
+/// Computes h times a weighted sum of the stages' slopes.
 #[inline(always)]
 fn combined<T: Lane, const D: usize>(
     h: N<T>,
@@ -63,7 +64,7 @@ fn combined<T: Lane, const D: usize>(
     sums
 }
 
-/// Runs every trajectory that the task has; no lane waits for another's error.
+/// Integrates every trajectory that the task has. No lane waits for another's error.
 #[inline(always)]
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     zero: T,
@@ -77,7 +78,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     let mut is_fresh = true;
 
     loop {
-        is_fresh |= lanes.take_up(task, &mut x);
+        is_fresh |= lanes.start_pending_lanes(task, &mut x);
         if task.is_stopped() || !lanes.are_active() {
             return;
         }
@@ -86,7 +87,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         // The last stage of a step is the first of the next, unless something new has begun.
         let mut y = x;
         for stage in usize::from(!is_fresh)..STAGES {
-            let forcing = task.system().forcing(h * NODE[stage] + lanes.time);
+            let forcing = task.system().forcing(h * C[stage] + lanes.time);
             for i in 0..D {
                 let mut sum = zero;
                 for j in 0..stage {
@@ -102,7 +103,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         is_fresh = false;
 
         let in_range = task.system().in_range(&y);
-        let error = tolerance.norm(&x, &y, &combined(h, &k, &ERROR));
+        let error = tolerance.norm(&x, &y, &combined(h, &k, &E));
         let accepted = error.0.less(zero.lit(1.0).0);
         let before = x;
         let slope_before = k[0];
@@ -111,7 +112,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
             x[i] = N(T::select(accepted, y[i].0, x[i].0));
             k[0][i] = N(T::select(accepted, k[STAGES - 1][i].0, k[0][i].0));
         }
-        let length = lanes.settle(h, error, [accepted, in_range], tolerance);
+        let length = lanes.accept_or_reject(h, error, [accepted, in_range], tolerance);
         let forcing = task.system().forcing_aside(lanes.time);
         task.observe(
             &forcing,

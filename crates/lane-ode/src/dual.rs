@@ -8,12 +8,12 @@ use crate::{Aside, Lane, N, Real};
 pub struct Dual<T> {
     /// The value.
     pub value: T,
-    /// Its derivative.
+    /// The derivative of the value.
     pub slope: T,
 }
 
 impl<T: Real> Dual<T> {
-    /// A constant.
+    /// Returns a constant.
     #[inline(always)]
     pub fn constant(value: T) -> Self {
         Self { value, slope: value.lit(0.0) }
@@ -21,7 +21,7 @@ impl<T: Real> Dual<T> {
 }
 
 impl<T: Real> N<T> {
-    /// This value as a constant of a dual number.
+    /// Returns this value as a constant of a dual number.
     #[inline(always)]
     pub fn constant(self) -> N<Dual<T>> {
         N(Dual::constant(self.0))
@@ -100,7 +100,7 @@ impl<T: Lane> Lane for Dual<T> {
         self.value.set(i, value);
         self.slope.set(i, 0.0);
     }
-    /// A step function: its derivative is zero wherever it has one.
+    /// Rounds to an integer. The derivative of this step function is zero.
     #[inline(always)]
     fn round(self) -> Self {
         Self::constant(self.value.round())

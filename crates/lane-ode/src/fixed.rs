@@ -1,80 +1,84 @@
-//! The common part of methods with a fixed step: each lane's place in its leg, and how legs end.
+//! The common part of methods with a fixed step: times of the lanes, and ends of their segments.
 
-use crate::{Count, Ended, Failure, Lane, Leg, MAX_LANES, N, Task};
+use crate::{Count, Failure, Lane, MAX_LANES, N, Segment, SegmentEnd, Task};
 
-/// Most steps between two calls of [`Task::is_stopped`]: some hundredths of a second.
+/// Greatest number of steps between two calls of [`Task::is_stopped`]. Basis: they take some
+/// hundredths of a second. Twice as many make a user who interrupts wait twice as long.
 pub const STEPS_AT_ONCE: u64 = 1 << 14;
 
-/// Steps of one lane's leg: the smallest whole number of equal steps not above the leg's own.
-pub(crate) fn fixed_steps(leg: &Leg) -> u64 {
+/// Returns the number of steps in a segment: the least for which equal steps are no longer than the
+/// segment's own.
+pub(crate) fn fixed_steps(segment: &Segment) -> u64 {
     // Rounding may leave the quotient just above the intended whole number.
-    let steps = ((leg.end_s - leg.start_s) / leg.step_s * (1.0 - 1e-12)).ceil().max(1.0);
+    let steps =
+        ((segment.end_s - segment.start_s) / segment.step_s * (1.0 - 1e-12)).ceil().max(1.0);
     steps as u64
 }
 
-/// The time of each lane's leg. Its end is exact, whatever the rounding error of the step.
+/// The time of each lane's segment. The end is exact, whatever the rounding error of the step.
 #[derive(Clone, Copy)]
-pub(crate) struct Clock<T> {
+pub(crate) struct SegmentClock<T> {
     start: N<T>,
     end: N<T>,
-    /// Step of each lane; zero where a lane is idle.
+    /// The step of each lane; zero in an idle lane.
     pub(crate) h: N<T>,
-    /// Steps in the leg.
+    /// The number of steps in the segment.
     total: N<T>,
 }
 
-impl<T: Lane> Clock<T> {
-    /// Time after `index` steps.
+impl<T: Lane> SegmentClock<T> {
+    /// Returns the time after `index` steps.
     #[inline(always)]
     pub(crate) fn at(&self, index: N<T>) -> N<T> {
         index.where_less(self.total, index * self.h + self.start, self.end)
     }
 }
 
-/// How far a lane is in its leg.
+/// The steps of a lane's segment, made and to make.
 #[derive(Clone, Copy, Default)]
-struct Progress {
+struct FixedProgress {
     is_active: bool,
     total: u64,
     left: u64,
 }
 
-/// The legs that the lanes are in.
-pub(crate) struct Legs<T> {
-    pub(crate) clock: Clock<T>,
-    /// Steps made in the leg.
+/// The segments that the lanes are in.
+pub(crate) struct FixedSegments<T> {
+    pub(crate) clock: SegmentClock<T>,
+    /// The number of steps made in the segment.
     pub(crate) index: N<T>,
-    lanes: [Progress; MAX_LANES],
-    ended: [Option<Ended>; MAX_LANES],
+    lanes: [FixedProgress; MAX_LANES],
+    ended: [Option<SegmentEnd>; MAX_LANES],
 }
 
-impl<T: Lane> Legs<T> {
-    /// Lanes that have no leg yet.
+impl<T: Lane> FixedSegments<T> {
+    /// Creates lanes without a segment.
     #[inline(always)]
     pub(crate) fn new(zero: N<T>) -> Self {
         Self {
-            clock: Clock { start: zero, end: zero, h: zero, total: zero },
+            clock: SegmentClock { start: zero, end: zero, h: zero, total: zero },
             index: zero,
-            lanes: [Progress::default(); MAX_LANES],
-            ended: [Some(Ended::Idle); MAX_LANES],
+            lanes: [FixedProgress::default(); MAX_LANES],
+            ended: [Some(SegmentEnd::Idle); MAX_LANES],
         }
     }
 
-    /// Gives every lane whose leg has ended its next one. Returns how many steps all lanes can make
-    /// before one of them is at its end, or the task wants to be asked whether it is stopped;
-    /// `None` when it is, or when no lane has anything left to do.
+    /// Requests the next segment for every lane whose segment has ended. Returns the number of
+    /// steps that all lanes can make before one of them is at its end, or the task wants to be
+    /// asked whether it is stopped; `None` when it is, or when no lane has anything left to do.
     #[inline(always)]
-    pub(crate) fn take_up<const D: usize, P: Task<T, D>>(
+    pub(crate) fn start_pending_lanes<const D: usize, P: Task<T, D>>(
         &mut self,
         task: &mut P,
         x: &mut [N<T>; D],
     ) -> Option<u64> {
         for lane in 0..T::LANES {
-            let Some(how) = self.ended[lane].take() else { continue };
-            let leg = task.next_leg(lane, how, x);
-            let steps = leg.as_ref().map_or(0, fixed_steps);
-            self.lanes[lane] = Progress { is_active: leg.is_some(), total: steps, left: steps };
-            let (from, to) = leg.map_or((0.0, 0.0), |l| (l.start_s, l.end_s));
+            let Some(end) = self.ended[lane].take() else { continue };
+            let segment = task.next_segment(lane, end, x);
+            let steps = segment.as_ref().map_or(0, fixed_steps);
+            self.lanes[lane] =
+                FixedProgress { is_active: segment.is_some(), total: steps, left: steps };
+            let (from, to) = segment.map_or((0.0, 0.0), |segment| (segment.start_s, segment.end_s));
             self.clock.start.0.set(lane, from);
             self.clock.end.0.set(lane, to);
             self.clock.h.0.set(lane, (to - from) / steps.max(1) as f64);
@@ -88,15 +92,15 @@ impl<T: Lane> Legs<T> {
         active.map(|lane| lane.left.min(STEPS_AT_ONCE)).min()
     }
 
-    /// Ends the legs of lanes that are out of range at `time`, `done` steps after the last taking
-    /// up. Returns whether there are any.
+    /// Ends the segments of lanes that are out of range at `time`, `done` steps after the last call
+    /// of [`Self::start_pending_lanes`]. Returns whether there are any.
     #[inline(always)]
     pub(crate) fn fail(&mut self, in_range: T::Mask, time: N<T>, done: u64) -> bool {
         let out = !T::bits(in_range);
         for lane in (0..T::LANES).filter(|lane| self.lanes[*lane].is_active && out >> lane & 1 == 1)
         {
             let made = self.lanes[lane].total - self.lanes[lane].left + done;
-            self.ended[lane] = Some(Ended::Failed {
+            self.ended[lane] = Some(SegmentEnd::Failed {
                 reason: Failure::Diverged,
                 time_s: time.0.get(lane),
                 count: Count { accepted: made, rejected: 0 },
@@ -105,16 +109,18 @@ impl<T: Lane> Legs<T> {
         self.ended.iter().any(Option::is_some)
     }
 
-    /// Counts `done` steps of every lane, and notes which of them have arrived.
+    /// Counts `done` steps of every lane, and ends the segments that are completed.
     #[inline(always)]
-    pub(crate) fn arrive(&mut self, done: u64) {
+    pub(crate) fn count_steps(&mut self, done: u64) {
         for lane in 0..T::LANES {
             let progress = &mut self.lanes[lane];
             if progress.is_active {
                 progress.left -= done;
                 if progress.left == 0 && self.ended[lane].is_none() {
-                    self.ended[lane] =
-                        Some(Ended::Arrived(Count { accepted: progress.total, rejected: 0 }));
+                    self.ended[lane] = Some(SegmentEnd::Completed(Count {
+                        accepted: progress.total,
+                        rejected: 0,
+                    }));
                 }
             }
         }

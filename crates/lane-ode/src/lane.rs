@@ -2,14 +2,15 @@
 
 use crate::Real;
 
-/// The most lanes that any instruction set has here.
+/// Greatest number of lanes of any instruction set here. Twice as many would serve registers of
+/// 1024 bits.
 pub const MAX_LANES: usize = 8;
 
 /// A [`Real`] whose lanes can be reached one by one.
 pub trait Lane: Real {
-    /// How many trajectories one value carries.
+    /// The number of trajectories that one value carries.
     const LANES: usize;
-    /// The value of lane `i`.
+    /// Returns the value of lane `i`.
     ///
     /// # Panics
     /// If `i >= LANES`.
@@ -19,12 +20,12 @@ pub trait Lane: Real {
     /// # Panics
     /// If `i >= LANES`.
     fn set(&mut self, i: usize, value: f64);
-    /// To the nearest integer, ties to even.
+    /// Rounds to the nearest integer, ties to even.
     #[must_use]
     fn round(self) -> Self;
-    /// Bit `i` is lane `i`'s truth value.
+    /// Packs the truth values: bit `i` is that of lane `i`.
     fn bits(mask: Self::Mask) -> u32;
-    /// The larger of each pair; `b` where either is NaN.
+    /// Returns the larger of each pair; `b` where either is NaN.
     #[inline(always)]
     #[must_use]
     fn larger(self, b: Self) -> Self {
@@ -43,13 +44,13 @@ pub trait Lane: Real {
 /// and [`Simd::one_lane`](crate::Simd::one_lane) what comes singly. The time that a function takes
 /// to compile grows faster than its length.
 pub trait Aside {
-    /// What the work gives.
+    /// The result of the work.
     type Output;
     /// Does the work. Mark it `#[inline(always)]` as [`Kernel::run`](crate::Kernel::run).
     fn run(self) -> Self::Output;
 }
 
-/// Work without any instruction set of its own.
+/// Runs work without any instruction set of its own.
 #[inline(never)]
 pub(crate) fn out_of_line<W: Aside>(work: W) -> W::Output {
     work.run()

@@ -11,8 +11,8 @@
 //! 1. [`System`]: x' = f(t, x), over values with operators ([`N`]). Products wait for the sum that
 //!    they are part of and fuse with it, the same way everywhere; [`Product::v`] rounds one that
 //!    is on its own.
-//! 2. [`Task`]: the trajectories of a system, each cut into [`Leg`]s at its kinks, and the records
-//!    of every [`Step`]. [`Peaks`] finds largest magnitudes between steps as well as at
+//! 2. [`Task`]: the trajectories of a system, each cut into [`Segment`]s at its kinks, and the
+//!    records of every [`Step`]. [`Peaks`] finds largest magnitudes between steps as well as at
 //!    them.
 //! 3. [`Kernel`]: the work as a whole. [`Simd::dispatch`] is compiled for every instruction set and
 //!    runs it on one.
@@ -26,7 +26,9 @@
 //! Twenty masses on springs, x'' = -k x, each with its own k, over one second.
 //!
 //! ```
-//! use lane_ode::{Ended, Kernel, Lane, Leg, MAX_LANES, N, Simd, Step, System, Task, rk4};
+//! use lane_ode::{
+//!     Kernel, Lane, MAX_LANES, N, Segment, SegmentEnd, Simd, Step, System, Task, rk4,
+//! };
 //!
 //! /// k of the trajectory in each lane (1/s^2).
 //! struct Spring<T>(N<T>);
@@ -67,8 +69,13 @@
 //!         &self.spring
 //!     }
 //!
-//!     fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; 2]) -> Option<Leg> {
-//!         if let Ended::Arrived(_) = ended {
+//!     fn next_segment(
+//!         &mut self,
+//!         lane: usize,
+//!         end: SegmentEnd,
+//!         x: &mut [N<T>; 2],
+//!     ) -> Option<Segment> {
+//!         if let SegmentEnd::Completed(_) = end {
 //!             self.ends[self.held[lane]] = x[0].0.get(lane);
 //!         }
 //!         let stiffness = *self.all.get(self.taken)?;
@@ -77,7 +84,7 @@
 //!         self.taken += 1;
 //!         x[0].0.set(lane, 1.0);
 //!         x[1].0.set(lane, 0.0);
-//!         Some(Leg { start_s: 0.0, end_s: 1.0, step_s: 0.01 })
+//!         Some(Segment { start_s: 0.0, end_s: 1.0, step_s: 0.01 })
 //!     }
 //!
 //!     fn begin(&mut self, (): &(), _: &[N<T>; 2], _: &[N<T>; 2]) {}
@@ -93,7 +100,8 @@
 //!     #[inline(always)]
 //!     fn run<T: Lane>(self, zero: T) -> Vec<f64> {
 //!         let ends = vec![f64::NAN; self.0.len()];
-//!         let (spring, held) = (Spring(N(zero)), [0; MAX_LANES]);
+//!         let spring = Spring(N(zero));
+//!         let held = [0; MAX_LANES];
 //!         let mut springs = Springs { spring, all: self.0, taken: 0, held, ends };
 //!         rk4::integrate(zero, &mut springs);
 //!         springs.ends
@@ -153,7 +161,7 @@ pub use quintic::Sample;
 pub use real::Real;
 pub use simd::{Kernel, Simd, UnsupportedProcessor};
 pub use squares::SquareIntegrals;
-pub use system::{Count, Ended, Failure, Forcing, Leg, SemiImplicit, Step, System, Task};
+pub use system::{Count, Failure, Forcing, Segment, SegmentEnd, SemiImplicit, Step, System, Task};
 pub use time_above::TimeAbove;
 
 #[cfg(test)]

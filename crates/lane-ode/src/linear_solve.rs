@@ -56,7 +56,7 @@ impl<const C: usize> Lu<C> {
         for i in 0..C {
             x[i] = b[self.order[i]];
         }
-        // By columns: each pass is independent over the rows.
+        // Column by column: each pass is independent over the rows.
         for j in 0..C {
             for i in j + 1..C {
                 x[i] -= self.packed[i][j] * x[j];

@@ -34,42 +34,42 @@ impl<T: Real> From<Product<T>> for N<T> {
 }
 
 impl<T: Real> N<T> {
-    /// The constant `value` in every lane of a number like this one.
+    /// Returns the constant `value` in every lane of a number like this one.
     #[inline(always)]
     #[must_use]
     pub fn lit(self, value: f64) -> Self {
         Self(self.0.lit(value))
     }
-    /// Square root.
+    /// Returns the square root.
     #[inline(always)]
     #[must_use]
     pub fn sqrt(self) -> Self {
         Self(self.0.sqrt())
     }
-    /// Magnitude.
+    /// Returns the magnitude.
     #[inline(always)]
     #[must_use]
     pub fn abs(self) -> Self {
         Self(self.0.abs())
     }
-    /// `1 / self`
+    /// Returns `1 / self`.
     #[inline(always)]
     #[must_use]
     pub fn recip(self) -> Self {
         Self(self.0.lit(1.0).div(self.0))
     }
-    /// `self * self`
+    /// Returns `self * self`, not rounded yet.
     #[inline(always)]
     pub fn squared(self) -> Product<T> {
         Product(self.0, self.0)
     }
-    /// Sine and cosine.
+    /// Returns sine and cosine.
     #[inline(always)]
     pub fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.0.sin_cos();
         (Self(sin), Self(cos))
     }
-    /// `a` where `self < bound`, else `b`.
+    /// Selects `a` where `self < bound`, else `b`.
     #[inline(always)]
     #[must_use]
     pub fn where_less(self, bound: Self, a: Self, b: Self) -> Self {
@@ -77,7 +77,7 @@ impl<T: Real> N<T> {
     }
 }
 
-/// One binary operator between two of value, product and plain constant.
+/// Implements a binary operator between two of value, product and plain constant.
 macro_rules! binary {
     ($Op:ident :: $op:ident, $L:ty, $R:ty => $Out:ty, |$a:ident, $b:ident| $body:expr) => {
         impl<T: Real> $Op<$R> for $L {
@@ -135,7 +135,7 @@ impl<T: Real> Neg for Product<T> {
     }
 }
 
-/// One operator that changes a value.
+/// Implements an operator that changes a value.
 macro_rules! assign {
     ($Op:ident :: $op:ident, $R:ty, $sign:tt) => {
         impl<T: Real> $Op<$R> for N<T> {

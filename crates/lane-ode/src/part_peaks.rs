@@ -3,8 +3,8 @@
 use crate::quintic::{Quintic, within_step};
 use crate::{Lane, MAX_LANES, N, Peaks, Sample};
 
-/// Largest magnitude of `M` outputs in every part of each lane's trajectory, parts being divided by
-/// instants of the lane's own.
+/// The largest magnitudes of `M` outputs in every part of each lane's trajectory. Each lane has its
+/// own instants, which divide the parts.
 ///
 /// Steps need not end at the instants. A step that spans one is divided there by the polynomial of
 /// degree 5 through values, slopes and curvatures at its ends. A lane allocates when it takes up a
@@ -12,7 +12,7 @@ use crate::{Lane, MAX_LANES, N, Peaks, Sample};
 #[derive(Clone, Debug)]
 pub struct PartPeaks<T, const M: usize> {
     peaks: Peaks<T, M>,
-    /// Where each lane's current part ends; infinity in its last.
+    /// The end of each lane's current part; infinity in its last.
     part_end_s: N<T>,
     /// Later cuts of each lane, the next one last.
     cuts_s: [Vec<f64>; MAX_LANES],
@@ -21,7 +21,7 @@ pub struct PartPeaks<T, const M: usize> {
 }
 
 impl<T: Lane, const M: usize> PartPeaks<T, M> {
-    /// Uncut trajectories of which nothing has been seen yet.
+    /// Creates the peaks of trajectories without cuts or samples.
     #[inline(always)]
     pub fn new(zero: N<T>) -> Self {
         Self {
@@ -43,8 +43,8 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
         self.part_end_s.0.set(lane, first);
     }
 
-    /// Peaks of one lane's parts, the last one as far as it has come; the lane's trajectory ends
-    /// here.
+    /// Returns the peaks of one lane's parts, the last one as far as it has come. The lane's
+    /// trajectory ends here.
     pub fn finish(&mut self, lane: usize) -> Vec<[f64; M]> {
         self.part_end_s.0.set(lane, f64::INFINITY);
         let mut parts = core::mem::take(&mut self.parts[lane]);
@@ -52,13 +52,13 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
         parts
     }
 
-    /// Samples that no step leads to; `counts` says in which lanes they count.
+    /// Adds samples that no step leads to, in the lanes that count.
     #[inline(always)]
     pub fn begin(&mut self, samples: &[Sample<T>; M], counts: T::Mask) {
         self.peaks.begin(samples, counts);
     }
 
-    /// The samples at `end_s`, the end of a step of `length_s` that began at the last ones.
+    /// Adds the samples at `end_s`, the end of a step of `length_s` that began at the last ones.
     #[inline(always)]
     pub fn advance(
         &mut self,

@@ -3,7 +3,7 @@
 
 use crate::{Dual, Lane, N, System};
 
-/// How the accelerations of a system of `C` coordinates change with its state.
+/// The derivatives of the accelerations of a system of `C` coordinates by its state.
 ///
 /// The state is C coordinates q, then their speeds u, so that q' = u and only u' = a(t, q, u) has
 /// derivatives worth storing.
@@ -16,13 +16,14 @@ pub struct Partials<const C: usize> {
 }
 
 impl<const C: usize> Partials<C> {
-    /// All zero.
+    /// Returns derivatives that are all zero.
     pub const fn zero() -> Self {
         Self { by_coordinate: [[N(0.0); C]; C], by_speed: [[N(0.0); C]; C] }
     }
 
-    /// The derivatives at time `t_s` and state `x`. `system` has the same parameters in every lane;
-    /// each lane takes a direction of its own, and the results do not depend on how many there are.
+    /// Computes the derivatives at time `t_s` and state `x`. `system` has the same parameters in
+    /// every lane; each lane takes a direction of its own, and the results do not depend on how
+    /// many there are.
     #[inline(always)]
     pub fn find<T: Lane, const D: usize, S: System<Dual<T>, D>>(
         &mut self,
@@ -38,7 +39,7 @@ impl<const C: usize> Partials<C> {
         for i in 0..D {
             constant[i] = zero.lit(x[i].0).constant();
         }
-        // One copy of the right-hand side for all directions.
+        // A loop, so that the right-hand side is compiled once for all directions.
         for group in 0..D.div_ceil(T::LANES) {
             let first = group * T::LANES;
             let mut seeded = constant;

@@ -3,7 +3,7 @@
 use crate::quintic::Quintic;
 use crate::{Lane, N, Sample};
 
-/// Largest magnitude so far of `M` outputs.
+/// The largest magnitudes so far of `M` outputs.
 ///
 /// Between two steps an output stays within the control polygon of the cubic through its values and
 /// slopes. Only where that reaches above the peak so far is a step looked into, with second
@@ -15,7 +15,7 @@ pub struct Peaks<T, const M: usize> {
 }
 
 impl<T: Lane, const M: usize> Peaks<T, M> {
-    /// No output seen yet.
+    /// Creates peaks without samples.
     #[inline(always)]
     pub fn new(zero: N<T>) -> Self {
         Self { peak: [zero; M], last: [Sample::still(zero, zero); M] }
@@ -27,13 +27,13 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         self.peak.iter_mut().for_each(|peak| peak.0.set(lane, 0.0));
     }
 
-    /// The peaks of one lane.
+    /// Returns the peaks of one lane.
     #[inline(always)]
     pub fn lane(&self, lane: usize) -> [f64; M] {
         self.peak.map(|peak| peak.0.get(lane))
     }
 
-    /// Samples that no step leads to; `counts` says in which lanes they count.
+    /// Adds samples that no step leads to, in the lanes that count.
     #[inline(always)]
     pub fn begin(&mut self, samples: &[Sample<T>; M], counts: T::Mask) {
         for i in 0..M {
@@ -42,7 +42,8 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         self.last = *samples;
     }
 
-    /// The samples at the end of a step of `length_s` that began at the last ones.
+    /// Adds the samples at the end of a step of `length_s` that began at the last ones, in the
+    /// lanes that count.
     #[inline(always)]
     pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let zero = length_s.lit(0.0);
@@ -50,9 +51,10 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         let mut highest = zero;
         let mut rises = [zero; M];
         for i in 0..M {
-            let (last, now) = (self.last[i], &samples[i]);
+            let last = self.last[i];
+            let now = &samples[i];
             self.raise(i, now.value.abs(), counts);
-            // How far the control polygon reaches above the peak.
+            // The height of the control polygon above the peak.
             let polygon = (last.value + third * last.slope)
                 .abs()
                 .0
@@ -73,8 +75,8 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         self.last = *samples;
     }
 
-    /// As [`Peaks::advance`], for outputs whose curvatures are not known: then a step is the cubic
-    /// through values and slopes, and the sampling error is of fourth order.
+    /// Adds samples as [`Peaks::advance`] does, for outputs whose curvatures are not known. A step
+    /// is then the cubic through values and slopes, and the sampling error is of fourth order.
     #[inline(always)]
     pub fn advance_by_slopes(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let mut samples = *samples;

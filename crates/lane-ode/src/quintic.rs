@@ -7,14 +7,14 @@ use crate::{Lane, N};
 pub struct Sample<T> {
     /// The output.
     pub value: N<T>,
-    /// Its first derivative, per second.
+    /// The first derivative, per second.
     pub slope: N<T>,
-    /// Its second derivative, per second squared.
+    /// The second derivative, per second squared.
     pub curvature: N<T>,
 }
 
 impl<T: Copy> Sample<T> {
-    /// A constant output.
+    /// Returns a constant output.
     #[inline(always)]
     pub const fn still(value: N<T>, zero: N<T>) -> Self {
         Self { value, slope: zero, curvature: zero }
@@ -30,8 +30,8 @@ impl<T: Lane> Sample<T> {
         now.curvature = (2.0 * last.slope + 4.0 * now.slope - 6.0 * mean_slope) / length_s;
     }
 
-    /// The output between two samples, at a `share` (0 to 1) of the step of `length_s` from one to
-    /// the other: that of the polynomial of degree 5 which meets both.
+    /// Interpolates between two samples, at a `share` (0 to 1) of the step of `length_s` from one
+    /// to the other, by the polynomial of degree 5 that meets both.
     #[inline(always)]
     pub fn between(start: &Self, end: &Self, length_s: N<T>, share: f64) -> Self {
         Quintic::new(length_s, start, end).sample(length_s.lit(share), length_s)
@@ -52,8 +52,10 @@ impl<T: Lane> Quintic<T> {
             Sample { value: y1, slope: d1, curvature: e1 },
         ) = (*start, *end);
         let hh = (h * h).v();
-        let (v0, v1) = ((h * d0).v(), (h * d1).v());
-        let (a0, a1) = ((0.5 * (hh * e0).v()).v(), (0.5 * (hh * e1).v()).v());
+        let v0 = (h * d0).v();
+        let v1 = (h * d1).v();
+        let a0 = (0.5 * (hh * e0).v()).v();
+        let a1 = (0.5 * (hh * e1).v()).v();
         // Residuals at s = 1 of value, slope and half curvature, after the terms fixed at s = 0.
         let r = y1 - y0 - v0 - a0;
         let s = v1 - v0 - 2.0 * a0;
@@ -70,14 +72,14 @@ impl<T: Lane> Quintic<T> {
         }
     }
 
-    /// The value where the slope vanishes; at worst an end's.
+    /// Returns the value at the place where the slope vanishes, or at an end if there is none.
     #[inline(always)]
     pub(crate) fn extremum(&self) -> N<T> {
         self.value(self.extremum_at())
     }
 
-    /// Where the slope vanishes, by Newton's method from where a straight slope would; at worst an
-    /// end.
+    /// Finds the place where the slope vanishes by Newton's method, from that of a slope that is a
+    /// straight line. Returns an end if there is none.
     #[inline(always)]
     pub(crate) fn extremum_at(&self) -> N<T> {
         let c = &self.c;
@@ -89,14 +91,14 @@ impl<T: Lane> Quintic<T> {
         s
     }
 
-    /// The value at s.
+    /// Returns the value at s.
     #[inline(always)]
     pub(crate) fn value(&self, s: N<T>) -> N<T> {
         let c = &self.c;
         c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5]))))
     }
 
-    /// Value and time derivatives at s, of a step of length `h`.
+    /// Returns value and time derivatives at s, of a step of length `h`.
     #[inline(always)]
     pub(crate) fn sample(&self, s: N<T>, h: N<T>) -> Sample<T> {
         Sample {
@@ -106,14 +108,14 @@ impl<T: Lane> Quintic<T> {
         }
     }
 
-    /// The first derivative by s.
+    /// Returns the first derivative by s.
     #[inline(always)]
     fn slope(&self, s: N<T>) -> N<T> {
         let c = &self.c;
         c[1] + s * (2.0 * c[2] + s * (3.0 * c[3] + s * (4.0 * c[4] + (5.0 * s) * c[5])))
     }
 
-    /// The second derivative by s.
+    /// Returns the second derivative by s.
     #[inline(always)]
     fn curvature(&self, s: N<T>) -> N<T> {
         let c = &self.c;
@@ -121,7 +123,7 @@ impl<T: Lane> Quintic<T> {
     }
 }
 
-/// Between 0 and 1; NaN becomes 1.
+/// Limits s to 0 to 1; NaN becomes 1.
 #[inline(always)]
 pub(crate) fn within_step<T: Lane>(s: N<T>) -> N<T> {
     let s = s.where_less(s.lit(1.0), s, s.lit(1.0));

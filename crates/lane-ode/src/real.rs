@@ -8,47 +8,47 @@
 /// value that exists already, because a vector type's first value proves that the processor has its
 /// instructions.
 pub trait Real: Copy {
-    /// One truth value per lane.
+    /// A truth value per lane.
     type Mask: Copy;
 
-    /// The constant `value` in every lane.
+    /// Returns the constant `value` in every lane.
     #[must_use]
     fn lit(self, value: f64) -> Self;
-    /// `self + b`
+    /// Returns `self + b`.
     #[must_use]
     fn add(self, b: Self) -> Self;
-    /// `self - b`
+    /// Returns `self - b`.
     #[must_use]
     fn sub(self, b: Self) -> Self;
-    /// `self * b`
+    /// Returns `self * b`.
     #[must_use]
     fn mul(self, b: Self) -> Self;
-    /// `self / b`
+    /// Returns `self / b`.
     #[must_use]
     fn div(self, b: Self) -> Self;
-    /// `-self`
+    /// Returns `-self`.
     #[must_use]
     fn neg(self) -> Self;
-    /// `self * b + c`, rounded once.
+    /// Returns `self * b + c`, rounded once.
     #[must_use]
     fn mul_add(self, b: Self, c: Self) -> Self;
-    /// `self * b - c`, rounded once.
+    /// Returns `self * b - c`, rounded once.
     #[must_use]
     fn mul_sub(self, b: Self, c: Self) -> Self;
-    /// `c - self * b`, rounded once.
+    /// Returns `c - self * b`, rounded once.
     #[must_use]
     fn neg_mul_add(self, b: Self, c: Self) -> Self;
-    /// Square root.
+    /// Returns the square root.
     #[must_use]
     fn sqrt(self) -> Self;
-    /// Magnitude.
+    /// Returns the magnitude.
     #[must_use]
     fn abs(self) -> Self;
-    /// Sine and cosine of an angle in radians.
+    /// Returns sine and cosine of an angle in radians.
     fn sin_cos(self) -> (Self, Self);
-    /// Where `self < b`; false where either is NaN.
+    /// Compares: true where `self < b`, false where either is NaN.
     fn less(self, b: Self) -> Self::Mask;
-    /// `a` where the mask holds, else `b`.
+    /// Selects `a` where the mask holds, else `b`.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// Whether the mask holds in every lane.
     fn all(mask: Self::Mask) -> bool;

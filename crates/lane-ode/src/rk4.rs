@@ -3,27 +3,28 @@
 //! W. Kutta, Zeitschrift fuer Mathematik und Physik 46 (1901) 435; Hairer, Norsett, Wanner, Solving
 //! Ordinary Differential Equations I, Table II.1.2.
 
-use crate::fixed::Legs;
+use crate::fixed::FixedSegments;
 use crate::{Lane, N, Step, System as _, Task};
 use core::hint::black_box;
 
 /// On the imaginary axis the method is stable up to |h w| = 2 sqrt(2).
 pub const RK4_STABILITY_LIMIT: f64 = 2.828_427_124_746_190_3;
 
-/// How far along its slope each stage but the last goes to the next one's state, in steps.
-const REACH: [f64; 3] = [0.5, 0.5, 1.0];
+/// Coefficients a21, a32 and a43, which are all that do not vanish.
+const A: [f64; 3] = [0.5, 0.5, 1.0];
 
-/// Runs every trajectory that the task has, lanes full as long as there are any.
+/// Integrates every trajectory that the task has. A lane takes the next one as soon as it is free.
 #[inline(always)]
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) {
     let zero = N(zero);
     let mut x = [zero; D];
-    let mut legs = Legs::new(zero);
-    while let Some(mut run) = legs.take_up(task, &mut x) {
-        let clock = legs.clock;
-        let mut index = legs.index;
+    let mut segments = FixedSegments::new(zero);
+    while let Some(mut run) = segments.start_pending_lanes(task, &mut x) {
+        let clock = segments.clock;
+        let mut index = segments.index;
         let h = clock.h;
-        let (one_third, one_sixth) = (zero.lit(1.0 / 3.0), h / zero.lit(6.0));
+        let one_third = zero.lit(1.0 / 3.0);
+        let h_sixth = h / zero.lit(6.0);
         let mut time = clock.at(index);
         // At the step's start, then its middle, then its end, which is the next one's start. Hidden
         // from the compiler, which would hold it in variables, and copy all of them from place to
@@ -33,8 +34,10 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         // States and slopes of this step's start and of the last one's, which change places too;
         // then two more for the states of stages. All states in one array, so that a stage's is one
         // address away. Few places, for the first cache is small.
-        let (mut states, mut slopes) = ([x; 4], [x; 2]);
-        let (mut now, mut last) = (0, 1);
+        let mut states = [x; 4];
+        let mut slopes = [x; 2];
+        let mut now = 0;
+        let mut last = 1;
         let mut is_fresh = true;
         let mut done = 0;
         loop {
@@ -43,8 +46,10 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             let is_last = done == run;
             let next_time = clock.at(index + 1.0);
             // The last step's start is not read any more once this step's has been observed.
-            let (second, third, fourth) = (2, last, 3);
-            // One copy of the right-hand side: four would not fit the instruction cache.
+            let second = 2;
+            let third = last;
+            let fourth = 3;
+            // A loop, because four copies of the right-hand side do not fit the instruction cache.
             let from = [now, second, third, fourth];
             for stage in 0..4 {
                 if stage % 2 == 1 {
@@ -59,12 +64,12 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                         let x = states[now][i];
                         let moved = states[second][i] + states[fourth][i] + 2.0 * states[third][i]
                             - 4.0 * x;
-                        states[last][i] = x + one_third * moved + one_sixth * slope[i];
+                        states[last][i] = x + one_third * moved + h_sixth * slope[i];
                     }
                     break;
                 }
                 let to = [second, third, fourth][stage];
-                let reach = (h * REACH[stage]).v();
+                let reach = (h * A[stage]).v();
                 for i in 0..D {
                     states[to][i] = states[now][i] + reach * slope[i];
                 }
@@ -100,12 +105,12 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             time = next_time;
             done += 1;
             let in_range = task.system().in_range(&states[now]);
-            if !T::all(in_range) && legs.fail(in_range, time, done) {
+            if !T::all(in_range) && segments.fail(in_range, time, done) {
                 run = done;
             }
         }
         x = states[now];
-        legs.index = index;
-        legs.arrive(done);
+        segments.index = index;
+        segments.count_steps(done);
     }
 }

@@ -74,7 +74,7 @@ fn negated(x: f64) -> f64 {
     -x
 }
 
-/// `a * b + c`, rounded once; twice where that is what lanes do.
+/// Returns `a * b + c`, rounded once; rounded twice on targets whose lanes do so.
 #[inline(always)]
 fn fused(a: f64, b: f64, c: f64) -> f64 {
     if cfg!(target_arch = "wasm32") { a * b + c } else { f64::mul_add(a, b, c) }

@@ -1,4 +1,4 @@
-//! Which instruction set runs, decided when the program runs.
+//! The choice of an instruction set, made when the program runs.
 
 use core::fmt;
 
@@ -11,8 +11,8 @@ use x86::one_lane;
 /// An instruction set the integrators can run on. Results are the same bits on all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Simd {
-    /// One lane, with the processor's fused multiply-add: on x86-64 that of AVX2's processors.
-    /// Where this is not available, nothing is.
+    /// A single lane, with the processor's fused multiply-add: on x86-64 that of AVX2's processors.
+    /// A processor without it runs nothing.
     Scalar,
     /// Four lanes of AVX2 with FMA.
     Avx2,
@@ -45,7 +45,7 @@ impl core::error::Error for UnsupportedProcessor {}
 /// Mark `run`, and all that it calls in a loop, `#[inline(always)]`: only code that ends up inside
 /// the entry function of an instruction set is compiled with its instructions.
 pub trait Kernel {
-    /// What the work gives.
+    /// The result of the work.
     type Output;
     /// Does the work over lanes of type `T`; `zero` is the first value, from which all constants
     /// are made.
@@ -56,29 +56,29 @@ impl Simd {
     /// Every instruction set, the widest first.
     pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Simd128, Self::Scalar];
 
-    /// Whether anything runs here. A program asks before it begins.
+    /// Checks that this processor runs any of them. A program asks before it begins.
     ///
     /// # Errors
-    /// Nothing does.
+    /// [`UnsupportedProcessor`] if it runs none.
     pub fn check() -> Result<(), UnsupportedProcessor> {
         if Self::Scalar.is_available() { Ok(()) } else { Err(UnsupportedProcessor) }
     }
 
-    /// The best that this processor has.
+    /// Returns the widest that this processor has.
     pub fn best() -> Self {
         Self::ALL.into_iter().find(|simd| simd.is_available()).unwrap_or(Self::Scalar)
     }
 
-    /// The one with the fewest lanes, no more than this one has, that takes so many trajectories at
-    /// once; else this one. Half the lanes cost little more than half the time where a processor
-    /// splits its widest instructions.
+    /// Returns the one with the fewest lanes, no more than this one has, that takes so many
+    /// trajectories at once; this one if none does. Half the lanes cost little more than half the
+    /// time on a processor that splits its widest instructions.
     pub fn narrowed(self, trajectories: usize) -> Self {
         let fits = |simd: &Self| (trajectories..=self.lanes()).contains(&simd.lanes());
         let mut narrowest_first = Self::ALL.into_iter().rev().filter(|simd| simd.is_available());
         narrowest_first.find(fits).unwrap_or(self)
     }
 
-    /// What [`Self::dispatch_narrow`] runs on.
+    /// Returns the one that [`Self::dispatch_narrow`] runs on.
     pub fn narrow() -> Self {
         [Self::Avx2, Self::Neon, Self::Simd128]
             .into_iter()
@@ -110,7 +110,7 @@ impl Simd {
         }
     }
 
-    /// Its name in lower case.
+    /// Returns the name in lower case.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
@@ -121,7 +121,7 @@ impl Simd {
         }
     }
 
-    /// Trajectories side by side.
+    /// Returns the number of trajectories side by side.
     pub const fn lanes(self) -> usize {
         match self {
             Self::Scalar => 1,
@@ -158,7 +158,7 @@ impl Simd {
     /// bits as in any lane.
     ///
     /// # Panics
-    /// As [`Self::dispatch`].
+    /// Like [`Self::dispatch`], on an [`UnsupportedProcessor`].
     #[inline(always)]
     pub fn one_lane<W: Aside>(work: W) -> W::Output {
         one_lane(work)
@@ -169,7 +169,7 @@ impl Simd {
     /// one instruction set instead of all.
     ///
     /// # Panics
-    /// As [`Self::dispatch`].
+    /// Like [`Self::dispatch`], on an [`UnsupportedProcessor`].
     #[inline(never)]
     pub fn dispatch_narrow<K: Kernel>(kernel: K) -> K::Output {
         #[cfg(target_arch = "x86_64")]

@@ -2,19 +2,19 @@
 
 use crate::{Lane, N, Sample};
 
-/// Integrals over time of the squares of `M` outputs.
+/// The integrals over time of the squares of `M` outputs.
 ///
-/// Over each step the rule through values and first and second derivatives at both ends: exact for
-/// polynomials of degree 5, so the error is of sixth order in the step.
+/// Each step is integrated by the rule through values and first and second derivatives at both
+/// ends. It is exact for polynomials of degree 5, so the error is of sixth order in the step.
 #[derive(Clone, Copy, Debug)]
 pub struct SquareIntegrals<T, const M: usize> {
     integral: [N<T>; M],
-    /// The square and its two derivatives where the next step begins.
+    /// The square and its two derivatives at the start of the next step.
     last: [Sample<T>; M],
 }
 
 impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
-    /// Nothing seen yet.
+    /// Creates integrals without samples.
     #[inline(always)]
     pub fn new(zero: N<T>) -> Self {
         Self { integral: [zero; M], last: [Sample::still(zero, zero); M] }
@@ -25,12 +25,12 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
         self.integral.iter_mut().for_each(|integral| integral.0.set(lane, 0.0));
     }
 
-    /// The integrals of one lane, in the square of the output's unit times seconds.
+    /// Returns the integrals of one lane, in the square of the output's unit times seconds.
     pub fn lane(&self, lane: usize) -> [f64; M] {
         self.integral.map(|integral| integral.0.get(lane))
     }
 
-    /// Samples that no step leads to.
+    /// Sets samples that no step leads to.
     #[inline(always)]
     pub fn begin(&mut self, samples: &[Sample<T>; M]) {
         for i in 0..M {
@@ -38,13 +38,13 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
         }
     }
 
-    /// The samples at the end of a step of `length_s` that began at the last ones; `counts` says in
-    /// which lanes it counts.
+    /// Adds a step of `length_s` from the last samples to these, in the lanes that count.
     #[inline(always)]
     pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let zero = length_s.lit(0.0);
         for i in 0..M {
-            let (start, end) = (self.last[i], square(&samples[i]));
+            let start = self.last[i];
+            let end = square(&samples[i]);
             // Hermite's rule: 1/2, 1/10 and 1/120 of the step's powers.
             let ends = (0.5 * (start.value + end.value)).v();
             let slopes = (0.1 * (start.slope - end.slope)).v();
@@ -56,7 +56,7 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
     }
 }
 
-/// An output's square with its derivatives.
+/// Returns an output's square with its derivatives.
 #[inline(always)]
 fn square<T: Lane>(y: &Sample<T>) -> Sample<T> {
     Sample {

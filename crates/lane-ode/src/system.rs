@@ -1,4 +1,4 @@
-//! What integrators need of a system, and what they report of a trajectory.
+//! The interface of integrators: systems, their trajectories, and the steps that are reported.
 
 use crate::{Aside, Lane, N};
 
@@ -7,7 +7,7 @@ pub trait System<T: Lane, const D: usize> {
     /// The part of f that depends on time alone; computed once where several stages share a time.
     type Forcing: Copy;
 
-    /// The forcing at time `t_s`, which may differ between lanes.
+    /// Computes the forcing at time `t_s`, which may differ between lanes.
     fn forcing(&self, t_s: N<T>) -> Self::Forcing;
 
     /// Overwrites a forcing of this system with that at another time; cheaper than a new one where
@@ -17,8 +17,8 @@ pub trait System<T: Lane, const D: usize> {
         *forcing = self.forcing(t_s);
     }
 
-    /// [`Self::forcing`] as a function of its own that all callers share: for where it is not most
-    /// of the time.
+    /// Computes [`Self::forcing`] as a function that all callers share, for callers that spend
+    /// little of their time in it.
     #[inline(always)]
     fn forcing_aside(&self, t_s: N<T>) -> Self::Forcing
     where
@@ -27,10 +27,10 @@ pub trait System<T: Lane, const D: usize> {
         t_s.0.aside(ForcingAside::<T, D, Self> { system: self, t_s })
     }
 
-    /// f at state `x`.
+    /// Computes f at state `x`.
     fn derivative(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D];
 
-    /// [`Self::derivative`], likewise.
+    /// Computes [`Self::derivative`] as a function that all callers share.
     #[inline(always)]
     fn derivative_aside(&self, forcing: &Self::Forcing, x: &[N<T>; D]) -> [N<T>; D]
     where
@@ -39,8 +39,8 @@ pub trait System<T: Lane, const D: usize> {
         x[0].0.aside(DerivativeAside { system: self, forcing, x })
     }
 
-    /// The lanes whose states are in the model's range. A lane that leaves it has diverged. NaN is
-    /// outside.
+    /// Returns the lanes whose states are in the model's range. A lane that leaves it has diverged.
+    /// NaN is outside.
     fn in_range(&self, x: &[N<T>; D]) -> T::Mask;
 }
 
@@ -76,7 +76,7 @@ impl<T: Lane, const D: usize, S: System<T, D>> Aside for DerivativeAside<'_, T, 
 /// A system x' = H(t, x, x) with a part that is too stiff for explicit formulas: the part is in the
 /// last argument, in which H is linear.
 pub trait SemiImplicit<T: Lane, const D: usize>: System<T, D> {
-    /// k with k = H(t, x, r + g k), for `g_s` above zero.
+    /// Solves k = H(t, x, r + g k) for k, with `g_s` above zero.
     fn derivative_ahead(
         &self,
         forcing: &Self::Forcing,
@@ -86,28 +86,28 @@ pub trait SemiImplicit<T: Lane, const D: usize>: System<T, D> {
     ) -> [N<T>; D];
 }
 
-/// Trajectories fed into lanes one after another: a lane that ends takes up the next at once.
+/// A queue of trajectories. A lane whose trajectory has ended takes the next one at once.
 pub trait Task<T: Lane, const D: usize> {
-    /// The system whose trajectories they are.
+    /// The system that is integrated.
     type System: System<T, D>;
 
-    /// The system with the parameters that the lanes hold.
+    /// Returns the system with the parameters that the lanes hold.
     fn system(&self) -> &Self::System;
 
-    /// Reports how lane `lane` came to the end of its leg, and asks for the next: another leg of
-    /// the same trajectory, the first leg of a new one (write its parameters and its state), or
+    /// Receives the end of lane `lane`'s segment, and returns the next one: another segment of the
+    /// same trajectory, the first segment of a new one (write its parameters and its state), or
     /// none.
-    fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; D]) -> Option<Leg>;
+    fn next_segment(&mut self, lane: usize, end: SegmentEnd, x: &mut [N<T>; D]) -> Option<Segment>;
 
-    /// A leg has begun in some lane: the trajectory may have a kink here, or be a new one. Lanes
-    /// whose legs went on are given the sample that they had.
+    /// Receives the state at the start of a segment of some lane: the trajectory may have a kink
+    /// here, or be a new one. Lanes whose segments go on are given the sample that they had.
     fn begin(&mut self, forcing: &Forcing<Self, T, D>, x: &[N<T>; D], dx: &[N<T>; D]);
 
-    /// Every lane has made a step, of zero length if it is idle.
+    /// Receives a step of every lane, of zero length in idle lanes.
     fn observe(&mut self, forcing: &Forcing<Self, T, D>, step: &Step<'_, T, D>);
 
-    /// Whether to stop; trajectories that have not ended by then never do. Asked every
-    /// [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps at least, because one leg may take hours.
+    /// Whether to stop; trajectories that have not ended by then never do. It is called every
+    /// [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps at least, because a segment may take hours.
     fn is_stopped(&self) -> bool {
         false
     }
@@ -116,37 +116,37 @@ pub trait Task<T: Lane, const D: usize> {
 /// The forcing of a task's system.
 pub type Forcing<P, T, const D: usize> = <<P as Task<T, D>>::System as System<T, D>>::Forcing;
 
-/// A stretch of a trajectory without kinks. Its last step ends exactly at its end.
+/// A segment of a trajectory without kinks. The last step ends exactly at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Leg {
-    /// Where it starts.
+pub struct Segment {
+    /// The time of its start.
     pub start_s: f64,
-    /// Where it ends.
+    /// The time of its end.
     pub end_s: f64,
-    /// Fixed-step methods: the longest step; a whole number of equal steps fills the leg. Adaptive
-    /// methods: the first step to try.
+    /// The longest step of fixed-step methods, which fill the segment with a whole number of equal
+    /// steps; the first step that adaptive methods try.
     pub step_s: f64,
 }
 
-/// How a lane's leg ended.
+/// The end of a lane's segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Ended {
-    /// There was none yet.
+pub enum SegmentEnd {
+    /// The lane had no segment yet.
     Idle,
-    /// At its end.
-    Arrived(Count),
-    /// Before it.
+    /// The segment was integrated to its end.
+    Completed(Count),
+    /// The trajectory cannot go on.
     Failed {
-        /// Why.
+        /// The reason.
         reason: Failure,
-        /// When.
+        /// The time of the last good state.
         time_s: f64,
-        /// Steps so far.
+        /// The number of steps so far.
         count: Count,
     },
 }
 
-/// Why a trajectory cannot go on.
+/// The reason why a trajectory cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Failure {
     /// The state left the range of the model, or is not finite.
@@ -157,44 +157,44 @@ pub enum Failure {
     StepLimit,
 }
 
-/// Steps of one leg.
+/// The number of steps of one segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Count {
-    /// Accepted.
+    /// The number of accepted steps.
     pub accepted: u64,
-    /// Rejected.
+    /// The number of rejected steps.
     pub rejected: u64,
 }
 
 impl Count {
-    /// Adds another leg's.
+    /// Adds the steps of another segment.
     pub const fn add(&mut self, other: Self) {
         self.accepted += other.accepted;
         self.rejected += other.rejected;
     }
 }
 
-/// A step just made, with all that an observer needs to interpolate in it.
+/// A step, with all that an observer needs to interpolate in it.
 pub struct Step<'a, T, const D: usize> {
-    /// Its end in time.
+    /// The time at the end.
     pub end_s: N<T>,
-    /// Its length; zero in an idle lane.
+    /// The length; zero in an idle lane.
     pub length_s: N<T>,
-    /// State at its start.
+    /// The state at the start.
     pub before: &'a [N<T>; D],
-    /// Derivative there.
+    /// The derivative at the start.
     pub slope_before: &'a [N<T>; D],
-    /// State at its end.
+    /// The state at the end.
     pub after: &'a [N<T>; D],
-    /// Derivative there.
+    /// The derivative at the end.
     pub slope_after: &'a [N<T>; D],
     /// The fourth-order term of the method's own dense output, if it has one.
     pub dense: Option<&'a [N<T>; D]>,
 }
 
 impl<T: Lane, const D: usize> Step<'_, T, D> {
-    /// The state a fraction `s` (0 to 1) into the step: the method's dense output, or the cubic
-    /// through both ends.
+    /// Interpolates the state a fraction `s` (0 to 1) into the step, by the method's dense output
+    /// or the cubic through both ends.
     ///
     /// Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.6 (`contd5`).
     #[inline(always)]

@@ -1,4 +1,4 @@
-//! What the integrators promise, shown on small equations whose solutions are known.
+//! Tests of the integrators on small equations whose solutions are known.
 
 mod allocation;
 pub(crate) mod array;
@@ -11,7 +11,7 @@ mod recorders;
 mod trig;
 
 use crate::{
-    Count, Ended, Kernel, Lane, Leg, MAX_LANES, N, SemiImplicit, Simd, Step, System, Task,
+    Count, Kernel, Lane, MAX_LANES, N, Segment, SegmentEnd, SemiImplicit, Simd, Step, System, Task,
     Tolerance, additive, dop853, dopri5, rk4,
 };
 use core::marker::PhantomData;
@@ -38,12 +38,12 @@ trait Equation<const D: usize, const P: usize> {
     }
 }
 
-/// One member of the family, from where, and over which legs.
+/// A member of the family, with its start and its segments.
 #[derive(Clone, Debug)]
 struct Trajectory<const D: usize, const P: usize> {
     parameters: [f64; P],
     start: [f64; D],
-    legs: Vec<Leg>,
+    segments: Vec<Segment>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -54,31 +54,31 @@ enum Method {
     Additive(Tolerance),
 }
 
-/// How a trajectory went.
+/// The result of a trajectory.
 #[derive(Clone, Copy, Debug)]
 struct Outcome<const D: usize> {
-    /// Its last leg.
-    ended: Ended,
-    /// All legs.
+    /// The end of the last segment.
+    ended: SegmentEnd,
+    /// The steps of all segments.
     count: Count,
-    /// State when it ended.
+    /// The state at the end.
     x: [f64; D],
-    /// End of the last step that an observer was shown.
+    /// The end of the last step that an observer received.
     observed_to_s: f64,
-    /// Largest error of [`Step::at`] inside a step.
+    /// The largest error of [`Step::at`] inside a step.
     error_inside: f64,
 }
 
 impl<const D: usize> Outcome<D> {
     const NONE: Self = Self {
-        ended: Ended::Idle,
+        ended: SegmentEnd::Idle,
         count: Count { accepted: 0, rejected: 0 },
         x: [f64::NAN; D],
         observed_to_s: f64::NAN,
         error_inside: 0.0,
     };
 
-    /// The same trajectory, bit for bit, step for step.
+    /// Whether both are one trajectory, bit for bit and step for step.
     fn is_same(&self, other: &Self) -> bool {
         self.x.map(f64::to_bits) == other.x.map(f64::to_bits)
             && self.ended == other.ended
@@ -135,7 +135,7 @@ struct Batch<'a, T, E, const D: usize, const P: usize> {
     member: Member<T, E, P>,
     trajectories: &'a [Trajectory<D, P>],
     taken: usize,
-    /// Trajectory and leg of each lane.
+    /// The trajectory and the segment of each lane.
     at: [(usize, usize); MAX_LANES],
     outcomes: Vec<Outcome<D>>,
 }
@@ -189,19 +189,21 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
         &self.member
     }
 
-    fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; D]) -> Option<Leg> {
-        if ended != Ended::Idle {
-            let (trajectory, leg) = &mut self.at[lane];
-            let (legs, outcome) =
-                (&self.trajectories[*trajectory].legs, &mut self.outcomes[*trajectory]);
-            outcome.ended = ended;
-            match ended {
-                Ended::Arrived(count) | Ended::Failed { count, .. } => outcome.count.add(count),
-                Ended::Idle => {}
+    fn next_segment(&mut self, lane: usize, end: SegmentEnd, x: &mut [N<T>; D]) -> Option<Segment> {
+        if end != SegmentEnd::Idle {
+            let (trajectory, segment) = &mut self.at[lane];
+            let segments = &self.trajectories[*trajectory].segments;
+            let outcome = &mut self.outcomes[*trajectory];
+            outcome.ended = end;
+            match end {
+                SegmentEnd::Completed(count) | SegmentEnd::Failed { count, .. } => {
+                    outcome.count.add(count);
+                }
+                SegmentEnd::Idle => {}
             }
-            if matches!(ended, Ended::Arrived(_)) && *leg + 1 < legs.len() {
-                *leg += 1;
-                return Some(legs[*leg]);
+            if matches!(end, SegmentEnd::Completed(_)) && *segment + 1 < segments.len() {
+                *segment += 1;
+                return Some(segments[*segment]);
             }
             outcome.x = x.map(|x| x.0.get(lane));
         }
@@ -214,7 +216,7 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
         for (x, start) in x.iter_mut().zip(trajectory.start) {
             x.0.set(lane, start);
         }
-        Some(trajectory.legs[0])
+        Some(trajectory.segments[0])
     }
 
     fn begin(&mut self, _: &N<T>, _: &[N<T>; D], _: &[N<T>; D]) {}
@@ -248,7 +250,8 @@ impl Equation<3, 1> for Swing {
         [(w * (x[0] * cos)).v(), (w * x[2]).v(), -(w * x[1]).v()]
     }
 
-    /// Of the oscillator, the implicit part w (1 + y^2) is more than all, by what both states know.
+    /// Takes w (1 + y^2) of the oscillator implicitly, which is more than all of it; the rest is
+    /// explicit and has the opposite sign.
     #[inline(always)]
     fn derivative_ahead<T: Lane>(
         p: &[N<T>; 1],
@@ -257,13 +260,13 @@ impl Equation<3, 1> for Swing {
         r: &[N<T>; 3],
         g: N<T>,
     ) -> [N<T>; 3] {
-        let [of_x, by_z, by_y] = Self::derivative(p, t_s, x);
+        let [x_rate, by_z, by_y] = Self::derivative(p, t_s, x);
         let more = (x[1] * x[1]).v();
         let rate = (p[0] * (1.0 + more)).v();
         let turn = (g * rate).v();
         let by_r = [rate * r[2] - more * by_z, -(rate * r[1]) - more * by_y];
         let to_y = (by_r[0] + turn * by_r[1]) / (1.0 + turn * turn);
-        [of_x, to_y, by_r[1] - turn * to_y]
+        [x_rate, to_y, by_r[1] - turn * to_y]
     }
 
     fn exact(&[w]: &[f64; 1], t_s: f64) -> [f64; 3] {
@@ -304,11 +307,11 @@ impl Equation<4, 1> for Coupled {
 }
 
 impl Trajectory<3, 1> {
-    /// From 0 to `end_s` in `legs` equal legs.
-    fn swing(w: f64, end_s: f64, legs: u32, step_s: f64) -> Self {
-        let edge = |i: u32| end_s * f64::from(i) / f64::from(legs);
-        let legs =
-            (0..legs).map(|i| Leg { start_s: edge(i), end_s: edge(i + 1), step_s }).collect();
-        Self { parameters: [w], start: [1.0, 1.0, 0.0], legs }
+    /// Returns a trajectory from 0 to `end_s` in `count` equal segments.
+    fn swing(w: f64, end_s: f64, count: u32, step_s: f64) -> Self {
+        let edge = |i: u32| end_s * f64::from(i) / f64::from(count);
+        let segments =
+            (0..count).map(|i| Segment { start_s: edge(i), end_s: edge(i + 1), step_s }).collect();
+        Self { parameters: [w], start: [1.0, 1.0, 0.0], segments }
     }
 }

@@ -9,7 +9,7 @@
 use crate::{Lane, N, Real};
 use core::f64::consts::FRAC_PI_4;
 
-/// fdlibm `k_sin.c`: S1 to S6.
+/// Coefficients S1 to S6 of fdlibm's `k_sin.c`.
 const SIN: [f64; 6] = [
     -1.666_666_666_666_663_243_48e-1,
     8.333_333_333_322_489_461_24e-3,
@@ -18,7 +18,7 @@ const SIN: [f64; 6] = [
     -2.505_076_025_340_686_341_95e-8,
     1.589_690_995_211_550_102_21e-10,
 ];
-/// fdlibm `k_cos.c`: C1 to C6.
+/// Coefficients C1 to C6 of fdlibm's `k_cos.c`.
 const COS: [f64; 6] = [
     4.166_666_666_666_660_190_37e-2,
     -1.388_888_888_887_410_957_49e-3,
@@ -32,7 +32,7 @@ const COS: [f64; 6] = [
 const HALF_PI: [f64; 3] =
     [core::f64::consts::FRAC_PI_2, 6.123_233_995_736_766e-17, -1.497_384_904_859_169_8e-33];
 
-/// Sine and cosine for |x| up to pi/4.
+/// Computes sine and cosine for |x| up to pi/4.
 #[inline(always)]
 fn within_quarter<T: Real>(x: N<T>) -> (N<T>, N<T>) {
     let z = x.squared().v();
@@ -41,7 +41,7 @@ fn within_quarter<T: Real>(x: N<T>) -> (N<T>, N<T>) {
     (sin, cos)
 }
 
-/// c0 + c1 z + ... by Horner's rule.
+/// Evaluates c0 + c1 z + ... by Horner's rule.
 #[inline(always)]
 fn polynomial<T: Real>(c: &[f64; 6], z: N<T>) -> N<T> {
     let mut sum = z.lit(c[5]);
@@ -61,15 +61,15 @@ fn turned_on<T: Lane>(quadrant: N<T>, sin: N<T>, cos: N<T>) -> (N<T>, N<T>) {
     (by_quadrant(part, [sin, cos, -sin, -cos]), by_quadrant(part, [cos, -sin, -cos, sin]))
 }
 
-/// The value for the quadrant that `part` (0, 0.25, 0.5 or 0.75) names.
+/// Selects the value of the quadrant that `part` (0, 0.25, 0.5 or 0.75) names.
 #[inline(always)]
-fn by_quadrant<T: Real>(part: N<T>, of: [N<T>; 4]) -> N<T> {
-    let upper = part.where_less(part.lit(0.625), of[2], of[3]);
-    let lower = part.where_less(part.lit(0.125), of[0], of[1]);
+fn by_quadrant<T: Real>(part: N<T>, values: [N<T>; 4]) -> N<T> {
+    let upper = part.where_less(part.lit(0.625), values[2], values[3]);
+    let lower = part.where_less(part.lit(0.125), values[0], values[1]);
     part.where_less(part.lit(0.375), lower, upper)
 }
 
-/// Sine and cosine of any angle up to about 1e6 rad.
+/// Computes sine and cosine of any angle up to about 1e6 rad.
 #[inline(always)]
 pub(crate) fn sin_cos<T: Lane>(x: T) -> (T, T) {
     if T::all(x.abs().less(x.lit(FRAC_PI_4))) {
@@ -79,13 +79,14 @@ pub(crate) fn sin_cos<T: Lane>(x: T) -> (T, T) {
     wide(x)
 }
 
-/// The rare path: lane by lane, out of line, so that the common one stays short. For an angle
-/// within a quarter turn it gives the bits of the common path, so that a lane does not depend on
+/// Computes sine and cosine lane by lane, out of line, so that the common path stays short. An
+/// angle within a quarter turn gets the bits of the common path, so that a lane does not depend on
 /// its neighbours.
 #[cold]
 #[inline(never)]
 fn wide<T: Lane>(x: T) -> (T, T) {
-    let (mut sin, mut cos) = (x, x);
+    let mut sin = x;
+    let mut cos = x;
     for i in 0..T::LANES {
         let x = N(x.get(i));
         let quadrant = N((x * core::f64::consts::FRAC_2_PI).v().0.round());
@@ -99,7 +100,7 @@ fn wide<T: Lane>(x: T) -> (T, T) {
     (sin, cos)
 }
 
-/// Sine and cosine of an angle given in whole turns, whose integer part drops out exactly.
+/// Computes sine and cosine of an angle in turns, whose integer part drops out exactly.
 #[inline(always)]
 pub fn sin_cos_turns<T: Lane>(turns: N<T>) -> (N<T>, N<T>) {
     let part = turns - N(turns.0.round());

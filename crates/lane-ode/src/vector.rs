@@ -18,7 +18,7 @@ macro_rules! vector {
         pub(crate) struct $name($raw);
 
         impl $name {
-            /// The constant `value` in every lane.
+            /// Returns the constant `value` in every lane.
             ///
             /// # Safety
             /// The processor must have this type's instruction set.

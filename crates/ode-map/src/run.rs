@@ -3,8 +3,8 @@
 use std::marker::PhantomData;
 
 use lane_ode::{
-    Ended, Forcing, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, Task, Tolerance,
-    dopri5, rk4,
+    Forcing, Kernel, Lane, MAX_LANES, N, Peaks, Sample, Segment, SegmentEnd, Simd, Step, Task,
+    Tolerance, dopri5, rk4,
 };
 
 use crate::Oscillator;
@@ -136,21 +136,26 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
         &self.system
     }
 
-    fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; D]) -> Option<Leg> {
+    fn next_segment(
+        &mut self,
+        lane: usize,
+        ended: SegmentEnd,
+        x: &mut [N<T>; D],
+    ) -> Option<Segment> {
         let (trajectory, mut leg) = self.held[lane];
-        if let Ended::Arrived(count) | Ended::Failed { count, .. } = ended {
+        if let SegmentEnd::Completed(count) | SegmentEnd::Failed { count, .. } = ended {
             let run = &mut self.runs[trajectory];
             run.steps += count.accepted;
             run.rejected += count.rejected;
             run.peaks = self.peaks.lane(lane);
         }
         match ended {
-            Ended::Arrived(_) => leg += 1,
-            Ended::Failed { reason, time_s, .. } => {
+            SegmentEnd::Completed(_) => leg += 1,
+            SegmentEnd::Failed { reason, time_s, .. } => {
                 self.runs[trajectory].failure = Some((1 + reason as usize, Some(time_s)));
                 leg = LEGS;
             }
-            Ended::Idle => leg = LEGS,
+            SegmentEnd::Idle => leg = LEGS,
         }
         loop {
             while leg < LEGS {
@@ -162,7 +167,11 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
                 if start_s < end_s {
                     self.held[lane].1 = leg;
                     self.inside.0.set(lane, if leg == 1 { 1.0 } else { 0.0 });
-                    return Some(Leg { start_s, end_s, step_s: self.step_s.min(end_s - start_s) });
+                    return Some(Segment {
+                        start_s,
+                        end_s,
+                        step_s: self.step_s.min(end_s - start_s),
+                    });
                 }
                 leg += 1;
             }

@@ -25,7 +25,8 @@ use crate::{COORDINATES, ModelKind, Point};
 use core::marker::PhantomData;
 use extras::{Extras, Instants, Seen};
 use lane_ode::{
-    Aside, Count, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Peaks, Sample, Simd, Step, Task,
+    Aside, Count, Failure, Kernel, Lane, MAX_LANES, N, Peaks, Sample, Segment, SegmentEnd, Simd,
+    Step, Task,
 };
 
 /// Says whether to stop.
@@ -167,13 +168,18 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
     }
 
     #[inline(never)]
-    fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; STATES]) -> Option<Leg> {
+    fn next_segment(
+        &mut self,
+        lane: usize,
+        ended: SegmentEnd,
+        x: &mut [N<T>; STATES],
+    ) -> Option<Segment> {
         let state = &mut self.lanes[lane];
         let mut failure = None;
         match ended {
-            Ended::Idle => return self.next_point(lane, x),
-            Ended::Arrived(count) => state.count.add(count),
-            Ended::Failed { reason, time_s, count } => {
+            SegmentEnd::Idle => return self.next_point(lane, x),
+            SegmentEnd::Completed(count) => state.count.add(count),
+            SegmentEnd::Failed { reason, time_s, count } => {
                 state.count.add(count);
                 failure = Some((reason, time_s));
             }
@@ -315,7 +321,7 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     }
 
     /// Takes up the next point, if there is one.
-    fn next_point(&mut self, lane: usize, x: &mut [N<T>; STATES]) -> Option<Leg> {
+    fn next_point(&mut self, lane: usize, x: &mut [N<T>; STATES]) -> Option<Segment> {
         self.windows.0.set(lane, 0.0);
         // An idle lane rests at the start of its last point, where the model is defined.
         let is_last = self.taken == self.points.len();
@@ -339,7 +345,7 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
     }
 
     /// Starts the lane's current leg.
-    fn enter(&mut self, lane: usize) -> Leg {
+    fn enter(&mut self, lane: usize) -> Segment {
         let state = &self.lanes[lane];
         let point = self.points[state.point];
         let leg = &point.legs[state.leg];

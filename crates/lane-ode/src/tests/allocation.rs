@@ -1,7 +1,7 @@
 //! After set-up the integrators leave the heap alone.
 
 use super::{Method, Swing, Trajectory, instruction_sets, solve};
-use crate::{Ended, Tolerance};
+use crate::{SegmentEnd, Tolerance};
 
 #[test]
 fn the_counter_counts() {
@@ -22,7 +22,7 @@ fn a_whole_integration_asks_nothing_of_the_heap() {
             assert!(
                 outcomes
                     .iter()
-                    .all(|o| matches!(o.ended, Ended::Arrived(_)) && o.count.accepted > 20)
+                    .all(|o| matches!(o.ended, SegmentEnd::Completed(_)) && o.count.accepted > 20)
             );
             assert_eq!(asked, 0, "{method:?} on {simd:?}");
         }

@@ -11,7 +11,7 @@ struct Case {
     by_hand: fn(f64) -> [f64; 2],
 }
 
-/// One source for all three.
+/// Makes a case of an expression, which is the source of all three functions.
 macro_rules! case {
     ($name:literal, |$x:ident| $f:expr, |$y:ident| $by_hand:expr) => {
         Case {

@@ -1,7 +1,7 @@
 //! A trajectory that cannot go on ends with its reason and time; its neighbours do not notice.
 
 use super::{Equation, Method, Outcome, Trajectory, instruction_sets, solve};
-use crate::{Ended, Failure, Lane, Leg, N, Tolerance};
+use crate::{Failure, Lane, N, Segment, SegmentEnd, Tolerance};
 
 /// x' = a x^2 + b / (c - t) + sqrt(d - t), y' = w z, z' = -w y: explodes, runs into a pole, has no
 /// value, or is fast.
@@ -16,11 +16,11 @@ impl Equation<3, 5> for Mishaps {
     }
 }
 
-const LEG: Leg = Leg { start_s: 0.0, end_s: 2.0, step_s: 1e-3 };
+const SEGMENT: Segment = Segment { start_s: 0.0, end_s: 2.0, step_s: 1e-3 };
 
 fn trajectory(parameters: [f64; 5]) -> Trajectory<3, 5> {
-    let legs = vec![Leg { end_s: 0.25, ..LEG }, Leg { start_s: 0.25, ..LEG }];
-    Trajectory { parameters, start: [1.0, 1.0, 0.0], legs }
+    let segments = vec![Segment { end_s: 0.25, ..SEGMENT }, Segment { start_s: 0.25, ..SEGMENT }];
+    Trajectory { parameters, start: [1.0, 1.0, 0.0], segments }
 }
 
 /// Nothing happens to these.
@@ -54,7 +54,7 @@ fn among_others(method: Method, mishaps: &[Trajectory<3, 5>]) -> Vec<Outcome<3>>
     for simd in instruction_sets() {
         let alone: Vec<_> = (0..12).map(sound).collect();
         let (alone, _) = solve::<Mishaps, 3, 5>(simd, method, &alone);
-        assert!(alone.iter().all(|o| matches!(o.ended, Ended::Arrived(_))));
+        assert!(alone.iter().all(|o| matches!(o.ended, SegmentEnd::Completed(_))));
         for offset in 0..4 {
             // Mishaps at every third place from `offset` on.
             let mut mixed: Vec<_> = (0..12).map(sound).collect();
@@ -65,7 +65,8 @@ fn among_others(method: Method, mishaps: &[Trajectory<3, 5>]) -> Vec<Outcome<3>>
                 places.push(place);
             }
             let (outcomes, _) = solve::<Mishaps, 3, 5>(simd, method, &mixed);
-            let (mut bad, mut good) = (Vec::new(), Vec::new());
+            let mut bad = Vec::new();
+            let mut good = Vec::new();
             for (i, outcome) in outcomes.into_iter().enumerate() {
                 if places.contains(&i) { bad.push(outcome) } else { good.push(outcome) }
             }
@@ -82,7 +83,7 @@ fn among_others(method: Method, mishaps: &[Trajectory<3, 5>]) -> Vec<Outcome<3>>
 }
 
 fn failure(outcome: &Outcome<3>) -> (Failure, f64) {
-    let Ended::Failed { reason, time_s, .. } = outcome.ended else {
+    let SegmentEnd::Failed { reason, time_s, .. } = outcome.ended else {
         panic!("it did not fail: {outcome:?}")
     };
     (reason, time_s)
@@ -129,7 +130,7 @@ fn a_spent_allowance_of_steps_ends_alone() {
     {
         let (reason, _) = failure(&outcome);
         assert_eq!(reason, Failure::StepLimit);
-        let Ended::Failed { count, .. } = outcome.ended else { unreachable!() };
+        let SegmentEnd::Failed { count, .. } = outcome.ended else { unreachable!() };
         assert_eq!(count.accepted + count.rejected, 2000);
     }
 }

@@ -9,11 +9,11 @@ use core::hint::black_box;
 /// Operands of one lane.
 type Operands = [f64; 3];
 
-/// What is computed of them: numbers, sine and cosine twice, two choices.
+/// Number of results of the operands: numbers, sine and cosine twice, two choices.
 const RESULTS: usize = 21;
 
-/// What IEEE 754 and the standard library say; of a negated sum, without the compiler's eye on both
-/// at once (`aarch64::negated`).
+/// Returns the results by IEEE 754 and the standard library. A negated sum is hidden from the
+/// compiler, which would fuse both (`aarch64::negated`).
 fn expected([a, b, c]: Operands) -> [f64; RESULTS] {
     let (sin, cos) = trig::sin_cos(a);
     let (sin_turns, cos_turns) = trig::sin_cos_turns(N(a));
@@ -144,7 +144,8 @@ fn operands() -> Vec<Operands> {
     all
 }
 
-/// The same bits, or both not a number: its sign and payload differ between processors.
+/// Whether both have the same bits or are not a number, whose sign and payload differ between
+/// processors.
 fn is_same(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
 }

@@ -1,11 +1,11 @@
 //! Orders of convergence, of both methods and of what they say between steps.
 
 use super::{Coupled, Equation, Method, Outcome, Swing, Trajectory, solve};
-use crate::{Ended, Leg, Simd, Tolerance};
+use crate::{Segment, SegmentEnd, Simd, Tolerance};
 
 const END_S: f64 = 6.0;
 
-/// Accepts any step: with legs of one step each, an adaptive method becomes one of fixed step.
+/// Accepts any step: with segments of one step each, an adaptive method becomes one of fixed step.
 const ANYTHING: Tolerance = Tolerance { relative: 1e30, absolute: 1e30, max_steps: u64::MAX };
 
 /// Error at the end, and the largest inside a step, for each number of steps.
@@ -20,7 +20,7 @@ fn errors(method: Method, steps: &[u32]) -> Vec<[f64; 2]> {
     let (outcomes, _) = solve::<Swing, 3, 1>(Simd::best(), method, &trajectories);
     let exact = Swing::exact(&[1.0], END_S);
     let of = |(n, outcome): (&u32, Outcome<3>)| {
-        assert!(matches!(outcome.ended, Ended::Arrived(_)), "{outcome:?}");
+        assert!(matches!(outcome.ended, SegmentEnd::Completed(_)), "{outcome:?}");
         assert_eq!((outcome.count.accepted, outcome.count.rejected), (u64::from(*n), 0));
         let at_end = (0..3).map(|i| (outcome.x[i] - exact[i]).abs()).fold(0.0, f64::max);
         [at_end, outcome.error_inside]
@@ -95,8 +95,8 @@ fn additive_has_order_5_with_a_part_that_is_implicit() {
 #[test]
 fn additive_steps_over_a_stiff_part_and_keeps_its_tolerance() {
     // Rigid, they swing at the root of 1/2.
-    let legs = vec![Leg { start_s: 0.0, end_s: 10.0, step_s: 1e-4 }];
-    let trajectory = Trajectory { parameters: [1e8], start: [1.0, 1.0, 0.0, 0.0], legs };
+    let segments = vec![Segment { start_s: 0.0, end_s: 10.0, step_s: 1e-4 }];
+    let trajectory = Trajectory { parameters: [1e8], start: [1.0, 1.0, 0.0, 0.0], segments };
     for tolerance in [1e-4, 1e-6] {
         let allowed = Tolerance { relative: tolerance, absolute: tolerance, max_steps: 5_000 };
         let (outcomes, _) = solve::<Coupled, 4, 1>(
@@ -105,7 +105,7 @@ fn additive_steps_over_a_stiff_part_and_keeps_its_tolerance() {
             core::slice::from_ref(&trajectory),
         );
         let Outcome { ended, x, count, .. } = outcomes[0];
-        assert!(matches!(ended, Ended::Arrived(_)), "{ended:?}");
+        assert!(matches!(ended, SegmentEnd::Completed(_)), "{ended:?}");
         let error = (x[0] - (10.0 * 0.5_f64.sqrt()).cos()).abs();
         eprintln!("additive at {tolerance:e}: error {error:.1e}, {count:?}");
         assert!(error < 10.0 * tolerance, "{tolerance:e} gave {error:e}");
@@ -127,7 +127,7 @@ fn dopri5_keeps_the_tolerance_it_is_given_with_steps_by_the_fifth_root() {
             core::slice::from_ref(&trajectory),
         );
         let Outcome { ended, x, count, error_inside, .. } = outcomes[0];
-        assert!(matches!(ended, Ended::Arrived(_)));
+        assert!(matches!(ended, SegmentEnd::Completed(_)));
         let error = (0..3).map(|i| (x[i] - exact[i]).abs()).fold(error_inside, f64::max);
         eprintln!("dopri5 at {tolerance:e}: error {error:.2e}, {count:?}");
         assert!(error < 30.0 * tolerance, "{tolerance:e} gave {error:e}");
@@ -141,7 +141,7 @@ fn dopri5_keeps_the_tolerance_it_is_given_with_steps_by_the_fifth_root() {
 }
 
 #[test]
-fn every_leg_ends_where_it_should() {
+fn every_segment_ends_where_it_should() {
     // Ends and steps that binary fractions do not hit.
     let ends = [0.1, 0.7, 1.0 / 3.0, 2.2, 5.3, 0.049, 7.77];
     for method in [
@@ -154,9 +154,10 @@ fn every_leg_ends_where_it_should() {
             .into_iter()
             .map(|end_s| {
                 let edges = [0.0, 0.3 * end_s, 0.31 * end_s, end_s];
-                let leg = |pair: &[f64]| Leg { start_s: pair[0], end_s: pair[1], step_s: 0.007 };
+                let segment =
+                    |pair: &[f64]| Segment { start_s: pair[0], end_s: pair[1], step_s: 0.007 };
                 Trajectory {
-                    legs: edges.windows(2).map(leg).collect(),
+                    segments: edges.windows(2).map(segment).collect(),
                     ..Trajectory::swing(1.0, 1.0, 1, 1.0)
                 }
             })
@@ -164,7 +165,7 @@ fn every_leg_ends_where_it_should() {
         for simd in super::instruction_sets() {
             let (outcomes, _) = solve::<Swing, 3, 1>(simd, method, &trajectories);
             for (end_s, outcome) in ends.into_iter().zip(outcomes) {
-                assert!(matches!(outcome.ended, Ended::Arrived(_)));
+                assert!(matches!(outcome.ended, SegmentEnd::Completed(_)));
                 assert_eq!(
                     outcome.observed_to_s.to_bits(),
                     end_s.to_bits(),
@@ -177,8 +178,9 @@ fn every_leg_ends_where_it_should() {
 
 #[test]
 fn a_fixed_step_fills_its_leg_with_the_fewest_equal_steps() {
-    let steps =
-        |end_s: f64, step_s: f64| crate::fixed::fixed_steps(&Leg { start_s: 0.0, end_s, step_s });
+    let steps = |end_s: f64, step_s: f64| {
+        crate::fixed::fixed_steps(&Segment { start_s: 0.0, end_s, step_s })
+    };
     assert_eq!(steps(50.0, 2e-4), 250_000);
     assert_eq!(steps(1.0, 0.3), 4);
     // 0.7 / 0.1 is a hair below 7, 0.3 / 0.1 a hair below 3, 4.35 / 0.01 a hair below 435: none is

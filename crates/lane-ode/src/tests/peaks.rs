@@ -1,4 +1,4 @@
-//! How far a peak found from steps lies from the true one.
+//! Differences of peaks that are found from steps from the true ones.
 
 use crate::{N, Peaks, Sample};
 use core::f64::consts::TAU;
@@ -15,7 +15,8 @@ impl Waves {
     fn at(&self, t: f64) -> [f64; 3] {
         let mut y = [0.0; 3];
         for k in 0..2 {
-            let (a, w) = (self.amplitude[k], self.frequency[k]);
+            let a = self.amplitude[k];
+            let w = self.frequency[k];
             let (sin, cos) = (w * t + self.phase[k]).sin_cos();
             y[0] += a * sin;
             y[1] += a * w * cos;
@@ -44,7 +45,7 @@ impl Waves {
         Sample { value, slope, curvature }
     }
 
-    /// What [`Peaks`] finds in `steps` equal steps.
+    /// Returns the peak that [`Peaks`] finds in `steps` equal steps.
     fn found(&self, end: f64, steps: u32) -> f64 {
         self.found_by(Peaks::advance, end, steps)
     }
@@ -117,7 +118,7 @@ fn without_curvatures_the_sampling_error_is_of_fourth_order() {
 
 #[test]
 fn without_a_look_inside_a_peak_would_be_missed() {
-    // The same signal from samples alone: what the refinement is for.
+    // Samples alone miss the peak by what the refinement adds.
     let waves = Waves { amplitude: [1.0, 0.0], frequency: [TAU, 1.0], phase: [0.4, 0.0] };
     let samples = (0..=20).map(|i| waves.at(f64::from(i) / 10.0)[0].abs()).fold(0.0, f64::max);
     assert!(1.0 - samples > 1e-3);

@@ -76,7 +76,8 @@ fn a_lane_does_not_feel_where_others_are_cut() {
     }
     together.begin(&sample(0.0), [true; 3]);
     for i in 1..=60 {
-        let (t, h) = (0.05 * f64::from(i), N(Array([0.05; 3])));
+        let t = 0.05 * f64::from(i);
+        let h = N(Array([0.05; 3]));
         together.advance(N(Array([t; 3])), h, &sample(t), [true; 3]);
     }
     for lane in 0..3 {
@@ -93,7 +94,9 @@ fn a_lane_does_not_feel_where_others_are_cut() {
 
 /// Relative error of the integral of the square over two periods and a bit.
 fn square_error(steps: u32) -> f64 {
-    let (amplitude, phase, end) = (1.5, 0.4, 2.3);
+    let amplitude = 1.5;
+    let phase = 0.4;
+    let end = 2.3;
     let waves = Waves { amplitude: [amplitude, 0.0], frequency: [TAU, 1.0], phase: [phase, 0.0] };
     let h = end / f64::from(steps);
     let mut squares = SquareIntegrals::<f64, 1>::new(N(0.0));

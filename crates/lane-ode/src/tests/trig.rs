@@ -26,12 +26,12 @@ impl Reference {
         ulps(sin, &true_sin).max(ulps(cos, &true_cos))
     }
 
-    /// Of an angle in radians.
+    /// Returns the errors of an angle in radians.
     fn radians(&mut self, x: f64) -> f64 {
         self.errors(&BigFloat::from_f64(x, BITS), trig::sin_cos(x))
     }
 
-    /// Of an angle in turns.
+    /// Returns the errors of an angle in turns.
     fn turns(&mut self, turns: f64) -> f64 {
         let two_pi =
             self.constants.pi(BITS, NEAREST).mul(&BigFloat::from_f64(2.0, BITS), BITS, NEAREST);
@@ -61,7 +61,8 @@ fn largest(
     angles: impl Iterator<Item = f64>,
     mut error: impl FnMut(f64) -> f64,
 ) -> f64 {
-    let (mut most, mut at) = (0.0_f64, 0.0);
+    let mut most = 0.0_f64;
+    let mut at = 0.0;
     for angle in angles {
         let error = error(angle);
         assert!(error.is_finite(), "{name}: {angle}");
@@ -95,7 +96,7 @@ fn sines_of_any_angle_are_within_1_5_ulp() {
     let mut reference = Reference::new();
     let large = random(4, 3000, |u| 10.0_f64.powf(6.0 * u));
     assert!(largest("up to 1e6", large, |x| reference.radians(x)) < 1.5);
-    // Where almost all digits cancel.
+    // Almost all digits cancel here.
     let close = (1..500_u32)
         .map(|k| f64::from(k * k) * FRAC_PI_2)
         .chain((1..500).map(|k| f64::from(k) * PI));
@@ -117,7 +118,7 @@ fn sines_of_turns_are_within_1_6_ulp_however_many() {
 fn whole_turns_drop_out_exactly() {
     for part in [0.0, 0.125, 0.2, -0.3, 0.499] {
         let [a, b] = [1.0, 1048576.0].map(|turns| {
-            // What is left of `part` after the whole turns have been added and taken away again.
+            // The rest of `part` after the whole turns have been added and taken away again.
             let kept: f64 = (part + turns) - turns;
             (trig::sin_cos_turns(N(kept)), trig::sin_cos_turns(N(kept + turns)))
         });

@@ -20,7 +20,8 @@ use crate::run::suspension::forces;
 use crate::{COORDINATES, Forces, Method, ModelKind, Point, Stop};
 use core::marker::PhantomData;
 use lane_ode::{
-    Aside, Ended, Failure, Kernel, Lane, Leg, MAX_LANES, N, Sample as Sampled, Simd, Step, Task,
+    Aside, Failure, Kernel, Lane, MAX_LANES, N, Sample as Sampled, Segment, SegmentEnd, Simd, Step,
+    Task,
 };
 
 /// One trajectory at some instants.
@@ -283,14 +284,19 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
     }
 
     #[inline(never)]
-    fn next_leg(&mut self, lane: usize, ended: Ended, x: &mut [N<T>; STATES]) -> Option<Leg> {
+    fn next_segment(
+        &mut self,
+        lane: usize,
+        ended: SegmentEnd,
+        x: &mut [N<T>; STATES],
+    ) -> Option<Segment> {
         let place = lane.min(self.asked.len() - 1);
         let (Asked { point, method, .. }, found) = (&self.asked[place], &mut self.found[place]);
         let next = match ended {
-            Ended::Idle if place < lane => point.legs.len(),
-            Ended::Idle => 0,
-            Ended::Arrived(_) => self.legs[lane].map_or(0, |leg| leg + 1),
-            Ended::Failed { reason, time_s, .. } => {
+            SegmentEnd::Idle if place < lane => point.legs.len(),
+            SegmentEnd::Idle => 0,
+            SegmentEnd::Completed(_) => self.legs[lane].map_or(0, |leg| leg + 1),
+            SegmentEnd::Failed { reason, time_s, .. } => {
                 found.failure = Some((reason, time_s));
                 point.legs.len()
             }

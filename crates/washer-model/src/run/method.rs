@@ -9,7 +9,7 @@ use crate::nonlinear::coupling::Coupling;
 use crate::point::PlannedLeg;
 use crate::run::model::{Linear, Model, Nonlinear};
 use crate::{Caps, Formula, ModelKind, Point};
-use lane_ode::{Lane, Leg, N, Task, Tolerance, additive, dop853, dopri5, rk4};
+use lane_ode::{Lane, N, Segment, Task, Tolerance, additive, dop853, dopri5, rk4};
 
 /// How trajectories are integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -156,13 +156,13 @@ pub(crate) fn enter<T: Lane, M: Model<T>>(
     mut method: Method,
     point: &Point,
     leg: &PlannedLeg,
-) -> Leg {
+) -> Segment {
     model.set_spin(lane, &point.stretches[leg.stretch]);
     let step_s = match method.numbers() {
         MethodNumbers::Step(step_s) | MethodNumbers::Capped(step_s, _) => *step_s,
         MethodNumbers::Tolerance(_) => FIRST_STEP_S,
     };
-    Leg { start_s: leg.start_s, end_s: leg.end_s, step_s }
+    Segment { start_s: leg.start_s, end_s: leg.end_s, step_s }
 }
 
 /// How bearings and hinge act where a trajectory starts.
