@@ -1,6 +1,6 @@
-//! Numbers that can be set and swept: their ranges, their form in messages, the unit at the end of
-//! their names; and which way a number of a result is bad. Models, the engine and whoever reads
-//! results share them.
+//! Numbers that can be set and swept: their ranges, their form in messages, and the unit at the end
+//! of their names; also the direction in which a number of a result is bad. Models, the engine and
+//! readers of results share them.
 
 mod named;
 
@@ -8,45 +8,45 @@ use std::fmt;
 
 /// A number that can be set and swept.
 pub trait Parameter: Clone + PartialEq + fmt::Debug + Send + Sync {
-    /// Name in grid files, on the command line and of the result's column.
+    /// Returns the name in grid files, on the command line and of the result's column.
     fn name(&self) -> &str;
-    /// Unit, as in the name's suffix but readable.
+    /// Returns the unit, as in the name's suffix but readable.
     fn unit(&self) -> &'static str;
-    /// What it is, in a phrase.
+    /// Returns the meaning, in a phrase.
     fn description(&self) -> &'static str;
-    /// Values it may take.
+    /// Returns the values that it may take.
     fn range(&self) -> Range;
-    /// The edge of the window that it is (0: the beginning, 1: the end), if any. The window belongs
-    /// to no model.
+    /// Returns the edge of the window that it is (0: the beginning, 1: the end), if any. The window
+    /// belongs to no model.
     fn window_edge(&self) -> Option<usize>;
 }
 
 /// A motion that is compared between two models.
 pub trait Channel: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
-    /// Name in grid files and column names.
+    /// Returns the name in grid files and column names.
     fn name(self) -> &'static str;
-    /// Unit.
+    /// Returns the unit.
     fn unit(self) -> &'static str;
-    /// One line for column dictionaries and pages.
+    /// Returns a line for column dictionaries and pages.
     fn description(self) -> &'static str;
 }
 
-/// Why a name is no parameter.
+/// The reason why a name is no parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownParameter {
-    /// In words.
+    /// The reason, in words.
     pub reason: String,
-    /// No model has a parameter of this name: there may be one of a name near to it.
+    /// Whether no model has a parameter of this name: there may be one of a name near to it.
     pub is_strange: bool,
 }
 
 impl UnknownParameter {
-    /// Of a name that no model has.
+    /// Returns the reason for a name that no model has.
     pub fn strange() -> Self {
         Self { reason: "no parameter has this name".to_owned(), is_strange: true }
     }
 
-    /// Of a name that this very model lacks.
+    /// Returns the reason for a name that this model lacks, and others have.
     pub fn not_here(reason: impl Into<String>) -> Self {
         Self { reason: reason.into(), is_strange: false }
     }
@@ -75,7 +75,8 @@ pub enum Range {
 }
 
 impl Range {
-    /// Greatest magnitude accepted of any number.
+    /// Greatest magnitude of any number, in its own unit. Basis: products of a few of them, and
+    /// squares of these, stay finite. Twice as much would be as good.
     pub const LARGEST: f64 = 1e12;
 
     /// Whether `value` is allowed; never for NaN or infinity.
@@ -86,7 +87,8 @@ impl Range {
             && !(value == 0.0 && self.excludes_zero())
     }
 
-    /// The least and the greatest value; infinite where there is no bound but [`Self::LARGEST`].
+    /// Returns the least and the greatest value; infinite where there is no bound but
+    /// [`Self::LARGEST`].
     pub const fn bounds(self) -> [f64; 2] {
         match self {
             Self::Any => [f64::NEG_INFINITY, f64::INFINITY],
@@ -101,7 +103,7 @@ impl Range {
         matches!(self, Self::Positive | Self::Negative)
     }
 
-    /// The accepted values, for the message about a refused one.
+    /// Describes the accepted values, for the message about a refused one.
     pub fn instead_of(self, value: f64) -> String {
         if value.is_finite() && value.abs() > Self::LARGEST && !matches!(self, Self::Within(..)) {
             format!("{self}, at most {:e} in magnitude", Self::LARGEST)
@@ -112,7 +114,7 @@ impl Range {
 }
 
 named! {
-    /// Which way a number is bad; named as column dictionaries say it.
+    /// The direction in which a number is bad; named as in column dictionaries.
     pub enum Worse {
         /// The greater it is.
         Greater = "greater",
@@ -122,7 +124,7 @@ named! {
 }
 
 impl Worse {
-    /// The worst value: the greatest or the least.
+    /// Names the worst value: the greatest or the least.
     pub const fn extreme(self) -> &'static str {
         match self {
             Self::Greater => "greatest",
@@ -130,7 +132,7 @@ impl Worse {
         }
     }
 
-    /// How much worse `a` is than `b`; at most 0 where it is not.
+    /// Returns by how much `a` is worse than `b`; at most 0 if it is not.
     pub fn by(self, a: f64, b: f64) -> f64 {
         match self {
             Self::Greater => a - b,
@@ -142,7 +144,7 @@ impl Worse {
 /// The value up to which a number is good, which has a meaning of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
-    /// In the number's unit.
+    /// The limit, in the number's unit.
     pub value: f64,
     /// A difference from the limit that counts as much as a factor of e counts of a ratio, in the
     /// number's unit.
@@ -159,7 +161,7 @@ pub struct RatioLimits {
 }
 
 impl From<f64> for RatioLimits {
-    /// No lower limit.
+    /// Returns limits without a lower one.
     fn from(most: f64) -> Self {
         Self { most, least: None }
     }
@@ -171,21 +173,22 @@ impl RatioLimits {
         greatest < self.most && self.least.is_none_or(|limit| least > limit)
     }
 
-    /// How far such a point is from turning its verdict, as a share of the limit.
+    /// Returns the distance of such a point from the other verdict, as a share of the limit.
     pub fn margin(self, least: f64, greatest: f64) -> f64 {
         let from = |ratio: f64, limit: f64| (ratio / limit - 1.0).abs();
-        let of_least = self.least.map_or(f64::INFINITY, |limit| from(least, limit));
-        from(greatest, self.most).min(of_least)
+        let from_least = self.least.map_or(f64::INFINITY, |limit| from(least, limit));
+        from(greatest, self.most).min(from_least)
     }
 
-    /// Below this ratio the linear model over-estimates as much as it may under-estimate.
+    /// Returns the ratio below which the linear model over-estimates by more than it may
+    /// under-estimate.
     pub fn over_estimate(self) -> f64 {
         self.least.unwrap_or(1.0 / self.most)
     }
 }
 
-/// A number as a message shows it: the shortest decimal that reads back the same, in powers of ten
-/// where it would be long.
+/// Writes a number for a message: the shortest decimal that reads back the same, in powers of ten
+/// if it would be long.
 pub fn decimal(value: f64) -> String {
     let text = format!("{value:?}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
@@ -205,7 +208,7 @@ impl fmt::Display for Range {
     }
 }
 
-/// The ending of names of numbers in this unit; `None` where names do not show it.
+/// Returns the ending of names of numbers in this unit; `None` if names do not show it.
 pub fn unit_suffix(unit: &str) -> Option<&'static str> {
     Some(match unit {
         "m" => "_m",

@@ -15,11 +15,11 @@ use washer_model::{
 };
 
 /// The equations of one machine and its spin.
-pub struct Washer(Equations);
+pub struct WasherEquations(Equations);
 
-/// What to make: see `washer_setup` in `washer.h`.
+/// The machine, spin and model to make: `washer_setup` of `washer.h`.
 #[repr(C)]
-pub struct Setup {
+pub struct WasherSetup {
     /// "nonlinear" or "linear".
     pub model: *const c_char,
     /// "cycloidal", "triangular", "ramp" or "table".
@@ -32,20 +32,20 @@ pub struct Setup {
     pub time_s: *const f64,
     /// Speeds (rpm) of "table" at these times.
     pub speed_rpm: *const f64,
-    /// How many of both.
+    /// The number of times, and of speeds.
     pub spin_points: usize,
     /// Names of parameters that differ from the paper's machine.
     pub names: *const *const c_char,
-    /// Their values.
+    /// Values of these parameters.
     pub values: *const f64,
-    /// How many of both.
+    /// The number of names, and of values.
     pub constants: usize,
 }
 
 /// The outcome of a call.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
+pub enum WasherStatus {
     /// The machine was made.
     Ok = 0,
     /// A pointer that must not be null is, or a text is not UTF-8.
@@ -58,34 +58,36 @@ pub enum Status {
     NoEquilibrium = 4,
 }
 
-/// Text that ends with a zero byte.
+/// Reads a text that ends with a zero byte.
 ///
 /// # Safety
 /// `text` is null or points at such a text.
-unsafe fn text<'a>(text: *const c_char) -> Result<&'a str, Status> {
+unsafe fn text<'a>(text: *const c_char) -> Result<&'a str, WasherStatus> {
     if text.is_null() {
-        return Err(Status::Null);
+        return Err(WasherStatus::Null);
     }
     // SAFETY: not null, and the caller's promise.
-    unsafe { CStr::from_ptr(text) }.to_str().map_err(|_| Status::Null)
+    unsafe { CStr::from_ptr(text) }.to_str().map_err(|_| WasherStatus::Null)
 }
 
-/// An array; an empty one may be null.
+/// Reads an array; an empty one may be null.
 ///
 /// # Safety
 /// `first` is null or points at `count` values.
-unsafe fn array<'a, T>(first: *const T, count: usize) -> Result<&'a [T], Status> {
+unsafe fn array<'a, T>(first: *const T, count: usize) -> Result<&'a [T], WasherStatus> {
     match (first.is_null(), count) {
         (_, 0) => Ok(&[]),
-        (true, _) => Err(Status::Null),
+        (true, _) => Err(WasherStatus::Null),
         // SAFETY: not null, and the caller's promise.
         (false, _) => Ok(unsafe { slice::from_raw_parts(first, count) }),
     }
 }
 
+/// Makes the equations of a setup.
+///
 /// # Safety
-/// What `setup` points at is as `washer_new` asks.
-unsafe fn make(setup: &Setup) -> Result<Washer, Status> {
+/// `setup` points at texts and arrays as `washer_new` requires them.
+unsafe fn make(setup: &WasherSetup) -> Result<WasherEquations, WasherStatus> {
     // SAFETY (of all five): the caller's promise.
     let (model, profile) = unsafe { (text(setup.model)?, text(setup.profile)?) };
     let time_s = unsafe { array(setup.time_s, setup.spin_points)? };
@@ -93,31 +95,33 @@ unsafe fn make(setup: &Setup) -> Result<Washer, Status> {
     let names = unsafe { array(setup.names, setup.constants)? };
     let values = unsafe { array(setup.values, setup.constants)? };
 
-    let model = ModelKind::named(model).ok_or(Status::UnknownName)?;
-    let (peak_rpm, ramp_s) = (setup.peak_rpm, setup.ramp_s);
+    let model = ModelKind::named(model).ok_or(WasherStatus::UnknownName)?;
+    let peak_rpm = setup.peak_rpm;
+    let ramp_s = setup.ramp_s;
     let mut spin = match Profile::named(profile) {
         Some(profile) => Spin::Ramped { profile, peak_rpm, ramp_s },
         None if profile == "table" => {
             Spin::Table { time_s: time_s.to_vec(), speed_rpm: speed_rpm.to_vec() }
         }
-        None => return Err(Status::UnknownName),
+        None => return Err(WasherStatus::UnknownName),
     };
     let mut machine = Machine::paper();
     for (&name, &value) in names.iter().zip(values) {
         // SAFETY: the caller's promise.
         let name = unsafe { text(name)? };
-        let parameter = Parameter::find(name, &machine, &spin).map_err(|_| Status::UnknownName)?;
+        let parameter =
+            Parameter::find(name, &machine, &spin).map_err(|_| WasherStatus::UnknownName)?;
         parameter.set(&mut machine, &mut spin, value);
     }
     if !machine.violations().is_empty() || !spin.violations().is_empty() {
-        return Err(Status::OutOfRange);
+        return Err(WasherStatus::OutOfRange);
     }
     // Only the equations are used, so any time will do.
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     let point = prepare(Simd::best(), &[(machine, spin)], &timing).pop();
     match point {
-        Some(Ok(point)) => Ok(Washer(Equations::new(&point, model))),
-        _ => Err(Status::NoEquilibrium),
+        Some(Ok(point)) => Ok(WasherEquations(Equations::new(&point, model))),
+        _ => Err(WasherStatus::NoEquilibrium),
     }
 }
 
@@ -127,16 +131,19 @@ unsafe fn make(setup: &Setup) -> Result<Washer, Status> {
 /// `setup` is null or points at a setup whose texts and arrays are null or valid; `made` is null or
 /// can be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn washer_new(setup: *const Setup, made: *mut *mut Washer) -> Status {
+pub unsafe extern "C" fn washer_new(
+    setup: *const WasherSetup,
+    made: *mut *mut WasherEquations,
+) -> WasherStatus {
     if setup.is_null() || made.is_null() {
-        return Status::Null;
+        return WasherStatus::Null;
     }
     // SAFETY: not null, and the caller's promise.
     match unsafe { make(&*setup) } {
         Ok(washer) => {
             // SAFETY: not null, and the caller's promise.
             unsafe { *made = Box::into_raw(Box::new(washer)) };
-            Status::Ok
+            WasherStatus::Ok
         }
         Err(status) => status,
     }
@@ -147,14 +154,14 @@ pub unsafe extern "C" fn washer_new(setup: *const Setup, made: *mut *mut Washer)
 /// # Safety
 /// `machine` comes from `washer_new` and is not used again.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn washer_free(machine: *mut Washer) {
+pub unsafe extern "C" fn washer_free(machine: *mut WasherEquations) {
     if !machine.is_null() {
         // SAFETY: the caller's promise.
         drop(unsafe { Box::from_raw(machine) });
     }
 }
 
-/// Numbers of a state.
+/// Returns the length of a state.
 #[unsafe(no_mangle)]
 pub extern "C" fn washer_dimension() -> usize {
     STATE_LEN
@@ -165,33 +172,38 @@ pub extern "C" fn washer_dimension() -> usize {
 /// # Safety
 /// `machine` is alive and `x` has room for a state.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn washer_initial_state(machine: *const Washer, x: *mut f64) {
+pub unsafe extern "C" fn washer_initial_state(machine: *const WasherEquations, x: *mut f64) {
     // SAFETY: the caller's promise.
     unsafe { ptr::copy_nonoverlapping((*machine).0.at_rest().as_ptr(), x, STATE_LEN) };
 }
 
-/// dx = f(t, x).
+/// Computes dx = f(t, x).
 ///
 /// # Safety
 /// `machine` is alive and in no other thread's call, `x` holds a state and `dx` has room for one.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn washer_rhs(t_s: f64, x: *const f64, dx: *mut f64, machine: *mut Washer) {
+pub unsafe extern "C" fn washer_rhs(
+    t_s: f64,
+    x: *const f64,
+    dx: *mut f64,
+    machine: *mut WasherEquations,
+) {
     // SAFETY: the caller's promise; `x` is copied, so that `dx` may be the same array.
     let (machine, x) = unsafe { (&mut *machine, *x.cast::<[f64; STATE_LEN]>()) };
     // SAFETY: the caller's promise.
     unsafe { *dx.cast::<[f64; STATE_LEN]>() = machine.0.derivative(t_s, &x) };
 }
 
-/// The Jacobian df/dx, row by row.
+/// Computes the Jacobian df/dx, row by row.
 ///
 /// # Safety
-/// As [`washer_rhs`]; `jacobian` has room for the square of the dimension.
+/// `machine` and `x` as for [`washer_rhs`]; `jacobian` has room for the square of the dimension.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn washer_jacobian(
     t_s: f64,
     x: *const f64,
     jacobian: *mut f64,
-    machine: *mut Washer,
+    machine: *mut WasherEquations,
 ) {
     // SAFETY: the caller's promise.
     let (machine, x) = unsafe { (&mut *machine, *x.cast::<[f64; STATE_LEN]>()) };
@@ -199,29 +211,29 @@ pub unsafe extern "C" fn washer_jacobian(
     unsafe { *jacobian.cast::<[[f64; STATE_LEN]; STATE_LEN]>() = machine.0.jacobian(t_s, &x) };
 }
 
-/// Number of channels.
+/// Returns the number of channels.
 #[unsafe(no_mangle)]
 pub extern "C" fn washer_channels() -> usize {
     Channel::ALL.len()
 }
 
-/// A channel's name; null beyond the last.
+/// Returns a channel's name; null beyond the last.
 #[unsafe(no_mangle)]
 pub extern "C" fn washer_channel_name(channel: usize) -> *const c_char {
     Channel::ALL.get(channel).map_or(ptr::null(), |channel| channel.c_name().as_ptr())
 }
 
-/// Channels and their rates.
+/// Computes the channels and their rates.
 ///
 /// # Safety
-/// As [`washer_rhs`]; `values` and `rates` have room for every channel.
+/// `machine` and `x` as for [`washer_rhs`]; `values` and `rates` have room for every channel.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn washer_outputs(
     t_s: f64,
     x: *const f64,
     values: *mut f64,
     rates: *mut f64,
-    machine: *mut Washer,
+    machine: *mut WasherEquations,
 ) {
     // SAFETY: the caller's promise.
     let (machine, x) = unsafe { (&mut *machine, *x.cast::<[f64; STATE_LEN]>()) };
@@ -237,8 +249,8 @@ pub unsafe extern "C" fn washer_outputs(
 mod tests {
     use super::*;
 
-    fn setup() -> Setup {
-        Setup {
+    fn setup() -> WasherSetup {
+        WasherSetup {
             model: c"nonlinear".as_ptr(),
             profile: c"triangular".as_ptr(),
             peak_rpm: 350.0,
@@ -252,11 +264,11 @@ mod tests {
         }
     }
 
-    fn status(setup: &Setup) -> Status {
+    fn status(setup: &WasherSetup) -> WasherStatus {
         let mut made = ptr::null_mut();
         // SAFETY: everything that the setup points at lives until here.
         let status = unsafe { washer_new(setup, &raw mut made) };
-        assert_eq!(status == Status::Ok, !made.is_null());
+        assert_eq!(status == WasherStatus::Ok, !made.is_null());
         // SAFETY: made above, or null.
         unsafe { washer_free(made) };
         status
@@ -264,19 +276,28 @@ mod tests {
 
     #[test]
     fn what_cannot_be_made_says_why() {
-        assert_eq!(status(&setup()), Status::Ok);
-        assert_eq!(status(&Setup { model: ptr::null(), ..setup() }), Status::Null);
-        assert_eq!(status(&Setup { profile: c"spiral".as_ptr(), ..setup() }), Status::UnknownName);
+        assert_eq!(status(&setup()), WasherStatus::Ok);
+        assert_eq!(status(&WasherSetup { model: ptr::null(), ..setup() }), WasherStatus::Null);
+        assert_eq!(
+            status(&WasherSetup { profile: c"spiral".as_ptr(), ..setup() }),
+            WasherStatus::UnknownName
+        );
         let names = [c"unbalance_mass_kg".as_ptr()];
         let with = |names: &[*const c_char; 1], value: &f64| {
-            status(&Setup { names: names.as_ptr(), values: value, constants: 1, ..setup() })
+            status(&WasherSetup { names: names.as_ptr(), values: value, constants: 1, ..setup() })
         };
-        assert_eq!(with(&names, &0.7), Status::Ok);
-        assert_eq!(with(&names, &-0.7), Status::OutOfRange);
-        assert_eq!(with(&[c"unbalance".as_ptr()], &0.7), Status::UnknownName);
-        assert_eq!(with(&[c"spring_stiffness_n_per_m".as_ptr()], &1e-3), Status::NoEquilibrium);
-        assert_eq!(status(&Setup { constants: 1, ..setup() }), Status::Null);
-        assert_eq!(status(&Setup { profile: c"table".as_ptr(), ..setup() }), Status::OutOfRange);
+        assert_eq!(with(&names, &0.7), WasherStatus::Ok);
+        assert_eq!(with(&names, &-0.7), WasherStatus::OutOfRange);
+        assert_eq!(with(&[c"unbalance".as_ptr()], &0.7), WasherStatus::UnknownName);
+        assert_eq!(
+            with(&[c"spring_stiffness_n_per_m".as_ptr()], &1e-3),
+            WasherStatus::NoEquilibrium
+        );
+        assert_eq!(status(&WasherSetup { constants: 1, ..setup() }), WasherStatus::Null);
+        assert_eq!(
+            status(&WasherSetup { profile: c"table".as_ptr(), ..setup() }),
+            WasherStatus::OutOfRange
+        );
     }
 
     #[test]
@@ -294,10 +315,10 @@ mod tests {
     fn the_jacobian_is_that_of_the_right_hand_side() {
         for model in [c"nonlinear", c"linear"] {
             let mut made = ptr::null_mut();
-            let setup = Setup { model: model.as_ptr(), ..setup() };
+            let setup = WasherSetup { model: model.as_ptr(), ..setup() };
             // SAFETY: setup and arrays live until the machine is freed.
             unsafe {
-                assert_eq!(washer_new(&raw const setup, &raw mut made), Status::Ok);
+                assert_eq!(washer_new(&raw const setup, &raw mut made), WasherStatus::Ok);
                 let mut x = [0.0; STATE_LEN];
                 washer_initial_state(made, x.as_mut_ptr());
                 x.iter_mut().enumerate().for_each(|(i, x)| *x += 1e-3 * (i as f64).sin());
