@@ -16,7 +16,7 @@ use serde_json::Value;
 
 use crate::store::schema::{Column, Holds, writer};
 use crate::{Build, StoreError};
-use sweep_files::batches::of_arrow;
+use sweep_files::batches::from_arrow;
 use sweep_files::{Writer, key, panics, seal};
 use sweep_parameter::{Parameter, Worse};
 
@@ -129,7 +129,7 @@ impl Table {
         };
         let (fields, arrays): (Vec<Field>, _) = self.columns.into_iter().map(field).unzip();
         let schema = Arc::new(Schema::new(fields));
-        let batch = RecordBatch::try_new(schema.clone(), arrays).map_err(of_arrow)?;
+        let batch = RecordBatch::try_new(schema.clone(), arrays).map_err(from_arrow)?;
         let rows = batch.clone();
         let bytes = panics::in_parquet("the library gave up writing", move || {
             let mut writer = Writer::new(Vec::new(), &schema, properties)?;

@@ -11,27 +11,30 @@ use tempfile::NamedTempFile;
 
 use crate::{FileError, regular};
 
-/// Prefix and suffix of files in the making.
+/// Beginning of the name of a temporary file.
 const PREFIX: &str = ".sweep-";
+/// Ending of the name of a temporary file.
 const SUFFIX: &str = ".tmp";
 
-/// How often a temporary file is made anew when somebody removes it before it is locked, or has
-/// taken its name.
+/// Greatest number of attempts to make a temporary file that nobody removes before it is locked,
+/// and whose name nobody has taken. Basis: either happens in an instant alone. Twice as many change
+/// nothing.
 const ATTEMPTS: u32 = 5;
 
-/// Hexadecimal digits of either part of such a name: at 48 bits, two processes of a cluster do not
-/// come upon the same name, nor a user upon a name with its check.
+/// Number of hexadecimal digits of either part of such a name. Basis: at 48 bits, two processes of
+/// a cluster do not make the same name, nor does a user choose a name with its check. Twice as many
+/// make long names.
 const DIGITS: usize = 12;
 
-/// Returns whether a name is that of a file in the making: one part of it is the check of the
-/// other, so that no file of a user's is taken for one.
+/// Whether a name is that of a temporary file. A part of it is the check of the other, so that no
+/// file of a user's is taken for a temporary one.
 pub fn is_temporary(name: &str) -> bool {
     let parts = name.strip_prefix(PREFIX).and_then(|rest| rest.strip_suffix(SUFFIX));
     let parts = parts.and_then(|parts| parts.split_once('-'));
     parts.is_some_and(|(own, check)| own.len() == DIGITS && check == digits(own))
 }
 
-/// Makes a name for a file in the making that this process has not made before.
+/// Makes a name of a temporary file that this process has not made before.
 pub fn temporary_name() -> String {
     static MADE: AtomicU64 = AtomicU64::new(0);
     let made = MADE.fetch_add(1, Ordering::Relaxed);
@@ -46,8 +49,8 @@ fn digits(text: &str) -> String {
     hash.chars().take(DIGITS).collect()
 }
 
-/// A file in the making inside `folder`; it disappears unless [`publish`]ed. It is locked, so that
-/// [`clear_leftovers`] knows it from those that killed processes left.
+/// Makes a temporary file in `folder`, which disappears unless it is [`publish`]ed. It is locked,
+/// so that [`clear_leftovers`] tells it from files that killed processes left.
 ///
 /// # Errors
 /// [`FileError::Io`].
@@ -71,7 +74,7 @@ pub fn begin(folder: &Path) -> Result<NamedTempFile, FileError> {
         let lost = match file.as_file().try_lock() {
             Ok(()) => !is_named(file.as_file(), file.path()),
             Err(TryLockError::WouldBlock) => true,
-            // Where there are no locks, nobody takes the file for a leftover.
+            // Without locks nobody takes the file for a leftover.
             Err(TryLockError::Error(_)) => false,
         };
         if !lost || attempt == ATTEMPTS {
@@ -91,7 +94,7 @@ pub fn is_named(file: &File, path: &Path) -> bool {
     }
 }
 
-/// Elsewhere an open file cannot be deleted, so it is.
+/// Whether the path exists: an open file cannot be deleted on other systems.
 #[cfg(not(unix))]
 pub fn is_named(_file: &File, path: &Path) -> bool {
     path.exists()
@@ -120,8 +123,7 @@ pub fn write(folder: &Path, target: &Path, bytes: &[u8]) -> Result<(), FileError
     publish(file, target)
 }
 
-/// Writes a file whole unless something is there; says whether this process was the one that wrote
-/// it.
+/// Writes a file whole unless something is there. Returns whether it was written.
 ///
 /// # Errors
 /// [`FileError::Io`].
@@ -136,7 +138,7 @@ pub fn create(folder: &Path, target: &Path, bytes: &[u8]) -> Result<bool, FileEr
     }
 }
 
-/// Makes renames and removals in a folder last.
+/// Syncs a folder, so that renames and removals in it are kept after a power cut.
 ///
 /// # Errors
 /// [`FileError::Io`].
@@ -176,7 +178,7 @@ pub fn remove(path: &Path) -> Result<(), FileError> {
     Ok(())
 }
 
-/// The folder a path lives in.
+/// Returns the folder of a path.
 pub fn parent(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if parent != Path::new("") => parent,
@@ -232,7 +234,7 @@ mod tests {
             assert!(folder.path().join(name).exists(), "{name}");
         }
         let path = held.path().to_owned();
-        // As after a kill: the file stays, the lock goes.
+        // A killed process leaves the file without its lock.
         drop(held.keep().unwrap());
         clear_leftovers(folder.path());
         assert!(!path.exists());
@@ -243,7 +245,8 @@ mod tests {
     fn others_may_read_what_the_umask_lets_them() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
-        let (ours, plain) = (folder.path().join("ours"), folder.path().join("plain"));
+        let ours = folder.path().join("ours");
+        let plain = folder.path().join("plain");
         write(folder.path(), &ours, b"").unwrap();
         File::create(&plain).unwrap();
         let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();

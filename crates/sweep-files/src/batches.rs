@@ -1,7 +1,7 @@
 //! Columns of a Parquet file as Arrow's arrays, by the Parquet library's own column readers.
 //!
-//! Its reader of Arrow's arrays would bring every type that Arrow has, and how to select from and
-//! compare each. Our files have numbers, truths and words.
+//! The library's reader of Arrow's arrays would compile selection and comparison of every type that
+//! Arrow has. Our files have numbers, truth values and words.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -24,33 +24,39 @@ use serde_json::Value;
 
 use crate::key;
 
-/// Rows of a batch, which never come from two row groups.
+/// Greatest number of rows of a batch, which never come from two row groups. Basis: a batch of a
+/// hundred columns takes 3 MB. Twice as many take twice the memory.
 const BATCH_ROWS: usize = 1 << 12;
 
-/// Words that are read at once, and their bytes in a batch (each word counts once): how they are
-/// coded may make a few bytes of a file many long words.
+/// Number of words that are read at once. Basis: a few bytes of a file may decode to many long
+/// words, whose bytes are counted after each read. Twice as many may take twice the memory.
 const WORDS_AT_ONCE: usize = 32;
-const MOST_WORD_BYTES: usize = 1 << 30;
+/// Greatest number of bytes of the different words of a batch. Basis: as [`WORDS_AT_ONCE`]. Twice
+/// as many may take 2 GB.
+const MAX_WORD_BYTES: usize = 1 << 30;
 
-/// The columns of a file. One that is not read, such as a group or a time, is of no type.
+/// Returns the columns of a file. A column that is not read, such as a group or a time, is of no
+/// type.
 pub fn schema(file: &ParquetMetaData) -> SchemaRef {
     let about = file.file_metadata();
     let pairs = about.key_value_metadata().into_iter().flatten();
-    let told = pairs.filter(|pair| pair.key == key::COLUMNS).find_map(|pair| pair.value.as_deref());
-    let told: Value = told.and_then(|told| serde_json::from_str(told).ok()).unwrap_or_default();
+    let described =
+        pairs.filter(|pair| pair.key == key::COLUMNS).find_map(|pair| pair.value.as_deref());
+    let described: Value =
+        described.and_then(|described| serde_json::from_str(described).ok()).unwrap_or_default();
     let fields = about.schema_descr().root_schema().get_fields().iter().map(|declared| {
-        let told = told[declared.name()].as_object().into_iter().flatten();
-        let told = told.filter(|(key, _)| *key != "type").map(|(key, value)| {
+        let described = described[declared.name()].as_object().into_iter().flatten();
+        let described = described.filter(|(key, _)| *key != "type").map(|(key, value)| {
             (key.clone(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
         });
-        let told: HashMap<String, String> = told.collect();
+        let described: HashMap<String, String> = described.collect();
         let is_nullable = declared.get_basic_info().repetition() != Repetition::REQUIRED;
-        Field::new(declared.name(), data_type(declared), is_nullable).with_metadata(told)
+        Field::new(declared.name(), data_type(declared), is_nullable).with_metadata(described)
     });
     Arc::new(Schema::new(fields.collect::<Vec<_>>()))
 }
 
-/// Numbers are of the widest type of their kind.
+/// Returns a column's type. Numbers are of the widest type of their kind.
 fn data_type(declared: &Declared) -> DataType {
     use ConvertedType as As;
     let about = declared.get_basic_info();
@@ -80,7 +86,7 @@ pub struct Batches<R> {
     source: Arc<R>,
     file: Arc<ParquetMetaData>,
     schema: SchemaRef,
-    /// Where each column is among those of a row group.
+    /// The place of each column among those of a row group.
     leaves: Vec<usize>,
     /// The decimal places of each column of decimals.
     scales: Vec<Option<i32>>,
@@ -92,7 +98,7 @@ pub struct Batches<R> {
 }
 
 impl<R: ChunkReader + 'static> Batches<R> {
-    /// The columns at these places of a file's [`schema`].
+    /// Opens the columns at these places of a file's [`schema`].
     ///
     /// # Errors
     /// A column of a type that is not read.
@@ -102,7 +108,7 @@ impl<R: ChunkReader + 'static> Batches<R> {
         schema: &Schema,
         fields: Vec<usize>,
     ) -> Result<Self, ParquetError> {
-        let schema = Arc::new(schema.project(&fields).map_err(of_arrow)?);
+        let schema = Arc::new(schema.project(&fields).map_err(from_arrow)?);
         if let Some(other) =
             schema.fields().iter().find(|field| *field.data_type() == DataType::Null)
         {
@@ -118,14 +124,22 @@ impl<R: ChunkReader + 'static> Batches<R> {
             (column.converted_type() == ConvertedType::DECIMAL).then(|| column.type_scale())
         };
         let scales = leaves.iter().map(scale).collect();
-        let (source, columns) = (Arc::new(source), Vec::new());
-        Ok(Self { source, file, schema, leaves, scales, group: 0, left: 0, columns })
+        Ok(Self {
+            source: Arc::new(source),
+            file,
+            schema,
+            leaves,
+            scales,
+            group: 0,
+            left: 0,
+            columns: Vec::new(),
+        })
     }
 
-    /// The next rows; `None` behind the last.
+    /// Reads the next rows; `None` after the last.
     ///
     /// # Errors
-    /// What is wrong with the file.
+    /// A damaged file.
     pub fn batch(&mut self) -> Result<Option<RecordBatch>, ParquetError> {
         while self.left == 0 {
             let Some(group) = self.file.row_groups().get(self.group) else { return Ok(None) };
@@ -150,12 +164,12 @@ impl<R: ChunkReader + 'static> Batches<R> {
         // There may be no column.
         let count = RecordBatchOptions::new().with_row_count(Some(rows));
         let batch = RecordBatch::try_new_with_options(Arc::clone(&self.schema), arrays, &count);
-        batch.map(Some).map_err(of_arrow)
+        batch.map(Some).map_err(from_arrow)
     }
 }
 
-/// What Arrow reported, among what the Parquet library does.
-pub fn of_arrow(error: ArrowError) -> ParquetError {
+/// Wraps an error of Arrow as one of the Parquet library.
+pub fn from_arrow(error: ArrowError) -> ParquetError {
     ParquetError::External(Box::new(error))
 }
 
@@ -185,12 +199,13 @@ fn array(
     }
 }
 
-/// The next values of a column, and which rows have one.
+/// Reads the next values of a column, and the levels that tell which rows have one.
 fn read<T: Physical>(
     column: &mut ColumnReaderImpl<T>,
     rows: usize,
 ) -> Result<(Vec<i16>, Vec<T::T>), ParquetError> {
-    let (mut levels, mut values) = (Vec::new(), Vec::new());
+    let mut levels = Vec::new();
+    let mut values = Vec::new();
     let (read, ..) = column.read_records(rows, Some(&mut levels), None, &mut values)?;
     if read != rows {
         return Err(ParquetError::General("a column has fewer rows than it should".to_owned()));
@@ -200,7 +215,7 @@ fn read<T: Physical>(
     Ok((levels, values))
 }
 
-/// Each value in its row.
+/// Puts each value in its row.
 fn cells<T>((levels, values): (Vec<i16>, Vec<T>)) -> impl Iterator<Item = Option<T>> {
     let mut values = values.into_iter();
     levels.into_iter().map(move |level| if level == 1 { values.next() } else { None })
@@ -253,12 +268,14 @@ fn words(
     column: &mut ColumnReaderImpl<ByteArrayType>,
     rows: usize,
 ) -> Result<ArrayRef, ParquetError> {
-    let (mut words, mut bytes) = (Vec::<String>::new(), 0);
-    // By place: a dictionary has each word once. Behind its page another word may lie there.
+    let mut words = Vec::<String>::new();
+    let mut bytes = 0;
+    // Codes by the words' addresses: a dictionary has each word once. The next page may have
+    // another word at an address.
     let mut codes = HashMap::new();
     let mut keys = Vec::with_capacity(rows);
     while keys.len() < rows {
-        // Neighbours mostly share theirs.
+        // Neighbours mostly have the same word.
         let mut last = (("".as_ptr(), usize::MAX), 0);
         for word in cells(read(column, WORDS_AT_ONCE.min(rows - keys.len()))?) {
             let Some(word) = word else {
@@ -279,11 +296,11 @@ fn words(
             }
             keys.push(Some(last.1));
         }
-        if bytes > MOST_WORD_BYTES {
+        if bytes > MAX_WORD_BYTES {
             return Err(ParquetError::General("its words are too long".to_owned()));
         }
     }
     let words = Arc::new(StringArray::from(words));
     let coded = DictionaryArray::<Int32Type>::try_new(Int32Array::from(keys), words);
-    Ok(Arc::new(coded.map_err(of_arrow)?))
+    Ok(Arc::new(coded.map_err(from_arrow)?))
 }

@@ -13,7 +13,7 @@ fn unreadable(array: &dyn Array, wanted: &str) -> ArrowError {
     ArrowError::SchemaError(format!("expected a column of {wanted}, found {}", array.data_type()))
 }
 
-/// Numbers of any width, one per row.
+/// Reads numbers of any width, one per row.
 ///
 /// # Errors
 /// [`ArrowError::SchemaError`] if the column does not hold integers or floats.
@@ -44,7 +44,7 @@ pub fn is_number(data_type: &DataType) -> bool {
     data_type.is_integer() || matches!(data_type, DataType::Float64 | DataType::Float32)
 }
 
-/// Truth values, one per row.
+/// Reads truth values, one per row.
 ///
 /// # Errors
 /// [`ArrowError::SchemaError`] if the column does not hold such.
@@ -52,7 +52,7 @@ pub fn flags(array: &dyn Array) -> Result<&BooleanArray, ArrowError> {
     array.as_boolean_opt().ok_or_else(|| unreadable(array, "true and false"))
 }
 
-/// Words, one per row: each lies there once, however many rows have it.
+/// Reads words, one per row. A word is stored once, however many rows have it.
 ///
 /// # Errors
 /// [`ArrowError::SchemaError`] if the column does not hold such.

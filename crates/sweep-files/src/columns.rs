@@ -1,11 +1,11 @@
-//! The columns of a file: what each says of itself.
+//! The columns of a file and their metadata.
 
 use arrow_schema::{DataType, Field, Schema};
 use sweep_parameter::Worse;
 
 use crate::{cells, key};
 
-/// What the cells of a column are.
+/// The kind of a column's cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellKind {
     /// Integers or floats.
@@ -17,7 +17,7 @@ pub enum CellKind {
 }
 
 impl CellKind {
-    /// In a sentence: "a number".
+    /// Names it for a sentence: "a number".
     pub const fn name(self) -> &'static str {
         match self {
             Self::Number => "a number",
@@ -30,21 +30,21 @@ impl CellKind {
 /// A column, without its rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// As in the file.
+    /// The name in the file.
     pub name: String,
-    /// From the field's metadata; empty for pure numbers and words.
+    /// The unit by the field's metadata; empty for pure numbers and words.
     pub unit: String,
-    /// From the field's metadata; may be empty.
+    /// The description by the field's metadata; may be empty.
     pub description: String,
-    /// What its cells are.
+    /// The kind of the cells.
     pub kind: CellKind,
     /// Whether the file keeps it as whole numbers.
     pub whole: bool,
-    /// Which way it is bad, if the file says so.
+    /// The direction in which it is bad, if the file says so.
     pub worse: Option<Worse>,
-    /// Up to where it is good, if the file says so.
+    /// The value up to which it is good, if the file says so.
     pub limit: Option<f64>,
-    /// Its place among the fields.
+    /// The place among the fields.
     pub field: usize,
 }
 
@@ -55,7 +55,7 @@ impl Column {
     }
 }
 
-/// The columns of rows, without those of types that none of our files has.
+/// Returns the columns of rows, without those of types that none of our files has.
 pub fn columns(schema: &Schema) -> Vec<Column> {
     let fields = schema.fields().iter().enumerate();
     fields.filter_map(|(place, field)| column(field, place)).collect()
@@ -68,16 +68,16 @@ fn column(field: &Field, place: usize) -> Option<Column> {
         number if cells::is_number(number) => CellKind::Number,
         _ => return None,
     };
-    let told = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
-    let unit = told("unit");
+    let metadata = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
+    let unit = metadata("unit");
     Some(Column {
         name: field.name().clone(),
         unit: if unit == "1" { String::new() } else { unit },
-        description: told("description"),
+        description: metadata("description"),
         kind,
         whole: field.data_type().is_integer(),
-        worse: Worse::named(&told(key::WORSE)),
-        limit: told(key::LIMIT).parse().ok(),
+        worse: Worse::named(&metadata(key::WORSE)),
+        limit: metadata(key::LIMIT).parse().ok(),
         field: place,
     })
 }

@@ -1,4 +1,4 @@
-//! What can go wrong with a file, each with the path and what to do about it.
+//! Failures of files, each with the path and with advice.
 
 use std::borrow::Cow;
 use std::io;
@@ -9,14 +9,14 @@ use arrow_schema::ArrowError;
 /// A failure to read or write a file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The file system said no.
+    /// The system refused an operation.
     #[error("cannot {action} {}: {source}\n  = help: {}", path.display(), advice(path, source))]
     Io {
-        /// What was being done, in the infinitive.
+        /// The operation, in the infinitive.
         action: &'static str,
-        /// The file or folder it was done to.
+        /// The file or folder.
         path: PathBuf,
-        /// What the system answered.
+        /// The system's error.
         source: io::Error,
     },
     /// There is something at a path where this program must not write.
@@ -24,17 +24,17 @@ pub enum FileError {
     Refused {
         /// The path as given.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         reason: String,
-        /// What to do.
+        /// The advice.
         help: &'static str,
     },
     /// A file that is not Parquet, or only a part of one.
     #[error("{} is not a readable Parquet file: {reason}", path.display())]
     NotParquet {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// The reader's words.
+        /// The reason, by the reader.
         reason: String,
     },
     /// A file of this program whose bytes have changed since it was written.
@@ -44,7 +44,7 @@ pub enum FileError {
         path.display()
     )]
     Damaged {
-        /// Which file.
+        /// The file.
         path: PathBuf,
     },
     /// A result of this program that another one has written anew.
@@ -54,32 +54,32 @@ pub enum FileError {
         path.display()
     )]
     Rewritten {
-        /// Which file.
+        /// The file.
         path: PathBuf,
     },
 }
 
-/// How a damaged file is known.
+/// The reason why a file is called damaged.
 const DAMAGED: &str = "the digest that it carries is not that of its bytes";
 
 impl FileError {
-    /// Turns what the system answered into [`FileError::Io`]; `action` in the infinitive.
+    /// Makes [`FileError::Io`] of a system's error; `action` in the infinitive.
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_path_buf();
         move |source| Self::Io { action, path, source }
     }
 
-    /// The cells of a file are not what its schema says.
+    /// Makes the error of cells that are not of their schema's types.
     pub fn cells(path: &Path) -> impl FnOnce(ArrowError) -> Self {
         move |error| Self::not_parquet(path, error.to_string())
     }
 
-    /// A file that the reader cannot read, for this reason.
+    /// Makes the error of a file that cannot be read, for this reason.
     pub(crate) fn not_parquet(path: &Path, reason: impl Into<String>) -> Self {
         Self::NotParquet { path: path.to_path_buf(), reason: reason.into() }
     }
 
-    /// A file of this program that has changed.
+    /// Makes the error of a file of this program that has changed.
     pub fn damaged(path: &Path) -> Self {
         Self::Damaged { path: path.to_path_buf() }
     }
@@ -94,10 +94,10 @@ impl FileError {
     }
 }
 
-/// What a user can do about an I/O failure. Finished chunks are whole whatever happened, so it ends
-/// alike.
+/// Returns the advice about a failed operation. Finished chunks are whole whatever happened, so
+/// that it ends alike.
 fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
-    let told = match source.kind() {
+    let advice = match source.kind() {
         io::ErrorKind::StorageFull => {
             "the disk is full: free some space and run the same command again; finished chunks of \
              a run are kept"
@@ -129,10 +129,10 @@ fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
              finished chunks of a run are kept"
         }
     };
-    told.into()
+    advice.into()
 }
 
-/// The result that a path without its folder or ending means.
+/// Finds the result that a path without its folder or ending means.
 fn near(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?;
     let mut whole = name.to_owned();

@@ -1,4 +1,5 @@
-//! The kinds of files that this program writes, and how one is recognised before it is overwritten.
+//! The kinds of files that this program writes, and the tests that recognise one before it is
+//! overwritten.
 
 use std::ffi::OsStr;
 use std::io::Read as _;
@@ -6,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{FileError, ParquetFile, key, regular};
 
-/// A kind of file. One may be written over another of the same kind.
+/// A kind of file. A file may be written over another of its kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileKind<'a> {
     /// Result of `sweep run`.
@@ -31,12 +32,12 @@ pub enum FileKind<'a> {
     Differences,
     /// A table that `sweep export` wrote.
     Exported {
-        /// Its ending: `csv` or `xlsx`.
+        /// The ending: `csv` or `xlsx`.
         ending: &'static str,
     },
     /// The JSON file beside a map that says how the run went.
     Account {
-        /// Name of the map.
+        /// The name of the map.
         of: &'a OsStr,
     },
     /// An SVG picture without a prologue, as `sweep plot` writes them and drawing programs do not.
@@ -61,14 +62,14 @@ const OWN: [(FileKind<'static>, &str, &str, &str); 8] = [
     (FileKind::Differences, "differences", key::DIFFERENCES, "result of `sweep compare --out`"),
 ];
 
-/// The beginning of the model's own file; what it is of follows.
+/// Beginning of the model's own file.
 pub const OWN_FILE: &str = "# Written by sweep: ";
 
 /// The first line of an exported CSV file.
 pub const EXPORTED_CSV: &str = "# exported by sweep ";
 
 impl FileKind<'_> {
-    /// The kind in words: "the file there is no NAME".
+    /// Names the kind: "the file there is no NAME".
     pub fn name(self) -> &'static str {
         match self {
             Self::Own => "file of `sweep optimise --best` or `sweep fit --out`",
@@ -82,7 +83,7 @@ impl FileKind<'_> {
         }
     }
 
-    /// Says why the regular file at `path` is not of this kind; `None` if it is.
+    /// Returns the reason why the regular file at `path` is not of this kind; `None` if it is.
     pub(crate) fn objection(self, path: &Path) -> Result<Option<String>, FileError> {
         let begins = |with: &[u8]| {
             let mut start = Vec::new();
@@ -116,13 +117,14 @@ impl FileKind<'_> {
         Ok((!is_ours).then_some(objection))
     }
 
-    /// A kind of result in one word.
+    /// Names a kind of result in one word.
     pub fn word(self) -> &'static str {
         self.own().map_or("map", |(_, word, ..)| word)
     }
 
-    /// The format that an ending says, if files of this kind are of another.
+    /// Returns the format that an ending says, if files of this kind are of another.
     pub(crate) fn other_format(self, path: &Path) -> Option<&'static str> {
+        // Endings of formats that are not Parquet.
         const OTHERS: &str = "csv tsv txt json toml xlsx ods nc h5 svg png pdf html zip";
         let ending = path.extension()?;
         let is_parquet = self == Self::Map || self.own().is_some();
@@ -135,7 +137,7 @@ impl FileKind<'_> {
 }
 
 impl ParquetFile {
-    /// The kind of result that the metadata speaks of, if of any.
+    /// Returns the kind of result by the metadata, if it is one.
     pub fn kind(&self) -> Option<FileKind<'static>> {
         let has = |key: &str| self.value(key).is_some();
         let own = OWN.iter().find(|(_, _, key, _)| has(key)).map(|(kind, ..)| *kind);
@@ -143,8 +145,8 @@ impl ParquetFile {
     }
 }
 
-/// The sidecar beside a result, under its name: `x.run.json` beside `x.parquet`, `v1.5.run.json`
-/// beside `v1.5`.
+/// Returns the path of a result's sidecar: `x.run.json` beside `x.parquet`, `v1.5.run.json` beside
+/// `v1.5`.
 pub fn beside(output: &Path, ending: &str) -> PathBuf {
     let stem = if output.extension().is_some_and(|extension| extension == "parquet") {
         output.file_stem()
@@ -157,8 +159,8 @@ pub fn beside(output: &Path, ending: &str) -> PathBuf {
     output.with_file_name(name)
 }
 
-/// Whether it is an account, but not that of another result whose place it is: what was renamed
-/// together with its result still has the old name in it.
+/// Whether the file is an account, and not that of another result in its place: an account that was
+/// renamed together with its result still has the old name in it.
 fn is_account(path: &Path, of: &OsStr) -> std::io::Result<bool> {
     let text = regular::read_json(path)?;
     let account: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();

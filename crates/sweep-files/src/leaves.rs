@@ -1,4 +1,4 @@
-//! JSON values walked side by side, such as the plans of two files.
+//! Two JSON values side by side, such as the plans of two files.
 
 use std::fmt;
 
@@ -23,7 +23,7 @@ impl fmt::Display for Step<'_> {
     }
 }
 
-/// A path as people write it: `machine.dampers.1.damping_n_s_per_m`.
+/// Writes a path with dots: `machine.dampers.1.damping_n_s_per_m`.
 pub fn dotted(path: &[Step<'_>]) -> String {
     path.iter().map(Step::to_string).collect::<Vec<_>>().join(".")
 }

@@ -8,8 +8,9 @@ use tempfile::NamedTempFile;
 
 use crate::{FileError, FileKind, atomic, regular};
 
-/// A file in the making. Before the command does any work, its path is judged, a missing folder is
-/// made, and its temporary file is opened: so a folder that cannot be written fails early.
+/// A file that is not finished. Before the command does any work, its path is checked, a missing
+/// folder is made, and its temporary file is opened: so a folder that cannot be written fails
+/// early.
 #[derive(Debug)]
 pub struct Output<'a> {
     path: &'a Path,
@@ -29,7 +30,7 @@ impl<'a> Output<'a> {
         Ok(Self { path, kind, temporary: atomic::begin(folder)? })
     }
 
-    /// Writes what comes next of it.
+    /// Writes the next bytes.
     ///
     /// # Errors
     /// [`FileError::Io`].
@@ -37,10 +38,10 @@ impl<'a> Output<'a> {
         self.temporary.write_all(bytes).map_err(FileError::io("write", self.path))
     }
 
-    /// Ends it with these bytes: from then on the file is whole at its path.
+    /// Writes the last bytes and publishes the file at its path.
     ///
     /// # Errors
-    /// As [`Output::begin`], for a file that has appeared there meanwhile.
+    /// Those of [`Output::begin`], for a file that has appeared there meanwhile.
     pub fn finish(mut self, bytes: &[u8]) -> Result<(), FileError> {
         self.write(bytes)?;
         judge(self.path, self.kind)?;
@@ -48,10 +49,10 @@ impl<'a> Output<'a> {
     }
 }
 
-/// Writes one of many files of a folder that is [`ready`].
+/// Writes a file in a folder that is [`ready`].
 ///
 /// # Errors
-/// As [`Output::begin`].
+/// Those of [`Output::begin`].
 pub fn write(path: &Path, kind: FileKind<'_>, bytes: &[u8]) -> Result<(), FileError> {
     judge(path, kind)?;
     let output = Output { path, kind, temporary: atomic::begin(atomic::parent(path))? };
@@ -68,7 +69,7 @@ pub fn ready(folder: &Path) -> Result<(), FileError> {
     Ok(())
 }
 
-/// The rule of what a file may be written over.
+/// Checks that a file of this kind may be written at a path, over the file that is there.
 ///
 /// # Errors
 /// [`FileError::Refused`] for what must not be overwritten, [`FileError::Io`],
@@ -77,6 +78,7 @@ pub fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
     let refuse = |reason: &str, help| {
         Err(FileError::Refused { path: path.to_path_buf(), reason: reason.to_owned(), help })
     };
+    // The advice about a path that is no file's.
     const NAME_A_FILE: &str = "give the name of a file, such as results/x.parquet";
     if path.file_name().is_none() {
         return refuse("it has no file name", NAME_A_FILE);

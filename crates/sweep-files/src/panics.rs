@@ -12,12 +12,13 @@ thread_local! {
     static CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Calls `work`; a panic comes back as its message, and nothing is printed. What `work` has changed
-/// must not be used after that.
+/// Calls `work` and turns a panic into its message; nothing is printed. Data that `work` has
+/// changed must not be used after a panic.
 ///
 /// # Errors
 /// The message of a panic.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    // The hook of panics is set once per process.
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let before = panic::take_hook();
@@ -33,8 +34,9 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     result.map_err(|panic| text(panic.as_ref()).to_owned())
 }
 
-/// As [`caught`], for the Parquet library; `what` a panic of it means. Reading, it panics at some
-/// damage and at some files of other programs; writing, where memory is refused.
+/// Calls `work` of the Parquet library like [`caught`]; `what` says the meaning of a panic. The
+/// library panics when it reads some damaged files and some of other programs, and when it writes
+/// and gets no memory.
 ///
 /// # Errors
 /// The library's own; [`ParquetError::General`] for a panic.
@@ -45,7 +47,7 @@ pub fn in_parquet<T>(
     caught(work).unwrap_or_else(|panic| Err(ParquetError::General(format!("{what}: {panic}"))))
 }
 
-/// What a panic said.
+/// Returns the message of a panic.
 pub fn text(panic: &(dyn Any + Send)) -> &str {
     panic
         .downcast_ref::<&str>()
@@ -54,12 +56,12 @@ pub fn text(panic: &(dyn Any + Send)) -> &str {
         .unwrap_or("a panic without a message")
 }
 
-/// A mutex's content, whatever a panic has left of it.
+/// Locks a mutex, whatever state a panic has left its content in.
 pub fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// As [`lock`], of a mutex that is used no more.
+/// Returns the content of a mutex, whatever state a panic has left it in.
 pub fn unlocked<T>(mutex: Mutex<T>) -> T {
     mutex.into_inner().unwrap_or_else(PoisonError::into_inner)
 }

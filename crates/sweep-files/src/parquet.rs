@@ -17,13 +17,15 @@ use crate::pages::{self, Unpacked};
 use crate::seal::{self, Seal};
 use crate::{FileError, Refused, footer, key, panics, regular};
 
-/// Most bytes that the pages of a file may unpack into at once. A byte of words counts as several:
-/// the library takes 32 for a word of a dictionary, which may be empty after its length of 4. Ours
-/// have pages of 1 MiB.
-const MOST_AT_ONCE: u64 = 1 << 30;
-const BYTE_OF_WORDS: u64 = 8;
+/// Greatest number of bytes that the pages of a file may unpack into at once. Basis: our pages have
+/// 1 MiB, and half of 2 GB is left for everything else. Twice as many may take 2 GB.
+const MAX_UNPACKED_BYTES: u64 = 1 << 30;
+/// Number of bytes that a byte of words counts as. Basis: the library takes 32 for a word of a
+/// dictionary, which may be empty after its length of 4. Twice as many refuse files of half as many
+/// words.
+const BYTES_PER_WORD_BYTE: u64 = 8;
 
-/// The beginning of the name by which this program signs its files; a version follows.
+/// Beginning of the name by which this program signs its files, before a version.
 pub const CREATED_BY: &str = "sweep version ";
 
 /// The beginnings of the names by which other writers sign their files. Some of these writers keep
@@ -43,12 +45,12 @@ pub struct ParquetFile {
 }
 
 impl ParquetFile {
-    /// Opens a file, and if it is one of ours, makes sure of every byte.
+    /// Opens a file, and checks every byte of one of ours.
     ///
     /// # Errors
     /// [`FileError::Io`], [`FileError::NotParquet`], [`FileError::Damaged`].
     pub fn open(path: &Path) -> Result<Self, FileError> {
-        // Where a run keeps its work is easily taken for its result.
+        // The folder of an unfinished run is easily taken for its result.
         if path.extension().is_some_and(|ending| ending == "partial") && path.is_dir() {
             let reason = format!(
                 "it is the folder of a run that is not finished; its result will be {}, and \
@@ -91,8 +93,8 @@ impl ParquetFile {
                 let outside = |_| FileError::not_parquet(&self.path, "a column lies outside of it");
                 let (start, length) = range.map_err(outside)?;
                 let is_words = column.column_type() == Type::BYTE_ARRAY;
-                let weight = if is_words { BYTE_OF_WORDS } else { 1 };
-                let left = (MOST_AT_ONCE - at_once) / weight;
+                let weight = if is_words { BYTES_PER_WORD_BYTE } else { 1 };
+                let left = (MAX_UNPACKED_BYTES - at_once) / weight;
                 let most = Unpacked { total: u64::MAX, at_once: left };
                 let codec = column.compression();
                 let sizes = pages::unpacked(&mut &self.file, start, length, codec, most);
@@ -102,7 +104,7 @@ impl ParquetFile {
         Ok(())
     }
 
-    /// Opens a file to see whose it is, without reading it through unless it makes no sense.
+    /// Opens a file to find out its writer. It is read through only if it cannot be parsed.
     pub(crate) fn look(path: &Path) -> Result<Self, FileError> {
         let open = || regular::open(path).map_err(FileError::io("open", path));
         let parsed = Self::parse(path, open()?, Seal::Absent);
@@ -121,7 +123,7 @@ impl ParquetFile {
         Ok(Self { path: path.to_path_buf(), file, metadata, schema, seal })
     }
 
-    /// Where it is.
+    /// Returns the path.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -137,7 +139,7 @@ impl ParquetFile {
         self.seal == Seal::Whole
     }
 
-    /// The file's bytes, which are still those that were checked if it is one of ours.
+    /// Reads the bytes of the file, and checks again that a file of ours is unchanged.
     ///
     /// # Errors
     /// [`FileError::Io`]; [`FileError::Damaged`] if it has been written over.
@@ -157,37 +159,37 @@ impl ParquetFile {
         self.metadata.file_metadata()
     }
 
-    /// The columns: names, types, and the metadata of each.
+    /// Returns the columns: names, types, and the metadata of each.
     pub fn schema(&self) -> &SchemaRef {
         &self.schema
     }
 
-    /// How many rows it has, by its own account.
+    /// Returns the number of rows by the metadata.
     pub fn rows(&self) -> u64 {
         u64::try_from(self.about().num_rows()).unwrap_or(0)
     }
 
-    /// The program that wrote it.
+    /// Returns the program that wrote it.
     pub fn created_by(&self) -> Option<&str> {
         self.about().created_by()
     }
 
-    /// The file's own key-value metadata.
+    /// Returns the file's own key-value metadata.
     pub fn pairs(&self) -> impl Iterator<Item = &KeyValue> {
         self.about().key_value_metadata().into_iter().flatten()
     }
 
-    /// One value of them.
+    /// Returns the value of a key of the metadata.
     pub fn value(&self, key: &str) -> Option<&str> {
         self.pairs().find(|pair| pair.key == key)?.value.as_deref()
     }
 
-    /// One value of them, which is JSON.
+    /// Returns the value of a key of the metadata, which is JSON.
     pub fn json(&self, key: &str) -> Option<Value> {
         serde_json::from_str(self.value(key)?).ok()
     }
 
-    /// The rows, of the columns at these places. After an error there are no more.
+    /// Reads the rows of the columns at these places. After an error there are no more.
     ///
     /// # Errors
     /// [`FileError::Io`], [`FileError::NotParquet`].
@@ -202,7 +204,7 @@ impl ParquetFile {
             let reader = batches.as_mut()?;
             let batch = guarded(|| reader.batch()).transpose();
             if !matches!(batch, Some(Ok(_))) {
-                // What a panic has left of it is of no use.
+                // A panic has left the reader in no useful state.
                 batches = None;
             }
             batch.map(|batch| batch.map_err(not_parquet(&self.path)))
@@ -210,17 +212,18 @@ impl ParquetFile {
     }
 }
 
-/// Has the library read.
+/// Runs a call of the library that may panic.
 fn guarded<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
     panics::in_parquet("it makes no sense inside", work)
 }
 
-/// What was found before the library was asked.
+/// Makes an error of a file that is refused before the library reads it.
 fn refused(path: &Path) -> impl FnOnce(Refused) -> FileError {
     move |refused| match refused {
         Refused::Io(source) => FileError::io("read", path)(source),
         Refused::TooLong => {
-            let [all, words] = [1, BYTE_OF_WORDS].map(|weight| (MOST_AT_ONCE / weight) >> 20);
+            let [all, words] =
+                [1, BYTES_PER_WORD_BYTE].map(|weight| (MAX_UNPACKED_BYTES / weight) >> 20);
             let reason = format!(
                 "its pages unpack into more than {all} MiB at once, or into {words} MiB of words"
             );
@@ -230,7 +233,7 @@ fn refused(path: &Path) -> impl FnOnce(Refused) -> FileError {
     }
 }
 
-/// What the library reported, as a plain I/O failure where it was one.
+/// Makes an error of one of the library: [`FileError::Io`] if the system reported it.
 fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
     move |error| match error {
         ParquetError::External(inner) => match inner.downcast::<io::Error>() {
@@ -377,7 +380,8 @@ mod tests {
             let words: DictionaryArray<Int32Type> =
                 vec![long.as_str(); mebibytes].into_iter().collect();
             let batch = RecordBatch::try_from_iter([("status", Arc::new(words) as _)]).unwrap();
-            let (file, properties) = (File::create(&path).unwrap(), properties.clone().build());
+            let file = File::create(&path).unwrap();
+            let properties = properties.clone().build();
             let mut writer = Writer::new(file, &batch.schema(), properties).unwrap();
             writer.write(&batch).unwrap();
             writer.end().unwrap().close().unwrap();
@@ -416,7 +420,7 @@ mod tests {
         let sound = writer.end().unwrap().into_inner().unwrap();
         std::fs::write(&path, &sound).unwrap();
         assert_eq!(ParquetFile::open(&path).unwrap().rows(), 3000);
-        // Its header's number of entries, 1500, becomes 8191; the library believes any.
+        // The header's number of entries, 1500, becomes 8191; the library believes any.
         let declared = [0x4c, 0x15, 0xb8, 0x17];
         let at = sound.windows(4).position(|bytes| bytes == declared).unwrap();
         let mut other = sound;

@@ -1,4 +1,4 @@
-//! Opening regular files and listing folders, without waiting for anybody and without a panic.
+//! Opens regular files and lists folders, without waiting for anybody and without a panic.
 
 use std::ffi::OsString;
 use std::fs::{self, File, FileType, OpenOptions};
@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 /// Opens a regular file for reading. Anything else is an error that says what it is.
 ///
 /// # Errors
-/// What the system answers, or that the path leads to something else, in words.
+/// An error of the system, or one that names the type of a file that is not regular.
 pub fn open(path: &Path) -> io::Result<File> {
-    // Before opening too: opening is enough to set some devices going.
+    // Checked before opening too: opening is enough to start some devices.
     expect_regular(fs::metadata(path)?.file_type())?;
     let file = careful(OpenOptions::new().read(true), true).open(path)?;
     expect_regular(file.metadata()?.file_type())?;
@@ -85,10 +85,10 @@ pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What was found; nothing where there is nothing.
+/// Turns "not found" into `None`.
 ///
 /// # Errors
-/// Any other that the system has answered.
+/// Any other error of the system.
 pub fn if_there<T>(found: io::Result<T>) -> io::Result<Option<T>> {
     match found {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -96,13 +96,15 @@ pub fn if_there<T>(found: io::Result<T>) -> io::Result<Option<T>> {
     }
 }
 
-/// Most bytes of a plan or of a sidecar. Ours have kilobytes; 16 MiB of JSON may take half a GB.
+/// Greatest number of bytes of a plan or of a sidecar. Basis: ours have kilobytes, and 16 MiB of
+/// JSON may take half a GB. Twice as many may take 1 GB.
 pub const LONGEST_JSON_BYTES: u64 = 16 << 20;
 
-/// The text of a JSON file. A file that is too long to be ours is cut off, so it no longer parses.
+/// Reads the text of a JSON file. A file that is too long to be ours is cut off, so that it no
+/// longer parses.
 ///
 /// # Errors
-/// What the system answers, or that the path leads to something else, in words.
+/// An error of the system, or one that names the type of a file that is not regular.
 pub fn read_json(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.take(LONGEST_JSON_BYTES).read_to_end(&mut bytes)?;
@@ -117,10 +119,10 @@ pub(crate) fn open_to_write(path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// As `open_to_write`, but makes the file if there is none.
+/// Opens a regular file to read and write, and makes it if there is none. Follows no symbolic link.
 ///
 /// # Errors
-/// What the system answers, or that the path leads to something else, in words.
+/// An error of the system, or one that names the type of a file that is not regular.
 pub fn open_or_create(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     match careful(options.read(true).write(true).create_new(true), false).open(path) {
@@ -139,7 +141,7 @@ fn expect_regular(found: FileType) -> io::Result<()> {
     }
 }
 
-/// What a path leads to, in words; `None` for a regular file.
+/// Names the type of a file; `None` for a regular one.
 pub(crate) fn what(found: FileType) -> Option<&'static str> {
     #[cfg(unix)]
     {
@@ -163,8 +165,8 @@ pub(crate) fn what(found: FileType) -> Option<&'static str> {
     }
 }
 
-/// Options that wait for nobody, and follow symbolic links only where that is said. Elsewhere than
-/// on Unix no file that does either can be named by a path that a user would give.
+/// Sets options that wait for nobody, and follow symbolic links only if asked to. On other systems
+/// than Unix no path that a user would give names a file of either kind.
 #[cfg_attr(not(unix), allow(unused_variables))]
 fn careful(options: &mut OpenOptions, follows_links: bool) -> &mut OpenOptions {
     #[cfg(unix)]
@@ -178,17 +180,18 @@ fn careful(options: &mut OpenOptions, follows_links: bool) -> &mut OpenOptions {
     options
 }
 
-/// The names in a folder, sorted.
+/// Lists the names in a folder, sorted.
 ///
 /// # Errors
-/// What the system answers.
+/// An error of the system.
 pub fn names(folder: &Path) -> io::Result<Vec<OsString>> {
     let mut names = unsorted_names(folder)?;
     names.sort_unstable();
     Ok(names)
 }
 
-/// Not by the standard library, which panics when a folder cannot be closed.
+/// Lists the names in a folder without the standard library, which panics when a folder cannot be
+/// closed.
 #[cfg(unix)]
 fn unsorted_names(folder: &Path) -> io::Result<Vec<OsString>> {
     use rustix::fs::{Dir, Mode, OFlags, open};
@@ -238,7 +241,8 @@ mod tests {
         assert_eq!(said(folder.path()), "it is a folder, not a regular file");
         assert_eq!(said(Path::new("/dev/null")), "it is a device, not a regular file");
 
-        let (target, link) = (folder.path().join("target"), folder.path().join("link"));
+        let target = folder.path().join("target");
+        let link = folder.path().join("link");
         fs::write(&target, "mine").unwrap();
         std::os::unix::fs::symlink(&target, &link).unwrap();
         assert_eq!(read_json(&link).unwrap(), b"mine");

@@ -13,7 +13,7 @@ use sweep_parameter::RatioLimits;
 
 use crate::{CellKind, Column, FileError, ParquetFile, cells, columns, key};
 
-/// One cell.
+/// The value of a column in a row.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Cell {
@@ -34,7 +34,7 @@ impl Cell {
         Some(*flag)
     }
 
-    /// The number, if it is one.
+    /// Returns the number, if it is one.
     pub const fn number(&self) -> Option<f64> {
         let Self::Number(number) = self else { return None };
         Some(*number)
@@ -43,12 +43,12 @@ impl Cell {
 
 fn plainly<S: serde::Serializer>(number: &f64, to: S) -> Result<S::Ok, S::Error> {
     let whole = *number as i64;
-    // Every one up to this is exact.
+    // Whole numbers up to this are exact.
     let is_whole = whole as f64 == *number && number.abs() < 2_f64.powi(53);
     if is_whole { to.serialize_i64(whole) } else { to.serialize_f64(*number) }
 }
 
-/// The limits of a plan's ratios.
+/// Returns the limits of a plan's ratios.
 pub fn ratio_limits(plan: &Value) -> Option<RatioLimits> {
     let reliability = &plan["reliability"];
     let most = reliability["ratio_limit"].as_f64()?;
@@ -58,7 +58,7 @@ pub fn ratio_limits(plan: &Value) -> Option<RatioLimits> {
 /// An open result file of any kind.
 #[derive(Debug)]
 pub struct ResultTable {
-    /// Its columns in file order, without those of types that none of our files has.
+    /// The columns in file order, without those of types that none of our files has.
     pub columns: Vec<Column>,
     /// The grid as run, the machine and the method, if it carries them.
     pub plan: Option<Value>,
@@ -69,39 +69,39 @@ impl ResultTable {
     /// Opens a file.
     ///
     /// # Errors
-    /// As [`ParquetFile::open`].
+    /// Those of [`ParquetFile::open`].
     pub fn open(path: &Path) -> Result<Self, FileError> {
         Ok(Self::of(ParquetFile::open(path)?))
     }
 
-    /// The columns of an open file.
+    /// Makes the table of an open file.
     pub fn of(file: ParquetFile) -> Self {
         let columns = columns(file.schema());
         let plan = file.json(key::PLAN);
         Self { columns, plan, file }
     }
 
-    /// The file.
+    /// Returns the file.
     pub const fn file(&self) -> &ParquetFile {
         &self.file
     }
 
-    /// Where it is.
+    /// Returns the path.
     pub fn path(&self) -> &Path {
         self.file.path()
     }
 
-    /// How many rows it has.
+    /// Returns the number of rows.
     pub fn rows(&self) -> u64 {
         self.file.rows()
     }
 
-    /// The column of that name.
+    /// Finds the column of a name.
     pub fn column(&self, name: &str) -> Option<&Column> {
         self.columns.iter().find(|column| column.name == name)
     }
 
-    /// The names of the swept parameters that have a column: of a map all, in order.
+    /// Returns the names of the swept parameters that have a column: all of a map's, in order.
     pub fn axes(&self) -> Vec<&str> {
         let planned = self.plan.as_ref().and_then(|plan| plan["axis"].as_array());
         if let Some(axes) = planned {
@@ -109,8 +109,9 @@ impl ResultTable {
             return names.filter_map(|name| Some(self.column(name)?.name.as_str())).collect();
         }
         // Files that have been through other programs have lost the plan.
-        let of_model = |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
-        let before = self.columns.iter().take_while(|column| !of_model(&column.name));
+        let is_amplitude =
+            |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
+        let before = self.columns.iter().take_while(|column| !is_amplitude(&column.name));
         if self.column("ratio_max").is_none() {
             return Vec::new();
         }
@@ -120,8 +121,8 @@ impl ResultTable {
             .collect()
     }
 
-    /// The names of the columns that say where a row is: the point's index, the axes, and what
-    /// counts on along them in files that are no maps.
+    /// Returns the names of the columns that identify a row: the point's index, the axes, and in
+    /// files that are no maps the counters along them.
     pub fn places(&self) -> Vec<&str> {
         let further = ["crossing", "speed_rpm", "branch", "motion", "mode", "time_s"];
         let mut names: Vec<&str> = ["point"].into_iter().chain(self.axes()).collect();
@@ -132,7 +133,8 @@ impl ResultTable {
 }
 
 impl ParquetFile {
-    /// The rows batch by batch, of the columns of these names. One that the file lacks is null.
+    /// Reads the rows batch by batch, of the columns of these names. A column that the file lacks
+    /// is null.
     ///
     /// # Errors
     /// [`FileError::Io`], [`FileError::NotParquet`].
@@ -143,7 +145,7 @@ impl ParquetFile {
         let all = columns(self.schema());
         let named = |name: &&str| all.iter().find(|column| column.name == **name);
         let chosen: Vec<Option<&Column>> = names.iter().map(named).collect();
-        // Each is decoded once.
+        // A column that is named twice is decoded once.
         let fields: BTreeMap<usize, CellKind> =
             chosen.iter().flatten().map(|column| (column.field, column.kind)).collect();
         let place = |column: &Column| fields.keys().position(|field| *field == column.field);
@@ -162,10 +164,11 @@ impl ParquetFile {
         }))
     }
 
-    /// Calls `take` for each row, with the columns of these names. One that the file lacks is null.
+    /// Calls `take` for each row, with the columns of these names. A column that the file lacks is
+    /// null.
     ///
     /// # Errors
-    /// As [`ParquetFile::read`], and whatever `take` says.
+    /// Those of [`ParquetFile::read`], and those of `take`.
     pub fn each_row<E: From<FileError>>(
         &self,
         names: &[&str],
@@ -182,17 +185,17 @@ impl ParquetFile {
 /// Some rows of some columns.
 #[derive(Debug)]
 pub struct Rows {
-    /// Number of the first of them in the file, from 0.
+    /// The number of the first row in the file, from 0.
     pub first: u64,
-    /// How many there are.
+    /// The number of rows.
     pub count: usize,
-    /// Where each of the columns asked for is, if the file has it.
+    /// The place of each of the requested columns, if the file has it.
     places: Vec<Option<usize>>,
     columns: Vec<Cells>,
 }
 
 impl Rows {
-    /// These columns of rows in memory.
+    /// Decodes these columns of rows in memory.
     ///
     /// # Errors
     /// Rows of other columns.
@@ -203,13 +206,13 @@ impl Rows {
         Ok(Self { first: 0, count: batch.num_rows(), places, columns })
     }
 
-    /// One of them.
+    /// Returns a row.
     pub const fn row(&self, at: usize) -> Row<'_> {
         Row { rows: self, at }
     }
 }
 
-/// A row, whose cells are in the order of the columns that were asked for.
+/// A row, whose cells are in the order of the requested columns.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
     rows: &'a Rows,
@@ -217,7 +220,7 @@ pub struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// Its number in the file, from 0.
+    /// Returns the number in the file, from 0.
     pub const fn index(self) -> u64 {
         self.rows.first + self.at as u64
     }
@@ -227,7 +230,7 @@ impl<'a> Row<'a> {
         self.rows.places[column].map(|place| &self.rows.columns[place])
     }
 
-    /// The cell of a column.
+    /// Returns the cell of a column.
     pub fn cell(self, column: usize) -> Cell {
         match self.cells(column) {
             Some(Cells::Numbers(cells)) if cells[self.at].is_nan() => Cell::Null,
@@ -237,14 +240,14 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// The number in a column, NaN where there is none.
+    /// Returns the number in a column, NaN if there is none.
     #[inline]
     pub fn value(self, column: usize) -> f64 {
         let Some(Cells::Numbers(cells)) = self.cells(column) else { return f64::NAN };
         cells[self.at]
     }
 
-    /// The word in a column; what is true or false is a word too.
+    /// Returns the word in a column; a truth value is a word too.
     #[inline]
     pub fn word(self, column: usize) -> Option<&'a str> {
         match self.cells(column)? {
@@ -263,7 +266,7 @@ impl<'a> Row<'a> {
 enum Cells {
     /// Missing ones are NaN.
     Numbers(Vec<f64>),
-    /// Few words are many rows' word: a place of each row among them.
+    /// The place of each row's word among the different words, and these.
     Words(Int32Array, StringArray),
     Flags(Vec<Option<bool>>),
 }

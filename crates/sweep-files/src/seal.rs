@@ -11,15 +11,16 @@ use parquet::file::metadata::KeyValue;
 
 use crate::key;
 
-/// Hexadecimal digits of a digest.
+/// Number of hexadecimal digits of a digest.
 const DIGITS: usize = 2 * blake3::OUT_LEN;
+/// A digest that is not computed yet.
 const BLANK: [u8; DIGITS] = [b'0'; DIGITS];
 
-/// How far from the file's end a digest can begin: what follows it grows with the number of columns
-/// only.
+/// Greatest distance of a digest from the end of its file, in bytes. Basis: only the number of
+/// columns adds to it, some ten bytes each. Twice as many allow twice as many columns.
 const TAIL_BYTES: u64 = 1 << 16;
 
-/// Whether a file is the one that its digest was taken of.
+/// The result of a comparison of a file with its digest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Seal {
     /// Every byte is as it was written.
@@ -30,7 +31,7 @@ pub(crate) enum Seal {
     Absent,
 }
 
-/// The metadata's last entry, for [`seal`] to fill.
+/// Returns the metadata's last entry, for [`seal`] to fill.
 pub fn blank() -> KeyValue {
     KeyValue::new(key::DIGEST.to_owned(), String::from_utf8_lossy(&BLANK).into_owned())
 }
@@ -38,7 +39,7 @@ pub fn blank() -> KeyValue {
 /// Writes the digest into a finished file that has a [`blank`] one.
 ///
 /// # Errors
-/// What the system answers; a file without a [`blank`] digest.
+/// Those of the system, and a file without a [`blank`] digest.
 pub fn seal(file: &mut (impl Read + Write + Seek)) -> io::Result<()> {
     let place = place(file)?.ok_or_else(|| io::Error::other("it has no place for its digest"))?;
     let digest = digest(file, place)?;
@@ -56,14 +57,14 @@ pub(crate) fn check(file: &mut (impl Read + Seek)) -> io::Result<Seal> {
     Ok(if digest(file, place)?.as_bytes() == found { Seal::Whole } else { Seal::Broken })
 }
 
-/// Where the digest begins.
+/// Finds the place at which the digest begins.
 fn place(file: &mut (impl Read + Seek)) -> io::Result<Option<u64>> {
     let length = file.seek(SeekFrom::End(0))?;
     let start = length.saturating_sub(TAIL_BYTES);
     let mut tail = Vec::new();
     file.seek(SeekFrom::Start(start))?;
     file.take(TAIL_BYTES).read_to_end(&mut tail)?;
-    // An entry in Thrift's compact protocol: the key, then a text of so many bytes.
+    // Thrift's compact protocol writes the key, then a text of so many bytes.
     let mut entry = key::DIGEST.as_bytes().to_vec();
     entry.extend_from_slice(&[0x18, DIGITS as u8]);
     let found = tail.windows(entry.len()).rposition(|window| window == entry);
@@ -71,7 +72,7 @@ fn place(file: &mut (impl Read + Seek)) -> io::Result<Option<u64>> {
     Ok(place.map(|place| start + place as u64))
 }
 
-/// The digest of a file whose digest begins at `place`.
+/// Computes the digest of a file whose digest begins at `place`.
 fn digest(file: &mut (impl Read + Seek), place: u64) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
     file.seek(SeekFrom::Start(0))?;
@@ -88,7 +89,7 @@ mod tests {
 
     use super::*;
 
-    /// As a file's end is laid out, as far as it matters here.
+    /// Returns bytes with the end of a file, and their digest.
     fn sealed() -> Vec<u8> {
         let mut bytes = b"PAR1 columns and metadata ".to_vec();
         bytes.extend_from_slice(b"\x18\x0csweep.digest\x18\x40");

@@ -1,4 +1,4 @@
-//! Rows on their way into a Parquet file, by the Parquet library's own column writers.
+//! Writes rows into a Parquet file, by the Parquet library's own column writers.
 
 use std::io::Write;
 
@@ -18,20 +18,21 @@ use serde_json::Value;
 
 use crate::key;
 
-/// A Parquet file in the making: counts, numbers, truths, and words that are a dictionary's.
+/// An unfinished Parquet file of counts, numbers, truth values, and words of a dictionary.
 pub struct Writer<W: Write> {
     file: SerializedFileWriter<W>,
-    /// Rows of a group, and those of the one that is not whole.
-    most: usize,
+    /// The number of rows of a whole row group.
+    group_rows: usize,
+    /// The number of rows of the unfinished group.
     count: usize,
     rows: Vec<RecordBatch>,
 }
 
 impl<W: Write + Send> Writer<W> {
-    /// Begins a file of these columns, which says under [`key::COLUMNS`] what each is.
+    /// Begins a file of these columns, which are described under [`key::COLUMNS`].
     ///
     /// # Errors
-    /// What the library says.
+    /// Those of the library.
     pub fn new(
         sink: W,
         schema: &Schema,
@@ -40,34 +41,34 @@ impl<W: Write + Send> Writer<W> {
         let fields = schema.fields().iter().map(|field| Ok(declared(field)?.into()));
         let fields = fields.collect::<Result<_, ParquetError>>()?;
         let root = Declared::group_type_builder("arrow_schema").with_fields(fields).build()?;
-        let most = properties.max_row_group_row_count().unwrap_or(usize::MAX);
+        let group_rows = properties.max_row_group_row_count().unwrap_or(usize::MAX);
         let mut file = SerializedFileWriter::new(sink, root.into(), properties.into())?;
-        file.append_key_value_metadata(told(schema));
-        Ok(Self { file, most, count: 0, rows: Vec::new() })
+        file.append_key_value_metadata(column_metadata(schema));
+        Ok(Self { file, group_rows, count: 0, rows: Vec::new() })
     }
 
     /// Adds rows. They are held until their group is whole.
     ///
     /// # Errors
-    /// What the library says.
+    /// Those of the library.
     pub fn write(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
         let mut from = 0;
         while from < rows.num_rows() {
-            let more = (rows.num_rows() - from).min(self.most - self.count);
+            let more = (rows.num_rows() - from).min(self.group_rows - self.count);
             self.rows.push(rows.slice(from, more));
             self.count += more;
             from += more;
-            if self.count == self.most {
+            if self.count == self.group_rows {
                 self.flush()?;
             }
         }
         Ok(())
     }
 
-    /// The file, whose rows are all written, for its last metadata and its end.
+    /// Writes the last row group. The returned file is open for its last metadata and its end.
     ///
     /// # Errors
-    /// What the library says.
+    /// Those of the library.
     pub fn end(mut self) -> Result<SerializedFileWriter<W>, ParquetError> {
         if self.count > 0 {
             self.flush()?;
@@ -92,8 +93,9 @@ impl<W: Write + Send> Writer<W> {
     }
 }
 
-/// The fields' metadata. Parquet has no place for it beside the columns.
-fn told(schema: &Schema) -> KeyValue {
+/// Returns the fields' metadata as an entry of the file's, because Parquet has no place for it
+/// beside the columns.
+fn column_metadata(schema: &Schema) -> KeyValue {
     let entry = |field: &FieldRef| {
         let kind = match field.data_type() {
             DataType::Boolean => "bool",
@@ -101,15 +103,15 @@ fn told(schema: &Schema) -> KeyValue {
             DataType::Float64 => "float64",
             _ => "string",
         };
-        let told = field.metadata().iter().map(|(key, text)| {
+        let pairs = field.metadata().iter().map(|(key, text)| {
             let number = (key == key::LIMIT).then(|| serde_json::from_str(text).ok()).flatten();
             (key.clone(), number.unwrap_or_else(|| Value::from(text.as_str())))
         });
-        let entry = told.chain([("type".to_owned(), kind.into())]).collect::<Value>();
+        let entry = pairs.chain([("type".to_owned(), kind.into())]).collect::<Value>();
         (field.name().clone(), entry)
     };
-    let told: Value = schema.fields().iter().map(entry).collect();
-    KeyValue::new(key::COLUMNS.to_owned(), told.to_string())
+    let columns: Value = schema.fields().iter().map(entry).collect();
+    KeyValue::new(key::COLUMNS.to_owned(), columns.to_string())
 }
 
 fn declared(field: &Field) -> Result<Declared, ParquetError> {

@@ -13,7 +13,7 @@ use super::provenance::{self};
 use super::read::{self};
 use super::schema::{self};
 use super::{BATCH_ROWS, Job, OpenRun, ResultRows, Session, StoreError, Tally};
-use sweep_files::batches::of_arrow;
+use sweep_files::batches::from_arrow;
 use sweep_files::{self as files, ParquetFile, Writer, atomic, panics, seal};
 
 /// A result file in the making: batches of [`BATCH_ROWS`] rows, the last perhaps of fewer.
@@ -93,7 +93,7 @@ impl OpenRun {
     ) -> Result<Option<Tally>, StoreError> {
         let output = self.folder.output.clone();
         let file = atomic::begin(&self.folder.path)?;
-        let from_arrow = |error| StoreError::parquet("write", &output)(of_arrow(error));
+        let from_arrow = |error| StoreError::parquet("write", &output)(from_arrow(error));
         let mut rows = ResultRows::new(&job.layout);
         let mut writer = MapWriter::begin(job, file, &output)?;
         for chunk in 0..self.chunks() {
