@@ -124,7 +124,8 @@ fn kept(folder: &tempfile::TempDir) -> u64 {
 
 /// Starts a search and waits until it has kept more points than were there.
 fn at_work(folder: &tempfile::TempDir, search: &mut Command) -> Child {
-    let (there, began) = (kept(folder), Instant::now());
+    let there = kept(folder);
+    let began = Instant::now();
     let child = search.stderr(Stdio::piped()).spawn().expect("it starts");
     while kept(folder) <= there {
         assert!(began.elapsed() < Duration::from_secs(60), "no points are kept");

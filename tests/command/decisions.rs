@@ -302,7 +302,7 @@ fn a_report_names_quantities_in_words_and_both_limits() {
         ">Ratio tub yaw<",
         "Resonances at Unbalance mass 0.525",
         "Unbalance mass ",
-        // Of the one damper that has it.
+        // The only damper that has friction.
         "with friction of 0 to 3 N",
     ] {
         assert!(page.contains(text), "{text}");

@@ -85,7 +85,7 @@ fn each_stop_and_foot_has_what_the_trace_shows_of_it() {
     let map = csv_of(&["run", "g.toml"], "map");
     let at = "unbalance_mass_kg=1";
     let trace = csv_of(&["trace", "g.toml", "--at", at, "--every", "1e-4", "--forces"], "trace");
-    let of_row = |name: String| column(&map, &name)[1];
+    let cell = |name: String| column(&map, &name)[1];
     for model in ["nonlinear", "linear"] {
         let close = |what: String, traced: f64, found: f64, allowed: f64| {
             assert!(
@@ -93,11 +93,10 @@ fn each_stop_and_foot_has_what_the_trace_shows_of_it() {
                 "{what}: {traced} traced, {found} in the map"
             );
         };
-        let pushes: Vec<f64> =
-            (1..=3).map(|k| of_row(format!("stop_{k}_force_{model}_n"))).collect();
-        let loads: Vec<f64> = (1..=4).map(|k| of_row(format!("foot_{k}_load_{model}_n"))).collect();
+        let pushes: Vec<f64> = (1..=3).map(|k| cell(format!("stop_{k}_force_{model}_n"))).collect();
+        let loads: Vec<f64> = (1..=4).map(|k| cell(format!("foot_{k}_load_{model}_n"))).collect();
         let contacts: Vec<f64> =
-            (1..=3).map(|k| of_row(format!("stop_{k}_contact_{model}_s"))).collect();
+            (1..=3).map(|k| cell(format!("stop_{k}_contact_{model}_s"))).collect();
         for (k, push) in (1..).zip(&pushes) {
             let name = format!("stop_{k}_force_{model}_n");
             let traced = extreme(&trace, &name, f64::max);
@@ -108,17 +107,17 @@ fn each_stop_and_foot_has_what_the_trace_shows_of_it() {
             close(name.clone(), extreme(&trace, &name, f64::min), *load, 0.5);
         }
         let name = format!("slip_margin_{model}_n");
-        close(name.clone(), extreme(&trace, &name, f64::min), of_row(name), 0.5);
-        let of_all = |values: &[f64], extreme: fn(f64, f64) -> f64| {
+        close(name.clone(), extreme(&trace, &name, f64::min), cell(name), 0.5);
+        let extreme_of_all = |values: &[f64], extreme: fn(f64, f64) -> f64| {
             values.iter().copied().reduce(extreme).expect("there are some")
         };
-        assert_eq!(of_row(format!("stop_force_{model}_n")), of_all(&pushes, f64::max));
-        assert_eq!(of_row(format!("stop_contact_{model}_s")), of_all(&contacts, f64::max));
-        assert_eq!(of_row(format!("foot_load_{model}_n")), of_all(&loads, f64::min));
+        assert_eq!(cell(format!("stop_force_{model}_n")), extreme_of_all(&pushes, f64::max));
+        assert_eq!(cell(format!("stop_contact_{model}_s")), extreme_of_all(&contacts, f64::max));
+        assert_eq!(cell(format!("foot_load_{model}_n")), extreme_of_all(&loads, f64::min));
         let differ = |values: &[f64]| values.windows(2).all(|pair| pair[0] != pair[1]);
         assert!(differ(&pushes) && differ(&loads), "{pushes:?} N, {loads:?} N");
     }
-    let closed = |k: usize| of_row(format!("stop_{k}_contact_nonlinear_s"));
+    let closed = |k: usize| cell(format!("stop_{k}_contact_nonlinear_s"));
     assert!(closed(1) > 0.01 && closed(2) > 0.01 && closed(1) != closed(2));
 
     let drawn = |stop: &str| {
@@ -283,7 +282,8 @@ fn responses_with_friction_are_followed_round_their_folds() {
     let (_, run) = head.split_once("[spin]").expect("a spin");
     let set = "machine = \"machine.toml\"\nset = { unbalance_mass_kg = 1.0, friction_n = 60.0 }";
     fs::write(home.path("g.toml"), format!("{set}\n[spin]{run}")).expect("the grid is written");
-    // By default, and where friction holds the linear model, which says nothing of the response.
+    // With defaults, and with friction that holds the linear model, which then says nothing of the
+    // response.
     for given in [&[][..], &["--set", "friction_linear_speed_m_per_s=0.01"]] {
         let asked = ["stability", "g.toml", "--speed", "255:256:1", "--fresh", "--out"];
         let found = home.sweep(&[&asked[..], &["s.parquet"], given].concat());
@@ -295,12 +295,12 @@ fn responses_with_friction_are_followed_round_their_folds() {
         let (on_curve, beside): (Vec<_>, Vec<_>) = rows.partition(|row| row[2] == "true");
         let branches: Vec<f64> = on_curve.iter().map(|row| number(row[0])).collect();
         assert_eq!(branches, [0.0, 1.0, 2.0, 0.0, 1.0, 2.0], "{given:?}");
-        let of_yaw = |rows: &[Vec<&str>], range: std::ops::Range<f64>| {
+        let has_yaw_within = |rows: &[Vec<&str>], range: std::ops::Range<f64>| {
             rows.iter().all(|row| range.contains(&number(row[1])))
         };
-        assert!(of_yaw(&on_curve, 0.045..0.055), "{given:?}: {on_curve:?}");
+        assert!(has_yaw_within(&on_curve, 0.045..0.055), "{given:?}: {on_curve:?}");
         // From the linear model's response others are found, of half this yaw.
-        assert!(of_yaw(&beside, 0.02..0.03) && !beside.is_empty(), "{given:?}: {beside:?}");
+        assert!(has_yaw_within(&beside, 0.02..0.03) && !beside.is_empty(), "{given:?}: {beside:?}");
     }
 }
 

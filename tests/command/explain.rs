@@ -93,7 +93,7 @@ fn a_folded_response_is_one_band_and_its_jump_is_named() {
     within(&tongues[1]["from_rpm"], 243.06, 0.1);
     for tongue in tongues {
         let closed = &tongue["closed_by"];
-        // What is said to close it leaves no growth anywhere about it.
+        // The damping that is said to close it leaves no growth anywhere about it.
         if let Some(damping) = closed["damping_n_s_per_m"].as_f64() {
             let axes = axes.replace("60.0, 140.0", &format!("{damping}"));
             let [from, to] = [0, 1].map(|end| closed["nothing_grows_from_to_rpm"][end].to_string());
@@ -115,7 +115,7 @@ fn a_stable_machine_is_told_so() {
     for line in ["stable at every speed from 200 to 340 rpm", "and the models agree"] {
         assert!(told.contains(line), "{line}\n{told}");
     }
-    // What is said follows the limits: friction lets the vertical motion be less.
+    // The summary follows the limits: friction lets the vertical motion be less.
     let strict = format!("{}[reliability]\nratio_min = 0.98\n", grid(PAPER, AXES));
     let at = ["--at", "damping_n_s_per_m=300", "--at", "friction_n=60", "--speed", "300:340:20"];
     let done = explain(&strict, &at);

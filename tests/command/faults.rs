@@ -255,7 +255,8 @@ fn a_disk_too_small_is_told_and_a_larger_one_is_gone_on_with() {
     );
     let mut full = 0;
     for pages in [1, 2, 3, 4, 5, 6, 8, 10, 12, 16] {
-        let (disk, result) = (home.path("disk"), home.path("result"));
+        let disk = home.path("disk");
+        let result = home.path("result");
         fs::create_dir_all(&disk).expect("a mount point");
         let mut command = Command::new("unshare");
         command.args(["--map-root-user", "--mount", "sh", "-c", &script, "sh"]);
@@ -454,7 +455,7 @@ fn failed_points_are_rows_and_fail_the_run_only_when_asked() {
     let run = output(&mut home.run());
     assert_eq!(run.status.code(), Some(0), "{}", said(&run));
     assert!(said(&run).contains("failed  40 no_equilibrium"), "{}", said(&run));
-    // What is there already counts too.
+    // Rows that are there already count too.
     for fresh in [&[] as &[&str], &["--fresh"]] {
         let run = output(home.run().arg("--fail-on-error").args(fresh));
         assert_eq!(run.status.code(), Some(3), "{fresh:?}: {}", said(&run));

@@ -1,4 +1,4 @@
-//! What a command may write over, and what it makes of files that are not as they were written.
+//! Files that a command may write over, and its answers to files that have changed.
 
 #![cfg(target_os = "linux")]
 
@@ -163,7 +163,7 @@ fn every_command_writes_over_its_own_and_clears_up_after_killed_processes() {
             let path = format!("new/{output}");
             let mut bytes = Vec::new();
             for round in 0..2 {
-                // What a process leaves that is killed while it writes.
+                // A process that is killed while it writes leaves such a file.
                 let left = home.path("new").join(sweep_files::atomic::temporary_name());
                 fs::write(&left, "half").expect("a leftover is written");
                 // A run has a folder of its own for such files, and clears that.
@@ -290,7 +290,8 @@ fn every_command_that_reads_a_file_sees_a_flipped_bit() {
             random ^= random << 13;
             random ^= random >> 7;
             random ^= random << 17;
-            let (at, bit) = (random % length, (random >> 40) as u8 % 8);
+            let at = random % length;
+            let bit = (random >> 40) as u8 % 8;
             let seen = with_flipped_bit(&path, at, bit, || home.sweep(reader));
             let text = said(&seen);
             assert!(

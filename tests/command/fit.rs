@@ -45,7 +45,8 @@ fn bench() -> Home {
             } else {
                 format!("{}", yaw.value(row) + 1e-4 * noise)
             };
-            let (y, pitch) = (9.81 + y.value(row) + 0.1 * noise, pitch.value(row) + 1e-3 * noise);
+            let y = 9.81 + y.value(row) + 0.1 * noise;
+            let pitch = pitch.value(row) + 1e-3 * noise;
             text += &format!("{},{y},{yaw},{pitch}\n", time.value(row));
         }
     }

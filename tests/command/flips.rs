@@ -17,7 +17,7 @@ const COMMANDS: [&[&str]; 5] = [
     &["merge", "g.toml", "--out", "x.parquet"],
 ];
 
-/// What a command left: its exit code, its words, the result and the picture.
+/// The exit code and the output of a command, its result and its picture.
 #[derive(PartialEq)]
 struct Left {
     output: Output,

@@ -6,7 +6,8 @@ use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
-/// What a scheduler says in the environment; the one that runs the tests must not be heard.
+/// Variables by which a scheduler sets shards and threads; those of the tests' own scheduler are
+/// removed.
 const SCHEDULERS: [&str; 3] =
     ["SLURM_ARRAY_TASK_ID", "SLURM_CPUS_PER_TASK", "JOB_COMPLETION_INDEX"];
 
@@ -38,7 +39,7 @@ pub(crate) fn grid(masses: u32, dampings: u32) -> String {
     )
 }
 
-/// What a command answers, and what else it says.
+/// Returns the output of a command and its messages.
 pub(crate) fn said(output: &Output) -> String {
     [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat()
 }
@@ -91,7 +92,7 @@ impl Home {
         command
     }
 
-    /// What the command does with these words.
+    /// Runs the command with these words.
     pub(crate) fn sweep(&self, words: &[&str]) -> Output {
         self.under(&[]).args(words).output().expect("the command starts")
     }

@@ -23,7 +23,7 @@ fn fresh_home() -> Home {
     home
 }
 
-/// What the command does behind another program's command line.
+/// Runs the command behind another program's command line.
 fn under(home: &Home, wrapper: &[&str], words: &[&str]) -> Output {
     home.under(wrapper).args(words).output().expect("the command starts")
 }
@@ -63,8 +63,8 @@ fn assert_mends(home: &Home, what: &str) {
 fn at_every_call(calls: &str, error: &str, words: &[&str]) {
     for when in 1.. {
         let home = fresh_home();
-        let (trace, inject) =
-            (format!("trace={calls}"), format!("inject={calls}:error={error}:when={when}"));
+        let trace = format!("trace={calls}");
+        let inject = format!("inject={calls}:error={error}:when={when}");
         let run = under(
             &home,
             &["strace", "-f", "-qq", "-o", "/dev/stderr", "-e", &trace, "-e", &inject],
@@ -156,8 +156,8 @@ fn slurm_gives_the_threads_of_a_run_and_of_its_traces() {
 
 #[test]
 fn a_signal_is_answered_within_a_trajectory() {
-    // By explicit methods an hour of computing; the additive one has a tolerance that takes it as
-    // long.
+    // An hour of computing by each: the explicit methods are held by stability, the additive one by
+    // its tolerance.
     for (set, method) in [
         ("tub_mass_kg = 1e-6", "method = \"rk4\"\nstep_s = 1.0e-8"),
         ("tub_mass_kg = 1e-6", "method = \"dopri5\""),

@@ -69,7 +69,7 @@ fn number(folder: &tempfile::TempDir, line: &str, column: &str) -> f64 {
 }
 
 #[test]
-fn of_several_objectives_it_is_said_what_the_last_third_put_on_the_front() {
+fn a_study_of_several_objectives_says_what_its_last_third_put_on_the_front() {
     let second = "[[objective]]\nmaximise = \"min(min_gap_nonlinear_m)\"\n[[parameter]]";
     let folder = folder_with("2", &STUDY.replacen("[[parameter]]", second, 1));
     let text = does(&folder, "optimise study.toml");
@@ -267,7 +267,7 @@ fn tolerances_of_what_is_looked_for_spread_over_the_design() {
     let first = |file: &str| {
         number(&folder, &format!("show {file} --top 1 --json --columns {column}"), column)
     };
-    // The same first candidate: of eight machines apart in damping, the worst is worse.
+    // The first candidate is one, but the worst of eight machines apart in damping is worse.
     assert_ne!(first("wide.parquet"), first("exact.parquet"));
 }
 

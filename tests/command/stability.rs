@@ -167,7 +167,7 @@ fn shards_join_to_the_same_bytes() {
 
 #[test]
 fn growth_is_a_metric_of_maps_and_a_quantity_of_boundaries() {
-    // By the reference, 252.5 N s/m closes the last tongue at 0.4 kg.
+    // The reference closes the last tongue at 0.4 kg by 252.5 N s/m.
     let growth = "[stability]\nspeed_rpm = \"296:316:0.5\"\n";
     let folder = folder_with("");
     let grid = format!("metrics = [\"growth\"]\n{GRID}{growth}");

@@ -6,25 +6,26 @@ use std::ffi::{CString, c_char, c_int};
 
 use diffsol::{NalgebraLU, NalgebraMat, NalgebraVec, OdeBuilder, OdeEquations, OdeSolverMethod};
 
+/// Length of a state.
 const DIMENSION: usize = 20;
-type Lu = NalgebraLU<f64>;
+type LuSolver = NalgebraLU<f64>;
 
 #[repr(C)]
-struct Washer([u8; 0]);
+struct WasherPointer([u8; 0]);
 
 #[link(name = "washer_capi")]
 unsafe extern "C" {
-    fn washer_rhs(t_s: f64, x: *const f64, dx: *mut f64, machine: *mut Washer);
-    fn washer_jacobian(t_s: f64, x: *const f64, rows: *mut f64, machine: *mut Washer);
+    fn washer_rhs(t_s: f64, x: *const f64, dx: *mut f64, machine: *mut WasherPointer);
+    fn washer_jacobian(t_s: f64, x: *const f64, rows: *mut f64, machine: *mut WasherPointer);
 }
 
 #[link(name = "trajectory")]
 unsafe extern "C" {
-    fn next_machine(x: *mut f64) -> *mut Washer;
+    fn next_machine(x: *mut f64) -> *mut WasherPointer;
     safe fn sample_time(i: c_int) -> f64;
     fn sample(i: c_int, x: *const f64);
     fn report(
-        machine: *mut Washer,
+        machine: *mut WasherPointer,
         program: *const c_char,
         method: *const c_char,
         rtol: f64,
@@ -56,8 +57,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [method, rtol, atol] = &words[..] else {
         return Err("usage: diffsol-peer bdf|tr_bdf2|esdirk34 RTOL ATOL".into());
     };
-    let (rtol, atol) = (rtol.parse::<f64>()?, atol.parse::<f64>()?);
-    // Of the manifest's only `version = "=..."`.
+    let rtol = rtol.parse::<f64>()?;
+    let atol = atol.parse::<f64>()?;
+    // The manifest has a single `version = "=..."`.
     let version = include_str!("../Cargo.toml").split("\"=").nth(1).expect("a version");
     let version = version.split('"').next().expect("its end");
     let mut rest = [0.0; DIMENSION];
@@ -93,12 +95,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             .atol([atol])
             .h0(1e-5)
             .build()?;
-        // Of a whole trajectory, not of a step.
+        // The limit is on a whole trajectory, not on a step.
         problem.ode_options.max_nonlinear_solver_failures = usize::MAX;
         let name = match method.as_str() {
-            "bdf" => run(problem.bdf::<Lu>()?).map(|()| "BDF, order to 5")?,
-            "tr_bdf2" => run(problem.tr_bdf2::<Lu>()?).map(|()| "TR-BDF2")?,
-            "esdirk34" => run(problem.esdirk34::<Lu>()?).map(|()| "ESDIRK34")?,
+            "bdf" => run(problem.bdf::<LuSolver>()?).map(|()| "BDF, order to 5")?,
+            "tr_bdf2" => run(problem.tr_bdf2::<LuSolver>()?).map(|()| "TR-BDF2")?,
+            "esdirk34" => run(problem.esdirk34::<LuSolver>()?).map(|()| "ESDIRK34")?,
             _ => return Err(format!("no method {method}").into()),
         };
         let program = CString::new(format!("diffsol {version}"))?;
