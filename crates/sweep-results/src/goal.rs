@@ -134,7 +134,7 @@ impl Goal {
 pub struct Slack {
     /// The distance, in the units of the comparison; below 0 beyond the limit.
     pub distance: f64,
-    /// The same over the magnitude of the greater operand.
+    /// The slack over the magnitude of the greater operand.
     pub part: f64,
 }
 
