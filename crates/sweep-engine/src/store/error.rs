@@ -3,7 +3,6 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::Unfinished;
 use super::differences::PlanDifference;
 use crate::threads::ThreadsError;
 use sweep_files::FileError;
@@ -79,8 +78,15 @@ pub enum StoreError {
     /// A result that is asked for before it is whole.
     #[error("{} is not finished: {}, in {}\n  = help: give the command again that began it, and it \
              goes on from there",
-        .0.output.display(), .0.progress(), .0.folder.display())]
-    Unfinished(Box<Unfinished>),
+        .output.display(), .progress, .folder.display())]
+    Unfinished {
+        /// The path of the result.
+        output: PathBuf,
+        /// The points done, in words.
+        progress: String,
+        /// The folder of its work.
+        folder: PathBuf,
+    },
     /// The engine handed over something that cannot be a chunk; a defect of this program.
     #[error(
         "internal error in points {first} to {last}: {reason}\n  = help: \
@@ -152,7 +158,7 @@ impl StoreError {
             Self::PlanDiffers { .. }
             | Self::OutputDiffers { .. }
             | Self::Refused(_)
-            | Self::Unfinished(_) => true,
+            | Self::Unfinished { .. } => true,
             Self::Threads(error) => error.is_refusal(),
             Self::File(error) => error.is_refusal(),
             Self::Parquet { action, .. } => *action == "read",

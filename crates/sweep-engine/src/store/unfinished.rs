@@ -90,7 +90,11 @@ fn count(folder: &Folder, chunk: u64, plan: &blake3::Hash) -> Result<u64, StoreE
 /// [`StoreError::Unfinished`], and as [`unfinished`].
 pub fn refuse_unfinished(path: &Path) -> Result<(), StoreError> {
     match unfinished(path)? {
-        Some(found) => Err(StoreError::Unfinished(Box::new(found))),
+        Some(found) => Err(StoreError::Unfinished {
+            progress: found.progress(),
+            output: found.output,
+            folder: found.folder,
+        }),
         None => Ok(()),
     }
 }
