@@ -33,6 +33,7 @@ mod status;
 pub mod synthetic;
 #[cfg(test)]
 mod tests;
+mod trial_records;
 mod trials;
 mod unfinished;
 
@@ -51,7 +52,8 @@ pub use read::{ResultFile, Tally};
 pub use schema::{BATCH_ROWS, Column, Done, Holds, Layout, ResultRows, Row};
 pub use shard::{Shard, ShardRequest, list as shard_list};
 pub use status::{FolderStatus, State, status};
-pub use trials::{Key, Trials};
+pub use trial_records::Key;
+pub use trials::Trials;
 pub use unfinished::{Unfinished, refuse_unfinished, unfinished};
 
 use sweep_parameter::{Parameter as _, RatioLimits};

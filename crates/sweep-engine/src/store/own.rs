@@ -10,7 +10,7 @@ use super::lock;
 use super::plan_file::{Found, PlanFile};
 use super::provenance::{self, Session};
 use super::shard::ShardLayout;
-use super::trials;
+use super::trial_records;
 use super::{Folder, LOCK, PLAN, SHARDS, StoreError, TRIALS, chunk_of_name};
 use sweep_files::{atomic, regular};
 
@@ -51,7 +51,7 @@ fn is_own(folder: &Folder, name: &OsStr, plans: &[blake3::Hash]) -> bool {
     let holds_own = match name {
         PLAN => matches!(PlanFile::read(folder), Ok(Found::Plan(_))),
         SHARDS => matches!(ShardLayout::read(folder), Ok(Some(_))),
-        TRIALS => plans.iter().any(|plan| trials::has_any(&path, plan.as_bytes())),
+        TRIALS => plans.iter().any(|plan| trial_records::has_any(&path, plan.as_bytes())),
         _ if atomic::is_temporary(name) => true,
         _ if chunk_of_name(name).is_some() => begins(&path, &chunk::MAGIC),
         _ if lock::shard_of_name(name).is_some() => lock::is_signed(&path),

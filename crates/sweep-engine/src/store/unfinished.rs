@@ -10,7 +10,7 @@ use super::chunk;
 use super::lock;
 use super::open::chunks_there;
 use super::plan_file::{Found, PlanFile};
-use super::trials;
+use super::trial_records;
 use super::{Folder, Holder, StoreError, TRIALS, chunk_name};
 use sweep_files::regular;
 
@@ -57,7 +57,7 @@ pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, StoreError> {
     let is_search = trials.exists();
     let mut points_done = 0;
     if is_search {
-        points_done = trials::count(&trials, hash.as_bytes());
+        points_done = trial_records::count(&trials, hash.as_bytes());
     } else {
         for chunk in chunks_there(&folder)? {
             points_done += count(&folder, chunk, &hash)?;
