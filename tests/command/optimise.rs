@@ -123,8 +123,8 @@ fn the_condition_that_binds_and_the_nearest_candidate_are_told() {
     let told = text.split_once("nearest  candidate ").expect("the nearest").1;
     assert!(told.contains("max(ratio_max) < 1e-3 by "), "{text}");
     let candidate = told.split(',').next().expect("its number");
-    let show = format!("show results/study.parquet --json --columns candidate --where feasible");
-    assert_eq!(does(&folder, &show).trim(), "[]");
+    let show = "show results/study.parquet --json --columns candidate --where feasible";
+    assert_eq!(does(&folder, show).trim(), "[]");
     let excess = |file: &str| number(&folder, file, "excess_2");
     let own = excess(&format!(
         "show results/study.parquet --json --columns excess_2 --where candidate=={candidate}"
