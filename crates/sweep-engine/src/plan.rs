@@ -289,7 +289,7 @@ impl<M: Model> Plan<M> {
         self.axes.iter().enumerate().map(end).collect()
     }
 
-    /// Returns at most [`Self::MAX_PREPARED`] corners, spread evenly, because a list may have many
+    /// Returns at most `MAX_PREPARED` corners, spread evenly, because a list may have many
     /// and a machine's modes are expensive.
     pub fn some_corners(&self) -> Vec<Vec<f64>> {
         let every = self.corners().div_ceil(Self::MAX_PREPARED);

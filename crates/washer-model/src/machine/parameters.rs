@@ -237,7 +237,7 @@ impl Parameter {
         self.row.source
     }
 
-    /// Returns the range of values. Coordinates are at most [`MAX_COORDINATE_M`], so that
+    /// Returns the range of values. Coordinates are at most `MAX_COORDINATE_M`, so that
     /// millimetres are refused.
     pub fn range(&self) -> Range {
         match (self.row.unit, self.row.range) {
