@@ -236,7 +236,7 @@ fn kept_traces_are_the_trajectories_of_their_rows() {
     fs::write(home.path("fast.toml"), fast).expect("the grid is written");
     let run = home.sweep(&["run", "fast.toml", "--keep-traces", "--out", "x.parquet"]);
     assert!(run.status.success(), "{}", said(&run));
-    assert!(said(&run).contains("rows by method: 3 fast"), "{}", said(&run));
+    assert!(said(&run).contains("rows by method: 3 capped_1"), "{}", said(&run));
     for point in 0..3 {
         let bytes = fs::read(home.path(&format!("x.traces/point-{point}.parquet")));
         let bytes = bytes.expect("the point has a trace");

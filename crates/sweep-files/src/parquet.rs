@@ -507,7 +507,6 @@ mod tests {
             "optional int32 x (DATE);",
             "optional int64 x (TIMESTAMP(NANOS, true));",
             "optional int64 x (TIME(MICROS, true));",
-            "optional int32 x (DECIMAL(9, 2));",
             "optional binary x;",
             "repeated int64 x;",
             "optional group x (LIST) { repeated group list { optional int64 element; } }",

@@ -682,9 +682,10 @@ mod tests {
             let view = View { every_s: Some(every_s), models, start, extras, quick: Some(quick) };
             let by_row = trace(&plan, scenario, Vec::new(), &view, &|| false);
             let (rows, _) = by_row.unwrap().table.finish().unwrap();
-            // The row says the nonlinear model's rung; the linear one's may have been another.
+            // The row names the nonlinear level; the linear one may have been another. Peaks between
+            // long steps are found to 1e-5.
             for (name, model, over) in
-                [("nonlinear", &row.nonlinear, 1e-9), ("linear", &row.linear, 1e-3)]
+                [("nonlinear", &row.nonlinear, 1e-5), ("linear", &row.linear, 1e-3)]
             {
                 for (channel, amplitude) in plan.reliability.channels.iter().zip(&model.amplitudes)
                 {
