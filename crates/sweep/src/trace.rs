@@ -682,8 +682,8 @@ mod tests {
             let view = View { every_s: Some(every_s), models, start, extras, quick: Some(quick) };
             let by_row = trace(&plan, scenario, Vec::new(), &view, &|| false);
             let (rows, _) = by_row.unwrap().table.finish().unwrap();
-            // The row names the nonlinear level; the linear one may have been another. Peaks between
-            // long steps are found to 1e-5.
+            // The row names the nonlinear level; the linear one may have been another. Peaks
+            // between long steps are found to 1e-5.
             for (name, model, over) in
                 [("nonlinear", &row.nonlinear, 1e-5), ("linear", &row.linear, 1e-3)]
             {
