@@ -14,7 +14,7 @@ use sweep_parameter::named;
 use washer_model::{Dwell, Endings, Gauge, Recorders, Starts, State, decimal};
 use washer_row::Status;
 
-use crate::engine::{Carried, motions as motions_of};
+use crate::engine::{Carried, find_motions};
 use crate::plan::Plan;
 use columns::{DwellColumn, RowOf};
 use sweep_engine::columns::{declared, row};
@@ -210,7 +210,7 @@ impl Motions {
         let Some(carry) = self.search.carry else {
             let dwells: Vec<(Dwell<'_>, Carried)> =
                 asked.iter().map(|(_, dwell)| (*dwell, None)).collect();
-            let found = motions_of(simd, &dwells, &self.starts, &is_stopped);
+            let found = find_motions(simd, &dwells, &self.starts, &is_stopped);
             let each = asked.iter().zip(found);
             return each.for_each(|((row, _), found)| keep(self.done(*row, found)));
         };
@@ -239,7 +239,7 @@ impl Motions {
                 (Dwell { point: groups[*k][0].1.point, speed_rpm }, carried[*k])
             };
             let dwells: Vec<(Dwell<'_>, Carried)> = needed.iter().map(dwell).collect();
-            let found = motions_of(simd, &dwells, &self.starts, &is_stopped);
+            let found = find_motions(simd, &dwells, &self.starts, &is_stopped);
             if is_stopped() {
                 return;
             }

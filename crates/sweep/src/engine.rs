@@ -1,11 +1,12 @@
-//! The engine: points through both models, in lanes, each at as many refinement levels as it needs.
+//! The engine of the washing machine: it integrates both models at the points of a plan, in lanes,
+//! each point at as many refinement levels as its error requires.
 
 mod growth;
 mod pool;
 mod reference;
 
-pub(crate) use growth::{Carried, motions, of_speeds, responses};
-pub(crate) use reference::{reference, reference_step_s};
+pub(crate) use growth::{Carried, fastest_growth, find_motions, find_responses};
+pub(crate) use reference::{reference_method, reference_step_s};
 pub(crate) use sweep_engine::{Engine, RunContext};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,7 +14,7 @@ use std::sync::{Arc, Condvar, Mutex};
 
 use lane_ode::Simd;
 use once_cell::sync::OnceCell;
-use pool::{Pool, Sink, Source};
+use pool::{OutcomeSink, PointSource, Pool};
 use washer_model::{Machine, Method, ModelKind, Point, Spin, StepSelector, Timing, prepare};
 use washer_row::{
     Demand, Level, LevelRun, Outcome, RefinementLevels, Rule, Status, refinement_levels, runs,
@@ -25,41 +26,44 @@ use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::{Error, Interrupt, RowSink, RowSource};
 use sweep_files::panics::{lock, unlocked};
 
-/// Parts of a run at whose ends a perturbed run is compared with its original.
+/// Number of parts of a run at whose ends a perturbed run is compared with its original. Basis: an
+/// exponential separation is measured over many of them. Doubling it doubles the memory of the
+/// comparison and, where steps are long, the steps that end at a checkpoint.
 pub(crate) const CHECKPOINTS: u32 = 128;
 
-/// What a row by capped modes came from.
+/// The methods by which a row with capped modes was computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CappedRun {
     pub(crate) level: Level,
-    /// The nonlinear model's, the linear one's.
+    /// The method of the nonlinear model, and that of the linear one.
     pub(crate) methods: [Method; 2],
-    /// Steps end at so many parts of the run.
+    /// The number of equal parts of the run at whose ends a step ends.
     pub(crate) checkpoints: u32,
 }
 
-/// Both models over a plan's points.
+/// An engine that computes rows of a plan with both models.
 pub struct ModelEngine<'a> {
     plan: &'a Plan,
-    /// What its rows are good for.
+    /// The use of the rows, which decides how far they are refined.
     pub(crate) demand: Demand,
-    /// What groups run on; else as few lanes as a group needs.
+    /// The instruction set of all groups. With `None` each group gets the narrowest that has a lane
+    /// for each of its trajectories.
     forced: Option<Simd>,
     timing: Timing,
     rule: Rule,
-    /// The refinement levels of both models; found when first asked for.
+    /// The refinement levels of both models, found when first used.
     pub(crate) levels: Arc<OnceCell<[RefinementLevels; 2]>>,
 }
 
-/// The instruction set that `SWEEP_SIMD` asks for, else the best.
+/// Returns the instruction set that the variable `SWEEP_SIMD` names, or else the best one.
 ///
 /// # Errors
-/// A name that is not one of this machine's.
+/// Returns an error if this processor has no instruction set of that name.
 pub(crate) fn simd_from_environment() -> Result<Simd, Error> {
     Ok(forced_simd()?.unwrap_or_else(Simd::best))
 }
 
-/// The instruction set that `SWEEP_SIMD` asks for, if it does.
+/// Returns the instruction set that the variable `SWEEP_SIMD` names, if it is set.
 fn forced_simd() -> Result<Option<Simd>, Error> {
     let Ok(name) = std::env::var("SWEEP_SIMD") else { return Ok(None) };
     let available = || Simd::ALL.into_iter().filter(|simd| simd.is_available());
@@ -71,15 +75,15 @@ fn forced_simd() -> Result<Option<Simd>, Error> {
 }
 
 impl<'a> ModelEngine<'a> {
-    /// An engine for a plan, on the best instruction set or the one asked for.
+    /// Returns an engine for a plan, with the instruction set that `SWEEP_SIMD` names, if it is set.
     ///
     /// # Errors
-    /// A method or an instruction set that is not there.
+    /// Returns an error if this processor has no instruction set of that name.
     pub fn new(plan: &'a Plan) -> Result<Self, Error> {
-        Ok(Self::on(forced_simd()?, plan))
+        Ok(Self::with_simd(forced_simd()?, plan))
     }
 
-    fn on(forced: Option<Simd>, plan: &'a Plan) -> Self {
+    fn with_simd(forced: Option<Simd>, plan: &'a Plan) -> Self {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
         let timing = Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints };
@@ -88,12 +92,14 @@ impl<'a> ModelEngine<'a> {
     }
 
     /// Returns an engine for another plan, with the instruction set and the levels of this one.
-    pub(crate) fn over<'b>(&self, plan: &'b Plan) -> ModelEngine<'b> {
+    pub(crate) fn for_plan<'b>(&self, plan: &'b Plan) -> ModelEngine<'b> {
         self.levels();
-        ModelEngine { levels: Arc::clone(&self.levels), ..ModelEngine::on(self.forced, plan) }
+        ModelEngine {
+            levels: Arc::clone(&self.levels),
+            ..ModelEngine::with_simd(self.forced, plan)
+        }
     }
 
-    /// What it computes.
     pub(crate) const fn plan(&self) -> &'a Plan {
         self.plan
     }
@@ -103,20 +109,20 @@ impl<'a> ModelEngine<'a> {
         self.levels.get_or_init(|| self.find_levels(&|| false))
     }
 
-    /// Returns [`Self::levels`], or `None` if `watch` stops the search.
-    fn levels_under(&self, watch: &RunContext<'_>) -> Option<&[RefinementLevels; 2]> {
+    /// Returns [`Self::levels`], or `None` if the context stops the search.
+    fn levels_under(&self, context: &RunContext<'_>) -> Option<&[RefinementLevels; 2]> {
         // The standard library's cell has no `get_or_try_init` yet.
         let find = || {
-            let found = self.find_levels(&|| watch.stopped());
-            // They may have been cut short.
-            if watch.stopped() { Err(()) } else { Ok(found) }
+            let found = self.find_levels(&|| context.stopped());
+            // A search that was stopped may lack levels.
+            if context.stopped() { Err(()) } else { Ok(found) }
         };
         self.levels.get_or_try_init(find).ok()
     }
 
-    /// How the trajectories of a row of this level were integrated; `None` where modes were not
-    /// capped.
-    pub(crate) fn quick(&self, level: Level) -> Option<CappedRun> {
+    /// Returns the methods by which a row of this level was computed; `None` if the level caps no
+    /// modes.
+    pub(crate) fn capped_run(&self, level: Level) -> Option<CappedRun> {
         if !level.is_capped() {
             return None;
         }
@@ -129,31 +135,32 @@ impl<'a> ModelEngine<'a> {
         if let Some((level, method)) = self.plan.integrator.direct() {
             return ModelKind::ALL.map(|_| RefinementLevels::direct(level, method));
         }
-        // The fast method's, by the corners of the grid.
+        // The corners of the grid have the extremes of the machines' frequencies.
         let scenarios: Vec<_> =
             self.plan.some_corners().iter().map(|at| self.plan.scenario_at(at)).collect();
         let prepared = self.prepare(&scenarios);
-        let ready = prepared.iter().zip(&scenarios);
-        let ready = ready
+        let points = prepared
+            .iter()
+            .zip(&scenarios)
             .filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.model.spin)));
-        let steps = StepSelector::until(ready, self.plan.end_s, is_stopped);
+        let steps = StepSelector::until(points, self.plan.end_s, is_stopped);
         ModelKind::ALL.map(|model| refinement_levels(&steps, model, self.rule.accuracy))
     }
 
-    /// One row per point given by the values of its axes, on the grid or between its points;
-    /// `point` of an outcome is the position among them. On all threads of the rayon pool it is
-    /// called in, if in one.
+    /// Computes a row for each point, given by the values of its axes, which need not be on the
+    /// grid. The field `point` of an outcome is the position in `axis_values`. Within a rayon pool
+    /// it uses all threads of the pool, otherwise the calling thread.
     pub fn evaluate_at(&self, axis_values: &[Vec<f64>]) -> Vec<Outcome> {
         let interrupt = Interrupt::new();
-        let watch = RunContext::new(&interrupt);
-        self.evaluate_under(axis_values, &watch).unwrap_or_default()
+        let context = RunContext::new(&interrupt);
+        self.evaluate_in_context(axis_values, &context).unwrap_or_default()
     }
 
-    /// As [`Self::evaluate_at`]; `None` if `watch` stopped it.
-    pub fn evaluate_under(
+    /// Computes rows like [`Self::evaluate_at`]; `None` if the context stopped the work.
+    pub fn evaluate_in_context(
         &self,
         axis_values: &[Vec<f64>],
-        watch: &RunContext<'_>,
+        context: &RunContext<'_>,
     ) -> Option<Vec<Outcome>> {
         let next = Mutex::new(0..axis_values.len());
         let source = |most: usize| {
@@ -166,27 +173,32 @@ impl<'a> ModelEngine<'a> {
         };
         let found = Mutex::new(Vec::with_capacity(axis_values.len()));
         let sink = |outcome: Outcome| lock(&found).push(outcome);
-        self.integrate_rows(&source, &sink, watch);
+        self.integrate_rows(&source, &sink, context);
         let mut found = unlocked(found);
         found.sort_by_key(|outcome| outcome.point);
         (found.len() == axis_values.len()).then_some(found)
     }
 
-    /// Computes rows from a source and gives them to a sink, on all threads of the rayon pool this
-    /// is called in.
-    fn integrate_rows(&self, source: &Source<'_>, sink: &Sink<'_>, watch: &RunContext<'_>) {
+    /// Computes the rows of all points from a source and passes them to a sink. Within a rayon pool
+    /// it uses all threads of the pool, otherwise the calling thread.
+    fn integrate_rows(
+        &self,
+        source: &PointSource<'_>,
+        sink: &OutcomeSink<'_>,
+        context: &RunContext<'_>,
+    ) {
         let state = Mutex::default();
         let changed = Condvar::new();
-        let pool = Pool { engine: self, source, sink, watch, state, changed };
+        let pool = Pool { engine: self, source, sink, context, state, changed };
         match rayon::current_thread_index() {
             Some(_) => drop(rayon::broadcast(|_| pool.work())),
-            // An estimate is of one thread.
+            // Estimates time a single thread.
             None => pool.work(),
         }
     }
 
-    /// What groups of any size run on.
-    fn widest(&self) -> Simd {
+    /// Returns the instruction set of the widest groups.
+    fn widest_simd(&self) -> Simd {
         self.forced.unwrap_or_else(Simd::best)
     }
 
@@ -194,44 +206,46 @@ impl<'a> ModelEngine<'a> {
         self.forced.unwrap_or_else(|| Simd::best().narrowed(trajectories))
     }
 
-    /// Points made ready, those of one window together; or why there is none.
+    /// Prepares points for integration, those with the same window together. A point that cannot be
+    /// prepared has its status.
     fn prepare(&self, scenarios: &[Scenario]) -> Vec<Result<Point, Status>> {
         let mut prepared = Vec::with_capacity(scenarios.len());
-        for alike in scenarios.chunk_by(|a, b| a.window_s == b.window_s) {
-            let machines: Vec<_> = alike
+        for same_window in scenarios.chunk_by(|a, b| a.window_s == b.window_s) {
+            let machines: Vec<_> = same_window
                 .iter()
                 .map(|Scenario { model, .. }| (model.machine.clone(), model.spin.clone()))
                 .collect();
-            let timing = Timing { window_s: alike[0].window_s, ..self.timing };
-            let together = |machines: &[(Machine, Spin)]| {
+            let timing = Timing { window_s: same_window[0].window_s, ..self.timing };
+            let prepare_group = |machines: &[(Machine, Spin)]| {
                 let points = prepare(self.simd_for(machines.len()), machines, &timing);
                 points.into_iter().map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
             };
-            prepared.extend(together_or_alone(&machines, together, || Err(Status::Panicked)));
+            let panicked = || Err(Status::Panicked);
+            prepared.extend(map_isolating_panics(&machines, prepare_group, panicked));
         }
         prepared
     }
 
-    /// One model at every point, by one method. Once `watch` says to stop, what this returns means
-    /// nothing.
-    fn runs(
+    /// Integrates one model at every point with one method. Once the context is stopped, the result
+    /// is meaningless.
+    fn integrate_runs(
         &self,
         model: usize,
         method: &Method,
         points: &[&Point],
-        watch: &RunContext<'_>,
+        context: &RunContext<'_>,
     ) -> Vec<LevelRun> {
-        let stop = || watch.stopped();
-        let together = |points: &[&Point]| {
+        let stop = || context.stopped();
+        let integrate_group = |points: &[&Point]| {
             let simd = self.simd_for(points.len());
             runs(simd, ModelKind::ALL[model], method, points, &self.rule, &stop).unwrap_or_default()
         };
         let panicked = || LevelRun::failed(Status::Panicked);
-        together_or_alone(points, together, panicked)
+        map_isolating_panics(points, integrate_group, panicked)
     }
 }
 
-/// What the rows of a plan take from trajectories, and what they must be good for.
+/// Returns the measures that rows take from the trajectories of a plan, and the accuracy required.
 pub(crate) fn rule(plan: &Plan) -> Rule {
     let accuracy = match plan.integrator.steps() {
         Steps::Checked(accuracy) => accuracy,
@@ -248,34 +262,37 @@ pub(crate) fn rule(plan: &Plan) -> Rule {
     }
 }
 
-/// One result per item of a group. A panic over one item must not cost the others theirs: then each
-/// is done alone, which gives the same bits, and the one is a defect.
-pub(crate) fn together_or_alone<I, R>(
+/// Returns the results of `map_group`, one for each item.
+///
+/// If it panics, every item is mapped alone, which gives the same bits, so that a panic over one
+/// item does not cost the others their results. An item that panics alone has the result
+/// `panicked`.
+pub(crate) fn map_isolating_panics<I, R>(
     items: &[I],
-    together: impl Fn(&[I]) -> Vec<R>,
-    defect: impl Fn() -> R,
+    map_group: impl Fn(&[I]) -> Vec<R>,
+    panicked: impl Fn() -> R,
 ) -> Vec<R> {
-    let caught = |items: &[I]| catch_unwind(AssertUnwindSafe(|| together(items))).ok();
-    caught(items).unwrap_or_else(|| {
-        let alone =
-            |item: &I| caught(std::slice::from_ref(item)).and_then(|mut results| results.pop());
-        items.iter().map(|item| alone(item).unwrap_or_else(&defect)).collect()
+    let map = |items: &[I]| catch_unwind(AssertUnwindSafe(|| map_group(items))).ok();
+    map(items).unwrap_or_else(|| {
+        let map_one =
+            |item: &I| map(std::slice::from_ref(item)).and_then(|mut results| results.pop());
+        items.iter().map(|item| map_one(item).unwrap_or_else(&panicked)).collect()
     })
 }
 
 impl Engine for ModelEngine<'_> {
-    fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, watch: &RunContext<'_>) {
+    fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, context: &RunContext<'_>) {
         let columns = Columns::of_run(self.plan);
         let sink = |outcome: Outcome| keep(columns.done(outcome));
         let source = |most: usize| {
             let rows = std::iter::from_fn(next).take(most);
             rows.map(|(row, values)| (row, self.plan.scenario_at(&values))).collect()
         };
-        self.integrate_rows(&source, &sink, watch);
+        self.integrate_rows(&source, &sink, context);
     }
 
     fn simd(&self) -> &str {
-        self.widest().name()
+        self.widest_simd().name()
     }
 }
 

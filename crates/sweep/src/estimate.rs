@@ -110,7 +110,7 @@ impl Measured {
             cut.end_s = end_s;
             cut.window_s = plan.window_s.map(|edge_s| (edge_s * (end_s / plan.end_s)).min(end_s));
             // The cut plan's own levels would be of slower spin, and longer steps.
-            let (cost_s, sampled) = cost_of(&engine.over(&cut), points);
+            let (cost_s, sampled) = cost_of(&engine.for_plan(&cut), points);
             let of_length = |metric: &Metric| !matches!(metric, Metric::Growth | Metric::Dwell);
             if !cut.model.measures.metrics.iter().all(of_length) {
                 cut.model.measures.metrics.retain(of_length);
@@ -173,8 +173,8 @@ fn cost_within(most_s: f64, engine: &ModelEngine<'_>, points: u64) -> Option<(f6
     let began_s = busy_s();
     let is_late = || busy_s() - began_s > most_s;
     let interrupt = Interrupt::new();
-    let outcomes =
-        engine.evaluate_under(&axis_values, &RunContext::with_time_limit(&interrupt, &is_late))?;
+    let outcomes = engine
+        .evaluate_in_context(&axis_values, &RunContext::with_time_limit(&interrupt, &is_late))?;
     let cost_s = busy_s() - began_s;
     let mut sampled = NameCounts::new();
     outcomes.iter().for_each(|outcome| add(&mut sampled, ROW_STATUSES[row_status(outcome).0]));

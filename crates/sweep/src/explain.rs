@@ -263,7 +263,7 @@ fn swept(plan: &Plan, interrupt: &Interrupt) -> Result<Swept, Error> {
     let scenario = plan.scenario(0);
     let channels = plan.reliability.channels.clone();
     let (engine, watch) = (ModelEngine::new(plan)?, RunContext::new(interrupt));
-    let outcomes = engine.evaluate_under(&[Vec::new()], &watch);
+    let outcomes = engine.evaluate_in_context(&[Vec::new()], &watch);
     let outcome = outcomes.and_then(|mut outcomes| outcomes.pop());
     // Where it was stopped: nothing.
     let outcome = outcome.unwrap_or_else(|| Outcome::failed(0, Status::Panicked));

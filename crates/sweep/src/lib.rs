@@ -80,6 +80,6 @@ pub use sweep_engine::store::{
 pub use sweep_engine::{
     Error, Exit, Interrupt, expect_random_numbers, survive_file_size_limits, tell,
 };
-pub use trace::Extras as TraceExtras;
+pub use trace::TraceExtras;
 pub use washer_model::Starts;
 pub use washer_row::{CREEPING_M_PER_S, Level, Outcome, Status, Trajectory, Verdict};

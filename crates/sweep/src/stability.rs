@@ -15,7 +15,9 @@ use washer_row::{Growth, Outcome, Status, Trajectory};
 
 use crate::columns::Columns;
 use crate::dwell::{Motions, Search};
-use crate::engine::{Engine, RunContext, responses, simd_from_environment, together_or_alone};
+use crate::engine::{
+    Engine, RunContext, find_responses, map_isolating_panics, simd_from_environment,
+};
 use crate::plan::{Plan, timing};
 use sweep_engine::store::{Column, Holds, Layout, axis_columns};
 use sweep_engine::{Error, Job, RowSink, RowSource};
@@ -184,7 +186,7 @@ impl DwellEngine<'_> {
         match &self.asked {
             Asked::Responses(columns) => {
                 let dwells: Vec<Dwell<'_>> = asked.iter().map(|(_, dwell)| *dwell).collect();
-                for ((row, _), found) in asked.iter().zip(responses(&dwells, &is_stopped)) {
+                for ((row, _), found) in asked.iter().zip(find_responses(&dwells, &is_stopped)) {
                     let none = |status| Outcome::failed(*row, status);
                     let outcome = found.map_or_else(none, |found| self.outcome(*row, &found));
                     keep(columns.done(outcome));
@@ -204,7 +206,7 @@ impl DwellEngine<'_> {
             let ready = prepare(self.simd, machines, &timing(self.held.plan)).into_iter();
             ready.map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
         };
-        together_or_alone(&machines, together, || Err(Status::Panicked))
+        map_isolating_panics(&machines, together, || Err(Status::Panicked))
     }
 
     fn outcome(&self, row: u64, responses: &[Response]) -> Outcome {

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
-use crate::trace::{self, MOST_KEPT};
+use crate::trace::{MAX_POINT_TRACES, write_point_traces};
 use sweep_engine::commands::run as engine_run;
 use sweep_engine::commands::run::{execute, exit, installed};
 use sweep_engine::run::Ended;
@@ -30,9 +30,10 @@ pub struct Args {
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan: Plan = args.run.target.grid.load()?;
     let engine = ModelEngine::new(&plan)?;
-    if args.keep_traces && plan.points() > MOST_KEPT {
+    if args.keep_traces && plan.points() > MAX_POINT_TRACES {
         let given = format!("with {} points", plan.points());
-        let expected = format!("at most {MOST_KEPT}; `sweep trace` writes those of single points");
+        let expected =
+            format!("at most {MAX_POINT_TRACES}; `sweep trace` writes those of single points");
         return Err(Error::option("--keep-traces", given, expected));
     }
     let interrupt = installed()?;
@@ -48,7 +49,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         let done = || progress.show(kept.fetch_add(1, Ordering::Relaxed) + 1);
         let map = ParquetFile::open(&output)?;
         let stop = || interrupt.stopped();
-        let ended = trace::keep(&engine, &map, &folder, threads, &stop, &done);
+        let ended = write_point_traces(&engine, &map, &folder, threads, &stop, &done);
         progress.finish();
         ended?;
         if let Some(signal) = interrupt.signal() {

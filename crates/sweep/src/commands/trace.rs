@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use crate::trace::{
-    Extras, Models, StartValue, Trace, View, every, in_pool, start_of, start_value,
+    Models, StartValue, TraceExtras, TraceSettings, TraceTable, check_spacing, parse_start_value,
+    start_from, trace_in_pool,
 };
 use sweep_engine::commands::cells::{Lines as _, short, span, table};
 use sweep_engine::commands::grid::quoted;
@@ -58,7 +59,7 @@ pub struct Args {
     forces: bool,
     /// Begin away from equilibrium, both models alike: a coordinate q1 to q10 (m, rad) or a speed
     /// u1 to u10 (per s); may be repeated
-    #[arg(long, value_name = "NAME=VALUE", value_parser = start_value)]
+    #[arg(long, value_name = "NAME=VALUE", value_parser = parse_start_value)]
     start: Vec<StartValue>,
     /// Trace file to write
     #[arg(short, long, value_name = "FILE")]
@@ -76,15 +77,15 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         true => (args.grid.load()?, None),
         false => args.grid.load_point(&chosen).map(|(plan, at)| (plan, Some(at)))?,
     };
-    let every_s = every((!args.turns).then_some(args.every), &plan)?;
+    let every_s = check_spacing((!args.turns).then_some(args.every), &plan)?;
     let Args { rates, states, forces, angle, model: models, .. } = *args;
-    let extras = Extras { rates, states, forces, angle };
-    let start = start_of(&args.start);
+    let extras = TraceExtras { rates, states, forces, angle };
+    let start = start_from(&args.start);
     let output = Output::begin(&args.out, FileKind::Trace)?;
-    let view = View { every_s, models, start, extras, quick: None };
+    let settings = TraceSettings { every_s, models, start, extras, capped: None };
     // A signal ends the process: there is nothing to keep.
-    let traced = in_pool(&plan, at, &view, &|| false).map_err(Error::model)?;
-    let Trace { table, instants, failures, level } = traced;
+    let traced = trace_in_pool(&plan, at, &settings, &|| false).map_err(Error::model)?;
+    let TraceTable { table, instants, failures, level } = traced;
     failures.iter().for_each(|failure| tell(failure));
     output.finish(&table.into_bytes(&args.out)?)?;
     let of = if args.all { format!(" of {} points", plan.points()) } else { String::new() };

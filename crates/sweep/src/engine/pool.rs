@@ -3,12 +3,13 @@
 //!
 //! A batch costs the same with one trajectory as with eight, because trajectories fill the lanes of
 //! a vector. So runs of one level wait for each other, and a thread takes a batch as soon as one is
-//! full, the finest level first: rows that are nearly done leave. Once the source is empty, batches
-//! that are not full are taken, the coarsest level first: it has the longest way to go. Where every
-//! trajectory has steps of its own, batches are larger, the longest trajectories first: a lane that
-//! ends early takes up the next.
+//! full. It takes the finest level first, so that rows that are nearly done leave the queue. Once
+//! the source is empty, batches that are not full are taken, too, the coarsest level first, because
+//! its rows may need all finer levels. By a method that chooses steps for each trajectory, batches
+//! are larger and begin with the longest trajectories: a lane that ends early continues with the
+//! next trajectory.
 //!
-//! A lane's numbers do not depend on the other lanes, so neither does a row.
+//! A lane's numbers do not depend on the other lanes, so a row does not depend on its batch.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -23,7 +24,8 @@ use super::{ModelEngine, RunContext, growth};
 use crate::plan::Scenario;
 use sweep_files::panics::lock;
 
-/// The number of points that are prepared together: one for each lane.
+/// Number of points that are prepared together: one for each lane. Doubling it makes threads wait
+/// longer for the first runs.
 const PREPARE_BATCH: usize = MAX_LANES;
 
 /// Returns the number of runs by a method that a thread takes at once.
@@ -32,26 +34,28 @@ fn batch_size(method: &Method) -> usize {
 }
 
 impl ModelEngine<'_> {
-    /// Returns the greatest number of rows under refinement at once on so many threads: less than
-    /// a batch waits for each level of both models.
+    /// Returns the maximum number of rows that so many threads have under refinement at once. For
+    /// each level of both models less than a batch waits, and each thread has one batch.
     pub(crate) fn max_rows_in_flight(&self, threads: usize) -> usize {
         let levels: usize = self.levels().iter().map(|levels| 2 * levels.levels.len()).sum();
         (levels + threads) * batch_size(&self.levels()[0].levels[0].method)
     }
 }
 
-/// The maximum age of a queued row, in rows queued after it. Older rows run in a batch that is not
+/// Maximum age of a queued row, in rows queued after it. Older rows run in a batch that is not
 /// full, so that chunks complete and an interrupt loses little. Doubling it halves the batches that
 /// are not full.
 const MAX_QUEUE_AGE: u64 = 2048;
 
-/// A source of points: at most so many, none at the end. Each has its caller's identifier.
-pub(super) type Source<'a> = dyn Fn(usize) -> Vec<(u64, Scenario)> + Sync + 'a;
+/// A source of points, each with its caller's identifier. The argument is the maximum number; it
+/// returns none at the end.
+pub(super) type PointSource<'a> = dyn Fn(usize) -> Vec<(u64, Scenario)> + Sync + 'a;
 
 /// A sink of rows, in no particular order.
-pub(super) type Sink<'a> = dyn Fn(Outcome) + Sync + 'a;
+pub(super) type OutcomeSink<'a> = dyn Fn(Outcome) + Sync + 'a;
 
-/// The time between two looks at the stop flag by a thread that waits for others.
+/// Time between two looks at the stop flag by a thread that waits for others. Basis: an interrupt
+/// ends a run within a tenth of a second. Doubling it doubles that delay.
 const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The kind of a run: its refinement level and its model's position in `ModelKind::ALL`.
@@ -71,7 +75,7 @@ struct RowTask {
 }
 
 impl RowTask {
-    /// Returns the row's next step once nothing is pending.
+    /// Returns the runs that the row needs next, or its outcome. No run may be pending.
     fn next(&self, rule: RefinementRule<'_>) -> Next {
         match &self.point {
             Ok(point) => self.refinement.next(self.id, point, rule),
@@ -109,17 +113,17 @@ enum Work {
 /// The threads' shared work.
 pub(super) struct Pool<'a> {
     pub(super) engine: &'a ModelEngine<'a>,
-    pub(super) source: &'a Source<'a>,
-    pub(super) sink: &'a Sink<'a>,
-    pub(super) watch: &'a RunContext<'a>,
+    pub(super) source: &'a PointSource<'a>,
+    pub(super) sink: &'a OutcomeSink<'a>,
+    pub(super) context: &'a RunContext<'a>,
     pub(super) state: Mutex<PoolState>,
     pub(super) changed: Condvar,
 }
 
 impl Pool<'_> {
-    /// Runs one thread until nothing is left or the watch stops it.
+    /// Works on one thread until nothing is left or the context is stopped.
     pub(super) fn work(&self) {
-        while !self.watch.stopped() {
+        while !self.context.stopped() {
             let mut state = self.lock();
             match state.choose(&|(level, model)| {
                 let size = |rule: RefinementRule<'_>| batch_size(rule.levels[model].method(level));
@@ -153,9 +157,14 @@ impl Pool<'_> {
                         true => originals().collect(),
                         false => perturbed.iter().collect(),
                     };
-                    let runs = self.engine.runs(model, levels.method(level), &points, self.watch);
-                    // They may have been cut short.
-                    if self.watch.stopped() {
+                    let runs = self.engine.integrate_runs(
+                        model,
+                        levels.method(level),
+                        &points,
+                        self.context,
+                    );
+                    // Runs of a stopped context may have ended early.
+                    if self.context.stopped() {
                         break;
                     }
                     let mut state = self.lock();
@@ -175,11 +184,11 @@ impl Pool<'_> {
         self.changed.notify_all();
     }
 
-    /// Returns the rule by which rows are refined; `None` if the watch stops the work before the
+    /// Returns the rule by which rows are refined; `None` if the context is stopped before the
     /// levels are found.
     fn rule(&self) -> Option<RefinementRule<'_>> {
         let ModelEngine { demand, rule, .. } = self.engine;
-        let levels = self.engine.levels_under(self.watch)?;
+        let levels = self.engine.levels_under(self.context)?;
         Some(RefinementRule { levels, demand: *demand, rule })
     }
 
@@ -228,12 +237,14 @@ impl Pool<'_> {
         done.iter_mut().for_each(|(outcome, _)| outcome.forget_turns());
         let model = &self.engine.plan.model;
         if let Some(speeds) = &model.held_speeds {
-            let is_stopped = || self.watch.stopped();
-            let asked = (speeds.values(), model.measures.metrics.as_slice());
-            let there = done
+            let is_stopped = || self.context.stopped();
+            let metrics = (speeds.values(), model.measures.metrics.as_slice());
+            let mut rows: Vec<_> = done
                 .iter_mut()
-                .filter_map(|(outcome, point)| point.as_deref().ok().map(|point| (outcome, point)));
-            growth::add(&mut there.collect::<Vec<_>>(), self.engine.widest(), asked, &is_stopped);
+                .filter_map(|(outcome, point)| point.as_deref().ok().map(|point| (outcome, point)))
+                .collect();
+            let simd = self.engine.widest_simd();
+            growth::add_held_speed_metrics(&mut rows, simd, metrics, &is_stopped);
             if is_stopped() {
                 return;
             }
@@ -255,7 +266,7 @@ impl PoolState {
         }
         let coarsest = self.waiting.iter().find(|(_, waiting)| !waiting.is_empty());
         match coarsest.map(|(kind, waiting)| (*kind, waiting.len())) {
-            // The rest is for other threads.
+            // The other half is left to other threads.
             Some((kind, count)) => self.take(kind, count.div_ceil(2).max(MAX_LANES)),
             None if self.busy_threads == 0 => Work::End,
             None => Work::Wait,

@@ -1,19 +1,21 @@
-//! The method of single trajectories that are no row's: nothing capped, converged to some 1e-9.
+//! The method of single trajectories that belong to no row: no capped modes, and an error of some
+//! 1e-9.
 
 use washer_model::{Formula, Method, ModelKind, StepSelector};
 
 use crate::method::REFERENCE_SHARE;
 
-/// The step (s) of classical Runge-Kutta, where the machine allows it: amplitudes are converged to
-/// about 1e-9.
+/// Maximum step (s) of the classical Runge-Kutta method. Basis: amplitudes of the paper's machine
+/// have an error of some 1e-9. Doubling it makes the error 16 times as large.
 const REFERENCE_STEP_S: f64 = 2e-4;
 
-/// The step (s) of order 8 where forces have corners: their errors are below 1e-4 in three rows of
-/// four of `sweeps/friction.toml`.
+/// Maximum step (s) of the method of order 8 where forces have corners. Basis: in three rows of four
+/// of `sweeps/friction.toml` the errors are below 1e-4. Doubling it halves the time and at least
+/// doubles the errors.
 const CORNER_STEP_S: f64 = 2.5e-4;
 
-/// Returns the method of a single trajectory.
-pub(crate) fn reference(steps: &StepSelector<'_>, model: ModelKind) -> Method {
+/// Returns the method of a single trajectory of a model.
+pub(crate) fn reference_method(steps: &StepSelector<'_>, model: ModelKind) -> Method {
     if model == ModelKind::Nonlinear && steps.are_nonsmooth() {
         let stable_s = steps.uncapped_step_s(model).unwrap_or(f64::INFINITY);
         return Method::Dop853 { step_s: CORNER_STEP_S.min(0.5 * stable_s) };

@@ -1,11 +1,11 @@
-//! Failures are rows, each its own: the others are the same bits with and without them.
+//! Tests of failed rows: they do not change the bits of the other rows.
 
 mod fast;
 
 use super::*;
 
-/// Springs too soft to carry the machine, unbalances that throw it out of the model's range, and
-/// points that go well.
+/// A grid with springs too soft to carry the machine, unbalances that drive the solution out of the
+/// model's range, and points without a failure.
 const GRID: &str = r#"
 [spin]
 profile = "ramp"
@@ -40,7 +40,7 @@ fn evaluate(engine: &ModelEngine<'_>, points: std::ops::Range<u64>) -> Vec<Outco
 }
 
 #[test]
-fn a_failed_point_is_a_row_and_leaves_the_others_bits_alone() {
+fn a_failed_point_is_a_row_and_does_not_change_the_others() {
     let plan = plan(GRID);
     let engine = ModelEngine::new(&plan).unwrap();
     let together = evaluate(&engine, 0..9);
@@ -64,7 +64,8 @@ fn levels_are_found_anew_after_a_stop() {
     let fast = GRID.replace("\"rk4\"", "\"rk4-mass-scaled\"");
     let plan = plan(&fast.replace("[1, 500, 7000]", "[6000, 7000]"));
     let engine = ModelEngine::new(&plan).unwrap();
-    let (stopped, calm) = (Interrupt::new(), Interrupt::new());
+    let stopped = Interrupt::new();
+    let calm = Interrupt::new();
     stopped.raise(15);
     assert!(engine.levels_under(&RunContext::new(&stopped)).is_none());
     let found = engine.levels_under(&RunContext::new(&calm)).unwrap();
@@ -72,17 +73,17 @@ fn levels_are_found_anew_after_a_stop() {
 }
 
 #[test]
-fn a_panic_over_one_item_is_that_items_defect() {
+fn a_panic_over_one_item_leaves_the_other_results() {
     let twice = |items: &[u32]| {
         assert!(!items.contains(&7), "a defect at seven");
         items.iter().map(|item| Some(2 * item)).collect()
     };
-    let results = together_or_alone(&[5, 6, 7, 8], twice, || None);
+    let results = map_isolating_panics(&[5, 6, 7, 8], twice, || None);
     assert_eq!(results, [Some(10), Some(12), None, Some(16)]);
 }
 
 #[test]
-fn groups_of_any_size_give_the_same_bits_in_as_few_lanes_as_they_need() {
+fn groups_of_any_size_give_the_same_bits_in_the_fewest_lanes() {
     for trajectories in 1..=9 {
         let simd = Simd::best().narrowed(trajectories);
         let narrower = |other: &Simd| other.is_available() && other.lanes() < simd.lanes();

@@ -11,7 +11,7 @@ use super::draws;
 use super::known::Influence;
 use super::model::Problem;
 use super::statistics::{Statistics, Z_975};
-use crate::engine::{ModelEngine, of_speeds, responses};
+use crate::engine::{ModelEngine, fastest_growth, find_responses};
 use crate::plan::{Axis, AxisValues, Plan, between, ready, timing};
 use sweep_engine::Error;
 use sweep_engine::commands::cells::span;
@@ -157,7 +157,7 @@ impl OnMap<'_> {
             .map(|k| step_rpm * f64::from(k))
             .filter(|speed| *speed > 0.0)
             .collect();
-        let growth = of_speeds(&self.responses_at(case, plan, (x, None), &speeds)?)?;
+        let growth = fastest_growth(&self.responses_at(case, plan, (x, None), &speeds)?)?;
         let interval = covariance
             .and_then(|covariance| self.growth_95(case, plan, (&growth, step_rpm), covariance));
         Some((growth, interval))
@@ -181,7 +181,7 @@ impl OnMap<'_> {
         let point = ready(machine, spin, &timing(plan)).ok()?;
         let dwells: Vec<Dwell<'_>> =
             speeds.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-        Some(responses(&dwells, &|| (self.problem.stop)()))
+        Some(find_responses(&dwells, &|| (self.problem.stop)()))
     }
 
     /// Computes the 95 % interval of the growth at the speed where it is greatest: to first order

@@ -1,35 +1,40 @@
-//! Time histories at one point or at all of a grid, in memory.
+//! Time histories at one point or at all points of a grid, in memory.
 
 use clap::ValueEnum as _;
 
 use super::result::MemoryTable;
 use crate::config::GridInput;
-use crate::trace::{self, Extras, Models, View, every, start_of, start_value};
+use crate::trace::{
+    Models, TraceExtras, TraceSettings, check_spacing, parse_start_value, start_from, trace_in_pool,
+};
 use sweep_engine::{Error, Interrupt};
 use sweep_files::FileKind;
 
-/// What a trace holds.
+/// The models, the instants and the quantities of a trace.
 #[derive(Clone, Debug, Default)]
 pub struct TraceOptions {
-    /// Time between two instants, s; `None` for one a turn, where the unbalance is up.
+    /// The time between two instants (s). `None` stands for one instant a turn, where the unbalance
+    /// is up.
     pub every_s: Option<f64>,
-    /// `nonlinear` or `linear`: that model alone.
+    /// The only model, `nonlinear` or `linear`; `None` for both.
     pub model: Option<String>,
-    /// Every point of the grid, not one.
+    /// Whether all points of the grid are traced, instead of one.
     pub all: bool,
-    /// What it holds beside channels, gap and speed.
-    pub extras: Extras,
-    /// Where both models begin, away from equilibrium: `q5=0.1` (m, rad), `u1=2` (per s).
+    /// The quantities besides channels, gap and speed.
+    pub extras: TraceExtras,
+    /// The initial values of both models that are not those of equilibrium, such as `q5=0.1` (m or
+    /// rad) and `u1=2` (per s).
     pub start: Vec<String>,
 }
 
-/// Time histories of both models at a point of a grid, or of its only one: `at` gives each axis a
-/// value, and any other parameter, as `NAME=VALUE`. Of all points it fixes what it names. Beside
-/// them, how each model failed that did;
-/// `None` if it was interrupted.
+/// Returns time histories of both models and a message for each integration that failed, or `None`
+/// if the work was interrupted.
+///
+/// `at` has texts `NAME=VALUE`. For one point they give every axis its value, and other parameters
+/// may be set, too; for all points they fix the parameters that they name.
 ///
 /// # Errors
-/// Mistakes in the grid or the options; a machine without equilibrium.
+/// Returns an error for mistakes in the grid or the options, and for a machine without equilibrium.
 pub fn trace_point(
     grid: &GridInput,
     at: &[String],
@@ -40,21 +45,21 @@ pub fn trace_point(
         true => (grid.clone().fixing(at).load()?, None),
         false => grid.load_point(at).map(|(plan, at)| (plan, Some(at)))?,
     };
-    let every_s = every(options.every_s, &plan)?;
+    let every_s = check_spacing(options.every_s, &plan)?;
     let start = options.start.iter().map(|text| {
-        start_value(text).map_err(|expected| {
+        parse_start_value(text).map_err(|expected| {
             Error::option("start", text, expected.trim_start_matches("expected "))
         })
     });
-    let start = start_of(&start.collect::<Result<Vec<_>, _>>()?);
+    let start = start_from(&start.collect::<Result<Vec<_>, _>>()?);
     let models = match options.model.as_deref() {
         None => Models::Both,
         Some(name) => Models::from_str(name, false)
             .map_err(|_| Error::option("model", name, "nonlinear, linear or both"))?,
     };
-    let view = View { every_s, models, start, extras: options.extras, quick: None };
+    let settings = TraceSettings { every_s, models, start, extras: options.extras, capped: None };
     let stop = || interrupt.stopped();
-    let trace = trace::in_pool(&plan, at, &view, &stop).map_err(Error::model)?;
+    let trace = trace_in_pool(&plan, at, &settings, &stop).map_err(Error::model)?;
     if interrupt.stopped() {
         return Ok(None);
     }
@@ -68,7 +73,7 @@ mod tests {
 
     #[test]
     fn an_interrupt_ends_a_trace_and_modes() {
-        // Hours of work each.
+        // Each of the two would take hours.
         let text = "spin = { profile = \"ramp\", peak_rpm = 350, ramp_s = 5 }\n\
              time = { end_s = 1e5 }\nintegrator = { method = \"rk4\", step_s = 1e-5 }\n";
         let grid = GridInput::text("grid", text.to_owned(), Vec::new());

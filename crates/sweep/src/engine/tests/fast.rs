@@ -1,6 +1,6 @@
-//! The fast method's promises, held against plain RK4: on the paper's map, with the channels and
-//! windows that once hid errors, and on other machines. `tests/random_rows.rs` holds it on random
-//! machines of every kind.
+//! Tests of the fast method's accuracy against plain RK4: on the paper's map, with channels and
+//! windows that are likely to hide errors, and on other machines. `tests/random_rows.rs` tests it
+//! on random machines of every kind.
 
 use rayon::prelude::*;
 use washer_row::{Level, Verdict};
@@ -26,10 +26,11 @@ fn reliable(plan: &Plan, outcome: &Outcome) -> Option<bool> {
     Verdict::new(outcome, rule.channels.len(), rule.limits).reliable
 }
 
-/// Shares of the gap are of this (m), the built-in machine's.
+/// Lower limit of the gap (m) to which differences of gaps are related: the clearance of the
+/// built-in machine.
 const CLEARANCE_M: f64 = 0.01;
 
-/// The greatest relative difference of two rows' amplitudes, gaps and ratios by turn.
+/// Returns the greatest relative difference of two rows' amplitudes, gaps and ratios by turn.
 fn error(a: &Outcome, b: &Outcome) -> f64 {
     let relative = |a: f64, b: f64| if a == b { 0.0 } else { (a - b).abs() / b.abs() };
     let models = [(&a.nonlinear, &b.nonlinear), (&a.linear, &b.linear)];
@@ -44,36 +45,35 @@ fn error(a: &Outcome, b: &Outcome) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Plain RK4 at a step (s).
-fn by_rk4(plan: &Plan, step_s: f64) -> Vec<Outcome> {
+/// Computes all rows by plain RK4 with a step (s).
+fn rows_by_rk4(plan: &Plan, step_s: f64) -> Vec<Outcome> {
     rows(&Plan { integrator: Integrator::Rk4 { step_s }, ..plan.clone() })
 }
 
-/// One point by plain RK4 at a step (s).
+/// Computes the row of one point by plain RK4 with a step (s).
 fn row_by_rk4(plan: &Plan, point: u64, step_s: f64) -> Outcome {
     let plan = Plan { integrator: Integrator::Rk4 { step_s }, ..plan.clone() };
     ModelEngine::new(&plan).unwrap().evaluate_at(&[plan.axis_values(point)]).remove(0)
 }
 
-/// Runs a plan by the fast method and by plain RK4 at 2e-4 s. Verdicts are the same, and amplitudes
-/// of every row that is not flagged within the accuracy; few rows are flagged, and only such where
-/// RK4 at another step differs.
-fn hold_against_rk4(plan: &Plan, accuracy: f64) -> Vec<Outcome> {
-    hold_against_rk4_at(2e-4, plan, accuracy)
+/// Computes the rows of a plan by the fast method and compares them with plain RK4 at 2e-4 s.
+fn compare_with_rk4(plan: &Plan, accuracy: f64) -> Vec<Outcome> {
+    compare_with_rk4_at(2e-4, plan, accuracy)
 }
 
-/// As [`hold_against_rk4`], at a step (s) of RK4.
-fn hold_against_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> {
+/// Computes the rows of a plan by the fast method and compares them with plain RK4 at a step (s).
+/// Every row that is marked as converged must have the same verdict and an error within 5 times the
+/// accuracy, and few rows may exceed the accuracy itself.
+fn compare_with_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> {
     let fast = Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
-    let at = |step_s: f64| by_rk4(plan, step_s);
     let rows = rows(&fast);
-    let expected = at(step_s);
-    let mut beyond = 0;
-    for (place, (row, expected)) in rows.iter().zip(&expected).enumerate() {
-        // It may be RK4 that errs, where a violent motion amplifies what its step leaves.
+    let expected = rows_by_rk4(plan, step_s);
+    let mut rows_beyond = 0;
+    for (point, (row, expected)) in rows.iter().zip(&expected).enumerate() {
+        // The error may be that of RK4, where a violent motion amplifies its truncation error.
         let finer;
         let expected = if error(row, expected) > accuracy {
-            finer = row_by_rk4(plan, place as u64, step_s / 8.0);
+            finer = row_by_rk4(plan, point as u64, step_s / 8.0);
             &finer
         } else {
             expected
@@ -84,16 +84,16 @@ fn hold_against_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> 
         }
         assert_eq!(reliable(plan, row), reliable(plan, expected), "{}: {row:?}", plan.name);
         let error = error(row, expected);
-        beyond += u64::from(error > accuracy);
+        rows_beyond += u64::from(error > accuracy);
         assert!(
             error <= 5.0 * accuracy,
             "{}: error {error:e} of {row:?} against {expected:?}",
             plan.name
         );
     }
-    // Of Fig. 12's 1287 rows these are violent motions whose least gap is off, by up to 4.4 times
-    // the accuracy.
-    assert!(beyond <= plan.points() / 300, "{beyond} rows are beyond {accuracy:e}");
+    // In the 1287 rows of Fig. 12 these are violent motions with an error of the least gap of up to
+    // 4.4 times the accuracy.
+    assert!(rows_beyond <= plan.points() / 300, "{rows_beyond} rows are beyond {accuracy:e}");
     rows
 }
 
@@ -101,18 +101,18 @@ fn hold_against_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> 
 fn every_row_of_fig12_is_that_of_rk4_or_flagged() {
     let plan = load(include_str!("../../../../../sweeps/fig12.toml"));
     assert_eq!(plan.points(), 39 * 33);
-    let rows = hold_against_rk4(&plan, 1e-3);
-    let left = rows.iter().filter(|row| row.converged == Some(false)).count();
-    assert!(left < 13, "{left} rows are in doubt: more than 1 %");
+    let rows = compare_with_rk4(&plan, 1e-3);
+    let unconverged = rows.iter().filter(|row| row.converged == Some(false)).count();
+    assert!(unconverged < 13, "{unconverged} rows have not converged: more than 1 %");
     for level in [Level::Capped1, Level::Capped2, Level::Dop853] {
         assert!(rows.iter().any(|row| row.method == level), "no row holds {level:?}");
     }
 }
 
 #[test]
-fn one_channel_alone_hides_nothing() {
-    // With all channels the yaw's ratio shows what these rows do; with the tub's front alone an
-    // early peak hides it.
+fn a_single_channel_is_as_accurate_as_all() {
+    // With all channels the ratio of the yaw reveals these rows' errors. With the tub's front alone
+    // an early peak hides them. The ratios are those of an independent program.
     let points = [(0.7, 60.0, 2.0012), (1.0, 67.5, 2.2821), (0.9, 60.0, 1.976)];
     let plan = load(
         "[spin]\nprofile = \"triangular\"\npeak_rpm = 350\nramp_s = 50\n[time]\nend_s = \
@@ -125,7 +125,6 @@ fn one_channel_alone_hides_nothing() {
     for (mass_kg, damping, ratio) in points {
         let row = &engine.evaluate_at(&[vec![mass_kg, damping]])[0];
         let found = Verdict::new(row, 1, 2.0).greatest.unwrap().1;
-        // By an independent program.
         assert!(
             (found / ratio - 1.0).abs() < 1e-3,
             "{mass_kg} kg, {damping} N s/m: {found} for {ratio}"
@@ -134,8 +133,8 @@ fn one_channel_alone_hides_nothing() {
 }
 
 #[test]
-fn rows_are_rk4s_on_other_machines() {
-    // Other proportions, speeds, and bearings and hinges soft enough for the cap to matter.
+fn rows_agree_with_rk4_on_other_machines() {
+    // Other proportions and speeds, and bearings and hinges so soft that the cap matters.
     let machines = [
         "unbalance_x_m = 0.36\nspring_stiffness_n_per_m = 11000\nspin_peak_rpm = 600",
         "bearing_stiffness_n_per_m = 2e6\nflexure_stiffness_n_m_per_rad = 15000",
@@ -159,13 +158,13 @@ fn rows_are_rk4s_on_other_machines() {
              [[axis]]\nparameter = \"{axis}\"\nrange = {{ from = 40, to = 240, count = 5 }}\n"
         ));
         for (accuracy, step_s) in [(1e-3, 2e-4), (1e-4, 1e-4)] {
-            hold_against_rk4_at(step_s, &plan, accuracy);
+            compare_with_rk4_at(step_s, &plan, accuracy);
         }
     }
 }
 
 #[test]
-fn rows_are_rk4s_on_machines_with_friction_stops_and_gasket() {
+fn rows_agree_with_rk4_on_machines_with_friction_stops_and_gasket() {
     let machine = include_str!("../../../../../docs/examples/friction.toml");
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("machine.toml"), machine).unwrap();
@@ -185,10 +184,10 @@ fn rows_are_rk4s_on_machines_with_friction_stops_and_gasket() {
         );
         std::fs::write(&path, text).unwrap();
         let plan = crate::config::load(&path, &[]).unwrap();
-        // Their own step is 2e-4 s or shorter.
-        let rows = hold_against_rk4_at(5e-5, &plan, 1e-3);
+        // The rows' own step is 2e-4 s or shorter.
+        let rows = compare_with_rk4_at(5e-5, &plan, 1e-3);
         let sensitive = rows.iter().filter(|row| row.sensitive == Some(true)).count();
-        // Whatever bounces between stops of 1e7 N/m is chaotic: no step settles it.
+        // A motion that bounces between stops of 1e7 N/m is chaotic: no step makes it converge.
         let most = if set == stiff { 2 * rows.len() / 3 } else { rows.len() / 6 };
         assert!(sensitive <= most, "{set}: {sensitive} of {} rows", rows.len());
         let engine = ModelEngine::new(&plan).unwrap();
@@ -201,7 +200,7 @@ fn rows_are_rk4s_on_machines_with_friction_stops_and_gasket() {
 }
 
 #[test]
-fn rows_by_other_criteria_are_rk4s() {
+fn rows_by_other_criteria_agree_with_rk4() {
     for criterion in ["envelope", "rms"] {
         let plan = load(&format!(
             "name = \"{criterion}\"\nmetrics = \
@@ -215,16 +214,16 @@ fn rows_by_other_criteria_are_rk4s() {
              5 }}\n\
              [reliability]\ncriterion = \"{criterion}\"\n"
         ));
-        let rows = hold_against_rk4(&plan, 1e-3);
+        let rows = compare_with_rk4(&plan, 1e-3);
         let mut by_peaks = plan.clone();
         by_peaks.model.measures = Default::default();
-        let peaks = hold_against_rk4(&by_peaks, 1e-3);
+        let peaks = compare_with_rk4(&by_peaks, 1e-3);
         let clashing = rows.iter().filter(|row| row.nonlinear.metrics[1] > 0.0).count();
         assert!((1..rows.len()).contains(&clashing), "{clashing} of {} rows", rows.len());
         for (row, peak) in rows.iter().zip(&peaks) {
             assert!(
                 row.nonlinear.turns.is_empty() && row.linear.turns.is_empty(),
-                "nothing is held for long"
+                "the amplitudes of turns are dropped"
             );
             assert!(
                 row.static_sag_m.is_some_and(|sag_m| (0.012..0.016).contains(&sag_m)),
@@ -241,18 +240,18 @@ fn rows_by_other_criteria_are_rk4s() {
                 );
                 continue;
             }
-            // In the turn in which the nonlinear motion is greatest the linear one is at most as
-            // great as it ever is.
-            let of_peaks = Verdict::new(peak, 6, 2.0).ratios;
-            for (by_turn, of_peaks) in row.turn_ratios.iter().zip(of_peaks) {
-                assert!(by_turn.unwrap() > 0.99 * of_peaks.unwrap(), "{row:?}");
+            // The ratio in the turn of the nonlinear model's peak is at least that of the peaks: in
+            // this turn the linear amplitude is at most its own peak.
+            let peak_ratios = Verdict::new(peak, 6, 2.0).ratios;
+            for (by_turn, by_peaks) in row.turn_ratios.iter().zip(peak_ratios) {
+                assert!(by_turn.unwrap() > 0.99 * by_peaks.unwrap(), "{row:?}");
             }
         }
     }
 }
 
 #[test]
-fn where_the_verdict_is_in_doubt_the_row_is_refined() {
+fn a_row_near_the_limit_is_refined() {
     let plan = load(include_str!("../../../../../sweeps/fig12.toml"));
     let at = [vec![0.4, 140.0]];
     let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
@@ -263,12 +262,12 @@ fn where_the_verdict_is_in_doubt_the_row_is_refined() {
     let plan = Plan { reliability, ..plan };
     let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
     assert_eq!((row.method, row.sensitive), (Level::Dop853, Some(false)));
-    // The error of the uncapped level, not of the capped one.
+    // This is the error of the uncapped level, which the capped level does not reach.
     assert!(row.error.unwrap() < 1e-5, "{row:?}");
 }
 
 #[test]
-fn a_row_does_not_depend_on_its_company() {
+fn a_row_does_not_depend_on_the_rows_beside_it() {
     let plan = load(include_str!("../../../../../sweeps/quick.toml"));
     let plan = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };
     let engine = ModelEngine::new(&plan).unwrap();
@@ -283,13 +282,13 @@ fn a_row_does_not_depend_on_its_company() {
 }
 
 #[test]
-fn a_side_is_that_of_the_row() {
+fn a_search_for_the_verdict_alone_gives_the_rows_verdict() {
     let plan = load(include_str!("../../../../../sweeps/quick.toml"));
     let plan = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };
     let engine = ModelEngine::new(&plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
-    let of_sides = ModelEngine { demand: Demand::Side, ..ModelEngine::new(&plan).unwrap() };
-    let sides = of_sides.evaluate_at(&values);
+    let side_engine = ModelEngine { demand: Demand::Side, ..ModelEngine::new(&plan).unwrap() };
+    let sides = side_engine.evaluate_at(&values);
     let rows = engine.evaluate_at(&values);
     let steps =
         |outcomes: &[Outcome]| outcomes.iter().map(|outcome| outcome.nonlinear.steps).sum::<u64>();
@@ -312,14 +311,15 @@ fn rows_of_a_drum_that_brakes_hard_follow_the_bearings() {
         ));
         let fast = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };
         let found = rows(&fast);
-        // The bearings' fastest mode times this is 0.12.
+        // This step times the frequency of the bearings' fastest mode is 0.12.
         let following = Integrator::Rk4 { step_s: 1.25e-5 };
         let expected = rows(&Plan { integrator: following, ..fast });
         for (row, expected) in found.iter().zip(&expected) {
             assert_eq!((row.converged, row.sensitive), (Some(true), Some(false)), "{row:?}");
             let models = [(&row.nonlinear, &expected.nonlinear), (&row.linear, &expected.linear)];
             for (model, expected) in models {
-                let (force_n, expected_n) = (model.metrics[0], expected.metrics[0]);
+                let force_n = model.metrics[0];
+                let expected_n = expected.metrics[0];
                 assert!((force_n / expected_n - 1.0).abs() < 1e-3, "{force_n} for {expected_n}");
             }
             assert!(error(row, expected) < 1e-3, "{row:?}");
@@ -327,22 +327,22 @@ fn rows_of_a_drum_that_brakes_hard_follow_the_bearings() {
     }
 }
 
-/// With friction nothing that rings counts as decayed, and the additive method damps it: however
-/// alike its runs were, these rows did not converge.
+/// With friction no ringing of the bearings counts as decayed. The additive method damps it, so that
+/// its runs agree on a wrong result; these rows must be refined beyond it.
 #[test]
-fn bearings_that_ring_with_friction_are_followed() {
+fn rows_with_friction_and_ringing_bearings_converge() {
     let plan = load_with_elements(
         "[spin]\nprofile = \"table\"\ntime_s = [0, 0.3, 0.301, 0.6]\n\
          speed_rpm = [0, 1000, 1000, 0]\n[time]\nend_s = 0.6\nwindow_s = [0.599, 0.6]\n\
          [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.9]\n\
          [[axis]]\nparameter = \"friction_n\"\nvalues = [20, 70]\n[reliability]\n",
     );
-    let rows = hold_against_rk4_at(1e-5, &plan, 1e-3);
+    let rows = compare_with_rk4_at(1e-5, &plan, 1e-3);
     assert!(rows.iter().all(|row| row.converged == Some(true)), "{rows:?}");
 }
 
 #[test]
-fn motions_of_micrometres_are_rk4s() {
+fn motions_of_micrometres_agree_with_rk4() {
     let plan = load(
         "name = \"tiny\"\n[spin]\nprofile = \"ramp\"\npeak_rpm = 350\nramp_s = 12\n\
          [time]\nend_s = 14\nwindow_s = [4, 14]\n\
@@ -351,12 +351,12 @@ fn motions_of_micrometres_are_rk4s() {
          [reliability]\nratio_limit = 1.001\n",
     );
     for accuracy in [1e-2, 1e-3] {
-        let rows = hold_against_rk4_at(1e-4, &plan, accuracy);
+        let rows = compare_with_rk4_at(1e-4, &plan, accuracy);
         assert!(rows.iter().all(|row| row.converged == Some(true)));
     }
 }
 
-/// A grid over the machine that has every element.
+/// Loads a grid over a machine with every kind of element.
 fn load_with_elements(text: &str) -> Plan {
     let machine = include_str!("../../../../../docs/examples/friction.toml");
     let unbalance = "[[further_unbalances]]\nmass_kg = 0.1\nx_m = 0.1\nradius_m = -0.2\n";

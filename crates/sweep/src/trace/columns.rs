@@ -1,0 +1,195 @@
+//! Columns of a trace: instants, channels, and what else is asked for.
+
+use std::f64::consts::TAU;
+
+use lane_ode::Failure;
+use sweep_engine::Table;
+use washer_model::{COORDINATES, Channel, Forces, History, Instant, ModelKind};
+
+use super::{TraceExtras, TraceRun};
+
+/// Distance from a whole turn (rad) below which an angle is reported as 0. Basis: some ten times
+/// the rounding error of the angle after the most turns that a run can have. Doubling it changes
+/// no angle that is sampled between whole turns.
+const WHOLE_TURN_RAD: f64 = 1e-7;
+
+/// Adds the columns of histories, in which the runs stand one below the other. Returns for each
+/// model and each run why the integration failed, if it did.
+pub(super) fn add_columns(
+    table: &mut Table,
+    runs: &[&TraceRun],
+    models: &[(ModelKind, Vec<History<'_>>)],
+    extras: TraceExtras,
+) -> Vec<Vec<Option<String>>> {
+    let times = runs.iter().flat_map(|run| run.times_s.iter().copied().map(Some));
+    table.numbers("time_s", "s", "time since the start", times);
+    let speeds = runs.iter().flat_map(|run| run.spin.speeds_rpm(run.times_s.iter().copied()));
+    table.numbers("speed_rpm", "rpm", "spin of the shaft", speeds.map(Some));
+    if extras.angle {
+        let angles = runs.iter().flat_map(|run| run.spin.angles_rad(run.times_s.iter().copied()));
+        // Instants of whole turns are rounded, so their angles may be just below 2 pi.
+        let is_whole = |angle: f64| angle.min(TAU - angle) < WHOLE_TURN_RAD;
+        let angles = angles.map(|angle| if is_whole(angle) { 0.0 } else { angle });
+        let description = "angle of the drum, 0 where the unbalance is up";
+        table.numbers("drum_angle_rad", "rad", description, angles.map(Some));
+    }
+    let counts: Vec<usize> = runs.iter().map(|run| run.times_s.len()).collect();
+    let models: Vec<ModelColumns<'_>> = models
+        .iter()
+        .map(|(kind, histories)| ModelColumns::new(kind.name(), histories, &counts))
+        .collect();
+    models.iter().for_each(|model| model.add_channels(table));
+    models.iter().for_each(|model| model.add_gap(table));
+    if extras.rates {
+        models.iter().for_each(|model| model.add_rates(table));
+    }
+    if extras.states {
+        models.iter().for_each(|model| model.add_states(table));
+    }
+    if extras.forces {
+        models.iter().for_each(|model| model.add_forces(table));
+    }
+    models.iter().map(ModelColumns::failures).collect()
+}
+
+/// The columns of one model.
+struct ModelColumns<'a> {
+    model: &'static str,
+    histories: &'a [History<'a>],
+    /// The number of instants of each history.
+    counts: &'a [usize],
+    instants: Vec<Option<Instant>>,
+}
+
+impl<'a> ModelColumns<'a> {
+    fn new(model: &'static str, histories: &'a [History<'a>], counts: &'a [usize]) -> Self {
+        let instants = histories
+            .iter()
+            .zip(counts)
+            .flat_map(|(history, &count)| (0..count).map(|k| history.instant(k)))
+            .collect();
+        Self { model, histories, counts, instants }
+    }
+
+    fn add_column(
+        &self,
+        table: &mut Table,
+        (name, unit, description): (&str, &str, &str),
+        quantity: impl Fn(&Instant) -> f64,
+    ) {
+        let description = format!("{description}, {} model; null from where it failed", self.model);
+        let values = self.instants.iter().map(|instant| instant.as_ref().map(&quantity));
+        table.numbers(name, unit, &description, values);
+    }
+
+    fn add_channels(&self, table: &mut Table) {
+        for channel in Channel::ALL {
+            let name = format!("{}_{}", self.model, channel.name());
+            let description = format!("{} from equilibrium", channel.description());
+            self.add_column(table, (&name, channel.unit(), &description), |at| {
+                at.channels[channel.index()]
+            });
+        }
+    }
+
+    fn add_rates(&self, table: &mut Table) {
+        for channel in Channel::ALL {
+            let name = channel.name();
+            let unit = channel.unit();
+            let k = channel.index();
+            let name = |per: &str| format!("{}_{name}_{unit}_per_{per}", self.model);
+            let description = channel.description();
+            let rate = format!("rate of the {description}");
+            self.add_column(table, (&name("s"), &format!("{unit}/s"), &rate), |at| at.rates[k]);
+            let acceleration = format!("acceleration of the {description}");
+            let unit = format!("{unit}/s^2");
+            self.add_column(table, (&name("s2"), &unit, &acceleration), |at| at.accelerations[k]);
+        }
+    }
+
+    fn add_gap(&self, table: &mut Table) {
+        let name = format!("gap_{}_m", self.model);
+        self.add_column(table, (&name, "m", "gap between drum and tub"), |at| at.gap_m);
+    }
+
+    fn add_states(&self, table: &mut Table) {
+        for i in 0..COORDINATES {
+            let (unit, per_s) = if i < 4 { ("m", "m/s") } else { ("rad", "rad/s") };
+            let name = format!("q{}_{}_{unit}", i + 1, self.model);
+            let description = format!("coordinate q{} from equilibrium", i + 1);
+            self.add_column(table, (&name, unit, &description), |at| at.deviations[i]);
+            let name = format!("u{}_{}_{unit}_per_s", i + 1, self.model);
+            self.add_column(table, (&name, per_s, &format!("speed of q{}", i + 1)), |at| {
+                at.speeds[i]
+            });
+        }
+    }
+
+    fn add_forces(&self, table: &mut Table) {
+        let forces: Vec<Option<Forces>> = self
+            .histories
+            .iter()
+            .zip(self.counts)
+            .flat_map(|(history, &count)| (0..count).map(|k| history.forces(k)))
+            .collect();
+        let mut add = |force: &str, description: &str, value: &dyn Fn(&Forces) -> f64| {
+            let name = format!("{force}_{}_n", self.model);
+            let description =
+                format!("{description}, {} model; null from where it failed", self.model);
+            table.numbers(&name, "N", &description, forces.iter().map(|at| at.as_ref().map(value)));
+        };
+        let Some(first) = forces.first().and_then(Option::as_ref) else { return };
+        let axes = ["x", "y", "z"];
+        for (kind, (element, force, description, count)) in
+            Forces::ELEMENT_KINDS.into_iter().enumerate()
+        {
+            for k in 0..first.by_kind()[kind].len() {
+                let mut name = format!("{element}_{}_{force}", k / count + 1);
+                let mut description = description.to_owned();
+                if count > 1 {
+                    name += &format!("_{}", axes[k % count]);
+                    description += &(k % count + 1).to_string();
+                }
+                add(&name, &description, &|at| at.by_kind()[kind][k]);
+            }
+        }
+        let elements = if first.stops_n.is_empty() && first.bushings_n.is_empty() {
+            "all springs and dampers"
+        } else {
+            "all springs, dampers, stops and bushings"
+        };
+        for (k, axis) in axes.into_iter().enumerate() {
+            let description = format!("force of {elements} on the cabinet along c{}", k + 1);
+            add(&format!("cabinet_force_{axis}"), &description, &|at| at.cabinet_n[k]);
+        }
+        for k in 0..first.feet_n.len() {
+            let description = "vertical load of the foot, negative where it would lift";
+            add(&format!("foot_{}_load", k + 1), description, &|at| at.feet_n[k]);
+        }
+        if first.slip_margin_n.is_some() {
+            let description = "margin of the cabinet against slipping, friction on all feet \
+                               together less the horizontal force";
+            add("slip_margin", description, &|at| at.slip_margin_n.unwrap_or(f64::NAN));
+            let description = "margin of the cabinet against walking: that against slipping less \
+                               what turning takes of it";
+            add("walk_margin", description, &|at| at.walk_margin_n.unwrap_or(f64::NAN));
+        }
+    }
+
+    /// Returns for each history why and when the integration failed, if it did.
+    fn failures(&self) -> Vec<Option<String>> {
+        let failure = |history: &History<'_>| {
+            let (reason, time_s) = history.failure?;
+            let what = match reason {
+                Failure::Diverged => "diverged",
+                Failure::StepTooSmall => "needs steps too small for double precision",
+                Failure::StepLimit => "used up its allowance of steps",
+            };
+            Some(format!(
+                "the {} model {what} at {time_s:.4} s: its columns are null from there on",
+                self.model
+            ))
+        };
+        self.histories.iter().map(failure).collect()
+    }
+}

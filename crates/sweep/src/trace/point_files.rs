@@ -1,0 +1,92 @@
+//! Traces of every point of a map, a file each, which `sweep run --keep-traces` writes.
+
+use std::path::Path;
+
+use rayon::iter::{IndexedParallelIterator as _, IntoParallelIterator as _, ParallelIterator as _};
+use sweep_engine::store::read;
+use sweep_engine::threads::Cancel;
+use sweep_engine::{StoreError, threads};
+use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
+use washer_model::Start;
+use washer_row::Level;
+
+use super::{Models, TraceExtras, TraceSettings, trace_scenario};
+use crate::engine::ModelEngine;
+
+/// Maximum number of points with a file each. Basis: a file of some 300 kB, so 3 GB in all;
+/// doubling it doubles the disk space that one option may take.
+pub(crate) const MAX_POINT_TRACES: u64 = 10_000;
+
+/// Time steps of each file, over the whole run. Basis: the width in pixels of the chart that shows
+/// it. Doubling it doubles the size of the files.
+const TIME_STEPS: f64 = 2000.0;
+
+/// Writes the trace of every point of `result` into `folder` as `point-<index>.parquet`, until
+/// `stop` returns true. A point without equilibrium gets no file. `on_point` is called after each
+/// point.
+///
+/// Where a row was computed with capped modes, its trace is integrated in the same way, in a
+/// fraction of the time that `sweep trace` takes.
+///
+/// # Errors
+/// Returns an error if `result` cannot be read, if a file cannot be written, and if no threads can
+/// be started.
+pub(crate) fn write_point_traces(
+    engine: &ModelEngine<'_>,
+    result: &ParquetFile,
+    folder: &Path,
+    threads: usize,
+    stop: Cancel<'_>,
+    on_point: &(dyn Fn() + Sync),
+) -> Result<(), StoreError> {
+    let plan = engine.plan();
+    files::ready(folder)?;
+    remove_point_traces(folder)?;
+    let levels = read::levels(result)?;
+    threads::pool(threads)?.install(|| {
+        levels.into_par_iter().enumerate().try_for_each(|(point, level)| {
+            let point = point as u64;
+            if stop() {
+                return Ok(());
+            }
+            let names = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
+            let at = names.zip(plan.axis_values(point)).collect();
+            let level = level.and_then(|name| Level::named(&name));
+            let settings = TraceSettings {
+                every_s: Some(plan.end_s / TIME_STEPS),
+                models: Models::Both,
+                start: Start::default(),
+                extras: TraceExtras::default(),
+                capped: level.and_then(|level| engine.capped_run(level)),
+            };
+            let traced = trace_scenario(plan, plan.scenario(point), at, &settings, stop);
+            if stop() {
+                return Ok(());
+            }
+            // A point without equilibrium is an error here; its row in the map reports that.
+            if let Ok(trace) = traced {
+                let path = folder.join(format!("point-{point}.parquet"));
+                files::write(&path, FileKind::Trace, &trace.table.into_bytes(&path)?)?;
+            }
+            on_point();
+            Ok(())
+        })
+    })
+}
+
+/// Removes the files of an earlier run from the folder: their points may be points of another grid.
+fn remove_point_traces(folder: &Path) -> Result<(), StoreError> {
+    for name in regular::names(folder).map_err(StoreError::io("list", folder))? {
+        let is_point_trace = name.to_str().is_some_and(|name| {
+            let number = name.strip_prefix("point-").and_then(|it| it.strip_suffix(".parquet"));
+            number.is_some_and(|number| number.parse::<u64>().is_ok())
+        });
+        let path = folder.join(&name);
+        if is_point_trace
+            && ParquetFile::open(&path).is_ok_and(|file| file.value(key::TRACE).is_some())
+        {
+            std::fs::remove_file(&path).map_err(StoreError::io("remove", &path))?;
+        }
+    }
+    Ok(())
+}
