@@ -29,7 +29,7 @@ fn holds(kind: TrialKind, greatest_exceptional_share: f64, greatest_unconverged_
     assert!(found.exceptions.len() <= allowed, "seed {seed}: {:#?}", found.exceptions);
     let unconverged = found.unconverged as f64 / found.rows.max(1) as f64;
     assert!(unconverged <= greatest_unconverged_share, "seed {seed}: {unconverged} of {rows} rows");
-    assert!(found.rows > rows / 2, "seed {seed}: {} grids were refused", found.refused);
+    assert!(found.rows >= rows, "seed {seed}: {} rows of {rows}", found.rows);
 }
 
 #[test]
