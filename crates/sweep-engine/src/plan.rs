@@ -1,7 +1,7 @@
 //! The plan of a run, with every value resolved and checked. The configuration makes it; engine,
 //! store and reports read it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 use sweep_parameter::{Parameter as _, Range, RatioLimits};
@@ -289,11 +289,39 @@ impl<M: Model> Plan<M> {
         self.axes.iter().enumerate().map(end).collect()
     }
 
-    /// Returns at most `MAX_PREPARED` corners, spread evenly, because a list may have many
-    /// and a machine's modes are expensive.
+    /// Returns at most `MAX_PREPARED` corners, because a list may have many and a machine's modes
+    /// are expensive. Points of a longer list at which an axis has its least or greatest value come
+    /// first, and the others are spread evenly.
     pub fn some_corners(&self) -> Vec<Vec<f64>> {
-        let every = self.corners().div_ceil(Self::MAX_PREPARED);
-        (0..self.corners().div_ceil(every)).map(|k| self.corner(k * every)).collect()
+        let corners = self.corners();
+        if corners <= Self::MAX_PREPARED {
+            return (0..corners).map(|corner| self.corner(corner)).collect();
+        }
+        let mut chosen = self.extreme_points();
+        let rest = Self::MAX_PREPARED.saturating_sub(chosen.len() as u64).max(1);
+        chosen.extend(
+            (0..rest)
+                .map(|k| u128::from(k) * u128::from(corners) / u128::from(rest))
+                .map(|corner| corner as u64),
+        );
+        chosen.iter().map(|corner| self.corner(*corner)).collect()
+    }
+
+    /// Returns the corners at which an axis has its least or greatest value first.
+    fn extreme_points(&self) -> BTreeSet<u64> {
+        let mut extremes: Vec<[(f64, u64); 2]> =
+            self.corner(0).into_iter().map(|value| [(value, 0); 2]).collect();
+        for corner in 1..self.corners() {
+            for (value, [least, greatest]) in self.corner(corner).into_iter().zip(&mut extremes) {
+                if value < least.0 {
+                    *least = (value, corner);
+                }
+                if value > greatest.0 {
+                    *greatest = (value, corner);
+                }
+            }
+        }
+        extremes.into_iter().flatten().map(|(_, corner)| corner).collect()
     }
 }
 

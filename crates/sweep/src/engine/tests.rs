@@ -40,6 +40,25 @@ fn evaluate(engine: &ModelEngine<'_>, points: std::ops::Range<u64>) -> Vec<Outco
 }
 
 #[test]
+fn a_single_stiff_point_of_a_long_list_is_integrated() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grid.toml");
+    let mut list = "bearing_stiffness_n_per_m\n".to_owned();
+    for point in 0..600 {
+        list.push_str(if point == 301 { "5e10\n" } else { "2e8\n" });
+    }
+    std::fs::write(folder.path().join("points.csv"), list).unwrap();
+    let grid = "[spin]\nprofile = \"triangular\"\npeak_rpm = 100\nramp_s = 1\n\
+                [time]\nend_s = 1\nwindow_s = [0.5, 1]\n[set]\nfriction_n = 40\n\
+                [design]\nmethod = \"list\"\nfile = \"points.csv\"\n";
+    std::fs::write(&path, grid).unwrap();
+    let plan = crate::config::load(&path, &[]).unwrap();
+    let engine = ModelEngine::new(&plan).unwrap();
+    let row = evaluate(&engine, 301..302).remove(0);
+    assert_eq!([row.nonlinear.status, row.linear.status], [Status::Ok; 2]);
+}
+
+#[test]
 fn a_failed_point_is_a_row_and_does_not_change_the_others() {
     let plan = plan(GRID);
     let engine = ModelEngine::new(&plan).unwrap();

@@ -56,11 +56,26 @@ fn a_list_of_millions_of_points_is_checked() {
     let mut list = "spring_1_cabinet_x_m,shaft_mass_kg\n".to_owned();
     list.push_str(&"0.1,1e0\n".repeat(3_000_000));
     let plan = load_list(SMALLEST, &list).unwrap();
-    assert_eq!((plan.points(), plan.some_corners().len()), (3_000_000, 256));
+    assert_eq!(plan.points(), 3_000_000);
+    assert!((250..=256).contains(&plan.some_corners().len()));
     list.push_str("0.1,0\n");
     let refused = load_list(SMALLEST, &list).unwrap_err();
     assert!(refused.contains("points.csv:3000002:5"), "{refused}");
     assert!(refused.contains("value 3000001"), "{refused}");
+}
+
+#[test]
+fn extreme_points_of_a_long_list_are_corners() {
+    let mut list = "bearing_stiffness_n_per_m,shaft_mass_kg\n".to_owned();
+    for point in 0..100_000 {
+        list.push_str(match point {
+            30_011 => "5e10,4\n",
+            77_777 => "2e8,0.5\n",
+            _ => "2e8,4\n",
+        });
+    }
+    let corners = load_list(SMALLEST, &list).unwrap().some_corners();
+    assert!(corners.contains(&vec![5e10, 4.0]) && corners.contains(&vec![2e8, 0.5]), "{corners:?}");
 }
 
 #[test]
