@@ -16,17 +16,25 @@ pub struct Setting {
     pub default: f64,
     /// The description in one line, with the unit.
     pub description: &'static str,
+    /// The help beside a value that is refused, or nothing.
+    pub help: &'static str,
 }
 
 /// The step of methods with fixed steps.
-pub const STEP_S: Setting =
-    Setting { key: "step_s", range: Range::Positive, default: 2e-4, description: "fixed step, s" };
+pub const STEP_S: Setting = Setting {
+    key: "step_s",
+    range: Range::Positive,
+    default: 2e-4,
+    description: "fixed step, s",
+    help: "",
+};
 /// The relative tolerance of adaptive methods.
 pub const RTOL: Setting = Setting {
     key: "rtol",
     range: Range::Within(1e-14, 1e-1),
     default: 1e-6,
     description: "relative tolerance per component",
+    help: "",
 };
 /// The absolute tolerance of adaptive methods.
 pub const ATOL: Setting = Setting {
@@ -34,6 +42,7 @@ pub const ATOL: Setting = Setting {
     range: Range::Within(1e-18, 1e-1),
     default: 1e-9,
     description: "absolute tolerance per component",
+    help: "",
 };
 /// The accuracy of methods that estimate their error by refinement.
 pub const ACCURACY: Setting = Setting {
@@ -41,6 +50,7 @@ pub const ACCURACY: Setting = Setting {
     range: Range::Within(1e-9, 1e-1),
     default: 1e-3,
     description: "relative error of the amplitudes",
+    help: "",
 };
 
 /// A row of the table of methods.

@@ -163,6 +163,13 @@ impl Report {
         self.push_with(|_| diagnostic);
     }
 
+    /// Adds help to the mistake that was kept last, if there is one.
+    pub fn add_help(&self, help: &str) {
+        if let Some(last) = self.found.borrow_mut().found.last_mut() {
+            last.help.push(help.to_owned());
+        }
+    }
+
     /// Keeps a mistake at one place: what is wrong, and what was expected there. There is no value.
     pub fn refuse<T>(
         &self,

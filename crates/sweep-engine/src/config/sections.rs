@@ -213,10 +213,16 @@ fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
         }
         // Settings that both methods have stay as they are.
         let was = integrator.settings();
-        *integrator = (entry.with)(&mut |&Setting { key, range, default, description }| {
+        *integrator = (entry.with)(&mut |&Setting { key, range, default, description, help }| {
             let was = was.iter().find(|(known, _)| *known == key);
             let mut number = was.map_or(default, |(_, number)| *number);
-            keys.key(Key::new(key, description).set(), &Form::Number(range), &mut number);
+            let setting = Key::new(key, description).set();
+            let field = keys.key(setting, &Form::Number(range), &mut number);
+            if let (Field::Bad, Some(report)) = (field, keys.report()) {
+                if !help.is_empty() {
+                    report.add_help(help);
+                }
+            }
             if let Some((section, at)) = keys.section().and_then(|s| Some((s, s.key_at(key)?))) {
                 section.report.put(format!("integrator.{key}"), at);
             }
