@@ -6,19 +6,16 @@ use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Settin
 use sweep_engine::methods;
 use sweep_parameter::Range;
 use washer_model::{Method, MethodNumbers};
-use washer_row::Level;
-
-/// Steps that one leg of an adaptive trajectory may take.
-pub(crate) const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
+use washer_row::{Level, MAX_ADAPTIVE_STEPS};
 
 /// Share of the longest stable step that plain RK4 uses as the fast method's reference.
 pub(crate) const REFERENCE_SHARE: f64 = 0.75;
 
-/// The accuracy of the fast method. Below 1e-4 its levels agree on the ringing that they leave out.
+/// The accuracy of the fast method. Below 1e-4 its levels agree on ringing that none resolves.
 const LEVELS_ACCURACY: Setting = Setting {
     range: Range::Within(1e-4, 1e-2),
-    description: "relative error of a row's numbers; for less take `method = \"rk4\"` with \
-                  `step_s = 2e-4`, which leaves 1e-8",
+    description: "relative error of a row's numbers",
+    help: "for less take `method = \"rk4\"` with `step_s = 2e-4`, which leaves some 1e-8",
     ..ACCURACY
 };
 

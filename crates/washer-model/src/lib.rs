@@ -97,7 +97,7 @@ pub use modes::{
 };
 pub use nonlinear::coupling::Caps;
 pub use point::friction::FrictionSpeed;
-pub use point::ringing::{LeftOut, Swing};
+pub use point::ringing::{Swing, UnresolvedModes};
 pub use point::{NoEquilibrium, Point, Timing};
 pub use ready::prepare;
 pub use run::equations::{Equations, STATE_LEN};

@@ -14,7 +14,9 @@ use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::equilibrium;
 use crate::nonlinear::outputs::{Axes, MovingCoordinates};
 use crate::point::ringing::{Ringing, jumps_rad_per_s2};
-use crate::{COORDINATES, FrictionSpeed, LeftOut, Machine, Matrices, ModelKind, Spin, Swing};
+use crate::{
+    COORDINATES, FrictionSpeed, Machine, Matrices, ModelKind, Spin, Swing, UnresolvedModes,
+};
 use core::iter::zip;
 use lane_ode::{Kernel, Lane, N, Simd};
 use std::sync::Arc;
@@ -109,10 +111,9 @@ impl Point {
         -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[TUB_Y])).0
     }
 
-    /// Returns a bound on the swing of hinge and bearings after all jumps of the drum's
-    /// acceleration, which steps longer than their periods leave out.
-    pub fn ringing(&self, left_out: LeftOut) -> Swing {
-        self.ringing.swing(left_out)
+    /// Returns a bound on the swing of unresolved modes after all jumps of the drum's acceleration.
+    pub fn ringing(&self, unresolved: UnresolvedModes) -> Swing {
+        self.ringing.swing(unresolved)
     }
 
     /// The same point, started 1e-10 (m, rad) beside its equilibrium in every coordinate of the
@@ -253,8 +254,13 @@ impl Kernel for Prepare<'_> {
                 }
                 let ((coefficients, linear), (linear_outputs, steepest)) = model;
                 let steepest = steepest.map(|tangents| Box::new(linear.with_tub(tangents)));
+                let matrices_at = |angle_rad: f64, acceleration_rad_per_s2: f64| {
+                    let spin =
+                        SpinState::new(N(angle_rad).sin_cos(), N(0.0), N(acceleration_rad_per_s2));
+                    linear.matrices(&coefficients.bodies, &spin)
+                };
                 ready.push(Ok(Point {
-                    ringing: Ringing::new(machine, course.jumps_rad_per_s2),
+                    ringing: Ringing::new(machine, course.jumps_rad_per_s2, matrices_at),
                     nudge: 0.0,
                     instants_s: [].into(),
                     machine: coefficients,

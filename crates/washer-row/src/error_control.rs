@@ -4,13 +4,15 @@
 //! difference of the row's numbers between level k and level k - 1. The error of level k is
 //!
 //! ```text
-//! e_k = 2 max(d_k, d_(k-1) / 5)
+//! e_k = 2 max(d_k, d_(k-1) / c)
 //! ```
 //!
 //! and the trajectory is done at the first level where e_k is at most the accuracy. The rule is
 //! Richardson's (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, II.4) without
 //! its extrapolation: the difference of two levels bounds the error of the finer one where the step
-//! shrinks by enough. The second term is for two levels that agree by chance.
+//! shrinks by enough. The second term is for two levels that agree by chance: c is the contraction
+//! of the error from level to level that the family guarantees, 1.5 where the step shrinks
+//! ([`STEP_CONTRACTION`]) and 10 where the tolerance does ([`TOLERANCE_RATIO`]).
 //!
 //! 1. With smooth forces, levels 0 to 5 cap the bearings' modes ([`StepSelector`]). The hinge is as
 //!    it is, and bounds the first step.
@@ -20,14 +22,15 @@
 //! 4. The last two levels resolve the bearings' modes. They are for rows in which bearings that
 //!    ring after a jump of the drum's acceleration matter.
 //!
-//! Levels that leave out the same ringing agree on an error that no difference shows. The static
-//! deflection under the jump bounds it ([`Point::ringing`](washer_model::Point::ringing)), and a
-//! motion whose first difference is beyond the accuracy amplifies it as much. A row goes to the
-//! first level that leaves out no more than the accuracy.
+//! Levels that leave the same ringing unresolved agree on an error that no difference shows. The
+//! static deflection under the jump bounds it ([`Point::ringing`](washer_model::Point::ringing)),
+//! and a motion whose first difference is beyond the accuracy amplifies it as much. A row goes to
+//! the first level whose unresolved ringing is within the accuracy.
 //!
 //! All numbers that decide `error`, `converged` and `sensitive` stand here, but for the three of
 //! chaos (`separation.rs`), the shares of the limit of stability (`STABILITY_SHARE`, `CAP_SHARE`
-//! and `HINGE_TO_DRUM` beside [`StepSelector`]) and each metric's scale.
+//! and `HINGE_TO_DRUM` beside [`StepSelector`]), the swing of a free body (`SWING_FACTOR`) and each
+//! metric's scale.
 
 use lane_ode::Tolerance;
 use washer_model::{Level, Method, ModelKind, StepSelector, capped_method};
@@ -40,20 +43,26 @@ use crate::levels::{RefinementLevel, RefinementLevels};
 /// level ([`step_ratio`]). Doubling it doubles every `error`, and sends twice as many rows on.
 const SAFETY_FACTOR: f64 = 2.0;
 
-/// The absolute tolerance (m, rad, m/s, rad/s) of the additive method over the relative one.
+/// The guaranteed contraction of the error from one step to the next: 1.5.
 ///
-/// Basis: a motion of 2 cm has both alike. Doubling it lengthens the steps of smaller motions.
-const ABSOLUTE_TO_RELATIVE: f64 = 2e-2;
+/// Derived: of two levels with errors E and E / c the difference is (1 - 1 / c) E, and
+/// [`SAFETY_FACTOR`] s times that is at least E / c where c is at least 1 + 1 / s.
+const STEP_CONTRACTION: f64 = 1.0 + 1.0 / SAFETY_FACTOR;
 
-/// The first level's relative tolerance per step at corners, and the ratio from level to level,
-/// in parts of the accuracy.
+/// The order in which errors shrink with the step where modes are capped: a cap's error is as its
+/// inverse square, and the cap as the inverse step.
+const CAPPED_ORDER: f64 = 2.0;
+
+/// The order in which errors shrink with the step where steps cross corners.
+const CORNER_ORDER: f64 = 1.0;
+
+/// The ratio of the additive method's relative tolerances from level to level; the first is this
+/// part of the accuracy.
 ///
 /// Basis: `sweeps/friction.toml`, where the error of a trajectory is some ten times its tolerance
-/// per step. Doubling it saves a third of the first level and sends more rows on.
+/// per step and shrinks with it. Doubling it saves a third of the first level and sends more rows
+/// on.
 const TOLERANCE_RATIO: f64 = 0.1;
-
-/// The number of the additive method's levels.
-const ADDITIVE_LEVELS: i32 = 3;
 
 /// The least relative tolerance of the additive method.
 ///
@@ -61,18 +70,25 @@ const ADDITIVE_LEVELS: i32 = 3;
 /// [`CORNER_STEP_S`] 31 ms. Doubling it leaves a level out at an accuracy of 1e-3.
 const LEAST_TOLERANCE: f64 = 1e-6;
 
+/// The absolute tolerance (m, rad, m/s, rad/s) of the additive method over the relative one.
+///
+/// Basis: a motion of 2 cm has both alike. Doubling it lengthens the steps of smaller motions.
+const ABSOLUTE_TO_RELATIVE: f64 = 2e-2;
+
 /// The longest step (s) of order 8 where forces have corners.
 ///
 /// Basis: corners are 3 ms wide, and order 8 needs some six steps for one. Doubling it makes the
 /// first of these levels useless: its median error grows from 7e-8 to that of the levels before.
 const CORNER_STEP_S: f64 = 5e-4;
 
-/// The number of levels with nothing capped: of smooth forces, and of order 8 at corners.
+/// The number of levels with nothing capped: two make one difference.
+const UNCAPPED_LEVELS: usize = 2;
+
+/// The number of levels of order 8 at corners.
 ///
-/// Basis: two make one difference, and chaos is told by a perturbed run; corners leave errors of
-/// first order, which a third difference settles. Each further one costs a row that does not
-/// converge as much as all others together.
-const UNCAPPED_LEVELS: [i32; 2] = [2, 3];
+/// Basis: corners leave errors of first order, which a second difference settles. Each further one
+/// costs a row that does not converge as much as all others together.
+const CORNER_LEVELS: usize = 3;
 
 /// The first step that resolves the bearings' modes, over the longest stable one.
 ///
@@ -80,48 +96,42 @@ const UNCAPPED_LEVELS: [i32; 2] = [2, 3];
 /// keeps its amplitude over a run. Doubling it damps the ringing away.
 const RESOLVING_SHARE: f64 = 0.25;
 
-/// The steps of an adaptive trajectory between two instants, at most.
-const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
+/// The number of levels that resolve the bearings' modes: two make one difference.
+pub(crate) const RESOLVING_LEVELS: usize = 2;
 
-/// The order in which errors shrink with the step where modes are capped: a cap's error is as its
-/// inverse square, and the cap as the inverse step.
-const CAPPED_ORDER: f64 = 2.0;
-
-/// The order where steps cross corners.
-const CORNER_ORDER: f64 = 1.0;
-
-/// The order of the formula of the nonlinear model: no error shrinks faster.
-const GREATEST_ORDER: f64 = 8.0;
-
-/// Returns the ratio of one level's step to the next one's.
+/// The greatest number of steps of an adaptive trajectory.
 ///
-/// Derived: of two levels with errors E and r^-p E the difference is (1 - r^-p) E, and
-/// [`SAFETY_FACTOR`] s times that is at least r^-p E where r^p is at least 1 + 1 / s.
+/// Basis: a trajectory of that many takes hours, so one that reaches it makes no progress. Doubling
+/// it doubles the time until such a row fails.
+pub const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
+
+/// Returns the ratio of one level's step to the next one's, where errors shrink by this order.
 fn step_ratio(order: f64) -> f64 {
-    (1.0 + 1.0 / SAFETY_FACTOR).powf(1.0 / order)
+    STEP_CONTRACTION.powf(1.0 / order)
 }
 
-/// Returns the greatest contraction of the error from one level to the next: a difference that
-/// shrinks by more is chance. 5.06.
-fn greatest_contraction() -> f64 {
-    step_ratio(CAPPED_ORDER).powf(GREATEST_ORDER)
+/// Returns the guaranteed contraction of the error from one level of a family to the next.
+fn contraction(level: Level) -> f64 {
+    match level {
+        Level::Additive => 1.0 / TOLERANCE_RATIO,
+        _ => STEP_CONTRACTION,
+    }
 }
 
 /// Returns the error of a level from its difference and the one before; `None` if there is no
 /// difference, or none that is a number.
-pub(crate) fn error_of_level(differences: &[Option<f64>]) -> Option<f64> {
+pub(crate) fn error_of_level(level: Level, differences: &[Option<f64>]) -> Option<f64> {
     let (last, earlier) = differences.split_last()?;
     let difference = (*last)?;
     let before = match earlier.last() {
         Some(before) => (*before)?,
         None => 0.0,
     };
-    let error = SAFETY_FACTOR * difference.max(before / greatest_contraction());
+    let error = SAFETY_FACTOR * difference.max(before / contraction(level));
     error.is_finite().then_some(error)
 }
 
-/// Returns the amplification of what a level leaves out, from the difference of the first two
-/// levels.
+/// Returns the amplification of unresolved ringing, from the difference of the first two levels.
 ///
 /// A motion that amplifies nothing differs there by less than the accuracy, because the levels are
 /// chosen so; one that differs by more amplifies by at least the quotient.
@@ -158,52 +168,57 @@ pub fn refinement_levels(
             step_s /= ratio;
         }
     }
-    let mut step_s = uncapped_s;
-    for _ in 0..UNCAPPED_LEVELS[0] {
-        levels.push(uncapped(model, step_s));
-        step_s /= ratio;
-    }
-    push_resolving(&mut levels, model, uncapped_s, step_s, ratio);
+    let next_s = push_uncapped(&mut levels, model, UNCAPPED_LEVELS, [uncapped_s, ratio]);
+    push_resolving(&mut levels, model, uncapped_s, next_s);
     RefinementLevels::checked(levels, None)
 }
 
 /// Returns the levels of the nonlinear model where friction and stops give forces corners.
 fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevels {
     let mut levels = Vec::new();
-    for k in 1..=ADDITIVE_LEVELS {
-        let relative = accuracy * TOLERANCE_RATIO.powi(k);
-        // The product of powers of ten may come out a hair below the least.
-        if relative < 0.999 * LEAST_TOLERANCE {
-            break;
-        }
+    let mut relative = TOLERANCE_RATIO * accuracy;
+    // The product of powers of ten may come out a hair below the least.
+    while relative > 0.999 * LEAST_TOLERANCE {
         let absolute = ABSOLUTE_TO_RELATIVE * relative;
         let tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
         let method = Method::Additive(tolerance);
         levels.push(RefinementLevel { level: Level::Additive, method });
+        relative *= TOLERANCE_RATIO;
     }
-    let stable_s = steps.uncapped_step_s(ModelKind::Nonlinear).unwrap_or(CORNER_STEP_S);
-    let mut step_s = CORNER_STEP_S.min(stable_s);
-    for _ in 0..UNCAPPED_LEVELS[1] {
-        levels.push(uncapped(ModelKind::Nonlinear, step_s));
-        step_s /= step_ratio(CORNER_ORDER);
-    }
-    push_resolving(&mut levels, ModelKind::Nonlinear, stable_s, step_s, step_ratio(CAPPED_ORDER));
+    let model = ModelKind::Nonlinear;
+    let stable_s = steps.uncapped_step_s(model).unwrap_or(CORNER_STEP_S);
+    let first_s = CORNER_STEP_S.min(stable_s);
+    let ratio = step_ratio(CORNER_ORDER);
+    let next_s = push_uncapped(&mut levels, model, CORNER_LEVELS, [first_s, ratio]);
+    push_resolving(&mut levels, model, stable_s, next_s);
     RefinementLevels::checked(levels, Some(AT_CORNERS.to_owned()))
 }
 
-/// Adds two levels whose steps resolve the bearings' modes.
-fn push_resolving(
+/// Adds levels with nothing capped from a first step (s), each a ratio shorter than the one before,
+/// and returns the step that would come next.
+fn push_uncapped(
     levels: &mut Vec<RefinementLevel>,
     model: ModelKind,
-    uncapped_s: f64,
-    step_s: f64,
-    ratio: f64,
-) {
-    let mut step_s = (RESOLVING_SHARE * uncapped_s).min(step_s);
-    for _ in 0..2 {
+    count: usize,
+    [first_s, ratio]: [f64; 2],
+) -> f64 {
+    let mut step_s = first_s;
+    for _ in 0..count {
         levels.push(uncapped(model, step_s));
         step_s /= ratio;
     }
+    step_s
+}
+
+/// Adds the levels whose steps resolve the bearings' modes.
+fn push_resolving(
+    levels: &mut Vec<RefinementLevel>,
+    model: ModelKind,
+    stable_s: f64,
+    longest_s: f64,
+) {
+    let first_s = longest_s.min(RESOLVING_SHARE * stable_s);
+    push_uncapped(levels, model, RESOLVING_LEVELS, [first_s, step_ratio(CAPPED_ORDER)]);
 }
 
 /// Returns a level with nothing capped.
@@ -226,22 +241,22 @@ mod tests {
 
     #[test]
     fn the_first_level_has_no_error() {
-        assert_eq!(error_of_level(&[]), None);
+        assert_eq!(error_of_level(Level::Capped1, &[]), None);
     }
 
     #[test]
     fn the_error_is_twice_the_difference_and_not_less_than_a_contraction_of_the_one_before() {
-        assert_eq!(error_of_level(&[Some(1e-4)]), Some(2e-4));
-        assert_eq!(error_of_level(&[Some(1e-4), Some(2e-4)]), Some(4e-4));
-        let by_chance = error_of_level(&[Some(1e-2), Some(1e-6)]).unwrap();
-        assert!((by_chance / (2e-2 / 5.0625) - 1.0).abs() < 1e-9, "{by_chance}");
+        assert_eq!(error_of_level(Level::Capped1, &[Some(1e-4)]), Some(2e-4));
+        assert_eq!(error_of_level(Level::Capped1, &[Some(1e-4), Some(2e-4)]), Some(4e-4));
+        let by_chance = error_of_level(Level::Capped1, &[Some(1e-2), Some(1e-6)]).unwrap();
+        assert!((by_chance / (2e-2 / 1.5) - 1.0).abs() < 1e-9, "{by_chance}");
     }
 
     #[test]
     fn levels_that_do_not_compare_leave_no_error() {
-        assert_eq!(error_of_level(&[Some(1e-3), None]), None);
-        assert_eq!(error_of_level(&[None, Some(1e-3)]), None);
-        assert_eq!(error_of_level(&[Some(f64::INFINITY)]), None);
+        assert_eq!(error_of_level(Level::Capped1, &[Some(1e-3), None]), None);
+        assert_eq!(error_of_level(Level::Capped1, &[None, Some(1e-3)]), None);
+        assert_eq!(error_of_level(Level::Capped1, &[Some(f64::INFINITY)]), None);
     }
 
     /// Levels of any error that shrinks at least as the ratio says are never further off than
@@ -253,8 +268,13 @@ mod tests {
             for steeper in [0.0, 0.5, 1.0, 4.0, 8.0] {
                 let error = |level: i32| ratio.powf(-f64::from(level) * (order + steeper));
                 let differences = [1, 2].map(|level| Some(error(level - 1) - error(level)));
-                assert!(error_of_level(&differences[..1]).unwrap() >= 0.999_999 * error(1));
-                assert!(error_of_level(&differences).unwrap() >= 0.999_999 * error(2));
+                assert!(
+                    error_of_level(Level::Capped1, &differences[..1]).unwrap()
+                        >= 0.999_999 * error(1)
+                );
+                assert!(
+                    error_of_level(Level::Capped1, &differences).unwrap() >= 0.999_999 * error(2)
+                );
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Refinement levels: the methods by which a trajectory is integrated, coarsest first.
 
-use washer_model::{Formula, LeftOut, Level, Method, MethodNumbers, ModelKind};
+use crate::error_control::RESOLVING_LEVELS;
+use washer_model::{Formula, Level, Method, MethodNumbers, ModelKind, UnresolvedModes};
 
 /// One refinement level.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,23 +76,22 @@ impl RefinementLevels {
         let family = |place: usize| {
             let level = self.levels[place].level;
             let kind = if level.is_capped() { Level::Capped0 } else { level };
-            (kind, self.left_out(place))
+            (kind, self.unresolved(place))
         };
         place > 0 && family(place) != family(place - 1)
     }
 
-    /// Returns the place of the first level whose steps resolve the bearings' modes: the last but
-    /// one.
+    /// Returns the place of the first level whose steps resolve the bearings' modes.
     pub const fn first_resolving(&self) -> usize {
-        self.levels.len().saturating_sub(2)
+        self.levels.len().saturating_sub(RESOLVING_LEVELS)
     }
 
-    /// Returns the parts whose ringing a level leaves out.
-    pub fn left_out(&self, place: usize) -> Option<LeftOut> {
+    /// Returns the modes that a level does not resolve.
+    pub fn unresolved(&self, place: usize) -> Option<UnresolvedModes> {
         if self.levels[place].level.is_capped() {
-            Some(LeftOut::HingeAndBearings)
+            Some(UnresolvedModes::HingeAndBearings)
         } else if place < self.first_resolving() {
-            Some(LeftOut::Bearings)
+            Some(UnresolvedModes::Bearings)
         } else {
             None
         }

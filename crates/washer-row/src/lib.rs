@@ -20,7 +20,7 @@ mod run;
 mod separation;
 mod verdict;
 
-pub use error_control::refinement_levels;
+pub use error_control::{MAX_ADAPTIVE_STEPS, refinement_levels};
 pub use levels::{RefinementLevel, RefinementLevels};
 pub use measures::{CREEPING_M_PER_S, Criterion, Facts, Measured, Measures, Metric, Part};
 pub use outcome::{Deviations, Dwelt, GrowingMode, Growth, Outcome, Status, Trajectory};

@@ -1,7 +1,7 @@
 //! A row under refinement: both models' trajectories, each at the finest level that it needed so
 //! far.
 
-use washer_model::{LeftOut, ModelKind, Point};
+use washer_model::{ModelKind, Point, UnresolvedModes};
 
 use crate::error_control::{amplification, error_of_chaos, error_of_level};
 use crate::levels::RefinementLevels;
@@ -33,6 +33,46 @@ pub struct RefinementRule<'a> {
     pub rule: &'a Rule,
 }
 
+impl<'a> RefinementRule<'a> {
+    /// Returns the rule of one model's trajectory of a point.
+    fn for_model(&self, model: usize, point: &'a Point) -> ModelRule<'a> {
+        let kind = ModelKind::ALL[model];
+        ModelRule { levels: &self.levels[model], rule: self.rule, point, kind }
+    }
+}
+
+/// The rule by which one model's trajectory of a point is refined.
+#[derive(Clone, Copy)]
+struct ModelRule<'a> {
+    levels: &'a RefinementLevels,
+    rule: &'a Rule,
+    point: &'a Point,
+    kind: ModelKind,
+}
+
+impl ModelRule<'_> {
+    /// Returns the unresolved ringing of a level as a share of the motion, amplified as the motion
+    /// amplifies.
+    fn ringing(&self, level: usize, refinement: &ModelRefinement) -> f64 {
+        let Some(run) = &refinement.run else { return 0.0 };
+        let Some(unresolved) = self.levels.unresolved(level) else { return 0.0 };
+        let swing = self.point.ringing(unresolved);
+        let mut greatest = swing.gap_m / self.point.clearance_m();
+        for (channel, amplitude) in self.rule.channels.iter().zip(&run.trajectory.amplitudes) {
+            let swing = swing.channels[channel.index()];
+            if swing > 0.0 {
+                greatest = greatest.max(swing / amplitude);
+            }
+        }
+        match unresolved {
+            UnresolvedModes::HingeAndBearings => {
+                amplification(refinement.first_difference, self.rule.accuracy) * greatest
+            }
+            UnresolvedModes::Bearings => greatest,
+        }
+    }
+}
+
 /// One model's trajectory under refinement.
 #[derive(Clone, Debug, Default)]
 struct ModelRefinement {
@@ -57,29 +97,22 @@ struct Perturbed {
 }
 
 impl ModelRefinement {
-    fn take(
-        &mut self,
-        level: usize,
-        run: LevelRun,
-        point: &Point,
-        with: RefinementRule<'_>,
-        model: usize,
-    ) {
+    fn take(&mut self, level: usize, run: LevelRun, rule: ModelRule<'_>) {
         let Some(before) = self.run.take() else {
             self.level = level;
             self.run = Some(run);
             return;
         };
-        let difference = difference(&before.trajectory, &run.trajectory, point, with.rule);
-        if with.levels[model].is_perturbed(level) {
-            let separation = Separation::new(&point.departure(&before.course, &run.course));
+        let difference = difference(&before.trajectory, &run.trajectory, rule.point, rule.rule);
+        if rule.levels.is_perturbed(level) {
+            let separation = Separation::new(&rule.point.departure(&before.course, &run.course));
             let is_chaotic = separation.is_exponential();
             self.perturbed = Some(Perturbed { is_chaotic, difference });
             self.run = Some(before);
             return;
         }
         // The difference before is of another method's error, which this one need not have.
-        if with.levels[model].begins_family(self.level) {
+        if rule.levels.begins_family(self.level) {
             self.differences.clear();
         }
         self.differences.push(difference);
@@ -99,74 +132,45 @@ impl ModelRefinement {
     }
 
     /// Returns the error of the finest run; `None` where nothing says how large it is.
-    fn error(&self, point: &Point, with: RefinementRule<'_>, model: usize) -> Option<f64> {
+    fn error(&self, rule: ModelRule<'_>) -> Option<f64> {
         if let Some(Perturbed { is_chaotic: true, difference }) = self.perturbed {
             return error_of_chaos((*self.differences.last()?)?, difference?);
         }
-        let error = error_of_level(&self.differences)?;
-        Some(error.max(self.ringing(self.level, point, with, model)))
-    }
-
-    /// Returns the ringing that a level leaves out, as a share of the motion and amplified as the
-    /// motion amplifies.
-    fn ringing(&self, level: usize, point: &Point, with: RefinementRule<'_>, model: usize) -> f64 {
-        let Some(run) = &self.run else { return 0.0 };
-        let Some(left_out) = with.levels[model].left_out(level) else { return 0.0 };
-        let swing = point.ringing(left_out);
-        let mut greatest = swing.gap_m / point.clearance_m();
-        for (channel, amplitude) in with.rule.channels.iter().zip(&run.trajectory.amplitudes) {
-            let swing = swing.channels[channel.index()];
-            if swing > 0.0 {
-                greatest = greatest.max(swing / amplitude);
-            }
-        }
-        match left_out {
-            LeftOut::HingeAndBearings => {
-                amplification(self.first_difference, with.rule.accuracy) * greatest
-            }
-            LeftOut::Bearings => greatest,
-        }
+        let error = error_of_level(rule.levels.levels[self.level].level, &self.differences)?;
+        Some(error.max(rule.ringing(self.level, self)))
     }
 
     /// Returns the level to run next, if the error is above the accuracy or `is_in_doubt`; `None`
     /// if the run is fine enough, or if no further one would help.
-    fn next_level(
-        &self,
-        point: &Point,
-        with: RefinementRule<'_>,
-        model: usize,
-        is_in_doubt: bool,
-    ) -> Option<usize> {
-        let levels = &with.levels[model];
+    fn next_level(&self, rule: ModelRule<'_>, is_in_doubt: bool) -> Option<usize> {
+        let levels = rule.levels;
         if self.run.is_none() {
             return Some(0);
         }
         if !levels.is_checked() || self.is_chaotic() {
             return None;
         }
-        let error = self.error(point, with, model);
-        let is_converged = error.is_some_and(|error| error <= with.rule.accuracy);
+        let accuracy = rule.rule.accuracy;
+        let is_converged = self.error(rule).is_some_and(|error| error <= accuracy);
         if is_converged && !is_in_doubt {
             return None;
         }
-        let accuracy = with.rule.accuracy;
-        let leaves_out_little =
-            |level: &usize| self.ringing(*level, point, with, model) <= accuracy;
+        let rings_little = |level: &usize| rule.ringing(*level, self) <= accuracy;
         let is_last = self.level + 1 == levels.levels.len()
-            || self.level + 1 == levels.first_resolving() && leaves_out_little(&self.level);
+            || self.level + 1 == levels.first_resolving() && rings_little(&self.level);
         if is_last {
-            // What the finest steps leave in doubt may be chaos, which no step settles.
-            let may_be_chaos = !is_converged && ModelKind::ALL[model] == ModelKind::Nonlinear;
-            let is_asked = may_be_chaos && self.perturbed.is_none();
-            return is_asked.then(|| levels.perturbed(self.level));
+            // Chaos leaves the finest steps in doubt, and no step settles it.
+            let may_be_chaos = !is_converged && rule.kind == ModelKind::Nonlinear;
+            let needs_perturbed = may_be_chaos && self.perturbed.is_none();
+            return needs_perturbed.then(|| levels.perturbed(self.level));
         }
         let mut next = self.level + 1;
         // It may be the capped modes that fail.
         if self.has_failed() {
             next = next.max(levels.first_uncapped());
         }
-        // Levels that leave out as much would agree on an error that none shows.
-        (next..levels.levels.len()).find(leaves_out_little)
+        // Levels with the same unresolved ringing would agree on an error that no difference shows.
+        (next..levels.levels.len()).find(rings_little)
     }
 }
 
@@ -192,7 +196,7 @@ impl RowRefinement {
         point: &Point,
         with: RefinementRule<'_>,
     ) {
-        self.0[model].take(level, run, point, with, model);
+        self.0[model].take(level, run, with.for_model(model, point));
     }
 
     /// Returns the finest run of a model with its level and its error, once there is one. The error
@@ -204,7 +208,7 @@ impl RowRefinement {
         with: RefinementRule<'_>,
     ) -> Option<(&LevelRun, usize, Option<f64>)> {
         let refinement = &self.0[model];
-        let error = refinement.error(point, with, model);
+        let error = refinement.error(with.for_model(model, point));
         refinement.run.as_ref().map(|run| (run, refinement.level, error))
     }
 
@@ -219,7 +223,7 @@ impl RowRefinement {
         if with.demand == Demand::Growth {
             return Next::Done(Box::new(Outcome::failed(id, Status::Ok)));
         }
-        let errors = [0, 1].map(|model| self.0[model].error(point, with, model));
+        let errors = [0, 1].map(|model| self.0[model].error(with.for_model(model, point)));
         let outcome = self.outcome(id, point, with, errors);
         let margin = outcome.as_ref().and_then(|outcome| margin(outcome, with.rule));
         let error = errors[0].zip(errors[1]).map(|(nonlinear, linear)| nonlinear + linear);
@@ -229,7 +233,7 @@ impl RowRefinement {
             // An error beyond the margin could turn the verdict.
             let is_in_doubt = margin.is_some() && error.is_some() && !is_on_its_side;
             for (model, refinement) in self.0.iter().enumerate() {
-                let next = refinement.next_level(point, with, model, is_in_doubt);
+                let next = refinement.next_level(with.for_model(model, point), is_in_doubt);
                 runs.extend(next.map(|level| (model, level)));
             }
         }
@@ -259,8 +263,9 @@ impl RowRefinement {
             outcome.static_sag_m = Some(point.static_sag_m());
         }
         if levels.iter().all(RefinementLevels::is_checked) {
-            let [of_nonlinear, of_linear] = errors;
-            outcome.error = of_nonlinear.zip(of_linear).map(|(one, other)| one.max(other));
+            let [nonlinear_error, linear_error] = errors;
+            let greatest = |(one, other): (f64, f64)| one.max(other);
+            outcome.error = nonlinear_error.zip(linear_error).map(greatest);
             outcome.converged = Some(outcome.error.is_some_and(|error| error <= rule.accuracy));
             // Two levels that agree leave an error by a perturbed run, and no chaos.
             let last = nonlinear.differences.last().copied().flatten();
