@@ -151,13 +151,13 @@ fn plan_of(file: &Path) -> Result<Plan, Error> {
     let mut json = json.ok_or_else(|| refused("a map by `sweep run`, which carries its plan"))?;
     let name = file.display().to_string();
     if json.get("design").is_none() {
-        let plan: Plan = GridInput::of_plan(&name, &json).load()?;
+        let plan: Plan = GridInput::from_plan(&name, &json).load()?;
         return if plan.axes.is_empty() { Err(refused("a map with an axis")) } else { Ok(plan) };
     }
     // Points of a design are where its axes' ranges have them; of a list and of distributions,
     // wherever its file does.
     let axes = json["axis"].take();
-    let mut plan: Plan = GridInput::of_plan(&name, &json).load()?;
+    let mut plan: Plan = GridInput::from_plan(&name, &json).load()?;
     let columns = overview(&opened)?.columns;
     for axis in axes.as_array().into_iter().flatten() {
         let name = axis["parameter"].as_str().unwrap_or_default();

@@ -6,7 +6,9 @@ use sweep_engine::config::grid::is_another;
 use sweep_engine::config::section::cut;
 use sweep_engine::config::source::{beside, read};
 use sweep_engine::config::syntax::parse;
-use sweep_engine::config::{Diagnostic, Field, Form, Key, Keys, Location, Report, Section, Walk};
+use sweep_engine::config::{
+    Diagnostic, Field, Form, Key, KeyWalk, Keys, Location, Report, Section,
+};
 use washer_model::Machine;
 use washer_row::{Metric, Part};
 
@@ -28,7 +30,7 @@ pub(super) fn machine(machine: &mut Machine, keys: &mut Keys<'_>, input: Option<
     if let (Some(root), Some(input)) = (keys.section(), input) {
         *machine = named(input, root);
     }
-    keys.tell(key, |is_schema| match is_schema {
+    keys.describe(key, |is_schema| match is_schema {
         true => json!({ "type": "string", "default": DEFAULT_MACHINE }),
         false => machine_json(machine),
     });
@@ -79,7 +81,7 @@ pub(super) fn stability(
 ) {
     let of_speeds = metrics.iter().find(|metric| metric.is_of_speeds());
     let lacking = |metric: &Metric| format!("the metric `{}` needs speeds", metric.name());
-    if let (Walk::Set(_), Field::Given(found)) = (&keys.walk, found) {
+    if let (KeyWalk::Set(_), Field::Given(found)) = (&keys.walk, found) {
         if let (Some(metric), None, Some(report)) = (of_speeds, &speeds, keys.report()) {
             let expected = "expected a grid file with this metric and a section [stability]";
             report.refuse::<()>(&found.at, lacking(metric), expected);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::Value;
-use sweep_engine::config::{Draft, Form, Key, Keys, Read, Walk};
+use sweep_engine::config::{Draft, Form, Key, KeyWalk, Keys, Read};
 use washer_model::Machine;
 use washer_row::{Criterion, Measures, Metric};
 
@@ -48,7 +48,7 @@ impl Read for Washer {
                      of the drum, or root mean squares";
         let criterion = &mut self.measures.criterion;
         // Plans that do not ask for another read as ever.
-        if !matches!(keys.walk, Walk::Tell(_))
+        if !matches!(keys.walk, KeyWalk::Describe(_))
             || keys.is_schema()
             || *criterion != Criterion::default()
         {
@@ -59,7 +59,7 @@ impl Read for Washer {
         }
     }
 
-    fn judge(draft: &Draft<'_, Self>) {
+    fn check(draft: &Draft<'_, Self>) {
         validate::scenarios(draft);
         validate::stability(draft);
         plausible::note(draft);

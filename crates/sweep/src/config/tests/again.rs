@@ -26,7 +26,7 @@ range = { from = 1e7, to = 2e8, count = 4, spacing = "log" }
 fn a_plan_is_read_again_from_its_own_json() {
     let mut plan = GridInput::text("again", GRID.to_owned(), Vec::new()).load().unwrap();
     let again = |plan: &crate::Plan| {
-        let input = GridInput::of_plan("again", &plan.to_json());
+        let input = GridInput::from_plan("again", &plan.to_json());
         input.load().unwrap_or_else(|mistakes| panic!("{mistakes}"))
     };
     assert_eq!(again(&plan), plan);
