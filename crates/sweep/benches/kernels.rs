@@ -3,7 +3,7 @@
 
 use divan::{Bencher, counter::ItemsCount};
 use lane_ode::{Simd, Tolerance};
-use washer_model::bench::{Part, evaluate};
+use washer_model::bench::{RhsPart, evaluate};
 use washer_model::{
     Caps, Machine, Method, ModelKind, Point, Profile, Spin, Timing, prepare, simulate,
 };
@@ -35,21 +35,21 @@ fn points(simd: Simd, end_s: f64) -> Vec<Point> {
 
 #[divan::bench(args = kernels())]
 fn derivative(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
-    part(bencher, model, simd, Part::Derivative, None);
+    part(bencher, model, simd, RhsPart::Derivative, None);
 }
 
 /// With the modes of bearings and hinge capped.
 #[divan::bench(args = kernels())]
 fn derivative_mass_scaled(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
-    part(bencher, model, simd, Part::Derivative, Some(CAPS));
+    part(bencher, model, simd, RhsPart::Derivative, Some(CAPS));
 }
 
 #[divan::bench(args = kernels())]
 fn forcing(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
-    part(bencher, model, simd, Part::Forcing, None);
+    part(bencher, model, simd, RhsPart::Forcing, None);
 }
 
-fn part(bencher: Bencher<'_, '_>, model: ModelKind, simd: Simd, part: Part, caps: Option<Caps>) {
+fn part(bencher: Bencher<'_, '_>, model: ModelKind, simd: Simd, part: RhsPart, caps: Option<Caps>) {
     const EVALUATIONS: u64 = 10_000;
     let point = &points(simd, 1.0)[0];
     bencher

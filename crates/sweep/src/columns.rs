@@ -8,10 +8,10 @@ use sweep_engine::columns::{
 use sweep_engine::store::read::FAR_OFF;
 use sweep_engine::store::{Column, Done, Holds, Layout, Rows, axis_columns};
 use sweep_parameter::{Limit, RatioLimits, Worse};
-use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, Motion};
+use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, ModeMotion};
 use washer_row::{
-    Dwelt, Facts, GrowingMode, Growth, Level, Measures, Metric, Outcome, ROW_STATUSES, Trajectory,
-    Verdict, row_status,
+    DwellPeaks, GrowingMode, Growth, Level, Measures, Metric, MetricFacts, Outcome, ROW_STATUSES,
+    Trajectory, Verdict, row_status,
 };
 
 use crate::model::Washer;
@@ -144,7 +144,7 @@ fn metric_columns(channels: &[Channel], measures: &Measures) -> Vec<WasherColumn
                 columns.push(of_metric(metric, metric.column(""), text, of));
             }
             _ => {
-                for number in measures.numbers_of(metric) {
+                for number in measures.metric_columns(metric) {
                     for (model, of) in MODELS {
                         let text = number.description();
                         let text = format!("{text}, {model} model; null if it failed");
@@ -172,7 +172,7 @@ fn of_metric(
 
 /// The column, with which way the metric is bad.
 fn judged(metric: Metric, column: WasherColumn) -> WasherColumn {
-    let Facts { worse, limit, .. } = metric.facts();
+    let MetricFacts { worse, limit, .. } = metric.facts();
     let column = column.worse(worse);
     match limit {
         Some(Limit { value, scale }) => column.limit(value, scale),
@@ -182,7 +182,7 @@ fn judged(metric: Metric, column: WasherColumn) -> WasherColumn {
 
 /// Columns of how far motions at the plan's constant speeds go.
 fn dwelt_columns(channels: &[Channel]) -> Vec<WasherColumn> {
-    let dwelt = |row: &ResultRow| -> Option<Dwelt> { row.outcome.dwelt };
+    let dwelt = |row: &ResultRow| -> Option<DwellPeaks> { row.outcome.dwelt };
     let mut columns = Vec::new();
     for &channel in channels {
         let text = format!("{}: {}", channel.description(), Metric::Dwell.facts().description);
@@ -331,7 +331,7 @@ fn growing_mode_columns(prefix: &str, place: usize) -> [WasherColumn; 3] {
          where nothing grows, or no such mode is needed"
     );
     let number = move |row: &ResultRow| Some(u64::from(mode(row)?.number));
-    let (moves, names) = ("what moves in it", Motion::NAMES.to_vec());
+    let (moves, names) = ("what moves in it", ModeMotion::NAMES.to_vec());
     let frequency = "its damped natural frequency at this speed in cycles per minute";
     [
         ResultColumn::new(name.clone(), "1", text, Holds::KnownCount, number),

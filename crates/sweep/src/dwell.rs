@@ -168,7 +168,7 @@ pub(crate) struct Motions {
 impl Motions {
     pub(crate) fn new(plan: &Plan, search: Search) -> Self {
         // A motion that goes on for ever has no times and no windows.
-        let Recorders { mut gauges, .. } = plan.model.measures.wanted();
+        let Recorders { mut gauges, .. } = plan.model.measures.recorders();
         gauges[Gauge::ClashTime as usize] = false;
         let wanted = Recorders { gauges, ..Recorders::default() };
         let starts = Starts {

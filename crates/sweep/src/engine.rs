@@ -17,7 +17,8 @@ use once_cell::sync::OnceCell;
 use pool::{OutcomeSink, PointSource, Pool};
 use washer_model::{Machine, Method, ModelKind, Point, Spin, StepSelector, Timing, prepare};
 use washer_row::{
-    Demand, Level, LevelRun, Outcome, RefinementLevels, Rule, Status, refinement_levels, runs,
+    Demand, Level, LevelRun, Outcome, RefinementLevels, RowRule, Status, integrate_points,
+    refinement_levels,
 };
 
 use crate::columns::Columns;
@@ -50,7 +51,7 @@ pub struct ModelEngine<'a> {
     /// for each of its trajectories.
     forced: Option<Simd>,
     timing: Timing,
-    rule: Rule,
+    rule: RowRule,
     /// The refinement levels of both models, found when first used.
     pub(crate) levels: Arc<OnceCell<[RefinementLevels; 2]>>,
 }
@@ -238,7 +239,8 @@ impl<'a> ModelEngine<'a> {
         let stop = || context.stopped();
         let integrate_group = |points: &[&Point]| {
             let simd = self.simd_for(points.len());
-            runs(simd, ModelKind::ALL[model], method, points, &self.rule, &stop).unwrap_or_default()
+            integrate_points(simd, ModelKind::ALL[model], method, points, &self.rule, &stop)
+                .unwrap_or_default()
         };
         let panicked = || LevelRun::failed(Status::Panicked);
         map_isolating_panics(points, integrate_group, panicked)
@@ -246,13 +248,13 @@ impl<'a> ModelEngine<'a> {
 }
 
 /// Returns the measures that rows take from the trajectories of a plan, and the accuracy required.
-pub(crate) fn rule(plan: &Plan) -> Rule {
+pub(crate) fn rule(plan: &Plan) -> RowRule {
     let accuracy = match plan.integrator.steps() {
         Steps::Checked(accuracy) => accuracy,
         // A single method has no accuracy to reach.
         Steps::Fixed(_) | Steps::ByError => f64::INFINITY,
     };
-    Rule {
+    RowRule {
         end_s: plan.end_s,
         window_s: plan.window_s,
         accuracy,

@@ -213,7 +213,7 @@ fn memory_bytes(engine: &ModelEngine<'_>, threads: usize) -> f64 {
 /// together.
 fn turn_bytes(engine: &ModelEngine<'_>, threads: usize) -> f64 {
     let plan = engine.plan();
-    if !plan.model.measures.wanted().turns {
+    if !plan.model.measures.recorders().turns {
         return 0.0;
     }
     let turns = plan.model.spin.turns_within(plan.window_s);

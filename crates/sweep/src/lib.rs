@@ -82,4 +82,4 @@ pub use sweep_engine::{
 };
 pub use trace::TraceExtras;
 pub use washer_model::Starts;
-pub use washer_row::{CREEPING_M_PER_S, Level, Outcome, Status, Trajectory, Verdict};
+pub use washer_row::{CREEP_M_PER_S, Level, Outcome, Status, Trajectory, Verdict};

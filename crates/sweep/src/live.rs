@@ -7,7 +7,7 @@ use sweep_files::{ParquetFile, key};
 use washer_live::{Setup, Sliders};
 use washer_model::{Channel, Ending, Kind, ModeOverSpeed, ModelKind, Parameter, campbell};
 use washer_plot::{Live, Slider};
-use washer_row::{Level, Measured, Metric};
+use washer_row::{Level, Metric, MetricColumn};
 
 use crate::config::GridInput;
 use crate::engine::{CHECKPOINTS, ModelEngine, rule};
@@ -86,7 +86,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     let axes = plan.axes.iter().map(|axis| slider(axis, None));
     let Washer { machine, spin, .. } = &plan.model;
     let further = sliders.iter().map(|axis| slider(axis, axis.parameter.get(machine, spin)));
-    let columns = |number: Measured| ModelKind::ALL.map(|model| number.column(model.name()));
+    let columns = |number: MetricColumn| ModelKind::ALL.map(|model| number.column(model.name()));
     let criterion = plan.model.measures.criterion;
     // What a column has where there is no ratio is not a page's.
     let ratio = criterion.ratio().split(';').next().unwrap_or_default();
@@ -98,7 +98,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         window_s: plan.window_s,
         channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
         criterion: [criterion.amplitude(), ratio].map(str::to_owned),
-        metrics: plan.model.measures.of_model().map(columns).collect(),
+        metrics: plan.model.measures.per_model().map(columns).collect(),
         held_speeds_rpm,
         held_metrics: held_metrics.iter().map(|metric| metric.name().to_owned()).collect(),
         has_slow_growth,
@@ -174,7 +174,7 @@ fn plan_of(file: &Path) -> Result<Plan, Error> {
 /// The constant speeds (rpm) of metrics that a page asks for beside a point's row, and these.
 fn take_held(plan: &mut Plan) -> (Vec<f64>, Vec<Metric>) {
     let Washer { measures, held_speeds, .. } = &mut plan.model;
-    let held = measures.metrics.extract_if(.., |metric| metric.is_of_speeds()).collect();
+    let held = measures.metrics.extract_if(.., |metric| metric.is_at_held_speeds()).collect();
     let speeds = held_speeds.take();
     (speeds.map_or_else(Vec::new, |speeds| speeds.values().to_vec()), held)
 }

@@ -37,7 +37,7 @@ impl Integrator {
     /// methods are compared. Of those a trace takes the reference, `rk4`.
     pub fn direct(&self) -> Option<(Level, Method)> {
         let level = Level::named(self.name())?;
-        let mut method = Method::of(level);
+        let mut method = Method::without_numbers(level);
         match (method.numbers(), &self.settings()[..]) {
             (MethodNumbers::Step(step_s), [(_, value)]) => *step_s = *value,
             (MethodNumbers::Tolerance(tolerance), &[(_, relative), (_, absolute)]) => {

@@ -91,7 +91,7 @@ impl Swept for Washer {
 
     fn variants(plan: &Plan) -> Vec<Plan> {
         let can_have = |metric: &Metric| match metric {
-            metric if metric.is_of_speeds() => plan.model.held_speeds.is_some(),
+            metric if metric.is_at_held_speeds() => plan.model.held_speeds.is_some(),
             metric => lacking(*metric, &plan.model.machine).is_none(),
         };
         let with = |metric| {

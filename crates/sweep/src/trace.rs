@@ -9,8 +9,8 @@ use std::iter::repeat_n;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use serde_json::{Value, json};
 use washer_model::{
-    Asked, COORDINATES, History, Method, ModelKind, NoEquilibrium, Point, Spin, Start,
-    StepSelector, Timing, histories, instants, together,
+    COORDINATES, History, HistoryRequest, Method, ModelKind, NoEquilibrium, Point, Spin, Start,
+    StepSelector, Timing, histories, histories_per_batch, instant_count,
 };
 
 use crate::engine::{CappedRun, reference_method};
@@ -292,7 +292,7 @@ impl TraceRun {
         let (methods, level, method_json) = methods(plan, &point, &spin, settings.capped);
         let times_s = match settings.every_s {
             Some(every_s) => {
-                (0..instants(plan.end_s, every_s)).map(|k| k as f64 * every_s).collect()
+                (0..instant_count(plan.end_s, every_s)).map(|k| k as f64 * every_s).collect()
             }
             None => spin.whole_turns_s(plan.end_s),
         };
@@ -310,10 +310,10 @@ fn integrate<'a>(
     let kinds = models.kinds();
     let groups: Vec<(ModelKind, &[&'a TraceRun])> = kinds
         .iter()
-        .flat_map(|&kind| runs.chunks(together()).map(move |runs| (kind, runs)))
+        .flat_map(|&kind| runs.chunks(histories_per_batch()).map(move |runs| (kind, runs)))
         .collect();
     let integrate_group = |&(kind, runs): &(ModelKind, &[&'a TraceRun])| {
-        let requests = runs.iter().map(|run| Asked {
+        let requests = runs.iter().map(|run| HistoryRequest {
             point: &run.point,
             method: run.methods[usize::from(kind == ModelKind::Linear)],
             start: run.start,

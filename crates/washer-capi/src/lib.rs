@@ -11,11 +11,12 @@ use core::ptr;
 use core::slice;
 use lane_ode::Simd;
 use washer_model::{
-    Channel, Equations, Machine, ModelKind, Parameter, Profile, STATE_LEN, Spin, Timing, prepare,
+    Channel, Machine, ModelKind, Parameter, PointEquations, Profile, STATE_LEN, Spin, Timing,
+    prepare,
 };
 
 /// The equations of one machine and its spin.
-pub struct WasherEquations(Equations);
+pub struct WasherEquations(PointEquations);
 
 /// The machine, spin and model to make: `washer_setup` of `washer.h`.
 #[repr(C)]
@@ -120,7 +121,7 @@ unsafe fn make(setup: &WasherSetup) -> Result<WasherEquations, WasherStatus> {
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     let point = prepare(Simd::best(), &[(machine, spin)], &timing).pop();
     match point {
-        Some(Ok(point)) => Ok(WasherEquations(Equations::new(&point, model))),
+        Some(Ok(point)) => Ok(WasherEquations(PointEquations::new(&point, model))),
         _ => Err(WasherStatus::NoEquilibrium),
     }
 }

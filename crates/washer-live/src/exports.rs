@@ -180,7 +180,7 @@ fn failure(failure: Option<(Failure, f64)>) -> [f64; 2] {
 }
 
 fn write_answer(output: &mut Vec<f64>, found: &Result<Answer, NoPoint>, setup: &Setup) {
-    let metrics = setup.rule.measures.of_model().count();
+    let metrics = setup.rule.measures.per_model().count();
     output.push(code(found.as_ref().err()));
     let Ok(answer) = found else {
         let channels = Channel::ALL.len();

@@ -7,8 +7,8 @@ use washer_model::{
     Target, Timing, endings, history, prepare, respond,
 };
 use washer_row::{
-    Demand, Deviations, Dwelt, Level, LevelRun, Next, Outcome, RefinementLevels, RefinementRule,
-    RowRefinement, Rule, Status, Trajectory, Verdict, runs,
+    Demand, Deviations, DwellPeaks, Level, LevelRun, Next, Outcome, RefinementLevels,
+    RefinementRule, RowRefinement, RowRule, Status, Trajectory, Verdict, integrate_points,
 };
 
 use crate::setup::Setup;
@@ -136,7 +136,7 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
     let ready = points.iter();
     let ready = ready.map(|values| (refinement_levels(setup, values), ready_point(setup, values)));
     let ready: Vec<_> = ready.collect();
-    let rule = Rule { accuracy: f64::INFINITY, ..setup.rule.clone() };
+    let rule = RowRule { accuracy: f64::INFINITY, ..setup.rule.clone() };
     let mut found: Vec<Result<Answer, NoPoint>> = Vec::with_capacity(points.len());
     // Runs at the same levels share the lanes.
     for alike in ready.chunk_by(|(a, _), (b, _)| core::ptr::eq(*a, *b)) {
@@ -177,7 +177,7 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
             Next::Runs(wanted) => {
                 for (model, place) in wanted {
                     let model_levels = &levels[model];
-                    let perturbed = model_levels.is_perturbed(place).then(|| point.nudged());
+                    let perturbed = model_levels.is_perturbed(place).then(|| point.perturbed());
                     let started = perturbed.as_ref().unwrap_or(&point);
                     for run in run_method(model, model_levels.method(place), &[started], rule) {
                         refinement.take((model, place), run, &point, with);
@@ -195,8 +195,9 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
     Ok(Answer { errors: finest.map(|(.., error)| error), ..answer })
 }
 
-fn run_method(model: usize, method: &Method, points: &[&Point], rule: &Rule) -> Vec<LevelRun> {
-    let found = runs(Simd::best(), ModelKind::ALL[model], method, points, rule, &|| false);
+fn run_method(model: usize, method: &Method, points: &[&Point], rule: &RowRule) -> Vec<LevelRun> {
+    let found =
+        integrate_points(Simd::best(), ModelKind::ALL[model], method, points, rule, &|| false);
     found.unwrap_or_default()
 }
 
@@ -252,11 +253,15 @@ pub fn growth(
 ///
 /// # Errors
 /// [`NoPoint`].
-pub fn dwell(setup: &Setup, values: &[f64], speeds_rpm: &[f64]) -> Result<Option<Dwelt>, NoPoint> {
+pub fn dwell(
+    setup: &Setup,
+    values: &[f64],
+    speeds_rpm: &[f64],
+) -> Result<Option<DwellPeaks>, NoPoint> {
     let point = ready_point(setup, values)?;
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
     let carried = vec![None; dwells.len()];
     let found = endings(Simd::best(), &dwells, &carried, &Starts::default(), &|| false);
-    Ok(Dwelt::of(speeds_rpm, &found))
+    Ok(DwellPeaks::from_endings(speeds_rpm, &found))
 }

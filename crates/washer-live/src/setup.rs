@@ -5,7 +5,7 @@ use sweep_parameter::RatioLimits;
 use washer_model::{
     Channel, ElementList, Machine, Method, MethodNumbers, Parameter, Profile, Spin,
 };
-use washer_row::{Criterion, Level, Measures, Metric, RefinementLevel, RefinementLevels, Rule};
+use washer_row::{Criterion, Level, Measures, Metric, RefinementLevel, RefinementLevels, RowRule};
 
 use crate::numbers::NumberWalk;
 
@@ -19,7 +19,7 @@ pub struct Setup {
     /// The number of parts of a run; two runs are compared at the end of each part.
     pub checkpoints: u32,
     /// The rule of rows: results, and the accuracy of checked numbers.
-    pub rule: Rule,
+    pub rule: RowRule,
     /// The parameters that a point sets.
     pub sliders: Sliders,
     /// The refinement levels of the nonlinear and of the linear model while only axes move. Their
@@ -50,13 +50,13 @@ impl Setup {
 
     /// Decodes a setup from [`Self::to_numbers`]; `None` for other numbers.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
-        let direct = || RefinementLevels::direct(Level::Rk4, Method::of(Level::Rk4));
+        let direct = || RefinementLevels::direct(Level::Rk4, Method::without_numbers(Level::Rk4));
         let levels = [0, 1].map(|_| direct());
         let mut setup = Self {
             machine: Machine::paper(),
             spin: Spin::Table { time_s: Vec::new(), speed_rpm: Vec::new() },
             checkpoints: 0,
-            rule: Rule {
+            rule: RowRule {
                 end_s: 0.0,
                 window_s: [0.0; 2],
                 accuracy: 0.0,
@@ -98,7 +98,7 @@ impl Setup {
         }
         self.checkpoints = u32::try_from(walk.count(self.checkpoints as usize)?).ok()?;
         walk_rule(walk, &mut self.rule)?;
-        let Rule { measures, .. } = &mut self.rule;
+        let RowRule { measures, .. } = &mut self.rule;
         (measures.stops, measures.feet) = (machine.stops.len(), machine.feet.len());
         measures.dampers = machine.dampers.len();
         walk.choices(&mut self.sliders.parameters, &parameters)?;
@@ -127,8 +127,8 @@ fn walk_profile(walk: &mut NumberWalk<'_>, spin: &mut Spin) -> Option<()> {
 }
 
 /// Writes or reads the rule, without the numbers of the machine's elements.
-fn walk_rule(walk: &mut NumberWalk<'_>, rule: &mut Rule) -> Option<()> {
-    let Rule { end_s, window_s: [from_s, to_s], accuracy, limits, channels, measures } = rule;
+fn walk_rule(walk: &mut NumberWalk<'_>, rule: &mut RowRule) -> Option<()> {
+    let RowRule { end_s, window_s: [from_s, to_s], accuracy, limits, channels, measures } = rule;
     walk.numbers([end_s, from_s, to_s, accuracy, &mut limits.most])?;
     walk.optional(&mut limits.least)?;
     walk.choices(channels, &Channel::ALL)?;
@@ -151,7 +151,7 @@ fn walk_levels(walk: &mut NumberWalk<'_>, levels: &mut RefinementLevels) -> Opti
 fn walk_level(walk: &mut NumberWalk<'_>, level: &mut RefinementLevel) -> Option<()> {
     walk.choice(&mut level.level, &Level::ALL)?;
     if walk.is_reading() {
-        level.method = Method::of(level.level);
+        level.method = Method::without_numbers(level.level);
     }
     match level.method.numbers() {
         MethodNumbers::Step(step_s) => walk.numbers([step_s]),

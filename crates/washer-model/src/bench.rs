@@ -1,9 +1,9 @@
-//! For benchmarks: parts of a step that the public interface does not expose.
+//! Functions for benchmarks, which evaluate parts of a step.
 
 use crate::coordinates::STATES;
 use crate::nonlinear::coupling::Coupling;
-use crate::run::method::{Family, OfLinear, OfNonlinear};
-use crate::run::model::Model;
+use crate::run::method::{LinearFamily, ModelFamily, NonlinearFamily};
+use crate::run::model::LaneModel;
 use crate::{Caps, ModelKind, Point};
 use core::hint::black_box;
 use core::marker::PhantomData;
@@ -11,10 +11,10 @@ use lane_ode::{Kernel, Lane, N, Simd, System};
 
 /// A part of the right-hand side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// What depends on time alone: twice an RK4 step.
+pub enum RhsPart {
+    /// The functions of time alone, which an RK4 step evaluates twice.
     Forcing,
-    /// The rest: four times an RK4 step.
+    /// The derivative of the state, which an RK4 step evaluates four times.
     Derivative,
 }
 
@@ -23,21 +23,22 @@ pub enum Part {
 pub fn evaluate(
     simd: Simd,
     model: ModelKind,
-    part: Part,
+    part: RhsPart,
     point: &Point,
     caps: Option<Caps>,
     evaluations: u64,
 ) {
     let subject = (point, part, caps, evaluations);
     match model {
-        ModelKind::Nonlinear => simd.dispatch(Evaluate::<OfNonlinear>(subject, PhantomData)),
-        ModelKind::Linear => simd.dispatch(Evaluate::<OfLinear>(subject, PhantomData)),
+        ModelKind::Nonlinear => simd.dispatch(Evaluate::<NonlinearFamily>(subject, PhantomData)),
+        ModelKind::Linear => simd.dispatch(Evaluate::<LinearFamily>(subject, PhantomData)),
     }
 }
 
-struct Evaluate<'a, F>((&'a Point, Part, Option<Caps>, u64), PhantomData<F>);
+/// The kernel that evaluates a part.
+struct Evaluate<'a, F>((&'a Point, RhsPart, Option<Caps>, u64), PhantomData<F>);
 
-impl<F: Family> Kernel for Evaluate<'_, F> {
+impl<F: ModelFamily> Kernel for Evaluate<'_, F> {
     type Output = ();
 
     #[inline(always)]
@@ -45,14 +46,14 @@ impl<F: Family> Kernel for Evaluate<'_, F> {
         let zero = N(zero);
         let (point, part, caps, evaluations) = self.0;
         let coupling = Coupling::new(zero, caps.as_ref());
-        let model = <F::Over<T> as Model<T>>::splat(zero, point, coupling);
+        let model = <F::Over<T> as LaneModel<T>>::splat(zero, point, coupling);
         let mut x = [zero; STATES];
-        for (x, at_rest) in x.iter_mut().zip(<F::Over<T> as Model<T>>::at_rest(point)) {
+        for (x, at_rest) in x.iter_mut().zip(<F::Over<T> as LaneModel<T>>::at_rest(point)) {
             *x = zero.lit(at_rest);
         }
         let mut t = zero.lit(10.0);
         match part {
-            Part::Forcing => {
+            RhsPart::Forcing => {
                 let mut forcing = model.forcing_aside(t);
                 for _ in 0..evaluations {
                     t += zero.lit(1e-4);
@@ -60,10 +61,11 @@ impl<F: Family> Kernel for Evaluate<'_, F> {
                     black_box(&forcing);
                 }
             }
-            Part::Derivative => {
+            RhsPart::Derivative => {
                 let forcing = model.forcing_aside(t);
                 for _ in 0..evaluations {
-                    // Opaque, so that the compiler computes nothing in advance.
+                    // The compiler does not see through `black_box`, so that it computes nothing
+                    // in advance.
                     let slope = model.derivative(black_box(&forcing), &x);
                     for i in 0..STATES {
                         x[i] += slope[i] * 1e-9;

@@ -13,7 +13,7 @@ mod tests;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::run::model::{Model, Nonlinear};
+use crate::run::model::{LaneModel, Nonlinear};
 use crate::stability::orbit::Row;
 use crate::stability::settings::{Case, Settings};
 use crate::{Dwell, Modes, NoAnswer, Reading, Recorders, Response, respond};
@@ -227,7 +227,7 @@ pub fn endings_beside(
         Err(none) => Err(none),
     });
     let mut found: Vec<Result<(Endings, Row<'_>), NoAnswer>> = found.collect();
-    if starts.wanted.anything() {
+    if starts.wanted.need_all_states() {
         record(simd, found.iter_mut().flatten(), starts.wanted);
     }
     found.into_iter().map(|found| found.map(|(endings, _)| endings)).collect()
@@ -351,7 +351,7 @@ impl<'a> Hunt<'a> {
     ) -> Self {
         let point = case.row.point;
         let frozen: Arc<Modes> = Arc::clone(&case.frozen);
-        let rest = <Nonlinear<f64> as Model<f64>>::at_rest(point);
+        let rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
         let from = responses.first().map_or(rest, |response| response.start);
         let mut states: Vec<([f64; STATES], Origin)> = Vec::new();
         let directions = directions(point, &frozen, random_kicks(starts.count));

@@ -16,7 +16,7 @@ pub(crate) trait InLanes<T: Lane> {
 }
 
 /// A structure that can be made of dual numbers whose derivatives are zero.
-pub(crate) trait Constant {
+pub(crate) trait ToDual {
     /// The structure of dual numbers.
     type Dual;
     /// Returns the structure with derivatives of zero.
@@ -39,7 +39,7 @@ impl<T: Lane> InLanes<T> for N<T> {
     }
 }
 
-impl<T: Real> Constant for N<T> {
+impl<T: Real> ToDual for N<T> {
     type Dual = N<Dual<T>>;
     #[inline(always)]
     fn constant(&self) -> N<Dual<T>> {
@@ -67,7 +67,7 @@ impl<T: Lane, A: InLanes<T> + Copy, const K: usize> InLanes<T> for [A; K] {
     }
 }
 
-impl<A: Constant<Dual: Copy>, const K: usize> Constant for [A; K] {
+impl<A: ToDual<Dual: Copy>, const K: usize> ToDual for [A; K] {
     type Dual = [A::Dual; K];
     #[inline(always)]
     fn constant(&self) -> [A::Dual; K] {
@@ -102,7 +102,7 @@ impl<T: Lane, A: InLanes<T>> InLanes<T> for Vec<A> {
     }
 }
 
-impl<A: Constant> Constant for Vec<A> {
+impl<A: ToDual> ToDual for Vec<A> {
     type Dual = Vec<A::Dual>;
     #[inline(always)]
     fn constant(&self) -> Vec<A::Dual> {
@@ -147,7 +147,7 @@ impl<T: Lane> InLanes<T> for InAnyLane<T> {
     }
 }
 
-impl<T: Real> Constant for InAnyLane<T> {
+impl<T: Real> ToDual for InAnyLane<T> {
     type Dual = InAnyLane<Dual<T>>;
     #[inline(always)]
     fn constant(&self) -> InAnyLane<Dual<T>> {
@@ -155,7 +155,7 @@ impl<T: Real> Constant for InAnyLane<T> {
     }
 }
 
-/// Declares a structure over a number `T` and implements [`InLanes`] and [`Constant`] for it.
+/// Declares a structure over a number `T` and implements [`InLanes`] and [`ToDual`] for it.
 ///
 /// Fields are `N<T>` where no types are given.
 macro_rules! lane_struct {
@@ -190,11 +190,11 @@ macro_rules! lane_struct {
             }
         }
 
-        impl<T: lane_ode::Real> $crate::lanes::Constant for $name<T> {
+        impl<T: lane_ode::Real> $crate::lanes::ToDual for $name<T> {
             type Dual = $name<lane_ode::Dual<T>>;
             #[inline(always)]
             fn constant(&self) -> $name<lane_ode::Dual<T>> {
-                $name { $($field: $crate::lanes::Constant::constant(&self.$field),)* }
+                $name { $($field: $crate::lanes::ToDual::constant(&self.$field),)* }
             }
         }
     };

@@ -58,6 +58,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![allow(missing_docs, reason = "a name that is clear needs no comment")]
+
 #[doc(hidden)]
 pub mod bench;
 mod channel;
@@ -91,7 +93,7 @@ pub use machine::{
     Unbalance,
 };
 pub use modes::campbell::{ModeAtSpeed, ModeOverSpeed, Resonance, campbell, campbell_until};
-pub use modes::shape::{Motion, Movement, Plane};
+pub use modes::shape::{ModeMotion, MotionPlane, Movement};
 pub use modes::{
     Mode, Modes, NoModes, highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s, modes,
 };
@@ -100,12 +102,14 @@ pub use point::friction::FrictionSpeed;
 pub use point::ringing::{Swing, UnresolvedModes};
 pub use point::{NoEquilibrium, Point, Timing};
 pub use ready::prepare;
-pub use run::equations::{Equations, STATE_LEN};
-pub use run::history::{Asked, History, Instant, Start, histories, history, instants, together};
+pub use run::equations::{PointEquations, STATE_LEN};
+pub use run::history::{
+    History, HistoryRequest, Instant, Start, histories, histories_per_batch, history, instant_count,
+};
 pub use run::suspension::{Forces, stops_at_rest_n};
 pub use run::{
-    Course, Gauge, Level, Method, MethodNumbers, Reading, Record, Recorders, Snapshot, Stop,
-    Waypoint, simulate, simulate_until, simulate_with,
+    Checkpoint, Checkpoints, Gauge, Level, Method, MethodNumbers, Reading, Record, Recorders,
+    Snapshot, StopRequest, simulate, simulate_until, simulate_with,
 };
 pub use stability::{
     Beyond, Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant,

@@ -15,7 +15,7 @@ pub(crate) mod symmetric;
 
 use crate::COORDINATES;
 use crate::coordinates::{ROTOR_TURNS, SHAFT_Y, SHAFT_Z, TUB, TUB_TURNS, TUB_Y, TUB_Z, seeded};
-use crate::lanes::{Constant as _, InLanes as _, lane_struct};
+use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::harmonics::{FUNCTIONS, HARMONICS, SAMPLES};
 use crate::linear::rotor_terms::{
     self as entry, ENTRIES, INERTIA_ENTRIES, InertiaTerms, ROWS, RotorTerms, Terms,

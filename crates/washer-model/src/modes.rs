@@ -241,29 +241,30 @@ pub fn highest_frequency_rad_per_s(point: &Point, speed_rad_per_s: f64) -> Resul
     highest_with_caps(point, ModelKind::Nonlinear, speed_rad_per_s, None)
 }
 
-/// Step of the additive method (s) that resolves the motion of interest: a fortieth of a swing of
-/// 25 Hz. Its length hardly matters: half of it lets the springs of bearings and hinge, which it
-/// makes slow, be twice as fast.
-const STEP_OF_INTEREST_S: f64 = 1e-3;
+/// The assumed step (s) of the additive method. Basis: forty steps in a period of 25 Hz. Doubling
+/// it halves the cap of the modes of bearings and hinge, which hardly changes the highest
+/// frequency.
+const ADDITIVE_STEP_S: f64 = 1e-3;
 
 /// Returns the largest |s| (rad/s) that limits the step of the additive method, as
-/// [`highest_frequency_rad_per_s`] does for an explicit method. In its steps the springs of
-/// bearings and hinge act as mass, which caps their modes at the reciprocal of its implicit
-/// coefficient times the step.
+/// [`highest_frequency_rad_per_s`] does for an explicit method. The implicit springs of bearings
+/// and hinge act as mass, which caps the frequencies of their modes at 1 / (gamma h), with the
+/// method's implicit coefficient gamma and the step h.
 ///
 /// # Errors
-/// As [`modes`].
+/// The errors of [`modes`].
 pub fn highest_explicit_frequency_rad_per_s(
     point: &Point,
     speed_rad_per_s: f64,
 ) -> Result<f64, NoModes> {
-    let cap = 1.0 / (GAMMA * STEP_OF_INTEREST_S);
+    let cap = 1.0 / (GAMMA * ADDITIVE_STEP_S);
     let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) };
     highest_with_caps(point, ModelKind::Nonlinear, speed_rad_per_s, Some(&caps))
 }
 
-/// The same of a model, whose elements are as at rest in the linear one, with caps on the modes of
-/// bearings and hinge if any are given (section 4.3 of the model page).
+/// Computes the largest |s| (rad/s) over a turn of theta, with caps on the modes of bearings and
+/// hinge if any are given (section 4.3 of the model page). The linear model has the tangents at
+/// equilibrium, the nonlinear model also the steepest ones.
 pub(crate) fn highest_with_caps(
     point: &Point,
     model: ModelKind,
@@ -310,7 +311,7 @@ pub(crate) fn fastest_rigid_rad_per_s(point: &Point, model: &LinearPoint) -> Res
 }
 
 /// The first-order form x' = unit A x with x = (q, q' / unit).
-struct FirstOrder {
+struct FirstOrderSystem {
     matrix: Mat<f64>,
     /// The rate (1/s) that balances the blocks of the matrix, so that errors of eigenvalues are
     /// relative to the greatest eigenvalue, not to its square.
@@ -325,7 +326,7 @@ fn first_order(
     theta_rad: f64,
     speed_rad_per_s: f64,
     caps: Option<&Caps>,
-) -> Result<FirstOrder, NoModes> {
+) -> Result<FirstOrderSystem, NoModes> {
     let bodies = &point.machine.bodies;
     let spin = SpinState::new(N(theta_rad).sin_cos(), N(speed_rad_per_s), N(0.0));
     let mut matrices = model.matrices(bodies, &spin);
@@ -373,5 +374,5 @@ fn first_order(
             -damping[(i - COORDINATES, j - COORDINATES)] / unit_per_s
         }
     });
-    Ok(FirstOrder { matrix, unit_per_s, mass: matrices.mass })
+    Ok(FirstOrderSystem { matrix, unit_per_s, mass: matrices.mass })
 }

@@ -1,4 +1,4 @@
-//! A grid point made ready: everything that is computed once, before its trajectories start.
+//! A prepared grid point: everything that is computed once, before its trajectories start.
 
 pub(crate) mod friction;
 pub(crate) mod ringing;
@@ -21,27 +21,29 @@ use core::iter::zip;
 use lane_ode::{Kernel, Lane, N, Simd};
 use std::sync::Arc;
 
-/// When a trajectory ends, and when its amplitudes are taken.
+/// The end of a run, its window and its checkpoints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timing {
-    /// The run is from 0 to here.
+    /// The end of the run, which starts at 0.
     pub end_s: f64,
-    /// Amplitudes are taken over this closed interval within the run.
+    /// The closed interval over which amplitudes are taken, within the run.
     pub window_s: [f64; 2],
-    /// Into how many even parts the run is cut, so that states at their ends can be compared; 0 for
-    /// none.
+    /// The number of equal parts of the run at whose ends states are recorded; 0 for none.
     pub checkpoints: u32,
 }
 
-/// How far a twin's start is from its original's (m, rad).
-const NUDGE: f64 = 1e-10;
+/// The initial distance of a perturbed run from its original (m, rad).
+///
+/// Basis: far above rounding, and a chaotic motion has some twenty e-foldings to grow until it is
+/// as far as the motion itself. Doubling it takes off less than one.
+const PERTURBATION: f64 = 1e-10;
 
 /// The machine has no static equilibrium, or none that is stable.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("the machine has no stable static equilibrium: {}", self.reason())]
 pub struct NoEquilibrium {
-    /// The motion of tub and drum together against which springs and weight hold least, if they
-    /// push along it: its name, its stiffness and the stiffness's unit.
+    /// The least stable rigid motion of tub and drum, if its stiffness is negative: its name, its
+    /// stiffness and the unit of the stiffness.
     pub unstable: Option<(&'static str, f64, &'static str)>,
 }
 
@@ -58,54 +60,55 @@ impl NoEquilibrium {
     }
 }
 
-/// A machine and its spin, ready to be integrated by either model.
+/// A machine and its spin, prepared for the integration of either model.
 #[derive(Clone, Debug)]
 pub struct Point {
     pub(crate) machine: Coefficients<f64>,
     pub(crate) equilibrium: [f64; COORDINATES],
-    /// Channels at the equilibrium.
+    /// The channels at the equilibrium (m, rad).
     pub(crate) rest: [f64; CHANNELS],
     pub(crate) linear: LinearPoint,
     pub(crate) linear_outputs: LinearOutputs<f64>,
-    /// Of the dampers with friction.
+    /// The speed amplitudes of the dampers with friction.
     pub(crate) friction_speeds: Vec<FrictionSpeed>,
-    /// The linear model of the machine at its steepest, if its elements are not linear along their
-    /// lines: what explicit steps must bear.
+    /// The linear model with the steepest tangents of all elements, which limits explicit steps;
+    /// `None` if these are the tangents at equilibrium.
     pub(crate) steepest: Option<Box<LinearPoint>>,
     pub(crate) stretches: Arc<[SpinStretch]>,
-    pub(crate) legs: Arc<[PlannedLeg]>,
+    pub(crate) segments: Arc<[PlannedSegment]>,
     pub(crate) ringing: Ringing,
-    /// By how much the nonlinear model starts beside its equilibrium, in every coordinate (m, rad).
-    pub(crate) nudge: f64,
-    /// When all outputs are recorded, if they are (s).
+    /// The initial deviation of every coordinate of the nonlinear model from equilibrium (m, rad).
+    pub(crate) perturbation: f64,
+    /// The instants of snapshots (s).
     pub(crate) instants_s: Arc<[f64]>,
-    /// Weight of all bodies (N).
+    /// The weight of all bodies (N).
     pub(crate) weight_n: f64,
-    /// What the cabinet's feet take of its loads, if it is described.
+    /// The distribution of loads on the cabinet's feet, if the machine has a cabinet.
     pub(crate) feet: Option<Feet>,
 }
 
-/// A stretch of the run between two kinks: of the spin, or of what is recorded.
+/// A part of the run between two kinks of its spin, edges of its window or checkpoints.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct PlannedLeg {
+pub(crate) struct PlannedSegment {
     pub(crate) start_s: f64,
     pub(crate) end_s: f64,
-    /// Which stretch of the spin holds.
+    /// The index of the stretch of the spin.
     pub(crate) stretch: usize,
-    /// Whether amplitudes are taken.
+    /// Whether the segment is within the window.
     pub(crate) in_window: bool,
-    /// The drum's greatest speed so far, at its end (rad/s).
+    /// The greatest speed of the drum up to the end of the segment (rad/s).
     pub(crate) fastest_rad_per_s: f64,
 }
 
 impl Point {
-    /// Coordinates at static equilibrium (m, rad), unbalance up.
+    /// Returns the coordinates at static equilibrium with the unbalance up (m, rad).
     pub const fn equilibrium(&self) -> &[f64; COORDINATES] {
         &self.equilibrium
     }
 
-    /// How far the tub's mass centre sinks (m) from its place in the machine file to the static
-    /// equilibrium. In the machine file springs carry no load, unless they have free lengths.
+    /// Returns the sag of the tub's mass centre (m), from its position in the machine file to the
+    /// static equilibrium. In the machine file springs carry no load, unless they have free
+    /// lengths.
     pub fn static_sag_m(&self) -> f64 {
         let (sin_pitch, _) = N(self.equilibrium[TUB_PITCH]).sin_cos();
         -(self.machine.bodies.tub_centre * sin_pitch + N(self.equilibrium[TUB_Y])).0
@@ -116,73 +119,80 @@ impl Point {
         self.ringing.swing(unresolved)
     }
 
-    /// The same point, started 1e-10 (m, rad) beside its equilibrium in every coordinate of the
-    /// nonlinear model: a near twin, whose departure tells chaos from a step that is too long.
+    /// Returns the point with an initial deviation of 1e-10 (m, rad) in every coordinate of the
+    /// nonlinear model. The separation of this perturbed run distinguishes chaos from steps that
+    /// are too long.
     #[must_use]
-    pub fn nudged(&self) -> Self {
-        Self { nudge: NUDGE, ..self.clone() }
+    pub fn perturbed(&self) -> Self {
+        Self { perturbation: PERTURBATION, ..self.clone() }
     }
 
-    /// The same point, with instants (s, rising) at which [`Recorders`](crate::Recorders) can have
-    /// its outputs recorded.
+    /// Returns the point with the instants (s, rising) of the snapshots of
+    /// [`Recorders`](crate::Recorders).
     #[must_use]
-    pub fn seen_at(self, instants_s: Arc<[f64]>) -> Self {
+    pub fn with_snapshots_at(self, instants_s: Arc<[f64]>) -> Self {
         Self { instants_s, ..self }
     }
 
-    /// Weight (N) of what the springs carry.
+    /// Returns the weight of all bodies (N).
     pub const fn weight_n(&self) -> f64 {
         self.weight_n
     }
 
-    /// The gap between drum and tub at rest (m).
+    /// Returns the gap between drum and tub at rest (m).
     pub const fn clearance_m(&self) -> f64 {
         self.machine.bodies.clearance.0
     }
 
-    /// The window's edges (s).
+    /// Returns the edges of the window (s).
     pub fn window_s(&self) -> [f64; 2] {
-        let inside = || self.legs.iter().filter(|leg| leg.in_window);
-        let from = inside().next().map_or(0.0, |leg| leg.start_s);
-        [from, inside().next_back().map_or(from, |leg| leg.end_s)]
+        let inside = || self.segments.iter().filter(|segment| segment.in_window);
+        let from = inside().next().map_or(0.0, |segment| segment.start_s);
+        [from, inside().next_back().map_or(from, |segment| segment.end_s)]
     }
 
-    /// At which speed amplitudes the linear model takes the friction of the dampers that have it.
+    /// Returns the speed amplitudes at which the linear model takes the friction of dampers.
     pub fn friction_speeds(&self) -> &[FrictionSpeed] {
         &self.friction_speeds
     }
 
-    /// By what factor these are off from the speeds (m/s) that the dampers had in a motion of this
-    /// model, the greatest of all; `None` if there are none. Own speeds are the linear motion's by
-    /// definition, so the nonlinear one is compared with given ones alone.
-    pub fn friction_speed_off(&self, model: ModelKind, occurred_m_per_s: &[f64]) -> Option<f64> {
-        let of_model = |taken: &&FrictionSpeed| model == ModelKind::Linear || !taken.is_own;
-        let off = self.friction_speeds.iter().filter(of_model).filter_map(|taken| {
-            let occurred = occurred_m_per_s.get(taken.damper)?.max(taken.least_m_per_s);
-            let quotient = taken.speed_m_per_s.max(taken.least_m_per_s) / occurred;
+    /// Returns the greatest factor between the speed amplitude of a damper's friction and the
+    /// damper's greatest speed (m/s, all dampers) in a motion of this model; `None` if no friction
+    /// is compared. Own speed amplitudes are those of the linear motion by definition, so that the
+    /// nonlinear motion is compared with given ones alone.
+    pub fn friction_speed_factor(&self, model: ModelKind, speeds_m_per_s: &[f64]) -> Option<f64> {
+        let is_compared = |assumed: &&FrictionSpeed| model == ModelKind::Linear || !assumed.is_own;
+        let factor = |assumed: &FrictionSpeed| {
+            let speed = speeds_m_per_s.get(assumed.damper)?.max(assumed.least_m_per_s);
+            let quotient = assumed.speed_m_per_s.max(assumed.least_m_per_s) / speed;
             Some(quotient.max(1.0 / quotient))
-        });
-        off.reduce(f64::max)
+        };
+        self.friction_speeds.iter().filter(is_compared).filter_map(factor).reduce(f64::max)
     }
 
-    /// The same point with friction taken at other own speeds, in their order.
-    pub(crate) fn at_own_speeds(&self, speeds_m_per_s: &[f64]) -> Self {
+    /// Returns the point with other speed amplitudes (m/s) for the dampers that have their own, in
+    /// the order of these dampers.
+    pub(crate) fn with_own_friction_speeds(&self, speeds_m_per_s: &[f64]) -> Self {
         let mut own = speeds_m_per_s.iter().copied();
-        self.at_speeds(|taken| if taken.is_own { own.next() } else { None })
+        self.with_friction_speeds(|assumed| if assumed.is_own { own.next() } else { None })
     }
 
-    /// The same point whose linear model has no friction.
+    /// Returns the point with a linear model without friction.
     pub(crate) fn without_friction(&self) -> Self {
-        self.at_speeds(|_| Some(f64::INFINITY))
+        self.with_friction_speeds(|_| Some(f64::INFINITY))
     }
 
-    /// The same point with friction taken at other speeds (m/s), where there are others.
-    fn at_speeds(&self, mut other: impl FnMut(&FrictionSpeed) -> Option<f64>) -> Self {
+    /// Returns the point with other speed amplitudes (m/s) for the dampers for which `new_speed`
+    /// returns one.
+    fn with_friction_speeds(
+        &self,
+        mut new_speed: impl FnMut(&FrictionSpeed) -> Option<f64>,
+    ) -> Self {
         let mut point = self.clone();
-        for taken in &mut point.friction_speeds {
-            if let Some(speed_m_per_s) = other(taken) {
-                taken.speed_m_per_s = speed_m_per_s;
-                point.machine.elements.linearise_friction(taken.damper, speed_m_per_s);
+        for assumed in &mut point.friction_speeds {
+            if let Some(speed_m_per_s) = new_speed(assumed) {
+                assumed.speed_m_per_s = speed_m_per_s;
+                point.machine.elements.linearise_friction(assumed.damper, speed_m_per_s);
             }
         }
         let tangents =
@@ -191,8 +201,7 @@ impl Point {
         point
     }
 
-    /// M, C, K and F of the linear model (Eq. 41) at spin angle `theta_rad`, speed and
-    /// acceleration.
+    /// Computes M, C, K and F of the linear model (Eq. 41) at a spin angle, speed and acceleration.
     pub fn matrices(
         &self,
         theta_rad: f64,
@@ -205,10 +214,10 @@ impl Point {
     }
 }
 
-/// Makes points ready, on lanes, but for speeds at which friction is taken that the motion has.
+/// Prepares points on lanes, all but the speed amplitudes of friction that depend on the motion.
 ///
 /// # Errors
-/// Per point: [`NoEquilibrium`].
+/// [`NoEquilibrium`] for each point without one.
 pub(crate) fn prepare(
     points: &[(Machine, Spin)],
     timing: &Timing,
@@ -216,9 +225,10 @@ pub(crate) fn prepare(
     Simd::dispatch_narrow(Prepare { points, courses: courses(points, timing) })
 }
 
+/// The kernel that prepares points.
 struct Prepare<'a> {
     points: &'a [(Machine, Spin)],
-    courses: Vec<Course>,
+    courses: Vec<SpinCourse>,
 }
 
 impl Kernel for Prepare<'_> {
@@ -227,13 +237,13 @@ impl Kernel for Prepare<'_> {
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let zero = N(zero);
-        let mut ready = Vec::with_capacity(self.points.len());
+        let mut prepared = Vec::with_capacity(self.points.len());
         let mut courses = self.courses.into_iter();
         for group in self.points.chunks(T::LANES) {
             let machines: Vec<_> =
                 group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
             let lanes = in_lanes(zero, &machines);
-            let (q, found) = zero.0.aside(equilibrium::SolveEquilibrium { zero, machine: &lanes });
+            let (q, solved) = zero.0.aside(equilibrium::SolveEquilibrium { zero, machine: &lanes });
             let steepest = steepest(&machines, &q);
             let viscous: Vec<_> =
                 machines.iter().map(Coefficients::with_viscous_friction).collect();
@@ -246,10 +256,10 @@ impl Kernel for Prepare<'_> {
             let models = zip(zip(machines, linear), zip(linear_outputs, steepest));
             let given = zip(group, courses.by_ref());
             for (lane, (model, ((machine, _), course))) in zip(models, given).enumerate() {
-                if found >> lane & 1 == 0 {
+                if solved >> lane & 1 == 0 {
                     let q = q.map(|q| q.0.get(lane));
                     let unstable = equilibrium::unstable_motion(&model.0.0, &q);
-                    ready.push(Err(NoEquilibrium { unstable }));
+                    prepared.push(Err(NoEquilibrium { unstable }));
                     continue;
                 }
                 let ((coefficients, linear), (linear_outputs, steepest)) = model;
@@ -259,9 +269,9 @@ impl Kernel for Prepare<'_> {
                         SpinState::new(N(angle_rad).sin_cos(), N(0.0), N(acceleration_rad_per_s2));
                     linear.matrices(&coefficients.bodies, &spin)
                 };
-                ready.push(Ok(Point {
+                prepared.push(Ok(Point {
                     ringing: Ringing::new(machine, course.jumps_rad_per_s2, matrices_at),
-                    nudge: 0.0,
+                    perturbation: 0.0,
                     instants_s: [].into(),
                     machine: coefficients,
                     equilibrium: q.map(|q| q.0.get(lane)),
@@ -271,17 +281,17 @@ impl Kernel for Prepare<'_> {
                     friction_speeds: FrictionSpeed::all(machine),
                     steepest,
                     stretches: course.stretches,
-                    legs: course.legs,
+                    segments: course.segments,
                     weight_n: machine.weight_n(),
                     feet: Feet::new(machine),
                 }));
             }
         }
-        ready
+        prepared
     }
 }
 
-/// Machines in lanes, the first also in those beyond the last.
+/// Puts machines into lanes, and the first one also into lanes that have none.
 #[inline(always)]
 fn in_lanes<T: Lane>(zero: N<T>, machines: &[Coefficients<f64>]) -> Coefficients<T> {
     let mut lanes = Coefficients::splat(zero, &machines[0]);
@@ -291,8 +301,8 @@ fn in_lanes<T: Lane>(zero: N<T>, machines: &[Coefficients<f64>]) -> Coefficients
     lanes
 }
 
-/// Stiffness and damping of each machine's tub at its steepest, with equilibria `q`; `None` where
-/// they are those of its linear model.
+/// Computes the stiffness and the damping of each machine's tub with the steepest tangents of all
+/// elements, at equilibria `q`; `None` if these are the tangents at equilibrium.
 fn steepest<T: Lane>(
     machines: &[Coefficients<f64>],
     q: &[N<T>; COORDINATES],
@@ -305,33 +315,33 @@ fn steepest<T: Lane>(
     machines.iter().enumerate().map(tangents).collect()
 }
 
-/// The course of a trajectory's spin.
+/// The spin of a trajectory, and the segments of the run.
 #[derive(Clone)]
-struct Course {
+struct SpinCourse {
     stretches: Arc<[SpinStretch]>,
-    legs: Arc<[PlannedLeg]>,
-    /// All jumps of the drum's acceleration, added.
+    segments: Arc<[PlannedSegment]>,
+    /// The sum of all jumps of the drum's acceleration.
     jumps_rad_per_s2: f64,
 }
 
-/// One per point. Neighbours with the same spin share it, because a table may have thousands of
-/// rows.
-fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<Course> {
-    let mut courses: Vec<Course> = Vec::with_capacity(points.len());
+/// Computes the course of each point's spin. Neighbours with the same spin share it, because a
+/// table may have thousands of rows.
+fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<SpinCourse> {
+    let mut courses: Vec<SpinCourse> = Vec::with_capacity(points.len());
     for (k, (_, spin)) in points.iter().enumerate() {
         let shared = if k > 0 && points[k - 1].1 == *spin { courses.last().cloned() } else { None };
         courses.push(shared.unwrap_or_else(|| {
             let stretches = spin.stretches();
             let jumps_rad_per_s2 = jumps_rad_per_s2(&stretches, timing.end_s);
-            let legs = legs(&stretches, timing).into();
-            Course { legs, jumps_rad_per_s2, stretches: stretches.into() }
+            let segments = segments(&stretches, timing).into();
+            SpinCourse { segments, jumps_rad_per_s2, stretches: stretches.into() }
         }));
     }
     courses
 }
 
-/// The run cut at every kink.
-pub(crate) fn legs(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedLeg> {
+/// Divides the run into segments at every kink of the spin, edge of the window and checkpoint.
+pub(crate) fn segments(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedSegment> {
     let [from, to] = timing.window_s;
     let kinks = stretches.iter().map(|s| s.start_s.0).chain([0.0, from, to, timing.end_s]);
     let parts = f64::from(timing.checkpoints);
@@ -343,15 +353,16 @@ pub(crate) fn legs(stretches: &[SpinStretch], timing: &Timing) -> Vec<PlannedLeg
     times
         .windows(2)
         .map(|pair| {
-            let (start_s, end_s) = (pair[0], pair[1]);
+            let start_s = pair[0];
+            let end_s = pair[1];
             let stretch = stretch_at(stretches, start_s);
-            // Within a stretch the speed rises or falls all the way.
+            // The speed is monotonic within a stretch.
             for time_s in [start_s, end_s] {
                 fastest_rad_per_s =
                     fastest_rad_per_s.max(stretches[stretch].speed_rad_per_s(time_s).abs());
             }
             let in_window = from <= start_s && end_s <= to;
-            PlannedLeg { start_s, end_s, stretch, in_window, fastest_rad_per_s }
+            PlannedSegment { start_s, end_s, stretch, in_window, fastest_rad_per_s }
         })
         .collect()
 }

@@ -10,7 +10,7 @@
 //! speed amplitude, which a damper has that the drum cannot move against its friction.
 
 use crate::modes::fastest_rigid_rad_per_s;
-use crate::point::{self, legs};
+use crate::point::{self, segments};
 use crate::steps::to_bits;
 use crate::{
     Caps, FrictionSpeed, Gauge, Machine, Method, ModelKind, NoEquilibrium, Point, Recorders, Spin,
@@ -175,11 +175,11 @@ pub fn prepare(
     let open = |(index, point): (usize, &Result<Point, NoEquilibrium>)| {
         let point = point.as_ref().ok()?;
         let search = Search::new(point)?;
-        let legs = legs(&point.stretches, &to_window).into();
-        let point = Point { legs, ..point.at_own_speeds(&search.speeds_m_per_s()) };
+        let segments = segments(&point.stretches, &to_window).into();
+        let point = Point { segments, ..point.with_own_friction_speeds(&search.speeds_m_per_s()) };
         let fastest = fastest_rigid_rad_per_s(&point, &point.linear).ok()?;
         let step_s =
-            to_bits(STEP_RAD / fastest.max(point.legs.last()?.fastest_rad_per_s), STEP_BITS);
+            to_bits(STEP_RAD / fastest.max(point.segments.last()?.fastest_rad_per_s), STEP_BITS);
         let shortest_s = MIN_STEP_SHARE * step_s;
         Some(OpenPoint { index, point, search, step_s, shortest_s, is_done: false })
     };
@@ -204,7 +204,7 @@ pub fn prepare(
     }
     for OpenPoint { index, search, .. } in all {
         if let Ok(point) = &mut prepared[index] {
-            *point = point.at_own_speeds(&search.speeds_m_per_s());
+            *point = point.with_own_friction_speeds(&search.speeds_m_per_s());
         }
     }
     prepared
@@ -220,6 +220,6 @@ impl OpenPoint {
             return;
         }
         self.is_done = self.search.update(&own(&self.point, speeds_m_per_s));
-        self.point = self.point.at_own_speeds(&self.search.speeds_m_per_s());
+        self.point = self.point.with_own_friction_speeds(&self.search.speeds_m_per_s());
     }
 }

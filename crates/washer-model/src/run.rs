@@ -1,8 +1,9 @@
-//! Trajectories: points run through the lanes of an integrator, and their records.
+//! Integration of trajectories: points pass through the lanes of an integrator, and each leaves a
+//! record.
 
-mod course;
+pub(crate) mod active_recorders;
+mod checkpoints;
 pub(crate) mod equations;
-pub(crate) mod extras;
 pub(crate) mod history;
 pub(crate) mod loads;
 pub(crate) mod method;
@@ -19,111 +20,118 @@ pub use snapshots::Snapshot;
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::nonlinear::outputs::{RADIAL, squared};
-use crate::run::method::{ByMethod, Family, OfLinear, OfNonlinear, Stepper, coupling, enter};
-use crate::run::model::Model;
+use crate::run::method::{
+    LinearFamily, ModelFamily, NonlinearFamily, Stepper, StepperVisitor, coupling, start_segment,
+};
+use crate::run::model::LaneModel;
 use crate::{COORDINATES, ModelKind, Point};
+use active_recorders::{ActiveRecorders, ObservedState, StepParts};
 use core::marker::PhantomData;
-use extras::{Extras, Instants, Seen};
 use lane_ode::{
     Aside, Count, Failure, Kernel, Lane, MAX_LANES, N, Peaks, Sample, Segment, SegmentEnd, Simd,
     Step, Task,
 };
 
-/// Says whether to stop.
-pub type Stop<'a> = &'a dyn Fn() -> bool;
+/// A function that returns true once the computation shall stop.
+pub type StopRequest<'a> = &'a dyn Fn() -> bool;
 
-/// The ends of a trajectory's legs, up to its own end.
-pub type Course = Vec<Waypoint>;
+/// The coordinates at the ends of a trajectory's segments, up to its own end.
+pub type Checkpoints = Vec<Checkpoint>;
 
-/// A trajectory at the end of a leg.
+/// The coordinates of a trajectory at the end of a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Waypoint {
-    /// Coordinates (m, rad).
+pub struct Checkpoint {
+    /// The coordinates q1 to q10 (m, rad).
     pub coordinates: [f64; COORDINATES],
 }
 
 /// The record of one trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
-    /// Why and when (s) it failed, if it did.
+    /// The reason and the time (s) of a failure.
     pub failure: Option<(Failure, f64)>,
-    /// Largest deviation from equilibrium within the window, in the order of `Channel::ALL` (m,
-    /// rad).
+    /// The largest deviation of each channel from equilibrium within the window (m, rad), in the
+    /// order of `Channel::ALL`.
     pub amplitudes: [f64; CHANNELS],
-    /// Least gap between drum and tub over the whole run (m).
+    /// The least gap between drum and tub over the whole run (m).
     pub min_gap_m: f64,
-    /// Steps of the integrator.
+    /// The number of accepted steps.
     pub steps: u64,
-    /// Steps that an adaptive method took back.
+    /// The number of steps that an adaptive method rejected.
     pub rejected: u64,
 }
 
-/// Integrates one model at every point and records peaks. The result does not depend on the
-/// instruction set, nor on which points come together.
+/// Integrates one model at every point and records peaks. The result of a point depends neither on
+/// the instruction set nor on the other points.
 pub fn simulate(simd: Simd, model: ModelKind, method: &Method, points: &[&Point]) -> Vec<Record> {
     simulate_with(simd, model, method, points, Recorders::default()).0
 }
 
-/// As [`simulate`], and records one [`Reading`] per point if anything else is wanted.
+/// Integrates one model at every point, like [`simulate`], with further recorders. Returns a
+/// [`Reading`] for each point, or none at all if no recorder is in use.
 pub fn simulate_with(
     simd: Simd,
     model: ModelKind,
     method: &Method,
     points: &[&Point],
-    wanted: Recorders,
+    recorders: Recorders,
 ) -> (Vec<Record>, Vec<Reading>) {
-    simulate_until(simd, model, method, points, wanted, &|| false).unwrap_or_default()
+    simulate_until(simd, model, method, points, recorders, &|| false).unwrap_or_default()
 }
 
-/// As [`simulate_with`]; `None` if `stop` says so before all trajectories have ended. It is asked
-/// every [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps at least.
+/// Integrates one model at every point, like [`simulate_with`]. Returns `None` if `stop` returned
+/// true before the end of all trajectories. It is called at least every
+/// [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps.
 pub fn simulate_until(
     simd: Simd,
     model: ModelKind,
     method: &Method,
     points: &[&Point],
-    wanted: Recorders,
-    stop: Stop<'_>,
+    recorders: Recorders,
+    stop: StopRequest<'_>,
 ) -> Option<(Vec<Record>, Vec<Reading>)> {
     if points.is_empty() {
         return Some((Vec::new(), Vec::new()));
     }
-    let order = (Order { points, method, wanted, stop }, simd);
+    let request = (SimulationRequest { points, method, recorders, stop }, simd);
     match model {
-        ModelKind::Nonlinear => method.choose::<OfNonlinear, _>(order),
-        ModelKind::Linear => method.choose::<OfLinear, _>(order),
+        ModelKind::Nonlinear => method.visit_stepper::<NonlinearFamily, _>(request),
+        ModelKind::Linear => method.visit_stepper::<LinearFamily, _>(request),
     }
 }
 
-/// What to simulate, by either model.
-struct Order<'a> {
+/// The arguments of a simulation, before model and integrator are types.
+struct SimulationRequest<'a> {
     points: &'a [&'a Point],
     method: &'a Method,
-    wanted: Recorders,
-    stop: Stop<'a>,
+    recorders: Recorders,
+    stop: StopRequest<'a>,
 }
 
-impl<F: Family> ByMethod<F> for (Order<'_>, Simd) {
+impl<F: ModelFamily> StepperVisitor<F> for (SimulationRequest<'_>, Simd) {
     type Output = Option<(Vec<Record>, Vec<Reading>)>;
 
-    fn by<S: Stepper>(self, stepper: S) -> Self::Output {
-        self.1.dispatch(Simulate(self.0, stepper, PhantomData::<F>))
+    fn visit<S: Stepper>(self, stepper: S) -> Self::Output {
+        let (request, simd) = self;
+        simd.dispatch(Simulate(request, stepper, PhantomData::<F>))
     }
 }
 
-struct Simulate<'a, F, S>(Order<'a>, S, PhantomData<F>);
+/// The kernel of a simulation.
+struct Simulate<'a, F, S>(SimulationRequest<'a>, S, PhantomData<F>);
 
-impl<F: Family, S: Stepper> Kernel for Simulate<'_, F, S> {
+impl<F: ModelFamily, S: Stepper> Kernel for Simulate<'_, F, S> {
     type Output = Option<(Vec<Record>, Vec<Reading>)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut run = Run::<T, F::Over<T>>::new(N(zero), self.0, F::KIND);
-        self.1.integrate(zero, &mut run);
-        run.recorded()
+        let mut task = SimulationTask::<T, F::Over<T>>::new(N(zero), self.0, F::KIND);
+        self.1.integrate(zero, &mut task);
+        task.into_records()
     }
 }
 
+/// The record of a trajectory that has not ended, or of one that failed.
 const EMPTY: Record = Record {
     failure: None,
     amplitudes: [f64::NAN; CHANNELS],
@@ -132,34 +140,40 @@ const EMPTY: Record = Record {
     rejected: 0,
 };
 
-/// Which trajectory a lane holds, and where in it.
+/// The trajectory in a lane.
 #[derive(Clone, Copy, Default)]
 struct LaneState {
+    /// The index of the point.
     point: usize,
-    leg: usize,
+    /// The index of the current segment.
+    segment: usize,
+    /// The steps up to the current segment.
     count: Count,
 }
 
-/// The task: every point through one model.
-struct Run<'a, T, M> {
+/// The integration of every point by one model. A lane whose trajectory ends starts the next point.
+struct SimulationTask<'a, T, M> {
     model: M,
     points: &'a [&'a Point],
-    stop: Stop<'a>,
-    taken: usize,
+    stop: StopRequest<'a>,
+    /// The number of points that have started.
+    started: usize,
+    /// The number of points that have ended.
     finished: usize,
     lanes: [LaneState; MAX_LANES],
     method: &'a Method,
     channels: Peaks<T, CHANNELS>,
+    /// The greatest square of the radial distance between the fronts of drum and tub.
     radial: Peaks<T, 1>,
-    /// 1 where a lane is inside its window, else 0.
+    /// 1 in lanes that are inside their window, 0 in others.
     windows: N<T>,
     records: Vec<Record>,
-    extras: Option<Extras<T>>,
-    /// Coordinates at the ends of each point's legs; empty unless wanted.
-    courses: Vec<Course>,
+    active: Option<ActiveRecorders<T>>,
+    /// The coordinates at the ends of each point's segments; empty without that recorder.
+    checkpoints: Vec<Checkpoints>,
 }
 
-impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
+impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
     type System = M;
 
     #[inline(always)]
@@ -177,7 +191,7 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
         let state = &mut self.lanes[lane];
         let mut failure = None;
         match ended {
-            SegmentEnd::Idle => return self.next_point(lane, x),
+            SegmentEnd::Idle => return self.start_next_point(lane, x),
             SegmentEnd::Completed(count) => state.count.add(count),
             SegmentEnd::Failed { reason, time_s, count } => {
                 state.count.add(count);
@@ -185,13 +199,13 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
             }
         }
         let point = self.points[state.point];
-        if let Some(course) = self.courses.get_mut(state.point) {
+        if let Some(checkpoints) = self.checkpoints.get_mut(state.point) {
             let coordinates = core::array::from_fn(|i| x[i].0.get(lane));
-            course.push(Waypoint { coordinates });
+            checkpoints.push(Checkpoint { coordinates });
         }
-        if failure.is_none() && state.leg + 1 < point.legs.len() {
-            state.leg += 1;
-            return Some(self.enter(lane));
+        if failure.is_none() && state.segment + 1 < point.segments.len() {
+            state.segment += 1;
+            return Some(self.start_segment(lane));
         }
         self.finished += 1;
         let Count { accepted: steps, rejected } = state.count;
@@ -202,15 +216,15 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
             let [radial_squared] = self.radial.lane(lane);
             record.min_gap_m = point.machine.bodies.clearance.0 - radial_squared.sqrt();
         }
-        if let Some(extras) = &mut self.extras {
-            extras.finish(lane, state.point, point, failure.is_some());
+        if let Some(active) = &mut self.active {
+            active.finish(lane, state.point, point, failure.is_some());
         }
-        self.next_point(lane, x)
+        self.start_next_point(lane, x)
     }
 
     #[inline(always)]
     fn begin(&mut self, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
-        self.windows.0.aside(Begin { run: self, forcing, x, dx });
+        self.windows.0.aside(RecordStart { task: self, forcing, x, dx });
     }
 
     #[inline(always)]
@@ -221,9 +235,9 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
         if let Some(channels) = channels {
             self.channels.advance(step.length_s, &channels, inside);
             let times = Some((step.end_s, step.length_s));
-            self.show(times, (step.after, step.slope_after), &radial, &channels, inside);
+            self.record(times, (step.after, step.slope_after), &radial, &channels, inside);
         }
-        self.radial.advance(step.length_s, &[squared(&radial)], everywhere(self.windows));
+        self.radial.advance(step.length_s, &[squared(&radial)], all_lanes(self.windows));
     }
 
     fn is_stopped(&self) -> bool {
@@ -231,48 +245,53 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Run<'_, T, M> {
     }
 }
 
-/// A leg begins.
-struct Begin<'r, 'a, T: Lane, M: Model<T>> {
-    run: &'r mut Run<'a, T, M>,
+/// A function that records the state at the start of a segment. It runs seldom, so that it is not
+/// inlined into the loop over steps.
+struct RecordStart<'r, 'a, T: Lane, M: LaneModel<T>> {
+    task: &'r mut SimulationTask<'a, T, M>,
     forcing: &'r M::Forcing,
     x: &'r [N<T>; STATES],
     dx: &'r [N<T>; STATES],
 }
 
-impl<T: Lane, M: Model<T>> Aside for Begin<'_, '_, T, M> {
+impl<T: Lane, M: LaneModel<T>> Aside for RecordStart<'_, '_, T, M> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { run, forcing, x, dx } = self;
-        let inside = run.inside();
-        let (radial, channels) = run.model.observe(forcing, x, dx, T::bits(inside) != 0);
+        let Self { task, forcing, x, dx } = self;
+        let inside = task.inside();
+        let (radial, channels) = task.model.observe(forcing, x, dx, T::bits(inside) != 0);
         if let Some(channels) = channels {
-            run.channels.begin(&channels, inside);
-            run.show(None, (x, dx), &radial, &channels, inside);
+            task.channels.begin(&channels, inside);
+            task.record(None, (x, dx), &radial, &channels, inside);
         }
-        run.radial.begin(&[squared(&radial)], everywhere(run.windows));
+        task.radial.begin(&[squared(&radial)], all_lanes(task.windows));
     }
 }
 
-/// True in every lane.
+/// Returns the mask that is true in every lane.
 #[inline(always)]
-pub(crate) fn everywhere<T: Lane>(like: N<T>) -> T::Mask {
+pub(crate) fn all_lanes<T: Lane>(like: N<T>) -> T::Mask {
     like.lit(0.0).0.less(like.lit(1.0).0)
 }
 
-impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
-    /// Every point still to be taken up; there is at least one.
+impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
+    /// Creates the task before any point has started. There is at least one point.
     #[inline(always)]
-    fn new(zero: N<T>, order: Order<'a>, model: ModelKind) -> Self {
-        let Order { points, method, wanted, stop } = order;
-        let instants = Instants::of(method);
-        let course = |point: &&Point| Vec::with_capacity(point.legs.len());
+    fn new(zero: N<T>, request: SimulationRequest<'a>, model: ModelKind) -> Self {
+        let SimulationRequest { points, method, recorders, stop } = request;
+        let parts = StepParts::for_method(method);
+        let reserved = |point: &&Point| Vec::with_capacity(point.segments.len());
+        let checkpoints = match recorders.checkpoints {
+            true => points.iter().map(reserved).collect(),
+            false => Vec::new(),
+        };
         Self {
             model: M::splat(zero, points[0], coupling(method, zero)),
             points,
             stop,
-            taken: 0,
+            started: 0,
             finished: 0,
             lanes: [LaneState::default(); MAX_LANES],
             method,
@@ -280,29 +299,29 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
             radial: Peaks::new(zero),
             windows: zero,
             records: vec![EMPTY; points.len()],
-            extras: Extras::new(zero, wanted, (model, instants), points[0], points.len()),
-            courses: if wanted.course { points.iter().map(course).collect() } else { Vec::new() },
+            active: ActiveRecorders::new(zero, recorders, (model, parts), points[0], points.len()),
+            checkpoints,
         }
     }
 
-    /// All records; `None` if some point has none.
-    fn recorded(self) -> Option<(Vec<Record>, Vec<Reading>)> {
+    /// Returns all records and readings; `None` if some trajectory has not ended.
+    fn into_records(self) -> Option<(Vec<Record>, Vec<Reading>)> {
         if self.finished < self.points.len() {
             return None;
         }
-        let mut found = self.extras.map_or_else(Vec::new, |extras| extras.found);
-        if !self.courses.is_empty() {
-            found.resize(self.courses.len(), Reading::default());
+        let mut readings = self.active.map_or_else(Vec::new, |active| active.readings);
+        if !self.checkpoints.is_empty() {
+            readings.resize(self.checkpoints.len(), Reading::default());
         }
-        for (extra, course) in found.iter_mut().zip(self.courses) {
-            extra.course = course;
+        for (reading, checkpoints) in readings.iter_mut().zip(self.checkpoints) {
+            reading.checkpoints = checkpoints;
         }
-        Some((self.records, found))
+        Some((self.records, readings))
     }
 
-    /// Passes an instant to the recorders in use.
+    /// Passes a state with its outputs to the recorders in use.
     #[inline(always)]
-    fn show(
+    fn record(
         &mut self,
         step: Option<(N<T>, N<T>)>,
         (x, dx): (&[N<T>; STATES], &[N<T>; STATES]),
@@ -310,46 +329,55 @@ impl<'a, T: Lane, M: Model<T>> Run<'a, T, M> {
         channels: &[Sample<T>; CHANNELS],
         inside: T::Mask,
     ) {
-        if let Some(extras) = &mut self.extras {
-            self.windows.0.aside(Seen { extras, step, x, dx, radial, channels, inside });
+        if let Some(recorders) = &mut self.active {
+            self.windows.0.aside(ObservedState {
+                recorders,
+                step,
+                x,
+                dx,
+                radial,
+                channels,
+                inside,
+            });
         }
     }
 
+    /// Returns the lanes that are inside their windows.
     #[inline(always)]
     fn inside(&self) -> T::Mask {
         self.windows.lit(0.0).0.less(self.windows.0)
     }
 
-    /// Takes up the next point, if there is one.
-    fn next_point(&mut self, lane: usize, x: &mut [N<T>; STATES]) -> Option<Segment> {
+    /// Starts the next point in a lane, if there is one.
+    fn start_next_point(&mut self, lane: usize, x: &mut [N<T>; STATES]) -> Option<Segment> {
         self.windows.0.set(lane, 0.0);
         // An idle lane rests at the start of its last point, where the model is defined.
-        let is_last = self.taken == self.points.len();
-        let index = if is_last { self.lanes[lane].point } else { self.taken };
+        let is_idle = self.started == self.points.len();
+        let index = if is_idle { self.lanes[lane].point } else { self.started };
         let point = self.points[index];
         for (x, at_rest) in x.iter_mut().zip(M::at_rest(point)) {
             x.0.set(lane, at_rest);
         }
-        if is_last {
+        if is_idle {
             return None;
         }
-        self.taken += 1;
+        self.started += 1;
         self.lanes[lane] = LaneState { point: index, ..LaneState::default() };
         self.model.set_point(lane, point);
         self.channels.reset(lane);
         self.radial.reset(lane);
-        if let Some(extras) = &mut self.extras {
-            extras.set_point(lane, point);
+        if let Some(active) = &mut self.active {
+            active.set_point(lane, point);
         }
-        Some(self.enter(lane))
+        Some(self.start_segment(lane))
     }
 
-    /// Starts the lane's current leg.
-    fn enter(&mut self, lane: usize) -> Segment {
+    /// Starts the lane's current segment.
+    fn start_segment(&mut self, lane: usize) -> Segment {
         let state = &self.lanes[lane];
         let point = self.points[state.point];
-        let leg = &point.legs[state.leg];
-        self.windows.0.set(lane, f64::from(u8::from(leg.in_window)));
-        enter(&mut self.model, lane, *self.method, point, leg)
+        let segment = &point.segments[state.segment];
+        self.windows.0.set(lane, f64::from(u8::from(segment.in_window)));
+        start_segment(&mut self.model, lane, *self.method, point, segment)
     }
 }

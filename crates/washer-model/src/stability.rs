@@ -19,7 +19,7 @@ pub(crate) mod turn;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::modes::shape::Motion;
+use crate::modes::shape::ModeMotion;
 use crate::point::Point;
 use core::f64::consts::TAU;
 
@@ -132,7 +132,7 @@ pub struct Participant {
     /// Its damped natural frequency while the drum turns (cycles per minute).
     pub frequency_cpm: f64,
     /// What moves.
-    pub motion: Motion,
+    pub motion: ModeMotion,
     /// Its share of the growing motion's energy.
     pub share: f64,
 }

@@ -1,4 +1,4 @@
-//! What the model promises, and the instruments to show it.
+//! Tests of the models, and their common functions.
 
 mod allocation;
 mod bits;
@@ -6,7 +6,6 @@ mod cost;
 pub(crate) mod elements;
 mod energy;
 mod expansion;
-mod extras;
 mod findings;
 pub(crate) mod friction;
 mod instruments;
@@ -14,5 +13,6 @@ mod loads;
 mod long_tables;
 mod mass;
 mod observation;
+mod recorders;
 pub(crate) mod reference;
 mod stiff;

@@ -98,7 +98,7 @@ impl RefinementLevels {
     }
 
     /// Returns the place that stands for the perturbed run of a level: the same method from a start
-    /// beside the row's own ([`Point::nudged`](washer_model::Point::nudged)).
+    /// beside the row's own ([`Point::perturbed`](washer_model::Point::perturbed)).
     pub const fn perturbed(&self, place: usize) -> usize {
         self.levels.len() + place
     }

@@ -1,15 +1,18 @@
-//! One row of a map: both models at a point, in finer and finer runs until two agree, and the
-//! numbers that the row takes from them.
+//! The computation of one row of a map: both models are integrated at a point, at finer and finer
+//! levels until two agree, and the row takes its numbers from these trajectories.
 //!
-//! Nothing here knows of grids, files or threads. `sweep` takes many rows through lanes at a time,
-//! a live page (`washer-live`) one. Both use this rule, so they get the same bits.
+//! The crate does not depend on grids, files or threads. `sweep` computes many rows at a time in
+//! lanes, a live page (`washer-live`) computes a single one. Both follow the rules of this crate,
+//! so that their rows have the same bits.
 //!
-//! * [`RefinementLevels`] holds one model's levels, coarsest first; [`runs`] integrates
+//! * [`RefinementLevels`] holds one model's levels, coarsest first; [`integrate_points`] integrates
 //!   trajectories at one of them.
-//! * [`RowRefinement`] is a row under refinement: it asks for runs, takes them, and estimates the
-//!   error by the rule of `error_control.rs`.
+//! * [`RowRefinement`] is a row under refinement: it requests trajectories, compares them with the
+//!   level before, and estimates the error by the rule of `error_control.rs`.
 //! * An [`Outcome`] is the result: both models' amplitudes and [`Metric`]s. A [`Verdict`] compares
 //!   them.
+
+#![allow(missing_docs, reason = "a name that is clear needs no comment")]
 
 mod error_control;
 mod levels;
@@ -22,9 +25,11 @@ mod verdict;
 
 pub use error_control::{MAX_ADAPTIVE_STEPS, refinement_levels};
 pub use levels::{RefinementLevel, RefinementLevels};
-pub use measures::{CREEPING_M_PER_S, Criterion, Facts, Measured, Measures, Metric, Part};
-pub use outcome::{Deviations, Dwelt, GrowingMode, Growth, Outcome, Status, Trajectory};
+pub use measures::{
+    CREEP_M_PER_S, Criterion, Measures, Metric, MetricColumn, MetricFacts, PartKind,
+};
+pub use outcome::{Deviations, DwellPeaks, GrowingMode, Growth, Outcome, Status, Trajectory};
 pub use refinement::{Demand, Next, RefinementRule, RowRefinement};
-pub use run::{LevelRun, Rule, runs};
+pub use run::{LevelRun, RowRule, integrate_points};
 pub use verdict::{ROW_STATUSES, Verdict, row_status};
 pub use washer_model::Level;

@@ -1,4 +1,4 @@
-//! What a run measures: the amplitude by which the two models are compared, and metrics.
+//! Measures of a trajectory: the amplitude by which the two models are compared, and metrics.
 
 use sweep_parameter::{Limit, Worse, named};
 use washer_model::{Channel, Gauge, Reading, Recorders};
@@ -12,22 +12,26 @@ use crate::outcome::{Deviations, Outcome};
 /// billionth of it. Doubling it is without effect.
 pub(crate) const REST_SHARE: f64 = 1e-9;
 
-/// Deviations below this count as this (m, rad) where turns are compared: neither 0 over 0 nor what
-/// no machine feels decides.
+/// The least deviation (m, rad) in the ratio of two turns: smaller ones count as this.
+///
+/// Basis: 10 um are no visible motion, and the quotient of two such motions says nothing of the
+/// models. Doubling it lowers the ratios of turns in which the machine hardly moves.
 pub(crate) const TURN_FLOOR: f64 = 1e-5;
 
-/// The speed (m/s) of a damper that friction all but holds. What bearings ring is a part of slower
-/// ones.
-pub const CREEPING_M_PER_S: f64 = 0.01;
+/// The least scale of differences of a damper's speed (m/s).
+///
+/// Basis: at lower speeds friction all but holds the damper, and ringing bearings contribute much
+/// of the speed. Doubling it halves the relative differences of slower dampers.
+pub const CREEP_M_PER_S: f64 = 0.01;
 
 named! {
-    /// What counts as the amplitude of a motion, and so as a ratio of two.
+    /// The measure of a motion by which the two models are compared.
     #[derive(Default)]
     pub enum Criterion {
         /// The largest deviation from equilibrium in the window.
         #[default]
         Peak = "peak",
-        /// The same in every turn of the drum; of the ratios by turn the largest.
+        /// The largest deviation in every turn of the drum; the largest ratio of all turns counts.
         Envelope = "envelope",
         /// The root mean square of the deviation from equilibrium over the window.
         Rms = "rms",
@@ -35,7 +39,7 @@ named! {
 }
 
 impl Criterion {
-    /// What a channel's column of one model holds.
+    /// Describes a channel's column of one model.
     pub const fn amplitude(self) -> &'static str {
         match self {
             Self::Peak | Self::Envelope => "largest deviation from equilibrium in the window",
@@ -43,7 +47,7 @@ impl Criterion {
         }
     }
 
-    /// What a channel's ratio is, and where there is none.
+    /// Describes a channel's ratio, and when it is null.
     pub const fn ratio(self) -> &'static str {
         match self {
             Self::Peak => {
@@ -65,17 +69,17 @@ impl Criterion {
 }
 
 named! {
-    /// A number beside the amplitudes, in columns of its own when asked for.
+    /// An optional number of a row beside the amplitudes, with columns of its own.
     pub enum Metric {
         /// The greatest force on the cabinet.
         CabinetForce = "cabinet_force",
-        /// How long drum and tub overlap.
+        /// The time for which drum and tub overlap.
         ClashTime = "clash_time",
-        /// How far the machine sinks under its weight.
+        /// The sag of the machine under its weight.
         StaticSag = "static_sag",
-        /// The greatest push of a stop.
+        /// The greatest force of a stop.
         StopForce = "stop_force",
-        /// How long a stop is closed.
+        /// The time for which a stop is closed.
         StopContact = "stop_contact",
         /// The least load of a foot of the cabinet.
         FootLoad = "foot_load",
@@ -83,253 +87,254 @@ named! {
         SlipMargin = "slip_margin",
         /// The least margin of the cabinet against slipping, turning or both.
         WalkMargin = "walk_margin",
-        /// How fast disturbances grow at constant speeds.
+        /// The growth of disturbances at held speeds.
         Growth = "growth",
         /// The greatest speed of a damper.
         DamperSpeed = "damper_speed",
-        /// How far the motions go that constant speeds end in.
+        /// The deviations of the attractors at held speeds.
         Dwell = "dwell",
     }
 }
 
 impl Metric {
-    /// What it is read from, if each model has its own: the gauge of its name.
+    /// Returns the gauge with the metric's name; `None` if models do not have it one by one.
     fn gauge(self) -> Option<Gauge> {
         Gauge::named(self.name())
     }
 
-    /// Whether each model has its own; else it belongs to the machine.
-    pub fn is_of_model(self) -> bool {
+    /// Whether each model has a value of its own. Otherwise the value belongs to the machine.
+    pub fn is_per_model(self) -> bool {
         self.gauge().is_some()
     }
 
-    /// Whether it is of the constant speeds of `[stability]`.
-    pub const fn is_of_speeds(self) -> bool {
+    /// Whether the metric is taken at the held speeds of `[stability]`.
+    pub const fn is_at_held_speeds(self) -> bool {
         matches!(self, Self::Growth | Self::Dwell)
     }
 
-    /// Whether a motion that goes on for ever has it: a force or a speed, not a time within a
-    /// window.
-    pub fn is_of_turns(self) -> bool {
-        self.is_of_model() && !matches!(self, Self::ClashTime | Self::StopContact)
+    /// Whether the metric has a value for a periodic motion, which has no window: forces and speeds
+    /// do, times within the window do not.
+    pub fn has_periodic_value(self) -> bool {
+        self.is_per_model() && !matches!(self, Self::ClashTime | Self::StopContact)
     }
 
-    /// The column's name; `model` only if each has its own.
+    /// Returns the name of the column. It contains `model` only if each model has a value.
     pub fn column(self, model: &str) -> String {
-        column(self.name(), if self.is_of_model() { model } else { "" }, self.facts().unit)
+        column(self.name(), if self.is_per_model() { model } else { "" }, self.facts().unit)
     }
 
-    /// Returns the scale that differences of the metric are measured against where its value is
-    /// less, in the metric's unit.
+    /// Returns the least scale of relative differences of the metric, in its unit. Greater values
+    /// are their own scale.
     pub fn scale(self, window_s: [f64; 2], weight_n: f64) -> f64 {
         match self.facts().scale {
-            Scale::Value => 0.0,
-            Scale::Window => window_s[1] - window_s[0],
-            Scale::Weight => weight_n,
-            Scale::Creeping => CREEPING_M_PER_S,
+            LeastScale::Value => 0.0,
+            LeastScale::Window => window_s[1] - window_s[0],
+            LeastScale::Weight => weight_n,
+            LeastScale::Creep => CREEP_M_PER_S,
         }
     }
 
-    /// What there is to say of it.
-    pub const fn facts(self) -> Facts {
+    /// Returns the metric's unit, description, parts, scale, bad direction and limit.
+    pub const fn facts(self) -> MetricFacts {
         match self {
-            Self::CabinetForce => Facts {
+            Self::CabinetForce => MetricFacts {
                 unit: "N",
                 description: "greatest magnitude in the window of the sum of the forces of all \
                               springs, dampers, stops and bushings on the cabinet (at rest the \
                               weight)",
-                ..PLAIN
+                ..MACHINE_METRIC
             },
-            Self::ClashTime => Facts {
+            Self::ClashTime => MetricFacts {
                 unit: "s",
                 description: "time in the window with a gap between drum and tub below zero; its \
                               error is a share of the window",
-                scale: Scale::Window,
-                ..PLAIN
+                scale: LeastScale::Window,
+                ..MACHINE_METRIC
             },
-            Self::StaticSag => Facts {
+            Self::StaticSag => MetricFacts {
                 unit: "m",
                 description: "how far the tub's mass centre sinks from where the machine file \
                               draws it to the static equilibrium; null if there is none",
-                ..PLAIN
+                ..MACHINE_METRIC
             },
-            Self::StopForce => Facts {
+            Self::StopForce => MetricFacts {
                 unit: "N",
                 description: "greatest push of any stop in the window; the linear model has the \
                               tangents of the stops at equilibrium, next to nothing while they are \
                               open",
-                part: Some(Part::Stop),
-                of_each: Some([
+                part: Some(PartKind::Stop),
+                each_part: Some([
                     "force",
                     "greatest push of the stop in the window; the linear model has its tangent at \
                      equilibrium, next to nothing while it is open",
                 ]),
-                scale: Scale::Weight,
-                ..PLAIN
+                scale: LeastScale::Weight,
+                ..MACHINE_METRIC
             },
-            Self::StopContact => Facts {
+            Self::StopContact => MetricFacts {
                 unit: "s",
                 description: "longest time in the window for which any one stop is closed",
-                part: Some(Part::Stop),
-                of_each: Some(["contact", "time in the window for which the stop is closed"]),
-                scale: Scale::Window,
-                ..PLAIN
+                part: Some(PartKind::Stop),
+                each_part: Some(["contact", "time in the window for which the stop is closed"]),
+                scale: LeastScale::Window,
+                ..MACHINE_METRIC
             },
-            Self::FootLoad => Facts {
+            Self::FootLoad => MetricFacts {
                 unit: "N",
                 description: "least vertical load of any foot of the cabinet in the window, by \
                               statics; below zero it would lift",
-                of_each: Some([
+                each_part: Some([
                     "load",
                     "least vertical load of the foot in the window, by statics; below zero it \
                      would lift",
                 ]),
-                ..OF_FEET
+                ..FEET_METRIC
             },
-            Self::SlipMargin => Facts {
+            Self::SlipMargin => MetricFacts {
                 unit: "N",
                 description: "least margin of the cabinet against slipping in the window: friction \
                               on all feet together less the horizontal force",
-                ..OF_FEET
+                ..FEET_METRIC
             },
-            Self::WalkMargin => Facts {
+            Self::WalkMargin => MetricFacts {
                 unit: "N",
                 description: "least margin of the cabinet against slipping, turning or both in the \
                               window: the margin against slipping less what the moment about the \
                               vertical takes of it",
-                ..OF_FEET
+                ..FEET_METRIC
             },
-            Self::Growth => Facts {
+            Self::Growth => MetricFacts {
                 unit: "1/s",
                 description: "how fast the fastest growing disturbance of the nonlinear response \
                               grows, at that of the speeds of [stability] at which it is greatest",
                 limit: Some(Limit { value: 0.0, scale: 1.0 }),
-                ..PLAIN
+                ..MACHINE_METRIC
             },
-            Self::DamperSpeed => Facts {
+            Self::DamperSpeed => MetricFacts {
                 unit: "m/s",
                 description: "greatest speed along any damper in the window: what \
                               `friction_linear_speed_m_per_s` should be near",
-                part: Some(Part::Damper),
-                of_each: Some(["speed", "greatest speed along the damper in the window"]),
-                scale: Scale::Creeping,
-                ..PLAIN
+                part: Some(PartKind::Damper),
+                each_part: Some(["speed", "greatest speed along the damper in the window"]),
+                scale: LeastScale::Creep,
+                ..MACHINE_METRIC
             },
             // Each channel has a column of its own, in its unit.
-            Self::Dwell => Facts {
+            Self::Dwell => MetricFacts {
                 description: "largest deviation of any motion that the drum held at any of the \
                               speeds of [stability] ends in (`sweep dwell`)",
-                ..PLAIN
+                ..MACHINE_METRIC
             },
         }
     }
 }
 
-/// A column's name: what it holds, of which model, in which unit.
-fn column(what: &str, model: &str, unit: &str) -> String {
+/// Returns the name of a column: quantity, model and unit, without those that are empty.
+fn column(quantity: &str, model: &str, unit: &str) -> String {
     let unit = unit.to_lowercase().replace("1/", "per_").replace('/', "_per_");
-    [what, model, &unit].into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
+    let words = [quantity, model, &unit].into_iter().filter(|word| !word.is_empty());
+    words.collect::<Vec<_>>().join("_")
 }
 
 named! {
-    /// A part that a machine may have several of.
-    pub enum Part {
-        /// A stop.
+    /// A kind of parts of which a machine may have several.
+    pub enum PartKind {
         Stop = "stop",
-        /// A foot of the cabinet.
         Foot = "foot",
-        /// A damper.
         Damper = "damper",
     }
 }
 
-/// The scale that differences of a metric are measured against where its value is less.
+/// The least scale of relative differences of a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Scale {
-    /// The value itself.
+enum LeastScale {
+    /// No least scale: differences are relative to the value itself.
     Value,
-    /// The window's length.
+    /// The length of the window.
     Window,
     /// The weight of everything that moves.
     Weight,
-    /// [`CREEPING_M_PER_S`].
-    Creeping,
+    /// The speed [`CREEP_M_PER_S`].
+    Creep,
 }
 
-/// What there is to say of a metric, once.
-pub struct Facts {
-    /// Unit.
+/// The properties of a metric.
+pub struct MetricFacts {
     pub unit: &'static str,
-    /// One line for column dictionaries and docs.
+    /// The description in column dictionaries and in docs, in one line.
     pub description: &'static str,
-    /// What the machine must have.
-    pub part: Option<Part>,
-    /// In the column of one part, and what that holds; none if parts have no columns.
-    of_each: Option<[&'static str; 2]>,
-    /// The scale of its differences.
-    scale: Scale,
-    /// Which way it is bad: of several parts, the worst stands for all.
+    /// The parts that the machine must have.
+    pub part: Option<PartKind>,
+    /// The quantity in the name of one part's column, and that column's description; `None` if
+    /// parts have no columns.
+    each_part: Option<[&'static str; 2]>,
+    /// The least scale of relative differences.
+    scale: LeastScale,
+    /// The direction in which values are bad. The value of all parts is that of the worst part.
     pub worse: Worse,
-    /// Up to where it is good, if that has a meaning of its own.
+    /// The limit of good values, if the metric has a natural one.
     pub limit: Option<Limit>,
 }
 
-/// The facts of a metric of the whole machine that is always known.
-const PLAIN: Facts = Facts {
+/// The facts of a metric of the whole machine that every machine has.
+const MACHINE_METRIC: MetricFacts = MetricFacts {
     unit: "",
     description: "",
     part: None,
-    of_each: None,
-    scale: Scale::Value,
+    each_part: None,
+    scale: LeastScale::Value,
     worse: Worse::Greater,
     limit: None,
 };
 
-/// What the metrics of the cabinet's stand have in common.
-const OF_FEET: Facts = Facts {
-    part: Some(Part::Foot),
-    scale: Scale::Weight,
+/// The common facts of the metrics of the cabinet's feet.
+const FEET_METRIC: MetricFacts = MetricFacts {
+    part: Some(PartKind::Foot),
+    scale: LeastScale::Weight,
     worse: Worse::Less,
     limit: Some(Limit { value: 0.0, scale: 100.0 }),
-    ..PLAIN
+    ..MACHINE_METRIC
 };
 
-/// A number that each model has of its own: a metric of the whole machine, or what one stop or foot
-/// has of it.
+/// A column of each model: a metric of the whole machine, or of one stop, foot or damper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Measured {
-    /// The metric, of all parts together or of one.
+pub struct MetricColumn {
+    /// The metric.
     pub metric: Metric,
-    /// Which part, from 0; none for all together.
+    /// The index of the part; `None` for all parts together.
     pub part: Option<usize>,
 }
 
-impl Measured {
-    /// In the column's name and what it holds, of one part.
-    fn of_part(self) -> Option<([&'static str; 2], String)> {
-        let Facts { part, of_each, .. } = self.metric.facts();
+impl MetricColumn {
+    /// Returns the part with its number, such as `stop_1`; then the quantity in the column's name
+    /// and the column's description. `None` for the column of all parts.
+    fn part_texts(self) -> Option<(String, [&'static str; 2])> {
+        let MetricFacts { part, each_part, .. } = self.metric.facts();
         let part = format!("{}_{}", part?.name(), self.part? + 1);
-        Some((of_each?, part))
+        Some((part, each_part?))
     }
 
-    /// The column's name.
+    /// Returns the name of the column.
     pub fn column(self, model: &str) -> String {
-        match self.of_part() {
-            Some(([what, _], part)) => {
-                column(&format!("{part}_{what}"), model, self.metric.facts().unit)
+        match self.part_texts() {
+            Some((part, [quantity, _])) => {
+                column(&format!("{part}_{quantity}"), model, self.metric.facts().unit)
             }
             None => self.metric.column(model),
         }
     }
 
-    /// One line for column dictionaries and docs.
+    /// Returns the description in column dictionaries and in docs, in one line.
     pub fn description(self) -> &'static str {
-        self.of_part().map_or(self.metric.facts().description, |([_, of_one], _)| of_one)
+        match self.part_texts() {
+            Some((_, [_, description])) => description,
+            None => self.metric.facts().description,
+        }
     }
 
-    /// Its value in a trajectory's records, if it was recorded.
-    pub fn of(self, extra: &Reading) -> Option<f64> {
-        let mut values = extra.gauge(self.metric.gauge()?).iter().copied();
+    /// Returns the value in a trajectory's reading; `None` if it was not recorded.
+    pub fn value(self, reading: &Reading) -> Option<f64> {
+        let mut values = reading.gauge(self.metric.gauge()?).iter().copied();
         match self.part {
             Some(part) => values.nth(part),
             None if self.metric.facts().worse == Worse::Less => values.reduce(f64::min),
@@ -338,46 +343,44 @@ impl Measured {
     }
 }
 
-/// What a run measures beyond peaks and gaps.
+/// The measures of a run: the criterion, the metrics, and the numbers of the machine's parts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measures {
-    /// What the models are compared by.
+    /// The measure by which the models are compared.
     pub criterion: Criterion,
-    /// Metrics asked for, in column order.
+    /// The requested metrics, in the order of columns.
     pub metrics: Vec<Metric>,
-    /// How many stops the machine has.
     pub stops: usize,
-    /// How many feet the machine has.
     pub feet: usize,
-    /// How many dampers the machine has.
     pub dampers: usize,
 }
 
 impl Measures {
-    /// Numbers that each model has its own of, in the order of trajectories and columns.
-    pub fn of_model(&self) -> impl Iterator<Item = Measured> + '_ {
+    /// Returns the columns that each model has, in their order, which is also that of
+    /// [`Trajectory::metrics`](crate::Trajectory::metrics).
+    pub fn per_model(&self) -> impl Iterator<Item = MetricColumn> + '_ {
         self.metrics
             .iter()
-            .filter(|metric| metric.is_of_model())
-            .flat_map(|metric| self.numbers_of(*metric))
+            .filter(|metric| metric.is_per_model())
+            .flat_map(|metric| self.metric_columns(*metric))
     }
 
-    /// The numbers of a metric that each model has its own of: of all parts, then of each if there
-    /// are several.
-    pub fn numbers_of(&self, metric: Metric) -> impl Iterator<Item = Measured> + use<> {
-        let parts = match metric.facts().of_each.and(metric.facts().part) {
-            Some(Part::Stop) => self.stops,
-            Some(Part::Foot) => self.feet,
-            Some(Part::Damper) => self.dampers,
+    /// Returns the columns of a metric: that of all parts, then that of each if there are several.
+    pub fn metric_columns(&self, metric: Metric) -> impl Iterator<Item = MetricColumn> + use<> {
+        let parts = match metric.facts().each_part.and(metric.facts().part) {
+            Some(PartKind::Stop) => self.stops,
+            Some(PartKind::Foot) => self.feet,
+            Some(PartKind::Damper) => self.dampers,
             None => 0,
         };
-        let of_each = if parts > 1 { 0..parts } else { 0..0 };
-        let of_all = Measured { metric, part: None };
-        std::iter::once(of_all).chain(of_each.map(move |k| Measured { part: Some(k), ..of_all }))
+        let numbered_parts = if parts > 1 { 0..parts } else { 0..0 };
+        let whole = MetricColumn { metric, part: None };
+        let each = numbered_parts.map(move |part| MetricColumn { metric, part: Some(part) });
+        std::iter::once(whole).chain(each)
     }
 
-    /// What trajectories must record.
-    pub fn wanted(&self) -> Recorders {
+    /// Returns the recorders that the measures need.
+    pub fn recorders(&self) -> Recorders {
         Recorders {
             root_mean_squares: self.criterion == Criterion::Rms,
             turns: self.criterion == Criterion::Envelope,
@@ -388,9 +391,10 @@ impl Measures {
 }
 
 impl Outcome {
-    /// Compares the two models turn by turn, if both have turns.
+    /// Computes [`Outcome::turn_ratios`] from the turns of both models, if both have turns.
     pub fn compare_turns(&mut self, channels: &[Channel]) {
-        let (nonlinear, linear) = (&self.nonlinear.turns, &self.linear.turns);
+        let nonlinear = &self.nonlinear.turns;
+        let linear = &self.linear.turns;
         self.turn_ratios.clear();
         if nonlinear.is_empty() || linear.is_empty() {
             return;
@@ -405,8 +409,8 @@ impl Outcome {
         }));
     }
 
-    /// Lets go of what only the comparison needs.
-    pub fn forget_turns(&mut self) {
+    /// Frees the deviations by turn, which only [`Self::compare_turns`] needs.
+    pub fn drop_turns(&mut self) {
         self.nonlinear.turns = Vec::new();
         self.linear.turns = Vec::new();
     }
@@ -428,15 +432,15 @@ mod tests {
     }
 
     #[test]
-    fn the_greatest_ratio_over_the_turns_counts_wherever_the_peaks_are() {
+    fn the_ratio_is_the_greatest_of_all_turns() {
         let compared = outcome(&[[5e-3, 1e-3], [3e-3, 1e-3]], &[[4e-3, 1e-3], [1e-3, 5e-3]]);
         assert_eq!(compared.turn_ratios, [Some(3.0), Some(1.0)]);
     }
 
     #[test]
-    fn motions_below_the_floor_decide_nothing() {
-        // A thousand times as large, and still nothing that counts; then from the floor upwards
-        // without a leap.
+    fn deviations_below_the_floor_count_as_the_floor() {
+        // The first channel's ratio is 1000 below the floor, so that it counts as 1. The second
+        // one's nonlinear deviation is four times the floor.
         let compared = outcome(&[[1e-6, 4e-5], [1e-3, 1e-3]], &[[1e-9, 1e-9], [1e-3, 1e-3]]);
         let [Some(first), Some(second)] = compared.turn_ratios[..] else { panic!("{compared:?}") };
         assert_eq!(first, 1.0);
@@ -444,17 +448,17 @@ mod tests {
     }
 
     #[test]
-    fn without_any_linear_motion_there_is_no_ratio() {
+    fn without_linear_motion_the_ratio_is_undefined() {
         assert_eq!(outcome(&[[1e-3, 1e-3]; 3], &[[0.0, 1e-3]; 3]).turn_ratios, [None, Some(1.0)]);
         assert!(outcome(&[], &[[1.0, 1.0]]).turn_ratios.is_empty(), "a model failed");
     }
 
     #[test]
-    fn each_of_several_stops_and_feet_has_columns_behind_those_of_all() {
+    fn columns_of_single_parts_follow_that_of_all_parts() {
         let metrics = vec![Metric::SlipMargin, Metric::StopContact, Metric::FootLoad];
         let mut measures = Measures { metrics, stops: 3, feet: 1, ..Measures::default() };
         let columns = |measures: &Measures| -> Vec<String> {
-            measures.of_model().map(|number| number.column("linear")).collect()
+            measures.per_model().map(|number| number.column("linear")).collect()
         };
         let expected = [
             "slip_margin_linear_n",
@@ -472,23 +476,24 @@ mod tests {
     }
 
     #[test]
-    fn the_number_of_all_is_the_extreme_of_each() {
-        let mut extra = Reading::default();
+    fn the_value_of_all_parts_is_that_of_the_worst() {
+        let mut reading = Reading::default();
         for (gauge, numbers) in [
             (Gauge::StopForce, vec![20.0, 50.0]),
             (Gauge::StopContact, vec![0.3, 0.1]),
             (Gauge::FootLoad, vec![90.0, -5.0, 70.0]),
         ] {
-            extra.gauges[gauge as usize] = numbers;
+            reading.gauges[gauge as usize] = numbers;
         }
         let metrics = vec![Metric::StopForce, Metric::StopContact, Metric::FootLoad];
         let measures = Measures { metrics, stops: 2, feet: 3, ..Measures::default() };
-        let found: Vec<_> = measures.of_model().filter_map(|number| number.of(&extra)).collect();
+        let found: Vec<_> =
+            measures.per_model().filter_map(|number| number.value(&reading)).collect();
         assert_eq!(found, [50.0, 20.0, 50.0, 0.3, 0.3, 0.1, -5.0, 90.0, -5.0, 70.0]);
     }
 
     #[test]
-    fn each_metric_has_the_row_of_its_name() {
+    fn names_of_metrics_are_those_of_their_variants() {
         let names = Metric::ALL.map(|metric| format!("{metric:?}").to_lowercase());
         assert_eq!(names, Metric::ALL.map(|metric| metric.name().replace('_', "")));
         let columns = [Metric::StaticSag, Metric::Growth, Metric::DamperSpeed];
@@ -497,11 +502,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_asked_for_is_not_recorded() {
-        assert_eq!(Measures::default().wanted(), Recorders::default());
+    fn only_metrics_of_trajectories_need_recorders() {
+        assert_eq!(Measures::default().recorders(), Recorders::default());
         let sag = Measures { metrics: vec![Metric::StaticSag], ..Measures::default() };
         assert_eq!(
-            sag.wanted(),
+            sag.recorders(),
             Recorders::default(),
             "the equilibrium is known without a trajectory"
         );

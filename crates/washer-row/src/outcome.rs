@@ -4,25 +4,27 @@ use washer_model::{Beyond, Channel, Disturbance, Endings, NoAnswer, Response};
 
 use crate::Level;
 
-/// Why a trajectory ended. The position is its code in chunk files, so new ones go to the end.
+/// The reason why a trajectory ended. The position is the code in chunk files, so that new reasons
+/// go to the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Status {
-    /// Reached the end.
+    /// The trajectory reached the end of the run.
     #[default]
     Ok,
-    /// A state left the range in which the model means anything, or became non-finite.
+    /// A state left the range of the model, or became non-finite.
     Diverged,
-    /// The adaptive step fell below what time can resolve.
+    /// The adaptive step fell below the resolution of time in double precision.
     StepTooSmall,
-    /// The adaptive method used up its allowance of steps.
+    /// The adaptive method reached its greatest number of steps.
     StepLimit,
     /// The machine has no static equilibrium at this point.
     NoEquilibrium,
-    /// The evaluation of this point panicked; a defect of this program, kept to the one row.
+    /// The evaluation of this point panicked, which is a defect of this program. Other rows are
+    /// not affected.
     Panicked,
-    /// No periodic response was found at a constant speed.
+    /// No periodic response was found at a held speed.
     NoResponse,
-    /// Its multipliers could not be computed.
+    /// The multipliers of the response could not be computed.
     NoMultipliers,
     /// The drum is so slow that a turn takes too many steps.
     TooSlow,
@@ -38,75 +40,73 @@ impl From<NoAnswer> for Status {
     }
 }
 
-/// One model's trajectory at one grid point.
+/// The trajectory of one model at one grid point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
-    /// How it ended.
+    /// The reason why it ended.
     pub status: Status,
-    /// When it failed, if it did during the integration.
+    /// The time of a failure during the integration.
     pub fail_time_s: Option<f64>,
-    /// Largest deviation from equilibrium within the window, per channel of the plan; empty if the
-    /// model failed.
+    /// The amplitude within the window by the plan's criterion, per channel of the plan; empty if
+    /// the model failed.
     pub amplitudes: Vec<f64>,
-    /// Least gap between drum and tub over the whole run; `None` if the model failed.
+    /// The least gap between drum and tub over the whole run; `None` if the model failed.
     pub min_gap_m: Option<f64>,
-    /// Accepted steps.
     pub steps: u64,
-    /// Rejected steps.
     pub rejected: u64,
     /// The model's metrics that the plan asks for, in column order; empty if the model failed.
     pub metrics: Vec<f64>,
-    /// The factor by which the speeds at which the linear model takes friction are off from those
-    /// of this motion. `None` without friction, if the model failed, and for the nonlinear model
-    /// where no speed is given.
+    /// The greatest factor between a damper's speed amplitude in this motion and the speed
+    /// amplitude at which the linear model takes its friction. `None` without friction, if the
+    /// model failed, and for the nonlinear model if no speed amplitude is given.
     pub friction_speed_off: Option<f64>,
-    /// Largest deviations by turn of the drum, in the order of `Channel::ALL`: while the two models
-    /// are being compared by them.
+    /// The largest deviations in each turn of the drum. They are dropped once both models are
+    /// compared by them.
     pub turns: Vec<Deviations>,
 }
 
-/// Every channel's deviation, in the order of `Channel::ALL` (m, rad).
+/// The deviation of every channel (m, rad), in the order of `Channel::ALL`.
 pub type Deviations = [f64; Channel::ALL.len()];
 
 impl Trajectory {
-    /// Nothing but a status.
+    /// Creates a failed trajectory, which has a status alone.
     pub fn failed(status: Status) -> Self {
         Self { status, ..Self::default() }
     }
 }
 
-/// A response at a constant speed, and what becomes of small disturbances of it.
+/// A periodic response at a held speed, and the growth of small disturbances about it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
-    /// Whether it is on the curve of responses that begins at a low speed.
+    /// Whether the response is on the curve of responses that begins at a low speed.
     pub is_on_curve: bool,
-    /// How many folds the curve has before it.
+    /// The number of folds of the curve before the response.
     pub branch: u32,
-    /// Speeds (rpm) of the folds between which that branch lies, lower and upper.
+    /// The speeds (rpm) of the lower and of the upper fold at the ends of the branch.
     pub between_rpm: [Option<f64>; 2],
-    /// What of the machine's geometry it passes.
+    /// The limit of the machine's geometry that the response exceeds.
     pub beyond: Option<Beyond>,
-    /// The fastest growing one.
+    /// The disturbance that grows fastest.
     pub fastest: Disturbance,
-    /// Modes of the linear model that take part in what grows, most first.
+    /// The modes of the linear model that take part in that disturbance, the greatest share first.
     pub modes: [Option<GrowingMode>; 2],
 }
 
-/// A mode of the linear model that takes part in what grows.
+/// A mode of the linear model that takes part in a growing disturbance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GrowingMode {
-    /// Its number, the slowest's being 1.
+    /// The number of the mode, 1 for the slowest.
     pub number: u32,
-    /// Position of its name in `Motion::NAMES`.
+    /// The position of the mode's name in `ModeMotion::NAMES`.
     pub name: u32,
-    /// Its damped natural frequency (cycles per minute).
+    /// The damped natural frequency (cycles per minute).
     pub frequency_cpm: f64,
 }
 
 impl From<&Response> for Growth {
     fn from(response: &Response) -> Self {
-        let mode = |place: usize| {
-            let participant = response.participants.get(place)?;
+        let mode = |rank: usize| {
+            let participant = response.participants.get(rank)?;
             Some(GrowingMode {
                 number: participant.mode as u32,
                 name: participant.motion.name_index() as u32,
@@ -124,92 +124,92 @@ impl From<&Response> for Growth {
     }
 }
 
-/// How far the motions go that some constant speeds end in.
+/// The largest deviations of the attractors at some held speeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dwelt {
-    /// The largest of all these motions; of one that left the model's range, before it did.
+pub struct DwellPeaks {
+    /// The largest deviations over all attractors. A motion that leaves the range of the model
+    /// counts up to then.
     pub deviations: Deviations,
-    /// The speed (rpm) at which the tub turns farthest, by yaw or by pitch.
+    /// The speed (rpm) at which the tub has the greatest yaw or pitch.
     pub speed_rpm: f64,
-    /// What that motion is: position in [`washer_model::Ending::KINDS`].
+    /// The kind of the attractor with the greatest yaw or pitch: the position in
+    /// [`washer_model::Ending::KINDS`].
     pub kind: usize,
 }
 
-impl Dwelt {
-    /// The farthest of the motions found at these speeds (rpm), of which some may have none; the
-    /// first of equals counts.
-    pub fn of<E>(speeds_rpm: &[f64], found: &[Result<Endings, E>]) -> Option<Self> {
+impl DwellPeaks {
+    /// Computes the largest deviations of the attractors found at speeds (rpm); `None` if there are
+    /// no attractors. Of attractors with equal rotation the first one gives speed and kind.
+    pub fn from_endings<E>(speeds_rpm: &[f64], found: &[Result<Endings, E>]) -> Option<Self> {
         let motions = speeds_rpm.iter().zip(found).flat_map(|(&speed_rpm, found)| {
             let motions = found.iter().flat_map(|found| &found.motions);
             motions.map(move |motion| (speed_rpm, motion))
         });
-        let mut farthest = 0.0;
-        motions.fold(None, |most: Option<Self>, (speed_rpm, motion)| {
+        let mut greatest_rad = 0.0;
+        motions.fold(None, |peaks: Option<Self>, (speed_rpm, motion)| {
             let this = Self { deviations: motion.peaks, speed_rpm, kind: motion.kind() };
-            let mut most = most.unwrap_or(this);
-            if this.turned_rad() > farthest {
-                farthest = this.turned_rad();
-                most = Self { deviations: most.deviations, ..this };
+            let mut peaks = peaks.unwrap_or(this);
+            if this.tub_rotation_rad() > greatest_rad {
+                greatest_rad = this.tub_rotation_rad();
+                peaks = Self { deviations: peaks.deviations, ..this };
             }
-            for (most, one) in most.deviations.iter_mut().zip(motion.peaks) {
-                *most = most.max(one);
+            for (peak, deviation) in peaks.deviations.iter_mut().zip(motion.peaks) {
+                *peak = peak.max(deviation);
             }
-            Some(most)
+            Some(peaks)
         })
     }
 
-    /// How far the tub turns, by yaw or by pitch (rad).
-    fn turned_rad(&self) -> f64 {
-        let turned = |channel: Channel| self.deviations[channel.index()];
-        turned(Channel::TubYaw).max(turned(Channel::TubPitch))
+    /// Returns the greater deviation of yaw and pitch (rad).
+    fn tub_rotation_rad(&self) -> f64 {
+        let deviation = |channel: Channel| self.deviations[channel.index()];
+        deviation(Channel::TubYaw).max(deviation(Channel::TubPitch))
     }
 }
 
-/// Both models at one grid point.
+/// The result of both models at one grid point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outcome {
-    /// Index in grid order.
+    /// The index in grid order.
     pub point: u64,
-    /// The nonlinear model.
     pub nonlinear: Trajectory,
-    /// The linear model.
     pub linear: Trajectory,
-    /// The method and level of the nonlinear model's numbers.
+    /// The method and level of the nonlinear trajectory.
     pub method: Level,
-    /// The relative error left in the row's numbers, at most, from the differences of its levels;
-    /// `None` where nothing was compared.
+    /// The estimate of the row's relative error by the differences of its levels; `None` if no
+    /// levels were compared.
     pub error: Option<f64>,
-    /// Whether that is within the accuracy asked for. `None` where nothing was compared.
+    /// Whether the error is within the accuracy. `None` if no levels were compared.
     pub converged: Option<bool>,
-    /// Whether the motion is chaotic: plain RK4 does not agree with itself at two steps, and a near
-    /// twin departs exponentially. `None` where nothing was compared.
+    /// Whether the motion is chaotic: its levels do not agree, and a perturbed run separates
+    /// exponentially. `None` if no levels were compared.
     pub sensitive: Option<bool>,
-    /// Ratios per channel of the plan where they are found turn by turn; `None` where undefined.
-    /// Empty where the amplitudes' quotients are the ratios, or a model failed.
+    /// The ratios of the envelope criterion, per channel of the plan; `None` where undefined. Empty
+    /// if the ratios are quotients of amplitudes, or if a model failed.
     pub turn_ratios: Vec<Option<f64>>,
-    /// How far the machine sinks to its equilibrium, if the plan asks for it and there is one.
+    /// The sag of the machine, if the plan asks for it and there is an equilibrium.
     pub static_sag_m: Option<f64>,
-    /// What becomes of disturbances at a constant speed: the row's own, or the one of the plan's
-    /// speeds at which they grow fastest. `None` where it is not asked for or not known.
+    /// The growth of disturbances at the row's held speed, or at that of the plan's speeds at which
+    /// they grow fastest. `None` if the plan does not ask for it or it is unknown.
     pub growth: Option<Growth>,
-    /// How far motions at the plan's constant speeds go, if it asks for that.
-    pub dwelt: Option<Dwelt>,
-    /// Other responses at the same point and constant speed: rows of their own, behind this one.
+    /// The largest deviations at the plan's held speeds, if the plan asks for them.
+    pub dwelt: Option<DwellPeaks>,
+    /// The outcomes of other responses at the same point and speed, which are rows after this one.
     pub coexisting: Vec<Outcome>,
 }
 
 impl Outcome {
-    /// Both models' trajectories, not yet assessed together.
+    /// Creates an outcome of two trajectories that have not been compared yet.
     pub fn new(point: u64, nonlinear: Trajectory, linear: Trajectory) -> Self {
         Self { point, nonlinear, linear, ..Self::default() }
     }
 
-    /// Nothing but a status, of both models.
+    /// Creates an outcome in which both models failed.
     pub fn failed(point: u64, status: Status) -> Self {
         Self::new(point, Trajectory::failed(status), Trajectory::failed(status))
     }
 
-    /// It, then the others at the same point and speed, apart.
+    /// Returns the outcome itself, then the coexisting ones.
     pub fn into_rows(mut self) -> impl Iterator<Item = Self> {
         let coexisting = core::mem::take(&mut self.coexisting);
         core::iter::once(self).chain(coexisting)

@@ -7,7 +7,7 @@ use crate::error_control::{amplification, error_of_chaos, error_of_level};
 use crate::levels::RefinementLevels;
 use crate::measures::{Metric, TURN_FLOOR};
 use crate::outcome::{Outcome, Status, Trajectory};
-use crate::run::{LevelRun, Rule};
+use crate::run::{LevelRun, RowRule};
 use crate::separation::Separation;
 use crate::verdict::Verdict;
 
@@ -30,7 +30,7 @@ pub struct RefinementRule<'a> {
     /// The purpose of outcomes.
     pub demand: Demand,
     /// The numbers that rows take from trajectories, and their accuracy.
-    pub rule: &'a Rule,
+    pub rule: &'a RowRule,
 }
 
 impl<'a> RefinementRule<'a> {
@@ -45,7 +45,7 @@ impl<'a> RefinementRule<'a> {
 #[derive(Clone, Copy)]
 struct ModelRule<'a> {
     levels: &'a RefinementLevels,
-    rule: &'a Rule,
+    rule: &'a RowRule,
     point: &'a Point,
     kind: ModelKind,
 }
@@ -105,7 +105,8 @@ impl ModelRefinement {
         };
         let difference = difference(&before.trajectory, &run.trajectory, rule.point, rule.rule);
         if rule.levels.is_perturbed(level) {
-            let separation = Separation::new(&rule.point.departure(&before.course, &run.course));
+            let separations = rule.point.separations(&before.checkpoints, &run.checkpoints);
+            let separation = Separation::new(&separations);
             let is_chaotic = separation.is_exponential();
             self.perturbed = Some(Perturbed { is_chaotic, difference });
             self.run = Some(before);
@@ -277,14 +278,14 @@ impl RowRefinement {
 }
 
 /// Returns the distance of the ratios from a limit, as a share of the limit.
-fn margin(outcome: &Outcome, rule: &Rule) -> Option<f64> {
+fn margin(outcome: &Outcome, rule: &RowRule) -> Option<f64> {
     let Verdict { least, greatest, .. } = Verdict::new(outcome, rule.channels.len(), rule.limits);
     Some(rule.limits.margin(least?.1, greatest?.1))
 }
 
 /// Returns the greatest relative difference of what a row takes from two trajectories; `None` if
 /// one of them failed. Of two that failed the times differ, as a share of the run.
-fn difference(a: &Trajectory, b: &Trajectory, point: &Point, rule: &Rule) -> Option<f64> {
+fn difference(a: &Trajectory, b: &Trajectory, point: &Point, rule: &RowRule) -> Option<f64> {
     if a.status != b.status {
         return None;
     }
@@ -306,7 +307,7 @@ fn difference(a: &Trajectory, b: &Trajectory, point: &Point, rule: &Rule) -> Opt
     if let Some((a, b)) = a.min_gap_m.zip(b.min_gap_m) {
         compare(a, b, point.clearance_m());
     }
-    for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(rule.measures.of_model()) {
+    for ((a, b), number) in a.metrics.iter().zip(&b.metrics).zip(rule.measures.per_model()) {
         compare(*a, *b, number.metric.scale(rule.window_s, point.weight_n()));
     }
     for (a, b) in a.turns.iter().zip(&b.turns) {

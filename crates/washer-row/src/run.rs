@@ -1,95 +1,102 @@
-//! One model's trajectories at one refinement level, and what a row takes from each.
+//! Trajectories of one model at one refinement level, and the numbers that rows take from them.
 
 use lane_ode::{Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
-    Channel, Course, Gauge, Method, ModelKind, Point, Reading, Record, Recorders, simulate_until,
+    Channel, Checkpoints, Gauge, Method, ModelKind, Point, Reading, Record, Recorders,
+    simulate_until,
 };
 
 use crate::measures::REST_SHARE;
 use crate::{Criterion, Deviations, Measures, Status, Trajectory};
 
-/// What rows take from trajectories, and what they must be good for.
+/// The numbers that rows take from trajectories, and their accuracy.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rule {
-    /// The run is from 0 to here.
+pub struct RowRule {
+    /// The end of the run, which starts at 0.
     pub end_s: f64,
-    /// What is measured is measured in this closed interval, unless a point has its own.
+    /// The window of points that have no window of their own, a closed interval.
     pub window_s: [f64; 2],
-    /// Largest error of a row's numbers, relative; infinite where nothing is compared.
+    /// The largest relative error of a row's numbers; infinite if levels are not compared.
     pub accuracy: f64,
-    /// Ratios between them are reliable.
+    /// The limits of reliable ratios.
     pub limits: RatioLimits,
-    /// What the verdict compares.
+    /// The channels that the verdict compares.
     pub channels: Vec<Channel>,
-    /// What is measured of the motions.
+    /// The measures of the motions.
     pub measures: Measures,
 }
 
-impl Rule {
-    /// What trajectories must record.
-    pub fn wanted(&self) -> Recorders {
-        Recorders { course: self.accuracy.is_finite(), ..self.measures.wanted() }
+impl RowRule {
+    /// Returns the recorders that trajectories need.
+    pub fn recorders(&self) -> Recorders {
+        Recorders { checkpoints: self.accuracy.is_finite(), ..self.measures.recorders() }
     }
 }
 
 /// A trajectory at one refinement level.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LevelRun {
-    /// What a row takes from it.
+    /// The numbers that a row takes from it.
     pub trajectory: Trajectory,
-    /// Amplitudes by the rule's criterion, of channels that it does not compare too.
+    /// The amplitudes of all channels by the rule's criterion.
     pub amplitudes: Deviations,
-    /// The motion at the ends of the run's parts, if anything is compared.
-    pub course: Course,
+    /// The coordinates at the checkpoints, if levels are compared.
+    pub checkpoints: Checkpoints,
 }
 
 impl LevelRun {
-    /// Nothing but a status.
+    /// Creates a failed run, which has a status alone.
     pub fn failed(status: Status) -> Self {
         Self { trajectory: Trajectory::failed(status), ..Self::default() }
     }
 
-    fn new(record: &Record, mut extra: Reading, rule: &Rule, point: &Point) -> Self {
-        let course = std::mem::take(&mut extra.course);
+    fn new(record: &Record, mut reading: Reading, rule: &RowRule, point: &Point) -> Self {
+        let checkpoints = std::mem::take(&mut reading.checkpoints);
         let amplitudes = match rule.measures.criterion {
             Criterion::Peak | Criterion::Envelope => record.amplitudes,
-            Criterion::Rms => extra.root_mean_squares.unwrap_or(record.amplitudes),
+            Criterion::Rms => reading.root_mean_squares.unwrap_or(record.amplitudes),
         };
         let at_rest = REST_SHARE * point.clearance_m();
-        let amplitudes = amplitudes.map(|one| if one < at_rest { 0.0 } else { one });
-        let trajectory = trajectory(record, extra, &amplitudes, rule);
-        Self { trajectory, amplitudes, course }
+        let amplitudes = amplitudes.map(|value| if value < at_rest { 0.0 } else { value });
+        let trajectory = trajectory(record, reading, &amplitudes, rule);
+        Self { trajectory, amplitudes, checkpoints }
     }
 }
 
-/// One model at every point, by one method; `None` once `is_stopped` says so.
-pub fn runs(
+/// Integrates one model at every point by one method; returns `None` if `is_stopped` returned true
+/// before the end.
+pub fn integrate_points(
     simd: Simd,
     model: ModelKind,
     method: &Method,
     points: &[&Point],
-    rule: &Rule,
+    rule: &RowRule,
     is_stopped: &dyn Fn() -> bool,
 ) -> Option<Vec<LevelRun>> {
-    let mut taken = points.iter().flat_map(|point| point.friction_speeds());
-    let mut wanted = rule.wanted();
-    wanted.gauges[Gauge::DamperSpeed as usize] |=
-        taken.any(|taken| model == ModelKind::Linear || !taken.is_own);
-    let (records, extras) = simulate_until(simd, model, method, points, wanted, is_stopped)?;
-    // None at all if nothing was wanted.
-    let mut extras = extras.into_iter();
+    let mut friction_speeds = points.iter().flat_map(|point| point.friction_speeds());
+    let mut recorders = rule.recorders();
+    recorders.gauges[Gauge::DamperSpeed as usize] |=
+        friction_speeds.any(|speed| model == ModelKind::Linear || !speed.is_own);
+    let (records, readings) = simulate_until(simd, model, method, points, recorders, is_stopped)?;
+    // There are no readings if no recorder is in use.
+    let mut readings = readings.into_iter();
     let run = |(record, point): (&Record, &&Point)| {
-        let extra = extras.next().unwrap_or_default();
-        let off = point.friction_speed_off(model, extra.gauge(Gauge::DamperSpeed));
-        let mut run = LevelRun::new(record, extra, rule, point);
-        run.trajectory.friction_speed_off = off.filter(|_| record.failure.is_none());
+        let reading = readings.next().unwrap_or_default();
+        let factor = point.friction_speed_factor(model, reading.gauge(Gauge::DamperSpeed));
+        let mut run = LevelRun::new(record, reading, rule, point);
+        run.trajectory.friction_speed_off = factor.filter(|_| record.failure.is_none());
         run
     };
     Some(records.iter().zip(points).map(run).collect())
 }
 
-fn trajectory(record: &Record, extra: Reading, amplitudes: &Deviations, rule: &Rule) -> Trajectory {
+fn trajectory(
+    record: &Record,
+    reading: Reading,
+    amplitudes: &Deviations,
+    rule: &RowRule,
+) -> Trajectory {
     let Record { failure, steps, rejected, .. } = *record;
     if let Some((reason, time_s)) = failure {
         let status = match reason {
@@ -104,14 +111,14 @@ fn trajectory(record: &Record, extra: Reading, amplitudes: &Deviations, rule: &R
             ..Trajectory::failed(status)
         };
     }
-    let metrics = rule.measures.of_model().filter_map(|number| number.of(&extra));
+    let metrics = rule.measures.per_model().filter_map(|column| column.value(&reading));
     Trajectory {
         amplitudes: rule.channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
         min_gap_m: Some(record.min_gap_m),
         steps,
         rejected,
         metrics: metrics.collect(),
-        turns: extra.turns,
+        turns: reading.turns,
         ..Trajectory::default()
     }
 }

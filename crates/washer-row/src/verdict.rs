@@ -1,14 +1,14 @@
-//! From two trajectories to a verdict: the ratios, the greatest of them, reliable or not, and the
-//! row's status.
+//! The verdict of a row: the ratios of its two trajectories, the greatest of them, whether the
+//! linear model is reliable, and the row's status.
 
 use sweep_parameter::RatioLimits;
 
 use crate::outcome::{Outcome, Status};
 
-/// Every value of the result file's `status` column, in the order of its dictionary.
+/// The values of the result file's `status` column, in the order of its dictionary.
 ///
-/// A row whose nonlinear model failed carries that model's reason, whatever became of the linear
-/// one; a row whose linear model alone failed carries that reason behind `linear_`.
+/// A row whose nonlinear model failed has that model's reason, also if the linear model failed too.
+/// A row whose linear model alone failed has that reason with the prefix `linear_`.
 pub const ROW_STATUSES: [&str; 14] = [
     "ok",
     "diverged",
@@ -26,35 +26,37 @@ pub const ROW_STATUSES: [&str; 14] = [
     "too_slow",
 ];
 
-/// Statuses that either model can have, each of which has a name behind `linear_` too.
-const OF_EITHER: usize = Status::Panicked as usize + 1;
+/// The number of statuses that a single model can have. All but `ok` have a second name with the
+/// prefix `linear_`.
+const MODEL_STATUSES: usize = Status::Panicked as usize + 1;
 
-/// The row's entry in [`ROW_STATUSES`], and the failing model's time of failure.
+/// Returns the row's index in [`ROW_STATUSES`], and the failing model's time of failure.
 pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
-    // Those of both models together stand behind those of either.
-    let code = |status: Status, of_linear: usize| match status as usize {
-        code if code < OF_EITHER => code + of_linear,
-        code => code + OF_EITHER - 1,
+    // The statuses of both models together follow those with the prefix.
+    let code = |status: Status, linear_offset: usize| match status as usize {
+        code if code < MODEL_STATUSES => code + linear_offset,
+        code => code + MODEL_STATUSES - 1,
     };
     if outcome.nonlinear.status != Status::Ok {
         (code(outcome.nonlinear.status, 0), outcome.nonlinear.fail_time_s)
     } else if outcome.linear.status != Status::Ok {
-        (code(outcome.linear.status, OF_EITHER - 1), outcome.linear.fail_time_s)
+        (code(outcome.linear.status, MODEL_STATUSES - 1), outcome.linear.fail_time_s)
     } else {
         (0, None)
     }
 }
 
-/// How the two models compare at one grid point.
+/// The comparison of the two models at one grid point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// Nonlinear over linear amplitude per channel of the plan, or the greatest such ratio over the
-    /// drum's turns; `None` where the linear amplitude is zero or a model failed.
+    /// The ratio of nonlinear to linear amplitude per channel of the plan, or the greatest such
+    /// ratio over the drum's turns; `None` if the linear amplitude is zero or a model failed.
     pub ratios: Vec<Option<f64>>,
-    /// The greatest defined ratio and its channel's position in the plan; the first channel wins a
-    /// tie.
+    /// The greatest defined ratio, after its channel's position in the plan; the first channel wins
+    /// a tie.
     pub greatest: Option<(usize, f64)>,
-    /// The same of the least.
+    /// The least defined ratio, after its channel's position in the plan; the first channel wins a
+    /// tie.
     pub least: Option<(usize, f64)>,
     /// Whether the ratios are between the limits; `None` where no ratio is defined.
     pub reliable: Option<bool>,
@@ -64,22 +66,28 @@ impl Verdict {
     /// Compares the amplitudes of an outcome over `channels` channels.
     pub fn new(outcome: &Outcome, channels: usize, limits: impl Into<RatioLimits>) -> Self {
         let limits = limits.into();
-        let (nonlinear, linear) = (&outcome.nonlinear.amplitudes, &outcome.linear.amplitudes);
-        let by_turns = &outcome.turn_ratios;
-        let ratios: Vec<Option<f64>> = (0..channels)
-            .map(|i| match (nonlinear.get(i), linear.get(i)) {
+        let nonlinear = &outcome.nonlinear.amplitudes;
+        let linear = &outcome.linear.amplitudes;
+        let ratio = |i: usize| {
+            if let Some(turn_ratio) = outcome.turn_ratios.get(i) {
+                return *turn_ratio;
+            }
+            match (nonlinear.get(i), linear.get(i)) {
                 (Some(nonlinear), Some(linear)) if *linear != 0.0 => Some(nonlinear / linear),
                 _ => None,
-            })
-            .enumerate()
-            .map(|(i, of_amplitudes)| by_turns.get(i).copied().unwrap_or(of_amplitudes))
-            .collect();
+            }
+        };
+        let ratios: Vec<Option<f64>> = (0..channels).map(ratio).collect();
         let extreme = |is_further: fn(f64, f64) -> bool| {
             let defined = ratios.iter().enumerate().filter_map(|(i, ratio)| Some((i, (*ratio)?)));
-            defined.reduce(|most, next| if is_further(next.1, most.1) { next } else { most })
+            defined.reduce(|so_far, next| if is_further(next.1, so_far.1) { next } else { so_far })
         };
-        let [greatest, least] = [extreme(|a, b| a > b), extreme(|a, b| a < b)];
-        let reliable = least.zip(greatest).map(|((_, least), (_, most))| limits.trust(least, most));
+        let greatest = extreme(|a, b| a > b);
+        let least = extreme(|a, b| a < b);
+        let reliable = match (least, greatest) {
+            (Some((_, least)), Some((_, greatest))) => Some(limits.trust(least, greatest)),
+            _ => None,
+        };
         Self { ratios, greatest, least, reliable }
     }
 }
@@ -98,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn greatest_ratio_decides_and_the_first_channel_wins_a_tie() {
+    fn the_first_of_equal_ratios_is_the_greatest() {
         let row = outcome(
             trajectory(Status::Ok, &[2.0, 3.0, 6.0], None),
             trajectory(Status::Ok, &[2.0, 1.0, 2.0], None),
@@ -111,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lower_limit_refuses_what_the_linear_model_over_estimates() {
+    fn a_ratio_below_the_lower_limit_is_not_reliable() {
         let row = outcome(
             trajectory(Status::Ok, &[1.5, 0.3, 0.3], None),
             trajectory(Status::Ok, &[1.0, 2.0, 2.0], None),
@@ -124,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn ratios_by_turns_stand_in_the_place_of_the_amplitudes() {
+    fn ratios_by_turns_replace_those_of_amplitudes() {
         let mut row = outcome(
             trajectory(Status::Ok, &[2.0, 3.0], None),
             trajectory(Status::Ok, &[2.0, 1.0], None),
@@ -136,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_linear_amplitude_leaves_that_ratio_undefined() {
+    fn the_ratio_to_a_zero_linear_amplitude_is_undefined() {
         let row = outcome(
             trajectory(Status::Ok, &[1.0, 1.0], None),
             trajectory(Status::Ok, &[0.0, 1.0], None),
@@ -154,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failed_model_leaves_everything_undefined_and_names_itself() {
+    fn a_failed_model_gives_the_status_and_no_verdict() {
         let row = outcome(
             trajectory(Status::Diverged, &[], Some(3.5)),
             trajectory(Status::Ok, &[1.0, 1.0], None),
@@ -170,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn both_failed_reports_the_nonlinear_reason_and_time() {
+    fn the_nonlinear_model_gives_the_status_if_both_failed() {
         let row = outcome(
             trajectory(Status::Panicked, &[], None),
             trajectory(Status::Diverged, &[], Some(1.0)),

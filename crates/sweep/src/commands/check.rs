@@ -130,7 +130,7 @@ impl Trial {
         }
         trial.model.held_speeds = format!("{plateau_rpm}").parse().ok();
         if trial.model.held_speeds.is_none() {
-            trial.model.measures.metrics.retain(|metric| !metric.is_of_speeds());
+            trial.model.measures.metrics.retain(|metric| !metric.is_at_held_speeds());
         }
         for (k, axis) in trial.axes.iter_mut().enumerate() {
             let values = points.iter().flat_map(|point| std::iter::repeat_n(point[k], stride));

@@ -10,7 +10,7 @@ use sweep_engine::config::{
     Diagnostic, Field, Form, Key, KeyWalk, Keys, Location, Report, Section,
 };
 use washer_model::Machine;
-use washer_row::{Metric, Part};
+use washer_row::{Metric, PartKind};
 
 use super::{GridInput, machine, machine_json};
 use crate::model::Washer;
@@ -79,7 +79,7 @@ pub(super) fn stability(
     speeds: &mut Option<SpeedList>,
     keys: &mut Keys<'_>,
 ) {
-    let of_speeds = metrics.iter().find(|metric| metric.is_of_speeds());
+    let of_speeds = metrics.iter().find(|metric| metric.is_at_held_speeds());
     let lacking = |metric: &Metric| format!("the metric `{}` needs speeds", metric.name());
     if let (KeyWalk::Set(_), Field::Given(found)) = (&keys.walk, found) {
         if let (Some(metric), None, Some(report)) = (of_speeds, &speeds, keys.report()) {
@@ -131,12 +131,14 @@ pub(super) fn stability(
 /// What a machine has not got and this metric is of.
 pub(crate) fn lacking(metric: Metric, machine: &Machine) -> Option<&'static str> {
     let (is_there, what) = match metric.facts().part? {
-        Part::Stop => (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file"),
-        Part::Foot => (
+        PartKind::Stop => {
+            (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file")
+        }
+        PartKind::Foot => (
             machine.cabinet.is_some(),
             "cabinet: expected [cabinet] and three or four [[feet]] in the machine file",
         ),
-        Part::Damper => {
+        PartKind::Damper => {
             (!machine.dampers.is_empty(), "dampers: expected [[dampers]] in the machine file")
         }
     };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use sweep_engine::columns::{MODELS, ResultColumn};
 use sweep_engine::store::{Done, Holds};
 use washer_model::{COORDINATES, Channel, Ending, Endings, Response, STATE_LEN, Settled, State};
-use washer_row::{Measured, Measures, Status};
+use washer_row::{Measures, MetricColumn, Status};
 
 use super::last_state;
 use crate::engine::Carried;
@@ -163,11 +163,11 @@ pub(crate) fn columns(
     let text = "after how many turns it repeats; null where it does not";
     columns.push(counts("period_turns", text, RowOf::period_turns));
     columns.extend(channel_columns(channels));
-    let of_turns = |number: &Measured| number.metric.is_of_turns();
-    for number in measures.of_model().filter(of_turns) {
+    let is_periodic = |number: &MetricColumn| number.metric.has_periodic_value();
+    for number in measures.per_model().filter(is_periodic) {
         let text = format!("{}, over 128 further turns of the motion", number.description());
         let (name, unit) = (number.column(MODELS[0]), number.metric.facts().unit);
-        let of = move |row: &RowOf| number.of(&row.within()?.extra);
+        let of = move |row: &RowOf| number.value(&row.within()?.extra);
         columns.push(ResultColumn::measured(name, unit, text.replace(" in the window", ""), of));
     }
     let numbers: [(&str, &str, &str, fn(&RowOf) -> Option<f64>); 7] = [

@@ -3,7 +3,7 @@
 
 use lane_ode::Simd;
 use washer_model::{Dwell, Endings, Point, Response, STATE_LEN, Starts, endings, respond};
-use washer_row::{Dwelt, Growth, Metric, Outcome, Status};
+use washer_row::{DwellPeaks, Growth, Metric, Outcome, Status};
 
 use super::map_isolating_panics;
 
@@ -77,7 +77,7 @@ pub(super) fn add_held_speed_metrics(
         let dwells: Vec<_> = dwells.iter().map(|dwell| (*dwell, None)).collect();
         let found = find_motions(simd, &dwells, &Starts::default(), is_stopped);
         for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
-            outcome.dwelt = Dwelt::of(speeds_rpm, found);
+            outcome.dwelt = DwellPeaks::from_endings(speeds_rpm, found);
         }
     }
 }

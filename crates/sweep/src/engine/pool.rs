@@ -150,7 +150,7 @@ impl Pool<'_> {
                     let levels = &rule.levels[model];
                     let originals = || taken.iter().map(|(_, point)| point.as_ref());
                     let perturbed: Vec<Point> = match levels.is_perturbed(level) {
-                        true => originals().map(Point::nudged).collect(),
+                        true => originals().map(Point::perturbed).collect(),
                         false => Vec::new(),
                     };
                     let points: Vec<&Point> = match perturbed.is_empty() {
@@ -234,7 +234,7 @@ impl Pool<'_> {
         state.busy_threads -= 1;
         drop(state);
         self.changed.notify_all();
-        done.iter_mut().for_each(|(outcome, _)| outcome.forget_turns());
+        done.iter_mut().for_each(|(outcome, _)| outcome.drop_turns());
         let model = &self.engine.plan.model;
         if let Some(speeds) = &model.held_speeds {
             let is_stopped = || self.context.stopped();

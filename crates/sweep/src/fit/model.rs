@@ -245,7 +245,7 @@ impl Problem<'_> {
                 .filter_map(|((place, shift_s), point)| {
                     let instants: Arc<[f64]> =
                         measured.time_s.iter().map(|time| (time + shift_s).max(0.0)).collect();
-                    Some((place, point.ok()?.seen_at(instants)))
+                    Some((place, point.ok()?.with_snapshots_at(instants)))
                 })
                 .collect();
             let all: Vec<&Point> = points.iter().map(|(_, point)| point).collect();

@@ -2,8 +2,8 @@
 
 use serde_json::{Map, Value, json};
 use washer_model::{
-    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Profile, Spin, Stop, Timing,
-    campbell_until, exact_motions,
+    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Profile, Spin, StopRequest,
+    Timing, campbell_until, exact_motions,
 };
 
 use super::check_speeds;
@@ -92,7 +92,7 @@ impl Analysis {
         asked: &Asked,
         speeds_rpm: &[f64],
         is_exact: bool,
-        stop: Stop<'_>,
+        stop: StopRequest<'_>,
     ) -> Result<Option<Self>, Error> {
         let point = ready(asked.machine.clone(), asked.spin.clone(), &asked.timing);
         let point = point.map_err(Error::model)?;

@@ -26,7 +26,7 @@ fn is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
     assert_eq!(errors, outcome.error, "{values:?}");
     assert_eq!(checked.levels[0], outcome.method, "{values:?}");
     let mut row = checked.outcome;
-    row.forget_turns();
+    row.drop_turns();
     assert_eq!((row, values), (Outcome { point: 0, ..outcome.clone() }, values));
     for (amplitudes, run) in checked.amplitudes.iter().zip([&outcome.nonlinear, &outcome.linear]) {
         let of_channels = setup.rule.channels.iter().map(|of| amplitudes[of.index()]);

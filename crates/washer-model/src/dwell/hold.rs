@@ -2,7 +2,7 @@
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
-use crate::run::extras::{Extras, Instants};
+use crate::run::active_recorders::{ActiveRecorders, StepParts};
 use crate::run::model::Nonlinear;
 use crate::stability::orbit::{Row, Watched, by_kind, clock, model};
 use crate::stability::turn::turn;
@@ -92,8 +92,8 @@ fn hold_lanes<T: Lane>(
     found.extend(held.iter().map(|_| (Vec::with_capacity(turns), Reading::default())));
     let mut watched = Watched::new(zero, &model, &clock);
     watched.with_states = false;
-    let of = (ModelKind::Nonlinear, Instants::of_steps(rows[0].caps.is_none()));
-    watched.extras = Extras::new(zero, wanted, of, rows[0].point, held.len());
+    let of = (ModelKind::Nonlinear, StepParts::new(rows[0].caps.is_none()));
+    watched.extras = ActiveRecorders::new(zero, wanted, of, rows[0].point, held.len());
     if let Some(extras) = &mut watched.extras {
         for lane in 0..T::LANES {
             extras.set_point(lane, rows[lane.min(rows.len() - 1)].point);
@@ -122,7 +122,7 @@ fn hold_lanes<T: Lane>(
         for (lane, held) in held.iter().enumerate() {
             let (of_lane, extra) = &mut found[first + lane];
             extras.finish(lane, lane, held.row.point, of_lane.len() < turns);
-            *extra = core::mem::take(&mut extras.found[lane]);
+            *extra = core::mem::take(&mut extras.readings[lane]);
         }
     }
 }

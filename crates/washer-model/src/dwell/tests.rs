@@ -231,7 +231,7 @@ fn plain_kicks_end_in_motions_that_are_found() {
         let starts = Starts::default();
         let found = endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0).unwrap();
         let case = Settings::new(&point).case(speed_rpm).unwrap().without_caps().unwrap();
-        let rest = <Nonlinear<f64> as Model<f64>>::at_rest(&point);
+        let rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
         let response = found.responses.first().map_or(rest, |response| response.start);
         let held: Vec<Held<'_>> = (0..given("KICKS", 16))
             .map(|kick| {

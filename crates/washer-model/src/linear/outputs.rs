@@ -9,7 +9,7 @@ use crate::coordinates::{
     COORDINATES, HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH,
     TUB_Y, TUB_YAW, TUB_Z, seeded,
 };
-use crate::lanes::{Constant as _, InLanes as _, lane_struct};
+use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::sparse::sparse_sums;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;

@@ -284,7 +284,8 @@ fn bearing_system<T: Lane>(
 }
 
 impl<T: Lane> BearingsAt<T> {
-    /// The load on the tub, from a deflection and its second derivative in absence of loads.
+    /// Computes the load of the bearings on the tub, from the deflection and from its second
+    /// derivative without loads of the bearings.
     #[inline(always)]
     fn reaction(&self, deflection: &[N<T>; 4], second: &[N<T>; 4]) -> [N<T>; 4] {
         let mut sum = *second;
@@ -308,11 +309,11 @@ pub(crate) fn accelerations<T: Lane>(
     match coupling {
         Coupling::Springs => {
             let load = c.spring_load(&deflection);
-            Halves::new(c, rotor_at, Some(load), q, u).in_order()
+            HalfAccelerations::new(c, rotor_at, Some(load), q, u).in_order()
         }
         Coupling::MassScaled(_) => {
             let bearings = &rotor_at.bearings;
-            let mut halves = Halves::new(c, rotor_at, None, q, u);
+            let mut halves = HalfAccelerations::new(c, rotor_at, None, q, u);
             let second = c.deflection(&halves.in_order());
             let reaction = bearings.reaction(&deflection, &second);
             halves.push_apart(c, &bearings.rotor, &reaction);
@@ -334,7 +335,7 @@ pub(crate) fn derivative_ahead<T: Lane>(
     r: &[N<T>; STATES],
     g: N<T>,
 ) -> [N<T>; STATES] {
-    // The coordinates ahead but for g^2 a.
+    // The coordinates at r + g k without the term g^2 a.
     let mut ahead = *q;
     for i in 0..COORDINATES {
         ahead[i] = r[i] + g * r[COORDINATES + i];
@@ -349,7 +350,7 @@ pub(crate) fn derivative_ahead<T: Lane>(
         torque_per_speed: g.lit(0.0),
     };
     let rotor_at = RotorAt::new(c, &Coupling::Springs, terms, spin, Some(hinge_mass));
-    let mut halves = Halves::new(c, &rotor_at, None, q, u);
+    let mut halves = HalfAccelerations::new(c, &rotor_at, None, q, u);
     let arms = entry::arms(&rotor_at.entries);
     let (by_load, compliance) = RotorPerLoad::new(c, &rotor_at.inverse, &arms);
     let per_g_squared = g_squared.recip();
@@ -358,7 +359,7 @@ pub(crate) fn derivative_ahead<T: Lane>(
     for i in 0..4 {
         sum[i] += per_g_squared * deflection[i];
     }
-    // By pivots: determinants overflow in idle lanes, whose g is next to nothing.
+    // Elimination by pivots, because determinants overflow in idle lanes, whose g is almost zero.
     let reaction = Factors::new(bearing_system(c, per_g_squared, &compliance)).solve(sum);
     halves.push_apart(c, &by_load, &reaction);
     let a = halves.in_order();
@@ -371,14 +372,14 @@ pub(crate) fn derivative_ahead<T: Lane>(
 }
 
 /// The accelerations of both halves: of the tub, of the rotor's midpoint and of its rotations.
-struct Halves<T> {
+struct HalfAccelerations<T> {
     tub: [N<T>; 4],
     midpoint: [N<T>; 2],
     rotation: [N<T>; 4],
 }
 
-impl<T: Lane> Halves<T> {
-    /// Computes them, under a load of the bearings on the shaft if one is given.
+impl<T: Lane> HalfAccelerations<T> {
+    /// Computes the accelerations, under a load of the bearings on the shaft if one is given.
     #[inline(always)]
     fn new(
         c: &StepConstants<T>,

@@ -8,7 +8,7 @@
 
 use crate::modes::assurance;
 use crate::modes::shape::motion;
-use crate::{COORDINATES, Mode, Modes, Motion, NoModes, Point, modes};
+use crate::{COORDINATES, Mode, ModeMotion, Modes, NoModes, Point, modes};
 use core::f64::consts::TAU;
 
 /// The number of angles over which frequencies are averaged. Basis: a dozen would do for the mean
@@ -39,7 +39,6 @@ pub struct ModeAtSpeed {
     pub re_per_s: f64,
     /// The mean imaginary part of s (rad/s).
     pub im_rad_per_s: f64,
-    /// The damping ratio.
     pub damping_ratio: f64,
     /// The mean damped natural frequency (cycles per minute).
     pub frequency_rpm: f64,
@@ -55,7 +54,6 @@ pub struct ModeAtSpeed {
 /// A spin speed that equals a mode's damped natural frequency, as a mean over a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resonance {
-    /// The spin speed.
     pub speed_rpm: f64,
     /// The mode at that speed.
     pub mode: ModeAtSpeed,
@@ -65,7 +63,7 @@ pub struct Resonance {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModeOverSpeed {
     /// The dominant motion at the first resonance, or else at the lowest speed.
-    pub motion: Motion,
+    pub motion: ModeMotion,
     /// The mode at each speed.
     pub at_speed: Vec<ModeAtSpeed>,
     /// The resonances in rising order.

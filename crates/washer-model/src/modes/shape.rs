@@ -1,7 +1,8 @@
-//! Mode shapes in words: the motion of tub and drum that dominates each.
+//! Names of mode shapes, by the motion of tub and drum that dominates each.
 
 use crate::coordinates::{
-    HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z,
+    HINGE_PITCH, HINGE_YAW, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW,
+    TUB_Z,
 };
 use crate::modes::inner;
 use crate::{COORDINATES, Point};
@@ -9,7 +10,7 @@ use core::fmt;
 
 /// A plane through the drum axis, or both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Plane {
+pub enum MotionPlane {
     /// Along c3, about c2.
     Horizontal,
     /// Along c2, about c3.
@@ -18,54 +19,54 @@ pub enum Plane {
     Both,
 }
 
-/// What moves in a mode.
+/// The kind of motion of a mode shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Movement {
-    /// Tub and drum together, their axis staying parallel to itself.
+    /// Translation of tub and drum as one body.
     Translation,
-    /// Tub and drum together, about their common mass centre.
+    /// Rotation of tub and drum as one body about their common mass centre.
     Rocking,
-    /// The drum against its shaft.
+    /// Bending of the drum against its shaft.
     Bending,
-    /// The shaft against the tub, its axis staying parallel to itself.
+    /// Translation of the shaft against the tub.
     BearingTranslation,
-    /// The shaft against the tub, tilting.
+    /// Tilt of the shaft against the tub.
     BearingTilt,
-    /// None of these has more than half of the energy.
+    /// No movement with more than half of the energy.
     Mixed,
 }
 
 /// The movement with the greatest share of a mode shape, if that is more than half of its energy,
 /// and the shares of its kinetic energy in the motions of the machine as one rigid body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
-    /// What moves.
+pub struct ModeMotion {
+    /// The movement with the greatest share.
     pub movement: Movement,
-    /// Where.
-    pub plane: Plane,
-    /// Share of the motion along c2,
+    /// The plane of the movement.
+    pub plane: MotionPlane,
+    /// The share of the rigid translation along c2.
     pub vertical_translation: f64,
-    /// along c3,
+    /// The share of the rigid translation along c3.
     pub horizontal_translation: f64,
-    /// about c2 through the mass centre,
+    /// The share of the rigid rotation about c2 through the mass centre.
     pub yaw: f64,
-    /// and about c3. The rest is relative motion of the bodies.
+    /// The share of the rigid rotation about c3 through the mass centre.
     pub pitch: f64,
 }
 
-/// Every movement in every plane, in words.
+/// Returns the names of movements, each in every plane.
 macro_rules! motion_names {
-    ($($what:literal)*) => {
+    ($($movement:literal)*) => {
         [$(
-            concat!($what, ", horizontal plane"),
-            concat!($what, ", vertical plane"),
-            concat!($what, ", both planes"),
+            concat!($movement, ", horizontal plane"),
+            concat!($movement, ", vertical plane"),
+            concat!($movement, ", both planes"),
         )*]
     };
 }
 
-impl Motion {
-    /// Every name of a motion, by movement and then by plane.
+impl ModeMotion {
+    /// The names of motions, by movement and then by plane.
     pub const NAMES: [&str; 18] = motion_names![
         "translation"
         "rocking"
@@ -75,32 +76,32 @@ impl Motion {
         "mixed"
     ];
 
-    /// Position of its name in [`Self::NAMES`].
+    /// Returns the position of the name in [`Self::NAMES`].
     pub const fn name_index(&self) -> usize {
         3 * self.movement as usize + self.plane as usize
     }
 }
 
-impl fmt::Display for Motion {
+impl fmt::Display for ModeMotion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(Self::NAMES[self.name_index()])
     }
 }
 
-/// The share of a mode's energy (1) above which a motion is in one plane. Basis: convention, a
-/// motion with three fifths of its energy in a plane looks like one of that plane. Doubling it puts
-/// every mode in both planes.
-const PREVAILS: f64 = 0.6;
+/// The share of a mode's energy above which a motion is in one plane. Basis: convention, a motion
+/// with three fifths of its energy in a plane looks like one of that plane. Doubling it puts every
+/// mode in both planes.
+const PLANE_SHARE: f64 = 0.6;
 
-/// The share of a mode's energy (1) that a movement has to exceed to name the mode. Basis: only one
+/// The share of a mode's energy that a movement has to exceed to name the mode. Basis: only one
 /// movement can have more than half. Doubling it names no mode.
 const MAJORITY: f64 = 0.5;
 
-/// Coordinates of the horizontal plane: q2, q4 along c3, q5, q7, q9 about c2.
+/// The coordinates of motions in the horizontal plane: q2 and q4 along c3; q5, q7 and q9 about c2.
 const HORIZONTAL: [usize; 5] = [TUB_Z, SHAFT_Z, TUB_YAW, SHAFT_YAW, HINGE_YAW];
 
-/// The machine moving as one: along c2, along c3, about c2, about c3. Body angles of the drum are
-/// against the shaft.
+/// The coordinates of the motions as one rigid body: along c2, along c3, about c2, about c3. The
+/// drum has none, because its angles are relative to the shaft.
 const RIGID: [[usize; 2]; 4] =
     [[TUB_Y, SHAFT_Y], [TUB_Z, SHAFT_Z], [TUB_YAW, SHAFT_YAW], [TUB_PITCH, SHAFT_PITCH]];
 
@@ -110,7 +111,7 @@ pub(crate) fn motion(
     point: &Point,
     mass: &[[f64; COORDINATES]; COORDINATES],
     shape: &[[f64; 2]; COORDINATES],
-) -> Motion {
+) -> ModeMotion {
     let shares = rigid_shares(mass, shape);
     let [vertical_translation, horizontal_translation, yaw, pitch] = shares;
     let movement = if shares.iter().sum::<f64>() < 1.0 - MAJORITY {
@@ -123,14 +124,14 @@ pub(crate) fn motion(
         in_plane[i] = shape[i];
     }
     let horizontal = inner(mass, &in_plane, &in_plane)[0];
-    let plane = if horizontal > PREVAILS {
-        Plane::Horizontal
-    } else if horizontal < 1.0 - PREVAILS {
-        Plane::Vertical
+    let plane = if horizontal > PLANE_SHARE {
+        MotionPlane::Horizontal
+    } else if horizontal < 1.0 - PLANE_SHARE {
+        MotionPlane::Vertical
     } else {
-        Plane::Both
+        MotionPlane::Both
     };
-    Motion { movement, plane, vertical_translation, horizontal_translation, yaw, pitch }
+    ModeMotion { movement, plane, vertical_translation, horizontal_translation, yaw, pitch }
 }
 
 /// Returns the rigid movement that has the greatest of these shares, in the order of [`RIGID`], and
@@ -146,8 +147,8 @@ fn rigid_movement([vertical, horizontal, yaw, pitch]: [f64; 4]) -> Movement {
     }
 }
 
-/// Likeness of a shape to each rigid motion. Rotations are made orthogonal to the translations, and
-/// so are about the mass centre.
+/// Computes the shares of a shape's energy in the rigid motions, in the order of [`RIGID`].
+/// Rotations are made orthogonal to the translations, so that they are about the mass centre.
 fn rigid_shares(
     mass: &[[f64; COORDINATES]; COORDINATES],
     shape: &[[f64; 2]; COORDINATES],
@@ -173,22 +174,26 @@ fn rigid_shares(
     })
 }
 
-/// Which spring between the bodies holds most energy: the flexure, or the bearings pushed or
-/// tilted.
+/// Returns the relative movement of the bodies with the greatest strain energy: bending of the
+/// flexure, translation or tilt in the bearings.
 fn relative_movement(point: &Point, shape: &[[f64; 2]; COORDINATES]) -> Movement {
     let bodies = &point.machine.bodies;
     let squared = |i: usize| shape[i][0].powi(2) + shape[i][1].powi(2);
-    let apart = |i: usize, j: usize| {
+    let squared_difference = |i: usize, j: usize| {
         (shape[i][0] - shape[j][0]).powi(2) + (shape[i][1] - shape[j][1]).powi(2)
     };
-    let bending = bodies.flexure_stiffness.0 * (squared(8) + squared(9));
-    let (front, rear) = (bodies.front_stiffness.0, bodies.rear_stiffness.0);
-    let pushing = (front + rear) * (apart(2, 0) + apart(3, 1));
-    let arm = front * bodies.bearing_front.0.powi(2) + rear * bodies.bearing_rear.0.powi(2);
-    let tilting = arm * (apart(6, 4) + apart(7, 5));
-    if bending > pushing.max(tilting) {
+    let bending = bodies.flexure_stiffness.0 * (squared(HINGE_YAW) + squared(HINGE_PITCH));
+    let front = bodies.front_stiffness.0;
+    let rear = bodies.rear_stiffness.0;
+    let offset = squared_difference(SHAFT_Y, TUB_Y) + squared_difference(SHAFT_Z, TUB_Z);
+    let translation = (front + rear) * offset;
+    let tilt_stiffness =
+        front * bodies.bearing_front.0.powi(2) + rear * bodies.bearing_rear.0.powi(2);
+    let tilt = squared_difference(SHAFT_YAW, TUB_YAW) + squared_difference(SHAFT_PITCH, TUB_PITCH);
+    let tilting = tilt_stiffness * tilt;
+    if bending > translation.max(tilting) {
         Movement::Bending
-    } else if pushing > tilting {
+    } else if translation > tilting {
         Movement::BearingTranslation
     } else {
         Movement::BearingTilt
@@ -206,7 +211,7 @@ mod tests {
             ([0.4, 0.4, 0.1, 0.1], Movement::Translation),
             ([0.0, 0.3, 0.65, 0.0], Movement::Rocking),
             ([0.05, 0.1, 0.42, 0.42], Movement::Rocking),
-            // The greatest share is of a movement without a majority, the majority of another.
+            // The greatest single share belongs to another movement than the majority.
             ([0.45, 0.0, 0.29, 0.26], Movement::Mixed),
             ([0.0, 0.45, 0.29, 0.2], Movement::Mixed),
             ([0.3, 0.25, 0.42, 0.0], Movement::Mixed),
@@ -222,7 +227,9 @@ mod tests {
         let seed = std::env::var("SEED").map_or(clock.as_secs(), |it| it.parse().unwrap());
         println!("SEED={seed}");
         let mut numbers = fastrand::Rng::with_seed(seed);
-        let (mut translations, mut rockings, mut mixed) = (0, 0, 0);
+        let mut translations = 0;
+        let mut rockings = 0;
+        let mut mixed = 0;
         for _ in 0..40 {
             let mut machine = crate::Machine::paper();
             let mut factor = || 0.4 * 6.0_f64.powf(numbers.f64());

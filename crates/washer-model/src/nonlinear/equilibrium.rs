@@ -9,7 +9,7 @@
 use crate::coordinates::{
     COORDINATES, SHAFT_PITCH, SHAFT_Y, SHAFT_YAW, SHAFT_Z, TUB_PITCH, TUB_Y, TUB_YAW, TUB_Z, seeded,
 };
-use crate::lanes::Constant as _;
+use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
 use crate::nonlinear::floating::Factors;

@@ -6,9 +6,7 @@ use core::f64::consts::PI;
 /// The speed amplitude at which the linear model takes the friction of a damper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionSpeed {
-    /// The index of the damper.
     pub damper: usize,
-    /// The speed amplitude (m/s).
     pub speed_m_per_s: f64,
     /// Whether the speed is that of the linear motion, not a given one.
     pub is_own: bool,

@@ -1,81 +1,88 @@
-//! One model of one point as plain functions of time and state, for integrators other than this
-//! project's own.
+//! The equations of motion of a point as plain functions of time and state, for integrators of
+//! other programs.
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
 use crate::machine::spin::{SpinStretch, stretch_at};
 use crate::nonlinear::coupling::Coupling;
-use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Aside, Dual, N, Partials, Simd};
 use std::sync::Arc;
 
-/// Numbers of a state: the ten coordinates q1 to q10 (m, rad), then their speeds.
+/// The length of a state: the ten coordinates q1 to q10 (m, rad), then their speeds.
 pub const STATE_LEN: usize = STATES;
 
-/// The equations of motion x' = f(t, x) of one point. The nonlinear model's coordinates are as in
-/// the model page, the linear model's are deviations from equilibrium.
-pub struct Equations {
-    model: Either,
+/// The equations of motion x' = f(t, x) of one point. The nonlinear model's coordinates are those
+/// of the model page, the linear model's are deviations from equilibrium.
+pub struct PointEquations {
+    model: EitherModel,
     at_rest: [f64; STATES],
     stretches: Arc<[SpinStretch]>,
-    /// The stretch of the spin that holds since the last call.
+    /// The index of the stretch of the spin at the last call.
     stretch: usize,
 }
 
-/// A model over plain and over dual numbers.
+/// A model over plain numbers and over dual numbers.
 struct Differentiable<M, J> {
     model: M,
     dual: J,
 }
 
-enum Either {
+/// The nonlinear or the linear model.
+enum EitherModel {
     Nonlinear(Box<Differentiable<Nonlinear<f64>, Nonlinear<Dual<f64>>>>),
     Linear(Box<Differentiable<Linear<f64>, Linear<Dual<f64>>>>),
 }
 
-impl Equations {
-    /// One model's equations at a point.
+impl PointEquations {
+    /// Creates the equations of one model at a point.
     pub fn new(point: &Point, model: ModelKind) -> Self {
         let (model, at_rest) = match model {
             ModelKind::Nonlinear => (
-                Either::Nonlinear(Differentiable::new(point)),
-                <Nonlinear<f64> as Model<f64>>::at_rest(point),
+                EitherModel::Nonlinear(Differentiable::new(point)),
+                <Nonlinear<f64> as LaneModel<f64>>::at_rest(point),
             ),
             ModelKind::Linear => (
-                Either::Linear(Differentiable::new(point)),
-                <Linear<f64> as Model<f64>>::at_rest(point),
+                EitherModel::Linear(Differentiable::new(point)),
+                <Linear<f64> as LaneModel<f64>>::at_rest(point),
             ),
         };
         Self { model, at_rest, stretches: Arc::clone(&point.stretches), stretch: 0 }
     }
 
-    /// The state at rest in static equilibrium, from which trajectories start.
+    /// Returns the state at rest in static equilibrium, from which trajectories start.
     pub const fn at_rest(&self) -> &[f64; STATE_LEN] {
         &self.at_rest
     }
 
-    /// Times (s) at which the spin's acceleration, and so f, may jump: integrate from one to the
-    /// next.
+    /// Returns the times (s) at which the spin's acceleration, and therefore f, may jump. An
+    /// integrator should end steps there.
     pub fn kinks_s(&self) -> impl Iterator<Item = f64> + '_ {
         self.stretches.iter().skip(1).map(|stretch| stretch.start_s.0)
     }
 
-    /// f at time `t_s`, at a kink from its right.
+    /// Computes f at time `t_s`; at a kink, its limit from the right.
     pub fn derivative(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [f64; STATE_LEN] {
         self.move_to(t_s);
         match &self.model {
-            Either::Nonlinear(of) => Simd::one_lane(Derivative { model: &of.model, t_s, x }),
-            Either::Linear(of) => Simd::one_lane(Derivative { model: &of.model, t_s, x }),
+            EitherModel::Nonlinear(models) => {
+                Simd::one_lane(Derivative { model: &models.model, t_s, x })
+            }
+            EitherModel::Linear(models) => {
+                Simd::one_lane(Derivative { model: &models.model, t_s, x })
+            }
         }
     }
 
-    /// The Jacobian of f by the state, row by row, exact to rounding.
+    /// Computes the Jacobian of f with respect to the state, by rows, exact to rounding.
     pub fn jacobian(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [[f64; STATE_LEN]; STATE_LEN] {
         self.move_to(t_s);
         let partials = match &self.model {
-            Either::Nonlinear(of) => Simd::one_lane(Jacobian { dual: &of.dual, t_s, x }),
-            Either::Linear(of) => Simd::one_lane(Jacobian { dual: &of.dual, t_s, x }),
+            EitherModel::Nonlinear(models) => {
+                Simd::one_lane(Jacobian { dual: &models.dual, t_s, x })
+            }
+            EitherModel::Linear(models) => Simd::one_lane(Jacobian { dual: &models.dual, t_s, x }),
         };
         let mut rows = [[0.0; STATES]; STATES];
         for i in 0..COORDINATES {
@@ -88,8 +95,8 @@ impl Equations {
         rows
     }
 
-    /// The channels' deviations from equilibrium (m, rad), in the order of [`crate::Channel::ALL`],
-    /// and their rates.
+    /// Computes the channels' deviations from equilibrium (m, rad) in the order of
+    /// [`crate::Channel::ALL`], and their rates.
     pub fn channels(
         &mut self,
         t_s: f64,
@@ -97,27 +104,30 @@ impl Equations {
     ) -> ([f64; CHANNELS], [f64; CHANNELS]) {
         self.move_to(t_s);
         match &self.model {
-            Either::Nonlinear(of) => Simd::one_lane(Outputs { model: &of.model, t_s, x }),
-            Either::Linear(of) => Simd::one_lane(Outputs { model: &of.model, t_s, x }),
+            EitherModel::Nonlinear(models) => {
+                Simd::one_lane(Outputs { model: &models.model, t_s, x })
+            }
+            EitherModel::Linear(models) => Simd::one_lane(Outputs { model: &models.model, t_s, x }),
         }
     }
 
-    /// Puts the stretch of the spin in place that holds at a time.
+    /// Sets the stretch of the spin at a time in the models.
     fn move_to(&mut self, t_s: f64) {
-        let holds = |k: usize| self.stretches.get(k).is_none_or(|stretch| t_s < stretch.start_s.0);
-        if holds(self.stretch + 1) && (self.stretch == 0 || !holds(self.stretch)) {
+        let is_before =
+            |k: usize| self.stretches.get(k).is_none_or(|stretch| t_s < stretch.start_s.0);
+        if is_before(self.stretch + 1) && (self.stretch == 0 || !is_before(self.stretch)) {
             return;
         }
         self.stretch = stretch_at(&self.stretches, t_s);
         let stretch = &self.stretches[self.stretch];
         match &mut self.model {
-            Either::Nonlinear(of) => of.set_spin(stretch),
-            Either::Linear(of) => of.set_spin(stretch),
+            EitherModel::Nonlinear(models) => models.set_spin(stretch),
+            EitherModel::Linear(models) => models.set_spin(stretch),
         }
     }
 }
 
-impl<M: Model<f64>, J: Model<Dual<f64>>> Differentiable<M, J> {
+impl<M: LaneModel<f64>, J: LaneModel<Dual<f64>>> Differentiable<M, J> {
     fn new(point: &Point) -> Box<Self> {
         Box::new(Self {
             model: M::splat(N(0.0), point, Coupling::Springs),
@@ -131,13 +141,14 @@ impl<M: Model<f64>, J: Model<Dual<f64>>> Differentiable<M, J> {
     }
 }
 
+/// The computation of f.
 struct Derivative<'a, M> {
     model: &'a M,
     t_s: f64,
     x: &'a [f64; STATES],
 }
 
-impl<M: Model<f64>> Aside for Derivative<'_, M> {
+impl<M: LaneModel<f64>> Aside for Derivative<'_, M> {
     type Output = [f64; STATES];
     #[inline(always)]
     fn run(self) -> [f64; STATES] {
@@ -146,13 +157,14 @@ impl<M: Model<f64>> Aside for Derivative<'_, M> {
     }
 }
 
+/// The computation of the Jacobian of f by automatic differentiation.
 struct Jacobian<'a, J> {
     dual: &'a J,
     t_s: f64,
     x: &'a [f64; STATES],
 }
 
-impl<J: Model<Dual<f64>>> Aside for Jacobian<'_, J> {
+impl<J: LaneModel<Dual<f64>>> Aside for Jacobian<'_, J> {
     type Output = Partials<COORDINATES>;
     #[inline(always)]
     fn run(self) -> Partials<COORDINATES> {
@@ -162,20 +174,22 @@ impl<J: Model<Dual<f64>>> Aside for Jacobian<'_, J> {
     }
 }
 
+/// The computation of the channels and their rates.
 struct Outputs<'a, M> {
     model: &'a M,
     t_s: f64,
     x: &'a [f64; STATES],
 }
 
-impl<M: Model<f64>> Aside for Outputs<'_, M> {
+impl<M: LaneModel<f64>> Aside for Outputs<'_, M> {
     type Output = ([f64; CHANNELS], [f64; CHANNELS]);
     #[inline(always)]
     fn run(self) -> Self::Output {
         let x = self.x.map(N);
         let forcing = self.model.forcing(N(self.t_s));
         let dx = self.model.derivative(&forcing, &x);
-        let (mut values, mut rates) = ([0.0; CHANNELS], [0.0; CHANNELS]);
+        let mut values = [0.0; CHANNELS];
+        let mut rates = [0.0; CHANNELS];
         if let (_, Some(channels)) = self.model.observe(&forcing, &x, &dx, true) {
             for i in 0..CHANNELS {
                 values[i] = channels[i].value.0;

@@ -1,9 +1,9 @@
 //! Time histories: trajectories at given instants, independent of their steps.
 //!
-//! It is the trajectory whose peaks [`simulate`](crate::simulate) records, with the same bits in
-//! every step: instants are interpolated, and steps do not end on them. Inside a step the state is
-//! the method's own dense output, or for Runge-Kutta the cubic through the states and slopes at
-//! both ends. That is of fourth order like the method; the error is at most (h w)^4 / 384 of a
+//! The trajectory is the one whose peaks [`simulate`](crate::simulate) records, with the same bits
+//! in every step: steps do not end at the instants, which are interpolated. Inside a step the state
+//! is the method's dense output, or for RK4 the cubic Hermite polynomial of the states and slopes
+//! at both ends. It has order 4 like the method: the relative error is at most (h w)^4 / 384 for a
 //! motion of frequency w, or 1e-9 at 1200 rpm and a step of 2e-4 s.
 
 use crate::channel::CHANNELS;
@@ -12,22 +12,22 @@ use crate::machine::spin::stretch_at;
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::squared;
 use crate::run::method::{
-    ByMethod, ByRk4, Family, OfLinear, OfNonlinear, Stepper, coupling, enter,
+    LinearFamily, ModelFamily, NonlinearFamily, Rk4Stepper, Stepper, StepperVisitor, coupling,
+    start_segment,
 };
-use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::run::snapshots::share_of_step;
 use crate::run::suspension::forces;
-use crate::{COORDINATES, Forces, Method, ModelKind, Point, Stop};
+use crate::{COORDINATES, Forces, Method, ModelKind, Point, StopRequest};
 use core::marker::PhantomData;
 use lane_ode::{
-    Aside, Failure, Kernel, Lane, MAX_LANES, N, Sample as Sampled, Segment, SegmentEnd, Simd, Step,
-    Task,
+    Aside, Failure, Kernel, Lane, MAX_LANES, N, Sample, Segment, SegmentEnd, Simd, Step, Task,
 };
 
-/// One trajectory at some instants.
+/// A trajectory at given instants.
 #[derive(Clone, Debug)]
 pub struct History<'a> {
-    /// Why and when (s) it failed, if it did; there are no instants from there on.
+    /// The reason and the time (s) of a failure, after which there are no instants.
     pub failure: Option<(Failure, f64)>,
     point: &'a Point,
     model: ModelKind,
@@ -35,34 +35,34 @@ pub struct History<'a> {
     states: Vec<[f64; STATES]>,
 }
 
-/// One instant of a history.
+/// The outputs of a trajectory at an instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instant {
-    /// Deviations from equilibrium in the order of `Channel::ALL` (m, rad).
+    /// The channels' deviations from equilibrium (m, rad), in the order of `Channel::ALL`.
     pub channels: [f64; CHANNELS],
-    /// Their rates (m/s, rad/s).
+    /// The channels' rates (m/s, rad/s).
     pub rates: [f64; CHANNELS],
-    /// Their accelerations (m/s^2, rad/s^2), by the equations at the instant.
+    /// The channels' accelerations (m/s^2, rad/s^2) by the equations of motion.
     pub accelerations: [f64; CHANNELS],
-    /// Gap between drum and tub (m).
+    /// The gap between drum and tub (m).
     pub gap_m: f64,
-    /// Coordinates q1 to q10 as deviations from equilibrium (m, rad).
+    /// The deviations of the coordinates q1 to q10 from equilibrium (m, rad).
     pub deviations: [f64; COORDINATES],
-    /// Their speeds u1 to u10 (m/s, rad/s).
+    /// The speeds u1 to u10 (m/s, rad/s).
     pub speeds: [f64; COORDINATES],
 }
 
-/// Where a trajectory starts: deviations from equilibrium at rest.
+/// The initial state of a trajectory, relative to rest at equilibrium.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Start {
-    /// Of q1 to q10 (m, rad).
+    /// The deviations of the coordinates q1 to q10 from equilibrium (m, rad).
     pub deviations: [f64; COORDINATES],
-    /// Speeds u1 to u10 (m/s, rad/s).
+    /// The speeds u1 to u10 (m/s, rad/s).
     pub speeds: [f64; COORDINATES],
 }
 
-/// Integrates one model at one point and keeps its state at 0, `every_s`, 2 `every_s` and so on to
-/// the end of the run.
+/// Integrates one model at one point, and returns its states at 0, `every_s`, 2 `every_s` and so on
+/// to the end of the run.
 pub fn history<'a>(
     model: ModelKind,
     method: &Method,
@@ -70,105 +70,124 @@ pub fn history<'a>(
     start: &Start,
     every_s: f64,
 ) -> History<'a> {
-    let end_s = point.legs.last().map_or(0.0, |leg| leg.end_s);
-    let times_s = (0..instants(end_s, every_s)).map(|k| k as f64 * every_s).collect();
-    let asked = [Asked { point, method: *method, start: *start, times_s }];
-    let sampled = sample(model, &asked, &|| false).pop().unwrap_or_default();
-    let [asked] = asked;
-    of(model, asked, sampled)
+    let end_s = point.segments.last().map_or(0.0, |segment| segment.end_s);
+    let times_s = (0..instant_count(end_s, every_s)).map(|k| k as f64 * every_s).collect();
+    let requests = [HistoryRequest { point, method: *method, start: *start, times_s }];
+    let sampled = integrate(model, &requests, &|| false).pop().unwrap_or_default();
+    let [request] = requests;
+    History::new(model, request, sampled)
 }
 
-/// How many instants there are from 0 to an end, so far apart.
-pub fn instants(end_s: f64, every_s: f64) -> usize {
-    // The quotient may come out a hair below the whole number that was meant.
+/// Returns the number of instants from 0 to `end_s` at intervals of `every_s`.
+pub fn instant_count(end_s: f64, every_s: f64) -> usize {
+    // Rounding may leave the quotient just below a whole number.
     1 + (end_s / every_s * (1.0 + 1e-12)).floor() as usize
 }
 
-/// One trajectory that is asked for.
+/// A request for the history of a trajectory.
 #[derive(Clone, Debug)]
-pub struct Asked<'a> {
-    /// Its machine and spin.
+pub struct HistoryRequest<'a> {
+    /// The machine and its spin.
     pub point: &'a Point,
-    /// What integrates it.
+    /// The method of integration.
     pub method: Method,
-    /// Where it starts.
     pub start: Start,
-    /// Its instants in order, the first at 0.
+    /// The instants in order, the first at 0.
     pub times_s: Vec<f64>,
 }
 
-/// Integrates one model at several points. By plain Runge-Kutta, so many points at once as there
-/// are lanes; each history has the same bits alone. It comes as far as it is when `stop` says so,
-/// which is asked every [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps at least.
-pub fn histories<'a>(model: ModelKind, asked: Vec<Asked<'a>>, stop: Stop<'_>) -> Vec<History<'a>> {
-    let is_plain = asked.iter().all(|one| matches!(one.method, Method::Rk4 { .. }));
-    let at_once = if is_plain { together() } else { 1 };
-    let mut asked = asked.into_iter();
-    let mut found = Vec::with_capacity(asked.len());
+/// Integrates one model at several points. If the method of all is RK4, as many points as there are
+/// lanes are integrated at once. The bits of a history do not depend on the other points.
+/// Histories are shorter once `stop` returned true, which is called at least every
+/// [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps.
+pub fn histories<'a>(
+    model: ModelKind,
+    requests: Vec<HistoryRequest<'a>>,
+    stop: StopRequest<'_>,
+) -> Vec<History<'a>> {
+    let is_rk4 = requests.iter().all(|request| matches!(request.method, Method::Rk4 { .. }));
+    let batch_len = if is_rk4 { histories_per_batch() } else { 1 };
+    let mut requests = requests.into_iter();
+    let mut histories = Vec::with_capacity(requests.len());
     loop {
-        let some: Vec<Asked<'a>> = asked.by_ref().take(at_once).collect();
-        if some.is_empty() {
-            return found;
+        let batch: Vec<HistoryRequest<'a>> = requests.by_ref().take(batch_len).collect();
+        if batch.is_empty() {
+            return histories;
         }
-        let sampled = sample(model, &some, stop);
-        found.extend(some.into_iter().zip(sampled).map(|(one, states)| of(model, one, states)));
+        let sampled = integrate(model, &batch, stop);
+        for (request, states) in batch.into_iter().zip(sampled) {
+            histories.push(History::new(model, request, states));
+        }
     }
 }
 
-/// How many points [`histories`] takes at once.
-pub fn together() -> usize {
+/// Returns the number of points that [`histories`] integrates at once.
+pub fn histories_per_batch() -> usize {
     Simd::narrow().lanes()
 }
 
-fn sample(model: ModelKind, asked: &[Asked<'_>], stop: Stop<'_>) -> Vec<States> {
+/// Integrates one model, with at most as many requests as there are lanes.
+fn integrate(
+    model: ModelKind,
+    requests: &[HistoryRequest<'_>],
+    stop: StopRequest<'_>,
+) -> Vec<SampledStates> {
     match model {
-        ModelKind::Nonlinear => sample_by::<OfNonlinear>(asked, stop),
-        ModelKind::Linear => sample_by::<OfLinear>(asked, stop),
+        ModelKind::Nonlinear => integrate_family::<NonlinearFamily>(requests, stop),
+        ModelKind::Linear => integrate_family::<LinearFamily>(requests, stop),
     }
 }
 
-/// One in one lane; several, by plain Runge-Kutta, side by side.
-fn sample_by<F: Family>(asked: &[Asked<'_>], stop: Stop<'_>) -> Vec<States> {
+/// Integrates a single request in one lane by any method, several ones side by side by RK4.
+fn integrate_family<F: ModelFamily>(
+    requests: &[HistoryRequest<'_>],
+    stop: StopRequest<'_>,
+) -> Vec<SampledStates> {
     let family = PhantomData::<F>;
-    match asked {
-        [one] => one.method.choose(Sample { asked, stop, stepper: (), family }),
-        _ => Simd::dispatch_narrow(Sample { asked, stop, stepper: ByRk4, family }),
+    match requests {
+        [single] => {
+            single.method.visit_stepper(SampleHistories { requests, stop, stepper: (), family })
+        }
+        _ => {
+            let stepper = Rk4Stepper;
+            Simd::dispatch_narrow(SampleHistories { requests, stop, stepper, family })
+        }
     }
 }
 
-impl<F: Family> ByMethod<F> for Sample<'_, F, ()> {
-    type Output = Vec<States>;
+impl<F: ModelFamily> StepperVisitor<F> for SampleHistories<'_, F, ()> {
+    type Output = Vec<SampledStates>;
 
-    fn by<S: Stepper>(self, stepper: S) -> Vec<States> {
-        let Self { asked, stop, family, .. } = self;
-        Simd::one_lane(Sample { asked, stop, stepper, family })
+    fn visit<S: Stepper>(self, stepper: S) -> Vec<SampledStates> {
+        let Self { requests, stop, family, .. } = self;
+        Simd::one_lane(SampleHistories { requests, stop, stepper, family })
     }
 }
 
-fn of(model: ModelKind, asked: Asked<'_>, sampled: States) -> History<'_> {
-    let Asked { point, times_s, .. } = asked;
-    let States { states, failure } = sampled;
-    History { failure, point, model, times_s, states }
-}
+impl<'a> History<'a> {
+    fn new(model: ModelKind, request: HistoryRequest<'a>, sampled: SampledStates) -> Self {
+        let HistoryRequest { point, times_s, .. } = request;
+        let SampledStates { states, failure } = sampled;
+        Self { failure, point, model, times_s, states }
+    }
 
-impl History<'_> {
-    /// How many instants there are; fewer than asked for if the trajectory failed.
+    /// Returns the number of instants, fewer than requested if the trajectory failed.
     pub fn len(&self) -> usize {
         self.states.len()
     }
 
-    /// Whether there are none. There is always the start.
+    /// Returns whether there are no instants. Every history has its start.
     pub fn is_empty(&self) -> bool {
         self.states.is_empty()
     }
 
-    /// The outputs at instant `k`, if the trajectory got there.
+    /// Computes the outputs at instant `k`; `None` if the trajectory failed before.
     pub fn instant(&self, k: usize) -> Option<Instant> {
         let state = self.states.get(k)?;
         let time_s = self.times_s[k];
         let ([channels, rates, accelerations], gap_m) = match self.model {
-            ModelKind::Nonlinear => observed::<Nonlinear<f64>>(self.point, time_s, state),
-            ModelKind::Linear => observed::<Linear<f64>>(self.point, time_s, state),
+            ModelKind::Nonlinear => outputs::<Nonlinear<f64>>(self.point, time_s, state),
+            ModelKind::Linear => outputs::<Linear<f64>>(self.point, time_s, state),
         };
         let mut deviations: [f64; COORDINATES] = core::array::from_fn(|i| state[i]);
         if self.model == ModelKind::Nonlinear {
@@ -184,58 +203,62 @@ impl History<'_> {
         })
     }
 
-    /// The forces of springs and dampers at instant `k`, if the trajectory got there.
+    /// Computes the forces of the suspension at instant `k`; `None` if the trajectory failed
+    /// before.
     pub fn forces(&self, k: usize) -> Option<Forces> {
         self.states.get(k).map(|state| forces(self.point, self.model, state))
     }
 }
 
-/// Channels with their rates and accelerations, and the gap, of a state.
-fn observed<M: Model<f64>>(
+/// Computes the channels with their rates and accelerations, and the gap, at a state.
+fn outputs<M: LaneModel<f64>>(
     point: &Point,
     time_s: f64,
     state: &[f64; STATES],
 ) -> ([[f64; CHANNELS]; 3], f64) {
     let mut model = M::splat(N(0.0), point, Coupling::Springs);
     model.set_spin(0, &point.stretches[stretch_at(&point.stretches, time_s)]);
-    let (forcing, state) = (model.forcing(N(time_s)), state.map(N));
-    let (radial, channels) =
-        model.observe(&forcing, &state, &model.derivative(&forcing, &state), true);
+    let forcing = model.forcing(N(time_s));
+    let state = state.map(N);
+    let derivative = model.derivative(&forcing, &state);
+    let (radial, channels) = model.observe(&forcing, &state, &derivative, true);
     let gap_m = point.machine.bodies.clearance.0 - squared(&radial).value.0.sqrt();
-    let of = |take: fn(&Sampled<f64>) -> N<f64>| {
-        channels.map_or([f64::NAN; CHANNELS], |channels| channels.map(|sample| take(&sample).0))
-    };
-    ([of(|it| it.value), of(|it| it.slope), of(|it| it.curvature)], gap_m)
+    let channels = channels.unwrap_or([Sample::still(N(f64::NAN), N(f64::NAN)); CHANNELS]);
+    let values = channels.map(|sample| sample.value.0);
+    let rates = channels.map(|sample| sample.slope.0);
+    let accelerations = channels.map(|sample| sample.curvature.0);
+    ([values, rates, accelerations], gap_m)
 }
 
-/// States at the instants, as far as it came.
+/// The states at the instants, up to a failure.
 #[derive(Default)]
-struct States {
+struct SampledStates {
     states: Vec<[f64; STATES]>,
     failure: Option<(Failure, f64)>,
 }
 
-struct Sample<'a, F, S> {
-    /// No more than there are lanes.
-    asked: &'a [Asked<'a>],
-    stop: Stop<'a>,
+/// The kernel that integrates histories.
+struct SampleHistories<'a, F, S> {
+    /// The requests, at most as many as there are lanes.
+    requests: &'a [HistoryRequest<'a>],
+    stop: StopRequest<'a>,
     stepper: S,
     family: PhantomData<F>,
 }
 
-impl<F: Family, S: Stepper> Kernel for Sample<'_, F, S> {
-    type Output = Vec<States>;
+impl<F: ModelFamily, S: Stepper> Kernel for SampleHistories<'_, F, S> {
+    type Output = Vec<SampledStates>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut sampling = Sampling::<T, F::Over<T>>::new(N(zero), self.asked, self.stop);
-        self.stepper.integrate(zero, &mut sampling);
-        sampling.found
+        let mut task = SamplingTask::<T, F::Over<T>>::new(N(zero), self.requests, self.stop);
+        self.stepper.integrate(zero, &mut task);
+        task.sampled
     }
 }
 
-impl<F: Family, S: Stepper> Aside for Sample<'_, F, S> {
-    type Output = Vec<States>;
+impl<F: ModelFamily, S: Stepper> Aside for SampleHistories<'_, F, S> {
+    type Output = Vec<SampledStates>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
@@ -243,39 +266,39 @@ impl<F: Family, S: Stepper> Aside for Sample<'_, F, S> {
     }
 }
 
-/// The task: a trajectory in each lane, its states kept where instants fall.
-struct Sampling<'a, T, M> {
+/// The integration of one trajectory in each lane, which samples the states at its instants.
+struct SamplingTask<'a, T, M> {
     model: M,
     zero: N<T>,
-    asked: &'a [Asked<'a>],
-    stop: Stop<'a>,
-    /// Which leg each lane is on, once it has begun.
-    legs: [Option<usize>; MAX_LANES],
-    found: Vec<States>,
+    requests: &'a [HistoryRequest<'a>],
+    stop: StopRequest<'a>,
+    /// The index of each lane's segment, once the lane has started.
+    segments: [Option<usize>; MAX_LANES],
+    sampled: Vec<SampledStates>,
 }
 
-impl<'a, T: Lane, M: Model<T>> Sampling<'a, T, M> {
+impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
     #[inline(always)]
-    fn new(zero: N<T>, asked: &'a [Asked<'a>], stop: Stop<'a>) -> Self {
-        let Asked { point, method, .. } = &asked[0];
+    fn new(zero: N<T>, requests: &'a [HistoryRequest<'a>], stop: StopRequest<'a>) -> Self {
+        let HistoryRequest { point, method, .. } = &requests[0];
         let mut model = M::splat(zero, point, coupling(method, zero));
-        for (lane, asked) in asked.iter().enumerate().skip(1) {
-            model.set_point(lane, asked.point);
+        for (lane, request) in requests.iter().enumerate().skip(1) {
+            model.set_point(lane, request.point);
         }
-        let begun = |asked: &Asked<'_>| {
-            let mut start = M::at_rest(asked.point);
+        let start_alone = |request: &HistoryRequest<'_>| {
+            let mut start = M::at_rest(request.point);
             for i in 0..COORDINATES {
-                start[i] += asked.start.deviations[i];
-                start[COORDINATES + i] += asked.start.speeds[i];
+                start[i] += request.start.deviations[i];
+                start[COORDINATES + i] += request.start.speeds[i];
             }
-            States { states: vec![start], failure: None }
+            SampledStates { states: vec![start], failure: None }
         };
-        let found = asked.iter().map(begun).collect();
-        Self { model, zero, asked, stop, legs: [None; MAX_LANES], found }
+        let sampled = requests.iter().map(start_alone).collect();
+        Self { model, zero, requests, stop, segments: [None; MAX_LANES], sampled }
     }
 }
 
-impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
+impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
     type System = M;
 
     #[inline(always)]
@@ -290,27 +313,29 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
         ended: SegmentEnd,
         x: &mut [N<T>; STATES],
     ) -> Option<Segment> {
-        let place = lane.min(self.asked.len() - 1);
-        let (Asked { point, method, .. }, found) = (&self.asked[place], &mut self.found[place]);
+        // Lanes without a request rest at the start of the last one.
+        let index = lane.min(self.requests.len() - 1);
+        let HistoryRequest { point, method, .. } = &self.requests[index];
+        let sampled = &mut self.sampled[index];
         let next = match ended {
-            SegmentEnd::Idle if place < lane => point.legs.len(),
+            SegmentEnd::Idle if index < lane => point.segments.len(),
             SegmentEnd::Idle => 0,
-            SegmentEnd::Completed(_) => self.legs[lane].map_or(0, |leg| leg + 1),
+            SegmentEnd::Completed(_) => self.segments[lane].map_or(0, |segment| segment + 1),
             SegmentEnd::Failed { reason, time_s, .. } => {
-                found.failure = Some((reason, time_s));
-                point.legs.len()
+                sampled.failure = Some((reason, time_s));
+                point.segments.len()
             }
         };
-        let leg = point.legs.get(next);
-        if next == 0 || leg.is_none() {
-            // An idle lane rests where the model is defined.
-            for (x, start) in x.iter_mut().zip(found.states[0]) {
+        let segment = point.segments.get(next);
+        if next == 0 || segment.is_none() {
+            // The state of an idle lane is one at which the model is defined.
+            for (x, start) in x.iter_mut().zip(sampled.states[0]) {
                 x.0.set(lane, start);
             }
         }
-        let leg = leg?;
-        self.legs[lane] = Some(next);
-        Some(enter(&mut self.model, lane, *method, point, leg))
+        let segment = segment?;
+        self.segments[lane] = Some(next);
+        Some(start_segment(&mut self.model, lane, *method, point, segment))
     }
 
     #[inline(always)]
@@ -318,14 +343,15 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
 
     #[inline(always)]
     fn observe(&mut self, _: &M::Forcing, step: &Step<'_, T, STATES>) {
-        // A step that left the model's range is meaningless, also inside.
+        // States inside a step that left the range of the model are not meaningful either.
         let in_range = T::bits(self.model.in_range(step.after));
         loop {
             let mut share = self.zero;
             let mut reached = [false; MAX_LANES];
-            for (lane, asked) in self.asked.iter().enumerate() {
-                let (end_s, length_s) = (step.end_s.0.get(lane), step.length_s.0.get(lane));
-                let next = asked.times_s.get(self.found[lane].states.len());
+            for (lane, request) in self.requests.iter().enumerate() {
+                let end_s = step.end_s.0.get(lane);
+                let length_s = step.length_s.0.get(lane);
+                let next = request.times_s.get(self.sampled[lane].states.len());
                 if let Some(time_s) = next
                     && in_range >> lane & 1 == 1
                     && let Some(at) = share_of_step(*time_s, end_s, length_s)
@@ -338,8 +364,8 @@ impl<T: Lane, M: Model<T>> Task<T, STATES> for Sampling<'_, T, M> {
                 return;
             }
             let states = step.at(share);
-            for lane in (0..self.asked.len()).filter(|&lane| reached[lane]) {
-                self.found[lane].states.push(states.map(|x| x.0.get(lane)));
+            for lane in (0..self.requests.len()).filter(|&lane| reached[lane]) {
+                self.sampled[lane].states.push(states.map(|x| x.0.get(lane)));
             }
         }
     }

@@ -1,11 +1,11 @@
-//! Loads of the cabinet, of its feet and of stops, and the speeds of dampers, over lanes.
+//! A recorder of the loads on the cabinet, on its feet and on stops, and of the speeds of dampers.
 //!
-//! The laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers for
-//! their rates; the linear model's are first order in its deviations from equilibrium.
+//! The force laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers
+//! for their rates. The linear model's loads are first order in its deviations from equilibrium.
 
 use super::suspension::{deviating, dual, forces, on_cabinet};
 use crate::coordinates::{STATES, TUB};
-use crate::lanes::{Constant as _, InLanes as _};
+use crate::lanes::{InLanes as _, ToDual as _};
 use crate::machine::feet::{FEET, LOAD, LoadDistribution, turning_force_n};
 use crate::nonlinear::elements::{Elements, TubMotion};
 use crate::nonlinear::frame::{Vec3, dot};
@@ -14,16 +14,16 @@ use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
 
 sweep_parameter::named! {
-    /// A number that can be recorded of a trajectory, within the window.
+    /// A quantity of a trajectory that can be recorded within the window.
     pub enum Gauge {
-        /// Time with a gap below zero (s).
+        /// The time with a gap below zero (s).
         ClashTime = "clash_time",
-        /// The greatest magnitude of the sum of all forces of springs and dampers on the cabinet
-        /// (N); at rest it is the weight.
+        /// The greatest magnitude of the sum of all forces of the suspension on the cabinet (N);
+        /// at rest it is the weight.
         CabinetForce = "cabinet_force",
-        /// The greatest push of each stop (N).
+        /// The greatest force of each stop (N).
         StopForce = "stop_force",
-        /// How long each stop is closed (s).
+        /// The time for which each stop is closed (s).
         StopContact = "stop_contact",
         /// The least vertical load of each foot (N), below zero where it would lift; none if the
         /// machine has no cabinet.
@@ -31,45 +31,53 @@ sweep_parameter::named! {
         /// The least margin against slipping (N): friction on all feet together less the
         /// horizontal force; below zero the cabinet slips. None if the machine has no cabinet.
         SlipMargin = "slip_margin",
-        /// The least margin against walking (N): that against slipping less what turning takes of
-        /// it. None if the machine has no cabinet.
+        /// The least margin against walking (N): the margin against slipping less the part of
+        /// friction that the moment about the vertical takes. None if the machine has no cabinet.
         WalkMargin = "walk_margin",
-        /// The greatest speed of each damper along it (m/s).
+        /// The greatest speed along each damper (m/s).
         DamperSpeed = "damper_speed",
     }
 }
 
-/// Which gauges are read.
+/// The gauges in use, in the order of [`Gauge::ALL`].
 pub(crate) type Gauges = [bool; Gauge::ALL.len()];
 
-/// Least values are found as greatest distances below this (N), farther than any load.
-const FAR_N: f64 = 1_048_576.0;
+/// A reference above all loads (N). The least of several loads is the reference less the greatest
+/// distance below it, because only greatest values are recorded.
+///
+/// Basis: a power of two, so that differences keep most digits of loads. Doubling it loses one
+/// binary digit.
+const REFERENCE_N: f64 = 1_048_576.0;
 
-/// Added under the root of the horizontal force (N^2), which has no rate at 0.
-const LEAST_SQUARED_N2: f64 = 1e-18;
+/// The summand under the root of the horizontal force (N^2), without which the root has no
+/// derivative at zero force.
+///
+/// Basis: the force is off by at most 1 nN. Doubling it changes no digit of any result.
+const ROOT_SUMMAND_N2: f64 = 1e-18;
 
-/// The margin against slipping, after the feet.
+/// The index of the margin against slipping, after the loads of the feet.
 const SLIP: usize = FEET;
-/// The margin against walking, after that.
+/// The index of the margin against walking, after that against slipping.
 const WALK: usize = FEET + 1;
 
-/// First order of something in the tub's deviations from equilibrium.
+/// The first-order expansion of a quantity in the tub's coordinates and speeds about equilibrium.
 #[derive(Clone, Copy)]
-struct FirstOrder<T> {
+struct TubExpansion<T> {
     rest: N<T>,
-    by_place: [N<T>; 4],
+    by_coordinate: [N<T>; 4],
     by_speed: [N<T>; 4],
 }
 
-impl<T: Lane> FirstOrder<T> {
+impl<T: Lane> TubExpansion<T> {
     #[inline(always)]
     fn new(zero: N<T>) -> Self {
-        Self { rest: zero, by_place: [zero; 4], by_speed: [zero; 4] }
+        Self { rest: zero, by_coordinate: [zero; 4], by_speed: [zero; 4] }
     }
 
-    fn set(&mut self, lane: usize, rest: f64, k: usize, by_place: f64, by_speed: f64) {
+    /// Sets the value at rest and the derivatives by coordinate `k` in one lane.
+    fn set(&mut self, lane: usize, rest: f64, k: usize, by_coordinate: f64, by_speed: f64) {
         self.rest.0.set(lane, rest);
-        self.by_place[k].0.set(lane, by_place);
+        self.by_coordinate[k].0.set(lane, by_coordinate);
         self.by_speed[k].0.set(lane, by_speed);
     }
 
@@ -78,178 +86,183 @@ impl<T: Lane> FirstOrder<T> {
         let mut value = self.rest;
         let mut slope = self.rest.lit(0.0);
         for k in 0..4 {
-            value += self.by_place[k] * tub[k].value;
+            value += self.by_coordinate[k] * tub[k].value;
             value += self.by_speed[k] * tub[k].slope;
-            slope += self.by_place[k] * tub[k].slope;
+            slope += self.by_coordinate[k] * tub[k].slope;
             slope += self.by_speed[k] * tub[k].curvature;
         }
         N(Dual { value: value.0, slope: slope.0 })
     }
 }
 
-/// What is recorded of a machine.
+/// The loads of a machine that are recorded.
 #[derive(Clone, Copy)]
-struct Recorded {
-    /// The force on the cabinet.
+struct LoadSelection {
+    /// Whether the force on the cabinet is recorded.
     force: bool,
-    /// Loads of the feet, and margins.
+    /// Whether the loads of the feet and the margins are recorded.
     feet: bool,
+    /// The number of stops that are recorded.
     stops: usize,
+    /// The number of dampers that are recorded.
     dampers: usize,
 }
 
-impl Recorded {
-    /// How many numbers it is taken from: the load on the cabinet, depth and push of each stop, the
-    /// speed of each damper.
-    fn numbers(self) -> usize {
+impl LoadSelection {
+    /// Returns the number of load components: the load on the cabinet, depth and force of each
+    /// stop, and the speed of each damper.
+    fn component_count(self) -> usize {
         LOAD + 2 * self.stops + self.dampers
     }
 
-    /// These numbers by the elements' laws; gives the force on the tub.
+    /// Computes the load components by the elements' force laws. Returns the force on the tub.
     #[inline(always)]
     fn evaluate<T: Lane>(
         self,
         elements: &Elements<T>,
         tub: &TubMotion<T>,
-        numbers: &mut [N<T>],
+        components: &mut [N<T>],
     ) -> Vec3<T> {
-        let nothing = [tub.midpoint[0].lit(0.0); 3];
-        let mut on_tub = (nothing, nothing);
+        let no_force = [tub.midpoint[0].lit(0.0); 3];
+        let mut on_tub = (no_force, no_force);
         if self.force || self.feet {
             on_tub = elements.load_on_tub(tub);
         }
         if self.feet {
-            numbers[..LOAD].copy_from_slice(&on_cabinet(tub, &on_tub));
+            components[..LOAD].copy_from_slice(&on_cabinet(tub, &on_tub));
         }
         for k in 0..self.stops {
-            [numbers[LOAD + 2 * k], numbers[LOAD + 2 * k + 1]] = elements.stop(k, tub);
+            [components[LOAD + 2 * k], components[LOAD + 2 * k + 1]] = elements.stop(k, tub);
         }
         for k in 0..self.dampers {
-            numbers[LOAD + 2 * self.stops + k] = elements.damper_speed(k, tub);
+            components[LOAD + 2 * self.stops + k] = elements.damper_speed(k, tub);
         }
         on_tub.0
     }
 }
 
-/// One of the two models' laws.
-enum Laws<T> {
-    /// Of the machine's elements, over duals for rates.
+/// The load laws of one of the two models.
+enum LoadLaws<T> {
+    /// The machine's elements, over dual numbers for rates.
     Nonlinear(Elements<Dual<T>>),
-    /// Of the force on the cabinet, and of the recorded numbers.
-    Linear { force: [FirstOrder<T>; 3], numbers: Vec<FirstOrder<T>> },
+    /// The expansions of the force on the cabinet and of the load components.
+    Linear { force: [TubExpansion<T>; 3], components: Vec<TubExpansion<T>> },
 }
 
-impl<T: Lane> Laws<T> {
+impl<T: Lane> LoadLaws<T> {
     /// Puts a point into one lane.
-    fn set_point(&mut self, lane: usize, point: &Point, recorded: Recorded) {
-        let (force, numbers) = match self {
+    fn set_point(&mut self, lane: usize, point: &Point, selection: LoadSelection) {
+        let (force, components) = match self {
             Self::Nonlinear(elements) => return elements.set_lane(lane, &point.machine.elements),
-            Self::Linear { force, numbers } => (force, numbers),
+            Self::Linear { force, components } => (force, components),
         };
         let elements = point.machine.elements.with_viscous_friction().constant();
-        let unit = |of: usize| core::array::from_fn(|i| f64::from(u8::from(i == of)));
-        let evaluated = |of: usize| {
-            let mut numbers = vec![dual(0.0, 0.0); recorded.numbers()];
-            recorded.evaluate(&elements, &deviating(point, &unit(of)), &mut numbers);
-            numbers
+        let unit = |state: usize| core::array::from_fn(|i| f64::from(u8::from(i == state)));
+        let components_by = |state: usize| {
+            let mut components = vec![dual(0.0, 0.0); selection.component_count()];
+            selection.evaluate(&elements, &deviating(point, &unit(state)), &mut components);
+            components
         };
         let force_at = |state: &[f64; STATES]| forces(point, ModelKind::Linear, state).cabinet_n;
         for k in 0..4 {
-            let [place, speed] = [TUB[k], COORDINATES + TUB[k]];
-            let by = evaluated(place).into_iter().zip(evaluated(speed));
-            for (number, (N(by_place), N(by_speed))) in numbers.iter_mut().zip(by) {
-                number.set(lane, by_place.value, k, by_place.slope, by_speed.slope);
+            let [coordinate, speed] = [TUB[k], COORDINATES + TUB[k]];
+            let slopes = components_by(coordinate).into_iter().zip(components_by(speed));
+            for (component, (N(by_coordinate), N(by_speed))) in components.iter_mut().zip(slopes) {
+                component.set(lane, by_coordinate.value, k, by_coordinate.slope, by_speed.slope);
             }
-            if recorded.force {
+            if selection.force {
                 let rest = force_at(&[0.0; STATES]);
-                let [by_place, by_speed] = [place, speed].map(|of| force_at(&unit(of)));
+                let [at_unit_coordinate, at_unit_speed] =
+                    [coordinate, speed].map(|state| force_at(&unit(state)));
                 for i in 0..3 {
-                    force[i].set(lane, rest[i], k, by_place[i] - rest[i], by_speed[i] - rest[i]);
+                    let by_coordinate = at_unit_coordinate[i] - rest[i];
+                    let by_speed = at_unit_speed[i] - rest[i];
+                    force[i].set(lane, rest[i], k, by_coordinate, by_speed);
                 }
             }
         }
     }
 }
 
-/// What has been seen of one stop.
-struct SeenStop<T> {
-    push: Peaks<T, 1>,
-    /// Time with a depth above zero.
+/// The records of one stop.
+struct StopRecord<T> {
+    force: Peaks<T, 1>,
+    /// The time with a depth above zero.
     contact: TimeAbove<T>,
 }
 
-/// The loads so far, over lanes.
+/// The recorder of loads, over lanes.
 ///
-/// They have no second derivative here. So the motion between the ends of a long step is
-/// interpolated first, and the loads evaluated at a few places of it.
+/// Loads have no second derivative here. Between the ends of a long step the motion is therefore
+/// interpolated, and the loads are evaluated at the ends of a few parts of the step.
 pub(crate) struct Loads<T> {
-    recorded: Recorded,
-    laws: Laws<T>,
-    /// Those of [`Recorded`] at the present instant.
-    numbers: Vec<N<Dual<T>>>,
+    selection: LoadSelection,
+    laws: LoadLaws<T>,
+    /// The load components at the present instant.
+    components: Vec<N<Dual<T>>>,
     /// The square of the force on the cabinet.
     force_squared: Peaks<T, 1>,
-    /// How far the loads of the feet are below [`FAR_N`], and then the two margins.
+    /// The distances of the feet's loads, and of the two margins, below [`REFERENCE_N`].
     below: Peaks<T, { FEET + 2 }>,
-    spread: Option<LoadDistribution<T>>,
-    stops: Vec<SeenStop<T>>,
-    /// The speed of each damper; none unless asked for.
+    distribution: Option<LoadDistribution<T>>,
+    stops: Vec<StopRecord<T>>,
+    /// The speed of each damper, if dampers are recorded.
     speeds: Vec<Peaks<T, 1>>,
-    /// Coordinates, speeds and accelerations of [`TUB`] where the next step begins.
+    /// The coordinates, speeds and accelerations of [`TUB`] at the start of the next step.
     last: [Sample<T>; 4],
-    /// Parts that a step is cut into.
+    /// The number of parts of a step.
     parts: u32,
 }
 
 impl<T: Lane> Loads<T> {
-    /// Nothing seen yet, with the same point in every lane; `None` if none of it is wanted.
+    /// Creates the recorder with the same point in every lane; `None` if no loads are recorded.
     #[inline(always)]
     pub(crate) fn new(
         zero: N<T>,
-        wanted: Gauges,
+        gauges: Gauges,
         model: ModelKind,
         point: &Point,
         parts: u32,
     ) -> Option<Self> {
-        // Those from the cabinet's force on.
-        let [_, force, of_elements @ ..] = wanted;
-        let with_elements = of_elements != [false; Gauge::ALL.len() - 2];
+        let [_, force, element_gauges @ ..] = gauges;
+        let with_elements = element_gauges != [false; Gauge::ALL.len() - 2];
         if !with_elements && !force {
             return None;
         }
         let elements = &point.machine.elements;
-        let with_dampers = wanted[Gauge::DamperSpeed as usize];
-        let recorded = Recorded {
+        let with_dampers = gauges[Gauge::DamperSpeed as usize];
+        let selection = LoadSelection {
             force,
             feet: with_elements && point.feet.is_some(),
             stops: if with_elements { elements.stops.len() } else { 0 },
             dampers: if with_dampers { elements.dampers.len() } else { 0 },
         };
-        // No closures: they would be compiled without the instruction set.
+        // Closures would be compiled without the instruction set.
         let laws = match model {
-            ModelKind::Nonlinear => Laws::Nonlinear(Elements::splat(zero.constant(), elements)),
+            ModelKind::Nonlinear => LoadLaws::Nonlinear(Elements::splat(zero.constant(), elements)),
             ModelKind::Linear => {
-                let none = FirstOrder::new(zero);
-                Laws::Linear { force: [none; 3], numbers: vec![none; recorded.numbers()] }
+                let none = TubExpansion::new(zero);
+                let components = vec![none; selection.component_count()];
+                LoadLaws::Linear { force: [none; 3], components }
             }
         };
-        let mut stops = Vec::with_capacity(recorded.stops);
-        for _ in 0..recorded.stops {
-            stops.push(SeenStop { push: Peaks::new(zero), contact: TimeAbove::new(zero) });
+        let mut stops = Vec::with_capacity(selection.stops);
+        for _ in 0..selection.stops {
+            stops.push(StopRecord { force: Peaks::new(zero), contact: TimeAbove::new(zero) });
         }
-        let spread = match &point.feet {
-            Some(feet) if recorded.feet => Some(LoadDistribution::splat(zero, &feet.spread)),
+        let distribution = match &point.feet {
+            Some(feet) if selection.feet => Some(LoadDistribution::splat(zero, &feet.spread)),
             _ => None,
         };
         let mut loads = Self {
-            recorded,
+            selection,
             laws,
-            numbers: vec![zero.constant(); recorded.numbers()],
+            components: vec![zero.constant(); selection.component_count()],
             force_squared: Peaks::new(zero),
             below: Peaks::new(zero),
-            spread,
+            distribution,
             stops,
-            speeds: vec![Peaks::new(zero); recorded.dampers],
+            speeds: vec![Peaks::new(zero); selection.dampers],
             last: [Sample::still(zero, zero); 4],
             parts,
         };
@@ -261,32 +274,33 @@ impl<T: Lane> Loads<T> {
 
     /// Begins a point's trajectory in one lane.
     pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
-        self.laws.set_point(lane, point, self.recorded);
+        self.laws.set_point(lane, point, self.selection);
         self.force_squared.reset(lane);
         self.below.reset(lane);
         for stop in &mut self.stops {
-            stop.push.reset(lane);
+            stop.force.reset(lane);
             stop.contact.reset(lane);
         }
         for speed in &mut self.speeds {
             speed.reset(lane);
         }
-        if let (Some(spread), Some(feet)) = (&mut self.spread, &point.feet) {
-            spread.set_lane(lane, &feet.spread);
+        if let (Some(distribution), Some(feet)) = (&mut self.distribution, &point.feet) {
+            distribution.set_lane(lane, &feet.spread);
         }
     }
 
-    /// What a gauge shows of one lane, that of a point: a number of each part, or the only one.
-    pub(crate) fn of(&self, gauge: Gauge, lane: usize, point: &Point) -> Vec<f64> {
+    /// Returns the numbers of a gauge in one lane, which has this point: one for each part, or a
+    /// single one.
+    pub(crate) fn gauge(&self, gauge: Gauge, lane: usize, point: &Point) -> Vec<f64> {
         let greatest = |peaks: &Peaks<T, 1>| peaks.lane(lane)[0];
-        let least = |of: core::ops::Range<usize>| {
-            let below_n = &self.below.lane(lane)[if self.spread.is_some() { of } else { 0..0 }];
-            below_n.iter().map(|below_n| FAR_N - below_n).collect()
+        let least = |indices: core::ops::Range<usize>| {
+            let indices = if self.distribution.is_some() { indices } else { 0..0 };
+            self.below.lane(lane)[indices].iter().map(|below_n| REFERENCE_N - below_n).collect()
         };
         match gauge {
             Gauge::ClashTime => Vec::new(),
             Gauge::CabinetForce => vec![greatest(&self.force_squared).sqrt()],
-            Gauge::StopForce => self.stops.iter().map(|stop| greatest(&stop.push)).collect(),
+            Gauge::StopForce => self.stops.iter().map(|stop| greatest(&stop.force)).collect(),
             Gauge::StopContact => self.stops.iter().map(|stop| stop.contact.lane(lane)).collect(),
             Gauge::FootLoad => least(0..point.feet.as_ref().map_or(0, |feet| feet.count)),
             Gauge::SlipMargin => least(SLIP..WALK),
@@ -295,20 +309,21 @@ impl<T: Lane> Loads<T> {
         }
     }
 
-    /// A state whose derivative is `dx`: at the end of a step, of which end and length (s) are
-    /// given, or where a leg begins. `counts` says in which lanes it counts.
+    /// Records the loads up to a state with derivative `dx`, in the lanes of `inside`. `step` has
+    /// the end and the length of the step (s); it is `None` at the start of a segment.
     #[inline(always)]
-    pub(crate) fn see(
+    pub(crate) fn record(
         &mut self,
         step: Option<(N<T>, N<T>)>,
         x: &[N<T>; STATES],
         dx: &[N<T>; STATES],
-        counts: T::Mask,
+        inside: T::Mask,
     ) {
         let now = tub_samples(x, dx);
         let parts = if step.is_some() { self.parts } else { 1 };
         let share = 1.0 / f64::from(parts);
-        // One loop, for one copy of the laws' code.
+        // The end of the step is in the same loop as the other instants, so that the force laws are
+        // compiled once.
         for part in 1..=parts {
             let mut tub = now;
             let mut step_s = None;
@@ -321,102 +336,111 @@ impl<T: Lane> Loads<T> {
                     }
                 }
             }
-            self.see_instant(step_s, &tub, counts);
+            self.record_instant(step_s, &tub, inside);
         }
         self.last = now;
     }
 
+    /// Evaluates and records the loads at one motion of the tub. `step_s` is the time since the
+    /// last instant; it is `None` at the start of a segment.
     #[inline(always)]
-    fn see_instant(&mut self, step_s: Option<N<T>>, tub: &[Sample<T>; 4], counts: T::Mask) {
-        let Self { recorded, laws, numbers, .. } = self;
+    fn record_instant(&mut self, step_s: Option<N<T>>, tub: &[Sample<T>; 4], inside: T::Mask) {
+        let Self { selection, laws, components, .. } = self;
         let zero = tub[0].value.lit(0.0);
-        let mut squared = Sample::still(zero, zero);
+        let mut force_squared = Sample::still(zero, zero);
         match laws {
-            Laws::Nonlinear(elements) => {
+            LoadLaws::Nonlinear(elements) => {
                 let mut q = [tub[0].value.constant(); 4];
                 let mut u = q;
                 for k in 0..4 {
                     q[k] = N(Dual { value: tub[k].value.0, slope: tub[k].slope.0 });
                     u[k] = N(Dual { value: tub[k].slope.0, slope: tub[k].curvature.0 });
                 }
-                // On the tub and in its axes: as large as on the cabinet.
-                let force = recorded.evaluate(elements, &TubMotion::new(&q, &u), numbers);
-                squared = sample(dot(&force, &force));
+                // The force on the tub in tub axes is as great as that on the cabinet.
+                let force = selection.evaluate(elements, &TubMotion::new(&q, &u), components);
+                force_squared = sample(dot(&force, &force));
             }
-            Laws::Linear { force, numbers: laws } => {
-                for component in force {
-                    let N(force) = component.at(tub);
-                    let (force, rate) = (N(force.value), N(force.slope));
-                    squared.value += force * force;
-                    squared.slope += (2.0 * force).v() * rate;
+            LoadLaws::Linear { force, components: expansions } => {
+                for expansion in force {
+                    let N(dual) = expansion.at(tub);
+                    let force = N(dual.value);
+                    let rate = N(dual.slope);
+                    force_squared.value += force * force;
+                    force_squared.slope += (2.0 * force).v() * rate;
                 }
-                for (number, law) in numbers.iter_mut().zip(laws) {
-                    *number = law.at(tub);
+                for (component, expansion) in components.iter_mut().zip(expansions) {
+                    *component = expansion.at(tub);
                 }
             }
         }
-        if recorded.force {
-            see(&mut self.force_squared, step_s, &[squared], counts);
+        if selection.force {
+            record_peaks(&mut self.force_squared, step_s, &[force_squared], inside);
         }
-        if let Some(spread) = &self.spread {
-            see(&mut self.below, step_s, &below(spread, &self.numbers), counts);
+        if let Some(distribution) = &self.distribution {
+            let below = below_reference(distribution, &self.components);
+            record_peaks(&mut self.below, step_s, &below, inside);
         }
-        let (of_stops, of_dampers) = self.numbers[LOAD..].split_at(2 * self.stops.len());
-        for (stop, of_stop) in self.stops.iter_mut().zip(of_stops.chunks(2)) {
-            let depth = sample(of_stop[0]);
-            see(&mut stop.push, step_s, &[sample(of_stop[1])], counts);
+        let (stops, damper_speeds) = self.components[LOAD..].split_at(2 * self.stops.len());
+        for (record, depth_and_force) in self.stops.iter_mut().zip(stops.chunks(2)) {
+            let depth = sample(depth_and_force[0]);
+            let force = sample(depth_and_force[1]);
+            record_peaks(&mut record.force, step_s, &[force], inside);
             match step_s {
-                Some(step_s) => stop.contact.advance_by_slopes(step_s, &depth, counts),
-                None => stop.contact.begin(&depth),
+                Some(step_s) => record.contact.advance_by_slopes(step_s, &depth, inside),
+                None => record.contact.begin(&depth),
             }
         }
-        for (peaks, speed) in self.speeds.iter_mut().zip(of_dampers) {
-            see(peaks, step_s, &[sample(*speed)], counts);
+        for (peaks, speed) in self.speeds.iter_mut().zip(damper_speeds) {
+            record_peaks(peaks, step_s, &[sample(*speed)], inside);
         }
     }
 }
 
-/// Of each foot how far its load is below [`FAR_N`], then of both margins, by the load on the
-/// cabinet.
+/// Computes the distances below [`REFERENCE_N`] of the load of each foot and of both margins, from
+/// the load on the cabinet.
 #[inline(always)]
-fn below<T: Lane>(spread: &LoadDistribution<T>, load: &[N<Dual<T>>]) -> [Sample<T>; FEET + 2] {
-    let spread = spread.constant();
-    let far = load[0].lit(FAR_N);
-    let mut cabinet = [far; LOAD];
-    cabinet.copy_from_slice(&load[..LOAD]);
-    let load = &cabinet;
-    let mut below = [sample(far); FEET + 2];
-    let mut loads = spread.own;
+fn below_reference<T: Lane>(
+    distribution: &LoadDistribution<T>,
+    components: &[N<Dual<T>>],
+) -> [Sample<T>; FEET + 2] {
+    let distribution = distribution.constant();
+    let reference = components[0].lit(REFERENCE_N);
+    let mut load = [reference; LOAD];
+    load.copy_from_slice(&components[..LOAD]);
+    let mut below = [sample(reference); FEET + 2];
+    let mut foot_loads = distribution.own;
     for k in 0..FEET {
         for i in 0..LOAD {
-            loads[k] += spread.shares[k][i] * load[i];
+            foot_loads[k] += distribution.shares[k][i] * load[i];
         }
-        below[k] = sample(far - loads[k]);
+        below[k] = sample(reference - foot_loads[k]);
     }
-    let squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(LEAST_SQUARED_N2);
-    let margin = spread.friction * (spread.weight - load[1]) - squared.sqrt();
-    below[SLIP] = sample(far - margin);
-    below[WALK] = sample(far - (margin - turning_force_n(&spread.places, &loads, load)));
+    let squared = load[0] * load[0] + load[2] * load[2] + load[0].lit(ROOT_SUMMAND_N2);
+    let slip_margin = distribution.friction * (distribution.weight - load[1]) - squared.sqrt();
+    let walk_margin = slip_margin - turning_force_n(&distribution.places, &foot_loads, &load);
+    below[SLIP] = sample(reference - slip_margin);
+    below[WALK] = sample(reference - walk_margin);
     below
 }
 
-/// Shows numbers to their peaks: after a step of a length (s), or where a leg begins.
+/// Passes samples to their peaks, after a step of a length (s) or at the start of a segment.
 #[inline(always)]
-fn see<T: Lane, const M: usize>(
+fn record_peaks<T: Lane, const M: usize>(
     peaks: &mut Peaks<T, M>,
     step_s: Option<N<T>>,
     samples: &[Sample<T>; M],
-    counts: T::Mask,
+    inside: T::Mask,
 ) {
     match step_s {
-        Some(step_s) => peaks.advance_by_slopes(step_s, samples, counts),
-        None => peaks.begin(samples, counts),
+        Some(step_s) => peaks.advance_by_slopes(step_s, samples, inside),
+        None => peaks.begin(samples, inside),
     }
 }
 
-/// A value with its rate.
+/// Returns a dual number as a sample without curvature.
 #[inline(always)]
 fn sample<T: Lane>(dual: N<Dual<T>>) -> Sample<T> {
-    let (value, slope) = (N(dual.0.value), N(dual.0.slope));
+    let value = N(dual.0.value);
+    let slope = N(dual.0.slope);
     Sample { value, slope, curvature: value.lit(0.0) }
 }

@@ -1,49 +1,37 @@
-//! The methods of integration, in one place: what each takes, what a row says of it, and what it is
-//! compiled from.
+//! The methods of integration: their parameters, their names in rows, and their steppers.
 //!
-//! Each is compiled as a kernel of its own: one function of all of them takes the compiler longer
-//! than all apart.
+//! Each stepper is compiled as a kernel of its own, because the compiler takes longer for one
+//! function with all of them than for all functions together.
 
 use crate::coordinates::STATES;
 use crate::nonlinear::coupling::Coupling;
-use crate::point::PlannedLeg;
-use crate::run::model::{Linear, Model, Nonlinear};
+use crate::point::PlannedSegment;
+use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::{Caps, Formula, ModelKind, Point};
 use lane_ode::{Lane, N, Segment, Task, Tolerance, additive, dop853, dopri5, rk4};
 
-/// How trajectories are integrated.
+/// A method of integration with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
     /// Classical Runge-Kutta of order 4.
-    Rk4 {
-        /// Longest step.
-        step_s: f64,
-    },
+    Rk4 { step_s: f64 },
     /// The model's formula ([`Formula::for_model`]) on the machine whose bearings, and hinge if it
     /// has a cap, have scaled mass, so that none of their modes is faster than a cap (section 4.3
     /// of the model page).
-    Capped {
-        /// The longest step.
-        step_s: f64,
-        /// The caps.
-        caps: Caps,
-    },
-    /// Dormand and Prince's formula of order 8, bearings and hinge as they are. The linear model
-    /// takes RK4 in its place.
-    Dop853 {
-        /// Longest step.
-        step_s: f64,
-    },
-    /// Dormand-Prince 5(4).
+    Capped { step_s: f64, caps: Caps },
+    /// Dormand and Prince's formula of order 8 with fixed steps, without caps. The linear model
+    /// uses RK4 instead.
+    Dop853 { step_s: f64 },
+    /// Dormand and Prince's method of order 5(4), adaptive.
     Dopri5(Tolerance),
-    /// Kennedy and Carpenter's additive method of order 5(4), the springs of bearings and hinge
-    /// implicit: however stiff these are, they do not hold its steps short.
+    /// Kennedy and Carpenter's additive method of order 5(4), adaptive. The springs of bearings and
+    /// hinge are implicit, so that their stiffness does not limit the step.
     Additive(Tolerance),
 }
 
 sweep_parameter::named! {
-    /// The method that a row's numbers come from, with its refinement level if modes are capped.
-    /// The position is its code in unfinished files, so new ones go to the end.
+    /// The method of a row's numbers, with the refinement level if modes are capped. The position
+    /// is the code in unfinished files, so that new methods go to the end.
     #[derive(Default)]
     pub enum Level {
         /// Capped bearing modes, the longest stable steps.
@@ -81,43 +69,43 @@ impl Level {
     }
 }
 
-/// The numbers that a method takes.
+/// The parameters of a method.
 #[derive(Debug)]
 pub enum MethodNumbers<'a> {
-    /// Longest step (s).
+    /// The longest step (s).
     Step(&'a mut f64),
-    /// Longest step (s) and caps.
+    /// The longest step (s) and the caps.
     Capped(&'a mut f64, &'a mut Caps),
-    /// Of steps that an adaptive method chooses.
+    /// The tolerance of an adaptive method.
     Tolerance(&'a mut Tolerance),
 }
 
-/// What is compiled once for each method, over a model.
-pub(crate) trait ByMethod<F: Family>: Sized {
+/// A function that is generic over the stepper, and so is compiled once for each of them.
+pub(crate) trait StepperVisitor<F: ModelFamily>: Sized {
     type Output;
-    fn by<S: Stepper>(self, stepper: S) -> Self::Output;
+    fn visit<S: Stepper>(self, stepper: S) -> Self::Output;
 }
 
 impl Method {
-    /// That of a level, with its numbers still to be put in.
-    pub const fn of(level: Level) -> Self {
-        const CAPS: Caps = Caps { bearings_rad_per_s: 0.0, hinge_rad_per_s: None };
-        const TOLERANCE: Tolerance = Tolerance { relative: 0.0, absolute: 0.0, max_steps: 0 };
+    /// Returns the method of a level with parameters of zero, which the caller sets.
+    pub const fn without_numbers(level: Level) -> Self {
+        let caps = Caps { bearings_rad_per_s: 0.0, hinge_rad_per_s: None };
+        let tolerance = Tolerance { relative: 0.0, absolute: 0.0, max_steps: 0 };
         match level {
             Level::Capped0
             | Level::Capped1
             | Level::Capped2
             | Level::Capped3
             | Level::Capped4
-            | Level::Capped5 => Self::Capped { step_s: 0.0, caps: CAPS },
+            | Level::Capped5 => Self::Capped { step_s: 0.0, caps },
             Level::Rk4 => Self::Rk4 { step_s: 0.0 },
-            Level::Dopri5 => Self::Dopri5(TOLERANCE),
-            Level::Additive => Self::Additive(TOLERANCE),
+            Level::Dopri5 => Self::Dopri5(tolerance),
+            Level::Additive => Self::Additive(tolerance),
             Level::Dop853 => Self::Dop853 { step_s: 0.0 },
         }
     }
 
-    /// What it takes, to be read or put in.
+    /// Returns the parameters, to be read or set.
     pub const fn numbers(&mut self) -> MethodNumbers<'_> {
         match self {
             Self::Rk4 { step_s } | Self::Dop853 { step_s } => MethodNumbers::Step(step_s),
@@ -128,89 +116,103 @@ impl Method {
         }
     }
 
-    /// Whether trajectories side by side in lanes have steps of their own.
+    /// Returns whether each lane has steps of its own, which an adaptive method chooses.
     pub const fn has_own_steps(&self) -> bool {
         matches!(self, Self::Dopri5(_) | Self::Additive(_))
     }
 
-    /// Does something by the integrator of this method.
-    pub(crate) fn choose<F: Family, B: ByMethod<F>>(&self, task: B) -> B::Output {
-        // A match on the formula would compile both of its arms.
+    /// Calls a function with the stepper of this method.
+    pub(crate) fn visit_stepper<F: ModelFamily, V: StepperVisitor<F>>(
+        &self,
+        visitor: V,
+    ) -> V::Output {
+        // A match on the formula would compile both of its arms for each model.
         const { assert!(F::Capped::FORMULA as u8 == Formula::for_model(F::KIND) as u8) };
         match *self {
-            Self::Rk4 { .. } => task.by(ByRk4),
-            Self::Capped { .. } | Self::Dop853 { .. } => task.by(F::Capped::NEW),
-            Self::Dopri5(tolerance) => task.by(ByDopri5(tolerance)),
-            Self::Additive(tolerance) => task.by(ByAdditive(tolerance)),
+            Self::Rk4 { .. } => visitor.visit(Rk4Stepper),
+            Self::Capped { .. } | Self::Dop853 { .. } => visitor.visit(F::Capped::NEW),
+            Self::Dopri5(tolerance) => visitor.visit(Dopri5Stepper(tolerance)),
+            Self::Additive(tolerance) => visitor.visit(AdditiveStepper(tolerance)),
         }
     }
 }
 
-/// First step that an adaptive method tries.
+/// The first step (s) that an adaptive method tries.
+///
+/// Basis: a tenth of the shortest steps in a run, which the controller reaches within two steps.
+/// Doubling it changes less than one step of a run.
 const FIRST_STEP_S: f64 = 1e-5;
 
-/// Starts a leg in a lane with its spin and its step.
-pub(crate) fn enter<T: Lane, M: Model<T>>(
+/// Starts a segment of a point in a lane: sets the spin, and returns the segment with its step.
+pub(crate) fn start_segment<T: Lane, M: LaneModel<T>>(
     model: &mut M,
     lane: usize,
     mut method: Method,
     point: &Point,
-    leg: &PlannedLeg,
+    segment: &PlannedSegment,
 ) -> Segment {
-    model.set_spin(lane, &point.stretches[leg.stretch]);
+    model.set_spin(lane, &point.stretches[segment.stretch]);
     let step_s = match method.numbers() {
         MethodNumbers::Step(step_s) | MethodNumbers::Capped(step_s, _) => *step_s,
         MethodNumbers::Tolerance(_) => FIRST_STEP_S,
     };
-    Segment { start_s: leg.start_s, end_s: leg.end_s, step_s }
+    Segment { start_s: segment.start_s, end_s: segment.end_s, step_s }
 }
 
-/// How bearings and hinge act where a trajectory starts.
+/// Returns the coupling of tub and rotor by a method's caps.
 #[inline(always)]
 pub(crate) fn coupling<T: Lane>(method: &Method, zero: N<T>) -> Coupling<T> {
     let Method::Capped { caps, .. } = method else { return Coupling::Springs };
     Coupling::new(zero, Some(caps))
 }
 
-/// A model before the lanes' type is known, and what integrates it.
-pub(crate) trait Family {
-    type Over<T: Lane>: Model<T>;
-    /// [`Method::Capped`] and [`Method::Dop853`], by the model's formula.
-    type Capped: Fixed;
+/// The nonlinear or the linear model, as a type that is independent of the lanes.
+pub(crate) trait ModelFamily {
+    /// The model over lanes.
+    type Over<T: Lane>: LaneModel<T>;
+    /// The stepper of [`Method::Capped`] and [`Method::Dop853`], by the model's formula.
+    type Capped: FixedStepper;
+    /// The model as a value.
     const KIND: ModelKind;
 }
 
-pub(crate) enum OfNonlinear {}
-pub(crate) enum OfLinear {}
-impl Family for OfNonlinear {
+/// The nonlinear model over any lanes.
+pub(crate) enum NonlinearFamily {}
+/// The linear model over any lanes.
+pub(crate) enum LinearFamily {}
+impl ModelFamily for NonlinearFamily {
     type Over<T: Lane> = Nonlinear<T>;
-    type Capped = ByDop853;
+    type Capped = Dop853Stepper;
     const KIND: ModelKind = ModelKind::Nonlinear;
 }
-impl Family for OfLinear {
+impl ModelFamily for LinearFamily {
     type Over<T: Lane> = Linear<T>;
-    type Capped = ByRk4;
+    type Capped = Rk4Stepper;
     const KIND: ModelKind = ModelKind::Linear;
 }
 
+/// An integrator of a task whose lanes are trajectories.
 pub(crate) trait Stepper {
-    fn integrate<T: Lane, P: Task<T, STATES, System: Model<T>>>(self, zero: T, task: &mut P);
+    /// Integrates all trajectories of a task.
+    fn integrate<T: Lane, P: Task<T, STATES, System: LaneModel<T>>>(self, zero: T, task: &mut P);
 }
 
-/// A stepper of fixed steps.
-pub(crate) trait Fixed: Stepper {
+/// A stepper of fixed steps, which has no parameters of its own.
+pub(crate) trait FixedStepper: Stepper {
+    /// The stepper.
     const NEW: Self;
+    /// The formula of the stepper.
     const FORMULA: Formula;
 }
 
-/// Integrators whose lanes are trajectories.
+/// Declares steppers: the type with its parameters, and the call of its integrator.
 macro_rules! steppers {
-    ($($Stepper:ident $(($by:ty))? = |$self:ident, $zero:ident, $task:ident| $run:expr;)+) => {$(
-        pub(crate) struct $Stepper$((pub(crate) $by))?;
+    ($($Stepper:ident $(($field:ty))? = |$self:ident, $zero:ident, $task:ident| $run:expr;)+) => {$(
+        pub(crate) struct $Stepper$((pub(crate) $field))?;
 
         impl Stepper for $Stepper {
             #[inline(always)]
-            fn integrate<T: Lane, P: Task<T, STATES, System: Model<T>>>(
+            fn integrate<T: Lane, P: Task<T, STATES, System: LaneModel<T>>>(
                 $self,
                 $zero: T,
                 $task: &mut P,
@@ -222,18 +224,18 @@ macro_rules! steppers {
 }
 
 steppers! {
-    ByRk4 = |self, zero, task| rk4::integrate(zero, task);
-    ByDop853 = |self, zero, task| dop853::integrate(zero, task);
-    ByDopri5(Tolerance) = |self, zero, task| dopri5::integrate(zero, task, &self.0);
-    ByAdditive(Tolerance) = |self, zero, task| additive::integrate(zero, task, &self.0);
+    Rk4Stepper = |self, zero, task| rk4::integrate(zero, task);
+    Dop853Stepper = |self, zero, task| dop853::integrate(zero, task);
+    Dopri5Stepper(Tolerance) = |self, zero, task| dopri5::integrate(zero, task, &self.0);
+    AdditiveStepper(Tolerance) = |self, zero, task| additive::integrate(zero, task, &self.0);
 }
 
-impl Fixed for ByRk4 {
+impl FixedStepper for Rk4Stepper {
     const NEW: Self = Self;
     const FORMULA: Formula = Formula::Rk4;
 }
 
-impl Fixed for ByDop853 {
+impl FixedStepper for Dop853Stepper {
     const NEW: Self = Self;
     const FORMULA: Formula = Formula::Dop853;
 }

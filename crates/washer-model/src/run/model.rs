@@ -1,4 +1,4 @@
-//! The two models as systems over lanes, and what they have in common.
+//! The two models as systems of ordinary differential equations over lanes.
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{FIRST_ANGLE, STATES, TUB};
@@ -18,9 +18,10 @@ use crate::{COORDINATES, Caps, Point, nonlinear};
 use core::f64::consts::FRAC_PI_2;
 use lane_ode::{Lane, N, Sample, SemiImplicit, System};
 
-/// One of the two models, over lanes. The springs of bearings and hinge are its stiff part.
-pub(crate) trait Model<T: Lane>: SemiImplicit<T, STATES> {
-    /// The same point in every lane.
+/// The nonlinear or the linear model over lanes. The springs of bearings and hinge are the stiff
+/// part.
+pub(crate) trait LaneModel<T: Lane>: SemiImplicit<T, STATES> {
+    /// Creates the model with the same point in every lane.
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self;
     /// Puts a point into one lane.
     fn set_point(&mut self, lane: usize, point: &Point);
@@ -28,12 +29,12 @@ pub(crate) trait Model<T: Lane>: SemiImplicit<T, STATES> {
     fn set_spin(&mut self, lane: usize, stretch: &SpinStretch);
     /// Puts other caps into one lane.
     fn set_caps(&mut self, lane: usize, caps: &Caps);
-    /// State at rest.
+    /// Returns the state at rest, from which trajectories start.
     fn at_rest(point: &Point) -> [f64; STATES];
     /// Adds the forces with corners at a state to a list, if the model has any.
     fn corner_forces(&self, _x: &[N<T>; STATES], _forces: &mut Vec<CornerForce<T>>) {}
-    /// Position of the drum's front centre relative to the tub axis, and the channels' deviations
-    /// from equilibrium; the latter only `with_channels`. `dx` is the state's derivative.
+    /// Computes the position of the drum's front centre relative to the tub axis, and if
+    /// `with_channels`, the channels' deviations from equilibrium. `dx` is the state's derivative.
     fn observe(
         &self,
         forcing: &Self::Forcing,
@@ -43,35 +44,36 @@ pub(crate) trait Model<T: Lane>: SemiImplicit<T, STATES> {
     ) -> ([Sample<T>; RADIAL], Option<[Sample<T>; CHANNELS]>);
 }
 
-/// Coordinates with two derivatives, from a state and its derivative.
+/// Returns the coordinates with two derivatives, from a state and its derivative.
 #[inline(always)]
 fn motion<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> MovingCoordinates<T> {
     let (q, u) = split(x);
     MovingCoordinates { q, u, a: split(dx).1 }
 }
 
-/// Coordinates of a state.
+/// Splits a state, or its derivative, into the parts of coordinates and of speeds.
 #[inline(always)]
 pub(crate) fn split<T: Copy>(x: &[N<T>; STATES]) -> ([N<T>; COORDINATES], [N<T>; COORDINATES]) {
     (core::array::from_fn(|i| x[i]), core::array::from_fn(|i| x[COORDINATES + i]))
 }
 
-/// The tub's coordinates with two derivatives, likewise.
+/// Returns the tub's coordinates with two derivatives, from a state and its derivative.
 #[inline(always)]
 pub(super) fn tub_samples<T: Copy>(x: &[N<T>; STATES], dx: &[N<T>; STATES]) -> [Sample<T>; 4] {
     TUB.map(|q| Sample { value: x[q], slope: dx[q], curvature: dx[COORDINATES + q] })
 }
 
+/// Joins speeds and accelerations to the derivative of a state.
 #[inline(always)]
 fn joined<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) -> [N<T>; STATES] {
     core::array::from_fn(|i| if i < COORDINATES { u[i] } else { a[i - COORDINATES] })
 }
 
-/// The lanes whose angles are within a quarter turn and whose translations are within
-/// [`MAX_COORDINATE_M`].
+/// Returns the lanes that are in the range of the model: the sum of the squares of all coordinates,
+/// each over its limit of a quarter turn or [`MAX_COORDINATE_M`], is less than 1.
 #[inline(always)]
 fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
-    // One sum of squares, each over its own limit: NaN and infinity fail the comparison too.
+    // A single comparison, which NaN and infinity fail too.
     let mut sum = x[0].lit(0.0);
     for (i, q) in x[..COORDINATES].iter().enumerate() {
         let limit = if i < FIRST_ANGLE { MAX_COORDINATE_M } else { FRAC_PI_2 };
@@ -86,7 +88,7 @@ pub(crate) struct Nonlinear<T> {
     coupling: Coupling<T>,
     machine: Coefficients<T>,
     spin: SpinLanes<T>,
-    /// Channels at the static equilibrium.
+    /// The channels at the static equilibrium.
     rest: [N<T>; CHANNELS],
     sag: Sag<T>,
 }
@@ -128,16 +130,17 @@ impl<T: Lane> SemiImplicit<T, STATES> for Nonlinear<T> {
 }
 
 impl<T: Lane> Nonlinear<T> {
-    /// The motions that forces with corners hang on, depth (m) and speed (m/s) of each.
+    /// Computes the motions on which forces with corners depend: depth (m) and speed (m/s) of each.
     #[inline(always)]
-    pub(crate) fn at_corners(&self, x: &[N<T>; STATES]) -> Vec<[N<T>; 2]> {
+    pub(crate) fn corner_motions(&self, x: &[N<T>; STATES]) -> Vec<[N<T>; 2]> {
         let tub = TubMotion::new(&TUB.map(|i| x[i]), &TUB.map(|i| x[COORDINATES + i]));
-        self.machine.elements.at_corners(&tub)
+        self.machine.elements.corner_motions(&tub)
     }
 
-    /// What a unit of generalised force on each of the tub's coordinates adds to the accelerations.
+    /// Computes the accelerations due to a unit of generalised force on each of the tub's
+    /// coordinates.
     #[inline(always)]
-    pub(crate) fn by_load(
+    pub(crate) fn accelerations_per_load(
         &self,
         spin: &SpinState<T>,
         x: &[N<T>; STATES],
@@ -147,7 +150,7 @@ impl<T: Lane> Nonlinear<T> {
     }
 }
 
-impl<T: Lane> Model<T> for Nonlinear<T> {
+impl<T: Lane> LaneModel<T> for Nonlinear<T> {
     #[inline(always)]
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
         Self {
@@ -174,13 +177,13 @@ impl<T: Lane> Model<T> for Nonlinear<T> {
     }
 
     fn at_rest(point: &Point) -> [f64; STATES] {
-        let nudged = |i: usize| point.equilibrium[i] + point.nudge;
-        core::array::from_fn(|i| if i < COORDINATES { nudged(i) } else { 0.0 })
+        let perturbed = |i: usize| point.equilibrium[i] + point.perturbation;
+        core::array::from_fn(|i| if i < COORDINATES { perturbed(i) } else { 0.0 })
     }
 
     #[inline(always)]
     fn corner_forces(&self, x: &[N<T>; STATES], forces: &mut Vec<CornerForce<T>>) {
-        self.machine.elements.corner_forces(&self.at_corners(x), forces);
+        self.machine.elements.corner_forces(&self.corner_motions(x), forces);
     }
 
     #[inline(always)]
@@ -212,7 +215,7 @@ pub(crate) struct Linear<T> {
     flexure_stiffness: N<T>,
     constants: StepConstants<T>,
     terms: Terms<T>,
-    /// Of the hinge: q9, q10.
+    /// The hinge's coordinates q9 and q10 at equilibrium (rad).
     sag: [N<T>; 2],
     outputs: LinearOutputs<T>,
     spin: SpinLanes<T>,
@@ -284,7 +287,7 @@ fn step_constants(point: &Point) -> StepConstants<f64> {
     StepConstants::new(&point.machine.bodies, &point.linear.constants)
 }
 
-impl<T: Lane> Model<T> for Linear<T> {
+impl<T: Lane> LaneModel<T> for Linear<T> {
     #[inline(always)]
     fn splat(zero: N<T>, point: &Point, coupling: Coupling<T>) -> Self {
         Self {

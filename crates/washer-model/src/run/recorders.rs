@@ -1,66 +1,68 @@
-//! What may be recorded on request, and what such records hold.
+//! The optional recorders of a trajectory, and their readings.
 
-use super::Course;
+use super::Checkpoints;
 use super::loads::{Gauge, Gauges};
 use crate::Snapshot;
 use crate::channel::CHANNELS;
 
-/// Records to make beyond a [`Record`](super::Record); none by default.
+/// The recorders in use besides that of [`Record`](super::Record); none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Recorders {
-    /// Root mean squares of the channels.
+    /// Whether root mean squares of the channels are computed.
     pub root_mean_squares: bool,
-    /// Largest deviations of the channels in every turn of the drum.
+    /// Whether the largest deviations in every turn of the drum are recorded.
     pub turns: bool,
-    /// Which [`Gauge`](super::Gauge)s are read.
+    /// The [`Gauge`](super::Gauge)s in use.
     pub gauges: Gauges,
-    /// The coordinates at the ends of legs ([`Timing::checkpoints`](crate::Timing)).
-    pub course: bool,
-    /// All outputs at the point's own instants ([`Point::seen_at`](crate::Point::seen_at)), within
-    /// the window.
+    /// Whether the coordinates at the ends of segments are recorded
+    /// ([`Timing::checkpoints`](crate::Timing)).
+    pub checkpoints: bool,
+    /// Whether all outputs are recorded at instants of the point within the window
+    /// ([`Point::with_snapshots_at`](crate::Point::with_snapshots_at)).
     pub snapshots: bool,
 }
 
-/// The records that [`Recorders`] asks for, of one trajectory, within the window.
+/// The readings of [`Recorders`] for one trajectory, within the window.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reading {
-    /// Root mean square of each channel's deviation from equilibrium, in the order of
-    /// `Channel::ALL` (m, rad).
+    /// The root mean square of each channel's deviation from equilibrium (m, rad), in the order of
+    /// `Channel::ALL`.
     pub root_mean_squares: Option<[f64; CHANNELS]>,
-    /// Per turn of the drum, each channel's largest deviation from equilibrium (m, rad). Turns are
-    /// counted from the start of the run by the angle that the drum travels; parts of turns at the
-    /// window's ends belong to the whole turn beside them, and a window without whole turns counts
-    /// as one. Empty unless asked for.
+    /// The largest deviation of each channel from equilibrium (m, rad) in each turn of the drum.
+    /// Turns are counted from the start of the run by the angle of the drum. A part of a turn at an
+    /// end of the window belongs to the whole turn beside it, and a window without whole turns is
+    /// one turn. Empty without this recorder.
     pub turns: Vec<[f64; CHANNELS]>,
-    /// By [`Gauge`]: of each part in the machine's order, or the only one; empty unless asked for.
+    /// The numbers of each [`Gauge`]: one for each part in the machine's order, or a single one.
+    /// Empty for gauges that are not in use.
     pub gauges: [Vec<f64>; Gauge::ALL.len()],
-    /// Coordinates at the ends of legs, as far as the trajectory came; also of one that failed.
-    /// Empty unless asked for.
-    pub course: Course,
-    /// All outputs at the point's own instants. Empty unless asked for.
+    /// The coordinates at the ends of segments up to the end or the failure of the trajectory.
+    /// Empty without this recorder.
+    pub checkpoints: Checkpoints,
+    /// The outputs at the point's instants. Empty without this recorder.
     pub snapshots: Vec<Snapshot>,
 }
 
 impl Reading {
-    /// What a gauge showed, if it was asked for.
+    /// Returns the numbers of a gauge; none if it was not in use.
     pub fn gauge(&self, gauge: Gauge) -> &[f64] {
         &self.gauges[gauge as usize]
     }
 }
 
 impl Recorders {
-    /// Whether it asks for a gauge.
-    pub(crate) const fn reads(&self, gauge: Gauge) -> bool {
+    /// Returns whether a gauge is in use.
+    pub(crate) const fn has_gauge(&self, gauge: Gauge) -> bool {
         self.gauges[gauge as usize]
     }
 
-    /// Nothing but a gauge.
+    /// Creates recorders of which only a gauge is in use.
     pub fn gauge(gauge: Gauge) -> Self {
-        Self { gauges: Gauge::ALL.map(|one| one == gauge), ..Self::default() }
+        Self { gauges: Gauge::ALL.map(|other| other == gauge), ..Self::default() }
     }
 
-    /// Whether any record needs more than the ends of legs.
-    pub(crate) fn anything(self) -> bool {
-        Self { course: false, ..self } != Self::default()
+    /// Returns whether any recorder needs the states between the ends of segments.
+    pub(crate) fn need_all_states(self) -> bool {
+        Self { checkpoints: false, ..self } != Self::default()
     }
 }

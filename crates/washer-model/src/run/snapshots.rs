@@ -1,5 +1,4 @@
-//! Outputs at given instants, of many trajectories side by side: what measurements are compared
-//! with.
+//! A recorder of the outputs at given instants, which fits compare with measurements.
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{STATES, TUB};
@@ -9,49 +8,53 @@ use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Lane, MAX_LANES, N, Sample};
 use std::sync::Arc;
 
-/// An instant this share of a step past its end is its end.
-const SLACK: f64 = 1e-9;
+/// The tolerance of an instant at the end of a step, as a share of the step: an instant so little
+/// beyond the end is at the end. Basis: rounding of times is far below. Doubling it changes
+/// nothing.
+const END_TOLERANCE: f64 = 1e-9;
 
-/// Which share of a lane's step an instant (s) is at, if the step leads so far.
+/// Returns the position of an instant (s) in a lane's step, as a share of the step; `None` if the
+/// instant is beyond the end of the step.
 pub(super) fn share_of_step(time_s: f64, end_s: f64, length_s: f64) -> Option<f64> {
-    // An idle lane's step has no length, nor does its time go on.
-    let is_reached = length_s != 0.0 && time_s <= end_s + SLACK * length_s;
+    // The step of an idle lane has no length.
+    let is_reached = length_s != 0.0 && time_s <= end_s + END_TOLERANCE * length_s;
     is_reached.then(|| (1.0 - (end_s - time_s) / length_s).clamp(0.0, 1.0))
 }
 
-/// What a trajectory shows at one instant.
+/// The outputs of a trajectory at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Snapshot {
-    /// Of each channel, in the order of `Channel::ALL`: the deviation from equilibrium (m, rad),
-    /// its rate (m/s, rad/s) and its acceleration (m/s^2, rad/s^2).
+    /// The deviation of each channel from equilibrium (m, rad), its rate (m/s, rad/s) and its
+    /// acceleration (m/s^2, rad/s^2), in the order of `Channel::ALL`.
     pub channels: [[f64; 3]; CHANNELS],
-    /// Place (m, rad) and speed of the tub's coordinates.
+    /// The tub's coordinates (m, rad), each with its speed.
     tub: [[f64; 2]; 4],
 }
 
 impl Snapshot {
-    /// Sum of all forces on the cabinet along c1, c2 and c3 (N), of the model that was integrated.
+    /// Computes the sum of all forces on the cabinet along c1, c2 and c3 (N). `point` and `model`
+    /// are those of the trajectory.
     pub fn cabinet_force_n(&self, point: &Point, model: ModelKind) -> [f64; 3] {
         let mut state = [0.0; STATES];
-        for (q, [place, speed]) in TUB.into_iter().zip(self.tub) {
-            state[q] = place;
+        for (q, [position, speed]) in TUB.into_iter().zip(self.tub) {
+            state[q] = position;
             state[COORDINATES + q] = speed;
         }
         forces(point, model, &state).cabinet_n
     }
 }
 
-/// One lane's instants, and what was seen at those that have passed.
+/// The instants of one lane, and the snapshots up to the present.
 #[derive(Default)]
-struct Album {
+struct LaneSnapshots {
     instants_s: Arc<[f64]>,
-    seen: Vec<Snapshot>,
+    taken: Vec<Snapshot>,
 }
 
-/// The recorder, over lanes. Inside a step an output is the polynomial of degree 5 that meets its
-/// values, rates and accelerations at both ends.
+/// The recorder of snapshots over lanes. Inside a step an output is the polynomial of degree 5 that
+/// has the output's values, rates and accelerations at both ends.
 pub(super) struct Snapshots<T> {
-    albums: [Album; MAX_LANES],
+    lanes: [LaneSnapshots; MAX_LANES],
     channels: [Sample<T>; CHANNELS],
     tub: [Sample<T>; 4],
 }
@@ -60,24 +63,26 @@ impl<T: Lane> Snapshots<T> {
     #[inline(always)]
     pub(super) fn new(zero: N<T>) -> Self {
         let still = Sample::still(zero, zero);
-        Self { albums: Default::default(), channels: [still; CHANNELS], tub: [still; 4] }
+        Self { lanes: Default::default(), channels: [still; CHANNELS], tub: [still; 4] }
     }
 
     /// Begins a point's trajectory in one lane.
     pub(super) fn set_point(&mut self, lane: usize, point: &Point) {
         let instants_s = Arc::clone(&point.instants_s);
-        self.albums[lane] = Album { seen: Vec::with_capacity(instants_s.len()), instants_s };
+        let taken = Vec::with_capacity(instants_s.len());
+        self.lanes[lane] = LaneSnapshots { instants_s, taken };
     }
 
-    /// What was seen in one lane.
+    /// Takes the snapshots of one lane.
     pub(super) fn finish(&mut self, lane: usize) -> Vec<Snapshot> {
-        std::mem::take(&mut self.albums[lane].seen)
+        std::mem::take(&mut self.lanes[lane].taken)
     }
 
-    /// A state whose derivative is `dx`, with its channels: at the end of a step, of which end and
-    /// length (s) are given, or where a leg begins.
+    /// Takes the snapshots within a step that ends at a state with derivative `dx` and with
+    /// channels. `step` has the end and the length of the step (s); it is `None` at the start of a
+    /// segment.
     #[inline(always)]
-    pub(super) fn see(
+    pub(super) fn record(
         &mut self,
         step: Option<(N<T>, N<T>)>,
         (x, dx): (&[N<T>; STATES], &[N<T>; STATES]),
@@ -86,21 +91,24 @@ impl<T: Lane> Snapshots<T> {
         let tub = tub_samples(x, dx);
         if let Some((end_s, length_s)) = step {
             for lane in 0..T::LANES {
-                let (end_s, length_s) = (end_s.0.get(lane), length_s.0.get(lane));
-                let album = &mut self.albums[lane];
-                while let Some(&time_s) = album.instants_s.get(album.seen.len())
+                let end_s = end_s.0.get(lane);
+                let length_s = length_s.0.get(lane);
+                let LaneSnapshots { instants_s, taken } = &mut self.lanes[lane];
+                while let Some(&time_s) = instants_s.get(taken.len())
                     && let Some(share) = share_of_step(time_s, end_s, length_s)
                 {
-                    let mut seen = Snapshot { channels: [[0.0; 3]; CHANNELS], tub: [[0.0; 2]; 4] };
+                    let mut snapshot =
+                        Snapshot { channels: [[0.0; 3]; CHANNELS], tub: [[0.0; 2]; 4] };
                     for i in 0..CHANNELS {
-                        let at = between(&self.channels[i], &channels[i], lane, length_s, share);
-                        seen.channels[i] = [at.value.0, at.slope.0, at.curvature.0];
+                        let at =
+                            interpolate(&self.channels[i], &channels[i], lane, length_s, share);
+                        snapshot.channels[i] = [at.value.0, at.slope.0, at.curvature.0];
                     }
                     for i in 0..4 {
-                        let at = between(&self.tub[i], &tub[i], lane, length_s, share);
-                        seen.tub[i] = [at.value.0, at.slope.0];
+                        let at = interpolate(&self.tub[i], &tub[i], lane, length_s, share);
+                        snapshot.tub[i] = [at.value.0, at.slope.0];
                     }
-                    album.seen.push(seen);
+                    taken.push(snapshot);
                 }
             }
         }
@@ -109,21 +117,21 @@ impl<T: Lane> Snapshots<T> {
     }
 }
 
-/// One lane of an output, a `share` of a step from one sample to the next.
+/// Interpolates one lane of an output at a share of the step between two samples.
 #[inline(always)]
-fn between<T: Lane>(
+fn interpolate<T: Lane>(
     start: &Sample<T>,
     end: &Sample<T>,
     lane: usize,
     length_s: f64,
     share: f64,
 ) -> Sample<f64> {
-    let of = |sample: &Sample<T>| Sample {
+    let in_lane = |sample: &Sample<T>| Sample {
         value: N(sample.value.0.get(lane)),
         slope: N(sample.slope.0.get(lane)),
         curvature: N(sample.curvature.0.get(lane)),
     };
-    Sample::between(&of(start), &of(end), N(length_s), share)
+    Sample::between(&in_lane(start), &in_lane(end), N(length_s), share)
 }
 
 #[cfg(test)]
@@ -136,7 +144,7 @@ mod tests {
     use lane_ode::Simd;
 
     #[test]
-    fn snapshots_are_those_of_a_history_in_any_company() {
+    fn snapshots_agree_with_a_history_and_do_not_depend_on_other_lanes() {
         let timing = Timing { end_s: 3.0, window_s: [0.0, 3.0], checkpoints: 0 };
         let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 300.0, ramp_s: 1.3 };
         let machines: Vec<(Machine, Spin)> = [0.2, 0.4, 0.6]
@@ -150,38 +158,38 @@ mod tests {
         let instants: Arc<[f64]> = (0..=218).map(|k| f64::from(k) * every_s).collect();
         let points: Vec<Point> = prepare(Simd::best(), &machines, &timing)
             .into_iter()
-            .map(|point| point.unwrap().seen_at(Arc::clone(&instants)))
+            .map(|point| point.unwrap().with_snapshots_at(Arc::clone(&instants)))
             .collect();
-        let wanted = Recorders { snapshots: true, ..Recorders::default() };
+        let recorders = Recorders { snapshots: true, ..Recorders::default() };
         let method = Method::Rk4 { step_s: 2e-4 };
         for model in ModelKind::ALL {
             let all: Vec<&Point> = points.iter().collect();
-            let (_, together) = simulate_with(Simd::best(), model, &method, &all, wanted);
-            let (_, alone) = simulate_with(Simd::Scalar, model, &method, &all[1..2], wanted);
+            let (_, together) = simulate_with(Simd::best(), model, &method, &all, recorders);
+            let (_, alone) = simulate_with(Simd::Scalar, model, &method, &all[1..2], recorders);
             assert_eq!(together[1].snapshots, alone[0].snapshots);
-            let known = history(model, &method, all[1], &Start::default(), every_s);
+            let history = history(model, &method, all[1], &Start::default(), every_s);
             let mut largest = [0.0_f64; 3];
-            let mut apart = [0.0_f64; 3];
+            let mut difference = [0.0_f64; 3];
             let yaw = Channel::TubYaw.index();
-            for (k, seen) in alone[0].snapshots.iter().enumerate() {
-                let expected = known.instant(k).unwrap();
-                let pair = [
-                    (seen.channels[yaw][0], expected.channels[yaw]),
-                    (seen.channels[yaw][1], expected.rates[yaw]),
-                    (seen.channels[yaw][2], expected.accelerations[yaw]),
+            for (k, snapshot) in alone[0].snapshots.iter().enumerate() {
+                let expected = history.instant(k).unwrap();
+                let pairs = [
+                    (snapshot.channels[yaw][0], expected.channels[yaw]),
+                    (snapshot.channels[yaw][1], expected.rates[yaw]),
+                    (snapshot.channels[yaw][2], expected.accelerations[yaw]),
                 ];
-                for (i, (ours, theirs)) in pair.into_iter().enumerate() {
-                    largest[i] = largest[i].max(theirs.abs());
-                    apart[i] = apart[i].max((ours - theirs).abs());
+                for (i, (value, expected)) in pairs.into_iter().enumerate() {
+                    largest[i] = largest[i].max(expected.abs());
+                    difference[i] = difference[i].max((value - expected).abs());
                 }
-                let force = seen.cabinet_force_n(all[1], model);
-                let theirs = known.forces(k).unwrap().cabinet_n;
-                let apart_n = (0..3).map(|i| (force[i] - theirs[i]).abs()).fold(0.0, f64::max);
-                assert!(apart_n < 1e-4, "{apart_n} N at {k}");
+                let force = snapshot.cabinet_force_n(all[1], model);
+                let expected = history.forces(k).unwrap().cabinet_n;
+                let error_n = (0..3).map(|i| (force[i] - expected[i]).abs()).fold(0.0, f64::max);
+                assert!(error_n < 1e-4, "{error_n} N at {k}");
             }
             assert_eq!(alone[0].snapshots.len(), instants.len());
-            let shares = [0, 1, 2].map(|i| apart[i] / largest[i]);
-            assert!(shares[0] < 1e-9 && shares[1] < 1e-6 && shares[2] < 1e-4, "{shares:?}");
+            let errors = [0, 1, 2].map(|i| difference[i] / largest[i]);
+            assert!(errors[0] < 1e-9 && errors[1] < 1e-6 && errors[2] < 1e-4, "{errors:?}");
         }
     }
 }

@@ -5,11 +5,11 @@
 //! are first order in its deviations, by automatic differentiation at the equilibrium.
 
 use crate::coordinates::{STATES, TUB, TUB_Y, TUB_Z};
-use crate::lanes::Constant as _;
+use crate::lanes::ToDual as _;
 use crate::machine::feet::LOAD;
 use crate::nonlinear::elements::{CabinetLine, Ends, ForceLaw, PointMotion, TubMotion};
 use crate::nonlinear::frame::{Tilt, Vec3, dot};
-use crate::run::model::{Model, Nonlinear};
+use crate::run::model::{LaneModel, Nonlinear};
 use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Dual, Lane, N, Real};
 use std::borrow::Cow;
@@ -162,7 +162,7 @@ pub(crate) fn load_on_cabinet(
 
 /// Computes the force of each stop (N) at equilibrium.
 pub fn stops_at_rest_n(point: &Point) -> Vec<f64> {
-    forces(point, ModelKind::Nonlinear, &<Nonlinear<f64> as Model<f64>>::at_rest(point)).stops_n
+    forces(point, ModelKind::Nonlinear, &<Nonlinear<f64> as LaneModel<f64>>::at_rest(point)).stops_n
 }
 
 /// Computes the speed along each damper (m/s) in the linear model, at deviations from equilibrium.

@@ -67,11 +67,11 @@ impl<T: Lane> Aside for Corners<'_, T> {
         for i in 0..STATES {
             state[i] = x[i].constant();
         }
-        let mut corners = vec![Corner::none(zero); model.at_corners(&state).len()];
+        let mut corners = vec![Corner::none(zero); model.corner_motions(&state).len()];
         for by in 0..BENDS.len() {
             state[BENDS[by]].0.slope = zero.lit(1.0).0;
-            let motions = model.at_corners(&state);
-            let by_load = model.by_load(spin, &state);
+            let motions = model.corner_motions(&state);
+            let by_load = model.accelerations_per_load(spin, &state);
             if by < TUB.len() {
                 for m in 0..corners.len() {
                     corners[m].by_place[by] = N(motions[m][1].0.slope);
@@ -85,7 +85,7 @@ impl<T: Lane> Aside for Corners<'_, T> {
                     unit[COORDINATES + of] = zero.constant();
                 }
                 unit[COORDINATES + TUB[k]] = zero.lit(1.0).constant();
-                let speeds = model.at_corners(&unit);
+                let speeds = model.corner_motions(&unit);
                 for m in 0..corners.len() {
                     let (corner, speed) = (&mut corners[m], speeds[m][1]);
                     corner.by_speed[k] = N(speed.0.value);

@@ -8,7 +8,7 @@ use crate::coordinates::{COORDINATES, STATES, mirrored};
 use crate::machine::spin::{SpinStretch, stretch_at};
 use crate::nonlinear::coupling::Coupling;
 use crate::point::Point;
-use crate::run::model::{Model, Nonlinear};
+use crate::run::model::{LaneModel, Nonlinear};
 use core::f64::consts::TAU;
 use faer::linalg::solvers::Solve as _;
 use faer::{Mat, Side};
@@ -57,7 +57,7 @@ pub fn cross(
     step_s: f64,
     crossings: &[Crossing<'_>],
 ) -> Vec<Result<Crossed, LeftRange>> {
-    let start = <Nonlinear<f64> as Model<f64>>::at_rest(point);
+    let start = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
     let (mut time_s, mut state) = (0.0, start);
     let mut failure = None;
     let mut crossed = Vec::with_capacity(crossings.len());
@@ -105,7 +105,7 @@ pub fn peaks_without_departures(
     crossings: &[Crossing<'_>],
     window_s: [f64; 2],
 ) -> Result<[f64; CHANNELS], LeftRange> {
-    let mut state = <Nonlinear<f64> as Model<f64>>::at_rest(point);
+    let mut state = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
     let mut time_s = 0.0;
     let mut peaks = [0.0_f64; CHANNELS];
     let mut follow = |to_s: f64, state: &mut [f64; STATES]| {
@@ -215,7 +215,7 @@ impl Aside for Run<'_> {
     #[inline(always)]
     fn run(self) -> Followed {
         let zero = N(0.0);
-        let mut model: Nonlinear<f64> = Model::splat(zero, self.point, Coupling::Springs);
+        let mut model: Nonlinear<f64> = LaneModel::splat(zero, self.point, Coupling::Springs);
         let mut x = [zero; STATES];
         for i in 0..STATES {
             x[i] = N(self.start[i]);
@@ -264,7 +264,7 @@ impl Kernel for Tangent<'_> {
         let zero = N(zero).constant();
         let legs = legs(self.point, self.step_s, self.crossing.from_to_s);
         let mut model: Nonlinear<lane_ode::Dual<T>> =
-            Model::splat(zero, self.point, Coupling::Springs);
+            LaneModel::splat(zero, self.point, Coupling::Springs);
         let mut columns = Vec::with_capacity(STATES);
         while columns.len() < STATES {
             let first = columns.len();

@@ -15,9 +15,9 @@ use crate::nonlinear::elements::corners::CornerForce;
 use crate::nonlinear::outputs::squared;
 use crate::point::Point;
 use crate::ready::{MAX_RUNS, Search, own};
-use crate::run::everywhere;
-use crate::run::extras::{Extras, Seen as Recorded};
-use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::active_recorders::{ActiveRecorders, ObservedState};
+use crate::run::all_lanes;
+use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::run::suspension::damper_speeds_m_per_s;
 use core::array::from_fn;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
@@ -187,7 +187,7 @@ pub(super) fn caps(steps: usize, turn_s: f64) -> Caps {
 
 /// A model with each row in its lane, and the last in those that are left over.
 #[inline(always)]
-pub(crate) fn model<T: Lane, M: Model<T>>(zero: N<T>, rows: &[Row<'_>]) -> M {
+pub(crate) fn model<T: Lane, M: LaneModel<T>>(zero: N<T>, rows: &[Row<'_>]) -> M {
     let coupling = Coupling::new(zero, rows[0].caps.as_ref());
     let mut model = M::splat(zero, rows[0].point, coupling);
     for lane in 0..T::LANES {
@@ -299,8 +299,9 @@ pub(super) fn linear_responses(
     let searched = |(k, row): (usize, &Row<'_>)| Some((k, Search::from_least(row.point)?));
     let mut open: Vec<(usize, Search)> = rows.iter().enumerate().filter_map(searched).collect();
     for _ in 0..MAX_RUNS {
-        let at_speeds =
-            |(k, search): &(usize, Search)| rows[*k].point.at_own_speeds(&search.speeds_m_per_s());
+        let at_speeds = |(k, search): &(usize, Search)| {
+            rows[*k].point.with_own_friction_speeds(&search.speeds_m_per_s())
+        };
         let points: Vec<Point> = open.iter().map(at_speeds).collect();
         let asked = open.iter().zip(&points).map(|((k, _), point)| Row { point, ..rows[*k] });
         let responses = together(&asked.collect::<Vec<_>>(), is_stopped);
@@ -410,10 +411,10 @@ pub(crate) struct Watched<'m, T, M> {
     /// The last state seen, and its slope.
     before: [[N<T>; STATES]; 2],
     /// Further records.
-    pub(crate) extras: Option<Extras<T>>,
+    pub(crate) extras: Option<ActiveRecorders<T>>,
 }
 
-impl<'m, T: Lane, M: Model<T>> Watched<'m, T, M> {
+impl<'m, T: Lane, M: LaneModel<T>> Watched<'m, T, M> {
     #[inline(always)]
     pub(crate) fn new(zero: N<T>, model: &'m M, clock: &'m Clock<T>) -> Self {
         Self {
@@ -439,7 +440,7 @@ struct Cornered<'a, T, M> {
     forces: &'a mut Vec<CornerForce<T>>,
 }
 
-impl<T: Lane, M: Model<T>> Aside for Cornered<'_, T, M> {
+impl<T: Lane, M: LaneModel<T>> Aside for Cornered<'_, T, M> {
     type Output = ();
 
     #[inline(always)]
@@ -448,7 +449,7 @@ impl<T: Lane, M: Model<T>> Aside for Cornered<'_, T, M> {
     }
 }
 
-impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
+impl<'m, T: Lane, M: LaneModel<T>> Watch<T, M> for Watched<'m, T, M> {
     #[inline(always)]
     fn see(&mut self, k: usize, forcing: &M::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]) {
         if self.with_states && k.is_multiple_of(self.clock.steps / self.instants) {
@@ -466,7 +467,7 @@ impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
             x[0].0.aside(Cornered { model: self.model, x, forces: &mut self.forces });
             self.before = [*x, *dx];
         }
-        let everywhere = everywhere(x[0]);
+        let everywhere = all_lanes(x[0]);
         if let (radial, Some(channels)) = self.model.observe(forcing, x, dx, true) {
             if k == 0 {
                 self.peaks.begin(&channels, everywhere);
@@ -480,7 +481,15 @@ impl<'m, T: Lane, M: Model<T>> Watch<T, M> for Watched<'m, T, M> {
                 } else {
                     Some((self.clock.time_s(k as f64), self.clock.step_s))
                 };
-                x[0].0.aside(Recorded { extras, step, x, dx, radial, channels, inside });
+                x[0].0.aside(ObservedState {
+                    recorders: extras,
+                    step,
+                    x,
+                    dx,
+                    radial,
+                    channels,
+                    inside,
+                });
             }
             let (most, here) = (self.radial_squared.0, squared(&radial).value.0);
             self.radial_squared = N(T::select(most.less(here), here, most));

@@ -11,7 +11,7 @@ use super::{Beyond, Dwell, Kind, NoAnswer, Response, rounded};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::modes::modes;
 use crate::point::Point;
-use crate::run::model::{Model, Nonlinear};
+use crate::run::model::{LaneModel, Nonlinear};
 use crate::run::suspension::attachments;
 use crate::steps::SUSPENSION_MODES;
 use core::f64::consts::TAU;
@@ -460,7 +460,7 @@ fn are_moved(
 
 /// The linear model's response, where there is one; else the machine at rest.
 fn from_linear(point: &Point, linear: &LinearResponse) -> Guess {
-    let rest = <Nonlinear<f64> as Model<f64>>::at_rest(point);
+    let rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
     let is_known = linear.start.iter().all(|x| x.is_finite());
     let deviation = |i: usize| if is_known { linear.start[i] } else { 0.0 };
     let state = core::array::from_fn(|i| rest[i] + deviation(i));

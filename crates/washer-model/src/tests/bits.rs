@@ -1,6 +1,7 @@
-//! The same bits: on every instruction set, at any position in a batch, in any company.
+//! Tests that the bits of a result depend neither on the instruction set, nor on the position in a
+//! batch, nor on the other points of the batch.
 
-use super::instruments::{EVERYTHING, paper, random_machine, random_spin};
+use super::instruments::{ALL_RECORDERS, paper, random_machine, random_spin};
 use crate::{
     Caps, Machine, Method, ModelKind, Point, Profile, Reading, Record, Recorders, Spin, Timing,
     prepare, simulate_until, simulate_with,
@@ -22,15 +23,15 @@ const METHODS: [Method; 5] = [
     Method::Additive(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
 
-/// Corners, edges and middle of the quick map and a few between, its spin in a second: eleven
-/// points, so that lanes of four and eight are left part empty.
+/// Returns the corners, the edges' middles and the centre of the quick map with two more points,
+/// with a spin of a second. They are eleven, so that some of four or eight lanes stay idle.
 fn quick_map() -> Vec<Scenario> {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 0.6 };
     let corners = [0.05, 0.525, 1.0].into_iter().flat_map(|m| [60.0, 180.0, 300.0].map(|c| (m, c)));
     corners.chain([(0.4, 90.0), (0.7, 120.0)]).map(|(m, c)| (paper(m, c), spin.clone())).collect()
 }
 
-/// Machines and spins of all kinds from a seed.
+/// Returns random machines with spins of all kinds.
 fn random_machines() -> Vec<Scenario> {
     let mut rng = fastrand::Rng::with_seed(31);
     (0..11).map(|i| (random_machine(&mut rng), random_spin(&mut rng, i, END_S))).collect()
@@ -40,8 +41,8 @@ fn points(simd: Simd, scenarios: &[Scenario]) -> Vec<Point> {
     prepare(simd, scenarios, &TIMING).into_iter().map(Result::unwrap).collect()
 }
 
-/// Every number that was recorded as its bits.
-fn bits((record, extra): (&Record, &Reading)) -> Vec<u64> {
+/// Returns the bits of all recorded numbers.
+fn bits((record, reading): (&Record, &Reading)) -> Vec<u64> {
     let Record { failure, amplitudes, min_gap_m, steps, rejected } = record;
     let mut bits: Vec<_> = amplitudes.iter().map(|a| a.to_bits()).collect();
     bits.extend([min_gap_m.to_bits(), *steps, *rejected]);
@@ -50,33 +51,33 @@ fn bits((record, extra): (&Record, &Reading)) -> Vec<u64> {
         root_mean_squares,
         turns,
         gauges,
-        course,
-        // Compared by `run/snapshots.rs`.
+        checkpoints,
+        // The tests of `run/snapshots.rs` compare them.
         snapshots: _,
-    } = extra;
+    } = reading;
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
-    let waypoints = course.iter().flat_map(|at| at.coordinates.iter());
-    bits.extend(waypoints.map(|of| of.to_bits()));
+    let coordinates = checkpoints.iter().flat_map(|checkpoint| checkpoint.coordinates.iter());
+    bits.extend(coordinates.map(|coordinate| coordinate.to_bits()));
     bits.extend(gauges.iter().flatten().map(|number| number.to_bits()));
     bits
 }
 
-/// For each model and method, the bits of every scenario, prepared and simulated as one batch.
+/// Returns the bits of every scenario for each model and method, simulated as one batch.
 fn batch(simd: Simd, scenarios: &[Scenario]) -> Vec<Vec<Vec<u64>>> {
     let points = points(simd, scenarios);
     let points: Vec<_> = points.iter().collect();
     let mut all = Vec::new();
     for model in MODELS {
         for method in &METHODS {
-            let (records, extras) = simulate_with(simd, model, method, &points, EVERYTHING);
-            assert_eq!((records.len(), extras.len()), (scenarios.len(), scenarios.len()));
-            all.push(records.iter().zip(&extras).map(bits).collect());
+            let (records, readings) = simulate_with(simd, model, method, &points, ALL_RECORDERS);
+            assert_eq!((records.len(), readings.len()), (scenarios.len(), scenarios.len()));
+            all.push(records.iter().zip(&readings).map(bits).collect());
         }
     }
     all
 }
 
-/// Picks the same scenarios out of every model and method.
+/// Selects scenarios by their indices for every model and method.
 fn picked(all: &[Vec<Vec<u64>>], indices: &[usize]) -> Vec<Vec<Vec<u64>>> {
     all.iter().map(|records| indices.iter().map(|&i| records[i].clone()).collect()).collect()
 }
@@ -101,13 +102,13 @@ fn same_at_any_position(scenarios: &[Scenario]) {
     assert!(batch(Simd::best(), &moved) == picked(&as_given, &order), "backwards");
 }
 
-fn same_in_any_company(scenarios: &[Scenario]) {
+fn same_beside_any_points(scenarios: &[Scenario]) {
     let together = batch(Simd::best(), scenarios);
     for (i, scenario) in scenarios.iter().enumerate() {
         let alone = batch(Simd::best(), core::slice::from_ref(scenario));
         assert!(alone == picked(&together, &[i]), "scenario {i} alone");
     }
-    // Neighbours of which two fail, one early and one late, and whose lanes others take up.
+    // Two neighbours fail, one early and one late, and other points start in their lanes.
     let wild = |ramp_s: f64| {
         (paper(30.0, 0.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 9e4, ramp_s })
     };
@@ -142,18 +143,19 @@ fn same_bits_at_any_position_in_a_batch_random_machines() {
 }
 
 #[test]
-fn same_bits_in_any_company_quick_map() {
-    same_in_any_company(&quick_map());
+fn same_bits_beside_any_points_quick_map() {
+    same_beside_any_points(&quick_map());
 }
 
 #[test]
-fn same_bits_in_any_company_random_machines() {
-    same_in_any_company(&random_machines());
+fn same_bits_beside_any_points_random_machines() {
+    same_beside_any_points(&random_machines());
 }
 
-/// A leg of more steps than are made at once, and in other lanes legs that end on the way.
+/// A segment has more steps than the integrator makes between two calls of `is_stopped`, while
+/// segments in other lanes end before.
 #[test]
-fn a_leg_is_cut_where_no_bit_shows_it() {
+fn blocks_of_steps_do_not_change_bits() {
     let timing = Timing { end_s: 1.0, window_s: [0.9, 1.0], checkpoints: 0 };
     let spins = [2.0, 0.37, 0.11].map(|ramp_s| Spin::Ramped {
         profile: Profile::Triangular,
@@ -168,10 +170,10 @@ fn a_leg_is_cut_where_no_bit_shows_it() {
     let dop853 = Method::Capped { step_s: 2e-5, caps: CAPS };
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853] {
         for model in MODELS {
-            let together = simulate_with(simd, model, &method, &all, EVERYTHING);
+            let together = simulate_with(simd, model, &method, &all, ALL_RECORDERS);
             assert!(together.0[0].steps > 3 * STEPS_AT_ONCE, "{} steps", together.0[0].steps);
             for (k, point) in all.iter().enumerate() {
-                let alone = simulate_with(simd, model, &method, &[point], EVERYTHING);
+                let alone = simulate_with(simd, model, &method, &[point], ALL_RECORDERS);
                 let expected = bits((&together.0[k], &together.1[k]));
                 assert_eq!(
                     bits((&alone.0[0], &alone.1[0])),
@@ -184,7 +186,7 @@ fn a_leg_is_cut_where_no_bit_shows_it() {
 }
 
 #[test]
-fn a_stop_is_answered_within_a_leg_by_every_method() {
+fn every_method_stops_within_a_segment() {
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     let scenario =
         (paper(0.4, 90.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 });
@@ -194,19 +196,19 @@ fn a_stop_is_answered_within_a_leg_by_every_method() {
     let adaptive = [Method::Dopri5(tolerance), Method::Additive(tolerance)];
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853].into_iter().chain(adaptive) {
         for model in MODELS {
-            let asked = Cell::new(0);
-            let until = |most: u32| {
-                asked.set(0);
+            let calls = Cell::new(0);
+            let until = |max_calls: u32| {
+                calls.set(0);
                 let stop = || {
-                    asked.set(asked.get() + 1);
-                    asked.get() > most
+                    calls.set(calls.get() + 1);
+                    calls.get() > max_calls
                 };
                 simulate_until(Simd::best(), model, &method, &[&point], Recorders::default(), &stop)
             };
             assert!(until(u32::MAX).is_some_and(|(records, _)| records[0].failure.is_none()));
-            assert!(asked.get() > 3, "{model:?} by {method:?} asks {} times", asked.get());
+            assert!(calls.get() > 3, "{model:?} by {method:?}: {} calls", calls.get());
             assert_eq!(until(2), None, "{model:?} by {method:?}");
-            assert_eq!(asked.get(), 3, "{model:?} by {method:?}");
+            assert_eq!(calls.get(), 3, "{model:?} by {method:?}");
         }
     }
 }

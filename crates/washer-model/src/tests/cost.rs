@@ -1,23 +1,23 @@
-//! Operations of one right-hand side, counted by a number that counts.
+//! Tests of the number of arithmetic operations of a right-hand side.
 
-use super::instruments::{paper, ready, triangular};
+use super::instruments::{paper, prepared, triangular};
 use crate::coordinates::STATES;
 use crate::nonlinear::coupling::{Caps, Coupling};
-use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::model::{LaneModel, Linear, Nonlinear};
 use core::cell::Cell;
 use lane_ode::{Lane, N, Real};
 
-/// Arithmetic operations. A fused one counts as one multiplication and one addition; signs are
-/// free.
+/// Numbers of arithmetic operations. A fused multiplication and addition counts as both; changes of
+/// sign do not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Operations {
     multiplications: u32,
     additions: u32,
-    /// Of the two above, fused in one.
+    /// The number of fused multiplications and additions.
     fused: u32,
     divisions: u32,
     square_roots: u32,
-    /// Sine and cosine of one angle together; not counted above.
+    /// The number of evaluations of sine and cosine of an angle, whose operations do not count.
     sine_cosine_pairs: u32,
 }
 
@@ -40,7 +40,7 @@ fn count(change: impl FnOnce(&mut Operations)) {
     });
 }
 
-/// What `work` takes.
+/// Returns the result of a function, and the operations that it takes.
 fn counted<R>(work: impl FnOnce() -> R) -> (R, Operations) {
     COUNT.with(|cell| cell.set(Operations::default()));
     let result = work();
@@ -55,7 +55,7 @@ fn count_fused() {
     });
 }
 
-/// A number that counts.
+/// A number that counts its operations.
 #[derive(Clone, Copy, Debug)]
 struct Counting(f64);
 
@@ -134,28 +134,30 @@ impl Lane for Counting {
     }
 }
 
-/// Counts of the forcing, which stages at one time share, and of the derivative; the derivative's
-/// values are plain numbers'.
-fn of_model<M: Model<Counting>, P: Model<f64>>(caps: Option<Caps>) -> [Operations; 2] {
-    let point = ready(paper(0.4, 140.0), triangular(), 50.0);
+/// Counts the operations of the forcing, which stages at the same time share, and of the
+/// derivative. Asserts that the derivative has the bits of plain numbers.
+fn evaluation_cost<M: LaneModel<Counting>, P: LaneModel<f64>>(
+    caps: Option<Caps>,
+) -> [Operations; 2] {
+    let point = prepared(paper(0.4, 140.0), triangular(), 50.0);
     let model = M::splat(N(Counting(0.0)), &point, Coupling::new(N(Counting(0.0)), caps.as_ref()));
     let mut x = P::at_rest(&point);
     for (i, x) in x.iter_mut().enumerate() {
         *x += 1e-4 * i as f64;
     }
-    let (forcing, of_forcing) = counted(|| model.forcing(N(Counting(7.3))));
-    let (dx, of_derivative) = counted(|| model.derivative(&forcing, &x.map(|x| N(Counting(x)))));
+    let (forcing, forcing_cost) = counted(|| model.forcing(N(Counting(7.3))));
+    let (dx, derivative_cost) = counted(|| model.derivative(&forcing, &x.map(|x| N(Counting(x)))));
     let plain = P::splat(N(0.0), &point, Coupling::new(N(0.0), caps.as_ref()));
     let expected = plain.derivative(&plain.forcing(N(7.3)), &x.map(N));
     for i in 0..STATES {
         assert_eq!(dx[i].0.0.to_bits(), expected[i].0.to_bits(), "state {i}");
     }
-    [of_forcing, of_derivative]
+    [forcing_cost, derivative_cost]
 }
 
-/// Counts of what is observed at the end of a step within the window: channels and radial distance.
-fn of_observation<M: Model<Counting>>() -> Operations {
-    let point = ready(paper(0.4, 140.0), triangular(), 50.0);
+/// Counts the operations of an observation within the window: channels and radial distance.
+fn observation_cost<M: LaneModel<Counting>>() -> Operations {
+    let point = prepared(paper(0.4, 140.0), triangular(), 50.0);
     let model = M::splat(N(Counting(0.0)), &point, Coupling::Springs);
     let x = core::array::from_fn(|i| N(Counting(1e-4 * i as f64)));
     let forcing = model.forcing(N(Counting(7.3)));
@@ -164,28 +166,27 @@ fn of_observation<M: Model<Counting>>() -> Operations {
 
 const CAPPED: Option<Caps> = Some(Caps { bearings_rad_per_s: 700.0, hinge_rad_per_s: Some(700.0) });
 
-fn of_nonlinear(caps: Option<Caps>) -> [Operations; 2] {
-    of_model::<Nonlinear<Counting>, Nonlinear<f64>>(caps)
+fn nonlinear_cost(caps: Option<Caps>) -> [Operations; 2] {
+    evaluation_cost::<Nonlinear<Counting>, Nonlinear<f64>>(caps)
 }
 
-fn of_linear(caps: Option<Caps>) -> [Operations; 2] {
-    of_model::<Linear<Counting>, Linear<f64>>(caps)
+fn linear_cost(caps: Option<Caps>) -> [Operations; 2] {
+    evaluation_cost::<Linear<Counting>, Linear<f64>>(caps)
 }
 
-/// All arithmetic but sines and cosines.
+/// Returns the sum of all operations but sines and cosines.
 fn flops(o: Operations) -> u32 {
     o.multiplications + o.additions + o.divisions + o.square_roots
 }
 
-/// What a counted function took, in the order of [`Operations`].
+/// Creates operations from their numbers in the order of the fields.
 const fn operations(
     [multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs]: [u32; 6],
 ) -> Operations {
     Operations { multiplications, additions, fused, divisions, square_roots, sine_cosine_pairs }
 }
 
-/// The present cost of forcing and right-hand side. Cheaper is better; a change writes its numbers
-/// here.
+/// The present cost of forcing and derivative. A change of the model updates these numbers.
 const NONLINEAR: [Operations; 2] =
     [operations([31, 34, 18, 0, 0, 0]), operations([557, 410, 319, 12, 4, 6])];
 const LINEAR: [Operations; 2] =
@@ -197,7 +198,7 @@ const OBSERVED_LINEAR: Operations = operations([334, 267, 215, 0, 0, 0]);
 
 #[test]
 fn the_nonlinear_right_hand_side_stays_below_the_naive_formulation() {
-    let [forcing, derivative] = of_nonlinear(None);
+    let [forcing, derivative] = nonlinear_cost(None);
     eprintln!("nonlinear: right-hand side {derivative:?}; spin {forcing:?}");
     let Operations { multiplications, additions, divisions, square_roots, .. } = derivative;
     assert!(multiplications < 825 && additions < 605 && divisions <= 14 && square_roots <= 4);
@@ -205,22 +206,23 @@ fn the_nonlinear_right_hand_side_stays_below_the_naive_formulation() {
 }
 
 #[test]
-fn the_linear_right_hand_side_costs_what_it_did() {
-    let [forcing, derivative] = of_linear(None);
+fn the_cost_of_the_linear_right_hand_side_is_unchanged() {
+    let [forcing, derivative] = linear_cost(None);
     eprintln!("linear: right-hand side {derivative:?}; spin and matrices {forcing:?}");
     assert_eq!([forcing, derivative], LINEAR);
 }
 
 #[test]
-fn mass_scaling_costs_what_it_did() {
-    let [nonlinear, linear] = [of_nonlinear(CAPPED)[1], of_linear(CAPPED)[1]];
+fn the_cost_of_mass_scaling_is_unchanged() {
+    let [nonlinear, linear] = [nonlinear_cost(CAPPED)[1], linear_cost(CAPPED)[1]];
     eprintln!("mass-scaled: nonlinear right-hand side {nonlinear:?}; linear {linear:?}");
     assert_eq!([nonlinear, linear], [NONLINEAR_MASS_SCALED, LINEAR_MASS_SCALED]);
 }
 
 #[test]
-fn observing_costs_what_it_did() {
-    let observed = [of_observation::<Nonlinear<Counting>>(), of_observation::<Linear<Counting>>()];
+fn the_cost_of_observation_is_unchanged() {
+    let observed =
+        [observation_cost::<Nonlinear<Counting>>(), observation_cost::<Linear<Counting>>()];
     eprintln!("observed: nonlinear {:?}; linear {:?}", observed[0], observed[1]);
     assert_eq!(observed, [OBSERVED_NONLINEAR, OBSERVED_LINEAR]);
 }
@@ -228,10 +230,10 @@ fn observing_costs_what_it_did() {
 #[test]
 fn a_linear_step_costs_less_than_a_nonlinear_one() {
     for caps in [None, CAPPED] {
-        // A step of RK4: four right-hand sides, the forcing at two new times.
+        // A step of RK4 has four derivatives, and the forcing at two new times.
         let step =
             |[forcing, derivative]: [Operations; 2]| 4 * flops(derivative) + 2 * flops(forcing);
-        let [nonlinear, linear] = [of_nonlinear(caps), of_linear(caps)].map(step);
+        let [nonlinear, linear] = [nonlinear_cost(caps), linear_cost(caps)].map(step);
         eprintln!("RK4 step, {caps:?}: {nonlinear} operations nonlinear, {linear} linear");
         assert!(linear < nonlinear);
     }

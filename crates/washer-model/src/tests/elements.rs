@@ -1,7 +1,7 @@
-//! Friction, stops, bushings, stiffening springs and further unbalances: against independent time
-//! histories and closed forms, and what a machine pays that has none.
+//! Tests of friction, stops, bushings, cubic springs and further unbalances against independent
+//! time histories and closed forms.
 
-use super::instruments::{paper, ready};
+use super::instruments::{paper, prepared};
 use super::reference::reference;
 use crate::coordinates::COORDINATES;
 use crate::{
@@ -12,7 +12,7 @@ use core::f64::consts::PI;
 use lane_ode::{Simd, Tolerance};
 use serde_json::Value;
 
-/// The speed amplitude of the linear model's friction, where a test does not care.
+/// The speed amplitude of the linear model's friction, in tests that do not depend on it.
 const LINEAR_SPEED_M_PER_S: f64 = 0.3;
 
 fn three(values: &[f64]) -> [f64; 3] {
@@ -24,7 +24,7 @@ fn rows(case: &Value, key: &str) -> Vec<Vec<f64>> {
     rows.map(|row| row.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()).collect()
 }
 
-/// The machine of a file of `tests/reference`, by the keys that its README explains.
+/// Reads the machine of a file of `tests/reference`, whose README explains the keys.
 pub(crate) fn machine(case: &Value) -> Machine {
     let number = |key: &str| case[key].as_f64();
     let mut machine =
@@ -68,22 +68,23 @@ pub(crate) fn machine(case: &Value) -> Machine {
     machine
 }
 
-/// The machine of the references that has everything.
+/// Returns the reference machine that has elements of every kind.
 pub(super) fn with_every_element() -> Machine {
     machine(&reference("elements_all.json"))
 }
 
-/// The case of a reference made ready, and the largest difference from its history as a share of
-/// each channel's peak, by each method.
-fn held_against<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N] {
+/// Computes the largest error of a reference's history by each method, as a share of each channel's
+/// peak.
+fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N] {
     let case = reference(&format!("elements_{name}.json"));
-    let (peak_rpm, ramp_s) = (case["peak_rpm"].as_f64().unwrap(), case["ramp_s"].as_f64().unwrap());
+    let peak_rpm = case["peak_rpm"].as_f64().unwrap();
+    let ramp_s = case["ramp_s"].as_f64().unwrap();
     let spin = match case["spin"].as_str().unwrap() {
         "triangular" => Spin::Ramped { profile: Profile::Triangular, peak_rpm, ramp_s },
         "cycloidal" => Spin::Ramped { profile: Profile::Cycloidal, peak_rpm, ramp_s },
         other => panic!("{other}"),
     };
-    let point = ready(machine(&case), spin, case["end_s"].as_f64().unwrap());
+    let point = prepared(machine(&case), spin, case["end_s"].as_f64().unwrap());
     let at_rest = case["equilibrium_m_rad"].as_array().unwrap();
     for i in 0..COORDINATES {
         let expected = at_rest[i].as_f64().unwrap();
@@ -96,8 +97,9 @@ fn held_against<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N] {
     let rows: Vec<Vec<f64>> =
         lines.map(|line| line.split(',').map(|v| v.parse().unwrap()).collect()).collect();
     let channel = |name: &&str| {
-        let of_name = |channel: &Channel| format!("{}_{}", channel.name(), channel.unit()) == *name;
-        Channel::ALL.into_iter().find(of_name)
+        let has_name =
+            |channel: &Channel| format!("{}_{}", channel.name(), channel.unit()) == *name;
+        Channel::ALL.into_iter().find(has_name)
     };
     let channels: Vec<Channel> = names.iter().filter_map(channel).collect();
     assert_eq!((names[0], channels.len()), ("time_s", 6));
@@ -122,7 +124,7 @@ fn val_histories_with_every_element_match_independent_ones() {
         let rk4 = |step_s| Method::Rk4 { step_s };
         let tolerance = Tolerance { relative: 1e-7, absolute: 1e-9, max_steps: 10_000_000 };
         let methods = [rk4(1e-4), rk4(5e-5), Method::Additive(tolerance)];
-        let [coarse, fine, additive] = held_against(name, methods);
+        let [coarse, fine, additive] = reference_errors(name, methods);
         eprintln!(
             "{name}: {coarse:.1e} of the peak at steps of 1e-4 s, {fine:.1e} at 5e-5 s, \
              {additive:.1e} by the additive method"
@@ -132,12 +134,13 @@ fn val_histories_with_every_element_match_independent_ones() {
     }
 }
 
-/// Beside the closed forms the rotor's inertia deflects the bearings, by 8 kg x 20 m/s^2 / 4e8 N/m
-/// = 4e-7 m. They start without, and ring.
-const BEARINGS_GIVE_M: f64 = 8e-7;
+/// The tolerance of the closed forms (m), which have no bearings: the rotor's inertia deflects
+/// these by 8 kg x 20 m/s^2 / 4e8 N/m = 4e-7 m, and they ring with as much.
+const BEARING_DEFLECTION_M: f64 = 8e-7;
 
-/// A machine that only heaves: every mass centre between the bearings, four springs that hang
-/// straight, and a shaft that hardly bends. And the natural frequency (rad/s) of its heave.
+/// Returns a machine that moves only up and down, and the natural frequency (rad/s) of this motion.
+/// All mass centres are between the bearings, four springs are vertical, and the shaft hardly
+/// bends.
 fn heaving() -> (Machine, f64) {
     let mut machine = paper(0.0, 0.0);
     machine.tub.centre_x_m = 0.0;
@@ -157,20 +160,22 @@ fn heaving() -> (Machine, f64) {
     (machine, (32_000.0 / mass_kg).sqrt())
 }
 
-/// The heights (m above equilibrium) every so long of a heaving machine let go from one.
+/// Computes the heights (m above equilibrium) of a heaving machine at equal intervals. It starts at
+/// rest from a height.
 fn heights_m(machine: Machine, from_m: f64, every_s: f64, count: u32) -> Vec<f64> {
     let end_s = every_s * f64::from(count) * (1.0 + 1e-9);
     let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    let point = ready(machine, still, end_s);
+    let point = prepared(machine, still, end_s);
     let mut start = Start::default();
-    (start.deviations[0], start.deviations[2]) = (from_m, from_m);
+    start.deviations[0] = from_m;
+    start.deviations[2] = from_m;
     let method = Method::Rk4 { step_s: 2e-5 };
     let history = history(ModelKind::Nonlinear, &method, &point, &start, every_s);
     (0..history.len()).map(|k| history.instant(k).unwrap().deviations[0]).collect()
 }
 
 #[test]
-fn friction_takes_the_same_length_off_every_half_swing() {
+fn friction_shortens_every_half_swing_by_the_same_length() {
     let (mut machine, w_rad_per_s) = heaving();
     machine.dampers = vec![Damper {
         cabinet_m: [0.0, -0.4, 0.0],
@@ -183,29 +188,30 @@ fn friction_takes_the_same_length_off_every_half_swing() {
     let heights = heights_m(machine, 0.02, PI / w_rad_per_s, 7);
     assert_eq!(heights.len(), 8);
     for (n, height) in heights.iter().enumerate() {
-        let left_m = 0.02 - 2.0 * n as f64 * 40.0 / 32_000.0;
-        let expected = if n % 2 == 0 { left_m } else { -left_m };
+        let amplitude_m = 0.02 - 2.0 * n as f64 * 40.0 / 32_000.0;
+        let expected = if n % 2 == 0 { amplitude_m } else { -amplitude_m };
         assert!(
-            (height - expected).abs() < BEARINGS_GIVE_M,
+            (height - expected).abs() < BEARING_DEFLECTION_M,
             "half swing {n}: {height} m, not {expected} m"
         );
     }
 }
 
 #[test]
-fn a_stop_turns_a_swing_as_the_stiffer_spring_does() {
+fn a_closed_stop_is_a_spring_in_parallel() {
     let (mut machine, w) = heaving();
-    let (stiffness, stop_stiffness) = (32_000.0, 40_000.0);
+    let stiffness = 32_000.0;
+    let stop_stiffness = 40_000.0;
     machine.stops = vec![BumpStop {
         tub_m: [0.0, 0.1, 0.0],
-        // Any length.
+        // The length of a direction does not matter.
         direction: [0.0, 2.0, 0.0],
         clearance_m: 0.0,
         stiffness_n_per_m: stop_stiffness,
         damping_n_s_per_m: 0.0,
         softness_m: 1e-6,
     }];
-    // It is open at rest by how far the machine sags, and its swing from 20 mm below closes it.
+    // The gap of the stop at rest is the sag of the machine. The swing from 20 mm below closes it.
     let gap_m = 9.81 / (w * w);
     let below_m = 0.02;
     let stiffer = w * (1.0 + stop_stiffness / stiffness).sqrt();
@@ -218,14 +224,14 @@ fn a_stop_turns_a_swing_as_the_stiffer_spring_does() {
     for (n, height) in heights.iter().enumerate() {
         let expected = if n % 2 == 0 { -below_m } else { centre_m + reach_m };
         assert!(
-            (height - expected).abs() < BEARINGS_GIVE_M,
+            (height - expected).abs() < BEARING_DEFLECTION_M,
             "half swing {n}: {height} m, not {expected} m"
         );
     }
 }
 
 #[test]
-fn friction_is_the_stated_viscous_damping_in_the_linear_model() {
+fn friction_is_equivalent_viscous_damping_in_the_linear_model() {
     let machine = with_every_element();
     let mut viscous = machine.clone();
     for damper in &mut viscous.dampers {
@@ -233,7 +239,7 @@ fn friction_is_the_stated_viscous_damping_in_the_linear_model() {
         damper.friction_n = 0.0;
     }
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 };
-    let [point, viscous] = [machine, viscous].map(|machine| ready(machine, spin(), 1.0));
+    let [point, viscous] = [machine, viscous].map(|machine| prepared(machine, spin(), 1.0));
     let matrices = |point: &Point| {
         let found = point.matrices(0.3, 20.0, 1.0);
         (found.mass, found.damping, found.stiffness, found.force)
@@ -245,12 +251,15 @@ fn friction_is_the_stated_viscous_damping_in_the_linear_model() {
 fn linear_forces_of_stops_and_bushings_are_first_order() {
     let mut machine = with_every_element();
     machine.dampers.iter_mut().for_each(|damper| damper.friction_n = 0.0);
-    // Closed at rest, and soft enough for a first order.
+    // The stop is closed at rest, and soft enough for the first order to be a good approximation.
     machine.stops[2].clearance_m = 0.01;
     machine.stops.iter_mut().for_each(|stop| stop.softness_m = 0.05);
-    let point =
-        ready(machine, Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 }, 0.1);
-    let apart = |size: f64| {
+    let point = prepared(
+        machine,
+        Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 },
+        0.1,
+    );
+    let difference = |size: f64| {
         let start = Start {
             deviations: std::array::from_fn(|i| size * (0.3 + 0.1 * i as f64)),
             speeds: std::array::from_fn(|i| size * (5.0 - i as f64)),
@@ -266,29 +275,32 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
         let pairs = all(&nonlinear).into_iter().zip(all(&linear));
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
-    let (coarse, fine) = (apart(1e-3), apart(1e-4));
-    assert!(coarse > 1e-4, "{coarse}");
-    assert!((coarse / fine - 100.0).abs() < 10.0, "{coarse} {fine}");
+    let large = difference(1e-3);
+    let small = difference(1e-4);
+    assert!(large > 1e-4, "{large}");
+    // A tenth of the motion has a hundredth of the difference, which is of second order.
+    assert!((large / small - 100.0).abs() < 10.0, "{large} {small}");
 }
 
 #[test]
-fn elements_without_force_and_other_machines_in_the_lanes_leave_the_bits_alone() {
+fn elements_without_force_and_machines_in_other_lanes_do_not_change_bits() {
     let plain = paper(0.6, 90.0);
-    let mut idle = plain.clone();
-    idle.dampers.iter_mut().for_each(|d| d.friction_linear_speed_m_per_s = Some(0.2));
-    let mut rubbing = idle.clone();
-    rubbing.dampers.iter_mut().for_each(|d| d.friction_n = 60.0);
-    rubbing.springs.iter_mut().for_each(|s| s.cubic_n_per_m3 = 1e6);
+    let mut frictionless = plain.clone();
+    frictionless.dampers.iter_mut().for_each(|d| d.friction_linear_speed_m_per_s = Some(0.2));
+    let mut friction = frictionless.clone();
+    friction.dampers.iter_mut().for_each(|d| d.friction_n = 60.0);
+    friction.springs.iter_mut().for_each(|s| s.cubic_n_per_m3 = 1e6);
     let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 1.0 };
-    let [plain, idle, rubbing] = [plain, idle, rubbing].map(|machine| ready(machine, spin(), 1.5));
+    let [plain, frictionless, friction] =
+        [plain, frictionless, friction].map(|machine| prepared(machine, spin(), 1.5));
     let method = Method::Rk4 { step_s: 2e-4 };
     for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
-        let of = |points: &[&Point]| simulate(simd, ModelKind::Nonlinear, &method, points);
-        let [alone, of_idle] = [of(&[&plain])[0], of(&[&idle])[0]];
-        assert_eq!(alone, of_idle, "{simd:?}");
-        let together = of(&[&plain, &rubbing, &idle, &rubbing, &plain]);
+        let records = |points: &[&Point]| simulate(simd, ModelKind::Nonlinear, &method, points);
+        let alone = records(&[&plain])[0];
+        assert_eq!(alone, records(&[&frictionless])[0], "{simd:?}");
+        let together = records(&[&plain, &friction, &frictionless, &friction, &plain]);
         assert_eq!([together[0], together[2], together[4]], [alone; 3], "{simd:?}");
-        assert_eq!([together[1], together[3]], [of(&[&rubbing])[0]; 2], "{simd:?}");
+        assert_eq!([together[1], together[3]], [records(&[&friction])[0]; 2], "{simd:?}");
         assert!(together[1].amplitudes[0] < 0.8 * alone.amplitudes[0], "{together:?}");
     }
 }

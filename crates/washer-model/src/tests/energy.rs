@@ -2,7 +2,7 @@
 //! independently of the equations of motion.
 
 use super::elements::with_every_element;
-use super::instruments::{mass_matrix, ready};
+use super::instruments::{mass_matrix, prepared};
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::{Spin, SpinState};
 use crate::machine::{BumpStop, Machine};
@@ -142,7 +142,7 @@ fn kinetic_j(machine: &Coefficients<f64>, q: &[f64; COORDINATES], u: &[f64; COOR
 /// Returns the history of a machine without spin that starts at its equilibrium with a velocity.
 fn thrown(machine: &Machine, end_s: f64, step_s: f64, every_s: f64) -> Vec<Instant> {
     let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    let point = ready(machine.clone(), still, end_s);
+    let point = prepared(machine.clone(), still, end_s);
     // 0.1 and 0.15 m/s, 0.5 and -0.4 rad/s: some 20 mm and 40 mrad.
     let mut start = Start::default();
     for (tub, rotor, speed) in [(0, 2, 0.1), (1, 3, 0.15), (4, 6, 0.5), (5, 7, -0.4)] {
@@ -174,7 +174,7 @@ fn energies_j(step_s: f64) -> Vec<f64> {
 
 fn equilibrium(machine: &Machine) -> [f64; COORDINATES] {
     let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    ready(machine.clone(), still, 1.0).equilibrium
+    prepared(machine.clone(), still, 1.0).equilibrium
 }
 
 #[test]

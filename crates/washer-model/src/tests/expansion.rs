@@ -1,15 +1,15 @@
 //! Tests of the linear model against automatic differentiation of the nonlinear equations of
 //! motion, for random machines at random spins.
 
-use super::instruments::{equations, paper, random_machine, ready};
+use super::instruments::{equations, paper, prepared, random_machine};
 use crate::coordinates::{COORDINATES, STATES};
-use crate::lanes::Constant as _;
+use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
 use crate::point::Point;
-use crate::run::model::{Linear, Model, Nonlinear};
-use crate::{Channel, Equations, ModelKind, Spin};
+use crate::run::model::{LaneModel, Linear, Nonlinear};
+use crate::{Channel, ModelKind, PointEquations, Spin};
 use lane_ode::{Dual, N, System};
 
 /// The number of random machines, each at one instant.
@@ -29,7 +29,7 @@ impl Instant {
     fn random(rng: &mut fastrand::Rng) -> Self {
         let mut rpm = || 1200.0 * (2.0 * rng.f64() - 1.0);
         let spin = Spin::Table { time_s: vec![0.0, 10.0], speed_rpm: vec![rpm(), rpm()] };
-        let point = ready(random_machine(rng), spin, 10.0);
+        let point = prepared(random_machine(rng), spin, 10.0);
         let model = Linear::splat(N(0.0), &point, Coupling::Springs);
         let t_s = 10.0 * rng.f64();
         let spin = Nonlinear::splat(N(0.0), &point, Coupling::Springs).forcing(N(t_s));
@@ -195,8 +195,8 @@ fn the_outputs_of_a_linear_machine_at_rest_turn_with_the_drum() {
         let unbalance = machine.unbalance;
         // The drum makes one turn per second.
         let spin = Spin::Table { time_s: vec![0.0, 1.0], speed_rpm: vec![60.0, 60.0] };
-        let point = ready(machine, spin, 1.0);
-        let mut equations = Equations::new(&point, ModelKind::Linear);
+        let point = prepared(machine, spin, 1.0);
+        let mut equations = PointEquations::new(&point, ModelKind::Linear);
         let mut at =
             |t_s: f64, channel: Channel| equations.channels(t_s, &[0.0; STATES]).0[channel.index()];
         // Weight tilts the shaft by q8 and bends the hinge by q10, which turns with the drum.

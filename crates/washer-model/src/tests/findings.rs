@@ -1,23 +1,24 @@
-//! What the paper found (its Figs. 10 to 12), as the model page retells it.
+//! Tests of the paper's findings (its Figs. 10 to 12).
 
 use super::instruments::{paper, triangular};
 use crate::{Channel, Method, ModelKind, Record, Timing, prepare, simulate};
 use lane_ode::Simd;
 
-/// Both models at each (unbalance mass in kg, damping in N s/m).
+/// Simulates both models at each unbalance mass (kg) and damping (N s/m).
 fn both(points: &[(f64, f64)]) -> Vec<[Record; 2]> {
     let scenarios: Vec<_> = points.iter().map(|&(m, c)| (paper(m, c), triangular())).collect();
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
     let simd = Simd::best();
-    let ready: Vec<_> =
+    let points: Vec<_> =
         prepare(simd, &scenarios, &timing).into_iter().map(Result::unwrap).collect();
-    let ready: Vec<_> = ready.iter().collect();
+    let points: Vec<_> = points.iter().collect();
     let method = Method::Rk4 { step_s: 2e-4 };
-    let of = |model| simulate(simd, model, &method, &ready);
-    of(ModelKind::Nonlinear).into_iter().zip(of(ModelKind::Linear)).map(|(n, l)| [n, l]).collect()
+    let nonlinear = simulate(simd, ModelKind::Nonlinear, &method, &points);
+    let linear = simulate(simd, ModelKind::Linear, &method, &points);
+    nonlinear.into_iter().zip(linear).map(|(nonlinear, linear)| [nonlinear, linear]).collect()
 }
 
-/// The largest ratio of amplitudes over the paper's channels.
+/// Returns the largest ratio of amplitudes over the paper's channels.
 fn ratio([nonlinear, linear]: &[Record; 2]) -> f64 {
     let channels = [
         Channel::TubFrontY,
@@ -28,12 +29,12 @@ fn ratio([nonlinear, linear]: &[Record; 2]) -> f64 {
         Channel::TubPitch,
     ];
     assert!(nonlinear.failure.is_none() && linear.failure.is_none());
-    let of = |c: Channel| nonlinear.amplitudes[c.index()] / linear.amplitudes[c.index()];
-    channels.into_iter().map(of).fold(0.0, f64::max)
+    let ratio = |c: Channel| nonlinear.amplitudes[c.index()] / linear.amplitudes[c.index()];
+    channels.into_iter().map(ratio).fold(0.0, f64::max)
 }
 
 #[test]
-fn at_a_damping_of_140_the_linear_model_is_reliable_and_at_100_it_misses_violent_yaw() {
+fn the_linear_model_is_reliable_at_a_damping_of_140_but_not_at_100() {
     let records = both(&[(0.4, 140.0), (0.4, 100.0)]);
     let [reliable, missed] = [&records[0], &records[1]].map(ratio);
     let yaw = records[1].map(|r| r.amplitudes[Channel::TubYaw.index()]);
@@ -50,9 +51,9 @@ fn at_a_damping_of_140_the_linear_model_is_reliable_and_at_100_it_misses_violent
 
 #[test]
 fn the_boundary_rises_with_the_unbalance_mass() {
-    // Below its bracket the linear model fails, above it holds; each bracket lies above the one
-    // before. (At 1 kg there is a reliable pocket inside the bracket, at 250 N s/m: the edge is not
-    // everywhere a single curve.)
+    // The linear model is not reliable at a bracket's lower damping, and reliable at the upper one.
+    // The brackets rise with the mass. (At 1 kg the bracket also contains a reliable island at
+    // 250 N s/m, so that the boundary is not a single curve everywhere.)
     let brackets = [(0.15, [55.0, 75.0]), (0.4, [110.0, 135.0]), (1.0, [240.0, 290.0])];
     let points: Vec<_> =
         brackets.iter().flat_map(|&(m, [low, high])| [(m, low), (m, high)]).collect();

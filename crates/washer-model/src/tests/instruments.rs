@@ -1,4 +1,4 @@
-//! Machines drawn from a seed, and the equations as a residual.
+//! Common functions of the tests: random machines, and the equations of motion as M a and f.
 
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::SpinState;
@@ -10,21 +10,21 @@ use crate::point::Point;
 use crate::{Gauge, Machine, Parameter, Profile, Recorders, Spin, Target, Timing, prepare};
 use lane_ode::{Lane, N, Real, Simd};
 
-/// Every record that there is.
-pub(super) const EVERYTHING: Recorders = Recorders {
+/// All recorders.
+pub(super) const ALL_RECORDERS: Recorders = Recorders {
     root_mean_squares: true,
     turns: true,
     gauges: [true; Gauge::ALL.len()],
-    course: true,
+    checkpoints: true,
     snapshots: true,
 };
 
-/// Fig. 12's spin.
+/// Returns the spin of the paper's Fig. 12.
 pub(super) fn triangular() -> Spin {
     Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 }
 }
 
-/// The paper's machine at another unbalance mass and damping.
+/// Returns the paper's machine with another unbalance mass and damping.
 pub(super) fn paper(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = unbalance_mass_kg;
@@ -32,11 +32,12 @@ pub(super) fn paper(unbalance_mass_kg: f64, damping_n_s_per_m: f64) -> Machine {
     machine
 }
 
-/// A machine with every number within a fifth of the paper's, drawn again until it is sound and
-/// rests somewhere.
+/// Returns a random machine whose numbers are within a fifth of the paper's. It is valid and has a
+/// static equilibrium.
 pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
     loop {
-        let (mut machine, mut spin) = (Machine::paper(), triangular());
+        let mut machine = Machine::paper();
+        let mut spin = triangular();
         for parameter in Parameter::all(&machine, &spin) {
             if parameter.target() == Target::Machine
                 && let Some(value) = parameter.get(&machine, &spin)
@@ -52,7 +53,7 @@ pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
     }
 }
 
-/// A spin of each kind in turn.
+/// Returns a random spin of one of four kinds.
 pub(super) fn random_spin(rng: &mut fastrand::Rng, kind: usize, end_s: f64) -> Spin {
     let peak_rpm = 200.0 + 400.0 * rng.f64();
     let ramp_s = end_s * (0.3 + 0.4 * rng.f64());
@@ -67,13 +68,13 @@ pub(super) fn random_spin(rng: &mut fastrand::Rng, kind: usize, end_s: f64) -> S
     }
 }
 
-/// One scenario made ready.
-pub(super) fn ready(machine: Machine, spin: Spin, end_s: f64) -> Point {
+/// Prepares the point of a machine and a spin.
+pub(super) fn prepared(machine: Machine, spin: Spin, end_s: f64) -> Point {
     let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
 }
 
-/// M a of one half: y and z of its midpoint, then its rotations.
+/// Computes M a of a half: y and z of its midpoint, then its rotations.
 fn inertia_forces<T: Real, const R: usize>(
     half: &Half<T, R>,
     midpoint: [N<T>; 2],
@@ -97,8 +98,8 @@ fn inertia_forces<T: Real, const R: usize>(
     (centre, about)
 }
 
-/// M a and f of the equations M a = f of both halves, as they are loaded.
-pub(super) fn equations_of<T: Real>(
+/// Computes M a and f of the equations M a = f of both halves with their loads.
+pub(super) fn loaded_equations<T: Real>(
     both: &Halves<T>,
     a: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; 2] {
@@ -110,7 +111,7 @@ pub(super) fn equations_of<T: Real>(
     [[i1, i2, i3, i4, i5, i6, i7, i8, i9, i10], [f1, f2, f3, f4, f5, f6, f7, f8, f9, f10]]
 }
 
-/// M(q, theta) a and f(q, u, theta, theta', theta'') of the nonlinear equations M a = f.
+/// Computes M(q, theta) a and f(q, u, theta, theta', theta'') of the nonlinear equations M a = f.
 pub(super) fn equations<T: Lane>(
     machine: &Coefficients<T>,
     spin: &SpinState<T>,
@@ -118,16 +119,17 @@ pub(super) fn equations<T: Lane>(
     u: &[N<T>; COORDINATES],
     a: &[N<T>; COORDINATES],
 ) -> [[N<T>; COORDINATES]; 2] {
-    equations_of(&halves(machine, spin, q, u), a)
+    loaded_equations(&halves(machine, spin, q, u), a)
 }
 
-/// The mass matrix of the nonlinear model, column by column from unit accelerations.
+/// Computes the mass matrix of the nonlinear model by columns from unit accelerations.
 pub(super) fn mass_matrix(
     machine: &Coefficients<f64>,
     spin: &SpinState<f64>,
     q: &[f64; COORDINATES],
 ) -> [[f64; COORDINATES]; COORDINATES] {
-    let (q, still) = (q.map(N), [N(0.0); COORDINATES]);
+    let q = q.map(N);
+    let still = [N(0.0); COORDINATES];
     let mut matrix = [[0.0; COORDINATES]; COORDINATES];
     for j in 0..COORDINATES {
         let mut unit = still;

@@ -1,4 +1,5 @@
-//! Loads of stops and feet and speeds of dampers, against the forces of dense time histories.
+//! Tests of the recorded loads of stops and feet, and of the speeds of dampers, against the forces
+//! of densely sampled time histories.
 
 use super::elements::with_every_element;
 use super::energy::{axes, place};
@@ -12,6 +13,8 @@ use lane_ode::Simd;
 
 const TIMING: Timing = Timing { end_s: 3.0, window_s: [0.5, 2.9], checkpoints: 0 };
 const EVERY_S: f64 = 1e-4;
+
+/// Adds a cabinet on four feet to a machine.
 fn on_feet(mut machine: Machine) -> Machine {
     machine.cabinet = Some(Cabinet { mass_kg: 35.0, centre_m: [0.18, -0.1, 0.02], friction: 0.4 });
     let corners = [[0.47, 0.26], [0.47, -0.26], [-0.07, 0.26], [-0.07, -0.26]];
@@ -24,30 +27,32 @@ fn point(machine: Machine) -> Point {
     prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
-/// The least of each number over instants.
+/// Returns the least of each number over all instants.
 fn least(instants: impl Iterator<Item = Vec<f64>>) -> Vec<f64> {
     let least = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(&b).map(|(a, b)| a.min(*b)).collect();
     instants.reduce(least).unwrap()
 }
 
-fn all_close(what: &str, found: &[f64], expected: &[f64], allowed: f64) {
-    assert_eq!(found.len(), expected.len(), "{what}");
-    for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
-        assert!((found - expected).abs() < allowed, "{what} {}: {found} for {expected}", k + 1);
+fn all_close(quantity: &str, values: &[f64], expected: &[f64], tolerance: f64) {
+    assert_eq!(values.len(), expected.len(), "{quantity}");
+    for (k, (value, expected)) in values.iter().zip(expected).enumerate() {
+        let error = (value - expected).abs();
+        assert!(error < tolerance, "{quantity} {}: {value} instead of {expected}", k + 1);
     }
 }
 
-fn found(point: &Point, model: ModelKind, simd: Simd) -> Reading {
+/// Returns the readings of all gauges of loads and damper speeds.
+fn read_gauges(point: &Point, model: ModelKind, simd: Simd) -> Reading {
     let method = Method::Rk4 { step_s: 1e-4 };
     let [clash, force] = [Gauge::ClashTime, Gauge::CabinetForce];
     let gauges = Gauge::ALL.map(|gauge| gauge != clash && gauge != force);
-    let wanted = Recorders { gauges, ..Recorders::default() };
-    let (_, mut extras) = simulate_with(simd, model, &method, &[point], wanted);
-    extras.remove(0)
+    let recorders = Recorders { gauges, ..Recorders::default() };
+    let (_, mut readings) = simulate_with(simd, model, &method, &[point], recorders);
+    readings.remove(0)
 }
 
-/// Force and moment about O on the cabinet at an instant: from the forces of the elements, each
-/// along its line or at its point.
+/// Computes the force and the moment about O on the cabinet at an instant, from the forces of the
+/// elements, each along its line or at its point.
 fn load(
     machine: &Machine,
     point: &Point,
@@ -60,7 +65,8 @@ fn load(
     let mut load = [0.0; LOAD];
     let mut add = |at: [f64; 3], force: [f64; 3]| {
         for i in 0..3 {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let j = (i + 1) % 3;
+            let k = (i + 2) % 3;
             load[i] += force[i];
             load[3 + i] += at[j] * force[k] - at[k] * force[j];
         }
@@ -84,21 +90,24 @@ fn load(
 }
 
 #[test]
-fn they_are_what_a_densely_sampled_history_shows() {
+fn recorded_loads_agree_with_a_densely_sampled_history() {
     let mut machine = on_feet(with_every_element());
     machine.unbalance.mass_kg = 0.9;
     machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.003);
-    // So heavy that no foot lifts: on a single foot, no margin against turning is left.
+    // The cabinet is so heavy that no foot lifts. On a single foot it would have no margin against
+    // turning.
     machine.cabinet.as_mut().unwrap().mass_kg = 1000.0;
     let point = point(machine.clone());
     let feet = Feet::new(&machine).unwrap();
     let method = Method::Rk4 { step_s: 1e-4 };
     let history = history(ModelKind::Nonlinear, &method, &point, &Start::default(), EVERY_S);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
-    let (mut feet_n, mut margin_n) = (vec![f64::INFINITY; 4], f64::INFINITY);
+    let mut feet_n = vec![f64::INFINITY; 4];
+    let mut margin_n = f64::INFINITY;
     let mut walk_n = f64::INFINITY;
-    let (mut pushes_n, mut closed_s) = (vec![0.0_f64; 3], vec![0.0_f64; 3]);
-    let mut tautest_n = vec![0.0_f64; machine.dampers.len()];
+    let mut stops_n = vec![0.0_f64; 3];
+    let mut closed_s = vec![0.0_f64; 3];
+    let mut greatest_tensions_n = vec![0.0_f64; machine.dampers.len()];
     for k in first..=last {
         let forces = history.forces(k).unwrap();
         let instant = history.instant(k).unwrap();
@@ -112,7 +121,7 @@ fn they_are_what_a_densely_sampled_history_shows() {
         let margin_now_n = 0.4 * (feet.spread.weight.0 - load[1]) - horizontal_n;
         assert!((forces.slip_margin_n.unwrap() - margin_now_n).abs() < 1e-9);
         margin_n = margin_n.min(margin_now_n);
-        // The feet are the corners of a rectangle: the moment about the centre of their loads.
+        // The moment is that about the centre of the feet's loads, and feet that lift bear none.
         let loaded_n: Vec<f64> = loads_n.iter().map(|n| n.max(0.0)).collect();
         let all_n: f64 = loaded_n.iter().sum();
         let mean = |axis: usize| {
@@ -128,11 +137,11 @@ fn they_are_what_a_densely_sampled_history_shows() {
         assert!((forces.walk_margin_n.unwrap() - walk_now_n).abs() < 1e-6);
         walk_n = walk_n.min(walk_now_n);
         feet_n = least([feet_n, loads_n].into_iter());
-        for (push_n, now_n) in pushes_n.iter_mut().zip(&forces.stops_n) {
-            *push_n = push_n.max(*now_n);
+        for (greatest_n, now_n) in stops_n.iter_mut().zip(&forces.stops_n) {
+            *greatest_n = greatest_n.max(*now_n);
         }
-        for (tautest_n, now_n) in tautest_n.iter_mut().zip(&forces.dampers_n) {
-            *tautest_n = tautest_n.max(now_n.abs());
+        for (greatest_n, now_n) in greatest_tensions_n.iter_mut().zip(&forces.dampers_n) {
+            *greatest_n = greatest_n.max(now_n.abs());
         }
         let q: [f64; 10] = std::array::from_fn(|i| point.equilibrium()[i] + instant.deviations[i]);
         for (closed_s, stop) in closed_s.iter_mut().zip(&machine.stops) {
@@ -143,17 +152,17 @@ fn they_are_what_a_densely_sampled_history_shows() {
             *closed_s += if along > stop.clearance_m { EVERY_S } else { 0.0 };
         }
     }
-    let hit = pushes_n.iter().zip(&closed_s).filter(|(push_n, s)| **push_n > 20.0 && **s > 0.01);
-    assert!(hit.count() >= 2, "{pushes_n:?} N, {closed_s:?} s");
-    let extra = found(&point, ModelKind::Nonlinear, Simd::best());
-    all_close("least load of foot", extra.gauge(Gauge::FootLoad), &feet_n, 1e-2);
-    all_close("margin", extra.gauge(Gauge::SlipMargin), &[margin_n], 1e-2);
-    all_close("walking", extra.gauge(Gauge::WalkMargin), &[walk_n], 0.1);
+    let hit = stops_n.iter().zip(&closed_s).filter(|(force_n, s)| **force_n > 20.0 && **s > 0.01);
+    assert!(hit.count() >= 2, "{stops_n:?} N, {closed_s:?} s");
+    let reading = read_gauges(&point, ModelKind::Nonlinear, Simd::best());
+    all_close("least load of foot", reading.gauge(Gauge::FootLoad), &feet_n, 1e-2);
+    all_close("margin", reading.gauge(Gauge::SlipMargin), &[margin_n], 1e-2);
+    all_close("walking", reading.gauge(Gauge::WalkMargin), &[walk_n], 0.1);
     assert!(walk_n < margin_n - 1.0, "{walk_n} N, {margin_n} N: this machine turns");
-    let greatest_n = pushes_n.iter().copied().fold(0.0, f64::max);
-    all_close("push of stop", extra.gauge(Gauge::StopForce), &pushes_n, 1e-3 * greatest_n);
-    // A damper's tension grows with its speed.
-    let tensions_n: Vec<f64> = extra
+    let greatest_n = stops_n.iter().copied().fold(0.0, f64::max);
+    all_close("force of stop", reading.gauge(Gauge::StopForce), &stops_n, 1e-3 * greatest_n);
+    // A damper's tension grows with its speed, so that both are greatest at the same instant.
+    let tensions_n: Vec<f64> = reading
         .gauge(Gauge::DamperSpeed)
         .iter()
         .zip(&machine.dampers)
@@ -163,10 +172,11 @@ fn they_are_what_a_densely_sampled_history_shows() {
                 + damper.friction_n * speed / (speed * speed + turn * turn).sqrt()
         })
         .collect();
-    all_close("tension at the greatest speed of damper", &tensions_n, &tautest_n, 1e-2);
-    // Every swing may be off by a sample at both ends.
-    all_close("contact of stop", extra.gauge(Gauge::StopContact), &closed_s, 40.0 * EVERY_S);
-    assert_eq!(found(&point, ModelKind::Nonlinear, Simd::Scalar), extra);
+    let quantity = "tension at the greatest speed of damper";
+    all_close(quantity, &tensions_n, &greatest_tensions_n, 1e-2);
+    // The error of each contact is up to one interval at both ends.
+    all_close("contact of stop", reading.gauge(Gauge::StopContact), &closed_s, 40.0 * EVERY_S);
+    assert_eq!(read_gauges(&point, ModelKind::Nonlinear, Simd::Scalar), reading);
 }
 
 #[test]
@@ -181,30 +191,31 @@ fn the_linear_models_loads_are_those_of_its_history() {
     let feet_n = least(forces.iter().map(|forces| forces.feet_n.clone()));
     let margin_n = least(forces.iter().map(|forces| vec![forces.slip_margin_n.unwrap()]));
     let below_n = least(forces.iter().map(|forces| forces.stops_n.iter().map(|n| -n).collect()));
-    let pushes_n: Vec<f64> = below_n.iter().map(|below_n| -below_n).collect();
-    let extra = found(&point, ModelKind::Linear, Simd::best());
+    let stops_n: Vec<f64> = below_n.iter().map(|below_n| -below_n).collect();
+    let reading = read_gauges(&point, ModelKind::Linear, Simd::best());
     let at_rest = history.forces(0).unwrap();
     assert!(at_rest.feet_n.iter().zip(&feet_n).all(|(rest_n, n)| rest_n - n > 10.0), "{feet_n:?}");
-    all_close("least load of foot", extra.gauge(Gauge::FootLoad), &feet_n, 1e-2);
-    all_close("margin", extra.gauge(Gauge::SlipMargin), &margin_n, 1e-2);
-    all_close("push of stop", extra.gauge(Gauge::StopForce), &pushes_n, 1e-6);
-    let dampers = machine.dampers.iter().zip(extra.gauge(Gauge::DamperSpeed));
+    all_close("least load of foot", reading.gauge(Gauge::FootLoad), &feet_n, 1e-2);
+    all_close("margin", reading.gauge(Gauge::SlipMargin), &margin_n, 1e-2);
+    all_close("force of stop", reading.gauge(Gauge::StopForce), &stops_n, 1e-6);
+    let dampers = machine.dampers.iter().zip(reading.gauge(Gauge::DamperSpeed));
     let tensions_n: Vec<f64> = dampers
         .map(|(damper, speed)| {
             let linear_speed = damper.friction_linear_speed_m_per_s.unwrap_or(f64::INFINITY);
-            let of_friction = 4.0 * damper.friction_n / (std::f64::consts::PI * linear_speed);
-            (damper.damping_n_s_per_m + of_friction) * speed
+            let equivalent = 4.0 * damper.friction_n / (std::f64::consts::PI * linear_speed);
+            (damper.damping_n_s_per_m + equivalent) * speed
         })
         .collect();
-    let slackest_n =
+    let negative_n =
         least(forces.iter().map(|forces| forces.dampers_n.iter().map(|n| -n.abs()).collect()));
-    let tautest_n: Vec<f64> = slackest_n.iter().map(|n| -n).collect();
-    assert!(tautest_n.iter().all(|n| *n > 1.0), "{tautest_n:?}");
-    all_close("tension at the greatest speed of damper", &tensions_n, &tautest_n, 1e-2);
+    let greatest_tensions_n: Vec<f64> = negative_n.iter().map(|n| -n).collect();
+    assert!(greatest_tensions_n.iter().all(|n| *n > 1.0), "{greatest_tensions_n:?}");
+    let quantity = "tension at the greatest speed of damper";
+    all_close(quantity, &tensions_n, &greatest_tensions_n, 1e-2);
 }
 
 #[test]
-fn in_small_motions_both_models_load_the_feet_alike() {
+fn the_foot_loads_of_both_models_agree_for_small_motions() {
     let mut machine = on_feet(with_every_element());
     machine.dampers.iter_mut().for_each(|damper| {
         damper.friction_n = 0.0;
@@ -224,17 +235,17 @@ fn in_small_motions_both_models_load_the_feet_alike() {
     let at_rest = load(&machine, &point, &[0.0; 10], &history.forces(0).unwrap());
     let rest_n = feet.loads_n(&at_rest).into_iter().fold(f64::INFINITY, f64::min);
     let [nonlinear, linear] = [ModelKind::Nonlinear, ModelKind::Linear].map(|model| {
-        let extra = found(&point, model, Simd::best());
-        rest_n - extra.gauge(Gauge::FootLoad).iter().copied().fold(f64::INFINITY, f64::min)
+        let reading = read_gauges(&point, model, Simd::best());
+        rest_n - reading.gauge(Gauge::FootLoad).iter().copied().fold(f64::INFINITY, f64::min)
     });
     assert!(nonlinear > 0.01, "{nonlinear} N");
     assert!((linear / nonlinear - 1.0).abs() < 5e-3, "{linear} N for {nonlinear} N");
 }
 
 #[test]
-fn a_machine_without_stops_or_cabinet_has_no_such_loads() {
+fn a_machine_without_stops_and_cabinet_has_only_damper_speeds() {
     let point = point(Machine::paper());
-    let mut extra = found(&point, ModelKind::Nonlinear, Simd::best());
-    let speeds = core::mem::take(&mut extra.gauges[Gauge::DamperSpeed as usize]);
-    assert_eq!((speeds.len(), extra), (2, Reading::default()));
+    let mut reading = read_gauges(&point, ModelKind::Nonlinear, Simd::best());
+    let speeds = core::mem::take(&mut reading.gauges[Gauge::DamperSpeed as usize]);
+    assert_eq!((speeds.len(), reading), (2, Reading::default()));
 }

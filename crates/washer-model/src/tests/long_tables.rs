@@ -1,4 +1,5 @@
-//! Long spin tables: preparation grows with the rows, not with their square.
+//! Tests that the time to prepare points grows with the rows of a spin table, not with their
+//! square.
 
 use std::sync::Arc;
 
@@ -6,7 +7,7 @@ use lane_ode::Simd;
 
 use crate::{Machine, Point, Spin, Timing, prepare};
 
-/// At every 1/64 s, a speed that rises and falls.
+/// Returns a table at intervals of 1/64 s with a speed that rises and falls.
 fn table(rows: usize) -> Spin {
     let speed = |k: usize| 300.0 + 50.0 * ((k % 97) as f64 - 48.0) / 48.0;
     let time_s = (0..rows).map(|k| k as f64 / 64.0).collect();
@@ -23,31 +24,32 @@ fn points(spins: &[Spin], timing: &Timing) -> Vec<Point> {
 }
 
 #[test]
-fn a_table_of_a_million_rows_is_made_ready() {
-    // By the square of the rows each of these would take hours.
+fn a_table_of_a_million_rows_is_prepared() {
+    // Each of these computations would take hours if it grew with the square of the rows.
     let rows = 1_000_000;
-    let (spin, end_s) = (table(rows), rows as f64 / 64.0);
+    let spin = table(rows);
+    let end_s = rows as f64 / 64.0;
     let greatest_rpm = spin.greatest_speed_rad_per_s(end_s) * 60.0 / core::f64::consts::TAU;
     assert!((greatest_rpm - 350.0).abs() < 1e-9, "{greatest_rpm}");
     let halfway_s = (0..rows).map(|k| (k as f64 + 0.5) / 64.0);
     let halfway_rpm = spin.speeds_rpm(halfway_s).sum::<f64>() / rows as f64;
     assert!((halfway_rpm - 300.0).abs() < 0.1, "{halfway_rpm}");
     let point = &points(&[spin], &timing(end_s, [1.0, end_s]))[0];
-    assert_eq!((point.stretches.len(), point.legs.len()), (rows, rows));
+    assert_eq!((point.stretches.len(), point.segments.len()), (rows, rows));
 }
 
 #[test]
-fn every_leg_has_the_stretch_that_holds_on_it() {
+fn every_segment_lies_within_its_stretch() {
     let spin = table(200);
-    // Edges on a row's time, between two, and past the last.
+    // The edges are at a row's time, between two rows, and after the last one.
     for window_s in [[0.0, 1.0], [0.5, 2.3], [1.01, 4.0]] {
         let point = &points(std::slice::from_ref(&spin), &timing(4.0, window_s))[0];
-        for leg in point.legs.iter() {
-            let holds =
-                point.stretches.iter().rposition(|stretch| stretch.start_s.0 <= leg.start_s);
-            assert_eq!(Some(leg.stretch), holds, "{leg:?}");
-            let next = point.stretches.get(leg.stretch + 1);
-            assert!(next.is_none_or(|next| leg.end_s <= next.start_s.0));
+        for segment in point.segments.iter() {
+            let expected =
+                point.stretches.iter().rposition(|stretch| stretch.start_s.0 <= segment.start_s);
+            assert_eq!(Some(segment.stretch), expected, "{segment:?}");
+            let next = point.stretches.get(segment.stretch + 1);
+            assert!(next.is_none_or(|next| segment.end_s <= next.start_s.0));
         }
         for t_s in [0.0, 0.3, 0.5, 2.3, 5.0] {
             let stretch = point.stretches.iter().rev().find(|stretch| stretch.start_s.0 <= t_s);
@@ -59,13 +61,14 @@ fn every_leg_has_the_stretch_that_holds_on_it() {
 }
 
 #[test]
-fn neighbours_of_one_spin_share_what_follows_from_it() {
-    let (a, b) = (table(100), table(101));
+fn neighbours_with_the_same_spin_share_stretches_and_segments() {
+    let a = table(100);
+    let b = table(101);
     let points = points(&[a.clone(), a.clone(), b, a], &timing(1.0, [0.0, 1.0]));
     let shared = |i: usize, j: usize| {
         Arc::ptr_eq(&points[i].stretches, &points[j].stretches)
-            && Arc::ptr_eq(&points[i].legs, &points[j].legs)
+            && Arc::ptr_eq(&points[i].segments, &points[j].segments)
     };
     assert!(shared(0, 1) && !shared(1, 2) && !shared(2, 3));
-    assert_eq!(points[0].legs, points[3].legs);
+    assert_eq!(points[0].segments, points[3].segments);
 }

@@ -1,6 +1,6 @@
-//! The mass matrix: against independent numbers, and against the accelerations it belongs to.
+//! Tests of the mass matrix against independent numbers and against the model's accelerations.
 
-use super::instruments::{equations, equations_of, mass_matrix, random_machine};
+use super::instruments::{equations, loaded_equations, mass_matrix, random_machine};
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Coefficients;
@@ -31,7 +31,7 @@ fn val_mass_matrix_matches_an_independent_one() {
     eprintln!("mass matrix: at most {worst:.1e} of the largest entry");
 }
 
-/// Machines in motion: tub and shaft within the bearings' play.
+/// Calls `check` with random states of random machines. The deflections of the bearings are small.
 fn in_motion(
     seed: u64,
     mut check: impl FnMut(&Coefficients<f64>, &SpinState<f64>, &Vector, &Vector),
@@ -52,8 +52,8 @@ fn in_motion(
 
 type Vector = [N<f64>; COORDINATES];
 
-/// What is left of M a - f, over the largest force.
-fn left([inertia, force]: &[Vector; 2]) -> f64 {
+/// Returns the residual M a - f, relative to the largest force.
+fn residual([inertia, force]: &[Vector; 2]) -> f64 {
     let scale = force.iter().fold(0.0_f64, |m, f| m.max(f.0.abs()));
     (0..COORDINATES).fold(0.0, |m, i| m.max((inertia[i] - force[i]).0.abs() / scale))
 }
@@ -63,49 +63,51 @@ fn accelerations_solve_the_equations_of_motion_of_any_machine() {
     let mut worst = 0.0_f64;
     in_motion(11, |machine, spin, q, u| {
         let a = accelerations(machine, &Coupling::Springs, &sag(), spin, q, u);
-        worst = worst.max(left(&equations(machine, spin, q, u, &a)));
+        worst = worst.max(residual(&equations(machine, spin, q, u, &a)));
     });
     eprintln!("M a - f: at most {worst:.1e} of the largest force");
     assert!(worst < 1e-12, "{worst:e}");
 }
 
-/// Of some size: the mass scaling's law holds about any.
+/// Returns a sag of any size, because the law of mass scaling holds about every sag.
 fn sag() -> Sag<f64> {
     let bearings = Deflection { offset: [N(-3e-6), N(1e-6)], tilt: [N(2e-5), N(-1e-5)] };
     Sag { bearings, hinge: [N(2e-4), N(-7e-4)] }
 }
 
 #[test]
-fn mass_scaling_changes_the_forces_of_bearings_and_hinge_and_nothing_else() {
+fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
     let mut worst = 0.0_f64;
     for (cap, hinge_rad_per_s) in [(300.0_f64, Some(400.0)), (1500.0, None)] {
         let caps = Caps { bearings_rad_per_s: cap, hinge_rad_per_s };
         in_motion(12, |machine, spin, q, u| {
             let sag = sag();
             let a = accelerations(machine, &Coupling::new(N(0.0), Some(&caps)), &sag, spin, q, u);
-            // d'' of the true deflection, by two derivatives carried along the motion.
-            let course: [_; COORDINATES] = core::array::from_fn(|i| {
+            // Nested dual numbers give the second time derivative of the deflection.
+            let motion: [_; COORDINATES] = core::array::from_fn(|i| {
                 let [q, u, a] = [q[i].0, u[i].0, a[i].0];
                 N(Dual { value: Dual { value: q, slope: u }, slope: Dual { value: u, slope: a } })
             });
-            let [tub, shaft] = [4, 6].map(|i| Tilt::new(course[i], course[i + 1]));
-            let d = Deflection::new(&course, &tub, &shaft);
+            let [tub, shaft] = [4, 6].map(|i| Tilt::new(motion[i], motion[i + 1]));
+            let d = Deflection::new(&motion, &tub, &shaft);
             let speed_squared = spin.speed.0 * spin.speed.0;
             let added = |d: [N<Dual<Dual<f64>>>; 2], sag: [N<f64>; 2]| {
-                let of_one = |i: usize| {
+                let component = |i: usize| {
                     let Dual { value, slope } = d[i].0;
                     N((slope.slope + speed_squared * (value.value - sag[i].0)) / (cap * cap))
                 };
-                [of_one(0), of_one(1)]
+                [component(0), component(1)]
             };
             let Deflection { offset, tilt } = sag.bearings;
-            let extra = Deflection { offset: added(d.offset, offset), tilt: added(d.tilt, tilt) };
-            let extra = extra.load(&machine.bodies);
+            let deflection =
+                Deflection { offset: added(d.offset, offset), tilt: added(d.tilt, tilt) };
+            let load = deflection.load(&machine.bodies);
             let mut both = halves(machine, spin, q, u);
-            both.tub.floating.apply(&extra.reaction());
-            both.rotor.floating.apply(&extra);
+            both.tub.floating.apply(&load.reaction());
+            both.rotor.floating.apply(&load);
             if let Some(cap) = hinge_rad_per_s {
-                // The weight's sag hangs still: seen from the shaft it turns backwards.
+                // The sag by weight does not turn with the drum, so that it turns backwards in the
+                // shaft's frame.
                 let [nine, ten] = sag.hinge;
                 let turned = [spin.cos * nine + spin.sin * ten, spin.cos * ten - spin.sin * nine];
                 let mass = N(machine.bodies.flexure_stiffness.0 / (cap * cap));
@@ -116,7 +118,7 @@ fn mass_scaling_changes_the_forces_of_bearings_and_hinge_and_nothing_else() {
                     both.rotor.floating.torque[2 + i] -= mass * (a[8 + i] + whirl);
                 }
             }
-            worst = worst.max(left(&equations_of(&both, &a)));
+            worst = worst.max(residual(&loaded_equations(&both, &a)));
         });
     }
     eprintln!("(M + K/w^2) a - f: at most {worst:.1e} of the largest force");

@@ -1,24 +1,23 @@
-//! What an observer sees of a motion: values, and derivatives in time that are really those of the
-//! values.
+//! Tests of the outputs' derivatives in time against differences of the outputs' values.
 
-use super::instruments::{random_machine, random_spin, ready};
+use super::instruments::{prepared, random_machine, random_spin};
 use crate::channel::CHANNELS;
 use crate::coordinates::{COORDINATES, STATES};
 use crate::nonlinear::coupling::Coupling;
 use crate::nonlinear::outputs::RADIAL;
-use crate::run::model::{Linear, Model, Nonlinear};
+use crate::run::model::{LaneModel, Linear, Nonlinear};
 use lane_ode::{N, Sample};
 
 const OUTPUTS: usize = CHANNELS + RADIAL;
 
-/// Largest errors of slope and curvature against differences over `2 H_S`, over their largest
-/// magnitudes.
-fn errors<M: Model<f64>>(seed: u64) -> [f64; 2] {
+/// Computes the largest errors of slope and curvature, relative to their largest magnitudes,
+/// against central differences over `2 H_S`.
+fn errors<M: LaneModel<f64>>(seed: u64) -> [f64; 2] {
     const H_S: f64 = 1e-5;
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut worst = [0.0_f64; 2];
     for kind in 0..40 {
-        let point = ready(random_machine(&mut rng), random_spin(&mut rng, kind, 4.0), 4.0);
+        let point = prepared(random_machine(&mut rng), random_spin(&mut rng, kind, 4.0), 4.0);
         let model = M::splat(N(0.0), &point, Coupling::Springs);
         let mut draw = |size: f64| size * (2.0 * rng.f64() - 1.0);
         let middle_s = 0.2 + draw(0.1);
@@ -26,36 +25,37 @@ fn errors<M: Model<f64>>(seed: u64) -> [f64; 2] {
         let q: [f64; COORDINATES] = core::array::from_fn(|i| rest[i] + draw(0.03));
         let u: [f64; COORDINATES] = core::array::from_fn(|_| draw(0.5));
         let a: [f64; COORDINATES] = core::array::from_fn(|_| draw(20.0));
-        // A motion of constant acceleration.
-        let seen = |t: f64| -> [Sample<f64>; OUTPUTS] {
-            let of = |i: usize| (q[i] + t * (u[i] + 0.5 * t * a[i]), u[i] + t * a[i]);
+        // The outputs of a motion of constant acceleration.
+        let outputs = |t: f64| -> [Sample<f64>; OUTPUTS] {
+            let position = |i: usize| q[i] + t * (u[i] + 0.5 * t * a[i]);
+            let speed = |i: usize| u[i] + t * a[i];
             let joined =
                 |first: &dyn Fn(usize) -> f64, second: &dyn Fn(usize) -> f64| -> [N<f64>; STATES] {
                     core::array::from_fn(|i| {
                         N(if i < COORDINATES { first(i) } else { second(i - COORDINATES) })
                     })
                 };
-            let x = joined(&|i| of(i).0, &|i| of(i).1);
-            let dx = joined(&|i| of(i).1, &|i| a[i]);
+            let x = joined(&position, &speed);
+            let dx = joined(&speed, &|i| a[i]);
             let (radial, channels) = model.observe(&model.forcing(N(middle_s + t)), &x, &dx, true);
             let channels = channels.unwrap();
             core::array::from_fn(|i| if i < CHANNELS { channels[i] } else { radial[i - CHANNELS] })
         };
-        let [before, now, after] = [-H_S, 0.0, H_S].map(seen);
+        let [before, now, after] = [-H_S, 0.0, H_S].map(outputs);
         let mut largest = [0.0_f64; 2];
-        let mut off = [0.0_f64; 2];
+        let mut difference = [0.0_f64; 2];
         for i in 0..OUTPUTS {
             let slope = (after[i].value.0 - before[i].value.0) / (2.0 * H_S);
             let curvature = (after[i].slope.0 - before[i].slope.0) / (2.0 * H_S);
-            for (k, (ours, theirs)) in
+            for (k, (value, expected)) in
                 [(now[i].slope.0, slope), (now[i].curvature.0, curvature)].into_iter().enumerate()
             {
-                off[k] = off[k].max((ours - theirs).abs());
-                largest[k] = largest[k].max(theirs.abs());
+                difference[k] = difference[k].max((value - expected).abs());
+                largest[k] = largest[k].max(expected.abs());
             }
         }
         for k in 0..2 {
-            worst[k] = worst[k].max(off[k] / largest[k]);
+            worst[k] = worst[k].max(difference[k] / largest[k]);
         }
     }
     worst

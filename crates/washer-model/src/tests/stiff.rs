@@ -1,4 +1,4 @@
-//! Bearings of any stiffness, by the method that takes them implicitly.
+//! Tests of the additive method, which treats bearings implicitly, with stiff bearings.
 
 use crate::{
     Channel, Machine, Method, ModelKind, Point, Record, Spin, Timing,
@@ -50,10 +50,11 @@ fn the_additive_method_agrees_with_converged_rk4() {
 }
 
 #[test]
-fn the_additive_method_takes_bearings_on_which_explicit_ones_crawl() {
+fn the_additive_method_integrates_bearings_too_stiff_for_explicit_methods() {
     let points = [2e9, 1e11, 1e14].map(point);
     for model in ModelKind::ALL {
-        // Bearings give way by a tenth of a micrometre, so rigid ones change little.
+        // The bearings of the reference deflect by a tenth of a micrometre, so that those of the
+        // other points, which are almost rigid, give a similar motion.
         let reference = run(model, &Method::Rk4 { step_s: 5e-5 }, &points[0]);
         for stiffer in &points[1..] {
             assert!(run(model, &Method::Rk4 { step_s: 5e-5 }, stiffer).failure.is_some());
@@ -62,18 +63,17 @@ fn the_additive_method_takes_bearings_on_which_explicit_ones_crawl() {
             let tried = found.steps + found.rejected;
             eprintln!("{model:?}: {error:.1e} in {tried} steps");
             assert!(error < 5e-4, "{model:?}: {error:e}");
-            // Dormand-Prince would need 3e5 and 1e7.
+            // An explicit method of order 5 needs 3e5 and 1e7 steps.
             assert!(tried < 10_000, "{model:?}: {tried} steps");
         }
     }
 }
 
 #[test]
-fn records_of_stiff_bearings_do_not_depend_on_company() {
+fn records_of_stiff_bearings_do_not_depend_on_other_points() {
     let points = [2e8, 1e11, 1e7, 1e8].map(point);
     let all: Vec<&Point> = points.iter().collect();
-    // One lane takes the points one after another; another instruction set may have them side by
-    // side.
+    // With one lane the points run one after another, on other instruction sets side by side.
     let method = Method::Additive(tolerance(1e-5));
     for model in ModelKind::ALL {
         let together = simulate(Simd::Scalar, model, &method, &all);

@@ -1,8 +1,8 @@
-//! What the paper says of the modes (its Fig. 7), and what must hold of any.
+//! Tests of the modes against the paper (its Fig. 7), and of their general properties.
 
 use crate::machine::Machine;
 use crate::modes::campbell::{ModeAtSpeed, ModeOverSpeed, campbell};
-use crate::modes::shape::{Movement, Plane};
+use crate::modes::shape::{MotionPlane, Movement};
 use crate::{Point, Profile, Spin, Timing, modes, prepare};
 use core::f64::consts::TAU;
 use lane_ode::Simd;
@@ -26,10 +26,10 @@ fn paper() -> &'static [ModeOverSpeed] {
 fn val_resonances_are_the_papers() {
     let modes = paper();
     let theirs = [
-        (99.9, 99.86, Movement::Rocking, Plane::Horizontal),
-        (147.6, 147.76, Movement::Rocking, Plane::Vertical),
-        (162.3, 162.08, Movement::Translation, Plane::Horizontal),
-        (261.6, 261.48, Movement::Translation, Plane::Vertical),
+        (99.9, 99.86, Movement::Rocking, MotionPlane::Horizontal),
+        (147.6, 147.76, Movement::Rocking, MotionPlane::Vertical),
+        (162.3, 162.08, Movement::Translation, MotionPlane::Horizontal),
+        (261.6, 261.48, Movement::Translation, MotionPlane::Vertical),
     ];
     for (mode, (paper, independent, movement, plane)) in modes.iter().zip(theirs) {
         let [resonance] = mode.resonances[..] else { panic!("{:?}", mode.resonances) };
@@ -44,11 +44,13 @@ fn val_resonances_are_the_papers() {
 }
 
 #[test]
-fn springs_without_load_where_the_tables_draw_them_decide_the_resonances() {
-    // The other reading: the tabulated place is that of the loaded machine. By the law of the lever
-    // each spring carries its share of the weight there, and is so much shorter without it.
+fn loaded_springs_at_the_tabulated_positions_do_not_give_the_papers_resonances() {
+    // This is the other interpretation of the paper's tables: positions are those of the loaded
+    // machine. By the law of the lever each spring then carries its share of the weight, and its
+    // free length is shorter by the deflection.
     let mut machine = Machine::paper();
-    let (drum, unbalance) = (&machine.drum, &machine.unbalance);
+    let drum = &machine.drum;
+    let unbalance = &machine.unbalance;
     let bodies = [
         (machine.tub.mass_kg, machine.tub.centre_x_m),
         (machine.shaft.mass_kg, machine.shaft.centre_x_m),
@@ -83,14 +85,15 @@ fn springs_without_load_where_the_tables_draw_them_decide_the_resonances() {
     }
 }
 
-/// Half the distance from least to greatest frequency over a turn, as a share of the mean.
+/// Returns half the distance from the least to the greatest frequency over a turn, as a share of
+/// the mean.
 fn swing(at: &ModeAtSpeed) -> f64 {
     0.5 * (at.greatest_rpm - at.least_rpm) / at.frequency_rpm
 }
 
 #[test]
 fn val_frequencies_hardly_vary_over_a_turn() {
-    // The paper: less than 0.3 % up to 1200 rpm. So it is, but for the first mode at the very end.
+    // The paper says less than 0.3 % up to 1200 rpm. This holds but for the first mode at 1200 rpm.
     for (k, mode) in paper()[..4].iter().enumerate() {
         for (at, step) in mode.at_speed.iter().zip(0..) {
             let speed = 50 * step;
@@ -101,8 +104,7 @@ fn val_frequencies_hardly_vary_over_a_turn() {
             }
         }
     }
-    // The dampers are what carries it over: the tenth of a percent that the paper prints holds
-    // without them.
+    // Without dampers the limit holds for all modes.
     let mut undamped = Machine::paper();
     for damper in &mut undamped.dampers {
         damper.damping_n_s_per_m = 0.0;
@@ -120,8 +122,10 @@ fn val_frequencies_hardly_vary_over_a_turn() {
 #[test]
 fn modes_are_followed_through_crossings() {
     let modes = paper();
-    // Pitch rises through the horizontal translation, whose damping is ten times as high.
-    let (pitch, sway) = (&modes[1].at_speed, &modes[2].at_speed);
+    // The frequency of pitch crosses that of the horizontal translation, whose damping ratio is
+    // several times as great.
+    let pitch = &modes[1].at_speed;
+    let sway = &modes[2].at_speed;
     assert!(pitch[0].frequency_rpm < sway[0].frequency_rpm);
     assert!(pitch[24].frequency_rpm > sway[24].frequency_rpm + 50.0);
     for k in 0..25 {
@@ -141,35 +145,41 @@ fn a_mode_solves_the_equations_of_motion() {
     let speed = 900.0 * TAU / 60.0;
     let matrices = point.matrices(1.0, speed, 0.0);
     for mode in modes(&point, 1.0, speed).unwrap().modes {
-        let (re, im) = (mode.re_per_s, mode.im_rad_per_s);
-        let (square_re, square_im) = (re * re - im * im, 2.0 * re * im);
+        let re = mode.re_per_s;
+        let im = mode.im_rad_per_s;
+        // The real and imaginary part of s^2.
+        let square_re = re * re - im * im;
+        let square_im = 2.0 * re * im;
         for i in 0..10 {
-            let (mut rest, mut size) = ([0.0; 2], 0.0);
+            let mut residual = [0.0; 2];
+            let mut size = 0.0;
             for j in 0..10 {
-                let (m, c, k) =
-                    (matrices.mass[i][j], matrices.damping[i][j], matrices.stiffness[i][j]);
+                let m = matrices.mass[i][j];
+                let c = matrices.damping[i][j];
+                let k = matrices.stiffness[i][j];
                 let a = m * square_re + c * re + k;
                 let b = m * square_im + c * im;
                 let [x, y] = mode.shape[j];
-                rest[0] += a * x - b * y;
-                rest[1] += a * y + b * x;
+                residual[0] += a * x - b * y;
+                residual[1] += a * y + b * x;
                 size += k.abs() * x.hypot(y);
             }
-            assert!(rest[0].hypot(rest[1]) < 1e-9 * size, "row {i} of the mode at {im} rad/s");
+            let residual = residual[0].hypot(residual[1]);
+            assert!(residual < 1e-9 * size, "row {i} of the mode at {im} rad/s");
         }
     }
 }
 
 #[test]
-fn a_tub_that_does_not_swing_has_ten_modes_all_the_same() {
+fn an_overdamped_machine_has_ten_modes_too() {
     let mut machine = Machine::paper();
     machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 3000.0);
     let modes = campbell(&point(machine), &[0.0, 100.0, 200.0]).unwrap();
     assert_eq!(modes.len(), 10);
-    let creeping: Vec<_> =
+    let overdamped: Vec<_> =
         modes.iter().filter(|mode| mode.at_speed[0].frequency_rpm == 0.0).collect();
-    assert!(!creeping.is_empty());
-    for mode in creeping {
+    assert!(!overdamped.is_empty());
+    for mode in overdamped {
         assert!(mode.at_speed[0].damping_ratio >= 1.0, "{}", mode.at_speed[0].damping_ratio);
     }
 }

@@ -2,7 +2,7 @@
 //! damper, a stop's force of depth and speed.
 
 use super::{CabinetLine, Elements, ForceLaw as _, TubMotion};
-use crate::lanes::{Constant as _, lane_struct};
+use crate::lanes::{ToDual as _, lane_struct};
 use lane_ode::{Lane, N};
 
 lane_struct! {
@@ -14,7 +14,7 @@ lane_struct! {
 impl<T: Lane> Elements<T> {
     /// Computes the depth (m) and the speed (m/s) of each motion. The depth of a friction is zero.
     #[inline(always)]
-    pub(crate) fn at_corners(&self, tub: &TubMotion<T>) -> Vec<[N<T>; 2]> {
+    pub(crate) fn corner_motions(&self, tub: &TubMotion<T>) -> Vec<[N<T>; 2]> {
         let mut motions = Vec::with_capacity(self.dampers.len() + self.stops.len());
         for number in 0..self.dampers.len() {
             motions.push([tub.midpoint[0].lit(0.0), self.damper_speed(number, tub)]);

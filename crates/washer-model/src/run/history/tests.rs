@@ -1,4 +1,4 @@
-//! Time histories: against independent ones, and what must hold of any.
+//! Tests of time histories against independent ones, and of their general properties.
 
 use crate::coordinates::COORDINATES;
 use crate::{
@@ -12,7 +12,7 @@ fn point(machine: Machine, spin: Spin, end_s: f64) -> Point {
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
 }
 
-/// Largest difference from a reference file's channels, as a share of each one's peak.
+/// Returns the largest difference from the channels of a reference file, as a share of their peaks.
 fn difference(file: &str, history: &History<'_>) -> f64 {
     let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
@@ -38,7 +38,7 @@ fn difference(file: &str, history: &History<'_>) -> f64 {
 fn val_a_run_up_matches_an_independent_one() {
     let spin = Spin::Ramped { profile: Profile::Cycloidal, peak_rpm: 600.0, ramp_s: 4.0 };
     let point = point(Machine::paper(), spin, 6.0);
-    // Steps that do not divide the time between instants, so that most instants lie inside one.
+    // Most instants lie inside a step, because steps do not divide the time between instants.
     let method = Method::Rk4 { step_s: 0.97e-4 };
     for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
         let history = history(model, &method, &point, &Start::default(), 0.01);
@@ -66,7 +66,7 @@ fn val_a_run_up_and_down_matches_an_independent_one() {
 }
 
 #[test]
-fn a_trajectory_does_not_depend_on_how_often_it_is_read() {
+fn a_trajectory_does_not_depend_on_the_instants() {
     let point = point(
         Machine::paper(),
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 },
@@ -76,13 +76,14 @@ fn a_trajectory_does_not_depend_on_how_often_it_is_read() {
     for method in
         [Method::Rk4 { step_s: 2e-4 }, Method::Dopri5(adaptive), Method::Additive(adaptive)]
     {
-        let read = |every_s: f64| {
+        let sample = |every_s: f64| {
             history(ModelKind::Nonlinear, &method, &point, &Start::default(), every_s)
         };
-        let (seldom, often) = (read(0.25), read(0.25 / 1024.0));
-        assert_eq!((seldom.len(), often.len()), (5, 4097));
+        let coarse = sample(0.25);
+        let dense = sample(0.25 / 1024.0);
+        assert_eq!((coarse.len(), dense.len()), (5, 4097));
         for k in 0..5 {
-            assert_eq!(seldom.instant(k), often.instant(1024 * k));
+            assert_eq!(coarse.instant(k), dense.instant(1024 * k));
         }
     }
 }
@@ -120,7 +121,7 @@ fn at_rest_the_cabinet_carries_the_weight() {
         let history = history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &Start::default(), 0.1);
         let forces = history.forces(0).unwrap();
         let [x, y, z] = forces.cabinet_n;
-        // Forces along the cabinet's axis need not cancel: the bodies are held along it.
+        // The force along c1 need not vanish, because the model does not move along it.
         assert!((y + weight).abs() < 1e-9 * weight && z.abs() < 1e-9 * weight, "{x} {y} {z}");
         assert_eq!(forces.dampers_n, [0.0; 2]);
         assert!(forces.springs_n.iter().all(|tension| *tension > 0.0), "{:?}", forces.springs_n);
@@ -134,7 +135,7 @@ fn linear_forces_are_the_nonlinear_ones_to_first_order() {
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 },
         0.1,
     );
-    let apart = |size: f64| {
+    let difference = |size: f64| {
         let start = Start {
             deviations: std::array::from_fn(|i| size * (0.3 + 0.1 * i as f64)),
             speeds: std::array::from_fn(|i| size * (5.0 - i as f64)),
@@ -148,13 +149,15 @@ fn linear_forces_are_the_nonlinear_ones_to_first_order() {
         let pairs = all(&nonlinear).into_iter().zip(all(&linear));
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
-    let (coarse, fine) = (apart(1e-2), apart(1e-3));
-    assert!(coarse > 1e-3, "{coarse}");
-    assert!((coarse / fine - 100.0).abs() < 10.0, "{coarse} {fine}");
+    let large = difference(1e-2);
+    let small = difference(1e-3);
+    assert!(large > 1e-3, "{large}");
+    // A tenth of the motion has a hundredth of the difference, which is of second order.
+    assert!((large / small - 100.0).abs() < 10.0, "{large} {small}");
 }
 
 #[test]
-fn both_models_start_where_they_are_told() {
+fn both_models_start_at_the_given_state() {
     let point = point(
         Machine::paper(),
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 },

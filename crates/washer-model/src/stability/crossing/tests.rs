@@ -24,7 +24,7 @@ fn ramp() -> Point {
 #[test]
 fn the_tangent_map_is_what_nearby_runs_do() {
     let point = ramp();
-    let at_rest = <Nonlinear<f64> as Model<f64>>::at_rest(&point);
+    let at_rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
     let entry = run(&point, STEP_S, [0.0, 1.8], &at_rest).end;
     // Over the profile's kink.
     let crossing = forwards([1.8, 2.2], None);
@@ -81,7 +81,7 @@ fn a_run_on_its_response_departs_by_nothing() {
 #[test]
 fn peaks_are_of_the_window_and_of_the_run_that_was_put_on_its_response() {
     let point = ramp();
-    let at_rest = <Nonlinear<f64> as Model<f64>>::at_rest(&point);
+    let at_rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
     let plain = run(&point, STEP_S, [0.0, 3.0], &at_rest).peaks;
     let late = run(&point, STEP_S, [0.0, 1.0], &at_rest);
     let late = run(&point, STEP_S, [1.0, 3.0], &late.end).peaks;
@@ -103,7 +103,7 @@ fn peaks_are_of_the_window_and_of_the_run_that_was_put_on_its_response() {
 fn a_run_that_leaves_its_range_says_when() {
     let point = ramp();
     // A speed that no suspension holds.
-    let mut start = <Nonlinear<f64> as Model<f64>>::at_rest(&point);
+    let mut start = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
     start[COORDINATES] = 1e4;
     let failure = run(&point, STEP_S, [0.0, 1.0], &start).failure.unwrap();
     assert!(failure.time_s > 0.0 && failure.time_s < 1.0, "{failure}");

@@ -1,7 +1,6 @@
-//! What is recorded only when asked for, against the same numbers from densely sampled time
-//! histories.
+//! Tests of the optional recorders against densely sampled time histories.
 
-use super::instruments::{EVERYTHING, paper};
+use super::instruments::{ALL_RECORDERS, paper};
 use crate::machine::spin::cuts_s;
 use crate::{
     Caps, Channel, Gauge, Machine, Method, ModelKind, Point, Profile, Recorders, Spin, Start,
@@ -12,8 +11,8 @@ use lane_ode::{Simd, Tolerance};
 const TIMING: Timing = Timing { end_s: 4.0, window_s: [1.3, 3.9], checkpoints: 0 };
 const EVERY_S: f64 = 2.5e-4;
 
-/// Through the resonances in four seconds, with so little room between drum and tub that they clash
-/// at times.
+/// Returns a point that passes the resonances in four seconds, with so small a clearance that drum
+/// and tub overlap at times.
 fn point() -> Point {
     let machine = Machine { radial_clearance_m: 0.4e-3, ..paper(0.8, 120.0) };
     let spin =
@@ -21,26 +20,26 @@ fn point() -> Point {
     prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap()
 }
 
-/// The same from a history.
-struct Sampled {
+/// The readings that follow from a history.
+struct SampledReadings {
     root_mean_squares: [f64; 8],
     turns: Vec<[f64; 8]>,
     cabinet_force_n: f64,
     clash_time_s: f64,
 }
 
-fn sampled(point: &Point, model: ModelKind, method: &Method) -> Sampled {
+fn sampled(point: &Point, model: ModelKind, method: &Method) -> SampledReadings {
     let history = history(model, method, point, &Start::default(), EVERY_S);
     let cuts = cuts_s(&point.stretches, TIMING.window_s);
     let [first, last] = TIMING.window_s.map(|edge_s| (edge_s / EVERY_S).round() as usize);
-    let mut found = Sampled {
+    let mut found = SampledReadings {
         root_mean_squares: [0.0; 8],
         turns: vec![[0.0; 8]; cuts.len() + 1],
         cabinet_force_n: 0.0,
         clash_time_s: 0.0,
     };
     for k in first..=last {
-        // The trapezoidal rule.
+        // The weight of the trapezoidal rule.
         let weight = if k == first || k == last { 0.5 * EVERY_S } else { EVERY_S };
         let instant = history.instant(k).unwrap();
         let turn = cuts.partition_point(|cut_s| *cut_s < k as f64 * EVERY_S);
@@ -58,63 +57,68 @@ fn sampled(point: &Point, model: ModelKind, method: &Method) -> Sampled {
     found
 }
 
-fn close(what: &str, found: f64, expected: f64, allowed: f64) {
-    let error = (found - expected).abs() / expected.abs();
-    assert!(error <= allowed, "{what}: {found} for {expected}, off by {error:e}");
+fn close(quantity: &str, value: f64, expected: f64, tolerance: f64) {
+    let error = (value - expected).abs() / expected.abs();
+    assert!(error <= tolerance, "{quantity}: {value} instead of {expected}, error {error:e}");
 }
 
 #[test]
-fn they_are_what_a_densely_sampled_history_shows() {
+fn readings_agree_with_densely_sampled_histories() {
     let point = point();
     let method = Method::Rk4 { step_s: 2e-4 };
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let (records, extras) = simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING);
+        let (records, readings) =
+            simulate_with(Simd::best(), model, &method, &[&point], ALL_RECORDERS);
         assert_eq!(
             records,
             simulate(Simd::best(), model, &method, &[&point]),
-            "the rest is as ever"
+            "recorders do not change peaks"
         );
-        let (extra, expected) = (&extras[0], sampled(&point, model, &method));
-        let rms = extra.root_mean_squares.unwrap();
-        assert!(extra.turns.len() > 10);
-        assert_eq!(extra.turns.len(), expected.turns.len());
+        let reading = &readings[0];
+        let expected = sampled(&point, model, &method);
+        let rms = reading.root_mean_squares.unwrap();
+        assert!(reading.turns.len() > 10);
+        assert_eq!(reading.turns.len(), expected.turns.len());
         for channel in Channel::ALL {
-            let (i, name) = (channel.index(), channel.name());
+            let i = channel.index();
+            let name = channel.name();
             close(name, rms[i], expected.root_mean_squares[i], 1e-5);
             let mut exact = 0;
-            for (found, expected) in extra.turns.iter().zip(&expected.turns) {
-                // A sample beside a crest is as good as the crest; one beside the end of a turn, on
-                // a flank, is not.
+            for (found, expected) in reading.turns.iter().zip(&expected.turns) {
+                // A sample near a crest has almost the value of the crest. A turn whose largest
+                // deviation is at its end, on a flank, has a greater error.
                 close(name, found[i], expected[i], 2e-2);
                 exact += usize::from((found[i] - expected[i]).abs() < 1e-4 * found[i]);
             }
             assert!(
-                2 * exact > extra.turns.len(),
+                2 * exact > reading.turns.len(),
                 "{name}: {exact} of {} turns",
-                extra.turns.len()
+                reading.turns.len()
             );
-            let greatest = extra.turns.iter().fold(0.0_f64, |greatest, turn| greatest.max(turn[i]));
+            let greatest =
+                reading.turns.iter().fold(0.0_f64, |greatest, turn| greatest.max(turn[i]));
             close(name, greatest, records[0].amplitudes[i], 1e-9);
         }
-        close("force", extra.gauge(Gauge::CabinetForce)[0], expected.cabinet_force_n, 1e-4);
-        let clash_s = extra.gauge(Gauge::ClashTime)[0];
+        close("force", reading.gauge(Gauge::CabinetForce)[0], expected.cabinet_force_n, 1e-4);
+        let clash_s = reading.gauge(Gauge::ClashTime)[0];
         assert!(clash_s > 0.05 && clash_s < 2.5, "{clash_s} s, least gap {}", records[0].min_gap_m);
-        // Each touch is a sample too long or too short.
-        let off_s = (clash_s - expected.clash_time_s).abs();
-        assert!(off_s < 20.0 * EVERY_S, "{clash_s} for {}", expected.clash_time_s);
+        // The error of each overlap is at most one interval.
+        let error_s = (clash_s - expected.clash_time_s).abs();
+        assert!(error_s < 20.0 * EVERY_S, "{clash_s} instead of {}", expected.clash_time_s);
     }
 }
 
 #[test]
-fn methods_whose_steps_lie_elsewhere_find_the_same() {
+fn readings_do_not_depend_on_the_method() {
     let point = point();
     let tolerance = Tolerance { relative: 1e-7, absolute: 1e-10, max_steps: 1_000_000 };
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let run =
-            |method| simulate_with(Simd::best(), model, &method, &[&point], EVERYTHING).1.remove(0);
+        let run = |method| {
+            simulate_with(Simd::best(), model, &method, &[&point], ALL_RECORDERS).1.remove(0)
+        };
         let reference = run(Method::Rk4 { step_s: 2e-4 });
         for other in [run(Method::Dopri5(tolerance)), run(Method::Additive(tolerance))] {
-            let rms = [&other, &reference].map(|extra| extra.root_mean_squares.unwrap());
+            let rms = [&other, &reference].map(|reading| reading.root_mean_squares.unwrap());
             rms[0]
                 .iter()
                 .zip(rms[1])
@@ -142,26 +146,26 @@ fn methods_whose_steps_lie_elsewhere_find_the_same() {
 }
 
 #[test]
-fn only_what_is_asked_for_is_there() {
+fn recorders_that_are_not_in_use_leave_no_readings() {
     let point = point();
     let caps = Caps { bearings_rad_per_s: 1500.0, hinge_rad_per_s: None };
     let method = Method::Capped { step_s: 1e-3, caps };
-    let run =
-        |wanted| simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], wanted);
+    let run = |recorders| {
+        simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point, &point], recorders)
+    };
     assert!(run(Recorders::default()).1.is_empty());
-    let (_, extras) = run(Recorders::gauge(Gauge::ClashTime));
-    assert_eq!(extras.len(), 2);
-    for extra in extras {
-        assert!(extra.root_mean_squares.is_none() && extra.turns.is_empty());
-        let shown = extra.gauges.each_ref().map(Vec::len);
-        assert_eq!(shown, Gauge::ALL.map(|gauge| usize::from(gauge == Gauge::ClashTime)));
+    let (_, readings) = run(Recorders::gauge(Gauge::ClashTime));
+    assert_eq!(readings.len(), 2);
+    for reading in readings {
+        assert!(reading.root_mean_squares.is_none() && reading.turns.is_empty());
+        let lengths = reading.gauges.each_ref().map(Vec::len);
+        assert_eq!(lengths, Gauge::ALL.map(|gauge| usize::from(gauge == Gauge::ClashTime)));
     }
 }
 
 #[test]
 fn at_rest_the_cabinet_carries_the_weight() {
     let mut machine = Machine::paper();
-    // Springs that carry the machine straight down: nothing along the drum's axis.
     machine.unbalance.mass_kg = 0.0;
     let weight_n = machine.gravity_m_per_s2
         * (machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg);
@@ -169,28 +173,27 @@ fn at_rest_the_cabinet_carries_the_weight() {
     let still = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 1.0 };
     let point = prepare(Simd::best(), &[(machine, still)], &timing).remove(0).unwrap();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let (_, extras) = simulate_with(
+        let (_, readings) = simulate_with(
             Simd::best(),
             model,
             &Method::Rk4 { step_s: 2e-4 },
             &[&point],
-            EVERYTHING,
+            ALL_RECORDERS,
         );
-        // Springs hold the tub back along c1, where the drum's bearings do: a force that the weight
-        // does not have.
-        close("force", extras[0].gauge(Gauge::CabinetForce)[0], weight_n, 1e-4);
-        assert_eq!(extras[0].gauge(Gauge::ClashTime), [0.0]);
-        assert_eq!(extras[0].turns.len(), 1);
+        // The springs also have a small force along c1, against the constraint of the model.
+        close("force", readings[0].gauge(Gauge::CabinetForce)[0], weight_n, 1e-4);
+        assert_eq!(readings[0].gauge(Gauge::ClashTime), [0.0]);
+        assert_eq!(readings[0].turns.len(), 1);
     }
 }
 
 #[test]
-fn the_built_in_machine_sags_as_the_model_page_says() {
+fn the_sag_of_the_papers_machine_is_that_of_the_model_page() {
     let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 1.0 };
     let machine = Machine::paper();
     let centre_m = machine.tub.centre_x_m;
     let point = prepare(Simd::best(), &[(machine, spin)], &TIMING).remove(0).unwrap();
-    // q1 = -14.0969 mm, and the tub's front lifted by q6 = 3.3526 mrad.
+    // At equilibrium q1 = -14.0969 mm and q6 = 3.3526 mrad.
     let expected = 14.0969e-3 - centre_m * 3.3526e-3_f64.sin();
     assert!((point.static_sag_m() - expected).abs() < 1e-7, "{}", point.static_sag_m());
 }

@@ -1,0 +1,192 @@
+//! The recorders that are in use only on request: root mean squares, turns, gauges and snapshots.
+//!
+//! They run over lanes after every step, in a function that is not inlined ([`Lane::aside`]), so
+//! that the loop over steps is not slower without them.
+
+use super::Method;
+use super::loads::{Gauge, Loads};
+use super::snapshots::Snapshots;
+use crate::channel::CHANNELS;
+use crate::coordinates::STATES;
+use crate::machine::spin::cuts_s;
+use crate::nonlinear::outputs::{RADIAL, squared};
+use crate::{ModelKind, Point, Reading, Recorders};
+use lane_ode::{Aside, Lane, N, PartPeaks, Sample, SquareIntegrals, TimeAbove};
+
+/// The number of parts of a long step at whose ends loads are evaluated.
+///
+/// Basis: steps of order 8 last a few ms, and forces peak within them; not measured. Doubling it
+/// doubles the cost of loads.
+const LONG_STEP_PARTS: u32 = 4;
+
+/// The length (s) of the parts of a step with capped modes.
+///
+/// Basis: forty parts in a period of 25 Hz, the turns of a drum at 1500 rpm. Doubling it halves the
+/// cost of loads and misses more of their peaks.
+const CAPPED_PART_S: f64 = 1e-3;
+
+/// The parts of a step at whose ends loads are evaluated.
+#[derive(Clone, Copy)]
+pub(crate) struct StepParts {
+    /// The number of parts.
+    count: u32,
+}
+
+impl StepParts {
+    /// Returns the parts of steps that are short, because the bearings limit them, or long.
+    pub(crate) const fn new(are_short: bool) -> Self {
+        Self { count: if are_short { 1 } else { LONG_STEP_PARTS } }
+    }
+
+    /// Returns the parts of a method's steps.
+    pub(crate) fn for_method(method: &Method) -> Self {
+        match method {
+            Method::Rk4 { .. } => Self::new(true),
+            Method::Capped { step_s, .. } => {
+                let count = (step_s / CAPPED_PART_S).ceil() as u32;
+                Self { count: count.clamp(1, LONG_STEP_PARTS) }
+            }
+            _ => Self::new(false),
+        }
+    }
+}
+
+/// The state of the recorders in use, over lanes.
+pub(crate) struct ActiveRecorders<T> {
+    recorders: Recorders,
+    squares: SquareIntegrals<T, CHANNELS>,
+    turns: PartPeaks<T, CHANNELS>,
+    loads: Option<Loads<T>>,
+    /// The time with a gap below zero.
+    clash: TimeAbove<T>,
+    clearance_squared: N<T>,
+    snapshots: Option<Snapshots<T>>,
+    /// The readings of every point; empty for points that have not ended.
+    pub(crate) readings: Vec<Reading>,
+}
+
+impl<T: Lane> ActiveRecorders<T> {
+    /// Creates the recorders for `count` points, of which `point` is any; `None` if none of these
+    /// recorders is in use.
+    #[inline(always)]
+    pub(crate) fn new(
+        zero: N<T>,
+        recorders: Recorders,
+        (model, parts): (ModelKind, StepParts),
+        point: &Point,
+        count: usize,
+    ) -> Option<Self> {
+        // A closure would be compiled without the instruction set.
+        if !recorders.need_all_states() {
+            return None;
+        }
+        let snapshots = if recorders.snapshots { Some(Snapshots::new(zero)) } else { None };
+        Some(Self {
+            recorders,
+            squares: SquareIntegrals::new(zero),
+            turns: PartPeaks::new(zero),
+            loads: Loads::new(zero, recorders.gauges, model, point, parts.count),
+            clash: TimeAbove::new(zero),
+            clearance_squared: zero,
+            snapshots,
+            readings: vec![Reading::default(); count],
+        })
+    }
+
+    /// Begins a point's trajectory in one lane.
+    pub(crate) fn set_point(&mut self, lane: usize, point: &Point) {
+        self.squares.reset(lane);
+        let clearance_m = point.machine.bodies.clearance.0;
+        self.clash.reset(lane);
+        self.clearance_squared.0.set(lane, clearance_m * clearance_m);
+        if self.recorders.turns {
+            self.turns.reset(lane, &cuts_s(&point.stretches, point.window_s()));
+        }
+        if let Some(loads) = &mut self.loads {
+            loads.set_point(lane, point);
+        }
+        if let Some(snapshots) = &mut self.snapshots {
+            snapshots.set_point(lane, point);
+        }
+    }
+
+    /// Ends a lane's trajectory, that of point `index`. A failed trajectory leaves no readings.
+    pub(crate) fn finish(&mut self, lane: usize, index: usize, point: &Point, failed: bool) {
+        let recorders = self.recorders;
+        let turns = if recorders.turns { self.turns.finish(lane) } else { Vec::new() };
+        let snapshots = match &mut self.snapshots {
+            Some(snapshots) => snapshots.finish(lane),
+            None => Vec::new(),
+        };
+        if failed {
+            return;
+        }
+        let [from_s, to_s] = point.window_s();
+        // Rounding can leave an integral of a motion at rest below zero.
+        let root_mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
+        let gauges = Gauge::ALL.map(|gauge| match &self.loads {
+            _ if !recorders.has_gauge(gauge) => Vec::new(),
+            _ if gauge == Gauge::ClashTime => vec![self.clash.lane(lane)],
+            Some(loads) => loads.gauge(gauge, lane, point),
+            None => Vec::new(),
+        });
+        let root_mean_squares = match recorders.root_mean_squares {
+            true => Some(self.squares.lane(lane).map(root_mean)),
+            false => None,
+        };
+        let checkpoints = Vec::new();
+        self.readings[index] = Reading { root_mean_squares, turns, gauges, checkpoints, snapshots };
+    }
+}
+
+/// A state with its outputs, which is passed to the recorders.
+pub(crate) struct ObservedState<'a, T: Lane> {
+    pub(crate) recorders: &'a mut ActiveRecorders<T>,
+    /// The end and the length (s) of the step that ends at the state; `None` at the start of a
+    /// segment.
+    pub(crate) step: Option<(N<T>, N<T>)>,
+    pub(crate) x: &'a [N<T>; STATES],
+    pub(crate) dx: &'a [N<T>; STATES],
+    pub(crate) radial: &'a [Sample<T>; RADIAL],
+    pub(crate) channels: &'a [Sample<T>; CHANNELS],
+    /// The lanes that are inside their windows.
+    pub(crate) inside: T::Mask,
+}
+
+impl<T: Lane> Aside for ObservedState<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { recorders: active, step, x, dx, radial, channels, inside } = self;
+        let recorders = active.recorders;
+        if recorders.root_mean_squares {
+            match step {
+                Some((_, length_s)) => active.squares.advance(length_s, channels, inside),
+                None => active.squares.begin(channels),
+            }
+        }
+        if recorders.turns {
+            match step {
+                Some((end_s, length_s)) => active.turns.advance(end_s, length_s, channels, inside),
+                None => active.turns.begin(channels, inside),
+            }
+        }
+        if let Some(loads) = &mut active.loads {
+            loads.record(step, x, dx, inside);
+        }
+        if let Some(snapshots) = &mut active.snapshots {
+            snapshots.record(step, (x, dx), channels);
+        }
+        if recorders.has_gauge(Gauge::ClashTime) {
+            // The gap is below zero where the square of the radial distance exceeds that of the
+            // clearance.
+            let mut overlap = squared(radial);
+            overlap.value -= active.clearance_squared;
+            match step {
+                Some((_, length_s)) => active.clash.advance(length_s, &overlap, inside),
+                None => active.clash.begin(&overlap),
+            }
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! The separation of two runs of the same point.
+
+use super::{Checkpoint, Checkpoints};
+use crate::point::PlannedSegment;
+use crate::{COORDINATES, Point};
+
+/// The number of coordinates that are compared. The last two are those of the hinge, which rings
+/// with little damping, mostly without effect on any output.
+const COMPARED: usize = COORDINATES - 2;
+
+impl Point {
+    /// Computes the separation of two runs of the nonlinear model at their common checkpoints.
+    /// Returns the instants (s) and the greatest differences of any coordinate but the hinge's, as
+    /// shares of that coordinate's greatest deviation from equilibrium in the whole run `b`.
+    pub fn separations(&self, a: &Checkpoints, b: &Checkpoints) -> Vec<(f64, f64)> {
+        let mut greatest = [0.0_f64; COMPARED];
+        for checkpoint in b {
+            for (i, greatest) in greatest.iter_mut().enumerate() {
+                *greatest = greatest.max((checkpoint.coordinates[i] - self.equilibrium[i]).abs());
+            }
+        }
+        let separation = |((a, b), segment): ((&Checkpoint, &Checkpoint), &PlannedSegment)| {
+            let share = |i: usize| {
+                let difference = (a.coordinates[i] - b.coordinates[i]).abs();
+                if difference == 0.0 { 0.0 } else { difference / greatest[i] }
+            };
+            (segment.end_s, (0..COMPARED).map(share).fold(0.0, f64::max))
+        };
+        a.iter().zip(b).zip(&*self.segments).map(separation).collect()
+    }
+}
