@@ -18,11 +18,11 @@ use core::marker::PhantomData;
 
 /// A family of equations x' = f(p, t, x), with `P` parameters of each lane's own.
 trait Equation<const D: usize, const P: usize> {
-    /// A component beyond this has left the range.
+    /// The limit of the components' magnitudes, beyond which a state is out of range.
     const FARTHEST: f64 = 1e6;
-    /// f
+    /// Computes f.
     fn derivative<T: Lane>(p: &[N<T>; P], t_s: N<T>, x: &[N<T>; D]) -> [N<T>; D];
-    /// k with k = H(t, x, r + g k), where H(t, x, x) is f. H is f(t, x) unless said otherwise.
+    /// Solves k = H(t, x, r + g k) for k, with H(t, x, x) = f(t, x). By default H is f(t, x).
     fn derivative_ahead<T: Lane>(
         p: &[N<T>; P],
         t_s: N<T>,
@@ -32,7 +32,7 @@ trait Equation<const D: usize, const P: usize> {
     ) -> [N<T>; D] {
         Self::derivative(p, t_s, x)
     }
-    /// The solution, where it is known; NaN otherwise.
+    /// Computes the solution; NaN if it is not known.
     fn exact(_p: &[f64; P], _t_s: f64) -> [f64; D] {
         [f64::NAN; D]
     }
@@ -78,7 +78,7 @@ impl<const D: usize> Outcome<D> {
         error_inside: 0.0,
     };
 
-    /// Whether both are one trajectory, bit for bit and step for step.
+    /// Returns whether both trajectories have the same bits and the same steps.
     fn is_same(&self, other: &Self) -> bool {
         self.x.map(f64::to_bits) == other.x.map(f64::to_bits)
             && self.ended == other.ended
@@ -88,12 +88,12 @@ impl<const D: usize> Outcome<D> {
     }
 }
 
-/// Every instruction set of this processor.
+/// Returns the instruction sets of this processor.
 fn instruction_sets() -> Vec<Simd> {
     Simd::ALL.into_iter().filter(|simd| simd.is_available()).collect()
 }
 
-/// Solves every trajectory; the outcomes, and how often the heap was asked while integrating.
+/// Solves every trajectory. Returns the outcomes, and the number of allocations of the integration.
 fn solve<E: Equation<D, P>, const D: usize, const P: usize>(
     simd: Simd,
     method: Method,
@@ -231,7 +231,7 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
                 let t_s = outcome.observed_to_s - (1.0 - share) * step.length_s.0.get(lane);
                 let exact = E::exact(&self.trajectories[trajectory].parameters, t_s);
                 for i in 0..D {
-                    // `max` drops a NaN: an unknown solution leaves no error.
+                    // `max` ignores NaN, so that an unknown solution has no error.
                     outcome.error_inside =
                         outcome.error_inside.max((inside[i].0.get(lane) - exact[i]).abs());
                 }
@@ -240,7 +240,7 @@ impl<T: Lane, E: Equation<D, P>, const D: usize, const P: usize> Task<T, D>
     }
 }
 
-/// A nonlinear equation driven by time, and an oscillator: x' = w x cos(w t), y' = w z, z' = -w y.
+/// A nonautonomous equation and an oscillator: x' = w x cos(w t), y' = w z, z' = -w y.
 struct Swing;
 
 impl Equation<3, 1> for Swing {
@@ -250,8 +250,8 @@ impl Equation<3, 1> for Swing {
         [(w * (x[0] * cos)).v(), (w * x[2]).v(), -(w * x[1]).v()]
     }
 
-    /// Takes w (1 + y^2) of the oscillator implicitly, which is more than all of it; the rest is
-    /// explicit and has the opposite sign.
+    /// The implicit part of the oscillator is w (1 + y^2), which is more than the whole frequency,
+    /// so that the explicit part has the opposite sign.
     #[inline(always)]
     fn derivative_ahead<T: Lane>(
         p: &[N<T>; 1],
@@ -275,8 +275,8 @@ impl Equation<3, 1> for Swing {
     }
 }
 
-/// Two masses on a stiff spring, one of them on a soft one: x1'' = k (x2 - x1) - x1, x2'' = k (x1 -
-/// x2). The stiff spring is implicit.
+/// Two masses with a stiff spring between them, the first one on a soft spring: x1'' = k (x2 - x1)
+/// - x1, x2'' = k (x1 - x2). The stiff spring is implicit.
 struct Coupled;
 
 impl Equation<4, 1> for Coupled {

@@ -1,13 +1,13 @@
-//! A trajectory that cannot go on ends with its reason and time; its neighbours do not notice.
+//! Tests that a trajectory that fails ends with reason and time, without effect on other lanes.
 
 use super::{Equation, Method, Outcome, Trajectory, instruction_sets, solve};
 use crate::{Failure, Lane, N, Segment, SegmentEnd, Tolerance};
 
-/// x' = a x^2 + b / (c - t) + sqrt(d - t), y' = w z, z' = -w y: explodes, runs into a pole, has no
-/// value, or is fast.
-struct Mishaps;
+/// The equations x' = a x^2 + b / (c - t) + sqrt(d - t), y' = w z, z' = -w y, which diverge, have a
+/// pole, are undefined or oscillate fast, depending on the parameters.
+struct FailingEquation;
 
-impl Equation<3, 5> for Mishaps {
+impl Equation<3, 5> for FailingEquation {
     const FARTHEST: f64 = 1e3;
 
     #[inline(always)]
@@ -23,7 +23,7 @@ fn trajectory(parameters: [f64; 5]) -> Trajectory<3, 5> {
     Trajectory { parameters, start: [1.0, 1.0, 0.0], segments }
 }
 
-/// Nothing happens to these.
+/// Returns a trajectory that does not fail.
 fn sound(i: usize) -> Trajectory<3, 5> {
     trajectory([0.01, 0.0, 100.0, 100.0 + i as f64, 2.0 + 0.37 * i as f64])
 }
@@ -47,24 +47,24 @@ fn is_fast() -> Trajectory<3, 5> {
 const TOLERANCE: Tolerance = Tolerance { relative: 1e-8, absolute: 1e-10, max_steps: 2000 };
 const ADAPTIVE: [Method; 2] = [Method::Dopri5(TOLERANCE), Method::Additive(TOLERANCE)];
 
-/// Solves mishaps among sound trajectories, in every order of arrival, and the sound ones alone;
-/// asserts that these are the same bits, and returns what became of the mishaps.
-fn among_others(method: Method, mishaps: &[Trajectory<3, 5>]) -> Vec<Outcome<3>> {
+/// Solves failing trajectories among sound ones in several orders, and asserts that the sound ones
+/// have the same bits as without failing ones. Returns the outcomes of the failing ones.
+fn among_others(method: Method, failing: &[Trajectory<3, 5>]) -> Vec<Outcome<3>> {
     let mut ends: Option<Vec<Outcome<3>>> = None;
     for simd in instruction_sets() {
         let alone: Vec<_> = (0..12).map(sound).collect();
-        let (alone, _) = solve::<Mishaps, 3, 5>(simd, method, &alone);
+        let (alone, _) = solve::<FailingEquation, 3, 5>(simd, method, &alone);
         assert!(alone.iter().all(|o| matches!(o.ended, SegmentEnd::Completed(_))));
         for offset in 0..4 {
-            // Mishaps at every third place from `offset` on.
+            // Every third trajectory from `offset` on fails.
             let mut mixed: Vec<_> = (0..12).map(sound).collect();
             let mut places = Vec::new();
-            for (i, mishap) in mishaps.iter().enumerate() {
+            for (i, trajectory) in failing.iter().enumerate() {
                 let place = offset + 3 * i;
-                mixed.insert(place, mishap.clone());
+                mixed.insert(place, trajectory.clone());
                 places.push(place);
             }
-            let (outcomes, _) = solve::<Mishaps, 3, 5>(simd, method, &mixed);
+            let (outcomes, _) = solve::<FailingEquation, 3, 5>(simd, method, &mixed);
             let mut bad = Vec::new();
             let mut good = Vec::new();
             for (i, outcome) in outcomes.into_iter().enumerate() {
@@ -95,7 +95,8 @@ fn a_diverged_trajectory_ends_alone() {
         let outcomes = among_others(method, &[explodes()]);
         let (reason, time_s) = failure(&outcomes[0]);
         assert_eq!(reason, Failure::Diverged, "{method:?}");
-        // x' > x^2 + 9 from x = 1 is at infinity before t = (pi/2 - atan(1/3)) / 3 = 0.42.
+        // From x = 1 the solution of x' > x^2 + 9 is infinite before t = (pi/2 - atan(1/3)) / 3, or
+        // 0.42.
         assert!((0.1..0.42).contains(&time_s), "{method:?}: {time_s} s");
     }
 }
@@ -125,7 +126,7 @@ fn a_step_too_small_for_time_ends_alone() {
 }
 
 #[test]
-fn a_spent_allowance_of_steps_ends_alone() {
+fn a_trajectory_at_its_limit_of_steps_ends_alone() {
     for outcome in ADAPTIVE.iter().flat_map(|method| among_others(*method, &[is_fast(), is_fast()]))
     {
         let (reason, _) = failure(&outcome);
@@ -136,10 +137,10 @@ fn a_spent_allowance_of_steps_ends_alone() {
 }
 
 #[test]
-fn all_mishaps_together_leave_the_others_as_they_are() {
-    let mishaps = [explodes(), has_no_value_after(0.3), runs_into_a_pole_at(0.9), is_fast()];
+fn all_failures_together_do_not_change_other_trajectories() {
+    let failing = [explodes(), has_no_value_after(0.3), runs_into_a_pole_at(0.9), is_fast()];
     for method in ADAPTIVE {
-        let reasons: Vec<_> = among_others(method, &mishaps).iter().map(|o| failure(o).0).collect();
+        let reasons: Vec<_> = among_others(method, &failing).iter().map(|o| failure(o).0).collect();
         assert_eq!(
             reasons,
             [Failure::Diverged, Failure::Diverged, Failure::StepTooSmall, Failure::StepLimit]

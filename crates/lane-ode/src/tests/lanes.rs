@@ -1,15 +1,15 @@
-//! Each operation of each lane type gives the bits of plain `f64`, whatever is in the other
-//! lanes.
+//! Tests that each operation of each lane type gives the bits of plain `f64`, for any numbers in
+//! the other lanes.
 
 use super::array::Array;
 use super::instruction_sets;
 use crate::{Kernel, Lane, N, Simd, trig};
 use core::hint::black_box;
 
-/// Operands of one lane.
+/// The operands of one lane.
 type Operands = [f64; 3];
 
-/// Number of results of the operands: numbers, sine and cosine twice, two choices.
+/// The number of results for the operands: arithmetic, sine and cosine twice, two selections.
 const RESULTS: usize = 21;
 
 /// Returns the results by IEEE 754 and the standard library. A negated sum is hidden from the
@@ -100,7 +100,7 @@ impl Kernel for Operations<'_> {
     }
 }
 
-/// Every pair of special values, then numbers of every size.
+/// Returns all pairs of special values, then random numbers of all magnitudes.
 fn operands() -> Vec<Operands> {
     let special = [
         0.0,
@@ -135,8 +135,7 @@ fn operands() -> Vec<Operands> {
         let mut number = || (rng.f64() * 2.0 - 1.0) * 2.0_f64.powi(rng.i32(-40..40));
         all.push([number(), number(), number()]);
     }
-    // Products of numbers of a size, and their sums: where a fused operation and two rounded ones
-    // differ.
+    // For products and sums of similar magnitude a fused operation differs from two rounded ones.
     for _ in 0..20_000 {
         let [a, b] = [rng.f64() + 0.5, rng.f64() + 0.5];
         all.push([a, b, -a * b]);
@@ -144,8 +143,8 @@ fn operands() -> Vec<Operands> {
     all
 }
 
-/// Whether both have the same bits or are not a number, whose sign and payload differ between
-/// processors.
+/// Returns whether both numbers have the same bits. Two NaN are the same, because their sign and
+/// payload depend on the processor.
 fn is_same(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
 }
@@ -192,7 +191,7 @@ impl Kernel for CountLanes {
 }
 
 #[test]
-fn every_instruction_set_has_the_lanes_it_says() {
+fn every_instruction_set_has_its_number_of_lanes() {
     for simd in instruction_sets() {
         assert_eq!(simd.dispatch(CountLanes), simd.lanes(), "{}", simd.name());
     }

@@ -1,4 +1,4 @@
-//! Differences of peaks that are found from steps from the true ones.
+//! Tests of the error of peaks that are found from steps.
 
 use crate::{N, Peaks, Sample};
 use core::f64::consts::TAU;
@@ -25,7 +25,8 @@ impl Waves {
         y
     }
 
-    /// The largest magnitude from 0 to `end`: the best of a fine grid, polished by Newton's method.
+    /// Computes the largest magnitude from 0 to `end`: the largest on a fine grid, refined by
+    /// Newton's method.
     fn peak(&self, end: f64) -> f64 {
         let cells = 4000;
         let step = end / f64::from(cells);
@@ -50,7 +51,7 @@ impl Waves {
         self.found_by(Peaks::advance, end, steps)
     }
 
-    /// Likewise with another way to take a step.
+    /// Returns the peak that [`Peaks`] finds in `steps` equal steps by a method of `advance`.
     fn found_by(&self, advance: Advance, end: f64, steps: u32) -> f64 {
         let h = end / f64::from(steps);
         let mut peaks = Peaks::<f64, 1>::new(N(0.0));
@@ -64,13 +65,13 @@ impl Waves {
 
 type Advance = fn(&mut Peaks<f64, 1>, N<f64>, &[Sample<f64>; 1], bool);
 
-/// The largest error, as a share of the amplitude, over many waves of unit frequency and a slower
-/// or faster companion.
+/// Returns the largest error, as a share of the amplitude, for many sums of a wave of unit
+/// frequency and a slower or faster one.
 fn largest_error(steps_per_period: u32) -> f64 {
     largest_error_by(Peaks::advance, steps_per_period)
 }
 
-/// Likewise with another way to take a step.
+/// Returns the largest error like [`largest_error`], by a method of `advance`.
 fn largest_error_by(advance: Advance, steps_per_period: u32) -> f64 {
     let mut rng = fastrand::Rng::with_seed(7);
     let mut most = 0.0_f64;
@@ -90,7 +91,7 @@ fn largest_error_by(advance: Advance, steps_per_period: u32) -> f64 {
 
 #[test]
 fn the_sampling_error_stays_below_1e_5_down_to_ten_steps_a_period() {
-    // The longest steps in use are 6.25 ms at 350 rpm: 27 a turn.
+    // The longest steps in use are 6.25 ms at 350 rpm, or 27 steps in a turn.
     for steps in [10, 12, 16, 27, 100] {
         let error = largest_error(steps);
         eprintln!("{steps} steps a period: {error:.2e} of the amplitude");
@@ -117,8 +118,8 @@ fn without_curvatures_the_sampling_error_is_of_fourth_order() {
 }
 
 #[test]
-fn without_a_look_inside_a_peak_would_be_missed() {
-    // Samples alone miss the peak by what the refinement adds.
+fn samples_alone_miss_the_peak() {
+    // The interpolation inside steps adds the difference.
     let waves = Waves { amplitude: [1.0, 0.0], frequency: [TAU, 1.0], phase: [0.4, 0.0] };
     let samples = (0..=20).map(|i| waves.at(f64::from(i) / 10.0)[0].abs()).fold(0.0, f64::max);
     assert!(1.0 - samples > 1e-3);
@@ -130,7 +131,7 @@ fn a_peak_outside_the_window_does_not_count() {
     let waves = Waves { amplitude: [1.0, 0.0], frequency: [TAU, 1.0], phase: [0.0, 0.0] };
     let mut peaks = Peaks::<f64, 1>::new(N(0.0));
     peaks.begin(&[waves.sample(0.0)], false);
-    // Over the crest at 1/4, not counted; then into the descent, counted.
+    // The step over the crest at 1/4 is outside the window, the descent after it is inside.
     let over = waves.sample(0.35);
     peaks.advance(N(0.35), &[over], false);
     peaks.begin(&[over], true);

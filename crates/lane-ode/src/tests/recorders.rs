@@ -1,4 +1,4 @@
-//! Peaks of parts, mean squares and times above zero, on waves of which all that is known.
+//! Tests of peaks of parts, mean squares and times above zero on waves with known results.
 
 use super::array::Array;
 use super::peaks::Waves;
@@ -14,7 +14,7 @@ fn waves(seed: u64) -> Waves {
     }
 }
 
-/// Peaks of the parts, in `steps` equal steps from 0 to `end`.
+/// Returns the peaks of the parts between cuts, in `steps` equal steps from 0 to `end`.
 fn parts(waves: &Waves, cuts: &[f64], end: f64, steps: u32) -> Vec<f64> {
     let h = end / f64::from(steps);
     let mut peaks = PartPeaks::<f64, 1>::new(N(0.0));
@@ -27,7 +27,7 @@ fn parts(waves: &Waves, cuts: &[f64], end: f64, steps: u32) -> Vec<f64> {
     peaks.finish(0).into_iter().map(|[peak]| peak).collect()
 }
 
-/// The peak from `from` to `to`, in steps that end at both.
+/// Returns the peak between two times, in steps that end at both.
 fn peak_between(waves: &Waves, from: f64, to: f64) -> f64 {
     const STEPS: u32 = 4000;
     let h = (to - from) / f64::from(STEPS);
@@ -40,8 +40,8 @@ fn peak_between(waves: &Waves, from: f64, to: f64) -> f64 {
 }
 
 #[test]
-fn parts_peak_as_if_each_were_a_trajectory_of_its_own() {
-    // Cuts at a step's end, one step apart, several within a step, and none for long.
+fn the_peak_of_a_part_is_that_of_a_separate_trajectory() {
+    // The cuts are at the end of a step, one step apart, several within a step, and far apart.
     let cuts = [0.5, 0.71, 0.775, 0.78, 0.79, 1.7, 4.3];
     let edges: Vec<f64> = [0.0].into_iter().chain(cuts).chain([5.0]).collect();
     for seed in 0..20 {
@@ -57,7 +57,7 @@ fn parts_peak_as_if_each_were_a_trajectory_of_its_own() {
 }
 
 #[test]
-fn a_lane_does_not_feel_where_others_are_cut() {
+fn the_parts_of_a_lane_do_not_depend_on_cuts_of_other_lanes() {
     let cuts = [vec![0.3, 0.33, 2.0], vec![], vec![0.301, 1.999]];
     let mut together = PartPeaks::<Array<3>, 1>::new(N(Array([0.0; 3])));
     let all: Vec<Waves> = (0..3).map(waves).collect();
@@ -92,7 +92,7 @@ fn a_lane_does_not_feel_where_others_are_cut() {
     }
 }
 
-/// Relative error of the integral of the square over two periods and a bit.
+/// Returns the relative error of the integral of the square over little more than two periods.
 fn square_error(steps: u32) -> f64 {
     let amplitude = 1.5;
     let phase = 0.4;
@@ -102,7 +102,7 @@ fn square_error(steps: u32) -> f64 {
     let mut squares = SquareIntegrals::<f64, 1>::new(N(0.0));
     squares.begin(&[waves.sample(0.0)]);
     for i in 1..=steps {
-        // Steps that do not count leave the integral alone.
+        // Steps outside the window do not change the integral.
         squares.advance(N(h), &[waves.sample(h * f64::from(i))], true);
         squares.advance(N(0.0), &[waves.sample(h * f64::from(i))], true);
     }
@@ -120,8 +120,8 @@ fn integrals_of_squares_are_of_sixth_order() {
     assert!(order > 5.5 && fine < 1e-6, "{order} {fine:e}");
 }
 
-/// Time above zero of a sine wave less `height`, from 0 to `end` in `steps` steps, and the exact
-/// one for whole periods.
+/// Returns the time above zero of a sine wave less `height` over whole periods, from `steps` steps,
+/// and its exact value.
 fn above(height: f64, phase: f64, periods: u32, steps: u32) -> [f64; 2] {
     let waves = Waves { amplitude: [1.0, 0.0], frequency: [TAU, 1.0], phase: [phase, 0.0] };
     let sample = |t: f64| {
@@ -143,7 +143,8 @@ fn above(height: f64, phase: f64, periods: u32, steps: u32) -> [f64; 2] {
 fn time_above_zero_is_found_between_steps() {
     for phase in [0.0, 0.3, 1.0, 2.2, 4.0] {
         for height in [-1.5, -0.999, -0.3, 0.0, 0.5, 0.97, 0.999, 1.5] {
-            // At 0.999 the wave is above zero for a seventieth of a period: a seventh of a step.
+            // At a height of 0.999 the wave is above zero for a seventieth of a period, or a
+            // seventh of a step.
             let [found, exact] = above(height, phase, 3, 30);
             assert!((found - exact).abs() < 1e-3, "{height} at {phase}: {found} for {exact}");
             let [finer, exact] = above(height, phase, 3, 300);
@@ -153,7 +154,7 @@ fn time_above_zero_is_found_between_steps() {
 }
 
 #[test]
-fn what_does_not_count_takes_no_time() {
+fn steps_outside_the_window_add_no_time() {
     let mut time = TimeAbove::<f64>::new(N(0.0));
     let high = Sample::still(N(1.0), N(0.0));
     time.begin(&high);
