@@ -1,5 +1,5 @@
-//! Apple's linker wants to know that Python's symbols come from whoever loads the library; others
-//! take that for granted. maturin says so too; this is for `cargo build`.
+//! Passes an option to Apple's linker that leaves Python's symbols to the process that loads the
+//! library; other linkers do so by default. maturin passes it too; this is for `cargo build`.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

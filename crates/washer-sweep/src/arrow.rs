@@ -1,8 +1,8 @@
-//! Arrow's C stream in capsules, as Python's libraries hand tables to each other
+//! Tables in capsules with Arrow's C stream, the protocol by which Python libraries exchange them
 //! (<https://arrow.apache.org/docs/format/CDataInterface/PyCapsuleInterface.html>). No row is
-//! copied: who takes a stream holds the buffers of whoever made it.
+//! copied: the consumer of a stream shares the buffers of its producer.
 
-// A capsule is a pointer; what is behind it is settled by its name alone.
+// A capsule is a pointer, whose type is known by the capsule's name alone.
 #![expect(unsafe_code)]
 
 use std::ffi::CStr;
@@ -15,10 +15,12 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 
+/// The name of capsules with a stream, by the protocol.
 const STREAM: &CStr = c"arrow_array_stream";
+/// The name of capsules with a schema, by the protocol.
 const SCHEMA: &CStr = c"arrow_schema";
 
-/// The rows as a stream.
+/// Returns rows as a stream.
 pub(crate) fn stream<'py>(
     py: Python<'py>,
     schema: &SchemaRef,
@@ -29,28 +31,29 @@ pub(crate) fn stream<'py>(
     PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(Box::new(reader)), STREAM)
 }
 
-/// The schema alone.
+/// Returns a schema without rows.
 pub(crate) fn schema<'py>(py: Python<'py>, schema: &SchemaRef) -> PyResult<Bound<'py, PyCapsule>> {
-    let schema = FFI_ArrowSchema::try_from(schema.as_ref()).map_err(wrong)?;
+    let schema = FFI_ArrowSchema::try_from(schema.as_ref()).map_err(stream_error)?;
     PyCapsule::new_with_value(py, schema, SCHEMA)
 }
 
-/// Every row of a table that speaks the protocol, with its schema; `None` for one that does not.
+/// Reads the schema and all rows of a table; `None` if the table does not support the protocol.
 pub(crate) fn rows(table: &Bound<'_, PyAny>) -> PyResult<Option<(SchemaRef, Vec<RecordBatch>)>> {
-    let Some(speaks) = table.getattr_opt("__arrow_c_stream__")? else { return Ok(None) };
-    let capsule = speaks.call0()?;
+    let Some(method) = table.getattr_opt("__arrow_c_stream__")? else { return Ok(None) };
+    let capsule = method.call0()?;
     let capsule = capsule.cast::<PyCapsule>().map_err(|_| {
         PyTypeError::new_err("`__arrow_c_stream__` of this table returns no capsule")
     })?;
     let pointer = capsule.pointer_checked(Some(STREAM))?.cast::<FFI_ArrowArrayStream>();
-    // SAFETY: A capsule of this name holds a stream by the protocol. `from_raw` moves it out and
-    // leaves an empty one, which the capsule's destructor knows.
-    let reader = unsafe { RecordBatchStreamReader::from_raw(pointer.as_ptr()) }.map_err(wrong)?;
+    // SAFETY: A capsule of this name holds a stream by the protocol. `from_raw` moves the stream
+    // out and leaves a released one, for which the capsule's destructor does nothing.
+    let reader =
+        unsafe { RecordBatchStreamReader::from_raw(pointer.as_ptr()) }.map_err(stream_error)?;
     let schema = arrow_array::RecordBatchReader::schema(&reader);
-    let batches = reader.collect::<Result<Vec<_>, _>>().map_err(wrong)?;
+    let batches = reader.collect::<Result<Vec<_>, _>>().map_err(stream_error)?;
     Ok(Some((schema, batches)))
 }
 
-fn wrong(error: ArrowError) -> PyErr {
+fn stream_error(error: ArrowError) -> PyErr {
     PyValueError::new_err(format!("this table's Arrow stream is broken: {error}"))
 }

@@ -1,4 +1,4 @@
-//! Tables as users hold them: anything that speaks Arrow's C stream, or a dictionary of columns.
+//! Tables that users pass: anything with Arrow's C stream, or a mapping of columns.
 
 use std::ffi::CStr;
 
@@ -11,7 +11,7 @@ use sweep::PointTable;
 use crate::arrow;
 use crate::errors::plan_error;
 
-/// The points of a table.
+/// Reads the points of a table.
 pub(crate) fn points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
     let py = table.py();
     if let Some((schema, batches)) = arrow::rows(table)? {
@@ -37,9 +37,9 @@ pub(crate) fn points(table: &Bound<'_, PyAny>) -> PyResult<PointTable> {
     PointTable::from_columns(columns).map_err(|wrong| plan_error(py, &wrong))
 }
 
-/// Numbers of an array of NumPy's, or of anything else in one dimension.
+/// Reads the numbers of a one-dimensional NumPy array, or of another iterable.
 pub(crate) fn numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    is_of_numbers(values)?;
+    check_numbers(values)?;
     let dimensions = values.getattr_opt("ndim")?.map(|count| count.extract::<usize>());
     let dimensions = dimensions.transpose()?.unwrap_or(1);
     if dimensions != 1 {
@@ -47,34 +47,34 @@ pub(crate) fn numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
         return Err(PyTypeError::new_err(text));
     }
     match PyBuffer::<f64>::get(values) {
-        // PyO3 takes either order of bytes for this machine's.
+        // PyO3 does not check the order of bytes, so that other ones are read value by value.
         Ok(buffer) if [c"d", NATIVE].contains(&buffer.format()) => buffer.to_vec(values.py()),
         _ => values.try_iter()?.map(|value| number(&value?)).collect(),
     }
 }
 
-/// An eight-byte float in this machine's order of bytes, where an array names that.
+/// The buffer format of an eight-byte float with this machine's order of bytes.
 const NATIVE: &CStr = if cfg!(target_endian = "little") { c"<d" } else { c">d" };
 
-/// A number, and nothing that Python would make one of.
+/// Reads a number. Other types that Python converts to numbers are errors.
 pub(crate) fn number(value: &Bound<'_, PyAny>) -> PyResult<f64> {
-    is_of_numbers(value)?;
+    check_numbers(value)?;
     if value.is_instance_of::<PyBool>() {
         return Err(PyTypeError::new_err("expected a number, got a truth value"));
     }
     value.extract()
 }
 
-/// Refuses what NumPy would turn into numbers with a loss: masked and complex values, truth values,
-/// times.
-fn is_of_numbers(values: &Bound<'_, PyAny>) -> PyResult<()> {
+/// Checks that values are real numbers. NumPy would convert masked and complex values, truth values
+/// and times with a loss.
+fn check_numbers(values: &Bound<'_, PyAny>) -> PyResult<()> {
     if values.getattr_opt("mask")?.is_some_and(|mask| !mask.is_callable()) {
         let text = "expected numbers, got masked ones: fill or drop what is masked";
         return Err(PyTypeError::new_err(text));
     }
     let Some(dtype) = values.getattr_opt("dtype")? else { return Ok(()) };
     let Some(kind) = dtype.getattr_opt("kind")? else { return Ok(()) };
-    // Objects are judged one by one.
+    // Values of an array of objects are checked one by one.
     match kind.extract::<char>() {
         Ok('f' | 'i' | 'u' | 'O') => Ok(()),
         _ => Err(PyTypeError::new_err(format!("expected real numbers, got `{dtype}`"))),

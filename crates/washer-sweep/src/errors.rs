@@ -1,5 +1,5 @@
-//! Errors as Python's: `washer_sweep.PlanError` for what a user wrote, with each mistake as data;
-//! `OSError` for files, `RuntimeError` for the rest.
+//! Conversion of errors to Python exceptions: `washer_sweep.PlanError` for mistakes in the input,
+//! with each mistake as data, `OSError` for files, `RuntimeError` for all others.
 
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -7,13 +7,14 @@ use pyo3::types::{PyDict, PyList};
 use sweep::{Diagnostics, Error, Exit, Mistake, StoreError};
 use sweep_plot::PlotError;
 
-/// An error of one of the package's own classes.
-fn raised(py: Python<'_>, class: &str, text: String, with: Py<PyAny>) -> PyErr {
-    let own = py.import("washer_sweep._errors").and_then(|own| own.getattr(class));
-    own.and_then(|class| class.call1((text, with))).map_or_else(|error| error, PyErr::from_value)
+/// Creates an exception of one of the package's classes.
+fn package_error(py: Python<'_>, class: &str, text: String, data: Py<PyAny>) -> PyErr {
+    let class = py.import("washer_sweep._errors").and_then(|module| module.getattr(class));
+    let exception = class.and_then(|class| class.call1((text, data)));
+    exception.map_or_else(|error| error, PyErr::from_value)
 }
 
-/// Mistakes in a plan, or in a table given to it.
+/// Creates the exception of mistakes in a plan, or in a table of points.
 pub(crate) fn plan_error(py: Python<'_>, mistakes: &Diagnostics) -> PyErr {
     let entry = |mistake: Mistake| -> PyResult<Bound<'_, PyDict>> {
         let entry = PyDict::new(py);
@@ -28,12 +29,14 @@ pub(crate) fn plan_error(py: Python<'_>, mistakes: &Diagnostics) -> PyErr {
     };
     let listed = mistakes.mistakes().into_iter().map(entry).collect::<PyResult<Vec<_>>>();
     match listed.and_then(|listed| PyList::new(py, listed)) {
-        Ok(listed) => raised(py, "PlanError", mistakes.to_string(), listed.into_any().unbind()),
+        Ok(listed) => {
+            package_error(py, "PlanError", mistakes.to_string(), listed.into_any().unbind())
+        }
         Err(error) => error,
     }
 }
 
-/// Any error of the engine's.
+/// Creates the exception of any error of the engine.
 pub(crate) fn error(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Input(mistakes) => plan_error(py, mistakes),
@@ -42,19 +45,19 @@ pub(crate) fn error(py: Python<'_>, error: &Error) -> PyErr {
         | Error::Store(StoreError::File(_) | StoreError::Parquet { .. })
         | Error::Plot(PlotError::File(_)) => PyOSError::new_err(error.to_string()),
         other if other.exit() == Exit::BadInput => {
-            let nothing = PyList::empty(py).into_any().unbind();
-            raised(py, "PlanError", other.to_string(), nothing)
+            let no_mistakes = PyList::empty(py).into_any().unbind();
+            package_error(py, "PlanError", other.to_string(), no_mistakes)
         }
         _ => PyRuntimeError::new_err(error.to_string()),
     }
 }
 
-/// What Ctrl-C raises: `KeyboardInterrupt`, with what was computed.
+/// Creates the exception of Ctrl-C, a `KeyboardInterrupt` with the result up to then.
 pub(crate) fn interrupted(py: Python<'_>, text: String, result: Py<PyAny>) -> PyErr {
-    raised(py, "Interrupted", text, result)
+    package_error(py, "Interrupted", text, result)
 }
 
-/// An interruption of what has no result before its end.
-pub(crate) fn early(py: Python<'_>) -> PyErr {
+/// Creates the exception of Ctrl-C during work that has no result before its end.
+pub(crate) fn interrupted_without_result(py: Python<'_>) -> PyErr {
     interrupted(py, "interrupted".to_owned(), py.None())
 }

@@ -1,4 +1,4 @@
-//! What is asked of a plan, or of the built-in machine, beside the methods of `Plan`.
+//! The functions of the package.
 
 use std::path::PathBuf;
 
@@ -8,14 +8,14 @@ use pyo3::types::{PyList, PyMapping};
 use sweep::{Explained, FitOptions, Search};
 
 use crate::columns::{numbers, points};
-use crate::ended;
 use crate::errors;
+use crate::finish;
 use crate::mappings::assignments;
 use crate::plan::PyPlan;
 use crate::result::PyResultTable;
-use crate::work::{How, abandonable, attended};
+use crate::work::{WorkOptions, supervise, supervise_abandonable};
 
-/// Natural frequencies over spin speed.
+/// Computes natural frequencies over spin speed.
 #[pyfunction]
 #[pyo3(signature = (plan=None, *, speeds_rpm=None, at=None))]
 pub(crate) fn modes(
@@ -31,13 +31,13 @@ pub(crate) fn modes(
     }
     let speeds = speeds_rpm.unwrap_or_else(|| (0..=120_u32).map(|k| 10.0 * f64::from(k)).collect());
     let input = plan.map(|plan| plan.get().input.clone());
-    let found = abandonable(py, None, move |effort| {
+    let found = supervise_abandonable(py, None, move |effort| {
         sweep::find_modes(input.as_ref(), &at, &speeds, effort.interrupt)
     })?;
     Ok(PyResultTable::new(found))
 }
 
-/// Periodic responses at constant speeds, and whether they are stable.
+/// Finds periodic responses at held speeds, and whether they are stable.
 #[pyfunction]
 #[pyo3(signature = (plan, speeds_rpm, out=None, *, threads=None, progress=true, fresh=false))]
 pub(crate) fn stability(
@@ -48,15 +48,14 @@ pub(crate) fn stability(
     progress: bool,
     fresh: bool,
 ) -> PyResult<PyResultTable> {
-    held(plan, speeds_rpm, None, (out, fresh), How { threads, progress })
+    held_speeds(plan, speeds_rpm, None, (out, fresh), WorkOptions { threads, progress })
 }
 
-/// The motions that constant speeds end in.
+/// Finds the attractors at held speeds.
 #[pyfunction]
 #[pyo3(signature = (plan, speeds_rpm, out=None, *, starts=12, kick=6.0, carry=None, threshold=false,
                     longest=600.0, sections=0, threads=None, progress=true, fresh=false))]
-// Options of a Python function.
-#[expect(clippy::too_many_arguments)]
+#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 pub(crate) fn dwell(
     plan: &Bound<'_, PyPlan>,
     speeds_rpm: &Bound<'_, PyAny>,
@@ -74,23 +73,24 @@ pub(crate) fn dwell(
     let carry = carry.map(str::parse).transpose();
     let carry = carry.map_err(|wrong: String| PyValueError::new_err(format!("carry: {wrong}")))?;
     let search = Search { starts, kick, carry, threshold, sections, longest };
-    held(plan, speeds_rpm, Some(search), (out, fresh), How { threads, progress })
+    held_speeds(plan, speeds_rpm, Some(search), (out, fresh), WorkOptions { threads, progress })
 }
 
-fn held(
+/// Runs a task of held speeds: stability, or with a search the attractors.
+fn held_speeds(
     plan: &Bound<'_, PyPlan>,
     speeds_rpm: &Bound<'_, PyAny>,
     search: Option<Search>,
     into: (Option<PathBuf>, bool),
-    how: How,
+    options: WorkOptions,
 ) -> PyResult<PyResultTable> {
     let py = plan.py();
     let speeds_rpm = &numbers(speeds_rpm)?;
     let task = sweep::held(plan.get().evaluator.plan(), speeds_rpm, search);
-    ended::rows_or_file(py, task, into, how)
+    finish::rows_or_file(py, task, into, options)
 }
 
-/// Candidates of a study.
+/// Searches for the best candidates of a study.
 #[pyfunction]
 #[pyo3(signature = (study, out=None, *, set=None, threads=None, progress=true, fresh=false))]
 pub(crate) fn optimise(
@@ -103,13 +103,13 @@ pub(crate) fn optimise(
     fresh: bool,
 ) -> PyResult<PyResultTable> {
     let sets = assignments(set)?;
-    let found = attended(py, How { threads, progress }, |effort| {
+    let found = supervise(py, WorkOptions { threads, progress }, |effort| {
         sweep::optimise_study(&study, &sets, out.as_deref(), fresh, effort)
     })?;
-    ended::table(py, found, || errors::early(py))
+    finish::table_or_raise(py, found, || errors::interrupted_without_result(py))
 }
 
-/// Why the linear model fails at a point.
+/// Explains why the linear model fails at a point.
 #[pyfunction]
 #[pyo3(signature = (plan, at=None, *, speeds_rpm=None, threads=None))]
 pub(crate) fn explain<'py>(
@@ -120,14 +120,15 @@ pub(crate) fn explain<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = plan.py();
     let speeds_rpm = speeds_rpm.map(numbers).transpose()?;
-    let (at, input) = (assignments(at)?, plan.get().input.clone());
-    let explained = abandonable(py, threads, move |effort| {
+    let at = assignments(at)?;
+    let input = plan.get().input.clone();
+    let explained = supervise_abandonable(py, threads, move |effort| {
         sweep::explain_point(&input, &at, speeds_rpm.as_deref(), effort)
     })?;
     explanation(py, explained)
 }
 
-/// Numbers of a machine from measured run-ups.
+/// Fits numbers of a machine to measured run-ups.
 #[pyfunction]
 #[pyo3(signature = (
     plan, table, free, *, own=Vec::new(), at=None, linear=false, shift=true, starts=1, bootstrap=0,
@@ -149,11 +150,11 @@ pub(crate) fn fit<'py>(
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = plan.py();
-    let several = |of: &Bound<'py, PyAny>| -> PyResult<Vec<Bound<'py, PyAny>>> {
-        if of.is_instance_of::<PyList>() { of.extract() } else { Ok(vec![of.clone()]) }
+    let as_list = |value: &Bound<'py, PyAny>| -> PyResult<Vec<Bound<'py, PyAny>>> {
+        if value.is_instance_of::<PyList>() { value.extract() } else { Ok(vec![value.clone()]) }
     };
-    let tables = several(table)?;
-    let at = at.map_or_else(|| Ok(Vec::new()), several)?;
+    let tables = as_list(table)?;
+    let at = at.map_or_else(|| Ok(Vec::new()), as_list)?;
     if at.len() > tables.len() {
         return Err(PyTypeError::new_err("`at` has more entries than there are tables"));
     }
@@ -167,19 +168,19 @@ pub(crate) fn fit<'py>(
     let no_shift = !shift;
     let options = FitOptions { free, own, model, no_shift, starts, bootstrap, known, draws };
     let input = plan.get().input.clone();
-    let fitted = abandonable(py, threads, move |effort| {
+    let fitted = supervise_abandonable(py, threads, move |effort| {
         sweep::fit_tables(&input, tables, &options, effort)
     })?;
     explanation(py, fitted)
 }
 
-/// Data and words, as Python has them.
+/// Creates the package's `Explanation` from data and text.
 fn explanation(py: Python<'_>, found: Explained) -> PyResult<Bound<'_, PyAny>> {
     let data = py.import("json")?.call_method1("loads", (found.found.to_string(),))?;
     py.import("washer_sweep._explanation")?.getattr("Explanation")?.call1((data, found.text))
 }
 
-/// Every number that can be set or swept.
+/// Lists all numbers that can be set or swept.
 #[pyfunction]
 #[pyo3(signature = (plan=None))]
 pub(crate) fn parameters<'py>(

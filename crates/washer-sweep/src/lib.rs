@@ -1,13 +1,13 @@
 //! The Rust part of the Python package `washer_sweep`. `python/washer_sweep` defines the public
 //! names, and its stubs their types.
 //!
-//! The engine runs without the interpreter's lock, on threads that end with the call. So other
-//! Python threads run meanwhile, and a later fork is safe.
+//! The engine runs without the interpreter's lock, on threads that end with the call, so that other
+//! Python threads run meanwhile and a later fork is safe.
 
 mod arrow;
 mod columns;
-mod ended;
 mod errors;
+mod finish;
 mod functions;
 mod mappings;
 mod plan;
@@ -16,7 +16,7 @@ mod work;
 
 use pyo3::pymodule;
 
-/// What `washer_sweep` is made of.
+/// The module from which `washer_sweep` imports its names.
 #[pymodule]
 mod _native {
     use lane_ode::Simd;
@@ -29,8 +29,10 @@ mod _native {
     use super::plan::PyPlan;
     #[pymodule_export]
     use super::result::{PyResultTable, read};
+    /// The version of the numerics: builds with the same one compute the same bits.
     #[pymodule_export]
     const NUMERICS_VERSION: u32 = sweep::NUMERICS_VERSION;
+    /// The version of the package.
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "its name in Python")]
     const __version__: &str = sweep::VERSION;

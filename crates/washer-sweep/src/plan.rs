@@ -1,4 +1,4 @@
-//! `Plan`: a grid that was read and checked, and all that can be asked of it.
+//! The class `Plan`: a grid that was read and checked, with methods that evaluate it.
 
 use std::path::PathBuf;
 
@@ -8,10 +8,10 @@ use sweep::{BoundaryOptions, Evaluator, GridInput, TraceExtras, TraceOptions};
 
 use crate::mappings::{self, assignments};
 use crate::result::PyResultTable;
-use crate::work::{How, abandonable, attended};
-use crate::{columns, ended, errors};
+use crate::work::{WorkOptions, supervise, supervise_abandonable};
+use crate::{columns, errors, finish};
 
-/// Name of a plan that comes from no file, where it gives none.
+/// The name of a plan without a file that has no name of its own.
 const UNNAMED: &str = "plan";
 
 /// A validated plan.
@@ -19,19 +19,19 @@ const UNNAMED: &str = "plan";
 pub(crate) struct PyPlan {
     pub(crate) input: GridInput,
     pub(crate) evaluator: Evaluator,
-    written: Written,
+    source: PlanSource,
 }
 
-/// What a plan was read from, by which another process reads it again.
+/// The source of a plan, from which another process can read it again.
 #[derive(Clone)]
-struct Written {
-    /// The text of a grid file; of a file its path from the root.
+struct PlanSource {
+    /// The text of a grid file, or the absolute path of one.
     text: String,
     is_file: bool,
     sets: Vec<String>,
 }
 
-impl Written {
+impl PlanSource {
     fn input(&self) -> GridInput {
         match self.is_file {
             true => GridInput::file(self.text.clone().into(), self.sets.clone()),
@@ -41,51 +41,52 @@ impl Written {
 }
 
 impl PyPlan {
-    fn load(py: Python<'_>, input: GridInput, written: Written) -> PyResult<Self> {
+    fn load(py: Python<'_>, input: GridInput, source: PlanSource) -> PyResult<Self> {
         let plan = py.detach(|| input.load()).map_err(|wrong| errors::plan_error(py, &wrong))?;
-        Ok(Self { input, evaluator: Evaluator::new(plan), written })
+        Ok(Self { input, evaluator: Evaluator::new(plan), source })
     }
 }
 
 #[pymethods]
 impl PyPlan {
-    /// A plan with the keys of a grid file.
+    /// Creates a plan from a mapping with the keys of a grid file.
     #[new]
     #[pyo3(signature = (grid, *, set=None))]
     fn new(grid: &Bound<'_, PyMapping>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
         let py = grid.py();
-        let (text, sets) = (mappings::text(grid)?, assignments(set)?);
-        let written = Written { text, is_file: false, sets };
-        Self::load(py, written.input(), written)
+        let text = mappings::text(grid)?;
+        let sets = assignments(set)?;
+        let source = PlanSource { text, is_file: false, sets };
+        Self::load(py, source.input(), source)
     }
 
-    /// A plan from a grid file, or from the text of one.
+    /// Reads a plan from a grid file, or from the text of one.
     #[staticmethod]
     #[pyo3(signature = (source, *, set=None))]
     fn from_toml(source: &Bound<'_, PyAny>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
         let py = source.py();
         let sets = assignments(set)?;
-        // A path has no line of its own with an assignment or a table.
+        // A text has a line break or an assignment, which paths do not have.
         let text = source.cast::<PyString>().ok().map(|text| text.to_string());
         let text = text.filter(|text| text.contains('\n') || text.contains('='));
-        let (input, written) = match text {
+        let (input, source) = match text {
             Some(text) => {
-                let written = Written { text, is_file: false, sets };
-                (written.input(), written)
+                let source = PlanSource { text, is_file: false, sets };
+                (source.input(), source)
             }
             None => {
                 let path: PathBuf = source.extract()?;
                 // Another process may work in another folder.
                 let whole = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
                 let text = whole.to_string_lossy().into_owned();
-                let written = Written { text, is_file: true, sets: sets.clone() };
-                (GridInput::file(path, sets), written)
+                let source = PlanSource { text, is_file: true, sets: sets.clone() };
+                (GridInput::file(path, sets), source)
             }
         };
-        Self::load(py, input, written)
+        Self::load(py, input, source)
     }
 
-    /// A plan that another process has pickled.
+    /// Creates a plan that another process has pickled.
     #[staticmethod]
     fn _unpickled(
         py: Python<'_>,
@@ -93,22 +94,22 @@ impl PyPlan {
         is_file: bool,
         sets: Vec<String>,
     ) -> PyResult<Self> {
-        let written = Written { text, is_file, sets };
-        Self::load(py, written.input(), written)
+        let source = PlanSource { text, is_file, sets };
+        Self::load(py, source.input(), source)
     }
 
-    /// How pickle makes it again: from its text, or from its file and those that the file names,
-    /// which have to be there.
+    /// Returns the function and the arguments by which pickle creates the plan again: from its
+    /// text, or from its file, which has to exist with all files that it names.
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, (String, bool, Vec<String>))> {
         let again = py.get_type::<Self>().getattr("_unpickled")?;
-        let Written { text, is_file, sets } = self.written.clone();
+        let PlanSource { text, is_file, sets } = self.source.clone();
         Ok((again, (text, is_file, sets)))
     }
 
-    /// Rows of designs in, rows of results out.
+    /// Evaluates both models at each row of a table.
     #[pyo3(signature = (table, *, threads=None, progress=false))]
     fn evaluate(
         &self,
@@ -118,13 +119,13 @@ impl PyPlan {
     ) -> PyResult<PyResultTable> {
         let py = table.py();
         let points = columns::points(table)?;
-        let evaluated = attended(py, How { threads, progress }, |effort| {
+        let evaluated = supervise(py, WorkOptions { threads, progress }, |effort| {
             self.evaluator.evaluate(&points, effort)
         })?;
-        ended::rows(py, evaluated)
+        finish::rows_or_raise(py, evaluated)
     }
 
-    /// Every point of the grid.
+    /// Evaluates both models at every point of the grid.
     #[pyo3(signature = (out=None, *, threads=None, progress=true, fresh=false))]
     fn run(
         &self,
@@ -134,10 +135,15 @@ impl PyPlan {
         progress: bool,
         fresh: bool,
     ) -> PyResult<PyResultTable> {
-        ended::rows_or_file(py, self.evaluator.whole(), (out, fresh), How { threads, progress })
+        finish::rows_or_file(
+            py,
+            self.evaluator.whole(),
+            (out, fresh),
+            WorkOptions { threads, progress },
+        )
     }
 
-    /// Time histories of both models at one point, or at every one.
+    /// Computes time histories of both models at one point, or at every one.
     #[pyo3(signature = (
         at=None, *, all=false, model=None, every=0.01, turns=false, rates=false, states=false,
         forces=false, angle=false, start=None
@@ -157,12 +163,13 @@ impl PyPlan {
         angle: bool,
         start: Option<&Bound<'_, PyMapping>>,
     ) -> PyResult<PyResultTable> {
-        let (at, start) = (assignments(at)?, assignments(start)?);
+        let at = assignments(at)?;
+        let start = assignments(start)?;
         let every_s = (!turns).then_some(every);
         let extras = TraceExtras { rates, states, forces, angle };
         let options = TraceOptions { every_s, model, all, extras, start };
         let input = self.input.clone();
-        let (table, failures) = abandonable(py, None, move |effort| {
+        let (table, failures) = supervise_abandonable(py, None, move |effort| {
             sweep::trace_point(&input, &at, &options, effort.interrupt)
         })?;
         for failure in failures {
@@ -171,7 +178,7 @@ impl PyPlan {
         Ok(PyResultTable::new(table))
     }
 
-    /// The curve on which a quantity is at its limit.
+    /// Traces the curve on which a quantity is at its limit.
     #[pyo3(signature = (
         quantity="ratio_max", *, limit=None, tolerance=None, lattice=6, out=None, threads=None,
         progress=true, fresh=false
@@ -192,28 +199,29 @@ impl PyPlan {
         let output = out.as_deref();
         let quantity = quantity.to_owned();
         let options = BoundaryOptions { quantity, limit, tolerance, lattice };
-        let found = attended(py, How { threads, progress }, |effort| {
+        let found = supervise(py, WorkOptions { threads, progress }, |effort| {
             sweep::find_boundary(self.evaluator.plan(), &options, output, fresh, effort)
         })?;
-        ended::table(py, found, || {
+        finish::table_or_raise(py, found, || {
             let text = match output {
                 Some(out) => format!(
-                    "interrupted; what was found is kept beside {}, and the same call goes on",
+                    "interrupted; the results so far are kept beside {}, and the same call \
+                     continues the search",
                     out.display()
                 ),
-                None => "interrupted; with `out` the search would have kept what it found".into(),
+                None => "interrupted; with `out` a search keeps its results so far".into(),
             };
-            ended::holding(py, text, None)
+            finish::interruption(py, text, None)
         })
     }
 
-    /// Name of the plan.
+    /// Returns the name of the plan.
     #[getter]
     fn name(&self) -> &str {
         &self.evaluator.plan().name
     }
 
-    /// Names of the axes with the least and the greatest value of each.
+    /// Returns the names of the axes with the least and the greatest value of each.
     #[getter]
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let axes = PyDict::new(py);
@@ -223,12 +231,12 @@ impl PyPlan {
         Ok(axes)
     }
 
-    /// How many points its grid or design has.
+    /// Returns the number of points.
     fn __len__(&self) -> PyResult<usize> {
         Ok(usize::try_from(self.evaluator.plan().points())?)
     }
 
-    /// Every default and constant in place, with the keys of a grid file.
+    /// Returns the plan with the keys of a grid file, with all defaults and constants.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text = self.evaluator.plan().to_json().to_string();
         py.import("json")?.call_method1("loads", (text,))

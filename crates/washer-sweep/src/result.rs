@@ -1,4 +1,4 @@
-//! `Result`: rows as columns, for whoever speaks Arrow.
+//! The class `Result`: a table of rows that libraries read by Arrow's C stream.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use sweep_files::{FileKind, cells};
 use crate::arrow;
 use crate::errors;
 
-/// Rows of a result in memory.
+/// A result in memory.
 #[pyclass(name = "Result", module = "washer_sweep", frozen)]
 pub(crate) struct PyResultTable(Arc<MemoryTable>);
 
@@ -34,7 +34,7 @@ impl PyResultTable {
         })
     }
 
-    /// Whether the rows are points of a table that leave out some of the grid over their values:
+    /// Whether the rows are points of a table that do not fill the grid over their values, so that
     /// a map of them would be mostly empty.
     fn is_scattered(&self) -> bool {
         let plan = self.0.plan();
@@ -50,13 +50,13 @@ impl PyResultTable {
         distinct.product::<usize>() != self.0.rows()
     }
 
-    /// One entry of every field's metadata.
-    fn said<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyDict>> {
-        let said = PyDict::new(py);
+    /// Returns an entry of the metadata of every column.
+    fn column_metadata<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyDict>> {
+        let entries = PyDict::new(py);
         for field in self.0.schema().fields() {
-            said.set_item(field.name(), field.metadata().get(key))?;
+            entries.set_item(field.name(), field.metadata().get(key))?;
         }
-        Ok(said)
+        Ok(entries)
     }
 }
 
@@ -68,7 +68,7 @@ impl PyResultTable {
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        // The protocol lets a producer answer with its own schema.
+        // The protocol allows a producer to ignore the requested schema.
         drop(requested_schema);
         arrow::stream(py, self.0.schema(), self.0.batches())
     }
@@ -85,7 +85,7 @@ impl PyResultTable {
         self.field(name).is_ok()
     }
 
-    /// A column as an array of NumPy's.
+    /// Returns a column as a NumPy array.
     fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let field = self.field(name)?;
         let parts: Vec<&ArrayRef> =
@@ -114,37 +114,37 @@ impl PyResultTable {
         numpy.call_method1("frombuffer", (PyByteArray::new(py, &bytes), kind))
     }
 
-    /// Names of the columns.
+    /// Returns the names of the columns.
     #[getter]
     fn columns(&self) -> Vec<String> {
         self.0.schema().fields().iter().map(|field| field.name().clone()).collect()
     }
 
-    /// Unit of each column.
+    /// Returns the unit of each column.
     #[getter]
     fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.said(py, "unit")
+        self.column_metadata(py, "unit")
     }
 
-    /// What each column is.
+    /// Returns the description of each column.
     #[getter]
     fn descriptions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.said(py, "description")
+        self.column_metadata(py, "description")
     }
 
-    /// `"map"`, `"boundary"`, `"trace"` or `"modes"`.
+    /// Returns the kind of the result, such as `"map"`, `"boundary"`, `"trace"` or `"modes"`.
     #[getter]
     fn kind(&self) -> &'static str {
         self.0.kind().word()
     }
 
-    /// The plan that it came of, as its file carries it.
+    /// Returns the plan of the result, with the keys of a grid file.
     #[getter]
     fn plan<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         py.import("json")?.call_method1("loads", (self.0.plan().to_string(),))
     }
 
-    /// Writes it as `.parquet`, or its figure as `.svg`, `.png` or `.html`.
+    /// Writes the result as `.parquet`, or a figure of it as `.svg`, `.png` or `.html`.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
         let is_rows = ending.eq_ignore_ascii_case("parquet");
@@ -155,7 +155,7 @@ impl PyResultTable {
         .map_err(|error| errors::error(py, &error))
     }
 
-    /// The program's own figure, where there is one: points off a grid have none.
+    /// Draws the figure of `sweep plot`; `None` for points off a grid, which have none.
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<Option<String>> {
         if self.is_scattered() {
             return Ok(None);
@@ -171,7 +171,8 @@ impl PyResultTable {
         drawn.map_err(|error| PyOSError::new_err(format!("cannot draw: {error}")))
     }
 
-    /// How pickle makes it again: from the bytes of its file.
+    /// Returns the function and the arguments by which pickle creates the result again: from the
+    /// bytes of its file.
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,
@@ -184,7 +185,7 @@ impl PyResultTable {
         Ok((again, (PyBytes::new(py, &bytes),)))
     }
 
-    /// A result that another process has pickled.
+    /// Creates a result that another process has pickled.
     #[staticmethod]
     fn _unpickled(py: Python<'_>, bytes: &[u8]) -> PyResult<Self> {
         in_temporary_file(|path| {
@@ -195,19 +196,20 @@ impl PyResultTable {
 
     fn __repr__(&self) -> String {
         let name = self.0.plan()["name"].as_str().unwrap_or("unnamed");
-        let (kind, rows) = (self.0.kind().word(), self.0.rows());
+        let kind = self.0.kind().word();
+        let rows = self.0.rows();
         let columns = self.0.schema().fields().len();
         format!("<washer_sweep.Result: {kind} of {name}, {rows} rows, {columns} columns>")
     }
 }
 
-/// Works with the path of a result file that goes afterwards.
+/// Calls a function with the path of a result file that is deleted afterwards.
 fn in_temporary_file<T>(work: impl FnOnce(&Path) -> PyResult<T>) -> PyResult<T> {
     let folder = tempfile::tempdir()?;
     work(&folder.path().join("result.parquet"))
 }
 
-/// Adds flags or words to a list, none as `None`.
+/// Appends flags or words to a list, null as `None`.
 fn append(values: &Bound<'_, PyList>, part: &ArrayRef) -> PyResult<()> {
     if let Ok(flags) = cells::flags(part) {
         return flags.iter().try_for_each(|flag| values.append(flag));

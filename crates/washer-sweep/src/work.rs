@@ -1,4 +1,4 @@
-//! The engine's work under Python's eyes: without the interpreter's lock, stopped by its signals.
+//! Execution of the engine's work without the interpreter's lock, which Python's signals stop.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread::Builder;
@@ -10,34 +10,35 @@ use sweep::{Effort, Error, Interrupt, ProgressMode};
 
 use crate::errors;
 
-/// How often signals are looked for.
-const LOOK_UP: Duration = Duration::from_millis(50);
+/// The interval at which signals are checked. Basis: Ctrl-C seems immediate. Doubling it delays the
+/// end by up to as long.
+const SIGNAL_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// How a work is to be done, as keywords say.
+/// The options of work that keywords set.
 #[derive(Clone, Copy)]
-pub(crate) struct How {
+pub(crate) struct WorkOptions {
     pub(crate) threads: Option<usize>,
     /// Whether progress is shown.
     pub(crate) progress: bool,
 }
 
-impl How {
-    fn until(self, interrupt: &Interrupt) -> Effort<'_> {
+impl WorkOptions {
+    fn effort(self, interrupt: &Interrupt) -> Effort<'_> {
         let progress = if self.progress { ProgressMode::Auto } else { ProgressMode::None };
         Effort { threads: self.threads, progress, interrupt }
     }
 }
 
-/// What came of a work, and what a signal's handler has raised meanwhile.
-pub(crate) struct Attended<T> {
+/// The result of work, and the exception that a signal handler raised meanwhile.
+pub(crate) struct Supervised<T> {
     value: Result<T, Error>,
     raised: Option<PyErr>,
 }
 
-impl<T> Attended<T> {
-    /// The value, unless it is an error or a handler raised: Ctrl-C becomes what `interrupted`
-    /// makes of the value, and anything else goes on as it is.
-    pub(crate) fn or_raise(
+impl<T> Supervised<T> {
+    /// Returns the value, or raises its error. After Ctrl-C it raises the exception that
+    /// `interrupted` makes of the value; other exceptions of signal handlers are raised unchanged.
+    pub(crate) fn value_or_raise(
         self,
         py: Python<'_>,
         interrupted: impl FnOnce(Result<T, Error>) -> PyErr,
@@ -52,58 +53,62 @@ impl<T> Attended<T> {
     }
 }
 
-/// Waits for what a work sends, and looks for signals meanwhile. A signal whose handler raises, as
-/// Ctrl-C's does, raises the interrupt; a work that `is_left` then is not waited for. Nothing comes
-/// of a work that panics.
-fn waited<T>(
+/// Waits for the result of work, and checks for signals meanwhile. A signal whose handler raises an
+/// exception, such as Ctrl-C, raises the interrupt; the function then returns at once if the work
+/// `is_abandoned`. Work that panics has no result.
+fn wait_for_result<T>(
     ended: &Receiver<T>,
     interrupt: &Interrupt,
-    is_left: bool,
+    is_abandoned: bool,
 ) -> (Option<T>, Option<PyErr>) {
     let mut raised = None;
     loop {
-        let come = ended.recv_timeout(LOOK_UP);
-        // Of a work that is done too: a signal since the last look is its own.
+        let received = ended.recv_timeout(SIGNAL_POLL_INTERVAL);
+        // Signals are checked after the end of the work too, because one may have come before it.
         if raised.is_none() {
             raised = Python::attach(|py| py.check_signals().err());
             if raised.is_some() {
-                // As SIGINT would.
+                // The number of SIGINT.
                 interrupt.raise(2);
             }
         }
-        let goes_on = come.as_ref().err() == Some(&RecvTimeoutError::Timeout);
-        if !goes_on || is_left && raised.is_some() {
-            return (come.ok(), raised);
+        let is_running = received.as_ref().err() == Some(&RecvTimeoutError::Timeout);
+        if !is_running || is_abandoned && raised.is_some() {
+            return (received.ok(), raised);
         }
     }
 }
 
-/// As [`attended`], for a work of which nothing is worth waiting for: Ctrl-C raises the interrupt
-/// and leaves the thread to end by itself, and what comes of it is dropped.
-pub(crate) fn abandonable<T: Send + 'static>(
+/// Runs work like [`supervise`], but does not wait for it after Ctrl-C: the thread ends by itself,
+/// and its result is dropped.
+pub(crate) fn supervise_abandonable<T: Send + 'static>(
     py: Python<'_>,
     threads: Option<usize>,
     work: impl FnOnce(Effort<'_>) -> Result<Option<T>, Error> + Send + 'static,
 ) -> PyResult<T> {
-    let left = py.detach(|| {
+    let result = py.detach(|| {
         let (done, ended) = channel();
         let interrupt = Interrupt::new();
-        let of_work = interrupt.clone();
+        let work_interrupt = interrupt.clone();
         let work = move || {
-            // Nobody may wait for it any more.
-            let _ = done.send(work(How { threads, progress: false }.until(&of_work)));
+            // The receiver is gone if the work was abandoned.
+            let _ =
+                done.send(work(WorkOptions { threads, progress: false }.effort(&work_interrupt)));
         };
         Builder::new().spawn(work).map_err(no_thread)?;
-        match waited(&ended, &interrupt, true) {
+        match wait_for_result(&ended, &interrupt, true) {
             (_, Some(raised)) => Err(raised),
             (value, None) => value.ok_or_else(panicked),
         }
     });
-    let value = left.map_err(|raised| match raised.is_instance_of::<PyKeyboardInterrupt>(py) {
-        true => errors::early(py),
-        false => raised,
-    })?;
-    value.map_err(|error| errors::error(py, &error))?.ok_or_else(|| errors::early(py))
+    let value =
+        result.map_err(|raised| match raised.is_instance_of::<PyKeyboardInterrupt>(py) {
+            true => errors::interrupted_without_result(py),
+            false => raised,
+        })?;
+    value
+        .map_err(|error| errors::error(py, &error))?
+        .ok_or_else(|| errors::interrupted_without_result(py))
 }
 
 fn no_thread(error: std::io::Error) -> PyErr {
@@ -114,27 +119,27 @@ fn panicked() -> PyErr {
     PyRuntimeError::new_err("the engine panicked: please report this with the plan")
 }
 
-/// Does a work on a thread of its own while this one looks for signals. A signal whose handler
-/// raises, as Ctrl-C's does, raises the interrupt, and the work is waited for.
-pub(crate) fn attended<T: Send>(
+/// Runs work on another thread while this one checks for signals. A signal whose handler raises an
+/// exception, such as Ctrl-C, raises the interrupt; the function waits for the end of the work.
+pub(crate) fn supervise<T: Send>(
     py: Python<'_>,
-    how: How,
+    options: WorkOptions,
     work: impl FnOnce(Effort<'_>) -> Result<T, Error> + Send,
-) -> PyResult<Attended<T>> {
+) -> PyResult<Supervised<T>> {
     py.detach(|| {
         let interrupt = Interrupt::new();
         std::thread::scope(|scope| {
             let (done, ended) = channel();
             let interrupt = &interrupt;
             let work = move || {
-                // The receiver waits for it.
-                let _ = done.send(work(how.until(interrupt)));
+                // The receiver exists, because this function waits for the work.
+                let _ = done.send(work(options.effort(interrupt)));
             };
             let worker = Builder::new().spawn_scoped(scope, work).map_err(no_thread)?;
-            let (value, raised) = waited(&ended, interrupt, false);
-            // Joined here, or the scope would pass a panic on.
+            let (value, raised) = wait_for_result(&ended, interrupt, false);
+            // Without this join the scope would propagate a panic of the thread.
             let _ = worker.join();
-            value.map(|value| Attended { value, raised }).ok_or_else(panicked)
+            value.map(|value| Supervised { value, raised }).ok_or_else(panicked)
         })
     })
 }

@@ -125,7 +125,7 @@ def test_a_run_into_a_file_goes_on_where_ctrl_c_left_it(short, tmp_path):
 
     stopped, _ = interrupted(lambda: plan.run(path, progress=False), 0.0, ready=chunks)
     assert stopped.result is None
-    assert "the same call goes on" in str(stopped)
+    assert "the same call continues" in str(stopped)
     assert not path.exists()
     assert chunks()
     plan.run(path, progress=False)

@@ -1,6 +1,6 @@
-"""A washing machine's suspension, linear and nonlinear, over tables of designs.
+"""Linear and nonlinear models of a washing machine's suspension, over tables of designs.
 
-The engine of the command `sweep`, as functions: the same numbers, bit for bit.
+The functions are those of the command `sweep`, and return the same numbers, bit for bit.
 
     import washer_sweep
 

@@ -33,17 +33,19 @@ __all__ = [
 ]
 
 NUMERICS_VERSION: int
-"""Builds of one version and this number compute the same bits."""
+"""The version of the numerics. Builds with the same versions of package and numerics compute the
+same bits."""
 __version__: str
+"""The version of the package."""
 
 @final
 class Plan:
-    """A validated plan: a machine, a spin, a method, axes."""
+    """A validated plan: a machine, a spin, a method of integration and axes."""
 
     def __new__(cls, grid: Mapping[str, Any], *, set: Mapping[str, float] | None = None) -> Plan:
-        """A plan with the keys of a grid file. `set` overrides constants.
+        """Creates a plan from a mapping with the keys of a grid file. `set` overrides constants.
 
-        Raises `PlanError` with every mistake. Lines and columns are those of the dictionary as
+        Raises `PlanError` with all mistakes. Their lines and columns are those of the mapping as
         TOML, which the text shows.
         """
 
@@ -51,9 +53,9 @@ class Plan:
     def from_toml(
         source: str | PathLike[str], *, set: Mapping[str, float] | None = None
     ) -> Plan:
-        """A plan from a grid file, or from the text of one. `set` overrides constants.
+        """Reads a plan from a grid file, or from the text of one. `set` overrides constants.
 
-        A string with a line break or `=` is a text. Raises `PlanError` with every mistake.
+        A string with a line break or `=` is a text. Raises `PlanError` with all mistakes.
         """
 
     def evaluate(
@@ -63,14 +65,15 @@ class Plan:
         threads: int | None = None,
         progress: bool = False,
     ) -> Result:
-        """Both models at each row of a table: rows of designs in, rows of results out, in order.
+        """Evaluates both models at each row of a table. The result's rows are in the same order.
 
-        The columns are the plan's axes; one of a single value may be left out. Every value lies on
-        its axis, from the least to the greatest: the plan's axes are the space of designs, for
-        which the method's steps are chosen. So a row depends on the plan and its own values alone,
-        and has the bits of a run with this point.
+        The table has a column for each axis of the plan; an axis with a single value may be left
+        out. Every value has to lie between the least and the greatest value of its axis, because
+        the steps of the method are chosen for the ranges of the axes. A row of the result
+        therefore depends on the plan and on its own values alone, and has the bits of a run with
+        this point.
 
-        Raises `PlanError` for columns and values that do not fit, before any work, and
+        Raises `PlanError` for columns and values that do not fit, before the computation, and
         `Interrupted` on Ctrl-C.
         """
 
@@ -82,10 +85,10 @@ class Plan:
         progress: bool = True,
         fresh: bool = False,
     ) -> Result:
-        """The map: both models at every point of the grid.
+        """Evaluates both models at every point of the grid.
 
-        With `out` it writes that Parquet file, byte for byte as `sweep run` does. An interrupted
-        run keeps what is done, and the same call goes on; `fresh` starts over.
+        With `out` it also writes a Parquet file, byte for byte as `sweep run` does. An interrupted
+        run keeps its rows beside the file, and the same call continues it; `fresh` starts over.
         """
 
     def trace(
@@ -102,15 +105,17 @@ class Plan:
         angle: bool = False,
         start: Mapping[str, float] | None = None,
     ) -> Result:
-        """Time histories of both models at one point, every `every` s, or by `turns` once a turn.
+        """Computes time histories of both models at one point, every `every` s, or with `turns`
+        once a turn.
 
-        `at` gives a value to each axis, and to any other parameter. `all` traces every point that
-        it leaves, in one table with columns `point` and the axes. `model` names the one to
-        integrate, `nonlinear` or `linear`. `rates` adds rates and accelerations of the channels,
-        `states` the ten coordinates and their speeds, `forces` those of springs, dampers, stops
-        and bushings, and what the feet carry, `angle` the drum's. `start` begins away from
-        equilibrium: q1 to q10 (m, rad), u1 to u10 (per s). Warns of a model that
-        failed; its values are null from there on.
+        `at` gives a value to each axis, and to any other parameter. With `all` it gives values to
+        some axes only, and every point with these values has a history, in one table with the
+        columns `point` and the axes. `model` restricts the table to the `nonlinear` or the `linear`
+        model. `rates` adds rates and accelerations of the channels, `states` the ten coordinates
+        and their speeds, `forces` the forces of springs, dampers, stops, bushings and feet, and
+        `angle` the drum's angle. `start` gives the initial state: deviations q1 to q10 (m, rad) and
+        speeds u1 to u10 (per s). If a model fails, a warning says so, and its values are null from
+        then on.
         """
 
     def boundary(
@@ -125,12 +130,12 @@ class Plan:
         progress: bool = True,
         fresh: bool = False,
     ) -> Result:
-        """The curve on which a quantity is at its limit, over the first two axes.
+        """Traces the curve on which a quantity is at its limit, over the first two axes.
 
-        `quantity` is any column of numbers that rows of this plan can have and that is bad one way,
-        `limit` a number in its unit; without one, the column's own.
-        `tolerance` is the width of the final brackets. With `out` the search writes that file and
-        goes on there after an interruption.
+        `quantity` is a column of numbers of this plan's rows for which greater or lesser values are
+        worse. `limit` is in the column's unit; by default it is the column's own. `tolerance` is
+        the width of the final brackets. With `out` the search writes that file, and the same call
+        continues it after an interruption.
         """
 
     @property
@@ -140,24 +145,24 @@ class Plan:
         """The axes in order, each with its least and greatest value."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Every default and constant in place, with the keys of a grid file."""
+        """Returns the plan with the keys of a grid file, with all defaults and constants."""
 
     def __len__(self) -> int:
-        """How many points."""
+        """Returns the number of points."""
 
 @final
 class Result:
-    """Rows of a result, which any library that speaks Arrow takes without a copy:
+    """A table of rows, which libraries with Arrow read without a copy:
     `polars.DataFrame(result)`, `pyarrow.table(result)`, `pandas.DataFrame.from_arrow(result)`.
 
-    A notebook shows the program's own figure of it. Units and descriptions are in each field's
-    metadata as well.
+    A notebook shows the figure of `sweep plot`. Units and descriptions are also in the metadata of
+    each field.
     """
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
     def __arrow_c_schema__(self) -> object: ...
     def __getitem__(self, name: str, /) -> NDArray[Any]:
-        """A column as an array of NumPy's: numbers with nan for null, else objects with None."""
+        """Returns a column as a NumPy array: numbers with nan for null, or objects with None."""
 
     def __contains__(self, name: str, /) -> bool: ...
     def __len__(self) -> int: ...
@@ -175,13 +180,13 @@ class Result:
     ]: ...
     @property
     def plan(self) -> dict[str, Any]:
-        """The plan that it came of, as its file carries it; of differences, what was compared."""
+        """The plan of the result with the keys of a grid file; for differences, both results."""
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes the file as `.parquet`, or a figure as `.svg`, `.png` or `.html`.
+        """Writes the result as `.parquet`, or a figure of it as `.svg`, `.png` or `.html`.
 
-        Parquet files have the bytes that the command writes. Nothing but a file of the same kind
-        is written over.
+        Parquet files have the bytes that the command writes. An existing file is overwritten only
+        if it has the same kind.
         """
 
     def _repr_svg_(self) -> str | None: ...
@@ -192,10 +197,11 @@ def modes(
     speeds_rpm: Sequence[float] | NDArray[np.float64] | None = None,
     at: Mapping[str, float] | None = None,
 ) -> Result:
-    """Natural frequencies, damping and resonances over spin speeds, by default 0 to 1200 rpm.
+    """Computes natural frequencies, damping and resonances over spin speeds, by default 0 to
+    1200 rpm.
 
-    Of the plan's machine, axes left aside unless `at` gives them values; without a plan, of the
-    built-in machine.
+    The machine is the plan's, with the values in `at`; other axes are ignored. Without a plan it is
+    the built-in machine.
     """
 
 def optimise(
@@ -207,10 +213,10 @@ def optimise(
     progress: bool = True,
     fresh: bool = False,
 ) -> Result:
-    """The candidates of a study file: what is least over its parameters, within its conditions.
+    """Searches for the candidates of a study file with the least objectives within its constraints.
 
-    `set` gives constants over those of its grid. With `out` it writes that Parquet file, byte for
-    byte as `sweep optimise` does, and goes on there after an interruption.
+    `set` overrides constants of the study's grid. With `out` it also writes a Parquet file, byte
+    for byte as `sweep optimise` does, and the same call continues after an interruption.
     """
 
 def stability(
@@ -222,11 +228,11 @@ def stability(
     progress: bool = True,
     fresh: bool = False,
 ) -> Result:
-    """The periodic response of both models at each point of the plan's grid and each constant
-    speed, and how fast disturbances of it grow. Speeds vary fastest.
+    """Finds the periodic response of both models at each point of the plan's grid and each held
+    speed, and the growth of disturbances about it. Rows are in the order of points, then of speeds.
 
-    With `out` it writes that Parquet file, byte for byte as `sweep stability` does, and goes on
-    there after an interruption.
+    With `out` it also writes a Parquet file, byte for byte as `sweep stability` does, and the same
+    call continues after an interruption.
     """
 
 def dwell(
@@ -244,13 +250,13 @@ def dwell(
     progress: bool = True,
     fresh: bool = False,
 ) -> Result:
-    """What each point of the plan's grid ends in that is held at each constant speed: a row for
-    each motion that is found.
+    """Finds the attractors of each point of the plan's grid at each held speed, a row for each.
 
-    `starts` a speed, kicks of up to `kick` rad/s among them, or with `carry` the motion of the
-    speed before; `threshold` asks for the smallest kick that does not come back; `longest` seconds
-    at most; `sections` keeps so many states once a turn, a row each. With `out` it writes that
-    Parquet file, byte for byte as `sweep dwell` does.
+    `starts` is the number of starts at a speed; some are kicks of up to `kick` rad/s. With `carry`
+    the start is the motion at the next lower (`up`) or higher (`down`) speed. `threshold` searches
+    for the smallest kick after which the motion does not return. `longest` is the greatest duration
+    of a trajectory in s. `sections` adds that many states at successive turns, a row each. With
+    `out` it also writes a Parquet file, byte for byte as `sweep dwell` does.
     """
 
 def explain(
@@ -260,12 +266,12 @@ def explain(
     speeds_rpm: Sequence[float] | NDArray[np.float64] | None = None,
     threads: int | None = None,
 ) -> Explanation:
-    """Why the linear model fails at one point: the unstable speeds that the run passes, what grows
-    there, and what would close them.
+    """Explains why the linear model fails at one point: the unstable speeds that the run passes,
+    the modes that grow there, and changes of the machine that make these speeds stable.
 
-    `at` gives a value to each axis, and to any other parameter. `speeds_rpm` are even speeds to
-    look at; by default each rpm from half of the slowest mode's frequency to the fastest speed of
-    the run.
+    `at` gives a value to each axis, and to any other parameter. `speeds_rpm` are equally spaced
+    speeds to examine; by default each rpm from half of the slowest mode's frequency to the greatest
+    speed of the run.
     """
 
 def fit(
@@ -283,16 +289,18 @@ def fit(
     draws: int = 64,
     threads: int | None = None,
 ) -> Explanation:
-    """The numbers of the plan's machine that make it follow a measured run-up, or several.
+    """Fits numbers of the plan's machine to one or several measured run-ups.
 
-    A table has `time_s`, perhaps `speed_rpm`, and channels with their units, such as
-    `tub_front_y_m_per_s2`; NaN where no sample is. `free` are names, or `name=from:to`; every table
-    has its `own`, and its constants in `at`. `known` are tolerances of fixed numbers, such as
-    `tub_mass_kg=2%`, `default` or `none`. The keys are those of `sweep fit --json`.
+    A table has the column `time_s`, optionally `speed_rpm`, and channels with their units, such as
+    `tub_front_y_m_per_s2`, with NaN where there is no sample. `free` are the names of the numbers
+    to fit, or `name=from:to`; `own` are further ones that have a value for each table. `at` has
+    the constants of each table. `known` are tolerances of fixed numbers, such as `tub_mass_kg=2%`,
+    `default` or `none`. The keys of the result are those of `sweep fit --json`.
     """
 
 def parameters(plan: Plan | None = None) -> list[Parameter]:
-    """Every number that can be set or swept, with its value in the plan or the built-in machine."""
+    """Lists all numbers that can be set or swept, with their values in the plan or the built-in
+    machine."""
 
 def read(path: str | PathLike[str]) -> Result:
-    """Reads a result file of any kind, and makes sure of every byte."""
+    """Reads a result file of any kind, and checks its digest."""

@@ -1,5 +1,5 @@
-"""Exceptions. They are Python's own classes, because the stable C API of Python 3.11 lets no
-extension derive from one with fields."""
+"""The exceptions of the package. They are classes in Python, because an extension cannot derive a
+class with fields from an exception by the stable C API of Python 3.11."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ if TYPE_CHECKING:
 
 
 class PlanError(ValueError):
-    """What was given makes no plan, or does not fit one. Nothing was done.
+    """The input is not a valid plan, or does not fit the plan. Nothing was computed.
 
-    The text shows each mistake at its place, as the command does. `diagnostics` has a dictionary
-    for each: `file`, `line`, `column`, `message`, `expected` and `hint`, None where there is none.
+    The text shows each mistake with its place, as the command does. `diagnostics` has a dictionary
+    for each mistake: `file`, `line`, `column`, `message`, `expected` and `hint`, which may be None.
     """
 
     diagnostics: list[Diagnostic]
@@ -27,9 +27,9 @@ class PlanError(ValueError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C ended the work.
+    """Ctrl-C stopped the computation.
 
-    `result` has the rows that were computed, each whole, or is None where a file keeps them.
+    `result` has the rows up to then, or is None if they are in a file.
     """
 
     result: Result | None

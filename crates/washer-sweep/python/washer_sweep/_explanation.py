@@ -1,4 +1,4 @@
-"""What `explain` and `fit` return."""
+"""The class of the results of `explain` and `fit`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 
 class Explanation(dict[str, Any]):
-    """What was found: the keys of `sweep explain --json`, or of `sweep fit --json`.
+    """The result of `explain` or `fit`, with the keys of the command's `--json`.
 
-    As text, and in a notebook, it is what the command prints.
+    Its text, which a notebook shows, is that of the command.
     """
 
     text: str

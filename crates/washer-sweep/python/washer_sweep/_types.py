@@ -1,4 +1,4 @@
-"""What type checkers know by name."""
+"""Types for annotations."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from typing import Any, Protocol, TypedDict
 
 
 class ArrowStream(Protocol):
-    """A table of polars, pyarrow, pandas, DuckDB, or any other that speaks Arrow's C stream."""
+    """A table with Arrow's C stream, such as those of polars, pyarrow, pandas and DuckDB."""
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
 
 
 class Diagnostic(TypedDict):
-    """One mistake."""
+    """A mistake in an input."""
 
     file: str | None
     """The file, or the name of the option, text or table."""
     line: int | None
-    """From 1."""
+    """The line, from 1."""
     column: int | None
-    """From 1."""
+    """The column, from 1."""
     message: str
     expected: str | None
     hint: str | None

@@ -1,0 +1,86 @@
+//! Tables from work that has ended, and exceptions if it was interrupted.
+
+use std::path::PathBuf;
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use sweep::{Error, MemoryTable, RanToFile, Task};
+
+use crate::errors;
+use crate::result::PyResultTable;
+use crate::work::{Supervised, WorkOptions, supervise};
+
+/// Returns the rows. After Ctrl-C it raises an exception with the rows up to then.
+pub(crate) fn rows_or_raise(
+    py: Python<'_>,
+    evaluated: Supervised<MemoryTable>,
+) -> PyResult<PyResultTable> {
+    let table = evaluated.value_or_raise(py, |evaluated| match evaluated {
+        Err(error) => errors::error(py, &error),
+        Ok(table) => {
+            let rows = table.rows();
+            let text = format!("interrupted; `result` of this exception holds {rows} rows");
+            interruption(py, text, Some(table))
+        }
+    })?;
+    Ok(PyResultTable::new(table))
+}
+
+/// Runs a task in memory, or into a file if there is one, and returns the rows. A file is started
+/// over if `fresh`; otherwise the call continues an unfinished one. With progress the task also
+/// prints what the command prints.
+pub(crate) fn rows_or_file(
+    py: Python<'_>,
+    task: Result<Task<'_>, Error>,
+    (out, fresh): (Option<PathBuf>, bool),
+    options: WorkOptions,
+) -> PyResult<PyResultTable> {
+    let task = &task.map_err(|error| errors::error(py, &error))?;
+    let Some(out) = out else {
+        return rows_or_raise(py, supervise(py, options, |effort| task.in_memory(effort))?);
+    };
+    let tell: fn(&str) = if options.progress { sweep::tell } else { |_| () };
+    let ran = supervise(py, options, |effort| task.to_file(&out, fresh, &tell, effort))?;
+    let ran = ran.value_or_raise(py, |ran| match ran {
+        Err(error) => errors::error(py, &error),
+        Ok(RanToFile::Whole(table)) => {
+            let text = format!("interrupted after {} was complete", out.display());
+            interruption(py, text, Some(table))
+        }
+        Ok(RanToFile::Interrupted { kept, points }) => {
+            let text = format!(
+                "interrupted with {kept} of {points} points kept beside {}; the same call \
+                 continues with the others",
+                out.display()
+            );
+            interruption(py, text, None)
+        }
+    })?;
+    match ran {
+        RanToFile::Whole(table) => Ok(PyResultTable::new(table)),
+        RanToFile::Interrupted { kept, points } => Err(PyValueError::new_err(format!(
+            "stopped with {kept} of {points} points without an interruption"
+        ))),
+    }
+}
+
+/// Returns the table of a search, or raises `interrupted` after Ctrl-C.
+pub(crate) fn table_or_raise(
+    py: Python<'_>,
+    found: Supervised<Option<MemoryTable>>,
+    interrupted: impl Fn() -> PyErr,
+) -> PyResult<PyResultTable> {
+    let found = found.value_or_raise(py, |_| interrupted())?;
+    found.map(PyResultTable::new).ok_or_else(interrupted)
+}
+
+/// Creates the exception of an interruption, with the result up to then.
+pub(crate) fn interruption(py: Python<'_>, text: String, result: Option<MemoryTable>) -> PyErr {
+    match result.map(|result| Py::new(py, PyResultTable::new(result))).transpose() {
+        Ok(result) => {
+            let result = result.map_or_else(|| py.None(), Py::into_any);
+            errors::interrupted(py, text, result)
+        }
+        Err(error) => error,
+    }
+}
