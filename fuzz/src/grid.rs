@@ -1,5 +1,5 @@
-//! Any grid file, machine file and constants: either a plan whose corners can be prepared and
-//! integrated, or an explanation.
+//! Fuzz target of grid files, machine files and constants. An input gives either a plan whose
+//! corners can be prepared and integrated, or a list of mistakes.
 
 #![no_main]
 
@@ -15,29 +15,33 @@ use sweep::{Job, Plan};
 use tempfile::TempDir;
 use washer_model::{Method, ModelKind, Point, Timing, prepare, simulate};
 
-/// Mistakes are shown up to a number, each in a few lines.
-const LONGEST_EXPLANATION: usize = 200_000;
+/// The greatest length of a list of mistakes (bytes). Basis: a list shows a limited number of
+/// mistakes, each in a few lines. Doubling it finds fewer lists that are too long.
+const MAX_LIST_LEN: usize = 200_000;
 
-/// Integrated time: a few dozen steps, so that an input costs a fraction of a millisecond.
+/// The end of the runs (s). Basis: some twenty steps, so that an input takes a fraction of a
+/// millisecond. Doubling it halves the inputs in the same time.
 const END_S: f64 = 2e-3;
+/// The step of the runs (s). Basis: below the limit of stability for usual machines. Doubling it
+/// lets more runs fail, which tests less.
 const STEP_S: f64 = 1e-4;
 
 fuzz_target!(|bytes: &[u8]| -> Corpus {
     let input = Input::new(bytes);
     let Ok(grid) = input.write(folder()) else { return Corpus::Reject };
     match sweep::load(&grid, &input.sets) {
-        Ok(plan) => try_out(&plan),
+        Ok(plan) => check_plan(&plan),
         Err(mistakes) => {
             let text = mistakes.to_string();
             assert!(text.contains("nothing was done"), "{text}");
-            assert!(text.len() < LONGEST_EXPLANATION, "an explanation of {} bytes", text.len());
+            assert!(text.len() < MAX_LIST_LEN, "a list of mistakes of {} bytes", text.len());
         }
     }
     Corpus::Keep
 });
 
-/// A plan that was let through is one that everything behind it can take.
-fn try_out(plan: &Plan) {
+/// Checks that the corners of a valid plan can be prepared and integrated.
+fn check_plan(plan: &Plan) {
     assert!(plan.points() >= 1);
     assert_eq!(plan.axis_values(plan.points() - 1).len(), plan.axes.len());
     assert!(plan.window_s[0] < plan.window_s[1] && plan.window_s[1] <= plan.end_s);
@@ -55,10 +59,10 @@ fn try_out(plan: &Plan) {
     let mut all = Simd::ALL.into_iter();
     let simd = all.find(|simd| simd.name() == "scalar").unwrap_or_else(Simd::best);
     let prepared = prepare(simd, &scenarios, &timing);
-    let ready: Vec<&Point> = prepared.iter().filter_map(|point| point.as_ref().ok()).collect();
+    let points: Vec<&Point> = prepared.iter().filter_map(|point| point.as_ref().ok()).collect();
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
-        let records = simulate(simd, model, &Method::Rk4 { step_s: STEP_S }, &ready);
-        assert_eq!(records.len(), ready.len());
+        let records = simulate(simd, model, &Method::Rk4 { step_s: STEP_S }, &points);
+        assert_eq!(records.len(), points.len());
         for record in records {
             let is_finite = record.amplitudes.iter().all(|amplitude| amplitude.is_finite());
             assert!(record.failure.is_some() || is_finite, "{record:?}");
@@ -67,6 +71,7 @@ fn try_out(plan: &Plan) {
 }
 
 fn folder() -> &'static Path {
+    /// The folder of the input's files, which all inputs share.
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     FOLDER.get_or_init(|| tempfile::tempdir().expect("a temporary folder")).path()
 }

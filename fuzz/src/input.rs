@@ -1,14 +1,13 @@
-//! What the fuzzer's bytes stand for: a grid file, a machine file beside it and constants of the
-//! command line.
+//! The parts of an input: a grid file, a machine file beside it and constants of the command line.
 
 use std::path::Path;
 
-/// A line that begins the machine file, which the grid can name as `machine.toml`.
+/// The line before the machine file, which the grid can name as `machine.toml`.
 const MACHINE: &[u8] = b"\n%% machine.toml\n";
-/// A line that begins the constants, one a line.
+/// The line before the constants, which have a line each.
 const SETS: &[u8] = b"\n%% set\n";
 
-/// One input, taken apart.
+/// The parts of an input.
 pub(crate) struct Input<'a> {
     pub(crate) grid: &'a [u8],
     pub(crate) machine: Option<&'a [u8]>,
@@ -17,14 +16,14 @@ pub(crate) struct Input<'a> {
 
 impl<'a> Input<'a> {
     pub(crate) fn new(bytes: &'a [u8]) -> Self {
-        let (files, sets) = cut(bytes, SETS);
-        let (grid, machine) = cut(files, MACHINE);
+        let (files, sets) = split_at_line(bytes, SETS);
+        let (grid, machine) = split_at_line(files, MACHINE);
         let sets =
             String::from_utf8_lossy(sets.unwrap_or_default()).lines().map(str::to_owned).collect();
         Self { grid, machine, sets }
     }
 
-    /// Puts the files where a user would have them and returns the grid's path.
+    /// Writes the files to a folder and returns the path of the grid file.
     pub(crate) fn write(&self, folder: &Path) -> std::io::Result<std::path::PathBuf> {
         let machine = folder.join("machine.toml");
         match self.machine {
@@ -40,9 +39,10 @@ impl<'a> Input<'a> {
     }
 }
 
-fn cut<'a>(bytes: &'a [u8], at: &[u8]) -> (&'a [u8], Option<&'a [u8]>) {
-    match bytes.windows(at.len()).position(|window| window == at) {
-        Some(place) => (&bytes[..place], Some(&bytes[place + at.len()..])),
+/// Returns the bytes before and after a line; `None` if the line is missing.
+fn split_at_line<'a>(bytes: &'a [u8], line: &[u8]) -> (&'a [u8], Option<&'a [u8]>) {
+    match bytes.windows(line.len()).position(|window| window == line) {
+        Some(start) => (&bytes[..start], Some(&bytes[start + line.len()..])),
         None => (bytes, None),
     }
 }

@@ -1,9 +1,9 @@
-//! Any bytes in place of one file of an unfinished run: the run is refused, or goes on and ends in
-//! a result whose bytes are those of the undisturbed one, unless the file is a chunk that passes
-//! for one.
+//! Fuzz target of the files of an unfinished run. An input replaces one of them. The program then
+//! reports an error, or continues the run to a result with the bytes of the undisturbed run. Only a
+//! chunk, whose rows are part of the result, may change it.
 //!
-//! The first byte of an input says which file it is for. A chunk gets a right header and a right
-//! hash, so that the fuzzer has records to change: those of all points, or as long as the input.
+//! The first byte of an input selects the file. A chunk gets a valid header and a valid hash, so
+//! that the fuzzer changes its records: those of all points, or as many as the input has.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,10 +15,12 @@ use sweep::{
 };
 use tempfile::TempDir;
 
-/// Bytes of a chunk before its records, and of the hash behind them.
+/// The number of bytes of a chunk before its records.
 const HEADER: usize = 76;
+/// The number of bytes of the hash after the records.
 const HASH: usize = 32;
 
+/// The names of the files that an input can replace.
 const NAMES: [&str; 8] = [
     "plan.json",
     "shards.json",
@@ -26,31 +28,32 @@ const NAMES: [&str; 8] = [
     "session-x-1-1.json",
     "shard-1.lock",
     CHUNK,
-    // Beside the folder.
+    // This file is beside the folder.
     "../x.run.json",
     CHUNK,
 ];
+/// The name of the only chunk.
 const CHUNK: &str = "chunk-00000000.bin";
 
-/// Tries one input; a panic is a finding.
+/// Runs the target with an input; a panic is a finding.
 pub(crate) fn run(bytes: &[u8]) {
-    let Some((which, content)) = bytes.split_first() else { return };
-    let home = home();
-    let which = usize::from(*which) % NAMES.len();
-    let name = NAMES[which];
-    let records = home.chunk.len() - HEADER - HASH;
+    let Some((selector, content)) = bytes.split_first() else { return };
+    let undisturbed = unfinished_run();
+    let file = usize::from(*selector) % NAMES.len();
+    let name = NAMES[file];
+    let records = undisturbed.chunk.len() - HEADER - HASH;
     let content = match name {
-        CHUNK if which + 1 == NAMES.len() => as_chunk(content, content.len(), &home.chunk),
-        CHUNK => as_chunk(content, records, &home.chunk),
+        CHUNK if file + 1 == NAMES.len() => as_chunk(content, content.len(), &undisturbed.chunk),
+        CHUNK => as_chunk(content, records, &undisturbed.chunk),
         _ => content.to_vec(),
     };
-    let partial = home.folder.path().join("x.parquet.partial");
-    reset(home, &partial);
+    let partial = undisturbed.folder.path().join("x.parquet.partial");
+    reset(undisturbed, &partial);
     fs::write(partial.join(name), &content).expect("the input is written");
 
-    let job = Job::of(&home.plan);
-    let output = home.folder.path().join("x.parquet");
-    // Looking changes nothing, whatever it finds.
+    let job = Job::of(&undisturbed.plan);
+    let output = undisturbed.folder.path().join("x.parquet");
+    // `status` changes no file.
     let _ = status(&output, &job);
     assert_eq!(fs::read(partial.join(name)).expect("the input is there"), content);
     let mut opened = match OpenRun::open(&output, &job, options()) {
@@ -64,9 +67,9 @@ pub(crate) fn run(bytes: &[u8]) {
     match opened.join(&job, &|| false) {
         Ok(tally) => {
             let tally = tally.expect("nobody stops it");
-            assert_eq!(tally.points, home.plan.points());
+            assert_eq!(tally.points, undisturbed.plan.points());
             let result = fs::read(&output).expect("there is a result");
-            assert!(name == CHUNK || result == home.result, "{name} has changed the result");
+            assert!(name == CHUNK || result == undisturbed.result, "{name} has changed the result");
             let _ = opened.complete(&job, &tally, None);
         }
         Err(error) => assert!(name == CHUNK, "{name}: {error}"),
@@ -77,7 +80,7 @@ fn options() -> OpenOptions<'static> {
     OpenOptions { fresh: false, shard: None, environment: &|_| None }
 }
 
-/// The records of an input between a right header and a right hash.
+/// Returns a chunk with the records of an input, a valid header and a valid hash.
 fn as_chunk(records: &[u8], length: usize, chunk: &[u8]) -> Vec<u8> {
     let mut bytes = chunk[..HEADER].to_vec();
     bytes.extend(records.iter().copied().chain(std::iter::repeat(0)).take(length));
@@ -86,30 +89,32 @@ fn as_chunk(records: &[u8], length: usize, chunk: &[u8]) -> Vec<u8> {
     bytes
 }
 
-struct Home {
+/// An undisturbed run before its chunks are joined, and its result.
+struct UnfinishedRun {
     folder: TempDir,
     plan: Plan,
-    /// Files of the whole run's folder, before it is joined.
+    /// The files of the run's folder.
     files: Vec<(String, Vec<u8>)>,
     chunk: Vec<u8>,
     result: Vec<u8>,
 }
 
-/// Puts everything back as an undisturbed run leaves it before its join.
-fn reset(home: &Home, partial: &Path) {
+/// Restores the files of the undisturbed run.
+fn reset(undisturbed: &UnfinishedRun, partial: &Path) {
     for file in ["x.parquet", "x.run.json"] {
-        let _ = fs::remove_file(home.folder.path().join(file));
+        let _ = fs::remove_file(undisturbed.folder.path().join(file));
     }
     let _ = fs::remove_dir_all(partial);
     fs::create_dir(partial).expect("the folder is made");
-    for (name, bytes) in &home.files {
+    for (name, bytes) in &undisturbed.files {
         fs::write(partial.join(name), bytes).expect("a file is written");
     }
 }
 
-fn home() -> &'static Home {
-    static HOME: OnceLock<Home> = OnceLock::new();
-    HOME.get_or_init(|| {
+fn unfinished_run() -> &'static UnfinishedRun {
+    /// The run that all inputs share.
+    static RUN: OnceLock<UnfinishedRun> = OnceLock::new();
+    RUN.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let grid = folder.path().join("g.toml");
         let text = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\n\
@@ -135,7 +140,7 @@ fn home() -> &'static Home {
                 .expect("the run ends")
                 .ended
         };
-        // A shard of one leaves its folder.
+        // A run with a single shard does not join its chunks.
         let shard = Some(ShardRequest::Given(Shard { index: 1, of: 1 }));
         assert!(matches!(go(shard), Ended::Shard(..)));
         let partial = folder.path().join("x.parquet.partial");
@@ -150,6 +155,6 @@ fn home() -> &'static Home {
         assert!(matches!(go(None), Ended::Finished(_)));
         let result = fs::read(&output).expect("there is a result");
         let (_, chunk) = files.iter().find(|(name, _)| name == CHUNK).expect("there is a chunk");
-        Home { chunk: chunk.clone(), plan, files, result, folder }
+        UnfinishedRun { chunk: chunk.clone(), plan, files, result, folder }
     })
 }

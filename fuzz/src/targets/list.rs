@@ -1,5 +1,5 @@
-//! Any bytes in place of a list of points, CSV or Parquet: a plan whose points are there, or an
-//! explanation.
+//! Fuzz target of lists of points, as CSV or Parquet. An input gives a valid plan or a list of
+//! mistakes.
 
 use std::fs;
 use std::path::PathBuf;
@@ -7,14 +7,15 @@ use std::sync::OnceLock;
 
 use tempfile::TempDir;
 
-/// Mistakes are shown up to a number, each in a few lines.
-const LONGEST_EXPLANATION: usize = 200_000;
+/// The greatest length of a list of mistakes (bytes). Basis: a list shows a limited number of
+/// mistakes, each in a few lines. Doubling it finds fewer lists that are too long.
+const MAX_LIST_LEN: usize = 200_000;
 
-/// Tries one input; a panic is a finding.
+/// Runs the target with an input; a panic is a finding.
 pub(crate) fn run(bytes: &[u8]) {
-    let home = home();
-    fs::write(&home.list, bytes).expect("the input is written");
-    match sweep::load(&home.grid, &[]) {
+    let files = list_files();
+    fs::write(&files.list, bytes).expect("the input is written");
+    match sweep::load(&files.grid, &[]) {
         Ok(plan) => {
             assert!(plan.points() >= 1);
             for corner in [0, plan.corners() - 1] {
@@ -26,20 +27,22 @@ pub(crate) fn run(bytes: &[u8]) {
         Err(mistakes) => {
             let text = mistakes.to_string();
             assert!(text.contains("nothing was done"), "{text}");
-            assert!(text.len() < LONGEST_EXPLANATION, "an explanation of {} bytes", text.len());
+            assert!(text.len() < MAX_LIST_LEN, "a list of mistakes of {} bytes", text.len());
         }
     }
 }
 
-struct Home {
+/// A grid file and the list of points that it names.
+struct ListFiles {
     _folder: TempDir,
     list: PathBuf,
     grid: PathBuf,
 }
 
-fn home() -> &'static Home {
-    static HOME: OnceLock<Home> = OnceLock::new();
-    HOME.get_or_init(|| {
+fn list_files() -> &'static ListFiles {
+    /// The files that all inputs share.
+    static FILES: OnceLock<ListFiles> = OnceLock::new();
+    FILES.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = |name: &str| folder.path().join(name);
         let grid = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\n\
@@ -47,6 +50,6 @@ fn home() -> &'static Home {
             integrator = { method = \"additive\" }\n\
             design = { method = \"list\", file = \"list\" }\n";
         fs::write(path("g.toml"), grid).expect("the grid is written");
-        Home { list: path("list"), grid: path("g.toml"), _folder: folder }
+        ListFiles { list: path("list"), grid: path("g.toml"), _folder: folder }
     })
 }
