@@ -1,4 +1,4 @@
-//! `sweep boundary` as a user meets it: what it writes, refuses and leaves behind.
+//! Tests of `sweep boundary`: its files, errors and interruptions.
 
 #![cfg(unix)]
 
@@ -6,10 +6,10 @@ use std::fs;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::home::{said, sweep_binary};
 use crate::signal;
+use crate::test_folder::{all_output, sweep_binary};
 
-/// A tenth of a second of every trajectory is plenty for what is tested here.
+/// A grid whose trajectories last a tenth of a second, which suffices for these tests.
 const GRID: &str = r#"
 [spin]
 profile = "triangular"
@@ -45,16 +45,16 @@ fn boundary(folder: &tempfile::TempDir, arguments: &[&str]) -> Command {
 }
 
 #[test]
-fn a_curve_for_every_combination_of_further_axes_in_a_figure() {
+fn every_combination_of_further_axes_has_a_curve() {
     let folder = folder_with("0.1");
     let done =
         boundary(&folder, &["--quantity", "min_gap_nonlinear_m"]).output().expect("it starts");
-    let said = said(&done);
-    assert_eq!(done.status.code(), Some(0), "{said}");
-    // No gap closes in a tenth of a second: six rows say so.
+    let messages = all_output(&done);
+    assert_eq!(done.status.code(), Some(0), "{messages}");
+    // No gap closes in a tenth of a second, as six rows say.
     assert!(
-        said.contains("6 lines within the limit throughout") && !said.contains("brackets"),
-        "{said}"
+        messages.contains("6 lines within the limit throughout") && !messages.contains("brackets"),
+        "{messages}"
     );
     let file = "results/grid-boundary.parquet";
     assert!(folder.path().join(file).is_file());
@@ -72,17 +72,17 @@ fn a_curve_for_every_combination_of_further_axes_in_a_figure() {
             [done.stdout, done.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()),
         )
     };
-    let (code, [shown, said]) = sweep(&["show", file]);
-    assert_eq!(code, Some(0), "{said}");
+    let (code, [shown, messages]) = sweep(&["show", file]);
+    assert_eq!(code, Some(0), "{messages}");
     assert!(shown.contains("6 none_in_range_reliable"), "{shown}");
-    // It carries the grid's plan, but is not that grid's map.
-    let (code, [_, said]) = sweep(&["run", "grid.toml", "--out", file]);
-    assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("is no result of `sweep run`"), "{said}");
+    // The file has the grid's plan, but is not that grid's map.
+    let (code, [_, messages]) = sweep(&["run", "grid.toml", "--out", file]);
+    assert_eq!(code, Some(2), "{messages}");
+    assert!(messages.contains("is no result of `sweep run`"), "{messages}");
 }
 
 #[test]
-fn brackets_of_a_logarithmic_axis_are_told_in_the_unit_that_was_asked() {
+fn brackets_of_a_logarithmic_axis_are_relative() {
     let folder = folder_with("0.1");
     let grid = GRID.replace("END", "0.1").split_once("[[axis]]").expect("axes").0.to_owned();
     let axes = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.2, 0.4]\n[[axis]]\n\
@@ -92,14 +92,14 @@ fn brackets_of_a_logarithmic_axis_are_told_in_the_unit_that_was_asked() {
     fs::write(folder.path().join("grid.toml"), text).expect("the grid is written");
     let arguments = ["--quantity", "static_sag_m", "--limit", "0.01", "--tolerance", "0.01"];
     let done = boundary(&folder, &arguments).output().expect("it starts");
-    let said = String::from_utf8_lossy(&done.stderr);
-    let widest = said.split("brackets  at most ").nth(1).expect("brackets").split(' ').next();
+    let messages = String::from_utf8_lossy(&done.stderr);
+    let widest = messages.split("brackets  at most ").nth(1).expect("brackets").split(' ').next();
     let widest: f64 = widest.expect("a number").parse().expect("a number");
-    assert!(widest <= 0.01 && said.contains("of its value wide (asked: 0.01)"), "{said}");
+    assert!(widest <= 0.01 && messages.contains("of its value wide (asked: 0.01)"), "{messages}");
 }
 
 #[test]
-fn what_cannot_be_traced_is_refused_before_any_work() {
+fn quantities_without_a_boundary_are_errors_before_the_search() {
     let folder = folder_with("0.1");
     fs::write(folder.path().join("notes.parquet"), "mine").expect("the notes are written");
     for (arguments, expected) in [
@@ -109,20 +109,20 @@ fn what_cannot_be_traced_is_refused_before_any_work() {
         (["--out", "notes.parquet"], "is no result of `sweep boundary`"),
     ] {
         let refused = boundary(&folder, &arguments).output().expect("it starts");
-        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-        assert_eq!(refused.status.code(), Some(2), "{said}");
-        assert!(said.contains(expected), "{said}");
+        let messages = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{messages}");
+        assert!(messages.contains(expected), "{messages}");
     }
     assert_eq!(fs::read(folder.path().join("notes.parquet")).expect("still there"), b"mine");
     assert!(!folder.path().join("results").exists());
 }
 
-/// Bytes of the points that a search on `x.parquet` has kept.
+/// Returns the number of bytes that a search for `x.parquet` has stored.
 fn kept(folder: &tempfile::TempDir) -> u64 {
     fs::metadata(folder.path().join("x.parquet.partial/trials.bin")).map_or(0, |found| found.len())
 }
 
-/// Starts a search and waits until it has kept more points than were there.
+/// Starts a search and waits until it has stored further points.
 fn at_work(folder: &tempfile::TempDir, search: &mut Command) -> Child {
     let there = kept(folder);
     let began = Instant::now();
@@ -143,42 +143,46 @@ fn names(folder: &tempfile::TempDir) -> Vec<String> {
 }
 
 #[test]
-fn an_interrupted_search_goes_on_and_ends_in_the_same_bytes() {
-    // Long enough that the signals come in the middle, on any machine.
+fn an_interrupted_search_continues_to_the_same_bytes() {
+    // The search takes so long that the signals come before its end on any machine.
     let folder = folder_with("10");
     let arguments = ["--threads", "1", "--lattice", "11", "--progress", "none", "--out"];
     let search = |out: &str| boundary(&folder, &[&arguments, &[out][..]].concat());
     let undisturbed = search("whole.parquet").output().expect("it starts");
-    assert_eq!(undisturbed.status.code(), Some(0), "{}", said(&undisturbed));
+    assert_eq!(undisturbed.status.code(), Some(0), "{}", all_output(&undisturbed));
     for (name, code) in [("INT", 130), ("TERM", 143)] {
         let child = at_work(&folder, &mut search("x.parquet"));
         signal(name, child.id());
         let done = child.wait_with_output().expect("it ends");
-        assert_eq!(done.status.code(), Some(code), "{}", said(&done));
-        assert!(said(&done).contains("points kept"), "{}", said(&done));
+        assert_eq!(done.status.code(), Some(code), "{}", all_output(&done));
+        assert!(all_output(&done).contains("points kept"), "{}", all_output(&done));
         let again =
             "go on  sweep boundary grid.toml --threads 1 --lattice 11 --progress none --out";
-        assert!(said(&done).contains(again), "{}", said(&done));
+        assert!(all_output(&done).contains(again), "{}", all_output(&done));
         assert_eq!(names(&folder), ["grid.toml", "whole.parquet", "x.parquet.partial"]);
     }
-    // Killed where nothing can be said any more.
+    // SIGKILL leaves the search no time for a message.
     let mut child = at_work(&folder, &mut search("x.parquet"));
     child.kill().expect("it is killed");
     child.wait().expect("it ends");
     let other =
         boundary(&folder, &["--lattice", "2", "--out", "x.parquet"]).output().expect("it starts");
-    assert_eq!(other.status.code(), Some(2), "{}", said(&other));
-    assert!(said(&other).contains("/boundary/lattice: was 11, is 2"), "{}", said(&other));
+    assert_eq!(other.status.code(), Some(2), "{}", all_output(&other));
+    assert!(
+        all_output(&other).contains("/boundary/lattice: was 11, is 2"),
+        "{}",
+        all_output(&other)
+    );
     let done = search("x.parquet").output().expect("it starts");
-    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
-    assert!(said(&done).contains("going on: "), "{}", said(&done));
+    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+    assert!(all_output(&done).contains("going on: "), "{}", all_output(&done));
     let bytes = |name: &str| fs::read(folder.path().join(name)).expect("there is a file");
     assert!(bytes("x.parquet") == bytes("whole.parquet"), "other bytes");
     assert_eq!(names(&folder), ["grid.toml", "whole.parquet", "x.parquet"]);
 }
 
 #[test]
-fn a_boundary_of_another_plan_is_not_written_over_unasked() {
+fn a_boundary_of_another_plan_is_overwritten_only_on_request() {
     let folder = folder_with("0.1");
     let trace = |more: &[&str]| {
         let arguments = [&["--lattice", "1", "--out", "x.parquet"][..], more].concat();
@@ -186,25 +190,25 @@ fn a_boundary_of_another_plan_is_not_written_over_unasked() {
         (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
     };
     let bytes = || fs::read(folder.path().join("x.parquet")).expect("there is a file");
-    let (code, said) = trace(&[]);
-    assert_eq!(code, Some(0), "{said}");
+    let (code, messages) = trace(&[]);
+    assert_eq!(code, Some(0), "{messages}");
     let first = bytes();
-    let (code, said) = trace(&[]);
-    assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("is there already"), "{said}");
+    let (code, messages) = trace(&[]);
+    assert_eq!(code, Some(0), "{messages}");
+    assert!(messages.contains("is there already"), "{messages}");
     for (more, expected) in [
         (["--tolerance", "3"], "/boundary/tolerance: was 0.5, is 3"),
         (["--quantity", "min_gap_linear_m"], "/boundary/quantity: was"),
         (["--set", "tub_mass_kg=31"], "/machine/tub/mass_kg: was"),
     ] {
-        let (code, said) = trace(&more);
-        assert_eq!(code, Some(2), "{said}");
-        assert!(said.contains("already holds the result of another plan"), "{said}");
-        assert!(said.contains(expected) && said.contains("--fresh"), "{said}");
+        let (code, messages) = trace(&more);
+        assert_eq!(code, Some(2), "{messages}");
+        assert!(messages.contains("already holds the result of another plan"), "{messages}");
+        assert!(messages.contains(expected) && messages.contains("--fresh"), "{messages}");
         assert!(bytes() == first, "{more:?}");
     }
-    let (code, said) = trace(&["--quantity", "min_gap_linear_m", "--fresh"]);
-    assert_eq!(code, Some(0), "{said}");
+    let (code, messages) = trace(&["--quantity", "min_gap_linear_m", "--fresh"]);
+    assert_eq!(code, Some(0), "{messages}");
     assert!(bytes() != first);
     assert_eq!(names(&folder), ["grid.toml", "x.parquet"]);
 }

@@ -1,16 +1,16 @@
-//! The fuzzer's files, findings among them, through what reads them.
+//! Tests of the commands with the files of the fuzzer's corpora, some of which were findings.
 
 #![cfg(target_os = "linux")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::home::{Home, said};
+use crate::test_folder::{TestFolder, all_output};
 
 #[path = "../../fuzz/src/targets/folder.rs"]
 mod folder;
 
-/// Files whose footers the Parquet library must not see, and what is said of each.
+/// The files whose footers the Parquet library cannot read safely, and the error of each.
 const HOSTILE: [(&str, &str); 2] = [
     ("footer_booleans.parquet", "its footer makes no sense"),
     ("footer_deep.parquet", "its columns are nested more than 100 deep"),
@@ -24,7 +24,7 @@ fn corpus(name: &str) -> Vec<PathBuf> {
     paths
 }
 
-/// The files of a corpus that stands for readers of Parquet.
+/// Returns the files of a corpus of Parquet files.
 fn parquet_corpus(name: &str) -> Vec<PathBuf> {
     let paths = corpus(name);
     for (file, _) in HOSTILE {
@@ -33,43 +33,43 @@ fn parquet_corpus(name: &str) -> Vec<PathBuf> {
     paths
 }
 
-/// Runs a command on `path`: it ends by itself, with what it does or with what is wrong.
-fn assert_ends(home: &Home, words: &[&str], path: &Path) {
-    let output = home.sweep(words);
-    let said = said(&output);
+/// Asserts that a command on `path` succeeds or ends with an error message.
+fn assert_ends(test_folder: &TestFolder, words: &[&str], path: &Path) {
+    let output = test_folder.sweep(words);
+    let messages = all_output(&output);
     let ended = output.status.code();
-    assert!(matches!(ended, Some(0..=2)), "{words:?} {}: {ended:?} {said}", path.display());
-    assert!(!said.contains("panicked"), "{words:?} {}: {said}", path.display());
+    assert!(matches!(ended, Some(0..=2)), "{words:?} {}: {ended:?} {messages}", path.display());
+    assert!(!messages.contains("panicked"), "{words:?} {}: {messages}", path.display());
     for (_, expected) in HOSTILE.iter().filter(|(file, _)| path.ends_with(file)) {
-        assert!(said.contains(expected), "{words:?} {}: {said}", path.display());
+        assert!(messages.contains(expected), "{words:?} {}: {messages}", path.display());
     }
 }
 
 #[test]
-fn results_of_the_fuzzers_corpus_are_shown_or_explained() {
-    let home = Home::new("");
+fn results_of_the_corpus_are_shown_or_give_an_error() {
+    let test_folder = TestFolder::new("");
     for path in parquet_corpus("corpus-result") {
-        fs::copy(&path, home.path("x.parquet")).expect("the file is there");
-        assert_ends(&home, &["show", "x.parquet"], &path);
-        assert_ends(&home, &["plot", "x.parquet", "-o", "x.svg"], &path);
+        fs::copy(&path, test_folder.path("x.parquet")).expect("the file is there");
+        assert_ends(&test_folder, &["show", "x.parquet"], &path);
+        assert_ends(&test_folder, &["plot", "x.parquet", "-o", "x.svg"], &path);
     }
 }
 
 #[test]
-fn lists_of_the_fuzzers_corpus_load_or_are_explained() {
-    let home = Home::new(
+fn lists_of_the_corpus_load_or_give_an_error() {
+    let test_folder = TestFolder::new(
         "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\n\
          time = { end_s = 1 }\n\
          design = { method = \"list\", file = \"list\" }\n",
     );
     for path in parquet_corpus("corpus-list") {
-        fs::copy(&path, home.path("list")).expect("the file is there");
-        assert_ends(&home, &["check", "g.toml"], &path);
+        fs::copy(&path, test_folder.path("list")).expect("the file is there");
+        assert_ends(&test_folder, &["check", "g.toml"], &path);
     }
 }
 
 #[test]
-fn run_folders_of_the_fuzzers_corpus_change_no_result() {
+fn run_folders_of_the_corpus_do_not_change_results() {
     for path in corpus("corpus-folder") {
         println!("{}", path.display());
         folder::run(&fs::read(&path).expect("the file is there"));

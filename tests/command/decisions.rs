@@ -1,5 +1,5 @@
-//! From one map to a decision: `require`, `compare`, `export`, rows of `show`, `trace --point`,
-//! `--set` of the grid file's scalars.
+//! Tests of the commands that work on a finished map: `require`, `compare`, `export`, rows of
+//! `show`, `trace --point`; and of `--set` for the scalars of a grid file.
 
 use std::fs::{self, File};
 use std::process::Output;
@@ -9,73 +9,79 @@ use arrow_array::{ArrayRef, Float64Array, RecordBatch};
 use serde_json::{Value, json};
 use sweep_files::Writer;
 
-use crate::home::{Home, grid, said};
+use crate::test_folder::{TestFolder, all_output, grid};
 
-/// A folder with a finished map of six points, `results/short.parquet`.
-fn mapped() -> Home {
-    let home = Home::new(&grid(3, 2));
-    let done = home.sweep(&["run", "g.toml", "--progress", "none"]);
-    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
-    home
+/// Returns a folder with a finished map of six points, `results/short.parquet`.
+fn folder_with_map() -> TestFolder {
+    let test_folder = TestFolder::new(&grid(3, 2));
+    let done = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+    test_folder
 }
 
 const MAP: &str = "results/short.parquet";
 
-fn code(output: &Output) -> Option<i32> {
+fn exit_code(output: &Output) -> Option<i32> {
     output.status.code()
 }
 
-fn printed(output: &Output) -> String {
+fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-fn parsed(output: &Output) -> Value {
+fn json_output(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
-        panic!("{error} in {}\n{}", printed(output), said(output));
+        panic!("{error} in {}\n{}", stdout(output), all_output(output));
     })
 }
 
 #[test]
-fn a_report_leaves_the_page_of_a_plot_and_asks_for_an_option_per_expression() {
-    let home = mapped();
+fn report_does_not_overwrite_a_page_of_plot_and_takes_an_option_for_each_expression() {
+    let test_folder = folder_with_map();
     let page = "results/short.html";
-    assert_eq!(code(&home.sweep(&["plot", MAP, "-o", page])), Some(0));
-    let before = fs::read(home.path(page)).unwrap();
-    let written = home.sweep(&["report", MAP]);
-    assert_eq!(code(&written), Some(0), "{}", said(&written));
-    assert!(fs::read(home.path(page)).unwrap() == before);
-    assert!(home.path("results/short.report.html").exists());
-    let refused = home.sweep(&["report", MAP, "--require", "point >= 0", "point < 9"]);
-    assert_eq!(code(&refused), Some(2));
-    assert!(said(&refused).contains("a `--require` of its own"), "{}", said(&refused));
+    assert_eq!(exit_code(&test_folder.sweep(&["plot", MAP, "-o", page])), Some(0));
+    let before = fs::read(test_folder.path(page)).unwrap();
+    let written = test_folder.sweep(&["report", MAP]);
+    assert_eq!(exit_code(&written), Some(0), "{}", all_output(&written));
+    assert!(fs::read(test_folder.path(page)).unwrap() == before);
+    assert!(test_folder.path("results/short.report.html").exists());
+    let refused = test_folder.sweep(&["report", MAP, "--require", "point >= 0", "point < 9"]);
+    assert_eq!(exit_code(&refused), Some(2));
+    assert!(all_output(&refused).contains("a `--require` of its own"), "{}", all_output(&refused));
 }
 
 #[test]
-fn a_gate_opens_or_names_the_rows_and_exits_with_4() {
-    let home = mapped();
-    let opened = home.sweep(&["require", MAP, "ratio_max < 1e6", "count(status == 'ok') == 6"]);
-    assert_eq!(code(&opened), Some(0), "{}", said(&opened));
-    assert!(said(&opened).contains("holds  ratio_max < 1e6: 6 rows"), "{}", said(&opened));
+fn require_names_the_failing_rows_and_exits_with_4() {
+    let test_folder = folder_with_map();
+    let opened =
+        test_folder.sweep(&["require", MAP, "ratio_max < 1e6", "count(status == 'ok') == 6"]);
+    assert_eq!(exit_code(&opened), Some(0), "{}", all_output(&opened));
+    assert!(
+        all_output(&opened).contains("holds  ratio_max < 1e6: 6 rows"),
+        "{}",
+        all_output(&opened)
+    );
 
-    let closed = home.sweep(&["require", MAP, "unbalance_mass_kg < 0.9", "share(reliable) >= 0"]);
-    assert_eq!(code(&closed), Some(4));
-    let text = said(&closed);
+    let closed =
+        test_folder.sweep(&["require", MAP, "unbalance_mass_kg < 0.9", "share(reliable) >= 0"]);
+    assert_eq!(exit_code(&closed), Some(4));
+    let text = all_output(&closed);
     assert!(text.contains("FAILS  unbalance_mass_kg < 0.9: 2 of 6 rows false"), "{text}");
     assert!(text.contains("holds  share(reliable) >= 0"), "{text}");
 
-    let gate = parsed(&home.sweep(&["require", MAP, "point < 2", "--json"]));
+    let gate = json_output(&test_folder.sweep(&["require", MAP, "point < 2", "--json"]));
     assert_eq!(gate["holds"], false);
     assert_eq!(gate["expressions"][0]["failing"], 4);
     assert_eq!(gate["expressions"][0]["offenders"][0]["row"], 2);
 
-    let none = home.sweep(&["require", MAP, "reliable", "--where", "false"]);
-    assert_eq!(code(&none), Some(4));
-    assert!(said(&none).contains("no row"), "{}", said(&none));
+    let none = test_folder.sweep(&["require", MAP, "reliable", "--where", "false"]);
+    assert_eq!(exit_code(&none), Some(4));
+    assert!(all_output(&none).contains("no row"), "{}", all_output(&none));
 }
 
 #[test]
-fn an_answer_goes_to_standard_output_and_nothing_else_does() {
-    let home = mapped();
+fn only_results_go_to_standard_output() {
+    let test_folder = folder_with_map();
     for words in [
         &["check", "g.toml"][..],
         &["status", "g.toml"],
@@ -84,17 +90,25 @@ fn an_answer_goes_to_standard_output_and_nothing_else_does() {
         &["compare", MAP, MAP],
         &["modes", "--speed", "0:300:100"],
     ] {
-        let done = home.sweep(words);
-        assert!(done.stdout.len() > 40 && done.stderr.is_empty(), "{words:?}: {}", said(&done));
+        let done = test_folder.sweep(words);
+        assert!(
+            done.stdout.len() > 40 && done.stderr.is_empty(),
+            "{words:?}: {}",
+            all_output(&done)
+        );
     }
     for words in [&["run", "g.toml"][..], &["plot", MAP]] {
-        let done = home.sweep(words);
-        assert!(done.stdout.is_empty() && !done.stderr.is_empty(), "{words:?}: {}", said(&done));
+        let done = test_folder.sweep(words);
+        assert!(
+            done.stdout.is_empty() && !done.stderr.is_empty(),
+            "{words:?}: {}",
+            all_output(&done)
+        );
     }
 }
 
-/// Writes a file of these ratios and gaps over as many masses.
-fn write_ratios(home: &Home, name: &str, ratio: impl Fn(u32) -> Option<f64>) {
+/// Writes a result with a ratio for each of several masses.
+fn write_ratios(test_folder: &TestFolder, name: &str, ratio: impl Fn(u32) -> Option<f64>) {
     let numbers = |of: &dyn Fn(u32) -> Option<f64>| -> ArrayRef {
         Arc::new((0..400).map(of).collect::<Float64Array>())
     };
@@ -106,97 +120,114 @@ fn write_ratios(home: &Home, name: &str, ratio: impl Fn(u32) -> Option<f64>) {
         ("status", numbers(&|_| None)),
     ];
     let rows = RecordBatch::try_from_iter(columns).expect("columns of one length");
-    let file = File::create(home.path(name)).expect("the file can be made");
+    let file = File::create(test_folder.path(name)).expect("the file can be made");
     let mut writer = Writer::new(file, &rows.schema(), Default::default()).expect("a writer");
     writer.write(&rows).expect("rows are written");
     writer.end().and_then(|file| file.close()).expect("the file is written");
 }
 
 #[test]
-fn no_gate_stands_open_where_points_failed() {
-    let home = Home::new(&grid(1, 1));
-    write_ratios(&home, "whole.parquet", |_| Some(1.5));
-    write_ratios(&home, "half.parquet", |row| (row % 2 == 0).then_some(1.5));
-    write_ratios(&home, "nan.parquet", |_| Some(f64::NAN));
+fn conditions_do_not_hold_if_points_failed() {
+    let test_folder = TestFolder::new(&grid(1, 1));
+    write_ratios(&test_folder, "whole.parquet", |_| Some(1.5));
+    write_ratios(&test_folder, "half.parquet", |row| (row % 2 == 0).then_some(1.5));
+    write_ratios(&test_folder, "nan.parquet", |_| Some(f64::NAN));
     for (file, over) in [("half.parquet", 200), ("nan.parquet", 0)] {
         for gate in
             ["max(ratio_max)<2", "mean(ratio_max)<2", "min(ratio_max)>1", "count(ratio_max>=2)==0"]
         {
-            let shut = home.sweep(&["require", file, gate]);
-            assert_eq!(code(&shut), Some(4), "{file}: {gate}");
-            let told = format!("over {over} of 400 rows");
-            assert!(said(&shut).contains(&told), "{}", said(&shut));
+            let shut = test_folder.sweep(&["require", file, gate]);
+            assert_eq!(exit_code(&shut), Some(4), "{file}: {gate}");
+            let expected = format!("over {over} of 400 rows");
+            assert!(all_output(&shut).contains(&expected), "{}", all_output(&shut));
         }
         for gate in ["ratio=0.05", "gap=0.001"] {
-            let shut = home.sweep(&["compare", "whole.parquet", file, "--fail-on", gate]);
-            assert_eq!(code(&shut), Some(4), "{file}: {gate}\n{}", printed(&shut));
-            let same = home.sweep(&["compare", file, file, "--fail-on", gate]);
-            assert_eq!(code(&same), Some(0), "{file}: {gate}\n{}", printed(&same));
+            let shut = test_folder.sweep(&["compare", "whole.parquet", file, "--fail-on", gate]);
+            assert_eq!(exit_code(&shut), Some(4), "{file}: {gate}\n{}", stdout(&shut));
+            let same = test_folder.sweep(&["compare", file, file, "--fail-on", gate]);
+            assert_eq!(exit_code(&same), Some(0), "{file}: {gate}\n{}", stdout(&same));
         }
     }
-    let known = home.sweep(&["require", "half.parquet", "max(ratio_max)<2", "--allow-null"]);
-    assert_eq!(code(&known), Some(0), "{}", said(&known));
+    let known = test_folder.sweep(&["require", "half.parquet", "max(ratio_max)<2", "--allow-null"]);
+    assert_eq!(exit_code(&known), Some(0), "{}", all_output(&known));
     let lacks = ["compare", "half.parquet", "half.parquet", "--fail-on", "flips"];
-    let lacks = home.sweep(&lacks);
-    assert_eq!(code(&lacks), Some(2), "{}", said(&lacks));
-    assert!(said(&lacks).contains("two files with verdicts"), "{}", said(&lacks));
+    let lacks = test_folder.sweep(&lacks);
+    assert_eq!(exit_code(&lacks), Some(2), "{}", all_output(&lacks));
+    assert!(all_output(&lacks).contains("two files with verdicts"), "{}", all_output(&lacks));
 }
 
 #[test]
-fn mistakes_in_a_gate_are_pointed_at_all_of_them() {
-    let home = mapped();
-    let refused = home.sweep(&["require", MAP, "ratio_mx < 2", "reliable = true"]);
-    assert_eq!(code(&refused), Some(2));
-    let text = said(&refused);
+fn all_mistakes_in_conditions_are_reported() {
+    let test_folder = folder_with_map();
+    let refused = test_folder.sweep(&["require", MAP, "ratio_mx < 2", "reliable = true"]);
+    assert_eq!(exit_code(&refused), Some(2));
+    let text = all_output(&refused);
     assert!(text.contains("did you mean `ratio_max`?") && text.contains("expected `==`"), "{text}");
-    let folded = home.sweep(&["require", MAP, "reliable", "--where", "max(ratio_max) > 2"]);
-    assert_eq!(code(&folded), Some(2), "{}", said(&folded));
-    let absent = home.sweep(&["require", "no.parquet", "reliable"]);
-    assert_eq!(code(&absent), Some(2), "{}", said(&absent));
+    let folded = test_folder.sweep(&["require", MAP, "reliable", "--where", "max(ratio_max) > 2"]);
+    assert_eq!(exit_code(&folded), Some(2), "{}", all_output(&folded));
+    let absent = test_folder.sweep(&["require", "no.parquet", "reliable"]);
+    assert_eq!(exit_code(&absent), Some(2), "{}", all_output(&absent));
     for wrong in ["short.parquet", "resluts/short.parquet", "results/short"] {
-        let absent = home.sweep(&["show", wrong]);
-        assert!(said(&absent).contains("results/short.parquet is there"), "{}", said(&absent));
+        let absent = test_folder.sweep(&["show", wrong]);
+        assert!(
+            all_output(&absent).contains("results/short.parquet is there"),
+            "{}",
+            all_output(&absent)
+        );
     }
-    let no_grid = home.sweep(&["check", MAP]);
-    assert!(said(&no_grid).contains("it is a Parquet file, not text"), "{}", said(&no_grid));
+    let no_grid = test_folder.sweep(&["check", MAP]);
+    assert!(
+        all_output(&no_grid).contains("it is a Parquet file, not text"),
+        "{}",
+        all_output(&no_grid)
+    );
 }
 
 #[test]
-fn show_sorts_filters_and_speaks_json() {
-    let home = mapped();
-    let top = parsed(&home.sweep(&["show", MAP, "--top", "2", "--by", "ratio_tub_yaw", "--json"]));
+fn show_sorts_and_filters_rows_and_prints_json() {
+    let test_folder = folder_with_map();
+    let top = json_output(&test_folder.sweep(&[
+        "show",
+        MAP,
+        "--top",
+        "2",
+        "--by",
+        "ratio_tub_yaw",
+        "--json",
+    ]));
     let rows = top.as_array().expect("rows");
     let ratios: Vec<f64> = rows.iter().filter_map(|row| row["ratio_tub_yaw"].as_f64()).collect();
     assert!(ratios.len() == 2 && ratios[0] >= ratios[1], "{top}");
-    // Every column, and counts as they are.
+    // The table has every column, and counts are integers.
     assert!(rows[0]["point"].is_u64() && rows[0]["nonlinear_tub_yaw"].is_f64(), "{top}");
-    let whole = parsed(&home.sweep(&["show", MAP, "--json"]));
+    let whole = json_output(&test_folder.sweep(&["show", MAP, "--json"]));
     assert_eq!(whole["summary"]["points"], 6);
     assert_eq!(whole["plan"]["name"], "short");
-    let filtered = home.sweep(&["show", MAP, "--where", "damping_n_s_per_m > 200"]);
-    assert_eq!(printed(&filtered).lines().count(), 4, "{}", printed(&filtered));
-    let wrong = home.sweep(&["show", MAP, "--by", "ratio_tub_yw"]);
-    assert_eq!(code(&wrong), Some(2));
-    assert!(said(&wrong).contains("`ratio_tub_yaw`"), "{}", said(&wrong));
+    let filtered = test_folder.sweep(&["show", MAP, "--where", "damping_n_s_per_m > 200"]);
+    assert_eq!(stdout(&filtered).lines().count(), 4, "{}", stdout(&filtered));
+    let wrong = test_folder.sweep(&["show", MAP, "--by", "ratio_tub_yw"]);
+    assert_eq!(exit_code(&wrong), Some(2));
+    assert!(all_output(&wrong).contains("`ratio_tub_yaw`"), "{}", all_output(&wrong));
 }
 
 #[test]
-fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
-    let home = mapped();
-    let same = home.sweep(&["compare", MAP, MAP, "--fail-on", "any"]);
-    assert_eq!(code(&same), Some(0), "{}", printed(&same));
-    assert!(printed(&same).contains("not at all"), "{}", printed(&same));
+fn compare_reports_the_differences_of_two_maps() {
+    let test_folder = folder_with_map();
+    let same = test_folder.sweep(&["compare", MAP, MAP, "--fail-on", "any"]);
+    assert_eq!(exit_code(&same), Some(0), "{}", stdout(&same));
+    assert!(stdout(&same).contains("not at all"), "{}", stdout(&same));
 
     let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--name", "light"];
-    let done = home.sweep(&[&light[..], &["--progress", "none"]].concat());
-    assert_eq!(code(&done), Some(0), "{}", said(&done));
-    let shown = printed(&home.sweep(&["show", "results/light.parquet"]));
+    let done = test_folder.sweep(&[&light[..], &["--progress", "none"]].concat());
+    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+    let shown = stdout(&test_folder.sweep(&["show", "results/light.parquet"]));
     assert!(shown.contains("--set  tub_mass_kg = 20"), "{shown}");
 
     let arguments = ["compare", MAP, "results/light.parquet"];
-    let differs = home.sweep(&[&arguments[..], &["--fail-on", "ratio=0", "--json"]].concat());
-    assert_eq!(code(&differs), Some(4), "{}", said(&differs));
-    let found = parsed(&differs);
+    let differs =
+        test_folder.sweep(&[&arguments[..], &["--fail-on", "ratio=0", "--json"]].concat());
+    assert_eq!(exit_code(&differs), Some(4), "{}", all_output(&differs));
+    let found = json_output(&differs);
     let paths: Vec<&str> = found["plan"]
         .as_array()
         .expect("changes")
@@ -206,10 +237,10 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
     assert!(paths.contains(&"machine.tub.mass_kg") && paths.contains(&"set"), "{paths:?}");
     assert_eq!(found["rows"]["in_both"], 6);
 
-    let markdown = printed(&home.sweep(&[&arguments[..], &["--markdown"]].concat()));
+    let markdown = stdout(&test_folder.sweep(&[&arguments[..], &["--markdown"]].concat()));
     assert!(markdown.starts_with("### `results/light.parquet` compared with"), "{markdown}");
-    let written = home.sweep(&[&arguments[..], &["--out", "d.parquet"]].concat());
-    assert_eq!(code(&written), Some(0), "{}", said(&written));
+    let written = test_folder.sweep(&[&arguments[..], &["--out", "d.parquet"]].concat());
+    assert_eq!(exit_code(&written), Some(0), "{}", all_output(&written));
     for (quantity, title) in [
         (None, "Greatest ratio of B over that of A"),
         (Some("gap_change_m"), "Least gap of the nonlinear model in B less that in A"),
@@ -217,82 +248,84 @@ fn a_map_differs_from_another_by_what_was_set_and_not_from_itself() {
     ] {
         let option = quantity.map(|column| ["--quantity", column]);
         let asked = option.as_ref().map_or(&[][..], |option| option);
-        let drawn = home.sweep(&[&["plot", "d.parquet", "-o", "d.svg"], asked].concat());
-        assert_eq!(code(&drawn), Some(0), "{}", said(&drawn));
-        let picture = fs::read_to_string(home.path("d.svg")).expect("it was drawn");
+        let drawn = test_folder.sweep(&[&["plot", "d.parquet", "-o", "d.svg"], asked].concat());
+        assert_eq!(exit_code(&drawn), Some(0), "{}", all_output(&drawn));
+        let picture = fs::read_to_string(test_folder.path("d.svg")).expect("it was drawn");
         assert!(picture.contains(&format!(">{title}<")), "{quantity:?}");
-        // Neither file's limit is known.
+        // The limits of both files are unknown.
         assert!(!picture.contains("boundary: "), "{quantity:?}");
     }
-    let shown = parsed(&home.sweep(&["show", "d.parquet", "--json"]));
+    let shown = json_output(&test_folder.sweep(&["show", "d.parquet", "--json"]));
     let columns = shown["columns"].as_array().expect("a list").iter();
     let worse: Vec<_> = columns.filter_map(|column| column["worse"].as_str()).collect();
     assert_eq!(worse, ["greater", "less"], "of the ratio's change and of the gap's");
-    let refused = home.sweep(&["compare", MAP, "d.parquet"]);
-    assert_eq!(code(&refused), Some(2), "{}", said(&refused));
+    let refused = test_folder.sweep(&["compare", MAP, "d.parquet"]);
+    assert_eq!(exit_code(&refused), Some(2), "{}", all_output(&refused));
 }
 
 #[test]
-fn any_column_can_be_a_gate_between_two_maps() {
-    let home = mapped();
+fn compare_can_limit_the_difference_of_any_column() {
+    let test_folder = folder_with_map();
     let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--out", "light.parquet"];
-    let done = home.sweep(&light);
-    assert_eq!(code(&done), Some(0), "{}", said(&done));
-    let compared = |gate: &str| home.sweep(&["compare", MAP, "light.parquet", "--fail-on", gate]);
-    assert_eq!(code(&compared("nonlinear_tub_yaw=1e9")), Some(0));
+    let done = test_folder.sweep(&light);
+    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+    let compared =
+        |gate: &str| test_folder.sweep(&["compare", MAP, "light.parquet", "--fail-on", gate]);
+    assert_eq!(exit_code(&compared("nonlinear_tub_yaw=1e9")), Some(0));
     let failed = compared("nonlinear_tub_yaw=0");
-    assert_eq!(code(&failed), Some(4), "{}", said(&failed));
-    let text = printed(&failed);
+    assert_eq!(exit_code(&failed), Some(4), "{}", all_output(&failed));
+    let text = stdout(&failed);
     assert!(text.contains("--fail-on: nonlinear_tub_yaw changed by up to "), "{text}");
     assert!(text.contains("greatest changes of nonlinear_tub_yaw, rad"), "{text}");
     for unfit in ["nonlinear_tub_yow=1", "unbalance_mass_kg=1", "status=1"] {
         let refused = compared(unfit);
-        assert_eq!(code(&refused), Some(2), "{unfit}");
-        assert!(said(&refused).contains("a column of numbers in both files"), "{unfit}");
+        assert_eq!(exit_code(&refused), Some(2), "{unfit}");
+        assert!(all_output(&refused).contains("a column of numbers in both files"), "{unfit}");
     }
 }
 
 #[test]
-fn a_verdict_that_flipped_shows_both_of_its_ratios() {
-    let home = Home::new(&grid(3, 2));
+fn compare_shows_both_ratios_of_a_changed_verdict() {
+    let test_folder = TestFolder::new(&grid(3, 2));
     for (name, least, mass) in [("a", "ratio_min=0.5", "20"), ("b", "ratio_min=1", "22")] {
         let mass = format!("tub_mass_kg={mass}");
         let run = ["run", "g.toml", "--name", name, "--set", least, "--set", &mass];
-        let done = home.sweep(&[&run[..], &["--progress", "none"]].concat());
-        assert_eq!(code(&done), Some(0), "{}", said(&done));
+        let done = test_folder.sweep(&[&run[..], &["--progress", "none"]].concat());
+        assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
     }
-    let told = printed(&home.sweep(&["compare", "results/a.parquet", "results/b.parquet"]));
-    let flips = told.split("verdicts that flipped").nth(1).expect("some");
+    let output = stdout(&test_folder.sweep(&["compare", "results/a.parquet", "results/b.parquet"]));
+    let flips = output.split("verdicts that flipped").nth(1).expect("some");
     let row = flips.lines().nth(2).expect("a row");
-    assert_eq!(row.matches(" to ").count(), 2, "{told}");
-    assert!(row.contains(" reliable") && row.ends_with(" not"), "{told}");
+    assert_eq!(row.matches(" to ").count(), 2, "{output}");
+    assert!(row.contains(" reliable") && row.ends_with(" not"), "{output}");
 }
 
 #[test]
-fn a_trace_says_which_limit_its_point_breaks() {
-    let home = Home::new(&grid(3, 2));
-    let told = |sets: &[&str]| {
+fn trace_says_which_limit_is_violated() {
+    let test_folder = TestFolder::new(&grid(3, 2));
+    let run_summary = |sets: &[&str]| {
         let trace = ["trace", "g.toml", "--point", "1", "--out", "t.parquet"];
-        said(&home.sweep(&[&trace[..], sets].concat()))
+        all_output(&test_folder.sweep(&[&trace[..], sets].concat()))
     };
-    let high = told(&[]);
+    let high = run_summary(&[]);
     assert!(high.contains("the greatest ratio is ") && high.contains("the limit 2"), "{high}");
-    // So short a run has ratios next to 1, and one of this point is below.
-    let low = told(&["--set", "ratio_min=1"]);
+    // The ratios of so short a run are almost 1, and one of this point is less.
+    let low = run_summary(&["--set", "ratio_min=1"]);
     let expected = "not reliable: the least ratio is 1 (tub_yaw), the limit 1";
     assert!(low.contains(expected), "{low}");
 }
 
 #[test]
-fn a_report_names_quantities_in_words_and_both_limits() {
+fn a_report_describes_quantities_and_both_limits() {
     let grid = grid(3, 2).replace("ratio_limit = 2.0", "ratio_limit = 2.0\nratio_min = 0.999");
-    let home = Home::new(&format!("metrics = [\"damper_speed\", \"static_sag\"]\n{grid}"));
+    let test_folder =
+        TestFolder::new(&format!("metrics = [\"damper_speed\", \"static_sag\"]\n{grid}"));
     let sets = ["--set", "spin_ramp_s=0.05", "--set", "damper_1_friction_n=3"];
-    let done = home.sweep(&[&["run", "g.toml", "--progress", "none"], &sets[..]].concat());
-    assert_eq!(code(&done), Some(0), "{}", said(&done));
-    let written = home.sweep(&["report", MAP, "-o", "r.html"]);
-    assert_eq!(code(&written), Some(0), "{}", said(&written));
-    let page = fs::read_to_string(home.path("r.html")).expect("it was written");
+    let done = test_folder.sweep(&[&["run", "g.toml", "--progress", "none"], &sets[..]].concat());
+    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+    let written = test_folder.sweep(&["report", MAP, "-o", "r.html"]);
+    assert_eq!(exit_code(&written), Some(0), "{}", all_output(&written));
+    let page = fs::read_to_string(test_folder.path("r.html")).expect("it was written");
     for text in [
         "is between 0.999 and 2",
         ">Tub front, vertical<",
@@ -302,65 +335,75 @@ fn a_report_names_quantities_in_words_and_both_limits() {
         ">Ratio tub yaw<",
         "Resonances at Unbalance mass 0.525",
         "Unbalance mass ",
-        // The only damper that has friction.
+        // This is the only damper with friction.
         "with friction of 0 to 3 N",
     ] {
         assert!(page.contains(text), "{text}");
     }
     assert_eq!(page.matches(">Tub front, vertical<").count(), 1, "of the nonlinear model alone");
-    // The file does not say who wrote a number: not even this one, which --set did.
+    // The file does not say where a number comes from, not even this one, which `--set` gave.
     assert!(!page.contains("assumed") && page.contains("sweep parameters"), "where from");
-    // Each damper's are among those of all, and numbers stay with their units.
+    // The column of all dampers replaces those of each, and lines do not break between numbers and
+    // units.
     assert!(!page.contains("Damper 1 speed"), "numbered");
     assert!(page.contains("\u{a0}N\u{a0}s/m") && page.contains("\u{a0}m/s"), "units");
 }
 
 #[test]
-fn exports_open_with_their_kind_and_nothing_else_is_overwritten() {
-    let home = mapped();
+fn exports_overwrite_only_files_of_the_same_kind() {
+    let test_folder = folder_with_map();
     for (name, begins) in [("m.csv", &b"# exported by sweep "[..]), ("m.xlsx", b"PK\x03\x04")] {
         for _ in 0..2 {
-            let done = home.sweep(&["export", MAP, name]);
-            assert_eq!(code(&done), Some(0), "{}", said(&done));
+            let done = test_folder.sweep(&["export", MAP, name]);
+            assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
         }
-        let bytes = fs::read(home.path(name)).expect("the export is there");
+        let bytes = fs::read(test_folder.path(name)).expect("the export is there");
         assert!(bytes.starts_with(begins), "{name}");
     }
-    fs::write(home.path("mine.csv"), "my,own\n1,2\n").expect("written");
-    assert_eq!(code(&home.sweep(&["export", MAP, "mine.csv"])), Some(2));
-    assert_eq!(code(&home.sweep(&["export", MAP, "m.ods"])), Some(2));
+    fs::write(test_folder.path("mine.csv"), "my,own\n1,2\n").expect("written");
+    assert_eq!(exit_code(&test_folder.sweep(&["export", MAP, "mine.csv"])), Some(2));
+    assert_eq!(exit_code(&test_folder.sweep(&["export", MAP, "m.ods"])), Some(2));
 }
 
 #[test]
-fn a_point_is_traced_by_its_number_or_as_the_worst_and_its_row_is_told() {
-    let home = mapped();
-    let traced = home.sweep(&["trace", "g.toml", "--point", "3", "--out", "t.parquet"]);
-    assert_eq!(code(&traced), Some(0), "{}", said(&traced));
-    let row = parsed(&home.sweep(&["show", MAP, "--where", "point == 3", "--json"]));
+fn trace_selects_a_point_by_number_or_the_worst_one() {
+    let test_folder = folder_with_map();
+    let traced = test_folder.sweep(&["trace", "g.toml", "--point", "3", "--out", "t.parquet"]);
+    assert_eq!(exit_code(&traced), Some(0), "{}", all_output(&traced));
+    let row = json_output(&test_folder.sweep(&["show", MAP, "--where", "point == 3", "--json"]));
     let ratio = row[0]["ratio_max"].as_f64().expect("a ratio");
-    let text = said(&traced);
+    let text = all_output(&traced);
     assert!(text.contains("verdict  ") && text.contains(&format!("{ratio:.4}")[..5]), "{text}");
 
-    let worst = home.sweep(&["trace", "g.toml", "--worst", "--out", "t.parquet"]);
-    assert_eq!(code(&worst), Some(0), "{}", said(&worst));
-    let first = parsed(&home.sweep(&["show", MAP, "--top", "1", "--by", "ratio_max", "--json"]));
-    let told = format!("point {} is where ratio_max is greatest", first[0]["point"]);
-    assert!(said(&worst).contains(&told), "{told}: {}", said(&worst));
+    let worst = test_folder.sweep(&["trace", "g.toml", "--worst", "--out", "t.parquet"]);
+    assert_eq!(exit_code(&worst), Some(0), "{}", all_output(&worst));
+    let first = json_output(&test_folder.sweep(&[
+        "show",
+        MAP,
+        "--top",
+        "1",
+        "--by",
+        "ratio_max",
+        "--json",
+    ]));
+    let expected = format!("point {} is where ratio_max is greatest", first[0]["point"]);
+    assert!(all_output(&worst).contains(&expected), "{expected}: {}", all_output(&worst));
 
-    let beyond = home.sweep(&["trace", "g.toml", "--point", "6", "--out", "t.parquet"]);
-    assert_eq!(code(&beyond), Some(2));
-    assert!(said(&beyond).contains("from 0 to 5"), "{}", said(&beyond));
+    let beyond = test_folder.sweep(&["trace", "g.toml", "--point", "6", "--out", "t.parquet"]);
+    assert_eq!(exit_code(&beyond), Some(2));
+    assert!(all_output(&beyond).contains("from 0 to 5"), "{}", all_output(&beyond));
     let other = ["trace", "g.toml", "--worst", "--set", "tub_mass_kg=20", "--out", "t.parquet"];
-    let other = home.sweep(&other);
-    assert_eq!(code(&other), Some(2));
-    assert!(said(&other).contains("of this very grid"), "{}", said(&other));
+    let other = test_folder.sweep(&other);
+    assert_eq!(exit_code(&other), Some(2));
+    assert!(all_output(&other).contains("of this very grid"), "{}", all_output(&other));
 }
 
 #[test]
 fn every_scalar_of_the_grid_file_can_be_set() {
-    let home = Home::new(&grid(3, 2));
-    let plan =
-        |sets: &[&str]| parsed(&home.sweep(&[&["check", "g.toml", "--json"], sets].concat()));
+    let test_folder = TestFolder::new(&grid(3, 2));
+    let plan = |sets: &[&str]| {
+        json_output(&test_folder.sweep(&[&["check", "g.toml", "--json"], sets].concat()))
+    };
     let set = plan(&["--set", "end_s=0.2", "--ratio-limit", "1.5", "--set", "step_s=1e-4"]);
     assert_eq!(set["time"]["end_s"], 0.2);
     assert_eq!(set["reliability"]["ratio_limit"], 1.5);
@@ -391,37 +434,37 @@ fn every_scalar_of_the_grid_file_can_be_set() {
         (["--ratio-limit", "nan"], "ratio_limit"),
         (["--name", "a/b"], "expected letters"),
     ] {
-        let refused = home.sweep(&[&["check", "g.toml"], &sets[..]].concat());
-        assert_eq!(code(&refused), Some(2), "{sets:?}: {}", said(&refused));
-        assert!(said(&refused).contains(expected), "{sets:?}: {}", said(&refused));
+        let refused = test_folder.sweep(&[&["check", "g.toml"], &sets[..]].concat());
+        assert_eq!(exit_code(&refused), Some(2), "{sets:?}: {}", all_output(&refused));
+        assert!(all_output(&refused).contains(expected), "{sets:?}: {}", all_output(&refused));
     }
 }
 
 #[test]
-fn a_list_says_its_axes_and_an_unfinished_run_what_it_is() {
-    let home = Home::new(&grid(3, 2));
-    fs::write(home.path("list.csv"), "unbalance_mass_kg\n0.1\n0.2\n").expect("written");
+fn show_describes_lists_and_unfinished_runs() {
+    let test_folder = TestFolder::new(&grid(3, 2));
+    fs::write(test_folder.path("list.csv"), "unbalance_mass_kg\n0.1\n0.2\n").expect("written");
     let listed = "name = \"short\"\n\
         spin = { profile = \"triangular\", peak_rpm = 350, ramp_s = 50 }\n\
         time = { end_s = 0.1 }\n\
         integrator = { method = \"rk4\" }\n\
         design = { method = \"list\", file = \"list.csv\" }\n";
-    fs::write(home.path("list.toml"), listed).expect("written");
-    let done = home.sweep(&["run", "list.toml", "--progress", "none"]);
-    assert_eq!(code(&done), Some(0), "{}", said(&done));
-    let shown = printed(&home.sweep(&["show", MAP]));
+    fs::write(test_folder.path("list.toml"), listed).expect("written");
+    let done = test_folder.sweep(&["run", "list.toml", "--progress", "none"]);
+    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+    let shown = stdout(&test_folder.sweep(&["show", MAP]));
     assert!(shown.contains("design  file list.csv"), "{shown}");
     assert!(shown.contains("axis  unbalance_mass_kg\n"), "{shown}");
 
-    // Of 32 rows a shard has every second chunk of 8.
-    fs::write(home.path("g.toml"), grid(8, 4)).expect("written");
-    let part = home.sweep(&["run", "g.toml", "--out", "part.parquet", "--shard", "1/2"]);
-    assert_eq!(code(&part), Some(0), "{}", said(&part));
+    // A shard has every second chunk of 8 rows, or 16 of 32 rows.
+    fs::write(test_folder.path("g.toml"), grid(8, 4)).expect("written");
+    let part = test_folder.sweep(&["run", "g.toml", "--out", "part.parquet", "--shard", "1/2"]);
+    assert_eq!(exit_code(&part), Some(0), "{}", all_output(&part));
     for path in ["part.parquet", "part.parquet.partial"] {
-        let shown = printed(&home.sweep(&["show", path]));
+        let shown = stdout(&test_folder.sweep(&["show", path]));
         assert!(shown.contains("unfinished: 16 of 32 points done (50.0 %)"), "{shown}");
-        let told = parsed(&home.sweep(&["show", path, "--json"]));
-        assert_eq!((&told["points"], &told["points_done"]), (&json!(32), &json!(16)));
+        let output = json_output(&test_folder.sweep(&["show", path, "--json"]));
+        assert_eq!((&output["points"], &output["points_done"]), (&json!(32), &json!(16)));
     }
     for words in [
         &["show", "part.parquet", "--top", "3"][..],
@@ -431,75 +474,76 @@ fn a_list_says_its_axes_and_an_unfinished_run_what_it_is() {
         &["export", "part.parquet", "part.csv"],
         &["compare", MAP, "part.parquet"],
     ] {
-        let refused = home.sweep(words);
-        assert_eq!(code(&refused), Some(2), "{words:?}");
-        let text = said(&refused);
+        let refused = test_folder.sweep(words);
+        assert_eq!(exit_code(&refused), Some(2), "{words:?}");
+        let text = all_output(&refused);
         assert!(text.contains("is not finished: 16 of 32 points done"), "{words:?}: {text}");
     }
 
-    fs::create_dir(home.path("x.parquet.partial")).expect("made");
-    let folder = home.sweep(&["show", "x.parquet.partial"]);
-    assert!(said(&folder).contains("a run that is not finished"), "{}", said(&folder));
+    fs::create_dir(test_folder.path("x.parquet.partial")).expect("made");
+    let folder = test_folder.sweep(&["show", "x.parquet.partial"]);
+    assert!(all_output(&folder).contains("a run that is not finished"), "{}", all_output(&folder));
 }
 
 #[test]
-fn a_gate_says_which_part_fails_and_how_sure_a_share_is() {
-    let home = Home::new(&designed("monte_carlo"));
-    let done = home.sweep(&["run", "g.toml", "--progress", "none"]);
-    assert_eq!(code(&done), Some(0), "{}", said(&done));
+fn require_names_the_failing_part_and_the_confidence_of_shares() {
+    let test_folder = TestFolder::new(&designed("monte_carlo"));
+    let done = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
     let text = "share(unbalance_mass_kg < 0.5) > 0.99 and count(true) == 32";
-    let closed = home.sweep(&["require", MAP, text]);
-    assert_eq!(code(&closed), Some(4), "{}", said(&closed));
-    let told = parsed(&home.sweep(&["require", MAP, text, "--json"]));
-    let whole = &told["expressions"][0];
+    let closed = test_folder.sweep(&["require", MAP, text]);
+    assert_eq!(exit_code(&closed), Some(4), "{}", all_output(&closed));
+    let output = json_output(&test_folder.sweep(&["require", MAP, text, "--json"]));
+    let whole = &output["expressions"][0];
     let share = whole["folded"][0].as_f64().expect("a share");
     let ends = [0, 1].map(|end| whole["intervals"][0][end].as_f64().expect("an interval"));
     assert!(ends[0] < share && share < ends[1] && ends[1] - ends[0] < 0.4, "{ends:?}");
     let holds: Vec<&Value> =
         whole["parts"].as_array().expect("parts").iter().map(|part| &part["holds"]).collect();
     assert_eq!(holds, [&json!(false), &json!(true)]);
-    let text = printed(&closed);
+    let text = stdout(&closed);
     assert!(text.contains("95 % confidence"), "{text}");
     assert!(text.contains("       FAILS  share(unbalance_mass_kg < 0.5) > 0.99"), "{text}");
     assert!(text.contains("       holds  count(true) == 32"), "{text}");
-    // The share of a grid is no estimate.
-    let grid = mapped();
-    let open = printed(&grid.sweep(&["require", MAP, "share(unbalance_mass_kg < 0.5) > 0"]));
+    // The share of a grid has no confidence interval.
+    let grid = folder_with_map();
+    let open = stdout(&grid.sweep(&["require", MAP, "share(unbalance_mass_kg < 0.5) > 0"]));
     assert!(!open.contains("confidence"), "{open}");
 }
 
 #[test]
-fn a_misspelt_quantity_of_a_figure_is_told_the_nearest() {
-    let home = mapped();
-    let refused = home.sweep(&["plot", MAP, "--quantity", "ratio_mx"]);
-    assert_eq!(code(&refused), Some(2));
-    assert!(said(&refused).contains("is `ratio_max` meant?"), "{}", said(&refused));
+fn plot_suggests_the_nearest_name_of_a_quantity() {
+    let test_folder = folder_with_map();
+    let refused = test_folder.sweep(&["plot", MAP, "--quantity", "ratio_mx"]);
+    assert_eq!(exit_code(&refused), Some(2));
+    assert!(all_output(&refused).contains("is `ratio_max` meant?"), "{}", all_output(&refused));
 }
 
 #[test]
-fn what_was_set_is_told_by_a_figure() {
-    let home = mapped();
+fn figures_show_the_constants_of_set() {
+    let test_folder = folder_with_map();
     let light = ["run", "g.toml", "--set", "tub_mass_kg=20", "--set", "channels=tub_yaw"];
-    let done = home.sweep(&[&light[..], &["--name", "light", "--progress", "none"]].concat());
-    assert_eq!(code(&done), Some(0), "{}", said(&done));
-    let drawn = home.sweep(&["plot", "results/light.parquet", "-o", "light.svg"]);
-    assert_eq!(code(&drawn), Some(0), "{}", said(&drawn));
-    let figure = fs::read_to_string(home.path("light.svg")).expect("a figure");
+    let done =
+        test_folder.sweep(&[&light[..], &["--name", "light", "--progress", "none"]].concat());
+    assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+    let drawn = test_folder.sweep(&["plot", "results/light.parquet", "-o", "light.svg"]);
+    assert_eq!(exit_code(&drawn), Some(0), "{}", all_output(&drawn));
+    let figure = fs::read_to_string(test_folder.path("light.svg")).expect("a figure");
     assert!(figure.contains("tub_mass_kg = 20") && figure.contains("channels = tub_yaw"));
 }
 
 #[test]
-fn a_small_result_takes_no_more_than_was_said() {
-    let home = mapped();
-    let checked = said(&home.sweep(&["check", "g.toml"]));
+fn the_size_of_a_small_result_is_that_of_check() {
+    let test_folder = folder_with_map();
+    let checked = all_output(&test_folder.sweep(&["check", "g.toml"]));
     let end = checked.find(" kB for the result").expect("a size in kB");
     let most = checked[..end].rsplit(' ').next().and_then(|kb| kb.parse::<f64>().ok());
     let most = most.expect("a number") * 1e3;
-    let bytes = fs::metadata(home.path(MAP)).expect("a result").len() as f64;
+    let bytes = fs::metadata(test_folder.path(MAP)).expect("a result").len() as f64;
     assert!(bytes <= most && most < 2.0 * bytes, "{bytes} of {most}: {checked}");
 }
 
-/// A grid file of a design over two parameters.
+/// Returns a grid file with a design over two parameters.
 fn designed(method: &str) -> String {
     format!(
         "name = \"short\"\n\
@@ -513,30 +557,30 @@ fn designed(method: &str) -> String {
 }
 
 #[test]
-fn a_run_of_a_design_recommends_a_figure_that_can_be_drawn() {
+fn run_recommends_a_figure_that_can_be_drawn_for_a_design() {
     for method in ["latin_hypercube", "sobol", "monte_carlo"] {
-        let home = Home::new(&designed(method));
-        let done = home.sweep(&["run", "g.toml", "--progress", "none"]);
-        assert_eq!(code(&done), Some(0), "{}", said(&done));
-        let text = said(&done);
+        let test_folder = TestFolder::new(&designed(method));
+        let done = test_folder.sweep(&["run", "g.toml", "--progress", "none"]);
+        assert_eq!(exit_code(&done), Some(0), "{}", all_output(&done));
+        let text = all_output(&done);
         assert!(text.contains("share  ") && text.contains("next  sweep plot "), "{text}");
-        let next = home.sweep(&["plot", MAP]);
-        assert_eq!(code(&next), Some(0), "{}", said(&next));
+        let next = test_folder.sweep(&["plot", MAP]);
+        assert_eq!(exit_code(&next), Some(0), "{}", all_output(&next));
         for (view, expected) in [
             ("scatter", "Greatest ratio"),
             ("histogram", "% confidence"),
             ("influence", "Rank correlation (Spearman)"),
         ] {
             for name in ["a.svg", "a.png", "a.html"] {
-                let drawn = home.sweep(&["plot", MAP, "--view", view, "-o", name]);
-                assert_eq!(code(&drawn), Some(0), "{}", said(&drawn));
+                let drawn = test_folder.sweep(&["plot", MAP, "--view", view, "-o", name]);
+                assert_eq!(exit_code(&drawn), Some(0), "{}", all_output(&drawn));
             }
-            let figure = fs::read_to_string(home.path("a.svg")).expect("a figure");
+            let figure = fs::read_to_string(test_folder.path("a.svg")).expect("a figure");
             assert!(figure.contains(expected), "{method}, {view}");
         }
     }
-    let home = mapped();
-    let refused = home.sweep(&["plot", MAP, "--view", "influence", "-o", "a.svg"]);
-    assert_eq!(code(&refused), Some(2));
-    assert!(said(&refused).contains("`--view` is for designs"), "{}", said(&refused));
+    let test_folder = folder_with_map();
+    let refused = test_folder.sweep(&["plot", MAP, "--view", "influence", "-o", "a.svg"]);
+    assert_eq!(exit_code(&refused), Some(2));
+    assert!(all_output(&refused).contains("`--view` is for designs"), "{}", all_output(&refused));
 }

@@ -1,12 +1,12 @@
-//! A result file is a pure function of its input: the same bytes for any number of threads, on any
-//! instruction set.
+//! Tests that the bytes of a result depend on the input alone, not on the number of threads nor on
+//! the instruction set.
 
 use std::fs;
 use std::process::Command;
 
-use crate::home::sweep_binary;
+use crate::test_folder::sweep_binary;
 
-/// Three chunks of eight points, of trajectories long enough to differ where a bit did.
+/// A grid of three chunks of eight points. The trajectories are so long that a wrong bit shows.
 const GRID: &str = r#"
 name = "determinism"
 machine = "paper"
@@ -35,11 +35,11 @@ channels = ["tub_front_y", "tub_front_z", "drum_front_y", "drum_front_z", "tub_y
 [integrator]
 "#;
 
-/// Runs the grid and returns the result's bytes; `None` where this processor lacks the instruction
-/// set.
+/// Runs the grid and returns the bytes of the result; `None` if this processor lacks the
+/// instruction set.
 fn bytes(integrator: &str, threads: u32, simd: &str) -> Option<Vec<u8>> {
-    let home = tempfile::tempdir().expect("a temporary folder");
-    let [grid, result] = ["grid.toml", "result.parquet"].map(|name| home.path().join(name));
+    let test_folder = tempfile::tempdir().expect("a temporary folder");
+    let [grid, result] = ["grid.toml", "result.parquet"].map(|name| test_folder.path().join(name));
     fs::write(&grid, format!("{GRID}{integrator}")).expect("the grid is written");
     let run = Command::new(sweep_binary())
         .args(["run", "--progress", "none", "--threads", &threads.to_string()])
@@ -51,12 +51,12 @@ fn bytes(integrator: &str, threads: u32, simd: &str) -> Option<Vec<u8>> {
         .env_remove("JOB_COMPLETION_INDEX")
         .output()
         .expect("the command starts");
-    let said = String::from_utf8_lossy(&run.stderr);
-    if !run.status.success() && said.contains("expected one that this machine has") {
+    let messages = String::from_utf8_lossy(&run.stderr);
+    if !run.status.success() && messages.contains("expected one that this machine has") {
         eprintln!("this machine has no {simd}");
         return None;
     }
-    assert!(run.status.success(), "{integrator}, {threads} threads, {simd}: {said}");
+    assert!(run.status.success(), "{integrator}, {threads} threads, {simd}: {messages}");
     Some(fs::read(result).expect("a finished run has an output"))
 }
 
@@ -89,7 +89,7 @@ fn same_bytes_for_1_2_and_4_threads_on_every_instruction_set_mass_scaled() {
     same_bytes("method = \"rk4-mass-scaled\"\naccuracy = 1e-3\n");
 }
 
-/// Random numbers (Marsaglia's xorshift).
+/// A generator of random numbers (Marsaglia's xorshift).
 struct Numbers(u64);
 
 impl Numbers {
@@ -105,16 +105,16 @@ impl Numbers {
     }
 }
 
-/// Returns a number that the environment gives, or another.
-fn given(name: &str, or: u64) -> u64 {
-    std::env::var(name).map_or(or, |it| it.parse().expect("it is a number"))
+/// Returns the number in an environment variable, or a default.
+fn from_environment(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| text.parse().expect("it is a number"))
 }
 
 /// Returns a random machine's file, with the elements of `kinds`' bits: friction, stops, bushings,
 /// stiffening springs, a second unbalance.
 fn machine(kinds: u64, numbers: &mut Numbers) -> String {
-    let of_file = include_str!("../../crates/sweep/tests/held/m_fine17.toml");
-    let (bare, _) = of_file.split_once("[[bushings]]").expect("the file's last element");
+    let template = include_str!("../../crates/sweep/tests/held/m_fine17.toml");
+    let (bare, _) = template.split_once("[[bushings]]").expect("the file's last element");
     let is_kept = |line: &&str| !line.starts_with("cubic");
     let mut text: String = bare.lines().filter(is_kept).map(|line| format!("{line}\n")).collect();
     let mut number = |low: f64, high: f64| format!("{}", numbers.between(low, high));
@@ -128,7 +128,8 @@ fn machine(kinds: u64, numbers: &mut Numbers) -> String {
     }
     if kinds & 2 != 0 {
         for side in [1, -1] {
-            let (clearance, stiffness) = (number(0.004, 0.02), number(1e4, 1e5));
+            let clearance = number(0.004, 0.02);
+            let stiffness = number(1e4, 1e5);
             text += &format!(
                 "\n[[stops]]\ntub_m = [0.35, 0.0, {}]\ndirection = [0.0, 0.1, {side}]\n\
                  clearance_m = {clearance}\nstiffness_n_per_m = {stiffness}\n\
@@ -156,7 +157,7 @@ fn machine(kinds: u64, numbers: &mut Numbers) -> String {
     text
 }
 
-/// The rows of a result as text, by what follows the point's number.
+/// Returns the rows of a result as text, without the point's number.
 fn rows(folder: &std::path::Path, name: &str) -> Vec<String> {
     let done = Command::new(sweep_binary())
         .current_dir(folder)
@@ -170,14 +171,14 @@ fn rows(folder: &std::path::Path, name: &str) -> Vec<String> {
     lines.filter_map(without_point).collect()
 }
 
-/// Bytes of random machines with random elements do not depend on the number of threads, nor rows
-/// on the points and speeds that are asked for beside them. SEED chooses other machines, and
-/// SECONDS how long to go on; from 60 s on, every command and the metrics that take long are tried.
+/// The bytes of random machines with random elements do not depend on the number of threads, and
+/// rows do not depend on the other points and speeds of a run. SEED selects other machines, and
+/// SECONDS sets the duration; from 60 s on, all commands and the slow metrics are tested.
 #[test]
-fn random_machines_have_the_same_rows_in_any_company() {
+fn rows_of_random_machines_do_not_depend_on_other_points() {
     let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    let seed = given("SEED", clock.expect("it is after 1970").as_secs());
-    let seconds = given("SECONDS", 5);
+    let seed = from_environment("SEED", clock.expect("it is after 1970").as_secs());
+    let seconds = from_environment("SECONDS", 5);
     println!("SEED={seed} SECONDS={seconds}");
     let begin = std::time::Instant::now();
     let mut numbers = Numbers(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
@@ -185,8 +186,9 @@ fn random_machines_have_the_same_rows_in_any_company() {
     let is_thorough = seconds >= 60;
     while compared == 0 || begin.elapsed().as_secs() < seconds {
         let kinds = (32.0 * numbers.next()) as u64;
-        let home = tempfile::tempdir().expect("a temporary folder");
-        fs::write(home.path().join("m.toml"), machine(kinds, &mut numbers)).expect("it is written");
+        let test_folder = tempfile::tempdir().expect("a temporary folder");
+        fs::write(test_folder.path().join("m.toml"), machine(kinds, &mut numbers))
+            .expect("it is written");
         let masses: [f64; 3] = core::array::from_fn(|k| {
             let third = 0.2 + 0.2 * k as f64;
             numbers.between(third, third + 0.15)
@@ -202,7 +204,7 @@ fn random_machines_have_the_same_rows_in_any_company() {
         if is_thorough {
             metrics.extend(["growth", "dwell"]);
         }
-        // The section is there for the metrics that take long.
+        // Only the slow metrics need this section.
         let stability = match is_thorough {
             true => format!("[stability]\nspeed_rpm = \"{}\"\n", speeds[1]),
             false => String::new(),
@@ -214,18 +216,19 @@ fn random_machines_have_the_same_rows_in_any_company() {
                  {stability}[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = {masses:?}\n"
             )
         };
-        fs::write(home.path().join("all.toml"), grid(&masses)).expect("it is written");
+        fs::write(test_folder.path().join("all.toml"), grid(&masses)).expect("it is written");
         let few = [masses[0], masses[2]];
-        fs::write(home.path().join("few.toml"), grid(&few)).expect("it is written");
+        fs::write(test_folder.path().join("few.toml"), grid(&few)).expect("it is written");
         let second = "[[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [40.0, 150.0, 260.0]\n";
         let plane =
             grid(&masses).replace(&format!("metrics = {metrics:?}\n"), "").replace(&stability, "");
         let plane = plane + second;
-        fs::write(home.path().join("plane.toml"), plane).expect("it is written");
+        fs::write(test_folder.path().join("plane.toml"), plane).expect("it is written");
         let three = speeds.map(|speed| speed.to_string()).join(",");
         let one = speeds[1].to_string();
         let search = ["--starts", "1", "--longest", "2"];
-        // Each command is asked with company, then alone where its rows are of points and speeds.
+        // Each command runs with other points; commands with rows of points and speeds also run
+        // with a single point.
         let commands: [(&str, Vec<&str>, Vec<&str>); 4] = [
             ("run", vec!["all.toml"], vec!["few.toml"]),
             ("stability", vec!["all.toml", "--speed", &three], vec!["few.toml", "--speed", &one]),
@@ -245,7 +248,7 @@ fn random_machines_have_the_same_rows_in_any_company() {
             let make = |asked: &[&str], threads: &str, name: &str| {
                 let out = &format!("{verb}-{name}.parquet");
                 let done = Command::new(sweep_binary())
-                    .current_dir(home.path())
+                    .current_dir(test_folder.path())
                     .arg(verb)
                     .args(asked)
                     .args(["--fresh", "--progress", "none", "--threads", threads, "--out", out])
@@ -253,9 +256,9 @@ fn random_machines_have_the_same_rows_in_any_company() {
                     .env_remove("JOB_COMPLETION_INDEX")
                     .output()
                     .expect("the command starts");
-                let said = String::from_utf8_lossy(&done.stderr);
-                assert!(done.status.success(), "{verb} {asked:?} of {kinds:05b}: {said}");
-                fs::read(home.path().join(out)).expect("it was written")
+                let messages = String::from_utf8_lossy(&done.stderr);
+                assert!(done.status.success(), "{verb} {asked:?} of {kinds:05b}: {messages}");
+                fs::read(test_folder.path().join(out)).expect("it was written")
             };
             let whole = make(together, "1", "one");
             for threads in ["2", "5"] {
@@ -267,8 +270,8 @@ fn random_machines_have_the_same_rows_in_any_company() {
                 continue;
             }
             make(alone, "2", "alone");
-            let [all, alone] =
-                ["one", "alone"].map(|name| rows(home.path(), &format!("{verb}-{name}.parquet")));
+            let [all, alone] = ["one", "alone"]
+                .map(|name| rows(test_folder.path(), &format!("{verb}-{name}.parquet")));
             assert!(alone.len() > 1, "{verb} has rows");
             for row in &alone {
                 assert!(

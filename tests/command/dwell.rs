@@ -1,9 +1,9 @@
-//! `sweep dwell` as a user meets it: what it writes, says and refuses.
+//! Tests of `sweep dwell`: its files, summaries and errors.
 
 use std::fs;
 use std::process::{Command, Output};
 
-use crate::home::{said, sweep_binary};
+use crate::test_folder::{all_output, sweep_binary};
 
 const GRID: &str = r#"
 machine = "paper"
@@ -37,16 +37,16 @@ fn sweep(folder: &tempfile::TempDir, arguments: &[&str], simd: Option<&str>) -> 
 fn every_motion_of_a_held_speed_has_a_row() {
     let folder = folder();
     let done = sweep(&folder, &["dwell", "grid.toml", "--speed", "250,297.5"], None);
-    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
     let file = "results/grid-dwell.parquet";
-    let shown = said(&sweep(&folder, &["show", file], None));
-    for told in [&said(&done), &shown] {
+    let shown = all_output(&sweep(&folder, &["show", file], None));
+    for messages in [&all_output(&done), &shown] {
         for line in [
             "4 at 4 points and speeds: 2 periodic, 1 periodic 2, 1 quasi periodic",
             "tub yaw 152.3 mrad, quasi periodic, at unbalance_mass_kg 0.4, 250 rpm",
             "tub pitch 163.7 mrad, periodic 2, at unbalance_mass_kg 0.4, 297.5 rpm",
         ] {
-            assert!(told.contains(line), "{line}\n{told}");
+            assert!(messages.contains(line), "{line}\n{messages}");
         }
     }
     let json = sweep(&folder, &["show", file, "--json"], None).stdout;
@@ -60,29 +60,29 @@ fn every_motion_of_a_held_speed_has_a_row() {
     assert_eq!(sweep(&folder, &gate, None).status.code(), Some(4));
     let at = "unbalance_mass_kg=0.4";
     let drawn = sweep(&folder, &["plot", file, "--at", at, "-o", "a.svg"], None);
-    assert_eq!(drawn.status.code(), Some(0), "{}", said(&drawn));
+    assert_eq!(drawn.status.code(), Some(0), "{}", all_output(&drawn));
     let picture = fs::read_to_string(folder.path().join("a.svg")).expect("it is there");
     assert!(picture.contains("ends in: two frequencies"));
 }
 
 #[test]
-fn a_point_may_stand_in_place_of_an_axis() {
+fn at_can_replace_an_axis() {
     let folder = folder();
     let files = [("--at", "a.parquet"), ("--set", "b.parquet")].map(|(option, file)| {
         let point = [option, "unbalance_mass_kg=0.4"];
         let dwell = ["dwell", "grid.toml", "--speed", "250", "--starts", "1", "--out", file];
         let done = sweep(&folder, &[&dwell[..], &point].concat(), None);
         assert!(
-            said(&done).contains("1 at 1 point and speed: 1 quasi periodic"),
+            all_output(&done).contains("1 at 1 point and speed: 1 quasi periodic"),
             "{}",
-            said(&done)
+            all_output(&done)
         );
         fs::read(folder.path().join(file)).expect("it is there")
     });
     assert!(files[0] == files[1]);
     let of = |more: &[&str]| {
         let stability = ["stability", "grid.toml", "--speed", "250", "--fresh"];
-        said(&sweep(&folder, &[&stability[..], more].concat(), None))
+        all_output(&sweep(&folder, &[&stability[..], more].concat(), None))
     };
     assert!(of(&[]).contains("unbalance_mass_kg 0.4: 250 rpm, quasi periodic"));
     assert!(of(&["--at", "unbalance_mass_kg=0.4"]).contains("unstable  250 rpm, quasi"));
@@ -91,31 +91,35 @@ fn a_point_may_stand_in_place_of_an_axis() {
 }
 
 #[test]
-fn how_far_dwells_go_is_a_metric_of_maps() {
+fn peaks_of_attractors_are_a_metric_of_maps() {
     let folder = folder();
     let grid = format!("metrics = [\"dwell\"]\n{GRID}\n[stability]\nspeed_rpm = \"250,297.5\"\n");
     fs::write(folder.path().join("map.toml"), grid).expect("it is written");
     let ran = sweep(&folder, &["run", "map.toml"], None);
-    assert_eq!(ran.status.code(), Some(0), "{}", said(&ran));
+    assert_eq!(ran.status.code(), Some(0), "{}", all_output(&ran));
     let file = "results/map.parquet";
     let columns = "dwell_tub_yaw,dwell_tub_pitch,dwell_speed_rpm,dwell_kind";
     let rows = ["show", file, "--top", "2", "--by", "dwell_tub_yaw", "--columns", columns];
-    let told = said(&sweep(&folder, &rows, None));
-    // Yaw is of 250 rpm, pitch of 297.5, where the machine turns farthest.
-    let first = told.lines().find(|line| line.contains("0.152"));
-    let first = first.unwrap_or_else(|| panic!("{told}"));
+    let messages = all_output(&sweep(&folder, &rows, None));
+    // The greatest yaw is that at 250 rpm, the greatest pitch that at 297.5 rpm, which is greater.
+    let first = messages.lines().find(|line| line.contains("0.152"));
+    let first = first.unwrap_or_else(|| panic!("{messages}"));
     assert!(first.contains("0.1637") && first.contains("297.5") && first.contains("periodic_2"));
     let gate = ["require", file, "dwell_tub_yaw < 0.02"];
     assert_eq!(sweep(&folder, &gate, None).status.code(), Some(4));
     let map = ["plot", file, "--quantity", "dwell_tub_yaw", "-o", "m.svg"];
     let drawn = sweep(&folder, &map, None);
-    assert_eq!(drawn.status.code(), Some(0), "{}", said(&drawn));
+    assert_eq!(drawn.status.code(), Some(0), "{}", all_output(&drawn));
     let without = sweep(&folder, &["run", "grid.toml", "--set", "metrics=dwell"], None);
-    assert!(said(&without).contains("the metric `dwell` needs speeds"), "{}", said(&without));
+    assert!(
+        all_output(&without).contains("the metric `dwell` needs speeds"),
+        "{}",
+        all_output(&without)
+    );
 }
 
 #[test]
-fn motions_keep_sections_and_metrics_and_are_compared() {
+fn motions_have_sections_and_metrics_and_can_be_compared() {
     let folder = folder();
     let grid = format!("metrics = [\"cabinet_force\", \"clash_time\"]\n{GRID}");
     fs::write(folder.path().join("grid.toml"), grid).expect("it is written");
@@ -123,12 +127,12 @@ fn motions_keep_sections_and_metrics_and_are_compared() {
         let at = ["--at", "unbalance_mass_kg=0.4", "--set", damping, "--starts", "1"];
         let dwell = ["dwell", "grid.toml", "--speed", "250,280", "--out", out];
         let done = sweep(&folder, &[&dwell[..], &at, more].concat(), None);
-        assert_eq!(done.status.code(), Some(0), "{}", said(&done));
-        said(&done)
+        assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+        all_output(&done)
     };
-    let told = dwell("damping_n_s_per_m=140", &["--sections", "64"], "a.parquet");
-    assert!(told.contains("2 at 2 points and speeds"), "{told}");
-    let shown = said(&sweep(&folder, &["show", "a.parquet", "--all"], None));
+    let messages = dwell("damping_n_s_per_m=140", &["--sections", "64"], "a.parquet");
+    assert!(messages.contains("2 at 2 points and speeds"), "{messages}");
+    let shown = all_output(&sweep(&folder, &["show", "a.parquet", "--all"], None));
     for column in ["turn", "q5_rad", "u10_rad_per_s", "cabinet_force_nonlinear_n"] {
         assert!(shown.contains(column), "{column}\n{shown}");
     }
@@ -136,18 +140,18 @@ fn motions_keep_sections_and_metrics_and_are_compared() {
     assert!(!shown.contains("clash_time"), "a motion that goes on has no such time");
     let view = ["plot", "a.parquet", "--view", "sections", "-o", "s.html"];
     let drawn = sweep(&folder, &view, None);
-    assert_eq!(drawn.status.code(), Some(0), "{}", said(&drawn));
+    assert_eq!(drawn.status.code(), Some(0), "{}", all_output(&drawn));
     dwell("damping_n_s_per_m=140", &[], "b.parquet");
     dwell("damping_n_s_per_m=240", &[], "c.parquet");
     let gate = ["compare", "b.parquet", "c.parquet", "--fail-on", "any"];
     let compared = sweep(&folder, &gate, None);
-    assert_eq!(compared.status.code(), Some(4), "{}", said(&compared));
+    assert_eq!(compared.status.code(), Some(4), "{}", all_output(&compared));
     let top = ["show", "b.parquet", "--top", "1", "--by", "nonlinear_tub_yaw"];
-    assert!(said(&sweep(&folder, &top, None)).contains("0.15232"));
+    assert!(all_output(&sweep(&folder, &top, None)).contains("0.15232"));
 }
 
 #[test]
-fn bytes_depend_on_neither_threads_nor_instruction_set_nor_shards() {
+fn bytes_do_not_depend_on_threads_instruction_set_or_shards() {
     let folder = folder();
     for search in [&["--starts", "3", "--threshold"][..], &["--carry", "down"]] {
         let arguments = |more: &[&'static str]| {
@@ -155,7 +159,7 @@ fn bytes_depend_on_neither_threads_nor_instruction_set_nor_shards() {
         };
         let bytes = |more: &[&'static str], simd| {
             let done = sweep(&folder, &arguments(more), simd);
-            assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+            assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
             more.last().map(|name| fs::read(folder.path().join(name)).unwrap_or_default())
         };
         let first = bytes(&["--threads", "1", "--out", "a.parquet"], None);
@@ -166,9 +170,9 @@ fn bytes_depend_on_neither_threads_nor_instruction_set_nor_shards() {
         let of = ["grid.toml", "--speed", "240:300:30", "--dwell", "--out", "c.parquet"];
         let asked = |verb| sweep(&folder, &[&[verb][..], &of, search].concat(), None);
         let next = "next  sweep merge grid.toml --out c.parquet --dwell --speed 240:300:30";
-        assert!(said(&asked("status")).contains(next), "{}", said(&asked("status")));
+        assert!(all_output(&asked("status")).contains(next), "{}", all_output(&asked("status")));
         let merged = asked("merge");
-        assert_eq!(merged.status.code(), Some(0), "{}", said(&merged));
+        assert_eq!(merged.status.code(), Some(0), "{}", all_output(&merged));
         let joined = fs::read(folder.path().join("c.parquet")).expect("it is there");
         assert!(first == Some(joined));
         for name in ["a.parquet", "b.parquet", "c.parquet"] {
@@ -178,7 +182,7 @@ fn bytes_depend_on_neither_threads_nor_instruction_set_nor_shards() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn contradictory_options_are_errors() {
     let folder = folder();
     for (more, expected) in [
         (&["--speed", "0"][..], "above 0 rpm"),
@@ -190,22 +194,23 @@ fn what_makes_no_sense_is_refused() {
     ] {
         let refused = sweep(&folder, &[&["dwell", "grid.toml"], more].concat(), None);
         assert_eq!(refused.status.code(), Some(2), "{more:?}");
-        assert!(said(&refused).contains(expected), "{more:?}: {}", said(&refused));
+        assert!(all_output(&refused).contains(expected), "{more:?}: {}", all_output(&refused));
     }
 }
 
-/// A line a motion, from which starts, and whether a push leads elsewhere.
+/// The summary has a line for each motion, with its starts and whether a kick leads to another one.
 #[test]
-fn each_motion_is_told_in_a_line() {
+fn the_summary_has_a_line_for_each_motion() {
     let folder = folder();
     let dwell = ["dwell", "grid.toml", "--speed", "250,280", "--at", "unbalance_mass_kg=0.4"];
-    let told = said(&sweep(&folder, &[&dwell[..], &["--starts", "6"]].concat(), None));
+    let messages = all_output(&sweep(&folder, &[&dwell[..], &["--starts", "6"]].concat(), None));
     let lines = |name: &str| {
-        let named = told.lines().filter(|line| line.trim_start().starts_with(&format!("{name} ")));
+        let named =
+            messages.lines().filter(|line| line.trim_start().starts_with(&format!("{name} ")));
         named.map(str::to_owned).collect::<Vec<_>>()
     };
     let motions = lines("motion");
-    assert_eq!(motions.len(), 2, "{told}");
+    assert_eq!(motions.len(), 2, "{messages}");
     for (line, kind, speed, yaw) in [
         (&motions[0], "quasi periodic at", "250 rpm", "tub yaw 152.3 mrad"),
         (&motions[1], "periodic at", "280 rpm", "tub yaw 4.9 mrad"),
@@ -216,34 +221,34 @@ fn each_motion_is_told_in_a_line() {
         }
     }
     let pushes = lines("push");
-    assert_eq!(pushes.len(), 2, "{told}");
+    assert_eq!(pushes.len(), 2, "{messages}");
     for (line, speed) in pushes.iter().zip(["250 rpm", "280 rpm"]) {
         let expected = "no push up to 6 rad/s that was tried leads elsewhere at";
         assert!(line.contains(expected) && line.contains(speed), "{line}");
     }
 }
 
-/// A cycle that reverses and waits is no hindrance: speeds are held whatever the profile.
+/// Held speeds do not depend on the profile of the spin.
 #[test]
-fn a_cycle_that_reverses_and_waits_may_be_held() {
+fn held_speeds_do_not_depend_on_the_spin() {
     let folder = folder();
     let table = "profile = \"table\"\ntime_s = [0, 9, 12, 20]\nspeed_rpm = [0, 0, 200, -200]";
     let ramp = "profile = \"ramp\"\npeak_rpm = 350.0\nramp_s = 50.0";
     fs::write(folder.path().join("grid.toml"), GRID.replace(ramp, table)).expect("it is written");
     let dwell = ["dwell", "grid.toml", "--speed", "250", "--starts", "1"];
-    let told = said(&sweep(&folder, &dwell, None));
-    assert!(told.contains("tub yaw 152.3 mrad, quasi periodic"), "{told}");
+    let messages = all_output(&sweep(&folder, &dwell, None));
+    assert!(messages.contains("tub yaw 152.3 mrad, quasi periodic"), "{messages}");
 }
 
-/// The dots of a single speed stand in the middle of the figure, not cut by its frame.
+/// The dots of a single speed are in the middle of the figure, not clipped by its frame.
 #[test]
 fn dots_of_one_speed_are_whole() {
     let folder = folder();
     let dwell = ["dwell", "grid.toml", "--speed", "280", "--at", "unbalance_mass_kg=0.4"];
     let done = sweep(&folder, &[&dwell[..], &["--starts", "1"]].concat(), None);
-    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
     let drawn = sweep(&folder, &["plot", "results/grid-dwell.parquet", "-o", "one.svg"], None);
-    assert_eq!(drawn.status.code(), Some(0), "{}", said(&drawn));
+    assert_eq!(drawn.status.code(), Some(0), "{}", all_output(&drawn));
     let picture = fs::read_to_string(folder.path().join("one.svg")).expect("it is there");
     let number = |text: &str| -> f64 {
         let end = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
@@ -251,7 +256,7 @@ fn dots_of_one_speed_are_whole() {
     };
     let path = |text: &str| text.split_once("d=\"M").map(|(_, path)| path.to_owned());
     let after = |text: &str, mark: char| text.split_once(mark).map(|(_, rest)| number(rest));
-    // The frame of a panel is M LEFT TOP h WIDTH v HEIGHT.
+    // The path of a panel's frame is M LEFT TOP h WIDTH v HEIGHT.
     let frames = picture.lines().filter(|line| line.contains("<clipPath")).filter_map(path);
     let frames: Vec<[f64; 4]> = frames
         .map(|frame| {
@@ -262,7 +267,7 @@ fn dots_of_one_speed_are_whole() {
     let middle = frames[0][0] + 0.5 * frames[0][2];
     let is_dot = |line: &&str| !line.contains("stroke") && line.ends_with("z\" fill=\"#0072b2\"/>");
     let dots = picture.lines().filter(is_dot).filter_map(path);
-    // The legend's stand below all frames.
+    // The dots of the legend are below all frames.
     let is_framed = |y: f64| frames.iter().any(|[_, top, _, height]| y > *top && y < top + height);
     let dots = dots.filter(|path| after(path, ' ').is_some_and(is_framed));
     let dots: Vec<f64> = dots.map(|path| number(&path)).collect();

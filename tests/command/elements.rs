@@ -1,12 +1,11 @@
-//! A machine as they are sold, as a user meets it: loads of stops and feet, what friction rules
-//! out, and what is refused.
+//! Tests with a machine that has friction, stops and feet: their columns, traces and errors.
 
 #![cfg(unix)]
 
 use std::fs;
 use std::path::Path;
 
-use crate::home::{Home, said};
+use crate::test_folder::{TestFolder, all_output};
 
 const GRID: &str = r#"
 machine = "machine.toml"
@@ -26,10 +25,10 @@ parameter = "unbalance_mass_kg"
 values = [0.05, 1.0]
 "#;
 
-fn home(machine: &str) -> Home {
-    let home = Home::new(GRID);
-    fs::write(home.path("machine.toml"), machine).expect("the folder can be written");
-    home
+fn test_folder(machine: &str) -> TestFolder {
+    let test_folder = TestFolder::new(GRID);
+    fs::write(test_folder.path("machine.toml"), machine).expect("the folder can be written");
+    test_folder
 }
 
 fn example() -> String {
@@ -37,7 +36,7 @@ fn example() -> String {
     fs::read_to_string(path).expect("the example is there")
 }
 
-/// A column of the result's two rows.
+/// Returns a column of a result.
 fn column(csv: &str, name: &str) -> Vec<f64> {
     let mut lines = csv.lines().filter(|line| !line.starts_with('#'));
     let header = lines.next().expect("a header");
@@ -48,14 +47,14 @@ fn column(csv: &str, name: &str) -> Vec<f64> {
 
 #[test]
 fn loads_of_stops_and_feet_are_columns() {
-    let home = home(&example());
-    let run = home.sweep(&["run", "g.toml", "--out", "map.parquet"]);
-    assert!(run.status.success(), "{}", said(&run));
-    let export = home.sweep(&["export", "map.parquet", "map.csv"]);
-    assert!(export.status.success(), "{}", said(&export));
-    let csv = fs::read_to_string(home.path("map.csv")).expect("it was written");
+    let test_folder = test_folder(&example());
+    let run = test_folder.sweep(&["run", "g.toml", "--out", "map.parquet"]);
+    assert!(run.status.success(), "{}", all_output(&run));
+    let export = test_folder.sweep(&["export", "map.parquet", "map.csv"]);
+    assert!(export.status.success(), "{}", all_output(&export));
+    let csv = fs::read_to_string(test_folder.path("map.csv")).expect("it was written");
     let of = |name: &str| column(&csv, name);
-    // A little laundry reaches no stop and stands safely; a kilogram does neither.
+    // With a small unbalance the machine reaches no stop and does not slip; with 1 kg it does both.
     let [pushes, contacts] = [of("stop_force_nonlinear_n"), of("stop_contact_nonlinear_s")];
     assert!(pushes[0] < 1.0 && contacts[0] == 0.0, "{pushes:?} N, {contacts:?} s");
     assert!(pushes[1] > 100.0 && contacts[1] > 0.02, "{pushes:?} N, {contacts:?} s");
@@ -64,23 +63,23 @@ fn loads_of_stops_and_feet_are_columns() {
     assert!(feet[1] < feet[0] - 50.0 && margins[1] < margins[0] - 50.0, "{feet:?}, {margins:?}");
 }
 
-/// A column of a trace in the window, which is all of it.
+/// Returns the extreme value of a column of a trace.
 fn extreme(csv: &str, name: &str, extreme: fn(f64, f64) -> f64) -> f64 {
     column(csv, name).into_iter().reduce(extreme).expect("a trace has instants")
 }
 
 #[test]
-fn each_stop_and_foot_has_what_the_trace_shows_of_it() {
-    let home = home(&example());
-    // Steps of its own, so that map and trace are one trajectory, and every step is an instant.
+fn columns_of_stops_and_feet_agree_with_the_trace() {
+    let test_folder = test_folder(&example());
+    // With a fixed step map and trace have the same trajectory, and every step is an instant.
     let grid = format!("{GRID}[integrator]\nmethod = \"rk4\"\nstep_s = 1e-4\n");
-    fs::write(home.path("g.toml"), grid).expect("the grid is written");
+    fs::write(test_folder.path("g.toml"), grid).expect("the grid is written");
     let csv_of = |words: &[&str], file: &str| {
-        let done = home.sweep(&[words, &["--out", &format!("{file}.parquet")]].concat());
-        assert!(done.status.success(), "{}", said(&done));
+        let done = test_folder.sweep(&[words, &["--out", &format!("{file}.parquet")]].concat());
+        assert!(done.status.success(), "{}", all_output(&done));
         let [from, to] = ["parquet", "csv"].map(|ending| format!("{file}.{ending}"));
-        assert!(home.sweep(&["export", &from, &to]).status.success());
-        fs::read_to_string(home.path(&to)).expect("it was written")
+        assert!(test_folder.sweep(&["export", &from, &to]).status.success());
+        fs::read_to_string(test_folder.path(&to)).expect("it was written")
     };
     let map = csv_of(&["run", "g.toml"], "map");
     let at = "unbalance_mass_kg=1";
@@ -122,33 +121,33 @@ fn each_stop_and_foot_has_what_the_trace_shows_of_it() {
 
     let drawn = |stop: &str| {
         let column = format!("{stop}_force_nonlinear_n");
-        home.sweep(&["plot", "map.parquet", "-o", "map.svg", "--quantity", &column])
+        test_folder.sweep(&["plot", "map.parquet", "-o", "map.svg", "--quantity", &column])
     };
     assert!(drawn("stop_2").status.success());
-    let picture = fs::read_to_string(home.path("map.svg")).expect("it was written");
+    let picture = fs::read_to_string(test_folder.path("map.svg")).expect("it was written");
     assert!(picture.contains("Stop 2 force"));
     let refused = drawn("stop_4");
-    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
-    assert!(said(&refused).contains("stop_3_force_nonlinear_n"), "{}", said(&refused));
-    let met = home.sweep(&["require", "map.parquet", "stop_3_contact_nonlinear_s == 0"]);
-    assert_eq!(met.status.success(), closed(3) == 0.0, "{}", said(&met));
+    assert_eq!(refused.status.code(), Some(2), "{}", all_output(&refused));
+    assert!(all_output(&refused).contains("stop_3_force_nonlinear_n"), "{}", all_output(&refused));
+    let met = test_folder.sweep(&["require", "map.parquet", "stop_3_contact_nonlinear_s == 0"]);
+    assert_eq!(met.status.success(), closed(3) == 0.0, "{}", all_output(&met));
 }
 
 #[test]
-fn what_needs_stops_or_a_cabinet_says_so() {
+fn metrics_of_missing_stops_and_feet_are_errors() {
     let text = example();
     let bare = text.split("[[stops]]").next().expect("a first part");
-    let home = home(bare);
-    let run = home.sweep(&["run", "g.toml"]);
-    assert_eq!(run.status.code(), Some(2), "{}", said(&run));
-    let told = said(&run);
+    let test_folder = test_folder(bare);
+    let run = test_folder.sweep(&["run", "g.toml"]);
+    assert_eq!(run.status.code(), Some(2), "{}", all_output(&run));
+    let messages = all_output(&run);
     for part in ["`stop_force` needs", "`foot_load` needs", "[[stops]]", "[cabinet]"] {
-        assert!(told.contains(part), "{part} is not in {told}");
+        assert!(messages.contains(part), "{part} is not in {messages}");
     }
 }
 
 #[test]
-fn feet_that_do_not_hold_the_cabinet_are_refused() {
+fn feet_that_do_not_support_the_cabinet_are_an_error() {
     let text = example();
     let lifted = text.replace("centre_m = [0.18, -0.1, 0.0] ", "centre_m = [1.8, -0.1, 0.0] ");
     let two = text.rsplitn(3, "[[feet]]").last().expect("a first part");
@@ -162,45 +161,51 @@ fn feet_that_do_not_hold_the_cabinet_are_refused() {
         (two, "the cabinet stands on 2 feet"),
         (without.as_str(), "feet without a cabinet"),
     ] {
-        let run = home(machine).sweep(&["run", "g.toml"]);
-        assert_eq!(run.status.code(), Some(2), "{}", said(&run));
-        assert!(said(&run).contains(expected), "{expected} is not in {}", said(&run));
+        let run = test_folder(machine).sweep(&["run", "g.toml"]);
+        assert_eq!(run.status.code(), Some(2), "{}", all_output(&run));
+        assert!(all_output(&run).contains(expected), "{expected} is not in {}", all_output(&run));
     }
 }
 
-/// Stability is for every machine: friction and stops are smooth by their laws.
+/// Machines with friction and stops have stability results too, because their laws are smooth.
 #[test]
 fn machines_with_friction_and_stops_have_responses_and_growth() {
-    let home = home(&example());
-    let done = home.sweep(&["stability", "g.toml", "--speed", "240:260:10", "--out", "s.parquet"]);
-    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
-    let met = home.sweep(&["require", "s.parquet", "count(status == 'ok') > 0"]);
-    assert_eq!(met.status.code(), Some(0), "{}", said(&met));
+    let test_folder = test_folder(&example());
+    let done =
+        test_folder.sweep(&["stability", "g.toml", "--speed", "240:260:10", "--out", "s.parquet"]);
+    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
+    let met = test_folder.sweep(&["require", "s.parquet", "count(status == 'ok') > 0"]);
+    assert_eq!(met.status.code(), Some(0), "{}", all_output(&met));
 }
 
 #[test]
-fn friction_is_taken_at_the_speed_that_the_linear_motion_has() {
-    let home = home(&example());
+fn friction_has_the_speed_amplitude_of_the_linear_motion() {
+    let test_folder = test_folder(&example());
     let metrics = "metrics=stop_force,damper_speed";
-    let run = home.sweep(&["run", "g.toml", "--set", metrics, "--out", "map.parquet"]);
-    assert!(run.status.success(), "{}", said(&run));
-    assert!(said(&run).contains("friction  0 rows whose linear model"), "{}", said(&run));
+    let run = test_folder.sweep(&["run", "g.toml", "--set", metrics, "--out", "map.parquet"]);
+    assert!(run.status.success(), "{}", all_output(&run));
+    assert!(
+        all_output(&run).contains("friction  0 rows whose linear model"),
+        "{}",
+        all_output(&run)
+    );
     let held = ["friction_speed_off >= 1", "friction_speed_off < 1.01"];
-    let met = home.sweep(&[&["require", "map.parquet"][..], &held].concat());
-    assert_eq!(met.status.code(), Some(0), "{}", said(&met));
+    let met = test_folder.sweep(&[&["require", "map.parquet"][..], &held].concat());
+    assert_eq!(met.status.code(), Some(0), "{}", all_output(&met));
 
-    // A trace, and modes, have the linear model of the row.
+    // Traces and modes have the same linear model as the row.
     let at = ["--at", "unbalance_mass_kg=1"];
-    let modes = home.sweep(&[&["modes", "g.toml", "--json"][..], &at].concat());
+    let modes = test_folder.sweep(&[&["modes", "g.toml", "--json"][..], &at].concat());
     let modes: serde_json::Value = serde_json::from_slice(&modes.stdout).expect("it is JSON");
-    let point = home.sweep(&[&["modes", "g.toml", "--out", "modes.parquet"][..], &at].concat());
-    assert!(point.status.success(), "{}", said(&point));
-    home.sweep(&["plot", "modes.parquet", "-o", "modes.svg"]);
-    let figure = fs::read_to_string(home.path("modes.svg")).expect("it was drawn");
+    let point =
+        test_folder.sweep(&[&["modes", "g.toml", "--out", "modes.parquet"][..], &at].concat());
+    assert!(point.status.success(), "{}", all_output(&point));
+    test_folder.sweep(&["plot", "modes.parquet", "-o", "modes.svg"]);
+    let figure = fs::read_to_string(test_folder.path("modes.svg")).expect("it was drawn");
     assert!(figure.contains("unbalance_mass_kg = 1 "), "a figure shows what was set");
-    let export = home.sweep(&["export", "map.parquet", "map.csv"]);
-    assert!(export.status.success(), "{}", said(&export));
-    let csv = fs::read_to_string(home.path("map.csv")).expect("it was written");
+    let export = test_folder.sweep(&["export", "map.parquet", "map.csv"]);
+    assert!(export.status.success(), "{}", all_output(&export));
+    let csv = fs::read_to_string(test_folder.path("map.csv")).expect("it was written");
     for damper in 1..=2 {
         let row = column(&csv, &format!("damper_{damper}_speed_linear_m_per_s"))[1];
         let taken = &modes["friction_speeds_m_per_s"][format!("damper_{damper}")];
@@ -209,26 +214,36 @@ fn friction_is_taken_at_the_speed_that_the_linear_motion_has() {
     }
 
     let slow = ["--set", "friction_linear_speed_m_per_s=0.02"];
-    let given = home.sweep(&[&["run", "g.toml", "--out", "given.parquet"], &slow[..]].concat());
-    assert!(said(&given).contains("friction  1 rows whose linear model"), "{}", said(&given));
-    let shown = home.sweep(&["show", "given.parquet"]);
+    let given =
+        test_folder.sweep(&[&["run", "g.toml", "--out", "given.parquet"], &slow[..]].concat());
+    assert!(
+        all_output(&given).contains("friction  1 rows whose linear model"),
+        "{}",
+        all_output(&given)
+    );
+    let shown = test_folder.sweep(&["show", "given.parquet"]);
     let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
     assert!(shown.contains("friction  1 rows whose linear model"), "{shown}");
 }
 
-/// At a given speed friction may hold the linear model, but not the machine.
+/// With a given speed amplitude friction may stop the linear model, but not the machine.
 #[test]
 fn a_given_speed_of_friction_is_compared_with_both_motions() {
     let grid = GRID.replace("values = [0.05, 1.0]", "values = [0.05, 0.52]");
-    let home = Home::new(&grid.replace("metrics = [", "metrics = [\"damper_speed\", "));
-    fs::write(home.path("machine.toml"), example()).expect("the folder can be written");
+    let test_folder =
+        TestFolder::new(&grid.replace("metrics = [", "metrics = [\"damper_speed\", "));
+    fs::write(test_folder.path("machine.toml"), example()).expect("the folder can be written");
     let given = ["friction_n=80", "friction_linear_speed_m_per_s=0.02"];
     let words = ["run", "g.toml", "--out", "m.parquet", "--set", given[0], "--set", given[1]];
-    let run = home.sweep(&words);
-    assert!(said(&run).contains("friction  1 rows whose linear model"), "{}", said(&run));
-    let export = home.sweep(&["export", "m.parquet", "m.csv"]);
-    assert!(export.status.success(), "{}", said(&export));
-    let csv = fs::read_to_string(home.path("m.csv")).expect("it was written");
+    let run = test_folder.sweep(&words);
+    assert!(
+        all_output(&run).contains("friction  1 rows whose linear model"),
+        "{}",
+        all_output(&run)
+    );
+    let export = test_folder.sweep(&["export", "m.parquet", "m.csv"]);
+    assert!(export.status.success(), "{}", all_output(&export));
+    let csv = fs::read_to_string(test_folder.path("m.csv")).expect("it was written");
     let factor = |model: &str| {
         let speed = |damper| column(&csv, &format!("damper_{damper}_speed_{model}_m_per_s"))[1];
         let off = |damper| speed(damper).max(4.0 * 0.01 / std::f64::consts::PI) / 0.02;
@@ -240,14 +255,14 @@ fn a_given_speed_of_friction_is_compared_with_both_motions() {
 }
 
 #[test]
-fn live_pages_are_for_one_axis_and_for_designs_of_any_machine() {
-    let home = home(&example());
+fn live_pages_exist_for_a_single_axis_and_for_designs() {
+    let test_folder = test_folder(&example());
     let page = |words: &[&str], map: &str| {
-        let run = home.sweep(&[words, &["--out", map]].concat());
-        assert!(run.status.success(), "{}", said(&run));
-        let plot = home.sweep(&["plot", map, "-o", "page.html", "--live"]);
-        assert!(plot.status.success(), "{}", said(&plot));
-        fs::read_to_string(home.path("page.html")).expect("it was written")
+        let run = test_folder.sweep(&[words, &["--out", map]].concat());
+        assert!(run.status.success(), "{}", all_output(&run));
+        let plot = test_folder.sweep(&["plot", map, "-o", "page.html", "--live"]);
+        assert!(plot.status.success(), "{}", all_output(&plot));
+        fs::read_to_string(test_folder.path("page.html")).expect("it was written")
     };
     let one_axis = page(&["run", "g.toml"], "map.parquet");
     for part in ["\"kind\":\"chart\"", "\"setup\":", "with friction of 50 N", "a cabinet of 35 kg"]
@@ -257,39 +272,43 @@ fn live_pages_are_for_one_axis_and_for_designs_of_any_machine() {
     assert!(!one_axis.contains("built-in machine"));
     let design = GRID.replace("values = [0.05, 1.0]", "range = { from = 0.05, to = 1.0 }");
     let design = format!("{design}[design]\nmethod = \"sobol\"\npoints = 4\n");
-    fs::write(home.path("d.toml"), design).expect("the grid is written");
-    fs::write(home.path("points.csv"), "unbalance_mass_kg,friction_n\n0.1,20\n0.3,60\n0.2,50\n")
-        .expect("the list is written");
+    fs::write(test_folder.path("d.toml"), design).expect("the grid is written");
+    fs::write(
+        test_folder.path("points.csv"),
+        "unbalance_mass_kg,friction_n\n0.1,20\n0.3,60\n0.2,50\n",
+    )
+    .expect("the list is written");
     let (head, _) = GRID.split_once("[[axis]]").expect("an axis");
     let list = format!("{head}[design]\nmethod = \"list\"\nfile = \"points.csv\"\n");
-    fs::write(home.path("l.toml"), list).expect("the grid is written");
-    // A design over one parameter is drawn as curves.
+    fs::write(test_folder.path("l.toml"), list).expect("the grid is written");
+    // The figure of a design over one parameter has curves.
     for (grid, kind) in [("d.toml", "chart"), ("l.toml", "design")] {
         let text = page(&["run", grid], &format!("{grid}.parquet"));
         assert!(text.contains(&format!("\"kind\":\"{kind}\"")), "{grid}");
         let slider =
             "\"axis\":true,\"description\":\"friction of all dampers (F_f)\",\"from\":20.0";
         assert_eq!(text.contains(slider), grid == "l.toml", "{grid}");
-        // The range of the axis, which no point of the design reaches.
+        // The range is that of the axis, whose ends no point of the design reaches.
         assert_eq!(text.contains("\"from\":0.05,"), grid == "d.toml", "{grid}");
     }
 }
 
 #[test]
-fn responses_with_friction_are_followed_round_their_folds() {
-    let home = home(&example());
+fn responses_with_friction_are_followed_through_folds() {
+    let test_folder = test_folder(&example());
     let (head, _) = GRID.split_once("[[axis]]").expect("an axis");
     let (_, run) = head.split_once("[spin]").expect("a spin");
     let set = "machine = \"machine.toml\"\nset = { unbalance_mass_kg = 1.0, friction_n = 60.0 }";
-    fs::write(home.path("g.toml"), format!("{set}\n[spin]{run}")).expect("the grid is written");
-    // With defaults, and with friction that holds the linear model, which then says nothing of the
-    // response.
+    fs::write(test_folder.path("g.toml"), format!("{set}\n[spin]{run}"))
+        .expect("the grid is written");
+    // The first machine has the defaults. The second has friction that stops the linear model, so
+    // that the linear response is no estimate of the nonlinear one.
     for given in [&[][..], &["--set", "friction_linear_speed_m_per_s=0.01"]] {
         let asked = ["stability", "g.toml", "--speed", "255:256:1", "--fresh", "--out"];
-        let found = home.sweep(&[&asked[..], &["s.parquet"], given].concat());
-        assert!(found.status.success(), "{}", said(&found));
+        let found = test_folder.sweep(&[&asked[..], &["s.parquet"], given].concat());
+        assert!(found.status.success(), "{}", all_output(&found));
         let shown = ["show", "s.parquet", "--columns", "branch,nonlinear_tub_yaw,on_curve"];
-        let shown = String::from_utf8(home.sweep(&shown).stdout).expect("it is text");
+        let shown = String::from_utf8(test_folder.sweep(&shown).stdout).expect("it is text");
         let number = |word: &str| word.parse::<f64>().expect("a number");
         let rows = shown.lines().skip(1).map(|row| row.split_whitespace().collect::<Vec<_>>());
         let (on_curve, beside): (Vec<_>, Vec<_>) = rows.partition(|row| row[2] == "true");
@@ -299,26 +318,26 @@ fn responses_with_friction_are_followed_round_their_folds() {
             rows.iter().all(|row| range.contains(&number(row[1])))
         };
         assert!(has_yaw_within(&on_curve, 0.045..0.055), "{given:?}: {on_curve:?}");
-        // From the linear model's response others are found, of half this yaw.
+        // A search from the linear response finds other responses, with half of this yaw.
         assert!(has_yaw_within(&beside, 0.02..0.03) && !beside.is_empty(), "{given:?}: {beside:?}");
     }
 }
 
 #[test]
 #[ignore = "takes a minute; .ci/run runs it"]
-fn growth_with_friction_ends_where_a_boundary_says() {
+fn growth_with_friction_vanishes_at_the_boundary() {
     let point = "machine = \"paper\"\nmetrics = [\"growth\"]\n[set]\ndamping_n_s_per_m = 20.0\n\
                  [spin]\nprofile = \"ramp\"\npeak_rpm = 350.0\nramp_s = 6.0\n\
                  [time]\nend_s = 6.0\nwindow_s = [3.0, 6.0]\n[stability]\nspeed_rpm = 250\n";
     let axes = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.35, 0.4]\n\
                 [[axis]]\nparameter = \"friction_n\"\nvalues = [20.0, 40.0]\n";
-    let home = Home::new(&format!("{point}{axes}"));
-    fs::write(home.path("point.toml"), point).expect("the grid is written");
+    let test_folder = TestFolder::new(&format!("{point}{axes}"));
+    fs::write(test_folder.path("point.toml"), point).expect("the grid is written");
     let asked = ["--quantity", "growth_per_s", "--tolerance", "1", "--out", "b.parquet"];
-    let traced = home.sweep(&[&["boundary", "g.toml"], &asked[..]].concat());
-    assert!(traced.status.success(), "{}", said(&traced));
+    let traced = test_folder.sweep(&[&["boundary", "g.toml"], &asked[..]].concat());
+    assert!(traced.status.success(), "{}", all_output(&traced));
     let shown = |file: &str, columns: &str| {
-        let shown = home.sweep(&["show", file, "--columns", columns]);
+        let shown = test_folder.sweep(&["show", file, "--columns", columns]);
         let text = String::from_utf8(shown.stdout).expect("it is text");
         let row = text.lines().nth(1).expect("a row").split_whitespace();
         row.map(|word| word.parse::<f64>().expect("a number")).collect::<Vec<_>>()
@@ -329,18 +348,19 @@ fn growth_with_friction_ends_where_a_boundary_says() {
         let set = ["unbalance_mass_kg=0.35".to_owned(), format!("friction_n={friction_n}")];
         let set = ["--set", &set[0], "--set", &set[1], "--fresh", "--out", "s.parquet"];
         let found =
-            home.sweep(&[&["stability", "point.toml", "--speed", "250"], &set[..]].concat());
-        assert!(found.status.success(), "{}", said(&found));
+            test_folder.sweep(&[&["stability", "point.toml", "--speed", "250"], &set[..]].concat());
+        assert!(found.status.success(), "{}", all_output(&found));
         let growth_per_s = shown("s.parquet", "growth_per_s")[0];
         assert_eq!(growth_per_s > 0.0, grows, "{growth_per_s} /s at {friction_n} N");
     }
 }
 
 #[test]
-fn a_machine_that_rests_on_a_stop_is_told_before_it_runs() {
-    let home = home(&example());
-    let told = |clearance: &str| said(&home.sweep(&["check", "g.toml", "--set", clearance]));
-    assert!(!told("stop_3_clearance_m=0.04").contains("at rest"));
-    let text = told("stop_3_clearance_m=0.005");
+fn check_reports_a_machine_that_rests_on_a_stop() {
+    let test_folder = test_folder(&example());
+    let check_output =
+        |clearance: &str| all_output(&test_folder.sweep(&["check", "g.toml", "--set", clearance]));
+    assert!(!check_output("stop_3_clearance_m=0.04").contains("at rest"));
+    let text = check_output("stop_3_clearance_m=0.005");
     assert!(text.contains("stop 3 carries ") && text.contains(" N at rest"), "{text}");
 }

@@ -1,4 +1,4 @@
-//! `sweep explain` as a user meets it: what it finds, says and refuses.
+//! Tests of `sweep explain`: its results and errors.
 
 #![cfg(unix)]
 
@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::home::{said, sweep_binary};
+use crate::test_folder::{all_output, sweep_binary};
 
 const AXES: &str = r#"
 [[axis]]
@@ -35,23 +35,24 @@ fn explain(grid: &str, arguments: &[&str]) -> Output {
     command.output().expect("it starts")
 }
 
-fn within(value: &Value, meant: f64, tolerance: f64) {
+fn within(value: &Value, expected: f64, tolerance: f64) {
     let value = value.as_f64().expect("a number");
-    assert!((value - meant).abs() <= tolerance, "{value}, not {meant} +- {tolerance}");
+    assert!((value - expected).abs() <= tolerance, "{value}, not {expected} +- {tolerance}");
 }
 
 #[test]
-fn the_papers_machine_has_two_tongues_with_the_references_edges_and_dampings() {
+fn tongues_of_the_papers_machine_agree_with_the_reference() {
     let more = ["--json", "--ratio-limit", "2.5", "--name", "own", "--progress", "none"];
     let arguments = [&["--at", "damping_n_s_per_m=140"], &more[..]].concat();
     let done = explain(&grid(PAPER, AXES), &arguments);
-    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
     let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
     assert_eq!(found["swept"]["reliable"], true);
     assert_eq!((&found["swept"]["ratio_limit"], &found["name"]), (&2.5.into(), &"own".into()));
     let tongues = found["tongues"].as_array().expect("a list");
     assert_eq!(tongues.len(), 2);
-    // Edges, growth and critical damping as in stability.json, which another program made.
+    // The edges, growth and critical damping are those of an independent program, in
+    // stability.json.
     let reference = [
         ("quasi_periodic", [238.4, 259.8], 230.0, [1, 2]),
         ("period_doubling", [294.5, 317.0], 253.0, [2, 2]),
@@ -65,26 +66,27 @@ fn the_papers_machine_has_two_tongues_with_the_references_edges_and_dampings() {
         let sum = tongue["resonance"]["sum_cpm"].as_f64().expect("a number");
         let speed = tongue["growth_at_rpm"].as_f64().expect("a number");
         assert!((sum / speed - 1.0).abs() < 0.02, "{sum} {speed}");
-        // 7 rpm a second, once: the window ends at the turn.
+        // The run passes once at 7 rpm/s, because the window ends where the spin turns.
         let crossed = tongue["crossed"].as_array().expect("a list");
         assert_eq!(crossed.len(), 1);
         within(&crossed[0]["from_s"], from / 7.0, 0.02);
         within(&crossed[0]["to_s"], to / 7.0, 0.02);
         let e_folds = crossed[0]["e_folds"].as_f64().expect("a number");
         let amplification = crossed[0]["amplification"].as_f64().expect("a number");
-        // No direction grows less than it would by the exponents, give or take what the ramp does.
+        // Disturbances grow at least as the exponents say, but for the effect of the ramp.
         assert!(e_folds > 0.3 && amplification > 0.9 * e_folds.exp(), "{e_folds} {amplification}");
     }
     assert!(found["entered_on_responses"]["ratio_max"].as_f64().expect("a number") < 2.0);
 }
 
-/// A corner of Fig. 12 whose response folds back: one wide band, and no damping that was not tried.
+/// The response of this corner of Fig. 12 folds back. It has one wide unstable band, and its
+/// critical damping is one that was computed.
 #[test]
-fn a_folded_response_is_one_band_and_its_jump_is_named() {
+fn a_folded_response_has_one_band_with_a_jump() {
     let axes = AXES.replace("[0.4]", "[1.0]").replace("100.0, 140.0", "60.0, 140.0");
     let at = ["--at", "damping_n_s_per_m=60", "--speed", "200:350:1", "--json"];
     let done = explain(&grid(PAPER, &axes), &at);
-    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
     let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
     within(&found["speeds"]["jumps_rpm"][0], 243.06, 0.1);
     let tongues = found["tongues"].as_array().expect("a list");
@@ -93,7 +95,7 @@ fn a_folded_response_is_one_band_and_its_jump_is_named() {
     within(&tongues[1]["from_rpm"], 243.06, 0.1);
     for tongue in tongues {
         let closed = &tongue["closed_by"];
-        // The damping that is said to close it leaves no growth anywhere about it.
+        // With the critical damping nothing grows near the band.
         if let Some(damping) = closed["damping_n_s_per_m"].as_f64() {
             let axes = axes.replace("60.0, 140.0", &format!("{damping}"));
             let [from, to] = [0, 1].map(|end| closed["nothing_grows_from_to_rpm"][end].to_string());
@@ -107,27 +109,27 @@ fn a_folded_response_is_one_band_and_its_jump_is_named() {
 }
 
 #[test]
-fn a_stable_machine_is_told_so() {
+fn a_stable_machine_has_no_tongues() {
     let done =
         explain(&grid(PAPER, AXES), &["--at", "damping_n_s_per_m=300", "--speed", "200:340:5"]);
-    let told = said(&done);
-    assert_eq!(done.status.code(), Some(0), "{told}");
+    let messages = all_output(&done);
+    assert_eq!(done.status.code(), Some(0), "{messages}");
     for line in ["stable at every speed from 200 to 340 rpm", "and the models agree"] {
-        assert!(told.contains(line), "{line}\n{told}");
+        assert!(messages.contains(line), "{line}\n{messages}");
     }
-    // The summary follows the limits: friction lets the vertical motion be less.
+    // The summary has the limits, because the vertical motion is less with friction.
     let strict = format!("{}[reliability]\nratio_min = 0.98\n", grid(PAPER, AXES));
     let at = ["--at", "damping_n_s_per_m=300", "--at", "friction_n=60", "--speed", "300:340:20"];
     let done = explain(&strict, &at);
-    let told = said(&done);
+    let messages = all_output(&done);
     for line in ["0.98 and 2", "over-estimates, a ratio is below 0.98"] {
-        assert!(told.contains(line), "{line}\n{told}");
+        assert!(messages.contains(line), "{line}\n{messages}");
     }
-    assert!(!told.contains("the models agree"), "{told}");
+    assert!(!messages.contains("the models agree"), "{messages}");
 }
 
 #[test]
-fn what_makes_no_sense_is_refused_before_any_work() {
+fn contradictory_options_are_errors_before_the_computation() {
     let paper = grid(PAPER, AXES);
     let still = "profile = \"table\"\ntime_s = [0]\nspeed_rpm = [0]";
     for (grid, arguments, expected) in [
@@ -137,21 +139,21 @@ fn what_makes_no_sense_is_refused_before_any_work() {
         (&grid(still, ""), &[][..], "a profile that exceeds"),
     ] {
         let refused = explain(grid, arguments);
-        assert_eq!(refused.status.code(), Some(2), "{arguments:?}: {}", said(&refused));
-        assert!(said(&refused).contains(expected), "{expected}: {}", said(&refused));
+        assert_eq!(refused.status.code(), Some(2), "{arguments:?}: {}", all_output(&refused));
+        assert!(all_output(&refused).contains(expected), "{expected}: {}", all_output(&refused));
     }
 }
 
-/// A cycle that runs up, waits and runs up backwards. The paper's machine is its own mirror image,
-/// so that its tongues are the same either way; one with a stiffer spring is not.
+/// The spin runs up, waits and runs up backwards. The paper's machine is symmetric, so that its
+/// tongues are the same in both directions; a machine with a stiffer spring is not symmetric.
 #[test]
-fn a_cycle_may_reverse_and_wait() {
+fn a_spin_may_reverse_and_pause() {
     let cycle = "profile = \"table\"\ntime_s = [0, 20, 22, 30, 50]\n\
                  speed_rpm = [0, 280, 0, 0, -280]";
     let arguments = ["--at", "damping_n_s_per_m=140", "--speed", "225:275:5", "--json"];
     let of = |more: &[&str]| {
         let done = explain(&grid(cycle, AXES), &[&arguments, more].concat());
-        assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+        assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
         serde_json::from_slice::<Value>(&done.stdout).expect("it is JSON")
     };
     let found = of(&[]);
@@ -166,7 +168,7 @@ fn a_cycle_may_reverse_and_wait() {
     let at_s = |tongue: &Value, crossing: usize| {
         tongue["crossed"][crossing]["from_s"].as_f64().expect("a number")
     };
-    // Up and down again forwards, once backwards.
+    // The run passes twice forwards, up and down, and once backwards.
     let crossed = [forward, backward].map(|tongue| tongue["crossed"].as_array().map(Vec::len));
     assert_eq!(crossed, [Some(2), Some(1)]);
     assert!(at_s(forward, 0) < 20.0 && at_s(forward, 1) < 22.0 && at_s(backward, 0) > 45.0);
@@ -182,22 +184,22 @@ fn a_cycle_may_reverse_and_wait() {
     assert!(edges.len() == 2 && (edges[0] - edges[1]).abs() > 0.05, "{edges:?}");
 }
 
-/// The paper's machine deviates by its tongues, most of all by the first; the end of the last one
-/// comes late, and grows little.
+/// The models of the paper's machine differ due to its tongues, mostly the first one. The run
+/// passes the end of the last tongue late, where disturbances grow little.
 #[test]
-fn a_cause_comes_early_and_grows_enough() {
+fn tongues_that_are_passed_late_are_not_causes() {
     let of = |mass: &str, speed: &str| {
         let axes = AXES.replace("[0.4]", &format!("[{mass}]"));
         let arguments = ["--at", "damping_n_s_per_m=100", "--speed", speed, "--json"];
         let done = explain(&grid(PAPER, &axes), &arguments);
-        assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+        assert_eq!(done.status.code(), Some(0), "{}", all_output(&done));
         serde_json::from_slice::<Value>(&done.stdout).expect("it is JSON")
     };
     let whole = of("0.4", "225:325:5");
     let deviation = &whole["deviation"];
     assert_eq!(deviation["tongues_are_the_cause"], true, "{deviation}");
     assert!(deviation["ratio_without_tongues"].as_f64().expect("a number") < 2.0, "{deviation}");
-    // Of the speeds that are looked at only the last tongue's end is unstable.
+    // The only unstable one of these speeds is the end of the last tongue.
     let part = of("0.4", "315:325:1");
     let deviation = &part["deviation"];
     assert_eq!(deviation["tongues_are_the_cause"], false, "{deviation}");

@@ -1,7 +1,8 @@
-//! Whatever happens to a run, running it again ends in the undisturbed run's bytes.
+//! Tests that a run that was disturbed in any way ends, once it is repeated, with the bytes of an
+//! undisturbed run.
 //!
-//! Drives the real binary on a small grid. Tests that tamper with system calls need strace, those
-//! of a disk that fills up or is read-only need to mount one: they are ignored unless asked for.
+//! They run the program on a small grid. Tests with faults of system calls need strace; those of a
+//! full or read-only disk need to mount one. They are ignored by default.
 
 #![cfg(target_os = "linux")]
 
@@ -12,15 +13,15 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use crate::home::{Home, grid, said, sweep_binary};
 use crate::signal;
+use crate::test_folder::{TestFolder, all_output, grid, sweep_binary};
 
-/// Five chunks of eight points.
-fn fresh_home() -> Home {
-    Home::new(&grid(5, 8))
+/// Returns a folder with a grid of five chunks of eight points.
+fn fresh_folder() -> TestFolder {
+    TestFolder::new(&grid(5, 8))
 }
 
-impl Home {
+impl TestFolder {
     fn output(&self) -> PathBuf {
         self.path("x.parquet")
     }
@@ -29,14 +30,14 @@ impl Home {
         self.path("x.parquet.partial")
     }
 
-    /// The words of a run: one thread, so that which call is the third does not depend on luck.
-    /// Paths are absolute, as messages are to show them.
+    /// Returns the arguments of a run. It has a single thread, so that the order of system calls is
+    /// always the same. Paths are absolute, because messages shall show them so.
     fn words(&self) -> Vec<String> {
         let [grid, output] = [self.path("g.toml"), self.output()].map(text);
         ["run", &grid, "--threads", "1", "--out", &output].map(str::to_owned).to_vec()
     }
 
-    /// A run as a shell takes it, between two single quotes.
+    /// Returns a run as a command line of a shell.
     fn line(&self) -> String {
         [vec![text(sweep_binary())], self.words()].concat().join("' '")
     }
@@ -45,29 +46,29 @@ impl Home {
         self.run_under(&[])
     }
 
-    /// A run behind another program's command line.
+    /// Returns a run as the argument of another program.
     fn run_under(&self, wrapper: &[&str]) -> Command {
         let mut command = self.under(wrapper);
         command.args(self.words());
         command
     }
 
-    /// A run in which strace tampers with system calls.
-    fn tampered(&self, tamper: &[&str]) -> Command {
+    /// Returns a run in which strace injects faults into system calls.
+    fn run_with_faults(&self, faults: &[&str]) -> Command {
         let mut wrapper = vec!["strace", "-f", "-qq", "-o", "/dev/null"];
-        for tamper in tamper {
-            wrapper.extend(["-e", tamper]);
+        for fault in faults {
+            wrapper.extend(["-e", fault]);
         }
         self.run_under(&wrapper)
     }
 
-    /// Whatever stands at the output is whole, and one more run makes it so if nothing does.
-    fn assert_mends(&self, after: &str) {
+    /// Asserts that the output is complete or missing, and that one more run completes it.
+    fn assert_recovers(&self, after: &str) {
         if let Ok(bytes) = fs::read(self.output()) {
             assert!(bytes == undisturbed(), "{after}: a broken result stands at the output");
         }
         let again = output(&mut self.run());
-        assert_eq!(again.status.code(), Some(0), "{after}: {}", said(&again));
+        assert_eq!(again.status.code(), Some(0), "{after}: {}", all_output(&again));
         let bytes = fs::read(self.output()).expect("a finished run has an output");
         assert!(bytes == undisturbed(), "{after}: other bytes than the undisturbed run's");
         assert!(!self.partial().exists(), "{after}: the folder stays behind");
@@ -78,14 +79,14 @@ fn text(path: PathBuf) -> String {
     path.into_os_string().into_string().expect("temporary folders are UTF-8")
 }
 
-/// The bytes of a run that nothing happens to.
+/// Returns the bytes of an undisturbed run.
 fn undisturbed() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
     BYTES.get_or_init(|| {
-        let home = fresh_home();
-        let done = output(&mut home.run());
-        assert!(done.status.success(), "{}", said(&done));
-        fs::read(home.output()).expect("a finished run has an output")
+        let test_folder = fresh_folder();
+        let done = output(&mut test_folder.run());
+        assert!(done.status.success(), "{}", all_output(&done));
+        fs::read(test_folder.output()).expect("a finished run has an output")
     })
 }
 
@@ -105,12 +106,12 @@ fn missing<T>(command: &Command, error: &std::io::Error) -> T {
     )
 }
 
-/// The process that holds the run, once it has computed something.
-fn holder_with_chunk(home: &Home) -> u32 {
+/// Waits for the first chunk and returns the process that holds the run.
+fn holder_with_chunk(test_folder: &TestFolder) -> u32 {
     let started = Instant::now();
     loop {
-        let lock = fs::read_to_string(home.partial().join("lock")).unwrap_or_default();
-        let chunks = home.partial().join("chunk-00000000.bin").exists();
+        let lock = fs::read_to_string(test_folder.partial().join("lock")).unwrap_or_default();
+        let chunks = test_folder.partial().join("chunk-00000000.bin").exists();
         if let (true, Some(process)) =
             (chunks, lock.split(' ').next().and_then(|word| word.parse().ok()))
         {
@@ -121,38 +122,38 @@ fn holder_with_chunk(home: &Home) -> u32 {
     }
 }
 
-/// Holds a run up, for some seconds, between its first chunk and its last.
-fn held_up(home: &Home, seconds: u32) -> Child {
-    // Syncs: the plan and its folder, then each chunk and its folder; the sixth is the second
-    // chunk's folder.
+/// Starts a run that stops for some seconds between its first and its last chunk.
+fn delayed_run(test_folder: &TestFolder, seconds: u32) -> Child {
+    // A run syncs the plan and its folder, then each chunk and its folder. The sixth sync is that
+    // of the folder after the second chunk.
     let delay = format!("inject=fsync:delay_enter={seconds}s:when=6");
-    spawn(&mut home.tampered(&["trace=fsync", &delay]))
+    spawn(&mut test_folder.run_with_faults(&["trace=fsync", &delay]))
 }
 
 #[test]
 fn killed_at_thirty_random_instants() {
     undisturbed();
-    let home = fresh_home();
+    let test_folder = fresh_folder();
     let started = Instant::now();
-    assert!(output(&mut home.run()).status.success());
+    assert!(output(&mut test_folder.run()).status.success());
     let whole = started.elapsed();
     let mut random = 0x2545_f491_4f6c_dd1d_u64;
     let mut killed = 0;
     for round in 0.. {
-        let home = fresh_home();
-        // Each kill meets what the ones before left.
+        let test_folder = fresh_folder();
+        // Each run continues the one that was killed before.
         for _ in 0..6 {
             random ^= random << 13;
             random ^= random >> 7;
             random ^= random << 17;
-            let mut run = spawn(&mut home.run());
+            let mut run = spawn(&mut test_folder.run());
             std::thread::sleep(whole.mul_f64((random % 1000) as f64 / 1000.0));
-            // It may have ended by itself.
+            // The run may have ended before.
             let _ = run.kill();
             let status = run.wait().expect("a child can be waited for");
             killed += u32::from(status.code().is_none());
         }
-        home.assert_mends(&format!("round {round}"));
+        test_folder.assert_recovers(&format!("round {round}"));
         if killed >= 30 {
             return;
         }
@@ -160,15 +161,15 @@ fn killed_at_thirty_random_instants() {
     }
 }
 
-/// Tampers with the first, second, ... call of some system calls, until a run has fewer of them.
+/// Injects a fault into the first, second, ... of some system calls, until a run has fewer of them.
 fn at_every_call(calls: &str, what: &str, check: impl Fn(&Output, u32)) {
     for when in 1.. {
-        let home = fresh_home();
+        let test_folder = fresh_folder();
         let tamper = format!("inject={calls}:{what}:when={when}");
-        let run = output(&mut home.tampered(&[&format!("trace={calls}"), &tamper]));
+        let run = output(&mut test_folder.run_with_faults(&[&format!("trace={calls}"), &tamper]));
         let untouched = run.status.success();
         check(&run, when);
-        home.assert_mends(&format!("{what} at {calls} {when}"));
+        test_folder.assert_recovers(&format!("{what} at {calls} {when}"));
         if untouched {
             assert!(when > 3, "a run has more than {when} of {calls}");
             return;
@@ -183,7 +184,7 @@ const RENAMES: &str = "rename,renameat,renameat2,linkat";
 #[ignore = "needs strace; .ci/run runs it"]
 fn killed_at_every_write() {
     at_every_call("write", "signal=SIGKILL", |run, when| {
-        assert!(run.status.code() != Some(1), "write {when}: {}", said(run));
+        assert!(run.status.code() != Some(1), "write {when}: {}", all_output(run));
     });
 }
 
@@ -191,7 +192,7 @@ fn killed_at_every_write() {
 #[ignore = "needs strace; .ci/run runs it"]
 fn killed_at_every_fsync() {
     at_every_call("fsync", "signal=SIGKILL", |run, when| {
-        assert!(run.status.code() != Some(1), "fsync {when}: {}", said(run));
+        assert!(run.status.code() != Some(1), "fsync {when}: {}", all_output(run));
     });
 }
 
@@ -199,48 +200,51 @@ fn killed_at_every_fsync() {
 #[ignore = "needs strace; .ci/run runs it"]
 fn killed_at_every_rename() {
     at_every_call(RENAMES, "signal=SIGKILL", |run, when| {
-        assert!(run.status.code() != Some(1), "rename {when}: {}", said(run));
+        assert!(run.status.code() != Some(1), "rename {when}: {}", all_output(run));
     });
 }
 
-/// A failed call is a message with the path (the result's, its folder's or its sidecar's) and what
-/// to do, and exit code 1.
-fn told(run: &Output, when: u32) {
-    let said = said(run);
+/// Asserts that a failed call gives exit code 1 and a message with the path of the result, of its
+/// folder or of its record, and with advice.
+fn assert_error_message(run: &Output, when: u32) {
+    let messages = all_output(run);
     let folder = std::env::temp_dir();
     let folder = folder.to_str().expect("temporary folders are UTF-8");
     if !run.status.success() {
-        assert_eq!(run.status.code(), Some(1), "call {when}: {said}");
-        assert!(said.contains(folder) && said.contains("= help: "), "call {when}: {said}");
-        assert!(!said.contains("panicked"), "call {when}: {said}");
+        assert_eq!(run.status.code(), Some(1), "call {when}: {messages}");
+        assert!(
+            messages.contains(folder) && messages.contains("= help: "),
+            "call {when}: {messages}"
+        );
+        assert!(!messages.contains("panicked"), "call {when}: {messages}");
     }
 }
 
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
 fn io_error_at_every_fsync() {
-    at_every_call("fsync", "error=EIO", told);
+    at_every_call("fsync", "error=EIO", assert_error_message);
 }
 
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
 fn io_error_at_every_rename() {
-    at_every_call(RENAMES, "error=EIO", told);
+    at_every_call(RENAMES, "error=EIO", assert_error_message);
 }
 
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
 fn disk_full_at_every_write() {
-    at_every_call("write", "error=ENOSPC", told);
+    at_every_call("write", "error=ENOSPC", assert_error_message);
 }
 
 #[test]
 #[ignore = "needs unshare and mount; .ci/run runs it"]
-fn a_disk_too_small_is_told_and_a_larger_one_is_gone_on_with() {
-    let home = fresh_home();
-    let run = home.line();
-    let out = home.output();
-    // The file system lives in a name space of its own and goes with it; only the result leaves.
+fn a_full_disk_is_an_error_and_the_run_continues_on_a_larger_one() {
+    let test_folder = fresh_folder();
+    let run = test_folder.line();
+    let out = test_folder.output();
+    // The file system exists in a namespace of its own, from which only the result is copied.
     let script = format!(
         "set -eu\n\
          disk=\"$1\"; pages=\"$2\"; result=\"$3\"\n\
@@ -255,21 +259,24 @@ fn a_disk_too_small_is_told_and_a_larger_one_is_gone_on_with() {
     );
     let mut full = 0;
     for pages in [1, 2, 3, 4, 5, 6, 8, 10, 12, 16] {
-        let disk = home.path("disk");
-        let result = home.path("result");
+        let disk = test_folder.path("disk");
+        let result = test_folder.path("result");
         fs::create_dir_all(&disk).expect("a mount point");
         let mut command = Command::new("unshare");
         command.args(["--map-root-user", "--mount", "sh", "-c", &script, "sh"]);
         command.args([disk.as_os_str(), pages.to_string().as_ref(), result.as_os_str()]);
         let run = output(&mut command);
-        let said = said(&run);
-        assert!(run.status.success(), "{pages} pages: {said}");
+        let messages = all_output(&run);
+        assert!(run.status.success(), "{pages} pages: {messages}");
         let first = String::from_utf8_lossy(&run.stdout).into_owned();
         if first.contains("first 1") {
             full += 1;
-            assert!(said.contains("the disk is full: free some space"), "{pages} pages: {said}");
+            assert!(
+                messages.contains("the disk is full: free some space"),
+                "{pages} pages: {messages}"
+            );
         } else {
-            assert!(first.contains("first 0"), "{pages} pages: {first} {said}");
+            assert!(first.contains("first 0"), "{pages} pages: {first} {messages}");
         }
         assert!(
             fs::read(&result).expect("a result") == undisturbed(),
@@ -280,41 +287,41 @@ fn a_disk_too_small_is_told_and_a_larger_one_is_gone_on_with() {
 }
 
 #[test]
-fn a_file_size_limit_is_told_and_gone_on_from() {
+fn a_file_size_limit_is_an_error_and_the_run_continues_without_it() {
     let mut limited = 0;
-    // Blocks of 512 bytes: too small for the plan, for a chunk, for the result.
+    // The limits, in blocks of 512 bytes, are too small for the plan, a chunk and the result.
     for blocks in [1, 2, 4, 8, 16, 24, 32] {
-        let home = fresh_home();
+        let test_folder = fresh_folder();
         let limit = format!("ulimit -f {blocks}; exec \"$@\"");
-        let run = output(&mut home.run_under(&["sh", "-c", &limit, "sh"]));
+        let run = output(&mut test_folder.run_under(&["sh", "-c", &limit, "sh"]));
         if !run.status.success() {
             limited += 1;
-            told(&run, blocks);
+            assert_error_message(&run, blocks);
             assert!(
-                said(&run).contains("a file-size limit was hit"),
+                all_output(&run).contains("a file-size limit was hit"),
                 "{blocks} blocks: {}",
-                said(&run)
+                all_output(&run)
             );
         }
-        home.assert_mends(&format!("{blocks} blocks"));
+        test_folder.assert_recovers(&format!("{blocks} blocks"));
     }
     assert!(limited >= 3, "only {limited} limits were met");
 }
 
 #[test]
-fn a_flipped_bit_and_a_truncation_are_told_and_mended() {
+fn a_flipped_bit_and_a_truncation_are_errors_and_repaired() {
     let break_chunk = |change: &dyn Fn(&mut Vec<u8>)| {
-        let home = fresh_home();
-        let shard = output(home.run().args(["--shard", "1/2"]));
-        assert!(shard.status.success(), "{}", said(&shard));
-        let chunk = home.partial().join("chunk-00000002.bin");
+        let test_folder = fresh_folder();
+        let shard = output(test_folder.run().args(["--shard", "1/2"]));
+        assert!(shard.status.success(), "{}", all_output(&shard));
+        let chunk = test_folder.partial().join("chunk-00000002.bin");
         let mut bytes = fs::read(&chunk).expect("the first shard has the third chunk");
         change(&mut bytes);
         fs::write(&chunk, bytes).expect("the chunk is broken");
-        let run = output(&mut home.run());
-        assert!(run.status.success(), "{}", said(&run));
-        assert!(said(&run).contains("chunk-00000002.bin.damaged"), "{}", said(&run));
-        assert!(fs::read(home.output()).expect("a result") == undisturbed());
+        let run = output(&mut test_folder.run());
+        assert!(run.status.success(), "{}", all_output(&run));
+        assert!(all_output(&run).contains("chunk-00000002.bin.damaged"), "{}", all_output(&run));
+        assert!(fs::read(test_folder.output()).expect("a result") == undisturbed());
     };
     break_chunk(&|bytes| {
         let middle = bytes.len() / 2;
@@ -326,66 +333,70 @@ fn a_flipped_bit_and_a_truncation_are_told_and_mended() {
 
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
-fn a_system_without_random_numbers_is_told() {
+fn a_system_without_random_numbers_is_an_error() {
     for error in ["ENOSYS", "ENOLCK", "EIO"] {
-        let home = fresh_home();
+        let test_folder = fresh_folder();
         let inject = format!("inject=getrandom:error={error}");
-        let run = output(&mut home.tampered(&["trace=getrandom", &inject]));
-        let text = said(&run);
+        let run = output(&mut test_folder.run_with_faults(&["trace=getrandom", &inject]));
+        let text = all_output(&run);
         assert!(!text.contains("panicked"), "{error}: {text}");
-        // Another source may take the place of a call that is not there.
+        // The program may use another source if the call does not exist.
         let is_told = text.contains("cannot draw random numbers for this process");
         assert!(run.status.success() || is_told, "{error}: {text}");
-        home.assert_mends(error);
+        test_folder.assert_recovers(error);
     }
 }
 
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
-fn a_second_runner_is_sent_away_with_the_first_ones_process_and_a_killed_one_blocks_nobody() {
-    let home = fresh_home();
-    let mut first = held_up(&home, 3);
-    let process = holder_with_chunk(&home);
-    let second = output(&mut home.run());
-    assert_eq!(second.status.code(), Some(75), "{}", said(&second));
-    assert!(said(&second).contains(&format!("process {process} on ")), "{}", said(&second));
+fn a_second_run_names_the_process_of_the_first_unless_it_was_killed() {
+    let test_folder = fresh_folder();
+    let mut first = delayed_run(&test_folder, 3);
+    let process = holder_with_chunk(&test_folder);
+    let second = output(&mut test_folder.run());
+    assert_eq!(second.status.code(), Some(75), "{}", all_output(&second));
+    assert!(
+        all_output(&second).contains(&format!("process {process} on ")),
+        "{}",
+        all_output(&second)
+    );
     assert!(first.wait().expect("a child can be waited for").success());
-    home.assert_mends("two runners");
+    test_folder.assert_recovers("two runners");
 
-    let home = fresh_home();
-    let mut first = held_up(&home, 30);
-    signal("KILL", holder_with_chunk(&home));
+    let test_folder = fresh_folder();
+    let mut first = delayed_run(&test_folder, 30);
+    signal("KILL", holder_with_chunk(&test_folder));
     first.wait().expect("a child can be waited for");
-    home.assert_mends("a killed runner");
+    test_folder.assert_recovers("a killed runner");
 }
 
 #[test]
 #[ignore = "needs strace; .ci/run runs it"]
-fn a_signal_keeps_what_is_done() {
+fn a_signal_keeps_completed_chunks() {
     for (name, code) in [("TERM", 143), ("INT", 130)] {
-        let home = fresh_home();
-        let run = held_up(&home, 1);
-        signal(name, holder_with_chunk(&home));
+        let test_folder = fresh_folder();
+        let run = delayed_run(&test_folder, 1);
+        signal(name, holder_with_chunk(&test_folder));
         let run = run.wait_with_output().expect("a child can be waited for");
-        assert_eq!(run.status.code(), Some(code), "{}", said(&run));
-        assert!(said(&run).contains("of 40 points kept"), "{}", said(&run));
-        assert!(!home.output().exists());
-        home.assert_mends(name);
+        assert_eq!(run.status.code(), Some(code), "{}", all_output(&run));
+        assert!(all_output(&run).contains("of 40 points kept"), "{}", all_output(&run));
+        assert!(!test_folder.output().exists());
+        test_folder.assert_recovers(name);
     }
 }
 
 #[test]
-fn a_second_signal_leaves_at_once() {
-    // Nobody reads what the run says, and no more fits into the pipe: with its answer to the first
-    // signal it waits there.
+fn a_second_signal_ends_the_run_at_once() {
+    // Nobody reads the messages of the run, and the pipe is full, so that the run blocks on its
+    // message about the first signal.
     const PIPE_BYTES: usize = 1 << 16;
     let (_reader, mut full) = std::io::pipe().expect("a pipe can be made");
     full.write_all(&[b' '; PIPE_BYTES]).expect("a pipe takes as much");
-    let home = fresh_home();
-    home.choose_for_seconds();
-    let mut run = home.run().stderr(full).spawn().expect("the command starts");
+    let test_folder = fresh_folder();
+    test_folder.write_slow_list();
+    let mut run = test_folder.run().stderr(full).spawn().expect("the command starts");
     let begun = Instant::now();
-    while !home.partial().join("plan.json").exists() {
+    while !test_folder.partial().join("plan.json").exists() {
         assert!(begun.elapsed() < Duration::from_secs(60), "no run starts");
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -400,29 +411,29 @@ fn a_second_signal_leaves_at_once() {
     signal("TERM", run.id());
     assert_eq!(run.wait().expect("a child can be waited for").code(), Some(143));
     assert!(second.elapsed() < Duration::from_secs(10), "it stayed for {:?}", second.elapsed());
-    assert!(!home.output().exists());
+    assert!(!test_folder.output().exists());
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_told() {
-    let home = fresh_home();
-    let blocked = home.path("g.toml/sub/x.parquet");
-    let words = home.words();
-    let run = output(home.under(&[]).args(&words[..words.len() - 1]).arg(&blocked));
-    assert_eq!(run.status.code(), Some(1), "{}", said(&run));
-    assert!(said(&run).contains("or give another path"), "{}", said(&run));
-    assert!(Path::new(&home.path("g.toml")).is_file());
+fn a_folder_that_cannot_be_written_is_an_error() {
+    let test_folder = fresh_folder();
+    let blocked = test_folder.path("g.toml/sub/x.parquet");
+    let words = test_folder.words();
+    let run = output(test_folder.under(&[]).args(&words[..words.len() - 1]).arg(&blocked));
+    assert_eq!(run.status.code(), Some(1), "{}", all_output(&run));
+    assert!(all_output(&run).contains("or give another path"), "{}", all_output(&run));
+    assert!(Path::new(&test_folder.path("g.toml")).is_file());
 }
 
 #[test]
 #[ignore = "needs unshare and mount; .ci/run runs it"]
-fn a_read_only_folder_is_told_and_gone_on_with_when_it_is_not() {
-    let home = fresh_home();
-    let disk = home.path("disk");
+fn a_read_only_folder_is_an_error_and_the_run_continues_once_it_is_writable() {
+    let test_folder = fresh_folder();
+    let disk = test_folder.path("disk");
     fs::create_dir(&disk).expect("a mount point");
-    let out = home.output();
-    let run = home.line().replace(out.to_str().expect("UTF-8"), "'\"$1\"'/x.parquet");
-    // For root too, which permissions do not stop.
+    let out = test_folder.output();
+    let run = test_folder.line().replace(out.to_str().expect("UTF-8"), "'\"$1\"'/x.parquet");
+    // A read-only mount stops root too, which permissions do not.
     let script = format!(
         "set -eu\n\
          mount -t tmpfs -o size=16m none \"$1\"\n\
@@ -436,32 +447,33 @@ fn a_read_only_folder_is_told_and_gone_on_with_when_it_is_not() {
     );
     let mut command = Command::new("unshare");
     command.args(["--map-root-user", "--mount", "sh", "-c", &script, "sh"]);
-    command.args([disk.as_os_str(), home.path("result").as_os_str()]);
+    command.args([disk.as_os_str(), test_folder.path("result").as_os_str()]);
     let run = output(&mut command);
-    assert!(run.status.success(), "{}", said(&run));
-    assert!(String::from_utf8_lossy(&run.stdout).contains("read-only 1"), "{}", said(&run));
-    assert!(said(&run).contains("give this user the right to it"), "{}", said(&run));
-    assert!(fs::read(home.path("result")).expect("a result") == undisturbed());
+    assert!(run.status.success(), "{}", all_output(&run));
+    assert!(String::from_utf8_lossy(&run.stdout).contains("read-only 1"), "{}", all_output(&run));
+    assert!(all_output(&run).contains("give this user the right to it"), "{}", all_output(&run));
+    assert!(fs::read(test_folder.path("result")).expect("a result") == undisturbed());
 }
 
 #[test]
-fn failed_points_are_rows_and_fail_the_run_only_when_asked() {
-    let home = fresh_home();
-    // Springs from too soft to carry the machine to its own.
+fn failed_points_are_rows_and_fail_the_run_only_on_request() {
+    let test_folder = fresh_folder();
+    // The softest springs cannot carry the machine.
     let axis =
         "[[axis]]\nparameter = \"spring_stiffness_n_per_m\"\nvalues = [1, 7000]\n[reliability]";
-    fs::write(home.path("g.toml"), grid(5, 8).replace("[reliability]", axis))
+    fs::write(test_folder.path("g.toml"), grid(5, 8).replace("[reliability]", axis))
         .expect("the grid is written");
-    let run = output(&mut home.run());
-    assert_eq!(run.status.code(), Some(0), "{}", said(&run));
-    assert!(said(&run).contains("failed  40 no_equilibrium"), "{}", said(&run));
-    // Rows that are there already count too.
+    let run = output(&mut test_folder.run());
+    assert_eq!(run.status.code(), Some(0), "{}", all_output(&run));
+    assert!(all_output(&run).contains("failed  40 no_equilibrium"), "{}", all_output(&run));
+    // Rows of an earlier run count too.
     for fresh in [&[] as &[&str], &["--fresh"]] {
-        let run = output(home.run().arg("--fail-on-error").args(fresh));
-        assert_eq!(run.status.code(), Some(3), "{fresh:?}: {}", said(&run));
+        let run = output(test_folder.run().arg("--fail-on-error").args(fresh));
+        assert_eq!(run.status.code(), Some(3), "{fresh:?}: {}", all_output(&run));
     }
-    // A shard speaks of its own rows, and the merge of all.
-    let sharded = |words: &[&str]| home.sweep(&[words, &["g.toml", "--out", "s.parquet"]].concat());
+    // A shard reports its own rows, and the merge all rows.
+    let sharded =
+        |words: &[&str]| test_folder.sweep(&[words, &["g.toml", "--out", "s.parquet"]].concat());
     for (words, code) in [
         (&["run", "--shard", "1/2", "--fail-on-error"][..], 3),
         (&["run", "--shard", "2/2"], 0),
@@ -469,14 +481,14 @@ fn failed_points_are_rows_and_fail_the_run_only_when_asked() {
         (&["merge"], 0),
     ] {
         let done = sharded(words);
-        assert_eq!(done.status.code(), Some(code), "{words:?}: {}", said(&done));
-        assert!(said(&done).contains(" no_equilibrium"), "{words:?}: {}", said(&done));
+        assert_eq!(done.status.code(), Some(code), "{words:?}: {}", all_output(&done));
+        assert!(all_output(&done).contains(" no_equilibrium"), "{words:?}: {}", all_output(&done));
     }
-    let last = home.sweep(&["run", "g.toml", "--shard", "12/12", "--out", "t.parquet"]);
+    let last = test_folder.sweep(&["run", "g.toml", "--shard", "12/12", "--out", "t.parquet"]);
     let idle = "with 10 chunks of 8 points, the run leaves 2 of the 12 shards without work";
-    assert!(said(&last).contains(idle), "{}", said(&last));
-    let checked = home.sweep(&["check", "g.toml"]);
-    assert!(said(&checked).contains(" no_equilibrium, of "), "{}", said(&checked));
-    let whole = output(fresh_home().run().arg("--fail-on-error"));
-    assert_eq!(whole.status.code(), Some(0), "{}", said(&whole));
+    assert!(all_output(&last).contains(idle), "{}", all_output(&last));
+    let checked = test_folder.sweep(&["check", "g.toml"]);
+    assert!(all_output(&checked).contains(" no_equilibrium, of "), "{}", all_output(&checked));
+    let whole = output(fresh_folder().run().arg("--fail-on-error"));
+    assert_eq!(whole.status.code(), Some(0), "{}", all_output(&whole));
 }

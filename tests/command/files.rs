@@ -1,4 +1,4 @@
-//! Files that a command may write over, and its answers to files that have changed.
+//! Tests of the files that commands overwrite, and of files that have changed.
 
 #![cfg(target_os = "linux")]
 
@@ -8,9 +8,9 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use crate::home::{Home, grid, said};
+use crate::test_folder::{TestFolder, all_output, grid};
 
-/// Every command that writes a file of its user's choice, up to the path.
+/// The commands that write a file, without its path.
 const WRITERS: [&[&str]; 7] = [
     &["run", "g.toml", "--out"],
     &["run", "g.toml", "--fresh", "--out"],
@@ -21,90 +21,95 @@ const WRITERS: [&[&str]; 7] = [
     &["plot", "map.parquet", "-o"],
 ];
 
-/// A folder with the grid, its finished map `map.parquet`, and nothing else.
-fn fresh_home() -> Home {
+/// Returns a folder with a grid and its finished map `map.parquet`.
+fn fresh_folder() -> TestFolder {
     static MAP: OnceLock<Vec<u8>> = OnceLock::new();
-    let home = Home::new(&grid(5, 8));
+    let test_folder = TestFolder::new(&grid(5, 8));
     let map = MAP.get_or_init(|| {
-        let done = home.sweep(&["run", "g.toml", "--out", "map.parquet"]);
-        assert!(done.status.success(), "{}", said(&done));
-        fs::remove_file(home.path("map.run.json")).expect("there is a sidecar");
-        fs::read(home.path("map.parquet")).expect("there is a map")
+        let done = test_folder.sweep(&["run", "g.toml", "--out", "map.parquet"]);
+        assert!(done.status.success(), "{}", all_output(&done));
+        fs::remove_file(test_folder.path("map.run.json")).expect("there is a sidecar");
+        fs::read(test_folder.path("map.parquet")).expect("there is a map")
     });
-    fs::write(home.path("map.parquet"), map).expect("the map is written");
-    home
+    fs::write(test_folder.path("map.parquet"), map).expect("the map is written");
+    test_folder
 }
 
-/// Runs a program that is on every Linux.
+/// Runs a standard program of Linux.
 fn run(program: &str, words: &[&Path]) {
     let status = Command::new(program).args(words).status().expect("the program starts");
     assert!(status.success(), "{program} {words:?}");
 }
 
-/// The refusal of an output: exit code 2, its name, why, what to do.
-fn assert_refused(output: &Output, writer: &[&str], name: &str) -> String {
-    let said = said(output);
-    assert_eq!(output.status.code(), Some(2), "{writer:?} {name}: {said}");
+/// Asserts that a command does not write an output: exit code 2, the name of the output, the reason
+/// and advice. Returns the message.
+fn assert_not_written(output: &Output, writer: &[&str], name: &str) -> String {
+    let messages = all_output(output);
+    assert_eq!(output.status.code(), Some(2), "{writer:?} {name}: {messages}");
     assert!(
-        said.contains("cannot be an output") && said.contains("= help: "),
-        "{writer:?} {name}: {said}"
+        messages.contains("cannot be an output") && messages.contains("= help: "),
+        "{writer:?} {name}: {messages}"
     );
-    said
+    messages
 }
 
 #[test]
-fn no_command_writes_over_what_is_not_its_own() {
+fn no_command_overwrites_files_of_other_kinds() {
     for writer in WRITERS {
-        let home = fresh_home();
+        let test_folder = fresh_folder();
         let ending = if writer[0] == "plot" { ".svg" } else { ".parquet" };
         let named = |name: &str| format!("{name}{ending}");
         let [fifo, folder, link, dangling, hard, mine] =
             ["fifo", "folder", "link", "dangling", "hard", "mine"].map(named);
-        run("mkfifo", &[&home.path(&fifo)]);
-        fs::create_dir(home.path(&folder)).expect("a folder is made");
-        fs::write(home.path("thesis.tex"), "mine").expect("a file is written");
-        std::os::unix::fs::symlink("thesis.tex", home.path(&link)).expect("a link is made");
-        std::os::unix::fs::symlink("nowhere", home.path(&dangling)).expect("a link is made");
-        // The grid file under another name, and a file of somebody's.
-        fs::hard_link(home.path("g.toml"), home.path(&hard)).expect("a link is made");
-        fs::write(home.path(&mine), "mine").expect("a file is written");
-        let before = home.names();
+        run("mkfifo", &[&test_folder.path(&fifo)]);
+        fs::create_dir(test_folder.path(&folder)).expect("a folder is made");
+        fs::write(test_folder.path("thesis.tex"), "mine").expect("a file is written");
+        std::os::unix::fs::symlink("thesis.tex", test_folder.path(&link)).expect("a link is made");
+        std::os::unix::fs::symlink("nowhere", test_folder.path(&dangling)).expect("a link is made");
+        // The link to the grid file has another name, and the other file is of another program.
+        fs::hard_link(test_folder.path("g.toml"), test_folder.path(&hard)).expect("a link is made");
+        fs::write(test_folder.path(&mine), "mine").expect("a file is written");
+        let before = test_folder.names();
         for name in [&fifo, &folder, &link, &dangling, &hard, &mine] {
             for path in [name.clone(), format!("./{name}")] {
-                assert_refused(&home.sweep(&[writer, &[&path]].concat()), writer, &path);
+                assert_not_written(&test_folder.sweep(&[writer, &[&path]].concat()), writer, &path);
             }
         }
         if ending == ".parquet" {
             for path in ["/dev/null", "/dev/stdout", "g.toml", "new/", "new/.", ".."] {
-                assert_refused(&home.sweep(&[writer, &[path]].concat()), writer, path);
+                assert_not_written(&test_folder.sweep(&[writer, &[path]].concat()), writer, path);
             }
         }
-        assert_eq!(home.names(), before, "{writer:?}");
-        assert_eq!(fs::read_to_string(home.path("g.toml")).expect("the grid"), grid(5, 8));
-        assert_eq!(fs::read_to_string(home.path("thesis.tex")).expect("the thesis"), "mine");
-        assert_eq!(fs::read_to_string(home.path(&mine)).expect("the file"), "mine");
+        assert_eq!(test_folder.names(), before, "{writer:?}");
+        assert_eq!(fs::read_to_string(test_folder.path("g.toml")).expect("the grid"), grid(5, 8));
+        assert_eq!(fs::read_to_string(test_folder.path("thesis.tex")).expect("the thesis"), "mine");
+        assert_eq!(fs::read_to_string(test_folder.path(&mine)).expect("the file"), "mine");
     }
 }
 
 #[test]
 fn a_result_has_no_name_of_another_format() {
-    let home = fresh_home();
+    let test_folder = fresh_folder();
     for writer in WRITERS.iter().filter(|writer| writer[0] != "plot") {
-        let said = assert_refused(&home.sweep(&[*writer, &["x.CSV"]].concat()), writer, "x.CSV");
-        assert!(said.contains("Parquet") && said.contains("`sweep export`"), "{said}");
+        let messages = assert_not_written(
+            &test_folder.sweep(&[*writer, &["x.CSV"]].concat()),
+            writer,
+            "x.CSV",
+        );
+        assert!(messages.contains("Parquet") && messages.contains("`sweep export`"), "{messages}");
     }
-    assert_eq!(home.names(), ["g.toml", "map.parquet"]);
+    assert_eq!(test_folder.names(), ["g.toml", "map.parquet"]);
 }
 
 #[test]
-fn a_file_of_another_kind_is_said_to_be_one_and_nothing_else() {
-    let home = fresh_home();
-    assert!(home.sweep(&["init", "--machine", "m.toml"]).status.success());
+fn errors_about_files_of_another_kind_name_the_kind() {
+    let test_folder = fresh_folder();
+    assert!(test_folder.sweep(&["init", "--machine", "m.toml"]).status.success());
     let study = "grid = \"g.toml\"\nseed = 1\n[[parameter]]\nname = \"friction_n\"\n";
-    fs::write(home.path("s.toml"), study).expect("a study is written");
+    fs::write(test_folder.path("s.toml"), study).expect("a study is written");
     for (file, text) in [("gm.toml", "m.toml"), ("gg.toml", "g.toml")] {
         let grid = grid(5, 8).replace("[spin]", &format!("machine = \"{text}\"\n[spin]"));
-        fs::write(home.path(file), grid).expect("a grid is written");
+        fs::write(test_folder.path(file), grid).expect("a grid is written");
     }
     for (words, kind, help) in [
         (["run", "m.toml"], "a machine file", "a grid file names it: machine = \"m.toml\""),
@@ -113,115 +118,128 @@ fn a_file_of_another_kind_is_said_to_be_one_and_nothing_else() {
         (["optimise", "g.toml"], "a grid file", "a study file names it: grid = \"g.toml\""),
         (["check", "gg.toml"], "a grid file", "`sweep run` takes it"),
     ] {
-        let run = home.sweep(&words);
-        let said = said(&run);
-        assert_eq!(run.status.code(), Some(2), "{words:?}: {said}");
-        let one = said.contains("1 mistake,") && said.contains(&format!("this is {kind}"));
-        assert!(one && said.contains(help), "{words:?}: {said}");
+        let run = test_folder.sweep(&words);
+        let messages = all_output(&run);
+        assert_eq!(run.status.code(), Some(2), "{words:?}: {messages}");
+        let one = messages.contains("1 mistake,") && messages.contains(&format!("this is {kind}"));
+        assert!(one && messages.contains(help), "{words:?}: {messages}");
     }
-    assert!(home.sweep(&["check", "gm.toml"]).status.success());
+    assert!(test_folder.sweep(&["check", "gm.toml"]).status.success());
 }
 
 #[test]
-fn help_is_of_what_the_command_has() {
-    let home = fresh_home();
+fn errors_mention_only_options_of_the_command() {
+    let test_folder = fresh_folder();
     for words in [["init", "nodir/x.toml"], ["init", "g.toml/x.toml"], ["plot", "no.parquet"]] {
-        let said = said(&home.sweep(&words));
-        let is_foreign = said.contains("--out") || said.contains("chunks");
-        assert!(said.contains("= help: ") && !is_foreign, "{words:?}: {said}");
+        let messages = all_output(&test_folder.sweep(&words));
+        let is_foreign = messages.contains("--out") || messages.contains("chunks");
+        assert!(messages.contains("= help: ") && !is_foreign, "{words:?}: {messages}");
     }
 }
 
 #[test]
 fn a_figure_does_not_overwrite_its_data_by_any_path() {
-    let home = fresh_home();
-    fs::rename(home.path("map.parquet"), home.path("map.svg")).expect("the map is renamed");
-    let data = fs::read(home.path("map.svg")).expect("the map");
-    std::os::unix::fs::symlink("map.svg", home.path("link.svg")).expect("a link is made");
-    fs::hard_link(home.path("map.svg"), home.path("hard.svg")).expect("a link is made");
-    let absolute = home.path("map.svg");
+    let test_folder = fresh_folder();
+    fs::rename(test_folder.path("map.parquet"), test_folder.path("map.svg"))
+        .expect("the map is renamed");
+    let data = fs::read(test_folder.path("map.svg")).expect("the map");
+    std::os::unix::fs::symlink("map.svg", test_folder.path("link.svg")).expect("a link is made");
+    fs::hard_link(test_folder.path("map.svg"), test_folder.path("hard.svg"))
+        .expect("a link is made");
+    let absolute = test_folder.path("map.svg");
     let outputs =
         ["map.svg", "./map.svg", absolute.to_str().expect("UTF-8"), "link.svg", "hard.svg"];
     for output in outputs {
-        assert_refused(&home.sweep(&["plot", "map.svg", "-o", output]), &["plot"], output);
-        assert!(fs::read(home.path("map.svg")).expect("the map") == data, "{output}");
+        assert_not_written(
+            &test_folder.sweep(&["plot", "map.svg", "-o", output]),
+            &["plot"],
+            output,
+        );
+        assert!(fs::read(test_folder.path("map.svg")).expect("the map") == data, "{output}");
     }
-    assert!(home.sweep(&["plot", "map.svg", "-o", "figure.svg"]).status.success());
+    assert!(test_folder.sweep(&["plot", "map.svg", "-o", "figure.svg"]).status.success());
 }
 
 #[test]
-fn every_command_writes_over_its_own_and_clears_up_after_killed_processes() {
+fn every_command_overwrites_its_own_files_and_removes_those_of_killed_processes() {
     for writer in WRITERS.iter().filter(|writer| writer[0] != "merge") {
-        let home = fresh_home();
+        let test_folder = fresh_folder();
         let outputs: &[&str] = if writer[0] == "plot" {
             &["out.svg", "out.png", "out.html"]
         } else {
             &["out.parquet"]
         };
         for output in outputs {
-            fs::create_dir_all(home.path("new")).expect("a folder is made");
+            fs::create_dir_all(test_folder.path("new")).expect("a folder is made");
             let path = format!("new/{output}");
             let mut bytes = Vec::new();
             for round in 0..2 {
-                // A process that is killed while it writes leaves such a file.
-                let left = home.path("new").join(sweep_files::atomic::temporary_name());
+                // A process that is killed during a write leaves such a file.
+                let left = test_folder.path("new").join(sweep_files::atomic::temporary_name());
                 fs::write(&left, "half").expect("a leftover is written");
-                // A run has a folder of its own for such files, and clears that.
+                // A run has a folder for such files, which it deletes.
                 let is_run = writer[0] == "run";
                 if is_run {
                     fs::remove_file(&left).expect("the leftover goes");
                 }
-                let done = home.sweep(&[*writer, &[&path]].concat());
+                let done = test_folder.sweep(&[*writer, &[&path]].concat());
                 assert!(
                     done.status.success(),
                     "{writer:?} {output} round {round}: {}",
-                    said(&done)
+                    all_output(&done)
                 );
                 assert!(!left.exists(), "{writer:?} {output}");
-                let written = fs::read(home.path(&path)).expect("there is an output");
+                let written = fs::read(test_folder.path(&path)).expect("there is an output");
                 assert!(round == 0 || written == bytes, "{writer:?} {output}: other bytes");
                 bytes = written;
             }
         }
-        let names: Vec<_> = fs::read_dir(home.path("new")).expect("the folder").collect();
+        let names: Vec<_> = fs::read_dir(test_folder.path("new")).expect("the folder").collect();
         let sidecars = usize::from(writer[0] == "run");
         assert_eq!(names.len(), outputs.len() + sidecars, "{writer:?}: {names:?}");
     }
 }
 
 #[test]
-fn a_file_size_limit_leaves_the_old_file() {
+fn a_file_size_limit_does_not_damage_the_old_file() {
     for (writer, output) in
         [(WRITERS[3], "x.parquet"), (WRITERS[4], "x.parquet"), (WRITERS[6], "x.svg")]
     {
-        let home = fresh_home();
+        let test_folder = fresh_folder();
         let limited = |output: &str| {
             let limit = ["sh", "-c", "ulimit -f 1; exec \"$@\"", "sh"];
-            home.under(&limit).args(writer).arg(output).output().expect("sh starts")
+            test_folder.under(&limit).args(writer).arg(output).output().expect("sh starts")
         };
         let run = limited(output);
-        assert_eq!(run.status.code(), Some(1), "{writer:?}: {}", said(&run));
-        assert!(said(&run).contains("a file-size limit was hit"), "{writer:?}: {}", said(&run));
-        assert_eq!(home.names(), ["g.toml", "map.parquet"], "{writer:?}");
+        assert_eq!(run.status.code(), Some(1), "{writer:?}: {}", all_output(&run));
+        assert!(
+            all_output(&run).contains("a file-size limit was hit"),
+            "{writer:?}: {}",
+            all_output(&run)
+        );
+        assert_eq!(test_folder.names(), ["g.toml", "map.parquet"], "{writer:?}");
 
-        let whole = home.sweep(&[writer, &[output]].concat());
-        assert!(whole.status.success(), "{}", said(&whole));
-        let before = fs::read(home.path(output)).expect("there is an output");
+        let whole = test_folder.sweep(&[writer, &[output]].concat());
+        assert!(whole.status.success(), "{}", all_output(&whole));
+        let before = fs::read(test_folder.path(output)).expect("there is an output");
         assert_eq!(limited(output).status.code(), Some(1));
-        assert!(fs::read(home.path(output)).expect("there is an output") == before, "{writer:?}");
+        assert!(
+            fs::read(test_folder.path(output)).expect("there is an output") == before,
+            "{writer:?}"
+        );
     }
 }
 
 #[test]
-fn traces_beside_a_result_are_named_as_it_is() {
-    let home = fresh_home();
+fn traces_beside_a_result_have_its_name() {
+    let test_folder = fresh_folder();
     for (output, traces) in
         [("v1.0", "v1.0.traces"), ("v1.5", "v1.5.traces"), ("x.parquet", "x.traces")]
     {
-        let run = home.sweep(&["run", "g.toml", "--keep-traces", "--out", output]);
-        assert!(run.status.success(), "{}", said(&run));
+        let run = test_folder.sweep(&["run", "g.toml", "--keep-traces", "--out", output]);
+        assert!(run.status.success(), "{}", all_output(&run));
         assert_eq!(
-            fs::read_dir(home.path(traces)).expect("there are traces").count(),
+            fs::read_dir(test_folder.path(traces)).expect("there are traces").count(),
             40,
             "{output}"
         );
@@ -230,22 +248,22 @@ fn traces_beside_a_result_are_named_as_it_is() {
 
 #[test]
 fn kept_traces_are_the_trajectories_of_their_rows() {
-    let home = fresh_home();
+    let test_folder = fresh_folder();
     let fast = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[time]\nend_s = 2\n\
                 [[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.2, 0.3]\n";
-    fs::write(home.path("fast.toml"), fast).expect("the grid is written");
-    let run = home.sweep(&["run", "fast.toml", "--keep-traces", "--out", "x.parquet"]);
-    assert!(run.status.success(), "{}", said(&run));
-    assert!(said(&run).contains("rows by method: 3 capped_1"), "{}", said(&run));
+    fs::write(test_folder.path("fast.toml"), fast).expect("the grid is written");
+    let run = test_folder.sweep(&["run", "fast.toml", "--keep-traces", "--out", "x.parquet"]);
+    assert!(run.status.success(), "{}", all_output(&run));
+    assert!(all_output(&run).contains("rows by method: 3 capped_1"), "{}", all_output(&run));
     for point in 0..3 {
-        let bytes = fs::read(home.path(&format!("x.traces/point-{point}.parquet")));
+        let bytes = fs::read(test_folder.path(&format!("x.traces/point-{point}.parquet")));
         let bytes = bytes.expect("the point has a trace");
         assert!(String::from_utf8_lossy(&bytes).contains(r#""row":"capped_1""#), "point {point}");
     }
 }
 
-/// A bit of this file is flipped, read by `look`, and flipped back.
-fn with_flipped_bit<T>(path: &Path, at: u64, bit: u8, look: impl FnOnce() -> T) -> T {
+/// Calls a function while a bit of a file is flipped.
+fn with_flipped_bit<T>(path: &Path, at: u64, bit: u8, read: impl FnOnce() -> T) -> T {
     let flip = || {
         let mut file =
             fs::OpenOptions::new().read(true).write(true).open(path).expect("the file opens");
@@ -256,19 +274,19 @@ fn with_flipped_bit<T>(path: &Path, at: u64, bit: u8, look: impl FnOnce() -> T) 
         file.write_all(&[byte[0] ^ (1 << bit)]).expect("a byte is written");
     };
     flip();
-    let seen = look();
+    let seen = read();
     flip();
     seen
 }
 
 #[test]
-fn every_command_that_reads_a_file_sees_a_flipped_bit() {
-    let home = fresh_home();
-    let map = home.path("map.parquet");
+fn every_command_detects_a_flipped_bit_in_its_input() {
+    let test_folder = fresh_folder();
+    let map = test_folder.path("map.parquet");
     let whole = fs::read(&map).expect("the map");
     for writer in [WRITERS[3], WRITERS[4], WRITERS[5]] {
-        let done = home.sweep(&[writer, &[&format!("{}.parquet", writer[0])]].concat());
-        assert!(done.status.success(), "{}", said(&done));
+        let done = test_folder.sweep(&[writer, &[&format!("{}.parquet", writer[0])]].concat());
+        assert!(done.status.success(), "{}", all_output(&done));
     }
     let readers: [&[&str]; 9] = [
         &["run", "g.toml", "--out", "map.parquet"],
@@ -284,7 +302,7 @@ fn every_command_that_reads_a_file_sees_a_flipped_bit() {
     let mut random = 0x2545_f491_4f6c_dd1d_u64;
     for reader in readers {
         let path = reader.iter().find(|word| word.ends_with(".parquet")).expect("a file to read");
-        let path = home.path(path);
+        let path = test_folder.path(path);
         let length = fs::metadata(&path).expect("the file is there").len();
         for _ in 0..12 {
             random ^= random << 13;
@@ -292,8 +310,8 @@ fn every_command_that_reads_a_file_sees_a_flipped_bit() {
             random ^= random << 17;
             let at = random % length;
             let bit = (random >> 40) as u8 % 8;
-            let seen = with_flipped_bit(&path, at, bit, || home.sweep(reader));
-            let text = said(&seen);
+            let seen = with_flipped_bit(&path, at, bit, || test_folder.sweep(reader));
+            let text = all_output(&seen);
             assert!(
                 matches!(seen.status.code(), Some(1 | 2)),
                 "{reader:?}, bit {bit} of {at}: {text}"
@@ -303,46 +321,50 @@ fn every_command_that_reads_a_file_sees_a_flipped_bit() {
     }
     assert!(fs::read(&map).expect("the map") == whole);
     for picture in ["map.svg", "trace.html", "modes.png"] {
-        assert!(!home.path(picture).exists(), "{picture}");
+        assert!(!test_folder.path(picture).exists(), "{picture}");
     }
 }
 
 #[test]
-fn junk_at_an_output_is_not_a_run_that_has_not_started() {
-    let home = fresh_home();
-    fs::write(home.path("junk.parquet"), "junk").expect("a file is written");
-    let status = home.sweep(&["status", "g.toml", "--out", "junk.parquet"]);
-    assert_refused(&status, &["status"], "junk.parquet");
-    let status = home.sweep(&["status", "g.toml", "--out", "nothing.parquet"]);
-    assert!(status.status.success() && said(&status).contains("not started"), "{}", said(&status));
+fn status_reports_a_file_that_is_no_result() {
+    let test_folder = fresh_folder();
+    fs::write(test_folder.path("junk.parquet"), "junk").expect("a file is written");
+    let status = test_folder.sweep(&["status", "g.toml", "--out", "junk.parquet"]);
+    assert_not_written(&status, &["status"], "junk.parquet");
+    let status = test_folder.sweep(&["status", "g.toml", "--out", "nothing.parquet"]);
+    assert!(
+        status.status.success() && all_output(&status).contains("not started"),
+        "{}",
+        all_output(&status)
+    );
     let status =
-        home.sweep(&["status", "g.toml", "--set", "tub_mass_kg=20", "--out", "map.parquet"]);
-    assert_eq!(status.status.code(), Some(2), "{}", said(&status));
-    assert!(said(&status).contains("tub"), "{}", said(&status));
+        test_folder.sweep(&["status", "g.toml", "--set", "tub_mass_kg=20", "--out", "map.parquet"]);
+    assert_eq!(status.status.code(), Some(2), "{}", all_output(&status));
+    assert!(all_output(&status).contains("tub"), "{}", all_output(&status));
 }
 
 #[test]
-fn files_that_are_not_regular_are_not_read() {
-    let home = fresh_home();
-    run("mkfifo", &[&home.path("fifo.parquet")]);
+fn special_files_are_not_read() {
+    let test_folder = fresh_folder();
+    run("mkfifo", &[&test_folder.path("fifo.parquet")]);
     for words in
         [&["show", "fifo.parquet"] as &[&str], &["plot", "fifo.parquet"], &["show", "/dev/zero"]]
     {
-        let run = home.sweep(words);
-        assert_eq!(run.status.code(), Some(2), "{}", said(&run));
-        assert!(said(&run).contains("not a regular file"), "{words:?}: {}", said(&run));
+        let run = test_folder.sweep(words);
+        assert_eq!(run.status.code(), Some(2), "{}", all_output(&run));
+        assert!(all_output(&run).contains("not a regular file"), "{words:?}: {}", all_output(&run));
     }
 }
 
 #[test]
-fn nothing_a_file_says_reaches_the_terminal_as_an_escape() {
-    let home = fresh_home();
+fn escape_sequences_in_files_do_not_reach_the_terminal() {
+    let test_folder = fresh_folder();
     let hostile = "evil\u{1b}]0;title\u{7}\u{9b}2J\u{202e}";
     let evil = grid(5, 8).replace("\"short\"", &format!("{hostile:?}")).replace("tub_yaw", hostile);
-    fs::write(home.path("evil.toml"), evil).expect("a grid is written");
+    fs::write(test_folder.path("evil.toml"), evil).expect("a grid is written");
     let raw = grid(5, 8).replace("name = ", &format!("# {hostile}\n{hostile} = "));
-    fs::write(home.path("raw.toml"), raw).expect("a grid is written");
-    let partial = home.path("x.parquet.partial");
+    fs::write(test_folder.path("raw.toml"), raw).expect("a grid is written");
+    let partial = test_folder.path("x.parquet.partial");
     fs::create_dir(&partial).expect("a folder is made");
     let plan = format!(
         r#"{{ "format": 2, "version": {version}, "numerics": 1, "plan_hash": "", "points": 1,
@@ -360,9 +382,9 @@ fn nothing_a_file_says_reaches_the_terminal_as_an_escape() {
         &["show", hostile],
         &["run", "g.toml", "--out", &format!("{hostile}/x.parquet/")],
     ] {
-        let run = home.sweep(words);
+        let run = test_folder.sweep(words);
         assert_ne!(run.status.code(), Some(0), "{words:?}");
-        let text = said(&run) + &String::from_utf8_lossy(&run.stdout);
+        let text = all_output(&run) + &String::from_utf8_lossy(&run.stdout);
         assert!(text.contains("evil"), "{words:?}: {text}");
         let is_bad = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
         assert!(!text.contains(is_bad), "{words:?}: {text:?}");

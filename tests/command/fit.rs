@@ -1,4 +1,4 @@
-//! `sweep fit` as a user meets it: a trace of the program's own is the measurement.
+//! Tests of `sweep fit`, with a trace of the program as the measurement.
 
 use std::fs;
 
@@ -7,21 +7,22 @@ use arrow_array::types::Float64Type;
 use serde_json::Value;
 use sweep_files::ParquetFile;
 
-use crate::home::{Home, said};
+use crate::test_folder::{TestFolder, all_output};
 
 const GRID: &str = "spin = { profile = \"triangular\", peak_rpm = 300, ramp_s = 3 }\n\
                     time = { end_s = 3 }\n\
                     [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [100, 140]\n";
 
-/// A home with a run of a machine of 180 N s/m and 0.35 kg in it, as CSV: an acceleration with
-/// gravity, in both senses of a sensor, and an angle with every seventh sample missing.
-fn bench() -> Home {
-    let home = Home::new(GRID);
+/// Returns a folder with a measurement of a machine with 180 N s/m and 0.35 kg as CSV: an
+/// acceleration with gravity, with both signs of a sensor, and an angle without every seventh
+/// sample.
+fn folder_with_measurement() -> TestFolder {
+    let test_folder = TestFolder::new(GRID);
     let at = ["--at", "damping_n_s_per_m=180", "--at", "unbalance_mass_kg=0.35"];
     let words = [&["trace", "g.toml", "--rates", "-o", "t.parquet"], &at[..]].concat();
-    let traced = home.sweep(&words);
-    assert!(traced.status.success(), "{}", said(&traced));
-    let file = ParquetFile::open(&home.path("t.parquet")).expect("it is there");
+    let traced = test_folder.sweep(&words);
+    assert!(traced.status.success(), "{}", all_output(&traced));
+    let file = ParquetFile::open(&test_folder.path("t.parquet")).expect("it is there");
     let all = (0..file.schema().fields().len()).collect();
     let batches = file.batches(all).expect("it is read");
     let mut text = "time_s,tub_front_y_m_per_s2,tub_yaw_rad,tub_pitch_rad_per_s\n".to_owned();
@@ -38,7 +39,7 @@ fn bench() -> Home {
         ]
         .map(column);
         for row in 0..batch.num_rows() {
-            // A sawtooth as noise: it correlates with nothing.
+            // The noise is a sawtooth, which does not correlate with the signals.
             let noise = (row * 7919 % 1000) as f64 / 1000.0 - 0.5;
             let yaw = if row % 7 == 0 {
                 String::new()
@@ -50,18 +51,18 @@ fn bench() -> Home {
             text += &format!("{},{y},{yaw},{pitch}\n", time.value(row));
         }
     }
-    fs::write(home.path("run.csv"), text).expect("it is written");
-    home
+    fs::write(test_folder.path("run.csv"), text).expect("it is written");
+    test_folder
 }
 
 #[test]
-fn a_fit_ends_in_a_machine_file_that_runs() {
-    let home = bench();
+fn a_fit_writes_a_machine_file_that_runs() {
+    let test_folder = folder_with_measurement();
     let words = ["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m,unbalance_mass_kg"];
     let more = ["--json", "--draws", "4", "--out", "bench.toml", "--curves", "fit.parquet"];
     let more = [&more[..], &["--set", "unbalance_mass_kg=0.3", "--name", "monday"]].concat();
-    let done = home.sweep(&[&words[..], &more].concat());
-    assert!(done.status.success(), "{}", said(&done));
+    let done = test_folder.sweep(&[&words[..], &more].concat());
+    assert!(done.status.success(), "{}", all_output(&done));
     let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
     for (parameter, (name, truth)) in found["parameters"]
         .as_array()
@@ -80,79 +81,81 @@ fn a_fit_ends_in_a_machine_file_that_runs() {
     for key in ["correlations", "noise", "shift_s", "residual_rms", "iso18571", "verdict"] {
         assert!(!found[key].is_null(), "{key}: {found}");
     }
-    // The machine is the fitted one, to the last bit.
+    // The machine file has the fitted numbers to the last bit.
     let grid = format!("machine = \"bench.toml\"\n{GRID}");
-    fs::write(home.path("own.toml"), grid).expect("it is written");
-    let listed = home.sweep(&["parameters", "own.toml", "--json"]);
+    fs::write(test_folder.path("own.toml"), grid).expect("it is written");
+    let listed = test_folder.sweep(&["parameters", "own.toml", "--json"]);
     let listed: Value = serde_json::from_slice(&listed.stdout).expect("it is JSON");
     let mass = listed.as_array().expect("a list").iter();
     let mut mass = mass.filter(|parameter| parameter["name"] == "unbalance_mass_kg");
     let value = mass.next().map(|parameter| &parameter["value"]);
     assert_eq!(value, Some(&found["parameters"][1]["value"]));
-    assert!(!home.path("bench.toml.partial").exists());
+    assert!(!test_folder.path("bench.toml.partial").exists());
     for (view, picture) in
         [("time", "t.svg"), ("passages", "p.html"), ("profiles", "c.svg"), ("spectrum", "s.svg")]
     {
-        let drawn = home.sweep(&["plot", "fit.parquet", "--view", view, "-o", picture]);
-        assert!(drawn.status.success(), "{view}: {}", said(&drawn));
+        let drawn = test_folder.sweep(&["plot", "fit.parquet", "--view", view, "-o", picture]);
+        assert!(drawn.status.success(), "{view}: {}", all_output(&drawn));
     }
-    // The picture names the fitted machine, and not where the fit began.
-    let picture = fs::read_to_string(home.path("t.svg")).expect("it is text");
+    // The figure shows the fitted numbers, not the initial ones.
+    let picture = fs::read_to_string(test_folder.path("t.svg")).expect("it is text");
     assert!(picture.contains("damping 1") && !picture.contains("damping 120 N s/m"));
     assert!(picture.contains("monday"));
     assert!(!picture.contains("unbalance_mass_kg = 0.3"));
-    // A fit is written over a fit, and over nothing else.
-    let again = home.sweep(&[&words[..], &more].concat());
-    assert!(again.status.success(), "{}", said(&again));
-    let over = home.sweep(&[&words[..], &["--out", "own.toml"]].concat());
-    assert_eq!(over.status.code(), Some(2), "{}", said(&over));
-    assert!(said(&over).contains("own.toml cannot be an output"), "{}", said(&over));
+    // A fit overwrites a fit, and no other file.
+    let again = test_folder.sweep(&[&words[..], &more].concat());
+    assert!(again.status.success(), "{}", all_output(&again));
+    let over = test_folder.sweep(&[&words[..], &["--out", "own.toml"]].concat());
+    assert_eq!(over.status.code(), Some(2), "{}", all_output(&over));
+    assert!(all_output(&over).contains("own.toml cannot be an output"), "{}", all_output(&over));
 }
 
 #[test]
 fn a_number_that_differs_from_damper_to_damper_needs_a_range() {
-    let home = bench();
+    let test_folder = folder_with_measurement();
     let apart = ["--set", "damper_1_friction_n=20", "--set", "damper_2_friction_n=30"];
     let words = ["fit", "g.toml", "run.csv", "--free", "friction_n"];
-    let refused = home.sweep(&[&words[..], &apart].concat());
-    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    let refused = test_folder.sweep(&[&words[..], &apart].concat());
+    assert_eq!(refused.status.code(), Some(2), "{}", all_output(&refused));
     assert!(
-        said(&refused).contains("`friction_n` differs from part to part"),
+        all_output(&refused).contains("`friction_n` differs from part to part"),
         "{}",
-        said(&refused)
+        all_output(&refused)
     );
 }
 
 #[test]
-fn a_fit_is_at_the_point_that_is_given() {
+fn a_fit_uses_the_given_point() {
     let words = ["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m", "--draws", "0"];
-    let done = bench().sweep(&[&words[..], &["--json", "--at", "unbalance_mass_kg=0.35"]].concat());
-    assert!(done.status.success(), "{}", said(&done));
+    let done = folder_with_measurement()
+        .sweep(&[&words[..], &["--json", "--at", "unbalance_mass_kg=0.35"]].concat());
+    assert!(done.status.success(), "{}", all_output(&done));
     let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
     let value = found["parameters"][0]["value"].as_f64().expect("a number");
     assert!((value / 180.0 - 1.0).abs() < 0.01, "{found}");
 }
 
 #[test]
-fn what_is_no_measurement_is_refused_with_its_place() {
-    let home = Home::new(GRID);
-    fs::write(home.path("run.csv"), "time_s,tub_front_x_m\n0,1\n1,2\n0.5,3\n").expect("written");
-    let done = home.sweep(&["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m"]);
+fn mistakes_in_a_measurement_are_reported_with_their_place() {
+    let test_folder = TestFolder::new(GRID);
+    fs::write(test_folder.path("run.csv"), "time_s,tub_front_x_m\n0,1\n1,2\n0.5,3\n")
+        .expect("written");
+    let done = test_folder.sweep(&["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m"]);
     assert_eq!(done.status.code(), Some(2));
     for said_of in
         ["run.csv:1:8", "is no channel", "run.csv:4:1", "time goes back: 0.5 s after 1 s"]
     {
-        assert!(said(&done).contains(said_of), "{said_of}: {}", said(&done));
+        assert!(all_output(&done).contains(said_of), "{said_of}: {}", all_output(&done));
     }
-    let gone = home.sweep(&["fit", "g.toml", "gone.csv", "--free", "damping_n_s_per_m"]);
-    assert_eq!(gone.status.code(), Some(2), "{}", said(&gone));
-    assert!(said(&gone).contains("cannot read gone.csv"), "{}", said(&gone));
+    let gone = test_folder.sweep(&["fit", "g.toml", "gone.csv", "--free", "damping_n_s_per_m"]);
+    assert_eq!(gone.status.code(), Some(2), "{}", all_output(&gone));
+    assert!(all_output(&gone).contains("cannot read gone.csv"), "{}", all_output(&gone));
 }
 
 #[test]
-fn a_clock_of_seconds_since_1970_begins_at_the_first_row() {
-    let home = bench();
-    let text = fs::read_to_string(home.path("run.csv")).expect("it is text");
+fn times_since_1970_are_relative_to_the_first_row() {
+    let test_folder = folder_with_measurement();
+    let text = fs::read_to_string(test_folder.path("run.csv")).expect("it is text");
     let mut lines = text.lines();
     let mut shifted = format!("{}\n", lines.next().expect("a line of names"));
     for line in lines {
@@ -160,34 +163,39 @@ fn a_clock_of_seconds_since_1970_begins_at_the_first_row() {
         let time: f64 = time.parse().expect("a number");
         shifted += &format!("{:.3},{rest}\n", 1_700_000_000.0 + time);
     }
-    fs::write(home.path("epoch.csv"), &shifted).expect("it is written");
+    fs::write(test_folder.path("epoch.csv"), &shifted).expect("it is written");
     let at = ["--draws", "0", "--json", "--at", "unbalance_mass_kg=0.35"];
     let words = ["fit", "g.toml", "epoch.csv", "--free", "damping_n_s_per_m"];
-    let done = home.sweep(&[&words[..], &at].concat());
-    assert!(done.status.success(), "{}", said(&done));
+    let done = test_folder.sweep(&[&words[..], &at].concat());
+    assert!(done.status.success(), "{}", all_output(&done));
     let found: Value = serde_json::from_slice(&done.stdout).expect("it is JSON");
     let value = found["parameters"][0]["value"].as_f64().expect("a number");
     assert!((value / 180.0 - 1.0).abs() < 0.01, "{found}");
     let note = found["notes"][0].as_str().expect("a note");
     assert!(note.contains("its clock reads 1700000000 s at the first row"), "{note}");
 
-    fs::write(home.path("stray.csv"), text + "100000,9.81,0,0\n").expect("it is written");
+    fs::write(test_folder.path("stray.csv"), text + "100000,9.81,0,0\n").expect("it is written");
     let words = ["fit", "g.toml", "stray.csv", "--free", "damping_n_s_per_m"];
-    let done = home.sweep(&words);
-    assert_eq!(done.status.code(), Some(2), "{}", said(&done));
-    assert!(said(&done).contains("time jumps by 99997 s, from 3 to 100000 s"), "{}", said(&done));
+    let done = test_folder.sweep(&words);
+    assert_eq!(done.status.code(), Some(2), "{}", all_output(&done));
+    assert!(
+        all_output(&done).contains("time jumps by 99997 s, from 3 to 100000 s"),
+        "{}",
+        all_output(&done)
+    );
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_fifo_is_refused_and_not_waited_for() {
-    let home = Home::new(GRID);
-    let made = std::process::Command::new("mkfifo").arg(home.path("fifo")).status();
+fn a_fifo_is_an_error() {
+    let test_folder = TestFolder::new(GRID);
+    let made = std::process::Command::new("mkfifo").arg(test_folder.path("fifo")).status();
     assert!(made.expect("mkfifo starts").success());
-    fs::write(home.path("machine.toml"), "machine = \"fifo\"\n").expect("it is written");
+    fs::write(test_folder.path("machine.toml"), "machine = \"fifo\"\n").expect("it is written");
     for words in [&["fit", "g.toml", "fifo"][..], &["check", "fifo"], &["check", "machine.toml"]] {
-        let done = home.under(&["timeout", "20"]).args(words).output().expect("timeout starts");
-        assert_eq!(done.status.code(), Some(2), "{words:?}: {}", said(&done));
-        assert!(said(&done).contains("it is a FIFO"), "{words:?}: {}", said(&done));
+        let done =
+            test_folder.under(&["timeout", "20"]).args(words).output().expect("timeout starts");
+        assert_eq!(done.status.code(), Some(2), "{words:?}: {}", all_output(&done));
+        assert!(all_output(&done).contains("it is a FIFO"), "{words:?}: {}", all_output(&done));
     }
 }

@@ -1,11 +1,11 @@
-//! Single flipped bits in a finished result: every command that reads it refuses it by name, or
-//! says and writes the very same as without the flip.
+//! Tests with single flipped bits in a finished result: every command that reads it ends with an
+//! error, or has the same output and files as without the flip.
 
 use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use crate::home::{Home, grid, said};
+use crate::test_folder::{TestFolder, all_output, grid};
 
 const FLIPS: u64 = 300;
 
@@ -17,7 +17,7 @@ const COMMANDS: [&[&str]; 5] = [
     &["merge", "g.toml", "--out", "x.parquet"],
 ];
 
-/// The exit code and the output of a command, its result and its picture.
+/// The exit code of a command, its output, and the files that it wrote.
 #[derive(PartialEq)]
 struct Left {
     output: Output,
@@ -25,19 +25,19 @@ struct Left {
     picture: Option<Vec<u8>>,
 }
 
-/// A folder with a grid and its finished result, `x.parquet`.
-pub(super) fn finished() -> Home {
-    let home = Home::new(&grid(12, 12));
-    let run = home.sweep(COMMANDS[0]);
-    assert!(run.status.success(), "{}", said(&run));
-    home
+/// Returns a folder with a grid and its finished result, `x.parquet`.
+pub(super) fn finished() -> TestFolder {
+    let test_folder = TestFolder::new(&grid(12, 12));
+    let run = test_folder.sweep(COMMANDS[0]);
+    assert!(run.status.success(), "{}", all_output(&run));
+    test_folder
 }
 
-impl Home {
-    /// Has a command meet these bytes.
-    fn meet(&self, bytes: &[u8], words: &[&str]) -> Left {
+impl TestFolder {
+    /// Runs a command with these bytes as the result.
+    fn run_on(&self, bytes: &[u8], words: &[&str]) -> Left {
         fs::write(self.path("x.parquet"), bytes).expect("the result is written");
-        // Absent unless drawn before.
+        // The figure exists only if a command drew it before.
         let _ = fs::remove_file(self.path("x.svg"));
         let output = self.sweep(words);
         let read = |path: &Path| fs::read(path).ok();
@@ -46,7 +46,7 @@ impl Home {
     }
 }
 
-/// Numbers from a seed: splitmix64.
+/// Returns a random number for a seed (splitmix64).
 fn random(seed: u64) -> u64 {
     let z = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -55,13 +55,13 @@ fn random(seed: u64) -> u64 {
 }
 
 #[test]
-fn a_flipped_bit_of_a_result_is_refused_or_changes_nothing() {
-    let home = finished();
-    let whole = fs::read(home.path("x.parquet")).expect("there is a result");
+fn a_flipped_bit_of_a_result_is_an_error_or_without_effect() {
+    let test_folder = finished();
+    let whole = fs::read(test_folder.path("x.parquet")).expect("there is a result");
     let mut undisturbed = Vec::new();
     for words in COMMANDS {
-        let left = home.meet(&whole, words);
-        assert!(left.output.status.success(), "{words:?}: {}", said(&left.output));
+        let left = test_folder.run_on(&whole, words);
+        assert!(left.output.status.success(), "{words:?}: {}", all_output(&left.output));
         undisturbed.push(left);
     }
     let mut refused = [0_u64; COMMANDS.len()];
@@ -70,18 +70,21 @@ fn a_flipped_bit_of_a_result_is_refused_or_changes_nothing() {
         let mut bytes = whole.clone();
         bytes[(bit / 8) as usize] ^= 1 << (bit % 8);
         for (k, words) in COMMANDS.iter().enumerate() {
-            let left = home.meet(&bytes, words);
-            let told = said(&left.output);
+            let left = test_folder.run_on(&bytes, words);
+            let messages = all_output(&left.output);
             if left.output.status.success() {
                 let same = Left { result: whole.clone(), ..left };
-                assert!(same == undisturbed[k], "bit {bit}: {words:?} took it: {told}");
+                assert!(same == undisturbed[k], "bit {bit}: {words:?} took it: {messages}");
                 continue;
             }
             refused[k] += 1;
-            let is_named = told.contains("error: ") && told.contains("x.parquet");
-            assert!(is_named && !told.contains("panicked"), "bit {bit}, {words:?}: {told}");
-            assert_eq!(left.output.status.code(), Some(2), "bit {bit}, {words:?}: {told}");
-            assert!(left.result == bytes && left.picture.is_none(), "bit {bit}, {words:?}: {told}");
+            let is_named = messages.contains("error: ") && messages.contains("x.parquet");
+            assert!(is_named && !messages.contains("panicked"), "bit {bit}, {words:?}: {messages}");
+            assert_eq!(left.output.status.code(), Some(2), "bit {bit}, {words:?}: {messages}");
+            assert!(
+                left.result == bytes && left.picture.is_none(),
+                "bit {bit}, {words:?}: {messages}"
+            );
         }
     }
     println!("{FLIPS} flips; refused by run, show, plot, status, merge: {refused:?}");

@@ -1,5 +1,5 @@
-//! The bytes that this build writes, by every method and command that writes results: hashes that
-//! change when any byte does, together with the version of the numerics or not at all.
+//! Test of the bytes of results by every method and command against recorded hashes, which change
+//! only together with the version of the numerics.
 //!
 //! `scripts/release/raise_numerics.sh` raises that version and writes the new hashes.
 
@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::home::sweep_binary;
+use crate::test_folder::sweep_binary;
 use serde_json::{Value, json};
 use sweep::{NUMERICS_VERSION, VERSION};
 use tempfile::TempDir;
@@ -19,21 +19,22 @@ const SPIN: &str = "machine = \"paper\"\n\
     spin = { profile = \"triangular\", peak_rpm = 350.0, ramp_s = 0.6 }\n\
     time = { end_s = 1.0, window_s = [0.4, 0.9] }\n";
 
-/// Three masses by three dampings.
+/// The axes of a map: three masses by three dampings.
 const AXES: &str = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.4, 0.9]\n\
     [[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = { from = 60.0, to = 300.0, count = 3 }\n";
 
-/// A range of either parameter, for designs.
+/// The ranges of both parameters, for designs.
 const BOX: &str = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nrange = { from = 0.1, to = 0.9 }\n\
     [[axis]]\nparameter = \"damping_n_s_per_m\"\nrange = { from = 60.0, to = 300.0 }\n";
 
+/// The method of all goldens but those of methods.
 const RK4: &str = "integrator = { method = \"rk4\", step_s = 2e-4 }\n";
 
-/// Metrics and a design stand for everything that adds or changes columns.
+/// Metrics, which add columns to a map.
 const METRICS: &str = "metrics = [\"cabinet_force\", \"clash_time\", \"static_sag\"]\n";
 
-/// Greatest relative difference of a frequency from the record. Basis: linear algebra is rounded by
-/// each processor in its own way. Twice as much would find the same faults.
+/// The greatest relative difference of a frequency from the record. Basis: the rounding of linear
+/// algebra depends on the processor. Doubling it would find the same faults.
 const MODES_TOLERANCE: f64 = 1e-9;
 
 /// Returns the path of the record.
@@ -41,11 +42,11 @@ fn record() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/goldens.json")
 }
 
-/// Runs a command in `home` and returns what it prints.
-fn sweep(home: &TempDir, words: &[&str]) -> Vec<u8> {
+/// Runs a command in `test_folder` and returns what it prints.
+fn sweep(test_folder: &TempDir, words: &[&str]) -> Vec<u8> {
     let done = Command::new(sweep_binary())
         .args(words)
-        .current_dir(home.path())
+        .current_dir(test_folder.path())
         .env_remove("SLURM_ARRAY_TASK_ID")
         .env_remove("SLURM_CPUS_PER_TASK")
         .env_remove("JOB_COMPLETION_INDEX")
@@ -55,16 +56,16 @@ fn sweep(home: &TempDir, words: &[&str]) -> Vec<u8> {
     done.stdout
 }
 
-/// The hash of the file that a command writes for a grid.
+/// Returns the hash of the file that a command writes for a grid.
 fn hash(grid: &str, command: &[&str]) -> String {
-    let home = tempfile::tempdir().expect("a temporary folder");
-    fs::write(home.path().join("grid.toml"), grid).expect("the grid is written");
+    let test_folder = tempfile::tempdir().expect("a temporary folder");
+    fs::write(test_folder.path().join("grid.toml"), grid).expect("the grid is written");
     let list = "unbalance_mass_kg,damping_n_s_per_m\n0.1,80\n0.7,211.5\n0.33,120\n";
-    fs::write(home.path().join("list.csv"), list).expect("the list is written");
+    fs::write(test_folder.path().join("list.csv"), list).expect("the list is written");
     let (verb, options) = command.split_first().expect("a command has a name");
-    sweep(&home, &[&[*verb, "grid.toml", "--out", "out.parquet"], options].concat());
+    sweep(&test_folder, &[&[*verb, "grid.toml", "--out", "out.parquet"], options].concat());
     let bytes =
-        fs::read(home.path().join("out.parquet")).expect("the command has written its file");
+        fs::read(test_folder.path().join("out.parquet")).expect("the command has written its file");
     blake3::hash(&bytes).to_hex().to_string()
 }
 
@@ -103,10 +104,10 @@ fn hashes() -> BTreeMap<&'static str, String> {
     ])
 }
 
-/// Frequency and damping of every mode at some speeds.
+/// Returns the frequency and the damping of every mode at some speeds.
 fn modes() -> Vec<f64> {
-    let home = tempfile::tempdir().expect("a temporary folder");
-    let printed = sweep(&home, &["modes", "--speed", "0:400:200", "--json"]);
+    let test_folder = tempfile::tempdir().expect("a temporary folder");
+    let printed = sweep(&test_folder, &["modes", "--speed", "0:400:200", "--json"]);
     let found: Value = serde_json::from_slice(&printed).expect("the modes are JSON");
     let modes = found["modes"].as_array().expect("a list of modes");
     modes
@@ -119,7 +120,7 @@ fn modes() -> Vec<f64> {
 }
 
 #[test]
-fn bytes_change_with_the_version_of_the_numerics_or_not_at_all() {
+fn bytes_change_only_with_the_version_of_the_numerics() {
     let hashes = hashes();
     let modes = modes();
     let now = json!({

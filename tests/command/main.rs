@@ -1,8 +1,9 @@
-//! The command as a user runs it: what it writes, says and leaves behind.
+//! Tests of the command: its files, output and exit codes.
 //!
-//! These tests belong to the package `sweep`, whose manifest names this file, because Cargo tells
-//! only a package's own tests where its binary is. They need a Rust toolchain and a POSIX shell.
-//! A test that needs more is ignored and names what it needs; `.ci/run` installs that and runs it.
+//! These tests belong to the package `sweep`, whose manifest names this file, because Cargo passes
+//! the path of a binary to tests of the same package only. They need a Rust toolchain and a POSIX
+//! shell. A test that needs more is ignored, with the reason; `.ci/run` installs it and runs the
+//! test.
 
 #![allow(missing_docs, reason = "a test is documented by its name")]
 
@@ -18,16 +19,16 @@ mod files;
 mod fit;
 mod flips;
 mod goldens;
-mod home;
 mod limits;
 mod optimise;
 mod pictures;
 mod stability;
+mod test_folder;
 
 use std::process::Command;
 
-/// Sends a signal by its short name. `kill` is built into every shell, and only some systems have
-/// it as a program.
+/// Sends a signal by its short name. It uses the shell's `kill`, because not all systems have the
+/// program.
 #[cfg(unix)]
 fn signal(name: &str, process: u32) {
     let script = format!("kill -{name} {process}");

@@ -1,4 +1,4 @@
-//! `sweep optimise` as a user meets it: mistakes, interruptions, and the machine file of the best.
+//! Tests of `sweep optimise`: its files, interruptions and errors.
 
 #![cfg(unix)]
 
@@ -7,8 +7,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::home::{said, sweep_binary};
 use crate::signal;
+use crate::test_folder::{all_output, sweep_binary};
 
 const GRID: &str = r#"
 machine = "paper"
@@ -56,44 +56,46 @@ fn sweep(folder: &tempfile::TempDir, line: &str) -> Command {
     command
 }
 
-fn does(folder: &tempfile::TempDir, line: &str) -> String {
+/// Runs a command that succeeds, and returns its output.
+fn output_of(folder: &tempfile::TempDir, line: &str) -> String {
     let output = sweep(folder, line).output().expect("it starts");
-    assert_eq!(output.status.code(), Some(0), "{line}: {}", said(&output));
-    said(&output)
+    assert_eq!(output.status.code(), Some(0), "{line}: {}", all_output(&output));
+    all_output(&output)
 }
 
-/// A number in a column of a row of a file.
+/// Returns the number in a column of a result with a single row.
 fn number(folder: &tempfile::TempDir, line: &str, column: &str) -> f64 {
-    let rows: serde_json::Value = serde_json::from_str(&does(folder, line)).expect("it is JSON");
+    let rows: serde_json::Value =
+        serde_json::from_str(&output_of(folder, line)).expect("it is JSON");
     rows[0][column].as_f64().unwrap_or_else(|| panic!("no {column} in {rows}"))
 }
 
 #[test]
-fn a_study_of_several_objectives_says_what_its_last_third_put_on_the_front() {
+fn the_summary_says_how_the_front_grew_in_the_last_third() {
     let second = "[[objective]]\nmaximise = \"min(min_gap_nonlinear_m)\"\n[[parameter]]";
     let folder = folder_with("2", &STUDY.replacen("[[parameter]]", second, 1));
-    let text = does(&folder, "optimise study.toml");
-    let told = text.split_once("the last 8 candidates put ").expect("the line `search`").1;
-    let told = told.split_once(" on the front").expect("its end").0;
-    let (late, front) = told.split_once(" of ").expect("two counts");
+    let text = output_of(&folder, "optimise study.toml");
+    let rest = text.split_once("the last 8 candidates put ").expect("the line `search`").1;
+    let rest = rest.split_once(" on the front").expect("its end").0;
+    let (late, front) = rest.split_once(" of ").expect("two counts");
     let held = [
         format!("count(on_front and candidate >= 16) == {late}"),
         format!("count(on_front) == {front}"),
     ];
     let checked = sweep(&folder, "require results/study.parquet").args(&held).output();
     let checked = checked.expect("it starts");
-    assert_eq!(checked.status.code(), Some(0), "{}", said(&checked));
+    assert_eq!(checked.status.code(), Some(0), "{}", all_output(&checked));
 }
 
 #[test]
-fn columns_of_a_study_differ_and_its_best_is_in_the_table() {
+fn the_best_candidate_is_a_row_of_the_table() {
     let objectives = "[[objective]]\nmaximise = \"min(min_gap_nonlinear_m)\"\n\
         [[objective]]\nminimise = \"max(nonlinear_tub_front_y + nonlinear_tub_front_z)\"\n\
         [[objective]]\nminimise = \"max(nonlinear_tub_front_y - nonlinear_tub_front_z)\"\n\
         [[parameter]]";
     let study = STUDY.replacen("[[parameter]]", objectives, 1).replace("24", "200");
     let folder = folder_with("2", &study);
-    let text = does(&folder, "optimise study.toml");
+    let text = output_of(&folder, "optimise study.toml");
     let best = text.split_once("best  candidate ").expect("a best").1;
     let best = best.split_whitespace().next().expect("its number");
     let is_row = |line: &str| line.split_whitespace().next() == Some(best);
@@ -107,9 +109,9 @@ fn columns_of_a_study_differ_and_its_best_is_in_the_table() {
 }
 
 #[test]
-fn the_condition_that_binds_and_the_nearest_candidate_are_told() {
+fn the_summary_names_the_active_constraint_and_the_nearest_candidate() {
     let folder = folder_with("2", STUDY);
-    let text = does(&folder, "optimise study.toml");
+    let text = output_of(&folder, "optimise study.toml");
     let binds = text.lines().find(|line| line.trim_start().starts_with("binds  "));
     let binds = binds.unwrap_or_else(|| panic!("no line `binds` in {text}"));
     assert!(binds.contains(": slack ") && binds.ends_with(" %"), "{binds}");
@@ -118,13 +120,13 @@ fn the_condition_that_binds_and_the_nearest_candidate_are_told() {
     let study = STUDY.replace("max(ratio_max) < 50", "max(ratio_max) < 1e-3");
     let folder = folder_with("2", &study);
     let none = sweep(&folder, "optimise study.toml").output().expect("it starts");
-    assert_eq!(none.status.code(), Some(4), "{}", said(&none));
-    let text = said(&none);
-    let told = text.split_once("nearest  candidate ").expect("the nearest").1;
-    assert!(told.contains("max(ratio_max) < 1e-3 by "), "{text}");
-    let candidate = told.split(',').next().expect("its number");
+    assert_eq!(none.status.code(), Some(4), "{}", all_output(&none));
+    let text = all_output(&none);
+    let rest = text.split_once("nearest  candidate ").expect("the nearest").1;
+    assert!(rest.contains("max(ratio_max) < 1e-3 by "), "{text}");
+    let candidate = rest.split(',').next().expect("its number");
     let show = "show results/study.parquet --json --columns candidate --where feasible";
-    assert_eq!(does(&folder, show).trim(), "[]");
+    assert_eq!(output_of(&folder, show).trim(), "[]");
     let excess = |file: &str| number(&folder, file, "excess_2");
     let own = excess(&format!(
         "show results/study.parquet --json --columns excess_2 --where candidate=={candidate}"
@@ -135,20 +137,20 @@ fn the_condition_that_binds_and_the_nearest_candidate_are_told() {
 }
 
 #[test]
-fn an_objective_that_is_a_parameter_has_a_column_of_its_own() {
+fn an_objective_that_is_a_parameter_has_its_own_column() {
     let study = STUDY.replace("max(cabinet_force_nonlinear_n)", "damping_n_s_per_m");
     let folder = folder_with("2", &study);
     let grid = GRID.replace("END", "2");
     let one = &grid[..grid.find("[[axis]]").expect("an axis")];
     fs::write(folder.path().join("grid.toml"), one).expect("it is written");
-    let text = does(&folder, "optimise study.toml");
+    let text = output_of(&folder, "optimise study.toml");
     assert!(text.contains("objective_damping_n_s_per_m"), "{text}");
 }
 
 #[test]
-fn the_machine_file_of_the_best_has_the_force_that_the_study_says() {
+fn the_machine_file_of_the_best_has_the_force_of_the_study() {
     let folder = folder_with("2", STUDY);
-    let text = does(&folder, "optimise study.toml --best best.toml --threads 2");
+    let text = output_of(&folder, "optimise study.toml --best best.toml --threads 2");
     assert!(text.contains("24 candidates of 4 points"), "{text}");
     let file = "results/study.parquet";
     let column = "max_cabinet_force_nonlinear_n";
@@ -157,7 +159,7 @@ fn the_machine_file_of_the_best_has_the_force_that_the_study_says() {
     let grid = fs::read_to_string(folder.path().join("grid.toml")).expect("there is a grid");
     let own = grid.replace("\"paper\"", "\"best.toml\"");
     fs::write(folder.path().join("own.toml"), own).expect("it is written");
-    does(&folder, "run own.toml --out own.parquet");
+    output_of(&folder, "run own.toml --out own.parquet");
     let worst = "show own.parquet --by cabinet_force_nonlinear_n --top 1 --json \
                  --columns cabinet_force_nonlinear_n";
     let own_n = number(
@@ -166,7 +168,7 @@ fn the_machine_file_of_the_best_has_the_force_that_the_study_says() {
         "cabinet_force_nonlinear_n",
     );
     assert_eq!(own_n, force_n, "a fixed step: the same bits");
-    // Every candidate within its bounds; none that is feasible beats the best.
+    // Every candidate is within its bounds, and no feasible one is better than the best.
     let require = [
         "spring_stiffness_n_per_m >= 4000 and damping_n_s_per_m <= 400".to_owned(),
         format!("not feasible or max_cabinet_force_nonlinear_n >= {force_n}"),
@@ -175,20 +177,20 @@ fn the_machine_file_of_the_best_has_the_force_that_the_study_says() {
     ];
     let checked = sweep(&folder, &format!("require {file}")).args(&require).output();
     let checked = checked.expect("it starts");
-    assert_eq!(checked.status.code(), Some(0), "{}", said(&checked));
-    does(&folder, &format!("plot {file} -o study.svg"));
+    assert_eq!(checked.status.code(), Some(0), "{}", all_output(&checked));
+    output_of(&folder, &format!("plot {file} -o study.svg"));
     let picture = fs::read_to_string(folder.path().join("study.svg")).expect("it was drawn");
     assert!(picture.contains(">max(cabinet_force_nonlinear_n) (N)<"), "the study's own words");
-    does(&folder, &format!("plot {file} -o study.html"));
-    does(&folder, &format!("export {file} study.csv"));
-    assert!(does(&folder, "optimise study.toml").contains("it is there already"));
+    output_of(&folder, &format!("plot {file} -o study.html"));
+    output_of(&folder, &format!("export {file} study.csv"));
+    assert!(output_of(&folder, "optimise study.toml").contains("it is there already"));
 }
 
 #[test]
-fn an_interrupted_study_goes_on_and_ends_in_the_same_bytes() {
+fn an_interrupted_study_continues_to_the_same_bytes() {
     let folder = folder_with("6", STUDY);
     let line = "optimise study.toml --threads 1 --progress none --out";
-    does(&folder, &format!("{line} whole.parquet"));
+    output_of(&folder, &format!("{line} whole.parquet"));
     let trials = folder.path().join("x.parquet.partial/trials.bin");
     for name in ["INT", "KILL"] {
         let kept = fs::metadata(&trials).map_or(0, |file| file.len());
@@ -207,19 +209,19 @@ fn an_interrupted_study_goes_on_and_ends_in_the_same_bytes() {
         assert_eq!(code, if name == "INT" { Some(130) } else { None });
         assert!(!folder.path().join("x.parquet").exists());
     }
-    does(&folder, &format!("{} x.parquet", line.replace("threads 1", "threads 2")));
+    output_of(&folder, &format!("{} x.parquet", line.replace("threads 1", "threads 2")));
     let bytes = |name: &str| fs::read(folder.path().join(name)).expect("there is a file");
     assert!(bytes("x.parquet") == bytes("whole.parquet"), "other bytes");
     assert!(!Path::new(&trials).exists());
     fs::write(folder.path().join("study.toml"), STUDY.replace("seed = 3", "seed = 4"))
         .expect("it is written");
     let other = sweep(&folder, &format!("{line} x.parquet")).output().expect("it starts");
-    assert_eq!(other.status.code(), Some(2), "{}", said(&other));
-    assert!(said(&other).contains("/optimise/seed: was 3, is 4"), "{}", said(&other));
+    assert_eq!(other.status.code(), Some(2), "{}", all_output(&other));
+    assert!(all_output(&other).contains("/optimise/seed: was 3, is 4"), "{}", all_output(&other));
 }
 
 #[test]
-fn every_mistake_in_a_study_and_its_grid_is_told_at_once() {
+fn all_mistakes_in_a_study_and_its_grid_are_reported_together() {
     let wrong = STUDY
         .replace("candidates = 24", "candidate = 24")
         .replace("damping_n_s_per_m", "dampin_n_s_per_m")
@@ -229,7 +231,7 @@ fn every_mistake_in_a_study_and_its_grid_is_told_at_once() {
     let folder = folder_with("-2", &wrong);
     let refused = sweep(&folder, "optimise study.toml").output().expect("it starts");
     assert_eq!(refused.status.code(), Some(2));
-    for told in [
+    for expected in [
         "did you mean `candidates`?",
         "did you mean `damping_n_s_per_m`?",
         "study.toml:5:1",
@@ -240,41 +242,51 @@ fn every_mistake_in_a_study_and_its_grid_is_told_at_once() {
         "expected max(), min(), mean()",
         "7 mistakes",
     ] {
-        assert!(said(&refused).contains(told), "no {told} in {}", said(&refused));
+        assert!(
+            all_output(&refused).contains(expected),
+            "no {expected} in {}",
+            all_output(&refused)
+        );
     }
-    // Which columns there are is known once everything else is right.
+    // The columns are known once there are no other mistakes.
     let wrong = STUDY
         .replace("ratio_max) < 50", "ratio_mx) < 50")
         .replace("max(cabinet_force_nonlinear_n)", "cabinet_force_nonlinear_n");
     let folder = folder_with("2", &wrong);
     let refused = sweep(&folder, "optimise study.toml").output().expect("it starts");
-    for told in ["did you mean `ratio_max`?", "study.toml:6:67", "expected max(), min(), mean()"] {
-        assert!(said(&refused).contains(told), "no {told} in {}", said(&refused));
+    for expected in
+        ["did you mean `ratio_max`?", "study.toml:6:67", "expected max(), min(), mean()"]
+    {
+        assert!(
+            all_output(&refused).contains(expected),
+            "no {expected} in {}",
+            all_output(&refused)
+        );
     }
     assert!(!folder.path().join("results").exists());
 }
 
 #[test]
-fn tolerances_of_what_is_looked_for_spread_over_the_design() {
+fn tolerances_vary_the_parameters_of_a_candidate() {
     let folder = folder_with("2", &STUDY.replace("to = 400\n", "to = 400\ntolerance = 0.2\n"));
     let grid = GRID.replace("END", "2").replace(", count = 4", "");
     let design = "[design]\nmethod = \"sobol\"\npoints = 8\n";
     fs::write(folder.path().join("grid.toml"), format!("{grid}{design}")).expect("it is written");
-    does(&folder, "optimise study.toml --out wide.parquet");
+    output_of(&folder, "optimise study.toml --out wide.parquet");
     fs::write(folder.path().join("study.toml"), STUDY).expect("it is written");
-    does(&folder, "optimise study.toml --out exact.parquet");
+    output_of(&folder, "optimise study.toml --out exact.parquet");
     let column = "max_cabinet_force_nonlinear_n";
     let first = |file: &str| {
         number(&folder, &format!("show {file} --top 1 --json --columns {column}"), column)
     };
-    // The first candidate is one, but the worst of eight machines apart in damping is worse.
+    // The worst of eight machines with different dampings is worse than the candidate itself.
     assert_ne!(first("wide.parquet"), first("exact.parquet"));
 }
 
 #[test]
-fn the_path_of_the_best_is_judged_before_the_search() {
+fn the_path_of_the_machine_file_is_checked_before_the_search() {
     let folder = folder_with("2", STUDY);
-    for (rest, told) in [
+    for (rest, expected) in [
         ("--best study.toml", "no file of `sweep optimise --best` or"),
         ("--best grid.toml", "no file of `sweep optimise --best` or"),
         ("--out x.toml.parquet --best ./x.toml.parquet", "another file than that of all"),
@@ -283,14 +295,14 @@ fn the_path_of_the_best_is_judged_before_the_search() {
     ] {
         let refused = sweep(&folder, &format!("optimise study.toml {rest}")).output();
         let refused = refused.expect("it starts");
-        assert_eq!(refused.status.code(), Some(2), "{rest}: {}", said(&refused));
-        assert!(said(&refused).contains(told), "{rest}: {}", said(&refused));
+        assert_eq!(refused.status.code(), Some(2), "{rest}: {}", all_output(&refused));
+        assert!(all_output(&refused).contains(expected), "{rest}: {}", all_output(&refused));
     }
     assert!(fs::read_to_string(folder.path().join("study.toml")).is_ok_and(|text| text == STUDY));
-    // Folders are made, and the own file of another candidate is written over.
+    // Folders are created, and the machine file of an earlier search is overwritten.
     for candidate in [0, 23] {
         let line = format!("optimise study.toml --best made/best.toml --candidate {candidate}");
-        does(&folder, &line);
+        output_of(&folder, &line);
         let own = fs::read_to_string(folder.path().join("made/best.toml")).expect("it is there");
         assert!(
             own.starts_with(&format!("# Written by sweep: candidate {candidate} of study\n")),
@@ -300,13 +312,13 @@ fn the_path_of_the_best_is_judged_before_the_search() {
 }
 
 #[test]
-fn a_study_without_a_feasible_candidate_says_so_and_writes_no_machine() {
+fn a_study_without_a_feasible_candidate_writes_no_machine_file() {
     let folder = folder_with("2", &STUDY.replace("max(ratio_max) < 50", "max(ratio_max) < 0"));
     let line = "optimise study.toml --best best.toml";
     let done = sweep(&folder, line).output().expect("it starts");
-    assert_eq!(done.status.code(), Some(4), "{}", said(&done));
-    for told in ["feasible  0 of 24\n", "none is feasible; best.toml is not written"] {
-        assert!(said(&done).contains(told), "no {told} in {}", said(&done));
+    assert_eq!(done.status.code(), Some(4), "{}", all_output(&done));
+    for expected in ["feasible  0 of 24\n", "none is feasible; best.toml is not written"] {
+        assert!(all_output(&done).contains(expected), "no {expected} in {}", all_output(&done));
     }
     assert!(!folder.path().join("best.toml").exists());
 }

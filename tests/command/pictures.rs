@@ -1,4 +1,5 @@
-//! `sweep plot` of maps with more rows than a picture has pixels: what it takes and what it makes.
+//! Tests of `sweep plot` for maps with more rows than a figure has pixels: its memory and the size
+//! of its files.
 
 #![cfg(target_os = "linux")]
 
@@ -13,16 +14,16 @@ use arrow_array::{RecordBatch, StringArray, UInt64Array};
 use sweep_files::Writer;
 
 use crate::flips::finished;
-use crate::home::sweep_binary;
+use crate::test_folder::sweep_binary;
 
-/// Bytes of memory that a figure may take, whatever the rows.
+/// The greatest memory of a plot (bytes), for any number of rows.
 const MOST_MEMORY: u64 = 200_000_000;
-/// Bytes that a picture or a page may have.
+/// The greatest size of a figure or a page (bytes).
 const MOST_BYTES: u64 = 10_000_000;
 
 const ROWS_AT_ONCE: u64 = 1 << 16;
 
-/// A number of 0 to 1 that looks random.
+/// Returns a pseudorandom number from 0 to 1.
 fn noise(index: u64) -> f64 {
     let mixed = (index ^ 0x5bf0_3635).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -34,8 +35,8 @@ fn names(list: &[&str], keys: impl Iterator<Item = Option<i32>>) -> ArrayRef {
     Arc::new(DictionaryArray::<Int32Type>::new(keys.collect::<Int32Array>(), Arc::new(names)))
 }
 
-/// Rows of a map of `side` dampings to a mass, with the columns of a result. The ratio falls with
-/// damping and is ragged by `rough`; some points fail, some are undefined, some chaotic.
+/// Returns rows of a map with `side` dampings for each mass. The ratio falls with damping, with
+/// noise of the size `rough`; some points fail, some are undefined, some chaotic.
 fn rows(from: u64, to: u64, side: u64, rough: f64) -> RecordBatch {
     let all: Vec<u64> = (from..to).collect();
     let failed = |point: u64| noise(3 * point) < 0.05 * rough;
@@ -88,7 +89,7 @@ fn rows(from: u64, to: u64, side: u64, rough: f64) -> RecordBatch {
     RecordBatch::try_from_iter_with_nullable(columns).expect("columns of one length")
 }
 
-/// A map of `side` masses by `side` dampings.
+/// Writes a map of `side` masses by `side` dampings.
 fn write_map(path: &Path, side: u64, rough: f64) {
     let file = File::create(path).expect("the map can be made");
     let mut writer: Option<Writer<File>> = None;
@@ -104,7 +105,7 @@ fn write_map(path: &Path, side: u64, rough: f64) {
     writer.expect("rows").end().and_then(|file| file.close()).expect("the map is written");
 }
 
-/// The command with no more address space than that.
+/// Runs the command with a limit of address space.
 fn plot_within(bytes: u64, folder: &Path, words: &[&str]) -> Output {
     let limit = format!("ulimit -v {}; exec \"$@\"", bytes / 1000);
     let mut command = Command::new("sh");
@@ -117,8 +118,8 @@ fn draws_within_bounds(side: u64, rough: f64) {
     write_map(&folder.path().join("map.parquet"), side, rough);
     for name in ["map.svg", "map.png", "map.html"] {
         let run = plot_within(MOST_MEMORY, folder.path(), &["map.parquet", "-o", name]);
-        let said = String::from_utf8_lossy(&run.stderr);
-        assert!(run.status.success(), "{side} by {side}, {name}: {said}");
+        let messages = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{side} by {side}, {name}: {messages}");
         let bytes = fs::metadata(folder.path().join(name)).expect("a figure").len();
         assert!(bytes < MOST_BYTES, "{side} by {side}, rough {rough}: {name} has {bytes} bytes");
         if let Some(kept) = std::env::var_os("SHOTS") {
@@ -129,36 +130,37 @@ fn draws_within_bounds(side: u64, rough: f64) {
 }
 
 #[test]
-fn a_million_rows_take_bounded_memory_and_make_bounded_figures() {
+fn memory_and_figures_of_a_million_rows_are_bounded() {
     draws_within_bounds(1000, 0.02);
 }
 
 #[test]
-fn rows_unlike_their_neighbours_take_no_more() {
+fn memory_and_figures_of_noisy_rows_are_bounded() {
     draws_within_bounds(1000, 1.0);
 }
 
 #[test]
 #[ignore = "writes 1.5 GB and takes a minute; .ci/run runs it"]
-fn ten_million_rows_take_no_more() {
+fn memory_and_figures_of_ten_million_rows_are_bounded() {
     draws_within_bounds(3163, 0.02);
 }
 
 #[test]
-fn a_flipped_bit_is_refused() {
-    let home = finished();
-    fs::rename(home.path("x.parquet"), home.path("map.parquet")).expect("there is a result");
-    assert!(home.sweep(&["plot", "map.parquet", "-o", "whole.svg"]).status.success());
-    let whole = fs::read(home.path("map.parquet")).expect("a map");
+fn a_flipped_bit_is_an_error() {
+    let test_folder = finished();
+    fs::rename(test_folder.path("x.parquet"), test_folder.path("map.parquet"))
+        .expect("there is a result");
+    assert!(test_folder.sweep(&["plot", "map.parquet", "-o", "whole.svg"]).status.success());
+    let whole = fs::read(test_folder.path("map.parquet")).expect("a map");
     for bit in (0..8 * whole.len()).step_by(8 * whole.len() / 150 + 1) {
         let mut bytes = whole.clone();
         bytes[bit / 8] ^= 1 << (bit % 8);
-        fs::write(home.path("map.parquet"), bytes).expect("the map is written");
-        let run = home.sweep(&["plot", "map.parquet", "-o", "a.svg"]);
-        let said = String::from_utf8_lossy(&run.stderr);
-        assert_eq!(run.status.code(), Some(2), "bit {bit}: {said}");
-        assert!(said.contains("map.parquet is"), "bit {bit}: {said}");
-        assert!(!said.contains("panicked"), "bit {bit}: {said}");
-        assert!(!home.path("a.svg").exists(), "bit {bit}");
+        fs::write(test_folder.path("map.parquet"), bytes).expect("the map is written");
+        let run = test_folder.sweep(&["plot", "map.parquet", "-o", "a.svg"]);
+        let messages = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(2), "bit {bit}: {messages}");
+        assert!(messages.contains("map.parquet is"), "bit {bit}: {messages}");
+        assert!(!messages.contains("panicked"), "bit {bit}: {messages}");
+        assert!(!test_folder.path("a.svg").exists(), "bit {bit}");
     }
 }

@@ -1,4 +1,4 @@
-//! A folder with a grid in it, in which the command runs.
+//! A temporary folder with a grid, in which the tests run the command.
 
 use std::fs;
 use std::path::PathBuf;
@@ -6,19 +6,18 @@ use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
-/// Variables by which a scheduler sets shards and threads; those of the tests' own scheduler are
-/// removed.
+/// The environment variables by which a scheduler sets shards and threads. They are removed,
+/// because the tests may run under a scheduler themselves.
 const SCHEDULERS: [&str; 3] =
     ["SLURM_ARRAY_TASK_ID", "SLURM_CPUS_PER_TASK", "JOB_COMPLETION_INDEX"];
 
-/// The `sweep` binary of this build, or the one that `SWEEP_BINARY` names, such as an installed
-/// one.
+/// Returns the path of the `sweep` binary: that of this build, or the one in `SWEEP_BINARY`.
 pub(crate) fn sweep_binary() -> PathBuf {
     std::env::var_os("SWEEP_BINARY").map_or_else(|| env!("CARGO_BIN_EXE_sweep").into(), Into::into)
 }
 
-/// A grid of so many masses by so many dampings, without dampings of masses alone; its trajectories
-/// are so short that the files are most of the work.
+/// Returns a grid of a number of masses by a number of dampings, which may be 0. Its trajectories
+/// are so short that reading and writing files takes most of the time.
 pub(crate) fn grid(masses: u32, dampings: u32) -> String {
     let axis = |name: &str, from: f64, to: f64, count: u32| {
         let range = format!("{{ from = {from:?}, to = {to:?}, count = {count} }}");
@@ -39,25 +38,25 @@ pub(crate) fn grid(masses: u32, dampings: u32) -> String {
     )
 }
 
-/// Returns the output of a command and its messages.
-pub(crate) fn said(output: &Output) -> String {
+/// Returns standard output and standard error of a command.
+pub(crate) fn all_output(output: &Output) -> String {
     [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat()
 }
 
-/// A temporary folder; it goes with this value.
-pub(crate) struct Home(TempDir);
+/// A temporary folder, which is deleted with this value.
+pub(crate) struct TestFolder(TempDir);
 
-impl Home {
-    /// A folder with nothing but this grid, as `g.toml`.
+impl TestFolder {
+    /// Creates a folder with a grid as `g.toml`.
     pub(crate) fn new(grid: &str) -> Self {
-        let home = Self(tempfile::tempdir().expect("a temporary folder"));
-        fs::write(home.path("g.toml"), grid).expect("the grid is written");
-        home
+        let test_folder = Self(tempfile::tempdir().expect("a temporary folder"));
+        fs::write(test_folder.path("g.toml"), grid).expect("the grid is written");
+        test_folder
     }
 
-    /// Puts a list of 256 machines in the grid's place: steps are chosen for all of them before the
-    /// first point, which takes seconds.
-    pub(crate) fn choose_for_seconds(&self) {
+    /// Replaces the grid by a list of 256 machines. The choice of steps for all of them, before the
+    /// first point, takes seconds.
+    pub(crate) fn write_slow_list(&self) {
         let rows = (0..256).map(|k| {
             format!("{},{}\n", 0.1 + 0.9 * f64::from(k) / 255.0, 60 + 239 * (k * 37 % 256) / 255)
         });
@@ -69,13 +68,13 @@ impl Home {
         fs::write(self.path("g.toml"), grid).expect("the grid is written");
     }
 
-    /// A path in it; of the folder itself by the empty name.
+    /// Returns the path of a file in the folder, or of the folder itself for an empty name.
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
-    /// The binary behind another program's command line, or alone, in this folder and out of every
-    /// scheduler's.
+    /// Returns a command of the binary in this folder, alone or as the argument of another program,
+    /// without the variables of schedulers.
     pub(crate) fn under(&self, wrapper: &[&str]) -> Command {
         let mut command = match wrapper {
             [] => Command::new(sweep_binary()),
@@ -92,12 +91,12 @@ impl Home {
         command
     }
 
-    /// Runs the command with these words.
+    /// Runs the binary with arguments.
     pub(crate) fn sweep(&self, words: &[&str]) -> Output {
         self.under(&[]).args(words).output().expect("the command starts")
     }
 
-    /// Names of all that is in it.
+    /// Returns the sorted names of all files in the folder.
     #[cfg(target_os = "linux")]
     pub(crate) fn names(&self) -> Vec<String> {
         let names = fs::read_dir(self.0.path()).expect("the folder is there");
