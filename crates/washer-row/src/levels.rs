@@ -3,7 +3,7 @@
 use crate::error_control::RESOLVING_LEVELS;
 use washer_model::{Formula, Level, Method, MethodNumbers, ModelKind, UnresolvedModes};
 
-/// One refinement level.
+/// A refinement level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RefinementLevel {
     /// The row's `method`.

@@ -73,7 +73,7 @@ impl ModelRule<'_> {
     }
 }
 
-/// One model's trajectory under refinement.
+/// The trajectory of one model under refinement.
 #[derive(Clone, Debug, Default)]
 struct ModelRefinement {
     /// The level of `run`.
