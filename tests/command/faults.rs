@@ -110,7 +110,7 @@ fn holder_with_chunk(home: &Home) -> u32 {
     let started = Instant::now();
     loop {
         let lock = fs::read_to_string(home.partial().join("lock")).unwrap_or_default();
-        let chunks = home.partial().join("chunk-00000000.bin").exists();
+        let chunks = home.partial().join("part-00000000.parquet").exists();
         if let (true, Some(process)) =
             (chunks, lock.split(' ').next().and_then(|word| word.parse().ok()))
         {
@@ -303,25 +303,25 @@ fn a_file_size_limit_is_told_and_gone_on_from() {
 
 #[test]
 fn a_flipped_bit_and_a_truncation_are_told_and_mended() {
-    let break_chunk = |change: &dyn Fn(&mut Vec<u8>)| {
+    let break_part = |change: &dyn Fn(&mut Vec<u8>)| {
         let home = fresh_home();
         let shard = output(home.run().args(["--shard", "1/2"]));
         assert!(shard.status.success(), "{}", said(&shard));
-        let chunk = home.partial().join("chunk-00000002.bin");
-        let mut bytes = fs::read(&chunk).expect("the first shard has the third chunk");
+        let part = home.partial().join("part-00000002.parquet");
+        let mut bytes = fs::read(&part).expect("the first shard has the third chunk");
         change(&mut bytes);
-        fs::write(&chunk, bytes).expect("the chunk is broken");
+        fs::write(&part, bytes).expect("the part is broken");
         let run = output(&mut home.run());
         assert!(run.status.success(), "{}", said(&run));
-        assert!(said(&run).contains("chunk-00000002.bin.damaged"), "{}", said(&run));
+        assert!(said(&run).contains("part-00000002.parquet.damaged"), "{}", said(&run));
         assert!(fs::read(home.output()).expect("a result") == undisturbed());
     };
-    break_chunk(&|bytes| {
+    break_part(&|bytes| {
         let middle = bytes.len() / 2;
         bytes[middle] ^= 0x10;
     });
-    break_chunk(&|bytes| bytes.truncate(bytes.len() - 1));
-    break_chunk(&Vec::clear);
+    break_part(&|bytes| bytes.truncate(bytes.len() - 1));
+    break_part(&Vec::clear);
 }
 
 #[test]

@@ -212,7 +212,7 @@ fn an_interrupted_shard_is_gone_on_with_as_that_shard() {
     fs::write(home.path("g.toml"), long).expect("the grid is written");
     let script = format!(
         "\"$@\" & sweep=$!\n{}kill -TERM $sweep; wait $sweep",
-        until("ls x.parquet.partial/chunk-* > /dev/null 2>&1")
+        until("ls x.parquet.partial/part-* > /dev/null 2>&1")
     );
     let words = ["run", "g.toml", "--threads", "1", "--shard", "2/3", "--out", "x.parquet"];
     let run = under(&home, &["sh", "-c", &script, "sh"], &words);

@@ -189,7 +189,7 @@ fn an_interrupted_study_goes_on_and_ends_in_the_same_bytes() {
     let folder = folder_with("6", STUDY);
     let line = "optimise study.toml --threads 1 --progress none --out";
     does(&folder, &format!("{line} whole.parquet"));
-    let trials = folder.path().join("x.parquet.partial/trials.bin");
+    let trials = folder.path().join("x.parquet.partial/part-00000000.parquet");
     for name in ["INT", "KILL"] {
         let kept = fs::metadata(&trials).map_or(0, |file| file.len());
         let mut child = sweep(&folder, &format!("{line} x.parquet"))

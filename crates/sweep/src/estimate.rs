@@ -9,8 +9,8 @@ use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::plan::shortest_step_s;
+use sweep_engine::store::chunk_points;
 use sweep_engine::store::read::{NameCounts, add};
-use sweep_engine::store::{Shape, chunk_points};
 use sweep_engine::{Engine, Error, Estimate, Interrupt, Job, RunContext};
 
 /// Integration goes on with longer and longer beginnings of a trajectory until one takes this long,
@@ -63,7 +63,7 @@ fn reckoned(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate, Error
         Measured::spread(&engine, &first).unwrap_or(first);
     let chunk = chunk_points(plan.points());
     let layout = &Job::of(plan).layout;
-    let disk_bytes = plan.points() as f64 * Shape::of(layout).bytes_a_row() as f64;
+    let disk_bytes = plan.points() as f64 * layout.bytes_a_row() as f64;
     let columns = layout.schema().fields().len() as f64;
     // A chunk is one thread's work, so the last round of chunks may leave threads without any.
     let rounds = plan.points().div_ceil(chunk).div_ceil(threads as u64);

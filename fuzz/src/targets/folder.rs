@@ -1,9 +1,10 @@
 //! Any bytes in place of one file of an unfinished run: the run is refused, or goes on and ends in
-//! a result whose bytes are those of the undisturbed one, unless the file is a chunk that passes
-//! for one.
+//! a result whose bytes are those of the undisturbed one, unless the file is a part that passes for
+//! one.
 //!
-//! The first byte of an input says which file it is for. A chunk gets a right header and a right
-//! hash, so that the fuzzer has records to change: those of all points, or as long as the input.
+//! The first byte of an input says which file it is for. A part is a sound one whose first or last
+//! bytes are the input's, with the digest of that, so that the fuzzer reaches its rows and its
+//! metadata.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,22 +16,18 @@ use sweep::{
 };
 use tempfile::TempDir;
 
-/// Bytes of a chunk before its records, and of the hash behind them.
-const HEADER: usize = 76;
-const HASH: usize = 32;
-
 const NAMES: [&str; 8] = [
     "plan.json",
     "shards.json",
     "lock",
     "session-x-1-1.json",
     "shard-1.lock",
-    CHUNK,
+    PART,
     // Beside the folder.
     "../x.run.json",
-    CHUNK,
+    PART,
 ];
-const CHUNK: &str = "chunk-00000000.bin";
+const PART: &str = "part-00000000.parquet";
 
 /// Tries one input; a panic is a finding.
 pub(crate) fn run(bytes: &[u8]) {
@@ -38,10 +35,8 @@ pub(crate) fn run(bytes: &[u8]) {
     let home = home();
     let which = usize::from(*which) % NAMES.len();
     let name = NAMES[which];
-    let records = home.chunk.len() - HEADER - HASH;
     let content = match name {
-        CHUNK if which + 1 == NAMES.len() => as_chunk(content, content.len(), &home.chunk),
-        CHUNK => as_chunk(content, records, &home.chunk),
+        PART => as_part(content, which + 1 == NAMES.len(), &home.part),
         _ => content.to_vec(),
     };
     let partial = home.folder.path().join("x.parquet.partial");
@@ -66,10 +61,10 @@ pub(crate) fn run(bytes: &[u8]) {
             let tally = tally.expect("nobody stops it");
             assert_eq!(tally.points, home.plan.points());
             let result = fs::read(&output).expect("there is a result");
-            assert!(name == CHUNK || result == home.result, "{name} has changed the result");
+            assert!(name == PART || result == home.result, "{name} has changed the result");
             let _ = opened.complete(&job, &tally, None);
         }
-        Err(error) => assert!(name == CHUNK, "{name}: {error}"),
+        Err(error) => assert!(name == PART, "{name}: {error}"),
     }
 }
 
@@ -77,13 +72,18 @@ fn options() -> OpenOptions<'static> {
     OpenOptions { fresh: false, shard: None, environment: &|_| None }
 }
 
-/// The records of an input between a right header and a right hash.
-fn as_chunk(records: &[u8], length: usize, chunk: &[u8]) -> Vec<u8> {
-    let mut bytes = chunk[..HEADER].to_vec();
-    bytes.extend(records.iter().copied().chain(std::iter::repeat(0)).take(length));
-    let hash = blake3::hash(&bytes);
-    bytes.extend_from_slice(hash.as_bytes());
-    bytes
+/// Returns a part with the input in place of its first or last bytes, between the magic numbers, and
+/// the digest of that where there is still a place for it.
+fn as_part(input: &[u8], is_at_end: bool, part: &[u8]) -> Vec<u8> {
+    const MAGIC: usize = 4;
+    let mut bytes = part.to_vec();
+    let room = bytes.len() - 2 * MAGIC;
+    let input = &input[..input.len().min(room)];
+    let start = if is_at_end { bytes.len() - MAGIC - input.len() } else { MAGIC };
+    bytes[start..start + input.len()].copy_from_slice(input);
+    let mut file = std::io::Cursor::new(bytes);
+    let _ = sweep_files::seal::seal(&mut file);
+    file.into_inner()
 }
 
 struct Home {
@@ -91,7 +91,7 @@ struct Home {
     plan: Plan,
     /// Files of the whole run's folder, before it is joined.
     files: Vec<(String, Vec<u8>)>,
-    chunk: Vec<u8>,
+    part: Vec<u8>,
     result: Vec<u8>,
 }
 
@@ -149,7 +149,7 @@ fn home() -> &'static Home {
             .collect();
         assert!(matches!(go(None), Ended::Finished(_)));
         let result = fs::read(&output).expect("there is a result");
-        let (_, chunk) = files.iter().find(|(name, _)| name == CHUNK).expect("there is a chunk");
-        Home { chunk: chunk.clone(), plan, files, result, folder }
+        let (_, part) = files.iter().find(|(name, _)| name == PART).expect("there is a part");
+        Home { part: part.clone(), plan, files, result, folder }
     })
 }
