@@ -72,8 +72,8 @@ fn options() -> OpenOptions<'static> {
     OpenOptions { fresh: false, shard: None, environment: &|_| None }
 }
 
-/// Returns a part with the input in place of its first or last bytes, between the magic numbers, and
-/// the digest of that where there is still a place for it.
+/// Returns a part with the input in place of its first or last bytes, between the magic numbers,
+/// and the digest of that where there is still a place for it.
 fn as_part(input: &[u8], is_at_end: bool, part: &[u8]) -> Vec<u8> {
     const MAGIC: usize = 4;
     let mut bytes = part.to_vec();

@@ -498,7 +498,8 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     let work = Work { stop: &stop, seen: &seen, output: Some(&output), fresh: false };
     assert!(fit(cases(), &options, &work).unwrap().is_none());
     let part = ParquetFile::open(&partial.join("part-00000000.parquet")).unwrap();
-    assert_eq!(part.rows(), 3);
+    // The start is evaluated once, though a descent asks for it again.
+    assert_eq!(part.rows(), 2);
     let fields = part.schema().fields().iter().take(4).map(|field| field.name().as_str());
     let expected = ["damping_n_s_per_m", "unbalance_mass_kg", "file_1_shift_s", "cost"];
     assert_eq!(fields.collect::<Vec<_>>(), expected);
