@@ -31,7 +31,8 @@ pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
         table.numbers(&one.name, unit, &description, answer(k, one.sign));
     }
     for (k, goal) in study.conditions.iter().enumerate() {
-        let description = format!("how far the rows are from keeping {}; 0 where they do", goal.text());
+        let description =
+            format!("how far the rows are from keeping {}; 0 where they do", goal.text());
         table.numbers(&excess_name(k), "1", &description, answer(objectives + k, 1.0));
     }
     let feasible = tried.iter().map(|one| one.is_feasible(objectives));
