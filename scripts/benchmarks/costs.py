@@ -203,8 +203,8 @@ def files(sweep, folder):
 
 def in_chunks_mb(result):
     """What a run that is under way has written."""
-    chunks = result.with_name(f"{result.name}.partial").glob("chunk-*.bin")
-    return sum(path.stat().st_size for path in chunks) / 1e6
+    parts = result.with_name(f"{result.name}.partial").glob("part-*.parquet")
+    return sum(path.stat().st_size for path in parts) / 1e6
 
 
 def in_two(sweep, grid, result, half_mb):

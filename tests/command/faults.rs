@@ -111,7 +111,7 @@ fn holder_with_chunk(test_folder: &TestFolder) -> u32 {
     let started = Instant::now();
     loop {
         let lock = fs::read_to_string(test_folder.partial().join("lock")).unwrap_or_default();
-        let chunks = test_folder.partial().join("chunk-00000000.bin").exists();
+        let chunks = test_folder.partial().join("part-00000000.parquet").exists();
         if let (true, Some(process)) =
             (chunks, lock.split(' ').next().and_then(|word| word.parse().ok()))
         {
@@ -310,25 +310,25 @@ fn a_file_size_limit_is_an_error_and_the_run_continues_without_it() {
 
 #[test]
 fn a_flipped_bit_and_a_truncation_are_errors_and_repaired() {
-    let break_chunk = |change: &dyn Fn(&mut Vec<u8>)| {
+    let break_part = |change: &dyn Fn(&mut Vec<u8>)| {
         let test_folder = fresh_folder();
         let shard = output(test_folder.run().args(["--shard", "1/2"]));
         assert!(shard.status.success(), "{}", all_output(&shard));
-        let chunk = test_folder.partial().join("chunk-00000002.bin");
-        let mut bytes = fs::read(&chunk).expect("the first shard has the third chunk");
+        let part = test_folder.partial().join("part-00000002.parquet");
+        let mut bytes = fs::read(&part).expect("the first shard has the third chunk");
         change(&mut bytes);
-        fs::write(&chunk, bytes).expect("the chunk is broken");
+        fs::write(&part, bytes).expect("the part is broken");
         let run = output(&mut test_folder.run());
         assert!(run.status.success(), "{}", all_output(&run));
-        assert!(all_output(&run).contains("chunk-00000002.bin.damaged"), "{}", all_output(&run));
+        assert!(all_output(&run).contains("part-00000002.parquet.damaged"), "{}", all_output(&run));
         assert!(fs::read(test_folder.output()).expect("a result") == undisturbed());
     };
-    break_chunk(&|bytes| {
+    break_part(&|bytes| {
         let middle = bytes.len() / 2;
         bytes[middle] ^= 0x10;
     });
-    break_chunk(&|bytes| bytes.truncate(bytes.len() - 1));
-    break_chunk(&Vec::clear);
+    break_part(&|bytes| bytes.truncate(bytes.len() - 1));
+    break_part(&Vec::clear);
 }
 
 #[test]

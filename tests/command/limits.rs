@@ -215,7 +215,7 @@ fn an_interrupted_shard_continues_as_that_shard() {
     fs::write(test_folder.path("g.toml"), long).expect("the grid is written");
     let script = format!(
         "\"$@\" & sweep=$!\n{}kill -TERM $sweep; wait $sweep",
-        wait_for("ls x.parquet.partial/chunk-* > /dev/null 2>&1")
+        wait_for("ls x.parquet.partial/part-* > /dev/null 2>&1")
     );
     let words = ["run", "g.toml", "--threads", "1", "--shard", "2/3", "--out", "x.parquet"];
     let run = under(&test_folder, &["sh", "-c", &script, "sh"], &words);

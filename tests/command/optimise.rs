@@ -191,7 +191,7 @@ fn an_interrupted_study_continues_to_the_same_bytes() {
     let folder = folder_with("6", STUDY);
     let line = "optimise study.toml --threads 1 --progress none --out";
     output_of(&folder, &format!("{line} whole.parquet"));
-    let trials = folder.path().join("x.parquet.partial/trials.bin");
+    let trials = folder.path().join("x.parquet.partial/part-00000000.parquet");
     for name in ["INT", "KILL"] {
         let kept = fs::metadata(&trials).map_or(0, |file| file.len());
         let mut child = sweep(&folder, &format!("{line} x.parquet"))

@@ -119,12 +119,12 @@ fn an_interrupted_run_continues_to_the_same_bytes() {
     let child = command.stderr(Stdio::piped()).spawn().expect("it starts");
     // The signal comes after the first chunk.
     let partial = folder.path().join("results/grid-stability.parquet.partial");
-    let is_chunk = |entry: std::io::Result<fs::DirEntry>| {
-        entry.is_ok_and(|entry| entry.file_name().to_string_lossy().starts_with("chunk-"))
+    let is_part = |entry: std::io::Result<fs::DirEntry>| {
+        entry.is_ok_and(|entry| entry.file_name().to_string_lossy().starts_with("part-"))
     };
     let began = Instant::now();
-    while !fs::read_dir(&partial).is_ok_and(|mut entries| entries.any(is_chunk)) {
-        assert!(began.elapsed() < Duration::from_secs(60), "no chunk is kept");
+    while !fs::read_dir(&partial).is_ok_and(|mut entries| entries.any(is_part)) {
+        assert!(began.elapsed() < Duration::from_secs(60), "no part is kept");
         std::thread::sleep(Duration::from_millis(20));
     }
     signal("TERM", child.id());

@@ -115,7 +115,7 @@ class Sweep:
 
     def chunks(self, shard: int) -> int:
         own = (shard - 1, shard - 1 + self.shards)
-        return sum((self.partial / f"chunk-{chunk:08}.bin").exists() for chunk in own)
+        return sum((self.partial / f"part-{chunk:08}.parquet").exists() for chunk in own)
 
     def process(self, task: str) -> int | None:
         """The sweep of a task, if it is at work."""

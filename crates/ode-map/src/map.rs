@@ -12,7 +12,7 @@ use sweep_engine::config::Keys;
 use sweep_engine::config::schema::set;
 use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Steps};
 use sweep_engine::store::read::{NameCounts, add};
-use sweep_engine::store::{Done, Layout, Shape, axis_columns};
+use sweep_engine::store::{Done, Layout, axis_columns};
 use sweep_engine::{
     Build, Engine, Error, Estimate, GridInput, Job, Listed, Model as EngineModel, Plan, Read,
     RowSink, RowSource, Rows, RunContext, Scenario, Swept, methods,
@@ -183,7 +183,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
         let mut sampled = NameCounts::new();
         rows.iter().for_each(|row| add(&mut sampled, STATUSES[row.status()]));
         let layout = &Job::of(plan).layout;
-        let result_bytes = plan.points() as f64 * Shape::of(layout).bytes_a_row() as f64;
+        let result_bytes = plan.points() as f64 * layout.bytes_a_row() as f64;
         let steps = match plan.integrator.steps() {
             Steps::Checked(_) => ", until two runs agree",
             Steps::Fixed(_) => ", two trajectories per point",

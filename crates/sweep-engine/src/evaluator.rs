@@ -3,10 +3,11 @@
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
 
 use rayon::ThreadPool;
 
-use crate::store::{Done, Key, Trials};
+use crate::store::{Done, Key, Trials, WRITE_INTERVAL};
 use crate::watch::IncompleteGroups;
 use crate::{Engine, Interrupt, RunContext, StoreError, ThreadsError, threads};
 use sweep_files::panics::{lock, unlocked};
@@ -34,7 +35,7 @@ impl Stopped {
     }
 }
 
-/// The response to a request: a number for each of its keys, `None` where it is null.
+/// The numbers of the response to a request, `None` where one is null.
 pub type RequestValues = Vec<Option<f64>>;
 
 /// An engine with a cache of responses.
@@ -76,7 +77,7 @@ impl<'a> CachedEvaluator<'a> {
         unlocked(self.cache)
     }
 
-    /// Evaluates requests, each identified by its keys and covering `rows` points.
+    /// Evaluates requests, each identified by its key and covering `rows` points.
     ///
     /// `axis_values` returns the values of the axes at a point of a request. `respond` reduces the
     /// results of a request's points, in order, to its response.
@@ -85,13 +86,12 @@ impl<'a> CachedEvaluator<'a> {
     /// Any [`Stopped`].
     pub fn evaluate(
         &self,
-        keys: &[Vec<Key>],
+        keys: &[Key],
         rows: u64,
         axis_values: &(dyn Fn(usize, u64) -> Vec<f64> + Sync),
         respond: &(dyn Fn(usize, Vec<Done>) -> Result<RequestValues, StoreError> + Sync),
     ) -> Result<Vec<RequestValues>, Stopped> {
-        let cached: Vec<Option<RequestValues>> =
-            keys.iter().map(|keys| self.look_up(keys)).collect();
+        let cached: Vec<Option<RequestValues>> = keys.iter().map(|key| self.look_up(key)).collect();
         let missing: Vec<usize> = (0..keys.len()).filter(|&k| cached[k].is_none()).collect();
         self.count_responses((keys.len() - missing.len()) as u64);
         // The points of all requests are one queue, so that they fill lanes together.
@@ -101,48 +101,75 @@ impl<'a> CachedEvaluator<'a> {
             let (k, row) = if context.stopped() { None } else { lock(&queue).next() }?;
             Some((k as u64 * rows + row, axis_values(k, row)))
         };
-        let responses = Mutex::new(cached);
-        let failure = Mutex::new(None);
+        let mut responses = cached;
+        let mut failure = None;
         let groups = IncompleteGroups::default();
-        let sink = |result: Done| {
-            let request = result.point / rows;
-            let Some(results) = groups.add(request, rows, result) else { return };
-            let k = request as usize;
-            let stored = respond(k, results).and_then(|response| {
-                self.store(&keys[k], &response)?;
-                Ok(response)
-            });
-            match stored {
-                Ok(response) => lock(&responses)[k] = Some(response),
-                Err(error) => {
-                    lock(&failure).get_or_insert(error);
+        let (sender, receiver) = channel();
+        let engine = &self.engine;
+        // The calling thread writes while the pool evaluates.
+        self.pool.in_place_scope(|scope| {
+            if missing.is_empty() {
+                drop(sender);
+            } else {
+                scope.spawn(|_| {
+                    let sender = sender;
+                    let sink = |result: Done| {
+                        let request = result.point / rows;
+                        let Some(results) = groups.add(request, rows, result) else { return };
+                        let k = request as usize;
+                        // The receiver outlives the engine's work.
+                        let _ = sender.send((k, respond(k, results)));
+                    };
+                    engine.evaluate(&source, &sink, &context);
+                });
+            }
+            loop {
+                let stored = match receiver.recv_timeout(WRITE_INTERVAL) {
+                    Ok((k, response)) => {
+                        self.count_responses(1);
+                        response.and_then(|response| {
+                            self.store(&keys[k], &response)?;
+                            responses[k] = Some(response);
+                            Ok(())
+                        })
+                    }
+                    Err(RecvTimeoutError::Timeout) => self.write(Trials::is_due),
+                    Err(RecvTimeoutError::Disconnected) => break,
+                };
+                if let Err(error) = stored {
+                    failure.get_or_insert(error);
                     context.abort();
                 }
             }
-            self.count_responses(1);
-        };
-        if !missing.is_empty() {
-            self.pool.install(|| self.engine.evaluate(&source, &sink, &context));
-        }
-        let flushed = lock(&self.cache).as_ref().map_or(Ok(()), Trials::settle);
-        if let Some(error) = unlocked(failure).or(flushed.err()) {
+        });
+        let written = self.write(|_| true);
+        if let Some(error) = failure.or(written.err()) {
             return Err(Stopped::Failed(error));
         }
-        unlocked(responses).into_iter().collect::<Option<_>>().ok_or(Stopped::Interrupted)
+        responses.into_iter().collect::<Option<_>>().ok_or(Stopped::Interrupted)
     }
 
-    fn look_up(&self, keys: &[Key]) -> Option<RequestValues> {
+    fn look_up(&self, key: &Key) -> Option<RequestValues> {
         let cache = lock(&self.cache);
-        keys.iter().map(|key| cache.as_ref()?.recall(key)).collect()
+        let cells = cache.as_ref()?.recall(key)?;
+        Some(cells.iter().map(|cell| cell.map(f64::from_bits)).collect())
     }
 
-    fn store(&self, keys: &[Key], response: &RequestValues) -> Result<(), StoreError> {
-        let mut cache = lock(&self.cache);
-        let Some(cache) = cache.as_mut() else { return Ok(()) };
-        for (&key, &number) in keys.iter().zip(response) {
-            cache.keep(key, number)?;
+    /// Adds a response to the cache, and writes the cache if that is due.
+    fn store(&self, key: &Key, response: &RequestValues) -> Result<(), StoreError> {
+        if let Some(cache) = lock(&self.cache).as_mut() {
+            let cells = response.iter().map(|number| number.map(f64::to_bits)).collect();
+            cache.add(key.clone(), cells)?;
         }
-        Ok(())
+        self.write(Trials::is_due)
+    }
+
+    /// Writes the cache if a condition holds.
+    fn write(&self, when: impl FnOnce(&Trials) -> bool) -> Result<(), StoreError> {
+        match lock(&self.cache).as_mut() {
+            Some(cache) if when(cache) => cache.write(),
+            _ => Ok(()),
+        }
     }
 
     fn count_responses(&self, count: u64) {

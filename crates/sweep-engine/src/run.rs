@@ -2,9 +2,9 @@
 //!
 //! 1. Open or create the run's folder, and find the missing chunks.
 //! 2. Have the engine evaluate their rows on all cores.
-//! 3. Write each chunk when its rows are complete, and at the end the rows of incomplete chunks,
+//! 3. Write each chunk as a part when its rows are complete, and at the end the rows of incomplete chunks,
 //!    which a signal or an error leaves.
-//! 4. Join the chunks to the result file.
+//! 4. Join their parts to the result file.
 //!
 //! Memory: at most a chunk for each thread (4096 points, about 2 MB) and as many that wait for the
 //! disk, then about 40 MB for the join. Only the set of missing chunks grows with the number of
@@ -145,7 +145,7 @@ pub fn run(
             notes.extend(run.record(&session).err().map(|error| error.to_string()));
             let (points, kept) = run.own_points();
             let ended = match (interrupt.signal(), run.shard()) {
-                (None, Some(shard)) => Ended::Shard(shard, run.statuses(job)?),
+                (None, Some(shard)) => Ended::Shard(shard, run.statuses()?),
                 (signal, _) => {
                     Ended::Interrupted { signal: signal.unwrap_or_default(), kept, points }
                 }
@@ -205,7 +205,7 @@ impl Runner<'_> {
             loop {
                 match receiver.recv_timeout(PROGRESS_INTERVAL) {
                     Ok((chunk, rows)) => {
-                        if let Err(error) = run.write_chunk(chunk, rows) {
+                        if let Err(error) = run.write_chunk(self.job, chunk, rows) {
                             // Invalid rows lose one chunk; a failing disk would lose all further
                             // ones.
                             if !matches!(error, StoreError::Engine { .. }) {
@@ -244,7 +244,7 @@ impl<'a> ChunkCollector<'a> {
         context: &'a RunContext<'a>,
         writer: SyncSender<(u64, Vec<Done>)>,
     ) -> Self {
-        let incomplete = run.take_parts();
+        let incomplete = run.take_incomplete();
         let stored: BTreeSet<u64> = incomplete.values().flatten().map(|row| row.point).collect();
         let chunks = run.chunks();
         let stride = if runner.engine.is_helped_by_neighbours() { 1 } else { stride(chunks) };
@@ -270,7 +270,7 @@ impl<'a> ChunkCollector<'a> {
         let incomplete = std::mem::take(&mut *lock(&self.incomplete.0));
         for (chunk, rows) in incomplete {
             // An error in one chunk does not keep the others from being written.
-            let written = self.run.write_chunk(chunk, rows);
+            let written = self.run.write_chunk(self.runner.job, chunk, rows);
             result = result.and(written);
         }
         result

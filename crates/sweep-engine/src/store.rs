@@ -6,24 +6,24 @@
 //! |---|---|
 //! | `plan.json` | the frozen plan, written first (`plan_file`) |
 //! | `shards.json` | into how many shards the run was dealt, if it was (`shard`) |
-//! | `chunk-<index>.bin` | rows of neighbouring points, or some of them (`chunk`) |
-//! | `trials.bin` | the trials of a search, in place of chunks (`trials`) |
+//! | `part-<index>.parquet` | finished rows (`part`): of a chunk of points (`point_parts`), or the trials of a search (`trials`) |
 //! | `*.damaged` | what was not as it had been written; kept |
 //! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
 //! | `lock`, `shard-<i>.lock` | who is at work (`lock`) |
 //!
-//! When every chunk is there they are joined into the one Parquet file (`merge`), and the folder
+//! When every part is there they are joined into the one Parquet file (`merge`), and the folder
 //! goes, unless it holds what the run did not write (`own`) or has set aside. The store knows
 //! points, axis names and outcomes; it does not know the engine that makes them.
 
-mod chunk;
 mod differences;
 mod error;
 mod lock;
 mod merge;
 mod open;
 mod own;
+mod part;
 mod plan_file;
+mod point_parts;
 pub mod provenance;
 pub mod read;
 pub mod schema;
@@ -33,7 +33,6 @@ mod status;
 pub mod synthetic;
 #[cfg(test)]
 mod tests;
-mod trial_records;
 mod trials;
 mod unfinished;
 
@@ -41,7 +40,6 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-pub use chunk::{Place, Shape};
 pub use differences::PlanDifference;
 pub use error::{Holder, StoreError};
 use lock::Lock;
@@ -52,8 +50,7 @@ pub use read::{ResultFile, Tally};
 pub use schema::{BATCH_ROWS, Column, Done, Holds, Layout, ResultRows, Row};
 pub use shard::{Shard, ShardRequest, list as shard_list};
 pub use status::{FolderStatus, State, status};
-pub use trial_records::Key;
-pub use trials::Trials;
+pub use trials::{Key, TrialColumns, Trials, WRITE_INTERVAL};
 pub use unfinished::{Unfinished, refuse_unfinished, unfinished};
 
 use sweep_parameter::{Parameter as _, RatioLimits};
@@ -143,11 +140,10 @@ pub fn idle_shards(points: u64, shards: u64) -> Option<String> {
     })
 }
 
-// The files of a folder that have one name: those of every run, of shards, and of searches.
+// The files of a folder that have one name: those of every run, and of shards.
 const PLAN: &str = "plan.json";
 const LOCK: &str = "lock";
 const SHARDS: &str = "shards.json";
-const TRIALS: &str = "trials.bin";
 
 /// The paths of one run.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -190,12 +186,13 @@ impl Folder {
     }
 }
 
-fn chunk_name(chunk: u64) -> String {
-    format!("chunk-{chunk:08}.bin")
+/// Returns the name of the part of this index: a chunk's, or one of a search's.
+fn part_name(index: u64) -> String {
+    format!("part-{index:08}.parquet")
 }
 
-/// The chunk that a file is named after, if any.
-fn chunk_of_name(name: &str) -> Option<u64> {
-    let chunk = name.strip_prefix("chunk-")?.strip_suffix(".bin")?.parse().ok()?;
-    (chunk_name(chunk) == name).then_some(chunk)
+/// Returns the index of the part that a file is named after, if any.
+fn part_index(name: &str) -> Option<u64> {
+    let index = name.strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()?;
+    (part_name(index) == name).then_some(index)
 }

@@ -32,5 +32,7 @@ pub const OPTIMISE: &str = "sweep.optimise";
 pub const FIT: &str = "sweep.fit";
 /// The files that were compared, and the differences of their plans. In files of differences alone.
 pub const DIFFERENCES: &str = "sweep.differences";
+/// Place of a part of unfinished work. In parts alone.
+pub const PART: &str = "sweep.part";
 /// BLAKE3 hash of the whole file with zeros in this place, hexadecimal.
 pub const DIGEST: &str = "sweep.digest";

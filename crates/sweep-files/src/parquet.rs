@@ -105,7 +105,10 @@ impl ParquetFile {
     }
 
     /// Opens a file to find out its writer. It is read through only if it cannot be parsed.
-    pub(crate) fn look(path: &Path) -> Result<Self, FileError> {
+    ///
+    /// # Errors
+    /// Those of [`ParquetFile::open`].
+    pub fn look(path: &Path) -> Result<Self, FileError> {
         let open = || regular::open(path).map_err(FileError::io("open", path));
         let parsed = Self::parse(path, open()?, Seal::Absent);
         let is_damaged = matches!(parsed, Err(FileError::NotParquet { .. }))

@@ -76,13 +76,15 @@ impl<W: Write + Send> Writer<W> {
         Ok(self.file)
     }
 
+    /// Writes a row group. Each of its columns is handed to the library at once: the library ends
+    /// pages by the rows of a call, and the file must not depend on the batches that rows came in.
     fn flush(&mut self) -> Result<(), ParquetError> {
         let mut group = self.file.next_row_group()?;
         let mut place = 0;
         while let Some(mut column) = group.next_column()? {
-            for rows in &self.rows {
-                write(column.untyped(), rows.column(place))?;
-            }
+            let arrays: Vec<&dyn Array> =
+                self.rows.iter().map(|rows| rows.column(place).as_ref()).collect();
+            write(column.untyped(), &arrays)?;
             column.close()?;
             place += 1;
         }
@@ -128,35 +130,77 @@ fn declared(field: &Field) -> Result<Declared, ParquetError> {
         .build()
 }
 
-fn write(column: &mut ColumnWriter<'_>, array: &dyn Array) -> Result<usize, ParquetError> {
-    let levels: Vec<i16> = match array.nulls() {
-        None => vec![1; array.len()],
-        Some(nulls) => nulls.iter().map(i16::from).collect(),
-    };
+/// Writes the arrays of a column, one behind the other.
+fn write(column: &mut ColumnWriter<'_>, arrays: &[&dyn Array]) -> Result<usize, ParquetError> {
+    let mut levels: Vec<i16> = Vec::new();
+    for array in arrays {
+        match array.nulls() {
+            None => levels.resize(levels.len() + array.len(), 1),
+            Some(nulls) => levels.extend(nulls.iter().map(i16::from)),
+        }
+    }
     let levels = Some(levels.as_slice());
     match column {
         ColumnWriter::BoolColumnWriter(column) => {
-            let cells: Vec<bool> = array.as_boolean().iter().flatten().collect();
-            column.write_batch(&cells, levels, None)
+            let cells = arrays.iter().flat_map(|array| array.as_boolean().iter().flatten());
+            column.write_batch(&cells.collect::<Vec<bool>>(), levels, None)
         }
         ColumnWriter::Int64ColumnWriter(column) => {
-            let cells = array.as_primitive::<UInt64Type>().iter().flatten();
+            let cells =
+                arrays.iter().flat_map(|array| array.as_primitive::<UInt64Type>().iter().flatten());
             column.write_batch(&cells.map(u64::cast_signed).collect::<Vec<_>>(), levels, None)
         }
         ColumnWriter::DoubleColumnWriter(column) => {
-            let array = array.as_primitive::<Float64Type>();
-            if array.null_count() == 0 {
-                return column.write_batch(array.values(), levels, None);
+            let mut cells = Vec::new();
+            for array in arrays.iter().map(|array| array.as_primitive::<Float64Type>()) {
+                match array.null_count() {
+                    0 => cells.extend_from_slice(array.values()),
+                    _ => cells.extend(array.iter().flatten()),
+                }
             }
-            column.write_batch(&array.iter().flatten().collect::<Vec<_>>(), levels, None)
+            column.write_batch(&cells, levels, None)
         }
         ColumnWriter::ByteArrayColumnWriter(column) => {
-            let coded = array.as_dictionary::<Int32Type>();
-            let words = coded.values().as_string::<i32>().iter();
-            let words: Vec<ByteArray> = words.map(|word| word.unwrap_or_default().into()).collect();
-            let cells = coded.keys().iter().flatten().map(|key| words[key as usize].clone());
-            column.write_batch(&cells.collect::<Vec<_>>(), levels, None)
+            let mut cells: Vec<ByteArray> = Vec::new();
+            for coded in arrays.iter().map(|array| array.as_dictionary::<Int32Type>()) {
+                let words = coded.values().as_string::<i32>().iter();
+                let words: Vec<ByteArray> =
+                    words.map(|word| word.unwrap_or_default().into()).collect();
+                let keys = coded.keys().iter().flatten();
+                cells.extend(keys.map(|key| words[key as usize].clone()));
+            }
+            column.write_batch(&cells, levels, None)
         }
         _ => unreachable!("`declared` makes no others"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow_array::{ArrayRef, Float64Array, UInt64Array};
+
+    use super::*;
+
+    #[test]
+    fn bytes_do_not_depend_on_batches() {
+        const ROWS: usize = 100_000;
+        let counts: ArrayRef = Arc::new((0..ROWS as u64).map(Some).collect::<UInt64Array>());
+        let number = |row: usize| (row % 7 != 0).then_some(row as f64 / 3.0);
+        let numbers: ArrayRef = Arc::new((0..ROWS).map(number).collect::<Float64Array>());
+        let batch = RecordBatch::try_from_iter([("count", counts), ("number", numbers)]).unwrap();
+        let written = |batch_rows: usize| {
+            let properties = WriterProperties::builder().set_max_row_group_row_count(Some(60_000));
+            let mut writer = Writer::new(Vec::new(), &batch.schema(), properties.build()).unwrap();
+            for from in (0..ROWS).step_by(batch_rows) {
+                writer.write(&batch.slice(from, batch_rows.min(ROWS - from))).unwrap();
+            }
+            writer.end().unwrap().into_inner().unwrap()
+        };
+        let whole = written(ROWS);
+        for batch_rows in [1000, 4096, 33_333] {
+            assert!(written(batch_rows) == whole, "batches of {batch_rows} rows");
+        }
     }
 }

@@ -3,12 +3,12 @@
 //!
 //! `measured` and `speed` read a measurement. `model` compares it with the model and its
 //! derivatives, `search` finds the least cost, `statistics` says how well the numbers are known,
-//! and `report` holds all of it. `journal` keeps what a fit has found out.
+//! and `report` holds all of it. `evaluations` keeps what a fit has found out.
 
 mod algebra;
 mod curves;
+mod evaluations;
 mod iso18571;
-mod journal;
 mod known;
 mod measured;
 mod model;
@@ -22,7 +22,7 @@ mod tests;
 mod units;
 mod verdict;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
@@ -33,10 +33,10 @@ use crate::engine::simd_from_environment;
 use sweep_engine::config::{Diagnostic, Location, Report as Mistakes};
 use sweep_engine::design::{DesignRule, DistributionShape};
 use sweep_engine::threads::Cancel;
-use sweep_engine::{Design, Diagnostics, Distribution, Error, tell};
+use sweep_engine::{Design, Diagnostics, Distribution, Error};
 
 use algebra::Symmetric;
-use journal::Journal;
+pub(crate) use evaluations::Evaluations;
 use known::Known;
 pub(crate) use measured::Measured;
 use measured::REST_SPEED_RATIO;
@@ -117,6 +117,8 @@ pub(crate) struct Fitted<'a> {
     pub(crate) x: Vec<f64>,
     against: Vec<Against>,
     pub(crate) report: Report,
+    /// The evaluations that it keeps until its machine file is in place.
+    pub(crate) evaluations: Option<Evaluations>,
 }
 
 /// How a fit goes about its work.
@@ -125,8 +127,10 @@ pub(crate) struct Work<'a> {
     pub(crate) stop: Cancel<'a>,
     /// Hears of every evaluation: how many there were.
     pub(crate) seen: &'a (dyn Fn(usize) + Sync),
-    /// Where answers are kept.
-    pub(crate) journal: Option<PathBuf>,
+    /// The machine file beside which evaluations are kept.
+    pub(crate) output: Option<&'a Path>,
+    /// Whether to discard evaluations that are kept.
+    pub(crate) fresh: bool,
 }
 
 /// The cases of a fit: each measurement with the grid and its own constants.
@@ -272,11 +276,13 @@ fn fitted<'a>(
             return Err(Error::Refused(said).into());
         }
     }
-    let journal = work.journal.as_deref();
-    let journal = journal.map(|path| open(path, &problem)).transpose()?;
+    let open = |output| Evaluations::open(output, &problem, work.fresh);
+    let kept = work.output.map(open).transpose()?;
     let made = AtomicUsize::new(0);
-    let search = Search { problem: &problem, journal: journal.as_ref(), work, made: &made };
-    let mut minima = search.minima(u64::from(options.starts))?;
+    let search = Search { problem: &problem, kept: kept.as_ref(), work, made: &made };
+    let minima = search.minima(u64::from(options.starts));
+    kept.as_ref().map_or(Ok(()), Evaluations::write)?;
+    let mut minima = minima?;
     let mut best = minima.first().cloned().ok_or_else(no_answer)?;
     let mut step_effect = None;
     // A step too long for the forces' corners shows in the numbers: then it is halved.
@@ -296,7 +302,7 @@ fn fitted<'a>(
             problem.method = Method::Rk4 { step_s };
             break;
         }
-        let search = Search { problem: &problem, journal: None, work, made: &made };
+        let search = Search { problem: &problem, kept: None, work, made: &made };
         best = search.from(&best.x)?.ok_or_else(no_answer)?;
         minima[0] = best.clone();
     }
@@ -343,34 +349,13 @@ fn fitted<'a>(
     if stop() {
         return Err(Ended::Stopped);
     }
-    if let Some(journal) = journal {
-        journal.complete();
-    }
-    Ok(Fitted { problem, x: best.x, against, report })
+    Ok(Fitted { problem, x: best.x, against, report, evaluations: kept })
 }
 
 fn no_answer() -> Error {
     let said = "the model does not get through the record at the starting values: expected a start \
                 from which it does (`--set NAME=VALUE`)";
     Error::Refused(said.to_owned())
-}
-
-/// The journal of a problem.
-fn open(path: &Path, problem: &Problem<'_>) -> Result<Journal, Error> {
-    let mut hasher = blake3::Hasher::new();
-    for case in &problem.cases {
-        hasher.update(case.plan.to_json().to_string().as_bytes());
-        hasher.update(format!("{:?}", case.measured).as_bytes());
-    }
-    let further = (&problem.free, problem.model, problem.with_shift, problem.method);
-    hasher.update(format!("{further:?} {:?}", crate::identity::BUILD).as_bytes());
-    let journal = Journal::open(path, hasher.finalize());
-    let refused = |source| Error::File { action: "write", path: path.to_owned(), source };
-    let journal = journal.map_err(refused)?;
-    if journal.count() > 0 {
-        tell(&format!("going on: {} evaluations are there", journal.count()));
-    }
-    Ok(journal)
 }
 
 /// By how many standard errors another model would move each unknown.
@@ -448,7 +433,7 @@ fn bootstrap(
             }
         }
         let made = AtomicUsize::new(0);
-        let search = Search { problem, journal: None, work, made: &made };
+        let search = Search { problem, kept: None, work, made: &made };
         let again = search.from(x)?.filter(|again| again.is_settled);
         found.extend(again.map(|again| again.x[..problem.free.len()].to_vec()));
     }
@@ -459,7 +444,7 @@ fn bootstrap(
 /// A search for the least cost of a problem.
 struct Search<'a> {
     problem: &'a Problem<'a>,
-    journal: Option<&'a Journal>,
+    kept: Option<&'a Evaluations>,
     work: &'a Work<'a>,
     /// How many evaluations were made.
     made: &'a AtomicUsize,
@@ -474,7 +459,7 @@ impl Search<'_> {
             }
             Ok(found.map(|against| self.problem.summary(&against)))
         };
-        let found = self.journal.map_or_else(find, |journal| journal.answer(x, find))?;
+        let found = self.kept.map_or_else(find, |kept| kept.answer(x, find))?;
         (self.work.seen)(1 + self.made.fetch_add(1, Ordering::Relaxed));
         Ok(found)
     }

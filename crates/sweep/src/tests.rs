@@ -253,7 +253,10 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
     let job = task.job();
     let mut stops = 0;
     let (found, trials) = loop {
-        let Ok(Opened::Open(trials)) = Trials::open(&output, &job, false) else { panic!() };
+        let Ok(Opened::Open(trials)) = Trials::open(&output, &job, task.trial_columns(), false)
+        else {
+            panic!()
+        };
         let interrupt = Interrupt::new();
         let there = trials.count();
         // The first to be told so much stops it, wherever it is in its batch.

@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import washer_sweep
@@ -120,17 +121,22 @@ def test_a_run_into_a_file_goes_on_where_ctrl_c_left_it(short, tmp_path):
         axis["range"]["count"] = count
     plan = washer_sweep.Plan(grid)
 
-    def chunks():
-        return list((tmp_path / "x.parquet.partial").glob("chunk-*.bin"))
+    def parts():
+        return list((tmp_path / "x.parquet.partial").glob("*.parquet"))
 
-    stopped, _ = interrupted(lambda: plan.run(path, progress=False), 0.0, ready=chunks)
+    stopped, _ = interrupted(lambda: plan.run(path, progress=False), 0.0, ready=parts)
     assert stopped.result is None
     assert "the same call continues" in str(stopped)
     assert not path.exists()
-    assert chunks()
+    assert parts()
+    done = pq.read_table(sorted(parts()))
     plan.run(path, progress=False)
     plan.run(whole, progress=False)
     assert path.read_bytes() == whole.read_bytes()
+    # Parts are read as the result is: the rows that were done are its rows.
+    result = pq.read_table(whole)
+    assert 0 < done.num_rows < result.num_rows
+    assert done == result.take(done["point"])
 
 
 def test_the_interpreter_goes_on_meanwhile(short):

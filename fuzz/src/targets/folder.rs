@@ -1,9 +1,10 @@
-//! Fuzz target of the files of an unfinished run. An input replaces one of them. The program then
-//! reports an error, or continues the run to a result with the bytes of the undisturbed run. Only a
-//! chunk, whose rows are part of the result, may change it.
+//! Any bytes in place of one file of an unfinished run: the run is refused, or goes on and ends in
+//! a result whose bytes are those of the undisturbed one, unless the file is a part that passes for
+//! one.
 //!
-//! The first byte of an input selects the file. A chunk gets a valid header and a valid hash, so
-//! that the fuzzer changes its records: those of all points, or as many as the input has.
+//! The first byte of an input says which file it is for. A part is a sound one whose first or last
+//! bytes are the input's, with the digest of that, so that the fuzzer reaches its rows and its
+//! metadata.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,45 +16,36 @@ use sweep::{
 };
 use tempfile::TempDir;
 
-/// The number of bytes of a chunk before its records.
-const HEADER: usize = 76;
-/// The number of bytes of the hash after the records.
-const HASH: usize = 32;
-
-/// The names of the files that an input can replace.
 const NAMES: [&str; 8] = [
     "plan.json",
     "shards.json",
     "lock",
     "session-x-1-1.json",
     "shard-1.lock",
-    CHUNK,
-    // This file is beside the folder.
+    PART,
+    // Beside the folder.
     "../x.run.json",
-    CHUNK,
+    PART,
 ];
-/// The name of the only chunk.
-const CHUNK: &str = "chunk-00000000.bin";
+const PART: &str = "part-00000000.parquet";
 
-/// Runs the target with an input; a panic is a finding.
+/// Tries one input; a panic is a finding.
 pub(crate) fn run(bytes: &[u8]) {
-    let Some((selector, content)) = bytes.split_first() else { return };
-    let undisturbed = unfinished_run();
-    let file = usize::from(*selector) % NAMES.len();
-    let name = NAMES[file];
-    let records = undisturbed.chunk.len() - HEADER - HASH;
+    let Some((which, content)) = bytes.split_first() else { return };
+    let home = home();
+    let which = usize::from(*which) % NAMES.len();
+    let name = NAMES[which];
     let content = match name {
-        CHUNK if file + 1 == NAMES.len() => as_chunk(content, content.len(), &undisturbed.chunk),
-        CHUNK => as_chunk(content, records, &undisturbed.chunk),
+        PART => as_part(content, which + 1 == NAMES.len(), &home.part),
         _ => content.to_vec(),
     };
-    let partial = undisturbed.folder.path().join("x.parquet.partial");
-    reset(undisturbed, &partial);
+    let partial = home.folder.path().join("x.parquet.partial");
+    reset(home, &partial);
     fs::write(partial.join(name), &content).expect("the input is written");
 
-    let job = Job::of(&undisturbed.plan);
-    let output = undisturbed.folder.path().join("x.parquet");
-    // `status` changes no file.
+    let job = Job::of(&home.plan);
+    let output = home.folder.path().join("x.parquet");
+    // Looking changes nothing, whatever it finds.
     let _ = status(&output, &job);
     assert_eq!(fs::read(partial.join(name)).expect("the input is there"), content);
     let mut opened = match OpenRun::open(&output, &job, options()) {
@@ -67,12 +59,12 @@ pub(crate) fn run(bytes: &[u8]) {
     match opened.join(&job, &|| false) {
         Ok(tally) => {
             let tally = tally.expect("nobody stops it");
-            assert_eq!(tally.points, undisturbed.plan.points());
+            assert_eq!(tally.points, home.plan.points());
             let result = fs::read(&output).expect("there is a result");
-            assert!(name == CHUNK || result == undisturbed.result, "{name} has changed the result");
+            assert!(name == PART || result == home.result, "{name} has changed the result");
             let _ = opened.complete(&job, &tally, None);
         }
-        Err(error) => assert!(name == CHUNK, "{name}: {error}"),
+        Err(error) => assert!(name == PART, "{name}: {error}"),
     }
 }
 
@@ -80,41 +72,44 @@ fn options() -> OpenOptions<'static> {
     OpenOptions { fresh: false, shard: None, environment: &|_| None }
 }
 
-/// Returns a chunk with the records of an input, a valid header and a valid hash.
-fn as_chunk(records: &[u8], length: usize, chunk: &[u8]) -> Vec<u8> {
-    let mut bytes = chunk[..HEADER].to_vec();
-    bytes.extend(records.iter().copied().chain(std::iter::repeat(0)).take(length));
-    let hash = blake3::hash(&bytes);
-    bytes.extend_from_slice(hash.as_bytes());
-    bytes
+/// Returns a part with the input in place of its first or last bytes, between the magic numbers,
+/// and the digest of that where there is still a place for it.
+fn as_part(input: &[u8], is_at_end: bool, part: &[u8]) -> Vec<u8> {
+    const MAGIC: usize = 4;
+    let mut bytes = part.to_vec();
+    let room = bytes.len() - 2 * MAGIC;
+    let input = &input[..input.len().min(room)];
+    let start = if is_at_end { bytes.len() - MAGIC - input.len() } else { MAGIC };
+    bytes[start..start + input.len()].copy_from_slice(input);
+    let mut file = std::io::Cursor::new(bytes);
+    let _ = sweep_files::seal::seal(&mut file);
+    file.into_inner()
 }
 
-/// An undisturbed run before its chunks are joined, and its result.
-struct UnfinishedRun {
+struct Home {
     folder: TempDir,
     plan: Plan,
-    /// The files of the run's folder.
+    /// Files of the whole run's folder, before it is joined.
     files: Vec<(String, Vec<u8>)>,
-    chunk: Vec<u8>,
+    part: Vec<u8>,
     result: Vec<u8>,
 }
 
-/// Restores the files of the undisturbed run.
-fn reset(undisturbed: &UnfinishedRun, partial: &Path) {
+/// Puts everything back as an undisturbed run leaves it before its join.
+fn reset(home: &Home, partial: &Path) {
     for file in ["x.parquet", "x.run.json"] {
-        let _ = fs::remove_file(undisturbed.folder.path().join(file));
+        let _ = fs::remove_file(home.folder.path().join(file));
     }
     let _ = fs::remove_dir_all(partial);
     fs::create_dir(partial).expect("the folder is made");
-    for (name, bytes) in &undisturbed.files {
+    for (name, bytes) in &home.files {
         fs::write(partial.join(name), bytes).expect("a file is written");
     }
 }
 
-fn unfinished_run() -> &'static UnfinishedRun {
-    /// The run that all inputs share.
-    static RUN: OnceLock<UnfinishedRun> = OnceLock::new();
-    RUN.get_or_init(|| {
+fn home() -> &'static Home {
+    static HOME: OnceLock<Home> = OnceLock::new();
+    HOME.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let grid = folder.path().join("g.toml");
         let text = "spin = { profile = \"ramp\", peak_rpm = 300, ramp_s = 1 }\n\
@@ -140,7 +135,7 @@ fn unfinished_run() -> &'static UnfinishedRun {
                 .expect("the run ends")
                 .ended
         };
-        // A run with a single shard does not join its chunks.
+        // A shard of one leaves its folder.
         let shard = Some(ShardRequest::Given(Shard { index: 1, of: 1 }));
         assert!(matches!(go(shard), Ended::Shard(..)));
         let partial = folder.path().join("x.parquet.partial");
@@ -154,7 +149,7 @@ fn unfinished_run() -> &'static UnfinishedRun {
             .collect();
         assert!(matches!(go(None), Ended::Finished(_)));
         let result = fs::read(&output).expect("there is a result");
-        let (_, chunk) = files.iter().find(|(name, _)| name == CHUNK).expect("there is a chunk");
-        UnfinishedRun { chunk: chunk.clone(), plan, files, result, folder }
+        let (_, part) = files.iter().find(|(name, _)| name == PART).expect("there is a part");
+        Home { part: part.clone(), plan, files, result, folder }
     })
 }

@@ -5,7 +5,7 @@ use super::quantity::traced;
 use super::{BoundaryTrial, SearchRange, TracedQuantity};
 use crate::config::written::finite;
 use crate::evaluator::{CachedEvaluator, Stopped};
-use crate::store::{Done, Key, Rows};
+use crate::store::{Column, Done, Holds, Key, Rows, TrialColumns, axis_columns};
 use crate::{AxisValues, Error, Model, Plan, Swept};
 use sweep_parameter::Parameter as _;
 
@@ -150,21 +150,32 @@ impl<M: Rows + Swept> BoundaryTask<M> {
             Some(self.quantity.distance(columns[place?].number(cell)?))
         };
         move |trials| {
-            let keys: Vec<Vec<Key>> = trials.iter().map(|trial| vec![key(trial)]).collect();
-            let values = |k: usize, _| {
-                let BoundaryTrial { curve, first, second } = trials[k];
-                // The axes beyond the second vary fastest.
-                let mut values = self.plan.axis_values(curve as u64);
-                values[..2].copy_from_slice(&[first, second]);
-                values
-            };
+            let values: Vec<Vec<f64>> =
+                trials.iter().map(|trial| self.axis_values(trial)).collect();
+            let key = |values: &Vec<f64>| values.iter().map(|value| value.to_bits()).collect();
+            let keys: Vec<Key> = values.iter().map(key).collect();
+            let values = |k: usize, _| values[k].clone();
             let answer = |_, points: Vec<Done>| Ok(points.iter().map(&distance).collect());
             Ok(evaluator.evaluate(&keys, 1, &values, &answer)?.concat())
         }
     }
-}
 
-/// Returns the key under which a trial is stored.
-const fn key(trial: &BoundaryTrial) -> Key {
-    [trial.curve as u64, trial.first.to_bits(), trial.second.to_bits()]
+    /// Returns the values of the axes at a trial point.
+    fn axis_values(&self, trial: &BoundaryTrial) -> Vec<f64> {
+        // The axes beyond the second vary fastest.
+        let mut values = self.plan.axis_values(trial.curve as u64);
+        values[..2].copy_from_slice(&[trial.first, trial.second]);
+        values
+    }
+
+    /// Returns the columns of trials: the axes, and the distance from the limit.
+    pub fn trial_columns(&self) -> TrialColumns {
+        let TracedQuantity { name, limit, .. } = &self.quantity;
+        let about = format!(
+            "signed distance of {name} from {limit}, negative on the good side; null where {name} \
+             is not defined"
+        );
+        let distance = Column::new("distance", "1", about, Holds::Measured);
+        TrialColumns { keys: axis_columns(&self.plan), answers: vec![distance] }
+    }
 }

@@ -63,7 +63,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let output = args.out.clone().unwrap_or_else(default);
     let file = Output::begin(&output, FileKind::Boundary)?;
     let interrupt = installed()?;
-    let mut trials = match Trials::open(&output, &task.job(), args.fresh)? {
+    let mut trials = match Trials::open(&output, &task.job(), task.trial_columns(), args.fresh)? {
         Opened::Open(trials) => trials,
         Opened::Finished(()) => {
             let there = "the boundary is there already (--fresh traces it again)";

@@ -7,7 +7,7 @@ use super::cells::table as text_table;
 use super::grid::typed;
 use super::{Lines as _, installed, short, word};
 use crate::config::section::counted;
-use crate::optimise::file::{own_file, parameters, table};
+use crate::optimise::file::{own_file, parameters, table, trial_columns};
 use crate::optimise::search::{search, slacks};
 use crate::optimise::study::{Objective, SearchedParameter, Study};
 use crate::store::{Opened, Trials};
@@ -69,7 +69,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let file = Output::begin(&output, FileKind::Optimise)?;
     let own = own_output(&study, args, &output)?;
     let interrupt = installed()?;
-    let mut trials = match Trials::open(&output, &study.job(), args.fresh)? {
+    let mut trials = match Trials::open(&output, &study.job(), trial_columns(&study), args.fresh)? {
         Opened::Open(trials) => trials,
         Opened::Finished(()) => {
             let how = "it is there already (--fresh searches again)";

@@ -1,8 +1,12 @@
 //! The file of a study: a row for each candidate, in the order of evaluation.
 
 use sweep_files::key;
+use sweep_parameter::Parameter as _;
+use sweep_results::Goal;
 
+use super::study::Objective;
 use super::{Candidate, Study, front};
+use crate::store::{Column, Holds, TrialColumns};
 use crate::{Axis, GridInput, Rows, Table};
 
 /// Returns the table of a study's candidates.
@@ -21,7 +25,7 @@ pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
         tried.iter().map(move |one| one.answers.as_ref().map(|answers| sign * answers[k]))
     };
     for (k, one) in study.objectives.iter().enumerate() {
-        let unit = if one.goal.unit().is_empty() { "1" } else { one.goal.unit() };
+        let unit = objective_unit(&one.goal);
         let verb = if one.sign > 0.0 { "minimised" } else { "maximised" };
         let description = format!("{}, {verb}; null where a row has no value", one.goal.text());
         table.numbers(&one.name, unit, &description, answer(k, one.sign));
@@ -29,7 +33,7 @@ pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
     for (k, goal) in study.conditions.iter().enumerate() {
         let description =
             format!("how far the rows are from keeping {}; 0 where they do", goal.text());
-        table.numbers(&format!("excess_{}", k + 1), "1", &description, answer(objectives + k, 1.0));
+        table.numbers(&excess_name(k), "1", &description, answer(objectives + k, 1.0));
     }
     let feasible = tried.iter().map(|one| one.is_feasible(objectives));
     table.flags("feasible", "whether every condition holds", feasible);
@@ -44,7 +48,35 @@ pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
     table
 }
 
-/// Returns the parameters of a study.
+/// Returns the columns of trials: the candidate and its parameters, then its objectives and its
+/// excesses over the conditions.
+pub fn trial_columns<M: Rows>(study: &Study<M>) -> TrialColumns {
+    let number = Column::new("candidate", "1", "index, in the order of trial", Holds::Count);
+    let mut keys = vec![number];
+    keys.extend(parameters(study).iter().map(|Axis { parameter, .. }| {
+        Column::new(parameter.name(), parameter.unit(), parameter.description(), Holds::Axis)
+    }));
+    let mut answers = Vec::with_capacity(study.answers());
+    for Objective { name, goal, .. } in &study.objectives {
+        answers.push(Column::new(name, objective_unit(goal), goal.text(), Holds::Measured));
+    }
+    for (k, goal) in study.conditions.iter().enumerate() {
+        answers.push(Column::new(excess_name(k), "1", goal.text(), Holds::Measured));
+    }
+    TrialColumns { keys, answers }
+}
+
+/// Returns the unit of an objective.
+fn objective_unit(goal: &Goal) -> &str {
+    if goal.unit().is_empty() { "1" } else { goal.unit() }
+}
+
+/// Returns the name of the column of the excess over a condition.
+fn excess_name(condition: usize) -> String {
+    format!("excess_{}", condition + 1)
+}
+
+/// The parameters of a study.
 pub fn parameters<M: Rows>(study: &Study<M>) -> &[Axis<M>] {
     &study.plan.axes[study.grid.axes.len()..]
 }

@@ -22,7 +22,7 @@ pub fn search<M: Swept>(
     trials: Option<Trials>,
     effort: Effort<'_>,
 ) -> Result<(Option<Vec<Candidate>>, Option<Trials>), Error> {
-    let there = trials.as_ref().map_or(0, |trials| trials.count() / study.answers()) as u64;
+    let there = trials.as_ref().map_or(0, Trials::count) as u64;
     let progress = Progress::new(effort.progress, study.evolution.candidates, there);
     let shown = |candidates| progress.show(candidates);
     let threads = effort.threads()?;
@@ -32,16 +32,20 @@ pub fn search<M: Swept>(
     let mut count = 0;
     let found = evolve(&study.evolution, &mut |places| {
         let candidates: Vec<Vec<f64>> = places.iter().map(|place| study.values(place)).collect();
-        let keys = (count..).zip(&candidates).map(|(number, values)| {
-            (0..study.answers()).map(|answer| key(number, answer, values)).collect()
-        });
-        let keys: Vec<Vec<Key>> = keys.collect();
+        let keys: Vec<Key> =
+            (count..).zip(&candidates).map(|(number, values)| key(number, values)).collect();
         count += places.len() as u64;
         let values = |k: usize, row| study.axis_values(&candidates[k], row);
         let answer = |k: usize, points| answer(study, &layout, &candidates[k], points);
         let found = evaluator.evaluate(&keys, study.rows(), &values, &answer)?;
-        // A candidate without one of its numbers has none.
-        Ok(found.into_iter().map(|numbers| numbers.into_iter().collect()).collect())
+        let signs = study.objectives.iter().map(|one| one.sign);
+        let signs: Vec<f64> = signs.chain(study.conditions.iter().map(|_| 1.0)).collect();
+        let minimised = |numbers: RequestValues| {
+            let signed = numbers.into_iter().zip(&signs);
+            // Without one number there are none.
+            signed.map(|(number, sign)| number.map(|number| sign * number)).collect()
+        };
+        Ok(found.into_iter().map(minimised).collect())
     });
     progress.finish();
     Ok((Stopped::interrupted_to_none(found)?, evaluator.into_cache()))
@@ -68,7 +72,7 @@ pub fn slacks<M: Swept>(
         *lock(&found) = slacks.collect::<Result<Vec<_>, ArrowError>>().map_err(defect)?;
         Ok(RequestValues::new())
     };
-    let keys = [vec![key(0, 0, values)]];
+    let keys = [key(0, values)];
     let evaluated =
         evaluator.evaluate(&keys, study.rows(), &|_, row| study.axis_values(values, row), &answer);
     Ok(Stopped::interrupted_to_none(evaluated)?.map(|_| unlocked(found)))
@@ -79,7 +83,7 @@ fn defect(error: ArrowError) -> StoreError {
     StoreError::Engine { first: 0, last: 0, reason: error.to_string() }
 }
 
-/// Returns the objectives of a candidate as they are minimised, then its constraint violations.
+/// Returns the objectives of a candidate, then its constraint violations.
 fn answer<M: Swept>(
     study: &Study<M>,
     layout: &Layout,
@@ -87,11 +91,10 @@ fn answer<M: Swept>(
     points: Vec<Done>,
 ) -> Result<RequestValues, StoreError> {
     let batch = batch(study, layout, values, points)?;
-    let number = |goal: &Goal, sign: f64| Ok(goal.evaluate(&batch)?.map(|number| sign * number));
-    let objectives = study.objectives.iter().map(|one| number(&one.goal, one.sign));
-    let excesses = study.conditions.iter().map(|goal| number(goal, 1.0));
-    let numbers = objectives.chain(excesses).collect::<Result<Vec<_>, ArrowError>>();
-    // An infinite number counts as missing.
+    let objectives = study.objectives.iter().map(|one| &one.goal);
+    let goals = objectives.chain(&study.conditions);
+    let numbers = goals.map(|goal: &Goal| goal.evaluate(&batch)).collect::<Result<Vec<_>, _>>();
+    // An infinite number is as good as none.
     let finite = |number: Option<f64>| number.filter(|number| number.is_finite());
     Ok(numbers.map_err(defect)?.into_iter().map(finite).collect())
 }
@@ -114,11 +117,7 @@ fn batch<M: Swept>(
     rows.take().map_err(defect)
 }
 
-/// Returns the key under which an answer is stored: the numbers of candidate and answer, and a hash
-/// of the candidate.
-fn key(number: u64, answer: usize, values: &[f64]) -> Key {
-    let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-    let hash = blake3::hash(&bytes);
-    let word = hash.as_bytes().first_chunk().copied().unwrap_or_default();
-    [number, answer as u64, u64::from_le_bytes(word)]
+/// Returns the key of a candidate: its number, and its parameters.
+fn key(number: u64, values: &[f64]) -> Key {
+    std::iter::once(number).chain(values.iter().map(|value| value.to_bits())).collect()
 }

@@ -186,7 +186,7 @@ fn a_folder_that_vanishes_ends_the_run_with_its_path_and_advice() {
     let gone = home.path().join("gone");
     let engine = Formula::new(|point| {
         if point == 40 {
-            while !partial.join("chunk-00000000.bin").exists() {
+            while !partial.join("part-00000000.parquet").exists() {
                 std::thread::yield_now();
             }
             fs::rename(&partial, &gone).unwrap();

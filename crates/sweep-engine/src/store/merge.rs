@@ -1,10 +1,12 @@
-//! Joining the chunks into the one Parquet file, a row group at a time.
+//! Joining the parts of a run into the one Parquet file, a row group at a time.
 
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
+use std::sync::Arc;
 
 use arrow_array::RecordBatch;
+use arrow_schema::SchemaRef;
 use parquet::errors::ParquetError;
 use tempfile::NamedTempFile;
 
@@ -12,13 +14,14 @@ use super::open::remove;
 use super::provenance::{self};
 use super::read::{self};
 use super::schema::{self};
-use super::{BATCH_ROWS, Job, OpenRun, ResultRows, Session, StoreError, Tally};
+use super::{Job, OpenRun, Session, StoreError, Tally};
 use sweep_files::batches::from_arrow;
 use sweep_files::{self as files, ParquetFile, Writer, atomic, panics, seal};
 
-/// A result file in the making: batches of [`BATCH_ROWS`] rows, the last perhaps of fewer.
+/// An unfinished result file.
 struct MapWriter<'a> {
     output: &'a Path,
+    schema: SchemaRef,
     file: NamedTempFile,
     writer: Writer<BufWriter<File>>,
 }
@@ -26,10 +29,21 @@ struct MapWriter<'a> {
 impl<'a> MapWriter<'a> {
     /// Begins the file of a job, which is to be at `output`.
     fn begin(job: &Job<'_>, file: NamedTempFile, output: &'a Path) -> Result<Self, StoreError> {
-        let (schema, properties) = (job.layout.schema(), schema::properties(job));
+        let schema = job.layout.schema();
+        let properties = schema::properties(job);
         let handle = file.as_file().try_clone().map_err(StoreError::io("write", output))?;
         let begin = || Writer::new(BufWriter::new(handle), &schema, properties);
-        Ok(Self { output, file, writer: written(output, begin)? })
+        let writer = written(output, begin)?;
+        Ok(Self { output, schema, file, writer })
+    }
+
+    /// Writes a batch of a part. With the schema of the file, the batches that are held until
+    /// their row group is whole do not each hold one of their own.
+    fn write_part(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
+        let batch = RecordBatch::try_new(Arc::clone(&self.schema), batch.columns().to_vec());
+        let batch =
+            batch.map_err(|error| StoreError::parquet("write", self.output)(from_arrow(error)))?;
+        self.write(&batch)
     }
 
     fn write(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
@@ -38,7 +52,7 @@ impl<'a> MapWriter<'a> {
 
     /// The whole file, with its digest.
     fn finish(self) -> Result<NamedTempFile, StoreError> {
-        let Self { output, mut file, writer } = self;
+        let Self { output, mut file, writer, .. } = self;
         // Closing flushes to the file. (Taking the file back out of the writer would tell a full
         // disk as text only.)
         written(output, || {
@@ -60,8 +74,7 @@ fn written<T>(
         .map_err(StoreError::parquet("write", output))
 }
 
-/// Writes the result file of a job whose rows are in memory, in batches of [`BATCH_ROWS`]: the same
-/// bytes as a run's.
+/// Writes the result file of a job whose rows are in memory: the same bytes as a run's.
 ///
 /// # Errors
 /// [`StoreError::File`].
@@ -77,10 +90,10 @@ pub fn write_map(job: &Job<'_>, batches: &[RecordBatch], output: &Path) -> Resul
 }
 
 impl OpenRun {
-    /// Joins the chunks into the output and syncs it into place; `None` when `stop` said so. The
+    /// Joins the parts into the output and syncs it into place; `None` when `stop` said so. The
     /// folder stays until [`OpenRun::complete`].
     ///
-    /// Memory: one row group while it is encoded and one chunk, about 40 MB whatever the number of
+    /// Memory: one row group while it is encoded and one part, about 40 MB whatever the number of
     /// points, and 150 bytes a column for each row group behind (10 MB for a billion points).
     ///
     /// # Errors
@@ -93,29 +106,16 @@ impl OpenRun {
     ) -> Result<Option<Tally>, StoreError> {
         let output = self.folder.output.clone();
         let file = atomic::begin(&self.folder.path)?;
-        let from_arrow = |error| StoreError::parquet("write", &output)(from_arrow(error));
-        let mut rows = ResultRows::new(&job.layout);
         let mut writer = MapWriter::begin(job, file, &output)?;
         for chunk in 0..self.chunks() {
             if stop() {
                 return Ok(None);
             }
-            let Some(outcomes) = self.read_chunk(chunk)? else {
+            let Some(batches) = self.read_whole(chunk, |part| part.result_batches())? else {
                 self.rescan()?;
                 return Err(self.incomplete()?);
             };
-            let of_points = outcomes
-                .into_iter()
-                .flat_map(|done| done.rows.into_iter().map(move |row| (done.point, row)));
-            for (point, row) in of_points {
-                rows.push(point, (job.axis_values)(point), row);
-                if rows.len() == BATCH_ROWS {
-                    writer.write(&rows.take().map_err(from_arrow)?)?;
-                }
-            }
-        }
-        if rows.len() > 0 {
-            writer.write(&rows.take().map_err(from_arrow)?)?;
+            batches.iter().try_for_each(|batch| writer.write_part(batch))?;
         }
         let file = writer.finish()?;
         // Read back before it takes its place: what cannot be read must not replace anything.
@@ -141,7 +141,7 @@ impl OpenRun {
         files::judge(&path, self.folder.account())?;
         atomic::write(&self.folder.path, &path, &sidecar)?;
         let mut notes = self.take_notes();
-        notes.extend(remove(&self.folder, self.lock, &job.hash()));
+        notes.extend(remove(&self.folder, self.lock));
         Ok(notes)
     }
 }

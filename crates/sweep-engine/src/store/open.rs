@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::fs;
-use std::io::{ErrorKind, Read as _};
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard};
@@ -11,16 +11,17 @@ use std::sync::{Mutex, MutexGuard};
 use arrow_schema::Schema;
 use serde_json::json;
 
-use super::chunk::{self, Damage, Place, Shape};
 use super::differences::PlanDifference;
 use super::lock::Lock;
 use super::own;
+use super::part::{Damage, Unreadable};
 use super::plan_file::{Found, PlanFile, pretty, set_aside};
+use super::point_parts::{PointPart, PointParts};
 use super::provenance::Session;
 use super::read::{self, NameCounts, ResultFile, Tally};
 use super::schema::Done;
 use super::shard::{self, Shard, ShardLayout, ShardRequest};
-use super::{Folder, Job, PLAN, chunk_name, chunk_of_name, chunk_points};
+use super::{Folder, Job, PLAN, part_index, part_name};
 use crate::{Environment, StoreError};
 use sweep_files::panics::lock;
 use sweep_files::{FileError, ParquetFile, atomic, regular};
@@ -52,15 +53,13 @@ pub struct OpenRun {
     pub folder: Folder,
     /// What it holds.
     pub lock: Lock,
-    place: Place,
-    points: u64,
-    chunk_points: u64,
+    parts: PointParts,
     dealt: Option<(Shard, ShardLayout)>,
     /// This process's chunks that are there; behind a lock because workers look while the writer
     /// adds.
     present: Mutex<BTreeSet<u64>>,
     /// What there is of this process's other chunks, until it is taken.
-    parts: Mutex<BTreeMap<u64, Vec<Done>>>,
+    incomplete: Mutex<BTreeMap<u64, Vec<Done>>>,
     notes: Vec<String>,
 }
 
@@ -101,17 +100,13 @@ impl OpenRun {
             let frozen = dealing.freeze(&folder)?;
             dealt = resolve(Some(frozen))?;
         }
-        let place =
-            Place { plan: job.hash(), shape: Shape::of(&job.layout), chunk: 0, first: 0, count: 0 };
         let mut run = Self {
             folder,
             lock,
-            place,
-            points: job.points,
-            chunk_points: chunk_points(job.points),
+            parts: PointParts::new(job),
             dealt,
             present: Mutex::default(),
-            parts: Mutex::default(),
+            incomplete: Mutex::default(),
             notes,
         };
         run.rescan()?;
@@ -138,31 +133,43 @@ impl OpenRun {
     /// # Errors
     /// [`StoreError::File`].
     pub fn rescan(&mut self) -> Result<(), StoreError> {
-        let (mut present, mut parts) = (BTreeSet::new(), BTreeMap::new());
-        for chunk in chunks_there(&self.folder)? {
+        let mut present = BTreeSet::new();
+        let mut incomplete = BTreeMap::new();
+        for chunk in parts_there(&self.folder)? {
             if chunk >= self.chunks() || !self.owns(chunk) {
                 continue;
             }
-            match self.read(chunk)? {
-                Some(outcomes) if outcomes.len() as u64 == self.place(chunk).count => {
+            let length = self.chunk_length(chunk);
+            let outcomes = self.read(chunk, |part| {
+                if part.points() == length { Ok(None) } else { part.outcomes().map(Some) }
+            })?;
+            match outcomes {
+                Some(None) => {
                     present.insert(chunk);
                 }
-                Some(part) => {
-                    parts.insert(chunk, part);
+                Some(Some(outcomes)) => {
+                    incomplete.insert(chunk, outcomes);
                 }
                 None => {}
             }
         }
         *self.present() = present;
-        *lock(&self.parts) = parts;
+        *lock(&self.incomplete) = incomplete;
         Ok(())
     }
 
-    /// A whole chunk's outcomes; `None` if it is not there, or, with the file set aside and noted,
-    /// if it is damaged.
-    pub fn read_chunk(&mut self, chunk: u64) -> Result<Option<Vec<Done>>, StoreError> {
-        let count = self.place(chunk).count;
-        let whole = self.read(chunk)?.filter(|outcomes| outcomes.len() as u64 == count);
+    /// Reads a whole chunk's part; `None` if it is not there, or, with the file set aside and
+    /// noted, if it is damaged.
+    pub(super) fn read_whole<T>(
+        &mut self,
+        chunk: u64,
+        read: impl FnOnce(&PointPart<'_>) -> Result<T, Unreadable>,
+    ) -> Result<Option<T>, StoreError> {
+        let length = self.chunk_length(chunk);
+        let found = self.read(chunk, |part| {
+            if part.points() == length { read(part).map(Some) } else { Ok(None) }
+        })?;
+        let whole = found.flatten();
         if whole.is_none() {
             self.present().remove(&chunk);
         }
@@ -171,22 +178,21 @@ impl OpenRun {
 
     /// What is kept of a point, by whichever process.
     pub fn known(&self, point: u64) -> Option<Done> {
-        let place = self.place(self.chunk_of(point));
-        let there = read_chunk(&self.folder, &place).ok()??.ok()?;
-        there.into_iter().find(|done| done.point == point)
+        let part = self.parts.open(&self.folder, self.chunk_of(point)).ok()??;
+        part.outcomes().ok()?.into_iter().find(|done| done.point == point)
     }
 
-    /// What there is of a chunk; a damaged file is set aside and noted.
-    fn read(&mut self, chunk: u64) -> Result<Option<Vec<Done>>, StoreError> {
-        match read_chunk(&self.folder, &self.place(chunk))? {
-            Some(Ok(outcomes)) => Ok(Some(outcomes)),
-            None => Ok(None),
-            Some(Err(damage)) => {
-                let path = self.folder.file(chunk_name(chunk));
-                let aside = set_aside(&path)?;
-                let (path, aside) = (path.display(), aside.file_name().unwrap_or_default());
-                let kept = format!("kept as {} and computed again", aside.to_string_lossy());
-                self.notes.push(format!("{path}: {damage}; {kept}"));
+    /// Reads the part of a chunk, if there is one. A damaged one is set aside and noted.
+    fn read<T>(
+        &mut self,
+        chunk: u64,
+        read: impl FnOnce(&PointPart<'_>) -> Result<T, Unreadable>,
+    ) -> Result<Option<T>, StoreError> {
+        match read_part(&self.parts, &self.folder, chunk, read)? {
+            Ok(found) => Ok(found),
+            Err(damage) => {
+                let note = set_part_aside(&self.folder, chunk, damage)?;
+                self.notes.push(note);
                 Ok(None)
             }
         }
@@ -197,23 +203,29 @@ impl OpenRun {
     ///
     /// # Errors
     /// [`StoreError::Engine`] when the outcomes are not this chunk's, [`StoreError::File`].
-    pub fn write_chunk(&self, chunk: u64, mut outcomes: Vec<Done>) -> Result<(), StoreError> {
-        let place = self.place(chunk);
+    pub fn write_chunk(
+        &self,
+        job: &Job<'_>,
+        chunk: u64,
+        mut outcomes: Vec<Done>,
+    ) -> Result<(), StoreError> {
         outcomes.sort_by_key(|outcome| outcome.point);
-        let bytes = chunk::encode(&place, &outcomes)?;
-        let is_whole = outcomes.len() as u64 == place.count;
+        let bytes = self.parts.encode(job, chunk, &outcomes)?;
+        let count = outcomes.len() as u64;
+        let is_whole = count == self.chunk_length(chunk);
         // Another process with the same shard may have done it.
         if !is_whole
-            && let Some(Ok(known)) = read_chunk(&self.folder, &place)?
-            && known.len() > outcomes.len()
+            && let Ok(Some(known)) =
+                read_part(&self.parts, &self.folder, chunk, |part| Ok(part.points()))?
+            && known > count
         {
             return Ok(());
         }
-        atomic::write(&self.folder.path, &self.folder.file(chunk_name(chunk)), &bytes)?;
+        atomic::write(&self.folder.path, &self.folder.file(part_name(chunk)), &bytes)?;
         if is_whole {
             self.present().insert(chunk);
         } else {
-            lock(&self.parts).insert(chunk, outcomes);
+            lock(&self.incomplete).insert(chunk, outcomes);
         }
         Ok(())
     }
@@ -222,34 +234,39 @@ impl OpenRun {
     ///
     /// # Errors
     /// [`StoreError::File`].
-    pub fn statuses(&mut self, job: &Job<'_>) -> Result<NameCounts, StoreError> {
-        let (mut counts, own) = (NameCounts::new(), self.present().clone());
+    pub fn statuses(&mut self) -> Result<NameCounts, StoreError> {
+        let mut counts = NameCounts::new();
+        let own = self.present().clone();
         for chunk in own {
-            let rows = self.read_chunk(chunk)?.unwrap_or_default();
-            read::add_statuses(&mut counts, job, &rows);
+            self.read_whole(chunk, |part| part.add_statuses(&mut counts))?;
         }
         Ok(counts)
     }
 
     /// The outcomes there are of chunks that are not whole, to go on from.
-    pub fn take_parts(&self) -> BTreeMap<u64, Vec<Done>> {
-        std::mem::take(&mut *lock(&self.parts))
+    pub fn take_incomplete(&self) -> BTreeMap<u64, Vec<Done>> {
+        std::mem::take(&mut *lock(&self.incomplete))
     }
 
     /// How many chunks make up the whole result.
-    pub fn chunks(&self) -> u64 {
-        self.points.div_ceil(self.chunk_points)
+    pub const fn chunks(&self) -> u64 {
+        self.parts.chunks()
     }
 
     /// The points of a chunk.
     pub fn chunk_range(&self, chunk: u64) -> Range<u64> {
-        let first = chunk.saturating_mul(self.chunk_points).min(self.points);
-        first..first.saturating_add(self.chunk_points).min(self.points)
+        self.parts.range(chunk)
+    }
+
+    /// The number of points of a chunk.
+    fn chunk_length(&self, chunk: u64) -> u64 {
+        let range = self.chunk_range(chunk);
+        range.end - range.start
     }
 
     /// The chunk that a point is in.
     pub const fn chunk_of(&self, point: u64) -> u64 {
-        point / self.chunk_points
+        self.parts.chunk(point)
     }
 
     /// The part this process computes, if not the whole.
@@ -272,31 +289,23 @@ impl OpenRun {
 
     /// Points this process answers for, and how many of them are there.
     pub fn own_points(&self) -> (u64, u64) {
-        let length = |chunk| {
-            let range = self.chunk_range(chunk);
-            range.end - range.start
-        };
         let chunks = self.chunks();
         let own = self.shard().map_or(chunks, |shard| shard.chunks(chunks));
+        let full = self.chunk_length(0);
         // All chunks are full but the last of the run.
         let short = match chunks.checked_sub(1) {
-            Some(last) if self.owns(last) => self.chunk_points - length(last),
+            Some(last) if self.owns(last) => full - self.chunk_length(last),
             _ => 0,
         };
-        let whole: u64 = self.present().iter().map(|&chunk| length(chunk)).sum();
-        let there = whole + lock(&self.parts).values().map(|part| part.len() as u64).sum::<u64>();
-        (own.saturating_mul(self.chunk_points).saturating_sub(short), there)
+        let whole: u64 = self.present().iter().map(|&chunk| self.chunk_length(chunk)).sum();
+        let incomplete = lock(&self.incomplete);
+        let there = whole + incomplete.values().map(|some| some.len() as u64).sum::<u64>();
+        (own.saturating_mul(full).saturating_sub(short), there)
     }
 
     /// Things a user should hear of once: damaged chunks, a file system without locks.
     pub fn take_notes(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notes)
-    }
-
-    /// The place of a chunk.
-    pub fn place(&self, chunk: u64) -> Place {
-        let range = self.chunk_range(chunk);
-        Place { chunk, first: range.start, count: range.end - range.start, ..self.place.clone() }
     }
 
     /// Records this process's work in the folder, for the sidecar of the process that finishes the
@@ -326,27 +335,37 @@ impl OpenRun {
     }
 }
 
-/// What is where a chunk's file would be: its outcomes, or why they are none.
-pub(super) fn read_chunk(
+/// Reads the part of a chunk: `None` if there is no file, or why it is no part.
+pub(super) fn read_part<T>(
+    parts: &PointParts,
     folder: &Folder,
-    place: &Place,
-) -> Result<Option<Result<Vec<Done>, Damage>>, StoreError> {
-    let path = &folder.file(chunk_name(place.chunk));
-    let mut bytes = Vec::new();
-    // A byte too many is enough to know that it is too long.
-    let read = regular::open(path)
-        .and_then(|file| file.take(place.most_bytes() + 1).read_to_end(&mut bytes));
-    let read = regular::if_there(read).map_err(StoreError::io("read", path))?;
-    Ok(read.map(|_| chunk::decode(place, &bytes)))
+    chunk: u64,
+    read: impl FnOnce(&PointPart<'_>) -> Result<T, Unreadable>,
+) -> Result<Result<Option<T>, Damage>, StoreError> {
+    let found = parts.open(folder, chunk).and_then(|part| part.as_ref().map(read).transpose());
+    Unreadable::damage(found)
 }
 
-/// The chunks that have a file.
-pub(super) fn chunks_there(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
-    let mut chunks = BTreeSet::new();
+/// Sets the part of this index aside, and returns a note on it.
+pub(super) fn set_part_aside(
+    folder: &Folder,
+    index: u64,
+    damage: Damage,
+) -> Result<String, StoreError> {
+    let path = folder.file(part_name(index));
+    let aside = set_aside(&path)?;
+    let aside = aside.file_name().unwrap_or_default().to_string_lossy();
+    let path = path.display();
+    Ok(format!("{path}: {damage}; kept as {aside} and computed again"))
+}
+
+/// Returns the indices of the parts that have a file.
+pub(super) fn parts_there(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
+    let mut parts = BTreeSet::new();
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
-        chunks.extend(name.to_str().and_then(chunk_of_name));
+        parts.extend(name.to_str().and_then(part_index));
     }
-    Ok(chunks)
+    Ok(parts)
 }
 
 /// The result at the output, checked; `None` if there is none.
@@ -431,7 +450,7 @@ pub(super) fn claim<T>(
     let lock = Lock::acquire(folder, shard()?)?;
     let mut notes: Vec<String> = lock.note(folder).into_iter().collect();
     if fresh {
-        own::clear(folder, &job.hash())?;
+        own::clear(folder)?;
     }
     atomic::clear_leftovers(&folder.path);
     let ours = PlanFile::of(job);
@@ -445,7 +464,7 @@ pub(super) fn claim<T>(
         Found::Nothing => {
             if !fresh && let Some(finished) = finished()? {
                 // What dies between publishing its file and removing its folder leaves that.
-                remove(folder, lock, &job.hash());
+                remove(folder, lock);
                 return Ok(Opened::Finished(finished));
             }
             ours.freeze(folder)?;
@@ -473,12 +492,11 @@ pub(super) fn refuse_other_plan(
     })
 }
 
-/// Removes a folder that has served, of the run whose plan has this hash. What the run has not
-/// written, or has set aside, stays with the folder. The result does not depend on it, so a failure
-/// is only worth a note.
-pub(super) fn remove(folder: &Folder, lock: Lock, plan: &blake3::Hash) -> Option<String> {
+/// Removes a folder that has served. What the run has not written, or has set aside, stays with the
+/// folder. The result does not depend on it, so a failure is only worth a note.
+pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
     let path = folder.path.display();
-    let removed = own::clear(folder, plan).and_then(|others| {
+    let removed = own::clear(folder).and_then(|others| {
         lock.retire()?;
         if others.is_empty() {
             let removed = regular::if_there(fs::remove_dir(&folder.path));

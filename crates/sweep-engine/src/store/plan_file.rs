@@ -11,20 +11,20 @@ use super::{Folder, Job, PLAN, PlanDifference, StoreError};
 use sweep_files::{atomic, regular};
 
 /// Format of `plan.json`; a folder of another format is another plan.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// What `plan.json` says.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PlanFile {
-    /// Layout of this file and of the chunks beside it.
+    /// Layout of this file and of the parts beside it.
     pub format: u32,
     /// Version of the program that began the run; another one might round differently.
     pub version: String,
     /// Version of its numerics; files of format 1 had none.
     #[serde(default)]
     pub numerics: u32,
-    /// Hash of version, numerics and plan, hexadecimal, as in every chunk's header.
+    /// Hash of version, numerics and plan, hexadecimal, as in every part.
     pub plan_hash: String,
     /// Rows of the result.
     pub points: u64,

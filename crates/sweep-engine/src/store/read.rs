@@ -8,7 +8,6 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::error::StoreError;
-use super::{Done, Holds, Job};
 use sweep_files::{FileKind, ParquetFile, columns, key};
 use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::ratio_limits;
@@ -133,15 +132,6 @@ pub fn failures(by_status: &NameCounts) -> impl Iterator<Item = (&String, &u64)>
 /// Rows whose status is not `ok`.
 pub fn failed(by_status: &NameCounts) -> u64 {
     failures(by_status).map(|(_, count)| count).sum()
-}
-
-/// Counts rows of a job by status.
-pub(super) fn add_statuses(counts: &mut NameCounts, job: &Job<'_>, points: &[Done]) {
-    let Some(column) = job.layout.position("status") else { return };
-    let Holds::Name(names) = &job.layout.columns[column].kind else { return };
-    let rows = points.iter().flat_map(|done| &done.rows);
-    let named = rows.filter_map(|row| names.get(row[column]? as usize));
-    named.for_each(|name| add(counts, name));
 }
 
 /// Counts one more of a name.

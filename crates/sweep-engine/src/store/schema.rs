@@ -5,10 +5,11 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use arrow_array::types::Int32Type;
+use arrow_array::cast::AsArray as _;
+use arrow_array::types::{Float64Type, Int32Type, UInt64Type};
 use arrow_array::{
-    ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray,
-    UInt64Array,
+    Array, ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int32Array, RecordBatch,
+    StringArray, UInt64Array,
 };
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use parquet::basic::{Compression, ZstdLevel};
@@ -28,6 +29,9 @@ pub const ROW_GROUP_ROWS: usize = 1 << 17;
 /// Rows handed to the Parquet writer at once: fixed for the same reason, and a whole number of them
 /// makes a group.
 pub const BATCH_ROWS: usize = 1 << 12;
+
+/// The name of the column of points.
+pub(super) const POINT: &str = "point";
 
 /// What a column's cells are.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -127,7 +131,7 @@ impl Column {
         }
     }
 
-    fn field(&self) -> Field {
+    pub(super) fn field(&self) -> Field {
         let names = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
         let (data_type, nullable) = match self.kind {
             Holds::Count => (DataType::UInt64, false),
@@ -154,7 +158,10 @@ impl Column {
     }
 
     /// The column's array; cells that must be there and are not become zeros.
-    fn array(&self, cells: impl Iterator<Item = Option<u64>>) -> Result<ArrayRef, ArrowError> {
+    pub(super) fn array(
+        &self,
+        cells: impl Iterator<Item = Option<u64>>,
+    ) -> Result<ArrayRef, ArrowError> {
         Ok(match &self.kind {
             Holds::Count => {
                 Arc::new(UInt64Array::from_iter_values(cells.map(Option::unwrap_or_default)))
@@ -177,6 +184,32 @@ impl Column {
         })
     }
 
+    /// Returns the cells of an array that [`Column::array`] has made, or of one that was read back;
+    /// `None` of any other.
+    pub(super) fn cells(&self, array: &dyn Array) -> Option<Vec<Option<u64>>> {
+        let cells: Vec<Option<u64>> = match &self.kind {
+            Holds::Count | Holds::KnownCount => {
+                array.as_primitive_opt::<UInt64Type>()?.iter().collect()
+            }
+            Holds::Measured | Holds::Axis | Holds::Time | Holds::Kept => {
+                let numbers = array.as_primitive_opt::<Float64Type>()?.iter();
+                numbers.map(|number| number.map(f64::to_bits)).collect()
+            }
+            Holds::Flag => array.as_boolean_opt()?.iter().map(|flag| flag.map(u64::from)).collect(),
+            Holds::Name(names) => {
+                let coded = array.as_dictionary_opt::<Int32Type>()?;
+                let words = coded.values().as_string_opt::<i32>()?.iter();
+                let place = |word: Option<&str>| names.iter().position(|name| Some(*name) == word);
+                let places: Vec<u64> = words
+                    .map(|word| place(word).map(|place| place as u64))
+                    .collect::<Option<_>>()?;
+                let cell = |key: Option<i32>| key.map(|key| places[key as usize]);
+                coded.keys().iter().map(cell).collect()
+            }
+        };
+        Some(cells)
+    }
+
     /// Whether a cell is one of this column.
     pub(super) fn takes(&self, cell: Option<u64>) -> bool {
         match (&self.kind, cell) {
@@ -191,13 +224,18 @@ impl Column {
 }
 
 impl Layout {
+    /// Returns the bytes of a row in a part, at most.
+    pub fn bytes_a_row(&self) -> usize {
+        8 * (1 + self.axes.len() + self.columns.len())
+    }
+
     /// Every column, in order.
-    fn all(&self) -> impl Iterator<Item = &Column> + Clone {
-        static POINT: std::sync::LazyLock<Column> = std::sync::LazyLock::new(|| {
-            Column::new("point", "1", "index in grid order", Holds::Count)
+    pub(super) fn all(&self) -> impl Iterator<Item = &Column> + Clone {
+        static POINTS: std::sync::LazyLock<Column> = std::sync::LazyLock::new(|| {
+            Column::new(POINT, "1", "index in grid order", Holds::Count)
         });
         let columns = self.columns.iter().filter(|column| column.kind != Holds::Kept);
-        std::iter::once(&*POINT).chain(&self.axes).chain(columns)
+        std::iter::once(&*POINTS).chain(&self.axes).chain(columns)
     }
 
     /// The Arrow schema.
@@ -265,11 +303,6 @@ impl<'a> ResultRows<'a> {
     /// The schema of its batches.
     pub fn schema(&self) -> SchemaRef {
         Arc::clone(&self.schema)
-    }
-
-    /// Rows so far.
-    pub(crate) fn len(&self) -> usize {
-        self.rows.len()
     }
 
     /// Adds a row of a point, with the values of the axes there.

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
-use super::open::{self, chunks_there, read_chunk};
+use super::open::{self, parts_there, read_part};
 use super::plan_file::{Found, PlanFile};
-use super::read::{NameCounts, add_statuses, failed};
+use super::point_parts::PointParts;
+use super::read::{NameCounts, failed};
 use super::shard::{self, ShardLayout};
-use super::{Folder, Holder, Job, Place, Shape, StoreError, chunk_points, lock};
+use super::{Folder, Holder, Job, StoreError, lock};
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -73,8 +74,8 @@ pub(super) fn shown<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, 
 /// As [`super::OpenRun::open`], but never [`StoreError::Busy`].
 pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> {
     let folder = Folder::of(output, &job.layout)?;
-    let points_a_chunk = chunk_points(job.points);
-    let chunks = job.points.div_ceil(points_a_chunk);
+    let parts = PointParts::new(job);
+    let chunks = parts.chunks();
     let mut status = FolderStatus {
         output: output.to_path_buf(),
         points: job.points,
@@ -82,7 +83,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         chunks_missing: chunks,
         ..FolderStatus::default()
     };
-    let (ours, hash) = (PlanFile::of(job), job.hash());
+    let ours = PlanFile::of(job);
     match PlanFile::read(&folder)? {
         Found::Plan(found) => open::refuse_other_plan(&folder, &found, &ours)?,
         Found::Nothing => {
@@ -99,25 +100,27 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         }
         Found::Damaged => {}
     }
-    let place = |chunk: u64| {
-        let first = chunk * points_a_chunk;
-        let shape = Shape::of(&job.layout);
-        Place { plan: hash, shape, chunk, first, count: points_a_chunk.min(job.points - first) }
-    };
     let mut present = BTreeSet::new();
-    for chunk in chunks_there(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
-        let place = place(chunk);
-        match read_chunk(&folder, &place)? {
-            Some(Ok(points)) => {
-                if points.len() as u64 == place.count {
+    for chunk in parts_there(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
+        let range = parts.range(chunk);
+        let mut by_status = NameCounts::new();
+        let points = read_part(&parts, &folder, chunk, |part| {
+            part.add_statuses(&mut by_status)?;
+            Ok(part.points())
+        });
+        match points? {
+            Ok(Some(points)) => {
+                if points == range.end - range.start {
                     present.insert(chunk);
                 }
-                status.points_done += points.len() as u64;
-                add_statuses(&mut status.by_status, job, &points);
+                status.points_done += points;
+                for (name, count) in by_status {
+                    *status.by_status.entry(name).or_default() += count;
+                }
             }
-            Some(Err(_)) => status.chunks_damaged.push(chunk),
-            // The run was finished, or the chunk set aside, a moment ago.
-            None => {}
+            Err(_) => status.chunks_damaged.push(chunk),
+            // The run was finished, or the part set aside, a moment ago.
+            Ok(None) => {}
         }
     }
     status.chunks_done = present.len() as u64;

@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use super::*;
 use sweep_files::{FileError, ParquetFile, cells};
 
-mod chunks;
+mod parts;
 mod plans;
 mod result;
 mod strangers;
@@ -49,14 +49,14 @@ fn open(output: &Path, job: &Job<'_>) -> OpenRun {
 
 fn write(run: &OpenRun, chunk: u64) {
     let outcomes: Vec<_> = run.chunk_range(chunk).map(synthetic::done).collect();
-    run.write_chunk(chunk, outcomes).unwrap();
+    run.write_chunk(&synthetic::job(POINTS), chunk, outcomes).unwrap();
 }
 
 fn write_bytes(job: &Job<'_>, chunk: u64) -> Vec<u8> {
     let home = Home::new();
     let run = open(&home.output(), job);
     write(&run, chunk);
-    fs::read(home.partial().join(chunk_name(chunk))).unwrap()
+    fs::read(home.partial().join(part_name(chunk))).unwrap()
 }
 
 fn write_missing(run: &OpenRun) -> u64 {
@@ -81,6 +81,21 @@ fn undisturbed(points: u64) -> Vec<u8> {
     finish(run, &job);
     assert!(!home.partial().exists());
     fs::read(home.output()).unwrap()
+}
+
+/// Columns of a search's trials.
+fn trial_columns() -> TrialColumns {
+    let axis = |name: &str| Column::new(name, "1", "a parameter", Holds::Axis);
+    let answers = vec![Column::new("distance", "1", "an answer", Holds::Measured)];
+    TrialColumns { keys: ["x", "y"].map(axis).to_vec(), answers }
+}
+
+/// The trials of a search.
+fn trials(output: &Path, job: &Job<'_>) -> Trials {
+    match Trials::open(output, job, trial_columns(), false).unwrap() {
+        Opened::Open(trials) => trials,
+        Opened::Finished(()) => panic!("is not done"),
+    }
 }
 
 fn batches(path: &Path) -> Vec<RecordBatch> {

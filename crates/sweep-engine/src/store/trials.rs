@@ -1,44 +1,56 @@
-//! The trials of a search, kept as they come. A search's next trials follow from the answers so
-//! far, so after an interruption it repeats them from here and ends in the same bytes.
+//! The trials of a search. A search's next trials follow from the answers so far, so after an
+//! interruption it runs again over the rows that are there, and ends in the same bytes.
 //!
 //! A search on `x.parquet` works in the folder `x.parquet.partial`, under the same lock and with
-//! the same frozen plan as a run. Chunks do not fit it: which points it needs is not known
-//! beforehand. Its trials are in `trials.bin` instead, in the order in which they came, 40 bytes
-//! each:
-//!
-//! | bytes | what |
-//! |---|---|
-//! | 24 | the point: three numbers |
-//! | 8 | the answer, an `f64`; NaN where there is none |
-//! | 8 | of the BLAKE3 hash of the 32 bytes before, keyed by the plan's hash |
-//!
-//! A record whose hash does not match, because a crash tore it or because it belongs to another
-//! plan, is ignored, and its trial is made again. What was written survives the process at once,
-//! and a power cut once [`Trials::settle`] has returned.
+//! the same frozen plan as a run. Which points it needs is not known beforehand, so its parts have
+//! no places but their order: a part is written again with the rows that have come since, until it
+//! is full, and then the next one begins.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use serde_json::json;
 
 use super::open::{self, Opened};
-use super::plan_file::set_aside;
-use super::trial_records::{Key, RECORD_BYTES, decode, encode};
-use super::{Folder, Job, Lock, StoreError, TRIALS};
-use sweep_files::regular;
+use super::part::{Damage, PartSchema, Unreadable};
+use super::{Column, Folder, Job, Lock, Row, StoreError, part_name};
+use sweep_files::{FileKind, atomic};
 
-/// Trials and their answers.
-type Known = BTreeMap<Key, Option<f64>>;
+/// The number of rows of a full part. Basis: a part is written again at most once in
+/// [`WRITE_INTERVAL`], and so many rows of ten columns take a millisecond. Doubling it halves the
+/// number of files and doubles what a write costs.
+const PART_ROWS: usize = 1024;
+
+/// The time between two writes of trials that come one by one. Basis: a kill loses the trials of a
+/// second at most, and writes take a thousandth of the time. Doubling it doubles what is lost.
+pub const WRITE_INTERVAL: Duration = Duration::from_secs(1);
+
+/// The identity of a trial: the cells of its first columns, none of which is null.
+pub type Key = Vec<u64>;
+
+/// The columns of a search's trials.
+#[derive(Clone, Debug)]
+pub struct TrialColumns {
+    /// The columns that identify a trial.
+    pub keys: Vec<Column>,
+    /// The columns of its answer.
+    pub answers: Vec<Column>,
+}
 
 /// The trials of a search that this process has a right to.
 #[derive(Debug)]
 pub struct Trials {
     folder: Folder,
     lock: Lock,
-    file: File,
-    path: PathBuf,
-    plan: [u8; blake3::OUT_LEN],
-    known: Known,
+    parts: PartSchema,
+    known: BTreeMap<Key, Row>,
+    /// The index and the rows of the last part, which is not full.
+    last: u64,
+    rows: Vec<Row>,
+    /// Whether the last part has rows that are not written.
+    is_dirty: bool,
+    written: Instant,
     notes: Vec<String>,
 }
 
@@ -50,34 +62,60 @@ impl Trials {
     /// [`StoreError::Busy`] when another process holds the output, [`StoreError::PlanDiffers`],
     /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::File`] for
     /// anything else at the output that is not ours, and for the file system.
-    pub fn open(output: &Path, job: &Job<'_>, fresh: bool) -> Result<Opened<(), Self>, StoreError> {
+    pub fn open(
+        output: &Path,
+        job: &Job<'_>,
+        columns: TrialColumns,
+        fresh: bool,
+    ) -> Result<Opened<(), Self>, StoreError> {
         let folder = Folder::beside(output, job.layout.kind)?;
-        let finished = || Ok(open::of_plan(&folder, job)?.map(drop));
-        let (lock, mut notes) = match open::claim(&folder, job, fresh, || Ok(None), finished)? {
+        let finished = || match job.layout.kind {
+            // The model's own file does not say which search it is from.
+            FileKind::Own => Ok(None),
+            _ => Ok(open::of_plan(&folder, job)?.map(drop)),
+        };
+        let (lock, notes) = match open::claim(&folder, job, fresh, || Ok(None), finished)? {
             Opened::Finished(()) => return Ok(Opened::Finished(())),
             Opened::Open(held) => held,
         };
-        let path = folder.file(TRIALS);
-        let plan = *job.hash().as_bytes();
-        let (mut file, found, known) = contents(&path, &plan)?;
-        let length = file.metadata().map_err(StoreError::io("read", &path))?.len();
-        if known.is_empty() && length > 0 {
-            let aside = set_aside(&path)?;
-            let kept = format!("kept as {}, and they are made again", aside.display());
-            notes.push(format!("{}: no trial is as it was written; {kept}", path.display()));
-            (file, ..) = contents(&path, &plan)?;
-        } else {
-            if found > known.len() {
-                let (path, torn) = (path.display(), found - known.len());
-                let told = "trials are not as they were written; they are made again";
-                notes.push(format!("{path}: {torn} of {found} {told}"));
+        let TrialColumns { mut keys, answers } = columns;
+        let width = keys.len();
+        keys.extend(answers);
+        let mut trials = Self {
+            folder,
+            lock,
+            parts: PartSchema::new(job, keys),
+            known: BTreeMap::new(),
+            last: 0,
+            rows: Vec::new(),
+            is_dirty: false,
+            written: Instant::now(),
+            notes,
+        };
+        trials.read(width)?;
+        Ok(Opened::Open(trials))
+    }
+
+    /// Reads the parts that are there, setting aside what is not whole.
+    fn read(&mut self, width: usize) -> Result<(), StoreError> {
+        for index in open::parts_there(&self.folder)? {
+            match Unreadable::damage(read_rows(&self.parts, &self.folder, index))? {
+                Ok(rows) => {
+                    for row in &rows {
+                        let (key, answer) = row.split_at(width);
+                        let key = key.iter().map(|cell| cell.unwrap_or_default()).collect();
+                        self.known.insert(key, answer.to_vec());
+                    }
+                    self.last = index;
+                    self.rows = rows;
+                }
+                Err(damage) => {
+                    let note = open::set_part_aside(&self.folder, index, damage)?;
+                    self.notes.push(note);
+                }
             }
-            // A torn record goes, so that the next one begins where a record should.
-            let whole = found as u64 * RECORD_BYTES as u64;
-            let cut = file.set_len(whole).and_then(|()| file.seek(SeekFrom::End(0)));
-            cut.map_err(StoreError::io("write", &path))?;
         }
-        Ok(Opened::Open(Self { folder, lock, file, path, plan, known, notes }))
+        Ok(())
     }
 
     /// How many trials are there.
@@ -86,27 +124,46 @@ impl Trials {
     }
 
     /// The answer to a trial that was made before.
-    pub fn recall(&self, key: &Key) -> Option<Option<f64>> {
-        self.known.get(key).copied()
+    pub fn recall(&self, key: &[u64]) -> Option<&Row> {
+        self.known.get(key)
     }
 
-    /// Keeps an answer.
+    /// Adds an answer, which [`Trials::write`] writes.
     ///
     /// # Errors
-    /// [`StoreError::File`].
-    pub fn keep(&mut self, key: Key, answer: Option<f64>) -> Result<(), StoreError> {
-        let record = encode(&self.plan, key, answer);
-        self.file.write_all(&record).map_err(StoreError::io("write", &self.path))?;
+    /// [`StoreError::File`], where the answer fills a part.
+    pub fn add(&mut self, key: Key, answer: Row) -> Result<(), StoreError> {
+        if self.rows.len() >= PART_ROWS {
+            self.write()?;
+            self.last += 1;
+            self.rows.clear();
+        }
+        self.rows.push(key.iter().copied().map(Some).chain(answer.iter().copied()).collect());
         self.known.insert(key, answer);
+        self.is_dirty = true;
         Ok(())
     }
 
-    /// Makes what was kept outlive a power cut.
+    /// Whether there are answers to write, and none were written for a while.
+    pub fn is_due(&self) -> bool {
+        self.is_dirty && self.written.elapsed() >= WRITE_INTERVAL
+    }
+
+    /// Writes the answers that are not written: when this returns, they outlive a power cut.
     ///
     /// # Errors
     /// [`StoreError::File`].
-    pub fn settle(&self) -> Result<(), StoreError> {
-        self.file.sync_data().map_err(StoreError::io("sync", &self.path))
+    pub fn write(&mut self) -> Result<(), StoreError> {
+        if !self.is_dirty {
+            return Ok(());
+        }
+        let path = self.folder.file(part_name(self.last));
+        let bytes = self.parts.encode(&place(self.last), &self.rows);
+        let bytes = bytes.map_err(StoreError::parquet("write", &path))?;
+        atomic::write(&self.folder.path, &path, &bytes)?;
+        self.is_dirty = false;
+        self.written = Instant::now();
+        Ok(())
     }
 
     /// Things a user should hear of once.
@@ -116,149 +173,24 @@ impl Trials {
 
     /// Removes the folder of a search whose file is in place; a failure is only worth a note.
     pub fn complete(self) -> Option<String> {
-        open::remove(&self.folder, self.lock, &blake3::Hash::from_bytes(self.plan))
+        open::remove(&self.folder, self.lock)
     }
 }
 
-/// The file of trials, made if need be; how many records it holds; and the trials in them.
-fn contents(path: &Path, plan: &[u8; blake3::OUT_LEN]) -> Result<(File, usize, Known), StoreError> {
-    let file = regular::open_or_create(path).map_err(StoreError::io("open or make", path))?;
-    let (mut found, mut known) = (0, Known::new());
-    // One by one: the file may be long, and somebody else's.
-    let mut records = BufReader::new(&file);
-    loop {
-        let mut record = [0; RECORD_BYTES];
-        match records.read_exact(&mut record) {
-            Ok(()) => found += 1,
-            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => break,
-            Err(error) => return Err(StoreError::io("read", path)(error)),
-        }
-        known.extend(decode(plan, &record));
+/// Returns the entry of a part's metadata that says which of a search's parts it is.
+fn place(index: u64) -> String {
+    json!({ "index": index }).to_string()
+}
+
+/// Reads the rows of the part of this index; none where there is no file.
+fn read_rows(parts: &PartSchema, folder: &Folder, index: u64) -> Result<Vec<Row>, Unreadable> {
+    let part = parts.open(&folder.file(part_name(index)), &place(index))?;
+    let Some(part) = part else { return Ok(Vec::new()) };
+    if part.rows() > PART_ROWS as u64 {
+        return Err(Damage::Rows.into());
     }
-    Ok((file, found, known))
+    part.all_cells()
 }
 
 #[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use serde_json::json;
-
-    use super::super::Layout;
-    use super::super::synthetic::job;
-    use super::*;
-    use crate::build::Build;
-    use crate::table::Table;
-    use sweep_files::{FileKind, key};
-
-    const BUILD: Build = Build { version: "0.0.0-test", numerics: 1 };
-
-    fn open(output: &Path, job: &Job<'_>) -> Trials {
-        match Trials::open(output, job, false) {
-            Ok(Opened::Open(trials)) => trials,
-            other => panic!("expected trials, got {other:?}"),
-        }
-    }
-
-    #[test]
-    fn trials_outlive_their_process_whatever_tears_the_last() {
-        let home = tempfile::tempdir().unwrap();
-        let (output, job) = (home.path().join("x.parquet"), job(8));
-        let mut trials = open(&output, &job);
-        for k in 0..5 {
-            trials.keep([k, 7, 9], (k != 3).then_some(0.5 * k as f64)).unwrap();
-        }
-        trials.settle().unwrap();
-        let path = trials.path.clone();
-        drop(trials);
-        let whole = fs::read(&path).unwrap();
-        for length in 0..=whole.len() {
-            fs::write(&path, &whole[..length]).unwrap();
-            let mut trials = open(&output, &job);
-            assert_eq!(trials.count(), length / RECORD_BYTES);
-            // Less than a record is nobody's that could be told.
-            let is_set_aside = (1..RECORD_BYTES).contains(&length);
-            assert_eq!(trials.take_notes().len(), usize::from(is_set_aside));
-            // The next one is found again behind what was torn.
-            trials.keep([9, 9, 9], Some(1.0)).unwrap();
-            drop(trials);
-            assert_eq!(open(&output, &job).recall(&[9, 9, 9]), Some(Some(1.0)));
-        }
-        fs::write(&path, &whole).unwrap();
-        let trials = open(&output, &job);
-        assert_eq!(trials.recall(&[2, 7, 9]), Some(Some(1.0)));
-        assert_eq!(trials.recall(&[3, 7, 9]), Some(None));
-        assert_eq!(trials.recall(&[3, 7, 8]), None);
-        let kept = trials.complete().unwrap();
-        assert!(kept.contains("trials.bin.damaged, trials.bin.damaged-10"), "{kept}");
-        assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), RECORD_BYTES - 1);
-    }
-
-    #[test]
-    fn a_record_that_is_not_as_it_was_written_is_none() {
-        let home = tempfile::tempdir().unwrap();
-        let (output, job) = (home.path().join("x.parquet"), job(8));
-        let mut trials = open(&output, &job);
-        for k in 0..3 {
-            trials.keep([k, 0, 0], Some(1.0)).unwrap();
-        }
-        let path = trials.path.clone();
-        drop(trials);
-        let whole = fs::read(&path).unwrap();
-        for bit in (8 * RECORD_BYTES..16 * RECORD_BYTES).step_by(7) {
-            let mut bytes = whole.clone();
-            bytes[bit / 8] ^= 1 << (bit % 8);
-            fs::write(&path, bytes).unwrap();
-            let mut trials = open(&output, &job);
-            assert_eq!((trials.count(), trials.recall(&[1, 0, 0])), (2, None), "bit {bit}");
-            assert!(trials.take_notes()[0].contains("1 of 3 trials"), "bit {bit}");
-        }
-        // Somebody's file of the same name.
-        fs::write(&path, [b'x'; 100]).unwrap();
-        let mut trials = open(&output, &job);
-        assert!(trials.take_notes()[0].contains("no trial is as it was written"));
-        assert_eq!(fs::read(path.with_extension("bin.damaged")).unwrap(), [b'x'; 100]);
-    }
-
-    #[test]
-    fn another_plan_is_refused_and_starting_over_forgets() {
-        let home = tempfile::tempdir().unwrap();
-        let output = home.path().join("x.parquet");
-        let (ours, other) = (job(8), job(9));
-        open(&output, &ours).keep([0; 3], None).unwrap();
-        let refused = Trials::open(&output, &other, false);
-        assert!(matches!(refused, Err(StoreError::PlanDiffers { .. })), "{refused:?}");
-        let Ok(Opened::Open(trials)) = Trials::open(&output, &other, true) else { panic!() };
-        assert_eq!(trials.count(), 0);
-        let busy = Trials::open(&output, &other, false);
-        assert!(matches!(busy, Err(StoreError::Busy { .. })), "{busy:?}");
-    }
-
-    #[test]
-    fn a_finished_file_is_known_by_its_plan() {
-        let home = tempfile::tempdir().unwrap();
-        let output = home.path().join("x.parquet");
-        let [ours, other] = [8, 9].map(|points| {
-            let job = job(points);
-            let layout = Layout { kind: FileKind::Boundary, ..job.layout };
-            Job { version: BUILD.version, numerics: BUILD.numerics, layout, ..job }
-        });
-        let mut table = Table::new(BUILD);
-        table.metadata(key::PLAN, &ours.plan);
-        table.text(key::PLAN_HASH, ours.hash().to_hex().to_string());
-        table.metadata(key::BOUNDARY, &json!({}));
-        table.counts("points", "", [1]);
-        fs::write(&output, table.into_bytes(&output).unwrap()).unwrap();
-        let opened = Trials::open(&output, &ours, false);
-        assert!(matches!(opened, Ok(Opened::Finished(()))), "{opened:?}");
-        let refused = Trials::open(&output, &other, false);
-        assert!(matches!(refused, Err(StoreError::OutputDiffers { .. })), "{refused:?}");
-        assert!(!home.path().join("x.parquet.partial").exists());
-        // A search that died with its file in place has left its folder.
-        let Ok(Opened::Open(_)) = Trials::open(&output, &ours, true) else { panic!() };
-        fs::remove_file(home.path().join("x.parquet.partial/plan.json")).unwrap();
-        let opened = Trials::open(&output, &ours, false);
-        assert!(matches!(opened, Ok(Opened::Finished(()))), "{opened:?}");
-        assert!(!home.path().join("x.parquet.partial").exists());
-    }
-}
+mod tests;

@@ -1,22 +1,19 @@
 //! A run or a search whose result is not there yet, found by the result's name alone: without the
-//! grid file nobody knows its columns, but its plan and its chunks say how far it is.
+//! grid file nobody knows its columns, but its plan and its parts say how far it is.
 
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use arrow_array::cast::AsArray as _;
+use arrow_array::types::UInt64Type;
 use serde::Serialize;
 
-use super::chunk;
 use super::lock;
-use super::open::chunks_there;
+use super::open::parts_there;
+use super::part;
 use super::plan_file::{Found, PlanFile};
-use super::trial_records;
-use super::{Folder, Holder, StoreError, TRIALS, chunk_name};
-use sweep_files::regular;
-
-/// Most bytes of a chunk that are looked at. Basis: a chunk of a map has a megabyte. Doubling it
-/// doubles the memory that a foreign file of a chunk's name may take.
-const MOST_CHUNK_BYTES: u64 = 1 << 28;
+use super::point_parts::{is_of_points, number_name};
+use super::{Folder, Holder, StoreError, part_name};
+use sweep_files::ParquetFile;
 
 /// How far a run or a search without a result is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -53,14 +50,18 @@ pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, StoreError> {
     let folder = Folder { output, path: folder.into() };
     let Found::Plan(plan) = PlanFile::read(&folder)? else { return Ok(None) };
     let Ok(hash) = blake3::Hash::from_hex(&plan.plan_hash) else { return Ok(None) };
-    let trials = folder.file(TRIALS);
-    let is_search = trials.exists();
     let mut points_done = 0;
-    if is_search {
-        points_done = trial_records::count(&trials, hash.as_bytes());
-    } else {
-        for chunk in chunks_there(&folder)? {
-            points_done += count(&folder, chunk, &hash)?;
+    let mut is_search = false;
+    for index in parts_there(&folder)? {
+        // The run may have finished a moment ago.
+        let Some((part, place)) = part::open_any(&folder.file(part_name(index)), &hash)? else {
+            continue;
+        };
+        if is_of_points(&place) {
+            points_done += count_points(&part);
+        } else {
+            is_search = true;
+            points_done += part.rows();
         }
     }
     Ok(Some(Unfinished {
@@ -73,15 +74,22 @@ pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, StoreError> {
     }))
 }
 
-/// Counts the points that are kept of a chunk.
-fn count(folder: &Folder, chunk: u64, plan: &blake3::Hash) -> Result<u64, StoreError> {
-    let path = folder.file(chunk_name(chunk));
-    let mut bytes = Vec::new();
-    let read =
-        regular::open(&path).and_then(|file| file.take(MOST_CHUNK_BYTES).read_to_end(&mut bytes));
-    // The run may have finished a moment ago.
-    regular::if_there(read).map_err(StoreError::io("read", &path))?;
-    Ok(chunk::count_points(plan, &bytes))
+/// Counts the points of a run's part, whose rows are in their order.
+fn count_points(part: &ParquetFile) -> u64 {
+    let fields = part.schema().fields();
+    let name = number_name(|name| fields.iter().any(|field| field.name() == name));
+    let position = fields.iter().position(|field| field.name() == name);
+    let batches = position.and_then(|position| part.batches(vec![position]).ok());
+    let mut last = None;
+    let mut count = 0;
+    for batch in batches.into_iter().flatten().flatten() {
+        let numbers = batch.column(0).as_primitive_opt::<UInt64Type>();
+        for number in numbers.into_iter().flatten() {
+            count += u64::from(number != last);
+            last = number;
+        }
+    }
+    count
 }
 
 /// Refuses a result that is not there yet, and says how far it is.

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::config::{self, GridInput};
-use crate::fit::{self, FitOptions, Measured, Work};
+use crate::fit::{self, Evaluations, FitOptions, Measured, Work};
 use sweep_engine::commands::grid::{GridArgs, typed};
 use sweep_engine::{EffortArgs, Error, Exit, Interrupt, Progress, show, tell, threads};
 use sweep_files::{FileKind, OWN_FILE, Output};
@@ -37,6 +37,9 @@ pub struct Args {
     json: bool,
     #[command(flatten)]
     effort: EffortArgs,
+    /// Start over, even if another fit with this --out was begun
+    #[arg(long, requires = "out")]
+    fresh: bool,
 }
 
 /// What `--help` adds.
@@ -84,17 +87,13 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let interrupt = Interrupt::install().map_err(Error::signals)?;
     let progress = Progress::for_search(args.effort.progress, 0, "", 0);
     let seen = |made: usize| progress.show_search(0, made as u64);
-    let journal = args.out.as_ref().map(|out| {
-        let mut name = out.as_os_str().to_owned();
-        name.push(".partial");
-        PathBuf::from(name)
-    });
     let stop = || interrupt.stopped();
-    let work = Work { stop: &stop, seen: &seen, journal };
+    let output = args.out.as_deref();
+    let work = Work { stop: &stop, seen: &seen, output, fresh: args.fresh };
     let threads = threads::count(args.effort.threads, &threads::process)?;
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &work))?;
     progress.finish();
-    let Some(fitted) = found else {
+    let Some(mut fitted) = found else {
         let kept = "with --out, what was found out is kept";
         tell(&format!("interrupted: {kept}\n     go on  {}", typed()));
         return Ok(Exit::interrupted(interrupt.signal()));
@@ -106,6 +105,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
             format!("{OWN_FILE}fitted to {:?}\n{text}", args.measured.join(" ")).as_bytes(),
         )?;
         tell(&format!("wrote {}", path.display()));
+        if let Some(note) = fitted.evaluations.take().and_then(Evaluations::complete) {
+            tell(&note);
+        }
     }
     for (case, (path, file)) in curves.iter().zip(begun).enumerate() {
         file.finish(&fitted.curves(case).into_bytes(path)?)?;

@@ -7,7 +7,6 @@ use std::sync::Arc;
 use lane_ode::Simd;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use rayon::slice::ParallelSlice as _;
-use serde::{Deserialize, Serialize};
 use washer_model::{
     Machine, Method, ModelKind, Parameter, Point, Recorders, Snapshot, Spin, StepSelector, Timing,
     prepare, simulate_until,
@@ -115,7 +114,7 @@ pub(crate) struct Against {
 
 /// What a descent needs to know of a point. Costs are twice a negative log-likelihood, with every
 /// signal's noise as its residual says.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Summary {
     pub(crate) cost: f64,
     /// Noise of each signal.

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::*;
 use sweep_engine::design::{Design, DesignRule};
+use sweep_files::ParquetFile;
 
 /// The reference's spin; of a run shorter than it, less.
 const GRID: &str = "spin = { profile = \"triangular\", peak_rpm = 350, ramp_s = 12 }\n\
@@ -57,7 +58,7 @@ fn options(free: &[&str]) -> FitOptions {
 }
 
 fn fitted(cases: Vec<Case>, options: &FitOptions) -> Report {
-    let work = Work { stop: &|| false, seen: &|_| {}, journal: None };
+    let work = Work { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
     fit(cases, options, &work).unwrap().unwrap().report
 }
 
@@ -333,7 +334,7 @@ fn a_linear_model_says_what_the_nonlinear_one_would_have() {
 #[test]
 fn what_cannot_be_fitted_is_said() {
     let wrong = |free: &[&str], measured: Measured| {
-        let work = Work { stop: &|| false, seen: &|_| {}, journal: None };
+        let work = Work { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
         let cases = vec![case_at(&VISCOUS, 1.0, measured)];
         match fit(cases, &options(free), &work) {
             Err(error) => error.to_string(),
@@ -412,7 +413,7 @@ fn a_number_that_does_not_count_at_the_start_is_found_from_others() {
     let start = [("friction_n", 0.0), FRICTION[0], FRICTION[1], FRICTION[2]];
     let cases = || vec![case_at(&start, 1.0, reference("friction", 8.0))];
     let mut options = options(&["friction_n=0:60", "friction_speed_m_per_s=0.005:0.02"]);
-    let work = Work { stop: &|| false, seen: &|_| {}, journal: None };
+    let work = Work { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
     let error = fit(cases(), &options, &work).err().unwrap().to_string();
     assert!(error.contains("does not depend on friction_speed_m_per_s"), "{error}");
     options.starts = 6;
@@ -484,7 +485,8 @@ fn a_start_that_is_far_off_is_no_wrong_unit() {
 #[test]
 fn an_interrupted_fit_goes_on_to_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
-    let journal = folder.path().join("x.partial");
+    let output = folder.path().join("x.toml");
+    let partial = folder.path().join("x.toml.partial");
     let cases = || vec![case_at(&VISCOUS, 0.9, reference("viscous", 3.0))];
     let options = options(&["damping_n_s_per_m", "unbalance_mass_kg"]);
     let whole = fitted(cases(), &options);
@@ -493,34 +495,55 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
         made.fetch_add(1, Ordering::Relaxed);
     };
     let stop = || made.load(Ordering::Relaxed) >= 3;
-    let work = Work { stop: &stop, seen: &seen, journal: Some(journal.clone()) };
+    let work = Work { stop: &stop, seen: &seen, output: Some(&output), fresh: false };
     assert!(fit(cases(), &options, &work).unwrap().is_none());
-    assert!(journal.exists());
-    let work = Work { stop: &|| false, seen: &|_| {}, journal: Some(journal.clone()) };
-    let resumed = fit(cases(), &options, &work).unwrap().unwrap().report;
-    assert_eq!(serde_json::json!(resumed), serde_json::json!(whole));
-    assert!(!journal.exists());
+    let part = ParquetFile::open(&partial.join("part-00000000.parquet")).unwrap();
+    // The start is evaluated once, though a descent asks for it again.
+    assert_eq!(part.rows(), 2);
+    let fields = part.schema().fields().iter().take(4).map(|field| field.name().as_str());
+    let expected = ["damping_n_s_per_m", "unbalance_mass_kg", "file_1_shift_s", "cost"];
+    assert_eq!(fields.collect::<Vec<_>>(), expected);
+
+    // Another fit leaves them alone, and so does a second process.
+    let stopped = || true;
+    let work = Work { stop: &stopped, seen: &|_| {}, output: Some(&output), fresh: false };
+    let other = FitOptions { no_shift: true, ..options.clone() };
+    let error = fit(cases(), &other, &work).err().unwrap().to_string();
+    assert!(error.contains("/fit/shift: was true, is false"), "{error}");
+
+    let made = AtomicUsize::new(0);
+    let seen = |_| {
+        made.fetch_add(1, Ordering::Relaxed);
+    };
+    let work = Work { stop: &|| false, seen: &seen, output: Some(&output), fresh: false };
+    let resumed = fit(cases(), &options, &work).unwrap().unwrap();
+    assert_eq!(serde_json::json!(resumed.report), serde_json::json!(whole));
+    let busy = fit(cases(), &options, &work).err().unwrap().to_string();
+    assert!(busy.contains("is in use by process"), "{busy}");
+    assert_eq!(resumed.evaluations.unwrap().complete(), None);
+    assert!(!partial.exists());
 }
 
 #[test]
-fn a_journal_spares_files_and_evaluations_of_others() {
-    use super::journal::Journal;
+fn a_damaged_part_of_a_fit_costs_its_evaluations() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("x.partial");
-    let open = |problem: &[u8]| Journal::open(&path, blake3::hash(problem));
-    for foreign in ["a thesis", "a thesis\nof two lines\n", "abc"] {
-        std::fs::write(&path, foreign).unwrap();
-        let error = open(b"a").err().unwrap().to_string();
-        assert!(error.contains("not a journal"), "{error}");
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), foreign);
-    }
-    std::fs::remove_file(&path).unwrap();
-    let journal = open(b"a").unwrap();
-    journal.answer(&[1.0], || Ok::<_, ()>(None)).unwrap();
-    let error = open(b"a").err().unwrap().to_string();
-    assert!(error.contains("another fit is writing"), "{error}");
-    drop(journal);
-    let error = open(b"b").err().unwrap().to_string();
-    assert!(error.contains("evaluations of another fit"), "{error}");
-    assert_eq!(open(b"a").unwrap().count(), 1);
+    let output = folder.path().join("x.toml");
+    let part = folder.path().join("x.toml.partial/part-00000000.parquet");
+    let cases = || vec![case_at(&VISCOUS, 0.9, reference("viscous", 3.0))];
+    let options = options(&["damping_n_s_per_m"]);
+    let whole = fitted(cases(), &options);
+    let fit = || {
+        let work = Work { stop: &|| false, seen: &|_| {}, output: Some(&output), fresh: false };
+        fit(cases(), &options, &work).unwrap().unwrap()
+    };
+    drop(fit());
+    let sound = std::fs::read(&part).unwrap();
+    let mut bytes = sound.clone();
+    bytes[sound.len() / 2] ^= 1;
+    std::fs::write(&part, bytes).unwrap();
+    let again = fit();
+    assert_eq!(serde_json::json!(again.report), serde_json::json!(whole));
+    assert!(part.with_extension("parquet.damaged").exists());
+    let note = again.evaluations.unwrap().complete().unwrap();
+    assert!(note.contains("part-00000000.parquet.damaged"), "{note}");
 }

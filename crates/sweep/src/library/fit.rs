@@ -32,7 +32,7 @@ pub fn fit_tables(
         cases.push(fit::case(grid, &constants, measured)?);
     }
     let stop = || effort.interrupt.stopped();
-    let work = Work { stop: &stop, seen: &|_| {}, journal: None };
+    let work = Work { stop: &stop, seen: &|_| {}, output: None, fresh: false };
     let found = threads::pool(effort.threads()?)?.install(|| fit::fit(cases, options, &work))?;
     Ok(found.map(|fitted| Explained { found: json!(fitted.report), text: fitted.report.text() }))
 }

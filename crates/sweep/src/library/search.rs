@@ -10,11 +10,11 @@ pub use sweep_engine::boundary::BoundaryOptions;
 use sweep_engine::boundary::BoundaryTask;
 use sweep_engine::commands::boundary::search as trace;
 use sweep_engine::optimise::Study;
-use sweep_engine::optimise::file::table as study_table;
+use sweep_engine::optimise::file::{table as study_table, trial_columns};
 use sweep_engine::optimise::search::search;
-use sweep_engine::store::{Opened, Trials};
+use sweep_engine::store::{Opened, TrialColumns, Trials};
 use sweep_engine::{Error, Job, Table};
-use sweep_files::{FileKind, Output};
+use sweep_files::Output;
 
 /// Traces the boundary of a plan's grid; `None` if the interrupt was raised. The output keeps what
 /// an interrupted search has found out, and goes on there; `fresh` starts over.
@@ -34,7 +34,8 @@ pub fn find_boundary(
     }
     let task = BoundaryTask::new(plan, options)?;
     let search = |trials| trace(&task, trials, effort);
-    found((&task.job(), FileKind::Boundary), (output, fresh), search, |found| task.table(found))
+    let stored = Stored { job: &task.job(), columns: task.trial_columns(), output, fresh };
+    found(stored, search, |found| task.table(found))
 }
 
 /// The candidates of a study file, constants `NAME=VALUE` over those of its grid; `None` if the
@@ -52,20 +53,30 @@ pub fn optimise_study(
 ) -> Result<Option<MemoryTable>, Error> {
     let study = Study::<Washer>::load(path, sets)?;
     let search = |trials| search(&study, trials, effort);
-    found((&study.job(), FileKind::Optimise), (output, fresh), search, |tried| {
-        study_table(&study, tried)
-    })
+    let stored = Stored { job: &study.job(), columns: trial_columns(&study), output, fresh };
+    found(stored, search, |tried| study_table(&study, tried))
 }
 
-/// What a search finds, with the trials that its output keeps. A finished output is read.
+/// The output of a search and the trials that it keeps.
+struct Stored<'a> {
+    job: &'a Job<'a>,
+    columns: TrialColumns,
+    output: Option<&'a Path>,
+    fresh: bool,
+}
+
+/// Returns the result of a search, with the trials that its output keeps. A finished output is
+/// read.
 fn found<T>(
-    (job, kind): (&Job<'_>, FileKind<'static>),
-    (output, fresh): (Option<&Path>, bool),
+    stored: Stored<'_>,
     search: impl FnOnce(Option<Trials>) -> Result<(Option<T>, Option<Trials>), Error>,
     table: impl FnOnce(&T) -> Table,
 ) -> Result<Option<MemoryTable>, Error> {
+    let Stored { job, columns, output, fresh } = stored;
+    let kind = job.layout.kind;
     let file = output.map(|path| Output::begin(path, kind)).transpose()?;
-    let trials = match output.map(|path| Trials::open(path, job, fresh)).transpose()? {
+    let open = |path| Trials::open(path, job, columns, fresh);
+    let trials = match output.map(open).transpose()? {
         Some(Opened::Finished(())) => return output.map(MemoryTable::read).transpose(),
         Some(Opened::Open(trials)) => Some(trials),
         None => None,

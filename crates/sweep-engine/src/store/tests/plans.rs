@@ -49,9 +49,9 @@ fn another_build_of_the_version_is_another_run() {
         status(&home.output(), &other).unwrap_err().to_string().contains("/numerics: was 1, is 2")
     );
 
-    // A chunk of that build under this one's plan.
+    // A part of that build under this one's plan.
     let foreign = write_bytes(&other, 3);
-    fs::write(home.partial().join(chunk_name(3)), foreign).unwrap();
+    fs::write(home.partial().join(part_name(3)), foreign).unwrap();
     let mut run = open(&home.output(), &job);
     assert!(run.is_missing(3) && !run.is_missing(0));
     let notes = run.take_notes();
@@ -77,13 +77,13 @@ fn a_folder_of_an_older_format_is_refused_as_such() {
     assert!(error.is_refusal());
     let text = error.to_string();
     assert!(
-        text.contains("/store_format: was 1, is 2") && text.contains("/numerics: was 0"),
+        text.contains("/store_format: was 1, is 3") && text.contains("/numerics: was 0"),
         "{text}"
     );
 }
 
 #[test]
-fn a_damaged_plan_is_set_aside_and_its_chunks_are_used() {
+fn a_damaged_plan_is_set_aside_and_its_parts_are_used() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     write(&open(&home.output(), &job), 0);
     let plan = home.partial().join("plan.json");

@@ -8,7 +8,7 @@ fn starting_over_deletes_what_a_run_wrote_and_nothing_else() {
     let run = open(&home.output(), &job);
     write_missing(&run);
     drop(run);
-    let theirs = ["chunk-notes.txt", "session-notes.md", "shard-plan.txt", "plan.json.old"];
+    let theirs = ["part-notes.txt", "session-notes.md", "shard-plan.txt", "plan.json.old"];
     for name in theirs.into_iter().chain(["shard-3.lock"]) {
         fs::write(home.partial().join(name), "").unwrap();
     }
@@ -16,8 +16,8 @@ fn starting_over_deletes_what_a_run_wrote_and_nothing_else() {
     assert_eq!(
         names(&home),
         [
-            "chunk-notes.txt",
             "lock",
+            "part-notes.txt",
             "plan.json",
             "plan.json.old",
             "session-notes.md",
@@ -41,16 +41,16 @@ fn names(home: &Home) -> Vec<String> {
 
 /// Names that a run gives, and others close to them.
 const NAMES: [&str; 12] = [
-    "chunk-00000002.bin",
-    "chunk-00000002.bin.damaged",
+    "part-00000002.parquet",
+    "part-00000002.parquet.damaged",
     "plan.json.damaged",
     "session-a-1-2.json",
     "session-interview.json",
     "shard-3.lock",
     "shard-+3.lock",
     "shards.json",
-    "trials.bin",
-    "trials.bin.damaged",
+    "part-00000099.parquet",
+    "part-notes.parquet",
     ".sweep-notes.tmp",
     ".sweep-Xb7Qz1.tmp",
 ];
@@ -98,11 +98,8 @@ fn what_a_run_wrote_goes_wherever_it_was_left() {
     write_missing(&run);
     run.record(&session()).unwrap();
     drop(run);
-    let Ok(Opened::Open(mut trials)) = Trials::open(&home.output(), &job, false) else { panic!() };
-    trials.keep([1, 2, 3], Some(4.0)).unwrap();
-    drop(trials);
     let left = names(&home);
-    for name in ["plan.json", "shards.json", "shard-2.lock", "trials.bin", "chunk-00000001.bin"] {
+    for name in ["plan.json", "shards.json", "shard-2.lock", "part-00000001.parquet"] {
         assert!(left.iter().any(|known| known == name), "{name}: {left:?}");
     }
     assert!(left.iter().any(|name| name.starts_with("session-")), "{left:?}");
@@ -118,13 +115,13 @@ fn what_was_set_aside_stays_beside_what_is_set_aside_later() {
     write_missing(&run);
     drop(run);
     for text in ["first", "second", "third"] {
-        fs::write(home.partial().join(chunk_name(3)), text).unwrap();
+        fs::write(home.partial().join(part_name(3)), text).unwrap();
         write_missing(&open(&home.output(), &job));
     }
     let (_, notes) = finish(open(&home.output(), &job), &job);
-    assert!(notes[0].contains("chunk-00000003.bin.damaged-2"), "{notes:?}");
+    assert!(notes[0].contains("part-00000003.parquet.damaged-2"), "{notes:?}");
     let read = |ending| {
-        let name = format!("{}.damaged{ending}", chunk_name(3));
+        let name = format!("{}.damaged{ending}", part_name(3));
         fs::read_to_string(home.partial().join(name)).unwrap()
     };
     assert_eq!(["", "-2", "-3"].map(read), ["first", "second", "third"]);
@@ -191,7 +188,7 @@ fn death_between_publishing_and_removing_the_folder_loses_nothing() {
 
     // The same, half-way through the removal: the plan goes first.
     fs::create_dir(home.partial()).unwrap();
-    fs::write(home.partial().join(chunk_name(3)), write_bytes(&job, 3)).unwrap();
+    fs::write(home.partial().join(part_name(3)), write_bytes(&job, 3)).unwrap();
     assert!(matches!(
         OpenRun::open(&home.output(), &job, options()).unwrap(),
         Opened::Finished(..)
@@ -205,7 +202,7 @@ fn leftovers_go_and_strangers_files_in_the_folder_stay() {
     drop(open(&home.output(), &job));
     let left = home.partial().join(sweep_files::atomic::temporary_name());
     let mine = home.partial().join("notes.txt");
-    fs::write(&left, "half a chunk").unwrap();
+    fs::write(&left, "half a part").unwrap();
     fs::write(&mine, "mine").unwrap();
     let run = open(&home.output(), &job);
     assert!(!left.exists());

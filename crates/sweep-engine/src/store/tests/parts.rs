@@ -1,5 +1,7 @@
-//! Chunks: left anywhere, damaged, dealt to shards, counted.
+//! Parts of runs: left anywhere, damaged, dealt to shards, counted.
 
+use super::super::part::Damage;
+use super::super::point_parts::{PointPart, PointParts};
 use super::*;
 
 #[test]
@@ -10,18 +12,18 @@ fn chunk_sizes_feed_small_grids_to_all_cores_and_bound_large_ones() {
 }
 
 #[test]
-fn chunk_names_stand_for_chunks_and_nothing_else_does() {
-    for chunk in [0, 7, 99_999_999, 100_000_000, u64::MAX] {
-        assert_eq!(chunk_of_name(&chunk_name(chunk)), Some(chunk));
+fn part_names_stand_for_parts_and_nothing_else_does() {
+    for index in [0, 7, 99_999_999, 100_000_000, u64::MAX] {
+        assert_eq!(part_index(&part_name(index)), Some(index));
     }
     for name in [
-        "chunk-7.bin",
-        "chunk-00000007.bin.damaged",
-        "chunk-+0000007.bin",
+        "part-7.parquet",
+        "part-00000007.parquet.damaged",
+        "part-+0000007.parquet",
         "part-00000007.bin",
         "plan.json",
     ] {
-        assert_eq!(chunk_of_name(name), None, "{name}");
+        assert_eq!(part_index(name), None, "{name}");
     }
 }
 
@@ -53,7 +55,7 @@ proptest! {
         drop(run);
         let mut harmed = std::collections::BTreeSet::new();
         for (chunk, at, how) in harm {
-            let path = home.partial().join(chunk_name(chunk));
+            let path = home.partial().join(part_name(chunk));
             let Ok(mut bytes) = fs::read(&path) else { continue };
             let at = at.index(bytes.len().max(1));
             match how {
@@ -69,7 +71,7 @@ proptest! {
         let mut run = open(&home.output(), &job);
         prop_assert_eq!(run.take_notes().len(), harmed.len());
         for chunk in &harmed {
-            let damaged = format!("{}.damaged", chunk_name(*chunk));
+            let damaged = format!("{}.damaged", part_name(*chunk));
             prop_assert!(home.partial().join(damaged).exists());
         }
         prop_assert_eq!(write_missing(&run), harmed.len() as u64);
@@ -83,14 +85,14 @@ fn damage_after_opening_is_met_at_the_join() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     let mut run = open(&home.output(), &job);
     write_missing(&run);
-    fs::write(home.partial().join(chunk_name(4)), b"not a chunk").unwrap();
-    fs::remove_file(home.partial().join(chunk_name(6))).unwrap();
+    fs::write(home.partial().join(part_name(4)), b"not a part").unwrap();
+    fs::remove_file(home.partial().join(part_name(6))).unwrap();
     let error = run.join(&job, &|| false).unwrap_err();
     assert!(error.to_string().contains("2 of 11 chunks are missing"), "{error}");
     assert!(!home.output().exists());
     assert_eq!(write_missing(&run), 2);
     let (_, notes) = finish(run, &job);
-    assert!(notes[0].contains("chunk-00000004.bin"), "{:?}", notes);
+    assert!(notes[0].contains("part-00000004.parquet"), "{:?}", notes);
     assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));
 }
 
@@ -177,7 +179,7 @@ fn status_counts_without_touching_anything() {
     let run = open(&home.output(), &job);
     write(&run, 0);
     write(&run, 1);
-    fs::write(home.partial().join(chunk_name(1)), "not a chunk").unwrap();
+    fs::write(home.partial().join(part_name(1)), "not a part").unwrap();
     let found = status(&home.output(), &job).unwrap();
     assert_eq!(
         (found.chunks_done, found.chunks_damaged.as_slice(), found.points_done),
@@ -185,7 +187,7 @@ fn status_counts_without_touching_anything() {
     );
     assert_eq!(found.points_failed, 2, "points 4 and 7 of the formula fail");
     assert_eq!(found.running[0].pid, std::process::id());
-    assert!(home.partial().join(chunk_name(1)).exists());
+    assert!(home.partial().join(part_name(1)).exists());
     let other = Job { plan: json!({}), ..synthetic::job(POINTS) };
     assert!(matches!(status(&home.output(), &other).unwrap_err(), StoreError::PlanDiffers { .. }));
 }
@@ -200,17 +202,20 @@ fn a_part_is_gone_on_from_until_its_chunk_is_whole() {
     let run = open(&home.output(), &job);
     write(&run, 0);
     // As rows come: in any order.
-    run.write_chunk(3, outcomes([30, 25, 27].into_iter())).unwrap();
+    run.write_chunk(&job, 3, outcomes([30, 25, 27].into_iter())).unwrap();
     assert_eq!(run.own_points(), (POINTS, 8 + 3));
     drop(run);
     let seen = status(&home.output(), &job).unwrap();
     assert_eq!((seen.points_done, seen.chunks_done), (11, 1));
-    assert!(home.partial().join("chunk-00000003.bin").exists());
+    assert!(home.partial().join("part-00000003.parquet").exists());
 
     let run = open(&home.output(), &job);
     assert_eq!(run.own_points(), (POINTS, 11));
-    let parts = run.take_parts();
-    assert_eq!(parts.into_iter().collect::<Vec<_>>(), [(3, outcomes([25, 27, 30].into_iter()))]);
+    let incomplete = run.take_incomplete();
+    assert_eq!(
+        incomplete.into_iter().collect::<Vec<_>>(),
+        [(3, outcomes([25, 27, 30].into_iter()))]
+    );
     assert_eq!(write_missing(&run), 10);
     assert_eq!(run.own_points(), (POINTS, POINTS));
     finish(run, &job);
@@ -223,10 +228,10 @@ fn an_unfinished_run_is_found_by_its_result_and_by_its_folder() {
     assert_eq!(unfinished(&home.output()).unwrap(), None);
     let run = open(&home.output(), &job);
     write(&run, 0);
-    run.write_chunk(3, outcomes([30, 25, 27].into_iter())).unwrap();
+    run.write_chunk(&job, 3, outcomes([30, 25, 27].into_iter())).unwrap();
     write(&run, 5);
     // What is not as it was written does not count.
-    fs::write(home.partial().join(chunk_name(5)), write_bytes(&job, 5).split_off(1)).unwrap();
+    fs::write(home.partial().join(part_name(5)), write_bytes(&job, 5).split_off(1)).unwrap();
     for path in [home.output(), home.partial()] {
         let found = unfinished(&path).unwrap().unwrap();
         assert_eq!((found.points, found.points_done), (Some(POINTS), 8 + 3));
@@ -237,7 +242,7 @@ fn an_unfinished_run_is_found_by_its_result_and_by_its_folder() {
     let error = refuse_unfinished(&home.output()).unwrap_err();
     assert!(error.is_refusal());
     assert!(error.to_string().contains("is not finished: 11 of 81 points done"), "{error}");
-    fs::remove_file(home.partial().join(chunk_name(5))).unwrap();
+    fs::remove_file(home.partial().join(part_name(5))).unwrap();
     drop(run);
     let run = open(&home.output(), &job);
     write_missing(&run);
@@ -249,10 +254,11 @@ fn an_unfinished_run_is_found_by_its_result_and_by_its_folder() {
 #[test]
 fn an_unfinished_search_counts_its_trials() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
-    let Ok(Opened::Open(mut trials)) = Trials::open(&home.output(), &job, false) else { panic!() };
+    let mut trials = trials(&home.output(), &job);
     for k in 0..5 {
-        trials.keep([k, 0, 0], Some(1.0)).unwrap();
+        trials.add(vec![k, 0], vec![Some(1)]).unwrap();
     }
+    trials.write().unwrap();
     let found = unfinished(&home.output()).unwrap().unwrap();
     assert_eq!((found.points, found.points_done), (None, 5));
     assert_eq!(found.progress(), "5 trials of a search kept");
@@ -262,20 +268,150 @@ fn an_unfinished_search_counts_its_trials() {
 fn a_damaged_part_is_set_aside_and_a_whole_chunk_takes_its_place() {
     let (home, job) = (Home::new(), synthetic::job(POINTS));
     let run = open(&home.output(), &job);
-    run.write_chunk(1, outcomes(8..10)).unwrap();
-    run.write_chunk(2, outcomes(16..20)).unwrap();
+    run.write_chunk(&job, 1, outcomes(8..10)).unwrap();
+    run.write_chunk(&job, 2, outcomes(16..20)).unwrap();
     drop(run);
-    let part = home.partial().join("chunk-00000002.bin");
+    let part = home.partial().join("part-00000002.parquet");
     let mut bytes = fs::read(&part).unwrap();
     bytes[100] ^= 1;
     fs::write(&part, bytes).unwrap();
     write(&open(&home.output(), &job), 1);
 
     let mut run = open(&home.output(), &job);
-    assert!(run.take_parts().is_empty());
+    assert!(run.take_incomplete().is_empty());
     assert_eq!(run.take_notes().len(), 0, "it was told of when it was set aside");
-    assert!(home.partial().join("chunk-00000002.bin.damaged").exists());
+    assert!(home.partial().join("part-00000002.parquet.damaged").exists());
     write_missing(&run);
     finish(run, &job);
     assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));
+}
+
+/// Why the bytes in a part's place are not the part of a job.
+fn damage(home: &Home, job: &Job<'_>, index: u64, bytes: &[u8]) -> Option<Damage> {
+    let folder = Folder::of(&home.output(), &job.layout).unwrap();
+    fs::create_dir_all(&folder.path).unwrap();
+    fs::write(folder.file(part_name(index)), bytes).unwrap();
+    let read = |part: &PointPart<'_>| part.outcomes();
+    super::super::open::read_part(&PointParts::new(job), &folder, index, read).unwrap().err()
+}
+
+#[test]
+fn a_flipped_bit_anywhere_in_a_part_is_found() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let bytes = write_bytes(&job, 3);
+    assert_eq!(damage(&home, &job, 3, &bytes), None);
+    for at in 0..bytes.len() {
+        let mut broken = bytes.clone();
+        broken[at] ^= 1 << (at % 8);
+        assert!(damage(&home, &job, 3, &broken).is_some(), "byte {at}");
+    }
+}
+
+#[test]
+fn a_truncation_anywhere_in_a_part_is_found() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let bytes = write_bytes(&job, 3);
+    for length in (0..bytes.len()).step_by(3) {
+        assert!(damage(&home, &job, 3, &bytes[..length]).is_some(), "cut to {length}");
+    }
+    let longer = [bytes.as_slice(), &[0]].concat();
+    assert_eq!(damage(&home, &job, 3, &longer), Some(Damage::Bytes));
+}
+
+#[test]
+fn a_whole_part_of_another_plan_place_or_layout_is_foreign() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let bytes = write_bytes(&job, 3);
+    assert_eq!(damage(&home, &job, 4, &bytes), Some(Damage::Foreign), "another place");
+    let other = Job { numerics: 2, ..synthetic::job(POINTS) };
+    assert_eq!(damage(&home, &other, 3, &bytes), Some(Damage::Foreign), "another build");
+    let mut narrower = synthetic::job(POINTS);
+    narrower.layout.columns.pop();
+    assert_eq!(damage(&home, &narrower, 3, &bytes), Some(Damage::Foreign), "another layout");
+    // A result, whole and sealed, and a file of another program.
+    assert_eq!(damage(&home, &job, 3, &undisturbed(POINTS)), Some(Damage::Foreign));
+}
+
+#[test]
+fn rows_that_do_not_fit_their_part_are_refused() {
+    let job = synthetic::job(POINTS);
+    let parts = PointParts::new(&job);
+    let good = outcomes(8..16);
+    let reason = |outcomes: &[Done]| parts.encode(&job, 1, outcomes).unwrap_err().to_string();
+    for some in [&good[..0], &good[1..2], &good] {
+        assert!(parts.encode(&job, 1, some).is_ok());
+    }
+    let swapped: Vec<Done> = good.iter().rev().cloned().collect();
+    assert!(reason(&swapped).contains("8 outcomes that are not of its points"));
+    assert!(reason(&outcomes(15..17)).contains("2 outcomes that are not of its points"));
+    let mut short = good.clone();
+    short[0].rows[0].pop();
+    assert!(reason(&short).contains("does not fit"), "{}", reason(&short));
+    let mut null = good.clone();
+    let steps = synthetic::layout().position("steps").unwrap();
+    null[0].rows[0][steps] = None;
+    assert!(reason(&null).contains("does not fit"), "{}", reason(&null));
+    let mut none = good;
+    none[0].rows.clear();
+    assert!(reason(&none).contains("0 rows of"), "{}", reason(&none));
+}
+
+/// A row of any cells that its columns take.
+fn any_row(columns: &[Column]) -> impl Strategy<Value = Row> + use<> {
+    let cell = |column: &Column| match &column.kind {
+        Holds::Count | Holds::Axis => any::<u64>().prop_map(Some).boxed(),
+        Holds::Flag => prop::option::of(0..2_u64).boxed(),
+        Holds::Name(names) => prop::option::of(0..names.len() as u64).boxed(),
+        _ => any::<Option<u64>>().boxed(),
+    };
+    columns.iter().map(cell).collect::<Vec<_>>()
+}
+
+/// A layout with every kind of column, and several rows of each of several numbers of a point.
+fn wide_layout() -> Layout {
+    let mut layout = synthetic::layout();
+    layout.columns.insert(2, Column::new("kept", "", "", Holds::Kept));
+    layout.columns.push(Column::new("known", "1", "a count", Holds::KnownCount));
+    Layout { rows_a_point: 3, has_several: true, ..layout }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn the_rows_of_a_part_are_those_that_were_written(
+        points in prop::collection::vec(prop::collection::vec(any_row(&wide_layout().columns), 1..4), 1..8),
+    ) {
+        let home = Home::new();
+        let job = Job { layout: wide_layout(), ..synthetic::job(POINTS) };
+        let done = |(rows, point)| Done { point, rows };
+        let outcomes: Vec<Done> = points.into_iter().zip(8..).map(done).collect();
+        let run = open(&home.output(), &job);
+        run.write_chunk(&job, 1, outcomes.clone()).unwrap();
+        prop_assert_eq!(run.known(8), outcomes.first().cloned());
+        drop(run);
+        let incomplete = open(&home.output(), &job).take_incomplete();
+        let found: Vec<Done> = incomplete.into_values().flatten().collect();
+        prop_assert_eq!(found, outcomes);
+    }
+
+    #[test]
+    fn any_bytes_in_place_of_a_part_are_damage(
+        bytes in prop::collection::vec(any::<u8>(), 0..400),
+    ) {
+        prop_assert!(damage(&Home::new(), &synthetic::job(POINTS), 1, &bytes).is_some());
+    }
+}
+
+#[test]
+fn a_part_has_the_columns_of_the_result_for_any_reader() {
+    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let run = open(&home.output(), &job);
+    write(&run, 2);
+    let part = ParquetFile::open(&home.partial().join(part_name(2))).unwrap();
+    assert_eq!(part.schema(), &job.layout.schema());
+    let found = batches(&home.partial().join(part_name(2)));
+    write_missing(&run);
+    finish(run, &job);
+    let result = &batches(&home.output())[0];
+    assert_eq!(found, [result.slice(16, 8)]);
 }

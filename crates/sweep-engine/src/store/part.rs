@@ -1,0 +1,222 @@
+//! Parts: finished rows of unfinished work, in Parquet files that any program reads while the work
+//! goes on.
+//!
+//! A part has the columns of its job ([`PartSchema`]) and three entries of metadata of its own:
+//!
+//! | entry | content |
+//! |---|---|
+//! | `sweep.plan_hash` | the hash of the plan |
+//! | `sweep.part` | the place of the part in its job, as JSON |
+//! | `sweep.digest` | the BLAKE3 hash of all other bytes of the file |
+//!
+//! The digest is the one that results carry (`sweep_files::seal`). So no changed byte is taken for
+//! a row, and no part of another plan or place either.
+
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow_array::RecordBatch;
+use arrow_schema::{ArrowError, Schema, SchemaRef};
+use parquet::basic::Compression;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
+use parquet::schema::types::ColumnPath;
+
+use super::schema::{self, Holds};
+use super::{Column, Job, Row, StoreError};
+use sweep_files::batches::from_arrow;
+use sweep_files::{CREATED_BY, FileError, ParquetFile, Writer, key, panics, seal};
+
+/// A reason why a file is not the part that is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(super) enum Damage {
+    #[error("it is not as it was written")]
+    Bytes,
+    #[error("it belongs to another plan, place or version")]
+    Foreign,
+    #[error("its rows make no sense")]
+    Rows,
+}
+
+/// A reason why there are no rows from a part.
+#[derive(Debug)]
+pub(super) enum Unreadable {
+    /// The file is not the part that is looked for.
+    Damaged(Damage),
+    /// The file cannot be read, whatever it holds.
+    Failed(StoreError),
+}
+
+impl From<Damage> for Unreadable {
+    fn from(damage: Damage) -> Self {
+        Self::Damaged(damage)
+    }
+}
+
+impl From<FileError> for Unreadable {
+    fn from(error: FileError) -> Self {
+        match error {
+            FileError::Io { .. } => Self::Failed(error.into()),
+            _ => Self::Damaged(Damage::Bytes),
+        }
+    }
+}
+
+impl Unreadable {
+    /// Separates damage from failures.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub(super) fn damage<T>(result: Result<T, Self>) -> Result<Result<T, Damage>, StoreError> {
+        match result {
+            Ok(found) => Ok(Ok(found)),
+            Err(Self::Damaged(damage)) => Ok(Err(damage)),
+            Err(Self::Failed(error)) => Err(error),
+        }
+    }
+}
+
+/// The columns of a job's parts, and the hash of its plan.
+#[derive(Clone, Debug)]
+pub(super) struct PartSchema {
+    plan: String,
+    columns: Vec<Column>,
+    schema: SchemaRef,
+    properties: WriterProperties,
+}
+
+impl PartSchema {
+    /// Returns the schema of the parts of a job with these columns.
+    pub(super) fn new(job: &Job<'_>, columns: Vec<Column>) -> Self {
+        let plan = job.hash().to_hex().to_string();
+        let metadata = vec![KeyValue::new(key::PLAN_HASH.to_owned(), plan.clone())];
+        // A part is read once or twice. Compression and statistics would cost more than they gain.
+        let builder = schema::writer(job.version, metadata)
+            .set_compression(Compression::UNCOMPRESSED)
+            .set_statistics_enabled(EnabledStatistics::None)
+            .set_offset_index_disabled(true)
+            .set_max_row_group_row_count(None)
+            .set_max_row_group_bytes(None)
+            .set_dictionary_enabled(false);
+        let names = columns.iter().filter(|column| matches!(column.kind, Holds::Name(_)));
+        let coded = |builder: WriterPropertiesBuilder, column: &Column| {
+            builder.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), true)
+        };
+        let properties = names.fold(builder, coded).build();
+        let fields: Vec<_> = columns.iter().map(Column::field).collect();
+        Self { plan, schema: Arc::new(Schema::new(fields)), columns, properties }
+    }
+
+    /// Encodes rows of these columns as the part at a place.
+    ///
+    /// # Errors
+    /// Those of the library: a defect of this program.
+    pub(super) fn encode(&self, place: &str, rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
+        let arrays =
+            self.columns.iter().enumerate().map(|(k, column)| {
+                column.array(rows.iter().map(|row| row.get(k).copied().flatten()))
+            });
+        let arrays = arrays.collect::<Result<Vec<_>, ArrowError>>().map_err(from_arrow)?;
+        let batch = RecordBatch::try_new(Arc::clone(&self.schema), arrays).map_err(from_arrow)?;
+        let write = || {
+            let mut writer = Writer::new(Vec::new(), &self.schema, self.properties.clone())?;
+            writer.write(&batch)?;
+            let mut writer = writer.end()?;
+            writer.append_key_value_metadata(KeyValue::new(key::PART.to_owned(), place.to_owned()));
+            writer.append_key_value_metadata(seal::blank());
+            writer.into_inner()
+        };
+        let mut file = io::Cursor::new(panics::in_parquet("the library gave up writing", write)?);
+        seal::seal(&mut file).map_err(|error| ParquetError::External(Box::new(error)))?;
+        Ok(file.into_inner())
+    }
+
+    /// Opens the part at a path, which is to be that of a place; `None` where there is no file.
+    pub(super) fn open(&self, path: &Path, place: &str) -> Result<Option<Part<'_>>, Unreadable> {
+        let Some(file) = sealed(path)? else { return Ok(None) };
+        let is_ours = file.value(key::PLAN_HASH) == Some(&self.plan)
+            && file.value(key::PART) == Some(place)
+            && *file.schema() == self.schema;
+        if is_ours { Ok(Some(Part { file, schema: self })) } else { Err(Damage::Foreign.into()) }
+    }
+
+    /// Returns the number of columns.
+    pub(super) const fn width(&self) -> usize {
+        self.columns.len()
+    }
+}
+
+/// An open part, every byte of which is as it was written.
+#[derive(Debug)]
+pub(super) struct Part<'a> {
+    file: ParquetFile,
+    schema: &'a PartSchema,
+}
+
+impl Part<'_> {
+    /// Returns the number of rows.
+    pub(super) fn rows(&self) -> u64 {
+        self.file.rows()
+    }
+
+    /// Reads the columns at these positions, in batches.
+    pub(super) fn batches(&self, columns: Vec<usize>) -> Result<Vec<RecordBatch>, Unreadable> {
+        Ok(self.file.batches(columns)?.collect::<Result<_, FileError>>()?)
+    }
+
+    /// Reads the cells of the columns at these positions, row by row.
+    pub(super) fn cells(&self, columns: &[usize]) -> Result<Vec<Row>, Unreadable> {
+        let mut rows = Vec::new();
+        for batch in self.batches(columns.to_vec())? {
+            let first = rows.len();
+            rows.resize_with(first + batch.num_rows(), || Row::with_capacity(columns.len()));
+            for (column, array) in columns.iter().zip(batch.columns()) {
+                let column = &self.schema.columns[*column];
+                let cells = column.cells(array).ok_or(Damage::Rows)?;
+                rows[first..].iter_mut().zip(cells).for_each(|(row, cell)| row.push(cell));
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Reads the cells of all columns, row by row.
+    pub(super) fn all_cells(&self) -> Result<Vec<Row>, Unreadable> {
+        self.cells(&(0..self.schema.columns.len()).collect::<Vec<_>>())
+    }
+}
+
+/// Opens a sealed file; `None` where there is none.
+fn sealed(path: &Path) -> Result<Option<ParquetFile>, Unreadable> {
+    match ParquetFile::open(path) {
+        Err(FileError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => Ok(None),
+        Ok(file) if file.is_sealed() => Ok(Some(file)),
+        Ok(_) => Err(Damage::Foreign.into()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Returns whether a file is a part that this program wrote, of whichever plan, whole or not.
+pub(super) fn is_part(path: &Path) -> bool {
+    let found = ParquetFile::look(path).ok();
+    found.is_some_and(|file| {
+        let is_ours = file.created_by().is_some_and(|by| by.starts_with(CREATED_BY));
+        is_ours && file.value(key::PART).is_some()
+    })
+}
+
+/// Opens a part of the plan with this hash, whatever its columns and its place are, which is
+/// returned with it; `None` for anything else.
+///
+/// # Errors
+/// A file that cannot be read.
+pub(super) fn open_any(
+    path: &Path,
+    plan: &blake3::Hash,
+) -> Result<Option<(ParquetFile, String)>, StoreError> {
+    let Ok(Some(file)) = Unreadable::damage(sealed(path))? else { return Ok(None) };
+    let is_of_plan = file.value(key::PLAN_HASH) == Some(plan.to_hex().as_str());
+    let place = file.value(key::PART).map(str::to_owned);
+    Ok(place.filter(|_| is_of_plan).map(|place| (file, place)))
+}

@@ -1,0 +1,229 @@
+//! The parts of a run: each has the rows of a chunk of neighbouring points, or of some of them
+//! where the process was interrupted.
+//!
+//! A part has the columns of the result, then those that are kept for whoever goes on with the run,
+//! and the number that the engine knows a row by, where that is not the point.
+
+use std::ops::Range;
+
+use arrow_array::RecordBatch;
+use serde_json::{Value, json};
+
+use super::part::{Damage, Part, PartSchema, Unreadable};
+use super::read::{NameCounts, add};
+use super::schema::{Holds, POINT};
+use super::{Column, Done, Folder, Job, Layout, Row, StoreError, chunk_points, part_name};
+
+/// The name of the column of the numbers that the engine knows rows by.
+const ROW_INDEX: &str = "row_index";
+
+/// The greatest number of rows of a point: 256 states of each of 32 motions. Basis: settings of
+/// `sweep dwell`. Doubling it doubles the memory that a part may take.
+const MAX_POINT_ROWS: usize = 32 * 256;
+
+/// The parts of a run.
+#[derive(Clone, Debug)]
+pub(super) struct PointParts {
+    parts: PartSchema,
+    layout: Layout,
+    /// The position of each of the model's columns in a part.
+    positions: Vec<usize>,
+    points: u64,
+    chunk_points: u64,
+}
+
+impl PointParts {
+    /// Returns the parts of a job.
+    pub(super) fn new(job: &Job<'_>) -> Self {
+        let layout = job.layout.clone();
+        let is_kept = |column: &&Column| column.kind == Holds::Kept;
+        let mut columns: Vec<Column> = layout.all().cloned().collect();
+        let mut plain = 1 + layout.axes.len();
+        let mut kept = columns.len();
+        let mut positions = Vec::with_capacity(layout.columns.len());
+        for column in &layout.columns {
+            let next = if is_kept(&column) { &mut kept } else { &mut plain };
+            positions.push(*next);
+            *next += 1;
+        }
+        columns.extend(layout.columns.iter().filter(is_kept).cloned());
+        if layout.rows_a_point > 1 {
+            let about = "number that an unfinished run knows the row by";
+            columns.push(Column::new(ROW_INDEX, "1", about, Holds::Count));
+        }
+        let parts = PartSchema::new(job, columns);
+        let chunk_points = chunk_points(job.points);
+        Self { parts, layout, positions, points: job.points, chunk_points }
+    }
+
+    /// Returns the number of chunks of the whole run.
+    pub(super) const fn chunks(&self) -> u64 {
+        self.points.div_ceil(self.chunk_points)
+    }
+
+    /// Returns the points of a chunk.
+    pub(super) fn range(&self, chunk: u64) -> Range<u64> {
+        let first = chunk.saturating_mul(self.chunk_points).min(self.points);
+        first..first.saturating_add(self.chunk_points).min(self.points)
+    }
+
+    /// Returns the chunk that a point is in.
+    pub(super) const fn chunk(&self, point: u64) -> u64 {
+        point / self.chunk_points
+    }
+
+    /// Returns the entry of a part's metadata that says which chunk it is of.
+    fn place(&self, chunk: u64) -> String {
+        let Range { start, end } = self.range(chunk);
+        json!({ "index": chunk, "from": start, "to": end }).to_string()
+    }
+
+    /// Encodes outcomes of a chunk, in the order of their points.
+    ///
+    /// # Errors
+    /// [`StoreError::Engine`] when the outcomes are not this chunk's.
+    pub(super) fn encode(
+        &self,
+        job: &Job<'_>,
+        chunk: u64,
+        outcomes: &[Done],
+    ) -> Result<Vec<u8>, StoreError> {
+        let points = self.range(chunk);
+        let reject = |reason: String| StoreError::Engine {
+            first: points.start,
+            last: points.end.saturating_sub(1),
+            reason,
+        };
+        if !are_ordered(&points, outcomes.iter().map(|outcome| outcome.point)) {
+            return Err(reject(format!("{} outcomes that are not of its points", outcomes.len())));
+        }
+        let columns = &self.layout.columns;
+        let mut rows = Vec::with_capacity(outcomes.len());
+        for Done { point, rows: found } in outcomes {
+            if found.is_empty() || found.len() > MAX_POINT_ROWS {
+                let count = found.len();
+                return Err(reject(format!("point {point}: {count} rows of {MAX_POINT_ROWS}")));
+            }
+            let axes: Vec<f64> = (job.axis_values)(*point);
+            for cells in found {
+                let fits = cells.len() == columns.len()
+                    && columns.iter().zip(cells).all(|(column, cell)| column.takes(*cell));
+                if !fits {
+                    return Err(reject(format!("point {point}: a row that does not fit")));
+                }
+                rows.push(self.part_row(*point, &axes, cells));
+            }
+        }
+        let bytes = self.parts.encode(&self.place(chunk), &rows);
+        bytes.map_err(|error| reject(error.to_string()))
+    }
+
+    /// Returns the cells of a row in a part's columns.
+    fn part_row(&self, point: u64, axes: &[f64], cells: &Row) -> Row {
+        let mut row: Row = vec![None; self.parts.width()];
+        row[0] = Some(point / self.layout.rows_a_point);
+        for (cell, value) in row[1..].iter_mut().zip(axes).take(self.layout.axes.len()) {
+            *cell = Some(value.to_bits());
+        }
+        for (position, cell) in self.positions.iter().zip(cells) {
+            row[*position] = *cell;
+        }
+        if self.layout.rows_a_point > 1 {
+            row[self.number()] = Some(point);
+        }
+        row
+    }
+
+    /// Opens the part of a chunk; `None` where there is no file.
+    pub(super) fn open(
+        &self,
+        folder: &Folder,
+        chunk: u64,
+    ) -> Result<Option<PointPart<'_>>, Unreadable> {
+        let path = folder.file(part_name(chunk));
+        let Some(part) = self.parts.open(&path, &self.place(chunk))? else { return Ok(None) };
+        let range = self.range(chunk);
+        let most = (range.end - range.start).saturating_mul(MAX_POINT_ROWS as u64);
+        if part.rows() > most {
+            return Err(Damage::Rows.into());
+        }
+        let number = self.number();
+        let numbers = part.cells(&[number])?;
+        let mut points: Vec<u64> = numbers.into_iter().filter_map(|row| row[0]).collect();
+        if self.layout.has_several {
+            points.dedup();
+        }
+        if !are_ordered(&range, points.iter().copied()) {
+            return Err(Damage::Rows.into());
+        }
+        Ok(Some(PointPart { parts: self, part, points }))
+    }
+
+    /// Returns the position of the column of the numbers that the engine knows rows by.
+    const fn number(&self) -> usize {
+        if self.layout.rows_a_point > 1 { self.parts.width() - 1 } else { 0 }
+    }
+}
+
+/// Returns whether these are points of a range, each once and in order.
+fn are_ordered(range: &Range<u64>, points: impl Iterator<Item = u64> + Clone) -> bool {
+    points.clone().all(|point| range.contains(&point)) && points.is_sorted_by(|a, b| a < b)
+}
+
+/// An open part of a run.
+#[derive(Debug)]
+pub(super) struct PointPart<'a> {
+    parts: &'a PointParts,
+    part: Part<'a>,
+    /// The points that it has rows of.
+    points: Vec<u64>,
+}
+
+impl PointPart<'_> {
+    /// Returns the number of points.
+    pub(super) const fn points(&self) -> u64 {
+        self.points.len() as u64
+    }
+
+    /// Reads the outcomes.
+    pub(super) fn outcomes(&self) -> Result<Vec<Done>, Unreadable> {
+        let positions = [&[self.parts.number()], &self.parts.positions[..]].concat();
+        let mut outcomes: Vec<Done> = Vec::with_capacity(self.points.len());
+        for mut row in self.part.cells(&positions)? {
+            let cells = row.split_off(1);
+            let point = row[0].unwrap_or_default();
+            match outcomes.last_mut() {
+                Some(last) if last.point == point => last.rows.push(cells),
+                _ => outcomes.push(Done { point, rows: vec![cells] }),
+            }
+        }
+        Ok(outcomes)
+    }
+
+    /// Counts rows by status.
+    pub(super) fn add_statuses(&self, counts: &mut NameCounts) -> Result<(), Unreadable> {
+        let PointParts { layout, positions, .. } = self.parts;
+        let Some(status) = layout.position("status") else { return Ok(()) };
+        let Holds::Name(names) = &layout.columns[status].kind else { return Ok(()) };
+        for row in self.part.cells(&[positions[status]])? {
+            let name = row[0].and_then(|name| names.get(name as usize));
+            name.into_iter().for_each(|name| add(counts, name));
+        }
+        Ok(())
+    }
+
+    /// Reads the rows in the columns of the result.
+    pub(super) fn result_batches(&self) -> Result<Vec<RecordBatch>, Unreadable> {
+        self.part.batches((0..self.parts.layout.all().count()).collect())
+    }
+}
+
+/// Returns whether the place of a part is that of points of a run.
+pub(super) fn is_of_points(place: &str) -> bool {
+    serde_json::from_str::<Value>(place).is_ok_and(|place| place["from"].is_u64())
+}
+
+/// Returns the name of the column that tells the points of a part apart, whatever its layout.
+pub(super) fn number_name(has: impl Fn(&str) -> bool) -> &'static str {
+    if has(ROW_INDEX) { ROW_INDEX } else { POINT }
+}

@@ -1,0 +1,183 @@
+//! Trials of searches: left anywhere, damaged, of other plans.
+
+use std::fs;
+
+use serde_json::json;
+
+use super::super::synthetic::{job, layout};
+use super::super::{Holds, Layout};
+use super::*;
+use crate::build::Build;
+use crate::table::Table;
+use sweep_files::{ParquetFile, key};
+
+const BUILD: Build = Build { version: "0.0.0-test", numerics: 1 };
+
+fn columns() -> TrialColumns {
+    let column = |name: &str, kind| Column::new(name, "1", format!("the {name}"), kind);
+    TrialColumns {
+        keys: vec![column("candidate", Holds::Count), column("x", Holds::Axis)],
+        answers: vec![column("cost", Holds::Measured), column("excess", Holds::Measured)],
+    }
+}
+
+fn open(output: &Path, job: &Job<'_>) -> Trials {
+    match Trials::open(output, job, columns(), false) {
+        Ok(Opened::Open(trials)) => trials,
+        other => panic!("expected trials, got {other:?}"),
+    }
+}
+
+/// A trial and its answer; no third one has any.
+fn trial(k: u64) -> (Key, Row) {
+    let x = 0.1 * k as f64;
+    let cost = (!k.is_multiple_of(3)).then_some(x.sin().to_bits());
+    (vec![k, x.to_bits()], vec![cost, Some(x.to_bits())])
+}
+
+fn add(trials: &mut Trials, some: std::ops::Range<u64>) {
+    for k in some {
+        let (key, answer) = trial(k);
+        trials.add(key, answer).unwrap();
+    }
+}
+
+fn parts(output: &Path) -> Vec<String> {
+    let names = fs::read_dir(output.with_file_name("x.parquet.partial")).unwrap();
+    let names = names.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<String> = names.filter(|name| name.starts_with("part-")).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn trials_outlive_their_process_in_few_parts() {
+    const COUNT: u64 = 2500;
+    let home = tempfile::tempdir().unwrap();
+    let output = home.path().join("x.parquet");
+    let job = job(8);
+    // Processes that each write several times, and lose what they do not write.
+    for from in (0..COUNT).step_by(100) {
+        let mut trials = open(&output, &job);
+        assert_eq!(trials.count() as u64, from);
+        add(&mut trials, from..from + 60);
+        trials.write().unwrap();
+        add(&mut trials, from + 60..from + 100);
+        trials.write().unwrap();
+        trials.write().unwrap();
+        add(&mut trials, COUNT..COUNT + 1);
+    }
+    let trials = open(&output, &job);
+    assert_eq!(trials.count() as u64, COUNT);
+    for k in 0..COUNT {
+        let (key, answer) = trial(k);
+        assert_eq!(trials.recall(&key), Some(&answer), "trial {k}");
+    }
+    assert_eq!(trials.recall(&[0, 1]), None);
+    let names = [0, 1, 2].map(|index| format!("part-{index:08}.parquet"));
+    assert_eq!(parts(&output), names);
+    // Whoever reads them finds columns by their names.
+    let first = output.with_file_name("x.parquet.partial").join(&names[0]);
+    let first = ParquetFile::open(&first).unwrap();
+    let fields = first.schema().fields().iter().map(|field| field.name().as_str());
+    assert_eq!(fields.collect::<Vec<_>>(), ["candidate", "x", "cost", "excess"]);
+    assert_eq!(first.rows(), PART_ROWS as u64);
+    assert_eq!(trials.complete(), None);
+    assert_eq!(fs::read_dir(home.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_damaged_part_costs_its_own_trials() {
+    let home = tempfile::tempdir().unwrap();
+    let output = home.path().join("x.parquet");
+    let job = job(8);
+    let mut trials = open(&output, &job);
+    add(&mut trials, 0..3000);
+    trials.write().unwrap();
+    drop(trials);
+    let folder = output.with_file_name("x.parquet.partial");
+    let whole = fs::read(folder.join("part-00000001.parquet")).unwrap();
+    let last = fs::read(folder.join("part-00000002.parquet")).unwrap();
+    for (k, at) in (0..whole.len()).step_by(whole.len() / 40).enumerate() {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 1 << (at % 8);
+        fs::write(folder.join("part-00000001.parquet"), &bytes).unwrap();
+        fs::write(folder.join("part-00000002.parquet"), &last).unwrap();
+        let mut trials = open(&output, &job);
+        assert_eq!(trials.count(), 3000 - PART_ROWS, "byte {at}");
+        let notes = trials.take_notes();
+        assert!(notes[0].contains("part-00000001.parquet.damaged"), "{notes:?}");
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 4 + k + 1);
+        // They are made again, behind the others.
+        add(&mut trials, 1024..1034);
+        trials.write().unwrap();
+        drop(trials);
+        let (key, answer) = trial(1030);
+        assert_eq!(open(&output, &job).recall(&key), Some(&answer));
+    }
+    // Somebody's file of the same name is kept.
+    fs::write(folder.join("part-00000001.parquet"), "my thesis").unwrap();
+    drop(open(&output, &job));
+    let aside: Vec<String> = parts(&output);
+    let read = |name: &String| fs::read(folder.join(name)).unwrap();
+    assert!(aside.iter().any(|name| read(name) == b"my thesis"), "{aside:?}");
+}
+
+#[test]
+fn another_plan_is_refused_and_starting_over_forgets() {
+    let home = tempfile::tempdir().unwrap();
+    let output = home.path().join("x.parquet");
+    let ours = job(8);
+    let other = job(9);
+    let mut trials = open(&output, &ours);
+    add(&mut trials, 0..5);
+    trials.write().unwrap();
+    drop(trials);
+    let refused = Trials::open(&output, &other, columns(), false);
+    assert!(matches!(refused, Err(StoreError::PlanDiffers { .. })), "{refused:?}");
+    let Ok(Opened::Open(trials)) = Trials::open(&output, &other, columns(), true) else { panic!() };
+    assert_eq!(trials.count(), 0);
+    assert!(parts(&output).is_empty());
+    let busy = Trials::open(&output, &other, columns(), false);
+    assert!(matches!(busy, Err(StoreError::Busy { .. })), "{busy:?}");
+}
+
+#[test]
+fn a_finished_file_is_known_by_its_plan() {
+    let home = tempfile::tempdir().unwrap();
+    let output = home.path().join("x.parquet");
+    let [ours, other] = [8, 9].map(|points| {
+        let job = job(points);
+        let layout = Layout { kind: FileKind::Boundary, ..job.layout };
+        Job { version: BUILD.version, numerics: BUILD.numerics, layout, ..job }
+    });
+    let mut table = Table::new(BUILD);
+    table.metadata(key::PLAN, &ours.plan);
+    table.text(key::PLAN_HASH, ours.hash().to_hex().to_string());
+    table.metadata(key::BOUNDARY, &json!({}));
+    table.counts("points", "", [1]);
+    fs::write(&output, table.into_bytes(&output).unwrap()).unwrap();
+    let open = |job: &Job<'_>, fresh| Trials::open(&output, job, columns(), fresh);
+    let opened = open(&ours, false);
+    assert!(matches!(opened, Ok(Opened::Finished(()))), "{opened:?}");
+    let refused = open(&other, false);
+    assert!(matches!(refused, Err(StoreError::OutputDiffers { .. })), "{refused:?}");
+    assert!(!home.path().join("x.parquet.partial").exists());
+    // A search that died with its file in place has left its folder.
+    let Ok(Opened::Open(_)) = open(&ours, true) else { panic!() };
+    fs::remove_file(home.path().join("x.parquet.partial/plan.json")).unwrap();
+    let opened = open(&ours, false);
+    assert!(matches!(opened, Ok(Opened::Finished(()))), "{opened:?}");
+    assert!(!home.path().join("x.parquet.partial").exists());
+}
+
+#[test]
+fn the_model_s_own_file_is_never_taken_for_finished() {
+    let home = tempfile::tempdir().unwrap();
+    let output = home.path().join("x.toml");
+    let job = job(8);
+    let own = Job { layout: Layout { kind: FileKind::Own, ..layout() }, ..job };
+    fs::write(&output, format!("{}by a fit\n", sweep_files::OWN_FILE)).unwrap();
+    let opened = Trials::open(&output, &own, columns(), false);
+    assert!(matches!(opened, Ok(Opened::Open(_))), "{opened:?}");
+}

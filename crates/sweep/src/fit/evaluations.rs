@@ -1,0 +1,171 @@
+//! The evaluations of a fit, kept as the trials of a search are: the same fit again runs over those
+//! that are there, and ends in the same bits.
+
+use std::path::Path;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use sweep_engine::store::{Column, Holds, Job, Key, Opened, Row, StoreError, TrialColumns, Trials};
+use sweep_engine::tell;
+use sweep_files::FileKind;
+use sweep_files::panics::lock;
+
+use super::model::{Problem, Summary};
+
+/// The time of an evaluation that is written at once. Basis: a write takes some milliseconds.
+/// Doubling it doubles what a kill may lose.
+const COSTLY: Duration = Duration::from_millis(100);
+
+/// The evaluations of a problem, in the store.
+#[derive(Debug)]
+pub(crate) struct Evaluations {
+    unknowns: usize,
+    signals: usize,
+    trials: Mutex<Trials>,
+}
+
+impl Evaluations {
+    /// Opens the evaluations of a problem whose machine file goes to `output`.
+    ///
+    /// # Errors
+    /// Those of [`Trials::open`].
+    pub(crate) fn open(
+        output: &Path,
+        problem: &Problem<'_>,
+        fresh: bool,
+    ) -> Result<Self, StoreError> {
+        let Opened::Open(mut trials) =
+            Trials::open(output, &job(problem), columns(problem), fresh)?
+        else {
+            let path = output.display();
+            return Err(StoreError::Refused(format!("{path} is the result of another command")));
+        };
+        trials.take_notes().iter().for_each(|note| tell(note));
+        if trials.count() > 0 {
+            tell(&format!("going on: {} evaluations are there", trials.count()));
+        }
+        let unknowns = problem.unknowns();
+        let signals = problem.signals().count();
+        Ok(Self { unknowns, signals, trials: Mutex::new(trials) })
+    }
+
+    /// Returns the answer for some unknowns, kept or found now.
+    ///
+    /// # Errors
+    /// Those of `find`, and of the file system.
+    pub(crate) fn answer<E: From<StoreError>>(
+        &self,
+        x: &[f64],
+        find: impl FnOnce() -> Result<Option<Summary>, E>,
+    ) -> Result<Option<Summary>, E> {
+        let key: Key = x.iter().map(|x| x.to_bits()).collect();
+        if let Some(cells) = lock(&self.trials).recall(&key) {
+            return Ok(self.summary(cells));
+        }
+        let began = Instant::now();
+        let found = find()?;
+        let is_costly = began.elapsed() >= COSTLY;
+        let cells = self.cells(found.as_ref());
+        let mut trials = lock(&self.trials);
+        trials.add(key, cells)?;
+        if is_costly || trials.is_due() {
+            trials.write()?;
+        }
+        drop(trials);
+        Ok(found)
+    }
+
+    /// Writes what is not written.
+    ///
+    /// # Errors
+    /// [`StoreError::File`].
+    pub(crate) fn write(&self) -> Result<(), StoreError> {
+        lock(&self.trials).write()
+    }
+
+    /// Removes them once the machine file is in place; a failure is only worth a note.
+    pub(crate) fn complete(self) -> Option<String> {
+        sweep_files::panics::unlocked(self.trials).complete()
+    }
+
+    /// Returns a summary's cells, in the order of [`columns`].
+    fn cells(&self, summary: Option<&Summary>) -> Row {
+        let Some(Summary { cost, sigma, normal, pull }) = summary else {
+            return vec![None; 1 + self.signals + (self.unknowns + 1) * self.unknowns];
+        };
+        let numbers = std::iter::once(cost).chain(sigma).chain(normal.iter().flatten()).chain(pull);
+        numbers.map(|number| Some(number.to_bits())).collect()
+    }
+
+    /// Returns the summary that some cells hold, if there is one.
+    fn summary(&self, cells: &Row) -> Option<Summary> {
+        let numbers: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
+        let numbers = numbers?;
+        let (cost, rest) = numbers.split_first()?;
+        let (sigma, rest) = rest.split_at_checked(self.signals)?;
+        let (normal, pull) = rest.split_at_checked(self.unknowns * self.unknowns)?;
+        Some(Summary {
+            cost: *cost,
+            sigma: sigma.to_vec(),
+            normal: normal.chunks(self.unknowns.max(1)).map(<[f64]>::to_vec).collect(),
+            pull: pull.to_vec(),
+        })
+    }
+}
+
+/// Returns the columns of evaluations: the unknowns, then what a descent needs to know of them.
+fn columns(problem: &Problem<'_>) -> TrialColumns {
+    let mut keys = Vec::new();
+    for free in &problem.free {
+        let parameter = &free.parameter;
+        let name = match free.case {
+            None => parameter.name().to_owned(),
+            Some(case) => format!("file_{}_{}", case + 1, parameter.name()),
+        };
+        let about = parameter.description();
+        keys.push(Column::new(name, parameter.unit(), about, Holds::Axis));
+    }
+    if problem.with_shift {
+        let about = "shift of the file's clock";
+        let shift = |case| Column::new(format!("file_{case}_shift_s"), "s", about, Holds::Axis);
+        keys.extend((1..=problem.cases.len()).map(shift));
+    }
+    let unknowns = 1..=problem.unknowns();
+    let number = |name: String, about: &str| Column::new(name, "1", about, Holds::Measured);
+    let mut answers = vec![number("cost".to_owned(), "twice the negative log-likelihood")];
+    for signal in 1..=problem.signals().count() {
+        answers.push(number(format!("noise_{signal}"), "noise of a signal, in its unit"));
+    }
+    for row in unknowns.clone() {
+        for column in unknowns.clone() {
+            let about = "entry of the normal matrix J'WJ";
+            answers.push(number(format!("normal_{row}_{column}"), about));
+        }
+    }
+    for row in unknowns {
+        answers.push(number(format!("gradient_{row}"), "entry of J'Wr"));
+    }
+    TrialColumns { keys, answers }
+}
+
+/// Returns the job of a problem: the plans of its cases, and a hash of what was measured.
+fn job<'a>(problem: &'a Problem<'_>) -> Job<'a> {
+    let mut measured = blake3::Hasher::new();
+    for case in &problem.cases {
+        measured.update(format!("{:?}", case.measured).as_bytes());
+    }
+    let Problem { free, model, with_shift, method, .. } = problem;
+    let mut job = Job::of(&problem.cases[0].plan);
+    job.layout.kind = FileKind::Own;
+    let plans = problem.cases.iter().map(|case| case.plan.to_json());
+    job.plan["fit"] = json!({
+        "cases": plans.collect::<Vec<_>>(),
+        "measured": measured.finalize().to_hex().as_str(),
+        "free": free.iter().map(|free| format!("{free:?}")).collect::<Vec<_>>(),
+        "model": model.name(),
+        "shift": with_shift,
+        "method": format!("{method:?}"),
+    });
+    job
+}
