@@ -125,8 +125,8 @@ const MODELS: [(&str, fn(&Outcome) -> &Trajectory); 2] =
     [("nonlinear", |outcome| &outcome.nonlinear), ("linear", |outcome| &outcome.linear)];
 
 fn verdict(channels: &[Channel], limits: RatioLimits) -> Vec<WasherColumn> {
-    let told = "the method of the row's nonlinear numbers: capped_1 to capped_5, additive and \
-                dop853 are levels of the fast method, the others methods of that name";
+    let told = "the method of the row's nonlinear numbers; with the fast method its level: \
+                capped_0 to capped_5, rk4, additive or dop853";
     verdict_columns(channels, limits, Level::ALL.map(Level::name).to_vec(), told)
 }
 

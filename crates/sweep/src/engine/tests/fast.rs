@@ -62,7 +62,7 @@ fn compare_with_rk4(plan: &Plan, accuracy: f64) -> Vec<Outcome> {
 }
 
 /// Computes the rows of a plan by the fast method and compares them with plain RK4 at a step (s).
-/// Every row that is marked as converged must have the same verdict and an error within 5 times the
+/// Every row that is marked as converged must have the same verdict and an error within twice the
 /// accuracy, and few rows may exceed the accuracy itself.
 fn compare_with_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> {
     let fast = Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
@@ -86,13 +86,11 @@ fn compare_with_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> 
         let error = error(row, expected);
         rows_beyond += u64::from(error > accuracy);
         assert!(
-            error <= 5.0 * accuracy,
+            error <= 2.0 * accuracy,
             "{}: error {error:e} of {row:?} against {expected:?}",
             plan.name
         );
     }
-    // In the 1287 rows of Fig. 12 these are violent motions with an error of the least gap of up to
-    // 4.4 times the accuracy.
     assert!(rows_beyond <= plan.points() / 300, "{rows_beyond} rows are beyond {accuracy:e}");
     rows
 }
@@ -104,7 +102,7 @@ fn every_row_of_fig12_is_that_of_rk4_or_flagged() {
     let rows = compare_with_rk4(&plan, 1e-3);
     let unconverged = rows.iter().filter(|row| row.converged == Some(false)).count();
     assert!(unconverged < 13, "{unconverged} rows have not converged: more than 1 %");
-    for level in [Level::Capped1, Level::Capped2, Level::Dop853] {
+    for level in [Level::Capped1, Level::Capped2, Level::Rk4] {
         assert!(rows.iter().any(|row| row.method == level), "no row holds {level:?}");
     }
 }
@@ -261,7 +259,7 @@ fn a_row_near_the_limit_is_refined() {
         sweep_engine::Reliability { limits: ratio.into(), ..plan.reliability.clone() };
     let plan = Plan { reliability, ..plan };
     let row = &ModelEngine::new(&plan).unwrap().evaluate_at(&at)[0];
-    assert_eq!((row.method, row.sensitive), (Level::Dop853, Some(false)));
+    assert_eq!((row.method, row.sensitive), (Level::Rk4, Some(false)));
     // This is the error of the uncapped level, which the capped level does not reach.
     assert!(row.error.unwrap() < 1e-5, "{row:?}");
 }
