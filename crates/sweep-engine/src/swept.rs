@@ -45,6 +45,11 @@ pub trait Swept: Rows {
         Vec::new()
     }
 
+    /// Returns a plan of the same points whose rows have every measurement that this plan can have.
+    fn complete(plan: &Plan<Self>) -> Plan<Self> {
+        plan.clone()
+    }
+
     /// Returns the lines of `parameters`; without a plan, those that need no grid file.
     fn listed(plan: Option<&Plan<Self>>) -> Vec<Listed<Self>>;
 }

@@ -42,6 +42,8 @@ pub enum FileKind<'a> {
     },
     /// An SVG picture without a prologue, as `sweep plot` writes them and drawing programs do not.
     Svg,
+    /// A PDF figure.
+    Pdf,
     /// A PNG picture.
     Png,
     /// An HTML page.
@@ -65,6 +67,9 @@ const OWN: [(FileKind<'static>, &str, &str, &str); 8] = [
 /// Beginning of the model's own file.
 pub const OWN_FILE: &str = "# Written by sweep: ";
 
+/// The first lines of a PDF figure: other documents differ in the second.
+pub const PDF_START: &[u8] = b"%PDF-1.7\n%\xe2\xe3\xcf\xd3 sweep plot\n";
+
 /// The first line of an exported CSV file.
 pub const EXPORTED_CSV: &str = "# exported by sweep ";
 
@@ -76,6 +81,7 @@ impl FileKind<'_> {
             Self::Exported { .. } => "table of `sweep export`",
             Self::Account { .. } => "account of the run with this --out",
             Self::Svg => "SVG picture of `sweep plot`",
+            Self::Pdf => "PDF figure of `sweep plot`",
             Self::Png => "PNG picture",
             Self::Html => "HTML page",
             Self::ManPage => "manual page of `sweep man`",
@@ -98,6 +104,7 @@ impl FileKind<'_> {
             Self::Exported { .. } => begins(b"PK\x03\x04")?,
             Self::Account { of } => is_account(path, of).map_err(FileError::io("read", path))?,
             Self::Svg => begins(br#"<svg xmlns="http://www.w3.org/2000/svg" "#)?,
+            Self::Pdf => begins(PDF_START)?,
             Self::Png => begins(b"\x89PNG\r\n\x1a\n")?,
             Self::Html => begins(b"<!doctype html>\n")?,
             Self::ManPage => begins(b".ie \\n(.g ")?,

@@ -38,7 +38,7 @@ mod writer;
 pub use columns::{CellKind, Column, columns};
 pub use error::FileError;
 pub use footer::Refused;
-pub use kind::{EXPORTED_CSV, FileKind, OWN_FILE, beside};
+pub use kind::{EXPORTED_CSV, FileKind, OWN_FILE, PDF_START, beside};
 pub use leaves::{Step, dotted, leaves};
 pub use output::{Output, judge, ready, write};
 pub use parquet::{CREATED_BY, ParquetFile};

@@ -164,6 +164,7 @@ mod tests {
             FileKind::Svg => {
                 return b"<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1\"/>".to_vec();
             }
+            FileKind::Pdf => return crate::PDF_START.to_vec(),
             FileKind::Png => return b"\x89PNG\r\n\x1a\n...".to_vec(),
             FileKind::Html => return b"<!doctype html>\n<title>x</title>".to_vec(),
             FileKind::ManPage => return b".ie \\n(.g .ds Aq \\(aq\n".to_vec(),
@@ -194,6 +195,7 @@ mod tests {
             account,
             FileKind::Own,
             FileKind::Svg,
+            FileKind::Pdf,
             FileKind::Png,
             FileKind::Html,
             FileKind::ManPage,

@@ -215,6 +215,7 @@ pub fn unit_suffix(unit: &str) -> Option<&'static str> {
         "kg" => "_kg",
         "s" => "_s",
         "rpm" => "_rpm",
+        "deg" => "_deg",
         "" | "1" => "",
         "rad/s" => "_rad_per_s",
         "N" => "_n",

@@ -24,6 +24,7 @@ mod influence;
 pub mod label;
 mod layer;
 mod model;
+mod pdf;
 mod raster;
 pub mod read;
 mod region;
@@ -106,17 +107,18 @@ fn format_from_ending(path: &Path) -> Result<Format> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     match ending.to_ascii_lowercase().as_str() {
         "svg" => Ok(Format::Svg),
+        "pdf" => Ok(Format::Pdf),
         "png" => Ok(Format::Png),
         "html" | "htm" => Ok(Format::Html),
         _ => Err(PlotError::Unfit(format!(
-            "{}: the figure's format follows from the ending of its name: .svg, .png or .html",
+            "{}: the figure's format follows from the ending of its name: .svg, .pdf, .png or .html",
             path.display()
         ))),
     }
 }
 
-/// Draws the figure of `input` to `output`, whose ending (`.svg`, `.png`, `.html`) gives the
-/// format.
+/// Draws the figure of `input` to `output`, whose ending (`.svg`, `.pdf`, `.png`, `.html`)
+/// gives the format.
 ///
 /// # Errors
 /// Any [`PlotError`]: an unreadable file, options that do not fit it, an output that cannot be
@@ -286,7 +288,8 @@ fn draw_differences(
     if format == Format::Html || swept::axes(&source)?.len() < 2 {
         let path = source.path.display();
         return Err(PlotError::Unfit(format!(
-            "{path} is a differences file, which is drawn as .svg or .png over two axes or more"
+            "{path} is a differences file, which is drawn as .svg, .pdf or .png over two axes or \
+             more"
         )));
     }
     draw_map(source, options, model, format)
@@ -295,6 +298,7 @@ fn draw_differences(
 fn encode_image(scene: &Scene, format: Format) -> Result<Vec<u8>> {
     match format {
         Format::Png => raster::write(scene, PNG_SCALE),
+        Format::Pdf => Ok(pdf::write(scene)),
         _ => Ok(svg::write(scene).into_bytes()),
     }
 }
@@ -313,7 +317,12 @@ fn check_options(source: &FigureFile, options: &PlotOptions, format: Format) -> 
     source.reject_option("--at", at, source.kind.has_points, &format!("maps{with_points}"))?;
     let boundary = options.boundary.is_some();
     let traces = options.traces.is_some();
-    source.reject_option("--boundary", boundary, map && !is_page, "maps drawn as .svg or .png")?;
+    source.reject_option(
+        "--boundary",
+        boundary,
+        map && !is_page,
+        "maps drawn as .svg, .pdf or .png",
+    )?;
     source.reject_option("--view", options.view.is_some(), design, designs)?;
     source.reject_option("--traces", traces, map && is_page, "maps drawn as .html")
 }

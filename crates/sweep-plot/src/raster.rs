@@ -13,12 +13,12 @@ use super::scene::{Anchor, Colour, Item, Outline, PathSegment, Scene, Stroke, Te
 use super::svg::halo_width;
 
 /// The typeface of plain text.
-const REGULAR: &[u8] = include_bytes!("fonts/NotoSans-Regular.subset.ttf");
+pub(crate) const REGULAR: &[u8] = include_bytes!("fonts/NotoSans-Regular.subset.ttf");
 /// The typeface of bold text.
-const BOLD: &[u8] = include_bytes!("fonts/NotoSans-Bold.subset.ttf");
+pub(crate) const BOLD: &[u8] = include_bytes!("fonts/NotoSans-Bold.subset.ttf");
 
 /// Returns the typeface of bold or plain text.
-fn face(bold: bool) -> &'static Face<'static> {
+pub(crate) fn face(bold: bool) -> &'static Face<'static> {
     /// The parsed typefaces, plain and bold.
     static FACES: LazyLock<[Face<'static>; 2]> = LazyLock::new(|| {
         [REGULAR, BOLD].map(|font| Face::parse(font, 0).expect("the built-in font is valid"))
@@ -33,7 +33,7 @@ pub(crate) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
     f64::from(advances) * size / f64::from(face.units_per_em())
 }
 
-fn advance(face: &Face<'_>, letter: char) -> u16 {
+pub(crate) fn advance(face: &Face<'_>, letter: char) -> u16 {
     let glyph = face.glyph_index(letter).unwrap_or_default();
     face.glyph_hor_advance(glyph).unwrap_or_default()
 }

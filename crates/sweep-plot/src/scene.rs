@@ -1,5 +1,5 @@
 //! A scene: the shapes and texts of a figure in pixels from the top left corner, drawn once and
-//! written as SVG or PNG.
+//! written as SVG, PDF or PNG.
 
 use super::axis::extremes;
 

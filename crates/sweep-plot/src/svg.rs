@@ -147,7 +147,7 @@ fn path(outline: &Outline) -> String {
     d
 }
 
-fn hundredths(point: [f64; 2]) -> [i64; 2] {
+pub(crate) fn hundredths(point: [f64; 2]) -> [i64; 2] {
     // A file's values may lie anywhere; their differences must fit an integer.
     point.map(|value| (value.clamp(-MAX_COORDINATE, MAX_COORDINATE) * 100.0).round() as i64)
 }
@@ -163,7 +163,7 @@ fn fixed(hundredths: i64) -> String {
 }
 
 /// Writes a number of pixels to a hundredth.
-fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     fixed((value * 100.0).round() as i64)
 }
 

@@ -281,6 +281,19 @@ fn a_page_is_self_contained() {
 }
 
 #[test]
+fn a_figure_as_pdf_has_the_pages_size_and_its_title() {
+    let document = draw(map(), &PlotOptions::default(), "figure.pdf").unwrap();
+    assert!(document.starts_with(b"%PDF-1.7\n"));
+    assert!(document.ends_with(b"%%EOF\n"));
+    let text = String::from_utf8_lossy(&document);
+    let drawn = svg(map(), &PlotOptions::default());
+    let width = drawn.split("width=\"").nth(1).unwrap().split('"').next().unwrap();
+    let points = 0.75 * width.parse::<f64>().unwrap();
+    assert!(text.contains(&format!("/MediaBox [0 0 {points} ")), "{width}");
+    assert!(text.contains("/Title <FEFF"));
+}
+
+#[test]
 fn errors_name_their_cause_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let none = PlotOptions::default();
@@ -293,7 +306,7 @@ fn errors_name_their_cause_and_nothing_is_written() {
         .numbers("ratio_max", "1", [1.0, 1.0])
         .words("status", [Some("ok"), Some("ok")]);
     for (result, phrase) in [
-        (draw(map(), &none, "a.pdf"), ".svg, .png or .html"),
+        (draw(map(), &none, "a.eps"), ".svg, .pdf, .png or .html"),
         (draw(map(), &none, "input.parquet/a.svg"), "a part of that path is a file"),
         (draw(map(), &showing("ratio_yow"), "a.svg"), "it has ratio_max, ratio_body_yaw"),
         (draw(map(), &showing("ratio_yow"), "a.html"), "it has ratio_max, ratio_body_yaw"),

@@ -55,6 +55,16 @@ impl Goal {
         &self.expression.text
     }
 
+    /// Returns whether it is a constraint.
+    pub const fn is_constraint(&self) -> bool {
+        self.is_constraint
+    }
+
+    /// Iterates over the names of the columns that the expression reads.
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        self.expression.columns.iter().map(String::as_str)
+    }
+
     /// Returns whether the expression reads columns outside of aggregates.
     pub const fn is_by_row(&self) -> bool {
         self.expression.by_row

@@ -90,16 +90,18 @@ impl Swept for Washer {
                                    file with [stability] have more";
 
     fn variants(plan: &Plan) -> Vec<Plan> {
-        let can_have = |metric: &Metric| match metric {
-            metric if metric.is_at_held_speeds() => plan.model.held_speeds.is_some(),
-            metric => lacking(*metric, &plan.model.machine).is_none(),
-        };
         let with = |metric| {
             let mut plan = plan.clone();
             plan.model.measures.metrics = vec![metric];
             plan
         };
-        Metric::ALL.into_iter().filter(can_have).map(with).collect()
+        metrics(plan).map(with).collect()
+    }
+
+    fn complete(plan: &Plan) -> Plan {
+        let mut complete = plan.clone();
+        complete.model.measures.metrics = metrics(plan).collect();
+        complete
     }
 
     fn listed(plan: Option<&Plan>) -> Vec<Listed> {
@@ -124,6 +126,15 @@ impl Swept for Washer {
         };
         Parameter::all(machine, spin).into_iter().map(row).collect()
     }
+}
+
+/// Iterates over the metrics that rows of a plan can have.
+fn metrics(plan: &Plan) -> impl Iterator<Item = Metric> {
+    let can_have = |metric: &Metric| match metric {
+        metric if metric.is_at_held_speeds() => plan.model.held_speeds.is_some(),
+        metric => lacking(*metric, &plan.model.machine).is_none(),
+    };
+    Metric::ALL.into_iter().filter(can_have)
 }
 
 /// A line of the listing.

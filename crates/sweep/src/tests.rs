@@ -63,7 +63,7 @@ fn asked(tolerance: Option<f64>, lattice: u16) -> BoundaryOptions {
 }
 
 fn traced(task: &Task, threads: usize, interrupt: &Interrupt) -> Result<Traced, Stopped> {
-    let engine = Washer::engine(&task.plan, Some(&task.quantity.name)).unwrap();
+    let engine = Washer::engine(&task.plan, task.column()).unwrap();
     let asking = CachedEvaluator::new(engine, threads, interrupt, None, &|_| {}).unwrap();
     trace(&task.distances(&asking), &task.firsts, task.curves, &task.search, &mut |_| {})
 }
@@ -265,7 +265,7 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
                 interrupt.raise(2);
             }
         };
-        let engine = Washer::engine(&task.plan, Some(&task.quantity.name)).unwrap();
+        let engine = Washer::engine(&task.plan, task.column()).unwrap();
         let asking = CachedEvaluator::new(engine, 2, &interrupt, Some(trials), &tell).unwrap();
         let distances = task.distances(&asking);
         let found = trace(&distances, &task.firsts, task.curves, &task.search, &mut |_| {});
@@ -396,6 +396,40 @@ fn every_column_of_numbers_that_is_bad_one_way_has_a_boundary() {
     assert!(refused("cabinet_force_linear_n", None).contains("no limit of its own"));
     assert!(refused("ratio_max", Some(0.0)).contains("greater than 0"));
     assert!(refused("clash_time_linear_s", Some(0.0)).contains("greater than 0"));
+}
+
+#[test]
+fn a_boundary_of_an_expression_or_a_condition_is_where_rows_say_so() {
+    let plan = plan(&format!("{HEAD}{GRID}"));
+    let ask = |quantity: &str, limit| {
+        let quantity = quantity.to_owned();
+        Task::new(&plan, &BoundaryOptions { quantity, limit, ..asked(Some(2.0), 3) })
+    };
+    let crossings = |task: &Task| {
+        let rows = traced(task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+        let edges = rows.into_iter().flat_map(|row| row.edges);
+        let at: Vec<f64> = edges.filter_map(|edge| edge.at).collect();
+        assert!(!at.is_empty());
+        at
+    };
+    // Twice a force at twice its limit, and the condition that it is below the limit.
+    let force = crossings(&ask("cabinet_force_nonlinear_n", Some(900.0)).unwrap());
+    let twice = crossings(&ask("2 * cabinet_force_nonlinear_n", Some(1800.0)).unwrap());
+    let below = crossings(&ask("cabinet_force_nonlinear_n < 900", None).unwrap());
+    assert_eq!(force.len(), twice.len());
+    assert_eq!(force.len(), below.len());
+    for ((force, twice), below) in force.iter().zip(&twice).zip(&below) {
+        assert!((force - twice).abs() < 1e-6 && (force - below).abs() < 2.0, "{force} {below}");
+    }
+    // A condition that is stricter still does not hold at more dampings.
+    let both = ask("cabinet_force_nonlinear_n < 900 and min_gap_nonlinear_m > 0", None).unwrap();
+    assert_eq!(both.quantity.limit, 0.0);
+    assert!(both.column().is_none());
+    let refused = |quantity, limit| ask(quantity, limit).unwrap_err().to_string();
+    assert!(refused("2 * ratio_max", None).contains("--limit"));
+    assert!(refused("ratio_max < 2", Some(2.0)).contains("none with a condition"));
+    assert!(refused("ratio_maxx < 2", None).contains("ratio_max"));
+    assert!(refused("max(ratio_max) < 2", None).contains("of a row"));
 }
 
 #[test]

@@ -17,9 +17,7 @@ use crate::COORDINATES;
 use crate::coordinates::{ROTOR_TURNS, SHAFT_Y, SHAFT_Z, TUB, TUB_TURNS, TUB_Y, TUB_Z, seeded};
 use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
 use crate::linear::harmonics::{FUNCTIONS, HARMONICS, SAMPLES};
-use crate::linear::rotor_terms::{
-    self as entry, ENTRIES, INERTIA_ENTRIES, InertiaTerms, ROWS, RotorTerms, Terms,
-};
+use crate::linear::rotor_terms::{self as entry, ENTRIES, INERTIA_ENTRIES, ROWS, Terms};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::{Bodies, Coefficients};
 use crate::nonlinear::forces::{AxisLoad, Deflection};
@@ -132,7 +130,7 @@ impl<T: Lane> Aside for Linearise<'_, T> {
         (0..T::LANES)
             .map(|lane| LinearPoint {
                 constants: constants.get_lane(lane),
-                terms: terms_of_lane(&samples, lane),
+                terms: terms_of_lane(&samples, lane, bodies.is_skewed_in(lane)),
             })
             .collect()
     }
@@ -184,6 +182,7 @@ fn about_centre<T: Real, const R: usize, const ROWS: usize>(
 fn terms_of_lane<T: Lane>(
     samples: &[[[N<T>; HARMONICS]; ALL_ENTRIES]; 3],
     lane: usize,
+    skewed: bool,
 ) -> Terms<f64> {
     let coefficients = |entry: usize| {
         let mut functions = [0.0; FUNCTIONS];
@@ -203,10 +202,8 @@ fn terms_of_lane<T: Lane>(
         }
         functions
     };
-    Terms {
-        inertia: InertiaTerms::gather(&core::array::from_fn(|entry| coefficients(ENTRIES + entry))),
-        others: RotorTerms::gather(&core::array::from_fn(coefficients)),
-    }
+    let inertia = core::array::from_fn(|entry| coefficients(ENTRIES + entry));
+    Terms::gather(&inertia, &core::array::from_fn(coefficients), skewed)
 }
 
 /// The matrices M, C, K and F of Eq. 41 in the coordinates q, for one machine at one instant.

@@ -81,7 +81,7 @@ pub struct Drum {
     pub front_x_m: f64,
 }
 
-/// An unbalance: a point mass fixed to the drum, along d2.
+/// An unbalance: a point mass fixed to the drum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Unbalance {
     /// The mass m_u.
@@ -90,6 +90,8 @@ pub struct Unbalance {
     pub x_m: f64,
     /// The distance r_u from the axis; negative for a further unbalance on the opposite side.
     pub radius_m: f64,
+    /// The angle about the axis from d2 towards d3, in which the drum turns.
+    pub angle_deg: f64,
 }
 
 /// The drum shaft's bending stiffness K_D.
@@ -127,7 +129,8 @@ pub struct Spring {
     pub cubic_n_per_m3: f64,
 }
 
-/// A damper between a cabinet point and a tub point, viscous, with friction, or both.
+/// A damper between a cabinet point and a tub point, viscous, with friction, or both, in one stage
+/// or in two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Damper {
     /// The end at the cabinet, in cabinet axes from O.
@@ -143,6 +146,13 @@ pub struct Damper {
     /// The speed amplitude V at which the linear model's viscous damping 4 F_f / (pi V) dissipates
     /// as much energy in a cycle as friction does; if absent, the amplitude of the linear motion.
     pub friction_linear_speed_m_per_s: Option<f64>,
+    /// The free stroke s: friction and outer damping act where the damper's length differs from
+    /// that at rest by more than this.
+    pub free_stroke_m: f64,
+    /// The width over which they set in.
+    pub free_stroke_softness_m: f64,
+    /// The damping beyond the free stroke, added to the damping that always acts.
+    pub outer_damping_n_s_per_m: f64,
 }
 
 /// A rubber stop at the cabinet, which a tub point meets after a clearance.
@@ -214,10 +224,28 @@ pub struct Foot {
     pub foot_m: [f64; 3],
 }
 
+impl Unbalance {
+    /// Returns the place across the axis, along d2 and d3 (m). Quarter turns are exact.
+    pub(crate) fn place_m(&self) -> [f64; 2] {
+        let quarters = (self.angle_deg / 90.0).round();
+        let (sin, cos) = libm::sincos((self.angle_deg - 90.0 * quarters).to_radians());
+        let [y, z] = match quarters.rem_euclid(4.0) {
+            0.0 => [cos, sin],
+            1.0 => [-sin, cos],
+            2.0 => [-cos, -sin],
+            _ => [sin, -cos],
+        };
+        [self.radius_m * y, self.radius_m * z]
+    }
+}
+
 impl Damper {
     /// The default of v_s. Basis: a usual value of suspension dampers. Doubling it makes friction
     /// viscous up to twice the speed.
     pub const FRICTION_SPEED_M_PER_S: f64 = 0.01;
+    /// The default width over which forces beyond a free stroke set in. Basis: that of stops.
+    /// Doubling it makes them set in over twice the length.
+    pub const FREE_STROKE_SOFTNESS_M: f64 = BumpStop::SOFTNESS_M;
     /// The start of the search for V. Basis: a usual speed amplitude. Doubling it changes the
     /// number of iterations only.
     pub(crate) const FIRST_LINEAR_SPEED_M_PER_S: f64 = 0.1;
@@ -246,6 +274,9 @@ impl Machine {
         for bushing in &mut mirrored.bushings {
             flip(&mut bushing.tub_m);
         }
+        for unbalance in mirrored.unbalances_mut() {
+            unbalance.angle_deg = -unbalance.angle_deg;
+        }
         for foot in &mut mirrored.feet {
             flip(&mut foot.foot_m);
         }
@@ -258,6 +289,11 @@ impl Machine {
     /// Iterates over all unbalances, first the one that every machine has.
     pub(crate) fn unbalances(&self) -> impl Iterator<Item = &Unbalance> {
         core::iter::once(&self.unbalance).chain(&self.further_unbalances)
+    }
+
+    /// Iterates over all unbalances, first the one that every machine has.
+    fn unbalances_mut(&mut self) -> impl Iterator<Item = &mut Unbalance> {
+        core::iter::once(&mut self.unbalance).chain(&mut self.further_unbalances)
     }
 
     /// Returns the weight of tub, shaft, drum and unbalances (N).
@@ -274,7 +310,8 @@ impl Machine {
     /// lengths of the springs).
     pub fn paper() -> Self {
         let [unbalance_mass_kg, drum_mass_kg, drum_x_m] = [0.4, 3.64, 0.200];
-        let unbalance = Unbalance { mass_kg: unbalance_mass_kg, x_m: 0.300, radius_m: 0.200 };
+        let unbalance =
+            Unbalance { mass_kg: unbalance_mass_kg, x_m: 0.300, radius_m: 0.200, angle_deg: 0.0 };
         // Tables 2 and 3 print the drum with its 0.4 kg unbalance; take the point mass out (model
         // page, section 2).
         let reduced_mass_kg = unbalance_mass_kg * drum_mass_kg / (unbalance_mass_kg + drum_mass_kg);
@@ -297,6 +334,9 @@ impl Machine {
             friction_n: 0.0,
             friction_speed_m_per_s: Damper::FRICTION_SPEED_M_PER_S,
             friction_linear_speed_m_per_s: None,
+            free_stroke_m: 0.0,
+            free_stroke_softness_m: Damper::FREE_STROKE_SOFTNESS_M,
+            outer_damping_n_s_per_m: 0.0,
         };
         Self {
             gravity_m_per_s2: 9.81,

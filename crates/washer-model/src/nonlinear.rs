@@ -25,7 +25,7 @@ use crate::nonlinear::elements::TubMotion;
 use crate::nonlinear::floating::{Factors, Floating};
 use crate::nonlinear::forces::{Deflection, flexure};
 use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
-use lane_ode::{Lane, N, Real};
+use lane_ode::{Aside, Lane, N, Real};
 
 /// A half of the machine: the equations of motion, the lower triangle of the inertia, and the
 /// orientation.
@@ -214,7 +214,41 @@ pub(crate) fn tub<T: Lane>(
 /// reduced mass mu. The terms in mu rho^2 are part of the drum's inertia about the hinge
 /// (`Bodies::drum_i11` ...); those in mu l rho and mu l^2 appear below with `mu_l` and `mu_l2`.
 #[inline(always)]
-pub(crate) fn rotor<T: Real>(
+pub(crate) fn rotor<T: Lane>(
+    b: &Bodies<T>,
+    spin: &SpinState<T>,
+    q: &[N<T>; COORDINATES],
+    u: &[N<T>; COORDINATES],
+) -> Half<T, 4> {
+    if b.is_skewed.holds() {
+        let zero = q[0].lit(0.0);
+        return zero.0.aside(SkewedRotor { b, spin, q, u });
+    }
+    assemble_rotor::<T, false>(b, spin, q, u)
+}
+
+/// The equations of bodies S and D with an unbalance outside the plane of d1 and d2. Coefficients
+/// of zero add zeros, so that no machine's bits depend on the machines in the other lanes.
+struct SkewedRotor<'a, T> {
+    b: &'a Bodies<T>,
+    spin: &'a SpinState<T>,
+    q: &'a [N<T>; COORDINATES],
+    u: &'a [N<T>; COORDINATES],
+}
+
+impl<T: Lane> Aside for SkewedRotor<'_, T> {
+    type Output = Half<T, 4>;
+
+    #[inline(always)]
+    fn run(self) -> Half<T, 4> {
+        assemble_rotor::<T, true>(self.b, self.spin, self.q, self.u)
+    }
+}
+
+/// Assembles the equations of bodies S and D, with the terms in rho_3, I_13 and I_23 where the drum
+/// is `SKEWED`.
+#[inline(always)]
+fn assemble_rotor<T: Real, const SKEWED: bool>(
     b: &Bodies<T>,
     spin: &SpinState<T>,
     q: &[N<T>; COORDINATES],
@@ -246,15 +280,26 @@ pub(crate) fn rotor<T: Real>(
     ];
     let omega_d = [ex, ey, ez + u10];
 
-    // The drum about the hinge, in E, where rho has no third component.
+    // The drum about the hinge, in E.
     let rho = [c10 * b.rho_1 - s10 * b.rho_2, s10 * b.rho_1 + c10 * b.rho_2];
-    let k = drum_inertia_in_e(b, s10, c10);
-    let rho_acceleration = second_derivative(&rho, &omega_d, &alpha_d);
+    let k = drum_inertia_in_e::<T, SKEWED>(b, s10, c10);
+    let mut rho_acceleration = second_derivative(&rho, &omega_d, &alpha_d);
+    if SKEWED {
+        let [x, y, z] = omega_d;
+        rho_acceleration[0] += b.rho_3 * (x * z + alpha_d[1]);
+        rho_acceleration[1] += b.rho_3 * (y * z - alpha_d[0]);
+        rho_acceleration[2] -= b.rho_3 * (x * x + y * y);
+    }
     let axis_acceleration_e = into_hinge(s9, c9, &into_spin(spin, &motion.axis_acceleration));
     let drum_moment_e = {
-        let [x, y, z] = k.moment(&omega_d, &alpha_d);
+        let [x, y, z] = k.moment::<SKEWED>(&omega_d, &alpha_d);
         let [ax, ay, az] = scaled(b.mu_l, axis_acceleration_e);
-        [x + rho[1] * az, y - rho[0] * az, z + (rho[0] * ay - rho[1] * ax)]
+        let mut moment = [x + rho[1] * az, y - rho[0] * az, z + (rho[0] * ay - rho[1] * ax)];
+        if SKEWED {
+            moment[0] -= b.rho_3 * ay;
+            moment[1] += b.rho_3 * ax;
+        }
+        moment
     };
 
     // Inertia moment of S and D together, in A; the shaft's is added where both are in S.
@@ -278,7 +323,11 @@ pub(crate) fn rotor<T: Real>(
 
     // The common centre w = along_shaft s1 + drum_share rho: place, partial velocities,
     // acceleration; in cabinet axes.
-    let rho_s = [(c9 * rho[0]).v(), rho[1], -(s9 * rho[0]).v()];
+    let mut rho_s = [(c9 * rho[0]).v(), rho[1], -(s9 * rho[0]).v()];
+    if SKEWED {
+        rho_s[0] += s9 * b.rho_3;
+        rho_s[2] += c9 * b.rho_3;
+    }
     let rho_a = out_of_spin(spin, &rho_s);
     let w = tilt.in_cabinet_axes(&[
         b.along_shaft + b.drum_share * rho_a[0],
@@ -287,11 +336,16 @@ pub(crate) fn rotor<T: Real>(
     ]);
     let drift = combination(b.along_shaft, axis_acceleration, b.drum_share, &rho_acceleration_a);
     let drift = tilt.in_cabinet_axes(&drift);
-    let arm_9 = {
+    let mut arm_9 = {
         let share = -(b.drum_share * rho[0]).v();
         let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];
         scaled(share, tilt.in_cabinet_axes(&d3_a))
     };
+    if SKEWED {
+        let share = (b.drum_share * b.rho_3).v();
+        let e1_a = [c9, (spin.sin * s9).v(), -(spin.cos * s9).v()];
+        arm_9 = sum(arm_9, &scaled(share, tilt.in_cabinet_axes(&e1_a)));
+    }
     let arm_10 = {
         let [x, y] = [-(b.drum_share * rho[1]).v(), (b.drum_share * rho[0]).v()];
         tilt.in_cabinet_axes(&out_of_spin(spin, &[(c9 * x).v(), y, -(s9 * x).v()]))
@@ -313,7 +367,7 @@ pub(crate) fn rotor<T: Real>(
     let axial = (b.rotor_mass * drift[0]).v();
     let axis_drift = tilt.in_cabinet_axes(axis_acceleration);
 
-    let mut inertia = rotor_inertia(b, spin, &tilt, &k, &rho_s, (s9, c9));
+    let mut inertia = rotor_inertia::<T, SKEWED>(b, spin, &tilt, &k, &rho_s, (s9, c9));
     for r in 0..4 {
         let axial_r = (b.rotor_mass * axial_arm[r]).v();
         for s in 0..=r {
@@ -335,22 +389,36 @@ pub(crate) fn rotor<T: Real>(
     }
 }
 
-/// The drum's inertia K about the hinge in E. Its 1-3 and 2-3 entries are zero.
+/// The drum's inertia K about the hinge in E. Its 1-3 and 2-3 entries are zero where all unbalances
+/// are in the plane of d1 and d2.
 struct DrumInertia<T> {
     k11: N<T>,
     k22: N<T>,
     k33: N<T>,
     k12: N<T>,
+    k13: N<T>,
+    k23: N<T>,
 }
 
 #[inline(always)]
-fn drum_inertia_in_e<T: Real>(b: &Bodies<T>, s10: N<T>, c10: N<T>) -> DrumInertia<T> {
+fn drum_inertia_in_e<T: Real, const SKEWED: bool>(
+    b: &Bodies<T>,
+    s10: N<T>,
+    c10: N<T>,
+) -> DrumInertia<T> {
     let difference = b.drum_i11 - b.drum_i22;
     let ss = (s10 * s10).v();
     let cs = (c10 * s10).v();
     // k11 = c^2 i11 - 2 c s i12 + s^2 i22; k22 follows from the trace.
     let turned = difference * ss + 2.0 * (cs * b.drum_i12).v();
+    let [mut k13, mut k23] = [b.drum_i13; 2];
+    if SKEWED {
+        k13 = c10 * b.drum_i13 - s10 * b.drum_i23;
+        k23 = s10 * b.drum_i13 + c10 * b.drum_i23;
+    }
     DrumInertia {
+        k13,
+        k23,
         k11: b.drum_i11 - turned,
         k22: b.drum_i22 + turned,
         k33: b.drum_i33,
@@ -361,21 +429,32 @@ fn drum_inertia_in_e<T: Real>(b: &Bodies<T>, s10: N<T>, c10: N<T>) -> DrumInerti
 impl<T: Real> DrumInertia<T> {
     /// Returns K alpha + omega x K omega.
     #[inline(always)]
-    fn moment(&self, omega: &Vec3<T>, alpha: &Vec3<T>) -> Vec3<T> {
+    fn moment<const SKEWED: bool>(&self, omega: &Vec3<T>, alpha: &Vec3<T>) -> Vec3<T> {
         let [x, y, z] = *omega;
-        let h = [self.k11 * x + self.k12 * y, self.k12 * x + self.k22 * y, (self.k33 * z).v()];
-        [
+        let mut h = [self.k11 * x + self.k12 * y, self.k12 * x + self.k22 * y, (self.k33 * z).v()];
+        if SKEWED {
+            h[0] += self.k13 * z;
+            h[1] += self.k23 * z;
+            h[2] = h[2] + self.k13 * x + self.k23 * y;
+        }
+        let mut moment = [
             self.k11 * alpha[0] + self.k12 * alpha[1] + (y * h[2] - z * h[1]),
             self.k12 * alpha[0] + self.k22 * alpha[1] + (z * h[0] - x * h[2]),
             self.k33 * alpha[2] + (x * h[1] - y * h[0]),
-        ]
+        ];
+        if SKEWED {
+            moment[0] += self.k13 * alpha[2];
+            moment[1] += self.k23 * alpha[2];
+            moment[2] = moment[2] + self.k13 * alpha[0] + self.k23 * alpha[1];
+        }
+        moment
     }
 }
 
 /// Computes the lower triangle of the rotor's inertia about its mass centre over (q7, q8, q9, q10),
 /// without the part of the axial motion.
 #[inline(always)]
-fn rotor_inertia<T: Real>(
+fn rotor_inertia<T: Real, const SKEWED: bool>(
     b: &Bodies<T>,
     spin: &SpinState<T>,
     tilt: &Tilt<T>,
@@ -386,10 +465,17 @@ fn rotor_inertia<T: Real>(
     // The drum's K turned by q9 into S.
     let ss = (s9 * s9).v();
     let difference = k.k33 - k.k11;
-    let l12 = (c9 * k.k12).v();
-    let l23 = -(s9 * k.k12).v();
-    let l11 = k.k11 + ss * difference;
-    let l33 = k.k33 - ss * difference;
+    let mut l12 = (c9 * k.k12).v();
+    let mut l23 = -(s9 * k.k12).v();
+    let mut l11 = k.k11 + ss * difference;
+    let mut l33 = k.k33 - ss * difference;
+    if SKEWED {
+        l12 += s9 * k.k23;
+        l23 += c9 * k.k23;
+        let turned = (2.0 * (c9 * s9).v()).v();
+        l11 += turned * k.k13;
+        l33 -= turned * k.k13;
+    }
     let mu_rho = scaled(b.mu_l, *rho_s);
 
     // The whole rotor in S, then its rows in A.
@@ -397,8 +483,11 @@ fn rotor_inertia<T: Real>(
     let j11 = l11 + b.shaft_i11;
     let j22 = k.k22 + b.shaft_i22 + across;
     let j33 = l33 + b.shaft_i33 + across;
-    let [_, j12, j13] =
-        out_of_spin(spin, &[j11, l12 - mu_rho[1], (c9 * s9) * difference - mu_rho[2]]);
+    let mut l13 = (c9 * s9) * difference - mu_rho[2];
+    if SKEWED {
+        l13 += (1.0 - 2.0 * ss) * k.k13;
+    }
+    let [_, j12, j13] = out_of_spin(spin, &[j11, l12 - mu_rho[1], l13]);
     let half_sum = (0.5 * (j22 + j33)).v();
     let half_difference = (0.5 * (j22 - j33)).v();
     let turned = half_difference * spin.cos_2 - l23 * spin.sin_2;
@@ -410,7 +499,15 @@ fn rotor_inertia<T: Real>(
     let h9_y = k.k22 + mu_rho[0];
     let h9 = out_of_spin(spin, &[l12, h9_y, l23]);
     let rho_1 = c9 * mu_rho[0] - s9 * mu_rho[2];
-    let h10 = out_of_spin(spin, &[(k.k33 * s9).v(), -(s9 * mu_rho[1]).v(), k.k33 * c9 + rho_1]);
+    let mut h10_s = [(k.k33 * s9).v(), -(s9 * mu_rho[1]).v(), k.k33 * c9 + rho_1];
+    let mut k23 = s9.lit(0.0);
+    if SKEWED {
+        h10_s[0] += c9 * k.k13;
+        h10_s[1] += k.k23;
+        h10_s[2] -= s9 * k.k13;
+        k23 = k.k23;
+    }
+    let h10 = out_of_spin(spin, &h10_s);
 
     let s8 = tilt.sin_pitch;
     let c8 = tilt.cos_pitch;
@@ -419,7 +516,7 @@ fn rotor_inertia<T: Real>(
         [s8 * (s8 * j11 + 2.0 * (c8 * j12).v()) + (c8 * c8) * j22_a, zero, zero, zero],
         [s8 * j13 + c8 * j23_a, j33_a, zero, zero],
         [s8 * h9[0] + c8 * h9[1], h9[2], k.k22, zero],
-        [s8 * h10[0] + c8 * h10[1], h10[2], zero, k.k33],
+        [s8 * h10[0] + c8 * h10[1], h10[2], k23, k.k33],
     ]
 }
 

@@ -240,10 +240,13 @@ impl Kernel for Prepare<'_> {
         let mut prepared = Vec::with_capacity(self.points.len());
         let mut courses = self.courses.into_iter();
         for group in self.points.chunks(T::LANES) {
-            let machines: Vec<_> =
+            let mut machines: Vec<_> =
                 group.iter().map(|(machine, _)| Coefficients::new(machine)).collect();
             let lanes = in_lanes(zero, &machines);
             let (q, solved) = zero.0.aside(equilibrium::SolveEquilibrium { zero, machine: &lanes });
+            for (lane, machine) in machines.iter_mut().enumerate() {
+                machine.elements.centre_free_strokes(&q.map(|q| q.0.get(lane)));
+            }
             let steepest = steepest(&machines, &q);
             let viscous: Vec<_> =
                 machines.iter().map(Coefficients::with_viscous_friction).collect();

@@ -1,6 +1,7 @@
 //! Tests of the models, and their common functions.
 
 mod allocation;
+mod angles;
 mod bits;
 mod cost;
 pub(crate) mod elements;

@@ -144,7 +144,7 @@ impl PyResultTable {
         py.import("json")?.call_method1("loads", (self.0.plan().to_string(),))
     }
 
-    /// Writes the result as `.parquet`, or a figure of it as `.svg`, `.png` or `.html`.
+    /// Writes the result as `.parquet`, or a figure of it as `.svg`, `.pdf`, `.png` or `.html`.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
         let is_rows = ending.eq_ignore_ascii_case("parquet");

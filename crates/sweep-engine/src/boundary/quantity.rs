@@ -1,8 +1,12 @@
 //! The quantity of a boundary, its limit, and distances from that: any column of numbers that a
-//! plan's rows can have.
+//! plan's rows can have, an expression of such columns, or a condition on them.
 
+use arrow_array::RecordBatch;
+use arrow_schema::ArrowError;
 use sweep_parameter::{Channel as _, Worse};
+use sweep_results::{Column as KnownColumn, Goal, columns};
 
+use crate::config::{Diagnostic, Location, Report};
 use crate::store::{Column, Holds};
 use crate::{Error, Plan, Swept, nearest};
 
@@ -87,6 +91,126 @@ pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
     // The verdict's ratios foremost.
     offered.sort_by_key(|(column, _)| !["ratio_max", LEAST_RATIO].contains(&&*column.name));
     offered
+}
+
+/// Returns whether a text is the name of a column, not an expression.
+pub fn is_name(text: &str) -> bool {
+    text.chars().all(|one| one.is_alphanumeric() || one == '_')
+}
+
+/// A quantity that an expression computes from the columns of a row.
+#[derive(Debug)]
+pub struct Derived<M: Swept> {
+    /// The quantity.
+    pub quantity: TracedQuantity,
+    /// The expression.
+    pub goal: Goal,
+    /// The plan whose rows have all its columns.
+    pub plan: Plan<M>,
+}
+
+/// Returns the quantity of an expression of columns at a limit, or the margin of a condition at 0,
+/// and the plan that computes the columns.
+///
+/// # Errors
+/// A mistake in the expression, columns that no plan has together, or a limit that is missing or
+/// one too many.
+pub fn derived<M: Swept>(
+    plan: &Plan<M>,
+    text: &str,
+    limit: Option<f64>,
+) -> Result<Derived<M>, Error> {
+    let plans = plans_by_columns(plan);
+    let known: Vec<Vec<KnownColumn>> =
+        plans.iter().map(|plan| columns(&M::layout(plan).schema())).collect();
+    let mut all: Vec<KnownColumn> = Vec::new();
+    for column in known.iter().flatten() {
+        if all.iter().all(|one| one.name != column.name) {
+            all.push(column.clone());
+        }
+    }
+    let condition = Goal::constraint(text, &all);
+    let goal = match (condition, Goal::objective(text, &all), limit) {
+        (Ok(_), _, Some(limit)) => {
+            let expected = "none with a condition, which has limits of its own";
+            return Err(Error::option("--limit", limit, expected));
+        }
+        (Err(_), Ok(_), None) => {
+            let expected = format!("--limit with it, or a condition such as `{text} < 2`");
+            return Err(Error::option("--quantity", text, expected));
+        }
+        (Ok(goal), _, None) | (Err(_), Ok(goal), Some(_)) => goal,
+        (Err(mistake), Err(number_mistake), limit) => {
+            let report = Report::default();
+            let mistake = if limit.is_some() { number_mistake } else { mistake };
+            let at = Location::new(report.add("--quantity", text), mistake.span.clone());
+            report.push(Diagnostic::from_expression(mistake, &at));
+            report.finish(None::<()>)?;
+            return Err(Error::option("--quantity", text, "an expression of columns"));
+        }
+    };
+    if !goal.is_by_row() {
+        let expected = "an expression of a row's columns, without min(), max() and the like";
+        return Err(Error::option("--quantity", text, expected));
+    }
+    let has_all = |columns: &&Vec<KnownColumn>| {
+        goal.columns().all(|name| columns.iter().any(|column| column.name == name))
+    };
+    let Some(at) = known.iter().position(|columns| has_all(&columns)) else {
+        let names: Vec<&str> = goal.columns().collect();
+        let names = names.join(", ");
+        let expected = format!("columns that one grid file has; ask in it for all of {names}");
+        return Err(Error::option("--quantity", text, expected));
+    };
+    let quantity = match limit {
+        None => TracedQuantity {
+            name: format!("margin({text})"),
+            unit: "1".to_owned(),
+            limit: 0.0,
+            worse: Worse::Less,
+            scale: Scale::Over(1.0),
+        },
+        Some(limit) => TracedQuantity {
+            name: text.to_owned(),
+            unit: goal.unit().to_owned(),
+            limit,
+            worse: Worse::Greater,
+            scale: Scale::Over(if limit == 0.0 { 1.0 } else { limit.abs() }),
+        },
+    };
+    let plan = plans.into_iter().nth(at).unwrap_or_else(|| plan.clone());
+    Ok(Derived { quantity, goal, plan })
+}
+
+/// Returns plans of the same points with more and more columns: the plan itself, each with a
+/// further measurement, one with all of them, and one with all channels too.
+fn plans_by_columns<M: Swept>(plan: &Plan<M>) -> Vec<Plan<M>> {
+    let complete = M::complete(plan);
+    let mut with_channels = complete.clone();
+    with_channels.reliability.channels = M::channels().to_vec();
+    let mut plans = vec![plan.clone()];
+    plans.extend(M::variants(plan));
+    plans.extend([complete, with_channels]);
+    plans
+}
+
+/// Computes the number of an expression in a row. A condition's is its margin: the distance of its
+/// comparisons from turning, over their greater operands, negative where it does not hold; 1 and -1
+/// where it compares no numbers.
+///
+/// # Errors
+/// A batch without the columns of the expression.
+pub fn margin(goal: &Goal, row: &RecordBatch) -> Result<Option<f64>, ArrowError> {
+    let Some(number) = goal.evaluate(row)? else { return Ok(None) };
+    if !goal.is_constraint() {
+        return Ok(Some(number));
+    }
+    let slack = goal.slack(row)?.map(|slack| slack.part);
+    // The condition itself decides at its limits, where the slack is 0.
+    Ok(Some(match (number == 0.0, slack) {
+        (true, slack) => slack.unwrap_or(1.0).max(f64::MIN_POSITIVE),
+        (false, slack) => slack.unwrap_or(-1.0).min(0.0),
+    }))
 }
 
 /// Returns the names of a channel's columns.

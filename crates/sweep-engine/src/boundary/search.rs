@@ -1,13 +1,17 @@
 //! The task of a plan, and a model's distances at trial points.
 
 use super::lattice::{columns, lattice_ranks};
-use super::quantity::traced;
+use super::quantity::{Derived, derived, is_name, margin, traced};
 use super::{BoundaryTrial, SearchRange, TracedQuantity};
 use crate::config::written::finite;
-use crate::evaluator::{CachedEvaluator, Stopped};
-use crate::store::{Column, Done, Holds, Key, Rows, TrialColumns, axis_columns};
-use crate::{AxisValues, Error, Model, Plan, Swept};
+use crate::evaluator::{CachedEvaluator, RequestValues, Stopped};
+use crate::optimise::search::defect;
+use crate::store::{
+    Column, Done, Holds, Key, Layout, ResultRows, Rows, TrialColumns, axis_columns,
+};
+use crate::{AxisValues, Error, Model, Plan, StoreError, Swept};
 use sweep_parameter::Parameter as _;
+use sweep_results::Goal;
 
 /// The most lines of all curves together. Basis: the traced rows of so many stay below a gigabyte
 /// of memory. Doubling it doubles that.
@@ -25,7 +29,8 @@ const DEFAULT_PARTS: f64 = 480.0;
 #[derive(Clone, Debug, clap::Args)]
 pub struct BoundaryOptions {
     /// Column whose limit is traced: any column of numbers that the grid's rows can have, such as
-    /// ratio_max, ratio_CHANNEL or nonlinear_CHANNEL; without a name, lists them
+    /// ratio_max, ratio_CHANNEL or nonlinear_CHANNEL; or an expression of columns, with --limit; or
+    /// a condition, as in `require`. Without a name, lists the columns
     #[arg(long, value_name = "COLUMN", default_value = "ratio_max")]
     #[arg(num_args = 0..=1, default_missing_value = "")]
     pub quantity: String,
@@ -50,6 +55,8 @@ pub struct BoundaryTask<M: Model> {
     pub plan: Plan<M>,
     /// The quantity that is at its limit.
     pub quantity: TracedQuantity,
+    /// The expression that computes the quantity; `None` where it is a column.
+    pub expression: Option<Goal>,
     /// The values of the first axis, in grid order.
     pub firsts: Vec<f64>,
     /// The number of curves: combinations of the axes beyond the second.
@@ -62,10 +69,16 @@ impl<M: Rows + Swept> BoundaryTask<M> {
     /// Returns the task of a plan.
     ///
     /// # Errors
-    /// The errors of [`traced`], and [`Error::Refused`] for a plan without a boundary or a
-    /// tolerance that cannot be met or means nothing.
+    /// The errors of [`traced`] and [`derived`], and [`Error::Refused`] for a plan without a
+    /// boundary or a tolerance that cannot be met or means nothing.
     pub fn new(plan: &Plan<M>, options: &BoundaryOptions) -> Result<Self, Error> {
-        let (quantity, plan) = traced(plan, &options.quantity, options.limit)?;
+        let (quantity, expression, plan) = if is_name(&options.quantity) {
+            let (quantity, plan) = traced(plan, &options.quantity, options.limit)?;
+            (quantity, None, plan)
+        } else {
+            let Derived { quantity, goal, plan } = derived(plan, &options.quantity, options.limit)?;
+            (quantity, Some(goal), plan)
+        };
         let refused = |why: String| Err(Error::Refused(why));
         if plan.design.is_some() {
             return refused(
@@ -118,7 +131,7 @@ impl<M: Rows + Swept> BoundaryTask<M> {
             lattice: options.lattice.into(),
         };
         let firsts = (0..first.values.len()).map(|k| first.values.value(k)).collect();
-        Ok(Self { plan, quantity, firsts, curves: curves as usize, search })
+        Ok(Self { plan, quantity, expression, firsts, curves: curves as usize, search })
     }
 
     /// Returns the largest size of a cell of the lattice along the first and the second axis, in
@@ -138,24 +151,51 @@ impl<M: Rows + Swept> BoundaryTask<M> {
             .map(|marks| marks.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max))
     }
 
+    /// Returns the name of the column that is at its limit, if it is one.
+    pub fn column(&self) -> Option<&str> {
+        self.expression.is_none().then_some(self.quantity.name.as_str())
+    }
+
+    /// Computes the quantity of a point.
+    fn value(
+        &self,
+        layout: &Layout,
+        axis_values: Vec<f64>,
+        done: Done,
+    ) -> Result<Option<f64>, StoreError> {
+        let Some(expression) = &self.expression else {
+            let place = layout.columns.iter().position(|one| one.name == self.quantity.name);
+            let cell = place.and_then(|place| Some((place, done.rows.first()?[place])));
+            return Ok(cell.and_then(|(place, cell)| layout.columns[place].number(cell)));
+        };
+        let mut rows = ResultRows::new(layout);
+        let point = done.point;
+        for row in done.rows.into_iter().take(1) {
+            rows.push(point, axis_values.clone(), row);
+        }
+        let value = rows.take().and_then(|batch| margin(expression, &batch));
+        Ok(value.map_err(defect)?.filter(|value| value.is_finite()))
+    }
+
     /// Returns the function that evaluates the distances at trial points.
     pub fn distances<'a>(
         &'a self,
         evaluator: &'a CachedEvaluator<'_>,
     ) -> impl Fn(&[BoundaryTrial]) -> Result<Vec<Option<f64>>, Stopped> + 'a {
-        let columns = M::layout(&self.plan).columns;
-        let place = columns.iter().position(|column| column.name == self.quantity.name);
-        let distance = move |done: &Done| {
-            let cell = done.rows.first()?[place?];
-            Some(self.quantity.distance(columns[place?].number(cell)?))
-        };
+        let layout = M::layout(&self.plan);
         move |trials| {
             let values: Vec<Vec<f64>> =
                 trials.iter().map(|trial| self.axis_values(trial)).collect();
             let key = |values: &Vec<f64>| values.iter().map(|value| value.to_bits()).collect();
             let keys: Vec<Key> = values.iter().map(key).collect();
-            let values = |k: usize, _| values[k].clone();
-            let answer = |_, points: Vec<Done>| Ok(points.iter().map(&distance).collect());
+            let values = |k: usize, _: u64| values[k].clone();
+            let answer = |k: usize, points: Vec<Done>| -> Result<RequestValues, StoreError> {
+                let distance = |done: Done| -> Result<Option<f64>, StoreError> {
+                    let value = self.value(&layout, values(k, 0), done)?;
+                    Ok(value.map(|value| self.quantity.distance(value)))
+                };
+                points.into_iter().map(distance).collect()
+            };
             Ok(evaluator.evaluate(&keys, 1, &values, &answer)?.concat())
         }
     }

@@ -194,7 +194,7 @@ pub fn search<M: Swept>(
     let progress = Progress::for_search(effort.progress, rows, "rows", there);
     let shown = |points| progress.show_search(rows_done.load(Ordering::Relaxed), points);
     let threads = effort.threads()?;
-    let engine = M::engine(&task.plan, Some(&task.quantity.name))?;
+    let engine = M::engine(&task.plan, task.column())?;
     let asking = CachedEvaluator::new(engine, threads, effort.interrupt, trials, &shown)?;
     let mut standing = |rows| rows_done.store(rows as u64, Ordering::Relaxed);
     let distances = task.distances(&asking);

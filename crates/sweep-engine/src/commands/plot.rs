@@ -18,7 +18,7 @@ pub struct Args<V: ValueEnum + Send + Sync + 'static = DesignView> {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
-    /// Where to write; the ending .svg, .png or .html says how [default: FILE with .svg]
+    /// Where to write; the ending .svg, .pdf, .png or .html says how [default: FILE with .svg]
     #[arg(short, long, visible_alias = "out", value_name = "IMAGE")]
     pub output: Option<PathBuf>,
 
@@ -37,7 +37,7 @@ pub struct Args<V: ValueEnum + Send + Sync + 'static = DesignView> {
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     pub at: Vec<(String, f64)>,
 
-    /// Map as .svg or .png: draw the line of this boundary file too
+    /// Map as .svg, .pdf or .png: draw the line of this boundary file too
     #[arg(long, value_name = "FILE")]
     pub boundary: Option<PathBuf>,
 }

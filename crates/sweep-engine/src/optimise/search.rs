@@ -79,7 +79,7 @@ pub fn slacks<M: Swept>(
 }
 
 /// Returns the error of rows that do not fit their own columns, which is a defect of the program.
-fn defect(error: ArrowError) -> StoreError {
+pub(crate) fn defect(error: ArrowError) -> StoreError {
     StoreError::Engine { first: 0, last: 0, reason: error.to_string() }
 }
 

@@ -291,11 +291,15 @@ fn fixed_numbers(
     let all = || Parameter::all(machine, spin).into_iter().filter(is_fixed_kind);
     let shared = all().filter(|parameter| parameter.target().is_several());
     let single = all().filter(|parameter| !parameter.target().is_several());
+    // A number that a machine file may leave out and does belongs to a part that is not there.
+    let is_there = |parameter: &Parameter| {
+        parameter.left_out().is_none_or(|value| parameter.get(machine, spin) != Some(value))
+    };
     let by_kind = |parameter: Parameter| {
         let tolerance = Tolerance::by_unit(parameter.unit());
         (parameter, tolerance)
     };
-    let defaults = shared.chain(single).map(by_kind).filter(|_| with_defaults);
+    let defaults = shared.chain(single).filter(is_there).map(by_kind).filter(|_| with_defaults);
     for (parameter, tolerance) in given.chain(defaults) {
         let own = parts(&parameter);
         if own.iter().any(|part| taken.contains(part)) {

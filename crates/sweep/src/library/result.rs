@@ -129,7 +129,7 @@ impl MemoryTable {
         }
     }
 
-    /// Draws the figure of it; the output's ending (`.svg`, `.png`, `.html`) says how.
+    /// Draws the figure of it; the output's ending (`.svg`, `.pdf`, `.png`, `.html`) says how.
     ///
     /// # Errors
     /// As [`sweep_plot::render`] and [`Self::save`].

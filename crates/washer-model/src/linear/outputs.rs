@@ -10,7 +10,7 @@ use crate::coordinates::{
     TUB_Y, TUB_YAW, TUB_Z, seeded,
 };
 use crate::lanes::{InLanes as _, ToDual as _, lane_struct};
-use crate::linear::sparse::sparse_sums;
+use crate::linear::sparse::{FurtherTerms, sparse_sums};
 use crate::machine::spin::SpinState;
 use crate::nonlinear::coefficients::Bodies;
 use crate::nonlinear::outputs::{Axes, MovingCoordinates, RADIAL};
@@ -106,12 +106,15 @@ sparse_sums! {
 
 lane_struct! {
     /// The coefficients of the outputs, of one machine in `f64`, of one machine per lane in `T`.
-    #[derive(Clone, Copy, Debug)]
+    #[derive(Clone, Debug)]
     LinearOutputs {
         channels: ChannelTerms<T>,
         channels_at_rest: [N<T>; CHANNELS_AT_REST.len()],
         radial: RadialTerms<T>,
         radial_at_rest: [N<T>; RADIAL_AT_REST.len()],
+        /// The terms that only skewed drums have, by entry, then column.
+        further_channels: FurtherTerms<T>,
+        further_radial: FurtherTerms<T>,
     }
 }
 
@@ -122,6 +125,9 @@ impl<T: Lane> LinearOutputs<T> {
         let mut sums = [[motion.cos[0].lit(0.0); 3]; CHANNEL_ENTRIES];
         self.channels.sum(&motion.coordinates, &mut sums);
         add_at_rest(&mut sums, CHANNELS_AT_REST, &self.channels_at_rest);
+        if !self.further_channels.is_empty() {
+            self.further_channels.add(&motion.columns(), &mut sums);
+        }
         motion.turned::<CHANNEL_ENTRIES, CHANNELS>(sums, TURNING)
     }
 
@@ -131,6 +137,9 @@ impl<T: Lane> LinearOutputs<T> {
         let mut sums = [[motion.cos[0].lit(0.0); 3]; RADIAL_ENTRIES];
         self.radial.sum(&motion.coordinates, &mut sums);
         add_at_rest(&mut sums, &RADIAL_AT_REST, &self.radial_at_rest);
+        if !self.further_radial.is_empty() {
+            self.further_radial.add(&motion.columns(), &mut sums);
+        }
         motion.turned::<RADIAL_ENTRIES, RADIAL>(sums, &RADIAL_TURNING)
     }
 }
@@ -175,6 +184,17 @@ impl<T: Real> LinearMotion<T> {
             cos: [spin.cos, -(n * spin.sin).v(), -(acceleration * spin.sin + nn * spin.cos)],
             sin: [spin.sin, (n * spin.cos).v(), acceleration * spin.cos - nn * spin.sin],
         }
+    }
+
+    /// Returns the factors of an expansion's columns: the coordinates, then 1.
+    #[inline(always)]
+    fn columns(&self) -> [[N<T>; 3]; COLUMNS] {
+        let zero = self.cos[0].lit(0.0);
+        let mut columns = [[zero.lit(1.0), zero, zero]; COLUMNS];
+        for j in 0..COORDINATES {
+            columns[j] = self.coordinates[j];
+        }
+        columns
     }
 
     /// Combines steady, cosine and sine parts to outputs.
@@ -241,12 +261,14 @@ impl<T: Lane> Aside for LineariseOutputs<'_, T> {
                 }
             }
         }
-        (0..T::LANES).map(|lane| gather_lane(&samples.get_lane(lane))).collect()
+        (0..T::LANES)
+            .map(|lane| gather_lane(&samples.get_lane(lane), bodies.is_skewed_in(lane)))
+            .collect()
     }
 }
 
 /// Computes the coefficients of one lane from samples at three angles.
-fn gather_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64> {
+fn gather_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3], skewed: bool) -> LinearOutputs<f64> {
     let mut channels = [[0.0; COORDINATES]; CHANNEL_ENTRIES];
     let mut channels_at_rest = [0.0; CHANNEL_ENTRIES];
     let mut radial = [[0.0; COORDINATES]; RADIAL_ENTRIES];
@@ -277,10 +299,35 @@ fn gather_lane(samples: &[[[N<f64>; COLUMNS]; OUTPUTS]; 3]) -> LinearOutputs<f64
             }
         }
     }
+    let [further_channels, further_radial] = if skewed {
+        [
+            gather_further(&channels, &channels_at_rest, &ChannelTerms::PLACES, CHANNELS_AT_REST),
+            gather_further(&radial, &radial_at_rest, &RadialTerms::PLACES, &RADIAL_AT_REST),
+        ]
+    } else {
+        [FurtherTerms::NONE, FurtherTerms::NONE]
+    };
     LinearOutputs {
+        further_channels,
+        further_radial,
         channels: ChannelTerms::gather(&channels),
         channels_at_rest: from_fn(|k| N(channels_at_rest[CHANNELS_AT_REST[k]])),
         radial: RadialTerms::gather(&radial),
         radial_at_rest: RADIAL_AT_REST.map(|entry| N(radial_at_rest[entry])),
     }
+}
+
+/// Selects the terms of entries that neither the table's `places` nor the entries `at_rest` name.
+fn gather_further<const ENTRIES: usize>(
+    slopes: &[[f64; COORDINATES]; ENTRIES],
+    values: &[f64; ENTRIES],
+    places: &[(usize, usize)],
+    at_rest: &[usize],
+) -> FurtherTerms<f64> {
+    let all: [[f64; COLUMNS]; ENTRIES] = from_fn(|entry| {
+        from_fn(|column| slopes[entry].get(column).copied().unwrap_or(values[entry]))
+    });
+    let at_rest = at_rest.iter().map(|entry| (*entry, AT_REST));
+    let named: Vec<_> = places.iter().copied().chain(at_rest).collect();
+    FurtherTerms::gather(&all, &named)
 }

@@ -2,16 +2,16 @@
 //!
 //! Rows are y and z of the midpoint, then the rotations about the mass centre. Columns are q7 to
 //! q10, because the rotor's forces depend on q3 and q4 through the bearings only. The pattern is
-//! the same for every machine, because the drum's mass centre lies in the plane of d1 and d2, which
-//! is upright at rest.
+//! that of machines whose unbalances lie in the plane of d1 and d2, which is upright at rest. Other
+//! machines have all harmonics, and further terms for those that the pattern lacks.
 
 use crate::lanes::lane_struct;
 use crate::linear::harmonics::{
     ACCELERATION, COS, COS_2, FUNCTIONS, ONE, SIN, SIN_2, SPEED, SPEED_COS, SPEED_COS_2, SPEED_SIN,
     SPEED_SIN_2, SPIN, SPIN_COS, SPIN_COS_2, SPIN_SIN, SPIN_SIN_2,
 };
-use crate::linear::sparse::sparse_sums;
-use lane_ode::N;
+use crate::linear::sparse::{FurtherTerms, sparse_sums};
+use lane_ode::{Lane, N};
 
 /// The number of the rotor's rows.
 pub(crate) const ROWS: usize = 6;
@@ -66,11 +66,55 @@ pub(crate) const fn damping(row: usize, column: usize) -> usize {
 lane_struct! {
     /// The coefficients of all terms of the rotor, of one machine in `f64`, of one machine per lane
     /// in `T`.
-    #[derive(Clone, Copy, Debug)]
-    Terms { inertia: InertiaTerms<T>, others: RotorTerms<T> }
+    #[derive(Clone, Debug)]
+    Terms {
+        inertia: InertiaTerms<T>,
+        others: RotorTerms<T>,
+        further_inertia: FurtherTerms<T>,
+        further_others: FurtherTerms<T>,
+    }
+}
+
+impl<T: Lane> Terms<T> {
+    /// Computes the inertia's entries at the functions of an instant.
+    #[inline(always)]
+    pub(crate) fn sum_inertia(
+        &self,
+        functions: &[N<T>; FUNCTIONS],
+        sums: &mut [N<T>; INERTIA_ENTRIES],
+    ) {
+        self.inertia.sum(functions, sums);
+        self.further_inertia.add(functions, sums);
+    }
+
+    /// Computes all other entries at the functions of an instant.
+    #[inline(always)]
+    pub(crate) fn sum_others(&self, functions: &[N<T>; FUNCTIONS], sums: &mut [N<T>; ENTRIES]) {
+        self.others.sum(functions, sums);
+        self.further_others.add(functions, sums);
+    }
 }
 
 impl Terms<f64> {
+    /// Selects the terms of a machine from all coefficients. Only a `skewed` drum has further ones.
+    pub(crate) fn gather(
+        inertia: &[[f64; FUNCTIONS]; INERTIA_ENTRIES],
+        others: &[[f64; FUNCTIONS]; ENTRIES],
+        skewed: bool,
+    ) -> Self {
+        let mut terms = Self {
+            inertia: InertiaTerms::gather(inertia),
+            others: RotorTerms::gather(others),
+            further_inertia: FurtherTerms::NONE,
+            further_others: FurtherTerms::NONE,
+        };
+        if skewed {
+            terms.further_inertia = FurtherTerms::gather(inertia, &InertiaTerms::PLACES);
+            terms.further_others = FurtherTerms::gather(others, &RotorTerms::PLACES);
+        }
+        terms
+    }
+
     /// Evaluates the inertia's entries and all others at the functions of an instant.
     pub(crate) fn at(
         &self,
@@ -78,8 +122,8 @@ impl Terms<f64> {
     ) -> ([N<f64>; INERTIA_ENTRIES], [N<f64>; ENTRIES]) {
         let mut inertia = [N(0.0); INERTIA_ENTRIES];
         let mut others = [N(0.0); ENTRIES];
-        self.inertia.sum(functions, &mut inertia);
-        self.others.sum(functions, &mut others);
+        self.sum_inertia(functions, &mut inertia);
+        self.sum_others(functions, &mut others);
         (inertia, others)
     }
 }

@@ -8,7 +8,8 @@
 ///
 /// Entries that are not named keep their values. `Name<f64>` holds the coefficients of one machine,
 /// `Name<T>` those of one machine per lane.
-use lane_ode::{N, Real};
+use crate::lanes::{InLanes, ToDual};
+use lane_ode::{Aside, Dual, Lane, N, Real};
 
 macro_rules! sparse_sums {
     (
@@ -27,7 +28,7 @@ macro_rules! sparse_sums {
 
         impl $name<f64> {
             /// The entry and the function of each term.
-            const PLACES: [(usize, usize); [$($first $(, $other)*),+].len()] =
+            pub(crate) const PLACES: [(usize, usize); [$($first $(, $other)*),+].len()] =
                 [$(($entry, $first) $(, ($entry, $other))*),+];
 
             /// Selects the coefficients that the table names.
@@ -61,6 +62,119 @@ macro_rules! sparse_sums {
     };
 }
 pub(crate) use sparse_sums;
+
+/// The coefficients that a table does not name, by entry, then function. There are none where they
+/// vanish.
+#[derive(Clone, Debug)]
+pub(crate) struct FurtherTerms<T> {
+    zero: N<T>,
+    coefficients: Vec<N<T>>,
+}
+
+impl FurtherTerms<f64> {
+    /// Creates a set without coefficients.
+    pub(crate) const NONE: Self = Self { zero: N(0.0), coefficients: Vec::new() };
+
+    /// Selects the coefficients of the table's entries that are not at one of its `places`.
+    pub(crate) fn gather<const FUNCTIONS: usize, const ENTRIES: usize>(
+        all: &[[f64; FUNCTIONS]; ENTRIES],
+        places: &[(usize, usize)],
+    ) -> Self {
+        let mut coefficients = vec![N(0.0); FUNCTIONS * ENTRIES];
+        for entry in 0..ENTRIES {
+            for function in 0..FUNCTIONS {
+                let is_of_table = places.iter().any(|place| place.0 == entry);
+                if is_of_table && !places.contains(&(entry, function)) {
+                    coefficients[entry * FUNCTIONS + function] = N(all[entry][function]);
+                }
+            }
+        }
+        Self { zero: N(0.0), coefficients }
+    }
+}
+
+impl<T> FurtherTerms<T> {
+    /// Returns whether there are no coefficients.
+    #[inline(always)]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.coefficients.is_empty()
+    }
+}
+
+impl<T: Lane> FurtherTerms<T> {
+    /// Adds the terms to the sums of the table's.
+    #[inline(always)]
+    pub(crate) fn add<V: Summand<T>, const FUNCTIONS: usize, const ENTRIES: usize>(
+        &self,
+        functions: &[V; FUNCTIONS],
+        sums: &mut [V; ENTRIES],
+    ) {
+        if !self.is_empty() {
+            let coefficients = &self.coefficients;
+            self.zero.0.aside(AddFurtherTerms { coefficients, functions, sums });
+        }
+    }
+}
+
+/// The addition of further terms. Coefficients of zero add zeros, so that no machine's bits depend
+/// on the machines in the other lanes.
+struct AddFurtherTerms<'a, T, V, const FUNCTIONS: usize, const ENTRIES: usize> {
+    coefficients: &'a [N<T>],
+    functions: &'a [V; FUNCTIONS],
+    sums: &'a mut [V; ENTRIES],
+}
+
+impl<T: Lane, V: Summand<T>, const FUNCTIONS: usize, const ENTRIES: usize> Aside
+    for AddFurtherTerms<'_, T, V, FUNCTIONS, ENTRIES>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for entry in 0..ENTRIES {
+            let mut sum = self.sums[entry];
+            for function in 0..FUNCTIONS {
+                let coefficient = self.coefficients[entry * FUNCTIONS + function];
+                sum = sum.plus_scaled(coefficient, self.functions[function]);
+            }
+            self.sums[entry] = sum;
+        }
+    }
+}
+
+impl<T: Lane> InLanes<T> for FurtherTerms<T> {
+    type One = FurtherTerms<f64>;
+
+    #[inline(always)]
+    fn splat(zero: N<T>, one: &FurtherTerms<f64>) -> Self {
+        Self { zero: zero.lit(0.0), coefficients: Vec::splat(zero, &one.coefficients) }
+    }
+
+    /// Overwrites a lane. Lists without coefficients are lists of zeros.
+    #[inline(always)]
+    fn set_lane(&mut self, lane: usize, one: &FurtherTerms<f64>) {
+        let count = self.coefficients.len().max(one.coefficients.len());
+        self.coefficients.resize(count, self.zero);
+        for k in 0..count {
+            let coefficient = one.coefficients.get(k).copied().unwrap_or(N(0.0));
+            self.coefficients[k].set_lane(lane, &coefficient);
+        }
+    }
+
+    #[inline(always)]
+    fn get_lane(&self, lane: usize) -> FurtherTerms<f64> {
+        FurtherTerms { zero: N(0.0), coefficients: self.coefficients.get_lane(lane) }
+    }
+}
+
+impl<T: Real> ToDual for FurtherTerms<T> {
+    type Dual = FurtherTerms<Dual<T>>;
+
+    #[inline(always)]
+    fn constant(&self) -> FurtherTerms<Dual<T>> {
+        FurtherTerms { zero: self.zero.constant(), coefficients: self.coefficients.constant() }
+    }
+}
 
 /// Returns the next coefficient.
 #[inline(always)]

@@ -183,11 +183,11 @@ impl<T: Lane> RotorAt<T> {
     ) {
         let functions = harmonics::functions(spin);
         let zero = spin.sin.lit(0.0);
-        terms.others.sum(&functions, &mut self.entries);
+        terms.sum_others(&functions, &mut self.entries);
         // The inverse is a long chain of dependent operations. It comes last, because a stage
         // begins with operations that do not need it.
         let mut sums = [zero; INERTIA_ENTRIES];
-        terms.inertia.sum(&functions, &mut sums);
+        terms.sum_inertia(&functions, &mut sums);
         let mut inertia = [[zero; 4]; 4];
         for row in 0..4 {
             for column in 0..=row {

@@ -1,9 +1,9 @@
 //! The coefficients of the equations, one machine per lane.
 
 use crate::Machine;
-use crate::lanes::lane_struct;
+use crate::lanes::{InAnyLane, lane_struct};
 use crate::nonlinear::elements::Elements;
-use lane_ode::N;
+use lane_ode::{Lane, N};
 
 lane_struct! {
     /// The coefficients of a machine.
@@ -26,29 +26,36 @@ lane_struct! {
     /// The coefficients of bodies, flexure and bearings (model page, sections 1 to 3).
     #[derive(Clone, Copy, Debug)]
     Bodies {
-        gravity,
-        tub_mass, tub_per_mass, tub_centre, tub_i11, tub_i22, tub_i33,
-        shaft_i11, shaft_i22, shaft_i33,
+        gravity: N<T>,
+        tub_mass: N<T>, tub_per_mass: N<T>, tub_centre: N<T>, tub_i11: N<T>, tub_i22: N<T>,
+        tub_i33: N<T>,
+        shaft_i11: N<T>, shaft_i22: N<T>, shaft_i33: N<T>,
         /// The mass of shaft, drum and unbalance.
-        rotor_mass, rotor_per_mass,
+        rotor_mass: N<T>, rotor_per_mass: N<T>,
         /// The shares of tub and rotor in the total mass.
-        tub_share, rotor_share,
+        tub_share: N<T>, rotor_share: N<T>,
         /// The rotor's mass centre is at `along_shaft * s1 + drum_share * rho` from P_S.
-        along_shaft, drum_share,
-        /// The vector rho from the hinge P_D to the drum's mass centre, in drum axes: (L_DM, e, 0).
-        rho_1, rho_2,
+        along_shaft: N<T>, drum_share: N<T>,
+        /// The vector rho from the hinge P_D to the drum's mass centre, in drum axes: (L_DM, e, 0)
+        /// where all unbalances are in the plane of d1 and d2.
+        rho_1: N<T>, rho_2: N<T>, rho_3: N<T>,
         /// The reduced mass mu of shaft and drum times the distance l from the shaft's mass centre
         /// to the hinge.
-        mu_l,
+        mu_l: N<T>,
         /// mu l^2.
-        mu_l2,
+        mu_l2: N<T>,
         /// The inertia of the drum and of the reduced mass at rho about the hinge, in drum axes.
-        drum_i11, drum_i22, drum_i33, drum_i12,
-        flexure_stiffness,
-        bearing_front, bearing_rear, front_stiffness, rear_stiffness,
+        drum_i11: N<T>, drum_i22: N<T>, drum_i33: N<T>, drum_i12: N<T>, drum_i13: N<T>,
+        drum_i23: N<T>,
+        /// A flag of drums with an unbalance outside the plane of d1 and d2. Without it `rho_3`,
+        /// `drum_i13` and `drum_i23` are zero, and the equations skip their terms.
+        is_skewed: InAnyLane<T>,
+        flexure_stiffness: N<T>,
+        bearing_front: N<T>, bearing_rear: N<T>, front_stiffness: N<T>, rear_stiffness: N<T>,
         /// The inverse of the bearings' stiffness matrix over (offset, tilt) of their midpoint.
-        bearing_force_compliance, bearing_mixed_compliance, bearing_moment_compliance,
-        tub_front, drum_hinge, hinge_to_front, clearance,
+        bearing_force_compliance: N<T>, bearing_mixed_compliance: N<T>,
+        bearing_moment_compliance: N<T>,
+        tub_front: N<T>, drum_hinge: N<T>, hinge_to_front: N<T>, clearance: N<T>,
     }
 }
 
@@ -65,30 +72,46 @@ impl<T: Copy> Bodies<T> {
     }
 }
 
+impl<T: Lane> Bodies<T> {
+    /// Returns whether a lane's drum has an unbalance outside the plane of d1 and d2.
+    pub(crate) fn is_skewed_in(&self, lane: usize) -> bool {
+        [self.rho_3, self.drum_i13, self.drum_i23].iter().any(|moment| moment.0.get(lane) != 0.0)
+    }
+}
+
 impl Bodies<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
         let Machine { tub, shaft, drum, flexure, bearings, .. } = machine;
         // Section 2: the drum of Tables 2 and 3 with its unbalances, added one by one.
         let mut m_d = drum.mass_kg;
-        let [mut x_d, mut e] = [drum.centre_x_m, 0.0];
+        let [mut x_d, mut e, mut e_3] = [drum.centre_x_m, 0.0, 0.0];
         let [mut i11, mut i22, mut i33] = drum.inertia_kg_m2;
-        let mut i12 = 0.0;
+        let [mut i12, mut i13, mut i23] = [0.0; 3];
         for unbalance in machine.unbalances() {
             let m_u = unbalance.mass_kg;
             let total = m_d + m_u;
             let dx = unbalance.x_m - x_d;
-            let dr = unbalance.radius_m - e;
+            let [y, z] = unbalance.place_m();
+            let dr = y - e;
+            let dz = z - e_3;
             let reduced = m_u * m_d / total;
             i11 += reduced * dr * dr;
+            i11 += reduced * dz * dz;
             i22 += reduced * dx * dx;
+            i22 += reduced * dz * dz;
             i33 += reduced * (dr * dr + dx * dx);
             i12 -= reduced * dx * dr;
+            i13 -= reduced * dx * dz;
+            i23 -= reduced * dr * dz;
             x_d += m_u / total * dx;
             e += m_u / total * dr;
+            e_3 += m_u / total * dz;
             m_d = total;
         }
+        let is_skewed = [e_3, i13, i23].iter().any(|moment| *moment != 0.0);
         let rho_1 = x_d - drum.hinge_x_m;
         let rho_2 = e;
+        let rho_3 = e_3;
         // Shaft and drum about their common mass centre: the vector between their centres moves
         // with the reduced mass.
         let m_s = shaft.mass_kg;
@@ -119,12 +142,16 @@ impl Bodies<f64> {
             drum_share: N(m_d / rotor_mass),
             rho_1: N(rho_1),
             rho_2: N(rho_2),
+            rho_3: N(rho_3),
             mu_l: N(mu * l),
             mu_l2: N(mu * l * l),
-            drum_i11: N(i11 + mu * rho_2 * rho_2),
-            drum_i22: N(i22 + mu * rho_1 * rho_1),
+            drum_i11: N(i11 + mu * rho_2 * rho_2 + mu * rho_3 * rho_3),
+            drum_i22: N(i22 + mu * rho_1 * rho_1 + mu * rho_3 * rho_3),
             drum_i33: N(i33 + mu * (rho_1 * rho_1 + rho_2 * rho_2)),
             drum_i12: N(i12 - mu * rho_1 * rho_2),
+            drum_i13: N(i13 - mu * rho_1 * rho_3),
+            drum_i23: N(i23 - mu * rho_2 * rho_3),
+            is_skewed: InAnyLane::new(is_skewed),
             flexure_stiffness: N(flexure.stiffness_n_m_per_rad),
             bearing_front: N(bearings.front_x_m),
             bearing_rear: N(bearings.rear_x_m),

@@ -9,6 +9,7 @@
 pub(crate) mod bounds;
 pub(crate) mod corners;
 
+use crate::coordinates::{COORDINATES, TUB};
 use crate::lanes::{InAnyLane, lane_struct};
 use crate::nonlinear::frame::{Tilt, Vec3, difference, dot, plus_cross, scaled, sum};
 use crate::{BumpStop, Bushing, Damper, Machine, Spring};
@@ -25,7 +26,7 @@ lane_struct! {
         bushings: Vec<BushingCoefficients<T>>,
         /// A flag of machines that have springs with a cubic term.
         has_cubic_springs: InAnyLane<T>,
-        /// A flag of machines that have dampers with friction.
+        /// A flag of machines that have dampers with friction or outer damping.
         has_friction: InAnyLane<T>,
         /// A flag of machines that have optional forces: cubic springs, friction, stops or
         /// bushings. Without them the equations skip their evaluation.
@@ -36,7 +37,7 @@ lane_struct! {
 impl Elements<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
         let has_cubic_springs = machine.springs.iter().any(|spring| spring.cubic_n_per_m3 != 0.0);
-        let has_friction = machine.dampers.iter().any(|damper| damper.friction_n != 0.0);
+        let has_friction = machine.dampers.iter().any(Damper::has_optional_force);
         let has_optional = has_cubic_springs
             || has_friction
             || !machine.stops.is_empty()
@@ -55,7 +56,20 @@ impl Elements<f64> {
     /// Returns whether a force is not smooth, as those of friction and stops. Steps longer than
     /// such a force's corner is wide miss it.
     pub(crate) fn are_nonsmooth(&self) -> bool {
-        !self.stops.is_empty() || self.dampers.iter().any(|damper| damper.friction.0 != 0.0)
+        let is_nonsmooth = |damper: &DamperCoefficients<f64>| {
+            damper.friction.0 != 0.0 || damper.has_step_of_damping()
+        };
+        !self.stops.is_empty() || self.dampers.iter().any(is_nonsmooth)
+    }
+
+    /// Centres the free strokes of dampers about their lengths at the equilibrium `q`, to which
+    /// they settle.
+    pub(crate) fn centre_free_strokes(&mut self, q: &[f64; COORDINATES]) {
+        let tub = TubMotion::new(&TUB.map(|i| N(q[i])), &[N(0.0); 4]);
+        for number in 0..self.dampers.len() {
+            let [length, _] = self.damper_motion(number, &tub);
+            self.dampers[number].rest_length = length;
+        }
     }
 
     /// Sets the speed amplitude at which the linear model takes a damper's friction.
@@ -65,10 +79,11 @@ impl Elements<f64> {
     }
 
     /// Returns the elements that the linear model linearises: friction is replaced by equivalent
-    /// viscous damping, which dissipates the same energy in a cycle.
+    /// viscous damping, which dissipates the same energy in a cycle. Friction beyond a free stroke
+    /// stays, so that its tangent at rest is taken.
     pub(crate) fn with_viscous_friction(&self) -> Self {
         let mut elements = self.clone();
-        for damper in &mut elements.dampers {
+        for damper in elements.dampers.iter_mut().filter(|damper| !damper.has_free_stroke()) {
             damper.damping += damper.viscous;
             damper.friction = N(0.0);
         }
@@ -106,13 +121,14 @@ impl<T: Lane> Elements<T> {
         [stop.depth(&point), stop.force(&point)]
     }
 
-    /// Computes the speed along a damper (m/s).
+    /// Computes the length of a damper (m) and the speed along it (m/s).
     #[inline(always)]
-    pub(crate) fn damper_speed(&self, number: usize, tub: &TubMotion<T>) -> N<T> {
+    pub(crate) fn damper_motion(&self, number: usize, tub: &TubMotion<T>) -> [N<T>; 2] {
         let ends = &self.dampers[number].ends;
         let span = span(&tub.tilt, &tub.midpoint, ends);
         let velocity = plus_cross(&tub.velocity, &tub.rate, &ends.tub);
-        dot(&span, &velocity) / dot(&span, &span).sqrt()
+        let length = dot(&span, &span).sqrt();
+        [length, dot(&span, &velocity) / length]
     }
 }
 
@@ -203,6 +219,25 @@ lane_struct! {
         speed_squared: N<T>,
         /// The equivalent viscous damping of the linear model (N s/m).
         viscous: N<T>,
+        /// The damping beyond the free stroke.
+        outer_damping: N<T>,
+        /// The length at rest, about which the stroke is free.
+        rest_length: N<T>,
+        /// 1 / (2 s) and s / 2 for a free stroke s; without one 0 and -1, so that the stage is
+        /// always engaged.
+        half_per_stroke: N<T>,
+        half_stroke: N<T>,
+        /// The square of the width over which forces beyond the free stroke set in; 0 without one.
+        softness_squared: N<T>,
+        /// A flag of dampers with a free stroke or outer damping.
+        has_stage: InAnyLane<T>,
+    }
+}
+
+impl Damper {
+    /// Returns whether the damper has forces other than linear viscous damping.
+    fn has_optional_force(&self) -> bool {
+        self.friction_n != 0.0 || self.outer_damping_n_s_per_m != 0.0
     }
 }
 
@@ -217,13 +252,45 @@ impl DamperCoefficients<f64> {
         // `ready.rs` replaces the default by the speed of the motion.
         let speed_m_per_s =
             damper.friction_linear_speed_m_per_s.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S);
+        let stroke_m = damper.free_stroke_m;
+        let softness_m = damper.free_stroke_softness_m;
+        let has_stroke = stroke_m != 0.0;
         Self {
             ends: Ends::new(damper.cabinet_m, damper.tub_m),
             damping: N(damper.damping_n_s_per_m),
             friction: N(damper.friction_n),
             speed_squared: N(damper.friction_speed_m_per_s * damper.friction_speed_m_per_s),
             viscous: N(equivalent_damping(damper.friction_n, speed_m_per_s)),
+            outer_damping: N(damper.outer_damping_n_s_per_m),
+            rest_length: N(damper.given_length_m()),
+            half_per_stroke: N(if has_stroke { 0.5 / stroke_m } else { 0.0 }),
+            half_stroke: N(if has_stroke { 0.5 * stroke_m } else { -1.0 }),
+            softness_squared: N(if has_stroke { softness_m * softness_m } else { 0.0 }),
+            has_stage: InAnyLane::new(has_stroke || damper.outer_damping_n_s_per_m != 0.0),
         }
+    }
+
+    /// Returns whether friction and outer damping act beyond a free stroke only.
+    fn has_free_stroke(&self) -> bool {
+        self.half_per_stroke.0 != 0.0
+    }
+
+    /// Returns whether damping sets in at the end of a free stroke.
+    fn has_step_of_damping(&self) -> bool {
+        self.has_free_stroke() && self.outer_damping.0 != 0.0
+    }
+}
+
+impl<T: Real> DamperCoefficients<T> {
+    /// Returns the share of friction and outer damping that acts at a length (m): a smooth step
+    /// from 0 within the free stroke to 1 beyond it.
+    #[inline(always)]
+    fn engagement(&self, length: N<T>) -> N<T> {
+        let elongation = length - self.rest_length;
+        // (x^2 - s^2) / (2 s) is about |x| - s at the end of the stroke, and smooth at its middle.
+        let beyond = (self.half_per_stroke * (elongation * elongation).v()).v() - self.half_stroke;
+        let width = (beyond * beyond + self.softness_squared).sqrt();
+        (0.5 * (1.0 + beyond / width)).v()
     }
 }
 
@@ -331,6 +398,8 @@ pub(crate) struct PointMotion<T> {
 /// The line between an element's ends at an instant. Its unit of force is the newton, or the newton
 /// per metre of the line's length, which saves the equations a square root.
 pub(crate) trait ElementLine<T> {
+    /// Returns the length (m).
+    fn length(&self) -> N<T>;
     /// Returns k (l_0 - l) for the length l, the `stiffness` k (N/m) and `force` = k l_0 (N).
     fn linear_force(&self, force: N<T>, stiffness: N<T>) -> N<T>;
     /// Returns k_3 (l - l_0)^3 for the length l, the `stiffness` k_3 (N/m^3) and the `free_length`
@@ -371,8 +440,8 @@ impl<T: Real> ForceLaw<T> for SpringCoefficients<T> {
     }
 }
 
-/// Eqs. 33 to 35: F = -C (v . n) n, and optionally F = -F_f v / sqrt(v^2 + v_s^2), with the speed v
-/// along the damper.
+/// Eqs. 33 to 35: F = -C (v . n) n, and optionally F = -h (F_f v / sqrt(v^2 + v_s^2) + C_o v), with
+/// the speed v along the damper and the share h of the stage beyond the free stroke.
 impl<T: Real> ForceLaw<T> for DamperCoefficients<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
@@ -386,7 +455,12 @@ impl<T: Real> ForceLaw<T> for DamperCoefficients<T> {
 
     #[inline(always)]
     fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T> {
-        -line.friction_force(self.friction, self.speed_squared)
+        let friction = line.friction_force(self.friction, self.speed_squared);
+        if self.has_stage.holds() {
+            let force = friction + line.damping_force(self.outer_damping);
+            return -(self.engagement(line.length()) * force).v();
+        }
+        -friction
     }
 }
 
@@ -465,6 +539,11 @@ impl<T: Real> TubLine<'_, T> {
 
 impl<T: Real> ElementLine<T> for TubLine<'_, T> {
     #[inline(always)]
+    fn length(&self) -> N<T> {
+        dot(&self.span, &self.span).sqrt()
+    }
+
+    #[inline(always)]
     fn linear_force(&self, force: N<T>, stiffness: N<T>) -> N<T> {
         force / dot(&self.span, &self.span).sqrt() - stiffness
     }
@@ -503,6 +582,11 @@ pub(crate) struct CabinetLine<T> {
 }
 
 impl<T: Real> ElementLine<T> for CabinetLine<T> {
+    #[inline(always)]
+    fn length(&self) -> N<T> {
+        self.length
+    }
+
     #[inline(always)]
     fn linear_force(&self, force: N<T>, stiffness: N<T>) -> N<T> {
         force - stiffness * self.length

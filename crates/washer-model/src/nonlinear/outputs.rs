@@ -162,8 +162,11 @@ impl<T: Real> Axes<T> {
         let tub_front = point(motion, TUB_Y, &self.tub_axis, b.tub_front);
         let tub_centre = point(motion, TUB_Y, &self.tub_axis, b.tub_centre);
         let drum_front = self.drum_front(b, motion);
-        let rho = blend(b.rho_1, &self.drum[0], b.rho_2, &self.drum[1]);
+        let mut rho = blend(b.rho_1, &self.drum[0], b.rho_2, &self.drum[1]);
         let one = b.tub_share.lit(1.0);
+        if b.is_skewed.holds() {
+            rho = blend(one, &rho, b.rho_3, &moving_cross(&self.drum[0], &self.drum[1]));
+        }
         let rotor_centre = blend(b.along_shaft, &self.shaft_axis, b.drum_share, &rho);
         let rotor_centre = point(motion, SHAFT_Y, &rotor_centre, one);
         let total_centre = blend(b.tub_share, &tub_centre, b.rotor_share, &rotor_centre);
@@ -256,6 +259,17 @@ fn moving_drum_vector<T: Real>(
         rate: out_of_drum(shaft, spin, hinge, &rate),
         second: out_of_drum(shaft, spin, hinge, &second),
     }
+}
+
+/// Computes the motion of the cross product of two moving vectors.
+#[inline(always)]
+fn moving_cross<T: Real>(a: &MovingVector<T>, b: &MovingVector<T>) -> MovingVector<T> {
+    let zero = [a.value[0].lit(0.0); 3];
+    let value = plus_cross(&zero, &a.value, &b.value);
+    let rate = plus_cross(&plus_cross(&zero, &a.rate, &b.value), &a.value, &b.rate);
+    let mixed = plus_cross(&zero, &a.rate, &b.rate);
+    let second = plus_cross(&sum(mixed, &mixed), &a.second, &b.value);
+    MovingVector { value, rate, second: plus_cross(&second, &a.value, &b.second) }
 }
 
 /// Transforms a vector from E to cabinet axes.

@@ -16,10 +16,11 @@ pub struct FrictionSpeed {
 
 impl FrictionSpeed {
     /// Returns the speeds of every damper with friction, with a default for those of the motion.
+    /// Friction beyond a free stroke is linearised about the place at rest and has none.
     pub(crate) fn all(machine: &Machine) -> Vec<Self> {
         let friction_speed = |(index, damper): (usize, &Damper)| {
             let given = damper.friction_linear_speed_m_per_s;
-            (damper.friction_n != 0.0).then(|| Self {
+            (damper.friction_n != 0.0 && damper.free_stroke_m == 0.0).then(|| Self {
                 damper: index,
                 speed_m_per_s: given.unwrap_or(Damper::FIRST_LINEAR_SPEED_M_PER_S),
                 is_own: given.is_none(),

@@ -135,7 +135,7 @@ impl LoadSelection {
             [components[LOAD + 2 * k], components[LOAD + 2 * k + 1]] = elements.stop(k, tub);
         }
         for k in 0..self.dampers {
-            components[LOAD + 2 * self.stops + k] = elements.damper_speed(k, tub);
+            components[LOAD + 2 * self.stops + k] = elements.damper_motion(k, tub)[1];
         }
         on_tub.0
     }

@@ -169,7 +169,7 @@ pub fn stops_at_rest_n(point: &Point) -> Vec<f64> {
 pub(crate) fn damper_speeds_m_per_s(point: &Point, deviations: &[f64; STATES]) -> Vec<f64> {
     let elements = point.machine.elements.constant();
     let tub = deviating(point, deviations);
-    let speed = |number| elements.damper_speed(number, &tub).0.slope;
+    let speed = |number| elements.damper_motion(number, &tub)[1].0.slope;
     (0..elements.dampers.len()).map(speed).collect()
 }
 

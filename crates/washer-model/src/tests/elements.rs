@@ -62,6 +62,7 @@ pub(crate) fn machine(case: &Value) -> Machine {
             mass_kg,
             x_m: number("x2").unwrap(),
             radius_m: number("r2").unwrap(),
+            angle_deg: 0.0,
         })
         .into_iter()
         .collect();
@@ -184,6 +185,7 @@ fn friction_shortens_every_half_swing_by_the_same_length() {
         friction_n: 40.0,
         friction_speed_m_per_s: 1e-4,
         friction_linear_speed_m_per_s: Some(0.3),
+        ..Machine::paper().dampers[0]
     }];
     let heights = heights_m(machine, 0.02, PI / w_rad_per_s, 7);
     assert_eq!(heights.len(), 8);
@@ -194,6 +196,72 @@ fn friction_shortens_every_half_swing_by_the_same_length() {
             (height - expected).abs() < BEARING_DEFLECTION_M,
             "half swing {n}: {height} m, not {expected} m"
         );
+    }
+}
+
+#[test]
+fn friction_beyond_a_free_stroke_takes_the_work_done_there_off_every_half_swing() {
+    let (mut machine, _) = heaving();
+    let stiffness = 32_000.0;
+    let friction_n = 40.0;
+    let stroke_m = 0.012;
+    machine.dampers = vec![Damper {
+        cabinet_m: [0.0, -0.4, 0.0],
+        tub_m: [0.0, -0.1, 0.0],
+        damping_n_s_per_m: 0.0,
+        friction_n,
+        friction_speed_m_per_s: 1e-4,
+        free_stroke_m: stroke_m,
+        free_stroke_softness_m: 1e-5,
+        ..Machine::paper().dampers[0]
+    }];
+    let heights = heights_m(machine, 0.02, 2e-4, 9000);
+    let turns = |w: &[f64]| (w[1] - w[0]) * (w[2] - w[1]) <= 0.0;
+    let extremes: Vec<f64> = heights.windows(3).filter(|w| turns(w)).map(|w| w[1].abs()).collect();
+    // k (a^2 - b^2) / 2 = F (a - s) + F (b - s), or without the last where it is negative.
+    let next_m = |a: f64| {
+        let left = stiffness * a * a / 2.0 - friction_n * (a - stroke_m);
+        let c = left + friction_n * stroke_m;
+        let b = (-friction_n + (friction_n * friction_n + 2.0 * stiffness * c).sqrt()) / stiffness;
+        if b > stroke_m { b } else { (2.0 * left / stiffness).sqrt() }
+    };
+    let mut expected = 0.02;
+    assert!(extremes.len() > 12, "{}", extremes.len());
+    for (n, found) in extremes.iter().enumerate() {
+        expected = if expected > stroke_m { next_m(expected) } else { expected };
+        assert!((found - expected).abs() < 1e-5, "half swing {n}: {found} m, not {expected} m");
+    }
+    // The swing tends to the free stroke.
+    let last = extremes[extremes.len() - 1];
+    assert!(last > stroke_m && last < 1.05 * stroke_m, "{last}");
+}
+
+#[test]
+fn the_linear_model_takes_the_tangent_of_a_damper_within_its_free_stroke() {
+    let softness_m = 1e-3;
+    let mut staged = paper(0.4, 80.0);
+    for damper in &mut staged.dampers {
+        damper.friction_n = 60.0;
+        damper.free_stroke_m = 0.01;
+        damper.free_stroke_softness_m = softness_m;
+        damper.outer_damping_n_s_per_m = 300.0;
+    }
+    // h at rest, for delta = -s / 2.
+    let engaged = 0.5 * (1.0 - 0.005 / 0.005_f64.hypot(softness_m));
+    let mut viscous = paper(0.4, 80.0);
+    for damper in &mut viscous.dampers {
+        damper.damping_n_s_per_m += engaged * (300.0 + 60.0 / damper.friction_speed_m_per_s);
+    }
+    let spin = || Spin::Ramped { profile: Profile::Ramp, peak_rpm: 300.0, ramp_s: 1.0 };
+    let [staged, viscous] = [staged, viscous].map(|machine| prepared(machine, spin(), 1.0));
+    assert!(staged.friction_speeds().is_empty());
+    let [ours, theirs] = [staged, viscous].map(|point| point.matrices(0.3, 20.0, 1.0));
+    assert_eq!(ours.mass, theirs.mass);
+    let pairs = [(ours.damping, theirs.damping), (ours.stiffness, theirs.stiffness)];
+    for (ours, theirs) in pairs {
+        for (ours, theirs) in ours.iter().flatten().zip(theirs.iter().flatten()) {
+            assert!((ours - theirs).abs() <= 1e-9 * theirs.abs().max(1.0), "{ours} {theirs}");
+        }
     }
 }
 

@@ -5,9 +5,9 @@ use super::elements::with_every_element;
 use super::instruments::{mass_matrix, prepared};
 use crate::coordinates::COORDINATES;
 use crate::machine::spin::{Spin, SpinState};
-use crate::machine::{BumpStop, Machine};
+use crate::machine::{BumpStop, Damper, Machine};
 use crate::nonlinear::coefficients::Coefficients;
-use crate::{Instant, Method, ModelKind, Start, history};
+use crate::{Instant, Method, ModelKind, Start, Unbalance, history};
 use lane_ode::N;
 
 type Vec3 = [f64; 3];
@@ -38,15 +38,18 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     let turned = axes(q[8], q[9]);
     let drum: [Vec3; 3] = std::array::from_fn(|k| place([0.0; 3], &shaft, turned[k]));
     let hinge = place(p_s, &shaft, [m.drum.hinge_x_m, 0.0, 0.0]);
-    let on_drum = |x_m: f64, r_m: f64| place(hinge, &drum, [x_m - m.drum.hinge_x_m, r_m, 0.0]);
+    let on_drum = |x_m: f64, r_m: f64, angle_deg: f64| {
+        let (sin, cos) = angle_deg.to_radians().sin_cos();
+        place(hinge, &drum, [x_m - m.drum.hinge_x_m, r_m * cos, r_m * sin])
+    };
     let heights = [
         m.tub.mass_kg * place(p_t, &tub, [m.tub.centre_x_m, 0.0, 0.0])[1],
         m.shaft.mass_kg * place(p_s, &shaft, [m.shaft.centre_x_m, 0.0, 0.0])[1],
-        m.drum.mass_kg * on_drum(m.drum.centre_x_m, 0.0)[1],
-        m.unbalance.mass_kg * on_drum(m.unbalance.x_m, m.unbalance.radius_m)[1],
+        m.drum.mass_kg * on_drum(m.drum.centre_x_m, 0.0, 0.0)[1],
     ];
-    let further = m.further_unbalances.iter().map(|u| u.mass_kg * on_drum(u.x_m, u.radius_m)[1]);
-    let mut energy = m.gravity_m_per_s2 * heights.into_iter().chain(further).sum::<f64>();
+    let height = |u: &Unbalance| u.mass_kg * on_drum(u.x_m, u.radius_m, u.angle_deg)[1];
+    let unbalances = m.unbalances().map(height);
+    let mut energy = m.gravity_m_per_s2 * heights.into_iter().chain(unbalances).sum::<f64>();
     for s in &m.springs {
         let free = s.free_length_m.unwrap_or_else(|| length(s.cabinet_m, s.tub_m));
         let stretch = length(place(p_t, &tub, s.tub_m), s.cabinet_m) - free;
@@ -96,7 +99,13 @@ fn along(a: Vec3, direction: Vec3) -> f64 {
 }
 
 /// Computes the power (W) that dampers, friction, stops and bushings dissipate.
-fn losses_w(m: &Machine, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 {
+fn losses_w(
+    m: &Machine,
+    at_rest: &[f64; COORDINATES],
+    q: &[f64; COORDINATES],
+    u: &[f64; COORDINATES],
+) -> f64 {
+    let rest = axes(at_rest[4], at_rest[5]);
     let tub = axes(q[4], q[5]);
     let tub_point = |at: Vec3| place([0.0, q[0], q[1]], &tub, at);
     // Angular velocity: yaw about c2, pitch about t3.
@@ -113,9 +122,11 @@ fn losses_w(m: &Machine, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 
     let mut losses = 0.0;
     for d in &m.dampers {
         let end = tub_point(d.tub_m);
+        let rest_m = length(place([0.0, at_rest[0], at_rest[1]], &rest, d.tub_m), d.cabinet_m);
         let v = along(velocity(d.tub_m), std::array::from_fn(|i| end[i] - d.cabinet_m[i]));
         losses += d.damping_n_s_per_m * v * v;
-        losses += d.friction_n * v * v / v.hypot(d.friction_speed_m_per_s);
+        let stage = d.friction_n / v.hypot(d.friction_speed_m_per_s) + d.outer_damping_n_s_per_m;
+        losses += engagement(d, length(end, d.cabinet_m) - rest_m) * stage * v * v;
     }
     for s in &m.stops {
         let place = tub_point(s.tub_m);
@@ -129,6 +140,16 @@ fn losses_w(m: &Machine, q: &[f64; COORDINATES], u: &[f64; COORDINATES]) -> f64 
         losses += (0..3).map(|i| b.damping_n_s_per_m[i] * v[i] * v[i]).sum::<f64>();
     }
     losses
+}
+
+/// Returns the share of friction and outer damping that acts at an elongation from rest (m).
+fn engagement(damper: &Damper, elongation_m: f64) -> f64 {
+    let stroke_m = damper.free_stroke_m;
+    if stroke_m == 0.0 {
+        return 1.0;
+    }
+    let beyond = (elongation_m * elongation_m - stroke_m * stroke_m) / (2.0 * stroke_m);
+    0.5 * (1.0 + beyond / beyond.hypot(damper.free_stroke_softness_m))
 }
 
 /// Computes the kinetic energy (J) without spin, u M u / 2.
@@ -194,6 +215,10 @@ fn the_energy_falls_by_what_the_elements_dissipate() {
     // A clearance within the motion, which friction ends after some 4 mm.
     machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.001);
     machine.dampers.iter_mut().for_each(|damper| damper.friction_speed_m_per_s = 0.05);
+    machine.dampers[0].free_stroke_m = 0.003;
+    machine.dampers[0].free_stroke_softness_m = 1e-3;
+    machine.dampers[0].outer_damping_n_s_per_m = 50.0;
+    machine.unbalance.angle_deg = 35.0;
     let coefficients = Coefficients::new(&machine);
     let every_s = 1e-4;
     let instants = thrown(&machine, 3.0, every_s, every_s);
@@ -201,11 +226,12 @@ fn the_energy_falls_by_what_the_elements_dissipate() {
         potential_j(&machine, &at.deviations) + kinetic_j(&coefficients, &at.deviations, &at.speeds)
     };
     let first = energy(&instants[0]);
+    let at_rest = equilibrium(&machine);
     let mut lost = 0.0;
     let mut worst = 0.0_f64;
     for pair in instants.windows(2) {
         let [before, after] =
-            [&pair[0], &pair[1]].map(|at| losses_w(&machine, &at.deviations, &at.speeds));
+            [&pair[0], &pair[1]].map(|at| losses_w(&machine, &at_rest, &at.deviations, &at.speeds));
         lost += 0.5 * every_s * (before + after);
         worst = worst.max((first - energy(&pair[1]) - lost).abs() / first.abs().max(lost));
     }

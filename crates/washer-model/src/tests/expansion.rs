@@ -1,7 +1,7 @@
 //! Tests of the linear model against automatic differentiation of the nonlinear equations of
 //! motion, for random machines at random spins.
 
-use super::instruments::{equations, paper, prepared, random_machine};
+use super::instruments::{equations, paper, prepared, random_machine, skew};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::ToDual as _;
 use crate::machine::spin::SpinState;
@@ -29,7 +29,11 @@ impl Instant {
     fn random(rng: &mut fastrand::Rng) -> Self {
         let mut rpm = || 1200.0 * (2.0 * rng.f64() - 1.0);
         let spin = Spin::Table { time_s: vec![0.0, 10.0], speed_rpm: vec![rpm(), rpm()] };
-        let point = prepared(random_machine(rng), spin, 10.0);
+        let mut machine = random_machine(rng);
+        if rng.bool() {
+            skew(&mut machine, rng);
+        }
+        let point = prepared(machine, spin, 10.0);
         let model = Linear::splat(N(0.0), &point, Coupling::Springs);
         let t_s = 10.0 * rng.f64();
         let spin = Nonlinear::splat(N(0.0), &point, Coupling::Springs).forcing(N(t_s));

@@ -7,7 +7,9 @@ use crate::nonlinear::equilibrium;
 use crate::nonlinear::floating::Floating;
 use crate::nonlinear::{Half, Halves, halves};
 use crate::point::Point;
-use crate::{Gauge, Machine, Parameter, Profile, Recorders, Spin, Target, Timing, prepare};
+use crate::{
+    Gauge, Machine, Parameter, Profile, Recorders, Spin, Target, Timing, Unbalance, prepare,
+};
 use lane_ode::{Lane, N, Real, Simd};
 
 /// All recorders.
@@ -51,6 +53,19 @@ pub(super) fn random_machine(rng: &mut fastrand::Rng) -> Machine {
             return machine;
         }
     }
+}
+
+/// Turns the unbalance of a machine about the axis, and adds one in another plane.
+pub(super) fn skew(machine: &mut Machine, rng: &mut fastrand::Rng) {
+    let mut angle_deg = || 360.0 * (2.0 * rng.f64() - 1.0);
+    machine.unbalance.angle_deg = angle_deg();
+    let angle_deg = angle_deg();
+    machine.further_unbalances.push(Unbalance {
+        mass_kg: 0.5 * machine.unbalance.mass_kg,
+        x_m: machine.drum.hinge_x_m,
+        angle_deg,
+        ..machine.unbalance
+    });
 }
 
 /// Returns a random spin of one of four kinds.

@@ -183,7 +183,7 @@ class Result:
         """The plan of the result with the keys of a grid file; for differences, both results."""
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes the result as `.parquet`, or a figure of it as `.svg`, `.png` or `.html`.
+        """Writes the result as `.parquet`, or a figure of it as `.svg`, `.pdf`, `.png` or `.html`.
 
         Parquet files have the bytes that the command writes. An existing file is overwritten only
         if it has the same kind.

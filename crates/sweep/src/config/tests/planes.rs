@@ -42,6 +42,30 @@ fn loads_of_two_planes_are_given_by_their_names() {
 }
 
 #[test]
+fn loads_have_angles_and_dampers_have_stages() {
+    let turned = FURTHER.replace("radius_m", "angle_deg = -120\nradius_m");
+    let file = |file: String| {
+        let damper = "[[dampers]]\nfree_stroke_m = 0.006\nouter_damping_n_s_per_m = 30\n";
+        file.replacen("[[dampers]]\n", damper, 1).replacen(
+            "[unbalance]\n",
+            "[unbalance]\nangle_deg = 30\n",
+            1,
+        ) + &turned
+    };
+    let machine = load(file).unwrap();
+    assert_eq!(machine.unbalance.angle_deg, 30.0);
+    assert_eq!(machine.further_unbalances[0].angle_deg, -120.0);
+    assert_eq!(machine.dampers[0].free_stroke_m, 0.006);
+    assert_eq!(machine.dampers[0].outer_damping_n_s_per_m, 30.0);
+    assert_eq!(machine.dampers[1].free_stroke_m, 0.0);
+    // What is written is read again.
+    let written = machine_file(&machine, &WrittenIn::default());
+    assert_eq!(load(|_| written.clone()).unwrap(), machine);
+    let refused = load(|file| file + &turned.replace("-120", "500")).unwrap_err();
+    assert!(refused.contains("angle_deg"), "{refused}");
+}
+
+#[test]
 fn a_plane_and_a_place_contradict_each_other() {
     let both = FURTHER.replace("mass_kg", "x_m = 0.1\nmass_kg");
     let refused = load(|file| file + &both).unwrap_err();

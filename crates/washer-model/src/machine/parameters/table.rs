@@ -138,6 +138,10 @@ const USUAL_SPEED: &str = "assumed: a usual value";
 const OWN_SPEED: &str = "assumed: that of the linear motion";
 /// The range of v_s and V (m/s), in which friction over speed is finite.
 const SPEED: Range = Within(1e-6, 1e3);
+/// The source of the unbalances' angles.
+const ALONG_D2: &str = "assumed: along d2, up at the start";
+/// The range of the unbalances' angles (deg).
+const ANGLE: Range = Within(-360.0, 360.0);
 /// The source of the spin's numbers.
 const GRID: &str = "the grid file's [spin]";
 /// The source of the window.
@@ -289,6 +293,9 @@ pub(super) static TABLE: &[ParameterRow] = &[
         assume |sheet, _| sheet.drum_radius_m,
         "the drum's radius",
         Factor(0.8, 1.0); machine unbalance.radius_m),
+    row!("unbalance_angle_deg", "deg", ANGLE, ALONG_D2,
+        "angle of the unbalance about the axis, from d2 in the direction in which the drum turns",
+        else 0.0, machine unbalance.angle_deg),
     row!("flexure_stiffness_n_m_per_rad", "N m/rad", Positive, SECTION_3_1,
         "bending stiffness between shaft and drum (K_D)",
         assume |_, m| hinge_stiffness_n_m_per_rad(m),
@@ -345,6 +352,12 @@ pub(super) static TABLE: &[ParameterRow] = &[
         set |m, _, _, v| {
             m.dampers.iter_mut().for_each(|d| d.friction_linear_speed_m_per_s = Some(v));
         }),
+    row!("free_stroke_m", "m", NonNegative, NONE,
+        "free stroke of all dampers to each side of their place at rest, without friction (s)",
+        else 0.0, every dampers Dampers free_stroke_m),
+    row!("outer_damping_n_s_per_m", "N s/m", NonNegative, NONE,
+        "damping of all dampers beyond their free stroke, added to that which always acts",
+        else 0.0, every dampers Dampers outer_damping_n_s_per_m),
     row!("spin_peak_rpm", "rpm", Range::Within(-1e5, 1e5), GRID,
         "greatest spin speed; negative turns backwards", spin peak_rpm),
     row!("spin_ramp_s", "s", Positive, GRID,
@@ -404,6 +417,15 @@ static DAMPER: &[&[ParameterRow]] = &[
             set |m, _, k, v| if let Some(d) = m.dampers.get_mut(k) {
                 d.friction_linear_speed_m_per_s = Some(v)
             }),
+        row!("free_stroke_m", "m", NonNegative, NONE,
+            "free stroke of this damper to each side of its place at rest, without friction (s)",
+            else 0.0, of dampers free_stroke_m),
+        row!("free_stroke_softness_m", "m", Within(1e-9, 1.0), "assumed: a tenth of a millimetre",
+            "length over which forces beyond the free stroke set in",
+            else Damper::FREE_STROKE_SOFTNESS_M, of dampers free_stroke_softness_m),
+        row!("outer_damping_n_s_per_m", "N s/m", NonNegative, NONE,
+            "damping of this damper beyond its free stroke, added to that which always acts",
+            else 0.0, of dampers outer_damping_n_s_per_m),
     ],
     axes!("cabinet_" "_m", "m", Any, TABLE_4, "cabinet end of this damper, ", of dampers cabinet_m),
     axes!("tub_" "_m", "m", Any, TABLE_4, "tub end of this damper, ", of dampers tub_m),
@@ -454,8 +476,11 @@ static UNBALANCE: &[&[ParameterRow]] = &[&[
     row!("x_m", "m", Any, NONE,
         "position of this further unbalance along the axis", of further_unbalances x_m),
     row!("radius_m", "m", Any, NONE,
-        "distance of this further unbalance from the axis; negative opposite the first",
+        "distance of this further unbalance from the axis; negative on the opposite side",
         of further_unbalances radius_m),
+    row!("angle_deg", "deg", ANGLE, ALONG_D2,
+        "angle of this further unbalance about the axis, from d2 in the direction of the turn",
+        else 0.0, of further_unbalances angle_deg),
 ]];
 
 /// The rows of each foot, after `foot_1_`.

@@ -77,8 +77,9 @@ fn sources_cite_the_paper() {
         "bearing_front_x_m",
         "bearing_rear_x_m",
     ];
-    // The paper's machine has no friction and no cubic stiffness.
-    let is_absent = |name: &str| name.contains("friction") || name.contains("cubic");
+    // The paper's machine has no friction, no second stage of dampers and no cubic stiffness.
+    let absent = ["friction", "cubic", "free_stroke", "outer_damping"];
+    let is_absent = |name: &str| absent.iter().any(|part| name.contains(part));
     let mut counts = [0; 5];
     for parameter in Parameter::all(&Machine::paper(), &spin()) {
         let name = parameter.name();

@@ -2,7 +2,9 @@
 //! machine's elements reach, from which the integrators' steps are chosen.
 
 use crate::coordinates::{COORDINATES, TUB};
-use crate::nonlinear::elements::{Elements, StopCoefficients, TubMotion};
+use crate::nonlinear::elements::{
+    DamperCoefficients, Elements, SpringCoefficients, StopCoefficients, TubMotion,
+};
 use crate::nonlinear::frame::{difference, dot};
 use lane_ode::N;
 
@@ -38,10 +40,14 @@ impl Elements<f64> {
             spring.stiffness_times_free_length = spring.stiffness * length - tension;
             spring.cubic = N(0.0);
         }
+        let mut onsets = Vec::new();
         for damper in &mut steepest.dampers {
-            damper.damping += damper.friction / damper.speed_squared.sqrt();
+            onsets.extend(damper.onset());
+            damper.damping += damper.friction / damper.speed_squared.sqrt() + damper.outer_damping;
             damper.friction = N(0.0);
+            damper.outer_damping = N(0.0);
         }
+        steepest.springs.append(&mut onsets);
         for stop in &mut steepest.stops {
             let depth = stop.depth(&tub.point(&stop.tub));
             let StopCoefficients { clearance, softness_squared, .. } = *stop;
@@ -56,5 +62,24 @@ impl Elements<f64> {
             }
         }
         Some(steepest)
+    }
+}
+
+impl DamperCoefficients<f64> {
+    /// Returns a spring without tension at rest that is as stiff as the onset of friction at the
+    /// end of the free stroke: the share of friction that acts grows by up to 1 / (2 sigma) per
+    /// length.
+    fn onset(&self) -> Option<SpringCoefficients<f64>> {
+        if !self.has_free_stroke() {
+            return None;
+        }
+        let stiffness = self.friction / (2.0 * self.softness_squared.sqrt());
+        Some(SpringCoefficients {
+            ends: self.ends,
+            stiffness,
+            stiffness_times_free_length: (stiffness * self.rest_length).v(),
+            cubic: N(0.0),
+            free_length: self.rest_length,
+        })
     }
 }

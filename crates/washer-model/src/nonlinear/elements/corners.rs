@@ -1,5 +1,5 @@
-//! Forces with corners as functions of one motion each: a damper's friction of the speed along the
-//! damper, a stop's force of depth and speed.
+//! Forces with corners as functions of one motion each: a damper's friction of the length of the
+//! damper and the speed along it, a stop's force of depth and speed.
 
 use super::{CabinetLine, Elements, ForceLaw as _, TubMotion};
 use crate::lanes::{ToDual as _, lane_struct};
@@ -12,12 +12,12 @@ lane_struct! {
 }
 
 impl<T: Lane> Elements<T> {
-    /// Computes the depth (m) and the speed (m/s) of each motion. The depth of a friction is zero.
+    /// Computes the depth (m) and the speed (m/s) of each motion. A damper's depth is its length.
     #[inline(always)]
     pub(crate) fn corner_motions(&self, tub: &TubMotion<T>) -> Vec<[N<T>; 2]> {
         let mut motions = Vec::with_capacity(self.dampers.len() + self.stops.len());
         for number in 0..self.dampers.len() {
-            motions.push([tub.midpoint[0].lit(0.0), self.damper_speed(number, tub)]);
+            motions.push(self.damper_motion(number, tub));
         }
         for stop in &self.stops {
             let point = tub.point(&stop.tub);
@@ -30,14 +30,24 @@ impl<T: Lane> Elements<T> {
     #[inline(always)]
     pub(crate) fn corner_forces(&self, motions: &[[N<T>; 2]], forces: &mut Vec<CornerForce<T>>) {
         let (damper_motions, stop_motions) = motions.split_at(self.dampers.len());
-        for (damper, [zero, speed]) in self.dampers.iter().zip(damper_motions) {
-            let still = zero.constant();
-            let mut rate = speed.constant();
-            rate.0.slope = zero.lit(1.0).0;
-            let line = CabinetLine { span: [still; 3], length: still, rate };
-            let N(force) = damper.constant().optional_force(&line);
-            let [force, by_speed] = [N(force.value), N(force.slope)];
-            forces.push(CornerForce { force, by_depth: *zero, by_speed });
+        for (damper, [length, speed]) in self.dampers.iter().zip(damper_motions) {
+            let damper = damper.constant();
+            let zero = length.lit(0.0);
+            let mut line = CabinetLine {
+                span: [zero.constant(); 3],
+                length: length.constant(),
+                rate: speed.constant(),
+            };
+            line.rate.0.slope = zero.lit(1.0).0;
+            let N(by_speed) = damper.optional_force(&line);
+            let mut by_depth = zero;
+            if damper.has_stage.holds() {
+                line.rate.0.slope = zero.0;
+                line.length.0.slope = zero.lit(1.0).0;
+                by_depth = N(damper.optional_force(&line).0.slope);
+            }
+            let [force, by_speed] = [N(by_speed.value), N(by_speed.slope)];
+            forces.push(CornerForce { force, by_depth, by_speed });
         }
         for (stop, [depth, speed]) in self.stops.iter().zip(stop_motions) {
             let stop = stop.constant();

@@ -1,0 +1,229 @@
+//! Tests of unbalances at any angle about the drum's axis.
+
+use super::instruments::{equations, paper, prepared, random_machine, skew, triangular};
+use crate::coordinates::COORDINATES;
+use crate::machine::spin::SpinState;
+use crate::nonlinear::coefficients::Coefficients;
+use crate::nonlinear::elements::Elements;
+use crate::nonlinear::elements::TubMotion;
+use crate::{Damper, Machine, Method, ModelKind, Point, Spin, Start, Unbalance, history, simulate};
+use lane_ode::{Dual, N, Real, Simd};
+
+/// Computes a point of the drum in cabinet axes, from its place in drum axes.
+fn drum_point<T: Real>(
+    q: &[N<T>; COORDINATES],
+    theta: N<T>,
+    hinge_x_m: f64,
+    place_m: [f64; 3],
+) -> [N<T>; 3] {
+    let about_2 =
+        |(sin, cos): (N<T>, N<T>), [x, y, z]: [N<T>; 3]| [cos * x + sin * z, y, cos * z - sin * x];
+    let about_3 =
+        |(sin, cos): (N<T>, N<T>), [x, y, z]: [N<T>; 3]| [cos * x - sin * y, sin * x + cos * y, z];
+    let [x, y, z] = place_m.map(|component| theta.lit(component));
+    let from_hinge = about_3(q[9].sin_cos(), [x - hinge_x_m, y, z]);
+    let [x, y, z] = about_2(q[8].sin_cos(), from_hinge);
+    let (sin, cos) = theta.sin_cos();
+    let unspun = [x + hinge_x_m, cos * y - sin * z, sin * y + cos * z];
+    let [x, y, z] = about_2(q[6].sin_cos(), about_3(q[7].sin_cos(), unspun));
+    [x, y + q[2], z + q[3]]
+}
+
+/// A mass m at p adds m (p'' + g) . dp/dq to M a - f, whatever else the machine has.
+#[test]
+fn an_unbalance_at_an_angle_is_a_point_mass() {
+    let mut rng = fastrand::Rng::with_seed(81);
+    let mut worst = 0.0_f64;
+    for _ in 0..100 {
+        let mut machine = random_machine(&mut rng);
+        if rng.bool() {
+            skew(&mut machine, &mut rng);
+        }
+        let added = Unbalance {
+            mass_kg: 0.1 + rng.f64(),
+            x_m: 0.1 + 0.3 * rng.f64(),
+            radius_m: 0.1 + 0.2 * rng.f64(),
+            angle_deg: 360.0 * rng.f64(),
+        };
+        let mut heavier = machine.clone();
+        heavier.further_unbalances.push(added);
+        let mut draw = |size: f64| size * (2.0 * rng.f64() - 1.0);
+        let [angle, speed, acceleration] = [draw(3.0), draw(130.0), draw(10.0)];
+        let spin = SpinState::new(N(angle).sin_cos(), N(speed), N(acceleration));
+        let mut vector = |size: f64| -> [f64; COORDINATES] { core::array::from_fn(|_| draw(size)) };
+        let [q, u, a] = [vector(0.05), vector(0.5), vector(20.0)];
+        let residual = |machine: &Machine| {
+            let coefficients = Coefficients::new(machine);
+            let [inertia, force] = equations(&coefficients, &spin, &q.map(N), &u.map(N), &a.map(N));
+            let residual: [f64; COORDINATES] = core::array::from_fn(|i| (inertia[i] - force[i]).0);
+            residual
+        };
+        let [without, with] = [residual(&machine), residual(&heavier)];
+        let (sin, cos) = added.angle_deg.to_radians().sin_cos();
+        let place_m = [added.x_m, added.radius_m * cos, added.radius_m * sin];
+        let hinge_x_m = machine.drum.hinge_x_m;
+        let along_time = |value: f64, rate: f64, second: f64| {
+            let slope = Dual { value: rate, slope: second };
+            N(Dual { value: Dual { value, slope: rate }, slope })
+        };
+        let course = core::array::from_fn(|i| along_time(q[i], u[i], a[i]));
+        let theta = along_time(angle, speed, acceleration);
+        let mut accelerations =
+            drum_point(&course, theta, hinge_x_m, place_m).map(|place| place.0.slope.slope);
+        accelerations[1] += machine.gravity_m_per_s2;
+        let largest = with.iter().fold(0.0_f64, |most, force| most.max(force.abs()));
+        for r in 0..COORDINATES {
+            let at = core::array::from_fn(|i| {
+                N(Dual { value: q[i], slope: if i == r { 1.0 } else { 0.0 } })
+            });
+            let partial = drum_point(&at, N(Dual { value: angle, slope: 0.0 }), hinge_x_m, place_m);
+            let power: f64 = (0..3).map(|i| accelerations[i] * partial[i].0.slope).sum();
+            let off = with[r] - without[r] - added.mass_kg * power;
+            worst = worst.max(off.abs() / largest);
+        }
+    }
+    eprintln!("a point mass at an angle: within {worst:.1e} of the largest force");
+    assert!(worst < 1e-13, "{worst:e}");
+}
+
+#[test]
+fn quarter_turns_are_exact() {
+    let unbalance = |radius_m, angle_deg| Unbalance { radius_m, angle_deg, ..Unbalance::default() };
+    assert_eq!(unbalance(0.2, 0.0).place_m(), [0.2, 0.0]);
+    assert_eq!(unbalance(0.2, 90.0).place_m(), [0.0, 0.2]);
+    assert_eq!(unbalance(0.2, -90.0).place_m(), [0.0, -0.2]);
+    assert_eq!(unbalance(0.2, 180.0).place_m(), unbalance(-0.2, 0.0).place_m());
+    assert_eq!(unbalance(0.2, 270.0).place_m(), [0.0, -0.2]);
+    let [y, z] = unbalance(0.2, 150.0).place_m();
+    assert!((y + 0.1 * 3.0_f64.sqrt()).abs() < 1e-16 && (z - 0.1).abs() < 1e-16, "{y} {z}");
+}
+
+/// A drum and a shaft that are alike in all directions across their axis.
+fn symmetric(angle_deg: f64) -> Machine {
+    let mut machine = paper(0.4, 400.0);
+    machine.drum.inertia_kg_m2[2] = machine.drum.inertia_kg_m2[1];
+    machine.unbalance.angle_deg = angle_deg;
+    machine
+}
+
+/// Returns the tub's coordinates over the last turns at constant speed, 24 times a turn.
+fn settled(model: ModelKind, machine: Machine, rpm: f64) -> Vec<[f64; 4]> {
+    let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![rpm] };
+    let every_s = 60.0 / rpm.abs() / 24.0;
+    let point = prepared(machine, spin, 24.0 * every_s * 150.0);
+    let method = Method::Rk4 { step_s: every_s / 32.0 };
+    let history = history(model, &method, &point, &Start::default(), every_s);
+    let count = history.len();
+    let tub = |k: usize| {
+        let q = history.instant(k).unwrap().deviations;
+        [0, 1, 4, 5].map(|i| point.equilibrium[i] + q[i])
+    };
+    (count - 60..count).map(tub).collect()
+}
+
+#[test]
+fn at_constant_speed_an_angle_is_a_shift_in_time() {
+    for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        for rpm in [310.0, -310.0] {
+            let straight = settled(model, symmetric(0.0), rpm);
+            // 60 degrees are four instants of 24 a turn. The unbalance is ahead by them where the
+            // drum turns forwards.
+            let turned = settled(model, symmetric(60.0), rpm);
+            let ahead: isize = if rpm > 0.0 { 4 } else { -4 };
+            let mut worst = 0.0_f64;
+            let mut peak = 0.0_f64;
+            for k in 8..44_usize {
+                let shifted = straight[k.checked_add_signed(ahead).unwrap()];
+                for i in 0..4 {
+                    let middle = 0.5 * (straight[k][i] + straight[k + 12][i]);
+                    peak = peak.max((straight[k][i] - middle).abs());
+                    worst = worst.max((turned[k][i] - shifted[i]).abs());
+                }
+            }
+            eprintln!("{model:?} at {rpm} rpm: {worst:.1e} of {peak:.1e} m or rad");
+            // The linear model is taken about the equilibrium of the drum's first angle.
+            let bound = if model == ModelKind::Nonlinear { 1e-8 } else { 1e-4 };
+            assert!(peak > 1e-4 && worst < bound * peak, "{model:?}: {worst:e} of {peak:e}");
+        }
+    }
+}
+
+#[test]
+fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
+    let mut rng = fastrand::Rng::with_seed(82);
+    let mut machine = random_machine(&mut rng);
+    skew(&mut machine, &mut rng);
+    let run = |machine: &Machine, rpm: f64| -> Vec<[f64; COORDINATES]> {
+        let spin = Spin::Table { time_s: vec![0.0, 2.0], speed_rpm: vec![0.0, rpm] };
+        let point = prepared(machine.clone(), spin, 2.0);
+        let method = Method::Rk4 { step_s: 2e-4 };
+        let history = history(ModelKind::Nonlinear, &method, &point, &Start::default(), 0.1);
+        (0..history.len()).map(|k| history.instant(k).unwrap().deviations).collect()
+    };
+    let [forwards, mirrored] = [run(&machine, 300.0), run(&machine.mirrored(), -300.0)];
+    // Translations along z, and turns about y.
+    let signs = [1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
+    for (k, (one, other)) in forwards.iter().zip(&mirrored).enumerate() {
+        for i in 0..COORDINATES {
+            let off = (one[i] - signs[i] * other[i]).abs();
+            assert!(off < 1e-12, "instant {k}, q{}: {} {}", i + 1, one[i], other[i]);
+        }
+    }
+}
+
+#[test]
+fn a_turned_unbalance_in_other_lanes_leaves_the_bits_alone() {
+    let mut turned = paper(0.6, 90.0);
+    turned.unbalance.angle_deg = 40.0;
+    let [plain, turned] = [paper(0.6, 90.0), turned].map(|m| prepared(m, triangular(), 1.5));
+    for model in [ModelKind::Nonlinear, ModelKind::Linear] {
+        for simd in Simd::ALL.into_iter().filter(|simd| simd.is_available()) {
+            let of =
+                |points: &[&Point]| simulate(simd, model, &Method::Rk4 { step_s: 2e-4 }, points);
+            let together = of(&[&plain, &turned, &plain, &turned, &plain]);
+            let alone = of(&[&plain])[0];
+            assert_eq!([together[0], together[2], together[4]], [alone; 3], "{model:?} {simd:?}");
+            assert_eq!([together[1], together[3]], [of(&[&turned])[0]; 2], "{model:?} {simd:?}");
+        }
+    }
+}
+
+#[test]
+fn slopes_of_staged_dampers_are_those_of_their_force() {
+    let mut machine = paper(0.4, 50.0);
+    machine.dampers[0] = Damper {
+        friction_n: 60.0,
+        free_stroke_m: 0.004,
+        free_stroke_softness_m: 1e-3,
+        outer_damping_n_s_per_m: 80.0,
+        ..machine.dampers[0]
+    };
+    let elements = Elements::new(&machine);
+    let rest = TubMotion::new(&[N(0.0); 4], &[N(0.0); 4]);
+    let motions = elements.corner_motions(&rest);
+    let force_at = |elongation_m: f64, speed: f64| {
+        let mut moved = motions.clone();
+        moved[0] = [moved[0][0] + elongation_m, N(speed)];
+        let mut forces = Vec::new();
+        elements.corner_forces(&moved, &mut forces);
+        forces[0]
+    };
+    for elongation_m in [-0.006, -0.0041, 0.0, 0.001, 0.0038, 0.005] {
+        for speed in [-0.2, -0.004, 0.03] {
+            let at = force_at(elongation_m, speed);
+            let d = 1e-7;
+            let by_depth = (force_at(elongation_m + d, speed).force
+                - force_at(elongation_m - d, speed).force)
+                .0
+                / (2.0 * d);
+            let by_speed = (force_at(elongation_m, speed + d).force
+                - force_at(elongation_m, speed - d).force)
+                .0
+                / (2.0 * d);
+            assert!((at.by_depth.0 - by_depth).abs() < 1e-3 + 1e-5 * by_depth.abs());
+            assert!((at.by_speed.0 - by_speed).abs() < 1e-3 + 1e-5 * by_speed.abs());
+            // It opposes the motion.
+            assert!(at.force.0 * speed <= 0.0);
+        }
+    }
+}
