@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
-use sweep::{BoundaryOptions, Evaluator, GridInput, TraceExtras, TraceOptions};
+use sweep::{BoundaryOptions, PlanEvaluator, TraceExtras, TraceOptions, WasherGridInput};
 
 use crate::mappings::{self, assignments};
 use crate::result::PyResultTable;
@@ -17,8 +17,8 @@ const UNNAMED: &str = "plan";
 /// A validated plan.
 #[pyclass(name = "Plan", module = "washer_sweep", frozen)]
 pub(crate) struct PyPlan {
-    pub(crate) input: GridInput,
-    pub(crate) evaluator: Evaluator,
+    pub(crate) input: WasherGridInput,
+    pub(crate) evaluator: PlanEvaluator,
     written: Written,
 }
 
@@ -32,18 +32,18 @@ struct Written {
 }
 
 impl Written {
-    fn input(&self) -> GridInput {
+    fn input(&self) -> WasherGridInput {
         match self.is_file {
-            true => GridInput::file(self.text.clone().into(), self.sets.clone()),
-            false => GridInput::text(UNNAMED, self.text.clone(), self.sets.clone()),
+            true => WasherGridInput::file(self.text.clone().into(), self.sets.clone()),
+            false => WasherGridInput::text(UNNAMED, self.text.clone(), self.sets.clone()),
         }
     }
 }
 
 impl PyPlan {
-    fn load(py: Python<'_>, input: GridInput, written: Written) -> PyResult<Self> {
+    fn load(py: Python<'_>, input: WasherGridInput, written: Written) -> PyResult<Self> {
         let plan = py.detach(|| input.load()).map_err(|wrong| errors::plan_error(py, &wrong))?;
-        Ok(Self { input, evaluator: Evaluator::new(plan), written })
+        Ok(Self { input, evaluator: PlanEvaluator::new(plan), written })
     }
 }
 
@@ -79,7 +79,7 @@ impl PyPlan {
                 let whole = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
                 let text = whole.to_string_lossy().into_owned();
                 let written = Written { text, is_file: true, sets: sets.clone() };
-                (GridInput::file(path, sets), written)
+                (WasherGridInput::file(path, sets), written)
             }
         };
         Self::load(py, input, written)
@@ -134,7 +134,12 @@ impl PyPlan {
         progress: bool,
         fresh: bool,
     ) -> PyResult<PyResultTable> {
-        ended::rows_or_file(py, self.evaluator.whole(), (out, fresh), How { threads, progress })
+        ended::rows_or_file(
+            py,
+            self.evaluator.all_points(),
+            (out, fresh),
+            How { threads, progress },
+        )
     }
 
     /// Time histories of both models at one point, or at every one.

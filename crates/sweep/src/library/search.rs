@@ -1,4 +1,4 @@
-//! Searches, with or without a file that keeps what they find out.
+//! Searches, with or without a file that keeps their trials.
 
 use std::path::Path;
 
@@ -16,12 +16,13 @@ use sweep_engine::store::{Opened, Trials};
 use sweep_engine::{Error, Job, Table};
 use sweep_files::{FileKind, Output};
 
-/// Traces the boundary of a plan's grid; `None` if the interrupt was raised. The output keeps what
-/// an interrupted search has found out, and goes on there; `fresh` starts over.
+/// Traces the boundary of a plan's grid; `None` if the interrupt was raised. With an output, the
+/// trials of an interrupted search are kept beside it, and another call continues from them unless
+/// it is `fresh`.
 ///
 /// # Errors
-/// A plan without a range to search, options that make no sense, and whatever keeps the file from
-/// being written.
+/// Returns an error if the plan has no range to search, if an option is out of bounds, and if the
+/// file cannot be written.
 pub fn find_boundary(
     plan: &Plan,
     options: &BoundaryOptions,
@@ -34,15 +35,18 @@ pub fn find_boundary(
     }
     let task = BoundaryTask::new(plan, options)?;
     let search = |trials| trace(&task, trials, effort);
-    found((&task.job(), FileKind::Boundary), (output, fresh), search, |found| task.table(found))
+    run_search((&task.job(), FileKind::Boundary), (output, fresh), search, |found| {
+        task.table(found)
+    })
 }
 
-/// The candidates of a study file, constants `NAME=VALUE` over those of its grid; `None` if the
-/// interrupt was raised. With an output it writes that file, byte for byte as `sweep optimise`
-/// does, and goes on there after an interruption; `fresh` starts over.
+/// Computes the candidates of a study file; `None` if the interrupt was raised. `sets` has
+/// constants `NAME=VALUE` for its grid. With an output, it writes the file of `sweep optimise`, and
+/// keeps the trials of an interrupted search, from which another call continues unless it is
+/// `fresh`.
 ///
 /// # Errors
-/// Mistakes in the study and its grid file, and whatever keeps the file from being written.
+/// Returns an error for mistakes in the study or its grid file, and if the file cannot be written.
 pub fn optimise_study(
     path: &Path,
     sets: &[String],
@@ -52,13 +56,14 @@ pub fn optimise_study(
 ) -> Result<Option<MemoryTable>, Error> {
     let study = Study::<Washer>::load(path, sets)?;
     let search = |trials| search(&study, trials, effort);
-    found((&study.job(), FileKind::Optimise), (output, fresh), search, |tried| {
+    run_search((&study.job(), FileKind::Optimise), (output, fresh), search, |tried| {
         study_table(&study, tried)
     })
 }
 
-/// What a search finds, with the trials that its output keeps. A finished output is read.
-fn found<T>(
+/// Runs a search with the trials that its output keeps, and returns its table. A finished output is
+/// read instead.
+fn run_search<T>(
     (job, kind): (&Job<'_>, FileKind<'static>),
     (output, fresh): (Option<&Path>, bool),
     search: impl FnOnce(Option<Trials>) -> Result<(Option<T>, Option<Trials>), Error>,
@@ -72,11 +77,11 @@ fn found<T>(
     };
     let (found, trials) = search(trials)?;
     let Some(found) = found else { return Ok(None) };
-    let found = MemoryTable::of_table(kind, table(&found))?;
+    let result = MemoryTable::from_table(kind, table(&found))?;
     if let Some(file) = file {
-        found.finish(file)?;
+        result.finish(file)?;
     }
-    // What it says matters where a user watches the folder.
+    // The result is complete, so a folder of trials that cannot be removed is no error.
     let _ = trials.and_then(Trials::complete);
-    Ok(Some(found))
+    Ok(Some(result))
 }
