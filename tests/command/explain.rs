@@ -120,7 +120,7 @@ fn a_stable_machine_is_told_so() {
     let at = ["--at", "damping_n_s_per_m=300", "--at", "friction_n=60", "--speed", "300:340:20"];
     let done = explain(&strict, &at);
     let told = said(&done);
-    for line in ["0.98 and 2", "over-estimates, a ratio is below 0.98"] {
+    for line in ["0.98 and 2", "over-estimates: a ratio is below 0.98"] {
         assert!(told.contains(line), "{line}\n{told}");
     }
     assert!(!told.contains("the models agree"), "{told}");
