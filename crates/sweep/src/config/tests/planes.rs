@@ -28,7 +28,7 @@ fn with_rear_unbalance(file: &str) -> String {
         *is_unbalance = if line.starts_with('[') { line == "[unbalance]" } else { *is_unbalance };
         let is_place = *is_unbalance && line.starts_with("x_m");
         Some(if is_place {
-            "plane = \"with_rear_unbalance\"\n".to_owned()
+            "plane = \"rear\"\n".to_owned()
         } else {
             format!("{line}\n")
         })
