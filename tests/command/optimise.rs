@@ -234,7 +234,7 @@ fn every_mistake_in_a_study_and_its_grid_is_told_at_once() {
         "did you mean `damping_n_s_per_m`?",
         "study.toml:5:1",
         "from 4000 to 4000",
-        "a tolerance that no design spreads",
+        "a tolerance without a design that spreads it",
         "grid.toml:5:18",
         "study.toml:6:78",
         "expected max(), min(), mean()",

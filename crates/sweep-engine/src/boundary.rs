@@ -39,7 +39,7 @@ use sweep_parameter::named;
 
 /// A point to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trial {
+pub struct BoundaryTrial {
     /// The number of the curve: a combination of the axes beyond the second.
     pub curve: usize,
     /// The value of the first axis.
@@ -50,7 +50,7 @@ pub struct Trial {
 
 /// The range of the second axis that is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Search {
+pub struct SearchRange {
     /// The least value.
     pub least: f64,
     /// The greatest value.

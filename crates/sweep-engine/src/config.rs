@@ -1,25 +1,25 @@
-//! From what a user typed to a [`Plan`], or to every mistake in it.
+//! The configuration: from a user's input to a [`Plan`], or to every mistake in it.
 //!
-//! A grid file, the file that it names for its model and the constants of the command line are
-//! walked once, each value with its place. Wrong values are reported and replaced by stand-ins, so
-//! that the walk goes on and one pass finds every mistake. There is a plan only if there are no
+//! A grid file, the file that it names for its model and the constants of the command line are read
+//! in one walk, each value with its location. Wrong values are reported and replaced by stand-ins,
+//! so that the walk goes on and one pass finds every mistake. There is a plan only if there are no
 //! mistakes.
 //!
-//! Defaults: `name` is the file's own name, `window_s` the whole run, `[integrator]` the defaults
-//! of [`crate::method`]'s table, `[reliability]` the ratio 2 over the model's usual channels;
+//! Defaults: `name` is the file's name, `window_s` the whole run, `[integrator]` the defaults of
+//! [`crate::method`]'s table, `[reliability]` the ratio 2 over the model's default channels;
 //! without axes the grid is a single point. `end_s` must be given.
 //!
 //! With `[design]` the axes are ranges without a count, over which `latin_hypercube` or `sobol`
 //! spreads `points` points; or there is no axis, and `list` takes points from a CSV or Parquet file
 //! whose columns are parameters.
 //!
-//! Bounds: files to 896 KiB; lists of points to 256 MiB, packed or not, and 2e7 numbers; a Sobol
-//! design to 2^32 points over 32 axes; 1e12 grid points; 1e6 s; 1e10 steps that stability asks for;
-//! numbers to 1e12 in magnitude.
+//! Bounds: files to 896 KiB; lists of points to 256 MiB, compressed or not, and 2e7 numbers; a
+//! Sobol design to 2^32 points over 32 axes; 1e12 grid points; 1e6 s; 1e10 steps that stability
+//! requires; numbers to 1e12 in magnitude.
 //!
 //! Precedence, later over earlier: the model's own file, `[set]`, `--set`, axes. Within each of
-//! them no number may be written twice, not even under two names, because nothing would say which
-//! comes last.
+//! them a number may be written only once, even under two names, because their order is not
+//! defined.
 
 pub mod axes;
 mod canonical;
@@ -49,29 +49,29 @@ use std::path::PathBuf;
 
 pub use draft::Draft;
 pub use form::Form;
-pub use keys::{Key, Keys, Walk};
+pub use keys::{Key, KeyWalk, Keys};
 pub use points::{check_columns, not_numbers, other_length};
 pub use read::Read;
 pub use report::{Diagnostic, Diagnostics, Mistake, Report};
-pub use section::{Field, Section, quoted, refused_number, short, twice, unknown_word};
+pub use section::{Field, Section, quoted, refused_number, short, unknown_word, written_twice};
 pub use sections::plain_name;
 pub use source::{Located, Location, SourceId, Sources};
-pub use written::Written;
+pub use written::NamedArgument;
 
 use serde_json::Value;
 
-use crate::plan::{Aside, Plan, WrittenIn};
+use crate::plan::{Plan, ReadingNotes, WrittenIn};
 
-/// A grid as a user gives it: a file or a text, with the constants `NAME=VALUE` over those it sets.
+/// A grid as a user gives it: a file or a text, with constants `NAME=VALUE` that override its own.
 #[derive(Clone, Debug)]
 pub struct GridInput<M> {
-    /// The file, to which the paths in it are relative.
+    /// The file; paths in it are relative to its folder.
     pub path: PathBuf,
-    /// The run's name, over the file's.
+    /// The run's name, if it overrides that of the file.
     name: Option<String>,
-    /// If it is not the file's.
+    /// The text of the grid, if it is not read from the file.
     text: Option<String>,
-    /// The text of a file of the model's own, in place of the one that the grid names.
+    /// The text of the model's own file, if it is not the one that the grid names.
     pub own_file: Option<String>,
     sets: Vec<String>,
     at: Vec<String>,
@@ -79,21 +79,24 @@ pub struct GridInput<M> {
 }
 
 impl<M: Read> GridInput<M> {
-    /// A grid file. The paths in it are relative to its folder.
+    /// Returns the input of a grid file. Paths in it are relative to its folder.
     pub fn file(path: PathBuf, sets: Vec<String>) -> Self {
-        let (name, text, own_file, at) = (None, None, None, Vec::new());
+        let name = None;
+        let text = None;
+        let own_file = None;
+        let at = Vec::new();
         Self { path, name, text, own_file, sets, at, model: PhantomData }
     }
 
-    /// The text of a grid file. Messages call it by this name, which is also that of the run if the
-    /// text gives none. The paths in it are relative to the working directory.
+    /// Returns the input of a grid's text. `name` stands in messages, and is the run's name if the
+    /// text gives none. Paths in it are relative to the working directory.
     pub fn text(name: &str, text: String, sets: Vec<String>) -> Self {
         Self { text: Some(text), ..Self::file(name.into(), sets) }
     }
 
-    /// The grid that a result was made of, by its plan in the result (`Plan::to_json`). The points
-    /// of a design are left out.
-    pub fn of_plan(name: &str, plan: &Value) -> Self {
+    /// Returns the grid of a result from the plan in it (`Plan::to_json`), without the points of a
+    /// design.
+    pub fn from_plan(name: &str, plan: &Value) -> Self {
         let is_read = |key: &str| {
             !["design", "set", "boundary", "optimise"].contains(&key) && Some(key) != M::OWN_FILE
         };
@@ -106,20 +109,20 @@ impl<M: Read> GridInput<M> {
         }
     }
 
-    /// As it is, with these `NAME=VALUE` beside the constants: a parameter that an axis sweeps
-    /// is fixed by one, as it is by a constant.
+    /// Returns the input with further constants `NAME=VALUE`, which also fix parameters that an
+    /// axis sweeps.
     #[must_use]
-    pub fn fixing(self, at: &[String]) -> Self {
+    pub fn with_fixed(self, at: &[String]) -> Self {
         Self { at: at.to_vec(), ..self }
     }
 
-    /// As it is, with this name of the run, if it is one, over the file's.
+    /// Returns the input with this name of the run, if there is one.
     #[must_use]
-    pub fn named(self, name: Option<String>) -> Self {
+    pub fn with_name(self, name: Option<String>) -> Self {
         Self { name, ..self }
     }
 
-    /// Reads the grid, puts the constants in place, and checks the whole.
+    /// Reads the grid, applies the constants, and checks the plan.
     ///
     /// # Errors
     /// Every mistake found, in one pass.
@@ -127,9 +130,9 @@ impl<M: Read> GridInput<M> {
         resolve(self, |_| ()).map(|(plan, ())| plan)
     }
 
-    /// As [`Self::load`], for one point: `at` gives each axis of several values one (on the grid or
-    /// between its points), and any other parameter too. The plan has no axes; its model
-    /// is the point's. Beside it, what `at` says, by name.
+    /// Reads the grid for one point. `at` gives a value to each axis of several values (on the grid
+    /// or between its points) and to other parameters. Returns the plan, which has no axes and the
+    /// point's model, and the values of `at` by name.
     ///
     /// # Errors
     /// Every mistake found, in one pass.
@@ -138,7 +141,7 @@ impl<M: Read> GridInput<M> {
     }
 }
 
-/// Parameters by name, with a value each.
+/// Parameters by name with their values.
 pub type NamedValues = Vec<(String, f64)>;
 
 fn resolve<M: Read, T>(
@@ -149,9 +152,9 @@ fn resolve<M: Read, T>(
     let read = grid::draft(input, &report).map(|mut draft| {
         let finished = finish(&mut draft);
         whole::steps(&draft);
-        M::judge(&draft);
+        M::check(&draft);
         let written = WrittenIn(report.written());
-        let aside = Aside { notes: report.take_notes(), ..draft.plan.aside };
+        let aside = ReadingNotes { notes: report.take_notes(), ..draft.plan.aside };
         (Plan { written, aside, ..draft.plan }, finished)
     });
     report.finish(read)

@@ -1,59 +1,60 @@
-//! Designs: points that fill a box of parameters more evenly than chance, or as listed, in place of
-//! a grid.
+//! Designs: points that fill a box of parameters more evenly than chance, or listed points, in
+//! place of a grid.
 //!
-//! A point's place is a pure function of design and index: any shard, any resumed run, any machine
-//! finds the same.
+//! The position of a point is a pure function of design and index, so that shards, resumed runs and
+//! other machines find the same.
 
 mod distribution;
 mod latin;
 mod sobol;
 
-pub use distribution::{Distribution, REACH, Shape};
+pub use distribution::{Distribution, DistributionShape, TAIL_DEVIATIONS};
 pub use sobol::MOST_AXES;
 
-/// How the points of a plan are laid out, if not as a grid.
+/// The layout of a plan's points, if it is not a grid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Design {
-    /// Over the axes' ranges.
+    /// Points spread over the axes' ranges.
     Spread {
-        /// By which rule.
-        rule: Rule,
-        /// How many points.
+        /// The rule of the positions.
+        rule: DesignRule,
+        /// The number of points.
         points: u64,
-        /// Another seed, another draw.
+        /// The seed of the positions.
         seed: u64,
     },
-    /// As listed in a file.
+    /// Points listed in a file.
     List {
-        /// The file as the grid file names it.
+        /// The file's name in the grid file.
         file: String,
-        /// How many points.
+        /// The number of points.
         points: u64,
-        /// BLAKE3 hash of the file's bytes, hexadecimal: another content is another plan.
+        /// The BLAKE3 hash of the file's bytes, hexadecimal, so that plans with other contents
+        /// differ.
         hash: String,
     },
 }
 
-/// What spreads points over a box.
+/// A rule that spreads points over a box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
-    /// Every axis cut into as many strata as there are points, one point in each, at random within
-    /// it.
+pub enum DesignRule {
+    /// Latin hypercube sampling: every axis has as many strata as there are points, with one point
+    /// in each, at random within it.
     ///
     /// M. D. McKay, R. J. Beckman, W. J. Conover, A comparison of three methods for selecting
     /// values of input variables in the analysis of output from a computer code, Technometrics 21
     /// (1979), 239-245.
     LatinHypercube,
-    /// Sobol's sequence with direction numbers of Joe and Kuo, in Owen's nested scrambling; a power
-    /// of two points is the most even.
+    /// The Sobol sequence with direction numbers of Joe and Kuo, in Owen's nested scrambling. A
+    /// power of two points is the most even.
     Sobol,
-    /// Every point at random, independent of all others: what averages, shares and their confidence
-    /// intervals by the binomial formulas assume.
+    /// Independent random points, which averages, shares and their binomial confidence intervals
+    /// assume.
     MonteCarlo,
 }
 
-impl Rule {
-    /// Every rule with its name in grid files, and what it does.
+impl DesignRule {
+    /// The rules with their names in grid files and their descriptions.
     pub const ALL: [(Self, &'static str, &'static str); 3] = [
         (
             Self::LatinHypercube,
@@ -70,42 +71,42 @@ impl Rule {
 }
 
 impl Design {
-    /// Number of points.
+    /// Returns the number of points.
     pub const fn points(&self) -> u64 {
         match self {
             Self::Spread { points, .. } | Self::List { points, .. } => *points,
         }
     }
 
-    /// Its name in grid files.
+    /// Returns the name of the method in grid files.
     pub const fn method(&self) -> &'static str {
         match self {
-            Self::Spread { rule, .. } => Rule::ALL[*rule as usize].1,
+            Self::Spread { rule, .. } => DesignRule::ALL[*rule as usize].1,
             Self::List { .. } => "list",
         }
     }
 
-    /// Where point `point` lies along axis `axis`, strictly between 0 and 1; `None` for a list,
-    /// whose axes hold the values themselves.
+    /// Returns the position of point `point` along axis `axis`, strictly between 0 and 1; `None`
+    /// for a list, whose axes hold the values themselves.
     pub fn place(&self, point: u64, axis: usize) -> Option<f64> {
         let &Self::Spread { rule, points, seed } = self else { return None };
         Some(match rule {
-            Rule::LatinHypercube => latin::place(point, points, axis, seed),
-            Rule::Sobol => sobol::place(point, axis, seed),
-            Rule::MonteCarlo => at_random(point, axis, seed),
+            DesignRule::LatinHypercube => latin::place(point, points, axis, seed),
+            DesignRule::Sobol => sobol::place(point, axis, seed),
+            DesignRule::MonteCarlo => at_random(point, axis, seed),
         })
     }
 }
 
-/// A number strictly between 0 and 1 that belongs to a point and an axis.
+/// Returns a random number strictly between 0 and 1 for a point and an axis.
 fn at_random(point: u64, axis: usize, seed: u64) -> f64 {
-    // The middle of each of 2^52 steps, so that neither 0 nor 1 comes up.
+    // The middle of each of 2^52 intervals is neither 0 nor 1.
     let bits = mixed(mixed(point) ^ axis_key(seed, axis)) >> 12;
     (bits as f64 + 0.5) / (1_u64 << 52) as f64
 }
 
-/// A well-mixed 64-bit function of its argument: the finaliser of SplitMix64 (G. L. Steele, D. Lea,
-/// C. H. Flood, Fast splittable pseudorandom number generators, OOPSLA 2014).
+/// Returns a well-mixed 64-bit function of its argument: the finaliser of SplitMix64 (G. L. Steele,
+/// D. Lea, C. H. Flood, Fast splittable pseudorandom number generators, OOPSLA 2014).
 const fn mixed(x: u64) -> u64 {
     let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -113,9 +114,9 @@ const fn mixed(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// A key of its own for every axis.
+/// Returns the key of an axis, from which its permutations and random numbers follow.
 const fn axis_key(seed: u64, axis: usize) -> u64 {
-    // Axes are few; the cast keeps them apart.
+    // Axes are few, so that the cast keeps their keys distinct.
     mixed(mixed(seed) ^ (axis as u64).wrapping_mul(0xD6E8_FEB8_6659_FD93))
 }
 
@@ -124,13 +125,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_at_random_are_even_and_independent() {
-        let design = Design::Spread { rule: Rule::MonteCarlo, points: 20_000, seed: 3 };
+    fn random_points_are_uniform_and_independent() {
+        let design = Design::Spread { rule: DesignRule::MonteCarlo, points: 20_000, seed: 3 };
         let draw = |axis| (0..20_000).map(move |point| at_random(point, axis, 3));
         assert_eq!(design.place(7, 1), Some(at_random(7, 1, 3)));
         assert_eq!((design.points(), design.method()), (20_000, "monte_carlo"));
         let mean = draw(0).sum::<f64>() / 20_000.0;
-        // Three standard errors of the mean of an even spread, 1 / sqrt(12 n), are 0.006.
+        // Three standard errors of the mean of a uniform distribution, 3 / sqrt(12 n), are 0.006.
         assert!((mean - 0.5).abs() < 0.006, "{mean}");
         let spread = draw(0).map(|x| (x - 0.5).powi(2)).sum::<f64>() / 20_000.0;
         assert!((spread - 1.0 / 12.0).abs() < 0.002, "{spread}");

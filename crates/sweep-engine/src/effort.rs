@@ -34,7 +34,7 @@ pub struct EffortArgs {
     /// Worker threads [default: SLURM_CPUS_PER_TASK, else the cores of this machine]
     #[arg(long, value_name = "N", value_parser = threads::parse)]
     pub threads: Option<usize>,
-    /// How progress is shown: auto (a bar on a terminal, else a line a minute), plain (a line every
+    /// Display of progress: auto (a bar on a terminal, else a line a minute), plain (a line every
     /// 5 s) or none
     #[arg(
         long,

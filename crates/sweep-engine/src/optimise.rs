@@ -1,9 +1,9 @@
-//! The least of some numbers over some parameters: a study.
+//! Optimisation studies: the minimum of some objectives over some parameters.
 //!
-//! A candidate is a value of each parameter. It is tried at every point of the study's grid, its
-//! rows go through the model's engine together with those of its generation, and expressions over
-//! them are its objectives and conditions. [`evolve()`] chooses the candidates, by their answers
-//! alone; the store keeps the answers, so an interrupted study goes on and ends in the same bytes.
+//! A candidate is a value of each parameter. It is evaluated at every point of the study's grid:
+//! the model's engine computes the rows of a whole generation, and expressions over them are the
+//! objectives and constraints. [`evolve()`] chooses the candidates from these numbers alone. The
+//! store keeps them, so that an interrupted study is resumed and ends in the same bytes.
 
 pub mod evolve;
 pub mod file;

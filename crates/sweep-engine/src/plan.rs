@@ -55,20 +55,20 @@ pub struct Plan<M: Model> {
     /// The sources of the numbers.
     pub written: WrittenIn,
     /// The notes of reading the grid file.
-    pub aside: Aside,
+    pub aside: ReadingNotes,
 }
 
 /// The notes of reading a grid file. Results do not depend on them, so that plans which differ only
 /// in them are equal.
 #[derive(Clone, Debug, Default)]
-pub struct Aside {
+pub struct ReadingNotes {
     /// The headers of columns in lists and measurements, with the names that they stand for.
     pub columns: Vec<(String, String)>,
     /// The notes for the user, a line each.
     pub notes: Vec<String>,
 }
 
-impl PartialEq for Aside {
+impl PartialEq for ReadingNotes {
     fn eq(&self, _: &Self) -> bool {
         true
     }

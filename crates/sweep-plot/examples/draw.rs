@@ -1,16 +1,16 @@
-//! A figure from a result file, without the model or the command:
+//! Draws the figure of a result file without a model or the command:
 //! `cargo run -p sweep-plot --example draw -- FILE.parquet FIGURE.svg`.
 
 use std::error::Error;
 use std::path::PathBuf;
 
-use sweep_plot::{CommonFigures, Options, render};
+use sweep_plot::{CommonFigures, PlotOptions, render};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut files = std::env::args_os().skip(1).map(PathBuf::from);
     let (Some(input), Some(output), None) = (files.next(), files.next(), files.next()) else {
         return Err("usage: draw FILE.parquet FIGURE.svg|.png|.html".into());
     };
-    render(&input, &Options::default(), &CommonFigures, &output)?;
+    render(&input, &PlotOptions::default(), &CommonFigures, &output)?;
     Ok(())
 }

@@ -1,35 +1,32 @@
-//! Scales and their ticks.
+//! Axis scales, linear or logarithmic, and their ticks.
 
 use super::label;
 
-/// From values to a position, evenly or by the logarithm.
+/// A mapping from values to positions along an axis, linear or logarithmic.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Scale {
-    /// Even steps are equal factors.
+pub(crate) struct AxisScale {
+    /// Whether the scale is logarithmic.
     pub(crate) log: bool,
-    /// Value at the start.
+    /// The value at position 0.
     pub(crate) from: f64,
-    /// Value at the end.
+    /// The value at position 1.
     pub(crate) to: f64,
 }
 
-/// A place on a scale that is marked.
+/// A labelled value of a scale.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tick {
-    /// Its value.
     pub(crate) value: f64,
-    /// Words and unit beside it.
     pub(crate) label: String,
 }
 
-impl Scale {
-    /// An even scale from one value to another.
+impl AxisScale {
+    /// Returns a linear scale.
     pub(crate) const fn linear(from: f64, to: f64) -> Self {
         Self { log: false, from, to }
     }
 
-    /// A logarithmic scale between two positive values; from 1 to 10 where one of them has no
-    /// logarithm.
+    /// Returns a logarithmic scale; from 1 to 10 if an end is not positive and finite.
     pub(crate) const fn log(from: f64, to: f64) -> Self {
         if has_logarithm(from) && has_logarithm(to) {
             Self { log: true, from, to }
@@ -38,28 +35,31 @@ impl Scale {
         }
     }
 
-    /// An even scale that holds all `values` and 0 if it is near, with some room; 0 to 1 if there
-    /// are none.
+    /// Returns a linear scale that holds all `values` with a margin of 5 % at both ends; 0 to 1 if
+    /// there are none.
     pub(crate) fn around(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extremes(values).unwrap_or((0.0, 1.0));
         let room = if high > low { 0.05 * (high - low) } else { 0.05 * high.abs().max(1.0) };
         Self::linear(low - room, high + room)
     }
 
-    /// The value in the units in which the scale is even.
-    pub(crate) fn even(self, value: f64) -> f64 {
+    /// Returns the coordinate of a value along the axis: its logarithm on a logarithmic scale,
+    /// otherwise the value itself.
+    pub(crate) fn coordinate(self, value: f64) -> f64 {
         if self.log { value.ln() } else { value }
     }
 
-    /// Position of a value, 0 at the start and 1 at the end.
+    /// Returns the position of a value: 0 at the start of the scale, 1 at its end.
     pub(crate) fn position(self, value: f64) -> f64 {
-        let (from, to) = (self.even(self.from), self.even(self.to));
-        (self.even(value) - from) / (to - from)
+        let from = self.coordinate(self.from);
+        let to = self.coordinate(self.to);
+        (self.coordinate(value) - from) / (to - from)
     }
 
-    /// About `count` round values within the scale.
+    /// Returns about `count` round values within the scale.
     pub(crate) fn ticks(self, count: usize) -> Vec<Tick> {
-        let (low, high) = (self.from.min(self.to), self.from.max(self.to));
+        let low = self.from.min(self.to);
+        let high = self.from.max(self.to);
         if self.log { log_ticks(low, high, count) } else { even_ticks(low, high, count) }
     }
 }
@@ -69,7 +69,7 @@ pub(crate) const fn has_logarithm(value: f64) -> bool {
     value > 0.0 && value < f64::INFINITY
 }
 
-/// Least and greatest of the finite values.
+/// Returns the least and the greatest of the finite values.
 pub fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let known = values.filter(|value| value.is_finite()).map(|value| (value, value));
     known.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
@@ -77,19 +77,20 @@ pub fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 
 /// A distance between ticks: 1, 2 or 5 times a power of ten.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Step {
+pub(crate) struct TickStep {
     mantissa: u8,
     power: i32,
 }
 
-impl Step {
-    /// Every step that a page can need, the shortest first: from 1e-15 to 5e15 of an axis' unit.
+impl TickStep {
+    /// Yields every step that a page can need in rising order: from 1e-15 to 5e15 in the axis'
+    /// unit.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
-        let of_power = |power| [1, 2, 5].map(|mantissa| Self { mantissa, power });
-        (-15..=15).flat_map(of_power)
+        let steps_of_power = |power| [1, 2, 5].map(|mantissa| Self { mantissa, power });
+        (-15..=15).flat_map(steps_of_power)
     }
 
-    /// The shortest step that is not shorter than `rough`, a positive number.
+    /// Returns the shortest step that is not shorter than `rough`, a positive number.
     fn at_least(rough: f64) -> Self {
         let power = rough.log10().floor() as i32;
         let factor = rough / 10_f64.powi(power);
@@ -107,13 +108,13 @@ impl Step {
         }
     }
 
-    /// In the axis' unit.
+    /// Returns the step in the axis' unit.
     pub(crate) fn length(self) -> f64 {
         f64::from(self.mantissa) * 10_f64.powi(self.power)
     }
 
-    /// Decimals of the numbers at such ticks; none where they would be long, and are written in
-    /// powers of ten.
+    /// Returns the number of decimals of tick labels; `None` from 1e6 on, where labels are powers
+    /// of ten.
     pub(crate) fn decimals(self) -> Option<usize> {
         (self.power < 6).then(|| usize::try_from(-self.power).unwrap_or_default())
     }
@@ -125,14 +126,15 @@ fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
         return Vec::new();
     }
     let finest = f64::EPSILON * low.abs().max(high.abs());
-    let mut step = Step::at_least(SLACK * rough);
-    // A step can leave fewer than three ticks, which do not make a scale: shorter ones then, as
-    // long as numbers at neighbouring ticks differ.
+    let mut step = TickStep::at_least(SLACK * rough);
+    // A step can leave fewer than `MIN_TICKS` ticks. Then shorter ones are tried, as long as the
+    // labels of neighbouring ticks differ.
     while step.length() > finest {
-        let (length, decimals) = (step.length(), step.decimals());
-        let (first, last) =
-            ((low / length - 1e-9).ceil() as i64, (high / length + 1e-9).floor() as i64);
-        if last - first + 1 >= LEAST_TICKS {
+        let length = step.length();
+        let decimals = step.decimals();
+        let first = (low / length - 1e-9).ceil() as i64;
+        let last = (high / length + 1e-9).floor() as i64;
+        if last - first + 1 >= MIN_TICKS {
             let tick = |k: i64| {
                 let value = k as f64 * length;
                 let label = match decimals {
@@ -148,14 +150,17 @@ fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     Vec::new()
 }
 
-/// Fewer ticks do not make a scale.
-pub(crate) const LEAST_TICKS: i64 = 3;
+/// Minimum number of ticks of a scale. Basis: fewer do not show how a scale runs. Doubling it gives
+/// dense ticks on short axes.
+pub(crate) const MIN_TICKS: i64 = 3;
 
-/// A step may be this part shorter than it should be: rounding shall not double it.
+/// Share of the wanted step that a round step may be shorter by. Basis: rounding of the range must
+/// not choose a step twice as long. It lies close below 1; half of it would choose steps that are
+/// half as long as wanted.
 pub(crate) const SLACK: f64 = 0.999;
 
-/// Ticks of a logarithmic scale from `low` to `high`, in ever denser sets; none where one of them
-/// has no logarithm.
+/// Returns the candidate sets of ticks of a logarithmic scale, from sparse to dense; empty sets if
+/// an end has no logarithm.
 pub(crate) fn log_sets(low: f64, high: f64) -> [Vec<Tick>; 5] {
     if !has_logarithm(low) || !has_logarithm(high) {
         return Default::default();
@@ -191,9 +196,9 @@ fn log_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     if best.len() < 2 { even_ticks(low, high, count) } else { best }
 }
 
-/// Whether values are spread more evenly by their logarithm; both choices hold for fewer than
-/// three.
-pub(crate) fn evenly_by_log(values: &[f64]) -> bool {
+/// Returns whether values are spaced more evenly by their logarithms than by themselves; false for
+/// fewer than three values.
+pub(crate) fn is_log_spaced(values: &[f64]) -> bool {
     if values.len() < 3 || values.iter().any(|&value| value <= 0.0) {
         return false;
     }
@@ -201,7 +206,7 @@ pub(crate) fn evenly_by_log(values: &[f64]) -> bool {
         let steps = values.windows(2).map(|pair| position(pair[1]) - position(pair[0]));
         extremes(steps).map_or(f64::INFINITY, |(least, greatest)| greatest / least)
     };
-    // A plain even axis is read more easily, so the logarithm must be clearly the better fit.
+    // A linear axis is easier to read, so the logarithm must fit clearly better.
     spread(&f64::ln) * 1.2 < spread(&|value| value)
 }
 
@@ -209,42 +214,46 @@ pub(crate) fn evenly_by_log(values: &[f64]) -> bool {
 mod tests {
     use super::*;
 
-    fn labels(scale: Scale, count: usize) -> Vec<String> {
+    fn labels(scale: AxisScale, count: usize) -> Vec<String> {
         scale.ticks(count).into_iter().map(|tick| tick.label).collect()
     }
 
     #[test]
-    fn ticks_are_round_and_lie_within() {
-        assert_eq!(labels(Scale::linear(0.0, 1.0), 5), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+    fn ticks_are_round_values_within_the_scale() {
         assert_eq!(
-            labels(Scale::linear(46.0, 314.0), 6),
+            labels(AxisScale::linear(0.0, 1.0), 5),
+            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
+        );
+        assert_eq!(
+            labels(AxisScale::linear(46.0, 314.0), 6),
             ["50", "100", "150", "200", "250", "300"]
         );
-        assert_eq!(labels(Scale::linear(-0.3, 0.3), 3), ["-0.2", "0.0", "0.2"]);
-        assert_eq!(labels(Scale::linear(-48.0, 48.0), 3), ["-40", "-20", "0", "20", "40"]);
-        assert_eq!(labels(Scale::linear(-1.1e15, 0.0), 3), ["-1e15", "-5e14", "0"]);
-        assert_eq!(labels(Scale::log(1.0, 1000.0), 4), ["1", "10", "100", "1000"]);
-        assert_eq!(labels(Scale::log(1.0, 9.0), 4), ["1", "2", "5"]);
-        assert!(labels(Scale::linear(1.0, 1.0), 5).is_empty());
+        assert_eq!(labels(AxisScale::linear(-0.3, 0.3), 3), ["-0.2", "0.0", "0.2"]);
+        assert_eq!(labels(AxisScale::linear(-48.0, 48.0), 3), ["-40", "-20", "0", "20", "40"]);
+        assert_eq!(labels(AxisScale::linear(-1.1e15, 0.0), 3), ["-1e15", "-5e14", "0"]);
+        assert_eq!(labels(AxisScale::log(1.0, 1000.0), 4), ["1", "10", "100", "1000"]);
+        assert_eq!(labels(AxisScale::log(1.0, 9.0), 4), ["1", "2", "5"]);
+        assert!(labels(AxisScale::linear(1.0, 1.0), 5).is_empty());
     }
 
     #[test]
-    fn a_scale_of_many_powers_of_ten_has_no_more_ticks_than_fit() {
-        assert_eq!(labels(Scale::log(1e-3, 1e12), 5).len(), 6);
-        assert!(labels(Scale::log(1e-100, 1e100), 5).len() <= 6);
+    fn a_log_scale_over_many_decades_has_few_ticks() {
+        assert_eq!(labels(AxisScale::log(1e-3, 1e12), 5).len(), 6);
+        assert!(labels(AxisScale::log(1e-100, 1e100), 5).len() <= 6);
     }
 
     #[test]
-    fn a_scale_without_a_logarithm_is_one_from_1_to_10() {
+    fn a_log_scale_with_an_invalid_end_runs_from_1_to_10() {
         for (from, to) in [(0.0, 1.0), (-1.0, 2.0), (1.0, f64::INFINITY), (f64::NAN, 2.0)] {
-            assert_eq!(Scale::log(from, to), Scale::log(1.0, 10.0), "{from} to {to}");
+            assert_eq!(AxisScale::log(from, to), AxisScale::log(1.0, 10.0), "{from} to {to}");
             assert!(log_sets(from, to).iter().all(Vec::is_empty), "{from} to {to}");
         }
     }
 
     #[test]
-    fn any_two_ends_have_few_ticks() {
-        let (least, tiny) = (f64::from_bits(1), f64::MIN_POSITIVE);
+    fn extreme_ends_give_at_most_16_ticks() {
+        let least = f64::from_bits(1);
+        let tiny = f64::MIN_POSITIVE;
         let ends = [
             0.0,
             least,
@@ -262,9 +271,9 @@ mod tests {
             f64::NAN,
         ];
         for (&from, &to) in ends.iter().flat_map(|from| ends.iter().map(move |to| (from, to))) {
-            // Neighbours, too: between them no tick has a number of its own.
+            // Pairs of neighbouring floats are tried too: no tick label can tell them apart.
             for to in [to, from.next_up(), from * (1.0 + 1e-15), from + to] {
-                for scale in [Scale::linear(from, to), Scale::log(from, to)] {
+                for scale in [AxisScale::linear(from, to), AxisScale::log(from, to)] {
                     let ticks = scale.ticks(6).len();
                     assert!(ticks <= 16, "{scale:?}: {ticks}");
                 }
@@ -273,20 +282,20 @@ mod tests {
     }
 
     #[test]
-    fn steps_rise_and_each_is_the_one_before_the_next() {
-        let all: Vec<Step> = Step::all().collect();
+    fn tick_steps_rise_and_shorter_returns_the_one_before() {
+        let all: Vec<TickStep> = TickStep::all().collect();
         for pair in all.windows(2) {
             assert!(pair[0].length() < pair[1].length());
             assert_eq!(pair[1].shorter(), pair[0]);
-            assert_eq!(Step::at_least(SLACK * pair[1].length()), pair[1]);
+            assert_eq!(TickStep::at_least(SLACK * pair[1].length()), pair[1]);
         }
     }
 
     #[test]
-    fn spacing_is_recognised() {
-        assert!(!evenly_by_log(&[60.0, 120.0, 180.0, 240.0]));
-        assert!(evenly_by_log(&[1.0, 10.0, 100.0, 1000.0]));
-        assert!(!evenly_by_log(&[0.0, 1.0, 10.0]));
-        assert!(!evenly_by_log(&[1.0, 10.0]));
+    fn logarithmic_spacing_is_recognised() {
+        assert!(!is_log_spaced(&[60.0, 120.0, 180.0, 240.0]));
+        assert!(is_log_spaced(&[1.0, 10.0, 100.0, 1000.0]));
+        assert!(!is_log_spaced(&[0.0, 1.0, 10.0]));
+        assert!(!is_log_spaced(&[1.0, 10.0]));
     }
 }

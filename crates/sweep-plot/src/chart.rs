@@ -1,104 +1,100 @@
-//! Curves over a common x axis, in panels one above the other. All figures but the map are charts.
+//! Charts: curves over a common x axis, in panels one above the other. All figures but maps and
+//! designs are charts.
 
 use std::rc::Rc;
 
-use super::axis::{Scale, extremes, has_logarithm};
-use super::colour::{BOTH as BOTH_SIDES, ColourScale, SHADE};
+use super::axis::{AxisScale, extremes, has_logarithm};
+use super::colour::{BOTH as BOTH_SIDES, ColourScale, UNSTABLE_SHADE};
 use super::decimate::envelope;
-use super::frame::{HEADING_HEIGHT, Panel, Sign, TICK_SIZE, heading, legend, legend_height};
+use super::frame::{
+    HEADING_HEIGHT, LegendSymbol, Panel, TICK_SIZE, heading, legend, legend_height,
+};
 use super::label::Label;
 use super::raster::text_width;
 use super::scene::{Colour, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
 
-/// A figure of curves.
+/// A figure of curves in panels over a common x axis.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Chart {
-    /// What is shown.
     pub title: String,
-    /// Name of the run and conditions.
     pub subtitle: String,
-    /// What the x axis shows.
     pub x_label: Label,
-    /// The x axis is better read by its logarithm.
+    /// Whether the x axis is logarithmic.
     pub x_log: bool,
-    /// From top to bottom.
+    /// The panels, from top to bottom.
     pub panels: Vec<ChartPanel>,
-    /// Upright lines through all panels.
+    /// Vertical lines through all panels.
     pub marks: Vec<Mark>,
-    /// What the marks mean, in the legend.
+    /// The legend entry of the marks.
     pub mark_meaning: String,
     /// Ranges of x that are shaded in all panels.
     pub shades: Vec<[f64; 2]>,
-    /// What the shades mean, in the legend.
+    /// The legend entry of the shades.
     pub shade_meaning: String,
 }
 
-/// One panel of a chart.
+/// A panel of a chart: curves over the common x axis with a y axis of their own.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct ChartPanel {
-    /// Short name, by which it is picked.
+    /// The short name by which options and pages choose the panel.
     pub name: String,
-    /// What the y axis shows.
+    /// The label of the y axis.
     #[serde(flatten)]
     pub label: Label,
-    /// Shown in a picture, and at first in a page.
+    /// Whether the panel is drawn in a picture, and at first in a page.
     pub shown: bool,
-    /// Whether the axis is logarithmic.
+    /// Whether the y axis is logarithmic.
     pub log: bool,
-    /// y values between which the panel extends; by default what its series need.
+    /// The range of the y axis; by default the range of the series and levels.
     pub range: Option<(f64, f64)>,
-    /// Height in a picture, px.
+    /// The height in a picture, px.
     pub height: f64,
-    /// In drawing order.
+    /// The curves in drawing order.
     #[serde(skip)]
     pub series: Vec<Series>,
-    /// Level lines: value and meaning.
+    /// Horizontal lines: value and legend entry.
     pub levels: Vec<(f64, String)>,
-    /// Starred points: x, y and a label.
+    /// Starred points: x, y and label.
     #[serde(skip)]
     pub stars: Vec<(f64, f64, String)>,
-    /// Ranges of x whose cells hold points on both sides of the level.
+    /// Ranges of x whose cells hold points on both sides of the limit.
     pub mixed: Vec<[f64; 2]>,
 }
 
 impl ChartPanel {
-    /// A panel of these curves that is shown, even, as high as its series need, and 420 px tall.
+    /// Returns a panel of these curves that is shown, linear, and 420 px high.
     pub fn new(name: &str, label: Label, series: Vec<Series>) -> Self {
         let name = name.to_owned();
         Self { name, label, series, shown: true, height: 420.0, ..Self::default() }
     }
 }
 
-/// How a series is drawn.
+/// The style in which a series is drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Style {
     /// A solid line of this width, px.
     Solid(f64),
-    /// A dashed line.
     Dashed,
     /// A dot at each point, and no line.
     Dots,
-    /// The line, and the area between these two values at each point.
+    /// The line, and a shaded area between these lower and upper values.
     Band(Vec<f64>, Vec<f64>),
 }
 
-/// One curve.
+/// A curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// Name in the legend.
+    /// The legend entry; empty for a curve without one.
     pub name: String,
-    /// Its colour.
     pub colour: Colour,
-    /// Rising; series mostly share theirs.
+    /// Rising values of x; series of one file mostly share them.
     pub x: Rc<Vec<f64>>,
-    /// One per x; NaN breaks the line.
+    /// The value at each x; NaN interrupts the line.
     pub y: Vec<f64>,
-    /// How it is drawn.
     pub style: Style,
 }
 
 impl Series {
-    /// A series.
     pub fn new(
         name: impl Into<String>,
         colour: Colour,
@@ -110,57 +106,63 @@ impl Series {
     }
 }
 
-/// An upright line.
+/// A vertical line with a label.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
-    /// Where.
     pub x: f64,
-    /// Words and unit beside it.
     pub label: String,
 }
 
-const WIDTH: f64 = 880.0;
-const LEFT: f64 = 92.0;
-const RIGHT: f64 = 26.0;
-const BELOW: f64 = 64.0;
-const GAP: f64 = 14.0;
-/// Radius of the dot of a place that no line runs to, px.
-const ALONE: f64 = 3.0;
-/// What a star means, in the legend.
-const STARS: &str = "resonance speed";
+/// Width of a chart, px. Basis: a figure across a page. Twice the width halves the type in print.
+const CHART_WIDTH: f64 = 880.0;
+/// Left margin for the numbers and the label of the y axis, px.
+const LEFT_MARGIN: f64 = 92.0;
+/// Right margin, px.
+const RIGHT_MARGIN: f64 = 26.0;
+/// Margin for the numbers and the label of the x axis, px.
+const BOTTOM_MARGIN: f64 = 64.0;
+/// Gap between two panels, px.
+const PANEL_GAP: f64 = 14.0;
 
-/// What the colour of one translucent curve over another means, in the legend.
-const BOTH: &str = "both, one over the other";
+/// Radius of a dot that stands for an isolated point of a line, px.
+const ISOLATED_RADIUS: f64 = 3.0;
+/// The legend entry of stars.
+const STAR_MEANING: &str = "resonance speed";
 
-/// Draws the panels that are shown.
+/// The legend entry of the colour that two translucent curves make together.
+const OVERLAP_MEANING: &str = "both, one over the other";
+
+/// Draws the panels of a chart that are shown.
 pub(crate) fn draw(chart: &Chart) -> Scene {
     let panels: Vec<&ChartPanel> = chart.panels.iter().filter(|panel| panel.shown).collect();
     let entries = entries(chart, &panels);
-    let width = WIDTH - LEFT - RIGHT;
-    let of_legend = legend_height(&entries, width);
-    let heights: f64 = panels.iter().map(|panel| panel.height + GAP).sum();
+    let width = CHART_WIDTH - LEFT_MARGIN - RIGHT_MARGIN;
+    let legend_height = legend_height(&entries, width);
+    let heights: f64 = panels.iter().map(|panel| panel.height + PANEL_GAP).sum();
     let labels = chart.marks.iter().map(|mark| text_width(&mark.label, TICK_SIZE, false) + 22.0);
     let strip = labels.fold(0.0, f64::max);
-    let total = HEADING_HEIGHT + strip + heights + BELOW + of_legend + 4.0;
-    let mut scene = Scene::new(WIDTH, total, format!("{}. {}", chart.title, chart.subtitle));
+    let total = HEADING_HEIGHT + strip + heights + BOTTOM_MARGIN + legend_height + 4.0;
+    let mut scene = Scene::new(CHART_WIDTH, total, format!("{}. {}", chart.title, chart.subtitle));
     heading(&mut scene, &chart.title, &chart.subtitle);
     let xs = x_scale(chart);
     let mut y = HEADING_HEIGHT + strip;
     for (index, &content) in panels.iter().enumerate() {
-        let panel = Panel { x: LEFT, y, width, height: content.height, xs, ys: y_scale(content) };
-        panel.rules(&mut scene);
+        let panel =
+            Panel { x: LEFT_MARGIN, y, width, height: content.height, xs, ys: y_scale(content) };
+        panel.draw_grid_lines(&mut scene);
         let mut dots = Vec::new();
         scene.clipped(panel.outline(), |scene| {
             dots = draw_panel(scene, chart, content, &panel);
         });
         if !has_values(content) {
-            panel.say(&mut scene, NO_VALUES);
+            panel.write_centred(&mut scene, NO_VALUES_TEXT);
         }
         draw_marks(&mut scene, chart, &panel, index == 0);
         draw_stars(&mut scene, content, &panel);
         let last = index + 1 == panels.len();
-        panel.frame(&mut scene, last, true);
-        // Whole at the panel's edge too.
+        panel.draw_frame(&mut scene, last, true);
+        // Dots are drawn after the frame and outside the clip, so that they are whole at the edge
+        // too.
         let within = |y: f64| (panel.y..=panel.y + panel.height).contains(&y);
         for (place, radius, colour) in dots.into_iter().filter(|([_, y], ..)| within(*y)) {
             scene.fill(Outline::circle(place, radius), colour);
@@ -169,37 +171,37 @@ pub(crate) fn draw(chart: &Chart) -> Scene {
         if last {
             panel.x_label(&mut scene, &chart.x_label.to_string());
         }
-        y += content.height + GAP;
+        y += content.height + PANEL_GAP;
     }
-    legend(&mut scene, &entries, LEFT, y - GAP + BELOW, width);
+    legend(&mut scene, &entries, LEFT_MARGIN, y - PANEL_GAP + BOTTOM_MARGIN, width);
     scene
 }
 
-/// The scale of the x axis: all that series hold, with room for dots where there are no lines.
-pub(crate) fn x_scale(chart: &Chart) -> Scale {
+/// Returns the scale of the x axis: the range of all series, with a margin if all are dots.
+pub(crate) fn x_scale(chart: &Chart) -> AxisScale {
     let all = || chart.panels.iter().flat_map(|panel| &panel.series);
     let xs = all().flat_map(|series| series.x.iter().copied());
     if !chart.x_log && all().all(|series| series.style == Style::Dots) {
-        return Scale::around(xs);
+        return AxisScale::around(xs);
     }
     if chart.x_log {
         let positive = xs.filter(|x| has_logarithm(*x));
         let (low, high) = extremes(positive).unwrap_or((1.0, 10.0));
-        return Scale::log(low, if high > low { high } else { 10.0 * low });
+        return AxisScale::log(low, if high > low { high } else { 10.0 * low });
     }
     let (low, high) = extremes(xs).unwrap_or((0.0, 1.0));
-    // The one place of all series is in the middle, so that dots are whole.
+    // If all series have the same single x, it lies in the middle, so that its dots are whole.
     if high <= low {
         let half = 0.5_f64.max(1e-6 * low.abs());
-        return Scale::linear(low - half, low + half);
+        return AxisScale::linear(low - half, low + half);
     }
-    Scale::linear(low, high)
+    AxisScale::linear(low, high)
 }
 
-/// The scale of a panel's y axis: its range, or all that its series and levels need.
-pub(crate) fn y_scale(panel: &ChartPanel) -> Scale {
+/// Returns the scale of a panel's y axis: its given range, or the range of its series and levels.
+pub(crate) fn y_scale(panel: &ChartPanel) -> AxisScale {
     if let Some((low, high)) = panel.range {
-        return if panel.log { Scale::log(low, high) } else { Scale::linear(low, high) };
+        return if panel.log { AxisScale::log(low, high) } else { AxisScale::linear(low, high) };
     }
     let bands = panel.series.iter().flat_map(|series| match &series.style {
         Style::Band(low, high) => [&low[..], &high[..]],
@@ -208,30 +210,30 @@ pub(crate) fn y_scale(panel: &ChartPanel) -> Scale {
     let values = bands.flatten().copied().chain(panel.levels.iter().map(|(value, _)| *value));
     if panel.log {
         let (low, high) = extremes(values.filter(|value| *value > 0.0)).unwrap_or((1.0, 10.0));
-        Scale::log(low / 1.15, high * 1.15)
+        AxisScale::log(low / 1.15, high * 1.15)
     } else {
-        Scale::around(values)
+        AxisScale::around(values)
     }
 }
 
-/// Stands in a panel without curves, dots and stars.
-const NO_VALUES: &str = "no values to show";
+/// The text in a panel without curves, dots and stars.
+const NO_VALUES_TEXT: &str = "no values to show";
 
-/// Returns whether a panel has a place for a line, a dot or a star.
+/// Returns whether a panel has a point of a line, a dot or a star to draw.
 fn has_values(panel: &ChartPanel) -> bool {
     let is_shown = |y: &f64| y.is_finite() && (!panel.log || *y > 0.0);
-    let of_series = |series: &Series| {
+    let has_points = |series: &Series| {
         let has_any = |ys: &[f64]| ys.iter().any(is_shown);
         match &series.style {
             Style::Band(low, high) => has_any(&series.y) || has_any(low) || has_any(high),
             _ => has_any(&series.y),
         }
     };
-    !panel.stars.is_empty() || panel.series.iter().any(of_series)
+    !panel.stars.is_empty() || panel.series.iter().any(has_points)
 }
 
-/// Draws shades, curves and levels; gives the dots: of series of dots, and of places that stand
-/// alone, which no line shows.
+/// Draws shades, curves and levels. Returns the dots, which are drawn later: those of series of
+/// dots, and those of isolated points, which no line shows.
 fn draw_panel(
     scene: &mut Scene,
     chart: &Chart,
@@ -239,14 +241,14 @@ fn draw_panel(
     panel: &Panel,
 ) -> Vec<([f64; 2], f64, Colour)> {
     let mut dots = Vec::new();
-    for (ranges, colour) in [(&chart.shades, SHADE), (&content.mixed, BOTH_SIDES)] {
+    for (ranges, colour) in [(&chart.shades, UNSTABLE_SHADE), (&content.mixed, BOTH_SIDES)] {
         if ranges.is_empty() {
             continue;
         }
         let mut areas = Outline::default();
         for range in ranges {
             let [from, to] = range.map(|x| panel.at_x(x));
-            // Narrower ones would not be seen.
+            // A shade narrower than 1 px would not be visible.
             areas.add_rectangle(from, panel.y, (to - from).max(1.0), panel.height);
         }
         scene.fill(areas, colour);
@@ -262,10 +264,10 @@ fn draw_panel(
             for run in both.split(Option::is_none).filter(|run| !run.is_empty()) {
                 let (mut area, mut back): (Vec<[f64; 2]>, Vec<[f64; 2]>) =
                     run.iter().flatten().copied().unzip();
-                // The bracket of a place that stands alone is as wide as its dot.
+                // The band at an isolated point is as wide as its dot.
                 for side in [&mut area, &mut back] {
                     if let [[x, y]] = side[..] {
-                        *side = vec![[x - ALONE, y], [x + ALONE, y]];
+                        *side = vec![[x - ISOLATED_RADIUS, y], [x + ISOLATED_RADIUS, y]];
                     }
                 }
                 area.extend(back.into_iter().rev());
@@ -275,15 +277,15 @@ fn draw_panel(
         }
         if series.style == Style::Dots {
             let places = (0..xs.len()).filter_map(|k| at(&series.y, k));
-            dots.extend(places.map(|place| (place, DOT, series.colour)));
+            dots.extend(places.map(|place| (place, DOT_RADIUS, series.colour)));
             continue;
         }
         let kept = envelope(xs, &series.y, panel.xs.from, panel.xs.to, panel.width as usize);
         let places: Vec<_> = kept.into_iter().map(|k| at(&series.y, k)).collect();
         let mut outline = Outline::default();
-        let alone = outline.add_runs(&places);
+        let isolated = outline.add_runs(&places);
         scene.line(outline, stroke(series));
-        dots.extend(alone.into_iter().map(|place| (place, ALONE, series.colour)));
+        dots.extend(isolated.into_iter().map(|place| (place, ISOLATED_RADIUS, series.colour)));
     }
     for (value, _) in &content.levels {
         let y = panel.at_y(*value);
@@ -292,7 +294,7 @@ fn draw_panel(
     dots
 }
 
-/// How a series is drawn where it is a line.
+/// Returns the stroke of a series' line.
 pub(crate) fn stroke(series: &Series) -> Stroke {
     match series.style {
         Style::Solid(width) => Stroke::solid(series.colour, width),
@@ -301,7 +303,7 @@ pub(crate) fn stroke(series: &Series) -> Stroke {
     }
 }
 
-/// Lines at a level.
+/// Returns the stroke of a level's line.
 pub(crate) fn level_stroke() -> Stroke {
     Stroke::dashed(INK, 1.6, &[3.0, 3.0])
 }
@@ -310,29 +312,30 @@ fn mark_stroke() -> Stroke {
     Stroke::dashed(MUTED, 1.2, &[6.0, 4.0])
 }
 
-/// Radius of a dot, px.
-pub(crate) const DOT: f64 = 2.8;
+/// Radius of a dot, px. Doubling it quadruples the ink of dense series.
+pub(crate) const DOT_RADIUS: f64 = 2.8;
 
-/// Radius of a star, px.
-const STAR: f64 = 10.0;
+/// Radius of a star from centre to tip, px.
+const STAR_RADIUS: f64 = 10.0;
 
-/// A rectangle: left, top, right, bottom, px.
-type Extent = [f64; 4];
+/// A rectangle: left, top, right and bottom, px.
+type Rectangle = [f64; 4];
 
-/// Stars first, then their labels, each where it covers neither a star nor a label before it, if
-/// there is such a place; of several, the one that the fewest lines run through.
+/// Draws all stars, then their labels. A label is placed where it covers no star and no earlier
+/// label; among such places the one that the fewest curves cross is taken.
 fn draw_stars(scene: &mut Scene, content: &ChartPanel, panel: &Panel) {
-    let mut taken: Vec<Extent> = Vec::new();
+    let mut taken: Vec<Rectangle> = Vec::new();
     for (x, y, _) in &content.stars {
         let [x, y] = panel.at(*x, *y);
-        scene.fill(Outline::star([x, y], STAR), INK);
-        taken.push([x - STAR, y - STAR, x + STAR, y + STAR]);
+        scene.fill(Outline::star([x, y], STAR_RADIUS), INK);
+        taken.push([x - STAR_RADIUS, y - STAR_RADIUS, x + STAR_RADIUS, y + STAR_RADIUS]);
     }
     for (x, y, label) in &content.stars {
         let [x, y] = panel.at(*x, *y);
         let width = text_width(label, TICK_SIZE, true);
-        // On either side of the star, and from close to it to farther above and below.
-        let sides = [x - STAR - 2.0 - width, x + STAR + 2.0];
+        // The candidates lie on both sides of the star, from close to it to farther above and
+        // below.
+        let sides = [x - STAR_RADIUS - 2.0 - width, x + STAR_RADIUS + 2.0];
         let heights = [-6.0, 18.0, -24.0, 36.0, -42.0, 54.0];
         let places = heights.iter().flat_map(|dy| sides.map(|left| [left, y + dy]));
         let extent = |[left, base]: [f64; 2]| [left, base - TICK_SIZE, left + width, base + 4.0];
@@ -355,19 +358,20 @@ fn draw_stars(scene: &mut Scene, content: &ChartPanel, panel: &Panel) {
     }
 }
 
-/// How many curves of a panel run through a rectangle.
-fn lines_through(content: &ChartPanel, panel: &Panel, extent: Extent) -> usize {
+/// Returns the number of curves of a panel that pass through a rectangle.
+fn lines_through(content: &ChartPanel, panel: &Panel, extent: Rectangle) -> usize {
     let runs_through = |series: &&Series| {
         let places = series.x.iter().zip(&series.y).map(|(&x, &y)| panel.at(x, y));
         let places: Vec<[f64; 2]> = places.collect();
-        places.windows(2).any(|pair| crosses([pair[0], pair[1]], extent))
+        places.windows(2).any(|pair| intersects([pair[0], pair[1]], extent))
     };
     content.series.iter().filter(runs_through).count()
 }
 
-/// Whether a straight line between two places has a part within a rectangle.
-fn crosses([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: Extent) -> bool {
-    let (mut first, mut last) = (0.0_f64, 1.0_f64);
+/// Returns whether a part of a line segment lies within a rectangle (Liang-Barsky clipping).
+fn intersects([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: Rectangle) -> bool {
+    let mut first = 0.0_f64;
+    let mut last = 1.0_f64;
     for (k, (low, high)) in [(left, right), (top, bottom)].into_iter().enumerate() {
         let step = to[k] - from[k];
         if step == 0.0 {
@@ -380,12 +384,12 @@ fn crosses([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: Extent) -> boo
         first = first.max(one.min(other));
         last = last.min(one.max(other));
     }
-    // A gap has no place.
+    // A segment with a NaN end belongs to a gap of the curve.
     from.iter().chain(&to).all(|part| part.is_finite()) && first <= last
 }
 
-/// Marks through a panel; above the first one their labels, moved aside where they would cover each
-/// other.
+/// Draws the marks through a panel, and their labels above it if `labelled`. A label that would
+/// cover the one before it is moved to the right.
 fn draw_marks(scene: &mut Scene, chart: &Chart, panel: &Panel, labelled: bool) {
     let mut free = f64::NEG_INFINITY;
     for mark in &chart.marks {
@@ -403,9 +407,9 @@ fn draw_marks(scene: &mut Scene, chart: &Chart, panel: &Panel, labelled: bool) {
     }
 }
 
-fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
-    let mut entries: Vec<(Sign, String)> = Vec::new();
-    let mut add = |sign: Sign, name: &str| {
+fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(LegendSymbol, String)> {
+    let mut entries: Vec<(LegendSymbol, String)> = Vec::new();
+    let mut add = |sign: LegendSymbol, name: &str| {
         if !name.is_empty() && !entries.iter().any(|(_, known)| known == name) {
             entries.push((sign, name.to_owned()));
         }
@@ -413,43 +417,44 @@ fn entries(chart: &Chart, panels: &[&ChartPanel]) -> Vec<(Sign, String)> {
     for panel in panels {
         for series in &panel.series {
             if series.style == Style::Dots {
-                let dot = Outline::circle([0.0, 0.0], 1.4 * DOT);
-                add(Sign::Shape(dot, true, series.colour), &series.name);
+                let dot = Outline::circle([0.0, 0.0], 1.4 * DOT_RADIUS);
+                add(LegendSymbol::Shape(dot, true, series.colour), &series.name);
                 continue;
             }
             let mut stroke = stroke(series);
             stroke.width = stroke.width.max(2.2);
-            add(Sign::Line(stroke), &series.name);
+            add(LegendSymbol::Line(stroke), &series.name);
         }
         if let [.., under, over] = &panel.series[..]
             && over.colour.alpha < 255
         {
             let both = Stroke::solid(over.colour.over(under.colour), 2.2);
-            add(Sign::Line(both), BOTH);
+            add(LegendSymbol::Line(both), OVERLAP_MEANING);
         }
         for (_, meaning) in &panel.levels {
-            add(Sign::Line(level_stroke()), meaning);
+            add(LegendSymbol::Line(level_stroke()), meaning);
         }
         if !panel.mixed.is_empty() {
-            add(Sign::Area(BOTH_SIDES), MIXED);
+            add(LegendSymbol::Area(BOTH_SIDES), MIXED);
         }
         if !panel.stars.is_empty() {
-            add(Sign::Shape(Outline::star([0.0, 0.0], 9.0), true, INK), STARS);
+            add(LegendSymbol::Shape(Outline::star([0.0, 0.0], 9.0), true, INK), STAR_MEANING);
         }
     }
     if !chart.marks.is_empty() {
-        add(Sign::Line(mark_stroke()), &chart.mark_meaning);
+        add(LegendSymbol::Line(mark_stroke()), &chart.mark_meaning);
     }
     if !chart.shades.is_empty() {
-        add(Sign::Area(SHADE), &chart.shade_meaning);
+        add(LegendSymbol::Area(UNSTABLE_SHADE), &chart.shade_meaning);
     }
     entries
 }
 
-/// What the ranges of [`ChartPanel::mixed`] are, in the legend.
+/// The legend entry of [`ChartPanel::mixed`].
 pub const MIXED: &str = "both: reliable and unreliable points";
 
-/// Whether positive values span so much that only a logarithm shows them all.
+/// Returns whether positive values span more than a factor of ten, which calls for a logarithmic
+/// axis.
 pub fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
     ColourScale::amplitude(values).scale.log
 }
@@ -459,10 +464,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn labels_of_stars_stand_off_the_curves() {
+    fn labels_of_stars_avoid_the_curves() {
         let speeds: Vec<f64> = (0..=30).map(|k| 10.0 * f64::from(k)).collect();
         let flat = |y: f64| Series::new("", INK, speeds.clone(), vec![y; 31], Style::Solid(2.0));
-        // The second curve is where the first one's label would stand.
+        // The second curve lies at the place that the first star's label prefers.
         let mut series = vec![flat(147.8), flat(154.0), flat(162.1)];
         series.push(Series { y: speeds.clone(), ..flat(0.0) });
         let stars = [147.8, 162.1].map(|at| (at, at, format!("{at} Hz"))).to_vec();
@@ -488,9 +493,18 @@ mod tests {
             _ => None,
         });
         let content = &chart.panels[0];
-        let (x, y) = (LEFT, HEADING_HEIGHT);
-        let (xs, ys) = (x_scale(&chart), y_scale(content));
-        let panel = Panel { x, y, width: WIDTH - LEFT - RIGHT, height: content.height, xs, ys };
+        let x = LEFT_MARGIN;
+        let y = HEADING_HEIGHT;
+        let xs = x_scale(&chart);
+        let ys = y_scale(content);
+        let panel = Panel {
+            x,
+            y,
+            width: CHART_WIDTH - LEFT_MARGIN - RIGHT_MARGIN,
+            height: content.height,
+            xs,
+            ys,
+        };
         let mut count = 0;
         for text in labels {
             let [left, base] = text.at;

@@ -1,37 +1,37 @@
-//! Level lines of values on a grid: marching squares that do not cross what is unknown.
+//! Level lines of values on a grid by marching squares. No line crosses an unknown value.
 
 use std::collections::BTreeMap;
 
-/// A node of the grid: its places along x and y.
-type Node = (usize, usize);
+/// A node of the grid: its index along x and along y.
+type GridNode = (usize, usize);
 
-/// An edge of the grid on which a line can cross: a side of a square or one of its diagonals. Of
-/// its nodes the one farther left comes first, or else the lower one. The second is kept as (y, x),
-/// so that the edges of a node come in order: along x, along y, and up to the right.
-type Edge = (Node, (usize, usize));
+/// An edge of the grid that a line can cross: a side of a square or its diagonal. The first node
+/// lies farther left, or below at the same x. The second is kept as (y, x), so that the edges of a
+/// node are ordered: along x, along y, up to the right.
+type GridEdge = (GridNode, (usize, usize));
 
-/// The edge between two nodes.
-fn edge(a: Node, b: Node) -> Edge {
+/// Returns the edge between two nodes.
+fn edge(a: GridNode, b: GridNode) -> GridEdge {
     let (first, (x, y)) = (a.min(b), a.max(b));
     (first, (y, x))
 }
 
-/// Lines on which `value` is zero, as points `[x, y]`; a closed line ends where it starts.
+/// Returns the lines on which `value` is zero, as points `[x, y]`; a closed line ends at its first
+/// point.
 ///
-/// `value(i, j)` is taken at `xs[i]`, `ys[j]`; between nodes it is taken as linear. Where it is not
-/// finite, the four squares around the node are reduced to the triangle of their other corners, and
-/// squares with two or more unknown corners are left out: no line is drawn through the unknown. A
-/// value of exactly zero counts as positive.
+/// `value(i, j)` is taken at `xs[i]`, `ys[j]`; it is linear between nodes. At a node that is not
+/// finite the four squares around it are reduced to the triangle of their other corners; a square
+/// with two unknown corners or more has no line. A value of exactly zero counts as positive.
 pub fn zero_lines(
     xs: &[f64],
     ys: &[f64],
     value: impl Fn(usize, usize) -> f64,
 ) -> Vec<Vec<[f64; 2]>> {
-    let mut crossings: BTreeMap<Edge, [f64; 2]> = BTreeMap::new();
-    let mut links: BTreeMap<Edge, Vec<Edge>> = BTreeMap::new();
+    let mut crossings: BTreeMap<GridEdge, [f64; 2]> = BTreeMap::new();
+    let mut links: BTreeMap<GridEdge, Vec<GridEdge>> = BTreeMap::new();
     for i in 0..xs.len().saturating_sub(1) {
         for j in 0..ys.len().saturating_sub(1) {
-            for (from, to) in square(i, j, &value) {
+            for (from, to) in segments_in_square(i, j, &value) {
                 for edge in [from, to] {
                     crossings.entry(edge).or_insert_with(|| crossing(edge, xs, ys, &value));
                 }
@@ -40,13 +40,17 @@ pub fn zero_lines(
             }
         }
     }
-    let line = |edges: Vec<Edge>| edges.iter().map(|edge| crossings[edge]).collect();
-    join(&mut links).into_iter().map(line).collect()
+    let line = |edges: Vec<GridEdge>| edges.iter().map(|edge| crossings[edge]).collect();
+    join_segments(&mut links).into_iter().map(line).collect()
 }
 
-/// The pieces of line within one square, each from edge to edge.
-fn square(i: usize, j: usize, value: &impl Fn(usize, usize) -> f64) -> Vec<(Edge, Edge)> {
-    // Counter-clockwise from the lower left.
+/// Returns the line segments within a square, each from edge to edge.
+fn segments_in_square(
+    i: usize,
+    j: usize,
+    value: &impl Fn(usize, usize) -> f64,
+) -> Vec<(GridEdge, GridEdge)> {
+    // The corners run counter-clockwise from the lower left.
     let nodes = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
     let corners = nodes.map(|(i, j)| value(i, j));
     let above = corners.map(|corner| corner >= 0.0);
@@ -56,12 +60,12 @@ fn square(i: usize, j: usize, value: &impl Fn(usize, usize) -> f64) -> Vec<(Edge
     }
     let sides = (0..known.len()).map(|k| (known[k], known[(k + 1) % known.len()]));
     let crossed = sides.filter(|&(from, to)| above[from] != above[to]);
-    let crossed: Vec<Edge> = crossed.map(|(from, to)| edge(nodes[from], nodes[to])).collect();
+    let crossed: Vec<GridEdge> = crossed.map(|(from, to)| edge(nodes[from], nodes[to])).collect();
     match crossed[..] {
         [from, to] => vec![(from, to)],
         [a, b, c, d] => {
-            // A saddle: the middle tells which pair of opposite corners is joined; the others are
-            // cut off.
+            // At a saddle the mean of the corners decides which pair of opposite corners is
+            // connected; the other corners are cut off.
             let middle_above = corners.iter().sum::<f64>() >= 0.0;
             if above[0] == middle_above { vec![(a, b), (c, d)] } else { vec![(d, a), (b, c)] }
         }
@@ -70,21 +74,22 @@ fn square(i: usize, j: usize, value: &impl Fn(usize, usize) -> f64) -> Vec<(Edge
 }
 
 fn crossing(
-    (from, (y, x)): Edge,
+    (from, (y, x)): GridEdge,
     xs: &[f64],
     ys: &[f64],
     value: &impl Fn(usize, usize) -> f64,
 ) -> [f64; 2] {
-    let (start, end) = (value(from.0, from.1), value(x, y));
+    let start = value(from.0, from.1);
+    let end = value(x, y);
     let part = start / (start - end);
     [xs[from.0] + part * (xs[x] - xs[from.0]), ys[from.1] + part * (ys[y] - ys[from.1])]
 }
 
-/// Chains pieces into lines, open ones from their ends first.
-fn join(links: &mut BTreeMap<Edge, Vec<Edge>>) -> Vec<Vec<Edge>> {
-    let ends: Vec<Edge> =
+/// Joins segments into lines; open lines come first, from one of their ends.
+fn join_segments(links: &mut BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridEdge>> {
+    let ends: Vec<GridEdge> =
         links.iter().filter(|(_, next)| next.len() == 1).map(|(&edge, _)| edge).collect();
-    let all: Vec<Edge> = links.keys().copied().collect();
+    let all: Vec<GridEdge> = links.keys().copied().collect();
     let mut lines = Vec::new();
     for start in ends.into_iter().chain(all) {
         let mut line = vec![start];
@@ -105,10 +110,11 @@ fn join(links: &mut BTreeMap<Edge, Vec<Edge>>) -> Vec<Vec<Edge>> {
     lines
 }
 
-/// Points of level lines that a figure has room for.
-pub(crate) const MOST_POINTS: usize = 100_000;
+/// Maximum number of points of level lines in a figure. Basis: a figure of a few megabytes.
+/// Doubling it doubles the size of figures with ragged boundaries.
+pub(crate) const MAX_POINTS: usize = 100_000;
 
-/// Leaves out the shortest lines of all cuts until at most `room` points are left.
+/// Removes the shortest lines of all cuts until at most `room` points are left.
 pub(crate) fn leave_out_shortest(lines: &mut [Vec<Vec<[f64; 2]>>], room: usize) {
     let mut lengths: Vec<usize> = lines.iter().flatten().map(Vec::len).collect();
     lengths.sort_unstable_by(|a, b| b.cmp(a));
@@ -134,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_is_cut_by_one_straight_line() {
+    fn the_level_line_of_a_plane_is_straight() {
         let lines = zero_lines(&numbers(6), &numbers(5), |i, j| 2.0 * i as f64 + j as f64 - 5.5);
         assert_eq!(lines.len(), 1);
         assert!(lines[0].iter().all(|[x, y]| (2.0 * x + y - 5.5).abs() < 1e-12));
@@ -143,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn an_island_is_closed() {
+    fn a_line_around_one_node_is_closed() {
         let lines =
             zero_lines(&numbers(5), &numbers(5), |i, j| if (i, j) == (2, 2) { 1.0 } else { -1.0 });
         assert_eq!(lines.len(), 1);
@@ -152,10 +158,11 @@ mod tests {
     }
 
     #[test]
-    fn a_saddle_keeps_its_two_lines_apart() {
+    fn the_two_lines_of_a_saddle_do_not_meet() {
         let corners = [[1.0, -1.0], [-1.0, 3.0]];
         let lines = zero_lines(&numbers(2), &numbers(2), |i, j| corners[i][j]);
-        // The middle is positive, so the positive corners are joined and the negative ones cut off.
+        // The middle is positive, so the positive corners are connected and the negative ones cut
+        // off.
         assert_eq!(lines.len(), 2);
         for line in lines {
             let cut_off = if line[0][0] + line[1][0] > line[0][1] + line[1][1] {
@@ -170,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_drawn_beside_what_is_unknown() {
+    fn no_line_is_drawn_beside_unknown_values() {
         let unknown = |i: usize, j: usize| (i, j) == (2, 1) || (i, j) == (2, 2);
         let value = |i: usize, j: usize| if unknown(i, j) { f64::NAN } else { i as f64 - 1.5 };
         let lines = zero_lines(&numbers(5), &numbers(6), value);
@@ -188,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shortest_lines_make_room() {
+    fn the_shortest_lines_are_removed_first() {
         let line = |points: usize| vec![[0.0, 0.0]; points];
         let mut cuts = [vec![line(2), line(7)], vec![line(4), line(2)]];
         leave_out_shortest(&mut cuts, 12);

@@ -1,11 +1,11 @@
-//! Long time histories as the few points that a picture can show.
+//! Min-max decimation: time histories reduced to the points that a picture can show.
 
-/// Indices of the points that keep the envelope: of each of `buckets` equal stretches of `xs`
-/// between `from` and `to`, the least and the greatest, in order, and the ends of the line. Every
-/// peak that a pixel column would show stays.
+/// Returns the indices of the points that keep the envelope of a curve: the least and the greatest
+/// value in each of `buckets` equal intervals of `xs` from `from` to `to`, and the ends of the
+/// line. Every peak that a pixel column would show stays.
 ///
-/// `xs` rises. A point that is not finite ends the line: the first of each run of them is kept. All
-/// points are kept where there are no more than two to a stretch.
+/// `xs` rises. A point that is not finite interrupts the line: the first of each run of them is
+/// kept. All points are kept if there are at most two for each interval.
 pub(crate) fn envelope(xs: &[f64], ys: &[f64], from: f64, to: f64, buckets: usize) -> Vec<usize> {
     if xs.len() <= 2 * buckets || buckets == 0 || to <= from {
         return (0..xs.len()).collect();
@@ -19,7 +19,8 @@ pub(crate) fn envelope(xs: &[f64], ys: &[f64], from: f64, to: f64, buckets: usiz
     for run in
         all.chunk_by(|&a, &b| finite(a) == finite(b) && (!finite(a) || bucket(a) == bucket(b)))
     {
-        let (start, end) = (run[0], run[run.len() - 1]);
+        let start = run[0];
+        let end = run[run.len() - 1];
         if !finite(start) {
             kept.push(start);
             continue;
@@ -41,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_peak_stays_and_few_points_do() {
+    fn peaks_are_kept_and_few_other_points() {
         let xs: Vec<f64> = (0..100_000).map(|k| f64::from(k) * 1e-3).collect();
         let mut ys: Vec<f64> = xs.iter().map(|x| (40.0 * x).sin()).collect();
         ys[54_321] = 7.0;
@@ -52,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hole_stays_a_hole() {
+    fn a_gap_of_the_curve_is_kept() {
         let xs: Vec<f64> = (0..10_000).map(f64::from).collect();
         let mut ys = vec![1.0; 10_000];
         ys[5000..6000].fill(f64::NAN);

@@ -1,10 +1,10 @@
-//! Why a figure could not be made.
+//! The errors of drawing a figure.
 
 use std::path::PathBuf;
 
 use sweep_files::FileError;
 
-/// What went wrong, where, and what to do about it.
+/// The error of drawing a figure: it says what went wrong, where, and what to do about it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
@@ -13,18 +13,12 @@ pub enum PlotError {
     File(#[from] FileError),
     /// A file that cannot be drawn.
     #[error("{}: {reason}", path.display())]
-    Undrawable {
-        /// Which file.
-        path: PathBuf,
-        /// Why not.
-        reason: String,
-    },
-    /// The rows do not lie on a grid.
+    Undrawable { path: PathBuf, reason: String },
+    /// A file whose rows do not lie on a grid.
     #[error("{}: {reason}; a map has one row per point of a full grid", path.display())]
     NotAGrid {
-        /// Which file.
         path: PathBuf,
-        /// What was found.
+        /// The finding that excludes a grid.
         reason: String,
     },
     /// An option or a name that does not fit the file, or the kind of output.
@@ -33,17 +27,17 @@ pub enum PlotError {
     /// A name that the file does not have.
     #[error("{refusal}")]
     NotThere {
-        /// What was asked for, where it is not, and what there is.
+        /// The message: the requested name, the place that lacks it, and the names that exist.
         refusal: String,
-        /// The name as typed.
+        /// The requested name.
         given: String,
-        /// The names that there are.
+        /// The names that exist.
         valid: Vec<String>,
     },
-    /// The figure cannot be drawn.
+    /// A figure that cannot be laid out or encoded.
     #[error("cannot draw the figure: {0}")]
     Drawing(String),
 }
 
-/// What there is unless the figure could not be made.
+/// A result with [`PlotError`] as its default error.
 pub(crate) type Result<T, E = PlotError> = std::result::Result<T, E>;

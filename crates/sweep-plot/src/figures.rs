@@ -1,4 +1,4 @@
-//! One figure a file.
+//! The figures: one module for each kind.
 
 pub(crate) mod boundary;
 pub(crate) mod curves;

@@ -1,56 +1,54 @@
-//! What all figures share: panels with axes, headings and legends.
+//! Parts that all figures share: panels with axes, headings and legends.
 
-use super::axis::{Scale, Tick};
+use super::axis::{AxisScale, Tick};
 use super::colour::FAILED;
 use super::raster::text_width;
 use super::scene::{Anchor, Colour, FAINT, Hatch, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
 
-/// Type sizes, px: legible at half a figure's size.
+/// Type size of titles, px. Basis: legible at half a figure's size.
 pub(crate) const TITLE_SIZE: f64 = 20.0;
-/// Axis labels, legends, subtitles.
+/// Type size of axis labels, legends and panel texts, px.
 pub(crate) const LABEL_SIZE: f64 = 16.0;
-/// Numbers at ticks.
+/// Type size of the numbers at ticks and of subtitles, px.
 pub(crate) const TICK_SIZE: f64 = 14.5;
 
-/// How far the numbers at an x axis reach beyond its ends at most, px.
-const OVERHANG: f64 = 7.0;
-/// Least room between two of them, px.
-const BETWEEN_NUMBERS: f64 = 6.0;
+/// Maximum overhang of the numbers at an x axis beyond its ends, px.
+const NUMBER_OVERHANG: f64 = 7.0;
+/// Minimum gap between two numbers at an x axis, px.
+const NUMBER_GAP: f64 = 6.0;
 
-/// A rectangle with an x and a y scale.
+/// A rectangle of a figure with an x and a y scale.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Panel {
-    /// Left edge, px.
+    /// The left edge, px.
     pub(crate) x: f64,
-    /// Top edge, px.
+    /// The top edge, px.
     pub(crate) y: f64,
-    /// px.
     pub(crate) width: f64,
-    /// px.
     pub(crate) height: f64,
-    /// Left to right.
-    pub(crate) xs: Scale,
-    /// Bottom to top.
-    pub(crate) ys: Scale,
+    /// The scale from left to right.
+    pub(crate) xs: AxisScale,
+    /// The scale from bottom to top.
+    pub(crate) ys: AxisScale,
 }
 
 impl Panel {
-    /// The position of a value, px.
+    /// Returns the pixel of a pair of values.
     pub(crate) fn at(&self, x: f64, y: f64) -> [f64; 2] {
         [self.at_x(x), self.at_y(y)]
     }
 
-    /// The position of a value from left to right, px.
+    /// Returns the horizontal pixel of an x value.
     pub(crate) fn at_x(&self, x: f64) -> f64 {
         self.x + self.xs.position(x) * self.width
     }
 
-    /// The position of a value from top to bottom, px.
+    /// Returns the vertical pixel of a y value.
     pub(crate) fn at_y(&self, y: f64) -> f64 {
         self.y + (1.0 - self.ys.position(y)) * self.height
     }
 
-    /// Its edge.
+    /// Returns the edge of the panel.
     pub(crate) fn outline(&self) -> Outline {
         Outline::rectangle(self.x, self.y, self.width, self.height)
     }
@@ -63,8 +61,8 @@ impl Panel {
         self.ys.ticks((self.height / 36.0).max(3.0) as usize)
     }
 
-    /// Faint lines at the ticks, to be drawn below the data.
-    pub(crate) fn rules(&self, scene: &mut Scene) {
+    /// Draws faint lines at the ticks; the data is drawn over them.
+    pub(crate) fn draw_grid_lines(&self, scene: &mut Scene) {
         let mut lines = Outline::default();
         for tick in self.x_ticks() {
             let x = self.at_x(tick.value);
@@ -77,22 +75,22 @@ impl Panel {
         scene.line(lines, Stroke::solid(FAINT, 1.0));
     }
 
-    /// The numbers at the x axis, and where their middles are, px: as many as have room beside each
-    /// other, at every tick, every second one and so on. Those at the ends do not reach into the
-    /// panels beside this one.
+    /// Returns the numbers at the x axis that fit, with their centres (px): those at every tick, or
+    /// at every second one, and so on. Numbers at the ends do not reach into neighbouring panels.
     fn numbers_that_fit(&self) -> Vec<(f64, String)> {
         let numbers = self.x_ticks().into_iter().map(|tick| {
             let width = text_width(&tick.label, TICK_SIZE, false);
-            let (left, right) = (self.x - OVERHANG, self.x + self.width + OVERHANG);
+            let left = self.x - NUMBER_OVERHANG;
+            let right = self.x + self.width + NUMBER_OVERHANG;
             let middle = self.at_x(tick.value).min(right - width / 2.0).max(left + width / 2.0);
             (middle, width, tick.label)
         });
         let numbers: Vec<_> = numbers.collect();
         let chosen = |every: usize, first: usize| numbers.iter().skip(first).step_by(every);
         let fits = |&(every, first): &(usize, usize)| {
-            chosen(every, first).zip(chosen(every, first).skip(1)).all(|(one, next)| {
-                (next.0 - one.0).abs() >= (one.1 + next.1) / 2.0 + BETWEEN_NUMBERS
-            })
+            chosen(every, first)
+                .zip(chosen(every, first).skip(1))
+                .all(|(one, next)| (next.0 - one.0).abs() >= (one.1 + next.1) / 2.0 + NUMBER_GAP)
         };
         let choices = (1..=numbers.len()).flat_map(|every| (0..every).map(move |k| (every, k)));
         let best = choices.filter(fits).max_by_key(|&(every, first)| {
@@ -102,21 +100,23 @@ impl Panel {
         chosen(every, first).map(|(middle, _, number)| (*middle, number.clone())).collect()
     }
 
-    /// Edge, ticks and numbers; without the numbers of an axis that is shared with the panel below
-    /// or to the left.
-    pub(crate) fn frame(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
+    /// Draws the edge, ticks and numbers. An axis shared with the panel below or to the left has no
+    /// numbers here.
+    pub(crate) fn draw_frame(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
         let numbers = self.x_ticks().into_iter().map(|tick| (self.at_x(tick.value), tick.label));
-        self.frame_with(scene, numbers.filter(|_| x_numbers).collect(), y_numbers);
+        self.draw_frame_with(scene, numbers.filter(|_| x_numbers).collect(), y_numbers);
     }
 
-    /// The same with others close beside it.
-    pub(crate) fn frame_beside(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
+    /// Draws the same as [`Self::draw_frame`] for a panel with close neighbours: numbers that would
+    /// touch are left out.
+    pub(crate) fn draw_frame_beside(&self, scene: &mut Scene, x_numbers: bool, y_numbers: bool) {
         let numbers = if x_numbers { self.numbers_that_fit() } else { Vec::new() };
-        self.frame_with(scene, numbers, y_numbers);
+        self.draw_frame_with(scene, numbers, y_numbers);
     }
 
-    fn frame_with(&self, scene: &mut Scene, x_numbers: Vec<(f64, String)>, y_numbers: bool) {
-        let (bottom, stroke) = (self.y + self.height, Stroke::solid(INK, 1.2));
+    fn draw_frame_with(&self, scene: &mut Scene, x_numbers: Vec<(f64, String)>, y_numbers: bool) {
+        let bottom = self.y + self.height;
+        let stroke = Stroke::solid(INK, 1.2);
         scene.line(self.outline(), stroke.clone());
         let mut marks = Outline::default();
         for tick in self.x_ticks() {
@@ -138,24 +138,24 @@ impl Panel {
         scene.line(marks, stroke);
     }
 
-    /// Sets a line of text in the middle: why nothing is drawn.
-    pub(crate) fn say(&self, scene: &mut Scene, text: &str) {
+    /// Writes a line of text in the middle of the panel: the reason for an empty panel.
+    pub(crate) fn write_centred(&self, scene: &mut Scene, text: &str) {
         let at = [self.x + self.width / 2.0, self.y + self.height / 2.0 + 0.35 * LABEL_SIZE];
         let text = Text::new(text, at, LABEL_SIZE).anchor(Anchor::Middle);
         scene.text(Text { colour: MUTED, ..text });
     }
 
-    /// What the x axis shows.
+    /// Writes the label of the x axis.
     pub(crate) fn x_label(&self, scene: &mut Scene, label: &str) {
         let at = [self.x + self.width / 2.0, self.y + self.height + 44.0];
         scene.text(Text::new(label, at, LABEL_SIZE).anchor(Anchor::Middle));
     }
 
-    /// What the y axis shows, `distance` px left of the panel; in two lines where one is longer
-    /// than the panel is high.
+    /// Writes the label of the y axis, `distance` px left of the panel; in two lines if it is
+    /// longer than the panel is high.
     pub(crate) fn y_label(&self, scene: &mut Scene, label: &str, distance: f64) {
         let fits = |text: &str| text_width(text, LABEL_SIZE, false) <= self.height;
-        // A unit, in brackets, stays whole.
+        // A unit, in brackets, stays on one line.
         let words_end = label.rfind(" (").map_or(label.len(), |place| place + 1);
         let spaces = label[..words_end].match_indices(' ').map(|(place, _)| place);
         let split = { spaces }.rfind(|&place| fits(&label[..place]));
@@ -171,19 +171,21 @@ impl Panel {
     }
 }
 
-/// Title, and a line below it that is shortened to fit.
+/// Writes the title, and below it the subtitle, shortened to fit.
 pub(crate) fn heading(scene: &mut Scene, title: &str, subtitle: &str) {
     let room = scene.width - 40.0;
-    scene.text(Text::new(fit(title, TITLE_SIZE, true, room), [20.0, 32.0], TITLE_SIZE).bold());
-    let subtitle = fit(subtitle, TICK_SIZE, false, room);
+    scene.text(
+        Text::new(cut_to_fit(title, TITLE_SIZE, true, room), [20.0, 32.0], TITLE_SIZE).bold(),
+    );
+    let subtitle = cut_to_fit(subtitle, TICK_SIZE, false, room);
     scene.text(Text { colour: MUTED, ..Text::new(subtitle, [20.0, 55.0], TICK_SIZE) });
 }
 
-/// Height taken by [`heading`], px.
+/// Height of [`heading`], px.
 pub(crate) const HEADING_HEIGHT: f64 = 72.0;
 
-/// `text`, or as much of it as fits into `room` px.
-fn fit(text: &str, size: f64, bold: bool, room: f64) -> String {
+/// Returns `text`, cut short to fit `room` px.
+fn cut_to_fit(text: &str, size: f64, bold: bool, room: f64) -> String {
     let mut shown: String = text.to_owned();
     while text_width(&shown, size, bold) > room {
         let kept = shown.trim_end_matches('…').chars().count().saturating_sub(1);
@@ -192,51 +194,57 @@ fn fit(text: &str, size: f64, bold: bool, room: f64) -> String {
     shown
 }
 
-/// The sign before a legend's text.
+/// The symbol before a legend's text.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Sign {
+pub(crate) enum LegendSymbol {
     /// A line as drawn in the figure.
     Line(Stroke),
-    /// A coloured area.
     Area(Colour),
-    /// A hatched area: failed points.
+    /// A hatched grey area: failed points.
     Failed,
-    /// A hatch without a ground of its own.
+    /// A hatch without a background.
     Hatched(Hatch),
-    /// A dotted mark: undefined points.
+    /// A white area with a dot: undefined points.
     Undefined,
-    /// A shape around the origin, filled or not.
+    /// A shape around the origin, whether it is filled, and its colour.
     Shape(Outline, bool, Colour),
 }
 
 /// Height of a row of a legend, px.
 const LEGEND_ROW: f64 = 25.0;
 
-/// Height of a legend in `width` px, px.
-pub(crate) fn legend_height(entries: &[(Sign, String)], width: f64) -> f64 {
+/// Returns the height of a legend in `width` px, px.
+pub(crate) fn legend_height(entries: &[(LegendSymbol, String)], width: f64) -> f64 {
     LEGEND_ROW * lay_out(entries, width).last().map_or(0, |(_, row)| row + 1) as f64
 }
 
 /// Draws a legend below `y`, px.
-pub(crate) fn legend(scene: &mut Scene, entries: &[(Sign, String)], x: f64, y: f64, width: f64) {
+pub(crate) fn legend(
+    scene: &mut Scene,
+    entries: &[(LegendSymbol, String)],
+    x: f64,
+    y: f64,
+    width: f64,
+) {
     for ((sign, text), (offset, row)) in entries.iter().zip(lay_out(entries, width)) {
-        let (x, y) = (x + offset, y + LEGEND_ROW / 2.0 + row as f64 * LEGEND_ROW);
+        let x = x + offset;
+        let y = y + LEGEND_ROW / 2.0 + row as f64 * LEGEND_ROW;
         let area = Outline::rectangle(x, y - 8.0, 28.0, 16.0);
         match sign {
-            Sign::Line(stroke) => {
+            LegendSymbol::Line(stroke) => {
                 scene.line(Outline::line(&[[x, y], [x + 28.0, y]]), stroke.clone())
             }
-            Sign::Area(colour) => {
+            LegendSymbol::Area(colour) => {
                 scene.fill(area.clone(), *colour);
                 scene.line(area, Stroke::solid(MUTED, 1.0));
             }
-            Sign::Failed => failed(scene, area),
-            Sign::Hatched(hatch) => {
+            LegendSymbol::Failed => failed(scene, area),
+            LegendSymbol::Hatched(hatch) => {
                 scene.hatch(area.clone(), hatch);
                 scene.line(area, Stroke::solid(MUTED, 1.0));
             }
-            Sign::Undefined => undefined(scene, &[[x, y - 8.0, 28.0, 16.0]]),
-            Sign::Shape(outline, filled, colour) => {
+            LegendSymbol::Undefined => undefined(scene, &[[x, y - 8.0, 28.0, 16.0]]),
+            LegendSymbol::Shape(outline, filled, colour) => {
                 let outline = outline.moved([x + 14.0, y]);
                 if *filled {
                     scene.fill(outline, *colour);
@@ -249,10 +257,11 @@ pub(crate) fn legend(scene: &mut Scene, entries: &[(Sign, String)], x: f64, y: f
     }
 }
 
-/// Offset and row of each entry.
-fn lay_out(entries: &[(Sign, String)], width: f64) -> Vec<(f64, usize)> {
-    let (mut x, mut row) = (0.0, 0);
-    let place = |(_, text): &(Sign, String)| {
+/// Returns the horizontal offset (px) and the row of each entry.
+fn lay_out(entries: &[(LegendSymbol, String)], width: f64) -> Vec<(f64, usize)> {
+    let mut x = 0.0;
+    let mut row = 0;
+    let place = |(_, text): &(LegendSymbol, String)| {
         let taken = 36.0 + text_width(text, TICK_SIZE, false);
         if x > 0.0 && x + taken > width {
             (x, row) = (0.0, row + 1);
@@ -270,12 +279,13 @@ pub(crate) fn failed(scene: &mut Scene, area: Outline) {
     scene.hatch(area, &failed_hatch());
 }
 
-/// Lines over points that failed.
+/// Returns the hatch of cells with failed points.
 pub(crate) fn failed_hatch() -> Hatch {
     Hatch { strokes: vec![Stroke::solid(INK, 1.2)], spacing: 9.0, falling: false }
 }
 
-/// Lines over points whose motion is chaotic: light on dark, to show on every colour of a scale.
+/// Returns the hatch of cells with chaotic motion: light and dark lines, which show on every
+/// colour.
 pub(crate) fn sensitive_hatch() -> Hatch {
     let strokes = vec![Stroke::solid(INK, 2.4), Stroke::solid(PAPER, 1.0)];
     Hatch { strokes, spacing: 7.0, falling: true }
@@ -283,7 +293,8 @@ pub(crate) fn sensitive_hatch() -> Hatch {
 
 /// Draws cells `[x, y, width, height]` of undefined points: white with a dot in the middle.
 pub(crate) fn undefined(scene: &mut Scene, cells: &[[f64; 4]]) {
-    let (mut area, mut dots) = (Outline::default(), Outline::default());
+    let mut area = Outline::default();
+    let mut dots = Outline::default();
     for &[x, y, width, height] in cells {
         area.add_rectangle(x, y, width, height);
         let side = 4.0_f64.min(0.4 * width.min(height));

@@ -1,26 +1,27 @@
-//! A map file's rows gathered into the cells of its grid, batch by batch. Memory depends on the
-//! number of cells, not of rows.
+//! Collects the rows of a map file into the cells of its grid, batch by batch. Memory depends on
+//! the number of cells, not of rows.
 //!
-//! A cell of one point has that point's values. A cell of several has the worst of them, column by
-//! column: the greatest, or the least of what is the worse the less it is. It counts its reliable,
-//! unreliable and failed points.
+//! A cell of one point has that point's values. A cell of several points has the worst value of
+//! each column: the greatest, or the least where less is worse. It counts its reliable, unreliable
+//! and failed points.
 
 use std::collections::BTreeMap;
 
 use super::error::{PlotError, Result};
 use super::grid::Grid;
-use super::read::{ColumnFacts, Row, Source, is_ratio};
-use super::table::{Column, NONE, SEVERAL, Table, Values, Words};
+use super::read::{ColumnFacts, FigureFile, FigureRow, is_ratio};
+use super::table::{FigureColumn, FigureTable, NONE, SEVERAL, Values, Words};
 use sweep_parameter::Worse;
 
-/// Least, least positive and greatest finite value of a column over all rows of the file.
+/// The least, the least positive and the greatest finite value of a column over all rows of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Extent([f64; 3]);
+pub(crate) struct ValueRange([f64; 3]);
 
-impl Extent {
+impl ValueRange {
+    /// The range of no values.
     const NONE: Self = Self([f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY]);
 
-    fn take(&mut self, value: f64) {
+    fn add(&mut self, value: f64) {
         let [low, least_positive, high] = &mut self.0;
         if value.is_finite() {
             (*low, *high) = (low.min(value), high.max(value));
@@ -30,126 +31,125 @@ impl Extent {
         }
     }
 
-    /// Values with the same extremes as all, and as all that are positive.
+    /// Yields values with the same extremes as all values, and as all positive ones.
     pub(crate) fn values(self) -> impl Iterator<Item = f64> {
         self.0.into_iter().filter(|value| value.is_finite())
     }
 }
 
-/// How many of a cell's points are what.
+/// The number of a cell's points of each kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Counts {
-    /// All of them.
     pub(crate) points: u32,
-    /// Whose ratio is below the limit.
+    /// Points whose verdict is reliable.
     pub(crate) reliable: u32,
-    /// Whose ratio is at the limit or above.
+    /// Points whose verdict is unreliable.
     pub(crate) unreliable: u32,
-    /// Whose status is not `ok`.
+    /// Points whose status is not `ok`.
     pub(crate) failed: u32,
-    /// Whose motion is chaotic.
+    /// Points whose motion is chaotic.
     pub(crate) sensitive: u32,
 }
 
-/// Where a cell's points lie about a level.
+/// The sides of a limit on which the points of each cell lie.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Sides {
-    /// Cells with points on both sides of the level.
+    /// Whether a cell has points on both sides of the limit.
     pub(crate) both: Vec<bool>,
-    /// Cells with points that did not fail and yet have no value.
+    /// Whether a cell has points that did not fail and yet have no value.
     pub(crate) undefined: Vec<bool>,
-    /// The mean of each cell's values, by the logarithm where distances are.
+    /// The mean of each cell's values; the geometric mean of ratios.
     pub(crate) mean: Vec<f64>,
 }
 
-/// A map file in cells.
+/// A map file collected into cells.
 #[derive(Debug)]
-pub(crate) struct Map {
-    /// One row per cell in grid order.
-    pub(crate) table: Table,
-    /// Where the cells are.
+pub(crate) struct CellMap {
+    /// The table with a row for each cell, in grid order.
+    pub(crate) table: FigureTable,
     pub(crate) grid: Grid,
-    /// How many points of each cell are what.
+    /// The number of points of each kind in each cell.
     pub(crate) counts: Vec<Counts>,
-    /// Of each column the range of its numbers, and the sides of its limit on which the points of a
-    /// cell lie; none without a limit, or where each cell is one point.
-    pub(crate) seen: BTreeMap<String, (Extent, Option<Sides>)>,
-    /// Rows of the whole file by their status.
+    /// The range of each column over all rows, and the sides of its limit in each cell; no sides
+    /// without a limit, or if each cell is one point.
+    pub(crate) seen: BTreeMap<String, (ValueRange, Option<Sides>)>,
+    /// The number of rows of the file by status.
     pub(crate) statuses: BTreeMap<String, usize>,
 }
 
-/// Status of a row whose file does not say.
+/// The status of a row whose file has none.
 const UNKNOWN: &str = "unknown";
-/// Status of a point with a result.
+/// The status of a point with a result.
 pub(crate) const OK: &str = "ok";
 
-impl Map {
+impl CellMap {
     /// Reads the named columns of a map file into the cells of a grid.
     ///
     /// # Errors
-    /// As [`Source::each_row`]; [`PlotError::NotAGrid`] for two rows at one point.
-    pub(crate) fn read(source: Source, grid: Grid, columns: &[String]) -> Result<Self> {
+    /// As [`FigureFile::each_row`]; [`PlotError::NotAGrid`] for two rows at one point.
+    pub(crate) fn read(source: FigureFile, grid: Grid, columns: &[String]) -> Result<Self> {
         let names = grid.axes.iter().map(|axis| axis.swept.name.as_str());
         let names = names.chain(["status", "reliable", "sensitive", "ratio_max"]);
-        let own: Vec<&ColumnFacts> =
+        let shown: Vec<&ColumnFacts> =
             source.columns.iter().filter(|column| columns.contains(&column.name)).collect();
-        let names: Vec<&str> = names.chain(own.iter().map(|facts| facts.name.as_str())).collect();
-        let mut gather = Gather::new(&source, &grid, &own);
-        source.each_row(&names, |row| gather.take(row))?;
-        let Gather { columns, counts, statuses, .. } = gather;
-        let (mut seen, mut kept) = (BTreeMap::new(), Vec::with_capacity(columns.len()));
-        for Gathered { facts, mut values, extent, dividing, .. } in columns {
+        let names: Vec<&str> = names.chain(shown.iter().map(|facts| facts.name.as_str())).collect();
+        let mut collector = CellCollector::new(&source, &grid, &shown);
+        source.each_row(&names, |row| collector.add(row))?;
+        let CellCollector { columns, counts, statuses, .. } = collector;
+        let mut seen = BTreeMap::new();
+        let mut kept = Vec::with_capacity(columns.len());
+        for CellColumn { facts, mut values, extent, dividing, .. } in columns {
             if let Values::Words(words) = &mut values {
                 words.sort();
             }
-            seen.insert(facts.name.clone(), (extent, dividing.map(Dividing::sides)));
-            kept.push(Column { facts: facts.clone(), values });
+            seen.insert(facts.name.clone(), (extent, dividing.map(SideCollector::sides)));
+            kept.push(FigureColumn { facts: facts.clone(), values });
         }
-        let table = Table { rows: grid.cells(), columns: kept, source, stretch: None };
+        let table = FigureTable { rows: grid.cells(), columns: kept, source, bucket_rows: None };
         Ok(Self { table, grid, counts, seen, statuses })
     }
 
-    /// The cell at `x` on the first axis, `y` on the second, and `rest` on those after, if the file
-    /// has a point in it.
+    /// Returns the cell at index `x` of the first axis, `y` of the second and `rest` of the others,
+    /// if the file has a point in it.
     pub(crate) fn cell(&self, x: usize, y: usize, rest: &[usize]) -> Option<usize> {
         Some(self.grid.cell(x, y, rest)).filter(|&cell| self.filled(cell))
     }
 
-    /// Whether the file has a point in the cell.
+    /// Returns whether the file has a point in the cell.
     pub(crate) fn filled(&self, cell: usize) -> bool {
         self.counts[cell].points > 0
     }
 
-    /// The status of each cell: none where its points differ in it.
+    /// Returns the status of a cell's points; `None` if they differ.
     pub(crate) fn status(&self, cell: usize) -> Option<&str> {
-        let words = self.table.column("status").and_then(Column::words)?;
+        let words = self.table.column("status").and_then(FigureColumn::words)?;
         match words.codes.get(cell) {
             Some(&SEVERAL) => None,
             _ => Some(words.get(cell).unwrap_or(UNKNOWN)),
         }
     }
 
-    /// How many rows of the file failed.
+    /// Returns the number of failed rows of the file.
     pub(crate) fn failed(&self) -> usize {
         self.statuses.iter().filter(|(status, _)| *status != OK).map(|(_, rows)| rows).sum()
     }
 }
 
-/// What becomes of the values of a cell's points.
+/// The rule that reduces the values of a cell's points to one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Rule {
+enum CellReduction {
     Greatest,
     Least,
-    /// That of the point with the greatest ratio.
-    OfGreatestRatio,
-    /// The word that all have.
+    /// The value of the point with the greatest ratio.
+    AtGreatestRatio,
+    /// The word that all points have.
     Common,
 }
 
-impl Rule {
-    fn of(column: &ColumnFacts) -> Self {
+impl CellReduction {
+    fn for_column(column: &ColumnFacts) -> Self {
         match column.name.as_str() {
-            "point" | "ratio_max_channel" => Self::OfGreatestRatio,
+            "point" | "ratio_max_channel" => Self::AtGreatestRatio,
             _ if !column.is_number() => Self::Common,
             _ if column.worse == Some(Worse::Less) => Self::Least,
             _ => Self::Greatest,
@@ -157,35 +157,36 @@ impl Rule {
     }
 }
 
-/// A column on its way into cells.
-struct Gathered<'a> {
+/// A column while its rows are collected into cells.
+struct CellColumn<'a> {
     facts: &'a ColumnFacts,
-    rule: Rule,
+    rule: CellReduction,
     values: Values,
-    extent: Extent,
-    dividing: Option<Dividing>,
+    extent: ValueRange,
+    dividing: Option<SideCollector>,
 }
 
-/// Cells on their way to [`Sides`].
-struct Dividing {
-    /// In the column's own unit.
+/// The sides of a limit while rows are collected.
+struct SideCollector {
+    /// The limit in the column's own unit.
     level: f64,
-    /// Whether distances from it are taken by the logarithm.
+    /// Whether the mean is taken of logarithms.
     log: bool,
-    /// Whether a cell has points below the level, and at it or above.
+    /// Whether a cell has points below the limit, and at or above it.
     sides: Vec<[bool; 2]>,
     undefined: Vec<bool>,
-    /// Sum and count of the values, or of their logarithms.
+    /// The sum and the count of the values or their logarithms.
     sums: Vec<(f64, u32)>,
 }
 
-impl Dividing {
+impl SideCollector {
     fn new(level: f64, log: bool, cells: usize) -> Self {
-        let (sides, undefined) = (vec![[false; 2]; cells], vec![false; cells]);
+        let sides = vec![[false; 2]; cells];
+        let undefined = vec![false; cells];
         Self { level, log, sides, undefined, sums: vec![(0.0, 0); cells] }
     }
 
-    fn take(&mut self, cell: usize, value: f64, failed: bool) {
+    fn add(&mut self, cell: usize, value: f64, failed: bool) {
         let even = if self.log { value.ln() } else { value };
         if even.is_finite() {
             self.sides[cell][usize::from(value >= self.level)] = true;
@@ -209,38 +210,38 @@ impl Dividing {
     }
 }
 
-/// All columns on their way into cells.
-struct Gather<'a> {
-    source: &'a Source,
+/// All columns while rows are collected into cells.
+struct CellCollector<'a> {
+    source: &'a FigureFile,
     grid: &'a Grid,
-    columns: Vec<Gathered<'a>>,
+    columns: Vec<CellColumn<'a>>,
     counts: Vec<Counts>,
-    /// First row of each cell.
+    /// The first row of each cell.
     first: Vec<usize>,
-    /// Greatest ratio of each cell so far.
+    /// The greatest ratio of each cell so far.
     greatest: Vec<f64>,
-    /// Rows by their status.
+    /// The number of rows by status.
     statuses: BTreeMap<String, usize>,
-    /// Value and place last found on each axis.
+    /// The last value of each axis and its index: rows in grid order repeat values.
     last: Vec<(f64, Option<usize>)>,
-    /// By which a row is judged where the file has no verdicts.
+    /// The limit of the ratio, if the file has no verdicts.
     limit: Option<f64>,
 }
 
-impl<'a> Gather<'a> {
-    fn new(source: &'a Source, grid: &'a Grid, columns: &[&'a ColumnFacts]) -> Self {
+impl<'a> CellCollector<'a> {
+    fn new(source: &'a FigureFile, grid: &'a Grid, columns: &[&'a ColumnFacts]) -> Self {
         let cells = grid.cells();
-        let columns = columns.iter().map(|&facts| Gathered {
-            rule: Rule::of(facts),
+        let columns = columns.iter().map(|&facts| CellColumn {
+            rule: CellReduction::for_column(facts),
             values: match facts.is_number() {
                 true => Values::Numbers(vec![f64::NAN; cells]),
                 false => Values::Words(Words::none(cells)),
             },
-            extent: Extent::NONE,
-            // A cell of one point lies on one side, and its value is its mean.
+            extent: ValueRange::NONE,
+            // A cell of one point needs no sides: its value is its mean.
             dividing: { source.limit(facts) }
                 .filter(|_| grid.merged())
-                .map(|level| Dividing::new(level, is_ratio(facts), cells)),
+                .map(|level| SideCollector::new(level, is_ratio(facts), cells)),
             facts,
         });
         Self {
@@ -256,8 +257,8 @@ impl<'a> Gather<'a> {
         }
     }
 
-    /// Takes a row: the values of the axes, what became of the point, and the columns.
-    fn take(&mut self, row: Row<'_>) -> Result<()> {
+    /// Adds a row: the values of the axes, the status of the point, and the columns.
+    fn add(&mut self, row: FigureRow<'_>) -> Result<()> {
         let mut cell = Some(0);
         for (column, (axis, last)) in self.grid.axes.iter().zip(&mut self.last).enumerate() {
             let value = row.number(column);
@@ -276,20 +277,21 @@ impl<'a> Gather<'a> {
         let failed = status != Some(OK);
         let is_worst = cell.map(|cell| self.count(cell, row, failed)).transpose()?;
         for (column, gathered) in (own + 4..).zip(&mut self.columns) {
-            gathered.take((row, column), cell.zip(is_worst), failed);
+            gathered.add((row, column), cell.zip(is_worst), failed);
         }
         Ok(())
     }
 
-    /// Counts what a row is; gives whether it has the greatest ratio of its cell so far.
-    fn count(&mut self, cell: usize, row: Row<'_>, failed: bool) -> Result<bool> {
+    /// Counts the kind of a row's point. Returns whether its ratio is the greatest of its cell so
+    /// far.
+    fn count(&mut self, cell: usize, row: FigureRow<'_>, failed: bool) -> Result<bool> {
         let own = self.last.len();
         let counts = &mut self.counts[cell];
         let is_full = |points| counts.points as usize >= points;
         if counts.points == 0 {
             self.first[cell] = row.index();
         } else if self.grid.points(cell).is_some_and(is_full) {
-            return Err(self.twice(cell, row.index()));
+            return Err(self.repeated_point(cell, row.index()));
         }
         let [verdict, sensitive] = [1, 2].map(|k| row.word(own + k));
         let ratio = row.number(own + 3);
@@ -310,7 +312,7 @@ impl<'a> Gather<'a> {
         Ok(is_worst)
     }
 
-    fn twice(&self, cell: usize, row: usize) -> PlotError {
+    fn repeated_point(&self, cell: usize, row: usize) -> PlotError {
         let first = self.first[cell];
         let reason = match self.grid.points(cell) {
             Some(1) => format!("rows {first} and {row} are the same point"),
@@ -320,35 +322,40 @@ impl<'a> Gather<'a> {
     }
 }
 
-impl Gathered<'_> {
-    /// Takes what a row has in a column, into a cell if it is shown; whether the row has the
-    /// greatest ratio of the cell so far.
-    fn take(&mut self, (row, column): (Row<'_>, usize), cell: Option<(usize, bool)>, failed: bool) {
+impl CellColumn<'_> {
+    /// Adds a row's value of the column, to a cell if the row lies in one. The `bool` beside the
+    /// cell says whether the row has the greatest ratio of the cell so far.
+    fn add(
+        &mut self,
+        (row, column): (FigureRow<'_>, usize),
+        cell: Option<(usize, bool)>,
+        failed: bool,
+    ) {
         match &mut self.values {
             Values::Numbers(kept) => {
                 let value = row.number(column);
-                self.extent.take(value);
+                self.extent.add(value);
                 let Some((cell, is_worst)) = cell else { return };
                 let known = kept[cell];
                 let takes = match self.rule {
-                    Rule::Least => value < known,
-                    Rule::OfGreatestRatio => is_worst,
-                    Rule::Greatest | Rule::Common => value > known,
+                    CellReduction::Least => value < known,
+                    CellReduction::AtGreatestRatio => is_worst,
+                    CellReduction::Greatest | CellReduction::Common => value > known,
                 };
                 if takes || known.is_nan() {
                     kept[cell] = value;
                 }
                 if let Some(dividing) = &mut self.dividing {
-                    dividing.take(cell, value, failed);
+                    dividing.add(cell, value, failed);
                 }
             }
             Values::Words(words) => {
                 let Some((cell, is_worst)) = cell else { return };
                 let code = words.code(row.word(column));
                 let known = &mut words.codes[cell];
-                if *known == NONE || (self.rule == Rule::OfGreatestRatio && is_worst) {
+                if *known == NONE || (self.rule == CellReduction::AtGreatestRatio && is_worst) {
                     *known = code;
-                } else if self.rule == Rule::Common && code != NONE && code != *known {
+                } else if self.rule == CellReduction::Common && code != NONE && code != *known {
                     *known = SEVERAL;
                 }
             }

@@ -1,157 +1,159 @@
-//! The cells of a map: one for each grid point, or for a block of them where a figure could not
+//! The cells of a map: one for each grid point, or one for a block of points if a figure cannot
 //! show so many.
 
-use super::axis::Scale;
+use super::axis::AxisScale;
 use super::label;
-use super::swept::{MOST_VALUES, SweptAxis};
+use super::swept::{MAX_VALUES, SweptAxis};
 
-/// A swept parameter as the map shows it.
+/// A swept parameter with the cells along it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct GridAxis {
     /// The parameter with its values.
     #[serde(flatten)]
     pub(crate) swept: SweptAxis,
-    /// Rising: the value of each place, of a block the middle.
+    /// The rising value of each cell; the middle of a block.
     pub(crate) values: Vec<f64>,
-    /// The borders of the cells around the values, one more than those: halfway between neighbours.
+    /// The borders of the cells, one more than there are cells: halfway between neighbours.
     pub(crate) borders: Vec<f64>,
-    /// First and last value of each block; none where each value has a place of its own.
+    /// The first and the last value of each block; `None` if each value has a cell of its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) spans: Option<Vec<[f64; 2]>>,
-    /// How a value finds its place.
+    /// The rule that maps a value to its cell.
     #[serde(skip)]
-    places: Places,
+    places: CellLookup,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Places {
-    /// This many neighbouring values share a place, fewer the last one.
+enum CellLookup {
+    /// Blocks of this many neighbouring values; the last may have fewer.
     Blocks(usize),
-    /// The values have a place, and no others.
+    /// A cell for each picked value, and none for other values.
     Picked,
-    /// The borders place a value, where an axis is known by its range alone.
+    /// The cell between whose borders a value lies: an axis that is known by its range alone.
     Borders,
 }
 
 impl GridAxis {
-    /// An axis whose neighbouring values share a place, `size` of them each.
+    /// Returns an axis whose cells are blocks of `size` neighbouring values.
     fn in_blocks(axis: &SweptAxis, size: usize) -> Self {
-        let even = axis.evened(&axis.values);
-        let last = even.len() - 1;
-        let starts = (0..even.len()).step_by(size);
+        let coordinates = axis.coordinates(&axis.values);
+        let last = coordinates.len() - 1;
+        let starts = (0..coordinates.len()).step_by(size);
         let blocks: Vec<_> = starts.map(|start| [start, (start + size - 1).min(last)]).collect();
-        let middle = |[from, to]: [usize; 2]| (even[from] + even[to]) / 2.0;
+        let middle = |[from, to]: [usize; 2]| (coordinates[from] + coordinates[to]) / 2.0;
         let (first_half, last_half) = if last == 0 {
-            // A lone value gets a cell of its own size, so that there is something to see.
-            let half = if axis.log || even[0] == 0.0 { 0.5 } else { 0.05 * even[0].abs() };
+            // A single value gets a cell with a width, so that it is visible.
+            let half =
+                if axis.log || coordinates[0] == 0.0 { 0.5 } else { 0.05 * coordinates[0].abs() };
             (half, half)
         } else {
-            (middle([0, 1]) - even[0], even[last] - middle([last - 1, last]))
+            (middle([0, 1]) - coordinates[0], coordinates[last] - middle([last - 1, last]))
         };
-        let mut borders = vec![even[0] - first_half];
+        let mut borders = vec![coordinates[0] - first_half];
         borders.extend(blocks.windows(2).map(|pair| middle([pair[0][1], pair[1][0]])));
-        borders.push(even[last] + last_half);
-        let borders = borders.into_iter().map(|border| axis.un_even(border)).collect();
-        let places = Places::Blocks(size);
+        borders.push(coordinates[last] + last_half);
+        let borders = borders.into_iter().map(|border| axis.from_coordinate(border)).collect();
+        let places = CellLookup::Blocks(size);
         if size == 1 {
             return Self { places, ..Self::new(axis, axis.values.clone(), borders) };
         }
-        let values = blocks.iter().map(|block| axis.un_even(middle(*block))).collect();
+        let values = blocks.iter().map(|block| axis.from_coordinate(middle(*block))).collect();
         let spans = blocks.iter().map(|block| block.map(|end| axis.values[end])).collect();
         Self { spans: Some(spans), places, ..Self::new(axis, values, borders) }
     }
 
-    /// An axis known by its range alone, in `count` equal parts.
+    /// Returns an axis that is known by its range alone, in `count` equal cells.
     fn in_parts(axis: &SweptAxis, count: usize) -> Self {
-        let even = axis.evened(&axis.values);
-        let border = |k: usize| even[0] + (even[1] - even[0]) * k as f64 / count as f64;
-        let borders: Vec<f64> = (0..=count).map(|k| axis.un_even(border(k))).collect();
-        let values = (0..count).map(|k| axis.un_even((border(k) + border(k + 1)) / 2.0)).collect();
+        let coordinates = axis.coordinates(&axis.values);
+        let border =
+            |k: usize| coordinates[0] + (coordinates[1] - coordinates[0]) * k as f64 / count as f64;
+        let borders: Vec<f64> = (0..=count).map(|k| axis.from_coordinate(border(k))).collect();
+        let values =
+            (0..count).map(|k| axis.from_coordinate((border(k) + border(k + 1)) / 2.0)).collect();
         let spans = borders.windows(2).map(|pair| [pair[0], pair[1]]).collect();
         Self { spans: Some(spans), ..Self::new(axis, values, borders) }
     }
 
-    /// An axis of which some values are shown.
+    /// Returns an axis with cells for some picked values.
     fn picked(axis: &SweptAxis, picks: &[usize]) -> Self {
         let values: Vec<f64> = picks.iter().map(|&pick| axis.values[pick]).collect();
         let shown = SweptAxis { values, ..axis.clone() };
-        Self { places: Places::Picked, ..Self::in_blocks(&shown, 1) }
+        Self { places: CellLookup::Picked, ..Self::in_blocks(&shown, 1) }
     }
 
     fn new(axis: &SweptAxis, values: Vec<f64>, borders: Vec<f64>) -> Self {
-        Self { swept: axis.clone(), values, borders, spans: None, places: Places::Borders }
+        Self { swept: axis.clone(), values, borders, spans: None, places: CellLookup::Borders }
     }
 
-    /// From the first border to the last.
-    pub(crate) fn scale(&self) -> Scale {
-        Scale {
+    /// Returns the scale from the first border to the last.
+    pub(crate) fn scale(&self) -> AxisScale {
+        AxisScale {
             log: self.swept.log,
             from: self.borders[0],
             to: self.borders[self.borders.len() - 1],
         }
     }
 
-    /// Words and unit.
     pub(crate) fn label(&self) -> String {
         label::with_unit(&self.swept.words, &self.swept.unit)
     }
 
-    /// The values in the units in which the axis is even.
-    pub(crate) fn even(&self) -> Vec<f64> {
-        self.swept.evened(&self.values)
+    /// Returns the coordinates of the cells along the axis: logarithms on a logarithmic axis.
+    pub(crate) fn coordinates(&self) -> Vec<f64> {
+        self.swept.coordinates(&self.values)
     }
 
-    /// The place that one of the axis' values belongs to; none if it is not shown.
+    /// Returns the index of the cell of one of the axis' values; `None` if it is not shown.
     pub(crate) fn place(&self, value: f64) -> Option<usize> {
         let values = &self.swept.values;
         let place = values.partition_point(|known| *known < value);
         match self.places {
-            Places::Blocks(size) => Some(place.min(values.len() - 1) / size),
-            Places::Picked => {
+            CellLookup::Blocks(size) => Some(place.min(values.len() - 1) / size),
+            CellLookup::Picked => {
                 values.get(place).is_some_and(|known| *known == value).then_some(place)
             }
-            Places::Borders => {
+            CellLookup::Borders => {
                 let place = self.borders.partition_point(|&border| border <= value);
                 Some(place.clamp(1, self.values.len()) - 1)
             }
         }
     }
 
-    /// The place of the axis' value that a number is, but for what writing it as text may have
-    /// lost.
+    /// Returns the index of the cell of a value that was rounded when it was written as text.
     pub(crate) fn place_near(&self, value: f64) -> Option<usize> {
-        if self.places == Places::Borders {
+        if self.places == CellLookup::Borders {
             return self.place(value);
         }
-        let known = self.swept.values.iter().find(|&&known| SweptAxis::near(known, value))?;
+        let known = self.swept.values.iter().find(|&&known| SweptAxis::is_near(known, value))?;
         self.place(*known)
     }
 
-    /// How many of the axis' values share a place; none where that is not known.
+    /// Returns the number of the axis' values in a cell; `None` if it is not known.
     fn shared(&self, place: usize) -> Option<usize> {
         match self.places {
-            Places::Blocks(size) => Some(size.min(self.swept.values.len() - place * size)),
-            Places::Picked => Some(1),
-            Places::Borders => None,
+            CellLookup::Blocks(size) => Some(size.min(self.swept.values.len() - place * size)),
+            CellLookup::Picked => Some(1),
+            CellLookup::Borders => None,
         }
     }
 }
 
-/// The cells of a map, on the grid of its axes.
+/// The cells of a map on the grid of its axes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Grid {
-    /// In file order; the first varies slowest.
+    /// The axes in file order; the first varies slowest.
     pub(crate) axes: Vec<GridAxis>,
-    /// Most values of the first two axes in a cell; none where an axis is known by its range alone.
+    /// The maximum number of values of the first two axes in a cell; `None` for an axis that is
+    /// known by its range alone.
     pub(crate) block: [Option<usize>; 2],
 }
 
 impl Grid {
-    /// At most about `most` cells: those of the first two axes, merged into blocks where there are
-    /// more, for each of the values picked of every axis after them.
+    /// Returns a grid of about `most` cells at most. Cells of the first two axes are blocks if
+    /// there are more points; every axis after them has its picked values.
     pub(crate) fn new(axes: &[SweptAxis], picks: &[Vec<usize>], most: usize) -> Self {
         let cuts: usize = picks.iter().map(Vec::len).product();
-        let wanted = |axis: &SweptAxis| if axis.complete { axis.values.len() } else { MOST_VALUES };
+        let wanted = |axis: &SweptAxis| if axis.complete { axis.values.len() } else { MAX_VALUES };
         let counts = [0, 1].map(|k| axes.get(k).map_or(1, wanted));
         let shown = sides(counts, most / cuts.max(1));
         let mut block = [Some(1); 2];
@@ -168,27 +170,28 @@ impl Grid {
         Self { axes: grid, block }
     }
 
-    /// Whether a cell can hold more than one point.
+    /// Returns whether a cell can hold more than one point.
     pub(crate) fn merged(&self) -> bool {
         self.block != [Some(1); 2]
     }
 
-    /// How many cells there are.
+    /// Returns the number of cells.
     pub(crate) fn cells(&self) -> usize {
         self.axes.iter().map(|axis| axis.values.len()).product()
     }
 
-    /// Index of a cell in grid order, from its place on each axis.
+    /// Returns the index of a cell in grid order, from its index on each axis.
     pub(crate) fn index(&self, at: impl IntoIterator<Item = usize>) -> usize {
         self.axes.iter().zip(at).fold(0, |index, (axis, place)| index * axis.values.len() + place)
     }
 
-    /// Index of the cell at `x` on the first axis, `y` on the second, and `rest` on those after.
+    /// Returns the index of the cell at `x` of the first axis, `y` of the second and `rest` of the
+    /// others.
     pub(crate) fn cell(&self, x: usize, y: usize, rest: &[usize]) -> usize {
         self.index([x, y].into_iter().chain(rest.iter().copied()))
     }
 
-    /// How many grid points a cell has; none where that is not known.
+    /// Returns the number of grid points of a cell; `None` if it is not known.
     pub(crate) fn points(&self, cell: usize) -> Option<usize> {
         let mut rest = cell;
         self.axes.iter().rev().try_fold(1, |points: usize, axis| {
@@ -198,21 +201,21 @@ impl Grid {
         })
     }
 
-    /// What a cell holds, in words, where it can be more than one point.
+    /// Returns the subtitle's note on cells of several points; `None` if each cell is one point.
     pub(crate) fn note(&self) -> Option<String> {
-        let said = match self.block {
+        let phrase = match self.block {
             [Some(1), Some(1)] => return None,
             [Some(x), Some(1)] => format!("{x} points"),
             [Some(1), Some(y)] => format!("{y} points"),
             [Some(x), Some(y)] => format!("{x} by {y} points"),
             _ => "many points".to_owned(),
         };
-        Some(format!("a cell holds {said} and shows the worst"))
+        Some(format!("a cell holds {phrase} and shows the worst"))
     }
 }
 
-/// How many places each of two axes gets so that there are at most `most` cells: as even a share as
-/// their counts allow.
+/// Returns the number of cells along two axes for at most `most` cells in all, shared as equally as
+/// the counts allow.
 fn sides(counts: [usize; 2], most: usize) -> [usize; 2] {
     let [x, y] = counts;
     let most = most.max(1);
@@ -243,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_meet_halfway_and_the_outer_ones_are_whole() {
+    fn borders_lie_halfway_between_values() {
         let borders = |values: &[f64], log| GridAxis::in_blocks(&axis(values, log), 1).borders;
         assert_eq!(borders(&[1.0, 2.0, 4.0], false), [0.5, 1.5, 3.0, 5.0]);
         assert_eq!(borders(&[10.0], false), [9.5, 10.5]);
@@ -256,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_hold_their_values_and_no_others() {
+    fn each_value_lies_in_its_block() {
         let values: Vec<f64> = (0..10).map(f64::from).collect();
         let blocks = GridAxis::in_blocks(&axis(&values, false), 4);
         assert_eq!(blocks.values, [1.5, 5.5, 8.5]);
@@ -269,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_known_by_its_range_is_cut_into_equal_parts() {
+    fn an_axis_known_by_its_range_has_equal_cells() {
         let range = SweptAxis { complete: false, ..axis(&[0.0, 8.0], false) };
         let parts = GridAxis::in_parts(&range, 4);
         assert_eq!(parts.borders, [0.0, 2.0, 4.0, 6.0, 8.0]);
@@ -281,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn picked_values_alone_have_a_place() {
+    fn only_picked_values_have_a_cell() {
         let picked = GridAxis::picked(&axis(&[1.0, 2.0, 3.0, 4.0], false), &[0, 3]);
         assert_eq!(
             [1.0, 2.0, 3.0, 4.0].map(|value| picked.place(value)),
@@ -290,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_stay_within_what_is_asked_for() {
+    fn the_number_of_cells_stays_within_the_limit() {
         for counts in
             [[1000, 1000], [4000, 2500], [10_000_000, 1], [3, 1_000_000], [39, 33], [1, 1]]
         {

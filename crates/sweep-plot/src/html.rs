@@ -1,55 +1,68 @@
-//! One self-contained page: the numbers, and the script that draws them. Opens from a disk, needs
-//! no network.
+//! Self-contained HTML pages: the numbers, and the scripts that draw them. A page opens from a disk
+//! and needs no network.
 
 mod design;
 pub mod embed;
 mod histories;
 mod report;
 
-pub(crate) use design::page_of as design_page;
-pub(crate) use report::told;
+pub(crate) use design::design_page;
+pub(crate) use report::run_summary;
 
 use std::rc::Rc;
 
 use serde_json::{Value, json};
 
-use super::axis::{LEAST_TICKS, SLACK, Scale, Step, Tick, log_sets};
-use super::chart::{Chart, ChartPanel, DOT, Series, Style, stroke, x_scale, y_scale};
-use super::colour::{BOTH, FAILED, LEVELS, SHADE};
-use super::contour::MOST_POINTS;
+use super::axis::{AxisScale, MIN_TICKS, SLACK, Tick, TickStep, log_sets};
+use super::chart::{Chart, ChartPanel, DOT_RADIUS, Series, Style, stroke, x_scale, y_scale};
+use super::colour::{BOTH, COLOUR_STEPS, FAILED, UNSTABLE_SHADE};
+use super::contour::MAX_POINTS;
 use super::cuts::Cuts;
 use super::error::Result;
-use super::frame::{Sign, failed_hatch};
-use super::gather::{Counts, Map};
+use super::frame::{LegendSymbol, failed_hatch};
+use super::gather::{CellMap, Counts};
 use super::grid::GridAxis;
-use super::layer::{self, Layer, Level, Shown};
-use super::model::{Computing, Figures};
-use super::read::Source;
+use super::layer::{self, DividingLimit, Layer, ShownColumn};
+use super::model::{Figures, LivePart};
+use super::read::FigureFile;
 use super::scene::{Colour, Hatch, INK, PAPER};
 use super::swept::SweptAxis;
-use super::table::{Column, Table};
-use super::{Options, figures, label};
+use super::table::{FigureColumn, FigureTable};
+use super::{PlotOptions, figures, label};
 use crate::escape;
 use sweep_parameter::Worse;
 
+/// The template of a page: placeholders in double braces.
 const PAGE: &str = include_str!("html/page.html");
+/// The templates of elements that scripts copy.
 const PARTS: &str = include_str!("html/parts.html");
+/// The template of a page without scripts.
 const SHEET: &str = include_str!("html/sheet.html");
+/// The style sheet of all pages.
 const STYLE: &str = include_str!("html/style.css");
+/// The script of parts that all figures share.
 const CORE: &str = include_str!("html/core.js");
+/// The script of charts.
 const CHART: &str = include_str!("html/chart.js");
+/// The script of a map's colour bar.
 const BAR: &str = include_str!("html/bar.js");
+/// The script that draws the cells of a map.
 const CELLS: &str = include_str!("html/cells.js");
+/// The script of maps.
 const MAP: &str = include_str!("html/map.js");
+/// The script of designs.
 const DESIGN: &str = include_str!("html/design.js");
+/// The script of the table of a map's point.
 const REPORT: &str = include_str!("html/report.js");
+/// The script that starts the page.
 const START: &str = include_str!("html/start.js");
 
-/// Bytes of a page that the values of a map's cells may take.
+/// Maximum size of the cell values of a page, bytes. Basis: a page of at most 10 MB. Doubling it
+/// doubles the cells of large maps and the size of their pages.
 const CELL_BYTES: usize = 7_000_000;
 
-/// Columns of a map file that a page carries: all results but the counts of steps.
-pub(crate) fn carried(source: &Source, axes: &[SweptAxis]) -> Vec<String> {
+/// Returns the columns of a map file that a page carries: all results but the counts of steps.
+pub(crate) fn page_columns(source: &FigureFile, axes: &[SweptAxis]) -> Vec<String> {
     let names = source.columns.iter().map(|column| column.name.as_str());
     names
         .filter(|name| !name.starts_with("steps_") && !name.starts_with("rejected_"))
@@ -58,29 +71,28 @@ pub(crate) fn carried(source: &Source, axes: &[SweptAxis]) -> Vec<String> {
         .collect()
 }
 
-/// How many cells of a map a page has room for.
-pub(crate) fn most_cells(columns: usize) -> usize {
-    // A number takes four bytes, which base64 makes 5.3; besides the columns there are the counts
-    // of each cell.
+/// Returns the maximum number of cells of a map's page with so many columns.
+pub(crate) fn max_cells(columns: usize) -> usize {
+    // A number takes four bytes, 5.3 in base64; each cell has its counts besides the columns.
     CELL_BYTES / (6 * (columns + 5))
 }
 
-/// The page of a map of two or more axes: every quantity and channel, and with `--traces` the time
-/// histories.
+/// Writes the page of a map of two axes or more: every quantity and channel, and with `--traces`
+/// the time histories.
 ///
 /// # Errors
-/// [`crate::PlotError::Unfit`] for options that the file does not have, and any that reading the
-/// traces brings.
+/// [`crate::PlotError::Unfit`] for options that do not fit the file, and the errors of reading the
+/// traces.
 pub(crate) fn map_page(
-    map: &Map,
+    map: &CellMap,
     cuts: &Cuts,
-    options: &Options,
+    options: &PlotOptions,
     model: &dyn Figures,
 ) -> Result<String> {
     let source = &map.table.source;
-    let first = layer::chosen(source, options)?;
+    let first = layer::requested_one(source, options)?;
     let all = layer::all(source);
-    let room = MOST_POINTS / all.len();
+    let room = MAX_POINTS / all.len();
     let layers = all.iter().map(|shown| Ok(layer_json(map, shown, shown.layer(map)?, room)));
     let layers = layers.collect::<Result<Vec<Value>>>()?;
     let traces = match &options.traces {
@@ -99,7 +111,7 @@ pub(crate) fn map_page(
         "rows": rows_json(source),
         "layers": layers,
         "first": {
-            "column": first.as_ref().map_or(layer::STATUS, Shown::column),
+            "column": first.as_ref().map_or(layer::STATUS, ShownColumn::column),
             "rest": cuts.cuts.first().map_or(&[][..], |cut| &cut.rest),
         },
         "palettes": {
@@ -114,19 +126,19 @@ pub(crate) fn map_page(
     }
     let axes = map.grid.axes.iter().map(|axis| (axis.swept.name.as_str(), axis.swept.log));
     let axes: Vec<(&str, bool)> = axes.collect();
-    let told = report::told(source, model) + &report::caveats(map, model);
+    let summary = report::run_summary(source, model) + &report::cautions(map, model);
     let scripts = [&[CORE, CHART, BAR, CELLS, MAP][..], &[REPORT, START]];
-    Ok(page(title, data, scripts, model.computing(&axes), source, &told))
+    Ok(page(title, data, scripts, model.live_part(&axes), source, &summary))
 }
 
-/// The file's own word about itself, without what would fill the page: a list of a million values,
-/// say.
-fn provenance(source: &Source) -> String {
+/// Writes the metadata of the file, without entries that would fill the page, such as a list of a
+/// million values.
+fn provenance(source: &FigureFile) -> String {
     let entry = |(key, value): &(String, Value)| {
         let text = value.as_str().map_or_else(|| format!("{value:#}"), str::to_owned);
         let mut lines: Vec<String> = text.lines().map(escape).collect();
-        if text.len() > MOST_PROVENANCE {
-            let head: String = text.chars().take(MOST_PROVENANCE / 8).collect();
+        if text.len() > MAX_ENTRY_CHARACTERS {
+            let head: String = text.chars().take(MAX_ENTRY_CHARACTERS / 8).collect();
             let length = text.len();
             lines = vec![format!(
                 "{} ... ({length} characters in all; the file has them)",
@@ -142,24 +154,27 @@ fn provenance(source: &Source) -> String {
     format!("<details><summary>digests, versions, the plan</summary><dl>\n{list}</dl></details>\n")
 }
 
-/// Longest entry of a file's metadata that a page carries whole, characters.
-const MOST_PROVENANCE: usize = 100_000;
+/// Maximum length of a metadata entry that a page carries whole, characters. Basis: a plan with
+/// long lists is shorter. Doubling it adds as much to a page for each longer entry.
+const MAX_ENTRY_CHARACTERS: usize = 100_000;
 
-/// What a page over these axes computes with, and what it then tells of the run, in HTML.
+/// Returns the live part of a page over these axes, and the summary of the run that it needs, in
+/// HTML.
 fn computed(
-    source: &Source,
+    source: &FigureFile,
     axes: &[(&str, bool)],
     model: &dyn Figures,
-) -> (Option<Computing>, String) {
-    let computing = model.computing(axes);
-    let told = computing.as_ref().map_or_else(String::new, |_| report::told(source, model));
-    (computing, told)
+) -> (Option<LivePart>, String) {
+    let live_part = model.live_part(axes);
+    let summary =
+        live_part.as_ref().map_or_else(String::new, |_| report::run_summary(source, model));
+    (live_part, summary)
 }
 
-/// The page of a chart: every panel, those that a picture shows at first. It may compute, along
-/// the axis of this name.
+/// Writes the page of a chart with all panels, of which those of a picture are shown first. A live
+/// page computes along the axis of this name.
 pub(crate) fn chart_page(
-    source: &Source,
+    source: &FigureFile,
     chart: &Chart,
     axis: &str,
     model: &dyn Figures,
@@ -170,23 +185,23 @@ pub(crate) fn chart_page(
         "subtitle": chart.subtitle,
         "chart": chart_json(chart, curve),
     });
-    let (computing, told) = computed(source, &[(axis, chart.x_log)], model);
-    page(&chart.title, data, [&[CORE, CHART], &[START]], computing, source, &told)
+    let (live_part, summary) = computed(source, &[(axis, chart.x_log)], model);
+    page(&chart.title, data, [&[CORE, CHART], &[START]], live_part, source, &summary)
 }
 
-/// A page with the picture that it shows where scripts are switched off.
-pub(crate) fn with_still(page: &[u8], picture: &[u8]) -> Vec<u8> {
+/// Adds the picture that a page shows where scripts are switched off.
+pub(crate) fn add_still_picture(page: &[u8], picture: &[u8]) -> Vec<u8> {
     let picture = embed::bytes(picture.iter().copied());
-    // It stands before the data, which might hold anything.
+    // The placeholder precedes the data, which might hold the same text.
     String::from_utf8_lossy(page).replacen("{{still}}", &picture, 1).into_bytes()
 }
 
-/// A page of this body, which is HTML, without scripts: to be read and printed.
+/// Writes a page of this HTML body without scripts, to be read and printed.
 pub fn sheet(title: &str, body: &str) -> String {
     SHEET.replace("{{title}}", &escape(title)).replace("{{style}}", STYLE).replace("{{body}}", body)
 }
 
-/// A table under a heading; nothing without rows.
+/// Writes an HTML table under a heading; nothing without rows.
 pub fn table(title: &str, heads: &[&str], rows: &[Vec<String>]) -> String {
     if rows.is_empty() {
         return String::new();
@@ -203,47 +218,50 @@ pub fn table(title: &str, heads: &[&str], rows: &[Vec<String>]) -> String {
     )
 }
 
-/// An SVG picture as an element: names within it are its own.
+/// Returns an SVG picture as an HTML image, so that names within it do not clash with those of the
+/// page.
 pub(crate) fn picture(svg: &[u8]) -> String {
     let data = embed::bytes(svg.iter().copied());
     format!("<img alt=\"figure\" src=\"data:image/svg+xml;base64,{data}\">")
 }
 
-/// A page of these data, and of what is `told` of the run in HTML. What it computes with has its
-/// scripts between these.
+/// Writes a page of these data with a `summary` of the run, in HTML. Scripts of a live page come
+/// between the two groups of scripts.
 fn page(
     title: &str,
     mut data: Value,
     [first, last]: [&[&str]; 2],
-    computing: Option<Computing>,
-    source: &Source,
-    told: &str,
+    live_part: Option<LivePart>,
+    source: &FigureFile,
+    summary: &str,
 ) -> String {
-    let (scripts, parts) = computing.map_or((&[][..], ""), |computing| {
-        data["live"] = computing.data;
-        (computing.scripts, computing.parts)
+    let (scripts, parts) = live_part.map_or((&[][..], ""), |live_part| {
+        data["live"] = live_part.data;
+        (live_part.scripts, live_part.parts)
     });
     let scripts = [first, scripts, last].concat();
-    // Where ticks of even axes can be, with the decimals of their numbers, and how one is chosen.
-    let steps: Value = Step::all().map(|step| json!([step.length(), step.decimals()])).collect();
-    data["ticks"] = json!({ "steps": steps, "slack": SLACK, "least": LEAST_TICKS });
+    // The distances of linear ticks with the decimals of their labels, and the rule that chooses
+    // one.
+    let steps: Value =
+        TickStep::all().map(|step| json!([step.length(), step.decimals()])).collect();
+    data["ticks"] = json!({ "steps": steps, "slack": SLACK, "least": MIN_TICKS });
     data["both"] = json!(BOTH.css());
-    data["shade"] = json!(format!("{}{:02x}", SHADE.css(), SHADE.alpha));
-    // What a file says is no place for what follows it.
-    let told = [told, &provenance(source)].map(|text| text.replace('{', "&#123;"));
-    // Within a script element only `<` could end it, or start a comment.
+    data["shade"] = json!(format!("{}{:02x}", UNSTABLE_SHADE.css(), UNSTABLE_SHADE.alpha));
+    // A brace in the file's text must not look like a placeholder.
+    let texts = [summary, &provenance(source)].map(|text| text.replace('{', "&#123;"));
+    // Within a script element only `<` could end the element or start a comment.
     let data = data.to_string().replace('<', "\\u003c");
     PAGE.replace("{{title}}", &escape(title))
         .replace("{{style}}", STYLE)
-        .replace("{{about}}", &told[0])
-        .replace("{{provenance}}", &told[1])
+        .replace("{{about}}", &texts[0])
+        .replace("{{provenance}}", &texts[1])
         .replace("{{parts}}", &[PARTS, parts].concat())
         .replace("{{script}}", &scripts.concat())
         .replace("{{data}}", &data)
 }
 
-/// The ticks of a logarithmic axis in ever denser sets, null for an even one.
-fn log_ticks_json(scale: Scale) -> Value {
+/// Returns the sets of ticks of a logarithmic axis, from sparse to dense; null for a linear one.
+fn log_ticks_json(scale: AxisScale) -> Value {
     if !scale.log {
         return Value::Null;
     }
@@ -252,23 +270,23 @@ fn log_ticks_json(scale: Scale) -> Value {
 }
 
 fn tick_json(tick: Tick) -> Value {
-    json!([embed::short(tick.value), tick.label])
+    json!([embed::rounded(tick.value), tick.label])
 }
 
-/// The rows of a point's table: name, words, unit, and the columns that hold the values of both
-/// models and their ratio.
-fn rows_json(source: &Source) -> Value {
-    let row = |family: layer::Family<'_>| {
-        let column = |k: usize| family.columns.get(k).map(|(_, facts)| &facts.name);
-        let ratio = family.is_channel.then(|| format!("ratio_{}", family.name));
+/// Returns the rows of the table of a point: name, words, unit, and the columns of both models and
+/// of their ratio.
+fn rows_json(source: &FigureFile) -> Value {
+    let row = |quantity: layer::QuantityColumns<'_>| {
+        let column = |k: usize| quantity.columns.get(k).map(|(_, facts)| &facts.name);
+        let ratio = quantity.is_channel.then(|| format!("ratio_{}", quantity.name));
         json!({
-            "name": family.name,
-            "words": family.words,
-            "unit": label::shown(&family.columns[0].1.unit).0,
+            "name": quantity.name,
+            "words": quantity.words,
+            "unit": label::display_unit(&quantity.columns[0].1.unit).0,
             "columns": [column(0), column(1), ratio.as_ref()],
         })
     };
-    layer::families(source).into_iter().map(row).collect()
+    layer::quantities(source).into_iter().map(row).collect()
 }
 
 fn axis_json(axis: &GridAxis) -> Value {
@@ -277,10 +295,10 @@ fn axis_json(axis: &GridAxis) -> Value {
     data
 }
 
-/// Every column of results as 32 bit floats in grid order, NaN where the file has no value.
-fn columns_json(table: &Table) -> Value {
-    let numbers = |column: &Column| {
-        let (unit, factor) = label::shown(&column.facts.unit);
+/// Returns every column of numbers as 32-bit floats in grid order, NaN where the file has no value.
+fn columns_json(table: &FigureTable) -> Value {
+    let numbers = |column: &FigureColumn| {
+        let (unit, factor) = label::display_unit(&column.facts.unit);
         let data = json!({
             "unit": unit,
             "factor": factor,
@@ -292,10 +310,10 @@ fn columns_json(table: &Table) -> Value {
     table.columns.iter().filter_map(numbers).collect()
 }
 
-/// Columns of few distinct words, as their numbers in grid order; 255 where the file has none, 254
-/// where a cell has several.
-fn codes_json(table: &Table) -> Value {
-    let words = |column: &Column| {
+/// Returns the columns of words as codes in grid order: 255 for no word, 254 for several words in a
+/// cell.
+fn codes_json(table: &FigureTable) -> Value {
+    let words = |column: &FigureColumn| {
         let words = column.words()?;
         let data =
             json!({ "data": embed::bytes(words.codes.iter().copied()), "words": words.names });
@@ -304,22 +322,22 @@ fn codes_json(table: &Table) -> Value {
     table.columns.iter().filter_map(words).collect()
 }
 
-/// How many of each cell's points are what.
-fn counts_json(map: &Map) -> Value {
-    let of = |count: fn(&Counts) -> u32| {
+/// Returns the number of points of each kind in each cell.
+fn counts_json(map: &CellMap) -> Value {
+    let encode = |count: fn(&Counts) -> u32| {
         embed::floats(map.counts.iter().map(|cell| f64::from(count(cell))))
     };
     json!({
-        "points": of(|cell| cell.points),
-        "reliable": of(|cell| cell.reliable),
-        "unreliable": of(|cell| cell.unreliable),
-        "failed": of(|cell| cell.failed),
-        "sensitive": of(|cell| cell.sensitive),
+        "points": encode(|cell| cell.points),
+        "reliable": encode(|cell| cell.reliable),
+        "unreliable": encode(|cell| cell.unreliable),
+        "failed": encode(|cell| cell.failed),
+        "sensitive": encode(|cell| cell.sensitive),
     })
 }
 
-/// Entries of a legend, each the style of its sign and its words.
-fn legend_json(entries: &[(Sign, String)]) -> Value {
+/// Returns the entries of a legend: the style of the symbol and its text.
+fn legend_json(entries: &[(LegendSymbol, String)]) -> Value {
     let hatched = |hatch: &Hatch| {
         let [ink, paper] = [INK, PAPER].map(Colour::css);
         let lines = match hatch.strokes.len() {
@@ -328,14 +346,14 @@ fn legend_json(entries: &[(Sign, String)]) -> Value {
         };
         format!("background:repeating-linear-gradient({lines})")
     };
-    let style = |sign: &Sign| match sign {
-        // As it is drawn: dark between light, on any ground.
-        Sign::Line(_) => {
+    let style = |sign: &LegendSymbol| match sign {
+        // The line of a boundary is dark between light edges, to show on any ground.
+        LegendSymbol::Line(_) => {
             "height:6px;background:#1b1f24;border:solid #ffffff;border-width:1.5px 0".to_owned()
         }
-        Sign::Area(colour) => format!("background:{}", colour.css()),
-        Sign::Failed => format!("{} {}", hatched(&failed_hatch()), FAILED.css()),
-        Sign::Hatched(hatch) => hatched(hatch),
+        LegendSymbol::Area(colour) => format!("background:{}", colour.css()),
+        LegendSymbol::Failed => format!("{} {}", hatched(&failed_hatch()), FAILED.css()),
+        LegendSymbol::Hatched(hatch) => hatched(hatch),
         _ => "background:radial-gradient(circle,var(--muted) 2px,var(--paper) 2.5px);\
               outline:1px solid var(--faint)"
             .to_owned(),
@@ -343,16 +361,16 @@ fn legend_json(entries: &[(Sign, String)]) -> Value {
     entries.iter().map(|(sign, words)| json!([style(sign), words])).collect()
 }
 
-fn layer_json(map: &Map, shown: &Shown, layer: Layer, room: usize) -> Value {
-    let (Scale { log, from, to }, limit) = (layer.scale.scale, layer.scale.centre);
+fn layer_json(map: &CellMap, shown: &ShownColumn, layer: Layer, room: usize) -> Value {
+    let (AxisScale { log, from, to }, limit) = (layer.scale.scale, layer.scale.centre);
     let middle = limit.unwrap_or(if log { (from * to).sqrt() } else { 0.5 * (from + to) });
-    let colours = (0..LEVELS).map(|level| layer.scale.colour(level).css());
+    let colours = (0..COLOUR_STEPS).map(|level| layer.scale.colour(level).css());
     let ticks = layer.scale.ticks().into_iter().map(tick_json);
     let mut data = json!({
         "group": shown.group.name(),
         "groupWords": shown.group.words(),
         "channel": shown.channel,
-        "words": shown.short(),
+        "words": shown.short_name(),
         "worse": shown.worse().map(Worse::name),
         "title": layer.title,
         "label": layer.label,
@@ -371,25 +389,24 @@ fn layer_json(map: &Map, shown: &Shown, layer: Layer, room: usize) -> Value {
     data
 }
 
-/// The level's lines in data coordinates for each cut through the axes after the second, in grid
-/// order.
-fn level_json(map: &Map, layer: &Layer, level: &Level, room: usize) -> Value {
+/// Returns the lines of a limit in data coordinates, for each cut in grid order.
+fn level_json(map: &CellMap, layer: &Layer, level: &DividingLimit, room: usize) -> Value {
     let cuts: usize = map.grid.axes[2..].iter().map(|axis| axis.values.len()).product();
     let ys = map.grid.axes[1].values.len();
     let cell = |cut: usize, x: usize, y: usize| (x * ys + y) * cuts + cut;
     let lines = figures::map::level_lines(map, (layer, level), cuts, cell, room);
     let flat = |line: &Vec<[f64; 2]>| -> Vec<f64> {
-        line.iter().flatten().map(|value| embed::short(*value)).collect()
+        line.iter().flatten().map(|value| embed::rounded(*value)).collect()
     };
     lines.iter().map(|cut| cut.iter().map(flat).collect::<Value>()).collect()
 }
 
-/// A curve's values, to seven digits.
+/// Encodes a curve's values to seven digits.
 fn curve(values: &[f64]) -> Value {
     json!(embed::floats(values.iter().copied()))
 }
 
-/// A chart, its curves by `curve`.
+/// Encodes a chart; `curve` encodes the values of its curves.
 fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
     let mut grids: Vec<&Rc<Vec<f64>>> = Vec::new();
     for series in chart.panels.iter().flat_map(|panel| &panel.series) {
@@ -398,7 +415,7 @@ fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
         }
     }
     let panels = chart.panels.iter().map(|panel| panel_json(panel, &grids, curve));
-    let marks = chart.marks.iter().map(|mark| json!([embed::short(mark.x), mark.label]));
+    let marks = chart.marks.iter().map(|mark| json!([embed::rounded(mark.x), mark.label]));
     let xs = x_scale(chart);
     json!({
         "xWords": chart.x_label.words,
@@ -416,18 +433,21 @@ fn chart_json(chart: &Chart, curve: fn(&[f64]) -> Value) -> Value {
 }
 
 fn panel_json(panel: &ChartPanel, grids: &[&Rc<Vec<f64>>], curve: fn(&[f64]) -> Value) -> Value {
-    let stars =
-        panel.stars.iter().map(|(x, y, label)| json!([embed::short(*x), embed::short(*y), label]));
+    let stars = panel
+        .stars
+        .iter()
+        .map(|(x, y, label)| json!([embed::rounded(*x), embed::rounded(*y), label]));
     let mut data = json!(panel);
     data["ticks"] = log_ticks_json(y_scale(panel));
     data["stars"] = stars.collect();
-    let of_series = |series| series_json(series, grids, curve);
-    data["series"] = panel.series.iter().map(of_series).collect();
+    let encode = |series| series_json(series, grids, curve);
+    data["series"] = panel.series.iter().map(encode).collect();
     data
 }
 
 fn series_json(series: &Series, grids: &[&Rc<Vec<f64>>], curve: fn(&[f64]) -> Value) -> Value {
-    let (stroke, dots) = (stroke(series), series.style == Style::Dots);
+    let stroke = stroke(series);
+    let dots = series.style == Style::Dots;
     let [low, high] = match &series.style {
         Style::Band(low, high) => [low, high].map(|side| curve(side)),
         _ => [Value::Null, Value::Null],
@@ -436,8 +456,8 @@ fn series_json(series: &Series, grids: &[&Rc<Vec<f64>>], curve: fn(&[f64]) -> Va
         "name": series.name,
         "colour": if series.colour == INK { "ink".to_owned() } else { series.colour.css() },
         "grid": grids.iter().position(|grid| **grid == series.x),
-        "alpha": embed::short(f64::from(series.colour.alpha) / 255.0),
-        "width": if dots { 2.0 * DOT } else { stroke.width },
+        "alpha": embed::rounded(f64::from(series.colour.alpha) / 255.0),
+        "width": if dots { 2.0 * DOT_RADIUS } else { stroke.width },
         "dashed": !stroke.dash.is_empty(),
         "dots": dots,
         "y": curve(&series.y),

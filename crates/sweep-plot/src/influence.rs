@@ -1,53 +1,57 @@
-//! How much a quantity of scattered points depends on each of their parameters.
+//! The influence of each parameter on a quantity of scattered points.
 
-/// Two measures of one parameter, both of ranks: they do not depend on units or on logarithms, and
-/// one point far away does not decide them.
+/// Two measures of a parameter's influence. Both are taken of ranks, so that they depend neither on
+/// units nor on logarithms, and an outlier does not dominate them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Influence {
-    /// Rank correlation, -1 to 1: where the quantity rises with the parameter, or falls, all the
-    /// way.
+pub(crate) struct RankInfluence {
+    /// The rank correlation, from -1 to 1: the extent to which the quantity rises or falls with the
+    /// parameter throughout.
     ///
     /// C. Spearman, The proof and measurement of association between two things, American Journal
     /// of Psychology 15 (1904), 72-101.
     pub(crate) rank: f64,
-    /// Root of the share of the ranks' variance that goes by the parameter alone, 0 to 1: as large
-    /// as the magnitude of `rank` where the quantity only rises or only falls, and larger where it
-    /// does both. None of too few points.
+    /// The root of the share of the ranks' variance that the parameter alone explains, from 0 to 1.
+    /// It is the magnitude of `rank` for a quantity that only rises or only falls, and larger for
+    /// one that does both. `None` for too few points.
     ///
-    /// Its square is the correlation ratio without the bias that bins bring: T. L. Kelley, An
-    /// unbiased correlation ratio measure, Proceedings of the National Academy of Sciences 21
-    /// (1935), 554-559.
+    /// The square is the correlation ratio without the bias of bins: T. L. Kelley, An unbiased
+    /// correlation ratio measure, Proceedings of the National Academy of Sciences 21 (1935),
+    /// 554-559.
     pub(crate) any: Option<f64>,
 }
 
-impl Influence {
-    /// The influence of `x` on `y`, over pairs that have both values.
-    pub(crate) fn of(x: &[f64], y: &[f64]) -> Option<Self> {
+impl RankInfluence {
+    /// Returns the influence of `x` on `y` over pairs that have both values.
+    pub(crate) fn new(x: &[f64], y: &[f64]) -> Option<Self> {
         let both = x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite());
         let (x, y): (Vec<f64>, Vec<f64>) = both.unzip();
-        let (x_ranks, y_ranks) = (ranks(&x), ranks(&y));
-        Some(Self { rank: correlation(&x_ranks, &y_ranks)?, any: by_bins(&x_ranks, &y_ranks) })
+        let x_ranks = ranks(&x);
+        let y_ranks = ranks(&y);
+        Some(Self {
+            rank: correlation(&x_ranks, &y_ranks)?,
+            any: correlation_ratio(&x_ranks, &y_ranks),
+        })
     }
 
-    /// The larger of both, by which parameters are put in order.
+    /// Returns the larger of both measures, which orders the parameters.
     pub(crate) fn size(self) -> f64 {
         self.rank.abs().max(self.any.unwrap_or_default())
     }
 }
 
-/// Magnitude of a rank correlation that chance alone exceeds in one of twenty samples of so many
-/// points, where the quantity does not depend on the parameter.
-pub(crate) fn chance(points: usize) -> f64 {
+/// Returns the magnitude of a rank correlation that chance alone exceeds in one of twenty samples
+/// of so many points, if the quantity does not depend on the parameter.
+pub(crate) fn chance_correlation(points: usize) -> f64 {
     if points < 2 { 1.0 } else { (1.96 / ((points - 1) as f64).sqrt()).min(1.0) }
 }
 
-/// Places in the order, from 1; equal values share the mean of theirs.
+/// Returns the ranks from 1; equal values share the mean of their ranks.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let mut ranks = vec![0.0; values.len()];
     for run in order.chunk_by(|&a, &b| values[a] == values[b]) {
-        // A run of m after k others has the ranks k + 1 to k + m.
+        // A run of m values after k others has the ranks k + 1 to k + m.
         let before = order.partition_point(|&other| values[other] < values[run[0]]);
         let rank = before as f64 + (run.len() + 1) as f64 / 2.0;
         run.iter().for_each(|&place| ranks[place] = rank);
@@ -55,26 +59,28 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// The correlation of two lists of ranks; none if either does not vary.
+/// Returns the correlation of two lists of ranks; `None` if either is constant.
 fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     let mean = (x.len() + 1) as f64 / 2.0;
-    let sum = |of: &dyn Fn(usize) -> f64| (0..x.len()).map(of).sum::<f64>();
+    let sum = |term: &dyn Fn(usize) -> f64| (0..x.len()).map(term).sum::<f64>();
     let xy = sum(&|k| (x[k] - mean) * (y[k] - mean));
     let xx = sum(&|k| (x[k] - mean).powi(2));
     let yy = sum(&|k| (y[k] - mean).powi(2));
     (xx > 0.0 && yy > 0.0).then(|| xy / (xx * yy).sqrt())
 }
 
-/// Most bins of the correlation ratio.
-const MOST_BINS: usize = 20;
-/// Least points to a bin.
-const LEAST_IN_BIN: usize = 10;
+/// Maximum number of bins of the correlation ratio. Basis: enough to follow a curve with several
+/// turns. Doubling it doubles the noise of the ratio.
+const MAX_BINS: usize = 20;
+/// Minimum number of points to a bin. Basis: the mean of ten ranks is stable. Doubling it halves
+/// the bins of small designs.
+const MIN_IN_BIN: usize = 10;
 
-/// The root of the corrected correlation ratio of ranks, over bins of as many points each. Equal
-/// values of `x` share a bin.
-fn by_bins(x: &[f64], y: &[f64]) -> Option<f64> {
+/// Returns the root of the corrected correlation ratio of ranks, over bins of equally many points.
+/// Equal values of `x` share a bin.
+fn correlation_ratio(x: &[f64], y: &[f64]) -> Option<f64> {
     let points = x.len();
-    let most = (points / LEAST_IN_BIN).min(MOST_BINS);
+    let most = (points / MIN_IN_BIN).min(MAX_BINS);
     if most < 2 {
         return None;
     }
@@ -107,43 +113,46 @@ mod tests {
     }
 
     #[test]
-    fn ranks_share_their_mean_where_values_are_equal() {
+    fn equal_values_share_the_mean_of_their_ranks() {
         assert_eq!(ranks(&[5.0, 1.0, 5.0, 9.0]), [2.5, 1.0, 2.5, 4.0]);
     }
 
     #[test]
-    fn spearman_is_as_by_hand() {
+    fn the_rank_correlation_agrees_with_a_hand_calculation() {
         // Differences of ranks 0, 1, -1, 0: 1 - 6 * 2 / (4 * 15).
-        let found = Influence::of(&[1.0, 2.0, 3.0, 4.0], &[10.0, 30.0, 20.0, 900.0]).unwrap();
+        let found = RankInfluence::new(&[1.0, 2.0, 3.0, 4.0], &[10.0, 30.0, 20.0, 900.0]).unwrap();
         assert!((found.rank - 0.8).abs() < 1e-12);
         assert_eq!(found.any, None, "four points are too few for bins");
-        assert_eq!(Influence::of(&[1.0, 1.0], &[1.0, 2.0]), None);
+        assert_eq!(RankInfluence::new(&[1.0, 1.0], &[1.0, 2.0]), None);
     }
 
     #[test]
-    fn what_rises_all_the_way_has_both_and_what_also_falls_only_one() {
+    fn a_hill_has_a_correlation_ratio_but_no_rank_correlation() {
         let x = line(400);
         let up: Vec<f64> = x.iter().map(|x| (0.1 * x).exp()).collect();
-        let found = Influence::of(&x, &up).unwrap();
+        let found = RankInfluence::new(&x, &up).unwrap();
         assert!(found.rank == 1.0 && found.any.unwrap() > 0.99, "{found:?}");
         let hill: Vec<f64> = x.iter().map(|x| -(x - 199.5).abs()).collect();
-        let found = Influence::of(&x, &hill).unwrap();
+        let found = RankInfluence::new(&x, &hill).unwrap();
         assert!(found.rank.abs() < 1e-3 && found.any.unwrap() > 0.99, "{found:?}");
     }
 
     #[test]
-    fn what_does_not_depend_has_less_than_chance() {
-        // A step of nearly the golden section's: no order left.
+    fn an_independent_quantity_correlates_less_than_by_chance() {
+        // Multiples of nearly the golden section modulo 1 have no order left.
         let x = line(400);
         let y: Vec<f64> = x.iter().map(|x| (x * 0.618_033_988_749_895).fract()).collect();
-        let found = Influence::of(&x, &y).unwrap();
-        assert!(found.rank.abs() < chance(400) && found.any.unwrap() < 0.2, "{found:?}");
-        assert!((chance(400) - 0.098).abs() < 1e-3);
+        let found = RankInfluence::new(&x, &y).unwrap();
+        assert!(
+            found.rank.abs() < chance_correlation(400) && found.any.unwrap() < 0.2,
+            "{found:?}"
+        );
+        assert!((chance_correlation(400) - 0.098).abs() < 1e-3);
     }
 
     #[test]
     fn pairs_without_a_value_are_left_out() {
-        let found = Influence::of(&[1.0, 2.0, 3.0, 4.0], &[1.0, f64::NAN, 3.0, 4.0]).unwrap();
+        let found = RankInfluence::new(&[1.0, 2.0, 3.0, 4.0], &[1.0, f64::NAN, 3.0, 4.0]).unwrap();
         assert_eq!(found.rank, 1.0);
     }
 }

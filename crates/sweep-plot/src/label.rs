@@ -1,8 +1,8 @@
-//! Column names in plain words, units as engineers write them, numbers as short as they can be.
+//! Labels: column names in words, units as engineers write them, numbers with few digits.
 
 use std::fmt;
 
-/// The units that suffixes of names are made of: `_n_s_per_m` is N s/m, `_kg_m2` is kg m².
+/// The units that name suffixes consist of: `_n_s_per_m` is N s/m, `_kg_m2` is kg m².
 const BASES: [(&str, &str); 8] = [
     ("n", "N"),
     ("m", "m"),
@@ -14,8 +14,8 @@ const BASES: [(&str, &str); 8] = [
     ("hz", "Hz"),
 ];
 
-/// A unit in a name, with its power.
-fn base(word: &str) -> Option<String> {
+/// Returns the unit, with its power, that a part of a name stands for.
+fn unit_from_part(word: &str) -> Option<String> {
     let stem = word.trim_end_matches(['2', '3']);
     let (_, unit) = BASES.iter().find(|(base, _)| *base == stem)?;
     let power = match &word[stem.len()..] {
@@ -27,14 +27,14 @@ fn base(word: &str) -> Option<String> {
     Some(format!("{unit}{power}"))
 }
 
-/// A name's words without those of its unit, and the unit; empty if the name says none.
-fn parted(name: &str) -> (Vec<&str>, String) {
+/// Splits a name into its words and its unit, which is empty if the name has none.
+fn split_unit(name: &str) -> (Vec<&str>, String) {
     let mut words: Vec<&str> = name.split('_').collect();
     let mut parts = [Vec::new(), Vec::new()];
-    // From behind: a denominator if there turns out to be one.
+    // The parts are read from the end: a denominator comes before its `per`.
     let mut is_over = false;
     while let [_, .., word] = words[..] {
-        match base(word) {
+        match unit_from_part(word) {
             Some(unit) => parts[usize::from(is_over)].insert(0, unit),
             None if word == "per" && !is_over && !parts[0].is_empty() => is_over = true,
             None => break,
@@ -51,21 +51,21 @@ fn parted(name: &str) -> (Vec<&str>, String) {
     (words, unit)
 }
 
-/// The unit that a name's suffix says; empty if none.
+/// Returns the unit that a name's suffix gives; empty if it gives none.
 pub fn unit_of_name(name: &str) -> String {
-    parted(name).1
+    split_unit(name).1
 }
 
-/// A parameter's or column's name in words, without its unit: `unbalance_mass_kg` is "Unbalance
-/// mass".
+/// Returns the name of a parameter or column in words, without its unit: `unbalance_mass_kg` is
+/// "Unbalance mass".
 pub fn words(name: &str) -> String {
-    capitalised(&parted(name).0.join(" "))
+    capitalised(&split_unit(name).0.join(" "))
 }
 
-/// A column's name in words without its unit and its model, and the model: `min_gap_linear_m` is
-/// the "least gap" of "linear".
-pub fn of_model(name: &str) -> (String, &'static str) {
-    let (mut words, _) = parted(name);
+/// Splits a column's name into its words, without unit and model, and the model: `min_gap_linear_m`
+/// is the "least gap" of "linear".
+pub fn split_model(name: &str) -> (String, &'static str) {
+    let (mut words, _) = split_unit(name);
     let model = ["nonlinear", "linear"].into_iter().find(|model| words.contains(model));
     words.retain(|word| Some(*word) != model);
     if matches!(words[..], [_, .., "min" | "max"]) {
@@ -79,13 +79,13 @@ pub fn of_model(name: &str) -> (String, &'static str) {
     (words.join(" "), model.unwrap_or(""))
 }
 
-/// A result's column in words, without unit and model: `nonlinear_body_front_y` is "Body front,
-/// vertical".
+/// Returns the name of a result's column in words, without unit and model: `nonlinear_body_front_y`
+/// is "Body front, vertical".
 pub fn quantity(name: &str) -> String {
-    capitalised(&channel(&of_model(name).0.replace(' ', "_")))
+    capitalised(&channel(&split_model(name).0.replace(' ', "_")))
 }
 
-/// A channel's name in words: `body_front_y` is "body front, vertical".
+/// Returns a channel's name in words: `body_front_y` is "body front, vertical".
 pub fn channel(name: &str) -> String {
     for (suffix, words) in [("_y", ", vertical"), ("_z", ", horizontal")] {
         if let Some(stem) = name.strip_suffix(suffix) {
@@ -95,8 +95,8 @@ pub fn channel(name: &str) -> String {
     name.replace('_', " ")
 }
 
-/// The unit of a channel whose file does not say it: angles are named after their axis, the rest
-/// are displacements.
+/// Returns the unit of a channel whose file has none: angles are named after their axis, other
+/// channels are displacements.
 pub fn unit_of_channel(name: &str) -> &'static str {
     match name.rsplit('_').next() {
         Some("x" | "y" | "z") => "m",
@@ -105,23 +105,21 @@ pub fn unit_of_channel(name: &str) -> &'static str {
     }
 }
 
-/// With a capital first letter.
+/// Returns the text with a capital first letter.
 pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// What an axis shows; as text, with the unit in brackets.
+/// The label of an axis; as text, with the unit in brackets.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Label {
-    /// In words.
     pub words: String,
-    /// Empty if there is none.
+    /// The unit; empty if there is none.
     pub unit: String,
 }
 
 impl Label {
-    /// Words and unit.
     pub fn new(words: &str, unit: &str) -> Self {
         Self { words: words.to_owned(), unit: unit.to_owned() }
     }
@@ -133,18 +131,18 @@ impl fmt::Display for Label {
     }
 }
 
-/// Words and unit as an axis label.
+/// Returns words and unit as an axis label.
 pub fn with_unit(words: &str, unit: &str) -> String {
     if unit.is_empty() { words.to_owned() } else { format!("{words} ({unit})") }
 }
 
-/// A name's words, its value to four digits and the unit: "damping 140 N s/m".
-pub fn valued(words: &str, value: f64, unit: &str) -> String {
+/// Returns words, a value to four digits and its unit: "damping 140 N s/m".
+pub fn with_value(words: &str, value: f64, unit: &str) -> String {
     format!("{words} {} {unit}", significant(value, 4)).trim().to_owned()
 }
 
-/// The unit in which small motions are shown, and how many of it one of `unit` is.
-pub fn shown(unit: &str) -> (&str, f64) {
+/// Returns the unit in which small motions are shown, and the factor from `unit` to it.
+pub fn display_unit(unit: &str) -> (&str, f64) {
     match unit {
         "m" => ("mm", 1e3),
         "rad" => ("mrad", 1e3),
@@ -152,12 +150,12 @@ pub fn shown(unit: &str) -> (&str, f64) {
     }
 }
 
-/// A number to `digits` significant digits, without trailing zeros.
+/// Returns a number to `digits` significant digits, without trailing zeros.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".to_owned() } else { "–".to_owned() };
     }
-    // The exponent after rounding: 9.996 to three digits is 10.0.
+    // The exponent is taken after rounding: 9.996 to three digits is 10.0.
     let scientific = format!("{value:.*e}", digits.saturating_sub(1));
     let exponent: i32 =
         scientific.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or_default();
@@ -168,7 +166,7 @@ pub fn significant(value: f64, digits: usize) -> String {
     trimmed(&format!("{value:.decimals$}")).to_owned()
 }
 
-/// Without the zeros after the last digit of a decimal fraction.
+/// Returns a number without the zeros at the end of its decimals.
 pub fn trimmed(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
@@ -178,7 +176,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_become_words_and_units() {
+    fn names_are_split_into_words_and_units() {
         for (name, plain, unit) in [
             ("unbalance_mass_kg", "Unbalance mass", "kg"),
             ("damping_n_s_per_m", "Damping", "N s/m"),
@@ -198,8 +196,11 @@ mod tests {
             assert_eq!((words(name).as_str(), unit_of_name(name).as_str()), (plain, unit));
         }
         assert_eq!(channel("end_front_z"), "end front, horizontal");
-        assert_eq!(of_model("min_gap_linear_m"), ("least gap".to_owned(), "linear"));
-        assert_eq!(of_model("stop_2_force_nonlinear_n"), ("stop 2 force".to_owned(), "nonlinear"));
+        assert_eq!(split_model("min_gap_linear_m"), ("least gap".to_owned(), "linear"));
+        assert_eq!(
+            split_model("stop_2_force_nonlinear_n"),
+            ("stop 2 force".to_owned(), "nonlinear")
+        );
         for (name, words) in [
             ("nonlinear_body_front_y", "Body front, vertical"),
             ("ratio_max", "Greatest ratio"),
@@ -207,11 +208,11 @@ mod tests {
         ] {
             assert_eq!(quantity(name), words);
         }
-        assert_eq!(of_model("static_sag_m"), ("static sag".to_owned(), ""));
+        assert_eq!(split_model("static_sag_m"), ("static sag".to_owned(), ""));
     }
 
     #[test]
-    fn numbers_are_rounded_not_cut() {
+    fn numbers_are_rounded() {
         for (value, text) in [
             (9.996, "10"),
             (0.1234, "0.123"),

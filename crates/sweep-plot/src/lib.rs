@@ -1,12 +1,14 @@
-//! Figures from this program's Parquet files: as SVG, as PNG, or as one HTML page that needs
-//! nothing else.
+//! Figures of result files (Parquet) as SVG, as PNG, or as one self-contained HTML page.
 //!
-//! A file's columns show its kind. A map becomes a picture of cells, any other file a chart of
-//! curves. Both are laid out as a scene of shapes and text, which is written as SVG or PNG. A page
-//! carries the numbers instead, and a script that draws them. The same file and options give the
-//! same bytes.
+//! The kind of a file follows from its columns. A map becomes a picture of cells, any other file a
+//! chart of curves. Both are laid out as a scene of shapes and text, which is written as SVG or
+//! PNG. A page carries the numbers instead, and a script that draws them. The same file and options
+//! give the same bytes.
+
+#![allow(missing_docs, reason = "private crate: a name that says enough needs no comment")]
 
 mod axis;
+mod bucket;
 pub mod chart;
 mod colour;
 pub mod contour;
@@ -35,7 +37,6 @@ pub mod swept;
 pub mod table;
 #[cfg(test)]
 mod tests;
-mod thin;
 pub mod together;
 
 use std::path::{Path, PathBuf};
@@ -45,7 +46,7 @@ pub use colour::{DISTINCT, FAILED, LINEAR, NONLINEAR};
 pub use error::PlotError;
 pub use html::{embed, sheet, table};
 pub use label::{capitalised, quantity, significant, words};
-pub use model::{CommonFigures, Computing, Figures};
+pub use model::{CommonFigures, Figures, LivePart};
 pub use scene::{Colour, INK, MUTED};
 pub use share::Share;
 pub use svg::escape;
@@ -54,138 +55,140 @@ use chart::Chart;
 use cuts::Cuts;
 use error::Result;
 use figures::boundary::Overlay;
-use gather::Map;
+use gather::CellMap;
 use grid::Grid;
-use read::{Kind, Source};
+use read::{FigureFile, FigureKind};
 use scatter::Scatter;
 use scene::Scene;
 use swept::SweptAxis;
-use table::Table;
-use together::At;
+use table::FigureTable;
+use together::NamedPoint;
 
 use sweep_files::{self as files, Output};
 
-/// Image pixels to a scene pixel in a PNG: sharp on dense screens and in print.
+/// Image pixels per scene pixel in a PNG. Basis: sharp text on dense screens and in print. Doubling
+/// it quadruples the pixels of the file.
 const PNG_SCALE: f64 = 2.0;
 
-/// Which figure of a design.
+/// A figure of a design; a file of another kind has none of these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
-pub enum View {
+pub enum DesignView {
     /// Design: points over every pair of parameters, and the quantity over each
     Scatter,
-    /// Design: how the quantity is distributed, and the share of reliable points
+    /// Design: the distribution of the quantity, and the share of reliable points
     Histogram,
-    /// Design: how much the quantity depends on each parameter
+    /// Design: the influence of each parameter on the quantity
     Influence,
 }
 
-/// What to show; the default is the figure that fits the file.
+/// The options of a figure. The default is the figure that fits the file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Options {
-    /// Design: which figure; by default the first.
-    pub view: Option<View>,
-    /// Map: the column that the colours are, by default the greatest ratio, or `status`; over one
-    /// axis the columns that are drawn. Design: the column that depends on the parameters.
+pub struct PlotOptions {
+    /// Designs: the figure; by default the scatter matrix.
+    pub view: Option<DesignView>,
+    /// Maps: the column that gives the colours; by default the greatest ratio, or `status`. Over
+    /// one axis: the columns that are drawn. Designs: the column that depends on the parameters.
     pub quantity: Vec<String>,
-    /// Map of three or more axes: where to cut an axis beyond the second, by name and value. Kinds
-    /// with points: values of those that are shown.
+    /// Maps of three axes or more: fixed values of axes beyond the second, by name. Other kinds
+    /// whose rows belong to points: values of the points that are drawn.
     pub at: Vec<(String, f64)>,
-    /// Map as a picture: a boundary file over the same axes, whose line is drawn too.
+    /// Maps as a picture: a boundary file over the same axes, whose curve is drawn too.
     pub boundary: Option<PathBuf>,
-    /// Map as a page: a folder of trace files; clicking a point that has one shows it.
+    /// Maps as a page: a folder of trace files. A click on a point with a trace shows its history.
     pub traces: Option<PathBuf>,
 }
 
-/// How a figure is written, and what it may be written over.
+/// The format of a figure: SVG, PNG or HTML.
 type Format = files::FileKind<'static>;
 
-fn format_of(path: &Path) -> Result<Format> {
+fn format_from_ending(path: &Path) -> Result<Format> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     match ending.to_ascii_lowercase().as_str() {
         "svg" => Ok(Format::Svg),
         "png" => Ok(Format::Png),
         "html" | "htm" => Ok(Format::Html),
         _ => Err(PlotError::Unfit(format!(
-            "{}: the figure's format goes by its name's ending: .svg, .png or .html",
+            "{}: the figure's format follows from the ending of its name: .svg, .png or .html",
             path.display()
         ))),
     }
 }
 
-/// Draws the figure that fits `input` to `output`, whose ending (`.svg`, `.png`, `.html`) says how.
+/// Draws the figure of `input` to `output`, whose ending (`.svg`, `.png`, `.html`) gives the
+/// format.
 ///
 /// # Errors
 /// Any [`PlotError`]: an unreadable file, options that do not fit it, an output that cannot be
-/// written. The output's name and the options are judged before the output is touched.
+/// written. The output's name and the options are checked before the output is touched.
 pub fn render(
     input: &Path,
-    options: &Options,
+    options: &PlotOptions,
     model: &dyn Figures,
     output: &Path,
 ) -> Result<(), PlotError> {
-    let format = format_of(output)?;
-    // A figure that cannot be drawn makes no folder.
+    let format = format_from_ending(output)?;
+    // This check comes first, so that a figure that cannot be drawn creates no folder.
     files::judge(output, format)?;
-    let source = opened(input, options, model)?;
+    let source = open_source(input, options, model)?;
     check_options(&source, options, format)?;
     model.check(&source, format == Format::Html)?;
-    let mut bytes = figure(source, options, model, format)?;
+    let mut bytes = draw_figure(source, options, model, format)?;
     if format == Format::Html {
-        // What the page shows where scripts are switched off.
-        let still = figure(opened(input, options, model)?, options, model, Format::Png)?;
-        bytes = html::with_still(&bytes, &still);
+        // The page shows this picture where scripts are switched off.
+        let still = draw_figure(open_source(input, options, model)?, options, model, Format::Png)?;
+        bytes = html::add_still_picture(&bytes, &still);
     }
     Ok(Output::begin(output, format)?.finish(&bytes)?)
 }
 
-/// A file's figure as an SVG picture of its own, and what its plan says in words, both HTML.
+/// Returns the SVG picture of a file and the summary of its plan, both as HTML.
 ///
 /// # Errors
-/// As [`render`].
+/// The errors of [`render`].
 pub fn described(input: &Path, model: &dyn Figures) -> Result<(String, String), PlotError> {
-    let options = Options::default();
-    let source = opened(input, &options, model)?;
-    let told = html::told(&source, model);
-    let svg = figure(source, &options, model, Format::Svg)?;
-    Ok((html::picture(&svg), told))
+    let options = PlotOptions::default();
+    let source = open_source(input, &options, model)?;
+    let plan_summary = html::run_summary(&source, model);
+    let svg = draw_figure(source, &options, model, Format::Svg)?;
+    Ok((html::picture(&svg), plan_summary))
 }
 
-fn opened(input: &Path, options: &Options, model: &dyn Figures) -> Result<Source> {
-    let mut source = Source::open(input, model.known())?;
+fn open_source(input: &Path, options: &PlotOptions, model: &dyn Figures) -> Result<FigureFile> {
+    let mut source = FigureFile::open(input, model.model_kinds())?;
     if is_scattered(&source, options)? {
-        source.kind = Kind::DESIGN;
+        source.kind = FigureKind::DESIGN;
     }
     Ok(source)
 }
 
-fn figure(
-    source: Source,
-    options: &Options,
+fn draw_figure(
+    source: FigureFile,
+    options: &PlotOptions,
     model: &dyn Figures,
     format: Format,
 ) -> Result<Vec<u8>> {
     let (source, chart) = match source.kind {
-        Kind::MAP => return map(source, options, model, format),
-        Kind::DESIGN => return design(source, options, model, format),
-        Kind::DIFFERENCES => return differences(source, options, model, format),
-        Kind::STUDY => {
+        FigureKind::MAP => return draw_map(source, options, model, format),
+        FigureKind::DESIGN => return draw_design(source, options, model, format),
+        FigureKind::DIFFERENCES => return draw_differences(source, options, model, format),
+        FigureKind::STUDY => {
             let chart = figures::optimise::chart(&source)?;
             (source, chart)
         }
-        Kind::BOUNDARY => {
-            let table = Table::read(source)?;
+        FigureKind::BOUNDARY => {
+            let table = FigureTable::read(source)?;
             let chart = figures::boundary::chart(&table)?;
             (table.source, chart)
         }
         _ => model.chart(source, options)?,
     };
-    written(&source, &chart, "", model, format)
+    write_chart(&source, &chart, "", model, format)
 }
 
-/// A chart of a file; over a parameter of this name, if that is an axis.
-fn written(
-    source: &Source,
+/// Writes a chart, whose x axis may be the parameter `axis` (empty if it is none).
+fn write_chart(
+    source: &FigureFile,
     chart: &Chart,
     axis: &str,
     model: &dyn Figures,
@@ -193,22 +196,23 @@ fn written(
 ) -> Result<Vec<u8>> {
     match format {
         Format::Html => Ok(html::chart_page(source, chart, axis, model).into_bytes()),
-        _ => image(&chart::draw(chart), format),
+        _ => encode_image(&chart::draw(chart), format),
     }
 }
 
-/// Whether a map file's points are a design's. One that lists a whole grid, or spreads points over
-/// a single parameter, has a map or curves unless a figure of designs is asked for.
-fn is_scattered(source: &Source, options: &Options) -> Result<bool> {
-    if source.kind != Kind::MAP || source.design_method().is_none() {
+/// Returns whether the rows of a map file are a design's points. A design that lists a whole grid,
+/// or varies one parameter alone, is drawn as a map or as curves unless a figure of designs is
+/// requested.
+fn is_scattered(source: &FigureFile, options: &PlotOptions) -> Result<bool> {
+    if source.kind != FigureKind::MAP || source.design_method().is_none() {
         return Ok(false);
     }
     Ok(options.view.is_some() || !swept::is_whole(source)?)
 }
 
-fn design(
-    source: Source,
-    options: &Options,
+fn draw_design(
+    source: FigureFile,
+    options: &PlotOptions,
     model: &dyn Figures,
     format: Format,
 ) -> Result<Vec<u8>> {
@@ -217,58 +221,65 @@ fn design(
         return Ok(html::design_page(&scatter, options, model).into_bytes());
     }
     let scene = match options.view {
-        Some(View::Histogram) => chart::draw(&figures::histogram::chart(&scatter)),
-        Some(View::Influence) => figures::influence::draw(&scatter),
+        Some(DesignView::Histogram) => chart::draw(&figures::histogram::chart(&scatter)),
+        Some(DesignView::Influence) => figures::influence::draw(&scatter),
         _ => figures::matrix::draw(&scatter).0,
     };
-    image(&scene, format)
+    encode_image(&scene, format)
 }
 
-/// Most cells of a picture: two pixels or three to each.
+/// Maximum number of cells of a picture. Basis: a cell of a picture takes two or three pixels.
+/// Doubling it makes cells smaller than a pixel.
 const PICTURE_CELLS: usize = 1 << 17;
 
-fn map(source: Source, options: &Options, model: &dyn Figures, format: Format) -> Result<Vec<u8>> {
+fn draw_map(
+    source: FigureFile,
+    options: &PlotOptions,
+    model: &dyn Figures,
+    format: Format,
+) -> Result<Vec<u8>> {
     let axes = swept::axes(&source)?;
     if format != Format::Html && axes.len() > 1 {
-        let shown = layer::chosen(&source, options)?;
+        let shown = layer::requested_one(&source, options)?;
         let columns = shown.iter().map(|shown| shown.column()).chain([layer::STATUS]);
         let columns: Vec<String> = columns.map(str::to_owned).collect();
-        let cuts = Cuts::of_picture(&source, &axes, &options.at)?;
+        let cuts = Cuts::for_picture(&source, &axes, &options.at)?;
         let grid = Grid::new(&axes, &cuts.picks, PICTURE_CELLS);
-        let map = Map::read(source, grid, &columns)?;
+        let map = CellMap::read(source, grid, &columns)?;
         let overlay = options.boundary.as_ref();
-        let overlay = overlay.map(|path| overlay_of(path, &axes, &map.table.source)).transpose()?;
+        let overlay =
+            overlay.map(|path| read_overlay(path, &axes, &map.table.source)).transpose()?;
         let scene = figures::map::draw(&map, &cuts, shown.as_ref(), overlay.as_ref())?;
-        return image(&scene, format);
+        return encode_image(&scene, format);
     }
-    let columns = html::carried(&source, &axes);
-    let most = html::most_cells(columns.len());
-    let cuts = Cuts::of_page(&source, &axes, &options.at, most)?;
+    let columns = html::page_columns(&source, &axes);
+    let most = html::max_cells(columns.len());
+    let cuts = Cuts::for_page(&source, &axes, &options.at, most)?;
     let grid = Grid::new(&axes, &cuts.picks, most);
-    let map = Map::read(source, grid, &columns)?;
+    let map = CellMap::read(source, grid, &columns)?;
     if axes.len() == 1 {
         let chart = figures::curves::chart(&map, options)?;
-        return written(&map.table.source, &chart, &axes[0].name, model, format);
+        return write_chart(&map.table.source, &chart, &axes[0].name, model, format);
     }
     Ok(html::map_page(&map, &cuts, options, model)?.into_bytes())
 }
 
-/// The boundary file beside a map of these axes.
-fn overlay_of(path: &Path, axes: &[SweptAxis], map: &Source) -> Result<Overlay> {
-    let source = Source::open(path, map.known)?;
-    source.expect(Kind::BOUNDARY, "--boundary", "`sweep boundary` writes a boundary file")?;
-    let table = Table::read(source)?;
+/// Reads the boundary file that is drawn over a map with these axes.
+fn read_overlay(path: &Path, axes: &[SweptAxis], map: &FigureFile) -> Result<Overlay> {
+    let source = FigureFile::open(path, map.model_kinds)?;
+    source.expect(FigureKind::BOUNDARY, "--boundary", "`sweep boundary` writes a boundary file")?;
+    let table = FigureTable::read(source)?;
     let line = figures::boundary::overlay(&table, [&axes[0].name, &axes[1].name])?;
-    let moved: At = axes.iter().map(|axis| (axis.name.clone(), 0.0)).collect();
+    let moved: NamedPoint = axes.iter().map(|axis| (axis.name.clone(), 0.0)).collect();
     let files = [(map, &moved), (&table.source, &moved)];
-    together::agree("--boundary", path, files, &figures::boundary::follows_from(&table))?;
+    together::check_agreement("--boundary", path, files, &figures::boundary::follows_from(&table))?;
     Ok(line)
 }
 
-/// A picture of what differs between two maps.
-fn differences(
-    source: Source,
-    options: &Options,
+/// Draws the differences between two maps as a picture.
+fn draw_differences(
+    source: FigureFile,
+    options: &PlotOptions,
     model: &dyn Figures,
     format: Format,
 ) -> Result<Vec<u8>> {
@@ -278,29 +289,31 @@ fn differences(
             "{path} is a differences file, which is drawn as .svg or .png over two axes or more"
         )));
     }
-    map(source, options, model, format)
+    draw_map(source, options, model, format)
 }
 
-fn image(scene: &Scene, format: Format) -> Result<Vec<u8>> {
+fn encode_image(scene: &Scene, format: Format) -> Result<Vec<u8>> {
     match format {
         Format::Png => raster::write(scene, PNG_SCALE),
         _ => Ok(svg::write(scene).into_bytes()),
     }
 }
 
-/// Refuses options that the file's kind or the output's format would leave without effect.
-fn check_options(source: &Source, options: &Options, format: Format) -> Result<()> {
+/// Rejects options that have no effect on this kind of file or this format.
+fn check_options(source: &FigureFile, options: &PlotOptions, format: Format) -> Result<()> {
     let is = |kind| source.kind == kind;
-    let (map, design) = (is(Kind::MAP) || is(Kind::DIFFERENCES), is(Kind::DESIGN));
+    let map = is(FigureKind::MAP) || is(FigureKind::DIFFERENCES);
+    let design = is(FigureKind::DESIGN);
     let is_page = format == Format::Html;
-    let with_points = source.known.kinds.iter().filter(|kind| kind.has_points);
+    let with_points = source.model_kinds.kinds.iter().filter(|kind| kind.has_points);
     let with_points: String = with_points.map(|kind| format!(", {} files", kind.name)).collect();
     let designs = "designs: results of a grid file with [design]";
-    source.refuse("--quantity", !options.quantity.is_empty(), map || design, "maps")?;
+    source.reject_option("--quantity", !options.quantity.is_empty(), map || design, "maps")?;
     let at = !options.at.is_empty();
-    source.refuse("--at", at, source.kind.has_points, &format!("maps{with_points}"))?;
-    let (boundary, traces) = (options.boundary.is_some(), options.traces.is_some());
-    source.refuse("--boundary", boundary, map && !is_page, "maps drawn as .svg or .png")?;
-    source.refuse("--view", options.view.is_some(), design, designs)?;
-    source.refuse("--traces", traces, map && is_page, "maps drawn as .html")
+    source.reject_option("--at", at, source.kind.has_points, &format!("maps{with_points}"))?;
+    let boundary = options.boundary.is_some();
+    let traces = options.traces.is_some();
+    source.reject_option("--boundary", boundary, map && !is_page, "maps drawn as .svg or .png")?;
+    source.reject_option("--view", options.view.is_some(), design, designs)?;
+    source.reject_option("--traces", traces, map && is_page, "maps drawn as .html")
 }

@@ -1,80 +1,79 @@
-//! What a model adds to the figures that every model's files have.
+//! The interface through which a model adds figures of its own to those of every model.
 
 use serde_json::Value;
 
-use crate::Options;
+use crate::PlotOptions;
 use crate::chart::Chart;
 use crate::error::Result;
-use crate::read::{Known, Source};
-use crate::table::Table;
+use crate::read::{FigureFile, ModelKinds};
+use crate::table::FigureTable;
 
-/// A model's own kinds of files, their charts, and what pages say of it. What is not given is what
-/// a model without any has.
+/// A model's own kinds of files, their charts, and the model's text in pages. The defaults are
+/// those of a model without any.
 pub trait Figures {
-    /// The kinds, and which sections of a plan files follow from.
-    fn known(&self) -> Known {
-        Known::default()
+    /// Returns the model's kinds of files, and the sections of a plan that results follow from.
+    fn model_kinds(&self) -> ModelKinds {
+        ModelKinds::default()
     }
 
-    /// Refuses options of the model that a file, or the form of the output, would leave without
-    /// effect.
+    /// Rejects options of the model that have no effect on a file or on the form of the output.
     ///
     /// # Errors
     /// [`crate::PlotError::Unfit`].
-    fn check(&self, _source: &Source, _is_page: bool) -> Result<()> {
+    fn check(&self, _source: &FigureFile, _is_page: bool) -> Result<()> {
         Ok(())
     }
 
-    /// The chart of a file whose kind is the model's own, or a trace.
+    /// Draws a file of the model's own kind, or a trace.
     ///
     /// # Errors
-    /// Whatever stands against drawing it.
-    fn chart(&self, source: Source, _options: &Options) -> Result<(Source, Chart)> {
-        Err(source.empty("this model has no figure of it"))
+    /// The errors of reading and drawing it.
+    fn chart(&self, source: FigureFile, _options: &PlotOptions) -> Result<(FigureFile, Chart)> {
+        Err(source.nothing_to_draw("this model has no figure of it"))
     }
 
-    /// The chart of a point's trace beside a map.
+    /// Draws the chart of a point's trace beside a map.
     ///
     /// # Errors
-    /// Whatever stands against drawing it.
-    fn history(&self, trace: &Table) -> Result<Chart> {
-        Err(trace.source.empty("this model has no figure of it"))
+    /// The errors of drawing it.
+    fn history(&self, trace: &FigureTable) -> Result<Chart> {
+        Err(trace.source.nothing_to_draw("this model has no figure of it"))
     }
 
-    /// What a plan says of the model, in words, each with its heading.
-    fn told(&self, _plan: &Value) -> Vec<(&'static str, String)> {
+    /// Returns the lines of a plan's summary about the model: heading and text.
+    fn plan_summary(&self, _plan: &Value) -> Vec<(&'static str, String)> {
         Vec::new()
     }
 
-    /// Tables behind these words, in HTML.
+    /// Returns the tables that follow the summary, in HTML.
     fn tables(&self) -> String {
         String::new()
     }
 
-    /// What to be careful about in every map.
-    fn caveats(&self) -> &'static [&'static str] {
+    /// Returns the notes on what to be careful about in every map.
+    fn cautions(&self) -> &'static [&'static str] {
         &[]
     }
 
-    /// What a page of a map over these axes computes with: their names, and whether they are
+    /// Returns the live part of a page over these axes, given by name and whether they are
     /// logarithmic.
-    fn computing(&self, _axes: &[(&str, bool)]) -> Option<Computing> {
+    fn live_part(&self, _axes: &[(&str, bool)]) -> Option<LivePart> {
         None
     }
 }
 
-/// What a page computes with.
+/// The live part of a page: data and scripts with which it computes.
 #[derive(Debug)]
-pub struct Computing {
-    /// The page's script finds it under `live`.
+pub struct LivePart {
+    /// The data that scripts of the page find under `live`.
     pub data: Value,
-    /// Scripts; one of them has the function `createLive`.
+    /// The scripts; one of them has the function `createLive`.
     pub scripts: &'static [&'static str],
-    /// Elements that they copy, in HTML.
+    /// The templates of elements that the scripts copy, in HTML.
     pub parts: &'static str,
 }
 
-/// The figures that every model has, and no others.
+/// The figures of a model that has none of its own.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CommonFigures;
 

@@ -1,4 +1,5 @@
-//! A scene as PNG, with the typeface it carries: the same picture on every machine.
+//! PNG output of a scene. The typeface is part of the program, so that the picture is the same on
+//! every machine.
 
 use std::sync::LazyLock;
 
@@ -8,21 +9,24 @@ use tiny_skia::{
 use ttf_parser::{Face, OutlineBuilder};
 
 use super::error::{PlotError, Result};
-use super::scene::{Anchor, Colour, Item, Outline, Scene, Segment, Stroke, Text};
+use super::scene::{Anchor, Colour, Item, Outline, PathSegment, Scene, Stroke, Text};
 use super::svg::halo_width;
 
+/// The typeface of plain text.
 const REGULAR: &[u8] = include_bytes!("fonts/NotoSans-Regular.subset.ttf");
+/// The typeface of bold text.
 const BOLD: &[u8] = include_bytes!("fonts/NotoSans-Bold.subset.ttf");
 
-/// The weight of text that is bold, and of other text.
+/// Returns the typeface of bold or plain text.
 fn face(bold: bool) -> &'static Face<'static> {
+    /// The parsed typefaces, plain and bold.
     static FACES: LazyLock<[Face<'static>; 2]> = LazyLock::new(|| {
-        [REGULAR, BOLD].map(|font| Face::parse(font, 0).expect("a font that is in the program"))
+        [REGULAR, BOLD].map(|font| Face::parse(font, 0).expect("the built-in font is valid"))
     });
     &FACES[usize::from(bold)]
 }
 
-/// Width of `text` in type `size` px high, px.
+/// Returns the width of `text` in type `size` px high, px.
 pub(crate) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
     let face = face(bold);
     let advances: u32 = text.chars().map(|letter| u32::from(advance(face, letter))).sum();
@@ -34,7 +38,7 @@ fn advance(face: &Face<'_>, letter: char) -> u16 {
     face.glyph_hor_advance(glyph).unwrap_or_default()
 }
 
-/// The scene as a PNG file's bytes, `scale` image pixels to a scene pixel.
+/// Encodes a scene as a PNG file with `scale` image pixels per scene pixel.
 ///
 /// # Errors
 /// [`PlotError::Drawing`] if the image would be too large to hold.
@@ -76,7 +80,8 @@ struct Canvas {
 impl Canvas {
     fn fill(&mut self, outline: &Outline, colour: Colour, anti_alias: bool) {
         if let Some(path) = path(outline) {
-            let (paint, clip) = (paint(colour, anti_alias), self.clips.last());
+            let paint = paint(colour, anti_alias);
+            let clip = self.clips.last();
             self.pixmap.fill_path(&path, &paint, FillRule::Winding, self.transform, clip);
         }
     }
@@ -138,9 +143,10 @@ impl Canvas {
     }
 }
 
-/// A solid line as wide as that.
+/// Returns a solid line of this width, px.
 fn line(width: f64) -> tiny_skia::Stroke {
-    let (width, line_join) = (width as f32, LineJoin::Round);
+    let width = width as f32;
+    let line_join = LineJoin::Round;
     tiny_skia::Stroke { width, line_join, ..tiny_skia::Stroke::default() }
 }
 
@@ -155,15 +161,15 @@ fn path(outline: &Outline) -> Option<Path> {
     let mut builder = PathBuilder::new();
     for segment in &outline.0 {
         match *segment {
-            Segment::Move([x, y]) => builder.move_to(x as f32, y as f32),
-            Segment::Line([x, y]) => builder.line_to(x as f32, y as f32),
-            Segment::Close => builder.close(),
+            PathSegment::Move([x, y]) => builder.move_to(x as f32, y as f32),
+            PathSegment::Line([x, y]) => builder.line_to(x as f32, y as f32),
+            PathSegment::Close => builder.close(),
         }
     }
     builder.finish()
 }
 
-/// Collects glyph outlines, which come in font units with y up.
+/// The collector of a glyph's outline, which comes in font units with y up.
 struct Pen {
     builder: PathBuilder,
     x: f32,

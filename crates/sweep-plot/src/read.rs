@@ -1,7 +1,7 @@
-//! One of this program's Parquet files, open: what it says of itself, and its rows, batch by batch.
+//! An open result file: its metadata, and its rows batch by batch.
 //!
-//! This is the one place that reads files. A map of ten million rows is read in several passes over
-//! the columns that a figure needs, and is never in memory whole.
+//! This is the only module that reads files. A map of ten million rows is read in several passes
+//! over the columns that a figure needs, and is never in memory whole.
 
 use std::fmt;
 use std::ops::Range;
@@ -14,44 +14,46 @@ use super::error::{PlotError, Result};
 use super::label;
 use sweep_files::{self as files, ParquetFile};
 
-/// A column without its rows, which [`super::table::Column`] has.
+/// The facts of a column without its rows, which [`super::table::FigureColumn`] has.
 pub use sweep_files::Column as ColumnFacts;
 use sweep_parameter::Worse;
 
-/// What a file holds.
+/// The kind of a result file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Kind {
-    /// As in "a map file".
+pub struct FigureKind {
+    /// The name, as in "a map file".
     pub name: &'static str,
-    /// The columns that show it. Where it has axes, they stand before the first of these.
+    /// The columns that identify the kind. Axes stand before the first of these.
     pub columns: &'static [&'static str],
-    /// And one that begins with one of these, if there are any.
+    /// Prefixes; a file of the kind also has a column that begins with one of these, if there are
+    /// any.
     pub begins: &'static [&'static str],
-    /// Whether its rows are of points, which `--at` picks.
+    /// Whether the rows belong to points, which `--at` chooses.
     pub has_points: bool,
 }
 
-impl Kind {
-    /// One row per grid point.
-    pub const MAP: Self = Self::of("map", &["status", "ratio_max"]).with_points();
+impl FigureKind {
+    /// A map: one row for each grid point.
+    pub const MAP: Self = Self::new("map", &["status", "ratio_max"]).with_points();
     /// A map whose points are scattered.
     pub const DESIGN: Self = Self { name: "design", has_points: false, ..Self::MAP };
-    /// One row per grid point that two maps share.
-    pub const DIFFERENCES: Self = Self::of("differences", &["ratio_change", "flip"]).with_points();
-    /// Candidates of a study.
-    pub const STUDY: Self = Self::of("study", &["candidate", "on_front"]);
-    /// Time histories of both models at one point, or of a measurement and the model fitted to it.
+    /// The differences of two maps: one row for each grid point that both have.
+    pub const DIFFERENCES: Self = Self::new("differences", &["ratio_change", "flip"]).with_points();
+    /// The candidates of an optimisation study.
+    pub const STUDY: Self = Self::new("study", &["candidate", "on_front"]);
+    /// Time histories of both models at one point, or of a measurement and the fitted model.
     pub const TRACE: Self =
-        Self { begins: &["nonlinear_", "measured_"], ..Self::of("trace", &["time_s"]) };
-    /// The curve on which a quantity is at its limit: it has a bracket instead of columns.
-    pub const BOUNDARY: Self = Self::of("boundary", &[]);
+        Self { begins: &["nonlinear_", "measured_"], ..Self::new("trace", &["time_s"]) };
+    /// The curve on which a quantity is at its limit. A file of it has the two columns of a
+    /// bracket.
+    pub const BOUNDARY: Self = Self::new("boundary", &[]);
 
-    /// A kind that these columns show.
-    pub const fn of(name: &'static str, columns: &'static [&'static str]) -> Self {
+    /// Returns a kind that these columns identify.
+    pub const fn new(name: &'static str, columns: &'static [&'static str]) -> Self {
         Self { name, columns, begins: &[], has_points: false }
     }
 
-    /// A kind whose rows are of points.
+    /// Returns the kind with rows that belong to points.
     pub const fn with_points(self) -> Self {
         Self { has_points: true, ..self }
     }
@@ -64,56 +66,55 @@ impl Kind {
     }
 }
 
-/// What a model's files have beside those of every model.
+/// The model's kinds of files and sections of plans.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Known {
-    /// Kinds of files, the surest first.
-    pub kinds: &'static [Kind],
-    /// Sections of a plan that histories follow from.
-    pub of_runs: &'static [&'static str],
-    /// Those that hold at any speed.
-    pub of_machine: &'static [&'static str],
+pub struct ModelKinds {
+    /// The kinds of files; of two that fit a file, the first is taken.
+    pub kinds: &'static [FigureKind],
+    /// The sections of a plan that time histories follow from.
+    pub history_sections: &'static [&'static str],
+    /// The sections of a plan that results at a constant speed follow from.
+    pub machine_sections: &'static [&'static str],
 }
 
-impl Known {
-    /// All kinds, the surest first. A design has a map's columns.
-    pub fn all_kinds(self) -> impl Iterator<Item = Kind> {
+impl ModelKinds {
+    /// Returns all kinds; of two that fit a file, the first is taken. A design has the columns of a
+    /// map.
+    pub fn all_kinds(self) -> impl Iterator<Item = FigureKind> {
         let own = self.kinds.iter().copied();
-        let last = [Kind::MAP, Kind::DIFFERENCES, Kind::TRACE, Kind::BOUNDARY];
-        std::iter::once(Kind::STUDY).chain(own).chain(last)
+        let last =
+            [FigureKind::MAP, FigureKind::DIFFERENCES, FigureKind::TRACE, FigureKind::BOUNDARY];
+        std::iter::once(FigureKind::STUDY).chain(own).chain(last)
     }
 }
 
-/// A file whose columns are those of a figure.
+/// An open result file of a kind that has a figure.
 #[derive(Debug)]
-pub struct Source {
-    /// Where it is.
+pub struct FigureFile {
     pub path: PathBuf,
-    /// What it holds.
-    pub kind: Kind,
-    /// In file order, without those of types that none of our files has.
+    pub kind: FigureKind,
+    /// The columns in file order, without columns of types that no result file has.
     pub columns: Vec<ColumnFacts>,
-    /// The file-level key-value metadata, parsed where it is JSON; in file order.
+    /// The key-value metadata of the file in file order, parsed if it is JSON.
     pub provenance: Vec<(String, Value)>,
-    /// Number of rows.
+    /// The number of rows.
     pub rows: usize,
-    /// What the model's files have.
-    pub known: Known,
-    /// Name of the run with what its command line set, if the file says them.
+    /// The kinds and sections of the model.
+    pub model_kinds: ModelKinds,
+    /// The name of the run with the settings of its command line, if the file has them.
     pub run_name: Option<String>,
     file: ParquetFile,
 }
 
-/// Key under which Arrow keeps its own copy of the schema: no provenance.
+/// The key of Arrow's own copy of the schema, which is not part of the provenance.
 const ARROW_SCHEMA: &str = "ARROW:schema";
 
-impl Source {
-    /// Opens a file and reads what it says of itself.
+impl FigureFile {
+    /// Opens a file and reads its metadata.
     ///
     /// # Errors
-    /// [`PlotError::File`], or [`PlotError::Undrawable`] when the columns are not those of a file
-    /// of ours.
-    pub fn open(path: &Path, known: Known) -> Result<Self> {
+    /// [`PlotError::File`], or [`PlotError::Undrawable`] if the columns are those of no kind.
+    pub fn open(path: &Path, model_kinds: ModelKinds) -> Result<Self> {
         let file = ParquetFile::open(path)?;
         let rows = usize::try_from(file.rows()).unwrap_or(usize::MAX);
         let provenance = file.pairs().filter(|entry| entry.key != ARROW_SCHEMA).map(|entry| {
@@ -123,52 +124,61 @@ impl Source {
         let provenance: Vec<(String, Value)> = provenance.collect();
         let columns = files::columns(file.schema()).into_iter();
         let columns: Vec<ColumnFacts> =
-            columns.map(|column| by_name(column, file.schema())).collect();
+            columns.map(|column| completed_by_name(column, file.schema())).collect();
         let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-        let kind = known.all_kinds().find(|kind| kind.is_shown_by(&names));
+        let kind = model_kinds.all_kinds().find(|kind| kind.is_shown_by(&names));
         let kind = kind.ok_or_else(|| PlotError::Undrawable {
             path: path.to_owned(),
             reason: format!(
                 "its columns ({}) are those of no file that has a figure: {}",
                 names.join(", "),
-                known.all_kinds().map(|kind| kind.name).collect::<Vec<_>>().join(", ")
+                model_kinds.all_kinds().map(|kind| kind.name).collect::<Vec<_>>().join(", ")
             ),
         })?;
         let run_name = run_name(&provenance);
-        Ok(Self { path: path.to_owned(), kind, columns, provenance, rows, known, run_name, file })
+        Ok(Self {
+            path: path.to_owned(),
+            kind,
+            columns,
+            provenance,
+            rows,
+            model_kinds,
+            run_name,
+            file,
+        })
     }
 
-    /// Calls `take` for each row, with the columns of these names. One that the file lacks is null.
+    /// Calls `take` for each row with the columns of these names; a missing column is null.
     ///
     /// # Errors
-    /// [`PlotError::File`], and whatever `take` says.
+    /// [`PlotError::File`], and the errors of `take`.
     pub fn each_row(
         &self,
         names: &[&str],
-        mut take: impl FnMut(Row<'_>) -> Result<()>,
+        mut take: impl FnMut(FigureRow<'_>) -> Result<()>,
     ) -> Result<()> {
-        self.file.each_row(names, |row| take(Row(row)))
+        self.file.each_row(names, |row| take(FigureRow(row)))
     }
 
-    /// The column of that name.
+    /// Returns the column of this name.
     pub fn column(&self, name: &str) -> Option<&ColumnFacts> {
         self.columns.iter().find(|column| column.name == name)
     }
 
-    /// Columns of numbers whose name starts with `prefix`, without it.
+    /// Returns the columns of numbers whose name starts with `prefix`, with the rest of the name.
     pub fn with_prefix(&self, prefix: &str) -> Vec<(&str, &ColumnFacts)> {
         self.numeric()
             .filter_map(|column| Some((column.name.strip_prefix(prefix)?, column)))
             .collect()
     }
 
-    /// Columns of numbers.
+    /// Yields the columns of numbers.
     pub fn numeric(&self) -> impl Iterator<Item = &ColumnFacts> {
         self.columns.iter().filter(|column| column.is_number())
     }
 
-    /// The error that something the options name is not there, and what is.
-    pub fn not_there(
+    /// Returns the error for an option that names something that the file does not have.
+    pub fn unknown_name(
         &self,
         option: &str,
         given: impl fmt::Display,
@@ -188,12 +198,12 @@ impl Source {
         PlotError::Undrawable { path: self.path.clone(), reason }
     }
 
-    /// Nothing in it can be drawn.
-    pub fn empty(&self, reason: &str) -> PlotError {
+    /// Returns the error for a file without anything to draw.
+    pub fn nothing_to_draw(&self, reason: &str) -> PlotError {
         self.undrawable(format!("nothing to draw: {reason}"))
     }
 
-    /// More rows than a figure of its kind shows.
+    /// Returns the error for a file with more rows than a figure of its kind can show.
     pub fn too_many(&self, rows: usize, most: usize) -> PlotError {
         let kind = self.kind.name;
         self.undrawable(format!(
@@ -201,53 +211,62 @@ impl Source {
         ))
     }
 
-    /// Refuses an option that was given and would have no effect on this file; `fits` says whether
-    /// it has one, and `for_what` on what.
+    /// Rejects an option that was given and has no effect on this file. `fits` says whether it has
+    /// one; `for_what` names the files on which it has one.
     ///
     /// # Errors
     /// [`PlotError::Unfit`].
-    pub fn refuse(&self, option: &str, given: bool, fits: bool, for_what: &str) -> Result<()> {
+    pub fn reject_option(
+        &self,
+        option: &str,
+        given: bool,
+        fits: bool,
+        for_what: &str,
+    ) -> Result<()> {
         if !given || fits {
             return Ok(());
         }
-        let (kind, path) = (self.kind.name, self.path.display());
+        let kind = self.kind.name;
+        let path = self.path.display();
         Err(PlotError::Unfit(format!("`{option}` is for {for_what}; {path} is a {kind} file")))
     }
 
-    /// Refuses a file of another kind than an option takes.
+    /// Rejects a file of another kind than an option takes.
     ///
     /// # Errors
     /// [`PlotError::Unfit`], which says what writes such a file.
-    pub fn expect(&self, kind: Kind, option: &str, hint: &str) -> Result<()> {
+    pub fn expect(&self, kind: FigureKind, option: &str, hint: &str) -> Result<()> {
         if self.kind == kind {
             return Ok(());
         }
-        let (path, own) = (self.path.display(), self.kind.name);
+        let path = self.path.display();
+        let own = self.kind.name;
         Err(PlotError::Unfit(format!("`{option} {path}`: this is a {own} file; {hint}")))
     }
 
-    /// A column that this kind of file must have is missing.
-    pub fn lacks(&self, column: &str, expected: &str) -> PlotError {
+    /// Returns the error for a missing column that this kind of file needs.
+    pub fn missing_column(&self, column: &str, expected: &str) -> PlotError {
         let kind = self.kind.name;
         self.undrawable(format!("a {kind} file needs the {expected} column `{column}`"))
     }
 
-    /// The first value stored under `key` in the provenance, outer levels before inner ones.
+    /// Returns the first value of `key` in the metadata; outer levels are searched before inner
+    /// ones.
     pub fn find(&self, key: &str) -> Option<&Value> {
         find_in(&self.provenance, key)
     }
 
-    /// The run's name, if the file says it, and these notes.
+    /// Returns the name of the run, if the file has it, and these notes.
     pub fn notes(&self, further: impl IntoIterator<Item = String>) -> Vec<String> {
         self.run_name.iter().cloned().chain(further).collect()
     }
 
-    /// The run's name, if the file says it, and `rest` as a figure's subtitle.
+    /// Returns the name of the run, if the file has it, and `rest` as a subtitle.
     pub fn subtitle(&self, rest: &str) -> String {
         self.notes([rest.to_owned()]).join(" · ")
     }
 
-    /// What its ratios compare, by the run's criterion.
+    /// Returns the quantity whose ratio is taken, by the run's criterion.
     pub fn compared(&self) -> &'static str {
         match self.find("criterion").and_then(Value::as_str) {
             Some("envelope") => "amplitudes by turn",
@@ -256,91 +275,94 @@ impl Source {
         }
     }
 
-    /// How the points were placed, of a file whose points are no grid by its plan.
+    /// Returns the method that placed the points, if the plan is a design.
     pub fn design_method(&self) -> Option<&str> {
         self.find("design")?.get("method")?.as_str()
     }
 
-    /// The entries of a list that the provenance has under `key`.
+    /// Yields the entries of a list that the metadata has under `key`.
     pub fn list(&self, key: &str) -> impl Iterator<Item = &Value> {
         self.find(key).and_then(Value::as_array).into_iter().flatten()
     }
 
-    /// The swept parameters that the plan names.
+    /// Yields the swept parameters that the plan names.
     pub fn planned_axes(&self) -> impl Iterator<Item = &str> {
         self.list("axis").filter_map(|axis| axis.get("parameter")?.as_str())
     }
 
-    /// Whether the plan spreads an axis by the logarithm.
+    /// Returns whether the plan spaces an axis by the logarithm.
     pub fn is_log(&self, parameter: &str) -> bool {
         self.list("axis").filter(|axis| axis["parameter"] == parameter).any(|axis| {
             axis["range"]["spacing"] == "log" || axis["distribution"]["kind"] == "lognormal"
         })
     }
 
-    /// Up to where a column is good, in its unit: its own limit, or the run's of ratios. Two files
-    /// may have two.
+    /// Returns the limit of a column in its unit: the column's own, or that of the run for ratios.
+    /// The ratios of two files may have two limits, so that they have none here.
     pub fn limit(&self, column: &ColumnFacts) -> Option<f64> {
-        let is_of_run = is_ratio(column) && self.kind != Kind::DIFFERENCES;
-        column.limit.or_else(|| is_of_run.then(|| self.ratio_limit()))
+        let has_run_limit = is_ratio(column) && self.kind != FigureKind::DIFFERENCES;
+        column.limit.or_else(|| has_run_limit.then(|| self.ratio_limit()))
     }
 
-    /// The ratio from which on a point is unreliable: the run's limit, or else the paper's, 2.
+    /// Returns the ratio from which a point is unreliable: the run's limit, or else that of the
+    /// paper, 2.
     pub fn ratio_limit(&self) -> f64 {
         let limit = self.find("ratio_limit").and_then(Value::as_f64).map(drawable);
         limit.filter(|limit| *limit > 0.0).unwrap_or(2.0)
     }
 }
 
-/// Whether a column's numbers are ratios of both models.
+/// Returns whether a column's numbers are ratios of both models.
 pub fn is_ratio(column: &ColumnFacts) -> bool {
     column.name.starts_with("ratio_") && column.name != "ratio_change"
 }
 
-/// The names of what there is.
-pub fn some_of<'a>(names: impl Iterator<Item = &'a str>) -> String {
+/// Returns the names as a list, or "none".
+pub fn list_names<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.collect();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 /// A row of a file.
 #[derive(Clone, Copy)]
-pub struct Row<'a>(sweep_files::Row<'a>);
+pub struct FigureRow<'a>(sweep_files::Row<'a>);
 
-impl<'a> Row<'a> {
-    /// Its number in the file.
+impl<'a> FigureRow<'a> {
+    /// Returns the index of the row in the file.
     pub fn index(self) -> usize {
         self.0.index() as usize
     }
 
-    /// The number in a column as it is drawn, NaN where there is none.
+    /// Returns the number in a column as it is drawn, NaN where there is none.
     pub fn number(self, column: usize) -> f64 {
         drawable(self.0.value(column))
     }
 
-    /// The numbers in these columns.
+    /// Returns the numbers in these columns.
     pub fn numbers(self, columns: Range<usize>) -> Vec<f64> {
         columns.map(|column| self.number(column)).collect()
     }
 
-    /// The word in a column.
+    /// Returns the word in a column.
     pub fn word(self, column: usize) -> Option<&'a str> {
         self.0.word(column)
     }
 }
 
-/// Numbers beyond these are drawn as these, and smaller ones as 0: what a figure makes of them,
-/// such as borders halfway on a logarithmic axis, shall neither overflow nor vanish.
-const GREATEST: f64 = 1e100;
-const LEAST: f64 = 1e-100;
+/// Greatest magnitude that is drawn; larger numbers are drawn as this. Basis: arithmetic on drawn
+/// numbers, such as borders halfway on a logarithmic axis, must not overflow.
+const GREATEST_DRAWN: f64 = 1e100;
+/// Least magnitude that is drawn; smaller numbers are drawn as 0, so that arithmetic on drawn
+/// numbers does not underflow.
+const LEAST_DRAWN: f64 = 1e-100;
 
 fn drawable(value: f64) -> f64 {
     if value.is_infinite() {
         value
-    } else if value.abs() < LEAST {
+    } else if value.abs() < LEAST_DRAWN {
         0.0
     } else {
-        value.clamp(-GREATEST, GREATEST)
+        value.clamp(-GREATEST_DRAWN, GREATEST_DRAWN)
     }
 }
 
@@ -350,13 +372,14 @@ fn find_in<'a>(provenance: &'a [(String, Value)], key: &str) -> Option<&'a Value
         .find_map(|(name, value)| if name == key { Some(value) } else { find(value, key) })
 }
 
-/// More letters of a name would leave no room for what was set.
-const NAME_LETTERS: usize = 40;
+/// Maximum length of a run's name in figures, characters. Basis: room in the subtitle for the
+/// settings that follow.
+const MAX_NAME_CHARACTERS: usize = 40;
 
-/// As in "fig12, mass_kg = 20".
+/// Returns the name of a run with its settings, as in "fig12, mass_kg = 20".
 fn run_name(provenance: &[(String, Value)]) -> Option<String> {
     let name = find_in(provenance, "name")?.as_str()?;
-    let mut named: String = name.chars().take(NAME_LETTERS).collect();
+    let mut named: String = name.chars().take(MAX_NAME_CHARACTERS).collect();
     if named.len() < name.len() {
         named.push('…');
     }
@@ -384,7 +407,7 @@ fn find<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
     }
 }
 
-/// The two columns between which a boundary is known to lie, after its two coordinates.
+/// Returns the two columns of a boundary's bracket, which follow its two coordinates.
 pub fn bracket<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
     let with_word = |words: &[&str]| {
         names.iter().skip(2).copied().find(|name| name.split('_').any(|part| words.contains(&part)))
@@ -392,8 +415,9 @@ pub fn bracket<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
     Some((with_word(&["low", "lower", "min"])?, with_word(&["high", "upper", "max"])?))
 }
 
-/// A file that went through another program has its columns' names alone, which say something too.
-fn by_name(column: ColumnFacts, schema: &Schema) -> ColumnFacts {
+/// Completes unit and direction from the column's name, for files that lost their metadata in
+/// another program.
+fn completed_by_name(column: ColumnFacts, schema: &Schema) -> ColumnFacts {
     let unit = schema.field(column.field).metadata().get("unit");
     let unit = match unit.is_none_or(String::is_empty) {
         true => label::unit_of_name(&column.name),
@@ -408,12 +432,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_drawn_as_far_as_figures_can_take_them() {
+    fn numbers_are_clamped_to_the_drawable_range() {
         for value in [0.0, -350.0, 1e-99, 9e99] {
             assert_eq!(drawable(value).to_bits(), value.to_bits());
         }
         assert_eq!(drawable(5e-324), 0.0);
-        assert_eq!(drawable(-1e300), -GREATEST);
+        assert_eq!(drawable(-1e300), -GREATEST_DRAWN);
         assert_eq!(drawable(f64::INFINITY), f64::INFINITY, "it is left out, as it was");
         assert!(drawable(f64::NAN).is_nan());
     }

@@ -1,12 +1,13 @@
-//! A place within a panel with room for the name of a region.
+//! Placement of a region's name within a panel.
 
-/// Samples across and down: enough to find room for a line of text.
+/// Number of sample points across and down. Basis: samples closer than a line of text. Doubling
+/// both makes the search sixteen times slower.
 const SAMPLES: [usize; 2] = [44, 33];
 
-/// Centre of the place deepest inside the region `inside`, in a panel `[width, height]` px, for a
-/// text of `size` `[width, height]` px; `None` if it fits nowhere. Coordinates are px from the
-/// panel's top left.
-pub(crate) fn roomiest(
+/// Returns the centre of the place deepest inside the region `inside` of a panel of `panel` px, for
+/// a text of `size` px; `None` if it fits nowhere. Coordinates are px from the top left corner of
+/// the panel.
+pub(crate) fn roomiest_place(
     panel: [f64; 2],
     size: [f64; 2],
     inside: impl Fn([f64; 2]) -> bool,
@@ -19,7 +20,7 @@ pub(crate) fn roomiest(
     };
     let samples = (0..SAMPLES[0]).flat_map(|i| (0..SAMPLES[1]).map(move |j| at(i, j)));
     let (within, outside): (Vec<_>, Vec<_>) = samples.partition(|&point| inside(point));
-    // Distance in units of the text's half extent, so that a wide text looks for a wide place.
+    // The distance is in units of the text's half extent, so that a wide text gets a wide place.
     let distance = |a: [f64; 2], b: [f64; 2]| {
         let [dx, dy] = [0, 1].map(|k| 2.0 * (a[k] - b[k]).abs() / size[k]);
         dx.max(dy)
@@ -46,11 +47,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_is_set_in_the_wide_part() {
-        // A strip 60 px high over the whole width at the top, and a column 100 px wide below it.
+    fn a_name_is_placed_in_the_wide_part() {
+        // The region is a strip 60 px high at the top, and a column 100 px wide below it.
         let shape = |[x, y]: [f64; 2]| y < 60.0 || x < 100.0;
-        let [x, y] = roomiest([600.0, 400.0], [200.0, 20.0], shape).unwrap();
+        let [x, y] = roomiest_place([600.0, 400.0], [200.0, 20.0], shape).unwrap();
         assert!((100.0..=500.0).contains(&x) && (10.0..=50.0).contains(&y), "{x} {y}");
-        assert_eq!(roomiest([600.0, 400.0], [200.0, 20.0], |[x, _]| x < 150.0), None);
+        assert_eq!(roomiest_place([600.0, 400.0], [200.0, 20.0], |[x, _]| x < 150.0), None);
     }
 }

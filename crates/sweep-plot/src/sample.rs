@@ -1,11 +1,12 @@
-//! Small files in the forms that this program writes, for the tests of this crate and of a model's
-//! own figures.
+//! Small files as the program writes them, for the tests of this crate and of a model's figures.
 
-#![allow(dead_code, reason = "neither has all of it")]
+#![allow(dead_code, reason = "each of the two crates uses a part of it")]
 
 use std::collections::HashMap;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use arrow_array::types::Int32Type;
 use arrow_array::{
@@ -17,14 +18,14 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use sweep_files::Writer;
 
-/// Columns with their units, and metadata, on the way to a file.
+/// The columns and metadata of a file to be written.
 #[derive(Clone, Default)]
-pub(crate) struct Sample {
+pub(crate) struct SampleFile {
     columns: Vec<(Field, ArrayRef)>,
     metadata: Vec<KeyValue>,
 }
 
-impl Sample {
+impl SampleFile {
     pub(crate) fn column(mut self, name: &str, unit: &str, array: ArrayRef) -> Self {
         let metadata = if unit.is_empty() {
             HashMap::new()
@@ -45,12 +46,12 @@ impl Sample {
         unit: &str,
         values: impl IntoIterator<Item = f64>,
     ) -> Self {
-        // As in the files: no value is null, not NaN.
+        // Result files mark a missing value by null, not by NaN.
         let values = values.into_iter().map(|value| value.is_finite().then_some(value));
         self.column(name, unit, Arc::new(values.collect::<Float64Array>()))
     }
 
-    /// The last column, with which way it is bad and up to where it is good.
+    /// Adds the bad direction and the limit to the last column.
     pub(crate) fn bad(mut self, worse: &str, limit: Option<f64>) -> Self {
         let (field, _) = self.columns.last_mut().unwrap();
         let mut metadata = field.metadata().clone();
@@ -60,7 +61,7 @@ impl Sample {
         self
     }
 
-    /// The column of that name, with that limit in its metadata.
+    /// Sets the limit of the column of this name.
     pub(crate) fn limited(mut self, name: &str, limit: &str) -> Self {
         for (field, _) in self.columns.iter_mut().filter(|(field, _)| field.name() == name) {
             let mut metadata = field.metadata().clone();
@@ -97,12 +98,12 @@ impl Sample {
         self
     }
 
-    /// Spoils cells of every column as files of other writers may have them: null, NaN, infinite,
-    /// of no size or of any. A column is spoilt in part, throughout or not at all.
-    pub(crate) fn spoilt(mut self, numbers: &mut fastrand::Rng) -> Self {
+    /// Replaces cells of every column by what other writers or failed runs may leave: null, NaN,
+    /// infinite, tiny and huge numbers. Some, all or none of a column's cells are replaced.
+    pub(crate) fn damaged(mut self, numbers: &mut fastrand::Rng) -> Self {
         for (_, array) in &mut self.columns {
             let share = [0.0, 0.0, 0.1, 0.5, 1.0][numbers.usize(..5)];
-            *array = spoilt(array, share, numbers);
+            *array = damaged(array, share, numbers);
         }
         self
     }
@@ -112,8 +113,9 @@ impl Sample {
     }
 }
 
-/// Spoils this share of a column's cells, all in one way or each in its own.
-fn spoilt(array: &ArrayRef, share: f64, numbers: &mut fastrand::Rng) -> ArrayRef {
+/// Replaces this share of a column's cells, all by one value or each by a value of its own.
+fn damaged(array: &ArrayRef, share: f64, numbers: &mut fastrand::Rng) -> ArrayRef {
+    /// Values that break a careless figure.
     const BAD: [Option<f64>; 12] = [
         None,
         Some(f64::NAN),
@@ -129,36 +131,36 @@ fn spoilt(array: &ArrayRef, share: f64, numbers: &mut fastrand::Rng) -> ArrayRef
         Some(f64::MIN),
     ];
     let common = numbers.bool().then(|| numbers.usize(..BAD.len()));
-    let mut spoil =
+    let mut damage =
         || (numbers.f64() < share).then(|| common.unwrap_or(numbers.usize(..BAD.len())));
     if let Some(values) = array.as_any().downcast_ref::<Float64Array>() {
-        let cells = values.iter().map(|cell| spoil().map_or(cell, |bad| BAD[bad]));
+        let cells = values.iter().map(|cell| damage().map_or(cell, |bad| BAD[bad]));
         return Arc::new(cells.collect::<Float64Array>());
     }
     if let Some(flags) = array.as_any().downcast_ref::<BooleanArray>() {
-        let cells = flags.iter().map(|cell| if spoil().is_some() { None } else { cell });
+        let cells = flags.iter().map(|cell| if damage().is_some() { None } else { cell });
         return Arc::new(cells.collect::<BooleanArray>());
     }
     if let Some(words) = array.as_any().downcast_ref::<DictionaryArray<Int32Type>>() {
         let words = words.downcast_dict::<StringArray>().unwrap();
-        let said = ["", "diverged", "no_equilibrium"];
-        let cell = |cell| match spoil() {
-            Some(bad) => said.get(bad).copied(),
+        let phrase = ["", "diverged", "no_equilibrium"];
+        let cell = |cell| match damage() {
+            Some(bad) => phrase.get(bad).copied(),
             None => cell,
         };
         let cells = words.into_iter().map(cell);
         return Arc::new(cells.collect::<DictionaryArray<Int32Type>>());
     }
-    // Counts: such files have numbers of any type in their place.
+    // Other writers may store counts as numbers of any type.
     let Some(counts) = array.as_any().downcast_ref::<UInt64Array>() else { return array.clone() };
     let cells =
-        counts.iter().map(|cell| spoil().map_or(cell.map(|cell| cell as f64), |bad| BAD[bad]));
+        counts.iter().map(|cell| damage().map_or(cell.map(|cell| cell as f64), |bad| BAD[bad]));
     Arc::new(cells.collect::<Float64Array>())
 }
 
-/// Writes samples of the same columns to one file, one after the other; the metadata is that of the
+/// Writes samples of the same columns to one file, one after the other, with the metadata of the
 /// first.
-fn write_all(folder: &Path, name: &str, samples: impl IntoIterator<Item = Sample>) -> PathBuf {
+fn write_all(folder: &Path, name: &str, samples: impl IntoIterator<Item = SampleFile>) -> PathBuf {
     let path = folder.join(name);
     let mut writer: Option<Writer<std::fs::File>> = None;
     for sample in samples {
@@ -180,24 +182,25 @@ fn write_all(folder: &Path, name: &str, samples: impl IntoIterator<Item = Sample
     path
 }
 
-/// A map's axes by name and values, and what the two models give at a point.
+/// A map to be written: axes by name and values, and the motion of both models at a point.
 pub(crate) struct MapSample<'a> {
     pub(crate) axes: Vec<(&'a str, Vec<f64>)>,
     pub(crate) limit: f64,
-    /// Amplitudes of `body_yaw` in the nonlinear and the linear model, rad; `None` where the run
+    /// The amplitudes of `body_yaw` in the nonlinear and the linear model, rad; `None` if the run
     /// diverged.
     pub(crate) yaw: &'a dyn Fn(&[f64]) -> Option<[f64; 2]>,
-    /// Where the motion is `sensitive`.
+    /// Whether the motion at a point is chaotic.
     pub(crate) chaotic: &'a dyn Fn(&[f64]) -> bool,
 }
 
 impl MapSample<'_> {
-    pub(crate) fn sample(&self) -> Sample {
+    pub(crate) fn sample(&self) -> SampleFile {
         self.rows(0..self.points())
     }
 
-    /// A file as long as the axes make it, some rows in memory at a time.
+    /// Writes all rows, of which few are in memory at a time.
     pub(crate) fn write_long(&self, folder: &Path, name: &str) -> PathBuf {
+        /// Rows in memory at a time.
         const ROWS: usize = 1 << 14;
         let all = self.points();
         let some = |row: usize| self.rows(row..all.min(row + ROWS));
@@ -219,7 +222,7 @@ impl MapSample<'_> {
         at
     }
 
-    fn rows(&self, rows: std::ops::Range<usize>) -> Sample {
+    fn rows(&self, rows: std::ops::Range<usize>) -> SampleFile {
         let points: Vec<Vec<f64>> = rows.clone().map(|index| self.point(index)).collect();
         let yaws: Vec<Option<[f64; 2]>> = points.iter().map(|at| (self.yaw)(at)).collect();
         let model = |k: usize| {
@@ -230,7 +233,7 @@ impl MapSample<'_> {
             .zip(model(1))
             .map(|(n, l)| if l > 0.0 { n / l } else { f64::NAN })
             .collect();
-        let mut sample = Sample::default().counts("point", rows.start as u64..rows.end as u64);
+        let mut sample = SampleFile::default().counts("point", rows.start as u64..rows.end as u64);
         for (k, (name, _)) in self.axes.iter().enumerate() {
             sample = sample.numbers(name, "", points.iter().map(|at| at[k]));
         }
@@ -269,9 +272,9 @@ impl MapSample<'_> {
     }
 }
 
-/// A two-axis map whose boundary is the straight line damping = 50 + 200 mass, with a failed and an
-/// undefined point.
-pub(crate) fn map() -> Sample {
+/// Returns a map over two axes whose boundary is the line damping = 50 + 200 mass, with a failed
+/// and an undefined point.
+pub(crate) fn map() -> SampleFile {
     let axis = |from: f64, step: f64, count: i32| {
         (0..count).map(|k| from + step * f64::from(k)).collect::<Vec<f64>>()
     };
@@ -294,15 +297,45 @@ pub(crate) fn map() -> Sample {
     .sample()
 }
 
-/// A boundary with its bracket.
-pub(crate) fn boundary() -> Sample {
+/// Returns a boundary file with its bracket.
+pub(crate) fn boundary() -> SampleFile {
     let mass: Vec<f64> = (1..=10).map(|k| 0.1 * f64::from(k)).collect();
     let damping = |offset: f64| {
         mass.iter().map(move |mass| 50.0 + 200.0 * mass + offset).collect::<Vec<f64>>()
     };
-    Sample::default()
+    SampleFile::default()
         .numbers("unbalance_mass_kg", "kg", mass.iter().copied())
         .numbers("damping_n_s_per_m", "N s/m", damping(0.0))
         .numbers("damping_low_n_s_per_m", "N s/m", damping(-2.0))
         .numbers("damping_high_n_s_per_m", "N s/m", damping(3.0))
+}
+
+/// Maximum time of a figure of a small file. Basis: a hundred times that of the slowest intact
+/// file. A larger bound finds only loops that never end.
+const MAX_TIME: Duration = Duration::from_secs(20);
+
+/// Draws a damaged file and returns whether it has a figure; otherwise it has an error. `name`
+/// stands in messages; `max_bytes` is the maximum size of the figure.
+pub(crate) fn has_figure<E: Display>(
+    name: &str,
+    max_bytes: usize,
+    draw: impl FnOnce() -> Result<Vec<u8>, E>,
+) -> bool {
+    let begun = Instant::now();
+    let result = draw();
+    let elapsed = begun.elapsed();
+    assert!(elapsed < MAX_TIME, "{name}: {elapsed:?}");
+    match result {
+        Ok(bytes) => assert!(bytes.len() < max_bytes, "{name}: {} bytes", bytes.len()),
+        Err(error) => {
+            assert!(!error.to_string().is_empty(), "{name}");
+            return false;
+        }
+    }
+    true
+}
+
+/// Returns the number in an environment variable, or else its default.
+pub(crate) fn number_from_environment(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| text.parse().unwrap())
 }

@@ -1,79 +1,83 @@
-//! Points that are scattered rather than on a grid: what a design's figures need of its file.
+//! The points of a design as its figures need them.
 
 use super::error::Result;
-use super::influence::Influence;
+use super::influence::RankInfluence;
 use super::label::{self, Label};
-use super::layer::{self, Group, Level};
-use super::read::Source;
-use super::{Options, swept};
+use super::layer::{self, DividingLimit, Group};
+use super::read::FigureFile;
+use super::{PlotOptions, swept};
 use crate::{PlotError, Share};
 use sweep_parameter::Worse;
 
-/// Most numbers of points that are kept; of a longer file some points are picked.
-const MOST_NUMBERS: usize = 600_000;
+/// Maximum number of values that are kept; of a longer file some points are picked. Basis: 5 MB of
+/// memory and a page of some megabytes. Doubling it doubles both.
+const MAX_NUMBERS: usize = 600_000;
 
-/// What a point is, by the quantity that is shown.
+/// The side of the limit on which a point lies, or the reason why it lies on none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// The side that is asked for: reliable, or a gap that stays open.
+    /// The good side: reliable, or a gap that stays open.
     Good,
-    /// The other one.
+    /// The bad side.
     Bad,
-    /// Neither, and yet no failure: nothing was excited.
+    /// A point without a value that did not fail: nothing was excited.
     Undefined,
-    /// No result.
+    /// A point that failed.
     Failed,
 }
 
 impl Side {
-    /// All, in drawing order: rare ones over frequent ones.
+    /// The sides in drawing order: rare ones are drawn over frequent ones.
     pub(crate) const ALL: [Self; 4] = [Self::Good, Self::Bad, Self::Undefined, Self::Failed];
 }
 
 /// A parameter that varies from point to point.
-pub(crate) struct Spread {
-    /// As in grid files.
+pub(crate) struct DesignParameter {
+    /// The name in grid files.
     pub(crate) name: String,
-    /// In words, with its unit.
     pub(crate) label: Label,
-    /// Spread evenly by the logarithm.
+    /// Whether the parameter is spread evenly by its logarithm.
     pub(crate) log: bool,
-    /// One per kept point.
+    /// The value at each kept point.
     pub(crate) values: Vec<f64>,
-    /// The parameter's influence on the quantity; none if that is the same everywhere.
-    pub(crate) influence: Option<Influence>,
+    /// The influence on the quantity; `None` if the quantity is constant.
+    pub(crate) influence: Option<RankInfluence>,
 }
 
-/// The points of a design.
+/// The points of a design with the quantity that is shown.
 pub(crate) struct Scatter {
-    /// The file.
-    pub(crate) source: Source,
-    /// What the quantity is, for headings.
+    pub(crate) source: FigureFile,
+    /// The title of the figure.
     pub(crate) title: String,
-    /// What its axis shows.
+    /// The label of the quantity's axis.
     pub(crate) label: Label,
-    /// The same where there is little room.
+    /// A shorter label, for axes with little room.
     pub(crate) short: Label,
-    /// The channel of the quantity, in words; empty without one.
+    /// The channel of the quantity in words; empty without one.
     pub(crate) channel: String,
-    /// The value that divides the points, if one does.
-    pub(crate) level: Option<Level>,
-    /// Better shown by the logarithm.
+    /// The limit that divides the points, if there is one.
+    pub(crate) level: Option<DividingLimit>,
+    /// Whether the quantity is shown on a logarithmic axis.
     pub(crate) log: bool,
-    /// In file order.
-    pub(crate) parameters: Vec<Spread>,
-    /// Numbers of the kept points.
+    /// The varying parameters in file order.
+    pub(crate) parameters: Vec<DesignParameter>,
+    /// The row numbers of the kept points.
     pub(crate) points: Vec<usize>,
-    /// The quantity at each, in shown units; NaN where there is none.
+    /// The quantity at each kept point in displayed units; NaN where there is none.
     pub(crate) quantity: Vec<f64>,
-    /// What each is.
+    /// The side of each kept point.
     pub(crate) sides: Vec<Side>,
-    /// How many of all points, kept or not, are what, as in [`Side::ALL`].
+    /// The number of all points, kept or not, on each of [`Side::ALL`].
     pub(crate) counts: [u64; 4],
 }
 
-/// What a point is by its value, or by the verdict where no level divides the points.
-fn side_of(level: Option<&Level>, value: f64, verdict: Option<&str>, status: Option<&str>) -> Side {
+/// Returns the side of a point by its value, or by its verdict if no limit divides the points.
+fn side_of(
+    level: Option<&DividingLimit>,
+    value: f64,
+    verdict: Option<&str>,
+    status: Option<&str>,
+) -> Side {
     let good = match level {
         Some(level) => {
             let is_good = match level.worse {
@@ -93,30 +97,32 @@ fn side_of(level: Option<&Level>, value: f64, verdict: Option<&str>, status: Opt
 }
 
 impl Scatter {
-    /// Reads a design's file: every point for the counts, and as many as a figure keeps.
+    /// Reads the file of a design: every point for the counts, and as many as a figure keeps.
     ///
     /// # Errors
-    /// As [`Source::each_row`] and [`layer::chosen`]; [`PlotError::Undrawable`] without points or
-    /// parameters that vary; [`PlotError::Unfit`] for a quantity that is no number.
-    pub(crate) fn read(source: Source, options: &Options) -> Result<Self> {
-        let Some(shown) = layer::chosen(&source, options)? else {
+    /// As [`FigureFile::each_row`] and [`layer::requested_one`]; [`PlotError::Undrawable`] without
+    /// points or parameters that vary; [`PlotError::Unfit`] for a quantity that is no number.
+    pub(crate) fn read(source: FigureFile, options: &PlotOptions) -> Result<Self> {
+        let Some(shown) = layer::requested_one(&source, options)? else {
             return Err(PlotError::Unfit(
                 "status is no number, and figures of designs mark failed points in any case"
                     .to_owned(),
             ));
         };
         let facts = source.column(shown.column());
-        let (unit, factor) = label::shown(facts.map_or("", |facts| &facts.unit));
+        let (unit, factor) = label::display_unit(facts.map_or("", |facts| &facts.unit));
         let (title, words) = shown.words(&source);
         let level = shown.level(&source);
         let ratio = shown.group == Group::Ratio;
         let axes: Vec<&str> =
             swept::columns(&source).iter().map(|column| column.name.as_str()).collect();
-        let stride = (source.rows * (axes.len() + 3)).div_ceil(MOST_NUMBERS).max(1) as u64;
-        // The verdict itself, where that is what is shown.
+        let stride = (source.rows * (axes.len() + 3)).div_ceil(MAX_NUMBERS).max(1) as u64;
+        // The verdict itself divides the points if it depends on the column alone.
         let dividing = level.as_ref().filter(|_| !shown.is_verdict(&source));
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); axes.len()];
-        let (mut points, mut quantity, mut sides) = (Vec::new(), Vec::new(), Vec::new());
+        let mut points = Vec::new();
+        let mut quantity = Vec::new();
+        let mut sides = Vec::new();
         let mut counts = [0; 4];
         let names = [&axes[..], &[shown.column(), "reliable", layer::STATUS]].concat();
         source.each_row(&names, |row| {
@@ -136,27 +142,27 @@ impl Scatter {
             Ok(())
         })?;
         if points.is_empty() {
-            return Err(source.empty("the design has no points"));
+            return Err(source.nothing_to_draw("the design has no points"));
         }
         let spread = axes.iter().zip(values).filter_map(|(name, values)| {
             let facts = source.column(name)?;
             let varies = values.iter().any(|value| *value != values[0]);
-            varies.then(|| Spread {
+            varies.then(|| DesignParameter {
                 name: (*name).to_owned(),
                 label: Label::new(&label::words(name), &facts.unit),
                 log: source.is_log(name) && values.iter().all(|value| *value > 0.0),
-                influence: Influence::of(&values, &quantity),
+                influence: RankInfluence::new(&values, &quantity),
                 values,
             })
         });
-        let parameters: Vec<Spread> = spread.collect();
+        let parameters: Vec<DesignParameter> = spread.collect();
         if parameters.is_empty() {
-            return Err(source.empty("no parameter varies from point to point"));
+            return Err(source.nothing_to_draw("no parameter varies from point to point"));
         }
         let spans = || crate::chart::spans_decades(quantity.iter().copied());
         let log = ratio || (level.is_none() && spans());
         let label = Label::new(&label::capitalised(&words), unit);
-        let short = Label::new(&shown.short(), unit);
+        let short = Label::new(&shown.short_name(), unit);
         Ok(Self {
             source,
             title,
@@ -173,13 +179,13 @@ impl Scatter {
         })
     }
 
-    /// The share of points on the good side among those on either.
+    /// Returns the share of points on the good side among points on either side.
     pub(crate) fn share(&self) -> Option<Share> {
         let [good, bad, ..] = self.counts;
-        Share::of(good, good + bad)
+        Share::wilson(good, good + bad)
     }
 
-    /// What it means to be on a side.
+    /// Returns the legend entry of a side.
     pub(crate) fn words(&self, side: Side) -> String {
         match (side, &self.level) {
             (Side::Good | Side::Bad, Some(level)) => {
@@ -193,7 +199,7 @@ impl Scatter {
         }
     }
 
-    /// Name of the run, its points and how they were placed, and what is not shown of them.
+    /// Returns the subtitle: name of the run, number and placement of the points, and notes.
     pub(crate) fn subtitle(&self, rest: &[String]) -> String {
         let all: u64 = self.counts.iter().sum();
         let mut parts = self.source.notes([match self.source.design_method() {
@@ -209,33 +215,33 @@ impl Scatter {
         parts.join(" · ")
     }
 
-    /// How many points have a value of the quantity.
-    pub(crate) fn valued(&self) -> usize {
+    /// Returns the number of points with a value of the quantity.
+    pub(crate) fn count_with_value(&self) -> usize {
         self.quantity.iter().filter(|value| value.is_finite()).count()
     }
 
-    /// Places of the kept points, or of the one of `stride` of them.
+    /// Returns the indices of about one in `stride` of the kept points.
     pub(crate) fn picked(&self, stride: usize) -> Vec<usize> {
-        let of = |&k: &usize| picked(self.points[k] as u64 ^ SECOND, stride as u64);
-        (0..self.points.len()).filter(of).collect()
+        let is_picked = |&k: &usize| picked(self.points[k] as u64 ^ SECOND_CHOICE, stride as u64);
+        (0..self.points.len()).filter(is_picked).collect()
     }
 
-    /// Places of the parameters, the most influential first.
+    /// Returns the indices of the parameters, the most influential first.
     pub(crate) fn by_influence(&self) -> Vec<usize> {
-        let size = |k: usize| self.parameters[k].influence.map_or(0.0, Influence::size);
+        let size = |k: usize| self.parameters[k].influence.map_or(0.0, RankInfluence::size);
         let mut places: Vec<usize> = (0..self.parameters.len()).collect();
         places.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
         places
     }
 }
 
-/// Makes the second choice of points independent of the first.
-const SECOND: u64 = 0x5bf0_3635_0000_0000;
+/// Bits that make the choice of drawn points independent of the choice of kept ones.
+const SECOND_CHOICE: u64 = 0x5bf0_3635_0000_0000;
 
-/// Whether a row is among the one of `stride` that are kept. Every `stride`-th would pick from a
-/// part of the box alone where the stride is a power of two and the points are Sobol's.
+/// Returns whether a row is among the one in `stride` that are picked. Every `stride`-th row would
+/// lie in a part of the box if the stride is a power of two and the points are a Sobol sequence.
 fn picked(row: u64, stride: u64) -> bool {
-    // Steele, Lea and Flood's SplitMix64.
+    // The hash is SplitMix64 of Steele, Lea and Flood.
     let mixed = row.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -1,29 +1,29 @@
-//! What a figure is made of, in pixels from the top left corner: drawn once, written as SVG or as
-//! PNG.
+//! A scene: the shapes and texts of a figure in pixels from the top left corner, drawn once and
+//! written as SVG or PNG.
 
 use super::axis::extremes;
 
 /// An opaque or translucent colour, sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Colour {
-    /// Red, green, blue.
+    /// The red, green and blue components.
     pub rgb: [u8; 3],
-    /// 255 is opaque.
+    /// The opacity; 255 is opaque.
     pub alpha: u8,
 }
 
 impl Colour {
-    /// An opaque colour written as in CSS, `0xrrggbb`.
+    /// Returns an opaque colour written as in CSS, `0xrrggbb`.
     pub const fn hex(rrggbb: u32) -> Self {
         Self { rgb: [(rrggbb >> 16) as u8, (rrggbb >> 8) as u8, rrggbb as u8], alpha: 255 }
     }
 
-    /// The same colour, `alpha` of 255 opaque.
+    /// Returns the colour with this opacity; 255 is opaque.
     pub const fn with_alpha(self, alpha: u8) -> Self {
         Self { alpha, ..self }
     }
 
-    /// What this colour makes over an opaque one.
+    /// Returns the colour that this one makes over an opaque one.
     pub fn over(self, under: Self) -> Self {
         let part = f64::from(self.alpha) / 255.0;
         let [r, g, b] = [0, 1, 2].map(|k| {
@@ -32,30 +32,28 @@ impl Colour {
         Self { rgb: [r, g, b], alpha: 255 }
     }
 
-    /// `#rrggbb`.
+    /// Returns the colour as in CSS, `#rrggbb`.
     pub fn css(self) -> String {
         let [r, g, b] = self.rgb;
         format!("#{r:02x}{g:02x}{b:02x}")
     }
 }
 
-/// One step of an outline.
+/// A segment of an outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Segment {
-    /// Starts a new part.
+pub(crate) enum PathSegment {
+    /// Starts a new part of the outline.
     Move([f64; 2]),
-    /// Straight to.
     Line([f64; 2]),
-    /// Back to the start of the part.
+    /// Closes the part with a line to its start.
     Close,
 }
 
 /// An outline of any number of parts.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Outline(pub(crate) Vec<Segment>);
+pub(crate) struct Outline(pub(crate) Vec<PathSegment>);
 
 impl Outline {
-    /// A rectangle.
     pub(crate) fn rectangle(x: f64, y: f64, width: f64, height: f64) -> Self {
         let mut outline = Self::default();
         outline.add_rectangle(x, y, width, height);
@@ -70,25 +68,25 @@ impl Outline {
     /// Adds a closed part through the points.
     pub(crate) fn add_polygon(&mut self, points: &[[f64; 2]]) {
         self.add_line(points);
-        self.0.push(Segment::Close);
+        self.0.push(PathSegment::Close);
     }
 
     /// Adds an open part through the points.
     pub(crate) fn add_line(&mut self, points: &[[f64; 2]]) {
         let mut points = points.iter().copied();
-        self.0.extend(points.next().map(Segment::Move));
-        self.0.extend(points.map(Segment::Line));
+        self.0.extend(points.next().map(PathSegment::Move));
+        self.0.extend(points.map(PathSegment::Line));
     }
 
-    /// One open line through the points.
+    /// Returns an open line through the points.
     pub(crate) fn line(points: &[[f64; 2]]) -> Self {
         let mut outline = Self::default();
         outline.add_line(points);
         outline
     }
 
-    /// Adds a line through each run of places that are known; gives those that stand alone, which
-    /// no line shows.
+    /// Adds a line through each run of known points. Returns the isolated points, which no line
+    /// shows.
     pub(crate) fn add_runs(&mut self, places: &[Option<[f64; 2]>]) -> Vec<[f64; 2]> {
         let mut alone = Vec::new();
         for run in places.split(Option::is_none) {
@@ -101,29 +99,30 @@ impl Outline {
         alone
     }
 
-    /// The same, elsewhere.
+    /// Returns the outline, shifted.
     pub(crate) fn moved(&self, [dx, dy]: [f64; 2]) -> Self {
         let moved = |[x, y]: [f64; 2]| [x + dx, y + dy];
         let segments = self.0.iter().map(|segment| match *segment {
-            Segment::Move(point) => Segment::Move(moved(point)),
-            Segment::Line(point) => Segment::Line(moved(point)),
-            Segment::Close => Segment::Close,
+            PathSegment::Move(point) => PathSegment::Move(moved(point)),
+            PathSegment::Line(point) => PathSegment::Line(moved(point)),
+            PathSegment::Close => PathSegment::Close,
         });
         Self(segments.collect())
     }
 
-    /// A disc around `centre`.
+    /// Returns a disc around `centre`.
     pub(crate) fn circle(centre: [f64; 2], radius: f64) -> Self {
         Self::around(centre, [radius; 16])
     }
 
-    /// A five-pointed star around `centre`, `radius` from centre to tip.
+    /// Returns a five-pointed star around `centre`, `radius` from centre to tip.
     pub(crate) fn star(centre: [f64; 2], radius: f64) -> Self {
         let [tip, notch] = [radius, 0.42 * radius];
         Self::around(centre, [tip, notch, tip, notch, tip, notch, tip, notch, tip, notch])
     }
 
-    /// Corners evenly around `centre`, these distances from it, clockwise from the top.
+    /// Returns a polygon around the centre: corners at equal angles and these distances, clockwise
+    /// from the top.
     fn around<const N: usize>([x, y]: [f64; 2], reaches: [f64; N]) -> Self {
         let mut outline = Self::default();
         let half = (N / 2) as f64;
@@ -136,24 +135,21 @@ impl Outline {
     }
 }
 
-/// How a line is drawn.
+/// The stroke of a line.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Stroke {
-    /// Its colour.
     pub(crate) colour: Colour,
-    /// Its width, px.
+    /// The width, px.
     pub(crate) width: f64,
-    /// Lengths of dash and gap, px; empty for a solid line.
+    /// The lengths of dash and gap, px; empty for a solid line.
     pub(crate) dash: Vec<f64>,
 }
 
 impl Stroke {
-    /// A solid line.
     pub(crate) fn solid(colour: Colour, width: f64) -> Self {
         Self { colour, width, dash: Vec::new() }
     }
 
-    /// A dashed line.
     pub(crate) fn dashed(colour: Colour, width: f64, dash: &[f64]) -> Self {
         Self { colour, width, dash: dash.to_vec() }
     }
@@ -162,20 +158,20 @@ impl Stroke {
 /// Slanted lines over an area.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Hatch {
-    /// Drawn one over the other.
+    /// The strokes of each line, drawn one over the other.
     pub(crate) strokes: Vec<Stroke>,
-    /// From one line to the next along x, px.
+    /// The distance between two lines along x, px.
     pub(crate) spacing: f64,
-    /// Lines fall to the right, in place of rising.
+    /// Whether lines fall to the right; otherwise they rise.
     pub(crate) falling: bool,
 }
 
 impl Hatch {
-    /// The same, drawn smaller where areas of `width` by `height` px are so small that they could
-    /// lie between its lines.
+    /// Returns the hatch, drawn finer if areas of `width` by `height` px could lie between its
+    /// lines.
     pub(crate) fn within(mut self, [width, height]: [f64; 2]) -> Self {
-        // An area is crossed by a line at least where the spacing is no more than both its sides.
-        let spacing = ((width + height) / 1.5).clamp(FINEST_HATCH, self.spacing);
+        // A line crosses an area at least once if the spacing is no larger than both sides.
+        let spacing = ((width + height) / 1.5).clamp(MIN_HATCH_SPACING, self.spacing);
         for stroke in &mut self.strokes {
             stroke.width *= spacing / self.spacing;
         }
@@ -184,43 +180,37 @@ impl Hatch {
     }
 }
 
-/// Least spacing at which lines can be seen apart, px.
-const FINEST_HATCH: f64 = 2.0;
+/// Minimum spacing of a hatch, px. Basis: finer lines merge. Doubling it hides hatches of small
+/// cells.
+const MIN_HATCH_SPACING: f64 = 2.0;
 
-/// Which part of a text is at its position.
+/// The part of a text that is at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Anchor {
-    /// The first letter.
     Start,
-    /// The middle.
     Middle,
-    /// The last letter.
     End,
 }
 
 /// A line of text.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Text {
-    /// What it says.
     pub(crate) text: String,
-    /// Baseline position of the anchor.
+    /// The position of the anchor on the baseline, px.
     pub(crate) at: [f64; 2],
-    /// Height of the type, px.
+    /// The type size, px.
     pub(crate) size: f64,
-    /// Heavier type.
     pub(crate) bold: bool,
-    /// Colour of the letters.
     pub(crate) colour: Colour,
-    /// Which part of it is at `at`.
     pub(crate) anchor: Anchor,
-    /// Reads upwards.
+    /// Whether the text reads upwards.
     pub(crate) upright: bool,
-    /// Letters stand out from what lies behind them by this outline.
+    /// The colour of an outline that sets the text off from what is behind it.
     pub(crate) halo: Option<Colour>,
 }
 
 impl Text {
-    /// Plain text in the ink colour.
+    /// Returns plain text in the ink colour.
     pub(crate) fn new(text: impl Into<String>, at: [f64; 2], size: f64) -> Self {
         Self {
             text: text.into(),
@@ -234,103 +224,96 @@ impl Text {
         }
     }
 
-    /// The same, heavier.
+    /// Returns the text in bold type.
     pub(crate) fn bold(mut self) -> Self {
         self.bold = true;
         self
     }
 
-    /// The same, placed by another part.
+    /// Returns the text with another anchor.
     pub(crate) fn anchor(mut self, anchor: Anchor) -> Self {
         self.anchor = anchor;
         self
     }
 
-    /// The same, reading upwards.
+    /// Returns the text reading upwards.
     pub(crate) fn upright(mut self) -> Self {
         self.upright = true;
         self
     }
 }
 
-/// Something drawn.
+/// An item of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Item {
-    /// A filled outline.
+    /// An outline filled by the non-zero rule.
     Fill {
-        /// What is filled, by the non-zero rule.
         outline: Outline,
-        /// With what.
         colour: Colour,
-        /// Edges on whole pixels, so that neighbours leave no seam.
+        /// Whether edges lie on whole pixels, so that neighbours leave no seam.
         crisp: bool,
     },
     /// A drawn outline.
     Line {
-        /// Where.
         outline: Outline,
-        /// How.
         stroke: Stroke,
     },
-    /// A line of text.
     Text(Text),
-    /// Until the matching `Unclip`, nothing is drawn outside the outline.
+    /// Starts a clip: items until the matching `Unclip` are drawn within the outline alone.
     Clip(Outline),
-    /// Ends the last `Clip`.
+    /// Ends the last clip.
     Unclip,
 }
 
-/// A picture.
+/// A figure as a list of shapes and texts.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Scene {
-    /// Width, px.
+    /// The width, px.
     pub(crate) width: f64,
-    /// Height, px.
+    /// The height, px.
     pub(crate) height: f64,
-    /// What the picture shows, in a sentence, for those who hear it.
+    /// A sentence that describes the picture to readers who cannot see it.
     pub(crate) description: String,
-    /// In drawing order.
+    /// The items in drawing order.
     pub(crate) items: Vec<Item>,
 }
 
-/// Letters and frames.
+/// The colour of letters and frames.
 pub const INK: Colour = Colour::hex(0x1b1f24);
-/// Secondary text.
+/// The colour of secondary text.
 pub const MUTED: Colour = Colour::hex(0x57606a);
-/// Grid lines.
+/// The colour of grid lines.
 pub(crate) const FAINT: Colour = Colour::hex(0xd8dee4);
-/// The sheet.
+/// The colour of the background.
 pub(crate) const PAPER: Colour = Colour::hex(0xffffff);
 
 impl Scene {
-    /// A white sheet.
+    /// Returns an empty scene with a white background.
     pub(crate) fn new(width: f64, height: f64, description: impl Into<String>) -> Self {
         let mut scene = Self { width, height, description: description.into(), items: Vec::new() };
         scene.fill(Outline::rectangle(0.0, 0.0, width, height), PAPER);
         scene
     }
 
-    /// Fills an outline.
     pub(crate) fn fill(&mut self, outline: Outline, colour: Colour) {
         self.items.push(Item::Fill { outline, colour, crisp: false });
     }
 
-    /// Fills an outline with its edges on whole pixels.
+    /// Fills an outline whose edges lie on whole pixels.
     pub(crate) fn fill_crisp(&mut self, outline: Outline, colour: Colour) {
         self.items.push(Item::Fill { outline, colour, crisp: true });
     }
 
-    /// Draws an outline.
+    /// Draws the line of an outline.
     pub(crate) fn line(&mut self, outline: Outline, stroke: Stroke) {
         self.items.push(Item::Line { outline, stroke });
     }
 
-    /// Sets a line of text.
     pub(crate) fn text(&mut self, text: Text) {
         self.items.push(Item::Text(text));
     }
 
-    /// Draws what `draw` draws, within `outline` alone.
+    /// Draws the items of `draw` within `outline` alone.
     pub(crate) fn clipped(&mut self, outline: Outline, draw: impl FnOnce(&mut Self)) {
         self.items.push(Item::Clip(outline));
         draw(self);
@@ -342,12 +325,12 @@ impl Scene {
         let spacing = hatch.spacing;
         let extent = |k: usize| {
             extremes(outline.0.iter().filter_map(|segment| match *segment {
-                Segment::Move(point) | Segment::Line(point) => Some(point[k]),
-                Segment::Close => None,
+                PathSegment::Move(point) | PathSegment::Line(point) => Some(point[k]),
+                PathSegment::Close => None,
             }))
         };
         let Some(((left, right), (top, bottom))) = extent(0).zip(extent(1)) else { return };
-        // Lines off the sheet are not seen, and there could be any number of them.
+        // Lines outside the scene are left out: a file's values could ask for any number of them.
         let [left, right] = [left, right].map(|x| x.clamp(0.0, self.width));
         let [top, bottom] = [top, bottom].map(|y| y.clamp(0.0, self.height));
         if left >= right || top >= bottom {
@@ -355,8 +338,8 @@ impl Scene {
         }
         let height = bottom - top;
         let mut lines = Outline::default();
-        // Lines lie on multiples of the spacing of x + y, or of x - y, so that the hatching runs on
-        // from shape to shape.
+        // Lines lie on multiples of the spacing of x + y, or of x - y, so that hatches of
+        // neighbouring shapes match.
         let (from, to, sign) = if hatch.falling { (bottom, top, -1.0) } else { (top, bottom, 1.0) };
         let mut along = ((left + sign * from) / spacing).ceil() * spacing - sign * from;
         while along < right + height {

@@ -1,20 +1,21 @@
-//! A scene as SVG 1.1 text.
+//! SVG output of a scene.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::scene::{Anchor, Colour, Item, Outline, Scene, Segment, Stroke, Text};
+use super::scene::{Anchor, Colour, Item, Outline, PathSegment, Scene, Stroke, Text};
 
-/// Tried in this order; the PNG always has the first, which it carries.
+/// The font families in order of preference; PNG output has the first, which is built in.
 const FAMILY: &str = "'Noto Sans', 'Segoe UI', 'Helvetica Neue', Arial, sans-serif";
 
-/// The scene as an SVG document. The same scene gives the same bytes.
+/// Writes a scene as an SVG document. The same scene gives the same bytes.
 pub(crate) fn write(scene: &Scene) -> String {
     let mut out = String::new();
-    let (width, height) = (number(scene.width), number(scene.height));
+    let width = number(scene.width);
+    let height = number(scene.height);
     let size = format!(r#"width="{width}" height="{height}" viewBox="0 0 {width} {height}""#);
     let role = format!(r#"role="img" font-family="{FAMILY}""#);
-    // Writing to a string cannot fail, so the results below carry nothing.
+    // Writing to a string cannot fail, so that the results below are ignored.
     let _ = writeln!(out, r#"<svg xmlns="http://www.w3.org/2000/svg" {size} {role}>"#);
     let _ = writeln!(out, "<title>{}</title>", escape(&scene.description));
     let clips = write_clips(&mut out, scene);
@@ -22,11 +23,13 @@ pub(crate) fn write(scene: &Scene) -> String {
         match item {
             Item::Fill { outline, colour, crisp } => {
                 let edges = if *crisp { r#" shape-rendering="crispEdges""# } else { "" };
-                let (path, fill) = (path(outline), paint("fill", *colour));
+                let path = path(outline);
+                let fill = paint("fill", *colour);
                 let _ = writeln!(out, r#"<path d="{path}"{fill}{edges}/>"#);
             }
             Item::Line { outline, stroke } => {
-                let (path, style) = (path(outline), stroke_style(stroke));
+                let path = path(outline);
+                let style = stroke_style(stroke);
                 let _ = writeln!(out, r#"<path d="{path}" fill="none"{style}/>"#);
             }
             Item::Text(text) => write_text(&mut out, text),
@@ -40,7 +43,7 @@ pub(crate) fn write(scene: &Scene) -> String {
     out
 }
 
-/// Defines each clip outline once; returns their numbers by outline.
+/// Writes the definition of each clip outline once. Returns their numbers by outline.
 fn write_clips(out: &mut String, scene: &Scene) -> BTreeMap<String, usize> {
     let mut clips = BTreeMap::new();
     for item in &scene.items {
@@ -56,7 +59,8 @@ fn write_clips(out: &mut String, scene: &Scene) -> BTreeMap<String, usize> {
 }
 
 fn write_text(out: &mut String, text: &Text) {
-    let (x, y) = (number(text.at[0]), number(text.at[1]));
+    let x = number(text.at[0]);
+    let y = number(text.at[1]);
     let place = if text.upright {
         format!(r#"transform="translate({x} {y}) rotate(-90)""#)
     } else {
@@ -70,18 +74,21 @@ fn write_text(out: &mut String, text: &Text) {
     let weight = if text.bold { r#" font-weight="bold""# } else { "" };
     let size = number(text.size);
     let halo = text.halo.map_or(String::new(), |colour| {
-        let (stroke, width) = (paint("stroke", colour), number(halo_width(text.size)));
+        let stroke = paint("stroke", colour);
+        let width = number(halo_width(text.size));
         format!(r#"{stroke} stroke-width="{width}" stroke-linejoin="round" paint-order="stroke""#)
     });
-    let (fill, said) = (paint("fill", text.colour), escape(&text.text));
+    let fill = paint("fill", text.colour);
+    let phrase = escape(&text.text);
     let style = format!(r#"font-size="{size}"{weight}{anchor}{fill}{halo}"#);
-    let _ = writeln!(out, "<text {place} {style}>{said}</text>");
+    let _ = writeln!(out, "<text {place} {style}>{phrase}</text>");
 }
 
-/// Positions farther out than this are drawn here, px: out of sight either way.
-const FARTHEST: f64 = 1e7;
+/// Greatest coordinate that is written, px; positions beyond are moved there. Basis: far outside of
+/// any picture, and differences of two fit an integer.
+const MAX_COORDINATE: f64 = 1e7;
 
-/// Width of the outline behind letters of this height, px.
+/// Returns the width of the outline behind letters of this size, px.
 pub(crate) fn halo_width(size: f64) -> f64 {
     0.3 * size
 }
@@ -96,7 +103,8 @@ fn paint(attribute: &str, colour: Colour) -> String {
 }
 
 fn stroke_style(stroke: &Stroke) -> String {
-    let (paint, width) = (paint("stroke", stroke.colour), number(stroke.width));
+    let paint = paint("stroke", stroke.colour);
+    let width = number(stroke.width);
     let mut style = format!(r#"{paint} stroke-width="{width}" stroke-linejoin="round""#);
     if !stroke.dash.is_empty() {
         let dash: Vec<String> = stroke.dash.iter().map(|&length| number(length)).collect();
@@ -105,19 +113,21 @@ fn stroke_style(stroke: &Stroke) -> String {
     style
 }
 
-/// Path data with relative steps, which are shorter: a transient has thousands of them.
+/// Returns path data with relative steps, which are shorter: a transient has thousands of them.
 fn path(outline: &Outline) -> String {
     let mut d = String::new();
-    // Rounded positions in hundredths of a pixel, so that rounding does not add up along the way.
-    let (mut here, mut start) = ([0_i64; 2], [0_i64; 2]);
+    // Positions are rounded to hundredths of a pixel before differences are taken, so that rounding
+    // does not add up.
+    let mut here = [0_i64; 2];
+    let mut start = [0_i64; 2];
     for segment in &outline.0 {
         match *segment {
-            Segment::Move(point) => {
+            PathSegment::Move(point) => {
                 here = hundredths(point);
                 start = here;
                 let _ = write!(d, "M{} {}", fixed(here[0]), fixed(here[1]));
             }
-            Segment::Line(point) => {
+            PathSegment::Line(point) => {
                 let there = hundredths(point);
                 let [dx, dy] = [there[0] - here[0], there[1] - here[1]];
                 d += &match (fixed(dx), fixed(dy)) {
@@ -128,7 +138,7 @@ fn path(outline: &Outline) -> String {
                 };
                 here = there;
             }
-            Segment::Close => {
+            PathSegment::Close => {
                 d.push('z');
                 here = start;
             }
@@ -138,25 +148,26 @@ fn path(outline: &Outline) -> String {
 }
 
 fn hundredths(point: [f64; 2]) -> [i64; 2] {
-    // Values of a file may lie anywhere; a step between two of them has to fit a number.
-    point.map(|value| (value.clamp(-FARTHEST, FARTHEST) * 100.0).round() as i64)
+    // A file's values may lie anywhere; their differences must fit an integer.
+    point.map(|value| (value.clamp(-MAX_COORDINATE, MAX_COORDINATE) * 100.0).round() as i64)
 }
 
-/// Hundredths as a decimal number without needless characters.
+/// Writes hundredths as a decimal number without needless characters.
 fn fixed(hundredths: i64) -> String {
     let sign = if hundredths < 0 { "-" } else { "" };
-    let (whole, part) = (hundredths.unsigned_abs() / 100, hundredths.unsigned_abs() % 100);
+    let whole = hundredths.unsigned_abs() / 100;
+    let part = hundredths.unsigned_abs() % 100;
     let whole = if whole == 0 && part > 0 { String::new() } else { whole.to_string() };
     let part = format!(".{part:02}");
     format!("{sign}{whole}{}", part.trim_end_matches(['0', '.']))
 }
 
-/// A number of pixels, to a hundredth.
+/// Writes a number of pixels to a hundredth.
 fn number(value: f64) -> String {
     fixed((value * 100.0).round() as i64)
 }
 
-/// Text as XML character data.
+/// Escapes text for XML character data.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {
@@ -165,7 +176,7 @@ pub fn escape(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            // XML 1.0 has no place for control characters, not even escaped.
+            // XML 1.0 allows no control characters, not even escaped ones.
             letter if letter.is_control() => out.push(' '),
             letter => out.push(letter),
         }
@@ -178,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short_and_exact_to_a_hundredth() {
+    fn numbers_are_rounded_to_a_hundredth() {
         for (value, text) in [
             (0.0, "0"),
             (12.0, "12"),
@@ -193,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_do_not_accumulate_rounding() {
+    fn rounding_does_not_accumulate_along_a_path() {
         let points: Vec<[f64; 2]> = (0..1000).map(|k| [f64::from(k) * 0.333_33, 1.0]).collect();
         let d = path(&Outline::line(&points));
         let sum: f64 =
@@ -202,13 +213,13 @@ mod tests {
     }
 
     #[test]
-    fn steps_between_positions_far_outside_are_numbers() {
+    fn positions_far_outside_are_clamped() {
         let line = Outline::line(&[[f64::MIN, 0.5], [f64::MAX, 1.0], [f64::MIN, f64::MAX]]);
         assert_eq!(path(&line), "M-10000000 .5l20000000 .5l-20000000 9999999");
     }
 
     #[test]
-    fn text_cannot_break_out_of_the_document() {
+    fn text_is_escaped() {
         assert_eq!(escape("a<b & \"c\"\u{1}"), "a&lt;b &amp; &quot;c&quot; ");
     }
 }

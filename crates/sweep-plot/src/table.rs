@@ -1,49 +1,50 @@
-//! Columns in memory, as figures take them: every row of a small file, the extremes of stretches of
-//! a long trace, or one row per cell of a map.
+//! Columns in memory: every row of a small file, the extremes of a long trace, or one row for each
+//! cell of a map.
 
 use std::path::Path;
 
+use super::bucket::{Buckets, Decimator, KeptValues};
 use super::error::Result;
 use super::label::{self, Label};
-use super::read::{ColumnFacts, Kind, Known, Source};
-use super::thin::{Keep, Stretches, Thinner};
+use super::read::{ColumnFacts, FigureFile, FigureKind, ModelKinds};
 
-/// Most numbers of a file that are kept for a figure: what a page of some megabytes carries.
-pub const MOST_NUMBERS: usize = 1_400_000;
+/// Maximum number of values of a file that are kept for a figure. Basis: a page of some megabytes.
+/// Doubling it doubles that page.
+pub const MAX_NUMBERS: usize = 1_400_000;
 
 /// The values of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
-    /// Any numeric type; null is NaN.
+    /// Numbers of any type; null is NaN.
     Numbers(Vec<f64>),
-    /// Words, by their numbers.
+    /// Words in dictionary encoding.
     Words(Words),
 }
 
-/// Words among which few are different.
+/// A column of words in dictionary encoding, with few different words.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Words {
-    /// The words that occur.
+    /// The different words.
     pub names: Vec<String>,
-    /// One per row: a place among the names, [`NONE`] or [`SEVERAL`].
+    /// The code of each row: an index into `names`, [`NONE`] or [`SEVERAL`].
     pub codes: Vec<u8>,
-    /// The name found last: neighbours mostly share theirs.
+    /// The code found last, tried first because neighbouring rows mostly share it.
     last: u8,
 }
 
-/// Code of a row without a word.
+/// The code of a row without a word.
 pub const NONE: u8 = u8::MAX;
-/// Code of a cell whose points have different words.
+/// The code of a cell whose points have different words.
 pub const SEVERAL: u8 = u8::MAX - 1;
 
 impl Words {
-    /// Rows without a word.
+    /// Returns a column of rows without a word.
     pub fn none(rows: usize) -> Self {
         Self { codes: vec![NONE; rows], ..Self::default() }
     }
 
-    /// The code of a word, which is taken up if it is new. Words past the first 254 could only come
-    /// from a file that is not ours, and have no code.
+    /// Returns the code of a word and adds new words to the dictionary. Words beyond the first 254
+    /// have no code; the program writes no such file.
     pub fn code(&mut self, word: Option<&str>) -> u8 {
         let Some(word) = word else { return NONE };
         if self.names.get(usize::from(self.last)).is_some_and(|name| name == word) {
@@ -62,12 +63,12 @@ impl Words {
         }
     }
 
-    /// The word of a row; none where it has none or several.
+    /// Returns the word of a row; `None` if it has none or several.
     pub fn get(&self, row: usize) -> Option<&str> {
         self.names.get(usize::from(*self.codes.get(row)?)).map(String::as_str)
     }
 
-    /// Puts the names in order of the alphabet, whatever order the rows came in.
+    /// Sorts the dictionary, so that it does not depend on the order of rows.
     pub fn sort(&mut self) {
         let mut sorted = self.names.clone();
         sorted.sort();
@@ -80,28 +81,28 @@ impl Words {
     }
 }
 
-/// A column.
+/// A column of a file with its values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Column {
-    /// What the file says of it.
+pub struct FigureColumn {
+    /// The column's facts in the file's schema.
     pub facts: ColumnFacts,
-    /// One per row.
+    /// The value of each row.
     pub values: Values,
 }
 
-impl Column {
-    /// Its name in words, and its unit.
+impl FigureColumn {
+    /// Returns the label of the column: its name in words and its unit.
     pub fn label(&self) -> Label {
         Label::new(&label::words(&self.facts.name), &self.facts.unit)
     }
 
-    /// The values, if they are numbers.
+    /// Returns the values if they are numbers.
     pub fn numbers(&self) -> Option<&[f64]> {
         let Values::Numbers(values) = &self.values else { return None };
         Some(values)
     }
 
-    /// The values, if they are words.
+    /// Returns the values if they are words.
     pub fn words(&self) -> Option<&Words> {
         let Values::Words(words) = &self.values else { return None };
         Some(words)
@@ -110,29 +111,27 @@ impl Column {
 
 /// The columns of a file that a figure needs.
 #[derive(Debug)]
-pub struct Table {
-    /// The file.
-    pub source: Source,
-    /// In file order.
-    pub columns: Vec<Column>,
-    /// Number of rows here.
+pub struct FigureTable {
+    pub source: FigureFile,
+    pub columns: Vec<FigureColumn>,
+    /// The number of rows in memory.
     pub rows: usize,
-    /// Rows of the file that became two rows here, where it was thinned.
-    pub stretch: Option<usize>,
+    /// The maximum number of rows of the file in a bucket, if it was decimated.
+    pub bucket_rows: Option<usize>,
 }
 
-impl Table {
-    /// Reads a file whose rows are not a map's. A trace with more numbers than a figure keeps is
-    /// cut into stretches, as [`Table::read_thinned`] does.
+impl FigureTable {
+    /// Reads a file whose rows are not a map's. A trace with more values than a figure keeps is
+    /// decimated, as [`FigureTable::read_decimated`] does.
     ///
     /// # Errors
-    /// As [`Source::each_row`]; [`crate::PlotError::Undrawable`] for modes and boundaries beyond
-    /// what a figure keeps.
-    pub fn read(source: Source) -> Result<Self> {
-        let most = MOST_NUMBERS / source.numeric().count().max(1);
+    /// As [`FigureFile::each_row`]; [`crate::PlotError::Undrawable`] for other files with more
+    /// values than a figure keeps.
+    pub fn read(source: FigureFile) -> Result<Self> {
+        let most = MAX_NUMBERS / source.numeric().count().max(1);
         if source.rows > most {
-            if source.kind == Kind::TRACE {
-                return Self::read_thinned(source, most / 2);
+            if source.kind == FigureKind::TRACE {
+                return Self::read_decimated(source, most / 2);
             }
             return Err(source.too_many(source.rows, most));
         }
@@ -145,7 +144,7 @@ impl Table {
         let mut rows = 0;
         source.each_row(&names, |row| {
             rows += 1;
-            // What the file says of its rows need not be so.
+            // The metadata may claim fewer rows than the file has.
             if rows > most {
                 return Err(source.too_many(rows, most));
             }
@@ -162,59 +161,60 @@ impl Table {
         })?;
         let columns = source.columns.iter().zip(values);
         let columns =
-            columns.map(|(facts, values)| Column { facts: facts.clone(), values }).collect();
-        Ok(Self { source, columns, rows, stretch: None })
+            columns.map(|(facts, values)| FigureColumn { facts: facts.clone(), values }).collect();
+        Ok(Self { source, columns, rows, bucket_rows: None })
     }
 
-    /// Reads the numbers of a trace in at most `count` stretches. Each leaves two rows: the least
-    /// and the greatest value of every column, in the order in which they occur, at the stretch's
-    /// first and middle instant.
+    /// Reads the numbers of a trace in at most `count` buckets. Each leaves two rows: the least and
+    /// the greatest value of every column in the order in which they occur, at the first and the
+    /// middle instant of the bucket.
     ///
     /// # Errors
-    /// As [`Source::each_row`].
-    pub fn read_thinned(source: Source, count: usize) -> Result<Self> {
-        let stretches = Stretches::new(source.rows, count);
+    /// As [`FigureFile::each_row`].
+    pub fn read_decimated(source: FigureFile, count: usize) -> Result<Self> {
+        let buckets = Buckets::new(source.rows, count);
         let names: Vec<&str> = source.numeric().map(|column| column.name.as_str()).collect();
-        let keep = |name: &str| if name == "time_s" { Keep::Instants } else { Keep::Extremes };
-        let mut thinners: Vec<Thinner> =
-            names.iter().map(|name| Thinner::new(stretches, keep(name))).collect();
+        let keep =
+            |name: &str| if name == "time_s" { KeptValues::Instants } else { KeptValues::Extremes };
+        let mut decimators: Vec<Decimator> =
+            names.iter().map(|name| Decimator::new(buckets, keep(name))).collect();
         source.each_row(&names, |row| {
-            let thinners = thinners.iter_mut().enumerate();
-            thinners.for_each(|(column, thinner)| thinner.push(row.number(column)));
+            let decimators = decimators.iter_mut().enumerate();
+            decimators.for_each(|(column, decimator)| decimator.push(row.number(column)));
             Ok(())
         })?;
-        let kept = thinners.into_iter().map(|thinner| Values::Numbers(thinner.finish()));
+        let kept = decimators.into_iter().map(|decimator| Values::Numbers(decimator.finish()));
         let columns = source.numeric().cloned().zip(kept);
-        let columns: Vec<Column> =
-            columns.map(|(facts, values)| Column { facts, values }).collect();
-        let rows = columns.first().and_then(Column::numbers).map_or(0, <[f64]>::len);
-        Ok(Self { source, columns, rows, stretch: Some(stretches.longest()) })
+        let columns: Vec<FigureColumn> =
+            columns.map(|(facts, values)| FigureColumn { facts, values }).collect();
+        let rows = columns.first().and_then(FigureColumn::numbers).map_or(0, <[f64]>::len);
+        Ok(Self { source, columns, rows, bucket_rows: Some(buckets.longest()) })
     }
 
-    /// Opens a file and reads it, as [`Table::read`].
+    /// Opens a file and reads it by [`FigureTable::read`].
     ///
     /// # Errors
-    /// As [`Source::open`] and [`Table::read`].
-    pub fn open(path: &Path, known: Known) -> Result<Self> {
-        Self::read(Source::open(path, known)?)
+    /// As [`FigureFile::open`] and [`FigureTable::read`].
+    pub fn open(path: &Path, model_kinds: ModelKinds) -> Result<Self> {
+        Self::read(FigureFile::open(path, model_kinds)?)
     }
 
-    /// The column of that name.
-    pub fn column(&self, name: &str) -> Option<&Column> {
+    /// Returns the column of this name.
+    pub fn column(&self, name: &str) -> Option<&FigureColumn> {
         self.columns.iter().find(|column| column.facts.name == name)
     }
 
-    /// The numbers of a column that this kind of file must have.
+    /// Returns the numbers of a column that this kind of file must have.
     ///
     /// # Errors
     /// [`crate::PlotError::Undrawable`].
     pub fn numbers(&self, name: &str) -> Result<&[f64]> {
-        let numbers = self.column(name).and_then(Column::numbers);
-        numbers.ok_or_else(|| self.source.lacks(name, "numeric"))
+        let numbers = self.column(name).and_then(FigureColumn::numbers);
+        numbers.ok_or_else(|| self.source.missing_column(name, "numeric"))
     }
 
-    /// Columns of numbers whose name starts with `prefix`, without it.
-    pub fn with_prefix(&self, prefix: &str) -> Vec<(&str, &Column)> {
+    /// Returns the columns of numbers whose name starts with `prefix`, with the rest of the name.
+    pub fn with_prefix(&self, prefix: &str) -> Vec<(&str, &FigureColumn)> {
         let numbers = self.columns.iter().filter(|column| column.numbers().is_some());
         numbers
             .filter_map(|column| Some((column.facts.name.strip_prefix(prefix)?, column)))

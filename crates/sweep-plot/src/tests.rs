@@ -1,19 +1,23 @@
-//! Files in, figures out.
+//! Tests of figures drawn from sample files.
 
+mod damaged;
 mod designs;
 mod drawing;
 mod long;
 mod metrics;
-mod spoilt;
 
 use std::path::Path;
 
 use serde_json::Value;
 
-use super::sample::{MapSample, Sample, boundary, map};
+use super::sample::{MapSample, SampleFile, boundary, map};
 use super::*;
 
-pub(super) fn draw(sample: Sample, options: &Options, output: &str) -> Result<Vec<u8>, PlotError> {
+pub(super) fn draw(
+    sample: SampleFile,
+    options: &PlotOptions,
+    output: &str,
+) -> Result<Vec<u8>, PlotError> {
     let folder = tempfile::tempdir().unwrap();
     let input = sample.write(folder.path(), "input.parquet");
     let output = folder.path().join(output);
@@ -21,22 +25,22 @@ pub(super) fn draw(sample: Sample, options: &Options, output: &str) -> Result<Ve
     Ok(std::fs::read(output).unwrap())
 }
 
-pub(super) fn svg(sample: Sample, options: &Options) -> String {
+pub(super) fn svg(sample: SampleFile, options: &PlotOptions) -> String {
     String::from_utf8(draw(sample, options, "figure.svg").unwrap()).unwrap()
 }
 
-pub(super) fn data(sample: Sample, options: &Options) -> Value {
-    carried(&draw(sample, options, "figure.html").unwrap())
+pub(super) fn data(sample: SampleFile, options: &PlotOptions) -> Value {
+    page_data(&draw(sample, options, "figure.html").unwrap())
 }
 
-/// What a page carries as its data.
-pub(super) fn carried(page: &[u8]) -> Value {
+/// Returns the data that a page carries.
+pub(super) fn page_data(page: &[u8]) -> Value {
     let page = std::str::from_utf8(page).unwrap();
     let start = page.find(r#"id="data">"#).unwrap() + r#"id="data">"#.len();
     serde_json::from_str(&page[start..start + page[start..].find("</script>").unwrap()]).unwrap()
 }
 
-/// A curve as a page carries it.
+/// Decodes a curve of a page.
 pub(super) fn curve(series: &Value) -> Vec<f64> {
     use base64::Engine as _;
     let bytes =
@@ -48,7 +52,7 @@ pub(super) fn message(result: Result<Vec<u8>, PlotError>) -> String {
     result.unwrap_err().to_string()
 }
 
-fn three_axes() -> Sample {
+fn three_axes() -> SampleFile {
     MapSample {
         axes: vec![
             ("unbalance_mass_kg", vec![0.2, 0.4, 0.6]),
@@ -62,7 +66,7 @@ fn three_axes() -> Sample {
     .sample()
 }
 
-pub(super) fn one_axis() -> Sample {
+pub(super) fn one_axis() -> SampleFile {
     MapSample {
         axes: vec![("damping_n_s_per_m", vec![60.0, 100.0, 140.0, 180.0])],
         limit: 2.0,
@@ -73,11 +77,12 @@ pub(super) fn one_axis() -> Sample {
 }
 
 #[test]
-fn columns_come_with_units_words_and_provenance() {
+fn columns_have_units_words_and_provenance() {
     let folder = tempfile::tempdir().unwrap();
     let table =
-        Table::open(&map().write(folder.path(), "map.parquet"), read::Known::default()).unwrap();
-    assert_eq!((table.source.kind, table.rows), (Kind::MAP, 90));
+        FigureTable::open(&map().write(folder.path(), "map.parquet"), read::ModelKinds::default())
+            .unwrap();
+    assert_eq!((table.source.kind, table.rows), (FigureKind::MAP, 90));
     let column = |name: &str| table.column(name).unwrap();
     assert_eq!(
         column("damping_n_s_per_m").facts.unit,
@@ -106,18 +111,18 @@ fn columns_come_with_units_words_and_provenance() {
 fn the_same_file_gives_the_same_bytes() {
     for sample in [map, three_axes, one_axis, boundary] {
         for output in ["a.svg", "a.html"] {
-            let twice = [0, 1].map(|_| draw(sample(), &Options::default(), output).unwrap());
+            let twice = [0, 1].map(|_| draw(sample(), &PlotOptions::default(), output).unwrap());
             assert!(twice[0] == twice[1], "{output}");
         }
     }
-    let twice = [0, 1].map(|_| draw(map(), &Options::default(), "a.png").unwrap());
+    let twice = [0, 1].map(|_| draw(map(), &PlotOptions::default(), "a.png").unwrap());
     assert!(twice[0] == twice[1], "a.png");
 }
 
 #[test]
-fn a_map_names_axes_sides_boundary_and_failures() {
-    let figure = svg(map(), &Options::default());
-    for said in [
+fn a_map_labels_axes_sides_boundary_and_failures() {
+    let figure = svg(map(), &PlotOptions::default());
+    for phrase in [
         ">Unbalance mass (kg)<",
         ">Damping (N s/m)<",
         ">linear model unreliable<",
@@ -127,13 +132,13 @@ fn a_map_names_axes_sides_boundary_and_failures() {
         ">undefined: no excitation<",
         ">sample · 90 points · 1 failed<",
     ] {
-        assert!(figure.contains(said), "{said}");
+        assert!(figure.contains(phrase), "{phrase}");
     }
 }
 
 #[test]
-fn the_boundary_is_where_the_ratio_is_at_its_limit() {
-    let data = data(map(), &Options::default());
+fn the_boundary_of_a_map_follows_the_limit() {
+    let data = data(map(), &PlotOptions::default());
     let line = &data["layers"][0]["lines"][0];
     let points: Vec<f64> = line
         .as_array()
@@ -144,20 +149,21 @@ fn the_boundary_is_where_the_ratio_is_at_its_limit() {
         .collect();
     assert!(points.len() > 20);
     for at in points.chunks(2) {
-        // The sample's log ratio is linear in both axes, so interpolation between points is exact.
+        // The logarithm of the sample's ratio is linear in both axes, so that interpolation is
+        // exact.
         assert!((at[1] - (50.0 + 200.0 * at[0])).abs() < 0.01, "{at:?}");
     }
 }
 
-/// A figure of this column.
-pub(crate) fn showing(column: &str) -> Options {
-    Options { quantity: vec![column.to_owned()], ..Options::default() }
+/// Returns the options for a figure of this column.
+pub(crate) fn showing(column: &str) -> PlotOptions {
+    PlotOptions { quantity: vec![column.to_owned()], ..PlotOptions::default() }
 }
 
 #[test]
-fn every_quantity_has_its_figure() {
+fn every_column_can_be_drawn() {
     let shown = |column| svg(map(), &showing(column));
-    for (figure, said) in [
+    for (figure, phrase) in [
         (shown("ratio_body_pitch"), ">Ratio of amplitudes: body pitch<"),
         (shown("nonlinear_body_yaw"), ">amplitude, nonlinear model (mrad)<"),
         (shown("linear_body_yaw"), ">amplitude, linear model (mrad)<"),
@@ -165,19 +171,19 @@ fn every_quantity_has_its_figure() {
         (shown("fail_time_s"), ">fail time (s)<"),
         (shown("status"), ">diverged (1)<"),
     ] {
-        assert!(figure.contains(said), "{said}");
+        assert!(figure.contains(phrase), "{phrase}");
     }
 }
 
 #[test]
-fn a_page_carries_its_ticks() {
-    let log = Sample::default()
+fn a_page_contains_its_ticks() {
+    let log = SampleFile::default()
         .counts("point", 0..4)
         .numbers("damping_n_s_per_m", "N s/m", [1.0, 10.0, 100.0, 1000.0])
         .numbers("nonlinear_body_yaw", "rad", [0.1, 0.2, 0.3, 0.4])
         .numbers("ratio_max", "1", [1.0, 1.1, 1.2, 40.0])
         .words("status", [Some("ok"); 4]);
-    let data = data(log, &Options::default());
+    let data = data(log, &PlotOptions::default());
     let steps = data["ticks"]["steps"].as_array().unwrap();
     assert!(steps.contains(&serde_json::json!([0.05, 2])), "5 hundredths, two decimals");
     assert_eq!(
@@ -189,10 +195,11 @@ fn a_page_carries_its_ticks() {
 }
 
 #[test]
-fn a_third_axis_is_drawn_side_by_side_or_cut() {
-    let figure = svg(three_axes(), &Options::default());
+fn a_third_axis_gives_panels_unless_it_is_fixed() {
+    let figure = svg(three_axes(), &PlotOptions::default());
     assert!(figure.contains(">Peak 300 Hz<") && figure.contains(">Peak 350 Hz<"));
-    let at = |value| Options { at: vec![("peak_hz".to_owned(), value)], ..Options::default() };
+    let at =
+        |value| PlotOptions { at: vec![("peak_hz".to_owned(), value)], ..PlotOptions::default() };
     let cut = svg(three_axes(), &at(350.0));
     assert!(cut.contains(">sample · 18 points · Peak 350 Hz<") && !cut.contains(">Peak 300 Hz<"));
     assert!(message(draw(three_axes(), &at(351.0), "a.svg")).contains("it has 300, 350"));
@@ -200,10 +207,11 @@ fn a_third_axis_is_drawn_side_by_side_or_cut() {
 }
 
 #[test]
-fn one_axis_is_drawn_as_curves_with_failures_marked() {
-    let figure = svg(one_axis(), &Options::default());
-    for said in [">Damping (N s/m)<", ">body yaw<", ">unreliable from ratio 2 on<", ">diverged<"] {
-        assert!(figure.contains(said), "{said}");
+fn a_map_of_one_axis_has_curves_and_marks_failures() {
+    let figure = svg(one_axis(), &PlotOptions::default());
+    for phrase in [">Damping (N s/m)<", ">body yaw<", ">unreliable from ratio 2 on<", ">diverged<"]
+    {
+        assert!(figure.contains(phrase), "{phrase}");
     }
     assert!(svg(one_axis(), &showing("min_gap_linear_m")).contains(">Least gap (mm)<"));
 }
@@ -219,13 +227,13 @@ fn titles_name_the_channel() {
         assert!(figure.contains(&format!(">{title}<")), "{column}: {figure}");
     }
     let two = ["nonlinear_body_yaw", "nonlinear_body_pitch"].map(str::to_owned);
-    let figure = svg(one_axis(), &Options { quantity: two.to_vec(), ..Options::default() });
+    let figure = svg(one_axis(), &PlotOptions { quantity: two.to_vec(), ..PlotOptions::default() });
     assert!(figure.contains(">Amplitudes of both models<"), "{figure}");
 }
 
 #[test]
 fn a_boundary_that_is_not_drawn_has_no_legend() {
-    let of_limit = |limit: f64| {
+    let draw_at_limit = |limit: f64| {
         let sample = MapSample {
             axes: vec![
                 ("unbalance_mass_kg", vec![0.2, 0.4, 0.6]),
@@ -235,30 +243,33 @@ fn a_boundary_that_is_not_drawn_has_no_legend() {
             yaw: &|at| Some([0.02 + 0.05 * at[0], 0.01]),
             chaotic: &|_| false,
         };
-        svg(sample.sample(), &Options::default())
+        svg(sample.sample(), &PlotOptions::default())
     };
-    assert!(of_limit(4.0).contains(">boundary: ratio 4<"));
-    let reliable = of_limit(40.0);
+    assert!(draw_at_limit(4.0).contains(">boundary: ratio 4<"));
+    let reliable = draw_at_limit(40.0);
     assert!(!reliable.contains(">boundary: ratio 40<"), "{reliable}");
     assert!(reliable.contains(">reliable: below 40<"), "{reliable}");
 }
 
 #[test]
 fn a_boundary_is_drawn_with_its_bracket() {
-    assert!(svg(boundary(), &Options::default()).contains(">boundary: ratio 2, bracket shaded<"));
+    assert!(
+        svg(boundary(), &PlotOptions::default()).contains(">boundary: ratio 2, bracket shaded<")
+    );
 }
 
 #[test]
 fn a_png_is_twice_the_size_of_its_figure() {
-    let image = draw(map(), &Options::default(), "a.png").unwrap();
+    let image = draw(map(), &PlotOptions::default(), "a.png").unwrap();
     assert_eq!(&image[..8], b"\x89PNG\r\n\x1a\n");
     assert_eq!(u32::from_be_bytes(image[16..20].try_into().unwrap()), 1760);
 }
 
 #[test]
-fn a_page_needs_nothing_but_itself() {
+fn a_page_is_self_contained() {
     let hostile = || map().metadata("note", "</script><img src=x> {{data}}");
-    let page = String::from_utf8(draw(hostile(), &Options::default(), "a.html").unwrap()).unwrap();
+    let page =
+        String::from_utf8(draw(hostile(), &PlotOptions::default(), "a.html").unwrap()).unwrap();
     let still = "src=\"data:image/png;base64,iVBOR";
     assert_eq!(page.matches(still).count(), 1, "a picture where scripts are switched off");
     let page = page.replace(still, "");
@@ -270,18 +281,18 @@ fn a_page_needs_nothing_but_itself() {
 }
 
 #[test]
-fn mistakes_are_told_apart_and_nothing_is_written() {
+fn errors_name_their_cause_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
-    let none = Options::default();
-    let at = Options { at: vec![("body_mass_kg".to_owned(), 20.0)], ..Options::default() };
-    let traces = Options { traces: Some(folder.path().to_owned()), ..Options::default() };
-    let empty = || Sample::default().numbers("ratio_max", "1", []).words("status", []);
-    let doubled = Sample::default()
+    let none = PlotOptions::default();
+    let at = PlotOptions { at: vec![("body_mass_kg".to_owned(), 20.0)], ..PlotOptions::default() };
+    let traces = PlotOptions { traces: Some(folder.path().to_owned()), ..PlotOptions::default() };
+    let empty = || SampleFile::default().numbers("ratio_max", "1", []).words("status", []);
+    let doubled = SampleFile::default()
         .numbers("damping_n_s_per_m", "", [60.0, 60.0])
         .numbers("nonlinear_body_yaw", "rad", [1.0, 1.0])
         .numbers("ratio_max", "1", [1.0, 1.0])
         .words("status", [Some("ok"), Some("ok")]);
-    for (result, said) in [
+    for (result, phrase) in [
         (draw(map(), &none, "a.pdf"), ".svg, .png or .html"),
         (draw(map(), &none, "input.parquet/a.svg"), "a part of that path is a file"),
         (draw(map(), &showing("ratio_yow"), "a.svg"), "it has ratio_max, ratio_body_yaw"),
@@ -292,21 +303,21 @@ fn mistakes_are_told_apart_and_nothing_is_written() {
         (draw(empty(), &none, "a.svg"), "the map has no rows"),
         (draw(doubled, &none, "a.svg"), "rows 0 and 1 are the same point"),
         (
-            draw(Sample::default().numbers("x", "", [1.0]), &none, "a.svg"),
+            draw(SampleFile::default().numbers("x", "", [1.0]), &none, "a.svg"),
             "no file that has a figure: study, map, differences",
         ),
     ] {
-        assert!(message(result).contains(said), "{said}");
+        assert!(message(result).contains(phrase), "{phrase}");
     }
     let text = folder.path().join("text.parquet");
     std::fs::write(&text, "no Parquet").unwrap();
-    for (input, said) in [
+    for (input, phrase) in [
         (text.as_path(), "not a readable Parquet file"),
         (Path::new("/no/such"), "cannot open /no/such"),
     ] {
         let output = folder.path().join("a.svg");
         assert!(
-            render(input, &none, &CommonFigures, &output).unwrap_err().to_string().contains(said)
+            render(input, &none, &CommonFigures, &output).unwrap_err().to_string().contains(phrase)
         );
         assert!(!output.exists());
     }

@@ -31,7 +31,7 @@ use washer_model::{Method, ModelKind, Parameter, Target};
 use crate::config::WasherGridInput;
 use crate::engine::simd_from_environment;
 use sweep_engine::config::{Diagnostic, Location, Report as Mistakes};
-use sweep_engine::design::{Rule, Shape};
+use sweep_engine::design::{DesignRule, DistributionShape};
 use sweep_engine::threads::Cancel;
 use sweep_engine::{Design, Diagnostics, Distribution, Error, tell};
 
@@ -428,7 +428,7 @@ fn bootstrap(
 ) -> Result<Vec<Vec<f64>>, Ended> {
     const BLOCK: usize = 100;
     let measured = problem.cases.clone();
-    let draw = Design::Spread { rule: Rule::MonteCarlo, points: 0, seed: SEED };
+    let draw = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: SEED };
     let mut drawn = 0;
     let mut found = Vec::new();
     for _ in 0..count {
@@ -507,7 +507,7 @@ impl Search<'_> {
         let mut chosen = vec![start.clone()];
         if starts > 1 {
             let design =
-                Design::Spread { rule: Rule::LatinHypercube, points: starts - 1, seed: SEED };
+                Design::Spread { rule: DesignRule::LatinHypercube, points: starts - 1, seed: SEED };
             let place = |point: u64, k: usize| {
                 let Free { range, start, .. } = &self.problem.free[k];
                 let around = AROUND.map(|share| share * start);
@@ -560,8 +560,8 @@ impl Search<'_> {
 
 /// So many draws from the standard normal distribution, evenly spread: of a draw the k-th number.
 fn evenly(count: u64) -> impl Fn(u64, usize) -> f64 {
-    let design = Design::Spread { rule: Rule::LatinHypercube, points: count, seed: SEED };
-    let shape = Shape::Normal { mean: 0.0, sd: 1.0 };
+    let design = Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed: SEED };
+    let shape = DistributionShape::Normal { mean: 0.0, sd: 1.0 };
     let normal = Distribution { shape, from: -6.0, to: 6.0 };
     move |point, k| normal.quantile(design.place(point, k).unwrap_or(0.5))
 }

@@ -164,13 +164,13 @@ fn plan_from_map(file: &Path) -> Result<Plan, Error> {
     let mut json = json.ok_or_else(|| refused("a map by `sweep run`, which carries its plan"))?;
     let name = file.display().to_string();
     if json.get("design").is_none() {
-        let plan: Plan = WasherGridInput::of_plan(&name, &json).load()?;
+        let plan: Plan = WasherGridInput::from_plan(&name, &json).load()?;
         return if plan.axes.is_empty() { Err(refused("a map with an axis")) } else { Ok(plan) };
     }
     // The axes of a design with ranges have these; those of a list and of distributions have the
     // ranges of the file's columns.
     let axes = json["axis"].take();
-    let mut plan: Plan = WasherGridInput::of_plan(&name, &json).load()?;
+    let mut plan: Plan = WasherGridInput::from_plan(&name, &json).load()?;
     let columns = overview(&opened)?.columns;
     for axis in axes.as_array().into_iter().flatten() {
         let name = axis["parameter"].as_str().unwrap_or_default();

@@ -69,7 +69,7 @@ mod tests {
 
     use super::*;
     use crate::method::Integrator;
-    use sweep_engine::design::{Design, Rule};
+    use sweep_engine::design::{Design, DesignRule};
     use sweep_engine::{AxisValues, Reliability};
     use washer_model::{Machine, Parameter, Profile, Spin};
     use washer_row::Measures;
@@ -138,7 +138,7 @@ mod tests {
             ("unbalance_mass_kg", AxisValues::Linear { from: 0.1, to: 0.9, count: 2 }),
             ("bearing_stiffness_n_per_m", AxisValues::Log { from: 1e6, to: 1e8, count: 2 }),
         ]);
-        plan.design = Some(Design::Spread { rule: Rule::Sobol, points: 1024, seed: 1 });
+        plan.design = Some(Design::Spread { rule: DesignRule::Sobol, points: 1024, seed: 1 });
         assert_eq!(plan.points(), 1024);
         let points: Vec<Vec<f64>> = (0..1024).map(|point| plan.axis_values(point)).collect();
         let below =

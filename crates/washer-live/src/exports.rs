@@ -1,15 +1,16 @@
-//! The module's exports. A caller writes numbers where [`input`] says and calls a function with how
-//! many they are; what it returns is how many numbers stand at [`output`], 0 if there is no answer.
+//! The exports of the WebAssembly module. A caller writes numbers to the address that [`input`]
+//! returns and calls a function with their count. The function returns the count of numbers at
+//! [`output`], or 0 without an answer.
 //!
-//! Numbers are 64 bit floats. An answer is 1, or 0 if the point is impossible or -1 if it has no
-//! equilibrium; whether it is sensitive; a record of each model, the nonlinear one first; the ratio
-//! of each channel; the static sag (m). What is not there is NaN.
+//! Numbers are 64-bit floats. The answer for a point is: a code (1, 0 for an impossible point, -1
+//! for one without equilibrium); 1 if the motion is sensitive, else 0; a record of the nonlinear
+//! and of the linear model; the ratio of each channel; the static sag (m). Missing numbers are NaN.
 //!
-//! A record is the level's place and name, the error left, `failure` (0 none, 1 diverged, 2 step
-//! too small, 3 step limit), its time (s), `steps`, the least gap (m), the amplitude of each
-//! channel and the map's metrics of the model.
+//! A record is: the index and the name of the refinement level, the remaining error, the failure (0
+//! none, 1 diverged, 2 step too small, 3 step limit) and its time (s), the number of steps, the
+//! least gap (m), the amplitude of each channel, and the map's metrics of the model.
 #![allow(unsafe_code)]
-// A module's exports are not this crate's.
+// Exports of the module are not public items of this crate.
 #![allow(unreachable_pub)]
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -18,24 +19,25 @@ use lane_ode::{Failure, Simd};
 use washer_model::{Channel, ModelKind, instants};
 use washer_row::{Status, Trajectory};
 
-use crate::point::{Answer, NoPoint, Scenario, check, motion};
+use crate::point::{Answer, NoPoint, PointScenario, check, motion};
 use crate::setup::Setup;
 
 #[derive(Default)]
-struct State {
+struct ModuleState {
     input: Vec<f64>,
     output: Vec<f64>,
     setup: Option<Setup>,
 }
 
-static STATE: Mutex<State> =
-    Mutex::new(State { input: Vec::new(), output: Vec::new(), setup: None });
+/// The state between two calls of exports; a module has one thread.
+static STATE: Mutex<ModuleState> =
+    Mutex::new(ModuleState { input: Vec::new(), output: Vec::new(), setup: None });
 
-fn state() -> MutexGuard<'static, State> {
+fn state() -> MutexGuard<'static, ModuleState> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Makes room for so many numbers and says where.
+/// Makes room for `count` numbers and returns its address.
 // SAFETY (of every export): no other symbol of the module has its name.
 #[unsafe(no_mangle)]
 pub extern "C" fn input(count: usize) -> *mut f64 {
@@ -45,19 +47,19 @@ pub extern "C" fn input(count: usize) -> *mut f64 {
     state.input.as_mut_ptr()
 }
 
-/// Where the last answer stands, until the next call.
+/// Returns the address of the last answer, which is valid until the next call.
 #[unsafe(no_mangle)]
 pub extern "C" fn output() -> *const f64 {
     state().output.as_ptr()
 }
 
-/// Trajectories side by side.
+/// Returns the number of trajectories that are integrated side by side.
 #[unsafe(no_mangle)]
 pub extern "C" fn lanes() -> usize {
     Simd::best().lanes()
 }
 
-/// Takes a setup; 1 if it is one.
+/// Reads the setup from the input. Returns 1 if it is valid, else 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn setup() -> usize {
     let state = &mut *state();
@@ -65,9 +67,9 @@ pub extern "C" fn setup() -> usize {
     usize::from(state.setup.is_some())
 }
 
-/// Answers by the setup and the input; without a setup there is no answer.
+/// Writes an answer by the setup and the input, and returns its length; 0 without a setup.
 fn answer(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize {
-    let State { input, output, setup } = &mut *state();
+    let ModuleState { input, output, setup } = &mut *state();
     output.clear();
     if let Some(setup) = setup {
         write(setup, input, output);
@@ -75,7 +77,7 @@ fn answer(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize {
     output.len()
 }
 
-/// Both models at the quick level at points of so many values each: an answer for each point.
+/// Answers points of `values` numbers each by both models at the quick level.
 #[unsafe(no_mangle)]
 pub extern "C" fn quick(values: usize) -> usize {
     answer(|setup, input, output| {
@@ -86,15 +88,15 @@ pub extern "C" fn quick(values: usize) -> usize {
     })
 }
 
-/// One checked point: its answer.
+/// Answers one point with a checked error.
 #[unsafe(no_mangle)]
 pub extern "C" fn checked() -> usize {
     answer(|setup, input, output| write_answer(output, &check(setup, input), setup))
 }
 
-/// The motion of a model (0 nonlinear, 1 linear) at a point at a refinement level, or at the quick
-/// one if there is none of this number: 1, 0 or -1 as above, the failure and its time, how many
-/// instants; of each, the channels and the gap.
+/// Writes the motion of a model (0 nonlinear, 1 linear) at a point and a refinement level; the
+/// quick level if there is none at this index. Output: the code, the failure and its time (s), the
+/// number of instants; for each instant the channels and the gap.
 #[unsafe(no_mangle)]
 pub extern "C" fn history(model: usize, place: usize, every_s: f64) -> usize {
     let model = if model == 0 { ModelKind::Nonlinear } else { ModelKind::Linear };
@@ -111,10 +113,10 @@ pub extern "C" fn history(model: usize, place: usize, every_s: f64) -> usize {
     })
 }
 
-/// How disturbances grow at a point of so many values while the drum turns at the constant speeds
-/// (rpm) behind them: 1, 0 or -1 as above; for each speed how fast the fastest one grows (1/s; NaN
-/// where there is no periodic response), its frequency (cycles per minute), what it is, by its
-/// place among [`washer_model::Kind::ALL`], and 1 where the response is on the curve of a machine
+/// Writes the growth of disturbances at a point of `values` numbers, at the constant speeds (rpm)
+/// that follow it in the input. Output: the code; for each speed the growth of the fastest
+/// disturbance (1/s; NaN without a periodic response), its frequency (cycles per minute), its kind
+/// as an index into [`washer_model::Kind::ALL`], and 1 if the response is on the curve of a machine
 /// that runs up, else 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn growth(values: usize) -> usize {
@@ -123,18 +125,19 @@ pub extern "C" fn growth(values: usize) -> usize {
         let found = crate::growth(setup, values, speeds_rpm);
         output.push(code(found.as_ref().err()));
         for disturbance in found.unwrap_or_default() {
-            output.extend(disturbance.map_or([f64::NAN; 4], |(of, is_on_curve)| {
-                let [kind, on_curve] = [of.kind() as u8, u8::from(is_on_curve)].map(f64::from);
-                [of.growth_per_s(), of.frequency_cpm(), kind, on_curve]
+            output.extend(disturbance.map_or([f64::NAN; 4], |(disturbance, is_on_curve)| {
+                let [kind, on_curve] =
+                    [disturbance.kind() as u8, u8::from(is_on_curve)].map(f64::from);
+                [disturbance.growth_per_s(), disturbance.frequency_cpm(), kind, on_curve]
             }));
         }
     })
 }
 
-/// How far the motions go that a point of so many values ends in at the constant speeds (rpm)
-/// behind them: 1, 0 or -1 as above; the speed at which the tub turns farthest (NaN where nothing
-/// was found), what that motion is, by its place among [`washer_model::Ending::KINDS`], and the
-/// largest deviation of each channel (m, rad).
+/// Writes the largest attractor of a point of `values` numbers at the constant speeds (rpm) that
+/// follow it in the input. Output: the code; the speed at which the tub turns farthest (NaN if no
+/// attractor was found), the attractor's kind as an index into [`washer_model::Ending::KINDS`], and
+/// the largest deviation of each channel (m, rad).
 #[unsafe(no_mangle)]
 pub extern "C" fn dwell(values: usize) -> usize {
     answer(|setup, input, output| {
@@ -151,11 +154,11 @@ pub extern "C" fn dwell(values: usize) -> usize {
     })
 }
 
-/// Speeds (rpm) at a point, every `every_s` from 0 to the end.
+/// Writes the speeds (rpm) at a point, every `every_s` from 0 to the end.
 #[unsafe(no_mangle)]
 pub extern "C" fn speeds(every_s: f64) -> usize {
     answer(|setup, input, output| {
-        if let Ok(scenario) = Scenario::new(setup, input) {
+        if let Ok(scenario) = PointScenario::new(setup, input) {
             let places = 0..instants(setup.rule.end_s, every_s);
             let times_s = places.map(|k| k as f64 * every_s);
             output.extend(scenario.spin.speeds_rpm(times_s));
@@ -171,7 +174,7 @@ fn code(why: Option<&NoPoint>) -> f64 {
     }
 }
 
-/// Why and when (s) a run failed; the reasons in the order of [`Failure`].
+/// Returns the code and the time (s) of a failure; codes follow the order of [`Failure`].
 fn failure(failure: Option<(Failure, f64)>) -> [f64; 2] {
     failure.map_or([0.0, f64::NAN], |(why, time_s)| [1.0 + f64::from(why as u8), time_s])
 }
@@ -191,7 +194,7 @@ fn write_answer(output: &mut Vec<f64>, found: &Result<Answer, NoPoint>, setup: &
         let error = errors[model].unwrap_or(f64::NAN);
         output.extend([places[model] as f64, f64::from(levels[model] as u8), error]);
         let Trajectory { status, fail_time_s, steps, min_gap_m, metrics: found, .. } = run;
-        // Those of runs come first, in the order of `Failure`.
+        // Failures of runs come first, in the order of `Failure`.
         let failure = f64::from((*status as u8).min(Status::StepLimit as u8));
         let or_none = |value: &Option<f64>| value.unwrap_or(f64::NAN);
         output.extend([failure, or_none(fail_time_s), *steps as f64, or_none(min_gap_m)]);

@@ -1,19 +1,21 @@
-//! Both models at single points, behind plain exports for a page.
+//! Both models of a washing machine at single points, with exports for a page.
 //!
 //! `sweep plot --live` writes a [`Setup`] into a page: the machine, its spin and the refinement
 //! levels of the fast method, as the program chose them for the map and for the sliders. The page's
-//! workers load this crate as a WebAssembly module, and ask for
+//! workers load this crate as a WebAssembly module and call
 //!
-//! * [`quick`]: both models at some points at one level, which is quick and not checked;
-//! * [`check`]: a point as a row of the map has it, by runs that agree;
+//! * [`quick`]: both models at some points at one refinement level, without an error estimate;
+//! * [`check`]: a point with a checked error, as a row of the map;
 //! * [`motion`]: the time history of one model at a point;
-//! * [`growth`]: how fast disturbances grow there while the drum turns at constant speeds;
-//! * [`dwell`]: how far the motions go that such a speed ends in.
+//! * [`growth`]: the growth of disturbances while the drum turns at constant speeds;
+//! * [`dwell`]: the largest attractor at constant speeds.
 //!
-//! Numbers go in and come out as arrays of 64 bit floats; `exports.rs` says in which order. Where
-//! this crate runs natively, [`check`] gives the bits of the program's rows, because both climb by
-//! the rule of `washer-row` (tests of `sweep`). As a module it rounds without fused operations
+//! Numbers are passed as arrays of 64-bit floats, in the order given in `exports.rs`. Compiled for
+//! the host, [`check`] gives the bits of the program's rows, because both refine by the rule of
+//! `washer-row` (tests of `sweep`). The module rounds without fused operations
 //! (`tests/browser/check_live.py`).
+
+#![allow(missing_docs, reason = "private crate: a name that says enough needs no comment")]
 
 #[cfg(target_arch = "wasm32")]
 mod exports;

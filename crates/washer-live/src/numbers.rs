@@ -1,18 +1,20 @@
-//! Arrays of numbers in one order: a walk writes them, and the same walk reads them back.
+//! Conversion of structures to arrays of numbers and back: one walk over the fields serves both
+//! directions.
 
-/// Counts and places are below this: what a page was written with has fewer of everything.
-const MOST: usize = 100_000;
+/// Upper bound of counts and indices; larger ones are rejected. Basis: no setup comes near it, and
+/// a damaged page must not allocate more.
+const COUNT_LIMIT: usize = 100_000;
 
-/// A walk over the numbers of something. Each step writes a number, or puts the next one in its
-/// place; it gives `None` where there is nothing like it.
-pub(crate) enum Walk<'a> {
-    /// The numbers so far.
+/// A walk over the fields of a structure. Each step writes a number or reads the next one; it
+/// returns `None` if the number is missing or invalid.
+pub(crate) enum NumberWalk<'a> {
+    /// The numbers written so far.
     Write(Vec<f64>),
-    /// Those that are left.
+    /// The numbers that are left to read.
     Read(&'a [f64]),
 }
 
-impl Walk<'_> {
+impl NumberWalk<'_> {
     pub(crate) const fn is_reading(&self) -> bool {
         matches!(self, Self::Read(_))
     }
@@ -30,7 +32,7 @@ impl Walk<'_> {
         Some(())
     }
 
-    /// A number that may be absent.
+    /// Writes or reads a number that may be absent.
     pub(crate) fn optional(&mut self, value: &mut Option<f64>) -> Option<()> {
         let mut number = value.unwrap_or(f64::NAN);
         self.numbers([&mut number])?;
@@ -38,22 +40,22 @@ impl Walk<'_> {
         Some(())
     }
 
-    /// The count that was written.
+    /// Writes a count, or reads one in its place.
     pub(crate) fn count(&mut self, count: usize) -> Option<usize> {
         let mut value = count as f64;
         self.numbers([&mut value])?;
-        let is_count = value >= 0.0 && value < MOST as f64 && value == value.trunc();
+        let is_count = value >= 0.0 && value < COUNT_LIMIT as f64 && value == value.trunc();
         is_count.then_some(value as usize)
     }
 
-    /// One of these, by its place among them.
+    /// Writes or reads one of `all` by its index.
     pub(crate) fn choice<T: Clone + PartialEq>(&mut self, one: &mut T, all: &[T]) -> Option<()> {
         let place = all.iter().position(|known| known == one).unwrap_or(all.len());
         *one = all.get(self.count(place)?)?.clone();
         Some(())
     }
 
-    /// Some of these, by their places among them.
+    /// Writes or reads some of `all` by their indices.
     pub(crate) fn choices<T: Clone + PartialEq>(
         &mut self,
         some: &mut Vec<T>,
@@ -63,7 +65,8 @@ impl Walk<'_> {
         some.iter_mut().try_for_each(|one| self.choice(one, all))
     }
 
-    /// A list's length; what the list is made of goes on its own.
+    /// Writes the length of a list, or reads it and resizes the list; elements are passed
+    /// separately.
     pub(crate) fn sized<T: Clone>(&mut self, list: &mut Vec<T>, blank: &T) -> Option<()> {
         list.resize(self.count(list.len())?, blank.clone());
         Some(())

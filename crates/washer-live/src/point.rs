@@ -1,4 +1,4 @@
-//! One point, ready to run, and its runs at one refinement level.
+//! Evaluation of single points.
 
 use lane_ode::{Failure, Simd};
 use sweep_parameter::RatioLimits;
@@ -13,29 +13,29 @@ use washer_row::{
 
 use crate::setup::Setup;
 
-/// Why a point has no answer.
+/// The reason why a point has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoPoint {
-    /// The machine cannot be: a number is out of its range.
+    /// A number of the machine is out of its range.
     Impossible,
     /// The machine has no static equilibrium.
     NoEquilibrium,
 }
 
-/// What both models do at a point; of pairs, the nonlinear one first.
+/// The results of both models at a point; pairs have the nonlinear model first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// The row that a map has of it; of a quick answer without what comparing runs says.
+    /// The row of a map; a quick answer lacks the numbers that follow from comparing runs.
     pub outcome: Outcome,
-    /// Amplitudes of every channel by the criterion, compared or not (m, rad).
+    /// The amplitudes of all channels by the criterion, compared or not (m, rad).
     pub amplitudes: [Deviations; 2],
-    /// Their ratios, as if every channel was compared.
+    /// The ratios, as if every channel were compared.
     pub ratios: Vec<Option<f64>>,
-    /// The places of the refinement levels that the models' numbers come from.
+    /// The indices of the refinement levels that the models' numbers come from.
     pub places: [usize; 2],
     /// The names of these levels.
     pub levels: [Level; 2],
-    /// The errors left, relative; absent where nothing says so.
+    /// The remaining relative errors, if they are known.
     pub errors: [Option<f64>; 2],
 }
 
@@ -47,12 +47,12 @@ impl Answer {
         refinement: &[RefinementLevels; 2],
         limits: RatioLimits,
     ) -> Self {
-        let every = |of: &Trajectory, amplitudes: &Deviations| match of.status {
-            Status::Ok => Trajectory { amplitudes: amplitudes.to_vec(), ..of.clone() },
+        let with_all_channels = |run: &Trajectory, amplitudes: &Deviations| match run.status {
+            Status::Ok => Trajectory { amplitudes: amplitudes.to_vec(), ..run.clone() },
             failed => Trajectory::failed(failed),
         };
-        let nonlinear = every(&outcome.nonlinear, &amplitudes[0]);
-        let linear = every(&outcome.linear, &amplitudes[1]);
+        let nonlinear = with_all_channels(&outcome.nonlinear, &amplitudes[0]);
+        let linear = with_all_channels(&outcome.linear, &amplitudes[1]);
         let mut compared = Outcome::new(outcome.point, nonlinear, linear);
         compared.compare_turns(&Channel::ALL);
         let Verdict { ratios, .. } = Verdict::new(&compared, Channel::ALL.len(), limits);
@@ -61,30 +61,31 @@ impl Answer {
     }
 }
 
-/// One model's motion at even instants.
+/// The motion of one model at equal time intervals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointHistory {
-    /// Why and when (s) it failed, if it did; there are no instants from there on.
+    /// The reason and the time (s) of a failure, after which there are no instants.
     pub failure: Option<(Failure, f64)>,
-    /// Deviations from equilibrium in the order of [`Channel::ALL`] (m, rad).
+    /// The deviations from equilibrium in the order of [`Channel::ALL`] (m, rad).
     pub channels: Vec<[f64; Channel::ALL.len()]>,
-    /// Gap between drum and tub (m).
+    /// The gap between drum and tub (m).
     pub gaps_m: Vec<f64>,
 }
 
-/// The machine, spin and window of a point: the setup's with these values of its sliders.
+/// The machine, spin and window of a point: those of the setup with the point's values.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Scenario {
+pub(crate) struct PointScenario {
     machine: Machine,
     pub(crate) spin: Spin,
     window_s: [f64; 2],
 }
 
-impl Scenario {
-    /// Missing values are the setup's.
+impl PointScenario {
+    /// Returns the setup with these values of its sliders; missing values stay those of the setup.
     pub(crate) fn new(setup: &Setup, values: &[f64]) -> Result<Self, NoPoint> {
         let Setup { machine, spin, rule, .. } = setup;
-        let (machine, spin) = (machine.clone(), spin.clone());
+        let machine = machine.clone();
+        let spin = spin.clone();
         let mut scenario = Self { machine, spin, window_s: rule.window_s };
         for (parameter, &value) in setup.sliders.parameters.iter().zip(values) {
             if !parameter.range().contains(value) {
@@ -124,28 +125,27 @@ fn refinement_levels<'a>(setup: &'a Setup, values: &[f64]) -> &'a [RefinementLev
 /// # Errors
 /// [`NoPoint`].
 fn ready_point(setup: &Setup, values: &[f64]) -> Result<Point, NoPoint> {
-    let scenario = Scenario::new(setup, values)?;
+    let scenario = PointScenario::new(setup, values)?;
     let timing = scenario.timing(setup);
     let mut points = prepare(Simd::Scalar, &[(scenario.machine, scenario.spin)], &timing);
     points.pop().and_then(Result::ok).ok_or(NoPoint::NoEquilibrium)
 }
 
-/// Integrates both models at points at the quick level, in lanes. Nothing is compared with these
-/// runs.
+/// Integrates both models at points at the quick level, in lanes, without comparing runs.
 pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
     let ready = points.iter();
     let ready = ready.map(|values| (refinement_levels(setup, values), ready_point(setup, values)));
     let ready: Vec<_> = ready.collect();
     let rule = Rule { accuracy: f64::INFINITY, ..setup.rule.clone() };
     let mut found: Vec<Result<Answer, NoPoint>> = Vec::with_capacity(points.len());
-    // Runs at the same levels go through the lanes together.
+    // Runs at the same levels share the lanes.
     for alike in ready.chunk_by(|(a, _), (b, _)| core::ptr::eq(*a, *b)) {
         let levels = alike[0].0;
         let sound: Vec<&Point> =
             alike.iter().filter_map(|(_, ready)| ready.as_ref().ok()).collect();
         let places = [0, 1].map(|model| quick_place(&levels[model]));
         let [nonlinear, linear] = [0, 1]
-            .map(|model| by_method(model, levels[model].method(places[model]), &sound, &rule));
+            .map(|model| run_method(model, levels[model].method(places[model]), &sound, &rule));
         let mut pairs = nonlinear.into_iter().zip(linear);
         let answer = |(nonlinear, linear): (LevelRun, LevelRun)| {
             let amplitudes = [nonlinear.amplitudes, linear.amplitudes];
@@ -161,7 +161,7 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
     found
 }
 
-/// Computes a point as a row of the map: each model at finer and finer levels, until two agree.
+/// Computes a point as a row of the map: each model is refined until two levels agree.
 ///
 /// # Errors
 /// [`NoPoint`].
@@ -176,10 +176,10 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
             Next::Done(outcome) => break *outcome,
             Next::Runs(wanted) => {
                 for (model, place) in wanted {
-                    let of_model = &levels[model];
-                    let perturbed = of_model.is_perturbed(place).then(|| point.nudged());
+                    let model_levels = &levels[model];
+                    let perturbed = model_levels.is_perturbed(place).then(|| point.nudged());
                     let started = perturbed.as_ref().unwrap_or(&point);
-                    for run in by_method(model, of_model.method(place), &[started], rule) {
+                    for run in run_method(model, model_levels.method(place), &[started], rule) {
                         refinement.take((model, place), run, &point, with);
                     }
                 }
@@ -195,19 +195,19 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
     Ok(Answer { errors: finest.map(|(.., error)| error), ..answer })
 }
 
-fn by_method(model: usize, method: &Method, points: &[&Point], rule: &Rule) -> Vec<LevelRun> {
+fn run_method(model: usize, method: &Method, points: &[&Point], rule: &Rule) -> Vec<LevelRun> {
     let found = runs(Simd::best(), ModelKind::ALL[model], method, points, rule, &|| false);
     found.unwrap_or_default()
 }
 
-/// Returns the place of the level of quick answers: the second, at which most rows are done. With
-/// nothing capped, the first.
+/// Returns the index of the level of quick answers: the second, at which most rows are accepted, or
+/// the first if no mode is capped.
 fn quick_place(levels: &RefinementLevels) -> usize {
     usize::from(levels.levels.get(1).is_some_and(|second| second.level.is_capped()))
 }
 
-/// Integrates the motion of one model at a point at a refinement level, or at the quick one, every
-/// `every_s` from 0 to the end.
+/// Integrates the motion of one model at a point, at a refinement level or else at the quick one,
+/// every `every_s` from 0 to the end.
 ///
 /// # Errors
 /// [`NoPoint`].
@@ -228,9 +228,9 @@ pub fn motion(
     Ok(PointHistory { failure: history.failure, channels, gaps_m })
 }
 
-/// The fastest growing disturbance of a point's periodic response at each of some constant speeds
-/// (rpm), and whether that is on the curve of a machine that runs up; none where there is no
-/// response.
+/// Returns the fastest growing disturbance of a point's periodic response at each of some constant
+/// speeds (rpm), and whether the response is on the curve of a machine that runs up; `None` without
+/// a response.
 ///
 /// # Errors
 /// [`NoPoint`].
@@ -242,13 +242,13 @@ pub fn growth(
     let point = ready_point(setup, values)?;
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-    let told = |first: &Response| (first.disturbance(), first.is_on_curve);
+    let disturbance = |first: &Response| (first.disturbance(), first.is_on_curve);
     let answers = respond(&dwells, &|| false).into_iter();
-    Ok(answers.map(|answer| answer.ok()?.first().map(told)).collect())
+    Ok(answers.map(|answer| answer.ok()?.first().map(disturbance)).collect())
 }
 
-/// How far the motions go that a point ends in at some constant speeds (rpm), from the usual
-/// starts; none where nothing was found.
+/// Returns the largest attractor of a point over some constant speeds (rpm), from the default
+/// starts; `None` if none was found.
 ///
 /// # Errors
 /// [`NoPoint`].

@@ -1,4 +1,4 @@
-//! What a page computes with.
+//! The setup of the module: everything that it computes with.
 
 use lane_ode::Tolerance;
 use sweep_parameter::RatioLimits;
@@ -7,48 +7,48 @@ use washer_model::{
 };
 use washer_row::{Criterion, Level, Measures, Metric, RefinementLevel, RefinementLevels, Rule};
 
-use crate::numbers::Walk;
+use crate::numbers::NumberWalk;
 
-/// The machine, its spin, what a point can change, and how points are integrated.
+/// The machine, its spin, the sliders, and the refinement levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
-    /// The machine, but for what a point changes.
+    /// The machine before a point's values are set.
     pub machine: Machine,
-    /// The spin, but for what a point changes.
+    /// The spin before a point's values are set.
     pub spin: Spin,
-    /// Into how many parts a run is cut, at whose ends two runs of it are compared.
+    /// The number of parts of a run; two runs are compared at the end of each part.
     pub checkpoints: u32,
-    /// What is measured, and what checked numbers must be good for.
+    /// The rule of rows: results, and the accuracy of checked numbers.
     pub rule: Rule,
-    /// What a point gives values.
+    /// The parameters that a point sets.
     pub sliders: Sliders,
     /// The refinement levels of the nonlinear and of the linear model while only axes move. Their
-    /// notes do not go with the numbers.
+    /// notes are not encoded.
     pub levels: [RefinementLevels; 2],
-    /// The same while any slider may be anywhere in its range.
+    /// The refinement levels while any slider may be anywhere in its range.
     pub wide_levels: [RefinementLevels; 2],
 }
 
-/// The parameters that a point gives values.
+/// The parameters that a point sets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sliders {
-    /// Axes of the map first.
+    /// The parameters, axes of the map first.
     pub parameters: Vec<Parameter>,
-    /// How many are axes.
+    /// The number of axes among them.
     pub axes: usize,
 }
 
 impl Setup {
-    /// As numbers.
+    /// Encodes the setup as numbers.
     pub fn to_numbers(&self) -> Vec<f64> {
-        let mut walk = Walk::Write(Vec::new());
+        let mut walk = NumberWalk::Write(Vec::new());
         // Only reading can fail.
         let _ = self.clone().walk(&mut walk);
-        let Walk::Write(numbers) = walk else { return Vec::new() };
+        let NumberWalk::Write(numbers) = walk else { return Vec::new() };
         numbers
     }
 
-    /// From [`Self::to_numbers`]; `None` from anything else.
+    /// Decodes a setup from [`Self::to_numbers`]; `None` for other numbers.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         let direct = || RefinementLevels::direct(Level::Rk4, Method::of(Level::Rk4));
         let levels = [0, 1].map(|_| direct());
@@ -68,11 +68,11 @@ impl Setup {
             wide_levels: levels.clone(),
             levels,
         };
-        setup.walk(&mut Walk::Read(numbers))?;
+        setup.walk(&mut NumberWalk::Read(numbers))?;
         Some(setup)
     }
 
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Option<()> {
+    fn walk(&mut self, walk: &mut NumberWalk<'_>) -> Option<()> {
         let Self { machine, spin, .. } = self;
         for list in ElementList::all() {
             let count = walk.count((list.count)(machine))?;
@@ -84,7 +84,7 @@ impl Setup {
         machine.cabinet = (cabinets > 0).then(|| machine.cabinet.unwrap_or_default());
         walk_profile(walk, spin)?;
         let parameters = Parameter::all(machine, spin);
-        // Numbers of single elements stand after those of all.
+        // Numbers of single elements come after those that set all elements.
         for parameter in &parameters {
             let mut value = parameter.get(machine, spin);
             walk.optional(&mut value)?;
@@ -92,7 +92,7 @@ impl Setup {
                 parameter.set(machine, spin, value);
             }
         }
-        // A spring's length without force may follow from where its ends are.
+        // A spring without a free length gets it from the positions of its ends.
         for spring in &mut machine.springs {
             walk.optional(&mut spring.free_length_m)?;
         }
@@ -108,8 +108,8 @@ impl Setup {
     }
 }
 
-/// Which profile it is; its numbers are parameters.
-fn walk_profile(walk: &mut Walk<'_>, spin: &mut Spin) -> Option<()> {
+/// Writes or reads the profile of the spin; its numbers are parameters.
+fn walk_profile(walk: &mut NumberWalk<'_>, spin: &mut Spin) -> Option<()> {
     let code = walk.count(match spin {
         Spin::Ramped { profile, .. } => *profile as usize,
         Spin::Table { time_s, .. } => Profile::ALL.len() + time_s.len(),
@@ -126,8 +126,8 @@ fn walk_profile(walk: &mut Walk<'_>, spin: &mut Spin) -> Option<()> {
     Some(())
 }
 
-/// But for how many elements the machine has.
-fn walk_rule(walk: &mut Walk<'_>, rule: &mut Rule) -> Option<()> {
+/// Writes or reads the rule, without the numbers of the machine's elements.
+fn walk_rule(walk: &mut NumberWalk<'_>, rule: &mut Rule) -> Option<()> {
     let Rule { end_s, window_s: [from_s, to_s], accuracy, limits, channels, measures } = rule;
     walk.numbers([end_s, from_s, to_s, accuracy, &mut limits.most])?;
     walk.optional(&mut limits.least)?;
@@ -136,8 +136,8 @@ fn walk_rule(walk: &mut Walk<'_>, rule: &mut Rule) -> Option<()> {
     walk.choices(&mut measures.metrics, &Metric::ALL)
 }
 
-/// Reads or writes at least two levels.
-fn walk_levels(walk: &mut Walk<'_>, levels: &mut RefinementLevels) -> Option<()> {
+/// Writes or reads the refinement levels, of which there are at least two.
+fn walk_levels(walk: &mut NumberWalk<'_>, levels: &mut RefinementLevels) -> Option<()> {
     let mut list = levels.levels.clone();
     walk.sized(&mut list, &levels.levels[0])?;
     list.iter_mut().try_for_each(|level| walk_level(walk, level))?;
@@ -148,7 +148,7 @@ fn walk_levels(walk: &mut Walk<'_>, levels: &mut RefinementLevels) -> Option<()>
     Some(())
 }
 
-fn walk_level(walk: &mut Walk<'_>, level: &mut RefinementLevel) -> Option<()> {
+fn walk_level(walk: &mut NumberWalk<'_>, level: &mut RefinementLevel) -> Option<()> {
     walk.choice(&mut level.level, &Level::ALL)?;
     if walk.is_reading() {
         level.method = Method::of(level.level);

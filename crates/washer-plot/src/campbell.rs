@@ -1,56 +1,59 @@
-//! Natural frequencies over spin speed, and where they meet it (the paper's Fig. 7).
+//! The Campbell diagram: natural frequencies over spin speed, and the speeds at which they meet it
+//! (the paper's Fig. 7).
 
 use crate::WasherFigures;
 use crate::kinds::MODES;
-use crate::stability::{self, Unstable};
+use crate::stability::{self, UnstableSpeeds};
 use sweep_files::key;
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
 use sweep_plot::label::Label;
-use sweep_plot::table::Table;
+use sweep_plot::table::FigureTable;
 use sweep_plot::{DISTINCT, INK, MUTED, PlotError, extremes};
 
-/// One mode over speed.
-pub(crate) struct Mode {
+/// The frequency of a mode, or a sum of two modes' frequencies, over speed.
+pub(crate) struct FrequencyCurve {
     pub(crate) name: String,
     pub(crate) speed: Vec<f64>,
     pub(crate) frequency: Vec<f64>,
-    /// Speeds at which it is the speed.
+    /// The speeds at which the frequency is the speed.
     pub(crate) resonances: Vec<f64>,
-    /// Least and greatest over a turn, if the file has them.
+    /// The least and the greatest frequency over a turn, if the file has them.
     pub(crate) band: Option<(Vec<f64>, Vec<f64>)>,
 }
 
-/// The chart of a modes file. Modes that lie wholly above the greatest speed are left out, and
-/// counted. With a stability file, the sums of two modes' frequencies that feed what grows are
-/// drawn too, with a star where such a sum is the speed.
+/// Draws the chart of a modes file. Modes whose frequency is above the greatest speed everywhere
+/// are only counted. With a stability file, the sums of the frequencies of modes in parametric
+/// resonance are drawn too, with a star where a sum is the speed.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] without a column or two speeds; as
-/// [`stability::unstable_of`].
-pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, PlotError> {
+/// [`PlotError::Undrawable`] without a column or with fewer than two speeds; the errors of
+/// [`stability::read_unstable`].
+pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Chart, PlotError> {
     let unstable = options.stability.as_ref();
-    let unstable = unstable.map(|path| stability::unstable_of(table, path)).transpose()?;
+    let unstable = unstable.map(|path| stability::read_unstable(table, path)).transpose()?;
     let modes = modes(table)?;
     let top = modes.iter().flat_map(|mode| &mode.speed).fold(0.0_f64, |top, &speed| top.max(speed));
     if top <= 0.0 || modes.iter().all(|mode| mode.speed.len() < 2) {
-        return Err(table.source.empty("the modes are given at one speed only"));
+        return Err(table.source.nothing_to_draw("the modes are given at one speed only"));
     }
-    let is_near = |mode: &Mode| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top);
-    let (near, far): (Vec<Mode>, Vec<Mode>) = modes.into_iter().partition(is_near);
-    let sums = unstable.as_ref().map_or_else(Vec::new, |unstable| sums(&near, unstable));
+    let is_near =
+        |mode: &FrequencyCurve| mode.frequency.iter().any(|&frequency| frequency < 1.06 * top);
+    let (near, far): (Vec<FrequencyCurve>, Vec<FrequencyCurve>) =
+        modes.into_iter().partition(is_near);
+    let sums = unstable.as_ref().map_or_else(Vec::new, |unstable| frequency_sums(&near, unstable));
     let drawn = near.iter().chain(&sums).flat_map(|mode| mode.frequency.iter().copied());
     let (_, highest) = extremes(drawn).unwrap_or((0.0, top));
     let range = (0.0, (1.06 * top).min(1.25 * highest));
 
     let mut series = Vec::new();
     let mut stars = Vec::new();
-    let of_modes = near.into_iter().enumerate().map(|(k, mut mode)| {
+    let mode_curves = near.into_iter().enumerate().map(|(k, mut mode)| {
         let band = mode.band.take();
         let style = band.map_or(Style::Solid(2.2), |(low, high)| Style::Band(low, high));
         (mode, DISTINCT[k % DISTINCT.len()], style)
     });
-    let of_sums = sums.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
-    for (mode, colour, style) in of_modes.chain(of_sums) {
+    let sum_curves = sums.into_iter().map(|sum| (sum, MUTED, Style::Dashed));
+    for (mode, colour, style) in mode_curves.chain(sum_curves) {
         stars.extend(mode.resonances.iter().map(|&at| (at, at, format!("{at:.1} rpm"))));
         series.push(Series::new(mode.name, colour, mode.speed, mode.frequency, style));
     }
@@ -77,30 +80,31 @@ pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, Plo
     })
 }
 
-/// The resonance speeds of a modes file, rpm, rising: where a mode's damped frequency is the spin
-/// speed.
+/// Returns the resonance speeds of a modes file in rising order, rpm: those at which a mode's
+/// damped frequency is the spin speed.
 ///
 /// # Errors
 /// [`PlotError::Unfit`] when the file is not a modes file,
 /// [`PlotError::Undrawable`] when it lacks a column.
-pub(crate) fn resonances(table: &Table) -> Result<Vec<f64>, PlotError> {
+pub(crate) fn resonances(table: &FigureTable) -> Result<Vec<f64>, PlotError> {
     table.source.expect(MODES, "--modes", "`sweep modes --out FILE` writes a modes file")?;
     let mut speeds: Vec<f64> = modes(table)?.into_iter().flat_map(|mode| mode.resonances).collect();
     speeds.sort_by(f64::total_cmp);
     Ok(speeds)
 }
 
-/// The sums of frequencies that feed what grows: of the two modes that take part, or twice that of
-/// the one.
-fn sums(modes: &[Mode], unstable: &Unstable) -> Vec<Mode> {
+/// Returns the sums of frequencies behind parametric resonances: of the two modes that take part,
+/// or twice the frequency of a single one.
+fn frequency_sums(modes: &[FrequencyCurve], unstable: &UnstableSpeeds) -> Vec<FrequencyCurve> {
     let mut pairs: Vec<[usize; 2]> = Vec::new();
     for (speed, frequencies) in &unstable.participants {
         let nearest = |frequency: f64| {
-            let apart = |mode: &Mode| (at_speed(mode, *speed) - frequency).abs();
+            let apart = |mode: &FrequencyCurve| (at_speed(mode, *speed) - frequency).abs();
             let places = 0..modes.len();
             places.min_by(|&a, &b| apart(&modes[a]).total_cmp(&apart(&modes[b])))
         };
-        // The pair whose sum is nearest to the speed, among those that could be meant.
+        // Among all pairs of participating modes, the one whose sum is nearest to the speed is
+        // taken.
         let named: Vec<usize> =
             frequencies.iter().filter(|f| f.is_finite()).filter_map(|f| nearest(*f)).collect();
         let all = named.iter().flat_map(|&a| named.iter().map(move |&b| [a.min(b), a.max(b)]));
@@ -126,20 +130,26 @@ fn sums(modes: &[Mode], unstable: &Unstable) -> Vec<Mode> {
             format!("sum of the frequencies of modes {} and {}", number(a), number(b))
         };
         let speed = modes[a].speed.clone();
-        let of_both = |speed: &f64| at_speed(&modes[a], *speed) + at_speed(&modes[b], *speed);
-        let frequency: Vec<f64> = speed.iter().map(of_both).collect();
-        Mode { name, resonances: crossings(&speed, &frequency), speed, frequency, band: None }
+        let sum_at = |speed: &f64| at_speed(&modes[a], *speed) + at_speed(&modes[b], *speed);
+        let frequency: Vec<f64> = speed.iter().map(sum_at).collect();
+        FrequencyCurve {
+            name,
+            resonances: crossings(&speed, &frequency),
+            speed,
+            frequency,
+            band: None,
+        }
     };
     pairs.into_iter().map(sum).collect()
 }
 
-/// A mode's frequency at a speed.
-fn at_speed(mode: &Mode, speed: f64) -> f64 {
-    between(&mode.speed, &mode.frequency, speed)
+/// Returns a mode's frequency at a speed.
+fn at_speed(mode: &FrequencyCurve, speed: f64) -> f64 {
+    interpolate(&mode.speed, &mode.frequency, speed)
 }
 
-/// The value at `x`, straight between the given ones and even beyond them.
-pub(crate) fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
+/// Interpolates linearly at `x`; beyond the given values the curve is constant.
+pub(crate) fn interpolate(xs: &[f64], ys: &[f64], x: f64) -> f64 {
     let above = xs.partition_point(|known| *known < x).min(xs.len() - 1);
     let below = above.saturating_sub(1);
     let step = xs[above] - xs[below];
@@ -150,8 +160,8 @@ pub(crate) fn between(xs: &[f64], ys: &[f64], x: f64) -> f64 {
     ys[below] + part * (ys[above] - ys[below])
 }
 
-/// Every mode of a file, by number.
-pub(crate) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
+/// Returns the modes of a file by number.
+pub(crate) fn modes(table: &FigureTable) -> Result<Vec<FrequencyCurve>, PlotError> {
     let speed = table.numbers("speed_rpm")?;
     let number = table.numbers("mode")?;
     let frequency = table.numbers("frequency_rpm")?;
@@ -167,7 +177,7 @@ pub(crate) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
     let names =
         table.column("name").or_else(|| table.column("shape")).and_then(|column| column.words());
 
-    // A row without a number is of no mode.
+    // A row without a number belongs to no mode.
     let mut numbers: Vec<f64> = number.iter().copied().filter(|mode| mode.is_finite()).collect();
     numbers.sort_by(f64::total_cmp);
     numbers.dedup();
@@ -175,15 +185,16 @@ pub(crate) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
         let mut rows: Vec<usize> = (0..table.rows).filter(|&row| number[row] == wanted).collect();
         rows.sort_by(|&a, &b| speed[a].total_cmp(&speed[b]));
         let pick = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
-        let said = names.and_then(|names| names.get(*rows.first()?));
+        let phrase = names.and_then(|names| names.get(*rows.first()?));
         let known = || -> Option<Vec<f64>> {
             let mut all = table.source.list(key::MODES);
             let found = all.find(|mode| mode["mode"] == wanted)?["resonances"].as_array()?;
             found.iter().map(|resonance| resonance["speed_rpm"].as_f64()).collect()
         };
-        let (speed, frequency) = (pick(speed), pick(frequency));
-        Mode {
-            name: said.map_or(format!("mode {wanted}"), |said| format!("{wanted} {said}")),
+        let speed = pick(speed);
+        let frequency = pick(frequency);
+        FrequencyCurve {
+            name: phrase.map_or(format!("mode {wanted}"), |phrase| format!("{wanted} {phrase}")),
             resonances: known().unwrap_or_else(|| crossings(&speed, &frequency)),
             speed,
             frequency,
@@ -193,7 +204,7 @@ pub(crate) fn modes(table: &Table) -> Result<Vec<Mode>, PlotError> {
     Ok(numbers.into_iter().map(mode).collect())
 }
 
-/// Speeds at which a mode's frequency, taken as linear between the given speeds, is the speed.
+/// Returns the speeds at which a mode's frequency, linear between the given speeds, is the speed.
 fn crossings(speeds: &[f64], frequencies: &[f64]) -> Vec<f64> {
     let both = frequencies.iter().zip(speeds);
     let excess: Vec<f64> = both.map(|(frequency, speed)| frequency - speed).collect();
@@ -211,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mode_is_excited_where_its_frequency_is_the_speed() {
+    fn a_resonance_is_where_the_frequency_is_the_speed() {
         let speed: Vec<f64> = (0..=10).map(|k| 30.0 * f64::from(k)).collect();
         let frequency: Vec<f64> = speed.iter().map(|speed| 150.0 - 0.02 * speed).collect();
         let found = crossings(&speed, &frequency);

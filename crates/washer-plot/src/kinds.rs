@@ -1,26 +1,31 @@
-//! The washing machine's own kinds of files, and marks that they share.
+//! The washing machine's kinds of files, and the marks that their charts share.
 
 use sweep_plot::chart::Mark;
 use sweep_plot::label;
-use sweep_plot::read::{Kind, Known};
+use sweep_plot::read::{FigureKind, ModelKinds};
 
-/// Motions that held speeds end in.
-pub(crate) const DWELL: Kind = Kind::of("dwell", &["motion", "speed_rpm"]).with_points();
-/// Periodic responses over constant speeds.
-pub(crate) const STABILITY: Kind =
-    Kind::of("stability", &["growth_per_s", "speed_rpm"]).with_points();
-/// Modes over spin speed.
-pub(crate) const MODES: Kind = Kind::of("modes", &["mode", "frequency_rpm", "speed_rpm"]);
+/// The attractors at held speeds.
+pub(crate) const DWELL: FigureKind =
+    FigureKind::new("dwell", &["motion", "speed_rpm"]).with_points();
+/// The periodic responses at constant speeds.
+pub(crate) const STABILITY: FigureKind =
+    FigureKind::new("stability", &["growth_per_s", "speed_rpm"]).with_points();
+/// The modes over spin speed.
+pub(crate) const MODES: FigureKind =
+    FigureKind::new("modes", &["mode", "frequency_rpm", "speed_rpm"]);
 
-/// What modes, and responses at constant speeds, follow from.
+/// The sections of a plan that modes, and responses at constant speeds, follow from.
 pub(crate) const MACHINE: &[&str] = &["machine"];
 
-/// What the engine is told of them.
-pub(crate) const KNOWN: Known =
-    Known { kinds: &[DWELL, STABILITY, MODES], of_runs: &["machine", "spin"], of_machine: MACHINE };
+/// The kinds and sections for `sweep-plot`.
+pub(crate) const MODEL_KINDS: ModelKinds = ModelKinds {
+    kinds: &[DWELL, STABILITY, MODES],
+    history_sections: &["machine", "spin"],
+    machine_sections: MACHINE,
+};
 
-/// A mark with a speed beside it, rpm.
-pub(crate) fn mark_of_speed(x: f64, speed_rpm: f64) -> Mark {
+/// Returns a mark that is labelled with a speed, rpm.
+pub(crate) fn speed_mark(x: f64, speed_rpm: f64) -> Mark {
     let speed = format!("{speed_rpm:.1}");
     Mark { x, label: format!("{} rpm", label::trimmed(&speed)) }
 }

@@ -1,11 +1,13 @@
-//! What a page computes with: the module, its setup and the sliders.
+//! The live part of a page: the WebAssembly module, its setup and the sliders.
 
 use serde_json::{Value, json};
-use sweep_plot::{Computing, embed, label, table};
+use sweep_plot::{LivePart, embed, label, table};
 
-/// The module of `crates/washer-live`, packed by gzip; `scripts/release/build_live.sh` makes it.
+/// The module of `crates/washer-live`, compressed by gzip; `scripts/release/build_live.sh` makes
+/// it.
 const MODULE: &[u8] = include_bytes!("../assets/live.wasm.gz");
 
+/// The scripts of the live part.
 const SCRIPTS: &[&str] = &[
     include_str!("html/spectrum.js"),
     include_str!("html/pool.js"),
@@ -14,7 +16,7 @@ const SCRIPTS: &[&str] = &[
     include_str!("html/live.js"),
 ];
 
-/// Templates, and what the page's workers run.
+/// The templates of elements, and the script of the page's workers.
 const PARTS: &str = concat!(
     include_str!("html/parts.html"),
     "<script type=\"text/plain\" id=\"worker\">",
@@ -22,56 +24,56 @@ const PARTS: &str = concat!(
     "</script>\n"
 );
 
-/// What a page computes with, beside the module that every such page has.
+/// The data of the live part, beside the module that every live page has.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Live {
-    /// What the module is set up with, in its own terms.
+    /// The setup of the module, encoded by `washer-live`.
     #[serde(skip)]
     pub setup: Vec<f64>,
-    /// What can be moved, the map's axes first.
+    /// The parameters that can be moved, axes of the map first.
     #[serde(skip)]
     pub sliders: Vec<Slider>,
-    /// Time between two instants of a history (s).
+    /// The time between two instants of a history (s).
     pub every_s: f64,
-    /// The end of the run (s).
+    /// The end of a run (s).
     pub end_s: f64,
-    /// When amplitudes are taken (s).
+    /// The window in which amplitudes are taken (s).
     pub window_s: [f64; 2],
-    /// The channels of the module's records, in their order.
+    /// The channels in the order of the module's records.
     pub channels: Vec<String>,
-    /// Those that the verdict compares, by their places.
+    /// The indices of the channels that the verdict compares.
     pub compared: Vec<usize>,
-    /// What an amplitude is, and a ratio.
+    /// The words for an amplitude and for a ratio.
     pub criterion: [String; 2],
-    /// The columns of each model's metrics in the module's records, in their order.
+    /// The columns of each model's metrics in the order of the module's records.
     pub metrics: Vec<[String; 2]>,
     /// Whether the map has the static sag.
     pub has_static_sag: bool,
-    /// The constant speeds (rpm) that metrics of the map are about; none if it has none of these.
+    /// The constant speeds (rpm) at which metrics of the map are taken; empty without such metrics.
     pub held_speeds_rpm: Vec<f64>,
-    /// These metrics: `growth`, `dwell`.
+    /// The metrics at these speeds: `growth`, `dwell`.
     pub held_metrics: Vec<String>,
-    /// Whether the growth at a constant speed takes long: with friction or stops.
+    /// Whether the growth at a constant speed takes long to compute, as with friction or stops.
     pub has_slow_growth: bool,
-    /// What motions that a held speed ends in are, in the module's order.
+    /// The kinds of attractors in the module's order, in words.
     pub motions: Vec<String>,
-    /// Ways in which a response at a constant speed can lose its stability, in the module's order;
-    /// none where that cannot be asked of the machine.
+    /// The ways in which a response can lose its stability, in the module's order; empty for a
+    /// machine whose stability cannot be computed.
     pub kinds: Vec<String>,
-    /// Names of the levels that the module counts.
+    /// The names of the refinement levels in the module's order.
     pub levels: Vec<String>,
-    /// Largest error of a checked amplitude, relative.
+    /// The largest relative error of a checked amplitude.
     pub accuracy: f64,
-    /// Ratios below it are reliable.
+    /// The upper limit of reliable ratios.
     pub ratio_limit: f64,
-    /// And above this, if it is asked for.
+    /// The lower limit of reliable ratios, if the plan has one.
     pub ratio_min: Option<f64>,
-    /// The rungs of the nonlinear and of the linear model, in words.
+    /// The refinement levels of the nonlinear and of the linear model, in words.
     pub rungs: [Vec<String>; 2],
-    /// The version of the program that chose the rungs.
+    /// The version of the program that chose the refinement levels.
     pub version: String,
-    /// Resonances of the linear model: motion, speed with its unit, damping ratio.
+    /// The resonances of the linear model: motion, speed with its unit, damping ratio.
     #[serde(skip)]
     pub resonances: Vec<[String; 3]>,
 }
@@ -79,22 +81,20 @@ pub struct Live {
 /// A parameter that a page can move.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Slider {
-    /// As in grid files.
+    /// The name in grid files.
     pub name: String,
-    /// In a phrase.
+    /// The meaning, as a phrase.
     pub description: String,
-    /// The least value.
     pub from: f64,
-    /// The greatest value.
     pub to: f64,
-    /// The map's own value; none of an axis.
+    /// The map's own value; `None` for an axis.
     pub value: Option<f64>,
 }
 
-/// What a page computes with. The axes by name, and whether they are logarithmic.
-pub(crate) fn computing(live: &Live, axes: &[(&str, bool)]) -> Computing {
+/// Returns the live part of a page over these axes, given by name and whether they are logarithmic.
+pub(crate) fn live_part(live: &Live, axes: &[(&str, bool)]) -> LivePart {
     let channel = |name: &String| {
-        let (unit, factor) = label::shown(label::unit_of_channel(name));
+        let (unit, factor) = label::display_unit(label::unit_of_channel(name));
         json!({ "name": name, "words": label::channel(name), "unit": unit, "factor": factor })
     };
     let mut data = json!(live);
@@ -106,10 +106,10 @@ pub(crate) fn computing(live: &Live, axes: &[(&str, bool)]) -> Computing {
     for (key, names) in [("kinds", &live.kinds), ("motions", &live.motions)] {
         data[key] = names.iter().map(|name| name.replace('_', " ")).collect();
     }
-    Computing { data, scripts: SCRIPTS, parts: PARTS }
+    LivePart { data, scripts: SCRIPTS, parts: PARTS }
 }
 
-/// The resonances of the machine, in HTML.
+/// Writes the table of the machine's resonances in HTML.
 pub(crate) fn resonances(live: &Live) -> String {
     let rows: Vec<_> = live.resonances.iter().cloned().map(Vec::from).collect();
     let heads = ["Motion", "Resonance", "Damping ratio"];
@@ -118,7 +118,7 @@ pub(crate) fn resonances(live: &Live) -> String {
 
 fn metric(columns: &[String; 2]) -> Value {
     let unit = label::unit_of_name(&columns[0]);
-    let (unit, factor) = label::shown(&unit);
+    let (unit, factor) = label::display_unit(&unit);
     let words = label::quantity(&columns[0]);
     json!({ "columns": columns, "words": words, "unit": unit, "factor": factor })
 }

@@ -1,12 +1,12 @@
-//! What a figure's file says of the machine.
+//! The machine's numbers in the plan of a file.
 
 use serde_json::Value;
 
-use sweep_plot::table::Table;
+use sweep_plot::table::FigureTable;
 
-/// The two numbers of the machine that reliability turns on, as far as the file has them and all
+/// Returns the unbalance and the damping of the machine, as far as the file has them and all
 /// dampers are alike.
-pub(crate) fn machine(table: &Table) -> Vec<(&'static str, f64)> {
+pub(crate) fn unbalance_and_damping(table: &FigureTable) -> Vec<(&'static str, f64)> {
     let Some(machine) = table.source.find("machine") else { return Vec::new() };
     let unbalance = machine.pointer("/unbalance/mass_kg").and_then(Value::as_f64);
     let dampers = machine.get("dampers").and_then(Value::as_array).into_iter().flatten();

@@ -1,22 +1,24 @@
-//! How the cost of a fit rises on both sides of each fitted number, the others fitted again.
+//! The chart of a fit's profiles: the cost at fixed values of each fitted number, with the other
+//! numbers fitted again.
 
 use serde_json::Value;
 
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
 use sweep_plot::label::{self, Label};
-use sweep_plot::table::Table;
+use sweep_plot::table::FigureTable;
 use sweep_plot::{DISTINCT, MUTED, PlotError};
 
-/// The cost at either end of a 95 % interval, above the least.
-const AT_95: f64 = 3.84;
+/// The 95 % quantile of the chi-squared distribution with one degree of freedom: the cost above the
+/// least at either end of a 95 % interval.
+const CHI2_1_95: f64 = 3.84;
 
-/// The chart of a fit's curves.
+/// Draws the profiles of a fit's curves.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] for a file that has no profiles.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+/// [`PlotError::Undrawable`] for a file without profiles.
+pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
     let empty = || {
-        table.source.empty(
+        table.source.nothing_to_draw(
             "it has no profiles: they are in the curves of `sweep fit`, if the model follows",
         )
     };
@@ -33,7 +35,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         Series::new("by the standard errors", MUTED, grid.clone(), parabola, Style::Dashed);
     let series = series.chain([parabola]).collect();
     let panel = ChartPanel {
-        levels: vec![(AT_95, "95 %".to_owned())],
+        levels: vec![(CHI2_1_95, "95 %".to_owned())],
         ..ChartPanel::new("cost", Label::new("Cost above the least", ""), series)
     };
     Ok(Chart {
@@ -45,7 +47,7 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     })
 }
 
-/// A list's numbers.
+/// Returns the numbers of a list.
 pub(crate) fn numbers(list: &Value) -> Vec<f64> {
     list.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
 }

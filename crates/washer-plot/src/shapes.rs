@@ -1,39 +1,40 @@
-//! What moves at each resonance speed: the axis of tub and drum (the paper's Fig. 8).
+//! Mode shapes: the axes of tub and drum at each resonance speed (the paper's Fig. 8).
 
 use serde_json::Value;
 use sweep_files::key;
 
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
 use sweep_plot::label::{self, Label};
-use sweep_plot::table::Table;
+use sweep_plot::table::FigureTable;
 use sweep_plot::{DISTINCT, PlotError};
 
-/// Departures of the drum's axis from the tub's are drawn from this share of the greatest
-/// deflection on.
-const TOGETHER: f64 = 0.02;
+/// Minimum separation of the drum's axis from the tub's that is drawn, as a share of the greatest
+/// deflection. Basis: smaller ones cannot be seen. Doubling it hides slight bending.
+const MIN_SEPARATION: f64 = 0.02;
 
-/// A deflection that swings, as real and imaginary part.
+/// An oscillating deflection by its real and imaginary part.
 type Phasor = [f64; 2];
 
-/// Places along the axis, from O towards the door (m).
-struct Places {
-    /// Rear and front of the tub.
+/// Positions along the axis, from O towards the door (m).
+struct AxisPositions {
+    /// The rear and the front of the tub.
     tub: [f64; 2],
-    /// Rear, hinge and front of the drum.
+    /// The rear, the hinge and the front of the drum.
     drum: [f64; 3],
 }
 
-/// Deflections of an axis along c2 and c3 at some places.
-type Line = [Vec<Phasor>; 2];
+/// The deflections of an axis along c2 and c3 at some positions.
+type AxisShape = [Vec<Phasor>; 2];
 
-/// The chart of a modes file: a panel for each resonance, which shows how far points of the axis
-/// are from rest when the greatest deflection is at its farthest, and a quarter of a period later.
+/// Draws the shapes of a modes file: a panel for each resonance, with the deflection of the axis at
+/// the instant of the greatest deflection and a quarter of a period later.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] where the file holds no machine or no resonances.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
-    let places = places(table)
-        .ok_or_else(|| table.source.empty("the file does not say where the machine's parts are"))?;
+/// [`PlotError::Undrawable`] if the file has no machine or no resonances.
+pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
+    let places = places(table).ok_or_else(|| {
+        table.source.nothing_to_draw("the file does not say where the machine's parts are")
+    })?;
     let mut panels = Vec::new();
     for mode in table.source.list(key::MODES) {
         let name = mode["name"].as_str().unwrap_or_default();
@@ -54,9 +55,9 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         }
     }
     if panels.is_empty() {
-        return Err(table
-            .source
-            .empty("the file holds no resonance; `sweep modes --speed` over faster speeds may"));
+        return Err(table.source.nothing_to_draw(
+            "the file holds no resonance; `sweep modes --speed` over faster speeds may",
+        ));
     }
     Ok(Chart {
         title: "Mode shapes at the resonance speeds".to_owned(),
@@ -69,49 +70,49 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
     })
 }
 
-fn places(table: &Table) -> Option<Places> {
+fn places(table: &FigureTable) -> Option<AxisPositions> {
     let machine = table.source.find("machine")?;
     let number = |path: &str| machine.pointer(path).and_then(Value::as_f64);
     let rear = number("/bearings/rear_x_m")?;
     let tub = [rear, number("/tub/front_x_m")?];
     let drum = [rear, number("/drum/hinge_x_m")?, number("/drum/front_x_m")?];
-    Some(Places { tub, drum })
+    Some(AxisPositions { tub, drum })
 }
 
-/// Coordinates of a shape: `q1` to `q10` of a modes file.
+/// Number of coordinates of a shape: `q1` to `q10` of a modes file.
 const COORDINATES: usize = 10;
 
-/// One phasor a coordinate.
-fn shape(of: &Value) -> Option<Vec<Phasor>> {
+/// Returns the phasor of each coordinate.
+fn shape(coordinates: &Value) -> Option<Vec<Phasor>> {
     let part = |q: &Value, k: usize| q.get(k).and_then(Value::as_f64);
     (1..=COORDINATES)
-        .map(|i| of.get(format!("q{i}")).and_then(|q| Some([part(q, 0)?, part(q, 1)?])))
+        .map(|i| coordinates.get(format!("q{i}")).and_then(|q| Some([part(q, 0)?, part(q, 1)?])))
         .collect()
 }
 
-/// Tub and drum along their axes to first order (model page, section 1).
-fn lines(places: &Places, q: &[Phasor]) -> [Line; 2] {
+/// Returns the axes of tub and drum to first order (model page, section 1).
+fn axis_shapes(places: &AxisPositions, q: &[Phasor]) -> [AxisShape; 2] {
     let plus = |a: Phasor, k: f64, b: Phasor| [a[0] + k * b[0], a[1] + k * b[1]];
     let straight = |start: Phasor, slope: Phasor, sign: f64, xs: &[f64]| -> Vec<Phasor> {
         xs.iter().map(|x| plus(start, sign * x, slope)).collect()
     };
-    let Places { tub, drum } = places;
+    let AxisPositions { tub, drum } = places;
     let tub = [straight(q[0], q[5], 1.0, tub), straight(q[1], q[4], -1.0, tub)];
     let mut drum = [straight(q[2], q[7], 1.0, drum), straight(q[3], q[6], -1.0, drum)];
-    // Beyond the hinge the drum bends away; at theta = 0 its angles are about c2 and c3 too.
+    // Beyond the hinge the drum is bent; at theta = 0 its angles are about c2 and c3.
     let beyond = places.drum[2] - places.drum[1];
     drum[0][2] = plus(drum[0][2], beyond, q[9]);
     drum[1][2] = plus(drum[1][2], -beyond, q[8]);
     [tub, drum]
 }
 
-fn series(places: &Places, q: &[Phasor]) -> Vec<Series> {
-    let [tub, drum] = lines(places, q);
+fn series(places: &AxisPositions, q: &[Phasor]) -> Vec<Series> {
+    let [tub, drum] = axis_shapes(places, q);
     let squared = |[re, im]: Phasor| re * re + im * im;
     let all = tub.iter().chain(&drum).flatten();
     let greatest =
         all.copied().max_by(|a, b| squared(*a).total_cmp(&squared(*b))).unwrap_or([1.0, 0.0]);
-    // Divided by the greatest deflection, which is then 1 at its farthest.
+    // Division by the greatest deflection makes that 1 at its maximum.
     let scale = squared(greatest);
     let turned = |[re, im]: Phasor| {
         [
@@ -124,7 +125,8 @@ fn series(places: &Places, q: &[Phasor]) -> Vec<Series> {
         let tub_line: Vec<Phasor> = tub[k].iter().copied().map(turned).collect();
         let drum_line: Vec<Phasor> = drum[k].iter().copied().map(turned).collect();
         let mut add = |body: &str, x: &[f64], line: &[Phasor], colour: usize| {
-            // The real part of exp(i w t); a quarter of a period later, less its imaginary part.
+            // The real part of exp(i w t) comes first; a quarter of a period later it is minus the
+            // imaginary part.
             for (part, sign, style, when) in [
                 (0, 1.0, Style::Solid(2.6), ""),
                 (1, -1.0, Style::Dashed, ", a quarter of a period later"),
@@ -135,42 +137,42 @@ fn series(places: &Places, q: &[Phasor]) -> Vec<Series> {
             }
         };
         add("", &places.tub, &tub_line, k);
-        if apart(places, &tub_line, &drum_line) > TOGETHER {
+        if max_separation(places, &tub_line, &drum_line) > MIN_SEPARATION {
             add("drum, ", &places.drum, &drum_line, k + 2);
         }
     }
     series
 }
 
-/// How far the drum's axis is from the tub's, at most.
-fn apart(places: &Places, tub: &[Phasor], drum: &[Phasor]) -> f64 {
+/// Returns the greatest distance between the axes of drum and tub.
+fn max_separation(places: &AxisPositions, tub: &[Phasor], drum: &[Phasor]) -> f64 {
     let on_tub = |x: f64| {
         let part = (x - places.tub[0]) / (places.tub[1] - places.tub[0]);
         [0, 1].map(|k| tub[0][k] + part * (tub[1][k] - tub[0][k]))
     };
     let points = places.drum.into_iter().zip(drum);
-    let apart = points.map(|(x, at)| (at[0] - on_tub(x)[0]).hypot(at[1] - on_tub(x)[1]));
-    apart.fold(0.0, f64::max)
+    let max_separation = points.map(|(x, at)| (at[0] - on_tub(x)[0]).hypot(at[1] - on_tub(x)[1]));
+    max_separation.fold(0.0, f64::max)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const PLACES: Places = Places { tub: [-0.05, 0.45], drum: [-0.05, 0.15, 0.45] };
+    const PLACES: AxisPositions = AxisPositions { tub: [-0.05, 0.45], drum: [-0.05, 0.15, 0.45] };
 
     #[test]
-    fn a_pitch_is_a_vertical_tilt_and_a_yaw_a_horizontal_one_against_its_sign() {
+    fn pitch_tilts_the_axis_up_and_yaw_tilts_it_against_c3() {
         let mut q = vec![[0.0, 0.0]; 10];
         (q[5], q[7]) = ([0.0, 2.0], [0.0, 2.0]);
         let drawn = series(&PLACES, &q);
         assert_eq!(drawn.len(), 4, "tub and drum move alike");
-        let of = |name: &str| &drawn.iter().find(|series| series.name == name).unwrap().y;
+        let curve = |name: &str| &drawn.iter().find(|series| series.name == name).unwrap().y;
         let near = |found: &[f64], expected: [f64; 2]| {
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
         };
-        near(of("vertical"), [-0.05 / 0.45, 1.0]);
-        near(of("horizontal"), [0.0, 0.0]);
+        near(curve("vertical"), [-0.05 / 0.45, 1.0]);
+        near(curve("horizontal"), [0.0, 0.0]);
         let mut q = vec![[0.0, 0.0]; 10];
         (q[4], q[6]) = ([1.0, 0.0], [1.0, 0.0]);
         let drawn = series(&PLACES, &q);
@@ -178,16 +180,16 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_later_is_drawn_later_and_a_bent_drum_apart() {
-        // Along c3 a quarter of a period before c2: c2 is at its farthest when c3 is back at rest.
+    fn phase_and_bending_of_the_drum_are_drawn() {
+        // The motion along c3 leads that along c2 by a quarter of a period.
         let mut q = vec![[0.0, 0.0]; 10];
         (q[0], q[2]) = ([0.0, -1.0], [0.0, -1.0]);
         (q[1], q[3]) = ([0.5, 0.0], [0.5, 0.0]);
         q[9] = [0.0, -0.5 / 0.3];
         let drawn = series(&PLACES, &q);
-        let of = |name: &str| &drawn.iter().find(|series| series.name == name).unwrap().y;
-        // The greatest is the drum's front, 1.5 along c2.
-        let last = |name: &str| of(name).last().copied().unwrap();
+        let curve = |name: &str| &drawn.iter().find(|series| series.name == name).unwrap().y;
+        // The greatest deflection is that of the drum's front, 1.5 along c2.
+        let last = |name: &str| curve(name).last().copied().unwrap();
         assert!((last("drum, vertical") - 1.0).abs() < 1e-12);
         assert!((last("vertical") - 1.0 / 1.5).abs() < 1e-12);
         assert!((last("horizontal, a quarter of a period later") + 0.5 / 1.5).abs() < 1e-12);

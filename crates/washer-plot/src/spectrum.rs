@@ -1,24 +1,24 @@
-//! What a fit leaves over by frequency, under what was measured.
+//! The chart of a fit's spectra: the measured motion and the residual over frequency.
 
 use serde_json::Value;
 
 use crate::profiles::numbers;
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
 use sweep_plot::label::{self, Label};
-use sweep_plot::table::Table;
+use sweep_plot::table::FigureTable;
 use sweep_plot::{INK, MUTED, PlotError};
 
-/// The chart of a fit's curves.
+/// Draws the spectra of a fit's curves.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] for a file that has no spectra.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+/// [`PlotError::Undrawable`] for a file without spectra.
+pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
     let spectra = table.source.find("spectra").ok_or_else(|| {
-        table.source.empty("it has no spectra: they are in the curves of `sweep fit`")
+        table.source.nothing_to_draw("it has no spectra: they are in the curves of `sweep fit`")
     })?;
     let panel = |column: &Value| {
         let text = |key: &str| column[key].as_str().unwrap_or_default();
-        let (unit, factor) = label::shown(text("unit"));
+        let (unit, factor) = label::display_unit(text("unit"));
         let curve = |key: &str, colour| {
             let values = numbers(&column[key]);
             let y = values.iter().map(|value| value * factor).collect();

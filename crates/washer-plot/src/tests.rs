@@ -1,8 +1,8 @@
-//! Files in, figures out.
+//! Tests of figures drawn from sample files.
 
+mod damaged;
 #[path = "../../sweep-plot/src/sample.rs"]
 mod sample;
-mod spoilt;
 mod stability;
 
 use std::io::Read as _;
@@ -12,50 +12,54 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
-use self::sample::{Sample, map};
+use self::sample::{SampleFile, map};
 use super::*;
 
-/// What a test draws with.
-trait Asked {
+/// Options with which a test draws.
+trait DrawOptions {
     fn draw(&self, input: &Path, output: &Path) -> Result<(), PlotError>;
 }
 
-impl Asked for Options {
+impl DrawOptions for PlotOptions {
     fn draw(&self, input: &Path, output: &Path) -> Result<(), PlotError> {
         sweep_plot::render(input, self, &WasherFigures::default(), output)
     }
 }
 
-impl Asked for WasherFigures {
+impl DrawOptions for WasherFigures {
     fn draw(&self, input: &Path, output: &Path) -> Result<(), PlotError> {
-        sweep_plot::render(input, &Options::default(), self, output)
+        sweep_plot::render(input, &PlotOptions::default(), self, output)
     }
 }
 
-fn draw(sample: Sample, asked: &impl Asked, output: &str) -> Result<Vec<u8>, PlotError> {
+fn draw(
+    sample: SampleFile,
+    options: &impl DrawOptions,
+    output: &str,
+) -> Result<Vec<u8>, PlotError> {
     let folder = tempfile::tempdir().unwrap();
     let input = sample.write(folder.path(), "input.parquet");
     let output = folder.path().join(output);
-    asked.draw(&input, &output)?;
+    options.draw(&input, &output)?;
     Ok(std::fs::read(output).unwrap())
 }
 
-fn svg(sample: Sample, asked: &impl Asked) -> String {
-    String::from_utf8(draw(sample, asked, "figure.svg").unwrap()).unwrap()
+fn svg(sample: SampleFile, options: &impl DrawOptions) -> String {
+    String::from_utf8(draw(sample, options, "figure.svg").unwrap()).unwrap()
 }
 
-fn data(sample: Sample, asked: &impl Asked) -> Value {
-    carried(&draw(sample, asked, "figure.html").unwrap())
+fn data(sample: SampleFile, options: &impl DrawOptions) -> Value {
+    page_data(&draw(sample, options, "figure.html").unwrap())
 }
 
-/// What a page carries as its data.
-fn carried(page: &[u8]) -> Value {
+/// Returns the data that a page carries.
+fn page_data(page: &[u8]) -> Value {
     let page = std::str::from_utf8(page).unwrap();
     let start = page.find(r#"id="data">"#).unwrap() + r#"id="data">"#.len();
     serde_json::from_str(&page[start..start + page[start..].find("</script>").unwrap()]).unwrap()
 }
 
-/// A curve as a page carries it.
+/// Decodes a curve of a page.
 fn curve(text: &Value) -> Vec<f64> {
     let bytes = STANDARD.decode(text.as_str().unwrap()).unwrap();
     bytes.chunks(4).map(|four| f64::from(f32::from_le_bytes(four.try_into().unwrap()))).collect()
@@ -65,18 +69,18 @@ fn message(result: Result<Vec<u8>, PlotError>) -> String {
     result.unwrap_err().to_string()
 }
 
-/// As drawn by itself.
-fn plain() -> Options {
-    Options::default()
+/// Returns the default options.
+fn default_options() -> PlotOptions {
+    PlotOptions::default()
 }
 
-/// Twelve seconds of both models, to 300 rpm and back.
-pub(crate) fn trace() -> Sample {
+/// Returns a trace of twelve seconds of both models, to 300 rpm and back.
+pub(crate) fn trace() -> SampleFile {
     let time: Vec<f64> = (0..=6000).map(|k| 0.002 * f64::from(k)).collect();
     let along = |factor: f64| {
         time.iter().map(move |t| factor * (t / 12.0) * (20.0 * t).sin()).collect::<Vec<f64>>()
     };
-    Sample::default()
+    SampleFile::default()
         .numbers("time_s", "s", time.iter().copied())
         .numbers("speed_rpm", "rpm", time.iter().map(|t| 50.0 * (6.0 - (t - 6.0).abs())))
         .numbers("nonlinear_tub_yaw", "rad", along(0.07))
@@ -88,8 +92,8 @@ pub(crate) fn trace() -> Sample {
         .metadata("at", r#"{"unbalance_mass_kg": 0.4, "damping_n_s_per_m": 120.0}"#)
 }
 
-/// Two modes that cross the speed at 100 and 200 rpm, and one far above.
-pub(crate) fn modes() -> Sample {
+/// Returns two modes that cross the speed at 100 and 200 rpm, and one far above.
+pub(crate) fn modes() -> SampleFile {
     let rows: Vec<(f64, u64)> =
         (0..=30).flat_map(|k| (1..=3).map(move |mode| (20.0 * f64::from(k), mode))).collect();
     let frequency = |&(speed, mode): &(f64, u64)| match mode {
@@ -97,7 +101,7 @@ pub(crate) fn modes() -> Sample {
         2 => 190.0 + 0.05 * speed,
         _ => 4000.0,
     };
-    Sample::default()
+    SampleFile::default()
         .numbers("speed_rpm", "rpm", rows.iter().map(|row| row.0))
         .counts("mode", rows.iter().map(|row| row.1))
         .numbers("frequency_rpm", "rpm", rows.iter().map(frequency))
@@ -107,7 +111,7 @@ pub(crate) fn modes() -> Sample {
 }
 
 #[test]
-fn a_trace_shows_the_asked_channels_and_the_resonances_passed() {
+fn a_trace_shows_requested_channels_and_passed_resonances() {
     let folder = tempfile::tempdir().unwrap();
     let options = WasherFigures {
         channels: vec!["drum_front_y".to_owned()],
@@ -116,10 +120,10 @@ fn a_trace_shows_the_asked_channels_and_the_resonances_passed() {
         ..WasherFigures::default()
     };
     let figure = svg(trace(), &options);
-    for said in
+    for phrase in
         [">Drum front, vertical<", ">Gap, drum to tub<", ">Spin (rpm)<", ">resonance speed passed<"]
     {
-        assert!(figure.contains(said), "{said}");
+        assert!(figure.contains(phrase), "{phrase}");
     }
     assert!(!figure.contains("Tub yaw"));
     for speed in ["100 rpm", "150 rpm", "200 rpm"] {
@@ -137,7 +141,7 @@ fn a_trace_shows_the_asked_channels_and_the_resonances_passed() {
 }
 
 #[test]
-fn a_trace_shows_forces_and_states_when_asked() {
+fn a_trace_shows_forces_on_request() {
     let with_forces = || {
         trace().numbers("cabinet_force_y_nonlinear_n", "N", (0..=6000).map(f64::from)).numbers(
             "cabinet_force_y_linear_n",
@@ -149,13 +153,13 @@ fn a_trace_shows_forces_and_states_when_asked() {
         WasherFigures { channels: vec!["cabinet_force_y".to_owned()], ..WasherFigures::default() };
     let figure = svg(with_forces(), &force);
     assert!(figure.contains(">Cabinet force y (N)<") && figure.contains(">linear model<"));
-    assert!(!svg(with_forces(), &plain()).contains("Cabinet force"));
+    assert!(!svg(with_forces(), &default_options()).contains("Cabinet force"));
 }
 
 #[test]
-fn a_trace_is_held_against_another() {
+fn a_trace_is_compared_with_another() {
     let folder = tempfile::tempdir().unwrap();
-    let other = Sample::default()
+    let other = SampleFile::default()
         .numbers("time_s", "s", [0.0, 6.0, 12.0])
         .numbers("nonlinear_tub_yaw", "rad", [0.0, 0.09, 0.0])
         .metadata("sweep.plan", r#"{"name": "another program"}"#);
@@ -178,25 +182,25 @@ fn a_trace_is_held_against_another() {
 
 #[test]
 fn a_campbell_diagram_stars_the_resonances() {
-    let figure = svg(modes(), &plain());
-    for said in [">100.0 rpm<", ">200.0 rpm<", ">frequency = spin speed<", "1 mode lies above"] {
-        assert!(figure.contains(said), "{said}");
+    let figure = svg(modes(), &default_options());
+    for phrase in [">100.0 rpm<", ">200.0 rpm<", ">frequency = spin speed<", "1 mode lies above"] {
+        assert!(figure.contains(phrase), "{phrase}");
     }
 }
 
-fn viewed(view: View) -> WasherFigures {
+fn with_view(view: FigureView) -> WasherFigures {
     WasherFigures { view: Some(view), ..WasherFigures::default() }
 }
 
 #[test]
-fn the_variation_over_a_turn_is_half_of_least_to_greatest() {
-    let figure = svg(modes(), &viewed(View::Variation));
-    for said in [">Variation over a turn (± % of the mean)<", ">100.0 rpm<", ">200.0 rpm<"] {
-        assert!(figure.contains(said), "{said}");
+fn the_variation_over_a_turn_is_half_the_range() {
+    let figure = svg(modes(), &with_view(FigureView::Variation));
+    for phrase in [">Variation over a turn (± % of the mean)<", ">100.0 rpm<", ">200.0 rpm<"] {
+        assert!(figure.contains(phrase), "{phrase}");
     }
-    let data = data(modes(), &viewed(View::Variation));
+    let data = data(modes(), &with_view(FigureView::Variation));
     let series = data["chart"]["panels"][0]["series"].as_array().unwrap();
-    // The third mode meets no speed.
+    // The third mode has no resonance.
     assert_eq!(series.len(), 2);
     for series in series {
         let curve = curve(&series["y"]);
@@ -205,7 +209,7 @@ fn the_variation_over_a_turn_is_half_of_least_to_greatest() {
 }
 
 #[test]
-fn mode_shapes_are_those_of_the_file() {
+fn mode_shapes_are_read_from_the_file() {
     let q = |i: usize, re: f64| if [5, 7].contains(&i) { [re, 0.0] } else { [0.0, 0.0] };
     let shape: serde_json::Map<String, Value> =
         (1..=10).map(|i| (format!("q{i}"), serde_json::json!(q(i, -0.3)))).collect();
@@ -220,59 +224,65 @@ fn mode_shapes_are_those_of_the_file() {
     } });
     let file = || modes().metadata("sweep.plan", &machine.to_string());
     let with_shapes = || file().metadata("sweep.modes", &facts.to_string());
-    let figure = svg(with_shapes(), &viewed(View::Shapes));
-    for said in
+    let figure = svg(with_shapes(), &with_view(FigureView::Shapes));
+    for phrase in
         [">Rocking, horizontal plane,<", ">100.1 rpm<", ">horizontal, a quarter of a period later<"]
     {
-        assert!(figure.contains(said), "{said}");
+        assert!(figure.contains(phrase), "{phrase}");
     }
-    let stars = svg(with_shapes(), &plain());
+    let stars = svg(with_shapes(), &default_options());
     assert!(stars.contains(">100.1 rpm<"), "the same in all figures of a file");
-    let carried = data(with_shapes(), &viewed(View::Shapes));
+    let carried = data(with_shapes(), &with_view(FigureView::Shapes));
     let panels = carried["chart"]["panels"].as_array().unwrap();
     assert_eq!(panels.len(), 1);
     assert_eq!(curve(&panels[0]["series"][2]["y"])[1], 1.0);
-    assert!(message(draw(file(), &viewed(View::Shapes), "a.svg")).contains("holds no resonance"));
     assert!(
-        message(draw(modes(), &viewed(View::Shapes), "a.svg"))
+        message(draw(file(), &with_view(FigureView::Shapes), "a.svg"))
+            .contains("holds no resonance")
+    );
+    assert!(
+        message(draw(modes(), &with_view(FigureView::Shapes), "a.svg"))
             .contains("where the machine's parts are")
     );
 }
 
 #[test]
-fn passages_are_drawn_over_speed_both_ways() {
+fn passages_are_drawn_for_rising_and_falling_speed() {
     let options = WasherFigures {
         channels: vec!["tub_yaw".to_owned()],
         resonances_rpm: vec![150.0],
-        ..viewed(View::Passages)
+        ..with_view(FigureView::Passages)
     };
     let figure = svg(trace(), &options);
-    for said in [
+    for phrase in [
         ">Spin speed (rpm)<",
         ">nonlinear model, speed rising<",
         ">linear model, speed falling<",
         ">150 rpm<",
     ] {
-        assert!(figure.contains(said), "{said}");
+        assert!(figure.contains(phrase), "{phrase}");
     }
     assert!(!figure.contains(">Gap, drum to tub<"));
     let data = data(trace(), &options);
     let chart = &data["chart"];
     let panels = chart["panels"].as_array().unwrap();
     let yaw = panels.iter().find(|panel| panel["name"] == "tub_yaw").unwrap();
-    // The sample swings faster than it turns and grows with time: on the way down it is at its end
-    // at rest.
+    // The sample's amplitude grows with time and it oscillates faster than it turns, so that on the
+    // way down the deviation is greatest at rest.
     let [up, down] = [0, 1].map(|series| curve(&yaw["series"][series]["y"]));
     assert!(up.is_sorted() && down.is_sorted_by(|a, b| a >= b) && up.len() > 10, "{up:?} {down:?}");
-    let still = Sample::default()
+    let still = SampleFile::default()
         .numbers("time_s", "s", [0.0, 1.0, 2.0])
         .numbers("speed_rpm", "rpm", [60.0, 60.0, 60.0])
         .numbers("nonlinear_tub_yaw", "rad", [0.0, 0.1, 0.0]);
-    assert!(message(draw(still, &viewed(View::Passages), "a.svg")).contains("no whole turn while"));
+    assert!(
+        message(draw(still, &with_view(FigureView::Passages), "a.svg"))
+            .contains("no whole turn while")
+    );
 }
 
 #[test]
-fn a_live_page_carries_the_module_and_its_setup() {
+fn a_live_page_contains_the_module_and_its_setup() {
     let slider =
         |name: &str, value| Slider { name: name.to_owned(), to: 2.0, value, ..Slider::default() };
     let live = Live {
@@ -285,7 +295,7 @@ fn a_live_page_carries_the_module_and_its_setup() {
     };
     let options = WasherFigures { live: Some(live), ..WasherFigures::default() };
     let page = draw(map(), &options, "a.html").unwrap();
-    let live = &carried(&page)["live"];
+    let live = &page_data(&page)["live"];
     let packed = STANDARD.decode(live["module"].as_str().unwrap()).unwrap();
     let mut module = Vec::new();
     flate2::read::GzDecoder::new(&packed[..]).read_to_end(&mut module).unwrap();
@@ -306,20 +316,20 @@ fn a_live_page_carries_the_module_and_its_setup() {
 }
 
 #[test]
-fn a_page_takes_the_time_histories_beside_it() {
+fn a_page_contains_the_histories_of_a_folder() {
     let folder = tempfile::tempdir().unwrap();
     trace().write(folder.path(), "by-its-metadata.parquet");
-    let plain = || {
-        Sample::default().numbers("time_s", "s", [0.0, 1.0]).numbers(
+    let default_options = || {
+        SampleFile::default().numbers("time_s", "s", [0.0, 1.0]).numbers(
             "nonlinear_tub_yaw",
             "rad",
             [0.0, 1.0],
         )
     };
-    plain().write(folder.path(), "point-7.parquet");
-    let options = Options { traces: Some(folder.path().to_owned()), ..Options::default() };
+    default_options().write(folder.path(), "point-7.parquet");
+    let options = PlotOptions { traces: Some(folder.path().to_owned()), ..PlotOptions::default() };
     let carried = data(map(), &options);
-    // Mass 0.4 is the fourth of ten, damping 120 the third of nine.
+    // Mass 0.4 is the fourth of ten values, damping 120 the third of nine.
     assert_eq!(carried["traces"].as_object().unwrap().keys().collect::<Vec<_>>(), ["29", "7"]);
     let history = &carried["traces"]["29"];
     let panel = |name: &str| {
@@ -330,7 +340,7 @@ fn a_page_takes_the_time_histories_beside_it() {
     assert_eq!(panel("drum_front_y")["words"], "Drum front, vertical");
     assert!(history.to_string().len() < 40_000, "6001 samples of seven columns are thinned");
 
-    let unknown = Sample::default().numbers("time_s", "s", [0.0, 1.0]).numbers(
+    let unknown = SampleFile::default().numbers("time_s", "s", [0.0, 1.0]).numbers(
         "nonlinear_tub_yaw",
         "rad",
         [0.0, 1.0],
@@ -340,37 +350,37 @@ fn a_page_takes_the_time_histories_beside_it() {
 }
 
 #[test]
-fn a_subtitle_says_once_what_was_set_whatever_the_name() {
+fn a_subtitle_names_each_setting_once() {
     let name = "long ".repeat(40);
     let plan = serde_json::json!({ "name": name, "set": { "damping_n_s_per_m": 120.0 } });
-    let figure = svg(trace().metadata("sweep.plan", &plan.to_string()), &plain());
-    let said = "…, damping_n_s_per_m = 120 · unbalance mass 0.4 kg · least gap";
-    assert!(figure.contains(said), "{figure}");
+    let figure = svg(trace().metadata("sweep.plan", &plan.to_string()), &default_options());
+    let phrase = "…, damping_n_s_per_m = 120 · unbalance mass 0.4 kg · least gap";
+    assert!(figure.contains(phrase), "{figure}");
 }
 
 #[test]
-fn subtitles_leave_units_their_letters() {
-    let dwells = Sample::default()
+fn units_in_subtitles_keep_their_case() {
+    let dwells = SampleFile::default()
         .counts("point", [0, 0, 0])
         .numbers("damping_n_s_per_m", "N s/m", [140.0; 3])
         .numbers("speed_rpm", "rpm", [200.0, 210.0, 220.0])
         .numbers("growth_per_s", "1/s", [-0.1, 0.1, 0.2])
         .words("status", [Some("ok"); 3]);
-    let figure = svg(dwells, &plain());
+    let figure = svg(dwells, &default_options());
     assert!(figure.contains(">damping 140 N s/m<"), "{figure}");
 }
 #[test]
-fn a_long_trace_keeps_its_peaks_within_a_page() {
+fn a_decimated_trace_keeps_its_peaks() {
     const ROWS: usize = 400_000;
     let wave = |k: usize| if k == 123_457 { 9.0 } else { (k as f64 * 0.01).sin() };
-    let trace = Sample::default()
+    let trace = SampleFile::default()
         .numbers("time_s", "s", (0..ROWS).map(|k| k as f64 * 1e-3))
         .numbers("nonlinear_tub_yaw", "rad", (0..ROWS).map(wave))
         .numbers("linear_tub_yaw", "rad", (0..ROWS).map(|k| (k as f64 * 0.01).cos()))
         .numbers("gap_nonlinear_m", "m", (0..ROWS).map(|_| 0.01));
-    let page = draw(trace, &plain(), "a.html").unwrap();
+    let page = draw(trace, &default_options(), "a.html").unwrap();
     assert!(page.len() < 10_000_000, "{}", page.len());
-    let data = carried(&page);
+    let data = page_data(&page);
     assert!(data["subtitle"].as_str().unwrap().contains("least and greatest of every 3 instants"));
     let yaw = curve(&data["chart"]["panels"][0]["series"][0]["y"]);
     assert_eq!(yaw.iter().copied().fold(0.0, f64::max), 9000.0, "mrad");
@@ -378,35 +388,39 @@ fn a_long_trace_keeps_its_peaks_within_a_page() {
 }
 
 #[test]
-fn modes_of_more_rows_than_a_figure_shows_are_refused() {
+fn modes_files_with_too_many_rows_are_rejected() {
     const ROWS: usize = 500_000;
-    let modes = Sample::default()
+    let modes = SampleFile::default()
         .numbers("speed_rpm", "rpm", (0..ROWS).map(|k| k as f64))
         .counts("mode", (0..ROWS).map(|_| 1))
         .numbers("frequency_rpm", "rpm", (0..ROWS).map(|_| 100.0));
-    let said = message(draw(modes, &plain(), "a.svg"));
-    assert!(said.contains("a modes file of 500000 rows is more than a figure can show"), "{said}");
+    let phrase = message(draw(modes, &default_options(), "a.svg"));
+    assert!(
+        phrase.contains("a modes file of 500000 rows is more than a figure can show"),
+        "{phrase}"
+    );
 }
 
 #[test]
-fn what_a_file_has_no_use_for_is_refused() {
+fn options_without_effect_are_rejected() {
     let channel =
         |name: &str| WasherFigures { channels: vec![name.to_owned()], ..WasherFigures::default() };
     let resonances = WasherFigures { resonances_rpm: vec![100.0], ..WasherFigures::default() };
-    let against = WasherFigures { against: Some("b.parquet".into()), ..viewed(View::Passages) };
-    for (result, said) in [
+    let against =
+        WasherFigures { against: Some("b.parquet".into()), ..with_view(FigureView::Passages) };
+    for (result, phrase) in [
         (draw(map(), &channel("body_yaw"), "a.svg"), "--quantity ratio_tub_yaw"),
         (draw(trace(), &channel("tub_pitch"), "a.svg"), "it has tub_yaw, drum_front_y"),
         (draw(map(), &resonances, "a.svg"), "`--resonances` is for traces"),
-        (draw(map(), &viewed(View::Time), "a.svg"), "`--view` is for traces"),
-        (draw(trace(), &viewed(View::Shapes), "a.svg"), "`--view` is for modes files"),
+        (draw(map(), &with_view(FigureView::Time), "a.svg"), "`--view` is for traces"),
+        (draw(trace(), &with_view(FigureView::Shapes), "a.svg"), "`--view` is for modes files"),
         (draw(trace(), &against, "a.svg"), "`--against` is for traces over time"),
         (
-            draw(Sample::default().numbers("x", "", [1.0]), &plain(), "a.svg"),
+            draw(SampleFile::default().numbers("x", "", [1.0]), &default_options(), "a.svg"),
             "no file that has a figure: study, dwell, stability, modes, map",
         ),
     ] {
-        assert!(message(result).contains(said), "{said}");
+        assert!(message(result).contains(phrase), "{phrase}");
     }
 }
 
@@ -414,19 +428,19 @@ fn what_a_file_has_no_use_for_is_refused() {
 fn the_same_file_gives_the_same_bytes() {
     for sample in [trace, modes] {
         for output in ["a.svg", "a.html"] {
-            let twice = [0, 1].map(|_| draw(sample(), &plain(), output).unwrap());
+            let twice = [0, 1].map(|_| draw(sample(), &default_options(), output).unwrap());
             assert!(twice[0] == twice[1], "{output}");
         }
     }
 }
 
 #[test]
-fn columns_of_one_name_do_no_harm() {
+fn columns_with_the_same_name_are_drawn() {
     let time = || (0..50).map(f64::from);
-    let trace = Sample::default()
+    let trace = SampleFile::default()
         .numbers("time_s", "s", time())
         .numbers("nonlinear_tub_yaw", "rad", time())
         .numbers("nonlinear_tub_yaw", "rad", time())
         .numbers("speed_rpm", "rpm", time());
-    assert!(draw(trace, &plain(), "a.svg").is_ok());
+    assert!(draw(trace, &default_options(), "a.svg").is_ok());
 }

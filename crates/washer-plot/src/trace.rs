@@ -1,28 +1,28 @@
-//! Time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
+//! Charts of time histories of both models at one point (the paper's Figs. 6 and 9 to 11).
 
 use std::path::Path;
 use std::rc::Rc;
 
 use crate::WasherFigures;
-use crate::kinds::{KNOWN, MACHINE, mark_of_speed};
-use crate::machine::machine;
+use crate::kinds::{MACHINE, MODEL_KINDS, speed_mark};
+use crate::machine::unbalance_and_damping;
 use crate::{campbell, stability};
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
 use sweep_plot::label::{self, Label};
-use sweep_plot::read::Kind;
-use sweep_plot::table::Table;
-use sweep_plot::together::{self, At};
+use sweep_plot::read::FigureKind;
+use sweep_plot::table::FigureTable;
+use sweep_plot::together::{self, NamedPoint};
 use sweep_plot::{INK, LINEAR, NONLINEAR, PlotError, extremes};
 
-/// The chart of a trace file.
+/// Draws the chart of a trace file.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] without time, [`PlotError::Unfit`] for an unknown channel, and as
-/// [`campbell::resonances`] for the modes file that gives the resonance speeds.
-pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, PlotError> {
+/// [`PlotError::Undrawable`] without time, [`PlotError::Unfit`] for an unknown channel, and the
+/// errors of [`campbell::resonances`] for the modes file.
+pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Chart, PlotError> {
     let time = Rc::new(table.numbers("time_s")?.to_vec());
     if time.len() < 2 {
-        return Err(table.source.empty("a trace needs at least two instants"));
+        return Err(table.source.nothing_to_draw("a trace needs at least two instants"));
     }
     if table.column("point").is_some() {
         let path = table.source.path.display();
@@ -33,18 +33,20 @@ pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, Plo
     let sides = sides(table);
     let found = quantities(table, sides);
     let names: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
-    let is_shown = stability::shown(&table.source, &names, &options.channels)?;
-    // Where no channel is usual, all are, and nothing else that is in the file.
+    let is_shown = stability::shown_channels(&table.source, &names, &options.channels)?;
+    // States and forces are drawn on request only.
     let any = !options.channels.is_empty();
-    let shown =
-        found.iter().zip(is_shown).filter(|(of, is_shown)| *is_shown && (any || of.channel));
+    let shown = found
+        .iter()
+        .zip(is_shown)
+        .filter(|(quantity, is_shown)| *is_shown && (any || quantity.channel));
     let shown: Vec<&str> = shown.map(|(quantity, _)| quantity.name).collect();
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
     let names = match &other {
-        Some(other) => told_apart(table, other),
+        Some(other) => distinct_names(table, other),
         None => sides.map(format_side),
     };
-    // The second curve lies in front; where it hides the first one, this must shine through.
+    // The second curve is translucent, so that the first one shows through.
     let front = other.as_ref().unwrap_or(table);
     let its_time = Rc::new(front.numbers("time_s")?.to_vec());
     let drawn = [(table, Rc::clone(&time), NONLINEAR), (front, its_time, LINEAR.with_alpha(165))];
@@ -57,19 +59,20 @@ pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, Plo
         };
         (0..2).filter_map(curve).collect()
     };
-    let of = |quantity: &Quantity<'_>| {
-        let (name, (unit, factor)) = (quantity.name, label::shown(quantity.unit));
+    let quantity_panel = |quantity: &TraceQuantity<'_>| {
+        let (name, (unit, factor)) = (quantity.name, label::display_unit(quantity.unit));
         let is_channel = quantity.channel && sides == MODELS;
         let words = if is_channel { label::channel(name) } else { label::words(name) };
         let lines = pair(&quantity.columns, factor);
         panel(name, Label::new(&words, unit), shown.contains(&name), lines)
     };
-    let mut panels: Vec<ChartPanel> = found.iter().map(of).collect();
-    // Rows of two files that were thinned do not lie at the same instants.
-    let whole = other.as_ref().is_some_and(|other| table.stretch.or(other.stretch).is_none());
+    let mut panels: Vec<ChartPanel> = found.iter().map(quantity_panel).collect();
+    // Decimated rows of two files do not lie at the same instants.
+    let whole =
+        other.as_ref().is_some_and(|other| table.bucket_rows.or(other.bucket_rows).is_none());
     let apart = if whole { difference(&panels) } else { None };
     for (name, column) in table.with_prefix("residual_") {
-        let (unit, factor) = label::shown(&column.facts.unit);
+        let (unit, factor) = label::display_unit(&column.facts.unit);
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
         let residual = Series::new("residual", INK, Rc::clone(&time), y, Style::Dots);
         let words = format!("residual, {}", label::words(name));
@@ -97,8 +100,8 @@ pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, Plo
     let (resonances, note) = resonances(table, options)?;
     if let Some(speed) = table.column("speed_rpm").and_then(|column| column.numbers()) {
         let passed = passages(&time, speed, &resonances).into_iter();
-        marks.extend(passed.map(|(x, resonance)| mark_of_speed(x, resonance)));
-        shades = stability::stretches_within(&time, speed, &unstable);
+        marks.extend(passed.map(|(x, resonance)| speed_mark(x, resonance)));
+        shades = stability::intervals_within(&time, speed, &unstable);
         let x = Rc::clone(&time);
         let series = Series::new("", INK, x, speed.to_vec(), Style::Solid(2.0));
         let spin = panel("speed", Label::new("spin", "rpm"), true, vec![series]);
@@ -111,8 +114,8 @@ pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, Plo
             None => "Motion of both models from static equilibrium".to_owned(),
         },
         subtitle: match &other {
-            // What one of them is would be wrong of the other.
-            Some(_) => of_both(&least, apart).join(" · "),
+            // The point of one trace would be wrong for the other.
+            Some(_) => common_notes(&least, apart).join(" · "),
             None => subtitle(table, &least, apart),
         } + &note,
         x_label: Label::new("Time", "s"),
@@ -125,51 +128,58 @@ pub(crate) fn chart(table: &Table, options: &WasherFigures) -> Result<Chart, Plo
     })
 }
 
-/// What stands before the columns of both sides of a trace, and of a fit.
+/// The prefixes of the columns of both models in a trace.
 const MODELS: [&str; 2] = ["nonlinear", "linear"];
+/// The prefixes of the columns of measurement and model in the curves of a fit.
 const FITTED: [&str; 2] = ["measured", "model"];
 
-/// The sides of a file.
-fn sides(table: &Table) -> [&'static str; 2] {
+/// Returns the prefixes of a file's columns.
+fn sides(table: &FigureTable) -> [&'static str; 2] {
     if table.with_prefix("measured_").is_empty() { MODELS } else { FITTED }
 }
 
-/// A side in the legend.
+/// Returns the legend entry of a prefix.
 fn format_side(side: &str) -> String {
     if MODELS.contains(&side) { format!("{side} model") } else { side.to_owned() }
 }
 
-/// What a trace holds of both models over time.
-struct Quantity<'a> {
-    /// A channel's name; of a coordinate, a speed or a force what stands before the model's name:
+/// A quantity that a trace has of both models over time.
+struct TraceQuantity<'a> {
+    /// The channel's name; for a coordinate, a speed or a force the part before the model's name:
     /// `spring_1_tension`.
     name: &'a str,
     unit: &'a str,
     channel: bool,
-    /// Of both sides.
+    /// The columns of both models.
     columns: [String; 2],
 }
 
-/// Channels first, then states and forces; the gap has its own panel.
-fn quantities<'a>(table: &'a Table, sides: [&str; 2]) -> Vec<Quantity<'a>> {
+/// Returns the quantities of a trace: channels first, then states and forces. The gap has a panel
+/// of its own.
+fn quantities<'a>(table: &'a FigureTable, sides: [&str; 2]) -> Vec<TraceQuantity<'a>> {
     let channels = table.with_prefix(&format!("{}_", sides[0])).into_iter();
     let channels = channels.map(|(name, column)| {
         let own = Some(column.facts.unit.as_str()).filter(|unit| !unit.is_empty());
         let unit = own.unwrap_or(label::unit_of_channel(name));
-        Quantity { name, unit, channel: true, columns: sides.map(|side| format!("{side}_{name}")) }
+        TraceQuantity {
+            name,
+            unit,
+            channel: true,
+            columns: sides.map(|side| format!("{side}_{name}")),
+        }
     });
     let numbers = table.columns.iter().filter(|column| column.numbers().is_some());
     let further = numbers.filter_map(|column| {
         let split = column.facts.name.split_once("_nonlinear_");
         let (name, end) = split.filter(|(name, _)| *name != "gap")?;
         let columns = sides.map(|side| format!("{name}_{side}_{end}"));
-        Some(Quantity { name, unit: &column.facts.unit, channel: false, columns })
+        Some(TraceQuantity { name, unit: &column.facts.unit, channel: false, columns })
     });
     channels.chain(further).collect()
 }
 
-/// The largest difference of two curves over the same instants in any panel shown, as a share of
-/// the first one's peak.
+/// Returns the largest difference between the two curves of any panel shown, as a share of the
+/// first curve's peak.
 fn difference(panels: &[ChartPanel]) -> Option<f64> {
     let shares = panels.iter().filter(|panel| panel.shown).filter_map(|panel| {
         let [first, second] = &panel.series[..] else { return None };
@@ -181,21 +191,21 @@ fn difference(panels: &[ChartPanel]) -> Option<f64> {
     shares.reduce(f64::max)
 }
 
-/// The trace whose nonlinear model is drawn in place of the linear one.
-pub(crate) fn other_trace(path: &Path) -> Result<Table, PlotError> {
-    let table = Table::open(path, KNOWN)?;
-    table.source.expect(Kind::TRACE, "--against", "`sweep trace` writes a trace")?;
+/// Reads the trace whose nonlinear model is drawn in place of the linear one.
+pub(crate) fn other_trace(path: &Path) -> Result<FigureTable, PlotError> {
+    let table = FigureTable::open(path, MODEL_KINDS)?;
+    table.source.expect(FigureKind::TRACE, "--against", "`sweep trace` writes a trace")?;
     Ok(table)
 }
 
-/// The name of a file without its ending.
-fn stem(table: &Table) -> String {
+/// Returns the name of a file without its ending.
+fn stem(table: &FigureTable) -> String {
     table.source.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// What two traces are called, so that they are told apart: by their runs' names, or what `--at`
-/// says otherwise of them, or else by their files.
-fn told_apart(one: &Table, other: &Table) -> [String; 2] {
+/// Returns distinct names of two traces: the names of their runs, or the values in which their
+/// points differ, or else their files' names.
+fn distinct_names(one: &FigureTable, other: &FigureTable) -> [String; 2] {
     let tables = [one, other];
     let names = tables.map(|table| table.source.run_name.clone().unwrap_or_else(|| stem(table)));
     if names[0] != names[1] {
@@ -213,13 +223,13 @@ fn told_apart(one: &Table, other: &Table) -> [String; 2] {
     tables.map(stem)
 }
 
-/// A parameter and its value within a sentence.
+/// Returns a parameter and its value within a sentence.
 fn parameter(name: &str, value: f64) -> String {
-    label::valued(&label::words(name).to_lowercase(), value, &label::unit_of_name(name))
+    label::with_value(&label::words(name).to_lowercase(), value, &label::unit_of_name(name))
 }
 
-/// What is so of both motions together.
-fn of_both(least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> Vec<String> {
+/// Returns the notes on the least gaps and on the difference of two runs.
+fn common_notes(least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> Vec<String> {
     let gaps = least_gaps_mm.iter().map(|(name, gap)| format!("{gap:.2} mm {name}"));
     let gaps = gaps.collect::<Vec<_>>().join(", ");
     let gaps = (!gaps.is_empty()).then(|| format!("least gap {gaps}"));
@@ -227,7 +237,7 @@ fn of_both(least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> Vec<String> {
     gaps.into_iter().chain(apart).collect()
 }
 
-/// The least gap of each model that has one, in the unit shown.
+/// Returns the least gap of each model that has one, in the displayed unit.
 fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
     gaps.iter()
         .filter_map(|series| {
@@ -237,66 +247,73 @@ fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// Name of the run, its unbalance and damping, the rest of the point if the file says which, the
-/// least gaps (mm), and how far two runs are apart.
+/// Returns the subtitle: name of the run, unbalance and damping, the rest of the point if the file
+/// has it, the least gaps (mm), and the difference of two runs.
 pub(crate) fn subtitle(
-    table: &Table,
+    table: &FigureTable,
     least_gaps_mm: &[(String, f64)],
     apart: Option<f64>,
 ) -> String {
-    let (of_machine, at) = (machine(table), together::at(&table.source));
-    let further = at.iter().filter(|(name, _)| of_machine.iter().all(|(known, _)| known != name));
+    let machine_sections = unbalance_and_damping(table);
+    let at = together::at(&table.source);
+    let further =
+        at.iter().filter(|(name, _)| machine_sections.iter().all(|(known, _)| known != name));
     let further = further.map(|(name, value)| (name.as_str(), *value));
-    // What was set stands in the name.
+    // Settings of the command line are part of the run's name.
     let set = table.source.find("set");
     let is_new = |(name, value): &(&str, f64)| set.is_none_or(|set| set[*name] != *value);
-    let said = of_machine.iter().copied().chain(further).filter(is_new);
-    let mut parts = table.source.notes(said.map(|(name, value)| parameter(name, value)));
-    parts.extend(of_both(least_gaps_mm, apart));
-    if let Some(rows) = table.stretch {
+    let phrase = machine_sections.iter().copied().chain(further).filter(is_new);
+    let mut parts = table.source.notes(phrase.map(|(name, value)| parameter(name, value)));
+    parts.extend(common_notes(least_gaps_mm, apart));
+    if let Some(rows) = table.bucket_rows {
         parts.push(format!("least and greatest of every {rows} instants"));
     }
     parts.join(" · ")
 }
 
-/// The ranges of unstable speeds that the options name, rpm.
+/// Returns the ranges of unstable speeds in the options' stability file, rpm.
 pub(crate) fn unstable_speeds(
-    table: &Table,
+    table: &FigureTable,
     options: &WasherFigures,
 ) -> Result<Vec<[f64; 2]>, PlotError> {
     match &options.stability {
-        Some(path) => Ok(stability::unstable_of(table, path)?.speeds),
+        Some(path) => Ok(stability::read_unstable(table, path)?.speeds),
         None => Ok(Vec::new()),
     }
 }
 
-/// The resonance speeds that the options name, rpm, and for the subtitle where the machine whose
-/// modes they are is another one. Resonances hardly move with unbalance and damping, so the modes
-/// of a machine serve all its points.
+/// Returns the resonance speeds of the options, rpm, and a note for the subtitle if the modes file
+/// is one of another machine. Resonances hardly depend on unbalance and damping, so that one modes
+/// file serves all points of a machine.
 pub(crate) fn resonances(
-    table: &Table,
+    table: &FigureTable,
     options: &WasherFigures,
 ) -> Result<(Vec<f64>, String), PlotError> {
     let mut speeds = options.resonances_rpm.clone();
     let mut note = String::new();
     if let Some(path) = &options.modes {
-        let modes = Table::open(path, KNOWN)?;
+        let modes = FigureTable::open(path, MODEL_KINDS)?;
         speeds.extend(campbell::resonances(&modes)?);
-        let files = [(&table.source, &together::at(&table.source)), (&modes.source, &At::new())];
-        let parted = together::parted(files, MACHINE);
-        if !parted.is_empty() {
-            note = format!(" · resonances of another machine: {}", together::some(&parted, 1));
+        let files =
+            [(&table.source, &together::at(&table.source)), (&modes.source, &NamedPoint::new())];
+        let split_unit = together::plan_differences(files, MACHINE);
+        if !split_unit.is_empty() {
+            note = format!(
+                " · resonances of another machine: {}",
+                together::list_first(&split_unit, 1)
+            );
         }
     }
     Ok((speeds, note))
 }
 
-/// Instants at which the speed passes each resonance, upwards or downwards, in order of time.
+/// Returns the instants at which the speed passes each resonance, in order of time.
 fn passages(time: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> {
     let mut found = Vec::new();
     for k in 1..time.len().min(speed.len()) {
         for &resonance in resonances {
-            let (before, after) = (speed[k - 1] - resonance, speed[k] - resonance);
+            let before = speed[k - 1] - resonance;
+            let after = speed[k] - resonance;
             if (before < 0.0) != (after < 0.0) && before.is_finite() && after.is_finite() {
                 let part = before / (before - after);
                 found.push((time[k - 1] + part * (time[k] - time[k - 1]), resonance));
@@ -304,7 +321,7 @@ fn passages(time: &[f64], speed: &[f64], resonances: &[f64]) -> Vec<(f64, f64)> 
         }
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // A peak that only touches a resonance is one passage, not one up and one down.
+    // A peak that only touches a resonance is one passage, not two.
     found.dedup();
     found
 }
@@ -319,7 +336,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_resonance_is_passed_on_the_way_up_and_down() {
+    fn a_resonance_is_passed_while_speed_rises_and_falls() {
         let time: Vec<f64> = (0..=8).map(f64::from).collect();
         let speed: Vec<f64> = time.iter().map(|t| 50.0 * (4.0 - (t - 4.0).abs())).collect();
         assert_eq!(passages(&time, &speed, &[75.0, 500.0]), [(1.5, 75.0), (6.5, 75.0)]);

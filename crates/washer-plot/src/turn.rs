@@ -1,17 +1,17 @@
-//! How far natural frequencies vary over a turn of the drum (the paper's Fig. 7b).
+//! The variation of natural frequencies over a turn of the drum (the paper's Fig. 7b).
 
-use crate::campbell::{between, modes};
+use crate::campbell::{interpolate, modes};
 use sweep_plot::chart::{Chart, ChartPanel, Series, Style};
 use sweep_plot::label::Label;
-use sweep_plot::table::Table;
+use sweep_plot::table::FigureTable;
 use sweep_plot::{DISTINCT, PlotError};
 
-/// The chart of a modes file: of each mode that has a resonance, half the distance from its least
-/// to its greatest frequency over a turn, as a share of the mean.
+/// Draws the variation in a modes file: for each mode with a resonance, half the difference between
+/// its greatest and least frequency over a turn, as a share of the mean.
 ///
 /// # Errors
-/// [`PlotError::Undrawable`] without a column, or where no mode has a resonance.
-pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
+/// [`PlotError::Undrawable`] without a column, or if no mode has a resonance.
+pub(crate) fn chart(table: &FigureTable) -> Result<Chart, PlotError> {
     table.numbers("frequency_min_rpm")?;
     table.numbers("frequency_max_rpm")?;
     let mut series = Vec::new();
@@ -24,13 +24,17 @@ pub(crate) fn chart(table: &Table) -> Result<Chart, PlotError> {
         let percent = |k: usize| 50.0 * (greatest[k] - least[k]) / mode.frequency[k];
         let percent: Vec<f64> = (0..mode.frequency.len()).map(percent).collect();
         for &speed in resonances {
-            stars.push((speed, between(&mode.speed, &percent, speed), format!("{speed:.1} rpm")));
+            stars.push((
+                speed,
+                interpolate(&mode.speed, &percent, speed),
+                format!("{speed:.1} rpm"),
+            ));
         }
         let colour = DISTINCT[k % DISTINCT.len()];
         series.push(Series::new(mode.name, colour, mode.speed, percent, Style::Solid(2.2)));
     }
     if series.is_empty() {
-        return Err(table.source.empty("no mode's frequency meets the spin speed"));
+        return Err(table.source.nothing_to_draw("no mode's frequency meets the spin speed"));
     }
     let label = Label::new("Variation over a turn", "± % of the mean");
     Ok(Chart {

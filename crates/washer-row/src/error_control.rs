@@ -16,7 +16,7 @@
 //!
 //! 1. With smooth forces, levels 0 to 5 cap the bearings' modes ([`StepSelector`]). The hinge is as
 //!    it is, and bounds the first step.
-//! 2. Two more levels cap nothing.
+//! 2. Two more levels cap nothing. They are of order 4, which bears long steps at the least cost.
 //! 3. With friction and stops, no modes are capped: the first levels are the additive method's at
 //!    falling tolerances, then come three of order 8 at falling steps.
 //! 4. The last two levels resolve the bearings' modes. They are for rows in which bearings that
@@ -33,7 +33,7 @@
 //! metric's scale.
 
 use lane_ode::Tolerance;
-use washer_model::{Level, Method, ModelKind, StepSelector, capped_method};
+use washer_model::{Formula, Level, Method, ModelKind, StepSelector, capped_method};
 
 use crate::levels::{RefinementLevel, RefinementLevels};
 
@@ -90,11 +90,14 @@ const UNCAPPED_LEVELS: usize = 2;
 /// costs a row that does not converge as much as all others together.
 const CORNER_LEVELS: usize = 3;
 
-/// The first step that resolves the bearings' modes, over the longest stable one.
+/// The product of the first step that resolves the bearings' modes and their frequency (rad), for
+/// the formula of each model: of order 8 for the nonlinear one, of order 4 for the linear one.
 ///
-/// Basis: order 8 errs by 5e-5 a radian where step times frequency is 1.44 rad, so that ringing
-/// keeps its amplitude over a run. Doubling it damps the ringing away.
-const RESOLVING_SHARE: f64 = 0.25;
+/// Basis: a step of order 4 damps by z^6 / 144 where z is this product, so ringing at 10^4 rad/s
+/// loses a fifth in 10 s at 0.2; order 8 errs by 5e-5 a radian at 1.4. `differential_test 180
+/// 965457 jumps` has rows that are off by up to 3.5e-4 where order 4 takes 0.7. Doubling it damps the
+/// ringing away.
+const RESOLVING_RAD: [f64; 2] = [1.4, 0.2];
 
 /// The number of levels that resolve the bearings' modes: two make one difference.
 pub(crate) const RESOLVING_LEVELS: usize = 2;
@@ -155,21 +158,21 @@ pub fn refinement_levels(
         return levels_at_corners(steps, accuracy);
     }
     let mut levels = Vec::new();
-    let uncapped_s = steps.uncapped_step_s(model).unwrap_or(CORNER_STEP_S);
+    let first_s = steps.plain_step_s(Formula::Rk4).unwrap_or(CORNER_STEP_S);
     let ratio = step_ratio(CAPPED_ORDER);
     // A machine without modes has rows that say so.
     if let Ok(Some(longest_s)) = steps.capped_step_s(model) {
         let mut step_s = longest_s;
         for level in Level::CAPPED {
-            if step_s < ratio * uncapped_s {
+            if step_s < ratio * first_s {
                 break;
             }
             levels.push(RefinementLevel { level, method: capped_method(model, step_s) });
             step_s /= ratio;
         }
     }
-    let next_s = push_uncapped(&mut levels, model, UNCAPPED_LEVELS, [uncapped_s, ratio]);
-    push_resolving(&mut levels, model, uncapped_s, next_s);
+    let next_s = push_uncapped(&mut levels, UNCAPPED_LEVELS, rk4, [first_s, ratio]);
+    push_resolving(&mut levels, steps, model, next_s);
     RefinementLevels::checked(levels, None)
 }
 
@@ -185,50 +188,59 @@ fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevel
         levels.push(RefinementLevel { level: Level::Additive, method });
         relative *= TOLERANCE_RATIO;
     }
-    let model = ModelKind::Nonlinear;
-    let stable_s = steps.uncapped_step_s(model).unwrap_or(CORNER_STEP_S);
-    let first_s = CORNER_STEP_S.min(stable_s);
+    let first_s = match steps.plain_step_s(Formula::Dop853) {
+        Some(stable_s) => stable_s.min(CORNER_STEP_S),
+        None => CORNER_STEP_S,
+    };
     let ratio = step_ratio(CORNER_ORDER);
-    let next_s = push_uncapped(&mut levels, model, CORNER_LEVELS, [first_s, ratio]);
-    push_resolving(&mut levels, model, stable_s, next_s);
+    let next_s = push_uncapped(&mut levels, CORNER_LEVELS, dop853, [first_s, ratio]);
+    push_resolving(&mut levels, steps, ModelKind::Nonlinear, next_s);
     RefinementLevels::checked(levels, Some(AT_CORNERS.to_owned()))
+}
+
+/// Adds the levels whose steps resolve the bearings' modes.
+fn push_resolving(
+    levels: &mut Vec<RefinementLevel>,
+    steps: &StepSelector<'_>,
+    model: ModelKind,
+    longest_s: f64,
+) {
+    let (formula, level, resolving_rad): (_, fn(f64) -> RefinementLevel, _) = match model {
+        ModelKind::Nonlinear => (Formula::Dop853, dop853, RESOLVING_RAD[0]),
+        ModelKind::Linear => (Formula::Rk4, rk4, RESOLVING_RAD[1]),
+    };
+    let resolving_s = match steps.plain_step_s(formula) {
+        Some(stable_s) => stable_s * resolving_rad / formula.limit(),
+        None => longest_s,
+    };
+    let first_s = resolving_s.min(longest_s);
+    push_uncapped(levels, RESOLVING_LEVELS, level, [first_s, step_ratio(CAPPED_ORDER)]);
 }
 
 /// Adds levels with nothing capped from a first step (s), each a ratio shorter than the one before,
 /// and returns the step that would come next.
 fn push_uncapped(
     levels: &mut Vec<RefinementLevel>,
-    model: ModelKind,
     count: usize,
+    level: fn(f64) -> RefinementLevel,
     [first_s, ratio]: [f64; 2],
 ) -> f64 {
     let mut step_s = first_s;
     for _ in 0..count {
-        levels.push(uncapped(model, step_s));
+        levels.push(level(step_s));
         step_s /= ratio;
     }
     step_s
 }
 
-/// Adds the levels whose steps resolve the bearings' modes.
-fn push_resolving(
-    levels: &mut Vec<RefinementLevel>,
-    model: ModelKind,
-    stable_s: f64,
-    longest_s: f64,
-) {
-    let first_s = longest_s.min(RESOLVING_SHARE * stable_s);
-    push_uncapped(levels, model, RESOLVING_LEVELS, [first_s, step_ratio(CAPPED_ORDER)]);
+/// Returns the level of order 4 with nothing capped.
+fn rk4(step_s: f64) -> RefinementLevel {
+    RefinementLevel { level: Level::Rk4, method: Method::Rk4 { step_s } }
 }
 
-/// Returns a level with nothing capped.
-fn uncapped(model: ModelKind, step_s: f64) -> RefinementLevel {
-    match model {
-        ModelKind::Nonlinear => {
-            RefinementLevel { level: Level::Dop853, method: Method::Dop853 { step_s } }
-        }
-        ModelKind::Linear => RefinementLevel { level: Level::Rk4, method: Method::Rk4 { step_s } },
-    }
+/// Returns the level of order 8 with nothing capped.
+fn dop853(step_s: f64) -> RefinementLevel {
+    RefinementLevel { level: Level::Dop853, method: Method::Dop853 { step_s } }
 }
 
 /// The reason why a machine with friction or stops has no levels with capped modes.

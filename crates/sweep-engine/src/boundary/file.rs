@@ -30,11 +30,11 @@ impl<M: Rows> BoundaryTask<M> {
     pub fn job(&self) -> Job<'_> {
         let mut job = Job::of(&self.plan);
         job.layout.kind = FileKind::Boundary;
-        job.plan["boundary"] = self.asked();
+        job.plan["boundary"] = self.settings();
         job
     }
 
-    fn asked(&self) -> Value {
+    fn settings(&self) -> Value {
         json!({
             "quantity": self.quantity.name,
             "limit": self.quantity.limit,
@@ -45,7 +45,7 @@ impl<M: Rows> BoundaryTask<M> {
 
     /// Returns the table of the traced curves.
     pub fn table(&self, traced: &Traced) -> Table {
-        let mut about = self.asked();
+        let mut about = self.settings();
         about["worse"] = self.quantity.worse.name().into();
         about["points"] = traced.trials.into();
         about["rounds"] = traced.rounds.into();
@@ -59,7 +59,7 @@ impl<M: Rows> BoundaryTask<M> {
     }
 
     fn add_columns(&self, table: &mut Table, traced: &Traced) {
-        let TracedQuantity { name: of, unit, .. } = &self.quantity;
+        let TracedQuantity { name: quantity, unit, .. } = &self.quantity;
         let mut lines = Vec::new();
         for (curve, rows) in traced.curves.iter().enumerate() {
             for row in rows {
@@ -89,9 +89,10 @@ impl<M: Rows> BoundaryTask<M> {
         table.counts("crossings", "how many changes of side there are", changes);
         for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
             let name = format!("quantity_{word}");
-            let said = format!("{of} at the bracket's {side} end; null where not defined");
+            let description =
+                format!("{quantity} at the bracket's {side} end; null where not defined");
             let value = |line: &EdgeRow<'_>| Some(self.quantity.value(line.edge.distances[end]?));
-            table.numbers(&name, unit, &said, lines.iter().map(value));
+            table.numbers(&name, unit, &description, lines.iter().map(value));
         }
         let trials = lines.iter().map(|line| line.row.trials as u64);
         table.counts("points", "points evaluated at this value of the first axis", trials);
@@ -104,15 +105,21 @@ impl<M: Rows> BoundaryTask<M> {
         let unit = second.parameter.unit();
         table.parameter(&first.parameter, lines.iter().map(|line| Some(line.row.first)));
         let what = second.parameter.description();
-        let TracedQuantity { name: of, limit, .. } = &self.quantity;
-        let said = format!("{what}, where {of} = {limit}; null unless it is a crossing");
-        table.numbers(name, unit, &said, lines.iter().map(|line| line.edge.at));
+        let TracedQuantity { name: quantity, limit, .. } = &self.quantity;
+        let description =
+            format!("{what}, where {quantity} = {limit}; null unless it is a crossing");
+        table.numbers(name, unit, &description, lines.iter().map(|line| line.edge.at));
         for (end, word, side) in [(0, "low", "lower"), (1, "high", "upper")] {
-            let said = format!(
+            let description = format!(
                 "{side} end of the bracket in which the side changes; null where none is in range"
             );
             let value = |line: &EdgeRow<'_>| Some(line.edge.bracket?[end]);
-            table.numbers(&insert_word(name, unit, word), unit, &said, lines.iter().map(value));
+            table.numbers(
+                &insert_word(name, unit, word),
+                unit,
+                &description,
+                lines.iter().map(value),
+            );
         }
         for (k, axis) in further.iter().enumerate() {
             let values = lines

@@ -63,15 +63,15 @@ mod tests {
     use super::*;
 
     /// Returns how many evaluations narrow a bracket of a root at 0 to the tolerance.
-    fn evaluations(of: &dyn Fn(f64) -> f64, ends: [f64; 2], tolerance: f64) -> usize {
+    fn evaluations(function: &dyn Fn(f64) -> f64, ends: [f64; 2], tolerance: f64) -> usize {
         let [mut low, mut high] = ends;
         let mut itp = Itp::new(high - low, tolerance);
         let mut count = 0;
         // Rounding may leave a bracket that much too wide.
         while high - low > tolerance * (1.0 + 1e-12) {
-            let x = itp.step(low, high, Some([of(low), of(high)]));
+            let x = itp.step(low, high, Some([function(low), function(high)]));
             assert!(low < x && x < high, "{x} in {low}..{high}");
-            if (of(x) < 0.0) == (of(low) < 0.0) {
+            if (function(x) < 0.0) == (function(low) < 0.0) {
                 low = x
             } else {
                 high = x
@@ -94,8 +94,8 @@ mod tests {
             let saturated = |x: f64| (steepness * x).tanh() * if x < 0.0 { skew } else { 1.0 };
             let flat = |x: f64| steepness * x.powi(9) + 1e-9 * x;
             let bisections = ((ends[1] - ends[0]) / tolerance).log2().ceil().max(0.0) as usize;
-            for of in [&saturated as &dyn Fn(f64) -> f64, &flat] {
-                let count = evaluations(of, ends, tolerance);
+            for function in [&saturated as &dyn Fn(f64) -> f64, &flat] {
+                let count = evaluations(function, ends, tolerance);
                 assert!(
                     count <= bisections + 1,
                     "{count} > {bisections} + 1: {ends:?} {tolerance}"
@@ -106,8 +106,8 @@ mod tests {
 
     #[test]
     fn a_smooth_function_takes_far_fewer_than_bisection() {
-        let of = |x: f64| (0.3 * x).exp() - 1.0;
-        assert!(evaluations(&of, [-2.0, 3.0], 1e-9) <= 12, "bisection takes 33");
+        let function = |x: f64| (0.3 * x).exp() - 1.0;
+        assert!(evaluations(&function, [-2.0, 3.0], 1e-9) <= 12, "bisection takes 33");
     }
 
     #[test]

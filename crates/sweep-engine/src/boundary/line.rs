@@ -1,4 +1,4 @@
-//! One line along the second axis: its samples, and the positions that it needs next.
+//! The search along one line of the second axis: its samples, and the positions that it needs next.
 //!
 //! Neighbouring samples on different sides are a bracket, narrowed by [`Itp`] until it is within
 //! tolerance. A bracket over which the distance still changes much may contain a jump, and is

@@ -62,14 +62,14 @@ mod tests {
     }
 
     /// Samples until no gap may hide a pair of roots, and returns whether one was found.
-    fn finds_a_dip(of: impl Fn(f64) -> f64, finest: f64) -> bool {
-        let mut samples: Vec<(f64, f64)> = [0.0, 40.0, 80.0].map(|at| (at, of(at))).to_vec();
+    fn finds_a_dip(function: impl Fn(f64) -> f64, finest: f64) -> bool {
+        let mut samples: Vec<(f64, f64)> = [0.0, 40.0, 80.0].map(|at| (at, function(at))).to_vec();
         loop {
             let places = candidates(&line(&samples), finest);
             if places.is_empty() {
                 return samples.iter().any(|(_, distance)| *distance < 0.0);
             }
-            samples.extend(places.iter().map(|at| (*at, of(*at))));
+            samples.extend(places.iter().map(|at| (*at, function(*at))));
             samples.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
     }
@@ -90,8 +90,8 @@ mod tests {
         for k in 0..=200 {
             let bottom = 5.0 + 0.15 * f64::from(k);
             // A dip 12 wide, on a slope that the samples at 40 and 80 show.
-            let of = |x: f64| ((x - bottom).abs() * 0.05 - 0.3).min(0.025 * (x - 40.0) + 0.5);
-            assert!(finds_a_dip(of, 1.0), "{bottom}");
+            let function = |x: f64| ((x - bottom).abs() * 0.05 - 0.3).min(0.025 * (x - 40.0) + 0.5);
+            assert!(finds_a_dip(function, 1.0), "{bottom}");
         }
     }
 }

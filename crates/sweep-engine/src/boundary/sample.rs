@@ -3,14 +3,14 @@
 //! Positions are coordinates of the second axis: its values, or their logarithms. Distances are
 //! signed distances from the limit, of order one (a logarithm of a ratio).
 
-use super::Search;
+use super::SearchRange;
 
 /// Returns the coordinate of an axis's value.
 pub(super) fn position(value: f64, is_log: bool) -> f64 {
     if is_log { libm::log(value) } else { value }
 }
 
-impl Search {
+impl SearchRange {
     /// Returns the range that is searched, in coordinates.
     pub(super) fn span(&self) -> Span {
         Span {

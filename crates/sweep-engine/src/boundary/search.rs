@@ -2,7 +2,7 @@
 
 use super::lattice::{columns, lattice_ranks};
 use super::quantity::traced;
-use super::{Search, TracedQuantity, Trial};
+use super::{BoundaryTrial, SearchRange, TracedQuantity};
 use crate::config::written::finite;
 use crate::evaluator::{CachedEvaluator, Stopped};
 use crate::store::{Done, Key, Rows};
@@ -24,13 +24,12 @@ const DEFAULT_PARTS: f64 = 480.0;
 /// The options of a boundary.
 #[derive(Clone, Debug, clap::Args)]
 pub struct BoundaryOptions {
-    /// What is at its limit: any column of numbers that the grid's rows can have, such as
+    /// Column whose limit is traced: any column of numbers that the grid's rows can have, such as
     /// ratio_max, ratio_CHANNEL or nonlinear_CHANNEL; without a name, lists them
     #[arg(long, value_name = "COLUMN", default_value = "ratio_max")]
     #[arg(num_args = 0..=1, default_missing_value = "")]
     pub quantity: String,
-    /// Where its limit is, in the column's unit [default: the column's own; of ratios that of the
-    /// grid file]
+    /// Limit in the column's unit [default: the column's own; of ratios that of the grid file]
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
     pub limit: Option<f64>,
     /// Width of the final brackets, in the second axis's unit; if that axis is logarithmic, as a
@@ -56,7 +55,7 @@ pub struct BoundaryTask<M: Model> {
     /// The number of curves: combinations of the axes beyond the second.
     pub curves: usize,
     /// The search along the second axis.
-    pub search: Search,
+    pub search: SearchRange,
 }
 
 impl<M: Rows + Swept> BoundaryTask<M> {
@@ -110,7 +109,7 @@ impl<M: Rows + Swept> BoundaryTask<M> {
                 extent * LEAST_TOLERANCE
             ));
         }
-        let search = Search {
+        let search = SearchRange {
             least,
             greatest,
             first_log: matches!(first.values, AxisValues::Log { .. }),
@@ -142,8 +141,8 @@ impl<M: Rows + Swept> BoundaryTask<M> {
     /// Returns the function that evaluates the distances at trial points.
     pub fn distances<'a>(
         &'a self,
-        asking: &'a CachedEvaluator<'_>,
-    ) -> impl Fn(&[Trial]) -> Result<Vec<Option<f64>>, Stopped> + 'a {
+        evaluator: &'a CachedEvaluator<'_>,
+    ) -> impl Fn(&[BoundaryTrial]) -> Result<Vec<Option<f64>>, Stopped> + 'a {
         let columns = M::layout(&self.plan).columns;
         let place = columns.iter().position(|column| column.name == self.quantity.name);
         let distance = move |done: &Done| {
@@ -153,19 +152,19 @@ impl<M: Rows + Swept> BoundaryTask<M> {
         move |trials| {
             let keys: Vec<Vec<Key>> = trials.iter().map(|trial| vec![key(trial)]).collect();
             let values = |k: usize, _| {
-                let Trial { curve, first, second } = trials[k];
+                let BoundaryTrial { curve, first, second } = trials[k];
                 // The axes beyond the second vary fastest.
                 let mut values = self.plan.axis_values(curve as u64);
                 values[..2].copy_from_slice(&[first, second]);
                 values
             };
             let answer = |_, points: Vec<Done>| Ok(points.iter().map(&distance).collect());
-            Ok(asking.evaluate(&keys, 1, &values, &answer)?.concat())
+            Ok(evaluator.evaluate(&keys, 1, &values, &answer)?.concat())
         }
     }
 }
 
 /// Returns the key under which a trial is stored.
-const fn key(trial: &Trial) -> Key {
+const fn key(trial: &BoundaryTrial) -> Key {
     [trial.curve as u64, trial.first.to_bits(), trial.second.to_bits()]
 }

@@ -1,4 +1,4 @@
-//! The search against functions whose edges are known.
+//! Tests of the search with functions whose edges are known.
 
 mod random;
 
@@ -7,7 +7,7 @@ use std::convert::Infallible;
 
 use super::*;
 
-pub(crate) const SEARCH: Search = Search {
+pub(crate) const SEARCH: SearchRange = SearchRange {
     least: 60.0,
     greatest: 300.0,
     first_log: false,
@@ -21,33 +21,34 @@ fn masses(count: u32) -> Vec<f64> {
 }
 
 pub(crate) fn traced(
-    of: impl Fn(f64, f64) -> Option<f64>,
+    distance: impl Fn(f64, f64) -> Option<f64>,
     firsts: &[f64],
-    search: &Search,
+    search: &SearchRange,
 ) -> Traced {
-    let asked = RefCell::new(Vec::<Trial>::new());
+    let evaluated = RefCell::new(Vec::<BoundaryTrial>::new());
     let batches = RefCell::new(Vec::new());
-    let evaluate = |trials: &[Trial]| {
-        asked.borrow_mut().extend_from_slice(trials);
+    let evaluate = |trials: &[BoundaryTrial]| {
+        evaluated.borrow_mut().extend_from_slice(trials);
         batches.borrow_mut().push(trials.len());
-        Ok(trials.iter().map(|trial| of(trial.first, trial.second)).collect())
+        Ok(trials.iter().map(|trial| distance(trial.first, trial.second)).collect())
     };
     let mut tell = |rows| assert!(rows < firsts.len(), "{rows}");
     let Ok::<_, Infallible>(traced) = trace(&evaluate, firsts, 1, search, &mut tell);
-    let asked = asked.borrow();
+    let evaluated = evaluated.borrow();
     let batches = batches.borrow();
     assert!(batches.iter().all(|&trials| trials > 0), "{batches:?}");
-    assert_eq!((traced.trials, traced.rounds), (asked.len(), batches.len()));
+    assert_eq!((traced.trials, traced.rounds), (evaluated.len(), batches.len()));
     let mut keys: Vec<[u64; 2]> =
-        asked.iter().map(|t| [t.first.to_bits(), t.second.to_bits()]).collect();
+        evaluated.iter().map(|t| [t.first.to_bits(), t.second.to_bits()]).collect();
     keys.sort_unstable();
     keys.dedup();
-    assert_eq!(keys.len(), asked.len(), "nothing is evaluated twice");
-    assert!(asked.iter().all(|trial| (search.least..=search.greatest).contains(&trial.second)));
+    assert_eq!(keys.len(), evaluated.len(), "nothing is evaluated twice");
+    assert!(evaluated.iter().all(|trial| (search.least..=search.greatest).contains(&trial.second)));
     traced
 }
 
-/// Shaped like the paper's Fig. 12: saturated far on both sides of a line that bends a little.
+/// Returns a distance like that of the paper's Fig. 12: saturated on both sides of a slightly bent
+/// line.
 fn like_fig12(mass: f64, damping: f64) -> Option<f64> {
     let x = (line(mass) - damping) / 40.0;
     let distance =
@@ -59,13 +60,17 @@ fn line(mass: f64) -> f64 {
     30.0 + 230.0 * mass + 15.0 * (5.0 * mass).sin()
 }
 
-/// Every edge has the right sides at its ends and is no wider than asked.
-pub(crate) fn check_edges(traced: &Traced, of: impl Fn(f64, f64) -> Option<f64>, tolerance: f64) {
+/// Checks that every edge has the right sides at its ends and is no wider than the tolerance.
+pub(crate) fn check_edges(
+    traced: &Traced,
+    distance: impl Fn(f64, f64) -> Option<f64>,
+    tolerance: f64,
+) {
     for row in &traced.curves[0] {
         for edge in &row.edges {
             let Some([low, high]) = edge.bracket else { continue };
             assert!(high - low <= tolerance, "{row:?}");
-            let [a, b] = [of(row.first, low), of(row.first, high)];
+            let [a, b] = [distance(row.first, low), distance(row.first, high)];
             assert_eq!(edge.distances, [a, b], "{row:?}");
             assert_ne!(a.map(|a| a < 0.0), b.map(|b| b < 0.0), "{row:?}");
             assert!(edge.at.is_none_or(|at| (low..=high).contains(&at)), "{row:?}");
@@ -86,7 +91,8 @@ fn a_smooth_boundary_takes_a_fifth_of_the_grids_points() {
             assert_eq!(edge.kind, EdgeKind::NoneReliable, "{mass}");
         } else {
             assert_eq!(edge.kind, EdgeKind::Crossing, "{mass}");
-            // The function has a kink there, so the straight line within the bracket is not exact.
+            // The function has a kink there, so that linear interpolation in the bracket is not
+            // exact.
             assert!((edge.at.unwrap() - line(mass)).abs() < 0.2, "{mass}: {edge:?}");
         }
     }
@@ -96,8 +102,8 @@ fn a_smooth_boundary_takes_a_fifth_of_the_grids_points() {
 fn the_cost_of_a_trace_is_pinned() {
     let fold = |mass, damping| folded(mass, damping);
     let wave = |mass: f64, damping: f64| Some(0.8 * ((damping - 20.0 * mass) / 25.0).sin());
-    let cost = |of: &dyn Fn(f64, f64) -> Option<f64>, rows| {
-        let traced = traced(of, &masses(rows), &SEARCH);
+    let cost = |distance: &dyn Fn(f64, f64) -> Option<f64>, rows| {
+        let traced = traced(distance, &masses(rows), &SEARCH);
         (traced.trials, traced.rounds)
     };
     let costs = [
@@ -111,7 +117,7 @@ fn the_cost_of_a_trace_is_pinned() {
 }
 
 #[test]
-fn a_jump_is_told_from_a_crossing_however_steep() {
+fn jumps_are_distinguished_from_steep_crossings() {
     let leap = |_: f64, damping: f64| Some(if damping < 137.3 { 1.0 } else { -0.6 });
     for row in &traced(leap, &masses(12), &SEARCH).curves[0] {
         let edge = row.edges[0];
@@ -191,9 +197,9 @@ fn a_narrow_dip_beside_the_crossing_is_found_and_followed() {
 
 #[test]
 fn a_pocket_that_ends_between_two_rows_is_found_in_the_last_that_has_it() {
-    // As damper 1's height on the cabinet against damping: reliable from a line that bends up
-    // towards the lowest heights, to one that leaves the range at 0.125 m, is at 180 N s/m at
-    // 0.1125 m, and has met the other at 0.1 m.
+    // The region is like that over damper 1's height on the cabinet and damping: reliable from a
+    // line that bends up at the lowest heights to one that leaves the range at 0.125 m, is at 180 N
+    // s/m at 0.1125 m, and meets the other line at 0.1 m.
     let heights: Vec<f64> = (0..17).map(|k| 0.1 + 0.0125 * f64::from(k)).collect();
     let bottom = |height: f64| 97.0 + 0.3 / (height - 0.09);
     let pocket = |height: f64, damping: f64| {
@@ -218,7 +224,7 @@ fn a_pocket_that_ends_between_two_rows_is_found_in_the_last_that_has_it() {
 
 #[test]
 fn a_pocket_found_late_is_followed_through_every_row() {
-    // Slanted, narrower than the lattice's cells, and met by the lattice at one point.
+    // The tongue is slanted, narrower than a cell of the lattice, and hit by one lattice point.
     let tongue = |mass: f64, damping: f64| {
         let middle = 140.0 + 180.0 * (mass - 0.3);
         let half = 4.0 * (1.0 - ((mass - 0.55) / 0.3).powi(2));
@@ -232,41 +238,41 @@ fn a_pocket_found_late_is_followed_through_every_row() {
     }
 }
 
-/// Over ramps of 4 to 30 s, three pockets of 0.3 to 0.5 s: cells of 4.3 s promise none of them.
+/// Searches ramps of 4 to 30 s with pockets of 0.3 to 0.5 s, which cells of 4.3 s can miss.
 #[test]
 fn pockets_are_found_once_a_cell_fits_into_them() {
     let pockets = [[7.1, 7.4], [13.3, 13.7], [21.0, 21.5]];
-    let of = |_: f64, ramp_s: f64| {
+    let distance = |_: f64, ramp_s: f64| {
         let inside = pockets.iter().any(|[from, to]| (from..=to).contains(&&ramp_s));
         Some(if inside { 0.5 } else { -0.5 })
     };
-    let search = Search { least: 4.0, greatest: 30.0, tolerance: 0.02, ..SEARCH };
+    let search = SearchRange { least: 4.0, greatest: 30.0, tolerance: 0.02, ..SEARCH };
     // Cells of 0.299 s.
-    let traced = traced(of, &masses(3), &Search { lattice: 87, ..search });
-    check_edges(&traced, of, 0.02);
+    let traced = traced(distance, &masses(3), &SearchRange { lattice: 87, ..search });
+    check_edges(&traced, distance, 0.02);
     assert!(traced.curves[0].iter().all(|row| row.edges.len() == 6), "{traced:?}");
 }
 
 #[test]
-fn where_the_quantity_is_not_defined_is_said() {
+fn undefined_quantities_are_reported() {
     let broken =
         |mass: f64, damping: f64| if damping < 100.0 { None } else { like_fig12(mass, damping) };
-    let of = |of: &dyn Fn(f64, f64) -> Option<f64>, firsts: &[f64]| {
-        traced(of, firsts, &SEARCH).curves.remove(0)
+    let rows_of = |distance: &dyn Fn(f64, f64) -> Option<f64>, firsts: &[f64]| {
+        traced(distance, firsts, &SEARCH).curves.remove(0)
     };
-    let rows = of(&broken, &[0.2, 0.6]);
+    let rows = rows_of(&broken, &[0.2, 0.6]);
     let kinds: Vec<Vec<EdgeKind>> =
         rows.iter().map(|row| row.edges.iter().map(|edge| edge.kind).collect()).collect();
     assert_eq!(kinds, [vec![EdgeKind::Undefined], vec![EdgeKind::Undefined, EdgeKind::Crossing]]);
     assert_eq!(rows[0].edges[0].at, None);
-    let nothing = of(&|_, _| None, &masses(5));
+    let nothing = rows_of(&|_, _| None, &masses(5));
     assert!(nothing.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
-    let nan = of(&|_, _| Some(f64::NAN), &masses(5));
+    let nan = rows_of(&|_, _| Some(f64::NAN), &masses(5));
     assert!(nan.iter().all(|row| row.edges[0].kind == EdgeKind::NoneUndefined));
 }
 
 #[test]
-fn nothing_in_range_is_no_number() {
+fn a_row_without_an_edge_has_no_number() {
     for (distance, kind) in [(-1.0, EdgeKind::NoneReliable), (1.0, EdgeKind::NoneUnreliable)] {
         let traced = traced(|_, _| Some(distance), &masses(39), &SEARCH);
         for row in &traced.curves[0] {
@@ -277,8 +283,8 @@ fn nothing_in_range_is_no_number() {
 }
 
 #[test]
-fn whatever_the_function_it_ends() {
-    // Noise of every kind, infinities included, decided by the digits of the values.
+fn the_search_of_noise_ends() {
+    // The noise, with infinities, depends on the bits of the values.
     for seed in 0..8_u64 {
         let noise = |mass: f64, damping: f64| {
             let bits = (mass.to_bits() ^ damping.to_bits().rotate_left(17))
@@ -292,17 +298,17 @@ fn whatever_the_function_it_ends() {
         };
         let traced = traced(noise, &masses(17), &SEARCH);
         check_edges(&traced, noise, 0.5);
-        // No more than twice what trying every tolerance would take.
+        // The bound is twice the number of trials at every tolerance.
         assert!(traced.trials <= 2 * 17 * 480, "{}", traced.trials);
     }
 }
 
 #[test]
-fn logarithmic_axes_are_searched_by_their_logarithms() {
+fn logarithmic_axes_are_searched_in_their_logarithms() {
     let line = |first: f64| 1e5 * first.powf(1.5);
-    let of = |first: f64, second: f64| Some((line(first) / second).ln().clamp(-1.0, 1.0));
+    let distance = |first: f64, second: f64| Some((line(first) / second).ln().clamp(-1.0, 1.0));
     let firsts: Vec<f64> = (0..20).map(|k| 10.0_f64.powf(f64::from(k) / 10.0)).collect();
-    let search = Search {
+    let search = SearchRange {
         least: 1e4,
         greatest: 1e9,
         first_log: true,
@@ -310,7 +316,7 @@ fn logarithmic_axes_are_searched_by_their_logarithms() {
         tolerance: 0.01,
         ..SEARCH
     };
-    for row in &traced(of, &firsts, &search).curves[0] {
+    for row in &traced(distance, &firsts, &search).curves[0] {
         let edge = row.edges[0];
         let [low, high] = edge.bracket.unwrap();
         assert!((high / low).ln() <= 0.0101, "{edge:?}");
@@ -320,8 +326,8 @@ fn logarithmic_axes_are_searched_by_their_logarithms() {
 
 #[test]
 fn curves_share_batches() {
-    let shifted = |trials: &[Trial]| -> Result<_, Infallible> {
-        let distance = |t: &Trial| like_fig12(t.first, t.second - 9.0 * t.curve as f64);
+    let shifted = |trials: &[BoundaryTrial]| -> Result<_, Infallible> {
+        let distance = |t: &BoundaryTrial| like_fig12(t.first, t.second - 9.0 * t.curve as f64);
         Ok(trials.iter().map(distance).collect())
     };
     let firsts = masses(39);
@@ -350,7 +356,7 @@ fn rows_in_any_order_give_the_same_edges() {
 #[test]
 fn an_evaluator_that_stops_ends_the_search() {
     let batches = Cell::new(0);
-    let third = |trials: &[Trial]| {
+    let third = |trials: &[BoundaryTrial]| {
         batches.set(batches.get() + 1);
         if batches.get() == 3 {
             return Err("enough");

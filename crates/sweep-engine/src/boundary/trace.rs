@@ -20,14 +20,13 @@ use super::lattice::{PlannedLine, columns, plan_lines};
 use super::line::LineSearch;
 use super::lipschitz;
 use super::sample::{LineSample, SideInterval, Span, position};
-use super::{Search, Traced, TracedRow, Trial};
+use super::{BoundaryTrial, SearchRange, Traced, TracedRow};
 
 /// Lines that are traced at once, in whole curves. Basis: some ten megabytes, and plenty to fill
 /// lanes. Doubling it doubles the memory.
 const LINES_AT_ONCE: usize = 1 << 14;
-/// The most samples that a line takes because its neighbours disagree with it. Basis: whatever the
-/// function, a trace ends (test `whatever_the_function_it_ends`). Doubling it doubles what noise
-/// takes.
+/// The most samples that a line takes because its neighbours disagree with it. Basis: the trace of
+/// any function ends (test `the_search_of_noise_ends`). Doubling it doubles the trials of noise.
 const DISPUTED_MAX: usize = 64;
 /// The narrowest gap on a lattice line that is searched for pairs of roots, as a part of a lattice
 /// cell. Basis: three bisections. Doubling it loses the folds of `sweeps/fig12.toml`.
@@ -41,10 +40,10 @@ const FINEST_PART: f64 = 0.125;
 /// # Errors
 /// Whatever stopped the evaluation.
 pub fn trace<E>(
-    evaluate: &dyn Fn(&[Trial]) -> Result<Vec<Option<f64>>, E>,
+    evaluate: &dyn Fn(&[BoundaryTrial]) -> Result<Vec<Option<f64>>, E>,
     firsts: &[f64],
     curves: usize,
-    search: &Search,
+    search: &SearchRange,
     tell: &mut dyn FnMut(usize),
 ) -> Result<Traced, E> {
     let mut traced = Traced { curves: Vec::with_capacity(curves), ..Traced::default() };
@@ -59,7 +58,7 @@ pub fn trace<E>(
                 break;
             }
             tell(begun * firsts.len() + block.lines_traced());
-            let trials: Vec<Trial> = batch.iter().map(|request| request.trial).collect();
+            let trials: Vec<BoundaryTrial> = batch.iter().map(|request| request.trial).collect();
             let distances = evaluate(&trials)?;
             for (request, distance) in batch.iter().zip(distances) {
                 block.insert(request, distance);
@@ -75,7 +74,7 @@ pub fn trace<E>(
 /// A trial, with the line that needs it: its curve within the block, its rank along the first axis,
 /// and the position on it.
 struct TrialRequest {
-    trial: Trial,
+    trial: BoundaryTrial,
     curve: usize,
     rank: usize,
     at: f64,
@@ -85,7 +84,7 @@ struct TrialRequest {
 struct Block<'a> {
     first_curve: usize,
     firsts: &'a [f64],
-    search: Search,
+    search: SearchRange,
     span: Span,
     columns: Vec<f64>,
     /// The width of a lattice cell along the second axis.
@@ -111,7 +110,7 @@ struct LineState {
 }
 
 impl<'a> Block<'a> {
-    fn new(curves: std::ops::Range<usize>, firsts: &'a [f64], search: &Search) -> Self {
+    fn new(curves: std::ops::Range<usize>, firsts: &'a [f64], search: &SearchRange) -> Self {
         let span = search.span();
         let cells = search.lattice.max(1);
         let places: Vec<f64> =
@@ -158,7 +157,7 @@ impl<'a> Block<'a> {
         let first = self.firsts[self.lines[rank].index];
         for at in self.next_places(curve, rank) {
             let second = self.search.value(at);
-            let trial = Trial { curve: self.first_curve + curve, first, second };
+            let trial = BoundaryTrial { curve: self.first_curve + curve, first, second };
             batch.push(TrialRequest { trial, curve, rank, at });
         }
     }

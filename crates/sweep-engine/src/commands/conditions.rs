@@ -18,7 +18,7 @@ pub fn parse(
         Ok(condition) => Some(condition),
         Err(mistake) => {
             let at = Location::new(report.add(option, text.as_str()), mistake.span.clone());
-            report.push(Diagnostic::of_expression(mistake, &at));
+            report.push(Diagnostic::from_expression(mistake, &at));
             None
         }
     };

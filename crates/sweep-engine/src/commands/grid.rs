@@ -37,7 +37,7 @@ impl GridArgs {
 
     /// The grid with all changes but `--at`.
     pub fn input<M: Read>(&self) -> GridInput<M> {
-        GridInput::file(self.grid.clone(), self.sets()).named(self.name.clone())
+        GridInput::file(self.grid.clone(), self.sets()).with_name(self.name.clone())
     }
 
     /// The plan.
@@ -45,7 +45,7 @@ impl GridArgs {
     /// # Errors
     /// Every mistake in the grid file and the constants.
     pub fn load<M: Read>(&self) -> Result<Plan<M>, Diagnostics> {
-        let plan = self.input().fixing(&self.at).load()?;
+        let plan = self.input().with_fixed(&self.at).load()?;
         self.tell_aside(&plan);
         Ok(plan)
     }

@@ -9,7 +9,7 @@ use super::{Lines as _, installed, short, word};
 use crate::config::section::counted;
 use crate::optimise::file::{own_file, parameters, table};
 use crate::optimise::search::{search, slacks};
-use crate::optimise::study::{Objective, Sought, Study};
+use crate::optimise::study::{Objective, SearchedParameter, Study};
 use crate::store::{Opened, Trials};
 use crate::{Effort, EffortArgs, Error, Exit, Swept, duration, tell};
 use sweep_files::{FileKind, OWN_FILE, Output, atomic, key};
@@ -247,7 +247,7 @@ fn told<M: Swept>(
         let of = |cells: &[Cell]| cells.get(3 + study.parameters.len()).and_then(Cell::number);
         of(a).unwrap_or(f64::NAN).total_cmp(&of(b).unwrap_or(f64::NAN))
     });
-    let is_at_end = |(sought, value): &(&Sought, &f64)| {
+    let is_at_end = |(sought, value): &(&SearchedParameter, &f64)| {
         [0.0, 1.0].into_iter().any(|end| sought.bounds.between(end) == **value)
     };
     let bounded = study.parameters.iter().zip(values.iter().flatten());

@@ -8,12 +8,12 @@ use crate::config::written::finite;
 use crate::exit::{Error, Exit, tell};
 use crate::store::refuse_unfinished;
 use sweep_files::beside;
-use sweep_plot::{CommonFigures, Figures, Options, PlotError, View, render};
+use sweep_plot::{CommonFigures, DesignView, Figures, PlotError, PlotOptions, render};
 use sweep_results::nearest;
 
 /// Arguments of `plot`, of a model with these views.
 #[derive(Debug, clap::Args)]
-pub struct Args<V: ValueEnum + Send + Sync + 'static = View> {
+pub struct Args<V: ValueEnum + Send + Sync + 'static = DesignView> {
     /// A result file
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
@@ -47,7 +47,7 @@ pub struct Args<V: ValueEnum + Send + Sync + 'static = View> {
 /// # Errors
 /// As [`render`].
 pub fn run(args: &Args) -> Result<Exit, Error> {
-    draw(args, Options { view: args.view, ..Options::default() }, &CommonFigures)
+    draw(args, PlotOptions { view: args.view, ..PlotOptions::default() }, &CommonFigures)
 }
 
 /// As [`run`], with what arguments of the model say further.
@@ -56,11 +56,11 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
 /// As [`render`].
 pub fn draw<V: ValueEnum + Send + Sync>(
     args: &Args<V>,
-    further: Options,
+    further: PlotOptions,
     model: &dyn Figures,
 ) -> Result<Exit, Error> {
     let output = args.output.clone().unwrap_or_else(|| beside(&args.file, "svg"));
-    let options = Options {
+    let options = PlotOptions {
         quantity: args.quantity.clone(),
         at: args.at.clone(),
         boundary: args.boundary.clone(),

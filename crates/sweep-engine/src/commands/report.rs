@@ -112,7 +112,7 @@ pub fn run<M: Swept>(
         body += &table(&shown, &["", ""], &lines);
         body += &format!("<figure>{picture}</figure>\n");
     }
-    let run = GridInput::<M>::of_plan(name, &plan).load();
+    let run = GridInput::<M>::from_plan(name, &plan).load();
     if let Ok(run) = &run {
         let found: Vec<_> = resonances(run).into_iter().map(Vec::from).collect();
         let heads = ["motion", "resonance", "damping ratio"];

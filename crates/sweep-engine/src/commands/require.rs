@@ -114,7 +114,7 @@ fn is_random(file: &ResultTable) -> bool {
 /// Computes Wilson's interval of every share.
 fn intervals(checked: &Checked, is_random: bool) -> Vec<Option<[f64; 2]>> {
     let of = |(count, rows): (&Option<u64>, &u64)| {
-        let share = Share::of((*count)?, *rows).filter(|_| is_random)?;
+        let share = Share::wilson((*count)?, *rows).filter(|_| is_random)?;
         Some([share.low, share.high])
     };
     checked.share_counts.iter().zip(&checked.folded_rows).map(of).collect()

@@ -237,7 +237,7 @@ pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
 /// The share of reliable points among those with a verdict, with the interval in which the true
 /// share lies with 95 % confidence if points are independent and at random.
 fn share(tally: &Tally) -> String {
-    match Share::of(tally.reliable, tally.reliable + tally.unreliable) {
+    match Share::wilson(tally.reliable, tally.reliable + tally.unreliable) {
         None => "no point has a verdict".to_owned(),
         Some(Share { part, low, high }) => {
             let [part, low, high] = [part, low, high].map(|part| format!("{:.1}", 100.0 * part));

@@ -3,22 +3,22 @@
 use sweep_parameter::{Parameter as _, Range, decimal};
 use sweep_results::nearest;
 
-use super::draft::Claimed;
+use super::draft::ClaimedNumbers;
 use super::list::{self, List};
-use super::parameters::{COMPARED, find};
+use super::parameters::{MAX_COMPARED_NAMES, find};
 use super::report::{Diagnostic, Report};
 use super::section::check_number;
 use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number, short};
-use crate::design::{MOST_AXES, REACH, Rule, Shape};
+use crate::design::{DesignRule, DistributionShape, MOST_AXES, TAIL_DEVIATIONS};
 use crate::plan::MAX_POINTS;
 use crate::{Axis, AxisValues, Design, Distribution};
 
-/// Takes note that an axis writes this parameter's numbers, perhaps about the model's own; not if
-/// another axis does.
+/// Claims the numbers that an axis writes. Returns false, after a report, if another axis writes
+/// them. `is_about` says that the axis is a tolerance about the model's own number.
 fn claim<M: Read>(
     name: &Located<&str>,
     parameter: &M::Parameter,
-    swept: &mut Claimed,
+    swept: &mut ClaimedNumbers,
     is_about: bool,
     draft: &Draft<'_, M>,
 ) -> bool {
@@ -27,7 +27,7 @@ fn claim<M: Read>(
     if !swept.claim(name, parts.clone(), report) {
         return false;
     }
-    // An axis about the model's own number lies about the constant.
+    // A tolerance lies about the constant, so that the constant has an effect.
     for constant in draft.constants.iter().filter(|_| !is_about) {
         if constant.parts.iter().all(|part| parts.contains(part)) {
             let title = format!(
@@ -42,20 +42,20 @@ fn claim<M: Read>(
     true
 }
 
-/// Whether an option has given all of an axis's numbers a value: it sweeps nothing then.
+/// Returns whether options fix all numbers of an axis, which then sweeps nothing.
 fn is_fixed<M: Read>(parameter: &M::Parameter, draft: &Draft<'_, M>) -> bool {
     let parts = draft.plan.model.parts(parameter);
     let mut options = draft.constants.iter().filter(|constant| constant.is_over_file);
     options.any(|constant| parts.iter().all(|part| constant.parts.contains(part)))
 }
 
-/// Reads every `[[axis]]`: of a grid, or of a design that fills a box: a range each, without a
-/// count.
+/// Reads every `[[axis]]`: the values of a grid, or the ranges of a design.
 pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Draft<'_, M>) {
-    let (report, mut swept) = (root.report, Claimed::default());
+    let report = root.report;
+    let mut swept = ClaimedNumbers::default();
     let sections = root.tables("axis");
     if let (Some(design), Some(at)) = (&design, report.place("design")) {
-        let most = if matches!(design, Design::Spread { rule: Rule::Sobol, .. }) {
+        let most = if matches!(design, Design::Spread { rule: DesignRule::Sobol, .. }) {
             MOST_AXES
         } else {
             usize::MAX
@@ -74,8 +74,8 @@ pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Dra
         let field = section.text("parameter");
         let name = section.require(field, "parameter", "the name of a parameter");
         let parameter = name.as_ref().and_then(|name| find(name, draft));
-        let own = parameter.as_ref().map(|parameter| Own::of(parameter, draft));
-        let own = own.unwrap_or(Own { name: "", range: Range::Any, value: None });
+        let own = parameter.as_ref().map(|parameter| SweptFacts::new(parameter, draft));
+        let own = own.unwrap_or(SweptFacts { name: "", range: Range::Any, value: None });
         let values = match &design {
             Some(design) => extent(&section, &own, design.points()),
             None => values(&section, &own),
@@ -105,7 +105,7 @@ pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Dra
             add(Axis { parameter, values: values.value }, values.at, draft);
         }
     }
-    // Where every axis is fixed there is one point.
+    // A plan whose axes are all fixed is a single point.
     let is_point = draft.plan.axes.is_empty();
     draft.plan.design = design.filter(|_| !is_point);
 }
@@ -116,14 +116,14 @@ pub fn add<M: Read>(axis: Axis<M>, at: Location, draft: &mut Draft<'_, M>) {
     draft.plan.axes.push(axis);
 }
 
-/// The axes of a list: its columns.
+/// Makes the columns of a list the plan's axes.
 pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draft<'_, M>) {
     let report = root.report;
     for section in root.tables("axis") {
         let expected = "the columns of the list are the axes; remove this";
         report.refuse::<()>(section.at(), "an [[axis]] beside a list of points", expected);
     }
-    let mut swept = Claimed::default();
+    let mut swept = ClaimedNumbers::default();
     list.table.notes().into_iter().for_each(|note| report.note(format!("the list: {note}")));
     for column in std::mem::take(&mut list.table.columns) {
         let name = Located { value: column.name.value.as_str(), at: column.name.at.clone() };
@@ -160,34 +160,34 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
     draft.plan.design = Some(list.design);
 }
 
-/// Whether a name is near no parameter's: a column of it is about something else.
+/// Returns whether a name is so different from all parameters that its column holds something else.
 fn is_foreign<M: Read>(name: &Located<&str>, draft: &Draft<'_, M>) -> bool {
     let model = &draft.plan.model;
     let Err(error) = model.find(name.value) else { return false };
     let all = model.parameters();
-    let near = nearest(name.value, all.iter().take(COMPARED).map(|one| one.name()));
+    let near = nearest(name.value, all.iter().take(MAX_COMPARED_NAMES).map(|one| one.name()));
     error.is_strange && near.is_none()
 }
 
-/// The kinds of distributions by name, with their numbers; "uniform" is a range by another name.
+/// The kinds of distributions by name, with their numbers; "uniform" is another name of a range.
 pub const DISTRIBUTIONS: [(&str, &[(&str, Range)]); 3] = [
     ("normal", &[("mean", Range::Any), ("sd", Range::Positive)]),
     ("lognormal", &[("median", Range::Positive), ("sigma", Range::Positive)]),
     ("uniform", &[]),
 ];
 
-/// What the model itself has of a swept parameter.
-struct Own<'p> {
-    /// The parameter's name; empty if there is none, which has been reported.
+/// The model's facts about a swept parameter.
+struct SweptFacts<'p> {
+    /// The name of the parameter; empty if it is unknown, which has been reported.
     name: &'p str,
-    /// The values that it may take.
+    /// The range of valid values.
     range: Range,
-    /// Its value without the axis, if the model has one number for it.
+    /// The value without the axis, if the model has a single number for it.
     value: Option<f64>,
 }
 
-impl<'p> Own<'p> {
-    fn of<M: Read>(parameter: &'p M::Parameter, draft: &Draft<'_, M>) -> Self {
+impl<'p> SweptFacts<'p> {
+    fn new<M: Read>(parameter: &'p M::Parameter, draft: &Draft<'_, M>) -> Self {
         let plan = &draft.plan;
         let value = match parameter.window_edge() {
             Some(edge) => Some(plan.window_s[edge]),
@@ -196,9 +196,9 @@ impl<'p> Own<'p> {
         Self { name: parameter.name(), range: parameter.range(), value }
     }
 
-    /// Reads `tolerance`: the ends of a range about the model's own number, so far from it or so
-    /// many percent of it.
-    fn tolerance(&self, section: &Section<'_>) -> Field<Tolerance> {
+    /// Reads `tolerance`: a range about the model's own number, by a distance in its unit or in
+    /// percent of it.
+    fn tolerance(&self, section: &Section<'_>) -> Field<AxisTolerance> {
         section.text_or_number("tolerance").then(|found| {
             let report = section.report;
             let at = found.at;
@@ -215,11 +215,13 @@ impl<'p> Own<'p> {
                 return None;
             }
             let Some(middle) = self.value else {
-                let title = format!("`{}` has no single number to be about", self.name);
-                let expected = "expected a range: the numbers that it sets differ, or are none";
+                let title =
+                    format!("`{}` has no single number as the middle of a tolerance", self.name);
+                let expected =
+                    "expected a range: it sets numbers that differ, or that the model lacks";
                 return report.refuse(&at, title, expected);
             };
-            // 120 less 5 % is exactly 114.
+            // This order of operations is exact: 120 less 5 % is 114.
             let [from, to] = match percent {
                 Some(_) => [100.0 - number, 100.0 + number].map(|part| middle * part / 100.0),
                 None => [middle - number, middle + number],
@@ -229,36 +231,36 @@ impl<'p> Own<'p> {
                 check_number(&quoted(self.name), end, at.clone(), self.range, report)?;
             }
             if from == to {
-                let title = format!("`{}` is 0, of which percents are 0", self.name);
+                let title = format!("`{}` is 0, and so is every percentage of it", self.name);
                 return report.refuse(&at, title, "expected a tolerance in the parameter's unit");
             }
-            Some(Located { value: Tolerance { from, middle, to }, at })
+            Some(Located { value: AxisTolerance { from, middle, to }, at })
         })
     }
 }
 
 /// A range about the model's own number.
 #[derive(Clone, Copy)]
-struct Tolerance {
+struct AxisTolerance {
     from: f64,
     middle: f64,
     to: f64,
 }
 
-/// Standard deviations from the middle of a tolerance to its ends: of a process that just keeps it
-/// (capability 1), 99.7 % lies within. Twice as many make parts that are twice as near the middle.
+/// Standard deviations between the middle of a tolerance and its ends. Basis: a process that just
+/// meets it (capability 1) has 99.7 % within. Doubling it halves the spread of parts.
 const DEVIATIONS: f64 = 3.0;
 
-impl Tolerance {
-    /// Returns the shape of a distribution within the tolerance, by its place among
-    /// [`DISTRIBUTIONS`]; none for one without a middle.
-    fn shape(self, kind: usize) -> Option<Shape> {
+impl AxisTolerance {
+    /// Returns the shape of a distribution within the tolerance, by its index in [`DISTRIBUTIONS`];
+    /// `None` for a uniform one.
+    fn shape(self, kind: usize) -> Option<DistributionShape> {
         match kind {
-            0 => Some(Shape::Normal {
+            0 => Some(DistributionShape::Normal {
                 mean: self.middle,
                 sd: (self.to - self.from) / 2.0 / DEVIATIONS,
             }),
-            1 => Some(Shape::Lognormal {
+            1 => Some(DistributionShape::Lognormal {
                 median: self.middle,
                 sigma: libm::log(self.to / self.middle) / DEVIATIONS,
             }),
@@ -267,9 +269,14 @@ impl Tolerance {
     }
 }
 
-/// A distribution, cut at `from` and `to`.
-fn distribution(section: Section<'_>, own: &Own<'_>, points: u64) -> Option<Located<AxisValues>> {
-    let (at, report) = (section.at().clone(), section.report);
+/// Reads a distribution truncated at `from` and `to`.
+fn distribution(
+    section: Section<'_>,
+    own: &SweptFacts<'_>,
+    points: u64,
+) -> Option<Located<AxisValues>> {
+    let at = section.at().clone();
+    let report = section.report;
     let range = own.range;
     let field = section.choice("kind", &DISTRIBUTIONS.map(|(kind, _)| kind));
     let kind = section.require(field, "kind", "`normal`, `lognormal` or `uniform`");
@@ -281,20 +288,25 @@ fn distribution(section: Section<'_>, own: &Own<'_>, points: u64) -> Option<Loca
     };
     let tolerance = own.tolerance(&section);
     let (shape, bounds) = if let Field::Absent = tolerance {
-        // An unknown kind has no list of keys, but each key has its range.
+        // An unknown kind has no list of keys, but each key has a range.
         let keys = kind.map_or(&DISTRIBUTIONS[..], |kind| &DISTRIBUTIONS[kind..=kind]);
         let keys = keys.iter().flat_map(|(_, numbers)| *numbers);
         let numbers: Vec<_> =
             keys.map(|&(key, range)| number(key, range, kind.is_some())).collect();
         let shape = match (kind, numbers.as_slice()) {
-            (Some(0), &[Some(mean), Some(sd)]) => Some(Shape::Normal { mean, sd }),
-            (Some(1), &[Some(median), Some(sigma)]) => Some(Shape::Lognormal { median, sigma }),
+            (Some(0), &[Some(mean), Some(sd)]) => Some(DistributionShape::Normal { mean, sd }),
+            (Some(1), &[Some(median), Some(sigma)]) => {
+                Some(DistributionShape::Lognormal { median, sigma })
+            }
             _ => None,
         };
         let [from, to] = ["from", "to"].map(|key| number(key, range, kind == Some(2)));
         section.finish();
         let bounds = match shape {
-            Some(shape) => [from.unwrap_or(shape.at(-REACH)), to.unwrap_or(shape.at(REACH))],
+            Some(shape) => [
+                from.unwrap_or(shape.at(-TAIL_DEVIATIONS)),
+                to.unwrap_or(shape.at(TAIL_DEVIATIONS)),
+            ],
             None => [from?, to?],
         };
         (shape, bounds)
@@ -332,10 +344,10 @@ fn distribution(section: Section<'_>, own: &Own<'_>, points: u64) -> Option<Loca
     let value = match shape {
         None => AxisValues::Linear { from, to, count: 2 },
         Some(shape) => {
-            let [low, high] = [shape.at(-REACH), shape.at(REACH)];
+            let [low, high] = [shape.at(-TAIL_DEVIATIONS), shape.at(TAIL_DEVIATIONS)];
             if to <= low || high <= from {
                 let title =
-                    format!("nothing of the distribution lies from {from_said} to {to_said}");
+                    format!("no part of the distribution lies between {from_said} and {to_said}");
                 let [low, high] = [low, high].map(decimal);
                 let expected = format!("expected bounds within {low} and {high}");
                 return report.refuse(&at, title, expected);
@@ -346,15 +358,15 @@ fn distribution(section: Section<'_>, own: &Own<'_>, points: u64) -> Option<Loca
     Some(Located { value, at })
 }
 
-/// What a design spreads so many points over: a distribution, or a range without a count.
-fn extent(section: &Section<'_>, own: &Own<'_>, points: u64) -> Option<Located<AxisValues>> {
+/// Reads the range or distribution over which a design spreads `points` points.
+fn extent(section: &Section<'_>, own: &SweptFacts<'_>, points: u64) -> Option<Located<AxisValues>> {
     let reason = "a design spreads its points over `range = { from = ..., to = ... }`";
     section.misplace(&["values"], reason);
     let tolerance = own.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
         section.misplace(&["range", "distribution"], BESIDE_TOLERANCE);
         section.misplace(&["count"], "the number of points belongs in [design], as `points`");
-        let Located { value: Tolerance { from, to, .. }, at } = tolerance.given()?;
+        let Located { value: AxisTolerance { from, to, .. }, at } = tolerance.given()?;
         return Some(Located { value: AxisValues::Linear { from, to, count: 2 }, at });
     }
     match section.table("distribution", "distribution = { kind, ... }").given() {
@@ -370,22 +382,22 @@ fn extent(section: &Section<'_>, own: &Own<'_>, points: u64) -> Option<Located<A
     }
 }
 
-/// Why other keys are refused beside a tolerance.
+/// The reason for rejecting other keys beside a tolerance.
 const BESIDE_TOLERANCE: &str = "`tolerance` gives the ends, about the machine's own number";
 
-/// Neighbours on a range are apart by at least this share of the greater end, or else rounding
-/// would put some on one number.
-const CLOSEST: f64 = 8.0 * f64::EPSILON;
+/// Minimum distance between neighbouring values, as a share of the greater end. Basis: closer
+/// values could round to the same number.
+const MIN_SEPARATION: f64 = 8.0 * f64::EPSILON;
 
-/// How many values a range has room for, if that is fewer than any range may have.
+/// Returns the maximum number of distinct values in a range; `None` if it exceeds every limit.
 fn most_distinct(from: f64, to: f64) -> Option<u64> {
-    let steps = ((to - from).abs() / (CLOSEST * from.abs().max(to.abs()))).floor();
-    // Both ends are exact, however close.
+    let steps = ((to - from).abs() / (MIN_SEPARATION * from.abs().max(to.abs()))).floor();
+    // Both ends are exact, however close they are.
     (steps < MAX_POINTS as f64).then_some((steps as u64 + 1).max(2))
 }
 
-/// The values of an axis: listed, or a range.
-fn values(section: &Section<'_>, own: &Own<'_>) -> Option<Located<AxisValues>> {
+/// Reads the values of an axis: listed, or as a range.
+fn values(section: &Section<'_>, own: &SweptFacts<'_>) -> Option<Located<AxisValues>> {
     let range = own.range;
     let tolerance = own.tolerance(section);
     if !matches!(tolerance, Field::Absent) {
@@ -393,7 +405,7 @@ fn values(section: &Section<'_>, own: &Own<'_>) -> Option<Located<AxisValues>> {
         let expected = "the number of values, both ends included";
         let count = section.whole("count", &(2..=MAX_POINTS));
         let count = section.require(count, "count", expected);
-        let Located { value: Tolerance { from, to, .. }, at } = tolerance.given()?;
+        let Located { value: AxisTolerance { from, to, .. }, at } = tolerance.given()?;
         let count = count?.value;
         if let Some(most) = most_distinct(from, to).filter(|&most| most < count) {
             let title = format!("a tolerance has no {count} different values");
@@ -446,13 +458,14 @@ fn list(
     sound.then_some(Located { value: values, at: listed.at })
 }
 
-/// A range: with a count, or for so many points of a design.
+/// Reads a range with a count, or one for the `points` points of a design.
 pub fn spacing(
     section: Section<'_>,
     range: Range,
     points: Option<u64>,
 ) -> Option<Located<AxisValues>> {
-    let (at, report) = (section.at().clone(), section.report);
+    let at = section.at().clone();
+    let report = section.report;
     let [from, to] =
         ["from", "to"].map(|key| section.require(section.number(key, range), key, "a number"));
     let count = match points {
@@ -468,8 +481,12 @@ pub fn spacing(
     };
     let logarithmic = section.choice("spacing", &["linear", "log"]).or(0);
     section.finish();
-    let (from, to, count, logarithmic) = (from?, to?, count?, logarithmic? == 1);
-    let (is_point, is_design) = (from.value == to.value, points.is_some());
+    let from = from?;
+    let to = to?;
+    let count = count?;
+    let logarithmic = logarithmic? == 1;
+    let is_point = from.value == to.value;
+    let is_design = points.is_some();
     let [low, high] = [from.value, to.value].map(decimal);
     if is_point && is_design {
         let title = format!("a design cannot spread points from {low} to {high}");
@@ -498,8 +515,10 @@ pub fn spacing(
         let expected = format!("expected at most {most}, or ends farther apart");
         return report.refuse(&count.at, title, expected);
     }
-    // Two values are the ends of a design's range; the design finds the points between.
-    let (from, to, count) = (from.value, to.value, if is_design { 2 } else { count.value });
+    // A design's range has its two ends as values; the design chooses the points between.
+    let from = from.value;
+    let to = to.value;
+    let count = if is_design { 2 } else { count.value };
     let value = if logarithmic {
         AxisValues::Log { from, to, count }
     } else {

@@ -1,4 +1,4 @@
-//! A plan as JSON: a result file carries it as its input, and it tells the plans of two runs apart.
+//! A plan as canonical JSON: the input in a result file, and the text by which plans are compared.
 
 use serde_json::{Value, json};
 use sweep_parameter::Parameter as _;
@@ -7,14 +7,14 @@ use super::{Keys, Read, sections};
 use crate::{Axis, AxisValues, Design, Distribution, Plan};
 
 impl<M: Read> Plan<M> {
-    /// The whole plan with every default and constant in place, in the grid file's own terms:
-    /// `name`, `time`, `integrator`, `axis`, `reliability`, what the model says of itself, and
-    /// under `set` what `--set` has changed, if it has.
+    /// Returns the plan with all defaults and constants, in the keys of grid files: `name`, `time`,
+    /// `integrator`, `axis`, `reliability`, the model's own keys, and under `set` the changes by
+    /// `--set`, if there are any.
     ///
-    /// Canonical: keys are sorted, and numbers are written as the shortest decimal that reads back
-    /// to the same bits, so two plans are the same if and only if their texts are.
+    /// The text is canonical: keys are sorted, and numbers are the shortest decimals that read back
+    /// to the same bits, so that two plans are equal if and only if their texts are.
     pub fn to_json(&self) -> Value {
-        // Not the axes, which may be long.
+        // The axes are left out of this copy, because they may be long.
         let mut plan = Self {
             name: self.name.clone(),
             model: self.model.clone(),
@@ -26,21 +26,21 @@ impl<M: Read> Plan<M> {
             ..Self::blank()
         };
         let axes = self.axes.iter().map(|axis| self::axis(axis, self.design.as_ref()));
-        let told = Keys::told(false, |keys| {
+        let description = Keys::described(false, |keys| {
             sections::walk(&mut plan, keys);
             keys.write("axis", axes.collect());
             if !self.set.is_empty() {
                 keys.write("set", self.set.iter().cloned().collect());
             }
         });
-        told.finish()
+        description.finish()
     }
 }
 
 fn axis<M: Read>(axis: &Axis<M>, design: Option<&Design>) -> Value {
     let parameter = axis.parameter.name();
     if let Some(Design::List { .. }) = design {
-        // The values are the result's own columns, and the design's hash is over them all.
+        // The values are columns of the result, and the design's hash covers them.
         return json!({ "parameter": parameter });
     }
     let range = |from: f64, to: f64, count: u64, spacing: &str| {

@@ -1,39 +1,42 @@
-//! `[design]`: points by a rule over the axes' ranges, or listed in a file of their own.
+//! The section `[design]`: points by a rule over the axes' ranges, or listed in a file.
 
 use super::keys::Variants;
-use super::{Field, Form, Key, Keys, Walk};
+use super::{Field, Form, Key, KeyWalk, Keys};
 use crate::Design;
-use crate::design::Rule;
+use crate::design::DesignRule;
 use crate::plan::MAX_POINTS;
 
-/// `seed` when the grid names none.
+/// The seed of a design whose file gives none.
 pub const DEFAULT_SEED: u64 = 0;
-/// Greatest seed: what JSON and TOML carry exactly everywhere.
-pub const MOST_SEED: u64 = (1 << 53) - 1;
-/// Points of Sobol's sequence with 32 bits.
-const MOST_SOBOL: u64 = 1 << 32;
+/// Maximum seed. Basis: every JSON and TOML reader has it exactly.
+pub const MAX_SEED: u64 = (1 << 53) - 1;
+/// The number of points of a Sobol sequence with 32 bits.
+const MAX_SOBOL_POINTS: u64 = 1 << 32;
 
-/// Walks over the section. Where it is read a list has no points yet.
+/// Walks over the section. After reading, a list has no points yet.
 pub fn walk(design: &mut Option<Design>, keys: &mut Keys<'_>) -> Field<()> {
     keys.table(Key::new("design", ""), |keys| {
-        let rules = Rule::ALL.map(|(_, name, about)| (name, about));
+        let rules = DesignRule::ALL.map(|(_, name, about)| (name, about));
         let all = [&rules[..], &[("list", "points as listed")]].concat();
         let now = design.as_ref().map(Design::method);
         let now = all.iter().position(|(name, _)| Some(*name) == now);
         let key =
             Key::new("method", "").needed("`latin_hypercube`, `sobol`, `monte_carlo` or `list`");
         let variants = Variants { all, default: None, set: 0 };
-        let chosen = keys.variants(key, &variants, now, |keys, k| match Rule::ALL.get(k) {
+        let chosen = keys.variants(key, &variants, now, |keys, k| match DesignRule::ALL.get(k) {
             Some((rule, ..)) => spread(*rule, design, keys),
             None => listed(design, keys),
         });
-        // A stand-in for what is refused, so that the axes are read all the same.
+        // A stand-in for a rejected design lets the axes be read.
         if chosen.is_none() && keys.section().is_some() && design.is_none() {
-            *design =
-                Some(Design::Spread { rule: Rule::MonteCarlo, points: 1, seed: DEFAULT_SEED });
+            *design = Some(Design::Spread {
+                rule: DesignRule::MonteCarlo,
+                points: 1,
+                seed: DEFAULT_SEED,
+            });
         }
-        if matches!(keys.walk, Walk::Set(_)) && !matches!(design, Some(Design::Spread { .. })) {
-            spread(Rule::LatinHypercube, &mut None, keys);
+        if matches!(keys.walk, KeyWalk::Set(_)) && !matches!(design, Some(Design::Spread { .. })) {
+            spread(DesignRule::LatinHypercube, &mut None, keys);
         }
     })
 }
@@ -57,19 +60,19 @@ fn listed(design: &mut Option<Design>, keys: &mut Keys<'_>) {
     }
 }
 
-fn spread(rule: Rule, design: &mut Option<Design>, keys: &mut Keys<'_>) {
+fn spread(rule: DesignRule, design: &mut Option<Design>, keys: &mut Keys<'_>) {
     keys.misplace(&["file"], "only the method \"list\" has it");
     let numbers = match design {
         Some(Design::Spread { points, seed, .. }) => Some((*points, *seed)),
         Some(Design::List { .. }) | None => None,
     };
-    // Stand-ins for what is refused, so that the axes are read all the same.
+    // Stand-ins for rejected numbers let the axes be read.
     let (mut points, mut seed) = numbers.unwrap_or((1, DEFAULT_SEED));
-    let most = if rule == Rule::Sobol { MOST_SOBOL } else { MAX_POINTS };
-    let key = Key::new("points", "how many").needed("the number of points").set();
+    let most = if rule == DesignRule::Sobol { MAX_SOBOL_POINTS } else { MAX_POINTS };
+    let key = Key::new("points", "the number of points").needed("the number of points").set();
     let points_found = keys.key(key, &Form::Whole(1..=most), &mut points);
-    let key = Key::new("seed", "another seed, another draw").set();
-    let seed_found = keys.key(key, &Form::Whole(0..=MOST_SEED), &mut seed);
+    let key = Key::new("seed", "the seed of the random positions").set();
+    let seed_found = keys.key(key, &Form::Whole(0..=MAX_SEED), &mut seed);
     for (name, field) in [("points", points_found), ("seed", seed_found)] {
         if let (None, Field::Given(_)) = (numbers, field) {
             let title =

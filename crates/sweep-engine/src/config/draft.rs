@@ -1,43 +1,43 @@
-//! A grid file while it is read.
+//! The state of a grid file while it is read.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use super::{Located, Report, twice};
+use super::{Located, Report, written_twice};
 use crate::{Model, Plan};
 
-/// A plan in the making: whole, but sound only if nothing was reported.
+/// A plan while it is read; it is valid only if nothing was reported.
 pub struct Draft<'a, M: Model> {
-    /// The plan.
+    /// The plan so far.
     pub plan: Plan<M>,
-    /// Where its numbers were written, and what is wrong.
+    /// The locations of its numbers, and the mistakes.
     pub report: &'a Report,
-    /// What `[set]`, `--set` and `--at` have written.
-    pub constants: Vec<Constant<M>>,
+    /// The constants that `[set]`, `--set` and `--at` have written.
+    pub constants: Vec<SetConstant<M>>,
 }
 
-/// A name with its value.
+/// A constant: a parameter's name with its value.
 #[derive(Clone)]
-pub struct Constant<M: Model> {
-    /// The name, and where it stands.
+pub struct SetConstant<M: Model> {
+    /// The name with its location.
     pub name: Located<String>,
-    /// What it names.
+    /// The parameter.
     pub parameter: M::Parameter,
-    /// Its value.
+    /// The value with its location.
     pub value: Located<f64>,
     /// The single numbers that it writes.
     pub parts: Vec<Cow<'static, str>>,
-    /// Whether it is over the file, and so fixes what an axis sweeps.
+    /// Whether it overrides the file, and so fixes a swept parameter.
     pub is_over_file: bool,
 }
 
-/// Single numbers that are written, each with the name that does.
+/// The single numbers that are written, each with the name that writes it.
 #[derive(Default)]
-pub(super) struct Claimed(BTreeMap<Cow<'static, str>, Located<String>>);
+pub(super) struct ClaimedNumbers(BTreeMap<Cow<'static, str>, Located<String>>);
 
-impl Claimed {
-    /// Takes note of the numbers that a name writes. Not if another name writes one of them: that
-    /// is reported, as nothing says which comes last.
+impl ClaimedNumbers {
+    /// Claims the numbers that a name writes. Returns false, after a report, if another name writes
+    /// one of them, because their order is not defined.
     pub(super) fn claim(
         &mut self,
         name: &Located<impl AsRef<str>>,
@@ -45,7 +45,7 @@ impl Claimed {
         report: &Report,
     ) -> bool {
         if let Some(first) = parts.iter().find_map(|part| self.0.get(part)) {
-            report.push(twice(name, first));
+            report.push(written_twice(name, first));
             return false;
         }
         let name = Located { value: name.value.as_ref().to_owned(), at: name.at.clone() };

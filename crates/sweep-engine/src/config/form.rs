@@ -1,5 +1,5 @@
-//! What may stand under a key: how it is read, how an option gives it, and its schema. Values are
-//! as a plan has them, in JSON.
+//! The forms of values: how each is read from a file and from an option, and its schema. Values are
+//! JSON, as in plans.
 
 use std::ops::RangeInclusive;
 
@@ -7,45 +7,45 @@ use serde_json::{Value, json};
 use sweep_parameter::{Parameter, Range};
 
 use super::words::names;
-use super::{Diagnostic, Field, Located, Section, Written};
+use super::{Diagnostic, Field, Located, NamedArgument, Section};
 
 /// A kind of value.
 pub enum Form<'k> {
-    /// A number.
+    /// A number in a range.
     Number(Range),
-    /// A whole number.
+    /// A whole number within bounds.
     Whole(RangeInclusive<u64>),
     /// A string.
     Text,
-    /// One of these words.
+    /// A word of a list.
     Word(&'k [&'static str]),
-    /// Some of these words, each once, which messages call so.
+    /// Some words of a list, each once. The first field names them in messages.
     Words(&'static str, &'k [&'static str]),
     /// An array of numbers.
     Numbers(Numbers),
-    /// What has a reader and a schema of its own, and no option.
+    /// A value with a reader and a schema of its own, which no option sets.
     Own(&'k dyn Fn(&Section<'_>, &'static str) -> Field<Value>, Value),
 }
 
 /// An array of numbers.
 #[derive(Clone)]
 pub struct Numbers {
-    /// Of each.
+    /// The range of each number in the schema.
     pub range: Range,
-    /// Of each when it is read, if the rest is judged later.
+    /// The range of each number when it is read, if it is checked later.
     pub read: Range,
-    /// How many.
+    /// The number of entries.
     pub count: RangeInclusive<usize>,
-    /// What their places are kept under, if not under that of all with the number of each.
+    /// The keys of the entries' locations, if they are not the array's key with an index.
     pub places: Vec<String>,
-    /// What is expected where they are more or fewer.
+    /// The text of the message about a wrong number of entries.
     pub expected: String,
-    /// What to do then.
+    /// The help of that message.
     pub help: Option<&'static str>,
 }
 
 impl Form<'_> {
-    /// The value in a file. The places of several numbers are kept under `place`.
+    /// Reads the value from a file. Locations of several numbers are kept under `place`.
     pub fn read(&self, section: &Section<'_>, key: &'static str, place: &str) -> Field<Value> {
         match self {
             Self::Number(range) => section.number(key, *range).map(|found| found.value.into()),
@@ -58,8 +58,8 @@ impl Form<'_> {
         }
     }
 
-    /// The value that an option gives.
-    pub fn typed(&self, written: &Written<'_>) -> Option<Value> {
+    /// Reads the value from an option.
+    pub fn read_option(&self, written: &NamedArgument<'_>) -> Option<Value> {
         Some(match self {
             Self::Number(range) => written.number(*range)?.value.into(),
             Self::Whole(bounds) => written.whole(bounds)?.into(),
@@ -69,7 +69,7 @@ impl Form<'_> {
         })
     }
 
-    /// Its schema.
+    /// Returns the schema of the value.
     pub fn schema(&self) -> Value {
         match self {
             Self::Number(range) => number(*range),
@@ -93,7 +93,7 @@ impl Form<'_> {
 }
 
 impl Numbers {
-    /// So many numbers in a range.
+    /// Returns an array of numbers in a range.
     pub fn new(range: Range, count: RangeInclusive<usize>, expected: impl Into<String>) -> Self {
         Self {
             range,
@@ -124,7 +124,7 @@ impl Numbers {
     }
 }
 
-/// The schema of a number in a range.
+/// Returns the schema of a number in a range.
 pub fn number(range: Range) -> Value {
     let largest = Range::LARGEST;
     match range {
@@ -138,7 +138,7 @@ pub fn number(range: Range) -> Value {
     }
 }
 
-/// What a schema says of a parameter's number.
-pub fn about(parameter: &impl Parameter) -> String {
+/// Returns the description of a parameter's number in schemas.
+pub fn describe_parameter(parameter: &impl Parameter) -> String {
     format!("{}, {}", parameter.description(), parameter.unit())
 }

@@ -1,4 +1,4 @@
-//! Reads a grid file, with the constants and options of the command line.
+//! Reading of grid files with the constants and options of the command line.
 
 use super::draft::Draft;
 use super::keys::Options;
@@ -7,14 +7,14 @@ use super::source::{Location, SourceId, is_blank};
 use super::syntax::{self, parse};
 use super::written::name_of;
 use super::{
-    Diagnostic, Field, GridInput, Keys, Located, Read, Report, Section, Walk, axes, design, list,
-    parameters,
+    Diagnostic, Field, GridInput, KeyWalk, Keys, Located, Read, Report, Section, axes, design,
+    list, parameters,
 };
 use crate::{Design, Plan, program};
 use sweep_parameter::Parameter as _;
 use toml::de::DeTable;
 
-/// Reads the grid file and puts the constants in place. `None` if the grid file has no text.
+/// Reads the grid file and applies the constants. Returns `None` if the file has no text.
 pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
     let GridInput { path, text, sets, at, .. } = input;
     let shown = path.display();
@@ -35,7 +35,7 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
     }
     let root = Section::new("the grid file", Location::new(source, 0..0), table.get_ref(), report);
 
-    let mut keys = Keys::new(Walk::Read(root));
+    let mut keys = Keys::new(KeyWalk::Read(root));
     let mut draft = Draft { plan: Plan::blank(), report, constants: Vec::new() };
     sections(&mut draft.plan, &mut keys, Some(input));
     let names = described::<M>().set;
@@ -58,18 +58,18 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
                 None => drop(root.tables("axis")),
             }
         }
-        // The right axes depend on a design that is no table.
+        // A [design] that is no table leaves it unknown which axes are right.
         (Field::Bad, None) => drop(root.tables("axis")),
         (_, design) => axes::axes(root, design, &mut draft),
     }
     keys.finish();
     let options = Options::read(options, report);
-    walk(&mut draft.plan, &mut Keys::new(Walk::Set(&options)));
+    walk(&mut draft.plan, &mut Keys::new(KeyWalk::Set(&options)));
     draft.plan.set.extend(options.changed.into_inner());
     Some(draft)
 }
 
-/// Reads `[columns]`: headers of lists and measurements with the names of what they hold.
+/// Reads `[columns]`: headers of lists and measurements with the names that they stand for.
 fn columns(root: &Section<'_>) -> Vec<(String, String)> {
     let Some(section) = root.table("columns", "[columns]").given() else { return Vec::new() };
     let section = section.value;
@@ -84,8 +84,8 @@ fn columns(root: &Section<'_>) -> Vec<(String, String)> {
 pub const STUDY: [&str; 8] =
     ["name", "grid", "parameter", "population", "candidates", "seed", "objective", "conditions"];
 
-/// Refuses a file as a whole that should be of one kind and is of another: it has most of its keys
-/// from that one, and none that the other has not.
+/// Rejects a file of another kind: most of its keys belong to that kind, and none to this kind
+/// alone. Returns whether it was rejected.
 pub fn is_another<M: Read>(
     own: &str,
     table: &DeTable<'_>,
@@ -108,7 +108,8 @@ pub fn is_another<M: Read>(
     let kinds = [own, "grid", "study", M::OWN_FILE.unwrap_or_default()];
     let Some(kind) = kinds.into_iter().find(is).filter(|kind| *kind != own) else { return false };
     report.push_with(|sources| {
-        let (program, name) = (program(), sources.name(source));
+        let program = program();
+        let name = sources.name(source);
         let help = match kind {
             "grid" => {
                 format!("`{program} run` takes it, and a study file names it: grid = {name:?}")

@@ -1,6 +1,6 @@
-//! One walk over the keys of a file. It says each key once: its kind, what it means, and where its
-//! value stands. By it a file is read, `--set` is put in place, a plan is written as JSON, and the
-//! schema of files is made.
+//! A walk over the keys of a file, which states each key once with its kind, description and value.
+//! The same walk reads a file, applies `--set`, writes a plan as JSON, and makes the schema of
+//! files.
 
 use std::cell::RefCell;
 
@@ -8,99 +8,99 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 
-use super::section::listed;
-use super::{Field, Form, Located, Report, Section, Written, twice};
+use super::section::list_choices;
+use super::{Field, Form, Located, NamedArgument, Report, Section, written_twice};
 
 /// A key of a table.
 #[derive(Clone, Copy)]
 pub struct Key<'k> {
     name: &'static str,
-    /// For schemas.
+    /// The description in schemas.
     description: &'k str,
-    /// What is expected where a file leaves it out, if it may not.
+    /// The expected value, if the key is required.
     needed: Option<&'k str>,
-    /// Whether `--set` takes it.
+    /// Whether `--set` takes the key.
     is_set: bool,
 }
 
 impl<'k> Key<'k> {
-    /// A key that may be left out.
+    /// Returns an optional key.
     pub const fn new(name: &'static str, description: &'k str) -> Self {
         Self { name, description, needed: None, is_set: false }
     }
 
-    /// The same, but it must be there.
+    /// Returns the key as a required one.
     #[must_use]
     pub const fn needed(self, expected: &'k str) -> Self {
         Self { needed: Some(expected), ..self }
     }
 
-    /// The same, but `--set` takes it too.
+    /// Returns the key as one that `--set` takes.
     #[must_use]
     pub const fn set(self) -> Self {
         Self { is_set: true, ..self }
     }
 }
 
-/// What a walk over keys does.
-pub enum Walk<'a> {
-    /// Takes the values of a file.
+/// The purpose of a walk over keys.
+pub enum KeyWalk<'a> {
+    /// Reads the values of a file.
     Read(Section<'a>),
-    /// Puts options in place of values.
+    /// Replaces values by options.
     Set(&'a Options<'a>),
-    /// Tells of values as JSON, or of keys as a schema.
-    Tell(Told),
+    /// Describes values as JSON, or keys as a schema.
+    Describe(Description),
 }
 
-/// Options of the command line that take the place of a file's values.
+/// Options of the command line that replace values of a file.
 pub struct Options<'a> {
-    written: Vec<Written<'a>>,
-    /// What they changed, by name.
+    written: Vec<NamedArgument<'a>>,
+    /// The changes by name.
     pub changed: RefCell<Vec<(String, Value)>>,
     report: &'a Report,
 }
 
 impl<'a> Options<'a> {
-    /// Takes arguments NAME=VALUE apart.
+    /// Parses arguments NAME=VALUE.
     pub fn read(arguments: impl IntoIterator<Item = &'a String>, report: &'a Report) -> Self {
-        let mut written: Vec<Written<'_>> = Vec::new();
+        let mut written: Vec<NamedArgument<'_>> = Vec::new();
         for argument in arguments {
-            let Some(next) = Written::read("--set", argument, report) else { continue };
+            let Some(next) = NamedArgument::read("--set", argument, report) else { continue };
             match written.iter().find(|known| known.name.value == next.name.value) {
-                Some(first) => report.push(twice(&next.name, &first.name)),
+                Some(first) => report.push(written_twice(&next.name, &first.name)),
                 None => written.push(next),
             }
         }
         Self { written, changed: RefCell::default(), report }
     }
 
-    /// The value under a name. Another than that which stands is noted.
+    /// Returns the value under a name, and notes it if it differs from `was`.
     fn value(&self, name: &str, kind: &Form<'_>, was: &Value) -> Field<Value> {
         let Some(written) = self.written.iter().find(|written| written.name.value == name) else {
             return Field::Absent;
         };
-        let Some(value) = kind.typed(written) else { return Field::Bad };
+        let Some(value) = kind.read_option(written) else { return Field::Bad };
         if value != *was {
-            // Several words are as they were written.
-            let said = if value.is_array() { written.value.value.into() } else { value.clone() };
-            self.changed.borrow_mut().push((name.to_owned(), said));
+            // A list of words is noted as it was written.
+            let noted = if value.is_array() { written.value.value.into() } else { value.clone() };
+            self.changed.borrow_mut().push((name.to_owned(), noted));
         }
         Field::Given(Located { value, at: written.value.at.clone() })
     }
 }
 
-/// What was told of a table so far.
+/// The description of a table so far.
 #[derive(Default)]
-pub struct Told {
+pub struct Description {
     is_schema: bool,
     entries: Map<String, Value>,
     required: Vec<&'static str>,
     variants: Vec<Value>,
-    /// The keys that `--set` takes, of this table and those in it.
+    /// The keys of this table and its inner tables that `--set` takes.
     pub set: Vec<&'static str>,
 }
 
-impl Told {
+impl Description {
     /// Adds a key with its value or schema.
     pub fn add(&mut self, key: Key<'_>, mut value: Value) {
         if self.is_schema {
@@ -113,14 +113,14 @@ impl Told {
         self.entries.insert(key.name.to_owned(), value);
     }
 
-    /// What another walk of this kind tells.
-    fn inside<'a>(&mut self, walk: impl FnOnce(&mut Keys<'a>)) -> Value {
-        let mut told = Keys::told(self.is_schema, walk);
-        self.set.append(&mut told.set);
-        told.finish()
+    /// Returns the description of an inner table.
+    fn describe_inner<'a>(&mut self, walk: impl FnOnce(&mut Keys<'a>)) -> Value {
+        let mut description = Keys::described(self.is_schema, walk);
+        self.set.append(&mut description.set);
+        description.finish()
     }
 
-    /// The table that has a key, if one of these has.
+    /// Returns the first of these tables that has a key.
     pub fn table_of<'t>(&self, key: &str, tables: &[&'t str]) -> Option<&'t str> {
         let has = |schema: &Value| schema["properties"].get(key).is_some();
         let any =
@@ -129,7 +129,7 @@ impl Told {
         tables.iter().copied().find(|table| entry(table))
     }
 
-    /// The table, or its schema.
+    /// Returns the table, or its schema.
     pub fn finish(self) -> Value {
         match (self.is_schema, self.variants.is_empty()) {
             (false, _) => self.entries.into(),
@@ -139,106 +139,113 @@ impl Told {
     }
 }
 
-/// The keys of a table, as a walk comes to them.
+/// The keys of a table during a walk.
 pub struct Keys<'a> {
-    /// What the walk does.
-    pub walk: Walk<'a>,
-    /// What the names begin with under which the places of values are kept.
+    /// The purpose of the walk.
+    pub walk: KeyWalk<'a>,
+    /// The prefix of the keys under which locations are kept.
     pub places: String,
-    /// Whether it is not known which keys belong here: those that are there are judged.
+    /// Whether the table's variant is unknown, so that only keys that are present are checked.
     is_loose: bool,
 }
 
 impl<'a> Keys<'a> {
-    /// The keys at the top.
-    pub fn new(walk: Walk<'a>) -> Self {
+    /// Returns the keys of the top table.
+    pub fn new(walk: KeyWalk<'a>) -> Self {
         Self { walk, places: String::new(), is_loose: false }
     }
 
-    /// What a walk tells: of keys, or of values.
-    pub fn told(is_schema: bool, walk: impl FnOnce(&mut Self)) -> Told {
-        let mut keys = Self::new(Walk::Tell(Told { is_schema, ..Told::default() }));
+    /// Returns the description of a walk: a schema, or values.
+    pub fn described(is_schema: bool, walk: impl FnOnce(&mut Self)) -> Description {
+        let mut keys =
+            Self::new(KeyWalk::Describe(Description { is_schema, ..Description::default() }));
         walk(&mut keys);
-        if let Walk::Tell(told) = keys.walk { told } else { Told::default() }
-    }
-
-    /// Whether a walk tells of keys.
-    pub fn is_schema(&self) -> bool {
-        matches!(&self.walk, Walk::Tell(told) if told.is_schema)
-    }
-
-    /// Adds what a walk that tells knows: a value, or the schema of a key.
-    pub fn tell(&mut self, key: Key<'_>, value: impl FnOnce(bool) -> Value) {
-        if let Walk::Tell(told) = &mut self.walk {
-            let value = value(told.is_schema);
-            told.add(key, value);
+        if let KeyWalk::Describe(description) = keys.walk {
+            description
+        } else {
+            Description::default()
         }
     }
 
-    /// Adds a value to what is told of values: no file has it.
+    /// Returns whether the walk makes a schema.
+    pub fn is_schema(&self) -> bool {
+        matches!(&self.walk, KeyWalk::Describe(description) if description.is_schema)
+    }
+
+    /// Adds a key's value or schema, if the walk describes.
+    pub fn describe(&mut self, key: Key<'_>, value: impl FnOnce(bool) -> Value) {
+        if let KeyWalk::Describe(description) = &mut self.walk {
+            let value = value(description.is_schema);
+            description.add(key, value);
+        }
+    }
+
+    /// Adds a value that no file has, if the walk describes values.
     pub fn write(&mut self, name: &'static str, value: Value) {
         if !self.is_schema() {
-            self.tell(Key::new(name, ""), |_| value);
+            self.describe(Key::new(name, ""), |_| value);
         }
     }
 
-    /// The table that is read, if one is.
+    /// Returns the table that is read, if the walk reads.
     pub fn section(&self) -> Option<&Section<'a>> {
-        if let Walk::Read(section) = &self.walk { Some(section) } else { None }
+        if let KeyWalk::Read(section) = &self.walk { Some(section) } else { None }
     }
 
-    /// Takes what is wrong, if values are read or set.
+    /// Returns the report of mistakes, if the walk reads or sets values.
     pub fn report(&self) -> Option<&'a Report> {
         match &self.walk {
-            Walk::Read(section) => Some(section.report),
-            Walk::Set(options) => Some(options.report),
-            Walk::Tell(_) => None,
+            KeyWalk::Read(section) => Some(section.report),
+            KeyWalk::Set(options) => Some(options.report),
+            KeyWalk::Describe(_) => None,
         }
     }
 
-    /// Refuses keys of a file that belong to another word, with a reason.
+    /// Rejects keys that belong to another variant, with a reason.
     pub fn misplace(&self, keys: &[&'static str], reason: &str) {
         self.section().into_iter().for_each(|section| section.misplace(keys, reason));
     }
 
-    /// Refuses an option for which there is no place.
+    /// Rejects an option that has no place in the plan.
     pub fn refuse(&self, name: &str, title: &str, expected: &str) {
-        let Walk::Set(options) = &self.walk else { return };
+        let KeyWalk::Set(options) = &self.walk else { return };
         for written in options.written.iter().filter(|written| written.name.value == name) {
             options.report.refuse::<()>(&written.name.at, title, expected);
         }
     }
 
-    /// A key with its value: a wrong or missing one is reported, and leaves the value as it is.
+    /// Walks over a key with its value. A wrong or missing value is reported and leaves the old
+    /// one.
     pub fn key<T: Serialize + DeserializeOwned>(
         &mut self,
         key: Key<'_>,
         kind: &Form<'_>,
         value: &mut T,
     ) -> Field<()> {
-        let (place, was) = (format!("{}{}", self.places, key.name), json!(value));
-        // What is not there is not written, and no default.
+        let place = format!("{}{}", self.places, key.name);
+        let was = json!(value);
+        // An empty value is neither written nor a default.
         let is_there = ![json!(null), json!([]), json!("")].contains(&was);
         let found = match &mut self.walk {
-            Walk::Read(section) if self.is_loose && section.is_known(key.name) => Field::Absent,
-            Walk::Read(section) => {
+            KeyWalk::Read(section) if self.is_loose && section.is_known(key.name) => Field::Absent,
+            KeyWalk::Read(section) => {
                 let field = kind.read(section, key.name, &place);
                 section.expect(field, key.name, key.needed.filter(|_| !self.is_loose))
             }
-            Walk::Set(options) if key.is_set => options.value(key.name, kind, &was),
-            Walk::Tell(told) if told.is_schema => {
+            KeyWalk::Set(options) if key.is_set => options.value(key.name, kind, &was),
+            KeyWalk::Describe(description) if description.is_schema => {
                 let mut schema = kind.schema();
                 if is_there && key.needed.is_none() {
                     schema["default"] = was;
                 }
-                told.add(key, schema);
+                description.add(key, schema);
                 Field::Absent
             }
-            Walk::Tell(told) if is_there => {
-                told.add(key, was);
+            KeyWalk::Describe(description) if is_there => {
+                description.add(key, was);
                 Field::Absent
             }
-            Walk::Set(_) | Walk::Tell(_) => Field::Absent,
+            KeyWalk::Set(_) | KeyWalk::Describe(_) => Field::Absent,
         };
         found.then(|Located { value: found, at }| {
             *value = serde_json::from_value(found).ok()?;
@@ -247,7 +254,7 @@ impl<'a> Keys<'a> {
         })
     }
 
-    /// A key with some of these things, by their names; messages call them so.
+    /// Walks over a key with some of `all`, by their names; `what` names them in messages.
     pub fn words<T: Copy>(
         &mut self,
         key: Key<'_>,
@@ -259,40 +266,40 @@ impl<'a> Keys<'a> {
         let names: Vec<&str> = all.iter().copied().map(name).collect();
         let mut words: Vec<String> = value.iter().map(|one| name(*one).to_owned()).collect();
         let found = self.key(key, &Form::Words(what, &names), &mut words);
-        let of = |word: &String| all.iter().copied().find(|one| name(*one) == word);
-        *value = words.iter().filter_map(of).collect();
+        let find = |word: &String| all.iter().copied().find(|one| name(*one) == word);
+        *value = words.iter().filter_map(find).collect();
         found
     }
 
-    /// A table under a key.
+    /// Walks over a table under a key.
     pub fn table(&mut self, key: Key<'_>, walk: impl FnOnce(&mut Keys<'a>)) -> Field<()> {
         let name = key.name;
         let keys = |inner| Keys { places: format!("{name}."), ..Keys::new(inner) };
         match &mut self.walk {
-            Walk::Read(root) => root
+            KeyWalk::Read(root) => root
                 .expect(root.table(name, &format!("[{name}]")), name, key.needed)
                 .map(|section| {
                     root.report.put(name, section.at);
-                    let mut keys = keys(Walk::Read(section.value));
+                    let mut keys = keys(KeyWalk::Read(section.value));
                     walk(&mut keys);
                     keys.finish();
                 }),
-            Walk::Set(options) => {
-                walk(&mut keys(Walk::Set(options)));
+            KeyWalk::Set(options) => {
+                walk(&mut keys(KeyWalk::Set(options)));
                 Field::Absent
             }
-            Walk::Tell(told) => {
-                let inner = told.inside(walk);
+            KeyWalk::Describe(description) => {
+                let inner = description.describe_inner(walk);
                 if inner != json!({}) {
-                    told.add(key, inner);
+                    description.add(key, inner);
                 }
                 Field::Absent
             }
         }
     }
 
-    /// An array of tables under a key: those that are read, or so many; `walk` goes over one by its
-    /// position.
+    /// Walks over an array of tables under a key: those in `read`, or `count` of them. `walk` takes
+    /// the index of a table.
     pub fn tables(
         &mut self,
         key: Key<'_>,
@@ -301,33 +308,33 @@ impl<'a> Keys<'a> {
         mut walk: impl FnMut(&mut Keys<'a>, usize),
     ) {
         for (k, section) in read.into_iter().enumerate() {
-            let mut keys = Keys::new(Walk::Read(section));
+            let mut keys = Keys::new(KeyWalk::Read(section));
             walk(&mut keys, k);
             keys.finish();
         }
-        let Walk::Tell(told) = &mut self.walk else { return };
-        let value = if told.is_schema {
-            let items = told.inside(|keys| walk(keys, 0));
+        let KeyWalk::Describe(description) = &mut self.walk else { return };
+        let value = if description.is_schema {
+            let items = description.describe_inner(|keys| walk(keys, 0));
             let mut schema = json!({ "type": "array", "items": items });
             if key.needed.is_some() {
                 schema["minItems"] = 1.into();
             }
             schema
         } else {
-            (0..count).map(|k| told.inside(|keys| walk(keys, k))).collect()
+            (0..count).map(|k| description.describe_inner(|keys| walk(keys, k))).collect()
         };
-        told.add(key, value);
+        description.add(key, value);
     }
 
-    /// Ends a walk: keys that it did not come to are refused.
+    /// Ends the walk: keys of the file that it did not name are rejected.
     pub fn finish(self) {
-        if let Walk::Read(section) = self.walk {
+        if let KeyWalk::Read(section) = self.walk {
             section.finish();
         }
     }
 
-    /// A key that says by a word which further keys there are: `walk` goes over those of a word, by
-    /// its position. `now` is the word that stands. Gives the word that is chosen.
+    /// Walks over a key whose word decides on further keys. `walk` takes the index of a word and
+    /// walks over its keys; `now` is the current word. Returns the word that is chosen.
     pub fn variants(
         &mut self,
         key: Key<'_>,
@@ -335,33 +342,33 @@ impl<'a> Keys<'a> {
         now: Option<usize>,
         mut walk: impl FnMut(&mut Self, usize),
     ) -> Option<usize> {
-        if let Walk::Tell(told) = &mut self.walk
-            && told.is_schema
+        if let KeyWalk::Describe(table) = &mut self.walk
+            && table.is_schema
         {
             for (k, (name, description)) in variants.all.iter().enumerate() {
                 let needed = (variants.default != Some(k)).then_some("");
-                let variant = told.inside(|keys| {
-                    keys.tell(Key { description, needed, ..key }, |_| json!({ "const": name }));
+                let variant = table.describe_inner(|keys| {
+                    keys.describe(Key { description, needed, ..key }, |_| json!({ "const": name }));
                     walk(keys, k);
                 });
-                told.variants.push(variant);
+                table.variants.push(variant);
             }
             return None;
         }
         let names: Vec<&str> = variants.all.iter().map(|(name, _)| *name).collect();
-        let expected = listed(&names);
+        let expected = list_choices(&names);
         let needed = key.needed.or(variants.default.is_none().then_some(&expected));
-        let can_be = if let Walk::Set(_) = self.walk { variants.set } else { names.len() };
+        let can_be = if let KeyWalk::Set(_) = self.walk { variants.set } else { names.len() };
         let mut word = now.map(|now| names[now].to_owned());
         let found = self.key(Key { needed, ..key }, &Form::Word(&names[..can_be]), &mut word);
-        if let (Walk::Set(options), Field::Given(found)) = (&self.walk, &found) {
-            // What a word decides is the whole table.
+        if let (KeyWalk::Set(options), Field::Given(found)) = (&self.walk, &found) {
+            // The word decides on the whole table, so that its location is that of the table.
             options.report.put(self.places.trim_end_matches('.'), found.at.clone());
         }
         let word = names.iter().position(|name| word.as_deref() == Some(name));
         let chosen = match (&self.walk, found) {
-            (Walk::Read(_), Field::Absent) => variants.default,
-            (Walk::Read(_), Field::Bad) => None,
+            (KeyWalk::Read(_), Field::Absent) => variants.default,
+            (KeyWalk::Read(_), Field::Bad) => None,
             _ => word,
         };
         self.is_loose = chosen.is_none() && self.section().is_some();
@@ -374,17 +381,17 @@ impl<'a> Keys<'a> {
     }
 }
 
-/// The words of a key that says which further keys there are.
+/// The words of a key that decides on further keys.
 pub struct Variants {
-    /// Each with what it means.
+    /// The words with their descriptions.
     pub all: Vec<(&'static str, &'static str)>,
-    /// The one that is chosen where a file names none; without, it must name one.
+    /// The word that is chosen if a file names none; `None` if it must name one.
     pub default: Option<usize>,
-    /// How many of them `--set` may choose, from the first on.
+    /// The number of words that `--set` may choose, from the first on.
     pub set: usize,
 }
 
-/// The schema of an object with these properties and no others.
+/// Returns the schema of an object with these properties and no others.
 pub fn table(
     properties: impl IntoIterator<Item = (impl Into<String>, Value)>,
     required: &[&str],

@@ -1,7 +1,7 @@
 //! Lists of points: files whose columns are parameters and whose rows are points.
 //!
-//! A list is read into memory as a whole. The bytes of its file, packed and unpacked, and the
-//! numbers in it are bounded; each bound is checked before the memory is taken.
+//! A list is read into memory as a whole. The size of its file, compressed and decompressed, and
+//! the number of its values are bounded; each bound is checked before memory is allocated.
 
 mod clock;
 mod csv;
@@ -19,37 +19,38 @@ use super::report::{Diagnostic, Report};
 use super::section::{counted, cut, quoted};
 use super::source::{Located, Location, SourceId, Sources, beside};
 use crate::design::Design;
-use layout::Line;
+use layout::TextLine;
 use sweep_files::regular;
 
 pub use names::Names;
 
-/// Longest list that is read, in bytes; and so of a Parquet file's pages unpacked.
-const LONGEST_BYTES: u64 = 256 << 20;
-/// Most numbers of a list.
-const MOST_NUMBERS: u64 = 20_000_000;
-/// Most columns of a list.
-const MOST_COLUMNS: usize = 1000;
-/// Most characters of a path in a message.
-const LONGEST_PATH: usize = 1000;
+/// Maximum size of a list, and of a Parquet file's decompressed pages, bytes. Basis: it holds the
+/// maximum number of values. Doubling it doubles the memory of a list.
+const MAX_LIST_BYTES: u64 = 256 << 20;
+/// Maximum number of values of a list. Basis: 160 MB of memory. Doubling it doubles that.
+const MAX_NUMBERS: u64 = 20_000_000;
+/// Maximum number of columns of a list. Basis: far more than a machine has parameters.
+const MAX_COLUMNS: usize = 1000;
+/// Maximum length of a path in a message, characters.
+const MAX_PATH_CHARACTERS: usize = 1000;
 
-/// Name of a column that is no parameter: it tells people which row is which.
+/// The name of a column that identifies rows for people and is no parameter.
 pub(super) const ID: &str = "id";
 
-/// Names of the columns in which programs number rows, beside those without a name.
+/// The names of columns in which programs number rows, beside empty names.
 const INDEX: [&str; 3] = ["__index_level_0__", "Unnamed: 0", "index"];
 
-/// Whether a column of this name only numbers rows.
+/// Returns whether a column of this name only numbers rows.
 pub fn is_index(name: &str) -> bool {
     name.is_empty() || INDEX.contains(&name)
 }
 
-/// A table of numbers in a file of its own, whatever they are; NaN where a value is missing.
+/// A table of numbers in a file; NaN for a missing value.
 pub struct NumberTable {
-    /// Its columns: those that are known, all of one length, and those that are left out.
+    /// The columns: known ones, all of one length, and ignored ones.
     pub columns: Vec<ListColumn>,
-    rows: Rows,
-    /// Lines before the line of names.
+    rows: RowLocations,
+    /// The number of lines before the line of names.
     preamble: usize,
 }
 
@@ -69,8 +70,8 @@ impl NumberTable {
         }
     }
 
-    /// A table in memory, which messages call so.
-    pub fn of_columns(
+    /// Returns a table of columns in memory; `name` stands in messages.
+    pub fn from_columns(
         name: &str,
         columns: Vec<(String, Vec<f64>)>,
         names: &Names<'_>,
@@ -95,28 +96,33 @@ impl NumberTable {
             let name = Located { value, at };
             table.push(ListColumn { name, header, place, is_known, values });
         }
-        Self { columns: table, rows: Rows::Binary(Location::new(source, 0..0)), preamble: 0 }
+        Self {
+            columns: table,
+            rows: RowLocations::Binary(Location::new(source, 0..0)),
+            preamble: 0,
+        }
     }
 
-    /// Whether a value was refused when it was read.
+    /// Returns whether a value was rejected when it was read.
     pub fn is_refused(&self, value: f64) -> bool {
-        matches!(self.rows, Rows::Lines { .. }) && value.is_nan()
+        matches!(self.rows, RowLocations::Lines { .. }) && value.is_nan()
     }
 
-    /// The place of a value: of a column by its place in the file, of a row from 0.
+    /// Returns the location of a value: `column` is the column's index in the file, `row` is from
+    /// 0.
     pub fn place(&self, sources: &Sources, column: usize, row: usize) -> Location {
         match &self.rows {
-            Rows::Binary(at) => at.clone(),
-            Rows::Lines { source, starts, separator } => {
+            RowLocations::Binary(at) => at.clone(),
+            RowLocations::Lines { source, starts, separator } => {
                 let start = starts.get(row).map_or(0, |&start| start as usize);
-                let line = Line::at(sources.text(*source), start);
+                let line = TextLine::at(sources.text(*source), start);
                 let span = line.cells(*separator).nth(column).map(|(_, at)| at);
                 Location::new(*source, span.unwrap_or(start..start))
             }
         }
     }
 
-    /// Returns what was read otherwise than it stands, or not at all, a line each.
+    /// Returns notes on ignored lines and columns and on renamed columns, a line each.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if self.preamble > 0 {
@@ -125,7 +131,7 @@ impl NumberTable {
         let left_out: Vec<String> =
             self.columns.iter().filter(|it| !it.is_known).map(|it| quoted(&it.header)).collect();
         if !left_out.is_empty() {
-            let (few, more) = left_out.split_at(left_out.len().min(MOST_NAMED));
+            let (few, more) = left_out.split_at(left_out.len().min(MAX_NAMED_COLUMNS));
             let more = if more.is_empty() { "" } else { ", ..." };
             let columns = if left_out.len() == 1 { "the column" } else { "the columns" };
             notes.push(format!("left out {columns} {}{more}", few.join(", ")));
@@ -140,49 +146,49 @@ impl NumberTable {
     }
 }
 
-/// Columns that a note names; more are said to be there.
-const MOST_NAMED: usize = 8;
+/// Maximum number of columns that a note names. Basis: a note of one line.
+const MAX_NAMED_COLUMNS: usize = 8;
 
 /// A list of points.
 pub struct List {
-    /// The design of its points.
+    /// The design of the plan.
     pub design: Design,
-    /// Its parameters with their values.
+    /// The parameters with their values.
     pub table: NumberTable,
 }
 
 /// A column of numbers.
 pub struct ListColumn {
-    /// The name of what it holds, with the header's place.
+    /// The name of the parameter or quantity, with the header's location.
     pub name: Located<String>,
     /// The name in the file.
     pub header: String,
-    /// The place in the file, from 0.
+    /// The index in the file, from 0.
     pub place: usize,
-    /// Whether the reader knows the name; else there are no values.
+    /// Whether the reader knows the name; otherwise there are no values.
     pub is_known: bool,
-    /// Row by row.
+    /// The value of each row.
     pub values: Vec<f64>,
 }
 
-/// The places of rows.
-enum Rows {
-    /// In lines of a text that begin at these bytes.
+/// The locations of rows.
+enum RowLocations {
+    /// Lines of a text that begin at these bytes.
     Lines { source: SourceId, starts: Vec<u32>, separator: char },
-    /// In no text; the file is named here.
+    /// Rows without a text; messages name the file.
     Binary(Location),
 }
 
-/// Why a file is no list.
+/// The reason why a file is no list.
 type Unreadable = String;
 
-/// A path in a message.
+/// Returns a path as messages show it.
 fn shown(path: &Path) -> String {
-    cut(&path.display().to_string(), LONGEST_PATH)
+    cut(&path.display().to_string(), MAX_PATH_CHARACTERS)
 }
 
-/// The table of a file, and the hash of its bytes; mistakes are reported. The file is named at
-/// `file`. With `gaps`, a missing value is NaN; else that is one that was refused.
+/// Reads the table of a file and the hash of its bytes; mistakes are reported. Messages point at
+/// `file`. If `gaps` is true, a missing value is NaN; otherwise NaN marks a rejected value.
 fn table(
     path: &Path,
     file: &Location,
@@ -195,24 +201,30 @@ fn table(
     if bytes.starts_with(b"PAR1") {
         let mut columns = Vec::new();
         for (place, read) in parquet::columns(bytes, gaps, names)?.into_iter().enumerate() {
-            let parquet::Column { name, header, values } = read;
+            let parquet::ParquetColumn { name, header, values } = read;
             let name = Located { value: name, at: file.clone() };
             let is_known = values.is_some();
             let values = values.unwrap_or_default();
             columns.push(ListColumn { name, header, place, is_known, values });
         }
-        return Ok((NumberTable { columns, rows: Rows::Binary(file.clone()), preamble: 0 }, hash));
+        return Ok((
+            NumberTable { columns, rows: RowLocations::Binary(file.clone()), preamble: 0 },
+            hash,
+        ));
     }
     let text = text::text(bytes)?;
-    // Messages quote the text when all is read; until then it is held here.
+    // Messages quote the text when all is read; until then this function owns it.
     let source = report.add(shown(path), String::new());
     let read = csv::read(&text, source, gaps, names, report);
     report.fill(source, text);
-    let csv::Read { columns, starts, separator, preamble } = read?;
-    Ok((NumberTable { columns, rows: Rows::Lines { source, starts, separator }, preamble }, hash))
+    let csv::TextTable { columns, starts, separator, preamble } = read?;
+    Ok((
+        NumberTable { columns, rows: RowLocations::Lines { source, starts, separator }, preamble },
+        hash,
+    ))
 }
 
-/// Reads the listed points.
+/// Reads a list of points.
 pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) -> Option<List> {
     let path = beside(grid, file);
     let at = report.place("design.file")?;
@@ -238,7 +250,7 @@ pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) 
         let expected = "expected a line of parameter names, and under it a row of numbers a point";
         return report.refuse(&at, title, expected);
     }
-    // What is wrong with unknown names is said when they are looked for.
+    // Unknown names are reported when they are looked up.
     if !has_parameter && !has_unknown {
         let title = format!("the list of points {shown} has no column but `{ID}`");
         return report.refuse(&at, title, "expected a column of a parameter");
@@ -250,22 +262,22 @@ pub(super) fn read(file: &str, grid: &Path, names: &Names<'_>, report: &Report) 
 fn bytes(path: &Path) -> Result<Vec<u8>, Unreadable> {
     let mut bytes = Vec::new();
     let read = regular::open(path)
-        .and_then(|file| file.take(LONGEST_BYTES + 1).read_to_end(&mut bytes))
+        .and_then(|file| file.take(MAX_LIST_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|error| error.to_string())?;
-    match read as u64 > LONGEST_BYTES {
-        true => Err(format!("it is longer than {} MiB", LONGEST_BYTES >> 20)),
+    match read as u64 > MAX_LIST_BYTES {
+        true => Err(format!("it is longer than {} MiB", MAX_LIST_BYTES >> 20)),
         false => Ok(bytes),
     }
 }
 
-/// Whether so many rows of so many columns are accepted.
-fn fits(rows: u64, columns: usize) -> Result<(), Unreadable> {
-    if columns > MOST_COLUMNS {
-        return Err(format!("it has {columns} columns, more than {MOST_COLUMNS}"));
+/// Checks that a table of this size is accepted.
+fn check_size(rows: u64, columns: usize) -> Result<(), Unreadable> {
+    if columns > MAX_COLUMNS {
+        return Err(format!("it has {columns} columns, more than {MAX_COLUMNS}"));
     }
     match rows.checked_mul(columns as u64) {
-        Some(0..=MOST_NUMBERS) => Ok(()),
-        _ => Err(format!("it holds more than {MOST_NUMBERS} numbers")),
+        Some(0..=MAX_NUMBERS) => Ok(()),
+        _ => Err(format!("it holds more than {MAX_NUMBERS} numbers")),
     }
 }
 

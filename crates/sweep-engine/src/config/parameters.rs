@@ -1,19 +1,19 @@
-//! Constants (`[set]`, `--set`, `--at`): names from the parameter table with a value each.
+//! Constants (`[set]`, `--set`, `--at`): parameters by name with their values.
 
 use sweep_parameter::{Parameter as _, Range, UnknownParameter};
 
-use super::draft::{Claimed, Constant, Draft};
+use super::draft::{ClaimedNumbers, Draft, SetConstant};
 use super::written::name_of;
 use super::{
-    Diagnostic, Located, NamedValues, Read, Section, Written, quoted, sections::described,
+    Diagnostic, Located, NamedArgument, NamedValues, Read, Section, quoted, sections::described,
 };
 use crate::{Plan, program};
 
-/// Names offered as the nearest one; a machine of thousands of springs has more than a reader wants
-/// compared.
-pub(super) const COMPARED: usize = 400;
+/// Number of names that are compared for a suggestion. Basis: a machine of thousands of springs has
+/// more, and the comparison of all would take long.
+pub(super) const MAX_COMPARED_NAMES: usize = 400;
 
-/// Reads `[set]`, then `--set` and `--at`, which override it, and writes all into the plan.
+/// Reads `[set]`, then `--set` and `--at`, which override it, and writes them into the plan.
 pub fn constants<M: Read>(
     root: &Section<'_>,
     sets: Vec<&String>,
@@ -33,8 +33,8 @@ pub fn constants<M: Read>(
     constants.extend(arguments("--at", at, draft));
     let before = draft.plan.clone();
     apply(&constants, draft);
-    // What is set to what it was leaves the plan as it was.
-    let changes = |constant: &&Constant<M>| {
+    // A constant that equals the file's value does not change the plan.
+    let changes = |constant: &&SetConstant<M>| {
         let mut after = before.clone();
         write(&constant.parameter, &mut after, constant.value.value);
         after != before
@@ -46,8 +46,7 @@ pub fn constants<M: Read>(
         .collect();
 }
 
-/// Puts one point in place of the axes: `--at` gives every axis of several values, and may give
-/// more.
+/// Replaces the axes by one point: `at` gives every axis of several values one, and may give more.
 pub fn point<M: Read>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
     let constants = arguments("--at", at, draft);
     let named = |name: &str| at.iter().any(|argument| name_of(argument) == name);
@@ -74,33 +73,35 @@ fn arguments<'a, M: Read>(
     option: &str,
     arguments: impl IntoIterator<Item = &'a String>,
     draft: &Draft<'a, M>,
-) -> Vec<Constant<M>> {
-    let written = arguments.into_iter().filter_map(|one| Written::read(option, one, draft.report));
+) -> Vec<SetConstant<M>> {
+    let written =
+        arguments.into_iter().filter_map(|one| NamedArgument::read(option, one, draft.report));
     let constant =
-        |one: Written<'a>| constant(one.name.clone(), |range| one.number(range), true, draft);
+        |one: NamedArgument<'a>| constant(one.name.clone(), |range| one.number(range), true, draft);
     written.filter_map(constant).collect()
 }
 
-/// A constant if its name is right and `number` has one in the parameter's range.
+/// Returns a constant if its name is a parameter and `number` gives a value in its range.
 fn constant<M: Read>(
     name: Located<&str>,
     number: impl FnOnce(Range) -> Option<Located<f64>>,
     is_over_file: bool,
     draft: &Draft<'_, M>,
-) -> Option<Constant<M>> {
+) -> Option<SetConstant<M>> {
     let parameter = find(&name, draft)?;
-    let (value, parts) = (number(parameter.range())?, draft.plan.model.parts(&parameter));
+    let value = number(parameter.range())?;
+    let parts = draft.plan.model.parts(&parameter);
     let name = Located { value: name.value.to_owned(), at: name.at };
-    Some(Constant { name, parameter, value, parts, is_over_file })
+    Some(SetConstant { name, parameter, value, parts, is_over_file })
 }
 
-/// The parameter of this name.
+/// Finds the parameter of this name; an unknown name is reported.
 pub fn find<M: Read>(name: &Located<&str>, draft: &Draft<'_, M>) -> Option<M::Parameter> {
     let refuse = |error| draft.report.push_with(|_| unknown(name, &error, &draft.plan.model));
     draft.plan.model.find(name.value).map_err(refuse).ok()
 }
 
-/// The mistake of a name that is no parameter.
+/// Returns the mistake of a name that is no parameter.
 pub fn unknown<M: Read>(
     name: &Located<&str>,
     UnknownParameter { reason, is_strange }: &UnknownParameter,
@@ -120,17 +121,17 @@ pub fn unknown<M: Read>(
         }
         (true, None) => {
             let all = model.parameters();
-            let near =
-                diagnostic.nearest(name.value, all.iter().take(COMPARED).map(|one| one.name()));
+            let near = diagnostic
+                .nearest(name.value, all.iter().take(MAX_COMPARED_NAMES).map(|one| one.name()));
             near.help(format!("`{} parameters` lists every name", program()))
         }
         (false, _) => diagnostic,
     }
 }
 
-/// Writes constants of equal rank.
-fn apply<M: Read>(constants: &[Constant<M>], draft: &mut Draft<'_, M>) {
-    let mut claimed = Claimed::default();
+/// Writes constants of equal precedence.
+fn apply<M: Read>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
+    let mut claimed = ClaimedNumbers::default();
     for constant in constants {
         if claimed.claim(&constant.name, constant.parts.clone(), draft.report) {
             write(&constant.parameter, &mut draft.plan, constant.value.value);

@@ -1,13 +1,13 @@
-//! JSON of plans as TOML, so that a plan in a result is read as grid files are.
+//! Conversion of plans from JSON to TOML, so that the plan of a result is read like a grid file.
 
 use serde_json::{Map, Value};
 use toml::Table;
 
-/// A file with these keys; a value that is null is left out, which TOML does not have.
+/// Writes a TOML file with these keys. Nulls are left out, which TOML does not have.
 pub(super) fn file<'a>(entries: impl IntoIterator<Item = (&'a String, &'a Value)>) -> String {
     let entries: Map<String, Value> =
         entries.into_iter().map(|(key, value)| (key.clone(), value.clone())).collect();
-    // What JSON has besides, TOML has too.
+    // All other values of JSON have a counterpart in TOML.
     Table::try_from(without_nulls(Value::Object(entries))).unwrap_or_default().to_string()
 }
 

@@ -1,4 +1,4 @@
-//! Columns of a table as the axes of a plan: what a program gives in place of a grid.
+//! Checks of a table whose columns are the axes of a plan, in place of its grid.
 
 use sweep_parameter::Parameter as _;
 
@@ -6,14 +6,13 @@ use super::parameters::unknown;
 use super::{Diagnostic, Diagnostics, Located, Location, Read, Report, quoted, refused_number};
 use crate::{Axis, Plan};
 
-/// Finds the column of each axis of a plan: its position among `names`, or none for an axis of one
-/// value that the table leaves out. Every value must lie on its axis, from the least to the
-/// greatest: the method's steps are chosen for that range, so that a row depends on the plan and
-/// its own values alone. `values` gives those of a column in order, `None` where there is none.
+/// Finds the column of each axis of a plan: its index in `names`, or `None` for an axis of one
+/// value that the table leaves out. Every value must lie between the ends of its axis, because the
+/// method's steps are chosen for that range; so a row depends on the plan and its own values alone.
+/// `values` yields those of a column in order, `None` for a missing one.
 ///
 /// # Errors
-/// Every mistake found: columns that are unknown, no axis, or given twice, missing ones, values out
-/// of range.
+/// Every mistake: columns that are unknown, no axis, repeated or missing, and values out of range.
 pub fn check_columns<M: Read, V>(
     plan: &Plan<M>,
     names: &[&str],
@@ -24,7 +23,7 @@ where
 {
     let report = Report::default();
     let (source, places) = report.header("table", names);
-    let mut of_axes: Vec<Option<usize>> = vec![None; plan.axes.len()];
+    let mut axis_columns: Vec<Option<usize>> = vec![None; plan.axes.len()];
     for (k, (&value, at)) in names.iter().zip(&places).enumerate() {
         let name = Located { value, at: at.clone() };
         let place = plan.axes.iter().position(|axis| axis.parameter.name() == name.value);
@@ -32,13 +31,13 @@ where
             report.push_with(|_| no_axis(&name, plan));
             continue;
         };
-        if let Some(first) = of_axes[place] {
+        if let Some(first) = axis_columns[place] {
             let title = format!("the column {} is given twice", quoted(name.value));
             let diagnostic = Diagnostic::new(title).at(&name.at, "expected each axis once");
             report.push(diagnostic.at(&places[first], "first given here"));
             continue;
         }
-        of_axes[place] = Some(k);
+        axis_columns[place] = Some(k);
         let axis = &plan.axes[place];
         let ends = axis.values.extremes();
         let [least, greatest] = ends;
@@ -49,7 +48,7 @@ where
             report.push_with(|_| off_axis(value, row, axis, ends, &name));
         }
     }
-    for (axis, column) in plan.axes.iter().zip(&of_axes) {
+    for (axis, column) in plan.axes.iter().zip(&axis_columns) {
         if column.is_none() && axis.values.len() > 1 {
             let name = axis.parameter.name();
             let title = format!("the table has no column {}", quoted(name));
@@ -58,22 +57,22 @@ where
             report.push(Diagnostic::new(title).at(&whole, expected));
         }
     }
-    report.finish(Some(of_axes))
+    report.finish(Some(axis_columns))
 }
 
-/// The mistake of a column that holds no numbers.
+/// Returns the mistake of a column that holds no numbers.
 pub fn not_numbers(names: &[String], column: usize, found: &str) -> Diagnostics {
     let what = format!("the column {} holds no numbers", quoted(&names[column]));
-    of_column(names, column, what, format!("expected numbers, found {found}"))
+    column_mistake(names, column, what, format!("expected numbers, found {found}"))
 }
 
-/// The mistake of a column that is longer or shorter than the first.
+/// Returns the mistake of a column whose length differs from the first.
 pub fn other_length(names: &[String], column: usize, length: usize, first: usize) -> Diagnostics {
     let what = format!("the column {} has {length} values", quoted(&names[column]));
-    of_column(names, column, what, format!("expected {first}, as the first column has"))
+    column_mistake(names, column, what, format!("expected {first}, as the first column has"))
 }
 
-fn of_column(names: &[String], column: usize, title: String, expected: String) -> Diagnostics {
+fn column_mistake(names: &[String], column: usize, title: String, expected: String) -> Diagnostics {
     let report = Report::default();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let (_, places) = report.header("table", &names);
@@ -81,7 +80,7 @@ fn of_column(names: &[String], column: usize, title: String, expected: String) -
     report.into_diagnostics()
 }
 
-/// The mistake of a value that is not on its axis.
+/// Returns the mistake of a value that is not on its axis.
 fn off_axis<M: Read>(
     value: Option<f64>,
     row: usize,
@@ -106,7 +105,7 @@ fn off_axis<M: Read>(
     }
 }
 
-/// A column that is no axis: of a parameter that the plan holds, or of nothing.
+/// Returns the mistake of a column that is no axis: a fixed parameter, or an unknown name.
 fn no_axis<M: Read>(name: &Located<&str>, plan: &Plan<M>) -> Diagnostic {
     if let Err(error) = plan.model.find(name.value) {
         return unknown(name, &error, &plan.model);

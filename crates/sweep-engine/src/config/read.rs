@@ -5,34 +5,34 @@ use serde_json::Value;
 use super::{Draft, GridInput, Keys};
 use crate::Model;
 
-/// A model in grid files. The engine walks over `name`, `[set]`, `[time]`, `[integrator]`,
-/// `[reliability]`, `[design]` and `[[axis]]`; over what else there is, the model does.
+/// A model that grid files configure. The engine walks over `name`, `[set]`, `[time]`,
+/// `[integrator]`, `[reliability]`, `[design]` and `[[axis]]`; the model walks over all other keys.
 pub trait Read: Model {
-    /// The key under which a grid names a file of the model's own, if it may.
+    /// The key by which a grid names the model's own file, if there is one.
     const OWN_FILE: Option<&'static str> = None;
 
-    /// What to do where there is no grid file yet.
+    /// The advice for a user without a grid file.
     const TO_START: Option<&'static str> = None;
 
-    /// Whether files of the model's own have this key at the top.
+    /// Returns whether the model's own files have this key at the top.
     fn is_own_key(_: &str) -> bool {
         false
     }
 
-    /// The model before anything is read: what is left out has these values.
+    /// Returns the model with its default values.
     fn blank() -> Self;
 
-    /// Walks over the model's keys at the top of a grid file; `input` is what is read.
+    /// Walks over the model's keys at the top of a grid file; `input` is the grid that is read.
     fn walk(&mut self, _: &mut Keys<'_>, _input: Option<&GridInput<Self>>) {}
 
     /// Walks over the model's keys of `[reliability]`.
     fn walk_reliability(&mut self, _: &mut Keys<'_>) {}
 
-    /// Judges the whole, once every value is in place.
-    fn judge(draft: &Draft<'_, Self>) {
+    /// Checks the plan as a whole, after every value is set.
+    fn check(draft: &Draft<'_, Self>) {
         super::whole::windows(draft);
     }
 
-    /// The schema of `[set]`, by [`crate::config::schema::set`].
+    /// Returns the schema of `[set]`, made by [`crate::config::schema::set`].
     fn schema_of_set() -> Value;
 }

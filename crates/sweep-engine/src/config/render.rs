@@ -1,4 +1,4 @@
-//! A mistake as text, in the form of rustc's messages.
+//! Mistakes as text, in the form of rustc's messages.
 
 use std::fmt;
 use std::ops::Range;
@@ -7,22 +7,24 @@ use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet}
 
 use super::report::{Diagnostic, Diagnostics};
 use super::section::counted;
-use super::source::{Line, Location, Sources, floor_char_boundary};
+use super::source::{Location, SourceLine, Sources, floor_char_boundary};
 
-/// Lines longer than this are shown only around the place that matters.
+/// Maximum length of a line that is shown whole, bytes. Basis: a few screens of a terminal. Longer
+/// lines are shown around the mistake.
 const LONGEST_LINE_BYTES: usize = 4000;
-/// How much of such a line is shown, and how much of that before the place.
+/// Length of the part of a long line that is shown, bytes. Basis: a line of a terminal.
 const SHOWN_BYTES: usize = 130;
+/// Length of that part before the mistake, bytes.
 const BEFORE_BYTES: usize = 40;
 
 fn renderer(colour: bool) -> Renderer {
     if colour { Renderer::styled() } else { Renderer::plain() }
 }
 
-/// One mistake, without a newline at the end.
+/// Renders one mistake, without a newline at its end.
 fn diagnostic(diagnostic: &Diagnostic, sources: &Sources, colour: bool) -> String {
     let mut group = Group::with_title(Level::ERROR.primary_title(diagnostic.title.as_str()));
-    // Places on one line share its picture.
+    // Locations on one line share its snippet.
     let mut shown: Vec<(usize, &Location)> = Vec::new();
     for (k, (at, _)) in diagnostic.places.iter().enumerate() {
         let number = sources.line(at).number;
@@ -36,7 +38,7 @@ fn diagnostic(diagnostic: &Diagnostic, sources: &Sources, colour: bool) -> Strin
     renderer(colour).render(&[group.elements(help)])
 }
 
-/// The line of place `k`, with every place of that line marked.
+/// Adds the snippet of location `k`: its line, with every location on it marked.
 fn picture<'a>(
     group: Group<'a>,
     diagnostic: &'a Diagnostic,
@@ -69,8 +71,8 @@ fn picture<'a>(
     }
 }
 
-/// The part of a line that is shown, in its bytes.
-fn window(line: &Line<'_>) -> Range<usize> {
+/// Returns the part of a line that is shown, in its bytes.
+fn window(line: &SourceLine<'_>) -> Range<usize> {
     if line.text.len() <= LONGEST_LINE_BYTES {
         return 0..line.text.len();
     }
@@ -78,7 +80,7 @@ fn window(line: &Line<'_>) -> Range<usize> {
     start..floor_char_boundary(line.text, start + SHOWN_BYTES)
 }
 
-/// The last line.
+/// Returns the last line, which counts the mistakes.
 fn summary(count: usize, beyond: usize, colour: bool) -> String {
     let mistakes = counted(count, "mistake");
     let shown = if beyond == 0 { String::new() } else { format!(" ({} shown)", count - beyond) };
@@ -87,7 +89,7 @@ fn summary(count: usize, beyond: usize, colour: bool) -> String {
 }
 
 impl Diagnostics {
-    /// The whole text with terminal colours.
+    /// Returns the text with terminal colours.
     pub fn styled(&self) -> String {
         self.text(true)
     }

@@ -1,4 +1,4 @@
-//! Mistakes as they are found: collected, not thrown, so that one pass shows them all.
+//! The report of mistakes, which are collected so that one pass shows them all.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -7,47 +7,48 @@ use super::source::{Location, SourceId, Sources};
 use crate::plan::ASSUMED;
 use sweep_results::nearest;
 
-/// More mistakes than this are counted but not kept: a wrong file should not fill a terminal or the
-/// memory.
-const KEPT: usize = 100;
+/// Maximum number of mistakes that are kept; further ones are counted. Basis: a wrong file must not
+/// fill a terminal or the memory.
+const MAX_KEPT: usize = 100;
 
-/// One mistake.
+/// A mistake.
 #[derive(Debug)]
 pub struct Diagnostic {
-    /// What is wrong, in one line.
+    /// The mistake in one line.
     pub title: String,
-    /// Where, and what was expected there; the first is the place itself, the rest explain.
+    /// The locations with the expectation at each; the first is that of the mistake, the others
+    /// explain.
     pub places: Vec<(Location, String)>,
-    /// What to do.
+    /// The advice.
     pub help: Vec<String>,
 }
 
 impl Diagnostic {
-    /// Nothing but what is wrong.
+    /// Returns a mistake without locations.
     pub fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), places: Vec::new(), help: Vec::new() }
     }
 
-    /// A mistake in an expression, at this place.
-    pub fn of_expression(mistake: sweep_results::ExpressionError, at: &Location) -> Self {
+    /// Returns the mistake of an expression at this location.
+    pub fn from_expression(mistake: sweep_results::ExpressionError, at: &Location) -> Self {
         let (typed, names) = mistake.candidates.unwrap_or_default();
         let names = names.iter().map(String::as_str);
         Self::new(mistake.title).at(at, mistake.expected).nearest(&typed, names)
     }
 
-    /// Adds a place, with what was expected there.
+    /// Adds a location with the expectation there.
     pub fn at(mut self, at: &Location, expected: impl Into<String>) -> Self {
         self.places.push((at.clone(), expected.into()));
         self
     }
 
-    /// Adds what to do.
+    /// Adds advice.
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help.push(help.into());
         self
     }
 
-    /// Adds the nearest valid name, if any is near.
+    /// Adds the nearest valid name, if one is near.
     pub fn nearest<'a>(self, typed: &str, valid: impl IntoIterator<Item = &'a str>) -> Self {
         match nearest(typed, valid) {
             Some(name) => self.help(format!("did you mean `{name}`?")),
@@ -56,34 +57,34 @@ impl Diagnostic {
     }
 }
 
-/// Texts read, where their numbers stand, and mistakes found so far. All who read share it.
+/// The texts that are read, the locations of their numbers, and the mistakes so far.
 #[derive(Debug, Default)]
 pub struct Report {
     sources: RefCell<Sources>,
-    found: RefCell<Found>,
-    /// Places of resolved numbers, so that a check made later can still point at them.
+    found: RefCell<FoundMistakes>,
+    /// The locations of numbers, for checks that are made later.
     places: RefCell<BTreeMap<String, Location>>,
-    /// Numbers that were refused or missing: a stand-in holds their place.
+    /// The numbers that were rejected or missing, in whose place stand-ins are.
     doubtful: RefCell<BTreeSet<String>>,
-    /// The rules of numbers that a file leaves out, by their parameters' names.
+    /// The rules of numbers that a file leaves out, by parameter.
     assumed: RefCell<BTreeMap<String, String>>,
-    /// What is no mistake, but was read otherwise than it stands.
+    /// The notes for the user on how input was read.
     notes: RefCell<Vec<String>>,
 }
 
 #[derive(Debug, Default)]
-struct Found {
+struct FoundMistakes {
     found: Vec<Diagnostic>,
     beyond: usize,
-    /// Lines that are not TOML: what recovery makes of them is not the user's mistake.
+    /// The lines that are not TOML; mistakes on them may come from the parser's recovery.
     broken: BTreeMap<SourceId, BTreeSet<usize>>,
-    /// Where an array that is never closed begins to swallow the rest of its text.
+    /// The start of an array that is never closed, in each text.
     swallowed: BTreeMap<SourceId, usize>,
 }
 
-impl Found {
+impl FoundMistakes {
     fn keep(&mut self, diagnostic: Diagnostic) {
-        if self.found.len() >= KEPT {
+        if self.found.len() >= MAX_KEPT {
             self.beyond += 1;
         } else {
             self.found.push(diagnostic);
@@ -92,14 +93,16 @@ impl Found {
 }
 
 impl Report {
-    /// Keeps a text under the name that messages show.
+    /// Adds a text under the name that messages show.
     pub fn add(&self, name: impl Into<String>, text: impl Into<String>) -> SourceId {
         self.sources.borrow_mut().add(name, text)
     }
 
-    /// Keeps names of columns as a line under the name that messages show; the place of each.
+    /// Adds column names as a line of text under the name that messages show. Returns their
+    /// locations.
     pub fn header(&self, name: &str, columns: &[&str]) -> (SourceId, Vec<Location>) {
-        let (source, mut next) = (self.add(name, columns.join(",")), 0);
+        let source = self.add(name, columns.join(","));
+        let mut next = 0;
         let place = |column: &&str| {
             let start = next;
             next += column.len() + 1;
@@ -108,57 +111,59 @@ impl Report {
         (source, columns.iter().map(place).collect())
     }
 
-    /// Puts in the text of a source that was kept under its name alone.
+    /// Sets the text of a source that was added without one.
     pub fn fill(&self, id: SourceId, text: String) {
         self.sources.borrow_mut().fill(id, text);
     }
 
-    /// Keeps the place of a number by its key: a parameter's name, `time.end_s` and the like for
-    /// the rest of the grid file, `spin.time_s[3]` for an entry of an array, `axis[0]` for an axis.
+    /// Keeps the location of a number by its key: a parameter's name, `time.end_s` and the like for
+    /// other keys of the grid file, `spin.time_s[3]` for an entry of an array, `axis[0]` for an
+    /// axis.
     pub fn put(&self, key: impl Into<String>, at: Location) {
         self.places.borrow_mut().insert(key.into(), at);
     }
 
-    /// Marks a number that was refused or missing: what depends on it is not judged.
+    /// Marks a number as rejected or missing, so that checks that depend on it are skipped.
     pub fn doubt(&self, key: impl Into<String>) {
         self.doubtful.borrow_mut().insert(key.into());
     }
 
-    /// Keeps the rule by which a number has its value that a file leaves out.
+    /// Keeps the rule that gives a parameter its value if a file leaves it out.
     pub fn assume(&self, name: &str, rule: &str) {
         self.assumed.borrow_mut().insert(name.to_owned(), format!("{ASSUMED}{rule}"));
     }
 
-    /// Keeps what a user should know of what was read, a line.
+    /// Adds a note for the user.
     pub fn note(&self, note: impl Into<String>) {
         self.notes.borrow_mut().push(note.into());
     }
 
-    /// Takes the notes that were kept.
+    /// Takes the notes.
     pub fn take_notes(&self) -> Vec<String> {
         self.notes.take()
     }
 
-    /// The place of a number, if it was written.
+    /// Returns the location of a number, if it was written.
     pub fn place(&self, key: &str) -> Option<Location> {
         self.places.borrow().get(key).cloned()
     }
 
-    /// Returns the text in which each parameter that was written stands last, and the rule of each
-    /// that was left out.
+    /// Returns the source of each parameter: the text that wrote it last, or the rule of one that
+    /// was left out.
     pub fn written(&self) -> BTreeMap<String, String> {
-        let (places, sources) = (self.places.borrow(), self.sources.borrow());
+        let places = self.places.borrow();
+        let sources = self.sources.borrow();
         let parameters = places.iter().filter(|(key, _)| !key.contains(['.', '[']));
         let written = parameters.map(|(key, at)| (key.clone(), sources.name(at.source).to_owned()));
         self.assumed.borrow().clone().into_iter().chain(written).collect()
     }
 
-    /// Whether it was refused or missing.
+    /// Returns whether a number was rejected or missing.
     pub fn is_doubtful(&self, key: &str) -> bool {
         self.doubtful.borrow().contains(key)
     }
 
-    /// Keeps a mistake, unless it is on a line whose syntax is already refused.
+    /// Adds a mistake, unless its line has a mistake of syntax.
     pub fn push(&self, diagnostic: Diagnostic) {
         self.push_with(|_| diagnostic);
     }
@@ -170,7 +175,7 @@ impl Report {
         }
     }
 
-    /// Keeps a mistake at one place: what is wrong, and what was expected there. There is no value.
+    /// Adds a mistake at one location, and returns `None` in place of the value.
     pub fn refuse<T>(
         &self,
         at: &Location,
@@ -181,8 +186,8 @@ impl Report {
         None
     }
 
-    /// As [`Report::push`], but a mistake beyond those kept is only counted: finding its line, or
-    /// the nearest name, a million times over would take minutes.
+    /// Adds a mistake that is made only if it is kept: finding its line or the nearest name a
+    /// million times would take minutes.
     pub fn push_with(&self, diagnose: impl FnOnce(&Sources) -> Diagnostic) {
         if self.is_full() {
             self.found.borrow_mut().beyond += 1;
@@ -201,10 +206,10 @@ impl Report {
         }
     }
 
-    /// Keeps a mistake of syntax, the first of each line.
+    /// Adds a mistake of syntax, the first of each line.
     pub fn push_syntax(&self, diagnostic: Diagnostic) {
         let mut found = self.found.borrow_mut();
-        let first = found.found.len() >= KEPT
+        let first = found.found.len() >= MAX_KEPT
             || diagnostic.places.first().is_none_or(|(at, _)| {
                 let number = self.sources.borrow().line(at).number;
                 found.broken.entry(at.source).or_default().insert(number)
@@ -214,12 +219,12 @@ impl Report {
         }
     }
 
-    /// Takes what follows a place for the inside of an array that is never closed.
+    /// Marks the text from a location on as the inside of an array that is never closed.
     pub fn swallow(&self, from: &Location) {
         self.found.borrow_mut().swallowed.insert(from.source, from.span.start);
     }
 
-    /// Keeps the report of a missing key, unless broken syntax may have swallowed it.
+    /// Adds the mistake of a missing key, unless wrong syntax may hide it.
     pub fn push_missing(&self, diagnostic: Diagnostic) {
         let mut found = self.found.borrow_mut();
         if !diagnostic.places.iter().any(|(at, _)| found.broken.contains_key(&at.source)) {
@@ -227,33 +232,33 @@ impl Report {
         }
     }
 
-    /// Whether further mistakes would only be counted.
+    /// Returns whether further mistakes are only counted.
     pub fn is_full(&self) -> bool {
-        self.found.borrow().found.len() >= KEPT
+        self.found.borrow().found.len() >= MAX_KEPT
     }
 
-    /// Whether nothing is wrong so far.
+    /// Returns whether there are no mistakes so far.
     pub fn is_clean(&self) -> bool {
         self.found.borrow().found.is_empty()
     }
 
-    /// The value if there is one and nothing is wrong.
+    /// Returns the value if there is one and there are no mistakes.
     pub fn finish<T>(self, value: Option<T>) -> Result<T, Diagnostics> {
         value.filter(|_| self.is_clean()).ok_or_else(|| self.into_diagnostics())
     }
 
-    /// Everything that was found.
+    /// Returns all mistakes.
     pub fn into_diagnostics(self) -> Diagnostics {
-        let Found { mut found, beyond, .. } = self.found.into_inner();
+        let FoundMistakes { mut found, beyond, .. } = self.found.into_inner();
         found.sort_by_key(|d| d.places.first().map(|(at, _)| (at.source, at.span.start)));
         Diagnostics { sources: self.sources.into_inner(), found, beyond }
     }
 }
 
-/// Everything wrong with a grid file, its machine file and the command line's constants.
+/// All mistakes of a grid file, its model's file and the command line's constants.
 ///
-/// `Display` shows each mistake with file, line and column, the text pointed at, what was expected
-/// and the nearest valid name, without colour; [`Diagnostics::styled`] the same with colour.
+/// `Display` shows each mistake with file, line and column, the text, the expectation and the
+/// nearest valid name, without colour; [`Diagnostics::styled`] adds colour.
 #[derive(Debug)]
 pub struct Diagnostics {
     pub(super) sources: Sources,
@@ -262,12 +267,12 @@ pub struct Diagnostics {
 }
 
 impl Diagnostics {
-    /// How many mistakes, at least 1.
+    /// Returns the number of mistakes, at least 1.
     pub fn count(&self) -> usize {
         self.found.len() + self.beyond
     }
 
-    /// Each mistake that is kept, in the order of the text.
+    /// Returns the mistakes that are kept, in the order of the text.
     pub fn mistakes(&self) -> Vec<Mistake> {
         let mistake = |Diagnostic { title, places, help }: &Diagnostic| {
             let place = places.first();
@@ -285,20 +290,20 @@ impl Diagnostics {
     }
 }
 
-/// One mistake as data.
+/// A mistake as data.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
-    /// The file that it is in, or the name of the option or text.
+    /// The file, or the name of the option or text.
     pub file: Option<String>,
-    /// From 1.
+    /// The line, from 1.
     pub line: Option<usize>,
-    /// From 1, in characters.
+    /// The column in characters, from 1.
     pub column: Option<usize>,
-    /// What is wrong, in one line.
+    /// The mistake in one line.
     pub message: String,
-    /// What was expected at that place.
+    /// The expectation at the location.
     pub expected: Option<String>,
-    /// What to do, a line each.
+    /// The advice, a line each.
     pub hints: Vec<String>,
 }
 
@@ -307,13 +312,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn mistakes_beyond_what_is_kept_are_counted() {
+    fn mistakes_beyond_the_maximum_are_counted() {
         let report = Report::default();
         for _ in 0..1000 {
             report.push(Diagnostic::new("wrong"));
         }
         let diagnostics = report.into_diagnostics();
-        assert_eq!((diagnostics.count(), diagnostics.found.len()), (1000, KEPT));
+        assert_eq!((diagnostics.count(), diagnostics.found.len()), (1000, MAX_KEPT));
         assert!(diagnostics.to_string().contains("1000 mistakes"));
     }
 }

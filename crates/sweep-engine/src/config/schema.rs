@@ -1,19 +1,20 @@
-//! JSON Schema (draft 2020-12) of grid files, made from the tables that read them. It covers what a
-//! schema can say about one file; what needs the model or two values together is left to reading.
+//! JSON Schema (draft 2020-12) of grid files, made by the walks that read them. It covers a single
+//! file; checks that need the model or several values are made on reading.
 
 use serde_json::{Map, Value, json};
 use sweep_parameter::{Parameter, Range};
 
 use super::axes::DISTRIBUTIONS;
-use super::form::{about, number};
+use super::form::{describe_parameter, number};
 use super::keys::table;
 use super::sections::described;
 use super::{Form, Key, Read};
 use crate::plan::MAX_POINTS;
 
+/// The identifier of the draft.
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
-/// The schema of a model's grid files.
+/// Returns the schema of a model's grid files.
 pub fn grid<M: Read>() -> Value {
     let mut described = described::<M>();
     let key = Key::new("set", "constants, by the names of `sweep parameters`");
@@ -26,7 +27,7 @@ pub fn grid<M: Read>() -> Value {
                  without a count";
     described.add(Key::new("axis", about), axes);
     let mut schema = described.finish();
-    // A design alone takes distributions, and counts its points itself.
+    // Only a design takes distributions; its ranges have no count.
     schema["if"] = json!({ "required": ["design"] });
     let counted = json!({ "range": { "required": ["count"] } });
     let every_axis = |items: Value| json!({ "properties": { "axis": { "items": items } } });
@@ -37,25 +38,25 @@ pub fn grid<M: Read>() -> Value {
     document("Grid file of sweep", schema)
 }
 
-/// A schema as a document.
+/// Returns a schema as a document.
 pub fn document(title: &str, mut schema: Value) -> Value {
     schema["$schema"] = DRAFT.into();
     schema["title"] = title.into();
     schema
 }
 
-/// A parameter's number.
-pub fn of(parameter: &impl Parameter) -> Value {
+/// Returns the schema of a parameter's number.
+pub fn parameter_schema(parameter: &impl Parameter) -> Value {
     let mut schema = number(parameter.range());
-    schema["description"] = about(parameter).into();
+    schema["description"] = describe_parameter(parameter).into();
     schema
 }
 
-/// `[set]`: parameters by name, and those of numbered elements as patterns.
+/// Returns the schema of `[set]`: parameters by name, and numbered elements as patterns.
 pub fn set(parameters: &[impl Parameter], patterns: Map<String, Value>) -> Value {
     let properties: Map<String, Value> = parameters
         .iter()
-        .map(|parameter| (parameter.name().to_owned(), self::of(parameter)))
+        .map(|parameter| (parameter.name().to_owned(), parameter_schema(parameter)))
         .collect();
     json!({
         "type": "object",
@@ -99,7 +100,7 @@ fn tolerance() -> Value {
 fn axis() -> Value {
     let parameter = json!({ "type": "string", "description": "a name of `sweep parameters`" });
     let mut count = Form::Whole(1..=MAX_POINTS).schema();
-    count["description"] = "how many, both ends included".into();
+    count["description"] = "the number of values, both ends included".into();
     let spacing = json!({ "enum": ["linear", "log"], "default": "linear" });
     let ends = ["from", "to"].map(|key| (key, number(Range::Any)));
     let further = [("count", count.clone()), ("spacing", spacing)];

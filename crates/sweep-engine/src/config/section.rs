@@ -1,6 +1,6 @@
-//! Walks one TOML table key by key. Every value is taken by name and kind; a wrong one is reported
-//! and the walk goes on, so that one pass finds every mistake. Keys nobody asked for are reported
-//! at the end.
+//! A walk over a TOML table key by key. Values are taken by name and kind; a wrong one is reported
+//! and the walk goes on, so that one pass finds every mistake. Keys that were not taken are
+//! reported at the end.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -12,18 +12,18 @@ use toml::de::{DeTable, DeValue};
 
 use super::{Diagnostic, Located, Location, Report};
 
-/// A key's value: not written, written wrong (already reported), or as written.
+/// The value of a key: absent, rejected (already reported), or given.
 pub enum Field<T> {
-    /// Not written.
+    /// The key is not in the table.
     Absent,
-    /// Written wrong, and reported.
+    /// The value was rejected and reported.
     Bad,
-    /// As written.
+    /// The value with its location.
     Given(Located<T>),
 }
 
 impl<T> Field<T> {
-    /// The value, or the default when it is not written; `None` when it is wrong.
+    /// Returns the value, or the default if it is absent; `None` if it was rejected.
     pub fn or(self, default: T) -> Option<T> {
         match self {
             Self::Absent => Some(default),
@@ -32,7 +32,7 @@ impl<T> Field<T> {
         }
     }
 
-    /// The value with its place, if it is written and right.
+    /// Returns the value with its location, if it was given.
     pub fn given(self) -> Option<Located<T>> {
         match self {
             Self::Given(found) => Some(found),
@@ -40,7 +40,7 @@ impl<T> Field<T> {
         }
     }
 
-    /// Another value at the same place.
+    /// Maps the value at the same location.
     pub fn map<U>(self, next: impl FnOnce(Located<T>) -> U) -> Field<U> {
         self.then(|found| {
             let at = found.at.clone();
@@ -48,7 +48,7 @@ impl<T> Field<T> {
         })
     }
 
-    /// Another value at the same place, or none, which has been reported.
+    /// Maps the value at the same location, or rejects it, which the function has reported.
     pub fn then<U>(self, next: impl FnOnce(Located<T>) -> Option<Located<U>>) -> Field<U> {
         match self {
             Self::Absent => Field::Absent,
@@ -60,21 +60,21 @@ impl<T> Field<T> {
 
 type Value<'a> = Spanned<DeValue<'a>>;
 
-/// One table of a file.
+/// A table of a file.
 pub struct Section<'a> {
-    /// As messages call it: `[spin]`, `the grid file`.
+    /// The name in messages: `[spin]`, `the grid file`.
     title: String,
     at: Location,
     table: &'a DeTable<'a>,
-    /// Takes what is wrong.
+    /// The report of mistakes.
     pub report: &'a Report,
     known: RefCell<Vec<&'static str>>,
-    /// Keys that are valid elsewhere, with the reason why not here.
+    /// Keys that are valid elsewhere, with the reason.
     misplaced: RefCell<BTreeMap<&'static str, String>>,
 }
 
 impl<'a> Section<'a> {
-    /// A table of a text.
+    /// Returns the walk over a table.
     pub fn new(
         title: impl Into<String>,
         at: Location,
@@ -85,7 +85,7 @@ impl<'a> Section<'a> {
         Self { title: title.into(), at, table, report, known, misplaced }
     }
 
-    /// Where the table begins.
+    /// Returns the location of the table.
     pub fn at(&self) -> &Location {
         &self.at
     }
@@ -95,44 +95,44 @@ impl<'a> Section<'a> {
     }
 
     fn get(&self, key: &'static str) -> Option<&'a Value<'a>> {
-        // A key that may be a number or a word is asked for twice.
+        // A key that may be a number or a word is taken twice.
         if !self.is_known(key) {
             self.known.borrow_mut().push(key);
         }
         self.table.get(key)
     }
 
-    /// Whether a key was asked for.
+    /// Returns whether a key was taken.
     pub fn is_known(&self, key: &str) -> bool {
         self.known.borrow().contains(&key)
     }
 
-    /// The place of a key, if it is written.
+    /// Returns the location of a key, if it is written.
     pub fn key_at(&self, key: &str) -> Option<Location> {
         self.table.get_key_value(key).map(|(key, _)| self.place(key.span()))
     }
 
-    /// Whether a table under a key has another key.
+    /// Returns whether a table under a key has another key.
     pub fn key_inside(&self, table: &str, key: &str) -> bool {
         let table = self.table.get(table).map(Spanned::get_ref);
         matches!(table, Some(DeValue::Table(table)) if table.contains_key(key))
     }
 
-    /// Refuses these keys with a reason of their own instead of "unknown key".
+    /// Rejects these keys with a reason of their own instead of "unknown key".
     pub fn misplace(&self, keys: &[&'static str], reason: &str) {
-        // The first reason is the caller's own.
+        // The first reason is kept, which is the caller's own.
         let mut misplaced = self.misplaced.borrow_mut();
         for key in keys {
             misplaced.entry(key).or_insert_with(|| reason.to_owned());
         }
     }
 
-    /// Reports a key that must be there.
+    /// Returns a required value; a missing one is reported.
     pub fn require<T>(&self, field: Field<T>, key: &str, expected: &str) -> Option<Located<T>> {
         self.expect(field, key, Some(expected)).given()
     }
 
-    /// The same, where something is expected.
+    /// Returns the field; a missing one is reported if a value is expected.
     pub fn expect<T>(&self, field: Field<T>, key: &str, expected: Option<&str>) -> Field<T> {
         if let (Field::Absent, Some(expected)) = (&field, expected) {
             self.missing(key, expected);
@@ -140,14 +140,14 @@ impl<'a> Section<'a> {
         field
     }
 
-    /// Reports a key that must be there and is not.
+    /// Reports a required key that is missing.
     pub fn missing(&self, key: &str, expected: &str) {
         let title = format!("`{key}` is missing in {}", self.title);
         self.report
             .push_missing(Diagnostic::new(title).at(&self.at, format!("expected {expected}")));
     }
 
-    /// What is read of the value under a key; where nothing is, that has been reported.
+    /// Reads the value under a key by a function, which reports a value that it rejects.
     fn read<T>(
         &self,
         key: &'static str,
@@ -179,12 +179,12 @@ impl<'a> Section<'a> {
         None
     }
 
-    /// A finite number in a range.
+    /// Takes a finite number in a range.
     pub fn number(&self, key: &'static str, range: Range) -> Field<f64> {
         self.read(key, |value, _| Some(self.number_of(&quoted(key), value, range)?.value))
     }
 
-    /// A whole number within bounds.
+    /// Takes a whole number within bounds.
     pub fn whole(&self, key: &'static str, bounds: &RangeInclusive<u64>) -> Field<u64> {
         self.read(key, |value, at| {
             let DeValue::Integer(integer) = value.get_ref() else {
@@ -193,19 +193,20 @@ impl<'a> Section<'a> {
             let count = u64::from_str_radix(integer.as_str(), integer.radix()).ok();
             count.filter(|count| bounds.contains(count)).or_else(|| {
                 let title = format!("`{key}` = {integer} is out of range");
-                let (least, most) = (bounds.start(), bounds.end());
+                let least = bounds.start();
+                let most = bounds.end();
                 let expected = format!("expected a whole number from {least} to {most}");
                 self.report.refuse(at, title, expected)
             })
         })
     }
 
-    /// A string.
+    /// Takes a string.
     pub fn text(&self, key: &'static str) -> Field<&'a str> {
         self.read(key, |value, _| Some(self.text_of(&quoted(key), value)?.value))
     }
 
-    /// A string, or a number alone as it is written.
+    /// Takes a string, or a number as it is written.
     pub fn text_or_number(&self, key: &'static str) -> Field<&'a str> {
         self.read(key, |value, _| match value.get_ref() {
             DeValue::Integer(integer) if integer.radix() == 10 => Some(integer.as_str()),
@@ -214,12 +215,12 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// Whether a string stands there, where something else may.
+    /// Returns whether the value is a string.
     pub fn is_text(&self, key: &'static str) -> bool {
         self.get(key).is_some_and(|value| value.get_ref().is_str())
     }
 
-    /// One of a few words. Given back as the word's position in `choices`.
+    /// Takes a word, as its index in `choices`.
     pub fn choice(&self, key: &'static str, choices: &[&str]) -> Field<usize> {
         self.text(key).then(|found| {
             let position = choices.iter().position(|&choice| choice == found.value);
@@ -230,7 +231,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// An array of finite numbers in a range; a single wrong one makes it wrong.
+    /// Takes an array of finite numbers in a range; one wrong number rejects all.
     pub fn numbers(&self, key: &'static str, range: Range) -> Field<Vec<Located<f64>>> {
         self.right_numbers(key, range).then(|found| {
             let (numbers, all) = found.value;
@@ -238,7 +239,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// The right ones among an array of numbers, and whether those are all.
+    /// Takes the valid numbers of an array, and whether all are valid.
     pub fn right_numbers(
         &self,
         key: &'static str,
@@ -252,7 +253,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// An array of strings, wrong ones left out and reported.
+    /// Takes the valid strings of an array; others are reported.
     pub fn texts(&self, key: &'static str) -> Field<Vec<Located<&'a str>>> {
         self.items(key, "an array of strings").map(|items| {
             items.value.iter().filter_map(|item| self.text_of(&entry(key), item)).collect()
@@ -266,7 +267,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// A table under this key.
+    /// Takes the table under a key.
     pub fn table(&self, key: &'static str, title: &str) -> Field<Section<'a>> {
         self.read(key, |value, at| match value.get_ref() {
             DeValue::Table(table) => Some(Section::new(title, at.clone(), table, self.report)),
@@ -274,7 +275,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// An array of tables, `[[key]]`; empty if it is not written.
+    /// Takes an array of tables, `[[key]]`; empty if it is absent.
     pub fn tables(&self, key: &'static str) -> Vec<Section<'a>> {
         let kind = format!("tables, each under [[{key}]]");
         let items = self.items(key, &kind).given().map_or(&[][..], |items| items.value);
@@ -288,18 +289,18 @@ impl<'a> Section<'a> {
         items.iter().enumerate().filter_map(section).collect()
     }
 
-    /// Every key as written, for tables whose keys are names of parameters.
+    /// Returns every key as written, for tables whose keys are names of parameters.
     pub fn names(&self) -> Vec<Located<&'a str>> {
         let keys = self.table.keys();
         keys.map(|key| Located { value: &**key.get_ref(), at: self.place(key.span()) }).collect()
     }
 
-    /// The number under a name from [`Section::names`].
+    /// Takes the number under a name from [`Section::names`].
     pub fn number_named(&self, name: &str, range: Range) -> Option<Located<f64>> {
         self.number_of(&quoted(name), self.table.get(name)?, range)
     }
 
-    /// The string under a name from [`Section::names`].
+    /// Takes the string under a name from [`Section::names`].
     pub fn text_named(&self, name: &str) -> Option<Located<&'a str>> {
         self.text_of(&quoted(name), self.table.get(name)?)
     }
@@ -324,9 +325,10 @@ impl<'a> Section<'a> {
         check_number(what, number, self.place(value.span()), range, self.report)
     }
 
-    /// Reports every key that was not asked for.
+    /// Reports every key that was not taken.
     pub fn finish(self) {
-        let (known, misplaced) = (self.known.into_inner(), self.misplaced.into_inner());
+        let known = self.known.into_inner();
+        let misplaced = self.misplaced.into_inner();
         for key in self.table.keys() {
             let name: &str = key.get_ref();
             if known.contains(&name) {
@@ -341,7 +343,7 @@ impl<'a> Section<'a> {
                     }
                     None => {
                         Diagnostic::new(format!("unknown key `{}` in {}", short(name), self.title))
-                            .at(&at, format!("expected {}", listed(&known)))
+                            .at(&at, format!("expected {}", list_choices(&known)))
                             .nearest(name, known.iter().copied())
                     }
                 }
@@ -350,8 +352,11 @@ impl<'a> Section<'a> {
     }
 }
 
-/// The mistake of a number that is written twice.
-pub fn twice(second: &Located<impl AsRef<str>>, first: &Located<impl AsRef<str>>) -> Diagnostic {
+/// Returns the mistake of a number that is written twice.
+pub fn written_twice(
+    second: &Located<impl AsRef<str>>,
+    first: &Located<impl AsRef<str>>,
+) -> Diagnostic {
     let title = match (second.value.as_ref(), first.value.as_ref()) {
         (name, other) if name == other => format!("`{name}` is given twice"),
         (name, other) => format!("`{other}` and `{name}` write the same number"),
@@ -361,16 +366,17 @@ pub fn twice(second: &Located<impl AsRef<str>>, first: &Located<impl AsRef<str>>
         .at(&first.at, "first written here")
 }
 
-/// A word that files of earlier versions have.
+/// A word of earlier versions that was removed.
 struct RemovedWord {
-    /// The key that had it.
+    /// The key of the word.
     key: &'static str,
     word: &'static str,
-    /// The word that serves in its place, where a model has that.
+    /// The word that replaces it, for models that have that.
     successor: &'static str,
     reason: &'static str,
 }
 
+/// |/// The words that were removed.
 const REMOVED_WORDS: [RemovedWord; 1] = [RemovedWord {
     key: "method",
     word: "rodas5p",
@@ -378,13 +384,13 @@ const REMOVED_WORDS: [RemovedWord; 1] = [RemovedWord {
     reason: "it has the same keys and takes stiff bearings in steps as long",
 }];
 
-/// Refuses a word that is not among the choices.
+/// Returns the mistake of a word that is not among the choices.
 pub fn unknown_word(what: &str, found: &Located<&str>, choices: &[&str]) -> Diagnostic {
     let removed = REMOVED_WORDS.iter().find(|removed| {
         removed.key == what && removed.word == found.value && choices.contains(&removed.successor)
     });
     let refusal = Diagnostic::new(format!("unknown {what} \"{}\"", short(found.value)))
-        .at(&found.at, format!("expected {}", listed(choices)));
+        .at(&found.at, format!("expected {}", list_choices(choices)));
     match removed {
         Some(RemovedWord { key, word, successor, reason }) => refusal.help(format!(
             "\"{word}\" was removed: write {key} = \"{successor}\" in its place; {reason}"
@@ -393,8 +399,8 @@ pub fn unknown_word(what: &str, found: &Located<&str>, choices: &[&str]) -> Diag
     }
 }
 
-/// `a`, `a or b`, `one of a, b, c`.
-pub fn listed(choices: &[&str]) -> String {
+/// Lists choices: `a`, `a or b`, `one of a, b, c`.
+pub fn list_choices(choices: &[&str]) -> String {
     match choices {
         [] => "nothing".to_owned(),
         [only] => format!("`{only}`"),
@@ -403,27 +409,27 @@ pub fn listed(choices: &[&str]) -> String {
     }
 }
 
-/// So many of something, whose plural ends in s.
+/// Returns a count with its noun, whose plural ends in s.
 pub fn counted(count: usize, what: &str) -> String {
     if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
-/// A key as messages call it.
+/// Returns a key as messages show it.
 pub fn quoted(key: &str) -> String {
     format!("`{}`", short(key))
 }
 
-/// An entry of an array as messages call it.
+/// Returns an entry of an array as messages show it.
 fn entry(key: &str) -> String {
     format!("an entry of `{key}`")
 }
 
-/// What a user typed, cut to what fits a title.
+/// Shortens a user's text to fit a title.
 pub fn short(typed: &str) -> String {
     cut(typed, 60)
 }
 
-/// At most `most` characters of a text.
+/// Returns at most `most` characters of a text.
 pub fn cut(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         Some((end, _)) => format!("{}...", &text[..end]),
@@ -431,7 +437,7 @@ pub fn cut(text: &str, most: usize) -> String {
     }
 }
 
-/// The number if it is finite and in range.
+/// Returns the number if it is finite and in range; otherwise it is reported.
 pub fn check_number(
     what: &str,
     value: f64,
@@ -446,7 +452,7 @@ pub fn check_number(
     None
 }
 
-/// What is wrong with a number that is not finite or not in range.
+/// Returns the mistake of a number that is not finite or not in range.
 pub fn refused_number(what: &str, value: f64, at: &Location, range: Range) -> Diagnostic {
     let title = if value.is_nan() {
         format!("{what} is not a number")

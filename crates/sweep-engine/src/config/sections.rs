@@ -1,4 +1,4 @@
-//! The keys of a grid file, table by table. What is left out has the defaults of a blank plan.
+//! The keys of a grid file, table by table. Missing values have the defaults of a blank plan.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -7,16 +7,16 @@ use serde_json::json;
 use sweep_parameter::{Channel, Range, decimal};
 
 use super::form::Numbers;
-use super::keys::{Told, Variants};
+use super::keys::{Description, Variants};
 use super::{
-    Diagnostic, Field, Form, GridInput, Key, Keys, Located, Location, Read, Report, Section, Walk,
-    design,
+    Diagnostic, Field, Form, GridInput, Key, KeyWalk, Keys, Located, Location, Read, Report,
+    Section, design,
 };
 use crate::method::{Integrator, Setting, default_method};
-use crate::plan::{Aside, MAX_END_S, Plan, RATIO_MIN, Reliability, WrittenIn};
+use crate::plan::{MAX_END_S, Plan, RATIO_MIN, ReadingNotes, Reliability, WrittenIn};
 
 impl<M: Read> Plan<M> {
-    /// A plan of which nothing is read: what is left out stays so.
+    /// Returns the plan of a grid file without keys: the defaults.
     pub(super) fn blank() -> Self {
         let end_s = 50.0;
         Self {
@@ -30,23 +30,23 @@ impl<M: Read> Plan<M> {
             reliability: Reliability { limits: 2.0.into(), channels: M::default_channels() },
             set: Vec::new(),
             written: WrittenIn::default(),
-            aside: Aside::default(),
+            aside: ReadingNotes::default(),
         }
     }
 }
 
-/// Walks over every key of a plan but its axes and `[set]`.
+/// Walks over every key of a plan except its axes and `[set]`.
 pub fn walk<M: Read>(plan: &mut Plan<M>, keys: &mut Keys<'_>) {
     sections(plan, keys, None);
     design::walk(&mut plan.design, keys);
 }
 
-/// The keys of grid files, described; but axes and `[set]`.
-pub fn described<M: Read>() -> Told {
-    Keys::told(true, |keys| walk(&mut Plan::<M>::blank(), keys))
+/// Returns the description of the keys of grid files, except axes and `[set]`.
+pub fn described<M: Read>() -> Description {
+    Keys::described(true, |keys| walk(&mut Plan::<M>::blank(), keys))
 }
 
-/// Those before `[set]`; `input` is what is read.
+/// Walks over the keys that are read before `[set]`; `input` is the grid that is read.
 pub(super) fn sections<M: Read>(
     plan: &mut Plan<M>,
     keys: &mut Keys<'_>,
@@ -72,12 +72,12 @@ pub(super) fn sections<M: Read>(
         keys.key(key.set(), &Form::Number(Range::Positive), &mut limits.most);
         let about = "if given, a point is reliable where every ratio is above this too";
         keys.key(Key::new("ratio_min", about).set(), &Form::Number(RATIO_MIN), &mut limits.least);
-        let key = Key::new("channels", "motions that are compared").set();
+        let key = Key::new("channels", "channels that are compared").set();
         keys.words(key, "channel", M::channels(), M::Channel::name, channels);
     });
 }
 
-/// What a name may be: it becomes a file's.
+/// The form of names, which become file names.
 const PLAIN_NAME: &str = "letters a to z and A to Z, digits, `-`, `_` and `.`, beginning with a \
                           letter or digit, at most 100 characters";
 
@@ -88,13 +88,13 @@ fn is_plain(name: &str) -> bool {
         && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
 }
 
-/// A run's name from the command line.
+/// Parses a run's name from the command line.
 pub fn plain_name(text: &str) -> Result<String, String> {
     if is_plain(text) { Ok(text.to_owned()) } else { Err(format!("expected {PLAIN_NAME}")) }
 }
 
-/// The name that a file gives its run, or its own; `over` is over both. `help` is of a file without
-/// any.
+/// Returns the run's name: `over`, the name in the file, or the file's own name, in this order.
+/// `help` is the advice for a file without any of them.
 pub fn name(root: &Section<'_>, path: &Path, over: Option<&str>, help: &str) -> String {
     match root.text("name") {
         Field::Given(found) if is_plain(found.value) => {
@@ -110,7 +110,7 @@ pub fn name(root: &Section<'_>, path: &Path, over: Option<&str>, help: &str) -> 
             if let Some(name) = over.or_else(stem).filter(|name| is_plain(name)) {
                 return name.to_owned();
             }
-            let title = "`name` is missing, and the file's own name cannot stand in for it";
+            let title = "`name` is missing, and the file's own name cannot replace it";
             let refusal = Diagnostic::new(title).at(root.at(), format!("expected {PLAIN_NAME}"));
             root.report.push_missing(refusal.help(help));
         }
@@ -118,14 +118,14 @@ pub fn name(root: &Section<'_>, path: &Path, over: Option<&str>, help: &str) -> 
     String::new()
 }
 
-/// End and window.
+/// Walks over the end and the window.
 fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     let about = Key::new("end_s", "end of the integration, s").set();
     let key = about.needed("the end of the integration in s");
     let described = json!({ "type": "number", "exclusiveMinimum": 0, "maximum": MAX_END_S });
     let (kind, expected) = match &keys.walk {
-        Walk::Read(_) => (Form::Number(Range::Any), "a time greater than 0, "),
-        Walk::Set(_) => (Form::Number(Range::Positive), ""),
+        KeyWalk::Read(_) => (Form::Number(Range::Any), "a time greater than 0, "),
+        KeyWalk::Set(_) => (Form::Number(Range::Positive), ""),
         _ => (Form::Own(&|_, _| Field::Absent, described), ""),
     };
     let mut value = *end_s;
@@ -139,7 +139,7 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     let is_window_written = |report: &Report| report.place(WINDOW[1]).is_some();
     if let Some(end) = &end {
         *end_s = end.value;
-        // A window that was not written ends with the run.
+        // A default window ends with the run.
         if !keys.report().is_some_and(is_window_written) {
             window_s[1] = end.value;
         }
@@ -161,10 +161,10 @@ fn time(end_s: &mut f64, window_s: &mut [f64; 2], keys: &mut Keys<'_>) {
     }
 }
 
-/// The edges of the window, as parameters.
+/// The names of the window's edges as parameters.
 const WINDOW: [&str; 2] = ["window_from_s", "window_to_s"];
 
-/// The window that was read, if it is one.
+/// Returns the window that was read, if it is valid.
 fn window(
     at: &Location,
     edges: &[f64],
@@ -188,7 +188,7 @@ fn window(
     Some([from, to])
 }
 
-/// The method and its settings.
+/// Walks over the method and its settings.
 fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
     let all = I::methods();
     let variants = Variants {
@@ -206,12 +206,15 @@ fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
             let owners: Vec<&str> = owners.collect();
             let (noun, verb) =
                 if owners.len() == 1 { ("method", "has") } else { ("methods", "have") };
-            let said = owners.join("\" and \"");
-            keys.misplace(&[key], &format!("only the {noun} \"{said}\" {verb} it, not \"{name}\""));
+            let owners_list = owners.join("\" and \"");
+            keys.misplace(
+                &[key],
+                &format!("only the {noun} \"{owners_list}\" {verb} it, not \"{name}\""),
+            );
             let title = format!("the method \"{name}\" has no `{key}`");
             keys.refuse(key, &title, &format!("`{key}` belongs to \"{}\"", owners.join("\", \"")));
         }
-        // Settings that both methods have stay as they are.
+        // Settings that the old and the new method share keep their values.
         let was = integrator.settings();
         *integrator = (entry.with)(&mut |&Setting { key, range, default, description, help }| {
             let was = was.iter().find(|(known, _)| *known == key);

@@ -1,4 +1,4 @@
-//! From text to a TOML table, with every mistake of syntax the parser can recover from.
+//! Parsing of TOML with every mistake of syntax from which the parser can recover.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -9,8 +9,8 @@ use toml::de::{DeTable, Error};
 use super::source::read;
 use super::{Diagnostic, Location, Report, SourceId, quoted};
 
-/// The text of a file that is named in words, kept under its path; none where it cannot be read,
-/// which is reported, with what to do where there is no such file.
+/// Reads the text of a file and adds it to the report. A file that cannot be read is reported;
+/// `to_start` is the advice if it does not exist, `what` its kind in words.
 pub fn text(
     path: &Path,
     what: &str,
@@ -31,13 +31,12 @@ pub fn text(
     None
 }
 
-/// The table a text holds; what is not TOML is reported, what can be made out of the rest is
-/// returned.
+/// Parses a text as TOML. Mistakes of syntax are reported, and the rest of the table is returned.
 pub fn parse<'a>(text: &'a str, source: SourceId, report: &Report) -> Spanned<DeTable<'a>> {
     let (table, mut errors) = DeTable::parse_recoverable(text);
     errors.sort_by_key(start);
-    // An array that is never closed swallows what follows. Only its first mistake says something of
-    // it.
+    // The rest of the text after an array that is never closed gives many mistakes, of which the
+    // first one is meaningful.
     let unclosed = errors.iter().any(|error| error.message().starts_with("unclosed array"));
     let swallowed =
         errors.iter().position(|error| error.message().contains("array")).filter(|_| unclosed);
@@ -63,7 +62,7 @@ fn describe(error: &Error, text: &str, source: SourceId) -> Diagnostic {
     let span = error.span().unwrap_or(0..0);
     let typed = text.get(span.clone()).unwrap_or_default();
     let at = Location::new(source, span);
-    // The message says what was expected after its first comma, if anything.
+    // The message has the expectation after its first comma, if at all.
     let (what, expected) = error.message().split_once(", ").unwrap_or((error.message(), ""));
     match what {
         "duplicate key" => Diagnostic::new(format!("the key {} is given twice", quoted(typed)))

@@ -1,4 +1,4 @@
-//! Checks of the resolved plan as a whole, each pointing back at the numbers it concerns.
+//! Checks of the plan as a whole, which point at the numbers that they concern.
 
 use std::collections::BTreeSet;
 use std::iter::{once, repeat};
@@ -10,7 +10,7 @@ use crate::method::{Integrator as _, Steps};
 use crate::plan::{MAX_STEPS, shortest_step_s};
 use crate::{Model, Scenario};
 
-/// A window that is none, at any corner of the grid.
+/// Reports a window that is invalid at a corner of the grid.
 pub fn windows<M: Model>(draft: &Draft<'_, M>) {
     let mut reported = BTreeSet::new();
     for corner in 0..draft.plan.corners() {
@@ -22,7 +22,7 @@ pub fn windows<M: Model>(draft: &Draft<'_, M>) {
     }
 }
 
-/// A window that constants or axes have turned round, or moved past the end.
+/// Reports a window that constants or axes have reversed or moved past the end.
 pub fn window<M: Model>(
     draft: &Draft<'_, M>,
     scenario: &Scenario<M>,
@@ -43,7 +43,7 @@ pub fn window<M: Model>(
     refuse(draft, title, &concerns, "expected window_from_s < window_to_s <= end_s");
 }
 
-/// Refuses how the concerned numbers go together, at each place where one was written.
+/// Reports a combination of numbers at each location where one of them was written.
 pub fn refuse<M: Model>(draft: &Draft<'_, M>, title: String, concerns: &[String], expected: &str) {
     draft.report.push_with(|sources| {
         let labels = once(expected).chain(repeat("and this"));
@@ -52,7 +52,7 @@ pub fn refuse<M: Model>(draft: &Draft<'_, M>, title: String, concerns: &[String]
     });
 }
 
-/// Where the concerned numbers were written: the axes that sweep them first, then files and
+/// Returns the locations of the concerned numbers: the axes that sweep them first, then files and
 /// arguments.
 fn places<M: Model>(draft: &Draft<'_, M>, concerns: &[String], sources: &Sources) -> Vec<Location> {
     let sweeps = |parameter: &M::Parameter| {
@@ -63,7 +63,7 @@ fn places<M: Model>(draft: &Draft<'_, M>, concerns: &[String], sources: &Sources
     let axes = axes.filter_map(|(k, _)| draft.report.place(&format!("axis[{k}]")));
     let mut places: Vec<Location> = Vec::new();
     for place in axes.chain(concerns.iter().filter_map(|key| draft.report.place(key))) {
-        // Numbers of one line, as of one vector, are one place.
+        // Numbers on one line, such as a vector's, share a location.
         let line = sources.line(&place).number;
         let same = places
             .iter_mut()
@@ -79,7 +79,7 @@ fn places<M: Model>(draft: &Draft<'_, M>, concerns: &[String], sources: &Sources
     places
 }
 
-/// A fixed step that is longer than the run, or so short that a trajectory would never end.
+/// Reports a fixed step that is longer than the run, or needs too many steps.
 pub fn steps<M: Model>(draft: &Draft<'_, M>) {
     let Steps::Fixed(step_s) = draft.plan.integrator.steps() else { return };
     let end_s = draft.plan.end_s;
@@ -98,7 +98,7 @@ pub fn steps<M: Model>(draft: &Draft<'_, M>) {
     draft.report.push(end.fold(refusal, |all, end| all.at(&end, "and this")));
 }
 
-/// A refusal of the step, pointing at it, or at the section that leaves it out.
+/// Returns the mistake of a step, at its location or that of the section that leaves it out.
 pub fn refuse_step<M: Model>(draft: &Draft<'_, M>, title: String, expected: &str) -> Diagnostic {
     let step = draft.report.place("integrator.step_s").or_else(|| draft.report.place("integrator"));
     step.into_iter().fold(Diagnostic::new(title), |diagnostic, at| diagnostic.at(&at, expected))

@@ -5,21 +5,21 @@ use std::ops::RangeInclusive;
 use sweep_parameter::Range;
 
 use super::section::check_number;
-use super::words::some_of;
+use super::words::known_words;
 use super::{Located, Location, Report, quoted, short, unknown_word};
 
-/// One argument NAME=VALUE, taken apart.
-pub struct Written<'a> {
-    /// What is set.
+/// An argument NAME=VALUE, split into its parts.
+pub struct NamedArgument<'a> {
+    /// The name with its location.
     pub name: Located<&'a str>,
-    /// To what.
+    /// The value with its location.
     pub value: Located<&'a str>,
-    /// Takes what is wrong.
+    /// The report of mistakes.
     pub report: &'a Report,
 }
 
-impl<'a> Written<'a> {
-    /// Takes an option's argument apart.
+impl<'a> NamedArgument<'a> {
+    /// Splits an option's argument.
     pub fn read(option: &str, argument: &'a str, report: &'a Report) -> Option<Self> {
         let source = report.add(option, argument);
         let located =
@@ -38,7 +38,7 @@ impl<'a> Written<'a> {
         }
     }
 
-    /// The number, in a range.
+    /// Parses the number, in a range.
     pub fn number(&self, range: Range) -> Option<Located<f64>> {
         let at = self.value.at.clone();
         match self.value.value.parse() {
@@ -50,18 +50,19 @@ impl<'a> Written<'a> {
         }
     }
 
-    /// A whole number within bounds.
+    /// Parses a whole number within bounds.
     pub fn whole(&self, bounds: &RangeInclusive<u64>) -> Option<u64> {
         let number = self.value.value.parse().ok();
         number.filter(|number| bounds.contains(number)).or_else(|| {
-            let title = format!("`{}` is no such number", short(self.value.value));
-            let (least, most) = (bounds.start(), bounds.end());
+            let title = format!("`{}` is not a valid number", short(self.value.value));
+            let least = bounds.start();
+            let most = bounds.end();
             let expected = format!("expected a whole number from {least} to {most}");
             self.report.refuse(&self.value.at, title, expected)
         })
     }
 
-    /// One of a few words, by its place.
+    /// Parses a word, as its index in `choices`.
     pub fn choice(&self, choices: &[&str]) -> Option<usize> {
         let place = choices.iter().position(|choice| *choice == self.value.value);
         if place.is_none() {
@@ -70,24 +71,24 @@ impl<'a> Written<'a> {
         place
     }
 
-    /// Words separated by commas, each once and at least one.
+    /// Parses words separated by commas, each once and at least one.
     pub fn list(&self, what: &str, all: &[&str]) -> Option<Vec<&'a str>> {
         let Located { value, at } = &self.value;
         let parts = value.split(',').map(|part| Located { value: part.trim(), at: at.clone() });
-        let (chosen, is_sound) = some_of(parts, what, all, self.report);
+        let (chosen, is_sound) = known_words(parts, what, all, self.report);
         is_sound.then_some(chosen)
     }
 }
 
-/// What an argument NAME=VALUE names.
+/// Returns the name of an argument NAME=VALUE.
 pub fn name_of(argument: &str) -> &str {
     argument.split('=').next().unwrap_or_default().trim()
 }
 
-/// A finite number of the command line.
+/// Parses a finite number of the command line.
 ///
 /// # Errors
-/// What it is not.
+/// The text of the message.
 pub fn finite(text: &str) -> Result<f64, String> {
     text.trim()
         .parse::<f64>()

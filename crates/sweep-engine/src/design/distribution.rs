@@ -1,43 +1,43 @@
-//! Distributions that a design's points follow along an axis.
+//! The distributions of a design's points along an axis.
 
 use std::f64::consts::SQRT_2;
 
-/// How far a distribution reaches that is not cut: so many standard deviations. Beyond lies a part
-/// of 2e-9.
-pub const REACH: f64 = 6.0;
+/// Range of a distribution without bounds on either side of its middle, standard deviations. Basis:
+/// a share of 2e-9 lies beyond. Doubling it makes axes twice as long, whose ends have no points.
+pub const TAIL_DEVIATIONS: f64 = 6.0;
 
 /// The shape of a distribution.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
-    /// Gauss's.
+pub enum DistributionShape {
+    /// A normal distribution.
     Normal {
-        /// Mean, before it is cut.
+        /// The mean before truncation.
         mean: f64,
-        /// Standard deviation, before it is cut.
+        /// The standard deviation before truncation.
         sd: f64,
     },
-    /// Gauss's of the logarithm.
+    /// A lognormal distribution.
     Lognormal {
-        /// Median, before it is cut.
+        /// The median before truncation.
         median: f64,
-        /// Standard deviation of the natural logarithm, before it is cut.
+        /// The standard deviation of the natural logarithm before truncation.
         sigma: f64,
     },
 }
 
-/// A distribution between two bounds: what lies outside is left out, and the rest makes up for it.
+/// A distribution truncated at two bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distribution {
-    /// Its shape.
-    pub shape: Shape,
-    /// Lower bound.
+    /// The shape before truncation.
+    pub shape: DistributionShape,
+    /// The lower bound.
     pub from: f64,
-    /// Upper bound.
+    /// The upper bound.
     pub to: f64,
 }
 
-impl Shape {
-    /// Name in grid files.
+impl DistributionShape {
+    /// Returns the name in grid files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Normal { .. } => "normal",
@@ -45,7 +45,7 @@ impl Shape {
         }
     }
 
-    /// Its two numbers with their keys in grid files.
+    /// Returns both numbers with their keys in grid files.
     pub const fn numbers(self) -> [(&'static str, f64); 2] {
         match self {
             Self::Normal { mean, sd } => [("mean", mean), ("sd", sd)],
@@ -53,7 +53,7 @@ impl Shape {
         }
     }
 
-    /// The value so many standard deviations from the middle.
+    /// Returns the value at this number of standard deviations from the middle.
     pub fn at(self, deviations: f64) -> f64 {
         match self {
             Self::Normal { mean, sd } => mean + sd * deviations,
@@ -61,7 +61,7 @@ impl Shape {
         }
     }
 
-    /// How many standard deviations a value is from the middle.
+    /// Returns the number of standard deviations between a value and the middle.
     fn deviations(self, value: f64) -> f64 {
         match self {
             Self::Normal { mean, sd } => (value - mean) / sd,
@@ -71,63 +71,73 @@ impl Shape {
 }
 
 impl Distribution {
-    /// The value below which a part `place` (0 to 1) lies. The same on every machine: no platform's
-    /// functions take part.
+    /// Returns the quantile at `place` (0 to 1). It has the same bits on every machine, because no
+    /// platform's functions are called.
     pub fn quantile(&self, place: f64) -> f64 {
         let [low, high] = [self.from, self.to].map(|bound| self.shape.deviations(bound));
-        // Above the middle the part beyond is small and keeps its digits; so it is turned around.
-        let deviations =
-            if low > 0.0 { -between(-high, -low, 1.0 - place) } else { between(low, high, place) };
+        // Above the middle the distribution is mirrored: the share beyond is small there and keeps
+        // its digits.
+        let deviations = if low > 0.0 {
+            -truncated_quantile(-high, -low, 1.0 - place)
+        } else {
+            truncated_quantile(low, high, place)
+        };
         self.shape.at(deviations).clamp(self.from, self.to)
     }
 }
 
-/// Gauss's quantile between two bounds.
-fn between(low: f64, high: f64, place: f64) -> f64 {
-    let [below, above] = [low, high].map(cumulative);
+/// Returns the quantile of the standard normal distribution truncated at two bounds.
+fn truncated_quantile(low: f64, high: f64, place: f64) -> f64 {
+    let [below, above] = [low, high].map(cumulative_normal);
     standard_quantile(below + place * (above - below)).clamp(low, high)
 }
 
-/// The part of Gauss's distribution below a value.
-fn cumulative(x: f64) -> f64 {
+/// Returns the cumulative standard normal distribution.
+fn cumulative_normal(x: f64) -> f64 {
     0.5 * libm::erfc(-x / SQRT_2)
 }
 
-/// The value below which a part `p` of Gauss's distribution lies.
+/// Returns the quantile of the standard normal distribution.
 ///
 /// M. J. Wichura, Algorithm AS 241: the percentage points of the normal distribution, Applied
 /// Statistics 37 (1988), 477-484: PPND16, relative accuracy about 1e-16.
 fn standard_quantile(p: f64) -> f64 {
+    /// Numerator coefficients of the central region, in the paper's letters.
     #[rustfmt::skip]
     const A: [f64; 8] = [
         3.387_132_872_796_366_6, 1.331_416_678_917_843_8e2, 1.971_590_950_306_551_3e3,
         1.373_169_376_550_946_1e4, 4.592_195_393_154_987_2e4, 6.726_577_092_700_870_1e4,
         3.343_057_558_358_812_8e4, 2.509_080_928_730_122_7e3,
     ];
+    /// Denominator coefficients of the central region.
     #[rustfmt::skip]
     const B: [f64; 8] = [
         1.0, 4.231_333_070_160_091_1e1, 6.871_870_074_920_579_1e2,
         5.394_196_021_424_751_1e3, 2.121_379_430_158_659_6e4, 3.930_789_580_009_271_1e4,
         2.872_908_573_572_194_3e4, 5.226_495_278_852_854_6e3,
     ];
+    /// Numerator coefficients of the intermediate region.
     #[rustfmt::skip]
     const C: [f64; 8] = [
         1.423_437_110_749_683_5, 4.630_337_846_156_545_3, 5.769_497_221_460_691_4,
         3.647_848_324_763_204_6, 1.270_458_252_452_368_4, 2.417_807_251_774_506_1e-1,
         2.272_384_498_926_918_5e-2, 7.745_450_142_783_414_1e-4,
     ];
+    /// Denominator coefficients of the intermediate region.
     #[rustfmt::skip]
     const D: [f64; 8] = [
         1.0, 2.053_191_626_637_758_8, 1.676_384_830_183_803_8,
         6.897_673_349_851_000_0e-1, 1.481_039_764_274_800_7e-1, 1.519_866_656_361_645_7e-2,
         5.475_938_084_995_344_9e-4, 1.050_750_071_644_416_8e-9,
     ];
+    /// Numerator coefficients of the tail.
     #[rustfmt::skip]
     const E: [f64; 8] = [
         6.657_904_643_501_103_8, 5.463_784_911_164_114_4, 1.784_826_539_917_291_3,
         2.965_605_718_285_048_9e-1, 2.653_218_952_657_612_3e-2, 1.242_660_947_388_078_4e-3,
         2.711_555_568_743_487_6e-5, 2.010_334_399_292_288_1e-7,
     ];
+    /// Denominator coefficients of the tail.
     #[rustfmt::skip]
     const F: [f64; 8] = [
         1.0, 5.998_322_065_558_879_4e-1, 1.369_298_809_227_358_1e-1,
@@ -156,8 +166,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_are_those_of_tables() {
-        // To the digits that tables of the normal distribution print.
+    fn quantiles_agree_with_tables() {
+        // Expected values: tables of the normal distribution to their printed digits.
         for (p, x) in [
             (0.5, 0.0),
             (0.975, 1.959_963_984_540_054),
@@ -171,17 +181,17 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_undo_the_cumulative_distribution() {
+    fn quantiles_invert_the_cumulative_distribution() {
         for k in 1..2000 {
             let p = f64::from(k) / 2000.0;
-            assert!((cumulative(standard_quantile(p)) - p).abs() < 1e-15, "{p}");
+            assert!((cumulative_normal(standard_quantile(p)) - p).abs() < 1e-15, "{p}");
         }
     }
 
     #[test]
-    fn a_cut_distribution_stays_between_its_bounds_and_rises() {
-        let normal = Shape::Normal { mean: 100.0, sd: 10.0 };
-        let lognormal = Shape::Lognormal { median: 100.0, sigma: 0.1 };
+    fn quantiles_of_a_truncated_distribution_rise_between_its_bounds() {
+        let normal = DistributionShape::Normal { mean: 100.0, sd: 10.0 };
+        let lognormal = DistributionShape::Lognormal { median: 100.0, sigma: 0.1 };
         for (shape, from, to) in [
             (normal, 90.0, 130.0),
             (normal, 140.0, 160.0),

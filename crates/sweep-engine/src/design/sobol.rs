@@ -1,14 +1,14 @@
-//! Sobol's sequence, scrambled by Owen's nested permutations through a hash.
+//! The Sobol sequence with Owen's nested scrambling by a hash.
 
 use std::array::from_fn;
 use std::sync::LazyLock;
 
 use super::axis_key;
 
-/// Axes that there are direction numbers for.
+/// Maximum number of axes: those with direction numbers in the table below.
 pub const MOST_AXES: usize = 32;
 
-/// Bits of a coordinate, and of an index: the sequence has 2^32 points.
+/// Bits of a coordinate and of an index: the sequence has 2^32 points.
 const BITS: usize = 32;
 
 /// Degree s, coefficients a and first direction numbers m of the primitive polynomial of each
@@ -50,14 +50,15 @@ const JOE_KUO: [(u32, &[u32]); MOST_AXES - 1] = [
     (42, &[1, 3, 7, 3, 13, 59, 17]),
 ];
 
-/// Direction numbers of every dimension, the first bit of a coordinate foremost.
+/// The direction numbers of every dimension, the first bit of a coordinate first.
 static DIRECTIONS: LazyLock<[[u32; BITS]; MOST_AXES]> = LazyLock::new(|| from_fn(directions));
 
 fn directions(axis: usize) -> [u32; BITS] {
-    let Some((a, m)) = axis.checked_sub(1).map(|of| JOE_KUO[of]) else {
+    let Some((a, m)) = axis.checked_sub(1).map(|index| JOE_KUO[index]) else {
         return from_fn(|i| 1 << (BITS - 1 - i));
     };
-    let (s, mut v) = (m.len(), [0; BITS]);
+    let s = m.len();
+    let mut v = [0; BITS];
     for i in 0..BITS {
         v[i] = match i.checked_sub(s) {
             None => m[i] << (BITS - 1 - i),
@@ -69,15 +70,15 @@ fn directions(axis: usize) -> [u32; BITS] {
     v
 }
 
-/// Coordinate `axis` of point `point`, as a fraction of 2^32. Beyond the 2^32 points there are, and
-/// the axes, it repeats.
+/// Returns coordinate `axis` of point `point` as a fraction of 2^32. Beyond 2^32 points or the last
+/// axis the sequence repeats.
 fn coordinate(point: u64, axis: usize) -> u32 {
     let directions = &DIRECTIONS[axis % MOST_AXES];
     (0..BITS).filter(|bit| point >> bit & 1 == 1).fold(0, |x, bit| x ^ directions[bit])
 }
 
-/// Owen's scrambling: each bit is flipped or not by a hash of the bits before it, which is what a
-/// hash that carries only upwards does to reversed bits.
+/// Scrambles a coordinate by Owen's method: each bit is flipped or not by a hash of the bits before
+/// it. A hash whose carries go upwards does so to reversed bits.
 ///
 /// B. Burley, Practical hash-based Owen scrambling, J. Computer Graphics Techniques 9 (2020), 1-20;
 /// after S. Laine and T. Karras (2011), with the constants that N. Vegdahl found to mix better.
@@ -91,9 +92,9 @@ const fn scrambled(x: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// Where a point lies along an axis: in the middle of the smallest cell that the sequence knows.
+/// Returns the position of a point along an axis: the middle of its interval of length 2^-32.
 pub(super) fn place(point: u64, axis: usize, seed: u64) -> f64 {
-    // The upper half of the key, which is mixed as well as the lower.
+    // The upper half of the key is mixed as well as the lower half.
     let key = (axis_key(seed, axis) >> 32) as u32;
     (f64::from(scrambled(coordinate(point, axis), key)) + 0.5) * 2.0_f64.powi(-32)
 }
@@ -103,9 +104,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_sequence_begins_as_published() {
-        // The first eight points in three dimensions, as Joe and Kuo's own program prints them (its
-        // Gray code order permutes within the eight).
+    fn the_first_points_are_those_published() {
+        // Expected values: the first eight points in three dimensions by Joe and Kuo's program,
+        // whose Gray code order permutes them.
         let points: Vec<[f64; 3]> = (0..8)
             .map(|i| [0, 1, 2].map(|axis| f64::from(coordinate(i, axis)) * 2.0_f64.powi(-32)))
             .collect();
@@ -125,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn every_axis_is_even_at_every_power_of_two_however_scrambled() {
+    fn every_axis_is_stratified_at_powers_of_two() {
         for axis in 0..MOST_AXES {
             for power in [1, 4, 10] {
                 let points = 1_u64 << power;
@@ -139,9 +140,10 @@ mod tests {
 
     #[test]
     fn the_first_two_axes_fill_every_elementary_rectangle() {
-        // A (0, m, 2)-net in base 2 stays one under nested scrambling.
+        // A (0, m, 2)-net in base 2 remains one under nested scrambling.
         for columns in 0..=8_u32 {
-            let (across, up) = (f64::from(1_u32 << columns), f64::from(1_u32 << (8 - columns)));
+            let across = f64::from(1_u32 << columns);
+            let up = f64::from(1_u32 << (8 - columns));
             let mut cells: Vec<u32> = (0..256)
                 .map(|i| {
                     ((place(i, 0, 9) * across) as u32) << (8 - columns)
@@ -154,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn directions_are_odd_as_they_must_be() {
+    fn direction_numbers_are_odd_and_bounded() {
         for (axis, directions) in DIRECTIONS.iter().enumerate() {
             for (i, direction) in directions.iter().enumerate() {
                 let m = direction >> (BITS - 1 - i);
@@ -164,14 +166,14 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_of_a_smooth_function_converges_faster_than_by_chance() {
+    fn the_mean_of_a_smooth_function_converges_faster_than_random() {
         let error = |points: u64| {
             let sum: f64 = (0..points)
                 .map(|i| (0..4).map(|axis| 1.0 + (place(i, axis, 1) - 0.5)).product::<f64>())
                 .sum();
             (sum / points as f64 - 1.0).abs()
         };
-        // By chance it would be about 0.009 at 4096 points.
+        // The error of independent random points would be about 0.009.
         assert!(error(4096) < 3e-4, "{}", error(4096));
     }
 

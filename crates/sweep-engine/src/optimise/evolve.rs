@@ -1,10 +1,14 @@
-//! Differential evolution towards a front: GDE3.
+//! Differential evolution towards a Pareto front (GDE3).
 //!
-//! A trial challenges every member of a generation: another member, moved by a part of the
-//! difference of two more. The better of the two stays, both if neither is better; then the least
-//! crowded of the best fronts go on, as in NSGA-II. With one objective this is plain differential
-//! evolution, and the last third of its trials are moved about the best instead, by half as much.
-//! What breaks a condition less is better than what breaks it more, whatever its objectives.
+//! 1. Each member of a generation is challenged by a trial: another member plus a multiple of the
+//! difference of two more.
+//! 2. The better one of member and trial survives; both survive if neither dominates.
+//! 3. Survivors beyond the size of the population are removed by fronts and crowding, as in
+//! NSGA-II.
+//!
+//! With one objective this is plain differential evolution; the last third of its trials start from
+//! the best candidate instead, with half the multiple. A candidate that violates constraints less
+//! is better, whatever its objectives.
 //!
 //! S. Kukkonen, J. Lampinen, GDE3: the third evolution step of generalized differential evolution,
 //! CEC 2005, 443-450. K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, A fast and elitist
@@ -13,43 +17,43 @@
 
 use std::cmp::Ordering;
 
-use crate::design::{Design, Rule};
+use crate::design::{Design, DesignRule};
 
-/// Share of a trial's coordinates that come from the mutant.
+/// Share of a trial's coordinates that come from the mutant. Basis: the papers' usual value.
 const CROSSOVER: f64 = 0.9;
-/// Between these, evenly, is the factor of the difference (S. Das, A. Konar, U. K. Chakraborty, Two
-/// improved differential evolution schemes for faster global search, GECCO 2005).
+/// Range of the multiple of the difference, uniformly distributed (S. Das, A. Konar, U. K.
+/// Chakraborty, Two improved differential evolution schemes for faster global search, GECCO 2005).
 const FACTOR: [f64; 2] = [0.3, 0.9];
 
-/// What is looked for.
+/// The settings of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct Evolution {
-    /// Coordinates, each from 0 to 1.
+    /// The number of coordinates, each from 0 to 1.
     pub parameters: usize,
-    /// Numbers of an answer that are minimised; the others are excesses over conditions.
+    /// The number of objectives, all minimised; the other numbers are constraint violations.
     pub objectives: usize,
-    /// Members of a generation, at least 4.
+    /// The number of members of a generation, at least 4.
     pub population: u64,
-    /// Trials in all.
+    /// The number of trials in all.
     pub candidates: u64,
-    /// Another seed, another search.
+    /// The seed of the random numbers.
     pub seed: u64,
 }
 
-/// A place that was tried.
+/// An evaluated candidate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// In the unit box.
+    /// The position in the unit box.
     pub place: Vec<f64>,
-    /// Objectives, then excesses; none if one of them is missing.
+    /// The objectives, then the constraint violations; `None` if one of them is missing.
     pub answers: Option<Vec<f64>>,
-    /// From 0.
+    /// The generation, from 0.
     pub generation: u64,
 }
 
 impl Evolution {
-    /// The first trial of the last third, if any is after the first generation; with one objective
-    /// they are tried beside the best.
+    /// Returns the index of the first trial of the last third, if it comes after the first
+    /// generation. With one objective, trials from there on start from the best candidate.
     pub fn first_late(&self) -> u64 {
         let Self { candidates, population, .. } = *self;
         (candidates - candidates / 3).max(population.min(candidates))
@@ -57,17 +61,17 @@ impl Evolution {
 }
 
 impl Candidate {
-    /// Whether it has every number and breaks no condition.
+    /// Returns whether the candidate has every number and violates no constraint.
     pub fn is_feasible(&self, objectives: usize) -> bool {
         self.answers.as_ref().is_some_and(|all| all[objectives..].iter().all(|&one| one <= 0.0))
     }
 }
 
-/// Everything that was tried, in order. `ask` answers places, whole generations at a time; all
-/// numbers are minimised. With the same answers it is asked for the same places.
+/// Returns all candidates in order. `ask` evaluates whole generations of positions; all numbers are
+/// minimised. Equal numbers lead to equal positions.
 ///
 /// # Errors
-/// Those of `ask`.
+/// The errors of `ask`.
 pub fn evolve<E>(
     evolution: &Evolution,
     ask: &mut dyn FnMut(&[Vec<f64>]) -> Result<Vec<Option<Vec<f64>>>, E>,
@@ -81,10 +85,10 @@ pub fn evolve<E>(
             break;
         }
         let first = tried.len();
-        let ranks = Ranks::of(&tried, objectives);
+        let ranks = Ranks::new(&tried, objectives);
         let better = |a, b| if ranks.compare(b, a) == Some(Ordering::Less) { b } else { a };
         let best = members.iter().copied().reduce(better);
-        let start = Design::Spread { rule: Rule::LatinHypercube, points: count, seed };
+        let start = Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed };
         let place = |k: u64| -> Vec<f64> {
             if generation == 0 {
                 return (0..parameters).filter_map(|axis| start.place(k, axis)).collect();
@@ -101,7 +105,7 @@ pub fn evolve<E>(
             members = (0..tried.len()).collect();
             continue;
         }
-        let ranks = Ranks::of(&tried, objectives);
+        let ranks = Ranks::new(&tried, objectives);
         let mut next = Vec::with_capacity(2 * members.len());
         for (k, &member) in members.iter().enumerate() {
             let trial = Some(first + k).filter(|&trial| trial < tried.len());
@@ -116,7 +120,8 @@ pub fn evolve<E>(
     Ok(tried)
 }
 
-/// The trial that challenges a member, perhaps near a candidate: its number decides what is drawn.
+/// Returns the trial that challenges a member. `number` selects its random numbers; `near` is the
+/// best candidate, if the trial starts from it.
 fn mutant(
     tried: &[Candidate],
     members: &[usize],
@@ -125,7 +130,7 @@ fn mutant(
     evolution: &Evolution,
 ) -> Vec<f64> {
     let draws = Design::Spread {
-        rule: Rule::MonteCarlo,
+        rule: DesignRule::MonteCarlo,
         points: evolution.candidates,
         seed: evolution.seed,
     };
@@ -144,34 +149,34 @@ fn mutant(
     let factor = FACTOR[0] + (FACTOR[1] - FACTOR[0]) * draw();
     let (base, factor) =
         near.map_or((base, factor), |best| (tried[best].place.as_slice(), 0.5 * factor));
-    let sure = (draw() * own.len() as f64) as usize;
+    let from_mutant = (draw() * own.len() as f64) as usize;
     let coordinate = |k: usize| {
         let mutated = (base[k] + factor * (plus[k] - minus[k])).clamp(0.0, 1.0);
-        if draw() < CROSSOVER || k == sure { mutated } else { own[k] }
+        if draw() < CROSSOVER || k == from_mutant { mutated } else { own[k] }
     };
     (0..own.len()).map(coordinate).collect()
 }
 
-/// The candidates that are on the front of all: feasible, and beaten in every objective by none.
+/// Returns the Pareto front: the feasible candidates that no other one dominates.
 pub fn front(tried: &[Candidate], objectives: usize) -> Vec<usize> {
-    let ranks = Ranks::of(tried, objectives);
+    let ranks = Ranks::new(tried, objectives);
     let feasible = (0..tried.len()).filter(|&k| tried[k].is_feasible(objectives));
     let feasible: Vec<usize> = feasible.collect();
-    let beaten =
+    let dominated =
         |k: usize| feasible.iter().any(|&other| ranks.compare(other, k) == Some(Ordering::Less));
-    feasible.iter().copied().filter(|&k| !beaten(k)).collect()
+    feasible.iter().copied().filter(|&k| !dominated(k)).collect()
 }
 
-/// What candidates are compared by.
+/// The order of candidates by constraint violation and dominance.
 struct Ranks<'a> {
     tried: &'a [Candidate],
     objectives: usize,
-    /// The sum of each candidate's excesses, each over the greatest of all.
+    /// The sum of each candidate's violations, each divided by the greatest of all candidates.
     broken: Vec<f64>,
 }
 
 impl<'a> Ranks<'a> {
-    fn of(tried: &'a [Candidate], objectives: usize) -> Self {
+    fn new(tried: &'a [Candidate], objectives: usize) -> Self {
         let excesses = || tried.iter().filter_map(|one| Some(&one.answers.as_ref()?[objectives..]));
         let conditions = excesses().next().map_or(0, <[f64]>::len);
         let greatest: Vec<f64> = (0..conditions)
@@ -190,7 +195,7 @@ impl<'a> Ranks<'a> {
         self.tried[candidate].answers.as_ref().map_or(&[], |all| &all[..self.objectives])
     }
 
-    /// `Less` where the first is better; none where each is better in something.
+    /// Compares two candidates: `Less` if the first is better, `None` if neither dominates.
     fn compare(&self, first: usize, second: usize) -> Option<Ordering> {
         let [a, b] = [self.broken[first], self.broken[second]];
         if a > 0.0 || b > 0.0 {
@@ -205,14 +210,16 @@ impl<'a> Ranks<'a> {
         }
     }
 
-    /// The best of these by fronts, the least crowded of the last.
+    /// Returns at most `most` of these, front by front; the most crowded of the last front are
+    /// removed.
     fn best(&self, mut left: Vec<usize>, most: usize) -> Vec<usize> {
         let mut chosen = Vec::with_capacity(most);
         while left.len() + chosen.len() > most && chosen.len() < most {
-            let beaten = |k: &usize| {
+            let dominated = |k: &usize| {
                 left.iter().any(|&other| self.compare(other, *k) == Some(Ordering::Less))
             };
-            let (rest, mut front): (Vec<usize>, Vec<usize>) = left.iter().partition(|k| beaten(k));
+            let (rest, mut front): (Vec<usize>, Vec<usize>) =
+                left.iter().partition(|k| dominated(k));
             while front.len() + chosen.len() > most {
                 front.remove(self.most_crowded(&front));
             }
@@ -225,7 +232,7 @@ impl<'a> Ranks<'a> {
         chosen
     }
 
-    /// The place of the member of a front whose neighbours are nearest.
+    /// Returns the index of the member of a front with the least crowding distance.
     fn most_crowded(&self, front: &[usize]) -> usize {
         let mut distances = vec![0.0; front.len()];
         for k in 0..self.objectives {
@@ -236,8 +243,8 @@ impl<'a> Ranks<'a> {
             distances[low] = f64::INFINITY;
             distances[high] = f64::INFINITY;
             let extent = (value(high) - value(low)).max(f64::MIN_POSITIVE);
-            for of in order.windows(3) {
-                distances[of[1]] += (value(of[2]) - value(of[0])) / extent;
+            for triple in order.windows(3) {
+                distances[triple[1]] += (value(triple[2]) - value(triple[0])) / extent;
             }
         }
         let nearest = (0..front.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b]));
@@ -265,8 +272,9 @@ mod tests {
         Evolution { parameters: 2, objectives: 1, population: 32, candidates: 1500, seed: 1 };
 
     #[test]
-    fn a_narrow_curved_valley_is_followed_to_its_least() {
-        // Rosenbrock's, in [-2, 2]: least at (1, 1), which is (0.75, 0.75) of the box.
+    fn rosenbrocks_function_is_minimised() {
+        // The function is Rosenbrock's in [-2, 2], with its minimum at (1, 1): (0.75, 0.75) of the
+        // box.
         let found = tried(ONE, |at| {
             let [x, y] = [4.0 * at[0] - 2.0, 4.0 * at[1] - 2.0];
             Some(vec![(1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2)])
@@ -276,8 +284,8 @@ mod tests {
     }
 
     #[test]
-    fn conditions_hold_at_the_least_that_is_found_and_what_has_no_number_loses() {
-        // The least of x + y where x y >= 0.25 is at (0.5, 0.5); nothing is known where x > 0.9.
+    fn the_minimum_satisfies_constraints_and_has_numbers() {
+        // The minimum of x + y with x y >= 0.25 is at (0.5, 0.5); there are no numbers for x > 0.9.
         let found = tried(ONE, |at| {
             let number = vec![at[0] + at[1], (0.25 - at[0] * at[1]).max(0.0)];
             (at[0] <= 0.9).then_some(number)
@@ -289,8 +297,8 @@ mod tests {
     }
 
     #[test]
-    fn a_front_is_covered_from_end_to_end() {
-        // Schaffer's: the front is x from 0 to 2, where sqrt(f) + sqrt(g) = 2.
+    fn a_pareto_front_is_covered_from_end_to_end() {
+        // The problem is Schaffer's, with the front from x = 0 to 2, where sqrt(f) + sqrt(g) = 2.
         let two = Evolution { parameters: 1, objectives: 2, ..ONE };
         let found = tried(two, |at| {
             let x = 20.0 * at[0] - 10.0;
@@ -306,8 +314,8 @@ mod tests {
     }
 
     #[test]
-    fn a_short_search_ends_beside_the_least() {
-        // Without trials beside the best the middle of these is above 1e-4.
+    fn a_short_search_ends_close_to_the_minimum() {
+        // Without trials from the best candidate the median of these exceeds 1e-4.
         let bowl = |at: &[f64]| (at[0] - 0.3).powi(2) + 3.0 * (at[1] - 0.6).powi(2);
         let least = |seed| {
             let short = Evolution { candidates: 256, seed, ..ONE };
@@ -320,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_answers_are_asked_for_the_same_places() {
+    fn equal_answers_lead_to_equal_candidates() {
         let sphere = |at: &[f64]| Some(vec![at.iter().map(|x| x * x).sum()]);
         let short = Evolution { candidates: 150, ..ONE };
         assert_eq!(tried(ONE, sphere)[..100], tried(short, sphere)[..100]);

@@ -1,11 +1,11 @@
-//! The file of a study: a row per candidate, in the order in which they were tried.
+//! The file of a study: a row for each candidate, in the order of evaluation.
 
 use sweep_files::key;
 
 use super::{Candidate, Study, front};
 use crate::{Axis, GridInput, Rows, Table};
 
-/// The file of what a study has tried.
+/// Returns the table of a study's candidates.
 pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
     let objectives = study.objectives.len();
     let front = front(tried, objectives);
@@ -23,18 +23,19 @@ pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
     for (k, one) in study.objectives.iter().enumerate() {
         let unit = if one.goal.unit().is_empty() { "1" } else { one.goal.unit() };
         let verb = if one.sign > 0.0 { "minimised" } else { "maximised" };
-        let said = format!("{}, {verb}; null where a row has no value", one.goal.text());
-        table.numbers(&one.name, unit, &said, answer(k, one.sign));
+        let description = format!("{}, {verb}; null where a row has no value", one.goal.text());
+        table.numbers(&one.name, unit, &description, answer(k, one.sign));
     }
     for (k, goal) in study.conditions.iter().enumerate() {
-        let said = format!("how far the rows are from keeping {}; 0 where they do", goal.text());
-        table.numbers(&format!("excess_{}", k + 1), "1", &said, answer(objectives + k, 1.0));
+        let description =
+            format!("how far the rows are from keeping {}; 0 where they do", goal.text());
+        table.numbers(&format!("excess_{}", k + 1), "1", &description, answer(objectives + k, 1.0));
     }
     let feasible = tried.iter().map(|one| one.is_feasible(objectives));
     table.flags("feasible", "whether every condition holds", feasible);
     let on_front = (0..tried.len()).map(|k| front.contains(&k));
     table.flags("on_front", "whether no feasible candidate beats it in every objective", on_front);
-    let mut about = study.asked();
+    let mut about = study.settings();
     about["best"] = best(tried, &front, objectives).into();
     let job = study.job();
     table.metadata(key::PLAN, &job.plan);
@@ -43,13 +44,13 @@ pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
     table
 }
 
-/// The parameters of a study.
+/// Returns the parameters of a study.
 pub fn parameters<M: Rows>(study: &Study<M>) -> &[Axis<M>] {
     &study.plan.axes[study.grid.axes.len()..]
 }
 
-/// The candidate of the front that is nearest to the least of every objective, each as a part of
-/// its extent over the front.
+/// Returns the candidate of the front that is closest to the minimum of every objective, each as a
+/// share of its range over the front.
 fn best(tried: &[Candidate], front: &[usize], objectives: usize) -> Option<usize> {
     let value = |candidate: usize, k: usize| {
         tried[candidate].answers.as_ref().map_or(f64::INFINITY, |answers| answers[k])
@@ -69,7 +70,7 @@ fn best(tried: &[Candidate], front: &[usize], objectives: usize) -> Option<usize
     front.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
 }
 
-/// The model's own file with these values of the parameters, if the model has one.
+/// Returns the model's own file with these values of the parameters, if the model has one.
 pub fn own_file<M: Rows>(study: &Study<M>, values: &[f64]) -> Option<String> {
     let mut plan = study.grid.clone();
     let mut scenario = crate::plan::Scenario { model: plan.model, window_s: plan.window_s };
@@ -77,5 +78,5 @@ pub fn own_file<M: Rows>(study: &Study<M>, values: &[f64]) -> Option<String> {
         scenario.write(&axis.parameter, value);
     }
     plan.model = scenario.model;
-    GridInput::<M>::of_plan(&study.name, &plan.to_json()).own_file
+    GridInput::<M>::from_plan(&study.name, &plan.to_json()).own_file
 }

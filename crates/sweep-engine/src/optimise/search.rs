@@ -1,4 +1,4 @@
-//! Candidates through a model's engine, with a memory.
+//! Evaluation of candidates by a model's engine, with a cache.
 
 use std::sync::Mutex;
 
@@ -12,11 +12,11 @@ use crate::{Effort, Error, Progress, StoreError, Swept};
 use sweep_files::panics::{lock, unlocked};
 use sweep_results::{Goal, Slack};
 
-/// Everything that a study tries, with a memory of trials if there is one, which it gives back;
-/// nothing where the interrupt was raised.
+/// Evaluates all candidates of a study, with the cache of its stored trials if there is one, which
+/// is returned. The candidates are `None` after an interrupt.
 ///
 /// # Errors
-/// No engine, no threads; trials that could not be kept.
+/// A model without an engine, threads that cannot be started, and trials that cannot be stored.
 pub fn search<M: Swept>(
     study: &Study<M>,
     trials: Option<Trials>,
@@ -25,8 +25,9 @@ pub fn search<M: Swept>(
     let there = trials.as_ref().map_or(0, |trials| trials.count() / study.answers()) as u64;
     let progress = Progress::new(effort.progress, study.evolution.candidates, there);
     let shown = |candidates| progress.show(candidates);
-    let (threads, engine) = (effort.threads()?, M::engine(&study.plan, None)?);
-    let asking = CachedEvaluator::new(engine, threads, effort.interrupt, trials, &shown)?;
+    let threads = effort.threads()?;
+    let engine = M::engine(&study.plan, None)?;
+    let evaluator = CachedEvaluator::new(engine, threads, effort.interrupt, trials, &shown)?;
     let layout = M::layout(&study.plan);
     let mut count = 0;
     let found = evolve(&study.evolution, &mut |places| {
@@ -38,27 +39,27 @@ pub fn search<M: Swept>(
         count += places.len() as u64;
         let values = |k: usize, row| study.axis_values(&candidates[k], row);
         let answer = |k: usize, points| answer(study, &layout, &candidates[k], points);
-        let found = asking.evaluate(&keys, study.rows(), &values, &answer)?;
-        // Without one number there are none.
+        let found = evaluator.evaluate(&keys, study.rows(), &values, &answer)?;
+        // A candidate without one of its numbers has none.
         Ok(found.into_iter().map(|numbers| numbers.into_iter().collect()).collect())
     });
     progress.finish();
-    Ok((Stopped::interrupted_to_none(found)?, asking.into_cache()))
+    Ok((Stopped::interrupted_to_none(found)?, evaluator.into_cache()))
 }
 
-/// Computes how far the points of a candidate are from the limit of each condition; nothing where
-/// the interrupt was raised.
+/// Computes the slack of each condition for the rows of a candidate; `None` after an interrupt.
 ///
 /// # Errors
-/// No engine, no threads.
+/// A model without an engine, and threads that cannot be started.
 pub fn slacks<M: Swept>(
     study: &Study<M>,
     values: &[f64],
     effort: Effort<'_>,
 ) -> Result<Option<Vec<Option<Slack>>>, Error> {
-    let (threads, engine) = (effort.threads()?, M::engine(&study.plan, None)?);
+    let threads = effort.threads()?;
+    let engine = M::engine(&study.plan, None)?;
     let silent = |_: u64| {};
-    let asking = CachedEvaluator::new(engine, threads, effort.interrupt, None, &silent)?;
+    let evaluator = CachedEvaluator::new(engine, threads, effort.interrupt, None, &silent)?;
     let layout = M::layout(&study.plan);
     let found = Mutex::new(Vec::new());
     let answer = |_: usize, points: Vec<Done>| -> Result<RequestValues, StoreError> {
@@ -68,17 +69,17 @@ pub fn slacks<M: Swept>(
         Ok(RequestValues::new())
     };
     let keys = [vec![key(0, 0, values)]];
-    let asked =
-        asking.evaluate(&keys, study.rows(), &|_, row| study.axis_values(values, row), &answer);
-    Ok(Stopped::interrupted_to_none(asked)?.map(|_| unlocked(found)))
+    let evaluated =
+        evaluator.evaluate(&keys, study.rows(), &|_, row| study.axis_values(values, row), &answer);
+    Ok(Stopped::interrupted_to_none(evaluated)?.map(|_| unlocked(found)))
 }
 
-/// A defect of the program: its own rows do not fit its own columns.
+/// Returns the error of rows that do not fit their own columns, which is a defect of the program.
 fn defect(error: ArrowError) -> StoreError {
     StoreError::Engine { first: 0, last: 0, reason: error.to_string() }
 }
 
-/// The objectives of a candidate as they are minimised, then its excesses, by its points.
+/// Returns the objectives of a candidate as they are minimised, then its constraint violations.
 fn answer<M: Swept>(
     study: &Study<M>,
     layout: &Layout,
@@ -90,12 +91,12 @@ fn answer<M: Swept>(
     let objectives = study.objectives.iter().map(|one| number(&one.goal, one.sign));
     let excesses = study.conditions.iter().map(|goal| number(goal, 1.0));
     let numbers = objectives.chain(excesses).collect::<Result<Vec<_>, ArrowError>>();
-    // An infinite number is as good as none.
+    // An infinite number counts as missing.
     let finite = |number: Option<f64>| number.filter(|number| number.is_finite());
     Ok(numbers.map_err(defect)?.into_iter().map(finite).collect())
 }
 
-/// The rows of a candidate's points.
+/// Returns the rows of a candidate's points as a batch.
 fn batch<M: Swept>(
     study: &Study<M>,
     layout: &Layout,
@@ -103,17 +104,18 @@ fn batch<M: Swept>(
     points: Vec<Done>,
 ) -> Result<RecordBatch, StoreError> {
     let mut rows = ResultRows::new(layout);
-    let of = |done: Done| {
+    let keyed_rows = |done: Done| {
         let row = done.point % study.rows();
         done.rows.into_iter().map(move |cells: Row| (row, cells))
     };
-    for (row, cells) in points.into_iter().flat_map(of) {
+    for (row, cells) in points.into_iter().flat_map(keyed_rows) {
         rows.push(row, study.axis_values(values, row), cells);
     }
     rows.take().map_err(defect)
 }
 
-/// The key under which an answer is stored: the candidate's number, the answer's, the candidate.
+/// Returns the key under which an answer is stored: the numbers of candidate and answer, and a hash
+/// of the candidate.
 fn key(number: u64, answer: usize, values: &[f64]) -> Key {
     let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
     let hash = blake3::hash(&bytes);

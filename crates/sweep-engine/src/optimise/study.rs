@@ -1,4 +1,4 @@
-//! A study file: what is minimised over which parameters, and what must hold.
+//! Study files: objectives, parameters and conditions of an optimisation.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -10,68 +10,75 @@ use sweep_results::{Column, ExpressionError, Goal, columns};
 
 use super::Evolution;
 use crate::config::axes::{add, spacing};
-use crate::config::design::{DEFAULT_SEED, MOST_SEED};
+use crate::config::design::{DEFAULT_SEED, MAX_SEED};
 use crate::config::grid::{STUDY, draft, is_another};
 use crate::config::parameters::find;
-use crate::config::section::listed;
+use crate::config::section::list_choices;
 use crate::config::sections::name;
 use crate::config::source::beside;
 use crate::config::syntax::{self, parse};
-use crate::config::{Diagnostic, Draft, Field, Located, Location, Report, Section, twice, whole};
-use crate::design::{MOST_AXES, Rule};
+use crate::config::{
+    Diagnostic, Draft, Field, Located, Location, Report, Section, whole, written_twice,
+};
+use crate::design::{DesignRule, MOST_AXES};
 use crate::{AxisValues, Design, Diagnostics, GridInput, Job, Model, Plan, Rows};
 
-/// Most candidates, most rows that a candidate is tried at, and most parameters.
-const MOST: [u64; 3] = [1_000_000, 100_000, 20];
+/// Maximum number of candidates. Basis: a file of some 100 MB. Doubling it doubles that.
+const MAX_CANDIDATES: u64 = 1_000_000;
+/// Maximum number of rows at which a candidate is evaluated. Basis: a generation must fit memory.
+const MAX_ROWS: u64 = 100_000;
+/// Maximum number of parameters. Basis: differential evolution converges slowly with more.
+const MAX_PARAMETERS: u64 = 20;
 
-/// Generations in the default number of candidates.
+/// Generations in the default number of candidates. Basis: a study of a washing machine's sum of a
+/// few parameters has converged by then. Doubling it doubles the time of a study.
 const GENERATIONS: u64 = 24;
 
-/// A search for the least of some numbers over some parameters.
+/// A search for the minimum of some objectives over some parameters.
 #[derive(Clone, Debug)]
 pub struct Study<M: Model> {
-    /// Name of the study: its file defaults to `results/<name>.parquet`.
+    /// The name of the study; its file defaults to `results/<name>.parquet`.
     pub name: String,
-    /// The grid's axes, as ranges, then the parameters: where the rows of candidates are.
+    /// The plan of all candidates' rows: the grid's axes as ranges, then the parameters.
     pub plan: Plan<M>,
-    /// The grid: every candidate is tried at all of its points.
+    /// The grid at whose points every candidate is evaluated.
     pub grid: Plan<M>,
-    /// What is looked for.
-    pub parameters: Vec<Sought>,
-    /// What is least.
+    /// The parameters that are searched.
+    pub parameters: Vec<SearchedParameter>,
+    /// The objectives, in the order of their columns.
     pub objectives: Vec<Objective>,
-    /// What must hold.
+    /// The conditions of feasible candidates.
     pub conditions: Vec<Goal>,
-    /// How it is looked for.
+    /// The settings of the search.
     pub evolution: Evolution,
 }
 
-/// The values of a parameter that are looked among.
+/// A parameter that is searched.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sought {
-    /// From the least to the greatest, evenly or by the logarithm.
+pub struct SearchedParameter {
+    /// The bounds, linear or logarithmic.
     pub bounds: AxisValues,
-    /// Products differ from the candidate by up to this part of its value; the grid's design
-    /// spreads them.
+    /// The greatest deviation of products from the candidate's value, as a share of it; the grid's
+    /// design spreads the deviations.
     pub tolerance: f64,
 }
 
-/// A number that is least, or greatest.
+/// A number that is minimised or maximised.
 #[derive(Clone, Debug)]
 pub struct Objective {
-    /// Name of its column.
+    /// The name of its column.
     pub name: String,
-    /// Its number over the rows of a candidate.
+    /// The expression over the rows of a candidate.
     pub goal: Goal,
-    /// 1 if it is minimised, -1 if it is maximised.
+    /// The factor by which the number is minimised: 1, or -1 if it is maximised.
     pub sign: f64,
 }
 
 impl<M: Rows> Study<M> {
-    /// Reads a study file, and the grid file that it names, with constants over those of the grid.
+    /// Reads a study file and the grid file that it names; `sets` override constants of the grid.
     ///
     /// # Errors
-    /// Every mistake in both, in one pass.
+    /// Every mistake in both files, in one pass.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, Diagnostics> {
         let report = Report::default();
         let study = Self::read(path, sets, &report);
@@ -98,34 +105,36 @@ impl<M: Rows> Study<M> {
         }
         let design = grid.as_ref().and_then(|grid| grid.design.as_ref());
         let parameters = parameters(&root, root.tables(parameter), design, &mut draft);
-        let population = root.whole(population, &(4..=MOST[0])).or(0);
-        let candidates = root.whole(candidates, &(1..=MOST[0])).or(0);
-        let seed = root.whole(seed, &(0..=MOST_SEED)).or(DEFAULT_SEED);
-        // Candidates of a single row fill whole groups of lanes.
+        let population = root.whole(population, &(4..=MAX_CANDIDATES)).or(0);
+        let candidates = root.whole(candidates, &(1..=MAX_CANDIDATES)).or(0);
+        let seed = root.whole(seed, &(0..=MAX_SEED)).or(DEFAULT_SEED);
+        // Populations of multiples of 8 fill the lanes of candidates with a single row.
         let usual = (10 * parameters.len() as u64).next_multiple_of(8).max(32);
         let population = population.filter(|&one| one > 0).unwrap_or(usual);
         let candidates = candidates.filter(|&one| one > 0).unwrap_or(GENERATIONS * population);
         if let Some(draft) = &draft {
             whole::steps(draft);
-            M::judge(draft);
+            M::check(draft);
         }
         let plan = draft.map(|draft| draft.plan);
         let axes = plan.as_ref().map_or(&[][..], |plan| &plan.axes);
         let names: Vec<String> = axes.iter().map(|axis| axis.parameter.name().to_owned()).collect();
         let known = plan.as_ref().map_or_else(Vec::new, |plan| columns(&M::layout(plan).schema()));
         let rows = grid.as_ref().map_or(1, Plan::points);
-        if rows > MOST[1] {
+        if rows > MAX_ROWS {
             let title = format!("a grid of {rows} points for every candidate");
-            report.refuse::<()>(root.at(), title, format!("expected at most {}", MOST[1]));
+            report.refuse::<()>(root.at(), title, format!("expected at most {}", MAX_ROWS));
         }
-        let goals = Goals { known, is_sound: report.is_clean(), rows, text: &text, report };
+        let goals = GoalReader { known, is_sound: report.is_clean(), rows, text: &text, report };
         let objectives = objectives(&root, root.tables(objective), &goals, &names);
         let conditions = root.texts(conditions).given();
         let conditions = conditions.into_iter().flat_map(|texts| texts.value);
         let conditions =
             conditions.filter_map(|text| goals.read(&text, Goal::constraint)).collect();
         root.finish();
-        let (mut plan, grid, seed) = (plan?, grid?, seed?);
+        let mut plan = plan?;
+        let grid = grid?;
+        let seed = seed?;
         plan.name.clone_from(&name);
         let evolution = Evolution {
             parameters: parameters.len(),
@@ -137,23 +146,23 @@ impl<M: Rows> Study<M> {
         Some(Self { name, plan, grid, parameters, objectives, conditions, evolution })
     }
 
-    /// Numbers that answer a candidate: objectives, then excesses over conditions.
+    /// Returns the number of numbers of a candidate: objectives and constraint violations.
     pub fn answers(&self) -> usize {
         self.objectives.len() + self.conditions.len()
     }
 
-    /// Rows of a candidate.
+    /// Returns the number of rows of a candidate.
     pub fn rows(&self) -> u64 {
         self.grid.points()
     }
 
-    /// The candidate's parameters at a place in the box of their bounds, each from 0 to 1.
+    /// Returns the candidate's parameters at a position in the box of their bounds.
     pub fn values(&self, place: &[f64]) -> Vec<f64> {
         let values = self.parameters.iter().zip(place);
         values.map(|(parameter, &place)| parameter.bounds.between(place)).collect()
     }
 
-    /// Values of the plan's axes in a row of a candidate.
+    /// Returns the values of the plan's axes in a row of a candidate.
     pub fn axis_values(&self, values: &[f64], row: u64) -> Vec<f64> {
         let mut at = self.grid.axis_values(row);
         let own = at.len();
@@ -170,16 +179,16 @@ impl<M: Rows> Study<M> {
         at
     }
 
-    /// What the store must know of it.
+    /// Returns the job of the store.
     pub fn job(&self) -> Job<'_> {
         let mut job = Job::of(&self.plan);
         job.layout.kind = FileKind::Optimise;
-        job.plan["optimise"] = self.asked();
+        job.plan["optimise"] = self.settings();
         job
     }
 
-    /// What is asked beside the plan.
-    pub fn asked(&self) -> Value {
+    /// Returns the study's settings beside the plan, as JSON.
+    pub fn settings(&self) -> Value {
         let verb = |one: &Objective| if one.sign > 0.0 { "minimise" } else { "maximise" };
         let objectives = self.objectives.iter();
         let objectives =
@@ -196,7 +205,7 @@ impl<M: Rows> Study<M> {
     }
 }
 
-/// Makes every axis a range and drops the design: rows of candidates are anywhere between.
+/// Makes every axis a range and drops the design, because rows of candidates lie anywhere between.
 fn flatten<M: Model>(plan: &mut Plan<M>) {
     for axis in &mut plan.axes {
         if let AxisValues::List(_) = axis.values {
@@ -207,20 +216,21 @@ fn flatten<M: Model>(plan: &mut Plan<M>) {
     plan.design = None;
 }
 
-/// Reads every `[[parameter]]`, and adds an axis for each that is right.
+/// Reads every `[[parameter]]` and adds an axis for each valid one.
 fn parameters<M: Rows>(
     root: &Section<'_>,
     sections: Vec<Section<'_>>,
     design: Option<&Design>,
     draft: &mut Option<Draft<'_, M>>,
-) -> Vec<Sought> {
+) -> Vec<SearchedParameter> {
     let report = root.report;
-    if sections.is_empty() || sections.len() as u64 > MOST[2] {
+    if sections.is_empty() || sections.len() as u64 > MAX_PARAMETERS {
         let title = format!("{} tables [[parameter]]", sections.len());
-        let expected = format!("expected from 1 to {}, each with name, from and to", MOST[2]);
+        let expected =
+            format!("expected from 1 to {}, each with name, from and to", MAX_PARAMETERS);
         report.push_missing(Diagnostic::new(title).at(root.at(), expected));
     }
-    let mut sought = Vec::new();
+    let mut searched = Vec::new();
     for section in sections {
         let at = section.at().clone();
         let name = section.require(section.text("name"), "name", "the name of a parameter");
@@ -235,7 +245,7 @@ fn parameters<M: Rows>(
                 report.refuse(&part.at, title, "expected a part of the value, as 0.05")
             }
             Field::Given(part) if draft.is_some() && !spreads(design, draft) => {
-                let title = "a tolerance that no design spreads";
+                let title = "a tolerance without a design that spreads it";
                 let expected = format!(
                     "expected a [design] in the grid file, by \"sobol\" over at most {MOST_AXES} \
                      axes and parameters, \"latin_hypercube\" or \"monte_carlo\""
@@ -261,7 +271,7 @@ fn parameters<M: Rows>(
             Some(Located { value: axis.parameter.name().to_owned(), at })
         };
         if let Some(first) = set.map(|constant| constant.name.clone()).or_else(swept) {
-            report.push(twice(&name, &first));
+            report.push(written_twice(&name, &first));
             continue;
         }
         let mut axis = crate::plan::Axis { parameter, values: bounds.value.clone() };
@@ -273,26 +283,26 @@ fn parameters<M: Rows>(
             *high += tolerance * high.abs();
         }
         add(axis, at, draft);
-        sought.push(Sought { bounds: bounds.value, tolerance });
+        searched.push(SearchedParameter { bounds: bounds.value, tolerance });
     }
-    sought
+    searched
 }
 
-/// Whether a design has room for one more axis.
+/// Returns whether a design has room for another axis.
 fn spreads<M: Rows>(design: Option<&Design>, draft: &Option<Draft<'_, M>>) -> bool {
     let axes = draft.as_ref().map_or(0, |draft| draft.plan.axes.len());
     match design {
         None | Some(Design::List { .. }) => false,
-        Some(Design::Spread { rule: Rule::Sobol, .. }) => axes < MOST_AXES,
+        Some(Design::Spread { rule: DesignRule::Sobol, .. }) => axes < MOST_AXES,
         Some(_) => true,
     }
 }
 
-/// Reads every `[[objective]]`; their columns stand beside those of the parameters.
+/// Reads every `[[objective]]`. Their columns come after those of the parameters.
 fn objectives(
     root: &Section<'_>,
     sections: Vec<Section<'_>>,
-    goals: &Goals<'_>,
+    goals: &GoalReader<'_>,
     parameters: &[String],
 ) -> Vec<Objective> {
     const VERBS: [(&str, f64); 2] = [("minimise", 1.0), ("maximise", -1.0)];
@@ -310,15 +320,20 @@ fn objectives(
             .collect::<Vec<_>>()[..]
         else {
             let expected =
-                format!("expected {}, and an expression", listed(&VERBS.map(|(v, _)| v)));
-            root.report.refuse::<()>(&at, "an objective without one number", expected);
+                format!("expected {}, and an expression", list_choices(&VERBS.map(|(v, _)| v)));
+            root.report.refuse::<()>(
+                &at,
+                "an objective without an expression, or with two",
+                expected,
+            );
             continue;
         };
         let (text, sign) = text;
         let Some(goal) = goals.read(text, Goal::objective) else { continue };
         let is_same = |one: &Objective| spaceless(one.goal.text()) == spaceless(text.value);
         if goal.is_by_row() && goals.rows > 1 {
-            let title = format!("a number of one row, and every candidate has {}", goals.rows);
+            let title =
+                format!("a number for each row, and every candidate has {} rows", goals.rows);
             let expected = "expected max(), min(), mean() or quantile() of it";
             root.report.refuse::<()>(&text.at, title, expected);
         } else if objectives.iter().any(is_same) {
@@ -362,9 +377,9 @@ fn unique_name(name: &str, objectives: &[Objective], parameters: &[String]) -> S
     plain.into_iter().chain(numbered).find(|name| !is_taken(name)).unwrap_or_default()
 }
 
-/// What expressions are read over.
-struct Goals<'a> {
-    /// The columns of rows; some may be missing while the plan is not sound.
+/// The context in which expressions are read.
+struct GoalReader<'a> {
+    /// The columns of rows; some may be missing while the plan has mistakes.
     known: Vec<Column>,
     is_sound: bool,
     rows: u64,
@@ -372,7 +387,7 @@ struct Goals<'a> {
     report: &'a Report,
 }
 
-impl Goals<'_> {
+impl GoalReader<'_> {
     fn read(
         &self,
         found: &Located<&str>,
@@ -383,13 +398,13 @@ impl Goals<'_> {
             Err(mistake) if mistake.candidates.is_some() && !self.is_sound => return None,
             Err(mistake) => mistake,
         };
-        // Behind the quote, unless escapes have moved it.
+        // The position in the text follows the opening quote, unless escapes have moved it.
         let start = found.at.span.start + 1;
         let is_plain = self.text.get(start..).is_some_and(|rest| rest.starts_with(found.value));
         let span = start + mistake.span.start..start + mistake.span.end;
         let at =
             Location::new(found.at.source, if is_plain { span } else { found.at.span.clone() });
-        self.report.push(Diagnostic::of_expression(mistake, &at));
+        self.report.push(Diagnostic::from_expression(mistake, &at));
         None
     }
 }
@@ -399,7 +414,7 @@ mod tests {
     use super::column_name;
 
     #[test]
-    fn names_of_objectives_keep_their_operators() {
+    fn column_names_spell_out_operators() {
         assert_eq!(column_name("max(a + b)"), "max_a_plus_b");
         assert_eq!(column_name("max(a - b)"), "max_a_minus_b");
         assert_eq!(column_name("a / b"), "a_over_b");

@@ -1,23 +1,23 @@
-//! A map file of one axis: ratios, amplitudes and gaps as curves over it.
+//! The figure of a map file over one axis: ratios, amplitudes and gaps as curves.
 
-use crate::Options;
+use crate::PlotOptions;
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style, spans_decades};
 use crate::colour::{DISTINCT, LINEAR, NONLINEAR};
 use crate::error::{PlotError, Result};
-use crate::gather::Map;
+use crate::gather::CellMap;
 use crate::label::{self, Label};
-use crate::layer::{self, Group, Shown};
-use crate::read::{ColumnFacts, Source};
+use crate::layer::{self, Group, ShownColumn};
+use crate::read::{ColumnFacts, FigureFile};
 use crate::scene::{Colour, INK};
-use crate::table::Column;
+use crate::table::FigureColumn;
 
-/// Most failed points that are marked: as many lines as a figure has room for.
-const MOST_MARKS: usize = 400;
+/// Maximum number of failed points that are marked. Basis: more lines than that fill a figure.
+const MAX_MARKS: usize = 400;
 
-/// The title over what is asked for first; with its channel, where no other is asked for too.
-fn title(source: &Source, asked: &[Shown]) -> String {
-    let Some(first) = asked.first() else { return TRUSTED.to_owned() };
-    let is_alone = asked.iter().all(|shown| shown.channel == first.channel);
+/// Returns the title for the requested columns, with the channel if it is the only one.
+fn title(source: &FigureFile, requested: &[ShownColumn]) -> String {
+    let Some(first) = requested.first() else { return TRUSTED.to_owned() };
+    let is_alone = requested.iter().all(|shown| shown.channel == first.channel);
     match (first.group, first.channel.as_ref().filter(|_| is_alone)) {
         (Group::Nonlinear | Group::Linear, Some(channel)) => {
             format!("{BOTH}: {}", label::channel(channel))
@@ -29,19 +29,22 @@ fn title(source: &Source, asked: &[Shown]) -> String {
     }
 }
 
-/// Titles of charts of amplitudes, and of ratios.
+/// The title of charts of amplitudes.
 const BOTH: &str = "Amplitudes of both models";
+/// The title of charts of ratios.
 const TRUSTED: &str = "Where the linear model can be trusted";
 
-/// The chart of a map file of one axis.
+/// Draws the chart of a map file over one axis.
 ///
 /// # Errors
 /// [`PlotError::Unfit`] for a column that the file does not have, or that is not a curve.
-pub(crate) fn chart(map: &Map, options: &Options) -> Result<Chart> {
-    let (axis, table) = (&map.grid.axes[0], &map.table);
+pub(crate) fn chart(map: &CellMap, options: &PlotOptions) -> Result<Chart> {
+    let axis = &map.grid.axes[0];
+    let table = &map.table;
     let source = &table.source;
-    let asked: Option<Vec<Shown>> = layer::asked(source, options)?.into_iter().collect();
-    let Some(asked) = asked else {
+    let requested: Option<Vec<ShownColumn>> =
+        layer::requested(source, options)?.into_iter().collect();
+    let Some(requested) = requested else {
         return Err(PlotError::Unfit(
             "status is drawn on maps of two or more axes; over one axis, failed points are marked"
                 .to_owned(),
@@ -49,44 +52,45 @@ pub(crate) fn chart(map: &Map, options: &Options) -> Result<Chart> {
     };
     let cells: Vec<usize> = (0..map.counts.len()).filter(|&cell| map.filled(cell)).collect();
     let xs: Vec<f64> = cells.iter().map(|&cell| axis.values[cell]).collect();
-    let line = |name: &str, colour: Colour, column: &Column, factor: f64| {
+    let line = |name: &str, colour: Colour, column: &FigureColumn, factor: f64| {
         let values = column.numbers().unwrap_or_default();
         let y = cells.iter().map(|&cell| values[cell] * factor).collect();
         Series::new(name, colour, xs.clone(), y, Style::Solid(2.2))
     };
-    let ratios_asked: Vec<&Shown> =
-        asked.iter().filter(|shown| shown.group == Group::Ratio).collect();
+    let requested_ratios: Vec<&ShownColumn> =
+        requested.iter().filter(|shown| shown.group == Group::Ratio).collect();
     let wanted = |name: &str| {
-        let mut channels = ratios_asked.iter().map(|shown| shown.channel.as_deref());
-        ratios_asked.is_empty() || channels.any(|channel| channel.is_none_or(|of| of == name))
+        let mut channels = requested_ratios.iter().map(|shown| shown.channel.as_deref());
+        requested_ratios.is_empty()
+            || channels.any(|channel| channel.is_none_or(|channel| channel == name))
     };
-    let mut panels = vec![ratios(map, !ratios_asked.is_empty(), &line, &wanted)];
-    // A panel of both models' columns.
-    let panel = |family: layer::Family<'_>| {
-        let columns = &family.columns;
-        let (unit, factor) = label::shown(&columns[0].1.unit);
+    let mut panels = vec![ratios(map, !requested_ratios.is_empty(), &line, &wanted)];
+    // Each quantity has a panel with the columns of both models.
+    let panel = |quantity: layer::QuantityColumns<'_>| {
+        let columns = &quantity.columns;
+        let (unit, factor) = label::display_unit(&columns[0].1.unit);
         let lines = columns.iter().filter_map(|(model, facts)| {
-            let said = if model.is_empty() { String::new() } else { format!("{model} model") };
+            let phrase = if model.is_empty() { String::new() } else { format!("{model} model") };
             let colour = if *model == "linear" { LINEAR } else { NONLINEAR };
-            Some(line(&said, colour, table.column(&facts.name)?, factor))
+            Some(line(&phrase, colour, table.column(&facts.name)?, factor))
         });
         let limit = columns[0].1.limit.map(|limit| limit * factor);
-        let is_asked = |name: &String| asked.iter().any(|shown| shown.column() == name);
-        let label = Label::new(&label::capitalised(&family.words), unit);
-        let panel = ChartPanel::new(&family.name, label, lines.collect());
+        let is_requested = |name: &String| requested.iter().any(|shown| shown.column() == name);
+        let label = Label::new(&label::capitalised(&quantity.words), unit);
+        let panel = ChartPanel::new(&quantity.name, label, lines.collect());
         ChartPanel {
-            shown: columns.iter().any(|(_, facts)| is_asked(&facts.name)),
+            shown: columns.iter().any(|(_, facts)| is_requested(&facts.name)),
             levels: limit.map(|limit| (limit, "limit".to_owned())).into_iter().collect(),
-            height: if family.is_channel { 190.0 } else { panel.height },
+            height: if quantity.is_channel { 190.0 } else { panel.height },
             ..panel
         }
     };
-    panels.extend(layer::families(source).into_iter().map(panel));
+    panels.extend(layer::quantities(source).into_iter().map(panel));
     panels.retain(|panel| !panel.series.is_empty());
 
     let failed: Vec<usize> =
         cells.iter().copied().filter(|&cell| map.counts[cell].failed > 0).collect();
-    let each = failed.len().div_ceil(MOST_MARKS).max(1);
+    let each = failed.len().div_ceil(MAX_MARKS).max(1);
     let mark = |&cell: &usize| Mark {
         x: axis.values[cell],
         label: map.status(cell).unwrap_or("some failed").replace('_', " "),
@@ -97,7 +101,7 @@ pub(crate) fn chart(map: &Map, options: &Options) -> Result<Chart> {
         format!("failed: no result; one of {each} places is marked")
     };
     Ok(Chart {
-        title: title(source, &asked),
+        title: title(source, &requested),
         subtitle: super::map::subtitle(map, &[]),
         x_label: Label::new(&axis.swept.words, &axis.swept.unit),
         x_log: axis.swept.log,
@@ -109,9 +113,9 @@ pub(crate) fn chart(map: &Map, options: &Options) -> Result<Chart> {
 }
 
 fn ratios(
-    map: &Map,
+    map: &CellMap,
     shown: bool,
-    line: &impl Fn(&str, Colour, &Column, f64) -> Series,
+    line: &impl Fn(&str, Colour, &FigureColumn, f64) -> Series,
     wanted: &impl Fn(&str) -> bool,
 ) -> ChartPanel {
     let limit = map.table.source.ratio_limit();
@@ -135,9 +139,9 @@ fn ratios(
     }
 }
 
-/// Where a cell holds reliable and unreliable points, as ranges of the axis. Those too near to each
-/// other to be seen apart are one.
-fn mixed(map: &Map) -> Vec<[f64; 2]> {
+/// Returns the ranges of the axis whose cells hold reliable and unreliable points. Ranges too close
+/// to be told apart are merged.
+fn mixed(map: &CellMap) -> Vec<[f64; 2]> {
     let axis = &map.grid.axes[0];
     let scale = axis.scale();
     let mut ranges: Vec<[f64; 2]> = Vec::new();
@@ -146,7 +150,7 @@ fn mixed(map: &Map) -> Vec<[f64; 2]> {
             continue;
         }
         match ranges.last_mut() {
-            Some(last) if scale.position(pair[0]) - scale.position(last[1]) < LEAST_APART => {
+            Some(last) if scale.position(pair[0]) - scale.position(last[1]) < MIN_GAP => {
                 last[1] = pair[1];
             }
             _ => ranges.push([pair[0], pair[1]]),
@@ -155,5 +159,6 @@ fn mixed(map: &Map) -> Vec<[f64; 2]> {
     ranges
 }
 
-/// Half a pixel of a picture, as a share of the axis.
-const LEAST_APART: f64 = 5e-4;
+/// Minimum gap between two ranges that are drawn apart, as a share of the axis. Basis: half a pixel
+/// of a picture.
+const MIN_GAP: f64 = 5e-4;

@@ -1,20 +1,21 @@
-//! How a quantity is distributed over a design's points, and the share of them on either side.
+//! The distribution of a quantity over a design's points, and the share of points on each side of
+//! its limit.
 
-use crate::axis::{Scale, extremes};
+use crate::axis::{AxisScale, extremes};
 use crate::chart::{Chart, ChartPanel, Mark, Series, Style};
 use crate::figures::matrix::colour;
 use crate::label::{self, Label};
-use crate::layer::Level;
+use crate::layer::DividingLimit;
 use crate::scatter::{Scatter, Side};
 
-/// Most bins.
-const MOST_BINS: f64 = 60.0;
+/// Maximum number of bins. Basis: bins of 12 px. Doubling it makes bins too narrow to read.
+const MAX_BINS: f64 = 60.0;
 
-/// The chart of a design: how many points have which value of the quantity.
+/// Draws the histogram of a design.
 pub(crate) fn chart(scatter: &Scatter) -> Chart {
     let edges = edges(scatter);
     let ends: Vec<f64> = edges.windows(2).flatten().copied().collect();
-    let valued = scatter.valued().max(1) as f64;
+    let with_value = scatter.count_with_value().max(1) as f64;
     let series = [Side::Good, Side::Bad].into_iter().filter_map(|side| {
         let mut counts = vec![0_u32; edges.len() - 1];
         for (value, own) in scatter.quantity.iter().zip(&scatter.sides) {
@@ -23,8 +24,8 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
                 counts[bin] += 1;
             }
         }
-        let share = |bin: usize| 100.0 * f64::from(counts[bin]) / valued;
-        // From its first bin that is not empty to its last.
+        let share = |bin: usize| 100.0 * f64::from(counts[bin]) / with_value;
+        // The bars of a side run from its first bin with points to its last.
         let filled = |bin: &usize| counts[*bin] > 0;
         let first = (0..counts.len()).find(filled)?;
         let last = (0..counts.len()).rfind(filled)?;
@@ -61,10 +62,10 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
     }
 }
 
-/// What share of the points is on the good side.
+/// Returns the title with the share of points on the good side.
 fn title(scatter: &Scatter) -> String {
     let words = match scatter.words(Side::Good) {
-        // The first word of "reliable: below 2".
+        // The good side's words may be "reliable: below 2", of which the title needs the first.
         words if words.starts_with("reliable") => "reliable".to_owned(),
         words => format!("with {words}"),
     };
@@ -76,7 +77,7 @@ fn title(scatter: &Scatter) -> String {
     }
 }
 
-/// How sure the share is, where points are drawn, and which it does not count.
+/// Returns the notes on the confidence interval of a random design and on points without a side.
 fn notes(scatter: &Scatter) -> Vec<String> {
     let mut notes = Vec::new();
     let is_drawn = scatter.source.design_method() != Some("list");
@@ -93,31 +94,34 @@ fn notes(scatter: &Scatter) -> Vec<String> {
     notes
 }
 
-/// The level, unless all points are so far from it that they would fill a small part of the axis.
-fn level(scatter: &Scatter) -> Option<&Level> {
+/// Returns the limit, unless all points are so far from it that they would fill a small part of the
+/// axis.
+fn level(scatter: &Scatter) -> Option<&DividingLimit> {
     let level = scatter.level.as_ref()?;
     let known = scatter.quantity.iter().copied().filter(|value| !scatter.log || *value > 0.0);
-    let even = |value: f64| if scatter.log { value.ln() } else { value };
-    let (low, high) = extremes(known.map(even))?;
-    let (span, at) = (high - low, even(level.value));
+    let coordinate = |value: f64| if scatter.log { value.ln() } else { value };
+    let (low, high) = extremes(known.map(coordinate))?;
+    let span = high - low;
+    let at = coordinate(level.value);
     (low - span..=high + span).contains(&at).then_some(level)
 }
 
-/// Rising borders of bins as wide as each other on the quantity's scale, one of them at the level.
-/// Their number grows with the cube root of the points': twice that, after Rice's rule.
+/// Returns the edges of bins of equal width on the quantity's scale, one of them at the limit. The
+/// number of bins is twice the cube root of the number of points (Rice's rule).
 fn edges(scatter: &Scatter) -> Vec<f64> {
     let level = level(scatter).map(|level| level.value);
     let known = scatter.quantity.iter().copied().chain(level);
     let known = known.filter(|value| !scatter.log || *value > 0.0);
     let (low, high) = extremes(known).unwrap_or((1.0, 2.0));
-    let scale = if scatter.log { Scale::log(low, high) } else { Scale::linear(low, high) };
-    let back = |even: f64| if scatter.log { even.exp() } else { even };
-    let (low, high) = (scale.even(low), scale.even(high));
-    let count = (2.0 * (scatter.valued() as f64).cbrt()).ceil().clamp(4.0, MOST_BINS);
+    let scale = if scatter.log { AxisScale::log(low, high) } else { AxisScale::linear(low, high) };
+    let back = |coordinate: f64| if scatter.log { coordinate.exp() } else { coordinate };
+    let low = scale.coordinate(low);
+    let high = scale.coordinate(high);
+    let count = (2.0 * (scatter.count_with_value() as f64).cbrt()).ceil().clamp(4.0, MAX_BINS);
     let width = if high > low { (high - low) / count } else { low.abs().max(1.0) / count };
-    let origin = level.map_or(low, |level| scale.even(level));
+    let origin = level.map_or(low, |level| scale.coordinate(level));
     let first = ((low - origin) / width).floor() as i64;
-    // The greatest value lies within the last bin or at its end.
+    // The last bin must reach the greatest value.
     let last = (((high - origin) / width).ceil() as i64).max(first + 1);
     (first..=last)
         .map(|k| match level {

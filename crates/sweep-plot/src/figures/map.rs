@@ -2,49 +2,50 @@
 
 use std::collections::BTreeMap;
 
-use crate::axis::Scale;
-use crate::colour::{BOTH, DISTINCT, LEVELS};
-use crate::contour::{MOST_POINTS, leave_out_shortest, zero_lines};
+use crate::axis::AxisScale;
+use crate::colour::{BOTH, COLOUR_STEPS, DISTINCT};
+use crate::contour::{MAX_POINTS, leave_out_shortest, zero_lines};
 use crate::cuts::Cuts;
 use crate::error::Result;
 use crate::figures::boundary::Overlay;
 use crate::frame::{
-    self, HEADING_HEIGHT, LABEL_SIZE, Panel, Sign, TICK_SIZE, failed, failed_hatch, heading,
-    legend_height, sensitive_hatch, undefined,
+    self, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, TICK_SIZE, failed, failed_hatch,
+    heading, legend_height, sensitive_hatch, undefined,
 };
-use crate::gather::{Map, OK};
+use crate::gather::{CellMap, OK};
 use crate::grid::GridAxis;
-use crate::layer::{Layer, Level, Shown};
+use crate::layer::{DividingLimit, Layer, ShownColumn};
 use crate::raster::text_width;
-use crate::region::roomiest;
+use crate::region::roomiest_place;
 use crate::scene::{Anchor, Colour, Hatch, INK, Outline, PAPER, Scene, Stroke, Text};
 
-const WIDTH: f64 = 880.0;
-/// The line of another file: on neither side of the colours.
-const OVERLAY: Colour = Colour::hex(0x0b6b3a);
-/// Left of a panel: numbers and label of the y axis.
-const LEFT: f64 = 86.0;
-/// Right of the panels: the colour bar with its numbers and label.
-const RIGHT: f64 = 128.0;
-/// Below a panel: numbers and label of the x axis.
-const BELOW: f64 = 64.0;
-/// Draws a map of two or more axes.
+/// Width of the figure, px.
+const FIGURE_WIDTH: f64 = 880.0;
+/// The colour of a boundary file's curve, which no colour scale has.
+const OVERLAY_COLOUR: Colour = Colour::hex(0x0b6b3a);
+/// Left margin for the numbers and the label of the y axis, px.
+const LEFT_MARGIN: f64 = 86.0;
+/// Right margin for the colour bar with its numbers and label, px.
+const RIGHT_MARGIN: f64 = 128.0;
+/// Margin below a panel for the numbers and the label of the x axis, px.
+const BOTTOM_MARGIN: f64 = 64.0;
+/// Draws a map of two axes or more.
 ///
-/// Over two axes it is one panel. A third axis becomes one panel for each of its values (at most
-/// nine, evenly picked); an axis beyond the second that is pinned by `--at`, and every one from the
-/// fourth on, is cut at one value (its first unless pinned), which the subtitle names.
+/// A map over two axes is one panel. A third axis becomes one panel for each of its values (at most
+/// nine, evenly picked). An axis beyond the second that `--at` fixes, and every axis from the
+/// fourth on, has one value (its first unless fixed), which the subtitle names.
 ///
 /// # Errors
-/// As [`Shown::layer`].
+/// As [`ShownColumn::layer`].
 pub(crate) fn draw(
-    map: &Map,
+    map: &CellMap,
     cuts: &Cuts,
-    shown: Option<&Shown>,
+    shown: Option<&ShownColumn>,
     overlay: Option<&Overlay>,
 ) -> Result<Scene> {
     let mut cells = match shown {
-        Some(shown) => Cells::by_value(map, shown.layer(map)?),
-        None => Cells::by_status(map),
+        Some(shown) => CellPainter::by_value(map, shown.layer(map)?),
+        None => CellPainter::by_status(map),
     };
     let grid = &map.grid;
 
@@ -55,9 +56,9 @@ pub(crate) fn draw(
     };
     let rows = cuts.cuts.len().div_ceil(columns);
     let single = cuts.cuts.len() == 1;
-    let bar = if cells.layer.is_some() { RIGHT } else { 24.0 };
+    let bar = if cells.layer.is_some() { RIGHT_MARGIN } else { 24.0 };
     let (gap, head) = if single { (0.0, 0.0) } else { (22.0, 26.0) };
-    let width = (WIDTH - LEFT - bar - gap * (columns - 1) as f64) / columns as f64;
+    let width = (FIGURE_WIDTH - LEFT_MARGIN - bar - gap * (columns - 1) as f64) / columns as f64;
     let height = if single { 440.0 } else { 0.78 * width };
     cells.refine_hatches([width, height]);
     let [xs, ys] = [0, 1].map(|k| grid.axes[k].values.len());
@@ -66,20 +67,21 @@ pub(crate) fn draw(
     let mut entries = cells.legend(&drawn.collect::<Vec<_>>());
     let scales = [0, 1].map(|k| grid.axes[k].scale());
     if let Some(overlay) = overlay.filter(|overlay| is_within(overlay, scales)) {
-        entries.push((Sign::Line(overlay_stroke()), overlay.name.clone()));
+        entries.push((LegendSymbol::Line(overlay_stroke()), overlay.name.clone()));
     }
-    let of_legend = legend_height(&entries, WIDTH - LEFT - 20.0);
+    let legend_height = legend_height(&entries, FIGURE_WIDTH - LEFT_MARGIN - 20.0);
     let panels_height = rows as f64 * (height + head) + gap * (rows - 1) as f64;
-    let total = HEADING_HEIGHT + panels_height + BELOW + of_legend + 14.0;
+    let total = HEADING_HEIGHT + panels_height + BOTTOM_MARGIN + legend_height + 14.0;
 
     let [x_axis, y_axis] = [&grid.axes[0], &grid.axes[1]];
     let described = format!("{}: {} over {}", cells.title, y_axis.label(), x_axis.label());
-    let mut scene = Scene::new(WIDTH, total, described);
+    let mut scene = Scene::new(FIGURE_WIDTH, total, described);
     heading(&mut scene, &cells.title, &subtitle(map, &cuts.notes));
     for (index, cut) in cuts.cuts.iter().enumerate() {
-        let (column, row) = (index % columns, index / columns);
+        let column = index % columns;
+        let row = index / columns;
         let panel = Panel {
-            x: LEFT + column as f64 * (width + gap),
+            x: LEFT_MARGIN + column as f64 * (width + gap),
             y: HEADING_HEIGHT + head + row as f64 * (height + head + gap),
             width,
             height,
@@ -88,21 +90,21 @@ pub(crate) fn draw(
         };
         cells.draw(&mut scene, &panel, &cut.rest);
         let divided = cells.layer.as_ref().and_then(|layer| Some((layer, layer.level.as_ref()?)));
-        let room = MOST_POINTS / cuts.cuts.len();
+        let room = MAX_POINTS / cuts.cuts.len();
         let mut lines = divided.map_or_else(Vec::new, |divided| {
             cells.draw_line(&mut scene, &panel, divided, &cut.rest, room)
         });
         if let Some(overlay) = overlay {
             draw_overlay(&mut scene, &panel, overlay);
         }
-        // Above the lines, which they interrupt where there is no room beside them.
+        // Names are drawn over the lines, which they interrupt if there is no room beside them.
         if let Some(divided) = divided {
             let overlaid = overlay.iter().flat_map(|overlay| &overlay.lines);
-            lines.extend(overlaid.map(|line| places(&panel, line)));
+            lines.extend(overlaid.map(|line| curve_pixels(&panel, line)));
             cells.name_regions(&mut scene, &panel, divided, (&cut.rest, &lines));
         }
         let lowest = index + columns >= cuts.cuts.len();
-        panel.frame(&mut scene, lowest, column == 0);
+        panel.draw_frame(&mut scene, lowest, column == 0);
         if let Some(name) = &cut.name {
             let at = [panel.x + width / 2.0, panel.y - 8.0];
             scene.text(Text::new(name.clone(), at, TICK_SIZE).bold().anchor(Anchor::Middle));
@@ -115,53 +117,54 @@ pub(crate) fn draw(
         }
     }
     if let Some(layer) = &cells.layer {
-        let area = [WIDTH - RIGHT + 20.0, HEADING_HEIGHT + head, 22.0, panels_height - head];
+        let area =
+            [FIGURE_WIDTH - RIGHT_MARGIN + 20.0, HEADING_HEIGHT + head, 22.0, panels_height - head];
         colour_bar(&mut scene, layer, area);
     }
-    let y = HEADING_HEIGHT + panels_height + BELOW;
-    frame::legend(&mut scene, &entries, LEFT, y, WIDTH - LEFT - 20.0);
+    let y = HEADING_HEIGHT + panels_height + BOTTOM_MARGIN;
+    frame::legend(&mut scene, &entries, LEFT_MARGIN, y, FIGURE_WIDTH - LEFT_MARGIN - 20.0);
     Ok(scene)
 }
 
-/// How the line of another file is drawn.
+/// Returns the stroke of a boundary file's curve.
 fn overlay_stroke() -> Stroke {
-    Stroke { dash: vec![9.0, 5.0], ..Stroke::solid(OVERLAY, 3.0) }
+    Stroke { dash: vec![9.0, 5.0], ..Stroke::solid(OVERLAY_COLOUR, 3.0) }
 }
 
-/// Draws the line of another file, as far as it is within the panel.
+/// Draws the curve of a boundary file as far as it lies within the panel.
 fn draw_overlay(scene: &mut Scene, panel: &Panel, overlay: &Overlay) {
     let mut outline = Outline::default();
     let mut alone = Vec::new();
     for line in &overlay.lines {
-        alone.extend(outline.add_runs(&places(panel, line)));
+        alone.extend(outline.add_runs(&curve_pixels(panel, line)));
     }
     scene.line(outline.clone(), Stroke::solid(PAPER, 5.0));
     scene.line(outline, overlay_stroke());
     for place in alone {
         scene.fill(Outline::circle(place, 4.5), PAPER);
-        scene.fill(Outline::circle(place, 3.5), OVERLAY);
+        scene.fill(Outline::circle(place, 3.5), OVERLAY_COLOUR);
     }
 }
 
-/// Returns whether some place of the line of another file is within these scales, across and up.
-fn is_within(overlay: &Overlay, [xs, ys]: [Scale; 2]) -> bool {
+/// Returns whether a point of a boundary file's curve lies within these scales.
+fn is_within(overlay: &Overlay, [xs, ys]: [AxisScale; 2]) -> bool {
     let is_inside = |&[x, y]: &[f64; 2]| {
         [xs.position(x), ys.position(y)].iter().all(|part| (0.0..=1.0).contains(part))
     };
     overlay.lines.iter().flatten().any(is_inside)
 }
 
-/// Where a line's places are in a panel, px; none of those outside, and where it has a gap.
-fn places(panel: &Panel, line: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
+/// Returns the pixels of a curve's points; `None` for points outside the panel and for gaps.
+fn curve_pixels(panel: &Panel, line: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
     let inside = |x: f64, y: f64| {
         [panel.xs.position(x), panel.ys.position(y)].iter().all(|part| (0.0..=1.0).contains(part))
     };
     line.iter().map(|&[x, y]| inside(x, y).then(|| panel.at(x, y))).collect()
 }
 
-/// Name of the run, how many points it has and how many failed, and what is fixed, left out or
-/// merged.
-pub(crate) fn subtitle(map: &Map, notes: &[String]) -> String {
+/// Returns the subtitle: the name of the run, the number of points and of failed ones, and notes on
+/// fixed, omitted or merged values.
+pub(crate) fn subtitle(map: &CellMap, notes: &[String]) -> String {
     let source = &map.table.source;
     let mut parts = source.notes([format!("{} points", source.rows)]);
     let failed = map.failed();
@@ -173,80 +176,82 @@ pub(crate) fn subtitle(map: &Map, notes: &[String]) -> String {
     parts.join(" · ")
 }
 
-/// The legend of all cells by a layer, or else by how points ended.
-pub(crate) fn legend(map: &Map, layer: Option<Layer>) -> Vec<(Sign, String)> {
-    let cells = layer.map_or_else(|| Cells::by_status(map), |layer| Cells::by_value(map, layer));
+/// Returns the legend of all cells by a layer, or by status without one.
+pub(crate) fn legend(map: &CellMap, layer: Option<Layer>) -> Vec<(LegendSymbol, String)> {
+    let cells = layer
+        .map_or_else(|| CellPainter::by_status(map), |layer| CellPainter::by_value(map, layer));
     cells.legend(&(0..map.counts.len()).collect::<Vec<_>>())
 }
 
-/// The colours of how points ended.
-pub(crate) fn kinds(map: &Map) -> BTreeMap<String, String> {
-    let cells = Cells::by_status(map);
-    let colour = |kind: usize| (cells.kinds[kind].0.clone(), cells.kind_colour(kind).css());
+/// Returns the colour of each status.
+pub(crate) fn kinds(map: &CellMap) -> BTreeMap<String, String> {
+    let cells = CellPainter::by_status(map);
+    let colour = |kind: usize| (cells.kinds[kind].0.clone(), cells.status_colour(kind).css());
     (0..cells.kinds.len()).map(colour).collect()
 }
 
-/// A level's lines in so many cuts of a map, through the values of its axes, with at most `room`
-/// points. Where a ragged boundary has more, its shortest lines are left out: the cells on either
-/// side show them. `cell` is the index of a cut's cell.
+/// Returns the lines of a limit in several cuts of a map, in values of its axes, with at most
+/// `room` points. If a ragged boundary has more, its shortest lines are left out: the cells on
+/// either side show them. `cell` maps a cut and its indices along both axes to a cell.
 pub(crate) fn level_lines(
-    map: &Map,
-    (layer, level): (&Layer, &Level),
+    map: &CellMap,
+    (layer, level): (&Layer, &DividingLimit),
     cuts: usize,
     cell: impl Fn(usize, usize, usize) -> usize,
     room: usize,
 ) -> Vec<Vec<Vec<[f64; 2]>>> {
     let [xs, ys] = [&map.grid.axes[0], &map.grid.axes[1]];
-    let of_cut = |cut: usize| {
-        zero_lines(&xs.even(), &ys.even(), |x, y| {
+    let lines_of_cut = |cut: usize| {
+        zero_lines(&xs.coordinates(), &ys.coordinates(), |x, y| {
             let cell = cell(cut, x, y);
             level.offset(if map.filled(cell) { layer.typical(cell) } else { f64::NAN })
         })
     };
-    let mut lines: Vec<Vec<Vec<[f64; 2]>>> = (0..cuts).map(of_cut).collect();
+    let mut lines: Vec<Vec<Vec<[f64; 2]>>> = (0..cuts).map(lines_of_cut).collect();
     leave_out_shortest(&mut lines, room);
     for [x, y] in lines.iter_mut().flatten().flatten() {
-        (*x, *y) = (xs.swept.un_even(*x), ys.swept.un_even(*y));
+        (*x, *y) = (xs.swept.from_coordinate(*x), ys.swept.from_coordinate(*y));
     }
     lines
 }
 
-/// What is drawn in a cell.
+/// The filling of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Fill {
-    Level(usize),
-    Kind(usize),
-    /// Points on both sides of the level, or of several kinds.
+    Step(usize),
+    Status(usize),
+    /// Points on both sides of the limit, or of several kinds.
     Both,
     Failed,
     Undefined,
 }
 
-/// How each cell is drawn.
-struct Cells<'a> {
-    map: &'a Map,
+/// The fillings of a map's cells.
+struct CellPainter<'a> {
+    map: &'a CellMap,
     title: String,
-    /// None where the file has no point.
+    /// The filling of each cell; `None` if the file has no point in it.
     fills: Vec<Option<Fill>>,
     layer: Option<Layer>,
-    /// The kinds of [`Fill::Kind`], with the number of points of each.
+    /// The statuses that [`Fill::Status`] refers to, with the number of points of each.
     kinds: Vec<(String, usize)>,
-    /// Over cells in which some points have no value, and over those with sensitive points.
+    /// The hatch of cells in which some points have no value, and that of cells with sensitive
+    /// points.
     hatches: [Hatch; 2],
 }
 
-impl<'a> Cells<'a> {
-    fn new(map: &'a Map, title: String, fill: impl Fn(usize) -> Fill) -> Self {
+impl<'a> CellPainter<'a> {
+    fn new(map: &'a CellMap, title: String, fill: impl Fn(usize) -> Fill) -> Self {
         let fill = |cell: usize| map.filled(cell).then(|| fill(cell));
         let fills = (0..map.counts.len()).map(fill).collect();
         let hatches = [failed_hatch(), sensitive_hatch()];
         Self { map, title, fills, layer: None, kinds: Vec::new(), hatches }
     }
 
-    fn by_value(map: &'a Map, layer: Layer) -> Self {
+    fn by_value(map: &'a CellMap, layer: Layer) -> Self {
         let fill = |cell: usize| match (layer.values[cell].is_finite(), map.counts[cell].failed) {
             (true, _) if layer.both(cell) => Fill::Both,
-            (true, _) => Fill::Level(layer.scale.level(layer.values[cell])),
+            (true, _) => Fill::Step(layer.scale.step(layer.values[cell])),
             (false, 0) => Fill::Undefined,
             (false, _) => Fill::Failed,
         };
@@ -254,20 +259,20 @@ impl<'a> Cells<'a> {
         Self { layer: Some(layer), ..cells }
     }
 
-    fn by_status(map: &'a Map) -> Self {
+    fn by_status(map: &'a CellMap) -> Self {
         let mut kinds: Vec<(String, usize)> =
             map.statuses.iter().map(|(kind, points)| (kind.clone(), *points)).collect();
         kinds.sort_by_key(|(kind, _)| (kind != OK, kind.clone()));
         let fill = |cell: usize| {
             map.status(cell).map_or(Fill::Both, |status| {
-                Fill::Kind(kinds.iter().position(|(kind, _)| kind == status).unwrap_or_default())
+                Fill::Status(kinds.iter().position(|(kind, _)| kind == status).unwrap_or_default())
             })
         };
         let cells = Self::new(map, "How each point ended".to_owned(), fill);
         Self { kinds, ..cells }
     }
 
-    /// Makes hatches fine enough to show on the smallest cell of a panel of that size, px.
+    /// Makes hatches fine enough to be visible on the smallest cell of a panel of this size, px.
     fn refine_hatches(&mut self, size: [f64; 2]) {
         let smallest = [0, 1].map(|k| {
             let axis = &self.map.grid.axes[k];
@@ -278,7 +283,7 @@ impl<'a> Cells<'a> {
         self.hatches = self.hatches.clone().map(|hatch| hatch.within(smallest));
     }
 
-    fn kind_colour(&self, kind: usize) -> Colour {
+    fn status_colour(&self, kind: usize) -> Colour {
         if self.kinds[kind].0 == OK {
             Colour::hex(0xe8ebee)
         } else {
@@ -287,8 +292,8 @@ impl<'a> Cells<'a> {
     }
 
     fn draw(&self, scene: &mut Scene, panel: &Panel, rest: &[usize]) {
-        // Cells of one colour are one shape, and runs of them along y one rectangle: small files,
-        // no seams.
+        // Cells of one colour are one shape, and runs of them along y one rectangle: the file is
+        // small and has no seams.
         let mut shapes: BTreeMap<Fill, Outline> = BTreeMap::new();
         let mut lone: Vec<[f64; 4]> = Vec::new();
         let fill = |cell: usize| self.fills[cell];
@@ -302,10 +307,10 @@ impl<'a> Cells<'a> {
         }
         for (fill, shape) in shapes {
             match (fill, &self.layer) {
-                (Fill::Level(level), Some(layer)) => {
+                (Fill::Step(level), Some(layer)) => {
                     scene.fill_crisp(shape, layer.scale.colour(level))
                 }
-                (Fill::Kind(kind), _) => scene.fill_crisp(shape, self.kind_colour(kind)),
+                (Fill::Status(kind), _) => scene.fill_crisp(shape, self.status_colour(kind)),
                 (Fill::Both, _) => scene.fill_crisp(shape, BOTH),
                 _ => failed(scene, shape),
             }
@@ -317,7 +322,7 @@ impl<'a> Cells<'a> {
         scene.hatch(self.area(panel, rest, |cell| self.sensitive(cell)), &self.hatches[1]);
     }
 
-    /// The cells that `holds` is true of.
+    /// Returns the outline of the cells for which `holds` is true.
     fn area(&self, panel: &Panel, rest: &[usize], holds: impl Fn(usize) -> bool) -> Outline {
         let mut area = Outline::default();
         for ([x, y, width, height], holds) in self.strips(panel, rest, holds, |_| false) {
@@ -328,8 +333,8 @@ impl<'a> Cells<'a> {
         area
     }
 
-    /// Rectangles `[x, y, width, height]` of neighbours along y with the same content, px; those of
-    /// content that is `lone` are one cell each.
+    /// Returns rectangles `[x, y, width, height]` (px) of runs of cells along y with the same
+    /// content. Cells whose content is `lone` have a rectangle each.
     fn strips<T: Copy + PartialEq>(
         &self,
         panel: &Panel,
@@ -341,12 +346,14 @@ impl<'a> Cells<'a> {
         let ys: Vec<f64> = y_axis.borders.iter().map(|&border| panel.at_y(border)).collect();
         let mut strips = Vec::new();
         for (x, pair) in x_axis.borders.windows(2).enumerate() {
-            let (left, right) = (panel.at_x(pair[0]), panel.at_x(pair[1]));
-            let of_cell = |y: usize| content(self.map.grid.cell(x, y, rest));
+            let left = panel.at_x(pair[0]);
+            let right = panel.at_x(pair[1]);
+            let content_at = |y: usize| content(self.map.grid.cell(x, y, rest));
             let mut start = 0;
             while start + 1 < ys.len() {
-                let (here, mut end) = (of_cell(start), start + 1);
-                while !lone(here) && end + 1 < ys.len() && of_cell(end) == here {
+                let here = content_at(start);
+                let mut end = start + 1;
+                while !lone(here) && end + 1 < ys.len() && content_at(end) == here {
                     end += 1;
                 }
                 strips.push(([left, ys[end], right - left, ys[start] - ys[end]], here));
@@ -356,9 +363,9 @@ impl<'a> Cells<'a> {
         strips
     }
 
-    /// Whether a cell has points that failed or have no value beside others that have one.
+    /// Returns whether a cell has points that failed or have no value beside others with a value.
     fn partly_lost(&self, cell: usize) -> bool {
-        matches!(self.fills[cell], Some(Fill::Level(_) | Fill::Both))
+        matches!(self.fills[cell], Some(Fill::Step(_) | Fill::Both))
             && self
                 .layer
                 .as_ref()
@@ -369,18 +376,18 @@ impl<'a> Cells<'a> {
         self.map.counts[cell].failed > 0
     }
 
-    /// Whether a cell's colour depends on a motion that is chaotic.
+    /// Returns whether a cell's colour depends on a chaotic motion.
     fn sensitive(&self, cell: usize) -> bool {
         self.layer.as_ref().is_some_and(|layer| layer.nonlinear)
             && self.map.counts[cell].sensitive > 0
     }
 
-    /// Draws the level's line with at most `room` points, and gives their places, px.
+    /// Draws the lines of the limit with at most `room` points. Returns their points, px.
     fn draw_line(
         &self,
         scene: &mut Scene,
         panel: &Panel,
-        divided: (&Layer, &Level),
+        divided: (&Layer, &DividingLimit),
         rest: &[usize],
         room: usize,
     ) -> Vec<Vec<Option<[f64; 2]>>> {
@@ -402,10 +409,10 @@ impl<'a> Cells<'a> {
         &self,
         scene: &mut Scene,
         panel: &Panel,
-        (layer, level): (&Layer, &Level),
+        (layer, level): (&Layer, &DividingLimit),
         (rest, lines): (&[usize], &[Vec<Option<[f64; 2]>>]),
     ) {
-        let place = |axis: &GridAxis, scale: Scale, part: f64| {
+        let place = |axis: &GridAxis, scale: AxisScale, part: f64| {
             let found = axis.borders.partition_point(|&border| scale.position(border) <= part);
             found.clamp(1, axis.borders.len() - 1) - 1
         };
@@ -417,16 +424,17 @@ impl<'a> Cells<'a> {
             level.offset(cell.map_or(f64::NAN, |cell| layer.values[cell]))
         };
         for (name, wanted_above) in [(&level.above[0], true), (&level.below[0], false)] {
-            // A cell without a value is on neither side.
+            // A cell without a value lies on neither side.
             let inside = |point: [f64; 2]| {
                 let offset = offset(point);
                 offset.is_finite() && (offset >= 0.0) == wanted_above
             };
             let size = [text_width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
             let area = [panel.width, panel.height];
-            // Off the lines, unless that leaves no room.
+            // A name is kept off the lines unless that leaves no room.
             let clear = |point: [f64; 2]| inside(point) && !is_near(panel, lines, point);
-            let found = roomiest(area, size, clear).or_else(|| roomiest(area, size, inside));
+            let found =
+                roomiest_place(area, size, clear).or_else(|| roomiest_place(area, size, inside));
             if let Some([x, y]) = found {
                 let at = [panel.x + x, panel.y + y + 0.35 * LABEL_SIZE];
                 let text = Text::new(name, at, LABEL_SIZE).bold().anchor(Anchor::Middle);
@@ -435,68 +443,68 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Of the cells that are drawn.
-    fn legend(&self, drawn: &[usize]) -> Vec<(Sign, String)> {
+    /// Returns the legend of the cells that are drawn.
+    fn legend(&self, drawn: &[usize]) -> Vec<(LegendSymbol, String)> {
         let mut entries = Vec::new();
         let shown = |wanted: &dyn Fn(usize) -> bool| drawn.iter().any(|&cell| wanted(cell));
         let filled = |fill: Fill| shown(&|cell| self.fills[cell] == Some(fill));
         if let Some(Layer { level: Some(level), scale, .. }) = &self.layer {
-            let quarter = |part: usize| scale.colour(part * LEVELS / 4);
-            // Between cells of one side no line is drawn.
+            let quarter = |part: usize| scale.colour(part * COLOUR_STEPS / 4);
+            // No line is drawn between cells of one side.
             let offset = |cell: usize| {
                 self.layer.as_ref().map_or(f64::NAN, |layer| level.offset(layer.typical(cell)))
             };
             if shown(&|cell| offset(cell) >= 0.0) && shown(&|cell| offset(cell) < 0.0) {
-                entries.push((Sign::Line(Stroke::solid(INK, 2.6)), level.line.clone()));
+                entries.push((LegendSymbol::Line(Stroke::solid(INK, 2.6)), level.line.clone()));
             }
-            entries.push((Sign::Area(quarter(3)), level.above[1].clone()));
-            entries.push((Sign::Area(quarter(1)), level.below[1].clone()));
+            entries.push((LegendSymbol::Area(quarter(3)), level.above[1].clone()));
+            entries.push((LegendSymbol::Area(quarter(1)), level.below[1].clone()));
             if filled(Fill::Both) {
-                entries.push((Sign::Area(BOTH), level.both.clone()));
+                entries.push((LegendSymbol::Area(BOTH), level.both.clone()));
             }
         }
         for (kind, (name, points)) in self.kinds.iter().enumerate() {
             let text = format!("{} ({points})", name.replace('_', " "));
-            entries.push((Sign::Area(self.kind_colour(kind)), text));
+            entries.push((LegendSymbol::Area(self.status_colour(kind)), text));
         }
         if self.layer.is_none() && filled(Fill::Both) {
-            entries.push((Sign::Area(BOTH), "points of several kinds".to_owned()));
+            entries.push((LegendSymbol::Area(BOTH), "points of several kinds".to_owned()));
         }
         let only_failed =
             |cell: usize| self.map.counts[cell].failed == self.map.counts[cell].points;
         if shown(&|cell| self.fills[cell] == Some(Fill::Failed) && !only_failed(cell)) {
-            entries.push((Sign::Failed, "no result: failed or undefined".to_owned()));
+            entries.push((LegendSymbol::Failed, "no result: failed or undefined".to_owned()));
         } else if filled(Fill::Failed) {
-            entries.push((Sign::Failed, "failed: no result".to_owned()));
+            entries.push((LegendSymbol::Failed, "failed: no result".to_owned()));
         }
         if shown(&|cell| self.partly_lost(cell)) {
             let some_failed = shown(&|cell| self.partly_lost(cell) && self.some_failed(cell));
             let undefined = |cell| self.layer.as_ref().is_some_and(|layer| layer.undefined(cell));
             let some_undefined = shown(&|cell| self.partly_lost(cell) && undefined(cell));
-            let said = match (some_failed, some_undefined) {
+            let phrase = match (some_failed, some_undefined) {
                 (true, false) => "some points failed",
                 (true, true) => "some points failed or undefined",
                 (false, _) => "some points undefined",
             };
-            entries.push((Sign::Hatched(self.hatches[0].clone()), said.to_owned()));
+            entries.push((LegendSymbol::Hatched(self.hatches[0].clone()), phrase.to_owned()));
         }
         if shown(&|cell| self.sensitive(cell)) {
-            let said = if self.map.grid.merged() {
+            let phrase = if self.map.grid.merged() {
                 "some points sensitive: chaotic"
             } else {
                 "sensitive: motion is chaotic"
             };
-            entries.push((Sign::Hatched(self.hatches[1].clone()), said.to_owned()));
+            entries.push((LegendSymbol::Hatched(self.hatches[1].clone()), phrase.to_owned()));
         }
         if filled(Fill::Undefined) {
-            entries.push((Sign::Undefined, "undefined: no excitation".to_owned()));
+            entries.push((LegendSymbol::Undefined, "undefined: no excitation".to_owned()));
         }
         entries
     }
 }
 
-/// Whether a point of a panel, px from its corner, is as near to one of these lines as samples for
-/// a name are to each other.
+/// Returns whether a point of a panel, px from its corner, is as close to a line as neighbouring
+/// samples of the search for a name's place are.
 fn is_near(panel: &Panel, lines: &[Vec<Option<[f64; 2]>>], [x, y]: [f64; 2]) -> bool {
     let point = [panel.x + x, panel.y + y];
     let reach = (panel.width / 44.0).max(panel.height / 33.0);
@@ -512,8 +520,8 @@ fn is_near(panel: &Panel, lines: &[Vec<Option<[f64; 2]>>], [x, y]: [f64; 2]) -> 
 }
 
 fn colour_bar(scene: &mut Scene, layer: &Layer, [x, y, width, height]: [f64; 4]) {
-    let step = height / LEVELS as f64;
-    for level in 0..LEVELS {
+    let step = height / COLOUR_STEPS as f64;
+    for level in 0..COLOUR_STEPS {
         let top = y + height - (level + 1) as f64 * step;
         scene.fill_crisp(Outline::rectangle(x, top, width, step), layer.scale.colour(level));
     }

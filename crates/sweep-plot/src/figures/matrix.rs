@@ -1,50 +1,58 @@
-//! A design's points over every pair of parameters, and the quantity over each of them.
+//! The scatter matrix of a design: its points over every pair of parameters, and the quantity over
+//! each parameter.
 
-use crate::axis::{Scale, extremes};
+use crate::axis::{AxisScale, extremes};
 use crate::chart::level_stroke;
-use crate::colour::{CALM, HARSH};
-use crate::frame::{HEADING_HEIGHT, LABEL_SIZE, Panel, Sign, heading, legend, legend_height};
+use crate::colour::{BAD_SIDE, GOOD_SIDE};
+use crate::frame::{
+    HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, heading, legend, legend_height,
+};
 use crate::label::Label;
-use crate::layer::Level;
+use crate::layer::DividingLimit;
 use crate::raster::text_width;
 use crate::scatter::{Scatter, Side};
 use crate::scene::{Colour, INK, MUTED, Outline, Scene, Stroke};
 
-/// Most parameters that are shown: beyond, panels are too small to read.
-pub(crate) const MOST_PARAMETERS: usize = 5;
-/// About as many points are drawn at most.
-pub(crate) const MOST_POINTS: usize = 4000;
+/// Maximum number of parameters shown. Basis: with more, panels are too small to read.
+pub(crate) const MAX_PARAMETERS: usize = 5;
+/// Number of points drawn at most, about. Basis: more points overlap. Doubling it doubles the size
+/// of the figure.
+pub(crate) const MAX_POINTS: usize = 4000;
 
-const WIDTH: f64 = 880.0;
-/// Left of the panels: numbers and label of the y axes.
-const LEFT: f64 = 100.0;
-const RIGHT: f64 = 24.0;
-/// Below the panels: numbers and label of the x axes.
-const BELOW: f64 = 64.0;
-const GAP: f64 = 20.0;
-/// Greatest height of a panel, px.
-const TALLEST: f64 = 330.0;
+/// Width of the figure, px.
+const FIGURE_WIDTH: f64 = 880.0;
+/// Left margin for the numbers and labels of the y axes, px.
+const LEFT_MARGIN: f64 = 100.0;
+/// Right margin, px.
+const RIGHT_MARGIN: f64 = 24.0;
+/// Margin below the panels for the numbers and labels of the x axes, px.
+const BOTTOM_MARGIN: f64 = 64.0;
+/// Gap between two panels, px.
+const PANEL_GAP: f64 = 20.0;
+/// Maximum height of a panel, px.
+const MAX_PANEL_HEIGHT: f64 = 330.0;
 
-/// A value along one direction of the matrix.
-pub(crate) struct Direction<'a> {
-    /// As in grid files; empty of the quantity.
+/// An axis of the scatter matrix: a parameter or the quantity.
+pub(crate) struct MatrixAxis<'a> {
+    /// The parameter's name in grid files; empty for the quantity.
     pub(crate) name: &'a str,
     pub(crate) label: &'a Label,
     pub(crate) values: &'a [f64],
-    pub(crate) scale: Scale,
+    pub(crate) scale: AxisScale,
 }
 
-/// The parameters that are shown: all, or the most influential, in file order.
+/// Returns the indices of the parameters shown in file order: all, or the most influential.
 pub(crate) fn shown(scatter: &Scatter) -> Vec<usize> {
     let mut places = scatter.by_influence();
-    places.truncate(MOST_PARAMETERS);
+    places.truncate(MAX_PARAMETERS);
     places.sort_unstable();
     places
 }
 
-/// What the subtitle says of parameters and points that are left out.
+/// Returns the notes on parameters and points that are left out.
 pub(crate) fn notes(scatter: &Scatter) -> Vec<String> {
-    let (all, shown) = (scatter.parameters.len(), shown(scatter).len());
+    let all = scatter.parameters.len();
+    let shown = shown(scatter).len();
     let mut notes = Vec::new();
     if shown < all {
         notes.push(format!("the {shown} most influential of {all} parameters"));
@@ -56,73 +64,74 @@ pub(crate) fn notes(scatter: &Scatter) -> Vec<String> {
     notes
 }
 
-/// Places of the points that are drawn.
+/// Returns the indices of the points drawn.
 pub(crate) fn drawn(scatter: &Scatter) -> Vec<usize> {
-    let stride = scatter.points.len().div_ceil(MOST_POINTS).max(1);
+    let stride = scatter.points.len().div_ceil(MAX_POINTS).max(1);
     scatter.picked(stride)
 }
 
-/// The scale that holds some values, with room for the dots at its ends.
-pub(crate) fn scale(values: &[f64], log: bool) -> Scale {
+/// Returns the scale of some values, with a margin for the dots at its ends.
+pub(crate) fn scale(values: &[f64], log: bool) -> AxisScale {
     if !log {
-        return Scale::around(values.iter().copied());
+        return AxisScale::around(values.iter().copied());
     }
     let positive = values.iter().copied().filter(|value| *value > 0.0);
     let (low, high) = extremes(positive).unwrap_or((1.0, 10.0));
     let room = (high / low).powf(0.05).max(1.02);
-    Scale::log(low / room, high * room)
+    AxisScale::log(low / room, high * room)
 }
 
-/// What the panels are over: the parameters, and last the quantity.
-pub(crate) fn directions(scatter: &Scatter) -> Vec<Direction<'_>> {
+/// Returns the axes of the matrix: the parameters, and last the quantity.
+pub(crate) fn directions(scatter: &Scatter) -> Vec<MatrixAxis<'_>> {
     let parameters = shown(scatter).into_iter().map(|k| &scatter.parameters[k]);
     let parameters = parameters.map(|one| (&one.name[..], &one.label, &one.values[..], one.log));
     let all = parameters.chain([("", &scatter.short, &scatter.quantity[..], scatter.log)]);
     let direction = |(name, label, values, log)| {
         let scale = scale(values, log);
-        Direction { name, label, values, scale }
+        MatrixAxis { name, label, values, scale }
     };
     all.map(direction).collect()
 }
 
-/// A panel each: the directions along it and up it, by their numbers, and its place: left, top,
-/// width and height.
-pub(crate) type Places = Vec<(usize, usize, f64, f64, f64, f64)>;
+/// The panels of the matrix, each by the indices of its x and y axis, and its left and top edge,
+/// width and height, px.
+pub(crate) type PanelPlaces = Vec<(usize, usize, f64, f64, f64, f64)>;
 
-/// The matrix: below its diagonal every pair of parameters, and in its last row the quantity.
-pub(crate) fn draw(scatter: &Scatter) -> (Scene, Places) {
+/// Draws the matrix: every pair of parameters below its diagonal, and the quantity in its last row.
+pub(crate) fn draw(scatter: &Scatter) -> (Scene, PanelPlaces) {
     let directions = directions(scatter);
     let parameters = &directions[..directions.len() - 1];
     let count = parameters.len();
-    let width = (WIDTH - LEFT - RIGHT - GAP * (count - 1) as f64) / count as f64;
-    let height = (0.8 * width).clamp(130.0, TALLEST);
+    let width =
+        (FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN - PANEL_GAP * (count - 1) as f64) / count as f64;
+    let height = (0.8 * width).clamp(130.0, MAX_PANEL_HEIGHT);
     let entries = entries(scatter);
-    let room = WIDTH - LEFT - RIGHT;
-    let of_legend = legend_height(&entries, room);
+    let room = FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN;
+    let legend_height = legend_height(&entries, room);
     let lines = parameters.iter().map(|one| x_lines(one.label, width).len()).max();
-    let below = BELOW + 1.2 * LABEL_SIZE * lines.unwrap_or(1).saturating_sub(1) as f64;
-    let panels_height = count as f64 * (height + GAP) - GAP;
-    let total = HEADING_HEIGHT + panels_height + below + of_legend + 8.0;
+    let below = BOTTOM_MARGIN + 1.2 * LABEL_SIZE * lines.unwrap_or(1).saturating_sub(1) as f64;
+    let panels_height = count as f64 * (height + PANEL_GAP) - PANEL_GAP;
+    let total = HEADING_HEIGHT + panels_height + below + legend_height + 8.0;
     let title = &scatter.title;
     let subtitle = scatter.subtitle(&notes(scatter));
-    let mut scene = Scene::new(WIDTH, total, format!("{title}. {subtitle}"));
+    let mut scene = Scene::new(FIGURE_WIDTH, total, format!("{title}. {subtitle}"));
     heading(&mut scene, title, &subtitle);
     let dots = Dots::new(scatter, width);
-    let mut places = Places::new();
+    let mut places = PanelPlaces::new();
     for row in 0..count {
         let last = row + 1 == count;
         let y = &directions[row + 1];
         for (column, x) in parameters.iter().enumerate().take(if last { count } else { row + 1 }) {
             let panel = Panel {
-                x: LEFT + column as f64 * (width + GAP),
-                y: HEADING_HEIGHT + row as f64 * (height + GAP),
+                x: LEFT_MARGIN + column as f64 * (width + PANEL_GAP),
+                y: HEADING_HEIGHT + row as f64 * (height + PANEL_GAP),
                 width,
                 height,
                 xs: x.scale,
                 ys: y.scale,
             };
             places.push((column, row + 1, panel.x, panel.y, width, height));
-            panel.rules(&mut scene);
+            panel.draw_grid_lines(&mut scene);
             scene.clipped(panel.outline(), |scene| {
                 if let (true, Some(level)) = (last, &scatter.level) {
                     let at = panel.at_y(level.value);
@@ -131,7 +140,7 @@ pub(crate) fn draw(scatter: &Scatter) -> (Scene, Places) {
                 }
                 dots.draw(scene, &panel, x.values, y.values);
             });
-            panel.frame_beside(&mut scene, last, column == 0);
+            panel.draw_frame_beside(&mut scene, last, column == 0);
             if last {
                 x_label(&mut scene, &panel, x.label);
             }
@@ -141,11 +150,11 @@ pub(crate) fn draw(scatter: &Scatter) -> (Scene, Places) {
         }
     }
     let y = HEADING_HEIGHT + panels_height + below;
-    legend(&mut scene, &entries, LEFT, y, room);
+    legend(&mut scene, &entries, LEFT_MARGIN, y, room);
     (scene, places)
 }
 
-/// A label in lines that fit below a panel; its unit stays whole.
+/// Breaks a label into lines that fit below a panel; its unit stays on one line.
 fn x_lines(label: &Label, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let unit = (!label.unit.is_empty()).then(|| format!("({})", label.unit));
@@ -169,19 +178,19 @@ fn x_label(scene: &mut Scene, panel: &Panel, label: &Label) {
     }
 }
 
-/// The colour of a side.
+/// Returns the colour of a side.
 pub(crate) const fn colour(side: Side) -> Colour {
     match side {
-        Side::Good => CALM,
-        Side::Bad => HARSH,
+        Side::Good => GOOD_SIDE,
+        Side::Bad => BAD_SIDE,
         Side::Undefined => MUTED,
         Side::Failed => INK,
     }
 }
 
-/// What each kind of point is drawn as: shapes differ as well as colours.
+/// The dots of a design's points: shapes differ as well as colours.
 struct Dots {
-    /// Places of the points that are drawn, by side.
+    /// The indices of the points drawn, by side.
     places: Vec<(Side, Vec<usize>)>,
     /// Half the size of a dot, px.
     radius: f64,
@@ -190,15 +199,16 @@ struct Dots {
 impl Dots {
     fn new(scatter: &Scatter, width: f64) -> Self {
         let all = drawn(scatter);
-        let of = |side: Side| all.iter().copied().filter(|&k| scatter.sides[k] == side).collect();
-        let places = Side::ALL.into_iter().map(|side| (side, of(side))).collect();
-        // A quarter of the panel's area under dots at most.
+        let points_on =
+            |side: Side| all.iter().copied().filter(|&k| scatter.sides[k] == side).collect();
+        let places = Side::ALL.into_iter().map(|side| (side, points_on(side))).collect();
+        // Dots cover a quarter of the panel's area at most.
         let radius = (0.25 * width / (all.len().max(1) as f64).sqrt()).clamp(1.1, 3.4);
         Self { places, radius }
     }
 
-    /// Points without one of the two values are drawn at the panel's lower edge, where what failed
-    /// is seen over its parameter.
+    /// Draws the dots of a panel. Points without a value lie at its lower edge, so that failures
+    /// are visible over their parameter.
     fn draw(&self, scene: &mut Scene, panel: &Panel, xs: &[f64], ys: &[f64]) {
         for (side, places) in &self.places {
             let mut outline = Outline::default();
@@ -226,11 +236,12 @@ impl Dots {
     }
 }
 
-/// A round dot, a diamond, a ring or a cross.
+/// Adds a dot of a side: a round dot, a diamond, a ring or a cross.
 fn add(outline: &mut Outline, side: Side, [x, y]: [f64; 2], radius: f64) {
     match side {
         Side::Good | Side::Undefined => {
-            let (n, f) = (0.414 * radius, radius);
+            let n = 0.414 * radius;
+            let f = radius;
             let corners = [[n, f], [f, n], [f, -n], [n, -f], [-n, -f], [-f, -n], [-f, n], [-n, f]];
             outline.add_polygon(&corners.map(|[dx, dy]| [x + dx, y + dy]));
         }
@@ -246,7 +257,7 @@ fn add(outline: &mut Outline, side: Side, [x, y]: [f64; 2], radius: f64) {
     }
 }
 
-fn entries(scatter: &Scatter) -> Vec<(Sign, String)> {
+fn entries(scatter: &Scatter) -> Vec<(LegendSymbol, String)> {
     let mut entries = Vec::new();
     for (side, count) in Side::ALL.into_iter().zip(scatter.counts) {
         if count > 0 {
@@ -255,16 +266,16 @@ fn entries(scatter: &Scatter) -> Vec<(Sign, String)> {
         }
     }
     let quantity = scale(&scatter.quantity, scatter.log);
-    let is_drawn = |level: &&Level| (0.0..=1.0).contains(&quantity.position(level.value));
+    let is_drawn = |level: &&DividingLimit| (0.0..=1.0).contains(&quantity.position(level.value));
     if let Some(level) = scatter.level.as_ref().filter(is_drawn) {
-        entries.push((Sign::Line(level_stroke()), level.line.clone()));
+        entries.push((LegendSymbol::Line(level_stroke()), level.line.clone()));
     }
     entries
 }
 
-/// A dot of a side as a legend draws it.
-fn sign(side: Side) -> Sign {
+/// Returns the legend symbol of a side.
+fn sign(side: Side) -> LegendSymbol {
     let mut outline = Outline::default();
     add(&mut outline, side, [0.0, 0.0], 5.0);
-    Sign::Shape(outline, matches!(side, Side::Good | Side::Bad), colour(side))
+    LegendSymbol::Shape(outline, matches!(side, Side::Good | Side::Bad), colour(side))
 }

@@ -1,26 +1,26 @@
-//! What a study has tried: the other objectives over the first, with the front; of one objective,
-//! how it fell from candidate to candidate.
+//! The figure of a study: its candidates with the other objectives over the first and the Pareto
+//! front, or its single objective over the number of the candidate.
 
 use crate::chart::{Chart, ChartPanel, Series, Style};
 use crate::colour::{DISTINCT, FAILED, NONLINEAR};
 use crate::error::Result;
 use crate::label::{self, Label};
-use crate::read::{ColumnFacts, Source};
+use crate::read::{ColumnFacts, FigureFile};
 
-/// The candidates by what became of them, their words and colours; the last are drawn on top.
-const KINDS: [&str; 3] = ["breaks a condition", "tried", "on the front"];
+/// The kinds of candidates in words, in drawing order: the last are drawn on top.
+const CANDIDATE_KINDS: [&str; 3] = ["breaks a condition", "tried", "on the front"];
 
-/// A column with its name in words.
+/// Returns a column with its name in words.
 fn in_words(column: &ColumnFacts) -> (&ColumnFacts, String) {
     (column, label::words(&column.name))
 }
 
-/// The chart of a study's file.
+/// Draws the chart of a study's file.
 ///
 /// # Errors
 /// A file without objectives.
-pub(crate) fn chart(source: &Source) -> Result<Chart> {
-    // In the study's own words: a name says no quantile.
+pub(crate) fn chart(source: &FigureFile) -> Result<Chart> {
+    // The study's expressions are clearer than column names, which lack quantiles.
     let objectives: Vec<(&ColumnFacts, String)> = source
         .list("objective")
         .filter_map(|one| {
@@ -29,10 +29,11 @@ pub(crate) fn chart(source: &Source) -> Result<Chart> {
         })
         .collect();
     let [first, further @ ..] = objectives.as_slice() else {
-        return Err(source.lacks("an objective", "written by `sweep optimise`"));
+        return Err(source.missing_column("an objective", "written by `sweep optimise`"));
     };
-    let number =
-        source.column("candidate").ok_or_else(|| source.lacks("candidate", "its index"))?;
+    let number = source
+        .column("candidate")
+        .ok_or_else(|| source.missing_column("candidate", "its index"))?;
     let (x, ys) = match further {
         [] => (in_words(number), &objectives[..]),
         _ => (first.clone(), further),
@@ -50,18 +51,26 @@ pub(crate) fn chart(source: &Source) -> Result<Chart> {
         Ok(())
     })?;
     rows.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
-    let units: Vec<(&str, f64)> =
-        std::iter::once(&x).chain(&shown).map(|(column, _)| label::shown(&column.unit)).collect();
-    let of = |kind: usize, k: usize| -> Vec<f64> {
-        let own = rows.iter().filter(|(of, values)| *of == kind && values[0].is_finite());
+    let units: Vec<(&str, f64)> = std::iter::once(&x)
+        .chain(&shown)
+        .map(|(column, _)| label::display_unit(&column.unit))
+        .collect();
+    let values = |kind: usize, k: usize| -> Vec<f64> {
+        let own = rows.iter().filter(|(own, values)| *own == kind && values[0].is_finite());
         own.map(|(_, values)| values[k] * units[k].1).collect()
     };
     let panels = shown.iter().enumerate().map(|(k, (column, words))| {
         let colours = [FAILED, DISTINCT[5], NONLINEAR];
         let dots = |kind: usize| {
-            Series::new(KINDS[kind], colours[kind], of(kind, 0), of(kind, k + 1), Style::Dots)
+            Series::new(
+                CANDIDATE_KINDS[kind],
+                colours[kind],
+                values(kind, 0),
+                values(kind, k + 1),
+                Style::Dots,
+            )
         };
-        let dots = (0..KINDS.len()).map(dots).filter(|series| !series.x.is_empty());
+        let dots = (0..CANDIDATE_KINDS.len()).map(dots).filter(|series| !series.x.is_empty());
         let label = Label::new(words, units[k + 1].0);
         ChartPanel {
             shown: k < ys.len(),

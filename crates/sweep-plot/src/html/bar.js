@@ -1,6 +1,7 @@
 // Colour scales and their bars, and hatches.
 
-// Place of a value on a colour scale, from 0 to 1; both sides of its middle have half the colours.
+// Returns the place of a value on a colour scale, from 0 to 1; both sides of its middle have half
+// the colours.
 function position(scale, value) {
   const even = scale.log ? Math.log : (x) => x;
   const [low, middle, high] = scale.stops.map(even);
@@ -9,7 +10,7 @@ function position(scale, value) {
   return Math.min(Math.max(place, 0), 1);
 }
 
-// The colour bar below a map, `margin` px from the figure's edge.
+// Draws the colour bar below a map, `margin` px from the figure's edge.
 function drawBar(context, box, layer, margin) {
   const [y, thick, right] = [box.top + box.height + 72, 16, box.left + box.width];
   const { colours } = layer;
@@ -20,7 +21,7 @@ function drawBar(context, box, layer, margin) {
   });
   context.strokeStyle = themed("ink");
   context.strokeRect(box.left, y, box.width, thick);
-  // The limit first; what would touch a number before it is left out.
+  // The limit comes first; a number that would touch an earlier one is left out.
   const isCentre = ([value]) => value === layer.scale.limit;
   const taken = [];
   context.font = `bold 13px ${FONT}`;
@@ -40,8 +41,8 @@ function drawBar(context, box, layer, margin) {
   write(context, layer.label, middle, y + thick + 38, { room: box.width + 50 });
 }
 
-// Slanted lines, on a ground of that colour or on what is there: each a colour and a width.
-// A finer one is for areas that could lie between the lines.
+// Draws slanted lines, each of a colour and a width, on a ground of this colour or on what is
+// there. A smaller `side` serves areas that could lie between the lines.
 function hatching(context, ground, { lines = [[DARK, 1]], falling = false, side = 8 } = {}) {
   const tile = element("canvas", { width: side, height: side });
   const brush = tile.getContext("2d");

@@ -1,6 +1,6 @@
-// The values of a map's cells, decoded, and what is asked of them.
+// The decoded values of a map's cells, and questions about them.
 
-// The code of a cell whose points differ.
+// The code of a cell whose points have different words.
 const SEVERAL_WORDS = 254;
 
 function createCells(data) {
@@ -13,7 +13,7 @@ function createCells(data) {
     codes[name] = { ...coded, values: decode(coded.data) };
   }
   const word = (name, cell) => codes[name]?.words[codes[name].values[cell]] ?? null;
-  // How many points of a cell are what; where each cell is one point, its words say so.
+  // Counts of a cell's points by kind; a cell of one point has them in its words.
   const counted = (name, holds) => (data.counts ? floats(data.counts[name])
     : Uint8Array.from(codes.status.values, (_, cell) => holds(cell)));
   const status = (cell) => word("status", cell);
@@ -24,8 +24,8 @@ function createCells(data) {
     unreliable: counted("unreliable", (cell) => word("reliable", cell) === "false"),
     sensitive: counted("sensitive", (cell) => word("sensitive", cell) === "true"),
   };
-  // Cells of several points with some on either side of a layer's level, and with some that did not
-  // fail and yet have no value.
+  // Cells of several points with some on either side of a layer's limit, and cells with some that
+  // did not fail and yet have no value.
   for (const layer of data.layers) {
     for (const name of ["both", "undefined"]) if (layer[name]) layer[name] = decode(layer[name]);
   }
@@ -33,18 +33,18 @@ function createCells(data) {
     ?? channel.replaceAll("_", " ");
   const bit = (bits, cell) => bits !== undefined && ((bits[cell >> 3] >> (cell & 7)) & 1) === 1;
   const filled = (cell) => counts.points[cell] > 0;
-  // Whether any point of a cell failed.
+  // Returns whether any point of a cell failed.
   const failed = (cell) => counts.failed[cell] > 0;
   const hasValue = (layer, cell) => {
     const value = columns[layer.column].values[cell];
     return Number.isFinite(value) && (layer.group !== "ratio" || value > 0);
   };
-  // Points that failed or have no value beside others that have one.
+  // Returns whether a cell has points that failed or have no value beside others with a value.
   const partlyLost = (layer, cell) => hasValue(layer, cell)
     && (failed(cell) || bit(layer.undefined, cell));
-  // Cells whose colour depends on a motion that is chaotic.
+  // Returns whether a cell's colour depends on a chaotic motion.
   const sensitive = (layer, cell) => layer.nonlinear && counts.sensitive[cell] > 0;
-  // What a cell says of the linear model, in words.
+  // Returns the verdict of a cell in words.
   function verdict(cell) {
     if (!filled(cell)) return "not in the file";
     const points = counts.points[cell];
@@ -59,7 +59,7 @@ function createCells(data) {
     return points === 1 ? said : `${said} at all ${points} points`;
   }
 
-  // Places of a cell along all axes.
+  // Returns the places of a cell along all axes.
   const placesOf = (cell) => data.axes.reduceRight(([left, ...found], { values }) => [
     Math.floor(left / values.length), left % values.length, ...found], [cell]).slice(1);
   const valuesOf = (cell) => placesOf(cell).map((place, k) => data.axes[k].values[place]);

@@ -2,7 +2,8 @@
 
 const CHART = { left: 84, right: 16, top: 12, gap: 14, bottom: 46 };
 
-// A line, a panel and a chart of what the page itself finds: linear axes, one grid, no marks.
+// Builders of a line, a panel and a chart for results of the page itself: linear axes, one grid, no
+// marks.
 function plainLine(name, colour, y, alpha = 1) {
   return { name, colour, alpha, grid: 0, width: 1.3, dashed: false, y };
 }
@@ -18,14 +19,14 @@ function plainChart(xWords, xUnit, grid, panels) {
 
 // `spec` as the page's data has it, with decoded arrays: { xWords, xUnit, xLog, xRange, xTicks,
 // grids, panels, marks, markMeaning, shades, shadeMeaning }.
-// `pick` hears of the x of a click, and of Enter.
+// `pick` is called with the x of a click, and of Enter.
 function createChart(host, spec, name, pick = () => {}) {
   const even = (x) => (spec.xLog ? Math.log(x) : x);
   const back = (x) => (spec.xLog ? Math.exp(x) : x);
   const all = spec.xRange.map(even);
   let view = [...all];
   let cursor = null;
-  // Where the pointer reads, px from the figure's top; null where keys do.
+  // The height at which the pointer reads, px from the figure's top; null if keys read.
   let readAt = null;
 
   const find = furnish(host, "chart");
@@ -64,7 +65,7 @@ function createChart(host, spec, name, pick = () => {}) {
     changed();
   }
 
-  // Indices of a grid's points within the view and one beyond on each side.
+  // Returns the indices of a grid's points in the view, and one beyond on each side.
   function visible(grid) {
     const from = Math.max(lowerBound(grid, back(view[0])) - 1, 0);
     return [from, Math.min(lowerBound(grid, back(view[1])) + 1, grid.length - 1)];
@@ -90,7 +91,7 @@ function createChart(host, spec, name, pick = () => {}) {
     return [low - room, high + room];
   }
 
-  // Whether a panel has a place for a line, a dot or a star.
+  // Returns whether a panel has a point of a line, a dot or a star.
   function hasValues(panel) {
     const isShown = (y) => Number.isFinite(y) && (!panel.log || y > 0);
     const ofSeries = ({ y, low, high }) => [y, low, high].some((values) => values?.some(isShown));
@@ -138,7 +139,7 @@ function createChart(host, spec, name, pick = () => {}) {
         write(context, label, atX(x) - 12, atY(y) - 5, { align: "right" });
       }
       context.restore();
-      // Whole at the frame too.
+      // Dots are drawn after the clip, so that they are whole at the frame.
       dots.forEach((path, k) => {
         context.fillStyle = lineColour(panel.series[k].colour);
         context.fill(path);
@@ -150,7 +151,7 @@ function createChart(host, spec, name, pick = () => {}) {
     }
   }
 
-  // Moved aside where they would cover each other.
+  // A label that would cover another is moved aside.
   function drawMarkLabels(context, { left, top, width }) {
     let free = -Infinity;
     for (const [x, label] of spec.marks) {
@@ -163,7 +164,7 @@ function createChart(host, spec, name, pick = () => {}) {
     }
   }
 
-  // Gives the dots within the box: those of a series of dots, and places to which no line runs.
+  // Returns the dots within the box: those of a series of dots, and isolated points of lines.
   function drawSeries(context, series, atY, box) {
     const dots = new Path2D();
     const grid = spec.grids[series.grid];
@@ -179,8 +180,8 @@ function createChart(host, spec, name, pick = () => {}) {
     context.globalAlpha = series.alpha;
     context.lineWidth = series.width;
     context.setLineDash(series.dashed ? [8, 5] : []);
-    // Of the points in one pixel column, the first, the extremes and the last make the same
-    // picture as all.
+    // The first, the least, the greatest and the last point of a pixel column make the same picture
+    // as all points in it.
     const isCrowded = to - from > 4 * box.width;
     const runs = [[]];
     for (let k = from; k <= to; k++) {
@@ -217,7 +218,7 @@ function createChart(host, spec, name, pick = () => {}) {
     ? `width:9px;height:9px;border-radius:5px;margin:0 9px;background:${lineColour(series.colour)}`
     : `height:0;border-top:3px ${series.dashed ? "dashed" : "solid"} ${lineColour(series.colour)}`);
 
-  // What lines and marks are.
+  // The legend of lines and marks.
   function tellLegend() {
     const entries = new Map();
     const add = (words, style = null) => {
@@ -274,7 +275,7 @@ function createChart(host, spec, name, pick = () => {}) {
     tip.dataset.x = cursor;
     tip.replaceChildren(element("p", {}, x), table([], rows));
     said.textContent = words.join("; ");
-    // Within what is seen of a figure that is higher than the window.
+    // The box stays within the visible part of a figure that is higher than the window.
     const bounds = figure.getBoundingClientRect();
     const seen = [Math.max(0, -bounds.top), Math.min(bounds.height, innerHeight - bounds.top)];
     placeTip(tip, [atX(cursor) - 12, atX(cursor) + 12], (readAt ?? seen[0]) + 14, seen);
@@ -332,7 +333,7 @@ function nearest(sorted, value) {
   return value - sorted[before] < sorted[after] - value ? before : after;
 }
 
-// The page's chart with its arrays decoded; curves of time histories are quantised.
+// Returns the page's chart with decoded arrays; curves of time histories are quantised.
 function decodedChart(chart) {
   const curve = (given) => given && (typeof given === "string" ? floats : quantised)(given);
   const series = (one) => ({ ...one, y: curve(one.y), low: curve(one.low), high: curve(one.high) });

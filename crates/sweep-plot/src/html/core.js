@@ -1,5 +1,5 @@
 "use strict";
-// What the map and the charts share: decoding, numbers, axes, canvases that follow size and theme,
+// Parts that map and charts share: decoding, numbers, axes, canvases that follow size and theme,
 // pointer and keys.
 
 function decode(text) {
@@ -9,7 +9,7 @@ function decode(text) {
   return bytes;
 }
 
-// What gzip has packed, as a promise of its bytes.
+// Unpacks gzip, as a promise of the bytes.
 function unpacked(text) {
   const stream = new Blob([decode(text)]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).arrayBuffer();
@@ -18,7 +18,7 @@ function unpacked(text) {
 const floats = (text) => new Float32Array(decode(text).buffer);
 const doubles = (text) => new Float64Array(decode(text).buffer);
 
-// Integers of 16 bits times their unit; the least integer means no value.
+// Decodes 16-bit integers times their unit; the least integer means no value.
 function quantised([text, unit]) {
   const whole = new Int16Array(decode(text).buffer);
   return Float32Array.from(whole, (value) => (value === -32768 ? NaN : value * unit));
@@ -32,11 +32,11 @@ function significant(value, digits = 4) {
   return String(Number(value.toPrecision(digits)));
 }
 
-// The page's numbers. `ticks` says where ticks can be, as in the program's own figures.
+// The page's numbers. `ticks` has the steps of ticks, as in the program's own figures.
 const DATA = JSON.parse(document.getElementById("data").textContent);
 
-// Ticks from low to high, about count of them, as [value, label]; `sets` are those of a logarithmic
-// axis, ever denser.
+// Returns about `count` ticks from low to high as [value, label]; `sets` are those of a logarithmic
+// axis, from sparse to dense.
 function ticks(low, high, count, sets) {
   if (!(high > low)) return [];
   const within = ([value]) => value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9);
@@ -62,7 +62,7 @@ function ticks(low, high, count, sets) {
   return [];
 }
 
-// Words with their unit, if they have one.
+// Returns words with their unit, if they have one.
 const withUnit = (words, unit) => (unit ? `${words} (${unit})` : words);
 
 const capitalised = (text) => text.charAt(0).toUpperCase() + text.slice(1);
@@ -78,30 +78,31 @@ function element(tag, attributes = {}, ...children) {
   return node;
 }
 
-// Puts a template's elements into a host, and gives what finds them there.
+// Copies a template's elements into a host, and returns a function that finds them there.
 function furnish(host, name) {
   host.append(document.getElementById(`${name}-parts`).content.cloneNode(true));
   return (selector) => host.querySelector(selector);
 }
 
-// A table's row: what it is of, and cells or their texts.
+// Returns a table's row: its heading, and cells or their texts.
 function tableRow(title, cells) {
   return element("tr", {}, element("th", { scope: "row" }, title),
     ...cells.map((cell) => (cell instanceof Element ? cell : element("td", {}, cell))));
 }
 
-// A table under heads, a column a text, if there are any.
+// Returns a table under heads, if there are any, with a column for each text.
 function table(heads, rows, attributes = {}) {
   const cells = heads.map((text) => element("th", { scope: "col" }, text));
   const head = heads.length ? [element("thead", {}, element("tr", {}, ...cells))] : [];
   return element("table", attributes, ...head, element("tbody", {}, ...rows));
 }
 
-// A sign of a legend, and an entry of it.
+// Returns a symbol of a legend, and an entry of it.
 const swatch = (style) => element("i", { style });
 const legendEntry = ([style, words]) => element("li", {}, ...(style ? [swatch(style)] : []), words);
 
-// A tip beside what lies from left to right, px, within a figure; its top at y, within the bounds.
+// Places a tip beside the range from left to right (px) within a figure; its top at y, within the
+// bounds.
 function placeTip(tip, [left, right], y, [top, bottom]) {
   const room = tip.parentElement.clientWidth - tip.offsetWidth;
   const fits = right <= room || left < tip.offsetWidth;
@@ -115,18 +116,18 @@ function themed(name) {
 
 const darkTheme = matchMedia("(prefers-color-scheme: dark)");
 
-// The same hues, lighter, for lines on a dark ground.
+// The same hues in lighter shades, for lines on a dark ground.
 function lineColour(colour) {
   if (colour === "ink") return themed("ink");
   return darkTheme.matches ? `color-mix(in srgb, ${colour} 65%, white)` : colour;
 }
 
 const FONT = '"Noto Sans", "Segoe UI", "Helvetica Neue", Arial, sans-serif';
-// What shows on every ground: dark on light.
+// Colours that show on every ground: dark on light.
 const [DARK, LIGHT] = ["#1b1f24", "#ffffff"];
 
-// A canvas as wide as its host and `height` px high; `draw(context, width, height)` whenever either
-// changes.
+// Creates a canvas as wide as its host and `height` px high; `draw(context, width, height)` is
+// called whenever either changes.
 function surface(host, height, draw) {
   const canvas = element("canvas", { "aria-hidden": "true" });
   host.append(canvas);
@@ -145,7 +146,7 @@ function surface(host, height, draw) {
     context.clearRect(0, 0, width, tall);
     draw(context, width, tall);
   };
-  // Many changes before the next frame are one drawing.
+  // Several changes before the next frame cause one drawing.
   const request = () => { pending ||= requestAnimationFrame(paint); };
   new ResizeObserver(request).observe(host);
   darkTheme.addEventListener("change", request);
@@ -164,7 +165,7 @@ function drawLine(context, x0, y0, x1, y1, dash, colour) {
   context.setLineDash([]);
 }
 
-// The path so far, dark within light of these widths.
+// Strokes the current path, dark within light, with these widths.
 function outlined(context, [light, dark], dash = []) {
   for (const [colour, width, dashed] of [[LIGHT, light, []], [DARK, dark, dash]]) {
     context.strokeStyle = colour;
@@ -175,7 +176,7 @@ function outlined(context, [light, dark], dash = []) {
   context.setLineDash([]);
 }
 
-// Text in ink, at most `room` px wide; upright if it `stands`.
+// Writes text in ink, at most `room` px wide; upright if it `stands`.
 function write(context, text, x, y, how = {}) {
   const { align = "center", size = 13, room, stands = false, bold = "" } = how;
   context.save();
@@ -188,9 +189,9 @@ function write(context, text, x, y, how = {}) {
   context.restore();
 }
 
-// Frame, ticks and numbers of a box, and the words of its axes. An axis is its { range, at, words,
-// unit, ticks }, `at` the place of a value on the screen; an x axis without words has no numbers.
-// Ticks are lines through the box if it is `ruled`.
+// Draws frame, ticks and numbers of a box, and the words of its axes. An axis is { range, at,
+// words, unit, ticks }, where `at` maps a value to the screen; an x axis without words has no
+// numbers. Ticks are lines through the box if it is `ruled`.
 function drawAxes(context, { left, top, width, height }, x, y, ruled) {
   const [bottom, middle] = [top + height, left + width / 2];
   const [ink, ruling] = [themed("ink"), themed("faint")];
@@ -216,14 +217,14 @@ function drawAxes(context, { left, top, width, height }, x, y, ruled) {
   });
 }
 
-// Cells or ranges with points on both sides of a limit.
+// The colour of cells or ranges with points on both sides of a limit.
 const MIXED = DATA.both;
 const SHADE = DATA.shade;
 
-// What pointer and keys do on a figure, and buttons for those who have no wheel. `does` has
-// view(), isZoomed() and reset(); move(view, [x, y]) from an earlier view by px; zoom(factor,
-// event), by which the view grows about the event's place or, without one, about what is read;
-// read(event) and letGo(); pick(event), a click; key(event), which says whether the key is one.
+// Connects pointer, keys and buttons (for readers without a wheel) to a figure. `does` has view(),
+// isZoomed() and reset(); move(view, [x, y]) from an earlier view by px; zoom(factor, event), by
+// which the view grows about the event's place or, without one, about the reading; read(event) and
+// letGo(); pick(event), a click; key(event), which returns whether it uses the key.
 function interact(figure, does) {
   const on = (kind, heard) => figure.addEventListener(kind, heard);
   let drag = null;
@@ -246,7 +247,7 @@ function interact(figure, does) {
     if (isClick) does.pick(event);
   });
   on("pointercancel", () => { drag = null; });
-  // A finger that is lifted leaves what it has read.
+  // A lifted finger leaves its reading.
   on("pointerleave", (event) => { if (event.pointerType === "mouse") does.letGo(); });
   on("blur", does.letGo);
   on("dblclick", does.reset);
@@ -274,7 +275,7 @@ function interact(figure, does) {
     button("−", "Zoom out", farther), button("Reset zoom", null, does.reset));
 }
 
-// A view [low, high] zoomed by `factor` about `centre`, kept within [least, greatest].
+// Returns a view [low, high] zoomed by `factor` about `centre`, within [least, greatest].
 function zoomed([low, high], factor, centre, [least, greatest]) {
   const span = Math.min((high - low) * factor, greatest - least);
   const start = centre - ((centre - low) / (high - low)) * span;
@@ -286,7 +287,7 @@ function moved([low, high], by, [least, greatest]) {
   return [low + shift, high + shift];
 }
 
-// The place of the first that is no less, in a sorted list.
+// Returns the place of the first value of a sorted list that is no less.
 function lowerBound(sorted, value) {
   const at = sorted.findIndex((one) => one >= value);
   return at < 0 ? sorted.length : at;

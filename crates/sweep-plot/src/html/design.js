@@ -1,10 +1,10 @@
-// A design's page: points over every pair of parameters with their values under the pointer, the
-// histogram, and what the quantity depends on.
+// The page of a design: points over every pair of parameters with their values under the pointer,
+// the histogram, and the influence of each parameter.
 
-// Pixels within which the pointer finds a point.
+// Distance within which the pointer finds a point, px.
 const REACH = 12;
 
-// `panel` computes the point that is chosen.
+// `panel` is the live panel, which computes the chosen point.
 function createDesign(main, data, panel) {
   const parts = {
     scatter: (host) => createMatrix(host, data.scatter, panel?.chosen),
@@ -26,7 +26,7 @@ function createDesign(main, data, panel) {
   }
 }
 
-// The picture is the program's own; the page finds points in it and marks them.
+// The picture is drawn by the program; the page finds points in it and marks them.
 function createMatrix(host, data, choose = () => {}) {
   const directions = data.directions.map((one) => ({ ...one, values: floats(one.values) }));
   let found = null;
@@ -46,7 +46,7 @@ function createMatrix(host, data, choose = () => {}) {
     const [from, to] = one.range.map(even);
     return (even(value) - from) / (to - from);
   };
-  // What a panel is over, and its place in the picture: [x, y, [left, top, width, height]].
+  // Returns a panel's directions and its place in the picture: [x, y, [left, top, width, height]].
   const panels = data.panels.map(([x, y, ...box]) => [directions[x], directions[y], box]);
   // Points without a value of y lie at the lower edge.
   const at = ([x, y, [left, top, width, height]], k) => {
@@ -56,7 +56,7 @@ function createMatrix(host, data, choose = () => {}) {
       top + (Number.isFinite(up) ? (1 - up) * height : height - 5),
     ];
   };
-  // The picture's units in a pixel of the page.
+  // Returns the picture's units in a pixel of the page.
   const scale = () => data.view[2] / picture.clientWidth;
 
   function tell(place) {
@@ -105,7 +105,7 @@ function createMatrix(host, data, choose = () => {}) {
     if (found === null) return;
     choose(Object.fromEntries(directions.map((one) => [one.name, one.values[found]])));
   }
-  // A finger that is lifted leaves what it has read.
+  // A lifted finger leaves its reading.
   const letGo = () => {
     found = null;
     tell();

@@ -1,4 +1,4 @@
-//! The page of a design: its scatter matrix, its histogram and what the quantity depends on.
+//! The page of a design: its scatter matrix, its histogram and the influence of its parameters.
 
 use serde_json::{Value, json};
 
@@ -7,15 +7,15 @@ use crate::figures::{histogram, influence, matrix};
 use crate::frame::HEADING_HEIGHT;
 use crate::model::Figures;
 use crate::scatter::{Scatter, Side};
-use crate::{Options, View, svg};
+use crate::{DesignView, PlotOptions, svg};
 
-/// The page, which opens with the view that the options name.
-pub(crate) fn page_of(scatter: &Scatter, options: &Options, model: &dyn Figures) -> String {
+/// Writes the page, which opens with the figure that the options name.
+pub(crate) fn design_page(scatter: &Scatter, options: &PlotOptions, model: &dyn Figures) -> String {
     let title = &scatter.title;
     let drawn = matrix::drawn(scatter);
     let chart = histogram::chart(scatter);
     let pick = |values: &[f64]| embed::floats(drawn.iter().map(|&k| values[k]));
-    let direction = |one: &matrix::Direction<'_>| {
+    let direction = |one: &matrix::MatrixAxis<'_>| {
         json!({
             "name": one.name,
             "words": one.label.words,
@@ -33,8 +33,8 @@ pub(crate) fn page_of(scatter: &Scatter, options: &Options, model: &dyn Figures)
         "title": title,
         "subtitle": scatter.subtitle(&[]),
         "first": match options.view {
-            Some(View::Histogram) => "histogram",
-            Some(View::Influence) => "influence",
+            Some(DesignView::Histogram) => "histogram",
+            Some(DesignView::Influence) => "influence",
             _ => "scatter",
         },
         "scatter": {
@@ -54,6 +54,6 @@ pub(crate) fn page_of(scatter: &Scatter, options: &Options, model: &dyn Figures)
     });
     let axes: Vec<(&str, bool)> =
         scatter.parameters.iter().map(|one| (one.name.as_str(), one.log)).collect();
-    let (computing, told) = computed(&scatter.source, &axes, model);
-    page(title, data, [&[CORE, CHART, DESIGN], &[START]], computing, &scatter.source, &told)
+    let (live_part, summary) = computed(&scatter.source, &axes, model);
+    page(title, data, [&[CORE, CHART, DESIGN], &[START]], live_part, &scatter.source, &summary)
 }

@@ -1,24 +1,24 @@
-//! Numbers in a page: compact, and exact to what a reader can see.
+//! Encodings of numbers in a page: compact, and exact to the digits that a reader can see.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-/// Values as little-endian 32 bit floats (7 digits), base64.
+/// Encodes values as little-endian 32-bit floats (7 digits) in base64.
 pub fn floats(values: impl Iterator<Item = f64>) -> String {
     STANDARD.encode(values.flat_map(|value| (value as f32).to_le_bytes()).collect::<Vec<u8>>())
 }
 
-/// Values as little-endian 64 bit floats, base64.
+/// Encodes values as little-endian 64-bit floats in base64.
 pub fn doubles(values: &[f64]) -> String {
     STANDARD.encode(values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())
 }
 
-/// Values as bytes, base64.
+/// Encodes bytes in base64.
 pub fn bytes(values: impl Iterator<Item = u8>) -> String {
     STANDARD.encode(values.collect::<Vec<u8>>())
 }
 
-/// Truth values as bits, the least of a byte first, base64.
+/// Encodes flags as bits, the least significant bit of a byte first, in base64.
 pub fn bits(values: &[bool]) -> String {
     let byte = |values: &[bool]| {
         values.iter().rev().fold(0, |byte: u8, value| byte << 1 | u8::from(*value))
@@ -26,20 +26,20 @@ pub fn bits(values: &[bool]) -> String {
     STANDARD.encode(values.chunks(8).map(byte).collect::<Vec<u8>>())
 }
 
-/// Values as little-endian 16 bit integers, base64, and the size of their unit: a curve to 1/32767
-/// of its peak. What is not finite becomes the least integer.
+/// Encodes values as little-endian 16-bit integers in base64, and returns the value of one unit:
+/// 1/32767 of the peak. A value that is not finite becomes the least integer.
 pub fn quantised(values: &[f64]) -> (String, f64) {
     let known = values.iter().filter(|value| value.is_finite());
     let peak = known.fold(0.0_f64, |peak, value| peak.max(value.abs()));
-    let unit = short(if peak > 0.0 { peak * 1.001 / f64::from(i16::MAX) } else { 1.0 });
+    let unit = rounded(if peak > 0.0 { peak * 1.001 / f64::from(i16::MAX) } else { 1.0 });
     let integer =
         |value: &f64| if value.is_finite() { (value / unit).round() as i16 } else { i16::MIN };
     let data = values.iter().flat_map(|value| integer(value).to_le_bytes()).collect::<Vec<u8>>();
     (STANDARD.encode(data), unit)
 }
 
-/// A number to six digits, so that it is written short.
-pub fn short(value: f64) -> f64 {
+/// Rounds a number to six digits, so that it is written short.
+pub fn rounded(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 
@@ -56,13 +56,13 @@ mod tests {
     }
 
     #[test]
-    fn bits_start_with_the_least() {
+    fn the_least_significant_bit_comes_first() {
         let values: Vec<bool> = (0..10).map(|k| k == 1 || k == 9).collect();
         assert_eq!(STANDARD.decode(bits(&values)).unwrap(), [0b10, 0b10]);
     }
 
     #[test]
-    fn a_quantised_curve_comes_back() {
+    fn a_quantised_curve_is_decoded_within_half_a_unit() {
         let curve = [0.0, 0.07, -0.035, 1.0e-5, f64::NAN];
         let (data, unit) = quantised(&curve);
         let back: Vec<i16> = STANDARD
@@ -78,8 +78,8 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_short() {
-        assert_eq!(short(0.1 + 0.2).to_string(), "0.3");
-        assert!(short(f64::NAN).is_nan());
+    fn numbers_are_rounded_to_six_digits() {
+        assert_eq!(rounded(0.1 + 0.2).to_string(), "0.3");
+        assert!(rounded(f64::NAN).is_nan());
     }
 }

@@ -1,5 +1,5 @@
-//! Time histories beside a map: which trace file belongs to which point, and a form small enough
-//! for a page.
+//! Time histories beside a map: the point of each trace file, and its chart small enough for a
+//! page.
 
 use std::path::{Path, PathBuf};
 
@@ -7,28 +7,30 @@ use serde_json::{Map as Object, Value, json};
 
 use super::{chart_json, embed};
 use crate::error::{PlotError, Result};
-use crate::gather::Map;
+use crate::gather::CellMap;
 use crate::model::Figures;
-use crate::read::{Kind, Source};
-use crate::table::Table;
-use crate::together::{self, At};
+use crate::read::{FigureFile, FigureKind};
+use crate::table::FigureTable;
+use crate::together::{self, NamedPoint};
 use sweep_files::{FileError, regular};
 
-/// Stretches of time that a history is cut into; of each, the least and the greatest value are
-/// kept.
-const STRETCHES: usize = 500;
+/// Number of time buckets of a history, each of which keeps its least and greatest value. Basis: a
+/// page draws a history about 500 px wide. Doubling it doubles the size of histories in a page.
+const BUCKETS: usize = 500;
 
-/// The charts of a folder's trace files, by the place of their point in the grid, their curves
-/// quantised. A file belongs to the point that its metadata names (`at`: axis to value), or else to
-/// the one whose index (column `point`) ends its name, as in `point-123.parquet`. Histories are cut
-/// into 500 stretches with two values each, the least and the greatest in the order in which they
-/// occur, at the stretch's first and middle instant.
+/// Returns the charts of a folder's trace files by the cell of their point, their curves quantised.
+///
+/// A file belongs to the point that its metadata gives (`at`: axis to value), or else to the one
+/// whose index (column `point`) ends its name, as in `point-123.parquet`. Histories are reduced to
+/// 500 buckets of two values each: the least and the greatest in the order in which they occur, at
+/// the first and the middle instant of the bucket.
 ///
 /// # Errors
-/// [`PlotError::File`] for the folder; as [`Table::open`] for its files; [`PlotError::Unfit`] for a
-/// file that is not a trace or belongs to no point of the grid, and for a folder without any.
-pub(crate) fn read(folder: &Path, map: &Map, model: &dyn Figures) -> Result<Value> {
-    let known = map.table.source.known;
+/// [`PlotError::File`] for the folder; the errors of [`FigureTable::open`] for its files;
+/// [`PlotError::Unfit`] for a file that is not a trace or belongs to no point of the grid, and for
+/// a folder without traces.
+pub(crate) fn read(folder: &Path, map: &CellMap, model: &dyn Figures) -> Result<Value> {
+    let known = map.table.source.model_kinds;
     let names = regular::names(folder).map_err(FileError::io("list", folder))?;
     let mut files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     files.retain(|file| file.extension().is_some_and(|ending| ending == "parquet"));
@@ -40,10 +42,10 @@ pub(crate) fn read(folder: &Path, map: &Map, model: &dyn Figures) -> Result<Valu
     }
     let mut histories = Object::new();
     for file in files {
-        let source = Source::open(&file, known)?;
+        let source = FigureFile::open(&file, known)?;
         let unfit =
             |what: &str| PlotError::Unfit(format!("`--traces`: {}: {what}", file.display()));
-        if source.kind != Kind::TRACE {
+        if source.kind != FigureKind::TRACE {
             return Err(unfit("not a trace file"));
         }
         let at = together::at(&source);
@@ -54,20 +56,20 @@ pub(crate) fn read(folder: &Path, map: &Map, model: &dyn Figures) -> Result<Valu
             )
         })?;
         let point = point(&at, cell, map);
-        // Where a cell holds several points, which of them a number means is not known.
+        // An index alone does not say which point of a cell of several it means.
         let own = if at.is_empty() && map.grid.merged() { &point } else { &at };
         let files = [(&map.table.source, &point), (&source, own)];
-        together::agree("--traces", &file, files, &together::of_runs(known))?;
-        let chart = model.history(&Table::read_thinned(source, STRETCHES)?)?;
+        together::check_agreement("--traces", &file, files, &together::history_parts(known))?;
+        let chart = model.history(&FigureTable::read_decimated(source, BUCKETS)?)?;
         let chart = chart_json(&chart, |values| json!(embed::quantised(values)));
         histories.insert(cell.to_string(), chart);
     }
     Ok(Value::Object(histories))
 }
 
-/// The cell of a trace's point in the map's grid.
-fn cell(trace: &Source, at: &At, map: &Map) -> Option<usize> {
-    // What says its point is of no other, whatever it is called.
+/// Returns the cell of a trace's point in the map's grid.
+fn cell(trace: &FigureFile, at: &NamedPoint, map: &CellMap) -> Option<usize> {
+    // A file that gives its point belongs to no other, whatever its name.
     if !at.is_empty() {
         let value =
             |name: &str| at.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
@@ -81,10 +83,10 @@ fn cell(trace: &Source, at: &At, map: &Map) -> Option<usize> {
     map.table.numbers("point").ok()?.iter().position(|point| *point == f64::from(wanted))
 }
 
-/// The values of the map's axes at a trace's point.
-fn point(at: &At, cell: usize, map: &Map) -> At {
+/// Returns the values of the map's axes at a trace's point.
+fn point(at: &NamedPoint, cell: usize, map: &CellMap) -> NamedPoint {
     let mut rest = cell;
-    let mut point = At::new();
+    let mut point = NamedPoint::new();
     for axis in map.grid.axes.iter().rev() {
         let named = at.iter().find(|(name, _)| *name == axis.swept.name);
         let value = named.map_or(axis.values[rest % axis.values.len()], |(_, value)| *value);

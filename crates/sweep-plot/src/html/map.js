@@ -1,11 +1,11 @@
 // The map over the first two axes: cells, the dividing line, values under the pointer, time
-// histories on a click. A cell is one point, or a block of points where the file has more than a
-// page carries: then its values are the worst of them.
+// histories on a click. A cell is one point, or a block of points if the file has more than a page
+// carries; then its values are the worst of the block.
 
 // Margins around the map, px, with the colour bar below.
 const MARGINS = { left: 70, right: 14, top: 10, bottom: 130 };
 
-// `panel` computes: it paints finer cells and marks its point.
+// `panel` is the live panel: it paints finer cells and marks its point.
 function createMap(host, data, panel) {
   const [xAxis, yAxis] = data.axes;
   const extra = data.axes.slice(2);
@@ -93,7 +93,8 @@ function createMap(host, data, panel) {
   const fromPx = (box, px) => at((px - box.left) / box.width, 0);
   const fromPy = (box, py) => at(1 - (py - box.top) / box.height, 1);
 
-  // What fills a cell: a colour, "failed", "undefined", or null where the file has no point.
+  // Returns the filling of a cell: a colour, "failed", "undefined", or null if the file has no
+  // point.
   function filler(layer) {
     if (!layer) {
       const { values, words } = codes.status;
@@ -126,7 +127,7 @@ function createMap(host, data, panel) {
     context.beginPath();
     context.rect(box.left, box.top, box.width, box.height);
     context.clip();
-    // Edges on whole pixels: neighbours meet without a seam.
+    // Edges lie on whole pixels, so that neighbours meet without a seam.
     const xs = borders[0].map((border) => Math.round(toPx(box, border)));
     const ys = borders[1].map((border) => Math.round(toPy(box, border)));
     for (let i = 0; i < nx; i++) {
@@ -185,12 +186,12 @@ function createMap(host, data, panel) {
 
   function paintOver(context) {
     const box = area();
-    // A figure that has become narrower moves its tip.
+    // The tip of a figure that became narrower is moved.
     if (hovered) placeTipAt(hovered);
     context.beginPath();
     context.rect(box.left, box.top, box.width, box.height);
     context.clip();
-    // Rings where a click shows time histories, unless it does everywhere.
+    // Rings mark the cells whose click shows time histories, unless all do.
     if (data.traces && Object.keys(data.traces).length < nx * ny * cuts) {
       for (const place of places.filter((at) => data.traces[pointAt(...at)])) {
         const [x, y] = centreOf(place);
@@ -253,7 +254,7 @@ function createMap(host, data, panel) {
     const channelWords = largest ? ` (${wordsOf(largest)})` : "";
     const where = several ? ` at point ${figure.dataset.point}` : "";
     readout.append(element("p", { class: "verdict" }, capitalised(verdict(point))),
-      // Where no step settles the digits.
+      // The digits are those of the value if no step of the axis decides on them.
       ...(counts.sensitive[point] ? [element("p", {}, `The motion is chaotic ${several
         ? `at ${counts.sensitive[point]} of ${counts.points[point]} points` : "here"}: `
         + "a near twin departs exponentially.")] : []),
@@ -328,7 +329,7 @@ function createMap(host, data, panel) {
     createChart(histories, chart, "Time histories");
   }
 
-  // Pointer and keys.
+  // The reactions to pointer and keys.
   const pxOf = ({ clientX, clientY }) => {
     const bounds = cells.canvas.getBoundingClientRect();
     return [clientX - bounds.left, clientY - bounds.top];
@@ -380,13 +381,13 @@ function createMap(host, data, panel) {
   zoomButtons.lastChild.id = "reset";
   controls.append(zoomButtons);
   changed();
-  // What a panel needs of the map: where its axes are among the sliders, and how to redraw.
+  // The interface for a live panel: the map's axes among the sliders, and redrawing.
   panel?.connect({
     sliders: data.axes.map(({ name }) => data.live.sliders.findIndex((one) => one.name === name)),
     start: valuesAt(cursor),
     even: (k, value) => evens[k](value),
     back: (k, value) => (data.axes[k].log ? Math.exp(value) : value),
-    // About a point, so many cells wide; the view, if it is zoomed.
+    // The range about a point that is so many cells wide, or the view if it is zoomed.
     region: (at, cellsWide) => view.map(([low, high], k) => {
       if (isZoomed()) return [low, high];
       const half = (0.5 * cellsWide * (high - low)) / (k === 0 ? nx : ny);
@@ -403,13 +404,13 @@ function createMap(host, data, panel) {
     cells: { columns, filled, word, wordsOf, verdict, valuesOf, shownValue },
     layer: currentLayer,
     onChange: (listener) => listeners.push(listener),
-    // The parts of the picture, from below.
+    // The layers of the picture, from below.
     canvases: [cells.canvas, over.canvas],
     title: () => document.getElementById("title").textContent,
-    // The point that is kept, or the one under the pointer.
+    // The pinned point, or the one under the pointer.
     chosen: () => pinned ?? hovered,
     index: pointAt,
-    // What a link holds, and back.
+    // The state that a link holds, and its restoration.
     state: () => ({ show: quantity.value, rest, view: view.flat(), pinned }),
     restore(state) {
       const offers = (select, value) => [...select.options].some((one) => one.value === value);

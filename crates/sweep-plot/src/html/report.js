@@ -1,7 +1,7 @@
-// What makes a map's page a report: all points in a table, the worst in what is shown first, and
-// what can be taken away.
+// The report part of a map's page: all points in a table, the worst of the quantity shown first,
+// and downloads.
 
-// Rows of the table at a time.
+// Number of rows of the table that are added at a time.
 const ROWS_AT_ONCE = 20;
 
 function createReport(host, data, map, panel) {
@@ -25,13 +25,13 @@ function createReport(host, data, map, panel) {
     const made = table(heads, [], { id: "points" });
     more.before(made);
     const [body, shownHead] = [made.tBodies[0], made.rows[0].cells[data.axes.length + 1]];
-    // What is shown, beside the ratio that stands there anyway.
+    // The quantity shown, beside the ratio, which is always there.
     let layer = null;
     function sort() {
       layer = map.layer() ?? data.layers[0];
       const { values } = columns[layer.column];
       const sign = layer.worse === "less" ? 1 : -1;
-      // What has no value last.
+      // Points without a value come last.
       const order = (cell) => (Number.isFinite(values[cell]) ? sign * values[cell] : Infinity);
       all.sort((a, b) => order(a) - order(b) || a - b);
       const isOther = layer.column !== "ratio_max";

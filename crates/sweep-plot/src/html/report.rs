@@ -1,33 +1,33 @@
-//! A run in words: what a reader of the page must know of it without the program.
+//! The summary of a run: facts that a reader of a page needs and that its figure does not show.
 
 use serde_json::Value;
 
 use super::table;
-use crate::gather::{Counts, Map};
+use crate::gather::{CellMap, Counts};
 use crate::label::{significant, words};
 use crate::model::Figures;
-use crate::read::Source;
+use crate::read::FigureFile;
 use sweep_files::key;
 
-/// The run as HTML: what was run, from the plan in the file if it carries one, and what its model
-/// says besides.
-pub(crate) fn told(source: &Source, model: &dyn Figures) -> String {
-    let of_plan = |plan: &Value| {
+/// Writes the summary of a run in HTML, from the plan in the file if there is one, with the model's
+/// own lines and tables.
+pub(crate) fn run_summary(source: &FigureFile, model: &dyn Figures) -> String {
+    let plan_lines = |plan: &Value| {
         let common = [
             ("Time", time(&plan["time"])),
             ("Method", method(&plan["integrator"])),
             ("Verdict", verdict(&plan["reliability"])),
         ];
         let common = common.into_iter().filter_map(|(title, text)| Some((title, text?)));
-        model.told(plan).into_iter().chain(common).collect::<Vec<_>>()
+        model.plan_summary(plan).into_iter().chain(common).collect::<Vec<_>>()
     };
-    let lines = source.find(key::PLAN).map(of_plan).into_iter().flatten();
+    let lines = source.find(key::PLAN).map(plan_lines).into_iter().flatten();
     let run: Vec<_> = lines.map(|(title, text)| vec![title.to_owned(), text]).collect();
     table("What was run", &["", ""], &run) + &model.tables()
 }
 
-/// What to be careful about, of a map.
-pub(crate) fn caveats(map: &Map, model: &dyn Figures) -> String {
+/// Writes the notes on what to be careful about in a map.
+pub(crate) fn cautions(map: &CellMap, model: &dyn Figures) -> String {
     let what = if map.grid.merged() { "cells" } else { "points" };
     let count = |has: fn(&Counts) -> bool| map.counts.iter().filter(|cell| has(cell)).count();
     let all = count(|cell| cell.points > 0);
@@ -43,15 +43,15 @@ pub(crate) fn caveats(map: &Map, model: &dyn Figures) -> String {
         found.push(format!("{failed} of {all} {what} failed; the map hatches them."));
     }
     if map.grid.merged() {
-        let said = "A cell holds several points and shows the worst of them. The file has all.";
-        found.push(said.to_owned());
+        let phrase = "A cell holds several points and shows the worst of them. The file has all.";
+        found.push(phrase.to_owned());
     }
-    found.extend(model.caveats().iter().chain([&ASSUMED]).map(|&said| said.to_owned()));
+    found.extend(model.cautions().iter().chain([&ASSUMED]).map(|&phrase| phrase.to_owned()));
     let items: String = found.iter().map(|text| format!("<li>{text}</li>\n")).collect();
     format!("<h2>What to be careful about</h2>\n<ul>\n{items}</ul>\n")
 }
 
-/// What is true of every map.
+/// The note that holds for every map.
 const ASSUMED: &str = "Numbers that nobody gave are assumed. The command sweep parameters says of \
                        each where it is from.";
 
@@ -65,8 +65,8 @@ fn method(integrator: &Value) -> Option<String> {
     let name = integrator["method"].as_str()?;
     let settings = integrator.as_object()?.iter().filter(|(key, _)| *key != "method");
     let settings = settings.map(|(key, value)| format!("{} {value}", words(key).to_lowercase()));
-    let said: Vec<String> = std::iter::once(name.to_owned()).chain(settings).collect();
-    Some(said.join(", "))
+    let phrase: Vec<String> = std::iter::once(name.to_owned()).chain(settings).collect();
+    Some(phrase.join(", "))
 }
 
 fn verdict(reliability: &Value) -> Option<String> {

@@ -1,55 +1,59 @@
-//! Figures of scattered points.
+//! Tests of figures of designs.
 
-use super::super::sample::Sample;
+use super::super::sample::SampleFile;
 use super::super::*;
-use super::{carried, draw, message, showing, svg};
+use super::{draw, message, page_data, showing, svg};
 
-/// Points whose ratio is 4 where the mass is above a half, whatever the damping; of the rows, the
-/// last failed and the one before it is undefined.
-pub(super) fn points(count: u32) -> Sample {
+/// Returns points whose ratio is 4 where the mass exceeds a half, whatever the damping; the last
+/// row failed and the one before it is undefined.
+pub(super) fn points(count: u32) -> SampleFile {
     points_with(count, |sample| sample)
 }
 
-/// The same with further parameters.
-fn points_with(count: u32, further: impl Fn(Sample) -> Sample) -> Sample {
+/// Returns the points of [`points`] with further parameters.
+fn points_with(count: u32, further: impl Fn(SampleFile) -> SampleFile) -> SampleFile {
     let part = |k: u32, step: f64| (f64::from(k) * step).fract();
     let mass: Vec<f64> = (0..count).map(|k| part(k, 0.618_033_988_749_895)).collect();
     let damping = (0..count).map(|k| 60.0 + 240.0 * part(k, 0.414_213_562_373_095));
     let lost = |k: usize| k + 2 >= count as usize;
     let ratio = |k: usize| (!lost(k)).then(|| if mass[k] > 0.5 { 4.0 } else { 1.0 + mass[k] });
-    let of = |value: &dyn Fn(usize) -> Option<f64>| -> Vec<f64> {
+    let column = |value: &dyn Fn(usize) -> Option<f64>| -> Vec<f64> {
         (0..count as usize).map(|k| value(k).unwrap_or(f64::NAN)).collect()
     };
     let plan = r#"{
         "name": "sample", "reliability": { "ratio_limit": 2.0 },
         "design": { "method": "monte_carlo", "points": 0, "seed": 0 }
     }"#;
-    let parameters = Sample::default()
+    let parameters = SampleFile::default()
         .counts("point", 0..u64::from(count))
         .numbers("unbalance_mass_kg", "kg", mass.iter().copied())
         .numbers("damping_n_s_per_m", "N s/m", damping)
         .numbers("gravity_m_per_s2", "m/s^2", mass.iter().map(|_| 9.81));
     further(parameters)
-        .numbers("nonlinear_body_yaw", "rad", of(&|k| Some(0.01 * ratio(k)?)))
-        .numbers("linear_body_yaw", "rad", of(&|k| ratio(k).map(|_| 0.01)))
-        .numbers("ratio_body_yaw", "1", of(&ratio))
-        .numbers("ratio_max", "1", of(&ratio))
+        .numbers("nonlinear_body_yaw", "rad", column(&|k| Some(0.01 * ratio(k)?)))
+        .numbers("linear_body_yaw", "rad", column(&|k| ratio(k).map(|_| 0.01)))
+        .numbers("ratio_body_yaw", "1", column(&ratio))
+        .numbers("ratio_max", "1", column(&ratio))
         .flags("reliable", (0..count as usize).map(|k| ratio(k).map(|ratio| ratio < 2.0)))
-        .numbers("min_gap_nonlinear_m", "m", of(&|k| ratio(k).map(|ratio| 0.003 - 0.001 * ratio)))
+        .numbers(
+            "min_gap_nonlinear_m",
+            "m",
+            column(&|k| ratio(k).map(|ratio| 0.003 - 0.001 * ratio)),
+        )
         .bad("less", Some(0.0))
         .words("status", (0..count).map(|k| Some(if k + 1 == count { "diverged" } else { "ok" })))
         .metadata("sweep.plan", plan)
 }
 
-/// Points at random, none of which has a result.
-pub(super) fn failed(count: u32) -> Sample {
+/// Returns random points, none of which has a result.
+pub(super) fn failed(count: u32) -> SampleFile {
     let none = || (0..count).map(|_| f64::NAN);
     let plan = r#"{
         "name": "sample", "reliability": { "ratio_limit": 2.0 },
         "design": { "method": "monte_carlo", "points": 0, "seed": 0 }
     }"#;
     let part = |step: f64| (0..count).map(move |k| (f64::from(k) * step).fract());
-    Sample::default()
+    SampleFile::default()
         .counts("point", 0..u64::from(count))
         .numbers("unbalance_mass_kg", "kg", part(0.618_033_988_749_895))
         .numbers("damping_n_s_per_m", "N s/m", part(0.414_213_562_373_095))
@@ -64,19 +68,19 @@ pub(super) fn failed(count: u32) -> Sample {
         .metadata("sweep.plan", plan)
 }
 
-fn view(view: View) -> Options {
-    Options { view: Some(view), ..Options::default() }
+fn view(view: DesignView) -> PlotOptions {
+    PlotOptions { view: Some(view), ..PlotOptions::default() }
 }
 
-/// How many panels of a picture have an x axis label, by the label.
-fn times(figure: &str, text: &str) -> usize {
+/// Counts the texts of a picture that are exactly this text.
+fn count_texts(figure: &str, text: &str) -> usize {
     figure.matches(&format!(">{text}<")).count()
 }
 
 #[test]
-fn a_design_has_a_panel_for_each_pair_and_names_its_points() {
-    let figure = svg(points(202), &Options::default());
-    for said in [
+fn a_design_has_a_panel_for_each_pair_and_a_legend() {
+    let figure = svg(points(202), &PlotOptions::default());
+    for phrase in [
         "Where the linear model can be trusted",
         "sample · 202 points at random",
         "Damping (N s/m)",
@@ -85,19 +89,22 @@ fn a_design_has_a_panel_for_each_pair_and_names_its_points() {
         "undefined: no excitation (1)",
         "failed: no result (1)",
     ] {
-        assert!(figure.contains(&format!(">{said}<")), "{said}");
+        assert!(figure.contains(&format!(">{phrase}<")), "{phrase}");
     }
-    assert_eq!(times(&figure, "Unbalance mass (kg)"), 1);
+    assert_eq!(count_texts(&figure, "Unbalance mass (kg)"), 1);
     assert!(!figure.contains("Gravity"), "what is the same at every point is no axis");
-    let of = |side: &str| {
+    let count_of_side = |side: &str| {
         let start = figure.find(side).unwrap() + side.len();
         figure[start..start + 5].split(['(', ')']).nth(1).unwrap().parse::<u32>().unwrap()
     };
-    assert_eq!(of(">reliable: below 2 ") + of(">unreliable: ratio 2 or more "), 200);
+    assert_eq!(
+        count_of_side(">reliable: below 2 ") + count_of_side(">unreliable: ratio 2 or more "),
+        200
+    );
 }
 
-/// Five parameters with long names and numbers of five digits.
-fn long_numbers() -> Sample {
+/// Returns a design of five parameters with long names and numbers of five digits.
+fn long_numbers() -> SampleFile {
     let spread = |from: f64, to: f64, step: f64| {
         (0..80).map(move |k| from + (to - from) * (f64::from(k) * step).fract())
     };
@@ -109,7 +116,7 @@ fn long_numbers() -> Sample {
     })
 }
 
-/// The horizontal texts of a picture: where the middle is, the size and the text.
+/// Returns the horizontal centred texts of a picture: position, size and text.
 fn middles(figure: &str) -> Vec<([f64; 2], f64, String)> {
     let number = |text: &str, name: &str| {
         let (_, rest) = text.split_once(&format!(" {name}=\""))?;
@@ -126,7 +133,7 @@ fn middles(figure: &str) -> Vec<([f64; 2], f64, String)> {
 
 #[test]
 fn numbers_below_neighbouring_panels_do_not_touch() {
-    let figure = svg(long_numbers(), &Options::default());
+    let figure = svg(long_numbers(), &PlotOptions::default());
     let texts = middles(&figure);
     let numbers: Vec<_> = texts.iter().filter(|(_, _, text)| text.parse::<f64>().is_ok()).collect();
     assert!(numbers.len() >= 10, "two below each panel: {numbers:?}");
@@ -144,8 +151,8 @@ fn numbers_below_neighbouring_panels_do_not_touch() {
 }
 
 #[test]
-fn a_unit_is_not_broken() {
-    let figure = svg(long_numbers(), &Options::default());
+fn units_are_not_broken_across_lines() {
+    let figure = svg(long_numbers(), &PlotOptions::default());
     for unit in ["(kg m^2)", "(N m/rad)", "(N/m)", "(kg)"] {
         assert!(figure.contains(&format!("{unit}<")), "{unit}");
     }
@@ -157,14 +164,15 @@ fn a_unit_is_not_broken() {
 }
 
 #[test]
-fn a_histogram_tells_the_share_and_how_sure_it_is() {
-    let figure = svg(points(102), &view(View::Histogram));
-    // Of 0.618 k modulo 1 with k below 100, 49 are above a half. Wilson's interval is by hand.
+fn a_histogram_states_the_share_and_its_interval() {
+    let figure = svg(points(102), &view(DesignView::Histogram));
+    // The values 0.618 k modulo 1 with k below 100 exceed a half 49 times. The interval (Wilson) is
+    // calculated by hand.
     assert!(figure.contains("51.0 % of the points reliable"), "{figure}");
     assert!(figure.contains("41.3 to 60.6 % (Wilson)"), "{figure}");
     assert!(figure.contains("1 undefined · 1 failed"), "{figure}");
     let histogram = |column| {
-        let options = Options { view: Some(View::Histogram), ..showing(column) };
+        let options = PlotOptions { view: Some(DesignView::Histogram), ..showing(column) };
         svg(points(102), &options)
     };
     let gap = histogram("min_gap_nonlinear_m");
@@ -173,11 +181,11 @@ fn a_histogram_tells_the_share_and_how_sure_it_is() {
 }
 
 #[test]
-fn bins_hold_every_point_once_on_its_side() {
-    let page = carried(&draw(points(102), &view(View::Histogram), "a.html").unwrap());
+fn bins_count_every_point_once() {
+    let page = page_data(&draw(points(102), &view(DesignView::Histogram), "a.html").unwrap());
     let series = page["histogram"]["chart"]["panels"][0]["series"].as_array().unwrap();
     let shares = series.iter().map(|series| {
-        // Each bin has two ends.
+        // Each bin gives two points of the curve.
         let ends = super::curve(series);
         ends.iter().filter(|share| share.is_finite()).sum::<f64>() / 2.0
     });
@@ -187,15 +195,15 @@ fn bins_hold_every_point_once_on_its_side() {
 }
 
 #[test]
-fn influence_puts_first_what_matters() {
-    let page = carried(&draw(points(402), &view(View::Influence), "a.html").unwrap());
+fn the_most_influential_parameter_comes_first() {
+    let page = page_data(&draw(points(402), &view(DesignView::Influence), "a.html").unwrap());
     assert_eq!(
         (page["kind"].as_str(), page["first"].as_str()),
         (Some("design"), Some("influence"))
     );
-    let figure = svg(points(402), &view(View::Influence));
+    let figure = svg(points(402), &view(DesignView::Influence));
     assert_eq!(page["influence"], figure);
-    // The first number behind a name.
+    // The number follows the parameter's name.
     let rank = |name: &str| -> f64 {
         let (_, after) = figure.split_once(&format!(">{name}<")).unwrap();
         after.split('>').find_map(|text| text.split_once('<')?.0.parse().ok()).unwrap()
@@ -207,16 +215,17 @@ fn influence_puts_first_what_matters() {
 }
 
 #[test]
-fn an_influence_names_its_channel() {
-    let options = Options { view: Some(View::Influence), ..showing("nonlinear_body_yaw") };
+fn a_figure_of_influence_names_its_channel() {
+    let options =
+        PlotOptions { view: Some(DesignView::Influence), ..showing("nonlinear_body_yaw") };
     let figure = svg(points(102), &options);
     let title = ">What it depends on: amplitude, nonlinear model: body yaw<";
     assert!(figure.contains(title), "{figure}");
 }
 
 #[test]
-fn many_points_are_picked_not_all_drawn_and_all_counted() {
-    let page = carried(&draw(points(250_002), &Options::default(), "a.html").unwrap());
+fn many_points_are_all_counted_and_some_are_drawn() {
+    let page = page_data(&draw(points(250_002), &PlotOptions::default(), "a.html").unwrap());
     let scatter = &page["scatter"];
     let picture = scatter["picture"].as_str().unwrap();
     let counted = ["reliable: below 2 (", "ratio 2 or more (", "excitation (", "no result ("];
@@ -228,21 +237,21 @@ fn many_points_are_picked_not_all_drawn_and_all_counted() {
     let drawn = scatter["of"].as_array().unwrap().len();
     assert!((3000..5000).contains(&drawn), "{drawn}");
     assert!(page["subtitle"].as_str().unwrap().contains("picked at random"));
-    let size = draw(points(250_002), &Options::default(), "a.svg").unwrap().len();
+    let size = draw(points(250_002), &PlotOptions::default(), "a.svg").unwrap().len();
     assert!(size < 2_000_000, "{size}");
 }
 
 #[test]
-fn a_grid_is_no_design_and_a_list_of_a_grid_is_a_map() {
-    let refused = message(draw(super::super::sample::map(), &view(View::Scatter), "a.svg"));
+fn a_list_of_a_whole_grid_is_drawn_as_a_map() {
+    let refused = message(draw(super::super::sample::map(), &view(DesignView::Scatter), "a.svg"));
     assert!(refused.contains("`--view` is for designs"), "{refused}");
     assert!(message(draw(points(50), &showing("status"), "a.svg")).contains("no number"));
-    let at = Options { at: vec![("x".to_owned(), 1.0)], ..Options::default() };
+    let at = PlotOptions { at: vec![("x".to_owned(), 1.0)], ..PlotOptions::default() };
     assert!(message(draw(points(50), &at, "a.svg")).contains("`--at` is for maps"));
     let listed = || {
         let plan = r#"{ "design": { "method": "list" } }"#;
         super::super::sample::map().metadata("sweep.listed", plan)
     };
-    assert!(svg(listed(), &Options::default()).contains("linear model unreliable"));
-    assert!(svg(listed(), &view(View::Histogram)).contains("Share of the points (%)"));
+    assert!(svg(listed(), &PlotOptions::default()).contains("linear model unreliable"));
+    assert!(svg(listed(), &view(DesignView::Histogram)).contains("Share of the points (%)"));
 }

@@ -1,15 +1,15 @@
-//! What is drawn where: places that stand alone, names off lines, legends that tell lines apart.
+//! Tests of positions in figures: isolated points, names of regions, legends.
 
-use super::super::sample::{MapSample, Sample, boundary, map};
+use super::super::sample::{MapSample, SampleFile, boundary, map};
 use super::super::scene::{Item, Outline};
 use super::super::*;
 use super::svg;
 
-/// One crossing at each of three masses, and two more at the last.
-fn folded(axes: &str) -> Sample {
+/// Returns a boundary with one crossing at each of three masses, and two more at the last.
+fn folded(axes: &str) -> SampleFile {
     let at = [(0.8, 200.0), (0.9, 230.0), (1.0, 248.1), (1.0, 251.2), (1.0, 271.4)];
     let damping = |by: f64| at.map(|(_, damping)| damping + by);
-    Sample::default()
+    SampleFile::default()
         .numbers("unbalance_mass_kg", "kg", at.map(|(mass, _)| mass))
         .numbers("damping_n_s_per_m", "N s/m", damping(0.0))
         .numbers("damping_low_n_s_per_m", "N s/m", damping(-0.1))
@@ -17,28 +17,30 @@ fn folded(axes: &str) -> Sample {
         .metadata("sweep.plan", &format!(r#"{{"axis": [{axes}]}}"#))
 }
 
-/// The map's figure with the line of this boundary file.
-fn over_the_map(file: Sample) -> String {
+/// Draws the sample map with this boundary file.
+fn over_the_map(file: SampleFile) -> String {
     let folder = tempfile::tempdir().unwrap();
     let boundary = Some(file.write(folder.path(), "boundary.parquet"));
-    svg(map(), &Options { boundary, ..Options::default() })
+    svg(map(), &PlotOptions { boundary, ..PlotOptions::default() })
 }
 
 const AXES: &str = r#"{"parameter": "unbalance_mass_kg"}, {"parameter": "damping_n_s_per_m"}"#;
 
 #[test]
-fn a_crossing_that_no_line_runs_to_is_drawn() {
+fn an_isolated_crossing_is_drawn_as_a_disc() {
     let folder = tempfile::tempdir().unwrap();
-    let table =
-        Table::open(&folded("").write(folder.path(), "boundary.parquet"), read::Known::default())
-            .unwrap();
+    let table = FigureTable::open(
+        &folded("").write(folder.path(), "boundary.parquet"),
+        read::ModelKinds::default(),
+    )
+    .unwrap();
     let chart = figures::boundary::chart(&table).unwrap();
     let scene = chart::draw(&chart);
     let segments = Outline::circle([0.0, 0.0], 3.0).0.len();
     let is_disc =
         |item: &&Item| matches!(item, Item::Fill { outline, .. } if outline.0.len() == segments);
     assert_eq!(scene.items.iter().filter(is_disc).count(), 2);
-    // Over a map each has a light rim.
+    // Over a map each disc has a light rim.
     let [alone, none] =
         [folded(AXES), boundary().metadata("sweep.plan", &format!(r#"{{"axis": [{AXES}]}}"#))];
     let discs = |file| over_the_map(file).matches(r##"fill="#0b6b3a""##).count();
@@ -54,8 +56,8 @@ fn a_legend_names_each_line_once() {
     }
 }
 
-/// Where a text of a figure stands.
-fn place_of(figure: &str, text: &str) -> [f64; 2] {
+/// Returns the position of a text in a figure.
+fn text_position(figure: &str, text: &str) -> [f64; 2] {
     let end = figure.find(&format!(">{text}<")).unwrap();
     let element = &figure[figure[..end].rfind("<text").unwrap()..end];
     ["x", "y"].map(|name| {
@@ -65,36 +67,36 @@ fn place_of(figure: &str, text: &str) -> [f64; 2] {
 }
 
 #[test]
-fn names_of_regions_keep_off_the_line_of_another_file() {
+fn names_of_regions_avoid_the_curve_of_a_boundary_file() {
     const NAME: &str = "linear model reliable";
-    let [_, y] = place_of(&svg(map(), &Options::default()), NAME);
-    // The panel's 440 px stand for 45 to 315 N s/m; the name's middle is above its base.
+    let [_, y] = text_position(&svg(map(), &PlotOptions::default()), NAME);
+    // The panel's 440 px represent 45 to 315 N s/m; the middle of the name is above its baseline.
     let through = 315.0 - (y - 5.6 - frame::HEADING_HEIGHT) / 440.0 * 270.0;
     let masses = (1..=10).map(|k| 0.1 * f64::from(k));
     let flat = |by: f64| (0..10).map(move |_| through + by);
-    let line = Sample::default()
+    let line = SampleFile::default()
         .numbers("unbalance_mass_kg", "kg", masses)
         .numbers("damping_n_s_per_m", "N s/m", flat(0.0))
         .numbers("damping_low_n_s_per_m", "N s/m", flat(-0.1))
         .numbers("damping_high_n_s_per_m", "N s/m", flat(0.1))
         .metadata("sweep.plan", &format!(r#"{{"axis": [{AXES}]}}"#));
-    let [_, moved] = place_of(&over_the_map(line), NAME);
+    let [_, moved] = text_position(&over_the_map(line), NAME);
     assert!((moved - y).abs() > 16.0, "{moved} {y}");
 }
 
 #[test]
-fn names_of_regions_keep_off_the_line_between_them() {
+fn names_of_regions_avoid_the_line_between_them() {
     let axes = [("unbalance_mass_kg", 6, 0.28), ("friction_n", 6, 6.0)];
     let values = |step: f64| (0..6).map(move |k| step * f64::from(k)).collect::<Vec<f64>>();
     let corner = MapSample {
         axes: axes.iter().map(|&(name, _, step)| (name, values(step))).collect(),
         limit: 2.0,
-        // Beyond the limit right of a line from the lower middle to the right edge.
+        // The ratio exceeds the limit right of a line from the lower middle to the right edge.
         yaw: &|at| Some([0.01 * (2.0 + 2.0 * (at[0] - 0.7) - at[1] / 8.0).max(0.1), 0.01]),
         chaotic: &|_| false,
     };
-    let figure = svg(corner.sample(), &Options::default());
-    let [_, y] = place_of(&figure, "linear model unreliable");
-    // Its panel ends at 512 px; in the middle of the region it would lie over the line.
+    let figure = svg(corner.sample(), &PlotOptions::default());
+    let [_, y] = text_position(&figure, "linear model unreliable");
+    // The panel ends at 512 px; a name in the middle of the region would cover the line.
     assert!(y > 480.0, "{y}");
 }

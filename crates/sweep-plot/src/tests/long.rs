@@ -1,19 +1,20 @@
-//! Files of more rows than a figure can show: bounded memory, bounded pages, and what cells of
-//! several points say.
+//! Tests of files with more rows than a figure can show: memory, size of pages, and cells of
+//! several points.
 
 use base64::Engine as _;
 use serde_json::Value;
 
-use super::super::sample::{MapSample, Sample};
+use super::super::sample::{MapSample, SampleFile};
 use super::super::*;
-use super::{carried, draw, svg};
+use super::{draw, page_data, svg};
 
-/// Values from 0 in steps of 1.
+/// Returns the values from 0 in steps of 1.
 fn counted(count: usize) -> Vec<f64> {
     (0..count).map(|k| k as f64).collect()
 }
 
-/// A map of `counts` points whose ratio is between twice the limit and half of it, but for some.
+/// Returns a map of `counts` points whose ratio lies between half and twice the limit, except for
+/// outliers.
 fn map(counts: [usize; 2]) -> MapSample<'static> {
     MapSample {
         axes: vec![
@@ -26,16 +27,16 @@ fn map(counts: [usize; 2]) -> MapSample<'static> {
     }
 }
 
-/// The ratio of a map's point.
+/// Returns the ratio at a point of the map.
 fn ratio(at: &[f64]) -> f64 {
-    // Now and then a point lies far off its neighbours, as chaotic motion does.
+    // Some points lie far off their neighbours, as they do in chaotic motion.
     let off = if (at[0] * 31.0 + at[1] * 17.0) % 101.0 == 0.0 { 3.0 } else { 1.0 };
     off * 4.0 / (1.0 + 3.0 * ((at[1] * 7.0 + at[0]) % 1000.0) / 1000.0)
 }
 
 fn render_to(input: &Path, name: &str) -> Vec<u8> {
     let output = input.with_file_name(name);
-    render(input, &Options::default(), &CommonFigures, &output).unwrap();
+    render(input, &PlotOptions::default(), &CommonFigures, &output).unwrap();
     std::fs::read(output).unwrap()
 }
 
@@ -50,8 +51,8 @@ fn floats(text: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn memory_and_page_do_not_grow_with_the_rows() {
-    const MOST_BYTES: u64 = 100 << 20;
+fn memory_and_page_size_do_not_grow_with_the_rows() {
+    const MAX_BYTES_ALLOCATED: u64 = 100 << 20;
     let folder = tempfile::tempdir().unwrap();
     let mut peaks: Vec<[u64; 3]> = Vec::new();
     for counts in [[724, 724], [1448, 1448]] {
@@ -60,9 +61,9 @@ fn memory_and_page_do_not_grow_with_the_rows() {
             let mut written = 0;
             let heap = allocation_counter::measure(|| written = render_to(&input, name).len());
             let peak = heap.bytes_max;
-            let said = format!("{counts:?} {name}: {peak} bytes at most, {written} written");
-            println!("{said}");
-            assert!(peak < MOST_BYTES && written < 10_000_000, "{said}");
+            let phrase = format!("{counts:?} {name}: {peak} bytes at most, {written} written");
+            println!("{phrase}");
+            assert!(peak < MAX_BYTES_ALLOCATED && written < 10_000_000, "{phrase}");
             peak
         }));
     }
@@ -72,10 +73,11 @@ fn memory_and_page_do_not_grow_with_the_rows() {
 }
 
 #[test]
-fn a_cell_of_several_points_shows_the_worst_and_says_what_it_holds() {
+fn a_cell_of_several_points_shows_the_worst_and_counts_them() {
     let folder = tempfile::tempdir().unwrap();
-    let (counts, sample) = ([500, 600], map([500, 600]));
-    let data = carried(&render_to(&sample.write_long(folder.path(), "map.parquet"), "a.html"));
+    let counts = [500, 600];
+    let sample = map([500, 600]);
+    let data = page_data(&render_to(&sample.write_long(folder.path(), "map.parquet"), "a.html"));
     let spans = |k: usize| -> Vec<[f64; 2]> {
         let spans = data["axes"][k]["spans"].as_array().unwrap();
         spans.iter().map(|span| [0, 1].map(|end| span[end].as_f64().unwrap())).collect()
@@ -122,14 +124,14 @@ fn a_cell_of_several_points_shows_the_worst_and_says_what_it_holds() {
 
 #[test]
 fn a_small_map_has_a_cell_for_every_point() {
-    let data = carried(&draw(map([30, 40]).sample(), &Options::default(), "a.html").unwrap());
+    let data = page_data(&draw(map([30, 40]).sample(), &PlotOptions::default(), "a.html").unwrap());
     assert!(data["counts"].is_null() && data["axes"][0]["spans"].is_null());
     assert!(data["layers"][0]["both"].is_null() && data["layers"][0]["undefined"].is_null());
-    assert!(!svg(map([30, 40]).sample(), &Options::default()).contains("both:"));
+    assert!(!svg(map([30, 40]).sample(), &PlotOptions::default()).contains("both:"));
 }
 
 #[test]
-fn points_that_failed_show_beside_others_in_their_cell() {
+fn failed_points_are_hatched_in_cells_with_others() {
     let yaw = |at: &[f64]| (at[1] % 50.0 != 0.0).then_some([0.01, 0.01]);
     let failing = MapSample { yaw: &yaw, ..map([500, 600]) };
     let folder = tempfile::tempdir().unwrap();
@@ -137,7 +139,7 @@ fn points_that_failed_show_beside_others_in_their_cell() {
     let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
     assert!(figure.contains(">some points failed<") && !figure.contains(">failed: no result<"));
     assert!(figure.contains("300000 points · 6000 failed"));
-    let data = carried(&render_to(&input, "a.html"));
+    let data = page_data(&render_to(&input, "a.html"));
     assert_eq!(floats(&data["counts"]["failed"]).iter().sum::<f64>(), 6000.0);
     let ended: Vec<&Value> =
         data["legend"].as_array().unwrap().iter().map(|entry| &entry[1]).collect();
@@ -145,7 +147,7 @@ fn points_that_failed_show_beside_others_in_their_cell() {
 }
 
 #[test]
-fn undefined_and_sensitive_points_show_in_their_cell() {
+fn undefined_and_sensitive_points_are_marked_in_cells_with_others() {
     let still = |at: &[f64]| at[1] % 50.0 == 7.0;
     let chaotic = |at: &[f64]| (at[0] + at[1]) % 40.0 == 0.0;
     let yaw = |at: &[f64]| Some(if still(at) { [0.0, 0.0] } else { [0.01, 0.01] });
@@ -153,11 +155,11 @@ fn undefined_and_sensitive_points_show_in_their_cell() {
     let folder = tempfile::tempdir().unwrap();
     let input = sample.write_long(folder.path(), "map.parquet");
     let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
-    for said in [">some points undefined<", ">some points sensitive: chaotic<"] {
-        assert!(figure.contains(said), "{said}");
+    for phrase in [">some points undefined<", ">some points sensitive: chaotic<"] {
+        assert!(figure.contains(phrase), "{phrase}");
     }
     assert!(!figure.contains("both:") && !figure.contains("failed"));
-    let data = carried(&render_to(&input, "a.html"));
+    let data = page_data(&render_to(&input, "a.html"));
     let all = (0..500).flat_map(|x| (0..600).map(move |y| [f64::from(x), f64::from(y)]));
     let sensitive = all.filter(|at| chaotic(at)).count();
     assert_eq!(floats(&data["counts"]["sensitive"]).iter().sum::<f64>(), sensitive as f64);
@@ -176,18 +178,18 @@ fn undefined_and_sensitive_points_show_in_their_cell() {
 fn sensitive_points_are_hatched_in_small_maps_too() {
     let chaotic = |at: &[f64]| at == [3.0, 4.0];
     let sample = MapSample { chaotic: &chaotic, ..map([30, 40]) };
-    let drawn = svg(sample.sample(), &Options::default());
+    let drawn = svg(sample.sample(), &PlotOptions::default());
     assert!(drawn.contains(">sensitive: motion is chaotic<"));
-    // Without them the picture is the same but for the hatch and its entry of the legend.
-    let none = svg(map([30, 40]).sample(), &Options::default());
+    // Without sensitive points the picture lacks the hatch and its legend entry.
+    let none = svg(map([30, 40]).sample(), &PlotOptions::default());
     assert!(!none.contains("sensitive") && drawn.len() > none.len());
-    let data = carried(&draw(sample.sample(), &Options::default(), "a.html").unwrap());
+    let data = page_data(&draw(sample.sample(), &PlotOptions::default(), "a.html").unwrap());
     let words = &data["codes"]["sensitive"]["words"];
     assert_eq!(*words, serde_json::json!(["false", "true"]));
 }
 
 #[test]
-fn an_axis_of_more_values_than_are_told_apart_goes_by_its_range() {
+fn an_axis_of_too_many_values_is_drawn_by_its_range() {
     let one = MapSample { axes: vec![("damping_n_s_per_m", counted(300_000))], ..map([1, 1]) };
     let one = MapSample { yaw: &|at| Some([0.02 - 1e-8 * at[0], 0.01]), ..one };
     let folder = tempfile::tempdir().unwrap();
@@ -199,7 +201,7 @@ fn an_axis_of_more_values_than_are_told_apart_goes_by_its_range() {
 
 #[test]
 fn a_curve_marks_the_cells_that_hold_both_verdicts() {
-    // The ratio falls through the limit of 2 and is above it once more, at one point.
+    // The ratio falls through the limit of 2, and exceeds it once more at one point.
     let yaw = |at: &[f64]| {
         let again = if at[0] == 200_000.0 { 0.01 } else { 0.0 };
         Some([0.03 - 1e-7 * (at[0] - 2.5) + again, 0.01])
@@ -207,10 +209,10 @@ fn a_curve_marks_the_cells_that_hold_both_verdicts() {
     let one = MapSample { axes: vec![("damping_n_s_per_m", counted(240_000))], ..map([1, 1]) };
     let folder = tempfile::tempdir().unwrap();
     let input = MapSample { yaw: &yaw, ..one }.write_long(folder.path(), "map.parquet");
-    let said = ">both: reliable and unreliable points<";
+    let phrase = ">both: reliable and unreliable points<";
     let figure = String::from_utf8(render_to(&input, "a.svg")).unwrap();
-    assert!(figure.contains(said));
-    let data = carried(&render_to(&input, "a.html"));
+    assert!(figure.contains(phrase));
+    let data = page_data(&render_to(&input, "a.html"));
     let mixed = data["chart"]["panels"][0]["mixed"].as_array().unwrap();
     let ranges: Vec<[f64; 2]> =
         mixed.iter().map(|range| [0, 1].map(|end| range[end].as_f64().unwrap())).collect();
@@ -219,14 +221,14 @@ fn a_curve_marks_the_cells_that_hold_both_verdicts() {
     }
     assert!(ranges.len() == 2 && ranges.iter().all(|[from, to]| to - from < 50.0), "{ranges:?}");
 
-    // Every point has a cell of its own: none can hold both.
+    // Cells of one point cannot hold both verdicts.
     let few = vec![("damping_n_s_per_m", counted(240))];
     let few = MapSample { axes: few, yaw: &yaw, ..map([1, 1]) };
-    assert!(!svg(few.sample(), &Options::default()).contains(said));
+    assert!(!svg(few.sample(), &PlotOptions::default()).contains(phrase));
 }
 
 #[test]
-fn a_page_of_too_many_cuts_picks_some_and_keeps_the_one_asked_for() {
+fn a_page_of_too_many_cuts_keeps_the_requested_one() {
     let values = || [40, 40, 60, 3].map(counted);
     let names = ["unbalance_mass_kg", "damping_n_s_per_m", "peak_hz", "body_mass_kg"];
     let sample = || MapSample { axes: names.into_iter().zip(values()).collect(), ..map([1, 1]) };
@@ -234,39 +236,40 @@ fn a_page_of_too_many_cuts_picks_some_and_keeps_the_one_asked_for() {
     let input = sample().write_long(folder.path(), "map.parquet");
     let page = render_to(&input, "a.html");
     assert!(page.len() < 10_000_000, "{}", page.len());
-    let data = carried(&page);
+    let data = page_data(&page);
     assert!(data["counts"].is_null(), "what is shown is shown point by point");
     let picked = |data: &Value, k: usize| data["axes"][k]["values"].as_array().unwrap().len();
     let [spins, masses] = [2, 3].map(|k| picked(&data, k));
-    let said = format!("{spins} of 60 values of peak");
-    assert!(spins < 60 && data["subtitle"].as_str().unwrap().contains(&said));
+    let phrase = format!("{spins} of 60 values of peak");
+    assert!(spins < 60 && data["subtitle"].as_str().unwrap().contains(&phrase));
     assert_eq!(masses, 3);
 
     let at = vec![("peak_hz".to_owned(), 17.0)];
-    let options = Options { at, ..Options::default() };
+    let options = PlotOptions { at, ..PlotOptions::default() };
     let output = folder.path().join("b.html");
     render(&input, &options, &CommonFigures, &output).unwrap();
-    let data = carried(&std::fs::read(output).unwrap());
+    let data = page_data(&std::fs::read(output).unwrap());
     assert_eq!(data["axes"][2]["values"], serde_json::json!([17.0]));
 }
 
 #[test]
-fn rows_that_are_the_same_point_are_found_among_merged_ones() {
+fn repeated_points_are_found_in_cells_of_several_points() {
     let folder = tempfile::tempdir().unwrap();
-    // The last value of the first axis stands twice, which no grid has.
+    // The last value of the first axis is repeated, which no grid has.
     let mut sample = map([500, 600]);
     sample.axes[0].1[499] = 498.0;
     let input = sample.write_long(folder.path(), "map.parquet");
-    let drawn = render(&input, &Options::default(), &CommonFigures, &folder.path().join("a.svg"));
-    let said = drawn.unwrap_err().to_string();
-    assert!(said.contains("are the same point"), "{said}");
+    let drawn =
+        render(&input, &PlotOptions::default(), &CommonFigures, &folder.path().join("a.svg"));
+    let phrase = drawn.unwrap_err().to_string();
+    assert!(phrase.contains("are the same point"), "{phrase}");
 }
 
 #[test]
-fn rows_that_are_no_grid_are_refused_before_they_fill_the_memory() {
+fn scattered_rows_are_rejected_before_they_fill_the_memory() {
     const ROWS: usize = 300_000;
     const AXES: usize = 40;
-    let mut sample = Sample::default().counts("point", 0..ROWS as u64);
+    let mut sample = SampleFile::default().counts("point", 0..ROWS as u64);
     for axis in 0..AXES {
         let values = (0..ROWS).map(|k| (k * (axis + 1)) as f64);
         sample = sample.numbers(&format!("x{axis}"), "", values);
@@ -277,30 +280,30 @@ fn rows_that_are_no_grid_are_refused_before_they_fill_the_memory() {
         .words("status", (0..ROWS).map(|_| Some("ok")));
     let folder = tempfile::tempdir().unwrap();
     let input = sample.write(folder.path(), "map.parquet");
-    let mut said = String::new();
+    let mut phrase = String::new();
     let peak = allocation_counter::measure(|| {
         let drawn =
-            render(&input, &Options::default(), &CommonFigures, &folder.path().join("a.svg"));
-        said = drawn.unwrap_err().to_string();
+            render(&input, &PlotOptions::default(), &CommonFigures, &folder.path().join("a.svg"));
+        phrase = drawn.unwrap_err().to_string();
     });
-    assert!(said.contains("scattered"), "{said}");
+    assert!(phrase.contains("scattered"), "{phrase}");
     assert!(peak.bytes_max < 60 << 20, "{} bytes", peak.bytes_max);
 }
 
 #[test]
-fn columns_of_one_name_do_no_harm() {
+fn columns_with_the_same_name_are_drawn() {
     let twice = map([30, 40]).sample().numbers("ratio_max", "1", (0..1200).map(|_| 1.0));
     let twice = twice.numbers("later", "1", (0..1200).map(|_| 1.0));
     for name in ["a.svg", "a.html"] {
-        assert!(draw(twice.clone(), &Options::default(), name).is_ok(), "{name}");
+        assert!(draw(twice.clone(), &PlotOptions::default(), name).is_ok(), "{name}");
     }
 }
 
 #[test]
-fn metadata_that_would_fill_a_page_is_cut_short() {
+fn long_metadata_is_truncated_in_a_page() {
     let long = serde_json::to_string(&counted(100_000)).unwrap();
     let sample = map([3, 4]).sample().metadata("note", &long);
-    let page = String::from_utf8(draw(sample, &Options::default(), "a.html").unwrap()).unwrap();
+    let page = String::from_utf8(draw(sample, &PlotOptions::default(), "a.html").unwrap()).unwrap();
     let from = page.find("<dt>note</dt>").unwrap();
     let note = &page[from..from + page[from..].find("</dd>").unwrap()];
     assert!(note.len() < 20_000 && note.contains("characters in all; the file has them)"));

@@ -1,12 +1,12 @@
-//! Columns beside those of channels in figures: metrics, of the whole machine and of its parts.
+//! Tests of columns that belong to no channel: metrics of the machine and of its parts.
 
 use serde_json::Value;
 
-use super::super::sample::{Sample, map};
+use super::super::sample::{SampleFile, map};
 use super::{data, draw, message, one_axis, showing, svg};
 
-/// A map with columns that are bad either way.
-fn with_metrics() -> Sample {
+/// Returns a map with columns whose bad direction is greater, and others whose is less.
+fn with_metrics() -> SampleFile {
     let rising = |from: f64| (0..90).map(move |k| from + f64::from(k));
     map()
         .numbers("cabinet_force_nonlinear_n", "N", rising(400.0))
@@ -22,7 +22,7 @@ fn with_metrics() -> Sample {
 }
 
 #[test]
-fn any_column_is_drawn_by_its_name() {
+fn metrics_are_drawn_by_their_column_names() {
     for (column, title, label) in [
         ("cabinet_force_linear_n", "Cabinet force, linear model", "cabinet force (N)"),
         ("stop_2_force_nonlinear_n", "Stop 2 force, nonlinear model", "stop 2 force (N)"),
@@ -30,8 +30,8 @@ fn any_column_is_drawn_by_its_name() {
         ("slip_margin_nonlinear_n", "Slip margin, nonlinear model", "slip margin (N)"),
     ] {
         let figure = svg(with_metrics(), &showing(column));
-        for said in [title, label] {
-            assert!(figure.contains(&format!(">{said}<")), "{said}");
+        for phrase in [title, label] {
+            assert!(figure.contains(&format!(">{phrase}<")), "{phrase}");
         }
     }
     let margin = svg(with_metrics(), &showing("slip_margin_nonlinear_n"));
@@ -61,13 +61,16 @@ fn any_column_is_drawn_by_its_name() {
     ];
     assert_eq!(rows[2..], expected);
     for output in ["a.svg", "a.html"] {
-        let said = message(draw(map(), &showing("static_sag_m"), output));
-        assert!(said.contains("`--quantity static_sag_m`") && said.contains("status"), "{said}");
+        let phrase = message(draw(map(), &showing("static_sag_m"), output));
+        assert!(
+            phrase.contains("`--quantity static_sag_m`") && phrase.contains("status"),
+            "{phrase}"
+        );
     }
 }
 
 #[test]
-fn a_verdict_of_two_sides_is_no_matter_of_one_ratio() {
+fn a_two_sided_verdict_names_the_ratio_of_each_side() {
     let two_sided = || {
         let least = (0..90).map(|k| 0.3 + 0.01 * f64::from(k));
         map().numbers("ratio_min", "1", least).bad("less", Some(0.5))
@@ -80,7 +83,7 @@ fn a_verdict_of_two_sides_is_no_matter_of_one_ratio() {
 }
 
 #[test]
-fn over_one_axis_any_column_has_a_panel() {
+fn metrics_have_a_panel_in_maps_of_one_axis() {
     let rising = (0..4).map(|k| 400.0 + f64::from(k));
     let curves = || {
         let sample = one_axis().numbers("stop_2_force_nonlinear_n", "N", rising.clone());
@@ -89,6 +92,6 @@ fn over_one_axis_any_column_has_a_panel() {
     let figure = svg(curves(), &showing("stop_2_force_linear_n"));
     assert!(figure.contains(">Stop 2 force (N)<") && figure.contains(">linear model<"));
     assert!(!svg(curves(), &showing("ratio_max")).contains(">Stop 2 force (N)<"));
-    let said = message(draw(one_axis(), &showing("clash_time_linear_s"), "a.svg"));
-    assert!(said.contains("no such column"), "{said}");
+    let phrase = message(draw(one_axis(), &showing("clash_time_linear_s"), "a.svg"));
+    assert!(phrase.contains("no such column"), "{phrase}");
 }

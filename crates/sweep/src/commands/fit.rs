@@ -56,7 +56,7 @@ on from there. docs/fit.md explains every line.";
 /// Mistakes in the grid file, the measurements or the options; data that cannot tell; and a machine
 /// file that cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let grid: WasherGridInput = args.grid.input().fixing(&args.grid.at);
+    let grid: WasherGridInput = args.grid.input().with_fixed(&args.grid.at);
     let mut cases = Vec::new();
     let columns = [args.columns.clone(), grid.load()?.aside.columns].concat();
     for text in &args.measured {

@@ -6,14 +6,14 @@ use crate::live::{SliderRange, live, parse_slider_range};
 use sweep_engine::commands::plot;
 use sweep_engine::config::written::finite;
 use sweep_engine::{Error, Exit};
-use sweep_plot::Options;
-use washer_plot::{View, WasherFigures};
+use sweep_plot::PlotOptions;
+use washer_plot::{FigureView, WasherFigures};
 
 /// Arguments of `sweep plot`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    plot: plot::Args<View>,
+    plot: plot::Args<FigureView>,
 
     /// Channel to show of a trace, of dwells or of responses, as in the column names; may be
     /// repeated
@@ -68,10 +68,10 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         against: args.against.clone(),
         live,
     };
-    let further = Options {
-        view: args.plot.view.and_then(View::common),
+    let further = PlotOptions {
+        view: args.plot.view.and_then(FigureView::common),
         traces: args.traces.clone(),
-        ..Options::default()
+        ..PlotOptions::default()
     };
     plot::draw(&args.plot, further, &figures)
 }

@@ -6,7 +6,9 @@ use sweep_engine::config::grid::is_another;
 use sweep_engine::config::section::cut;
 use sweep_engine::config::source::{beside, read};
 use sweep_engine::config::syntax::parse;
-use sweep_engine::config::{Diagnostic, Field, Form, Key, Keys, Location, Report, Section, Walk};
+use sweep_engine::config::{
+    Diagnostic, Field, Form, Key, KeyWalk, Keys, Location, Report, Section,
+};
 use washer_model::Machine;
 use washer_row::{Metric, Part};
 
@@ -34,7 +36,7 @@ pub(super) fn walk_machine(
     if let (Some(root), Some(input)) = (keys.section(), input) {
         *machine = grid_machine(input, root);
     }
-    keys.tell(key, |is_schema| match is_schema {
+    keys.describe(key, |is_schema| match is_schema {
         true => json!({ "type": "string", "default": DEFAULT_MACHINE }),
         false => machine_json(machine),
     });
@@ -87,7 +89,7 @@ pub(super) fn walk_stability(
 ) {
     let held_metric = metrics.iter().find(|metric| metric.is_of_speeds());
     let needs_speeds = |metric: &Metric| format!("the metric `{}` needs speeds", metric.name());
-    if let (Walk::Set(_), Field::Given(found)) = (&keys.walk, found) {
+    if let (KeyWalk::Set(_), Field::Given(found)) = (&keys.walk, found) {
         if let (Some(metric), None, Some(report)) = (held_metric, &speeds, keys.report()) {
             let expected = "expected a grid file with this metric and a section [stability]";
             report.refuse::<()>(&found.at, needs_speeds(metric), expected);

@@ -9,11 +9,11 @@ use std::sync::LazyLock;
 use serde_json::{Value, json};
 use washer_model::{Cabinet, ElementList, Machine, Parameter, Spin, Target};
 
-use sweep_engine::config::form::{Numbers, about};
+use sweep_engine::config::form::{Numbers, describe_parameter};
 use sweep_engine::config::keys;
-use sweep_engine::config::schema::{document, of};
+use sweep_engine::config::schema::{document, parameter_schema};
 use sweep_engine::config::source::is_blank;
-use sweep_engine::config::{Diagnostic, Field, Form, Keys, Report, Section, Walk};
+use sweep_engine::config::{Diagnostic, Field, Form, KeyWalk, Keys, Report, Section};
 use sweep_engine::plan::WrittenIn;
 
 use sheet::{MOVING_MASS, SheetKeys, UNBALANCE_X, UNBALANCES};
@@ -241,7 +241,7 @@ pub(super) fn read(text: &str, root: Section<'_>) -> Machine {
             .push(Diagnostic::new("the machine file is empty").at(root.at(), "expected a machine"));
         return machine;
     }
-    let mut keys = Keys::new(Walk::Read(root));
+    let mut keys = Keys::new(KeyWalk::Read(root));
     walk(&mut machine, &mut keys);
     keys.finish();
     machine
@@ -249,14 +249,14 @@ pub(super) fn read(text: &str, root: Section<'_>) -> Machine {
 
 /// Returns the JSON schema of machine files.
 pub(crate) fn schema() -> Value {
-    let told = Keys::told(true, |keys| walk(&mut with_one_of_each(), keys));
-    document("Machine file of sweep", told.finish())
+    let description = Keys::described(true, |keys| walk(&mut with_one_of_each(), keys));
+    document("Machine file of sweep", description.finish())
 }
 
 /// Returns a machine as JSON with the tables of a machine file, as result files have it. Every
 /// number is the shortest decimal that reads back the same.
 pub(crate) fn to_json(machine: &Machine) -> Value {
-    Keys::told(false, |keys| walk(&mut machine.clone(), keys)).finish()
+    Keys::described(false, |keys| walk(&mut machine.clone(), keys)).finish()
 }
 
 /// Whether machine files have this key at the top.
@@ -374,12 +374,12 @@ impl MachineKey {
                 )
             }
             IfOmitted::Auto => {
-                let schema = json!({ "anyOf": [of(first), { "const": AUTO }] });
+                let schema = json!({ "anyOf": [parameter_schema(first), { "const": AUTO }] });
                 (Form::Own(&or_auto, schema), String::new(), String::new())
             }
             _ => {
                 let expected = format!("{}: {}", first.description(), first.range());
-                (Form::Number(first.range()), about(first), expected)
+                (Form::Number(first.range()), describe_parameter(first), expected)
             }
         };
         let is_assumed = keys.is_schema() || sheet.is_given;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::Value;
-use sweep_engine::config::{Draft, Form, Key, Keys, Read, Walk};
+use sweep_engine::config::{Draft, Form, Key, KeyWalk, Keys, Read};
 use washer_model::Machine;
 use washer_row::{Criterion, Measures, Metric};
 
@@ -52,7 +52,7 @@ impl Read for Washer {
                      turn by turn of the drum, or root mean squares";
         let criterion = &mut self.measures.criterion;
         // A plan with the default criterion omits it, so that its hash stays the same.
-        if !matches!(keys.walk, Walk::Tell(_))
+        if !matches!(keys.walk, KeyWalk::Describe(_))
             || keys.is_schema()
             || *criterion != Criterion::default()
         {
@@ -63,7 +63,7 @@ impl Read for Washer {
         }
     }
 
-    fn judge(draft: &Draft<'_, Self>) {
+    fn check(draft: &Draft<'_, Self>) {
         validate::check_scenarios(draft);
         validate::check_stability(draft);
         plausible::note_unusual_numbers(draft);

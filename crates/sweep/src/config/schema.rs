@@ -1,7 +1,7 @@
 //! JSON Schema of `[set]` in grid files.
 
 use serde_json::{Map, Value};
-use sweep_engine::config::schema::{of, set as set_schema};
+use sweep_engine::config::schema::{parameter_schema, set as set_schema};
 use washer_model::{ElementList, Parameter, Profile, Spin};
 
 use super::machine::with_one_of_each;
@@ -25,7 +25,8 @@ pub(super) fn schema_of_set() -> Value {
             Some((element, first, rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => {
                 let suffix = rest.trim_start_matches(|c: char| c.is_ascii_digit());
                 let number = if first == 1 { "[1-9][0-9]*" } else { "([2-9]|[1-9][0-9]+)" };
-                patterns.insert(format!("^{element}_{number}{suffix}$"), of(parameter));
+                patterns
+                    .insert(format!("^{element}_{number}{suffix}$"), parameter_schema(parameter));
             }
             _ => single.push(parameter.clone()),
         }

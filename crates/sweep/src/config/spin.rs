@@ -4,7 +4,7 @@ mod cycle;
 
 use std::path::Path;
 
-use sweep_engine::config::form::{Numbers, about};
+use sweep_engine::config::form::{Numbers, describe_parameter};
 use sweep_engine::config::keys::Variants;
 use sweep_engine::config::source::beside;
 use sweep_engine::config::{Field, Form, Key, Keys};
@@ -128,7 +128,7 @@ fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
         ("ramp_s", "spin_ramp_s", "the duration of the run-up in s", &mut *ramp_s),
     ] {
         if let Ok(parameter) = Parameter::find(parameter, &Machine::paper(), &BLANK) {
-            let about = about(&parameter);
+            let about = describe_parameter(&parameter);
             let key = Key::new(key, &about).needed(expected);
             let found = keys.key(key, &Form::Number(parameter.range()), value);
             is_right &= matches!(found, Field::Given(_)) || keys.section().is_none();

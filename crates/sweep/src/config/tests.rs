@@ -23,7 +23,7 @@ use washer_row::{Measures, Metric};
 use super::*;
 use crate::method::Integrator;
 use crate::plan::AxisValues;
-use sweep_engine::design::{Design, Rule};
+use sweep_engine::design::{Design, DesignRule};
 use sweep_engine::plan::WrittenIn;
 
 /// The format of the fuzzer's inputs.
@@ -562,7 +562,7 @@ fn a_design_is_ranges_and_a_number_of_points() {
     let plan =
         |design: &str| load_text(format!("{SMALLEST}[design]\n{design}\n{axes}"), &[]).unwrap();
     let sobol = plan("method = \"sobol\"\npoints = 64\nseed = 3");
-    assert_eq!(sobol.design, Some(Design::Spread { rule: Rule::Sobol, points: 64, seed: 3 }));
+    assert_eq!(sobol.design, Some(Design::Spread { rule: DesignRule::Sobol, points: 64, seed: 3 }));
     let latin = plan("method = \"latin_hypercube\"\npoints = 64");
     assert_eq!((latin.points(), latin.to_json()["design"]["seed"].as_u64()), (64, Some(0)));
     assert_ne!(latin.axis_values(0), sobol.axis_values(0));
@@ -612,5 +612,5 @@ fn a_name_from_the_command_line_replaces_an_invalid_file_name() {
     let input = WasherGridInput::text("my grid", text.collect(), Vec::new());
     let refused = input.load().unwrap_err().to_string();
     assert!(refused.contains("or pass `--name`"), "{refused}");
-    assert_eq!(input.named(Some("mine".to_owned())).load().unwrap().name, "mine");
+    assert_eq!(input.with_name(Some("mine".to_owned())).load().unwrap().name, "mine");
 }

@@ -144,7 +144,7 @@ impl Measured {
     ) -> Result<Self, Diagnostics> {
         let report = Report::default();
         let names = Names { known: &known, renamed };
-        let table = NumberTable::of_columns("table", columns, &names, &report);
+        let table = NumberTable::from_columns("table", columns, &names, &report);
         let measured = judged("table".to_owned(), table, &report);
         report.finish(Some(measured))
     }

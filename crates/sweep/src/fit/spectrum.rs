@@ -40,13 +40,16 @@ pub(crate) fn spectrum(values: &[f64], step_s: f64) -> (Vec<f64>, Vec<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sweep_engine::design::{Design, Distribution, Rule, Shape};
+    use sweep_engine::design::{Design, DesignRule, Distribution, DistributionShape};
 
     #[test]
     fn a_tone_stands_at_its_frequency_above_even_noise() {
-        let normal =
-            Distribution { shape: Shape::Normal { mean: 0.0, sd: 0.3 }, from: -6.0, to: 6.0 };
-        let noise = Design::Spread { rule: Rule::MonteCarlo, points: 0, seed: 3 };
+        let normal = Distribution {
+            shape: DistributionShape::Normal { mean: 0.0, sd: 0.3 },
+            from: -6.0,
+            to: 6.0,
+        };
+        let noise = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: 3 };
         let value = |k: u64| {
             let tone = (TAU * 6.25 * 0.002 * k as f64).sin();
             tone + normal.quantile(noise.place(k, 0).unwrap())

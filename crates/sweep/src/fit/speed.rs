@@ -198,14 +198,17 @@ fn further(samples: &[[f64; 2]], knots: &[f64], speeds: &[f64], worth: f64) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sweep_engine::design::{Design, Distribution, Rule, Shape};
+    use sweep_engine::design::{Design, DesignRule, Distribution, DistributionShape};
 
     #[test]
     fn a_noisy_course_with_kinks_keeps_its_angle() {
         let course = |t: f64| if t < 7.3 { 40.0 * t } else { 292.0 - 20.0 * (t - 7.3) };
-        let normal =
-            Distribution { shape: Shape::Normal { mean: 0.0, sd: 1.5 }, from: -9.0, to: 9.0 };
-        let noise = Design::Spread { rule: Rule::MonteCarlo, points: 0, seed: 5 };
+        let normal = Distribution {
+            shape: DistributionShape::Normal { mean: 0.0, sd: 1.5 },
+            from: -9.0,
+            to: 9.0,
+        };
+        let noise = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: 5 };
         let time_s: Vec<f64> = (0..3000).map(|k| 0.003 + 0.004 * f64::from(k)).collect();
         let speed: Vec<f64> = time_s
             .iter()

@@ -5,7 +5,7 @@ mod fixed;
 use std::path::Path;
 
 use super::*;
-use sweep_engine::design::{Design, Rule};
+use sweep_engine::design::{Design, DesignRule};
 
 /// The reference's spin; of a run shorter than it, less.
 const GRID: &str = "spin = { profile = \"triangular\", peak_rpm = 350, ramp_s = 12 }\n\
@@ -73,8 +73,12 @@ fn off(report: &Report, truth: &[(&str, f64)]) -> Vec<f64> {
 /// Noise of standard deviation 1 in which neighbours correlate by so much.
 pub(super) fn noise(seed: u64, signal: usize, count: usize, correlation: f64) -> Vec<f64> {
     const SETTLED: usize = 200;
-    let normal = Distribution { shape: Shape::Normal { mean: 0.0, sd: 1.0 }, from: -6.0, to: 6.0 };
-    let draw = Design::Spread { rule: Rule::MonteCarlo, points: 0, seed };
+    let normal = Distribution {
+        shape: DistributionShape::Normal { mean: 0.0, sd: 1.0 },
+        from: -6.0,
+        to: 6.0,
+    };
+    let draw = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed };
     let mut last = 0.0;
     let values = (0..(count + SETTLED) as u64).map(|row| {
         let fresh = normal.quantile(draw.place(row, signal).unwrap());

@@ -10,7 +10,7 @@ use crate::identity;
 use sweep_engine::store::{Layout, write_map};
 use sweep_engine::{Error, Job, StoreError, Table};
 use sweep_files::{FileError, FileKind, Output, ParquetFile, key};
-use sweep_plot::{Options, render};
+use sweep_plot::{PlotOptions, render};
 use washer_plot::WasherFigures;
 
 /// A result with its rows in memory.
@@ -147,6 +147,6 @@ impl MemoryTable {
         let folder = tempfile::tempdir().map_err(FileError::io("make", shown))?;
         let path = folder.path().join("result.parquet");
         self.save(&path)?;
-        Ok(render(&path, &Options::default(), &WasherFigures::default(), output)?)
+        Ok(render(&path, &PlotOptions::default(), &WasherFigures::default(), output)?)
     }
 }

@@ -42,7 +42,7 @@ pub fn trace_point(
     interrupt: &Interrupt,
 ) -> Result<Option<(MemoryTable, Vec<String>)>, Error> {
     let (plan, at) = match options.all {
-        true => (grid.clone().fixing(at).load()?, None),
+        true => (grid.clone().with_fixed(at).load()?, None),
         false => grid.load_point(at).map(|(plan, at)| (plan, Some(at)))?,
     };
     let every_s = check_spacing(options.every_s, &plan)?;

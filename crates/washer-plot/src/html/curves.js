@@ -1,4 +1,4 @@
-// Time histories and spectra of the panel that computes.
+// Time histories and spectra of the live panel.
 
 // The highest frequency of a spectrum, Hz.
 const HIGHEST = 25;
@@ -12,7 +12,7 @@ function createCurves(host, live) {
   const perBin = 1 / (size * live.everyS);
   const bins = Math.min(Math.floor(HIGHEST / perBin), size / 2);
   const frequencies = Float32Array.from({ length: bins }, (_, k) => k * perBin);
-  // Of the motions that are there.
+  // The models whose motions are known.
   let version = 0;
   const line = (name, colour, count, alpha) => plainLine(name, colour,
     new Float32Array(count).fill(NaN), alpha);
@@ -23,7 +23,7 @@ function createCurves(host, live) {
     capitalised(channel.words), channel.unit, k === first, both(instants)));
   const gap = plainPanel("gap", "Gap, drum to tub", "mm", false, both(instants));
   const speed = plainPanel("speed", "Spin", "rpm", true, [line("", "ink", instants)], 80);
-  // Spectra are found when they are drawn.
+  // Spectra are computed when they are drawn.
   const ofWindow = (one, source) => {
     const [y, found] = [new Float32Array(bins).fill(NaN), { version: -1 }];
     return Object.defineProperty({ ...one }, "y", { get() {

@@ -1,12 +1,12 @@
-// What becomes of the panel's point while the drum turns at constant speeds: how fast small
-// disturbances grow, and how far the motions go that it ends in.
+// The panel's point at constant speeds: the growth of small disturbances, and the amplitudes of the
+// attractors.
 
-// The least speed that is asked for, rpm; about how many are, and how many a call takes: of a
-// machine whose growth is slow, and of another one.
+// The least speed (rpm); the number of speeds, about, and of those in a call: for a machine whose
+// growth takes long to compute, and for others.
 const GROWTH = { from: 50, slow: [24, 1], quick: [300, 10] };
 
-// Of the fastest disturbance at each speed: growth (1/s), frequency (cycles per minute), kind, and
-// whether the response is on the curve of a machine that runs up.
+// The numbers of the fastest disturbance at each speed: growth (1/s), frequency (cycles per
+// minute), kind, and whether the response is on the curve of a machine that runs up.
 async function growthAt(pool, kind, values, speeds) {
   const urgency = kind === "check" ? 1 : 0;
   const { numbers } = await pool.ask(kind, urgency, "growth", [...values, ...speeds],
@@ -14,7 +14,7 @@ async function growthAt(pool, kind, values, speeds) {
   return Array.from(speeds, (_, k) => numbers.slice(1 + 4 * k, 5 + 4 * k));
 }
 
-// What a reader should know of the speeds at which a response is off that curve.
+// Returns the note on speeds at which the response is off that curve.
 function toldOffCurve(speeds, isOnCurve) {
   const off = Array.from(speeds).filter((_, k) => isOnCurve[k] === 0);
   const told = off.map((rpm) => significant(rpm)).join(", ");
@@ -22,7 +22,7 @@ function toldOffCurve(speeds, isOnCurve) {
     + "another motion there.";
 }
 
-// The map's own metrics of constant speeds: what is said of each, and its numbers.
+// The map's own metrics of constant speeds, each with its words and numbers.
 const HELD = {
   async growth(pool, values, { heldSpeedsRpm: speeds }) {
     const found = await growthAt(pool, "check", values, speeds);
@@ -55,7 +55,7 @@ function createGrowth(host, live, pool) {
   let isDone = true;
   let asked = 0;
 
-  // Speeds up to the fastest of the spin, in whole steps.
+  // The speeds, in whole steps, up to the fastest of the spin.
   function speedsUpTo(peak) {
     const from = Math.min(GROWTH.from, peak / 4);
     const step = Math.max(1, Math.round((peak - from) / count));
@@ -100,7 +100,7 @@ function createGrowth(host, live, pool) {
       return;
     }
     if (of !== asked) return;
-    // Runs of speeds at which disturbances grow.
+    // The ranges of speeds at which disturbances grow.
     const runs = [];
     speeds.forEach((_, k) => {
       if (!(y[k] > 0)) return;
@@ -126,14 +126,14 @@ function createGrowth(host, live, pool) {
   }
 
   return {
-    // The point is another from now on.
+    // The point has changed.
     moved() {
       asked += 1;
       pool.drop("growth");
       point = null;
       if (box.open) about.textContent = "The point moves.";
     },
-    // It rests here, with this greatest speed.
+    // The point rests, with this greatest speed.
     rested(values, peak) {
       point = { values, peak };
       isDone = false;

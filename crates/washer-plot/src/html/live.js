@@ -1,11 +1,12 @@
-// The panel that computes: sliders, both models' peaks and curves at any point, a finer map.
+// The live panel: sliders, both models' peaks and curves at any point, a finer map.
 
-// No rung has this number: the quick one is taken.
+// A number beyond all refinement levels, for which the module takes the quick one.
 const QUICK_RUNG = 255;
-// A point is checked once its sliders have rested so long, ms.
+// Time for which sliders must rest before their point is checked, ms.
 const REST = 150;
 const FAILURES = ["", "diverged", "needs steps too small", "used up its steps"];
-// Points of a finer map along each axis, how many cells it spans without a zoom, points a call.
+// The size of a finer map: points along each axis, cells that it spans without a zoom, points in a
+// call.
 const FINE = { points: 20, cells: 7, together: 10 };
 
 function createLive(host, data) {
@@ -18,7 +19,7 @@ function createLive(host, data) {
   let isMoved = false;
   let fine = [];
   let fineLeft = 0;
-  // Its ends along both axes, as the map spaces them.
+  // Returns the ends of a slider along both axes, as the map spaces them.
   let fineEdges = null;
 
   const find = furnish(host, "live");
@@ -48,7 +49,7 @@ function createLive(host, data) {
 
   function createSlider(slider, k) {
     const { from, to } = slider;
-    // Along a logarithmic axis the slider goes by the logarithm, and says the value.
+    // The slider of a logarithmic axis moves by the logarithm and shows the value.
     const [scaled, back] = slider.log ? [Math.log10, (x) => 10 ** x] : [(x) => x, (x) => x];
     const bounded = (value) => Math.min(Math.max(value, from), to);
     const number = element("input", {
@@ -75,13 +76,13 @@ function createLive(host, data) {
   function set(k, value) {
     values[k] = value;
     const { number, range, scaled } = inputs[k];
-    // As it was meant, where a step of an axis was rounded.
+    // A value that a step of an axis has rounded is restored.
     number.value = Number(value.toPrecision(12));
     range.value = scaled(value);
     if (live.sliders[k].log) range.setAttribute("aria-valuetext", value);
   }
 
-  // Values of some sliders, each its number and the value.
+  // Sets some sliders, each by its number and value.
   function put(some) {
     for (const [k, value] of some) set(k, value);
     changed();
@@ -101,7 +102,7 @@ function createLive(host, data) {
   const motions = (kind, rungs) => [0, 1].map((model) => ask(kind, 3, "history",
     [model, rungs[model], live.everyS]));
 
-  // Quick answers, the next as soon as the last is there; then the checked one.
+  // Computes quick answers, each as soon as the last one is there, and then the checked one.
   async function preview() {
     isBusy = true;
     do {
@@ -145,7 +146,7 @@ function createLive(host, data) {
     }
   }
 
-  // The map's own metrics of constant speeds; what takes long, once it is asked for.
+  // The map's own metrics of constant speeds; slow ones are computed on request.
   function tellHeld(of) {
     const line = element("p", { id: "held" });
     const compute = () => Promise.all(live.heldMetrics.map(async (metric) => {
@@ -162,7 +163,7 @@ function createLive(host, data) {
       `Compute ${live.heldMetrics.join(" and ")} at ${live.heldSpeedsRpm.length} constant speeds`));
   }
 
-  // Work that was let go fails without an error.
+  // Work that was dropped fails without an error.
   function tellError(error) {
     if (!error) return;
     status.textContent = `This point could not be computed: ${error.message}. It is a defect.`;
@@ -228,7 +229,7 @@ function createLive(host, data) {
         + `${answer.ms.slice(1).map((ms) => ms.toFixed(1)).join(" and ")} ms, side by side.`;
   }
 
-  // A finer map: quick answers around the point, from the middle outwards.
+  // Computes a finer map: quick answers around the point, from the middle outwards.
   function refineMap() {
     pool.drop("fine");
     fineEdges = map.region(map.sliders.slice(0, 2).map((k) => values[k]), FINE.cells);
@@ -275,14 +276,14 @@ function createLive(host, data) {
 
   const ofAxes = (place) => place.map((value, k) => [map.sliders[k], value]);
   return {
-    // The figure calls these; `connect` gives what a map lets this panel do.
+    // The interface for the figure; `connect` passes the interface of a map to this panel.
     connect(given = alone()) {
       map = given;
       refine.hidden = !map.region;
       put(ofAxes(map.start));
     },
     pinned: (place) => put(ofAxes(place)),
-    // By name; as a file's numbers of 32 bits.
+    // Values by name, with the 32-bit precision of the file's numbers.
     chosen: (point) => put(live.sliders.flatMap(({ name }, k) => (name in point
       ? [[k, Number(point[name].toPrecision(7))]] : []))),
     values: () => [...values],
@@ -292,7 +293,7 @@ function createLive(host, data) {
       if (!layer) return;
       for (const { from, to, columns } of fine) {
         const value = columns[layer.column];
-        // It shows something else.
+        // The panel shows another point.
         if (!Number.isFinite(value)) continue;
         const [left, low] = at(...from).map(Math.round);
         const [right, high] = at(...to).map(Math.round);
@@ -319,7 +320,7 @@ function createLive(host, data) {
   };
 }
 
-// What the module answers of a point, by name (`exports.rs` of washer-live), and in shown units
+// Reads the module's answer for a point by name (`exports.rs` of washer-live), in displayed units
 // under the names of a map's columns.
 function parsedAnswer(numbers, live) {
   const rest = [...numbers];

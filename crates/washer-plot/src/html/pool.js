@@ -1,12 +1,12 @@
-// Workers that compute, each with the module; a queue feeds them.
+// The pool of workers that compute, each with the module; a queue feeds them.
 
-// Most workers, of the processors that the browser tells of.
+// Maximum number of workers, from the browser's number of processors.
 const MOST_WORKERS = 8;
-// Work on something that is not wanted any more is cut off after this time, ms.
+// Time after which work that was dropped is cut off, ms.
 const PATIENCE = 60;
 
-// `module` is a promise of its bytes. `tell` hears { workers, ready, lanes, error } as workers come
-// up.
+// `module` is a promise of its bytes. `tell` is called with { workers, ready, lanes, error } as
+// workers start.
 function createPool(module, setup, tell) {
   const source = document.getElementById("worker").textContent;
   const url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
@@ -48,7 +48,7 @@ function createPool(module, setup, tell) {
   function feed() {
     for (const member of members) {
       if (!member.isReady || member.task || queue.length === 0) continue;
-      // The most urgent first, of equals the oldest.
+      // The most urgent call comes first; of equally urgent ones, the oldest.
       queue.sort((a, b) => b.urgency - a.urgency || a.id - b.id);
       const task = queue.shift();
       member.task = task;
@@ -58,7 +58,7 @@ function createPool(module, setup, tell) {
     }
   }
 
-  // A call to the module, as a promise of { numbers, ms }. `kind` is what `drop` knows it by.
+  // Calls the module and returns a promise of { numbers, ms }. `drop` refers to calls by `kind`.
   function ask(kind, urgency, call, numbers, rest = []) {
     return new Promise((done, fail) => {
       next += 1;
@@ -67,7 +67,7 @@ function createPool(module, setup, tell) {
     });
   }
 
-  // Lets go of what is not wanted any more, also where it is being worked on.
+  // Drops calls that are not needed any more, even if a worker is on them.
   function drop(kind) {
     const isDropped = (task) => task.kind === kind;
     for (const task of queue.filter(isDropped)) task.fail(null);

@@ -1,6 +1,6 @@
-// Amplitudes of a motion's frequencies, by a fast Fourier transform.
+// Spectra of motions by a fast Fourier transform.
 
-// Of a power of two of complex numbers: [their real parts, their imaginary ones].
+// Transforms a power of two of complex numbers: [real parts, imaginary parts].
 function transformed([re, im]) {
   const half = re.length / 2;
   if (half < 1) return [re, im];
@@ -16,8 +16,8 @@ function transformed([re, im]) {
   return found;
 }
 
-// Of values `every` s apart within a window, by Hann's weights: the amplitude that a steady motion
-// of each frequency would have. Without all values there is none.
+// Returns the amplitude of a steady motion of each frequency for values `every` s apart in a
+// window, with Hann's weights; none if values are missing.
 function spectrum(values, every, bins) {
   const size = spectrumSize(values.length);
   const weighted = [new Float64Array(size), new Float64Array(size)];
@@ -28,12 +28,12 @@ function spectrum(values, every, bins) {
     weighted[0][k] = (value - mean) * (0.5 - 0.5 * Math.cos(turn));
   });
   const [re, im] = transformed(weighted);
-  // The weights' mean is a half, and half of the motion is at negative frequencies.
+  // The mean of the weights is a half, and half of the motion is at negative frequencies.
   const scale = 4 / values.length;
   return Float32Array.from({ length: bins }, (_, k) => scale * Math.hypot(re[k], im[k]));
 }
 
-// Twice as long, at least: lines between those of the window itself.
+// The transform is at least twice as long as the window, for lines between its own.
 function spectrumSize(count) {
   return 2 ** Math.ceil(Math.log2(2 * count));
 }

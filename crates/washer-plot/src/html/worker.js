@@ -1,6 +1,6 @@
 "use strict";
-// One worker: the module with its setup, and one call after another. The first message is the
-// module and the setup; later ones are calls: { id, call, numbers, rest }.
+// A worker: the module with its setup, and one call after another. The first message has the module
+// and the setup; later ones are calls: { id, call, numbers, rest }.
 let module = null;
 let setup = null;
 let api = null;

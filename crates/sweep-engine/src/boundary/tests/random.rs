@@ -193,9 +193,9 @@ fn random_level_sets() {
     let mut missed_others = Vec::new();
     for k in 0..LEVEL_SETS {
         let level_set = LevelSet::draw(seed.wrapping_add(k));
-        let of = |x, y| Some(level_set.distance(x, y));
-        let traced = traced(of, &firsts, &SEARCH);
-        check_edges(&traced, of, SEARCH.tolerance);
+        let distance = |x, y| Some(level_set.distance(x, y));
+        let traced = traced(distance, &firsts, &SEARCH);
+        check_edges(&traced, distance, SEARCH.tolerance);
         trials += traced.trials;
         let found: Vec<Vec<RowStretch>> = traced.curves[0].iter().map(traced_stretches).collect();
         let sides: Vec<Vec<bool>> = firsts.iter().map(|first| level_set.sides(*first)).collect();

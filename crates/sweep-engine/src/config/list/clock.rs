@@ -1,11 +1,11 @@
-//! Times of a clock, as loggers write them: 12:34:56.789, perhaps behind a date.
+//! Times of day as data loggers write them: 12:34:56.789, with or without a date.
 
 /// Seconds of a day.
 const DAY_S: f64 = 86_400.0;
 /// Days from the first of March of the year 0 to the first of January 1970, counted from 1.
 const BEFORE_1970: f64 = 719_469.0;
 
-/// Returns the seconds of a clock's time since midnight, or with a date since 1970.
+/// Returns the seconds since midnight of a time of day, or since 1970 if it has a date.
 pub(super) fn seconds(cell: &str) -> Option<f64> {
     let cell = cell.trim().trim_end_matches('Z');
     let (date, time) = match cell.rsplit_once([' ', 'T']) {
@@ -31,7 +31,7 @@ fn whole(text: &str, most: u32) -> Option<f64> {
 }
 
 /// Returns the days since 1970 of a date: year, month, day with `-` or `/`, or day, month, year
-/// with points. Dates that may be read in two ways are none.
+/// with points. A date that can be read in two ways gives `None`.
 fn days(date: &str) -> Option<f64> {
     let parts: Vec<&str> = date.split(['-', '/', '.']).collect();
     let [first, month, last] = parts.as_slice() else { return None };
@@ -43,13 +43,13 @@ fn days(date: &str) -> Option<f64> {
     let year = whole(year, 9999)?;
     let month = whole(month, 12).filter(|month| *month > 0.0)?;
     let day = whole(day, 31).filter(|day| *day > 0.0)?;
-    // Years begin in March, so that the leap day is the last.
+    // Years begin in March, so that the leap day is their last.
     let is_early = month <= 2.0;
     let year = if is_early { year - 1.0 } else { year };
     let month = if is_early { month + 9.0 } else { month - 3.0 };
-    let of_years = 365.0 * year + (year / 4.0).floor() - (year / 100.0).floor();
-    let of_months = ((153.0 * month + 2.0) / 5.0).floor();
-    Some(of_years + (year / 400.0).floor() + of_months + day - BEFORE_1970)
+    let days_of_years = 365.0 * year + (year / 4.0).floor() - (year / 100.0).floor();
+    let days_of_months = ((153.0 * month + 2.0) / 5.0).floor();
+    Some(days_of_years + (year / 400.0).floor() + days_of_months + day - BEFORE_1970)
 }
 
 #[cfg(test)]
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_time_is_not_read() {
+    fn invalid_times_are_rejected() {
         for cell in
             ["", "12", "25:00:00", "1:60", "1:2:-3", "1:2:3:4", "03/04/2026 1:00", "a 1:00", "1:+2"]
         {

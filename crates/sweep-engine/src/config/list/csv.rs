@@ -1,34 +1,34 @@
-//! Numbers under a line of names, separated by commas, semicolons, tabs or spaces. All numbers of a
-//! file have one decimal mark, which they show together. Lines that are empty or begin with `#` do
-//! not count.
+//! Tables of numbers in text: a line of names, and cells separated by commas, semicolons, tabs or
+//! spaces. All numbers of a file have the same decimal mark, which they decide together. Empty
+//! lines and lines that begin with `#` are skipped.
 
 use super::super::report::{Diagnostic, Report};
 use super::super::section::{counted, short};
 use super::super::source::{Located, Location, SourceId};
 use super::clock;
-use super::layout::{Layout, Line, lines, said};
+use super::layout::{TableLayout, TextLine, lines, separator_words};
 use super::names::Names;
-use super::notation::{Evidence, Notation, Seen, Unclear};
-use super::units::Scale;
-use super::{ID, ListColumn, Unreadable, fits, is_index};
+use super::notation::{Evidence, Notation, NotationEvidence, Unclear};
+use super::units::UnitScale;
+use super::{ID, ListColumn, Unreadable, check_size, is_index};
 
-/// What is read of a table in text.
+/// A table that is read from text.
 #[derive(Default)]
-pub(super) struct Read {
-    /// The columns, with NaN for what is refused.
+pub(super) struct TextTable {
+    /// The columns, with NaN for rejected values.
     pub(super) columns: Vec<ListColumn>,
     /// The byte at which each row's line begins.
     pub(super) starts: Vec<u32>,
-    /// What separates cells.
+    /// The separator of cells.
     pub(super) separator: char,
-    /// Lines before the line of names.
+    /// The number of lines before the line of names.
     pub(super) preamble: usize,
 }
 
-/// The name of a column of times (s), which may be those of a clock.
+/// The name of a column of times (s), whose cells may be times of day.
 const TIME: &str = "time_s";
 
-/// Texts of cells that hold no sample, in small letters.
+/// Texts of cells without a value, in lower case.
 const MISSING: [&str; 9] = ["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "<na>"];
 
 /// Reads a text; mistakes are reported.
@@ -38,15 +38,15 @@ pub(super) fn read(
     gaps: bool,
     names: &Names<'_>,
     report: &Report,
-) -> Result<Read, Unreadable> {
-    let Some(layout) = Layout::find(text, names)? else {
-        return Ok(Read { separator: ',', ..Read::default() });
+) -> Result<TextTable, Unreadable> {
+    let Some(layout) = TableLayout::find(text, names)? else {
+        return Ok(TextTable { separator: ',', ..TextTable::default() });
     };
     let separator = layout.separator;
     let headers = headers(&layout)?;
     let width = headers.len();
-    let mut read = Read { separator, preamble: layout.preamble, ..Read::default() };
-    let mut scales: Vec<Option<Scale>> = Vec::new();
+    let mut read = TextTable { separator, preamble: layout.preamble, ..TextTable::default() };
+    let mut scales: Vec<Option<UnitScale>> = Vec::new();
     for (place, (header, at)) in headers.into_iter().enumerate() {
         let unit = layout.units.get(place).map(String::as_str);
         let (column, scale) = column(header, place, unit, Location::new(source, at), names, report);
@@ -75,8 +75,8 @@ pub(super) fn read(
             report.push_with(|_| wrong_row(line, count, width, separator, source));
             continue;
         }
-        fits(read.starts.len() as u64 + 1, width)?;
-        // Fits: no list is as long as 4 GiB.
+        check_size(read.starts.len() as u64 + 1, width)?;
+        // The cast fits: no list has 4 GiB.
         read.starts.push(line.start as u32);
         for (((cell, at), column), scale) in cells.zip(&mut read.columns).zip(&scales) {
             let Some(scale) = scale else { continue };
@@ -102,7 +102,7 @@ pub(super) fn read(
     }
     let rows = read.starts.len();
     for (column, scale) in read.columns.iter_mut().zip(&scales) {
-        // A number holds the place of whatever tells people which row is which.
+        // A column of row identifiers has zeros in place of numbers.
         if scale.is_none() && column.name.value == ID {
             column.values = vec![0.0; rows];
         }
@@ -111,11 +111,12 @@ pub(super) fn read(
     Ok(read)
 }
 
-/// Returns the names in the line of names, with their places; those without a name at its end do
-/// not count.
-fn headers<'t>(layout: &Layout<'t>) -> Result<Vec<(&'t str, std::ops::Range<usize>)>, Unreadable> {
+/// Returns the names in the line of names with their positions; empty names at its end are dropped.
+fn headers<'t>(
+    layout: &TableLayout<'t>,
+) -> Result<Vec<(&'t str, std::ops::Range<usize>)>, Unreadable> {
     let cells = layout.header.cells(layout.separator);
-    fits(0, cells.clone().count())?;
+    check_size(0, cells.clone().count())?;
     let mut headers: Vec<_> = cells.collect();
     while headers.len() > 1 && headers.last().is_some_and(|(name, _)| name.is_empty()) {
         headers.pop();
@@ -131,8 +132,8 @@ fn headers<'t>(layout: &Layout<'t>) -> Result<Vec<(&'t str, std::ops::Range<usiz
     Ok(headers)
 }
 
-/// Returns a column without its numbers, and the factor to its name's unit; no factor if it is left
-/// out.
+/// Returns a column without its numbers, and the factor to the unit of its name; no factor if it is
+/// ignored.
 fn column(
     header: &str,
     place: usize,
@@ -140,8 +141,8 @@ fn column(
     at: Location,
     names: &Names<'_>,
     report: &Report,
-) -> (ListColumn, Option<Scale>) {
-    let of_name = |name: String, is_known| ListColumn {
+) -> (ListColumn, Option<UnitScale>) {
+    let named_column = |name: String, is_known| ListColumn {
         name: Located { value: name, at: at.clone() },
         header: header.to_owned(),
         place,
@@ -149,26 +150,26 @@ fn column(
         values: Vec::new(),
     };
     if header == ID {
-        return (of_name(header.to_owned(), true), None);
+        return (named_column(header.to_owned(), true), None);
     }
     match names.find(header, unit) {
-        Ok(Some(found)) => (of_name(found.name, true), Some(found.scale)),
-        Ok(None) => (of_name(header.to_owned(), false), None),
+        Ok(Some(found)) => (named_column(found.name, true), Some(found.scale)),
+        Ok(None) => (named_column(header.to_owned(), false), None),
         Err([title, expected]) => {
             report.refuse::<()>(&at, title, expected);
-            (of_name(header.to_owned(), true), None)
+            (named_column(header.to_owned(), true), None)
         }
     }
 }
 
-/// Whether a cell says that there is no sample.
+/// Returns whether a cell marks a missing value.
 fn is_missing(cell: &str) -> bool {
     cell.len() <= 4 && MISSING.contains(&cell.to_lowercase().as_str())
 }
 
-/// Returns the mistake of a row of too few or too many cells.
+/// Returns the mistake of a row with too few or too many cells.
 fn wrong_row(
-    line: Line<'_>,
+    line: TextLine<'_>,
     count: usize,
     width: usize,
     separator: char,
@@ -177,7 +178,7 @@ fn wrong_row(
     let at = Location::new(source, line.offset..line.offset + line.text.len());
     let [names, numbers] = ["name", "number"].map(|what| counted(width, what));
     let title = format!("a row of {} under {names}", counted(count, "number"));
-    let expected = format!("expected {numbers}, separated by {}", said(separator));
+    let expected = format!("expected {numbers}, separated by {}", separator_words(separator));
     let refusal = Diagnostic::new(title).at(&at, expected);
     let help = "commas separate cells here: if they separate decimals or thousands too, write the \
                 file with semicolons or tabs between cells";
@@ -186,12 +187,12 @@ fn wrong_row(
 
 /// Returns the notation of the numbers in these lines.
 fn notation<'t>(
-    rows: impl Iterator<Item = Line<'t>> + Clone,
-    read: &Read,
+    rows: impl Iterator<Item = TextLine<'t>> + Clone,
+    read: &TextTable,
 ) -> Result<Notation, Unclear> {
-    // Commas end cells, and so every mark within one is a decimal point.
+    // Commas separate cells, so that a mark within a cell is a decimal point.
     let is_by_commas = read.separator == ',' && read.columns.len() > 1;
-    let mut seen = Seen::default();
+    let mut seen = NotationEvidence::default();
     if is_by_commas && !rows.clone().any(|line| line.text.contains('"')) {
         return Ok(Notation::POINT);
     }
@@ -205,7 +206,7 @@ fn notation<'t>(
     seen.notation(is_by_commas)
 }
 
-/// Returns the mistake of numbers that may be others.
+/// Returns the mistake of numbers that can be read in two ways.
 fn refusal(unclear: &Unclear, source: SourceId) -> Diagnostic {
     let place = |evidence: &Evidence| Location::new(source, evidence.at.clone());
     match unclear {

@@ -1,21 +1,21 @@
-//! The parts of a table in text: what stands before its line of names, what separates its cells, a
-//! row of units, and where its rows begin.
+//! The layout of a table in text: its line of names, separator, units and rows.
 
 use std::ops::Range;
 
 use super::names::Names;
 use super::notation::Notation;
 use super::units::is_unit;
-use super::{MOST_COLUMNS, Unreadable};
+use super::{MAX_COLUMNS, Unreadable};
 
-/// Lines among which the line of names is looked for.
-const LOOKED_AT: usize = 200;
+/// Number of lines among which the line of names is searched. Basis: no logger writes as long a
+/// preamble.
+const MAX_HEADER_LINE: usize = 200;
 
-/// The separator of cells that stand apart by any white space.
+/// The separator of cells that are separated by white space.
 pub(super) const WHITE_SPACE: char = ' ';
 
-/// What separates the cells of a file, for messages.
-pub(super) fn said(separator: char) -> &'static str {
+/// Returns the words for a separator in messages.
+pub(super) fn separator_words(separator: char) -> &'static str {
     match separator {
         ';' => "semicolons",
         '\t' => "tabs",
@@ -24,18 +24,18 @@ pub(super) fn said(separator: char) -> &'static str {
     }
 }
 
-/// A line that counts.
+/// A line of the table.
 #[derive(Clone, Copy)]
-pub(super) struct Line<'t> {
+pub(super) struct TextLine<'t> {
     /// The byte at which it begins.
     pub(super) start: usize,
-    /// Its text without byte order mark and line end.
+    /// The text without byte order mark and line end.
     pub(super) text: &'t str,
-    /// The byte at which that begins.
+    /// The byte at which `text` begins.
     pub(super) offset: usize,
 }
 
-impl<'t> Line<'t> {
+impl<'t> TextLine<'t> {
     /// Returns the line that begins at a byte of a text.
     pub(super) fn at(text: &'t str, start: usize) -> Self {
         let line = text.get(start..).unwrap_or_default();
@@ -45,19 +45,19 @@ impl<'t> Line<'t> {
         Self { start, text: plain, offset: start + body.len() - plain.len() }
     }
 
-    /// The cells of the line without white space and quotation marks, and their places.
-    pub(super) fn cells(self, separator: char) -> Cells<'t> {
-        Cells { line: self, separator, next: Some(0) }
+    /// Yields the cells of the line without white space and quotation marks, with their positions.
+    pub(super) fn cells(self, separator: char) -> LineCells<'t> {
+        LineCells { line: self, separator, next: Some(0) }
     }
 }
 
-/// The lines of a text from a byte on that are not empty and no comments.
-pub(super) fn lines(text: &str, from: usize) -> impl Iterator<Item = Line<'_>> + Clone {
+/// Yields the lines of a text from a byte on, without empty lines and comments.
+pub(super) fn lines(text: &str, from: usize) -> impl Iterator<Item = TextLine<'_>> + Clone {
     let mut next = from;
     let all = text[from..].split_inclusive('\n').map(move |line| {
         let start = next;
         next += line.len();
-        Line::at(text, start)
+        TextLine::at(text, start)
     });
     all.filter(|line| {
         let line = line.text.trim();
@@ -65,16 +65,16 @@ pub(super) fn lines(text: &str, from: usize) -> impl Iterator<Item = Line<'_>> +
     })
 }
 
-/// The cells of a line.
+/// An iterator over the cells of a line.
 #[derive(Clone)]
-pub(super) struct Cells<'t> {
-    line: Line<'t>,
+pub(super) struct LineCells<'t> {
+    line: TextLine<'t>,
     separator: char,
     /// The byte of the line at which the next cell begins.
     next: Option<usize>,
 }
 
-impl<'t> Iterator for Cells<'t> {
+impl<'t> Iterator for LineCells<'t> {
     type Item = (&'t str, Range<usize>);
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -99,8 +99,8 @@ impl<'t> Iterator for Cells<'t> {
     }
 }
 
-/// Returns the length of the first cell of a text. A separator between quotation marks, which may
-/// begin a cell, is none.
+/// Returns the length of the first cell of a text. A separator between quotation marks belongs to
+/// the cell.
 fn end_of_cell(text: &str, separator: char) -> usize {
     let is_separator = |letter: char| match separator {
         WHITE_SPACE => letter == ' ' || letter == '\t',
@@ -116,32 +116,32 @@ fn end_of_cell(text: &str, separator: char) -> usize {
     found.unwrap_or(text.len())
 }
 
-/// The parts of a table in text.
-pub(super) struct Layout<'t> {
-    /// What separates its cells.
+/// The layout of a table in text.
+pub(super) struct TableLayout<'t> {
+    /// The separator of cells.
     pub(super) separator: char,
     /// The line of names.
-    pub(super) header: Line<'t>,
-    /// The units of its columns, in order; shorter where none follow.
+    pub(super) header: TextLine<'t>,
+    /// The units of the columns in order; shorter if some have none.
     pub(super) units: Vec<String>,
     /// The decimal mark that the file states.
     pub(super) notation: Option<Notation>,
-    /// The byte at which its rows begin.
+    /// The byte at which the rows begin.
     pub(super) rows: usize,
-    /// Whether it is a LabVIEW file: its first column is the time, its last one remarks, which rows
-    /// leave out.
+    /// Whether it is a LabVIEW file: the first column is the time, and the last one holds remarks,
+    /// which rows may leave out.
     pub(super) is_labview: bool,
-    /// Lines before the line of names that count for nothing.
+    /// The number of ignored lines before the line of names.
     pub(super) preamble: usize,
 }
 
-impl<'t> Layout<'t> {
-    /// Finds the parts of a table; none if the text has no line.
+impl<'t> TableLayout<'t> {
+    /// Finds the layout of a table; `None` if the text has no line.
     ///
     /// # Errors
-    /// A kind of LabVIEW's files that is not read.
+    /// A kind of LabVIEW file that is not supported.
     pub(super) fn find(text: &'t str, names: &Names<'_>) -> Result<Option<Self>, Unreadable> {
-        let mut first: Vec<Line<'_>> = lines(text, 0).take(LOOKED_AT).collect();
+        let mut first: Vec<TextLine<'_>> = lines(text, 0).take(MAX_HEADER_LINE).collect();
         let Some(opening) = first.first().copied() else { return Ok(None) };
         if opening.text.starts_with("LabVIEW Measurement") {
             return Self::labview(text, &first).map(Some);
@@ -151,14 +151,15 @@ impl<'t> Layout<'t> {
             first.remove(0);
         }
         let Some(opening) = first.first().copied() else { return Ok(None) };
-        let by_line = |line: &Line<'_>| stated.unwrap_or_else(|| separator(line.text));
-        let words = |line: &Line<'_>| line.cells(WHITE_SPACE).count();
-        // A single name may be of several words; cells apart by spaces are so in every row.
+        let by_line = |line: &TextLine<'_>| stated.unwrap_or_else(|| separator(line.text));
+        let words = |line: &TextLine<'_>| line.cells(WHITE_SPACE).count();
+        // A single name may have several words; cells separated by spaces are so in every row.
         let by = |k: usize| match by_line(&first[k]) {
             WHITE_SPACE if first.get(k + 1).map(words) != Some(words(&first[k])) => ',',
             found => found,
         };
-        // The line with known names above rows of numbers; what fits less is taken for want of it.
+        // The best line has known names and stands above rows of numbers; others serve if there is
+        // none.
         let rank = |k: usize| {
             let by = by(k);
             let Some(cells) = texts(first[k], by) else { return (0, false, 0) };
@@ -169,7 +170,7 @@ impl<'t> Layout<'t> {
         let mut place = 0;
         let mut best = rank(0);
         for k in 1..first.len() {
-            // Rows follow: nothing but numbers can stand below the names.
+            // Rows follow, and a line of names cannot come after them.
             if best.0 == 1 && best.1 {
                 break;
             }
@@ -198,10 +199,11 @@ impl<'t> Layout<'t> {
         }))
     }
 
-    /// Finds the parts of a LabVIEW measurement file (.lvm).
-    fn labview(text: &'t str, first: &[Line<'t>]) -> Result<Self, Unreadable> {
+    /// Finds the layout of a LabVIEW measurement file (.lvm).
+    fn labview(text: &'t str, first: &[TextLine<'t>]) -> Result<Self, Unreadable> {
+        /// The line at the end of a header.
         const END: &str = "***End_of_Header***";
-        let ends = |line: &Line<'_>| line.text.starts_with(END);
+        let ends = |line: &TextLine<'_>| line.text.starts_with(END);
         let value = |key: &str| {
             let rest = first.iter().find_map(|line| line.text.strip_prefix(key));
             rest.map(|rest| rest.trim_matches([',', '\t', ';']).to_owned())
@@ -211,7 +213,7 @@ impl<'t> Layout<'t> {
             _ => '\t',
         };
         let notation = match value("Decimal_Separator").as_deref() {
-            // A comma that ends the line is the value where commas separate cells.
+            // A comma that ends the line is the value itself if commas separate cells.
             Some(",") => Notation::COMMA,
             Some("") if separator == '\t' => Notation::COMMA,
             _ => Notation::POINT,
@@ -223,9 +225,10 @@ impl<'t> Layout<'t> {
                  times"
             ));
         }
+        /// The message about a file of several segments.
         const SEGMENTS: &str = "it is a LabVIEW file of several segments: export one of them";
         let all: Vec<usize> = (0..first.len()).filter(|k| ends(&first[*k])).collect();
-        // One of the file, one of its segment.
+        // A file has a header of its own and one of its segment.
         let end = match all.as_slice() {
             [] => return Err("it is a LabVIEW file whose header has no end".to_owned()),
             [end] | [_, end] => *end,
@@ -254,24 +257,24 @@ impl<'t> Layout<'t> {
     }
 }
 
-/// Returns the layout of a table whose line of names is a comment above its first row, as numpy
+/// Returns the layout of a table whose line of names is a comment above its first row, as NumPy
 /// writes it.
 fn commented_header<'t>(
     text: &'t str,
-    row: Line<'t>,
-    separator: &dyn Fn(&Line<'_>) -> char,
-) -> Option<Layout<'t>> {
+    row: TextLine<'t>,
+    separator: &dyn Fn(&TextLine<'_>) -> char,
+) -> Option<TableLayout<'t>> {
     let above = text[..row.start].trim_end();
     let start = above.rfind('\n').map_or(0, |end| end + 1);
-    let line = Line::at(text, start);
+    let line = TextLine::at(text, start);
     let names = line.text.trim_start().strip_prefix('#')?;
     let offset = line.offset + line.text.len() - names.len();
-    let header = Line { start, text: names, offset };
+    let header = TextLine { start, text: names, offset };
     let by = separator(&header);
     let count = texts(header, by)?.len();
     let numbers = texts(row, by)?;
     let is_row = numbers.len() == count && numbers.into_iter().all(is_number);
-    is_row.then_some(Layout {
+    is_row.then_some(TableLayout {
         separator: by,
         header,
         units: Vec::new(),
@@ -282,20 +285,20 @@ fn commented_header<'t>(
     })
 }
 
-/// Returns the cells of a line, unless they are more than any table has.
-fn texts(line: Line<'_>, separator: char) -> Option<Vec<&str>> {
-    let cells = line.cells(separator).take(MOST_COLUMNS + 2).map(|(cell, _)| cell);
+/// Returns the cells of a line; `None` if there are more than a table may have.
+fn texts(line: TextLine<'_>, separator: char) -> Option<Vec<&str>> {
+    let cells = line.cells(separator).take(MAX_COLUMNS + 2).map(|(cell, _)| cell);
     let cells: Vec<&str> = cells.collect();
-    (cells.len() <= MOST_COLUMNS + 1).then_some(cells)
+    (cells.len() <= MAX_COLUMNS + 1).then_some(cells)
 }
 
 /// Returns the byte after a line.
-fn after(text: &str, line: Line<'_>) -> usize {
+fn after(text: &str, line: TextLine<'_>) -> usize {
     let end = text[line.start..].find('\n');
     end.map_or(text.len(), |end| line.start + end + 1)
 }
 
-/// Returns the separator that a first line `sep=;` states, as Excel writes and reads it.
+/// Returns the separator that a first line `sep=;` states, a convention of Excel.
 fn stated_separator(line: &str) -> Option<char> {
     let stated = line.trim().trim_matches('"').strip_prefix("sep=")?;
     let mut letters = stated.chars();
@@ -303,7 +306,7 @@ fn stated_separator(line: &str) -> Option<char> {
     letters.next().is_none().then_some(separator)
 }
 
-/// Returns what separates the cells of a line of names.
+/// Returns the separator of a line of names.
 fn separator(line: &str) -> char {
     let is_there = |wanted: &char| {
         let mut is_quoted = false;
@@ -317,20 +320,20 @@ fn separator(line: &str) -> char {
     found.unwrap_or(if has_words { WHITE_SPACE } else { ',' })
 }
 
-/// Whether a cell is a number by any notation.
+/// Returns whether a cell is a number in any notation.
 fn is_number(cell: &str) -> bool {
     cell.contains(|letter: char| letter.is_ascii_digit())
         && [Notation::POINT, Notation::COMMA].into_iter().any(|by| by.number(cell).is_some())
 }
 
-/// Whether the first of these lines has as many names as the next row has numbers.
-fn is_above_rows(lines: &[Line<'_>], separator: char) -> bool {
+/// Returns whether the first of these lines has as many names as the next row has numbers.
+fn is_above_rows(lines: &[TextLine<'_>], separator: char) -> bool {
     let [header, below @ ..] = lines else { return false };
     let Some(names) = texts(*header, separator) else { return false };
     if names.iter().any(|name| is_number(name)) {
         return false;
     }
-    let has_units = |line: &&Line<'_>| units(**line, separator, names.len()).is_some();
+    let has_units = |line: &&TextLine<'_>| units(**line, separator, names.len()).is_some();
     let below = if below.first().as_ref().is_some_and(has_units) { &below[1..] } else { below };
     let Some(row) = below.first() else { return false };
     let Some(row) = texts(*row, separator) else { return false };
@@ -340,9 +343,9 @@ fn is_above_rows(lines: &[Line<'_>], separator: char) -> bool {
         && row.iter().any(|cell| is_number(cell))
 }
 
-/// Returns the units in a row of units of so many columns, if it is one: units and empty cells, in
-/// brackets or not.
-fn units(line: Line<'_>, separator: char, columns: usize) -> Option<Vec<String>> {
+/// Returns the units in a row of units: units and empty cells, with or without brackets. Returns
+/// `None` if the line is no such row.
+fn units(line: TextLine<'_>, separator: char, columns: usize) -> Option<Vec<String>> {
     let plain = |cell: &str| cell.trim_matches(['[', ']', '(', ')', ' ']).to_owned();
     let cells: Vec<String> = texts(line, separator)?.into_iter().map(plain).collect();
     let is_empty = |cell: &String| ["", "-", "1"].contains(&cell.as_str());
@@ -350,7 +353,7 @@ fn units(line: Line<'_>, separator: char, columns: usize) -> Option<Vec<String>>
         && cells.iter().all(|cell| is_empty(cell) || !is_number(cell))
         && cells.iter().any(|cell| is_unit(cell));
     let known = cells.iter().filter(|cell| is_empty(cell) || is_unit(cell)).count();
-    // Units of columns that nobody reads may be unknown: volts, degrees of temperature.
+    // Units of ignored columns may be unknown, such as volts or degrees Celsius.
     let is_row = is_row && 2 * known > cells.len();
     is_row.then(|| {
         cells.into_iter().map(|cell| if is_empty(&cell) { String::new() } else { cell }).collect()

@@ -1,31 +1,31 @@
-//! From the headers of a table to the names of what its columns hold: by the user's own names, and
-//! by units in brackets, in a row of their own or at the end of a name.
+//! The names of a table's columns: by the user's own names, and by units in brackets, in a row of
+//! units or at the end of a header.
 
 use super::super::section::short;
-use super::units::{Scale, endings, is_unit, of_suffix, scale};
+use super::units::{UnitScale, endings, is_unit, scale, unit_from_suffix};
 
 /// The names that a reader of a table knows.
 pub struct Names<'a> {
-    /// Returns the name of a quantity that this text names, and its unit.
+    /// Returns the name of the quantity that a text names, and its unit.
     pub known: &'a dyn Fn(&str) -> Option<(String, String)>,
-    /// Headers of the file with the names of what they hold, as the user gives them.
+    /// Headers of the file with the names that the user gives them.
     pub renamed: &'a [(String, String)],
 }
 
-/// A column that is known.
+/// A known column.
 #[derive(Debug, PartialEq)]
 pub(super) struct Match {
-    /// The name of what it holds.
+    /// The name of the quantity.
     pub(super) name: String,
     /// The factor to the unit of that name.
-    pub(super) scale: Scale,
+    pub(super) scale: UnitScale,
 }
 
-/// A header that names two units, or one of another kind: the mistake, and what was expected.
+/// The mistake of a header with two units, or with a unit of another kind: title and expectation.
 pub(super) type Contradiction = [String; 2];
 
 impl Names<'_> {
-    /// Returns what a column holds, if it is known; `unit` is that of a row of units.
+    /// Finds the quantity of a column, if it is known; `unit` is that of a row of units.
     ///
     /// # Errors
     /// A unit that contradicts the name.
@@ -34,7 +34,7 @@ impl Names<'_> {
         header: &str,
         unit: Option<&str>,
     ) -> Result<Option<Match>, Contradiction> {
-        let (stem, bracketed) = parted(header);
+        let (stem, bracketed) = split_bracketed(header);
         let unit = bracketed.or(unit).filter(|unit| !unit.is_empty());
         let by_user = |(written, _): &&(String, String)| {
             let written = written.trim();
@@ -57,7 +57,7 @@ impl Names<'_> {
             let found = converted(header, name, unit, &own);
             let says_unit = ending(&stem).is_some();
             return match (found, by_unit()) {
-                (Ok(found), _) if found.scale == Scale::ONE || !says_unit => Ok(Some(found)),
+                (Ok(found), _) if found.scale == UnitScale::ONE || !says_unit => Ok(Some(found)),
                 (Err(_), Some((name, own))) if !says_unit => {
                     converted(header, name, unit, &own).map(Some)
                 }
@@ -71,11 +71,11 @@ impl Names<'_> {
         if let Some((name, own)) = by_unit() {
             return converted(header, name, unit, &own).map(Some);
         }
-        // As mass_g for mass_kg.
+        // A header such as mass_g stands for mass_kg.
         if unit.is_none()
             && let Some((stem, suffix)) = ending(&stem)
         {
-            let written = of_suffix(suffix);
+            let written = unit_from_suffix(suffix);
             let names = endings(&written).into_iter().map(|ending| format!("{stem}_{ending}"));
             if let Some((name, own)) = names.filter_map(|name| (self.known)(&name)).next() {
                 return converted(header, name, Some(&written), &own).map(Some);
@@ -84,7 +84,7 @@ impl Names<'_> {
         Ok(None)
     }
 
-    /// Whether a header is that of a known column.
+    /// Returns whether a header is that of a known column.
     pub(super) fn has(&self, header: &str) -> bool {
         !matches!(self.find(header, None), Ok(None))
     }
@@ -97,9 +97,9 @@ fn converted(
     unit: Option<&str>,
     own: &str,
 ) -> Result<Match, Contradiction> {
-    let Some(unit) = unit else { return Ok(Match { name, scale: Scale::ONE }) };
+    let Some(unit) = unit else { return Ok(Match { name, scale: UnitScale::ONE }) };
     if unit == own {
-        return Ok(Match { name, scale: Scale::ONE });
+        return Ok(Match { name, scale: UnitScale::ONE });
     }
     match scale(unit, own) {
         Some(scale) => Ok(Match { name, scale }),
@@ -113,28 +113,28 @@ fn converted(
     }
 }
 
-/// Returns a header without the unit in brackets at its end, and that unit.
-fn parted(header: &str) -> (&str, Option<&str>) {
+/// Splits a header into its stem and the unit in brackets at its end.
+fn split_bracketed(header: &str) -> (&str, Option<&str>) {
     let header = header.trim();
     let pairs = [('[', ']'), ('(', ')')];
-    let parted = pairs.into_iter().find_map(|(open, close)| {
+    let split_bracketed = pairs.into_iter().find_map(|(open, close)| {
         let (stem, unit) = header.strip_suffix(close)?.rsplit_once(open)?;
         (!stem.trim().is_empty()).then_some((stem.trim(), Some(unit.trim())))
     });
-    parted.unwrap_or((header, None))
+    split_bracketed.unwrap_or((header, None))
 }
 
-/// Returns a text as names are written: small letters, words joined by underscores.
+/// Returns a text in the form of names: lower case, words joined by underscores.
 fn plain(text: &str) -> String {
     let words = text.split(|letter: char| letter.is_whitespace() || letter == '-');
     let words: Vec<String> = words.filter(|word| !word.is_empty()).map(str::to_lowercase).collect();
     words.join("_")
 }
 
-/// Returns a name without the unit at its end, and that unit as it is written there.
+/// Splits a name into its stem and the unit at its end.
 fn ending(name: &str) -> Option<(&str, &str)> {
     let splits = name.match_indices('_').map(|(at, _)| (&name[..at], &name[at + 1..]));
-    splits.into_iter().find(|(_, suffix)| is_unit(&of_suffix(suffix)))
+    splits.into_iter().find(|(_, suffix)| is_unit(&unit_from_suffix(suffix)))
 }
 
 #[cfg(test)]
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_contradicts_itself_is_refused_and_what_is_unknown_is_not_taken() {
+    fn contradictory_units_are_rejected_and_unknown_headers_ignored() {
         for (header, unit) in
             [("time_s [ms]", None), ("time_s", Some("ms")), ("arm_yaw_rad [g]", None)]
         {

@@ -1,4 +1,4 @@
-//! How a table of text writes its numbers: its decimal mark, and what separates groups of three
+//! The notation of a table's numbers: its decimal mark, and the separator of groups of three
 //! digits. All cells decide together, because `1.050` alone may be 1.05 or 1050.
 
 use std::borrow::Cow;
@@ -7,26 +7,26 @@ use std::ops::Range;
 /// The marks that separate decimals in some countries and thousands in others.
 const MARKS: [char; 2] = ['.', ','];
 
-/// Marks that separate thousands and never decimals: apostrophes, and spaces of several widths.
+/// The marks that only separate thousands: apostrophes, and spaces of several widths.
 const GROUP_MARKS: [char; 6] = ['\'', '\u{2019}', ' ', '\u{a0}', '\u{202f}', '\u{2009}'];
 
-/// Digits of a group.
+/// The number of digits in a group.
 const GROUP: usize = 3;
 
-/// What a cell shows of the notation.
+/// The evidence of a cell about the notation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Sign {
+enum MarkEvidence {
     /// The cell has no mark, or is no number.
     Nothing,
-    /// This mark separates its decimals.
+    /// The mark separates decimals.
     Decimal(char),
-    /// This mark separates its thousands, and there are no decimals.
+    /// The mark separates thousands, and there are no decimals.
     Thousands(char),
-    /// This mark separates either: a few digits before it, three behind.
+    /// The mark can be either: at most three digits precede it, and three follow.
     Either(char),
 }
 
-/// A cell that shows something of the notation.
+/// A cell with evidence about the notation.
 #[derive(Clone, Debug)]
 pub(super) struct Evidence {
     /// The cell's text.
@@ -35,24 +35,24 @@ pub(super) struct Evidence {
     pub(super) at: Range<usize>,
 }
 
-/// What the cells that were seen show: the first cell of each kind, for each mark.
+/// The evidence so far: the first cell of each kind for each mark.
 #[derive(Debug, Default)]
-pub(super) struct Seen {
+pub(super) struct NotationEvidence {
     decimal: [Option<Evidence>; 2],
     thousands: [Option<Evidence>; 2],
     either: [Option<Evidence>; 2],
 }
 
-/// Cells that are read only by one of two notations, and the file does not say by which.
+/// The reason why the notation of a file is unclear.
 #[derive(Debug)]
 pub(super) enum Unclear {
-    /// One cell has decimals by the one mark, another cell has them by the other mark.
+    /// Two cells have decimals with different marks.
     TwoNotations(Evidence, Evidence),
-    /// The cell may be either number, and no other cell tells.
+    /// The cell can be two numbers, and no other cell decides.
     OneCell(Evidence),
 }
 
-/// A decimal mark; the other mark separates thousands.
+/// A notation by its decimal mark; the other mark separates thousands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Notation {
     decimal: char,
@@ -65,40 +65,40 @@ impl Notation {
     /// Decimal commas.
     pub(super) const COMMA: Self = Self { decimal: ',' };
 
-    /// Returns the number that a cell holds, if it holds one.
+    /// Parses the number in a cell.
     pub(super) fn number(self, cell: &str) -> Option<f64> {
         if self == Self::POINT && !cell.contains(',') && !cell.contains(GROUP_MARKS) {
             return cell.parse().ok();
         }
         let cell = ungrouped(cell);
         let thousands = other(self.decimal);
-        match sign(&cell) {
-            Sign::Nothing if cell.contains(MARKS) => None,
-            Sign::Decimal(mark) if mark != self.decimal => None,
-            Sign::Thousands(mark) if mark == self.decimal => None,
+        match mark_evidence(&cell) {
+            MarkEvidence::Nothing if cell.contains(MARKS) => None,
+            MarkEvidence::Decimal(mark) if mark != self.decimal => None,
+            MarkEvidence::Thousands(mark) if mark == self.decimal => None,
             _ => cell.replace(thousands, "").replace(self.decimal, ".").parse().ok(),
         }
     }
 }
 
-impl Seen {
-    /// Notes what a cell shows.
+impl NotationEvidence {
+    /// Adds the evidence of a cell.
     pub(super) fn note(&mut self, cell: &str, at: Range<usize>) {
         if !cell.contains(MARKS) {
             return;
         }
         let text = ungrouped(cell);
-        let (kinds, mark) = match sign(&text) {
-            Sign::Nothing => return,
-            Sign::Decimal(mark) => (&mut self.decimal, mark),
-            Sign::Thousands(mark) => (&mut self.thousands, mark),
-            Sign::Either(mark) => (&mut self.either, mark),
+        let (kinds, mark) = match mark_evidence(&text) {
+            MarkEvidence::Nothing => return,
+            MarkEvidence::Decimal(mark) => (&mut self.decimal, mark),
+            MarkEvidence::Thousands(mark) => (&mut self.thousands, mark),
+            MarkEvidence::Either(mark) => (&mut self.either, mark),
         };
         kinds[place(mark)].get_or_insert_with(|| Evidence { cell: cell.to_owned(), at });
     }
 
     /// Returns the notation in which every cell is a number. `has_commas` says that commas separate
-    /// cells: such files have decimal points.
+    /// cells; such files have decimal points.
     ///
     /// # Errors
     /// Cells that contradict each other, or one that may be two numbers.
@@ -122,56 +122,56 @@ impl Seen {
 }
 
 impl Evidence {
-    /// Returns both numbers that a cell without other evidence may be: as thousands, as decimals.
+    /// Returns both numbers that the cell can be: with thousands, and with decimals.
     pub(super) fn readings(&self) -> [String; 2] {
         let text = ungrouped(&self.cell);
         [text.replace(MARKS, ""), text.replace(MARKS, ".")]
     }
 }
 
-/// Returns the place of a mark among [`MARKS`].
+/// Returns the index of a mark in [`MARKS`].
 fn place(mark: char) -> usize {
     usize::from(mark == MARKS[1])
 }
 
-/// Returns the mark that separates thousands where this one separates decimals.
+/// Returns the mark of thousands for a decimal mark.
 fn other(mark: char) -> char {
     MARKS[1 - place(mark)]
 }
 
-/// Returns what a cell shows of the notation.
-fn sign(cell: &str) -> Sign {
+/// Returns the evidence of a cell.
+fn mark_evidence(cell: &str) -> MarkEvidence {
     let number = cell.strip_prefix(['+', '-']).unwrap_or(cell);
     let mantissa = number.split(['e', 'E']).next().unwrap_or_default();
     let has_exponent = mantissa.len() < number.len();
-    let Some(last) = mantissa.rfind(MARKS) else { return Sign::Nothing };
+    let Some(last) = mantissa.rfind(MARKS) else { return MarkEvidence::Nothing };
     let mark = if mantissa.as_bytes()[last] == b'.' { MARKS[0] } else { MARKS[1] };
     let before = &mantissa[..last];
     let after = &mantissa[last + 1..];
     if !is_digits(after) || before.is_empty() && after.is_empty() {
-        return Sign::Nothing;
+        return MarkEvidence::Nothing;
     }
     if before.contains(mark) {
         let is_whole = !has_exponent && is_grouped(mantissa, mark);
-        return if is_whole { Sign::Thousands(mark) } else { Sign::Nothing };
+        return if is_whole { MarkEvidence::Thousands(mark) } else { MarkEvidence::Nothing };
     }
     if before.contains(other(mark)) {
         let is_number = is_grouped(before, other(mark));
-        return if is_number { Sign::Decimal(mark) } else { Sign::Nothing };
+        return if is_number { MarkEvidence::Decimal(mark) } else { MarkEvidence::Nothing };
     }
     match is_digits(before) {
-        false => Sign::Nothing,
-        true if !has_exponent && is_grouped(mantissa, mark) => Sign::Either(mark),
-        true => Sign::Decimal(mark),
+        false => MarkEvidence::Nothing,
+        true if !has_exponent && is_grouped(mantissa, mark) => MarkEvidence::Either(mark),
+        true => MarkEvidence::Decimal(mark),
     }
 }
 
-/// Whether a text is digits, or nothing.
+/// Returns whether a text consists of digits, or is empty.
 fn is_digits(text: &str) -> bool {
     text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Whether a mark separates groups of three digits: no number of thousands begins with 0.
+/// Returns whether a mark separates groups of three digits; the first group does not begin with 0.
 fn is_grouped(text: &str, mark: char) -> bool {
     let mut groups = text.split(mark);
     let first = groups.next().unwrap_or_default();
@@ -181,7 +181,7 @@ fn is_grouped(text: &str, mark: char) -> bool {
         && groups.all(|group| group.len() == GROUP && is_digits(group))
 }
 
-/// Returns a cell without those marks that only separate thousands, where they do.
+/// Returns a cell without marks that only separate thousands.
 fn ungrouped(cell: &str) -> Cow<'_, str> {
     let Some(mark) = cell.chars().find(|mark| GROUP_MARKS.contains(mark)) else {
         return Cow::Borrowed(cell);
@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     fn read(cells: &[&str], has_commas: bool) -> Result<Vec<Option<f64>>, Unclear> {
-        let mut seen = Seen::default();
+        let mut seen = NotationEvidence::default();
         cells.iter().for_each(|cell| seen.note(cell, 0..cell.len()));
         let notation = seen.notation(has_commas)?;
         Ok(cells.iter().map(|cell| notation.number(cell)).collect())
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_clear_is_refused() {
+    fn unclear_notations_are_rejected() {
         for cells in [["0,9", "0.9"], ["0.9", "1.234.567"], ["1,234,567", "0,9"]] {
             assert!(matches!(read(&cells, false), Err(Unclear::TwoNotations(..))), "{cells:?}");
         }
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_shows_nothing() {
+    fn cells_without_a_number_are_no_evidence() {
         for cell in ["1.2.3", "12:30", "a,b", "1,05,000", "1,0,5", ".", "1,050.", "01,050.2"] {
             let found = read(&["0.5", cell], false).unwrap();
             assert!(found[1].is_none() || cell == "1,050.", "{cell}: {found:?}");

@@ -1,5 +1,5 @@
-//! Parquet files of numbers. The library trusts a file's own account of its sizes, so that is
-//! checked first.
+//! Parquet files of numbers. The sizes that a file claims are checked before the library, which
+//! trusts them, reads it.
 
 use std::io::Cursor;
 use std::sync::Arc;
@@ -16,41 +16,41 @@ use sweep_files::{Refused, cells, footer, panics};
 
 use super::super::section::short;
 use super::names::{Match, Names};
-use super::units::Scale;
-use super::{LONGEST_BYTES, Unreadable, fits, is_index};
+use super::units::UnitScale;
+use super::{MAX_LIST_BYTES, Unreadable, check_size, is_index};
 
-/// How a list may be compressed, for a message.
+/// The compressions that are read, for a message.
 const READABLE_CODECS: &str = "snappy, zstd, gzip, lz4_raw or none";
 
 /// A column of a file.
 #[derive(Debug, PartialEq)]
-pub(super) struct Column {
-    /// The name of what it holds, or the file's if it is not known.
+pub(super) struct ParquetColumn {
+    /// The name of the quantity, or the name in the file if it is not known.
     pub(super) name: String,
     /// The name in the file.
     pub(super) header: String,
-    /// The numbers, if it is known.
+    /// The numbers, if the column is known.
     pub(super) values: Option<Vec<f64>>,
 }
 
-/// Returns the columns of a file but its index. With `gaps`, a null is NaN.
+/// Returns the columns of a file without its index. If `gaps` is true, a null is NaN.
 pub(super) fn columns(
     bytes: Vec<u8>,
     gaps: bool,
     names: &Names<'_>,
-) -> Result<Vec<Column>, Unreadable> {
+) -> Result<Vec<ParquetColumn>, Unreadable> {
     let panicked = |panic| Err(format!("it is damaged: it makes no sense inside: {panic}"));
     panics::caught(|| read(bytes.into(), gaps, names)).unwrap_or_else(panicked)
 }
 
-fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<Column>, Unreadable> {
+fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<ParquetColumn>, Unreadable> {
     footer::check(&mut Cursor::new(&bytes)).map_err(refused)?;
     let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes).map_err(damaged)?;
     let schema = batches::schema(&metadata);
     let fields = schema.fields();
-    fits(0, fields.len())?;
-    let mut columns: Vec<Column> = Vec::new();
-    let mut known: Vec<(usize, usize, Scale)> = Vec::new();
+    check_size(0, fields.len())?;
+    let mut columns: Vec<ParquetColumn> = Vec::new();
+    let mut known: Vec<(usize, usize, UnitScale)> = Vec::new();
     for (place, field) in fields.iter().enumerate() {
         let header = field.name().clone();
         let found = names.find(&header, None);
@@ -60,10 +60,10 @@ fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<Column>, Unre
                     return Err(no_numbers(&header, field.data_type()));
                 }
                 known.push((columns.len(), place, scale));
-                columns.push(Column { name, header, values: Some(Vec::new()) });
+                columns.push(ParquetColumn { name, header, values: Some(Vec::new()) });
             }
             None if is_index(&header) => {}
-            None => columns.push(Column { name: header.clone(), header, values: None }),
+            None => columns.push(ParquetColumn { name: header.clone(), header, values: None }),
         }
     }
     check_sizes(&metadata, &bytes, fields.len())?;
@@ -72,9 +72,9 @@ fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<Column>, Unre
     let reader = Batches::new(bytes, Arc::new(metadata), &schema, fields);
     let mut reader = reader.map_err(damaged)?;
     while let Some(batch) = reader.batch().map_err(damaged)? {
-        fits((rows + batch.num_rows()) as u64, known.len())?;
+        check_size((rows + batch.num_rows()) as u64, known.len())?;
         for ((column, _, scale), array) in known.iter().zip(batch.columns()) {
-            let Column { header, values: Some(values), .. } = &mut columns[*column] else {
+            let ParquetColumn { header, values: Some(values), .. } = &mut columns[*column] else {
                 continue;
             };
             let numbers = cells::numbers(array).map_err(|error| error.to_string())?;
@@ -91,7 +91,7 @@ fn read(bytes: Bytes, gaps: bool, names: &Names<'_>) -> Result<Vec<Column>, Unre
     Ok(columns)
 }
 
-/// Returns the mistake of a column of other things.
+/// Returns the mistake of a column without numbers.
 fn no_numbers(header: &str, data_type: &DataType) -> Unreadable {
     let found = match data_type {
         DataType::Boolean => "true and false",
@@ -101,18 +101,19 @@ fn no_numbers(header: &str, data_type: &DataType) -> Unreadable {
     format!("its column `{}` holds no numbers but {found}", short(header))
 }
 
-/// Refuses what could not be held, or not be unpacked, before any of it is.
+/// Rejects a file that would exceed a bound, or could not be decompressed, before it is read.
 fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Result<(), Unreadable> {
-    let (mut rows, mut unpacked) = (0_u64, 0_u64);
+    let mut rows = 0_u64;
+    let mut unpacked = 0_u64;
     for group in metadata.row_groups() {
         rows = rows.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX));
-        fits(rows, columns)?;
+        check_size(rows, columns)?;
         for column in group.columns() {
             let codec = column.compression();
-            // What the features of `parquet` in the workspace's Cargo.toml are not for.
+            // These codecs need features of `parquet` that the workspace's Cargo.toml leaves out.
             if matches!(codec, Compression::BROTLI(_) | Compression::LZ4 | Compression::LZO) {
                 let name = short(&column.column_path().string());
-                // Its level, in brackets, is nothing to a reader.
+                // The level in brackets does not matter to the user.
                 let codec = codec.to_string();
                 let codec = codec.split('(').next().unwrap_or_default().to_lowercase();
                 return Err(format!(
@@ -124,7 +125,7 @@ fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Resu
             if start.checked_add(length).is_none_or(|end| end > bytes.len() as u64) {
                 return Err("it is damaged: a column lies outside of it".to_owned());
             }
-            let left = LONGEST_BYTES - unpacked;
+            let left = MAX_LIST_BYTES - unpacked;
             let most = Unpacked { total: left, at_once: left };
             let sizes = pages::unpacked(&mut Cursor::new(bytes), start, length, codec, most);
             unpacked += sizes.map_err(refused)?.total;
@@ -136,7 +137,7 @@ fn check_sizes(metadata: &ParquetMetaData, bytes: &[u8], columns: usize) -> Resu
 fn refused(refused: Refused) -> Unreadable {
     match refused {
         Refused::Io(error) => error.to_string(),
-        Refused::TooLong => format!("unpacked, it is longer than {} MiB", LONGEST_BYTES >> 20),
+        Refused::TooLong => format!("unpacked, it is longer than {} MiB", MAX_LIST_BYTES >> 20),
         refused => format!("it is damaged: {refused}"),
     }
 }

@@ -1,4 +1,4 @@
-//! Every compression, every bound, and files that are damaged.
+//! Tests of lists: compressions, bounds, damaged files, and files of loggers.
 
 use std::sync::Arc;
 
@@ -12,11 +12,11 @@ use super::*;
 
 const NAME: &str = "unbalance_mass_kg";
 
-/// Names that are all known, and have no unit.
+/// Names that are all known and have no unit.
 const ANY: Names<'_> =
     Names { known: &|name: &str| Some((name.to_owned(), String::new())), renamed: &[] };
 
-/// The known columns of a Parquet file.
+/// Returns the known columns of a Parquet file.
 fn parquet_of(bytes: Vec<u8>) -> Result<Vec<(String, Vec<f64>)>, Unreadable> {
     let columns = parquet::columns(bytes, false, &ANY)?;
     Ok(columns.into_iter().map(|it| (it.name, it.values.unwrap_or_default())).collect())
@@ -32,7 +32,7 @@ fn readable() -> [Compression; 5] {
     ]
 }
 
-/// A file with these columns, batch after batch.
+/// Returns a file with these columns, repeated in batches.
 fn file(columns: &[(&str, ArrayRef)], batches: usize, properties: WriterProperties) -> Vec<u8> {
     let batch = RecordBatch::try_from_iter(columns.iter().cloned()).unwrap();
     let mut bytes = Vec::new();
@@ -48,7 +48,7 @@ fn compressed(codec: Compression, version: WriterVersion) -> WriterProperties {
     WriterProperties::builder().set_compression(codec).set_writer_version(version).build()
 }
 
-/// A mass and a whole number of kilograms.
+/// Returns a file with a mass and a whole number of kilograms.
 fn small(codec: Compression, version: WriterVersion) -> Vec<u8> {
     let masses = (0..300).map(|k| 0.1 + 0.001 * f64::from(k % 50)).collect::<Vec<_>>();
     let frames = (0..300).map(|k| 20 + k % 7).collect::<Vec<_>>();
@@ -62,7 +62,7 @@ fn refusal(bytes: Vec<u8>) -> String {
 }
 
 #[test]
-fn every_usual_compression_reads_alike() {
+fn supported_compressions_give_the_same_numbers() {
     let plain = small(Compression::UNCOMPRESSED, WriterVersion::PARQUET_1_0);
     let plain = parquet_of(plain).unwrap();
     assert_eq!((plain[0].1[49], plain[1].1[6]), (0.1 + 0.001 * 49.0, 26.0));
@@ -75,41 +75,42 @@ fn every_usual_compression_reads_alike() {
 }
 
 #[test]
-fn a_compression_that_is_not_read_is_named_with_those_that_are() {
+fn an_unsupported_compression_is_named_with_the_supported_ones() {
     let snappy = small(Compression::SNAPPY, WriterVersion::PARQUET_1_0);
-    // A column's codec follows its name: an i32, one field on.
+    // The codec of a column follows its name in the metadata, as an i32.
     let place = [NAME.as_bytes(), &[0x15, 0x02]].concat();
     let found = snappy.windows(place.len()).position(|window| window == place);
     let place = found.unwrap() + place.len() - 1;
     for (code, name) in [(3, "lzo"), (4, "brotli"), (5, "lz4")] {
         let mut other = snappy.clone();
         other[place] = 2 * code;
-        let told = refusal(other);
+        let message = refusal(other);
         let expected = format!("`{NAME}` is compressed by {name}, which this program does not");
-        assert!(told.contains(&expected) && told.contains("snappy, zstd, gzip"), "{told}");
+        assert!(message.contains(&expected) && message.contains("snappy, zstd, gzip"), "{message}");
     }
 }
 
 #[test]
-fn what_is_no_number_is_told_by_column() {
+fn columns_without_numbers_are_named() {
     let texts: ArrayRef = Arc::new(["a"].into_iter().collect::<DictionaryArray<Int32Type>>());
     let none: ArrayRef = Arc::new(Float64Array::from(vec![Some(1.0), None]));
-    let of = |column: ArrayRef| refusal(file(&[("x", column)], 1, WriterProperties::default()));
-    assert!(of(texts).contains("`x` holds no numbers but text"));
-    assert!(of(none).contains("`x` has no value in row 2"));
+    let message =
+        |column: ArrayRef| refusal(file(&[("x", column)], 1, WriterProperties::default()));
+    assert!(message(texts).contains("`x` holds no numbers but text"));
+    assert!(message(none).contains("`x` has no value in row 2"));
 }
 
 #[test]
-fn a_small_file_of_too_many_rows_is_refused_unread() {
+fn a_small_file_with_too_many_rows_is_rejected_unread() {
     let column: ArrayRef = Arc::new(Float64Array::from(vec![1.0; 1_000_000]));
     let properties = compressed(Compression::SNAPPY, WriterVersion::PARQUET_1_0);
-    let bytes = file(&[("x", column)], 1 + (MOST_NUMBERS / 1_000_000) as usize, properties);
+    let bytes = file(&[("x", column)], 1 + (MAX_NUMBERS / 1_000_000) as usize, properties);
     assert!(bytes.len() < 1_000_000, "{}", bytes.len());
     assert!(refusal(bytes).contains("more than 20000000 numbers"));
 }
 
 #[test]
-fn damage_is_an_error_or_another_list_and_nothing_else() {
+fn a_damaged_file_gives_an_error_or_a_list() {
     for codec in readable() {
         let whole = small(codec, WriterVersion::PARQUET_2_0);
         for length in (0..whole.len()).step_by(7) {
@@ -120,28 +121,28 @@ fn damage_is_an_error_or_another_list_and_nothing_else() {
                 let mut flipped = whole.clone();
                 flipped[at] ^= 1 << bit;
                 if let Ok(columns) = parquet_of(flipped) {
-                    assert!(columns.iter().all(|(_, values)| values.len() as u64 <= MOST_NUMBERS));
+                    assert!(columns.iter().all(|(_, values)| values.len() as u64 <= MAX_NUMBERS));
                 }
             }
         }
     }
 }
 
-/// The place of a cell in the line that begins at a byte of a text.
+/// Returns the position of a cell in the line that begins at a byte of a text.
 fn cell_span(text: &str, start: usize, by: char, column: usize) -> std::ops::Range<usize> {
-    Line::at(text, start).cells(by).nth(column).expect("it is there").1
+    TextLine::at(text, start).cells(by).nth(column).expect("it is there").1
 }
 
-fn csv_of(text: &str) -> Result<csv::Read, Unreadable> {
+fn csv_of(text: &str) -> Result<csv::TextTable, Unreadable> {
     let report = Report::default();
     let source = report.add("list.csv", String::new());
     csv::read(text, source, false, &ANY, &report)
 }
 
 #[test]
-fn a_text_of_too_many_numbers_or_columns_is_refused() {
-    let rows = "1,2\n".repeat((MOST_NUMBERS / 2) as usize);
-    let csv::Read { columns, starts, .. } = csv_of(&format!("a,b\n{rows}")).unwrap();
+fn a_text_with_too_many_numbers_or_columns_is_rejected() {
+    let rows = "1,2\n".repeat((MAX_NUMBERS / 2) as usize);
+    let csv::TextTable { columns, starts, .. } = csv_of(&format!("a,b\n{rows}")).unwrap();
     assert_eq!((columns[1].values.len(), starts.len()), (10_000_000, 10_000_000));
     let refused = |text: &str| csv_of(text).map(|_| ()).unwrap_err().to_string();
     assert!(refused(&format!("a,b\n{rows}1,2\n")).contains("more than 20000000 numbers"));
@@ -158,9 +159,9 @@ fn a_row_of_too_many_numbers_is_one_mistake() {
 }
 
 #[test]
-fn a_value_is_found_where_it_stands() {
+fn the_location_of_a_value_is_its_cell() {
     let text = "\u{feff}# by hand\r\n a , \"b\"\r\n\r\n 1,2 \r\n3 , \"4\"\r\n";
-    let csv::Read { columns, starts, separator: by, .. } = csv_of(text).unwrap();
+    let csv::TextTable { columns, starts, separator: by, .. } = csv_of(text).unwrap();
     assert_eq!([&columns[0].values, &columns[1].values], [&[1.0, 3.0], &[2.0, 4.0]]);
     let found = |row: usize, column| &text[cell_span(text, starts[row] as usize, by, column)];
     assert_eq!([found(0, 0), found(0, 1), found(1, 0), found(1, 1)], ["1", "2", "3", "\"4\""]);
@@ -171,38 +172,38 @@ fn a_value_is_found_where_it_stands() {
 }
 
 #[test]
-fn a_cell_between_quotation_marks_may_hold_what_separates_cells() {
+fn a_quoted_cell_may_contain_the_separator() {
     let text = "id,b\n\"a,b\",2\n\"5\"\" pipe, short\",3\n5\" pipe,4\n";
-    let csv::Read { columns, .. } = csv_of(text).unwrap();
+    let csv::TextTable { columns, .. } = csv_of(text).unwrap();
     assert_eq!(columns[1].values, [2.0, 3.0, 4.0]);
 }
 
 #[test]
-fn a_spreadsheet_may_have_semicolons_or_tabs_and_decimal_commas() {
+fn semicolons_tabs_and_decimal_commas_are_read() {
     for text in ["a;b\n1,5;2\n3;-4,25e2\n", "a\tb\n1.5\t2\n3\t-425\n"] {
-        let csv::Read { columns, starts, separator: by, .. } = csv_of(text).unwrap();
+        let csv::TextTable { columns, starts, separator: by, .. } = csv_of(text).unwrap();
         assert_eq!([&columns[0].values, &columns[1].values], [&[1.5, 3.0], &[2.0, -425.0]]);
         assert_eq!(text[cell_span(text, starts[0] as usize, by, 1)], *"2");
     }
     let report = Report::default();
     let source = report.add("list.csv", String::new());
     assert!(csv::read("a;b\n1;2;3\n", source, false, &ANY, &report).is_ok());
-    let said = report.into_diagnostics().to_string();
-    assert!(said.contains("expected 2 numbers, separated by semicolons"), "{said}");
+    let message = report.into_diagnostics().to_string();
+    assert!(message.contains("expected 2 numbers, separated by semicolons"), "{message}");
 }
 
 #[test]
-fn a_file_has_one_decimal_mark_and_a_thousand_is_no_decimal() {
+fn a_file_has_one_decimal_mark() {
     let german = "unbalance_mass_kg;damping_n_s_per_m\n0,9;950,0\n0,9;1.050\n";
     let american = "unbalance_mass_kg\tdamping_n_s_per_m\n0.9\t950\n0.9\t1,050\n";
     let quoted = "unbalance_mass_kg,damping_n_s_per_m\n0.9,950\n0.9,\"1,050\"\n";
     for text in [german, american, quoted] {
-        let csv::Read { columns, .. } = csv_of(text).unwrap();
+        let csv::TextTable { columns, .. } = csv_of(text).unwrap();
         assert_eq!([&columns[0].values, &columns[1].values], [&[0.9, 0.9], &[950.0, 1050.0]]);
     }
     let commas = "a,b\n1.050,950\n\"1.100\",970\n";
     assert_eq!(csv_of(commas).unwrap().columns[0].values, [1.05, 1.1]);
-    let said = |text: &str| {
+    let message = |text: &str| {
         let report = Report::default();
         let source = report.add("list.csv", String::new());
         let read = csv::read(text, source, true, &ANY, &report);
@@ -210,18 +211,18 @@ fn a_file_has_one_decimal_mark_and_a_thousand_is_no_decimal() {
         assert!(read.unwrap().columns.iter().all(|column| column.values.is_empty()));
         report.into_diagnostics().to_string()
     };
-    let mixed = said("a;b\n0,9;950\n0.9;1050\n");
+    let mixed = message("a;b\n0,9;950\n0.9;1050\n");
     for part in ["decimal points, as in `0.9`", "commas, as in `0,9`", ":2:1", ":3:1", "the same"] {
         assert!(mixed.contains(part), "{part}: {mixed}");
     }
-    let unclear = said("a;b\n2;950\n3;1.050\n");
+    let unclear = message("a;b\n2;950\n3;1.050\n");
     for part in ["`1.050` may be 1050 or 1.050", ":3:3", "write 1050, or 1.0500"] {
         assert!(unclear.contains(part), "{part}: {unclear}");
     }
-    assert!(said("a\n950\n1.050\n").contains("may be 1050"));
+    assert!(message("a\n950\n1.050\n").contains("may be 1050"));
 }
 
-/// Columns of a file of a logger, as a reader of these names takes them: names with their units.
+/// Returns the columns of a logger's file for a reader of four names with units, and the notes.
 fn logged(bytes: &[u8]) -> (Vec<(String, Vec<f64>)>, Vec<String>) {
     const KNOWN: [(&str, &str); 4] =
         [("time_s", "s"), ("speed_rpm", "rpm"), ("arm_yaw_rad", "rad"), ("acc_m_per_s2", "m/s^2")];
@@ -243,7 +244,7 @@ fn logged(bytes: &[u8]) -> (Vec<(String, Vec<f64>)>, Vec<String>) {
 }
 
 #[test]
-fn files_of_loggers_and_spreadsheets_are_read_as_they_are() {
+fn files_of_loggers_and_spreadsheets_are_read() {
     let plain = "time_s,arm_yaw_rad\n0,0.5\n0.02,-0.25\n";
     let utf16 = format!("\u{feff}{}", plain.replace(',', "\t"));
     let utf16: Vec<u8> = utf16.encode_utf16().flat_map(u16::to_le_bytes).collect();
@@ -283,15 +284,16 @@ fn a_name_of_several_words_is_one_column() {
 }
 
 #[test]
-fn what_is_read_otherwise_than_it_stands_is_said() {
+fn ignored_and_renamed_columns_are_noted() {
     let text = "Logger 7\nTime [s];Acc front [g];Temp [\u{b0}C];n (Hz)\n0,0;1,0;21,5;2\n";
     let latin: Vec<u8> = text.chars().map(|letter| letter as u8).collect();
     let (columns, notes) = logged(&latin);
     assert_eq!(columns[1], ("acc_m_per_s2".to_owned(), vec![9.80665]));
     let notes = notes.join("\n");
-    for said in ["1 line before the names", "`Temp [\u{b0}C]`, `n (Hz)`", "`Acc front [g]` is acc"]
+    for message in
+        ["1 line before the names", "`Temp [\u{b0}C]`, `n (Hz)`", "`Acc front [g]` is acc"]
     {
-        assert!(notes.contains(said), "{said}: {notes}");
+        assert!(notes.contains(message), "{message}: {notes}");
     }
 }
 
@@ -314,7 +316,7 @@ fn a_labview_file_is_read_with_its_units_and_its_decimal_mark() {
 }
 
 #[test]
-fn an_index_and_what_is_unknown_are_left_out_of_a_parquet_list() {
+fn index_and_unknown_columns_of_parquet_lists_are_ignored() {
     let masses: ArrayRef = Arc::new(Float64Array::from(vec![300.0, 400.0]));
     let index: ArrayRef = Arc::new(UInt64Array::from(vec![3, 7]));
     let words: ArrayRef = Arc::new(["a", "b"].into_iter().collect::<DictionaryArray<Int32Type>>());
@@ -328,7 +330,7 @@ fn an_index_and_what_is_unknown_are_left_out_of_a_parquet_list() {
 }
 
 #[test]
-fn decimals_are_numbers() {
+fn parquet_decimals_are_numbers() {
     use ::parquet::data_type::{FixedLenByteArrayType, Int32Type, Int64Type};
     use ::parquet::file::writer::SerializedFileWriter;
     use ::parquet::schema::parser::parse_message_type;

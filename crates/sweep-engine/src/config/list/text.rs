@@ -1,9 +1,9 @@
-//! Text of a file as loggers and spreadsheets write it: UTF-8, UTF-16 or Windows' western letters,
-//! with the line ends of any system.
+//! The text of a file from loggers and spreadsheets: UTF-8, UTF-16 or Windows code page 1252, with
+//! the line ends of any system.
 
 use super::Unreadable;
 
-/// Kinds of file that are no text, by their first bytes, and what to do with them.
+/// Kinds of files that are no text, by their first bytes, with advice.
 const OTHER_KINDS: [(&[u8], &str); 7] = [
     (b"PK\x03\x04", "it is an Excel workbook or another zip file: save its sheet as CSV"),
     (b"\xd0\xcf\x11\xe0", "it is an old Excel workbook: save its sheet as CSV"),
@@ -14,8 +14,9 @@ const OTHER_KINDS: [(&[u8], &str); 7] = [
     (b"ARROW1", "it is an Arrow file: write it as Parquet"),
 ];
 
-/// Bytes by which text without a byte order mark is told from UTF-16.
-const LOOKED_AT: usize = 512;
+/// Number of bytes by which UTF-16 without a byte order mark is recognised. Basis: enough letters
+/// of a header.
+const DETECTION_BYTES: usize = 512;
 
 /// Returns the text of a file.
 ///
@@ -25,28 +26,28 @@ pub(super) fn text(bytes: Vec<u8>) -> Result<String, Unreadable> {
     if let Some((_, kind)) = OTHER_KINDS.iter().find(|(first, _)| bytes.starts_with(first)) {
         return Err((*kind).to_owned());
     }
-    let text = match wide(&bytes) {
+    let text = match utf16_decoder(&bytes) {
         Some(read) => {
             let units = bytes.chunks_exact(2).map(|pair| read([pair[0], pair[1]]));
             let units: Vec<u16> = units.collect();
             String::from_utf16(&units).map_err(|_| "it is damaged UTF-16 text".to_owned())?
         }
-        None => narrow(bytes)?,
+        None => decode_bytes(bytes)?,
     };
     // Old systems end lines by carriage returns alone.
     let has_old_ends = text.contains('\r') && !text.contains('\n');
     Ok(if has_old_ends { text.replace('\r', "\n") } else { text })
 }
 
-/// Returns how to read pairs of bytes, if they are UTF-16: by its mark, or by bytes of zero in
-/// every other place, which no other text has.
-fn wide(bytes: &[u8]) -> Option<fn([u8; 2]) -> u16> {
+/// Returns the decoder of byte pairs if the text is UTF-16: by its mark, or by zeros in every other
+/// byte, which no other text has.
+fn utf16_decoder(bytes: &[u8]) -> Option<fn([u8; 2]) -> u16> {
     match bytes {
         [0xff, 0xfe, ..] => return Some(u16::from_le_bytes),
         [0xfe, 0xff, ..] => return Some(u16::from_be_bytes),
         _ => {}
     }
-    let begin = &bytes[..bytes.len().min(LOOKED_AT)];
+    let begin = &bytes[..bytes.len().min(DETECTION_BYTES)];
     let zeros = |parity: usize| begin.iter().skip(parity).step_by(2).filter(|b| **b == 0).count();
     let pairs = begin.len() / 2;
     match [zeros(0), zeros(1)] {
@@ -56,8 +57,8 @@ fn wide(bytes: &[u8]) -> Option<fn([u8; 2]) -> u16> {
     }
 }
 
-/// Returns the text of single bytes: UTF-8, else Windows' western letters.
-fn narrow(bytes: Vec<u8>) -> Result<String, Unreadable> {
+/// Decodes single bytes: UTF-8, or else code page 1252.
+fn decode_bytes(bytes: Vec<u8>) -> Result<String, Unreadable> {
     let bytes = match String::from_utf8(bytes) {
         Ok(text) => return Ok(text),
         Err(error) => error.into_bytes(),
@@ -69,10 +70,12 @@ fn narrow(bytes: Vec<u8>) -> Result<String, Unreadable> {
     Ok(bytes.into_iter().map(letter).collect())
 }
 
-/// Returns the letter of a byte in Windows' western letters (code page 1252): those of Latin-1, and
-/// others in place of its control characters.
+/// Returns the letter of a byte in Windows code page 1252: those of Latin-1, and others in place of
+/// its control characters.
 fn letter(byte: u8) -> char {
+    /// The first byte whose letter differs from Latin-1.
     const FIRST: u8 = 0x80;
+    /// The letters from that byte on.
     const LETTERS: [char; 32] = [
         '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž',
         '\u{8f}', '\u{90}', '‘', '’', '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}',
@@ -87,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn texts_of_every_system_are_read() {
+    fn text_encodings_are_detected() {
         let expected = "Weg [µm]\n1\n";
         let wide = |order: fn(u16) -> [u8; 2], mark: &str| -> Vec<u8> {
             let text = format!("{mark}{expected}");
@@ -109,11 +112,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_text_is_told_by_its_kind() {
-        let said = |bytes: &[u8]| text(bytes.to_vec()).unwrap_err();
-        assert!(said(b"PK\x03\x04rest").contains("save its sheet as CSV"));
-        assert!(said(b"MATLAB 5.0 MAT-file").contains("writetable"));
-        assert!(said(b"a,b\n\xff\x01").contains("byte 6 is wrong"));
-        assert!(said(b"\xff\xfe\x00\xd8").contains("damaged UTF-16"));
+    fn other_kinds_of_files_are_named() {
+        let message = |bytes: &[u8]| text(bytes.to_vec()).unwrap_err();
+        assert!(message(b"PK\x03\x04rest").contains("save its sheet as CSV"));
+        assert!(message(b"MATLAB 5.0 MAT-file").contains("writetable"));
+        assert!(message(b"a,b\n\xff\x01").contains("byte 6 is wrong"));
+        assert!(message(b"\xff\xfe\x00\xd8").contains("damaged UTF-16"));
     }
 }

@@ -1,39 +1,46 @@
-//! Units as people and loggers write them, and how a number in one is a number in another.
+//! Units as people and loggers write them, and conversion between them.
 
-/// A factor from one unit to another, as a quotient: 300 g are exactly 0.3 kg.
+/// A conversion factor as a quotient, so that 300 g are exactly 0.3 kg.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scale {
+pub(super) struct UnitScale {
     times: f64,
     by: f64,
 }
 
-impl Scale {
-    /// The same unit.
+impl UnitScale {
+    /// The factor between equal units.
     pub(super) const ONE: Self = Self { times: 1.0, by: 1.0 };
 
-    /// Returns the number in the other unit.
+    /// Converts a number to the other unit.
     pub(super) fn apply(self, value: f64) -> f64 {
         value * self.times / self.by
     }
 }
 
-/// A unit: its names in small letters without spaces, its base unit, and its size as a quotient.
-struct Unit {
+/// A unit: its names in lower case without spaces, its base unit, and its size as a quotient.
+struct UnitEntry {
     names: &'static [&'static str],
     base: &'static str,
-    size: Scale,
+    size: UnitScale,
 }
 
-const fn unit(names: &'static [&'static str], base: &'static str, times: f64, by: f64) -> Unit {
-    Unit { names, base, size: Scale { times, by } }
+const fn unit(
+    names: &'static [&'static str],
+    base: &'static str,
+    times: f64,
+    by: f64,
+) -> UnitEntry {
+    UnitEntry { names, base, size: UnitScale { times, by } }
 }
 
 /// Standard gravity, the unit of accelerometers (m/s^2), exact by definition.
 const G: f64 = 9.806_65;
+/// The ratio of a circle's circumference to its diameter.
 const PI: f64 = std::f64::consts::PI;
 
-/// The units that are read. `g` stands twice: what is measured says whether it is a mass.
-static UNITS: &[Unit] = &[
+/// The units that are read. `g` is listed twice: the measured quantity decides whether it is a
+/// mass.
+static UNITS: &[UnitEntry] = &[
     unit(&["s", "sec", "secs", "second", "seconds", "sek"], "s", 1.0, 1.0),
     unit(&["ms", "msec", "millisecond", "milliseconds"], "s", 1.0, 1e3),
     unit(&["us", "usec", "microseconds"], "s", 1.0, 1e6),
@@ -80,7 +87,7 @@ static UNITS: &[Unit] = &[
     unit(&["nm/deg"], "nm/rad", 180.0, PI),
 ];
 
-/// Returns a unit's name as the table has it.
+/// Returns a unit's name in the form of the table.
 fn plain(name: &str) -> String {
     let letters = name.chars().flat_map(char::to_lowercase);
     let letter = |letter: char| match letter {
@@ -93,35 +100,35 @@ fn plain(name: &str) -> String {
     };
     let name: String = letters.map(letter).collect();
     let name = name.replace("**", "^");
-    // m/s2 and kg m2 are written for want of exponents.
+    // The forms m/s2 and kg m2 stand for exponents.
     match name.strip_suffix(['2', '3']) {
         Some(rest) if rest.ends_with(['s', 'm']) => format!("{rest}^{}", &name[rest.len()..]),
         _ => name,
     }
 }
 
-/// Returns every unit of this name.
-fn named(name: &str) -> impl Iterator<Item = &'static Unit> {
+/// Yields every unit of this name.
+fn named(name: &str) -> impl Iterator<Item = &'static UnitEntry> {
     let name = plain(name);
     UNITS.iter().filter(move |unit| unit.names.contains(&name.as_str()))
 }
 
-/// Whether a text is the name of a unit.
+/// Returns whether a text is the name of a unit.
 pub(super) fn is_unit(name: &str) -> bool {
     named(name).next().is_some()
 }
 
-/// Returns the factor from one unit to another, if both are of one kind.
-pub(super) fn scale(from: &str, to: &str) -> Option<Scale> {
+/// Returns the factor from one unit to another, if both measure the same kind of quantity.
+pub(super) fn scale(from: &str, to: &str) -> Option<UnitScale> {
     let mut pairs = named(from).flat_map(|from| named(to).map(move |to| (from, to)));
     let (from, to) = pairs.find(|(from, to)| from.base == to.base)?;
     if from.size == to.size {
-        return Some(Scale::ONE);
+        return Some(UnitScale::ONE);
     }
-    Some(Scale { times: from.size.times * to.size.by, by: from.size.by * to.size.times })
+    Some(UnitScale { times: from.size.times * to.size.by, by: from.size.by * to.size.times })
 }
 
-/// The endings of names that say each base unit.
+/// The endings of names for each base unit.
 const ENDINGS: [(&str, &[&str]); 14] = [
     ("s", &["s"]),
     ("m", &["m"]),
@@ -139,15 +146,15 @@ const ENDINGS: [(&str, &[&str]); 14] = [
     ("nm/rad", &["n_m_per_rad"]),
 ];
 
-/// Returns the endings of names whose numbers a unit converts to.
+/// Returns the endings of names whose unit a unit converts to.
 pub(super) fn endings(name: &str) -> Vec<&'static str> {
     let bases: Vec<&str> = named(name).map(|unit| unit.base).collect();
     let all = ENDINGS.iter().filter(|(base, _)| bases.contains(base));
     all.flat_map(|(_, endings)| endings.iter().copied()).collect()
 }
 
-/// Returns the name of a unit that stands at the end of a name, as `m_per_s2` does.
-pub(super) fn of_suffix(suffix: &str) -> String {
+/// Returns the name of the unit that an ending of a name such as `m_per_s2` gives.
+pub(super) fn unit_from_suffix(suffix: &str) -> String {
     suffix.replace("_per_", "/").replace('_', "")
 }
 
@@ -182,7 +189,7 @@ mod tests {
             assert_eq!(scale(from, to), None, "{from} to {to}");
         }
         assert!(is_unit("[g]".trim_matches(['[', ']'])) && !is_unit("front"));
-        assert_eq!(of_suffix("m_per_s2"), "m/s2");
-        assert!(scale(&of_suffix("n_s_per_mm"), "N s/m").is_some());
+        assert_eq!(unit_from_suffix("m_per_s2"), "m/s2");
+        assert!(scale(&unit_from_suffix("n_s_per_mm"), "N s/m").is_some());
     }
 }

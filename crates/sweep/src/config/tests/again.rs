@@ -26,7 +26,7 @@ range = { from = 1e7, to = 2e8, count = 4, spacing = "log" }
 fn a_plan_is_read_back_from_its_json() {
     let mut plan = WasherGridInput::text("again", GRID.to_owned(), Vec::new()).load().unwrap();
     let again = |plan: &crate::Plan| {
-        let input = WasherGridInput::of_plan("again", &plan.to_json());
+        let input = WasherGridInput::from_plan("again", &plan.to_json());
         input.load().unwrap_or_else(|mistakes| panic!("{mistakes}"))
     };
     assert_eq!(again(&plan), plan);

@@ -27,11 +27,7 @@ fn with_rear_unbalance(file: &str) -> String {
     let lines = file.lines().scan(false, |is_unbalance, line| {
         *is_unbalance = if line.starts_with('[') { line == "[unbalance]" } else { *is_unbalance };
         let is_place = *is_unbalance && line.starts_with("x_m");
-        Some(if is_place {
-            "plane = \"rear\"\n".to_owned()
-        } else {
-            format!("{line}\n")
-        })
+        Some(if is_place { "plane = \"rear\"\n".to_owned() } else { format!("{line}\n") })
     });
     lines.collect()
 }

@@ -1,35 +1,37 @@
-//! A plan's machine and spin in words: what a reader of a page must know of them without the
-//! program.
+//! The summary of a plan's machine and spin, which a reader of a page needs.
 
 use serde_json::Value;
 use sweep_plot::label::{significant, unit_of_name};
 
-/// What the plan says of them, each with its heading.
-pub(crate) fn told(plan: &Value) -> Vec<(&'static str, String)> {
-    let said = [("Machine", machine(&plan["machine"])), ("Spin", spin(&plan["spin"]))];
-    said.into_iter().filter_map(|(title, text)| Some((title, text?))).collect()
+/// Returns the summary as headings and texts.
+pub(crate) fn plan_summary(plan: &Value) -> Vec<(&'static str, String)> {
+    let phrase = [("Machine", machine(&plan["machine"])), ("Spin", spin(&plan["spin"]))];
+    phrase.into_iter().filter_map(|(title, text)| Some((title, text?))).collect()
 }
 
-/// A number under a key, with the unit that the key's end says.
-fn quantity(of: &Value, key: &str) -> Option<String> {
-    let value = significant(of.get(key)?.as_f64()?, 4);
+/// Returns the number under a key, with the unit that ends the key.
+fn quantity(table: &Value, key: &str) -> Option<String> {
+    let value = significant(table.get(key)?.as_f64()?, 4);
     Some(format!("{value} {}", unit_of_name(key)).trim_end().to_owned())
 }
 
 fn machine(machine: &Value) -> Option<String> {
     let mass = |body: &str| quantity(&machine[body], "mass_kg");
-    let (tub, shaft, drum) = (mass("tub")?, mass("shaft")?, mass("drum")?);
-    let (unbalance, radius) = (mass("unbalance")?, quantity(&machine["unbalance"], "radius_m")?);
+    let tub = mass("tub")?;
+    let shaft = mass("shaft")?;
+    let drum = mass("drum")?;
+    let radius = quantity(&machine["unbalance"], "radius_m")?;
+    let unbalance = mass("unbalance")?;
     let mut parts = vec![format!(
         "tub {tub}, shaft {shaft}, drum {drum}, unbalance {unbalance} at radius {radius}"
     )];
-    // Numbers of a list's elements, each behind its word: the one that they have in common, or the
-    // least and the greatest.
+    // Each number of a list's elements follows its word: the common value, or the least and the
+    // greatest.
     let elements = |(list, numbers): (&str, &[(&str, &str)])| {
         let all = machine.get(list).and_then(Value::as_array)?;
-        let said = numbers.iter().filter_map(|(word, number)| {
-            // What an element does not say is 0; what none says is not told.
-            let size = |of: &Value| of[*number].as_f64().unwrap_or_default();
+        let phrase = numbers.iter().filter_map(|(word, number)| {
+            // A number that an element lacks is 0; a number that all lack is left out.
+            let size = |element: &Value| element[*number].as_f64().unwrap_or_default();
             let most = all.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
             let least = all.iter().map(size).fold(f64::INFINITY, f64::min);
             let from = match least == size(most) {
@@ -40,7 +42,7 @@ fn machine(machine: &Value) -> Option<String> {
         });
         let words = list.replace('_', " ");
         let words = if all.len() == 1 { words.trim_end_matches('s') } else { &words };
-        Some(format!("{} {words}{}", all.len(), said.collect::<Vec<_>>().join(",")))
+        Some(format!("{} {words}{}", all.len(), phrase.collect::<Vec<_>>().join(",")))
     };
     let lists: [(&str, &[(&str, &str)]); 6] = [
         ("springs", &[("of", "stiffness_n_per_m")]),

@@ -1,0 +1,137 @@
+//! Min-max decimation of long columns while their rows are read: a curve needs the least and the
+//! greatest value of each bucket.
+
+/// The rows of a file in buckets whose sizes differ by at most one row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Buckets {
+    rows: usize,
+    count: usize,
+}
+
+impl Buckets {
+    /// Returns at most `count` buckets, none of them empty.
+    pub(crate) fn new(rows: usize, count: usize) -> Self {
+        Self { rows, count: count.min(rows) }
+    }
+
+    /// Returns the maximum number of rows in a bucket.
+    pub(crate) fn longest(self) -> usize {
+        self.rows.div_ceil(self.count.max(1))
+    }
+
+    /// Returns the first row of a bucket, one past the last row of the bucket before it.
+    fn start(self, bucket: usize) -> usize {
+        // Rows times buckets can exceed 64 bits if the metadata claims too many rows.
+        (bucket as u128 * self.rows as u128 / self.count.max(1) as u128) as usize
+    }
+}
+
+/// The values of a bucket that are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum KeptValues {
+    /// The least and the greatest value in the order in which they occur; NaN if no value is
+    /// finite.
+    Extremes,
+    /// The first and the middle value: the instants at which the extremes are drawn.
+    Instants,
+}
+
+/// A column while it is decimated.
+pub(crate) struct Decimator {
+    buckets: Buckets,
+    keep: KeptValues,
+    /// The number of rows so far.
+    row: usize,
+    /// The bucket of the next row.
+    bucket: usize,
+    least: Option<(usize, f64)>,
+    greatest: Option<(usize, f64)>,
+    kept: Vec<f64>,
+}
+
+impl Decimator {
+    pub(crate) fn new(buckets: Buckets, keep: KeptValues) -> Self {
+        let kept = Vec::with_capacity(2 * buckets.count);
+        Self { buckets, keep, row: 0, bucket: 0, least: None, greatest: None, kept }
+    }
+
+    /// Adds the next row's value. Rows beyond the announced number are ignored.
+    pub(crate) fn push(&mut self, value: f64) {
+        if self.bucket == self.buckets.count {
+            return;
+        }
+        let [start, end] = [0, 1].map(|k| self.buckets.start(self.bucket + k));
+        match self.keep {
+            KeptValues::Instants => {
+                for instant in [start, (start + end) / 2] {
+                    self.kept.extend((self.row == instant).then_some(value));
+                }
+            }
+            KeptValues::Extremes if value.is_finite() => {
+                if self.least.is_none_or(|(_, least)| value < least) {
+                    self.least = Some((self.row, value));
+                }
+                if self.greatest.is_none_or(|(_, greatest)| value > greatest) {
+                    self.greatest = Some((self.row, value));
+                }
+            }
+            KeptValues::Extremes => {}
+        }
+        self.row += 1;
+        if self.row == end {
+            if self.keep == KeptValues::Extremes {
+                let ends = [self.least.take(), self.greatest.take()];
+                let mut ends = ends.map(|end| end.unwrap_or((0, f64::NAN)));
+                ends.sort_by_key(|(row, _)| *row);
+                self.kept.extend(ends.map(|(_, value)| value));
+            }
+            self.bucket += 1;
+        }
+    }
+
+    /// Returns two values for each bucket.
+    pub(crate) fn finish(self) -> Vec<f64> {
+        self.kept
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decimated(values: &[f64], count: usize, keep: KeptValues) -> Vec<f64> {
+        let mut decimator = Decimator::new(Buckets::new(values.len(), count), keep);
+        values.iter().for_each(|value| decimator.push(*value));
+        decimator.finish()
+    }
+
+    #[test]
+    fn extremes_are_kept_in_order_of_time() {
+        assert_eq!(decimated(&[0.0, 3.0, -2.0, 1.0], 1, KeptValues::Extremes), [3.0, -2.0]);
+        assert_eq!(decimated(&[f64::NAN, 5.0], 1, KeptValues::Extremes), [5.0, 5.0]);
+        assert!(decimated(&[f64::NAN], 1, KeptValues::Extremes).iter().all(|value| value.is_nan()));
+        assert_eq!(
+            decimated(&[1.0, 2.0, 3.0, 4.0, 5.0], 2, KeptValues::Extremes),
+            [1.0, 2.0, 3.0, 5.0]
+        );
+    }
+
+    #[test]
+    fn instants_are_the_first_and_the_middle_one() {
+        assert_eq!(decimated(&[0.0, 1.0, 2.0, 3.0], 1, KeptValues::Instants), [0.0, 2.0]);
+        assert_eq!(decimated(&[0.0, 1.0], 2, KeptValues::Instants), [0.0, 0.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn buckets_cover_every_row_once() {
+        for rows in [1_u32, 3, 499, 500, 501, 12_345] {
+            let values: Vec<f64> = (0..rows).map(f64::from).collect();
+            let kept = decimated(&values, 500, KeptValues::Extremes);
+            assert_eq!(kept.len(), 2 * 500.min(rows as usize));
+            let starts: Vec<f64> = kept.chunks(2).map(|pair| pair[0]).collect();
+            let ends: Vec<f64> = kept.chunks(2).map(|pair| pair[1]).collect();
+            assert_eq!((starts[0], ends[ends.len() - 1]), (0.0, f64::from(rows - 1)));
+            assert!(starts[1..].iter().zip(&ends).all(|(start, end)| *start == end + 1.0));
+        }
+    }
+}
