@@ -13,9 +13,14 @@ use washer_model::{
     StepSelector, Timing, capped_method, endings, prepare, respond, simulate,
 };
 
-/// As many as the widest lanes hold.
+/// Number of trajectories of a kernel. Basis: the number of lanes of AVX-512. Doubling it takes two
+/// passes of the widest kernel.
 const TRAJECTORIES: usize = 8;
+
+/// Step (s) of the kernels. Basis: it is stable on the paper's machine. Doubling it is not.
 const STEP_S: f64 = 2.5e-4;
+
+/// Number of rounds, of which medians are reported. Doubling it doubles the time.
 const ROUNDS: usize = 5;
 
 fn main() {
@@ -53,7 +58,7 @@ fn table(unit: &str, subjects: &[String], rounds: &[Vec<f64>]) -> Vec<f64> {
     medians
 }
 
-/// One core, every instruction set and model.
+/// Measures trajectories of both models on one core, with every instruction set.
 fn trajectories(rounds: usize) {
     let scenario = (
         Machine::paper(),
@@ -101,11 +106,12 @@ fn trajectories(rounds: usize) {
     println!();
 }
 
-/// One core, the whole grid of Fig. 12: plain steps and the fast method. What both models'
-/// trajectories take by the latter at 1e-3, once each (s).
+/// Measures plain steps and the fast method on one core, on the whole grid of Fig. 12. Returns the
+/// time (s) of a trajectory of each model by the fast method at 1e-3.
 fn methods(rounds: usize) -> f64 {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
-    let (end_s, window_s) = (50.0, [30.0, 50.0]);
+    let end_s = 50.0;
+    let window_s = [30.0, 50.0];
     let mut scenarios = Vec::new();
     for mass in 0..39 {
         for damping in 0..33 {
@@ -174,8 +180,7 @@ fn methods(rounds: usize) -> f64 {
 
 const FIG12: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../sweeps/fig12.toml");
 
-/// How long the program takes with these arguments, in a folder for its output (s); a map's name is
-/// no boundary's.
+/// Returns the time (s) that the program takes with these arguments, in a folder for its output.
 fn program_s(folder: &Path, arguments: &[&str]) -> f64 {
     let begin = Instant::now();
     let run = Command::new(env!("CARGO_BIN_EXE_sweep"))
@@ -259,8 +264,9 @@ fn dwells(rounds: usize, pair_s: f64) {
     );
 }
 
-/// What a held speed ends in, from eight starts of 100 s, against eight trajectories with peaks: as
-/// many steps of the same formula, and as long by plain RK4.
+/// Measures the search for motions at a held speed, from eight starts of 100 s, against eight
+/// trajectories with peaks: with as many steps of the same formula, and with as long a time by
+/// plain RK4.
 fn motions(rounds: usize) {
     const SPEED_RPM: f64 = 250.0;
     const STEPS_A_TURN: f64 = 96.0;
@@ -347,9 +353,9 @@ fn threads(rounds: usize, once_s: f64) {
     );
 }
 
-/// What each element of a suspension adds to a step, by machines that have two friction dampers,
-/// three stops, a gasket or four stiffening springs, with the numbers of
-/// `docs/examples/friction.toml`; what stiffening springs have is assumed.
+/// Measures the time that each element of a suspension adds to a step. The machines have two
+/// friction dampers, three stops, a gasket or four stiffening springs, with the numbers of
+/// `docs/examples/friction.toml`; the numbers of the springs are assumed.
 fn elements(rounds: usize) {
     let friction = |machine: &mut Machine| {
         for damper in &mut machine.dampers {

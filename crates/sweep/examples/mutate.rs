@@ -1,14 +1,14 @@
-//! The fuzzer's targets without a fuzzer: inputs of its corpus, changed at random, for as long as
-//! asked.
+//! Runs the fuzzer's targets without a fuzzer: on inputs of its corpus that are changed at random,
+//! for a given time.
 //!
 //! ```sh
 //! # target, seconds, seed
 //! cargo run --release -p sweep --example mutate -- list 300 1 > /dev/null
 //! ```
 //!
-//! Needs no instrumented build, so it finds less in a second than `scripts/checks/fuzz.sh` and can
-//! be started at once. Targets are `list`, `result` and `folder`. Findings are in
-//! `target/fuzz/findings`; exits with 1 if there is any.
+//! It needs no instrumented build, so that it starts at once, but finds less in a second than
+//! `scripts/checks/fuzz.sh`. Targets are `list`, `result` and `folder`. Findings are in
+//! `target/fuzz/findings`; the exit code is 1 if there are any.
 
 #[path = "../../../fuzz/src/targets/folder.rs"]
 mod folder;
@@ -23,17 +23,18 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// An input is changed in at most so many places.
-const MOST_CHANGES: u64 = 12;
+/// Maximum number of changes of an input. Doubling it makes more inputs invalid at once.
+const MAX_CHANGES: u64 = 12;
 
-/// An input that takes longer is a finding.
-const SLOW: Duration = Duration::from_secs(10);
+/// Maximum time of an input; a longer one is a finding. Basis: CONTRIBUTING.md. Doubling it finds
+/// fewer slow inputs.
+const MAX_TIME: Duration = Duration::from_secs(10);
 
-/// Bytes that formats stumble over.
-const ODD: [u8; 8] = [0, 1, 0x7f, 0x80, 0xff, b'-', b',', b'\n'];
+/// Bytes that are limits of formats, or have a meaning in them.
+const SPECIAL_BYTES: [u8; 8] = [0, 1, 0x7f, 0x80, 0xff, b'-', b',', b'\n'];
 
-/// What makes numbers, and text of them, go wrong.
-const WORDS: [&[u8]; 12] = [
+/// Texts of extreme numbers, and separators of text formats.
+const SPECIAL_WORDS: [&[u8]; 12] = [
     b"1e999",
     b"-0",
     b"nan",
@@ -48,7 +49,7 @@ const WORDS: [&[u8]; 12] = [
     b"\xff\xff\xff\xff\xff\xff\xff\x7f",
 ];
 
-/// Numbers from a seed: splitmix64.
+/// A random number generator with a seed (splitmix64).
 struct Rng(u64);
 
 impl Rng {
@@ -59,41 +60,41 @@ impl Rng {
         z ^ (z >> 31)
     }
 
-    /// A number below another; 0 below 0.
+    /// Returns a random number below `end`, or 0 if that is 0.
     fn below(&mut self, end: usize) -> usize {
         (self.bits() % end.max(1) as u64) as usize
     }
 
-    /// A stretch of so many bytes, rather short than long.
-    fn stretch(&mut self, length: usize) -> std::ops::Range<usize> {
+    /// Returns a random range within `length` bytes, mostly a short one.
+    fn random_range(&mut self, length: usize) -> std::ops::Range<usize> {
         let start = self.below(length);
         let most = if self.below(4) == 0 { length } else { 16 };
         start..(start + self.below(most) + 1).min(length)
     }
 }
 
-fn changed(rng: &mut Rng, seeds: &[Vec<u8>]) -> Vec<u8> {
+fn mutate(rng: &mut Rng, seeds: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = seeds[rng.below(seeds.len())].clone();
-    for _ in 0..=rng.bits() % MOST_CHANGES {
+    for _ in 0..=rng.bits() % MAX_CHANGES {
         let at = rng.below(bytes.len() + 1);
-        let here = rng.stretch(bytes.len());
+        let here = rng.random_range(bytes.len());
         match rng.below(8) {
             0 | 1 if at < bytes.len() => bytes[at] ^= 1 << rng.below(8),
             2 if at < bytes.len() => bytes[at] = rng.bits() as u8,
-            3 if at < bytes.len() => bytes[at] = ODD[rng.below(ODD.len())],
+            3 if at < bytes.len() => bytes[at] = SPECIAL_BYTES[rng.below(SPECIAL_BYTES.len())],
             4 => drop(bytes.drain(here)),
             5 => {
                 let copy = bytes[here].to_vec();
                 drop(bytes.splice(at..at, copy));
             }
             6 => {
-                let word = WORDS[rng.below(WORDS.len())];
+                let word = SPECIAL_WORDS[rng.below(SPECIAL_WORDS.len())];
                 let end = (at + rng.below(word.len() + 1)).min(bytes.len());
                 drop(bytes.splice(at..end, word.iter().copied()));
             }
             7 => {
                 let other = &seeds[rng.below(seeds.len())];
-                let there = rng.stretch(other.len());
+                let there = rng.random_range(other.len());
                 drop(bytes.splice(here, other[there].iter().copied()));
             }
             _ => bytes.truncate(at),
@@ -109,14 +110,14 @@ fn seeds(corpus: &Path) -> Vec<Vec<u8>> {
     paths.iter().map(|path| fs::read(path).expect("an input is read")).collect()
 }
 
-/// Time that this thread has computed, so that other work of the machine slows no input down.
-fn computed() -> Duration {
+/// Returns the processor time of this thread, which other work on the computer does not affect.
+fn thread_time() -> Duration {
     let schedule = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     let nanoseconds = schedule.split_whitespace().next().and_then(|text| text.parse().ok());
     Duration::from_nanos(nanoseconds.unwrap_or_default())
 }
 
-/// The most memory that this process has had, in kB.
+/// Returns the peak memory of this process as text, in kB.
 fn peak_kb() -> String {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -135,24 +136,27 @@ fn main() -> ExitCode {
         "folder" => folder::run,
         _ => panic!("no target {name}: expected list, result or folder"),
     };
-    let (seconds, mut rng) = (number(1, 60), Rng(number(2, 1)));
+    let seconds = number(1, 60);
+    let mut rng = Rng(number(2, 1));
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let findings = root.join("target/fuzz/findings");
     fs::create_dir_all(&findings).expect("a folder for findings");
     let seeds = seeds(&root.join("fuzz").join(format!("corpus-{name}")));
 
     let began = Instant::now();
-    let (mut tried, mut found, mut slowest) = (0_u64, 0_u64, Duration::ZERO);
+    let mut tried = 0_u64;
+    let mut found = 0_u64;
+    let mut slowest = Duration::ZERO;
     let unchanged = seeds.clone().into_iter();
-    let mut inputs = unchanged.chain(std::iter::repeat_with(|| changed(&mut rng, &seeds)));
+    let mut inputs = unchanged.chain(std::iter::repeat_with(|| mutate(&mut rng, &seeds)));
     while began.elapsed() < Duration::from_secs(seconds) {
         let Some(input) = inputs.next() else { break };
-        let start = computed();
+        let start = thread_time();
         let is_sound = catch_unwind(|| run(&input)).is_ok();
-        let took = computed() - start;
+        let took = thread_time() - start;
         tried += 1;
         slowest = slowest.max(took);
-        if !is_sound || took > SLOW {
+        if !is_sound || took > MAX_TIME {
             found += 1;
             let path = findings.join(format!("{name}-{tried}"));
             fs::write(&path, &input).expect("a finding is kept");

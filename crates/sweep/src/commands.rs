@@ -20,7 +20,7 @@ mod trace;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use crate::dwell::Search;
+use crate::dwell::AttractorSearch;
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::{
     boundary, compare, examples, export, merge, optimise, parameters, report, require,
@@ -77,7 +77,7 @@ pub enum Command {
     /// Find the motions that held speeds end in
     #[command(after_long_help = held::MOTIONS_LONG)]
     #[command(mut_arg("out", |out| out.help(out_of("dwell"))))]
-    Dwell(held::Args<Search>),
+    Dwell(held::Args<AttractorSearch>),
     /// Explain why the linear model fails at one point
     Explain(explain::Args),
     /// Find the numbers of a machine from measured run-ups
@@ -215,7 +215,7 @@ impl Command {
             Self::Show(args) => show_engine::run(args, &show::FURTHER),
             Self::Report(args) => {
                 let figures = WasherFigures::default();
-                report::run(args, &show::FURTHER, &crate::live::resonances, &figures)
+                report::run(args, &show::FURTHER, &crate::live::resonance_rows, &figures)
             }
             Self::Require(args) => require::run(args),
             Self::Compare(args) => compare::run(args, crate::identity::BUILD),

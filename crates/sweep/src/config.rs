@@ -1,11 +1,11 @@
-//! What grid files hold of the washing machine, read by the engine's rules.
+//! The washing machine's part of grid files, read by the engine's rules.
 //!
-//! Defaults: `machine` is `"paper"`, `[reliability]` compares the six channels of tub and drum
-//! fronts and tub angles by their peaks. `[spin]` must be given, and a machine file is always
-//! whole. Bounds: spin tables of 20,000 rows, 1000 of each kind of element.
+//! Defaults: `machine` is `"paper"`, and `[reliability]` compares the peaks of six channels, the
+//! fronts of tub and drum and the tub's angles. `[spin]` is required, and a machine file must be
+//! complete. Bounds: spin tables have at most 20,000 rows, and a machine at most 1000 elements of
+//! each kind.
 //!
-//! Precedence: `damping_n_s_per_m` writes every `damper_1_damping_n_s_per_m`, so that not both may
-//! stand in one place.
+//! `damping_n_s_per_m` sets every `damper_N_damping_n_s_per_m`, so one section may not have both.
 
 pub(crate) mod grid;
 pub(crate) mod machine;
@@ -26,14 +26,13 @@ pub(crate) use machine::{to_json as machine_json, to_toml as machine_file};
 pub use sweep_engine::config::{Diagnostics, Mistake};
 pub(crate) use sweep_engine::config::{check_columns, not_numbers, other_length};
 
-/// A grid as a user gives it.
-pub type GridInput = sweep_engine::GridInput<Washer>;
+/// A grid of washing machines as a user gives it.
+pub type WasherGridInput = sweep_engine::GridInput<Washer>;
 
-/// Reads a grid file with its machine file, puts the constants `NAME=VALUE` in place, and checks
-/// the whole.
+/// Reads a grid file and its machine file, applies the constants `NAME=VALUE`, and checks the plan.
 ///
 /// # Errors
-/// Every mistake found, in one pass.
+/// Returns all mistakes that one pass finds.
 pub fn load(path: &Path, sets: &[String]) -> Result<Plan, Diagnostics> {
-    GridInput::file(path.to_owned(), sets.to_vec()).load()
+    WasherGridInput::file(path.to_owned(), sets.to_vec()).load()
 }

@@ -1,5 +1,5 @@
-//! What held speeds end in, over a grid: what `sweep dwell` asks of the engine of dwells, its rows,
-//! and what a finished file says.
+//! The motions in which machines at held speeds end (attractors), over a grid: the search of
+//! `sweep dwell`, its rows, and the summary of a finished file.
 
 pub(crate) mod columns;
 pub(crate) mod summary;
@@ -16,18 +16,21 @@ use washer_row::Status;
 
 use crate::engine::{Carried, find_motions};
 use crate::plan::Plan;
-use columns::{DwellColumn, RowOf};
+use columns::{DwellColumn, DwellRow};
 use sweep_engine::columns::{declared, row};
 use sweep_engine::store::{Column, Done};
 use sweep_engine::{Error, RunContext};
 
-/// Rows that a thread takes at once, at most: their starts fill lanes. Where rows have more starts
-/// than these, they are fewer: what is kept of a trajectory is 0.1 MB.
-const MOST_AT_ONCE: u64 = 16;
-const STARTS_AT_ONCE: u64 = 128;
+/// Maximum number of rows that a thread computes together. Basis: their starts fill the lanes.
+/// Doubling it leaves threads without work at the end of a run.
+const MAX_ROWS_TOGETHER: u64 = 16;
+
+/// Maximum number of starts of the rows that a thread computes together. Basis: the history of a
+/// trajectory takes 0.1 MB. Doubling it doubles the memory of a thread.
+const MAX_STARTS_TOGETHER: u64 = 128;
 
 named! {
-    /// Which way the last motion is taken along from speed to speed.
+    /// The direction in which the final state of a motion becomes the start at the next speed.
     pub enum Carry {
         /// From the lowest speed up.
         Up = "up",
@@ -44,8 +47,8 @@ impl FromStr for Carry {
     }
 }
 
-/// What a kick and the longest time may be.
-const POSITIVE: &str = "a number above 0, at most 1e5";
+/// The expected value of a kick and of the longest time, in messages.
+const EXPECTED_POSITIVE: &str = "a number above 0, at most 1e5";
 
 fn is_positive(value: f64) -> bool {
     value > 0.0 && value <= 1e5
@@ -53,37 +56,38 @@ fn is_positive(value: f64) -> bool {
 
 fn positive(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value| is_positive(*value));
-    value.ok_or_else(|| format!("expected {POSITIVE}"))
+    value.ok_or_else(|| format!("expected {EXPECTED_POSITIVE}"))
 }
 
-/// How motions are looked for.
+/// The options of a search for motions at held speeds.
 #[derive(Clone, Copy, Debug, PartialEq, clap::Args)]
-pub struct Search {
-    /// Starts a speed, the disturbed periodic response among them; at most 1024
+pub struct AttractorSearch {
+    /// Number of starts at each speed, the disturbed periodic response among them; at most 1024
     #[arg(long, value_name = "N", default_value_t = 12,
-          value_parser = clap::value_parser!(u64).range(1..=Search::MOST_STARTS))]
+          value_parser = clap::value_parser!(u64).range(1..=AttractorSearch::MAX_STARTS))]
     pub starts: u64,
     /// Hardest kick, in rad/s of the tub's rocking
     #[arg(long, value_name = "RAD/S", default_value_t = 6.0, value_parser = positive)]
     pub kick: f64,
-    /// Take the motion along from speed to speed, up or down, instead of starts at each
+    /// Start at each speed from the motion at the speed before, going up or down, instead of from
+    /// several starts
     #[arg(long, value_name = "up|down", conflicts_with_all = ["starts", "kick", "threshold"])]
     pub carry: Option<Carry>,
-    /// Look for the smallest kick that does not come back, where there are several motions
+    /// Search for the smallest kick after which the machine does not return, where there are
+    /// several motions
     #[arg(long)]
     pub threshold: bool,
-    /// Keep so many states of each motion, at most 256, once a turn: a row each, with its
-    /// coordinates
+    /// Keep N states of each motion, at most 256, one a turn: each is a row with its coordinates
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true,
           value_parser = clap::value_parser!(u64).range(..=256))]
     pub sections: u64,
-    /// Follow a motion that does not settle for at most this long, in s
+    /// Maximum time for which a motion that does not settle is followed, in s
     #[arg(long, value_name = "SECONDS", default_value_t = 600.0, value_parser = positive)]
     pub longest: f64,
 }
 
-impl fmt::Display for Search {
-    /// What differs from the defaults, as it is written on a command line.
+impl fmt::Display for AttractorSearch {
+    /// Writes the options that differ from the defaults, as on a command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let usual = Starts::default();
         if let Some(carry) = self.carry {
@@ -105,27 +109,28 @@ impl fmt::Display for Search {
     }
 }
 
-impl Search {
-    /// Most starts a speed.
-    const MOST_STARTS: u64 = 1024;
+impl AttractorSearch {
+    /// Maximum number of starts at a speed. Basis: far more than find further motions. Doubling it
+    /// doubles the longest time of a row.
+    const MAX_STARTS: u64 = 1024;
 
-    /// Refuses what is out of bounds.
+    /// Checks that the options are within their bounds.
     ///
     /// # Errors
-    /// [`Error::Refused`].
+    /// Returns [`Error::Refused`] if one is not.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        if !(1..=Self::MOST_STARTS).contains(&self.starts) {
+        if !(1..=Self::MAX_STARTS).contains(&self.starts) {
             return Err(Error::option("starts", self.starts, "a number from 1 to 1024"));
         }
         for (option, value) in [("kick", self.kick), ("longest", self.longest)] {
             if !is_positive(value) {
-                return Err(Error::option(option, value, POSITIVE));
+                return Err(Error::option(option, value, EXPECTED_POSITIVE));
             }
         }
         Ok(())
     }
 
-    /// As a plan says what was asked at these speeds.
+    /// Returns the search and its speeds as JSON, for the plan of a result.
     pub(crate) fn json(&self, speeds_rpm: &[f64]) -> Value {
         let mut json = json!({
             "speed_rpm": speeds_rpm,
@@ -145,29 +150,30 @@ impl Search {
         json
     }
 
-    /// The columns of a file.
+    /// Returns the declared columns of a result.
     pub(crate) fn columns(&self, plan: &Plan) -> Vec<Column> {
-        declared(self.columns_of_rows(plan))
+        declared(self.row_columns(plan))
     }
 
-    fn columns_of_rows(&self, plan: &Plan) -> Vec<DwellColumn> {
-        let (channels, measures) = (&plan.reliability.channels, &plan.model.measures);
+    fn row_columns(&self, plan: &Plan) -> Vec<DwellColumn> {
+        let channels = &plan.reliability.channels;
+        let measures = &plan.model.measures;
         let mut columns = columns::columns(channels, measures, self.sections > 0);
-        columns.extend(self.carry.is_some().then(columns::carried).into_iter().flatten());
+        columns.extend(self.carry.is_some().then(columns::carried_columns).into_iter().flatten());
         columns
     }
 }
 
-/// What the engine is asked for.
-pub(crate) struct Motions {
-    search: Search,
+/// The search for attractors, prepared for the rows of a plan.
+pub(crate) struct AttractorEngine {
+    search: AttractorSearch,
     starts: Starts,
     columns: Vec<DwellColumn>,
 }
 
-impl Motions {
-    pub(crate) fn new(plan: &Plan, search: Search) -> Self {
-        // A motion that goes on for ever has no times and no windows.
+impl AttractorEngine {
+    pub(crate) fn new(plan: &Plan, search: AttractorSearch) -> Self {
+        // An attractor has no duration, so metrics over times and windows are not recorded.
         let Recorders { mut gauges, .. } = plan.model.measures.recorders();
         gauges[Gauge::ClashTime as usize] = false;
         let wanted = Recorders { gauges, ..Recorders::default() };
@@ -178,64 +184,67 @@ impl Motions {
             with_threshold: search.threshold,
             wanted,
         };
-        Self { search, starts, columns: search.columns_of_rows(plan) }
+        Self { search, starts, columns: search.row_columns(plan) }
     }
 
-    /// Rows that a thread takes at once, of its share and of a number of speeds a point.
-    pub(crate) fn at_once(&self, share: u64, speeds: u64) -> u64 {
+    /// Returns the number of rows that a thread computes together, given its share of the rows and
+    /// the number of speeds of a point.
+    pub(crate) fn rows_together(&self, share: u64, speeds: u64) -> u64 {
         match self.search.carry {
-            // The motion goes through all speeds of its point.
-            Some(_) => speeds * (share / speeds).clamp(1, MOST_AT_ONCE),
-            None => share.min(STARTS_AT_ONCE / self.search.starts).clamp(1, MOST_AT_ONCE),
+            // All speeds of a point are one sequence.
+            Some(_) => speeds * (share / speeds).clamp(1, MAX_ROWS_TOGETHER),
+            None => share.min(MAX_STARTS_TOGETHER / self.search.starts).clamp(1, MAX_ROWS_TOGETHER),
         }
     }
 
-    /// The row of a point at a speed where nothing was found.
-    pub(crate) fn failed(&self, number: u64, status: Status) -> Done {
-        let none = RowOf { found: Err(status), motion: 0, turn: 0 };
-        Done { point: number, rows: vec![row(&self.columns, &none)] }
+    /// Returns the row of a point at a speed without a motion.
+    pub(crate) fn failed_row(&self, number: u64, status: Status) -> Done {
+        let failed = DwellRow { found: Err(status), motion: 0, turn: 0 };
+        Done { point: number, rows: vec![row(&self.columns, &failed)] }
     }
 
-    /// Keeps the rows of these dwells, each with its number, as they come. Once the watch has
-    /// stopped, what comes means nothing.
+    /// Finds the motions of points at held speeds, each with its row's number, and passes the rows
+    /// to `keep`. Once the context is stopped, they are meaningless.
     pub(crate) fn find(
         &self,
         simd: Simd,
         speeds_rpm: &[f64],
-        asked: &[(u64, Dwell<'_>)],
+        requested: &[(u64, Dwell<'_>)],
         keep: &dyn Fn(Done),
-        watch: &RunContext<'_>,
+        context: &RunContext<'_>,
     ) {
-        let is_stopped = || watch.stopped();
+        let is_stopped = || context.stopped();
         let Some(carry) = self.search.carry else {
             let dwells: Vec<(Dwell<'_>, Carried)> =
-                asked.iter().map(|(_, dwell)| (*dwell, None)).collect();
+                requested.iter().map(|(_, dwell)| (*dwell, None)).collect();
             let found = find_motions(simd, &dwells, &self.starts, &is_stopped);
-            let each = asked.iter().zip(found);
-            return each.for_each(|((row, _), found)| keep(self.done(*row, found)));
+            for ((row, _), found) in requested.iter().zip(found) {
+                keep(self.found_rows(*row, found));
+            }
+            return;
         };
         let speeds = speeds_rpm.len() as u64;
         let groups: Vec<&[(u64, Dwell<'_>)]> =
-            asked.chunk_by(|a, b| a.0 / speeds == b.0 / speeds).collect();
+            requested.chunk_by(|a, b| a.0 / speeds == b.0 / speeds).collect();
         let mut carried: Vec<Carried> = vec![None; groups.len()];
         for step in 0..speeds {
-            let place = if carry == Carry::Up { step } else { speeds - 1 - step };
-            // Speeds before the first that is asked for lead to it.
-            let is_further = |(row, _): &(u64, Dwell<'_>)| match carry {
-                Carry::Up => row % speeds >= place,
-                Carry::Down => row % speeds <= place,
+            let position = if carry == Carry::Up { step } else { speeds - 1 - step };
+            // The speeds before the first requested row are needed for its start.
+            let is_at_or_after = |(row, _): &(u64, Dwell<'_>)| match carry {
+                Carry::Up => row % speeds >= position,
+                Carry::Down => row % speeds <= position,
             };
-            let row_of = |k: usize| groups[k][0].0 / speeds * speeds + place;
-            let is_asked = |k: usize| groups[k].iter().any(|(asked, _)| *asked == row_of(k));
+            let row_at = |k: usize| groups[k][0].0 / speeds * speeds + position;
+            let is_requested = |k: usize| groups[k].iter().any(|(row, _)| *row == row_at(k));
             let mut needed = Vec::new();
-            for k in (0..groups.len()).filter(|k| groups[*k].iter().any(is_further)) {
-                match Some(k).filter(|k| !is_asked(*k)).and_then(|k| watch.known(row_of(k))) {
-                    Some(known) => carried[k] = columns::carried_by(&known),
+            for k in (0..groups.len()).filter(|k| groups[*k].iter().any(is_at_or_after)) {
+                match Some(k).filter(|k| !is_requested(*k)).and_then(|k| context.known(row_at(k))) {
+                    Some(known) => carried[k] = columns::carried_state(&known),
                     None => needed.push(k),
                 }
             }
             let dwell = |k: &usize| {
-                let speed_rpm = speeds_rpm[place as usize];
+                let speed_rpm = speeds_rpm[position as usize];
                 (Dwell { point: groups[*k][0].1.point, speed_rpm }, carried[*k])
             };
             let dwells: Vec<(Dwell<'_>, Carried)> = needed.iter().map(dwell).collect();
@@ -244,36 +253,39 @@ impl Motions {
                 return;
             }
             for (k, found) in needed.into_iter().zip(found) {
-                carried[k] = found.as_ref().ok().and_then(last_state);
-                if is_asked(k) {
-                    keep(self.done(row_of(k), found));
+                carried[k] = found.as_ref().ok().and_then(final_state);
+                if is_requested(k) {
+                    keep(self.found_rows(row_at(k), found));
                 }
             }
         }
     }
 
-    fn done(&self, number: u64, found: Result<Endings, Status>) -> Done {
+    /// Returns the rows of the motions of a point at a speed.
+    fn found_rows(&self, number: u64, found: Result<Endings, Status>) -> Done {
         let mut found = match found {
             Ok(found) => found,
-            Err(status) => return self.failed(number, status),
+            Err(status) => return self.failed_row(number, status),
         };
         for motion in &mut found.motions {
-            let others = motion.sections.len().saturating_sub(self.search.sections as usize);
-            motion.sections.drain(..others);
+            let surplus = motion.sections.len().saturating_sub(self.search.sections as usize);
+            motion.sections.drain(..surplus);
         }
         let found = Arc::new(found);
-        let turns = |motion: usize| 0..found.motions[motion].sections.len().max(1);
-        let places = (0..found.motions.len())
-            .flat_map(|motion| turns(motion).map(move |turn| (motion, turn)));
-        let of = |(motion, turn)| {
-            row(&self.columns, &RowOf { found: Ok(Arc::clone(&found)), motion, turn })
-        };
-        Done { point: number, rows: places.map(of).collect() }
+        let mut rows = Vec::new();
+        for motion in 0..found.motions.len() {
+            for turn in 0..found.motions[motion].sections.len().max(1) {
+                let dwell_row = DwellRow { found: Ok(Arc::clone(&found)), motion, turn };
+                rows.push(row(&self.columns, &dwell_row));
+            }
+        }
+        Done { point: number, rows }
     }
 }
 
-/// Where a machine is that is taken to the next speed.
-fn last_state(found: &Endings) -> Carried {
+/// Returns the state from which a machine is taken to the next speed, unless it left the model's
+/// range.
+fn final_state(found: &Endings) -> Carried {
     let motion = found.motions.first()?;
     (!matches!(motion.state, State::LeftRange { .. })).then_some(motion.end)
 }
@@ -283,33 +295,42 @@ mod tests {
     use std::sync::Mutex;
 
     use super::*;
-    use crate::stability::Held;
+    use crate::stability::HeldPlan;
     use sweep_engine::{Engine as _, Interrupt, RowLookup};
     use sweep_files::panics::{lock, unlocked};
 
     #[test]
-    fn a_motion_is_taken_along_from_a_row_that_was_kept() {
+    fn a_carried_motion_starts_from_a_known_row() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/examples/plateau.toml");
         let plan = crate::config::load(path.as_ref(), &[]).unwrap();
-        let (carry, longest) = (Some(Carry::Up), 5.0);
-        let search = Search { starts: 8, kick: 6.0, carry, threshold: false, sections: 0, longest };
-        let held = Held { plan: &plan, speeds_rpm: &[300.0, 305.0, 310.0], search: Some(search) };
-        let (engine, calm) = (held.engine().unwrap(), Interrupt::new());
-        let found = |rows: std::ops::Range<u64>, known: &RowLookup<'_>| {
-            let (left, done) = (Mutex::new(rows), Mutex::new(Vec::new()));
-            let next = || lock(&left).next().map(|row| (row, Vec::new()));
+        let search = AttractorSearch {
+            starts: 8,
+            kick: 6.0,
+            carry: Some(Carry::Up),
+            threshold: false,
+            sections: 0,
+            longest: 5.0,
+        };
+        let speeds_rpm = &[300.0, 305.0, 310.0];
+        let held = HeldPlan { plan: &plan, speeds_rpm, search: Some(search) };
+        let engine = held.engine().unwrap();
+        let interrupt = Interrupt::new();
+        let evaluate = |rows: std::ops::Range<u64>, known: &RowLookup<'_>| {
+            let remaining = Mutex::new(rows);
+            let finished = Mutex::new(Vec::new());
+            let next = || lock(&remaining).next().map(|row| (row, Vec::new()));
             engine.evaluate(
                 &next,
-                &|one| lock(&done).push(one),
-                &RunContext::with_known_rows(&calm, known),
+                &|row| lock(&finished).push(row),
+                &RunContext::with_known_rows(&interrupt, known),
             );
-            let mut done = unlocked(done);
-            done.sort_by_key(|one: &Done| one.point);
-            done
+            let mut finished = unlocked(finished);
+            finished.sort_by_key(|row: &Done| row.point);
+            finished
         };
-        let whole = found(0..3, &|_| None);
-        assert_eq!(found(2..3, &|row| whole.get(row as usize).cloned()), whole[2..]);
-        // It is taken from there, and not found again.
-        assert_ne!(found(2..3, &|_| whole.first().cloned()), whole[2..]);
+        let all = evaluate(0..3, &|_| None);
+        assert_eq!(evaluate(2..3, &|row| all.get(row as usize).cloned()), all[2..]);
+        // With another known row the result differs: the row is used, and not computed again.
+        assert_ne!(evaluate(2..3, &|_| all.first().cloned()), all[2..]);
     }
 }

@@ -76,7 +76,8 @@ fn forced_simd() -> Result<Option<Simd>, Error> {
 }
 
 impl<'a> ModelEngine<'a> {
-    /// Returns an engine for a plan, with the instruction set that `SWEEP_SIMD` names, if it is set.
+    /// Returns an engine for a plan, with the instruction set that `SWEEP_SIMD` names, if it is
+    /// set.
     ///
     /// # Errors
     /// Returns an error if this processor has no instruction set of that name.

@@ -1,5 +1,5 @@
-//! Why the linear model fails at a point: the tongues of instability that its run crosses, and what
-//! they do to the run.
+//! The cause of a failure of the linear model at a point: the tongues of instability that its run
+//! crosses, and their effect on the run.
 
 mod cause;
 pub(crate) mod format;
@@ -23,59 +23,63 @@ use sweep_engine::{Effort, Error, Interrupt, Progress, RunContext, threads};
 
 pub(crate) use cause::Cause;
 use sweep_parameter::RatioLimits;
-use tongue::{Asker, Seen, tongues};
-pub(crate) use tongue::{Closing, End, Resonance, Tongue};
+pub(crate) use tongue::{Closing, ModeResonance, Tongue, TongueEnd};
+use tongue::{ResponseFinder, SpeedScan, find_tongues};
 use washer_row::{Outcome, ROW_STATUSES, Status, Verdict, row_status};
 
-/// Distance between the speeds that are looked at (rpm), unless `--speed` says another.
+/// Step between the speeds at which responses are sought (rpm), unless `--speed` gives another.
+/// Basis: the tongues of the paper's machine are wider. Doubling it halves the time and misses
+/// tongues of up to twice the width.
 const STEP_RPM: f64 = 1.0;
 
-/// Speeds from this share of the slowest mode's frequency are looked at, unless `--speed` says
-/// others. Parametric resonances of a mode f are at 2 f / k: this is the fourth.
-const LOWEST_SHARE: f64 = 0.5;
+/// Lowest speed at which responses are sought, as a share of the slowest mode's frequency, unless
+/// `--speed` gives another. Basis: parametric resonances of a mode of frequency f are at 2 f / k,
+/// and this is the fourth. Doubling it leaves out the third and the fourth.
+const LOWEST_SPEED: f64 = 0.5;
 
-/// What is found at a point.
+/// The tongues of a point, and their part in its verdict.
 pub(crate) struct Explanation {
     /// The grid's name.
     pub(crate) name: String,
-    /// The point: parameters by name.
+    /// The parameters of the point, with their names.
     pub(crate) at: NamedValues,
-    /// The swept verdict.
-    pub(crate) swept: Swept,
-    /// What is seen beside tongues, by the way in which the drum turns: forwards first.
-    pub(crate) seen: Vec<Seen>,
-    /// From lowest to fastest speed of the profile within the run (rpm), below 0 backwards.
+    /// The result of the point in a map.
+    pub(crate) swept: SweptResult,
+    /// The scans over speed, one for each direction in which the drum turns, forwards first.
+    pub(crate) scans: Vec<SpeedScan>,
+    /// The lowest and the greatest speed of the profile within the run (rpm), negative backwards.
     pub(crate) profile_rpm: [f64; 2],
-    /// Each, with the times at which the run crosses it.
+    /// The tongues, each with its passages in order of time.
     pub(crate) tongues: Vec<(Tongue, Vec<Passage>)>,
-    /// The same run, each tongue entered on its periodic response: amplitudes in the window, per
-    /// channel of the plan; none where no tongue is crossed before the window ends.
+    /// The amplitudes, by channel of the plan, of the same run when it is put on the periodic
+    /// response at the entry of each tongue; `None` if no tongue is crossed before the window ends.
     pub(crate) without_departures: Option<Result<Vec<f64>, LeftRange>>,
-    /// The deviation, and how much of it the tongues' growth makes; none without a ratio.
+    /// The deviation of the models, and the share that tongues have in it; `None` without a ratio.
     pub(crate) cause: Option<Cause>,
 }
 
-/// What `sweep run` says of the point.
-pub(crate) struct Swept {
+/// The result of the point as a map has it.
+pub(crate) struct SweptResult {
     pub(crate) channels: Vec<Channel>,
     pub(crate) window_s: [f64; 2],
     pub(crate) limits: RatioLimits,
-    /// One of the result file's.
+    /// The status of the row, by its name in result files.
     pub(crate) status: &'static str,
     pub(crate) fail_time_s: Option<f64>,
-    /// Amplitudes by the nonlinear and the linear model, per channel; empty of a model that failed.
+    /// The amplitudes of the nonlinear and of the linear model, by channel; empty for a model whose
+    /// integration failed.
     pub(crate) amplitudes: [Vec<f64>; 2],
     pub(crate) verdict: Verdict,
 }
 
-impl Swept {
-    /// The plan's channels of all.
-    pub(crate) fn of_plan(&self, peaks: &[f64; Channel::ALL.len()]) -> Vec<f64> {
+impl SweptResult {
+    /// Returns the peaks of the plan's channels, out of those of all channels.
+    pub(crate) fn plan_channels(&self, peaks: &[f64; Channel::ALL.len()]) -> Vec<f64> {
         self.channels.iter().map(|channel| peaks[channel.index()]).collect()
     }
 
-    /// The greatest ratio of other amplitudes of the nonlinear model to the linear one's.
-    pub(crate) fn greatest_of(&self, nonlinear: &[f64]) -> Option<(f64, Channel)> {
+    /// Returns the greatest ratio of given nonlinear amplitudes to those of the linear model.
+    pub(crate) fn greatest_ratio(&self, nonlinear: &[f64]) -> Option<(f64, Channel)> {
         let pairs = nonlinear.iter().zip(&self.amplitudes[1]).zip(&self.channels);
         let ratios = pairs
             .filter(|((_, linear), _)| **linear != 0.0)
@@ -86,32 +90,32 @@ impl Swept {
 
 /// A stretch of time in which the profile is inside a tongue.
 pub(crate) struct Passage {
-    /// From when to when (s).
+    /// The times of entry and exit (s).
     pub(crate) from_to_s: [f64; 2],
-    /// Whether the run ends inside.
+    /// Whether the run ends inside the tongue.
     pub(crate) is_cut: bool,
-    /// The integral over it of the growth at the speed of each instant.
+    /// The integral over the passage of the growth at the speed of each instant.
     pub(crate) e_folds: f64,
-    /// What it does to disturbances.
+    /// The growth of disturbances in the passage.
     pub(crate) crossed: Result<Crossed, LeftRange>,
 }
 
-/// Explains a plan's one point. Once the interrupt is raised it ends early, and what it returns
-/// means nothing.
+/// Explains the verdict of a plan's only point. Once the interrupt is raised it ends early, and the
+/// result is meaningless.
 ///
 /// # Errors
-/// A profile without a speed to look at, a machine without equilibrium or modes, and an instruction
-/// set that is not there.
+/// Returns an error if the profile reaches no speed at which responses are sought, if the machine
+/// has no equilibrium or no modes, and if this processor lacks the instruction set.
 pub(crate) fn explain(
     plan: &Plan,
     at: NamedValues,
     speeds: Option<Speeds>,
     effort: Effort<'_>,
 ) -> Result<Explanation, Error> {
-    threads::pool(effort.threads()?)?.install(|| explained(plan, at, speeds, effort))
+    threads::pool(effort.threads()?)?.install(|| explain_in_pool(plan, at, speeds, effort))
 }
 
-fn explained(
+fn explain_in_pool(
     plan: &Plan,
     at: NamedValues,
     speeds: Option<Speeds>,
@@ -121,51 +125,56 @@ fn explained(
     let scenario = plan.scenario(0);
     let spin = &scenario.model.spin;
     let profile_rpm = profile::range(spin, plan.end_s);
-    let point = ready(plan, &scenario).map_err(Error::model)?;
+    let point = prepare_scenario(plan, &scenario).map_err(Error::model)?;
     let directions = directions(plan, &scenario, &point, profile_rpm, speeds)?;
-    // Behind those that are looked at come speeds that nobody can count beforehand.
-    let speeds_of = |direction: &Direction| direction.looked.values().len() as u64;
-    let total: u64 = directions.iter().map(speeds_of).sum();
+    // The total is that of the scans. The searches after them take a number of speeds that is not
+    // known beforehand.
+    let speed_count = |direction: &TurningDirection| direction.scanned.values().len() as u64;
+    let total: u64 = directions.iter().map(speed_count).sum();
     let done = AtomicU64::new(0);
     let progress = Progress::for_search(progress, total, "speeds looked at", 0);
-    let counted = |speeds: usize| {
+    let count_speeds = |speeds: usize| {
         let done = done.fetch_add(speeds as u64, Ordering::Relaxed) + speeds as u64;
         progress.show_search(done.min(total), done);
     };
-    counted(0);
-    let mut askers = Vec::with_capacity(directions.len());
+    count_speeds(0);
+    let mut finders = Vec::with_capacity(directions.len());
     for direction in &directions {
-        let mut asker = Asker {
+        let mut finder = ResponseFinder {
             simd,
             plan,
             scenario: &direction.scenario,
             point: &direction.point,
             is_backward: direction.is_backward,
             interrupt,
-            counted: &counted,
-            followed: Vec::new(),
+            count_speeds: &count_speeds,
+            curves: Vec::new(),
         };
-        asker.follow(direction.looked.to.max(direction.fastest_rpm));
-        askers.push(asker);
+        finder.follow(direction.scanned.to.max(direction.fastest_rpm));
+        finders.push(finder);
     }
-    let look = || {
-        let each = askers.iter().zip(&directions);
-        each.map(|(asker, direction)| tongues(asker, direction.looked)).collect::<Vec<_>>()
+    let scan = || {
+        finders
+            .iter()
+            .zip(&directions)
+            .map(|(finder, direction)| find_tongues(finder, direction.scanned))
+            .collect::<Vec<_>>()
     };
-    let (looked, swept) = rayon::join(look, || swept(plan, interrupt));
-    let (found, seen): (Vec<Vec<Tongue>>, Vec<Seen>) = looked.into_iter().unzip();
+    let (scanned, swept) = rayon::join(scan, || swept_result(plan, interrupt));
+    let (found, scans): (Vec<Vec<Tongue>>, Vec<SpeedScan>) = scanned.into_iter().unzip();
     let found: Vec<Tongue> = found.into_iter().flatten().collect();
     let swept = swept?;
-    let asker_of = |tongue: &Tongue| {
-        let asks = |asker: &&Asker<'_>| asker.is_backward == tongue.is_backward;
-        askers.iter().find(asks).unwrap_or(&askers[0])
+    let finder_for = |tongue: &Tongue| {
+        let same_direction =
+            |finder: &&ResponseFinder<'_>| finder.is_backward == tongue.is_backward;
+        finders.iter().find(same_direction).unwrap_or(&finders[0])
     };
     let ends_in = || -> Vec<Option<Ending>> {
         let directions = found.chunk_by(|a, b| a.is_backward == b.is_backward);
-        directions.flat_map(|found| tongue::ends_in(asker_of(&found[0]), found)).collect()
+        directions.flat_map(|found| tongue::find_endings(finder_for(&found[0]), found)).collect()
     };
-    let crossings = || crossings(plan, (&point, spin), &askers, &found, &swept);
-    let closings = || found.par_iter().map(|tongue| tongue.closing(asker_of(tongue)));
+    let crossings = || find_crossings(plan, (&point, spin), &finders, &found, &swept);
+    let closings = || found.par_iter().map(|tongue| tongue.find_closing(finder_for(tongue)));
     let ((crossings, ends_in), closings) =
         rayon::join(|| rayon::join(crossings, ends_in), || closings().collect::<Vec<_>>());
     let (passages, without_departures) = crossings;
@@ -174,10 +183,10 @@ fn explained(
         passages.iter().map(|passage| (passage, tongue.growths.as_slice()))
     });
     let keeps_limit = |amplitudes: &Vec<f64>| {
-        swept.greatest_of(amplitudes).is_some_and(|(ratio, _)| ratio < swept.limits.most)
+        swept.greatest_ratio(amplitudes).is_some_and(|(ratio, _)| ratio < swept.limits.most)
     };
     let has_passed = matches!(&without_departures, Some(Ok(amplitudes)) if keeps_limit(amplitudes));
-    let cause = cause::cause((&point, spin), step_s, &swept, has_passed, growing);
+    let cause = cause::find_cause((&point, spin), step_s, &swept, has_passed, growing);
     let tongues = found.into_iter().zip(closings).zip(ends_in).zip(passages);
     let tongues = tongues.map(|(((tongue, closing), ends_in), passages)| {
         (Tongue { closing: Some(closing), ends_in, ..tongue }, passages)
@@ -185,7 +194,7 @@ fn explained(
     Ok(Explanation {
         name: plan.name.clone(),
         at,
-        seen,
+        scans,
         profile_rpm,
         tongues: tongues.collect(),
         without_departures,
@@ -194,42 +203,45 @@ fn explained(
     })
 }
 
-/// A way in which a run's drum turns. Backwards it moves as the mirrored machine does forwards.
-struct Direction {
+/// A direction in which the drum turns in a run. A machine that turns backwards moves like its
+/// mirror image that turns forwards.
+struct TurningDirection {
     is_backward: bool,
     /// The machine and its spin, mirrored if the drum turns backwards.
     scenario: Scenario,
     point: Point,
-    looked: Speeds,
-    /// The profile's fastest speed in this direction (rpm).
+    /// The speeds at which responses are sought.
+    scanned: Speeds,
+    /// The greatest speed of the profile in this direction (rpm).
     fastest_rpm: f64,
 }
 
-/// Returns the ways in which a profile between two speeds (rpm) turns the drum, with the speeds to
-/// look at: those that were asked for, or from half of the slowest mode's frequency up.
+/// Returns the directions in which a profile between two speeds (rpm) turns the drum, with the
+/// speeds at which responses are sought: `requested`, or those from half of the slowest mode's
+/// frequency up.
 ///
 /// # Errors
-/// A machine without modes, and a profile that has no speed to look at.
+/// Returns an error if the machine has no modes, or if the profile reaches none of these speeds.
 fn directions(
     plan: &Plan,
     scenario: &Scenario,
     point: &Point,
     [least_rpm, most_rpm]: [f64; 2],
-    asked: Option<Speeds>,
-) -> Result<Vec<Direction>, Error> {
+    requested: Option<Speeds>,
+) -> Result<Vec<TurningDirection>, Error> {
     let slowest_rpm = modes(point, 0.0, 0.0).map_err(Error::model)?.modes[0].frequency_rpm();
-    let from_rpm = (LOWEST_SHARE * slowest_rpm).floor().max(1.0);
+    let from_rpm = (LOWEST_SPEED * slowest_rpm).floor().max(1.0);
     let mut directions = Vec::new();
     for (is_backward, fastest_rpm) in [(false, most_rpm), (true, -least_rpm)] {
         let is_turned = fastest_rpm > 0.0 || !is_backward && least_rpm >= 0.0;
-        let looked = match asked {
-            Some(asked) if is_turned => asked,
+        let scanned = match requested {
+            Some(requested) if is_turned => requested,
             None if fastest_rpm > from_rpm => Speeds::new(from_rpm, fastest_rpm, STEP_RPM),
             _ => continue,
         };
         let scenario = if is_backward { mirrored(scenario) } else { scenario.clone() };
-        let point = ready(plan, &scenario).map_err(Error::model)?;
-        directions.push(Direction { is_backward, scenario, point, looked, fastest_rpm });
+        let point = prepare_scenario(plan, &scenario).map_err(Error::model)?;
+        directions.push(TurningDirection { is_backward, scenario, point, scanned, fastest_rpm });
     }
     if directions.is_empty() {
         let fastest_rpm = most_rpm.max(-least_rpm);
@@ -253,23 +265,26 @@ fn mirrored(scenario: &Scenario) -> Scenario {
     mirrored
 }
 
-/// A machine with its spin, ready to be integrated.
-fn ready(plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilibrium> {
+/// Prepares a machine and its spin for integration.
+fn prepare_scenario(plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilibrium> {
     let timing = Timing { window_s: scenario.window_s, ..plan::timing(plan) };
-    plan::ready(scenario.model.machine.clone(), scenario.model.spin.clone(), &timing)
+    plan::prepare_point(scenario.model.machine.clone(), scenario.model.spin.clone(), &timing)
 }
 
-fn swept(plan: &Plan, interrupt: &Interrupt) -> Result<Swept, Error> {
+/// Computes the row of the plan's only point. Once the interrupt is raised, the result is
+/// meaningless.
+fn swept_result(plan: &Plan, interrupt: &Interrupt) -> Result<SweptResult, Error> {
     let scenario = plan.scenario(0);
     let channels = plan.reliability.channels.clone();
-    let (engine, watch) = (ModelEngine::new(plan)?, RunContext::new(interrupt));
-    let outcomes = engine.evaluate_in_context(&[Vec::new()], &watch);
+    let engine = ModelEngine::new(plan)?;
+    let context = RunContext::new(interrupt);
+    let outcomes = engine.evaluate_in_context(&[Vec::new()], &context);
     let outcome = outcomes.and_then(|mut outcomes| outcomes.pop());
-    // Where it was stopped: nothing.
+    // A stopped engine returns no row.
     let outcome = outcome.unwrap_or_else(|| Outcome::failed(0, Status::Panicked));
     let (status, fail_time_s) = row_status(&outcome);
     let verdict = Verdict::new(&outcome, channels.len(), plan.reliability.limits);
-    Ok(Swept {
+    Ok(SweptResult {
         channels,
         window_s: scenario.window_s,
         limits: plan.reliability.limits,
@@ -280,19 +295,20 @@ fn swept(plan: &Plan, interrupt: &Interrupt) -> Result<Swept, Error> {
     })
 }
 
+/// The field of this name of an [`Explanation`].
 type WithoutDepartures = Option<Result<Vec<f64>, LeftRange>>;
 
-/// When the run crosses each tongue and what comes of it; and the amplitudes of the run that enters
-/// them on their periodic responses.
-fn crossings(
+/// Returns the passages of the run through each tongue, and the amplitudes of the same run when it
+/// is put on the periodic response at the entry of each tongue.
+fn find_crossings(
     plan: &Plan,
     (point, spin): (&Point, &Spin),
-    askers: &[Asker<'_>],
+    finders: &[ResponseFinder<'_>],
     tongues: &[Tongue],
-    swept: &Swept,
+    swept: &SweptResult,
 ) -> (Vec<Vec<Passage>>, WithoutDepartures) {
     let end_s = plan.end_s;
-    // In order of time, with the tongue of each.
+    // Passages in order of time, each with the number of its tongue.
     let times = tongues.iter().enumerate().flat_map(|(k, tongue)| {
         let [from, to] = tongue.from_to_rpm;
         let band_rpm = if tongue.is_backward { [-to, -from] } else { [from, to] };
@@ -302,17 +318,17 @@ fn crossings(
     let mut times: Vec<(usize, [f64; 2])> = times.collect();
     times.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
     for i in 1..times.len() {
-        // Neighbours share an edge, found twice.
+        // Adjacent tongues share an edge that was located twice, with an error each.
         times[i].1[0] = times[i].1[0].max(times[i - 1].1[1]);
     }
     let mut responses: Vec<[Option<Response>; 2]> = vec![[None, None]; times.len()];
-    for asker in askers {
-        let is_of_asker =
-            |number: &usize| tongues[times[*number].0].is_backward == asker.is_backward;
-        let numbers: Vec<usize> = (0..times.len()).filter(is_of_asker).collect();
+    for finder in finders {
+        let same_direction =
+            |number: &usize| tongues[times[*number].0].is_backward == finder.is_backward;
+        let numbers: Vec<usize> = (0..times.len()).filter(same_direction).collect();
         let ends_s = numbers.iter().flat_map(|&number| times[number].1);
         let speeds: Vec<f64> = spin.speeds_rpm(ends_s).map(f64::abs).collect();
-        let mut found = asker.responses(&speeds).into_iter();
+        let mut found = finder.find_responses(&speeds).into_iter();
         for number in numbers {
             responses[number] = [found.next().flatten(), found.next().flatten()];
         }
@@ -326,7 +342,7 @@ fn crossings(
             is_backward: tongues[*k].is_backward,
         })
         .collect();
-    if askers.iter().any(|asker| asker.interrupt.stopped()) {
+    if finders.iter().any(|finder| finder.interrupt.stopped()) {
         return (Vec::new(), None);
     }
     let step_s = reference_step_s(&StepSelector::new([(point, spin)], end_s));
@@ -336,7 +352,7 @@ fn crossings(
         || {
             crossings.iter().find(before_end)?;
             let peaks = peaks_without_departures(point, step_s, &crossings, swept.window_s);
-            Some(peaks.map(|peaks| swept.of_plan(&peaks)))
+            Some(peaks.map(|peaks| swept.plan_channels(&peaks)))
         },
     );
     let mut passages: Vec<Vec<Passage>> = tongues.iter().map(|_| Vec::new()).collect();

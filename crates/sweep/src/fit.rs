@@ -28,7 +28,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use washer_model::{Method, ModelKind, Parameter, Target};
 
-use crate::config::GridInput;
+use crate::config::WasherGridInput;
 use crate::engine::simd_from_environment;
 use sweep_engine::config::{Diagnostic, Location, Report as Mistakes};
 use sweep_engine::design::{DesignRule, DistributionShape};
@@ -138,7 +138,7 @@ pub(crate) struct Work<'a> {
 /// # Errors
 /// Mistakes in the grid and the constants. An axis without a constant stands at its middle.
 pub(crate) fn case(
-    grid: &GridInput,
+    grid: &WasherGridInput,
     constants: &[String],
     mut measured: Measured,
 ) -> Result<Case, Error> {
@@ -150,7 +150,7 @@ pub(crate) fn case(
 }
 
 /// A value for every axis of several that has no constant.
-fn middle(grid: &GridInput, constants: &[String]) -> Result<Vec<String>, Diagnostics> {
+fn middle(grid: &WasherGridInput, constants: &[String]) -> Result<Vec<String>, Diagnostics> {
     let plan = grid.load()?;
     let is_given = |name: &str| constants.iter().any(|it| it.split('=').next() == Some(name));
     let several =

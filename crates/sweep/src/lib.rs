@@ -10,7 +10,7 @@
 //!   says which builds write the same bytes.
 //! * `trace` writes one point's time histories, `stability`, `dwell`, `explain` and `fit` answer
 //!   the questions of their names. [`washer_plot`] draws any of these files.
-//! * `library` is the commands' work as functions: an [`Evaluator`] takes tables of points, a
+//! * `library` is the commands' work as functions: an [`PlanEvaluator`] takes tables of points, a
 //!   [`MemoryTable`] holds a result in memory.
 //! * `commands` is the command line.
 //!
@@ -59,15 +59,15 @@ mod tests;
 mod trace;
 
 pub use commands::Cli;
-pub use config::{Diagnostics, GridInput, Mistake, load};
-pub use dwell::{Carry, Search};
+pub use config::{Diagnostics, Mistake, WasherGridInput, load};
+pub use dwell::{AttractorSearch, Carry};
 pub use engine::ModelEngine;
 pub use fit::FitOptions;
 pub use identity::{NUMERICS_VERSION, VERSION};
 pub use library::{
-    BoundaryOptions, Effort, Evaluator, Explained, MemoryTable, PointTable, RanToFile, Task,
-    TraceOptions, explain_point, find_boundary, find_modes, fit_tables, held, list_parameters,
-    optimise_study, trace_point,
+    BoundaryOptions, Effort, EvaluationTask, Explained, MemoryTable, PlanEvaluator, PointTable,
+    RanToFile, TraceOptions, explain_point, find_boundary, find_modes, fit_tables, hold_speeds,
+    list_parameters, optimise_study, trace_point,
 };
 pub use method::Integrator;
 pub use model::Washer;

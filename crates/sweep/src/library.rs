@@ -1,7 +1,7 @@
-//! The commands' work as functions with results in memory, for programs.
+//! The work of the commands as functions with results in memory, for programs.
 //!
-//! Functions that may take long take an [`Interrupt`](crate::Interrupt). Raised from another
-//! thread, it ends the work in a fraction of a second.
+//! Functions that may take long have an [`Interrupt`](crate::Interrupt) as an argument. If another
+//! thread raises it, the work ends within a fraction of a second.
 
 mod evaluate;
 mod explain;
@@ -14,15 +14,15 @@ mod search;
 mod stability;
 mod trace;
 
-pub use evaluate::Evaluator;
+pub use evaluate::PlanEvaluator;
 pub use explain::{Explained, explain_point};
 pub use fit::fit_tables;
 pub use modes::find_modes;
 pub use points::PointTable;
 pub use result::MemoryTable;
-pub use run::{RanToFile, Task};
+pub use run::{EvaluationTask, RanToFile};
 pub use search::{BoundaryOptions, find_boundary, optimise_study};
-pub use stability::held;
+pub use stability::hold_speeds;
 pub use trace::{TraceOptions, trace_point};
 
 use sweep_engine::commands::parameters::as_json;
@@ -31,36 +31,36 @@ use sweep_engine::{Error, Swept as _};
 
 use crate::model::Washer;
 use crate::plan::Plan;
-use crate::speeds::MOST_SPEEDS;
+use crate::speeds::MAX_SPEEDS;
 
-/// Every number that can be set or swept as a JSON array of objects: `name`, `value`, `unit`,
-/// `description`, `range` and `source`. The values are the plan's, before its axes; without a plan
-/// those of the built-in machine.
+/// Returns all parameters as a JSON array of objects with `name`, `value`, `unit`, `description`,
+/// `range` and `source`. The values are those of the plan without its axes, or those of the
+/// built-in machine.
 pub fn list_parameters(plan: Option<&Plan>) -> String {
     as_json(&Washer::listed(plan))
 }
 
-/// Speeds that make no sense.
+/// Returns the error for a list of speeds that is refused.
 fn refused_speeds(count: usize, expected: String) -> Error {
     Error::option("speeds", format!("with {count} values"), expected)
 }
 
-/// Refuses speeds (rpm) that do not rise, fewer than `least` of them or too many, and any that is
-/// not `allowed`, which are those `said`.
+/// Checks that speeds (rpm) increase, that there are at least `least` and not too many, and that
+/// each `is_allowed`, which `condition` describes.
 fn check_speeds(
     speeds_rpm: &[f64],
     least: usize,
-    allowed: fn(f64) -> bool,
-    said: &str,
+    is_allowed: fn(f64) -> bool,
+    condition: &str,
 ) -> Result<(), Error> {
     let count = speeds_rpm.len();
-    let rise = speeds_rpm.windows(2).all(|pair| pair[0] < pair[1]);
-    let are_speeds = speeds_rpm.iter().all(|speed| speed.is_finite() && allowed(*speed));
-    if rise && are_speeds && count >= least && count as f64 <= MOST_SPEEDS + 1.0 {
+    let are_increasing = speeds_rpm.windows(2).all(|pair| pair[0] < pair[1]);
+    let are_speeds = speeds_rpm.iter().all(|speed| speed.is_finite() && is_allowed(*speed));
+    if are_increasing && are_speeds && count >= least && count as f64 <= MAX_SPEEDS + 1.0 {
         return Ok(());
     }
     let expected = format!(
-        "from {least} to {MOST_SPEEDS} finite speeds in rpm{said}, each above the one before"
+        "from {least} to {MAX_SPEEDS} finite speeds in rpm{condition}, each above the one before"
     );
     Err(refused_speeds(count, expected))
 }

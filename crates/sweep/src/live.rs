@@ -1,4 +1,5 @@
-//! What a live page computes with: the plan of a map as the setup of `washer-live`'s module.
+//! The data with which a live page computes: the plan of a map as the setup of `washer-live`'s
+//! module.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -9,16 +10,16 @@ use washer_model::{Channel, Ending, Kind, ModeOverSpeed, ModelKind, Parameter, c
 use washer_plot::{Live, Slider};
 use washer_row::{Level, Metric, MetricColumn};
 
-use crate::config::GridInput;
+use crate::config::WasherGridInput;
 use crate::engine::{CHECKPOINTS, ModelEngine, rule};
 use crate::method::Integrator;
 use crate::model::Washer;
-use crate::plan::{Axis, Plan, between, corners_of_forces, ready, timing};
+use crate::plan::{Axis, Plan, axis_between, corners_of_forces, prepare_point, timing};
 use sweep_engine::Error;
 use sweep_engine::method::ACCURACY;
 use sweep_engine::store::read::overview;
 
-/// Parameters that a page offers beside the axes, where the machine has them.
+/// Parameters with sliders besides the axes, if the machine has them.
 const OFFERED: [&str; 6] = [
     "unbalance_mass_kg",
     "damping_n_s_per_m",
@@ -28,23 +29,27 @@ const OFFERED: [&str; 6] = [
     "spin_peak_rpm",
 ];
 
-/// How far their values go either way, as a share.
-const SPREAD: f64 = 0.3;
+/// Range of a slider on each side of the plan's value, as a share of it. Basis: a wide range that
+/// machines can have. Doubling it includes values that few machines have.
+const SLIDER_SPREAD: f64 = 0.3;
 
-/// The greatest number of sliders beside the axes: levels are chosen for every corner of their
-/// ranges.
-const MOST_SLIDERS: usize = 6;
+/// Maximum number of sliders besides the axes. Basis: levels are chosen for every corner of their
+/// ranges. Doubling it makes 64 times as many corners.
+const MAX_SLIDERS: usize = 6;
 
-/// Time between two instants of a history (s): at 1200 rpm five to a turn.
-const EVERY_S: f64 = 0.01;
+/// Minimum time between two instants of a history (s). Basis: five instants a turn at 1200 rpm.
+/// Doubling it misses peaks of fast motions.
+const MIN_SPACING_S: f64 = 0.01;
 
-/// Most instants of a history, so that a page of a long run stays quick.
-const MOST_INSTANTS: f64 = 8000.0;
+/// Maximum number of instants of a history. Basis: the page of a long run stays fast. Doubling it
+/// doubles the time to draw.
+const MAX_INSTANTS: f64 = 8000.0;
 
-/// Speeds at which modes are followed (rpm).
-const MODES_EVERY_RPM: f64 = 10.0;
+/// Step between the speeds at which modes are computed (rpm). Basis: resonances are refined between
+/// these speeds. Doubling it may confuse modes whose frequencies cross.
+const MODE_STEP_RPM: f64 = 10.0;
 
-/// A parameter with the ends of its range, as `--slider` gives them.
+/// A parameter with the ends of its range, from `--slider`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SliderRange {
     name: String,
@@ -52,11 +57,11 @@ pub struct SliderRange {
     to: f64,
 }
 
-/// Reads `tub_mass_kg=20:30`.
+/// Parses a range such as `tub_mass_kg=20:30`.
 ///
 /// # Errors
-/// What was expected instead.
-pub(crate) fn slider_range(text: &str) -> Result<SliderRange, String> {
+/// Returns a description of the expected text.
+pub(crate) fn parse_slider_range(text: &str) -> Result<SliderRange, String> {
     let expected = "expected NAME=FROM:TO, as in tub_mass_kg=20:30";
     let (name, range) = text.split_once('=').ok_or(expected)?;
     let (from, to) = range.split_once(':').ok_or(expected)?;
@@ -70,17 +75,19 @@ pub(crate) fn slider_range(text: &str) -> Result<SliderRange, String> {
     }
 }
 
-/// What the page of a map file computes with. Without `ranges` it has the usual sliders.
+/// Returns the data with which the page of a map file computes. Without `ranges` it has the usual
+/// sliders.
 ///
 /// # Errors
-/// A file that is not the map of a grid with its plan; ranges that no machine can have.
+/// Returns an error if the file is no map of a grid with its plan, or if no machine can have the
+/// ranges.
 pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
-    let mut plan = plan_of(file)?;
+    let mut plan = plan_from_map(file)?;
     let has_slow_growth = corners_of_forces(&plan).is_some();
-    let (held_speeds_rpm, held_metrics) = take_held(&mut plan);
+    let (held_speeds_rpm, held_metrics) = take_held_metrics(&mut plan);
     let sliders = match ranges {
-        [] => usual(&plan),
-        _ => chosen(&plan, ranges)?,
+        [] => usual_sliders(&plan),
+        _ => requested_sliders(&plan, ranges)?,
     };
     let (setup, words) = setup(&plan, &sliders)?;
     let axes = plan.axes.iter().map(|axis| slider(axis, None));
@@ -88,12 +95,12 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     let further = sliders.iter().map(|axis| slider(axis, axis.parameter.get(machine, spin)));
     let columns = |number: MetricColumn| ModelKind::ALL.map(|model| number.column(model.name()));
     let criterion = plan.model.measures.criterion;
-    // What a column has where there is no ratio is not a page's.
+    // The description goes on about rows without a ratio, which a page does not have.
     let ratio = criterion.ratio().split(';').next().unwrap_or_default();
     Ok(Live {
         setup: setup.to_numbers(),
         sliders: axes.chain(further).collect(),
-        every_s: EVERY_S.max(plan.end_s / MOST_INSTANTS),
+        every_s: MIN_SPACING_S.max(plan.end_s / MAX_INSTANTS),
         end_s: plan.end_s,
         window_s: plan.window_s,
         channels: Channel::ALL.map(|channel| channel.name().to_owned()).to_vec(),
@@ -112,52 +119,58 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         ratio_min: setup.rule.limits.least,
         rungs: words,
         version: crate::VERSION.to_owned(),
-        resonances: resonances(&plan),
+        resonances: resonance_rows(&plan),
     })
 }
 
-/// Resonances of the machine at the middle of every axis, up to its greatest speed; none where it
-/// has no modes.
-pub(crate) fn resonances(plan: &Plan) -> Vec<[String; 3]> {
+/// Returns the resonances of the machine at the middle of every axis, up to its greatest speed, as
+/// rows of text: motion, speed and damping ratio. A machine without modes has none.
+pub(crate) fn resonance_rows(plan: &Plan) -> Vec<[String; 3]> {
     let middle: Vec<f64> = plan.axes.iter().map(|axis| axis.values.between(0.5)).collect();
     let Washer { machine, spin, .. } = plan.scenario_at(&middle).model;
     let greatest_rpm = spin.greatest_speed_rad_per_s(plan.end_s) * 60.0 / TAU;
-    let count = (greatest_rpm / MODES_EVERY_RPM).ceil() as u32;
-    let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODES_EVERY_RPM * f64::from(k)).collect();
-    let Ok(point) = ready(machine, spin, &timing(plan)) else { return Vec::new() };
+    let count = (greatest_rpm / MODE_STEP_RPM).ceil() as u32;
+    let speeds_rpm: Vec<f64> = (0..=count).map(|k| MODE_STEP_RPM * f64::from(k)).collect();
+    let Ok(point) = prepare_point(machine, spin, &timing(plan)) else { return Vec::new() };
     let modes = campbell(&point, &speeds_rpm).unwrap_or_default();
-    let of_mode = |mode: ModeOverSpeed| {
+    let rows = |mode: ModeOverSpeed| {
         let motion = mode.motion.to_string();
-        let resonances = mode.resonances.into_iter().map(move |at| {
-            let (speed, damping) = (at.speed_rpm, at.mode.damping_ratio);
+        let rows = mode.resonances.into_iter().map(move |at| {
+            let speed = at.speed_rpm;
+            let damping = at.mode.damping_ratio;
             [motion.clone(), format!("{speed:.1} rpm"), format!("{damping:.4}")]
         });
-        resonances.collect::<Vec<_>>()
+        rows.collect::<Vec<_>>()
     };
-    modes.into_iter().flat_map(of_mode).collect()
+    modes.into_iter().flat_map(rows).collect()
 }
 
 fn slider(Axis { parameter, values }: &Axis, value: Option<f64>) -> Slider {
     let [from, to] = values.extremes();
-    let (name, description) = (parameter.name().to_owned(), parameter.description().to_owned());
-    Slider { name, description, from, to, value }
+    Slider {
+        name: parameter.name().to_owned(),
+        description: parameter.description().to_owned(),
+        from,
+        to,
+        value,
+    }
 }
 
-/// The plan that a map was made by.
-fn plan_of(file: &Path) -> Result<Plan, Error> {
+/// Returns the plan of a map.
+fn plan_from_map(file: &Path) -> Result<Plan, Error> {
     let refused = |expected: &str| Error::option("--live", file.display(), expected);
     let opened = ParquetFile::open(file)?;
     let json = opened.json(key::PLAN);
     let mut json = json.ok_or_else(|| refused("a map by `sweep run`, which carries its plan"))?;
     let name = file.display().to_string();
     if json.get("design").is_none() {
-        let plan: Plan = GridInput::from_plan(&name, &json).load()?;
+        let plan: Plan = WasherGridInput::from_plan(&name, &json).load()?;
         return if plan.axes.is_empty() { Err(refused("a map with an axis")) } else { Ok(plan) };
     }
-    // Points of a design are where its axes' ranges have them; of a list and of distributions,
-    // wherever its file does.
+    // The axes of a design with ranges have these; those of a list and of distributions have the
+    // ranges of the file's columns.
     let axes = json["axis"].take();
-    let mut plan: Plan = GridInput::from_plan(&name, &json).load()?;
+    let mut plan: Plan = WasherGridInput::from_plan(&name, &json).load()?;
     let columns = overview(&opened)?.columns;
     for axis in axes.as_array().into_iter().flatten() {
         let name = axis["parameter"].as_str().unwrap_or_default();
@@ -165,38 +178,39 @@ fn plan_of(file: &Path) -> Result<Plan, Error> {
         let [from, to] = ["from", "to"].map(|end| axis["range"][end].as_f64());
         let in_file = || columns.iter().find(|column| column.name == name)?.range;
         if let (Ok(parameter), Some((from, to))) = (parameter, from.zip(to).or_else(in_file)) {
-            plan.axes.push(between(parameter, from, to));
+            plan.axes.push(axis_between(parameter, from, to));
         }
     }
     Ok(plan)
 }
 
-/// The constant speeds (rpm) of metrics that a page asks for beside a point's row, and these.
-fn take_held(plan: &mut Plan) -> (Vec<f64>, Vec<Metric>) {
+/// Removes the metrics at held speeds from a plan, because a page requests them separately. Returns
+/// their speeds (rpm) and the metrics.
+fn take_held_metrics(plan: &mut Plan) -> (Vec<f64>, Vec<Metric>) {
     let Washer { measures, held_speeds, .. } = &mut plan.model;
     let held = measures.metrics.extract_if(.., |metric| metric.is_at_held_speeds()).collect();
     let speeds = held_speeds.take();
     (speeds.map_or_else(Vec::new, |speeds| speeds.values().to_vec()), held)
 }
 
-/// The usual sliders: about the plan's values, as far as machines can be.
-fn usual(plan: &Plan) -> Vec<Axis> {
+/// Returns sliders about the plan's values, for the ranges that machines can have.
+fn usual_sliders(plan: &Plan) -> Vec<Axis> {
     let is_axis = |name: &str| plan.axes.iter().any(|axis| axis.parameter.name() == name);
     let offered = OFFERED.into_iter().filter(|name| !is_axis(name));
     let Washer { machine, spin, .. } = &plan.model;
     let range = |name| {
         let parameter = Parameter::find(name, machine, spin).ok()?;
         let value = parameter.get(machine, spin).filter(|value| *value != 0.0)?;
-        let ends = [(1.0 - SPREAD) * value, (1.0 + SPREAD) * value];
+        let ends = [(1.0 - SLIDER_SPREAD) * value, (1.0 + SLIDER_SPREAD) * value];
         let [from, to] = if value > 0.0 { ends } else { [ends[1], ends[0]] };
-        let range = between(parameter, from, to);
+        let range = axis_between(parameter, from, to);
         is_sound(plan, std::slice::from_ref(&range)).then_some(range)
     };
     offered.filter_map(range).collect()
 }
 
-/// The sliders that `--slider` asks for.
-fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, Error> {
+/// Returns the sliders of `--slider`.
+fn requested_sliders(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, Error> {
     let mut found: Vec<Axis> = Vec::new();
     for SliderRange { name, from, to } in ranges {
         let refused =
@@ -207,12 +221,12 @@ fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, Error> {
         let is_spread = parameter.get(&plan.model.machine, &plan.model.spin).is_none();
         let range = parameter.range();
         let beyond = [*from, *to].into_iter().find(|end| !range.contains(*end));
-        found.push(between(parameter, *from, *to));
+        found.push(axis_between(parameter, *from, *to));
         let expected = match beyond {
             _ if has_slider => "a parameter that has no slider yet".to_owned(),
             _ if is_spread => "a parameter that has one value in this map".to_owned(),
             Some(end) => format!("{} at both ends", range.instead_of(end)),
-            None if found.len() > MOST_SLIDERS => format!("at most {MOST_SLIDERS} sliders"),
+            None if found.len() > MAX_SLIDERS => format!("at most {MAX_SLIDERS} sliders"),
             None if !is_sound(plan, &found) => "values that a machine can have together".to_owned(),
             None => continue,
         };
@@ -221,29 +235,29 @@ fn chosen(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, Error> {
     Ok(found)
 }
 
-/// Whether machines and spins can be everywhere within these ranges.
+/// Whether all corners of these ranges have a possible machine and spin.
 fn is_sound(plan: &Plan, sliders: &[Axis]) -> bool {
-    let wide = widened(plan, sliders);
-    wide.some_corners().iter().all(|corner| {
-        let scenario = wide.scenario_at(corner);
+    let plan = with_sliders(plan, sliders);
+    plan.some_corners().iter().all(|corner| {
+        let scenario = plan.scenario_at(corner);
         scenario.model.machine.violations().is_empty()
             && scenario.model.spin.violations().is_empty()
     })
 }
 
-/// The plan with the sliders as further axes.
-fn widened(plan: &Plan, sliders: &[Axis]) -> Plan {
+/// Returns the plan with the sliders as further axes.
+fn with_sliders(plan: &Plan, sliders: &[Axis]) -> Plan {
     Plan { axes: [&plan.axes, sliders].concat(), ..plan.clone() }
 }
 
-/// Returns the setup, and the refinement levels of both models in words.
+/// Returns the setup, and a description of each model's refinement levels.
 fn setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Error> {
-    // By the fast method, whatever the map's; as accurate as that, or as usual.
-    let own = rule(plan).accuracy;
-    let accuracy = if own.is_finite() { own } else { ACCURACY.default };
+    // A page uses the fast method, with the accuracy of the map's method if it has one.
+    let map_accuracy = rule(plan).accuracy;
+    let accuracy = if map_accuracy.is_finite() { map_accuracy } else { ACCURACY.default };
     let plan = &Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
     let levels = ModelEngine::new(plan)?.levels().clone();
-    let wide = widened(plan, sliders);
+    let wide = with_sliders(plan, sliders);
     let wide_levels = ModelEngine::new(&wide)?.levels().clone();
     let words = ModelKind::ALL.map(|model| {
         levels[model as usize].levels.iter().map(|level| level.describe(model)).collect()

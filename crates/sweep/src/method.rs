@@ -33,8 +33,8 @@ methods! {
 }
 
 impl Integrator {
-    /// What integrates a trajectory, and what a row says of it; `None` where levels of other
-    /// methods are compared. Of those a trace takes the reference, `rk4`.
+    /// Returns the level and the method by which each trajectory is integrated; `None` for the fast
+    /// method, which compares levels.
     pub fn direct(&self) -> Option<(Level, Method)> {
         let level = Level::named(self.name())?;
         let mut method = Method::without_numbers(level);

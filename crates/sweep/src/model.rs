@@ -20,14 +20,14 @@ const DEFAULT_CHANNELS: [Channel; 6] = [
     Channel::TubPitch,
 ];
 
-/// What a grid file sets of the washing machine.
+/// The washing machine's part of a plan, from a grid file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Washer {
     /// The machine after `[set]` and `--set`, before the axes.
     pub machine: Machine,
     /// The spin after `[set]` and `--set`, before the axes.
     pub spin: Spin,
-    /// What is measured of the motions.
+    /// The criterion and the metrics that are computed from the motions.
     pub measures: Measures,
     /// The constant speeds of the metrics `growth` and `dwell`; `None` if neither is asked for.
     pub held_speeds: Option<SpeedList>,

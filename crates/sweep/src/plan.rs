@@ -1,4 +1,4 @@
-//! The engine's plan, of a washing machine.
+//! The engine's plan with a washing machine as its model.
 
 use lane_ode::Simd;
 use serde_json::{Map, Value};
@@ -8,37 +8,42 @@ use crate::model::Washer;
 
 pub(crate) use sweep_engine::AxisValues;
 
-/// A validated run of a washing machine: every grid point, and how each is integrated.
+/// A validated plan of a washing machine: its points, and the method by which each is integrated.
 pub type Plan = sweep_engine::Plan<Washer>;
 
-/// One swept parameter.
+/// A parameter that varies over the points, with its values.
 pub(crate) type Axis = sweep_engine::Axis<Washer>;
 
-/// One grid point's input: machine, spin and window with that point's axis values in place.
+/// The machine, spin and window of a point, with the values of its axes.
 pub(crate) type Scenario = sweep_engine::Scenario<Washer>;
 
-/// When a plan's run ends, and its window.
+/// Returns the end and the window of a plan's runs.
 pub(crate) fn timing(plan: &Plan) -> Timing {
     Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 }
 }
 
-/// An axis from one value to another.
-pub(crate) fn between(parameter: Parameter, from: f64, to: f64) -> Axis {
+/// Returns an axis with two values.
+pub(crate) fn axis_between(parameter: Parameter, from: f64, to: f64) -> Axis {
     Axis { parameter, values: AxisValues::Linear { from, to, count: 2 } }
 }
 
-/// One machine with its spin, ready to be integrated.
+/// Prepares a machine with its spin for integration.
 ///
 /// # Errors
-/// [`NoEquilibrium`].
-pub(crate) fn ready(machine: Machine, spin: Spin, timing: &Timing) -> Result<Point, NoEquilibrium> {
+/// Returns [`NoEquilibrium`] if the machine has none.
+pub(crate) fn prepare_point(
+    machine: Machine,
+    spin: Spin,
+    timing: &Timing,
+) -> Result<Point, NoEquilibrium> {
     prepare(Simd::Scalar, &[(machine, spin)], timing).remove(0)
 }
 
-/// At which speeds (m/s) a point's linear model takes the friction of its dampers, by name.
+/// Returns the speed amplitudes (m/s) at which the linear model of a point takes the friction of
+/// its dampers, by their names.
 pub(crate) fn friction_speeds(point: &Point) -> Map<String, Value> {
     let speeds = point.friction_speeds().iter();
-    speeds.map(|of| (format!("damper_{}", of.damper + 1), of.speed_m_per_s.into())).collect()
+    speeds.map(|it| (format!("damper_{}", it.damper + 1), it.speed_m_per_s.into())).collect()
 }
 
 /// Whether some damper has friction at some point of a plan.
@@ -47,7 +52,8 @@ pub(crate) fn has_friction(plan: &Plan) -> bool {
         || plan.axes.iter().any(|axis| axis.parameter.name().ends_with("friction_n"))
 }
 
-/// What gives forces corners at some point of a plan, in words; `None` where all are smooth.
+/// Returns the elements whose forces have corners at some point of a plan, as text; `None` if all
+/// forces are smooth.
 pub(crate) fn corners_of_forces(plan: &Plan) -> Option<&'static str> {
     match (has_friction(plan), plan.model.machine.stops.is_empty()) {
         (true, true) => Some("dampers with friction"),

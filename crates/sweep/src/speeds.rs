@@ -1,22 +1,23 @@
-//! Spin speeds as they are asked for: even ones, FROM:TO:STEP, and lists.
+//! Spin speeds as users write them: FROM:TO:STEP, and lists.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// Most speeds that are accepted: an hour of computing.
-pub(crate) const MOST_SPEEDS: f64 = 100_000.0;
+/// Maximum number of speeds. Basis: an hour of computing. Doubling it doubles that.
+pub(crate) const MAX_SPEEDS: f64 = 100_000.0;
 
-/// The greatest that a drum is held at (rpm): as of `spin_peak_rpm`.
-const MOST_RPM: f64 = 1e5;
+/// Maximum held speed (rpm). Basis: that of `spin_peak_rpm`. Doubling it accepts more mistakes of
+/// units.
+const MAX_RPM: f64 = 1e5;
 
-/// Even speeds, both ends included.
+/// Equally spaced speeds, including both ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Speeds {
-    /// First (rpm).
+    /// The first speed (rpm).
     pub(crate) from: f64,
-    /// Last (rpm).
+    /// The last speed (rpm).
     pub(crate) to: f64,
-    /// Between two (rpm).
+    /// The distance of two neighbours (rpm); that of the last two may be smaller.
     pub(crate) step: f64,
 }
 
@@ -29,17 +30,16 @@ impl FromStr for Speeds {
         let Some([from, to, step]) = numbers.as_deref() else {
             return Err("expected FROM:TO:STEP in rpm, as in 0:1200:10".to_owned());
         };
-        Self::new(*from, *to, *step).judged()
+        Self::new(*from, *to, *step).check()
     }
 }
 
 impl Speeds {
-    /// From one speed to a greater one, in steps above 0.
     pub(crate) const fn new(from: f64, to: f64, step: f64) -> Self {
         Self { from, to, step }
     }
 
-    fn judged(self) -> Result<Self, String> {
+    fn check(self) -> Result<Self, String> {
         let Self { from, to, step } = self;
         let count = (to - from) / step;
         if !(from >= 0.0 && to > from && step > 0.0 && to.is_finite()) {
@@ -47,25 +47,27 @@ impl Speeds {
                 "expected speeds of 0 rpm or more, TO above FROM, and a STEP above 0".to_owned()
             );
         }
-        if count > MOST_SPEEDS {
-            return Err(format!("these are {count:.0} speeds, expected at most {MOST_SPEEDS}"));
+        if count > MAX_SPEEDS {
+            return Err(format!("these are {count:.0} speeds, expected at most {MAX_SPEEDS}"));
         }
         Ok(self)
     }
 
-    /// The even speeds whose [`Self::values`] are these, but for rounding.
-    pub(crate) fn of_values(speeds_rpm: &[f64]) -> Option<Self> {
+    /// Returns the speeds whose [`Self::values`] are these within rounding; `None` if they are not
+    /// equally spaced.
+    pub(crate) fn from_values(speeds_rpm: &[f64]) -> Option<Self> {
         let (&[from, second, ..], &[.., to]) = (speeds_rpm, speeds_rpm) else { return None };
-        let speeds = Self::new(from, to, second - from).judged().ok()?;
-        let alike = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * to;
+        let speeds = Self::new(from, to, second - from).check().ok()?;
+        let is_close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * to;
         let values = speeds.values();
-        let is_even = values.len() == speeds_rpm.len() && values.iter().zip(speeds_rpm).all(alike);
+        let is_even =
+            values.len() == speeds_rpm.len() && values.iter().zip(speeds_rpm).all(is_close);
         is_even.then_some(speeds)
     }
 
-    /// The speeds (rpm); the last is the end itself.
+    /// Returns the speeds (rpm). The last one is exactly `to`.
     pub(crate) fn values(self) -> Vec<f64> {
-        // The quotient may come out a hair beside the whole number that was meant.
+        // Rounding may make the quotient slightly greater than the whole number of steps.
         let steps = ((self.to - self.from) / self.step * (1.0 - 1e-12)).ceil().max(1.0) as usize;
         (0..=steps)
             .map(|k| if k == steps { self.to } else { self.from + k as f64 * self.step })
@@ -73,23 +75,22 @@ impl Speeds {
     }
 }
 
-/// Speeds at which the drum turns, rising: one, even ones, or several of these.
+/// Increasing speeds above 0: single ones, equally spaced ones, or several of these.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpeedList {
-    /// As it was written.
+    /// The list as the user wrote it.
     text: String,
     values_rpm: Vec<f64>,
 }
 
 impl SpeedList {
-    /// The speeds (rpm).
+    /// Returns the speeds (rpm).
     pub fn values(&self) -> &[f64] {
         &self.values_rpm
     }
 }
 
 impl fmt::Display for SpeedList {
-    /// As it is written on a command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.text)
     }
@@ -102,7 +103,7 @@ impl FromStr for SpeedList {
         let mut values_rpm: Vec<f64> = Vec::new();
         for part in text.split(',') {
             if part.contains(':') {
-                values_rpm.extend(turning(part)?.values());
+                values_rpm.extend(parse_speeds_above_zero(part)?.values());
                 continue;
             }
             match part.trim().parse::<f64>() {
@@ -117,28 +118,28 @@ impl FromStr for SpeedList {
         if values_rpm.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err("expected rising speeds".to_owned());
         }
-        if values_rpm.last().is_some_and(|last| *last > MOST_RPM) {
-            return Err(format!("expected at most {MOST_RPM} rpm"));
+        if values_rpm.last().is_some_and(|last| *last > MAX_RPM) {
+            return Err(format!("expected at most {MAX_RPM} rpm"));
         }
         let count = values_rpm.len();
-        if count as f64 > MOST_SPEEDS + 1.0 {
-            return Err(format!("these are {count} speeds, expected at most {MOST_SPEEDS}"));
+        if count as f64 > MAX_SPEEDS + 1.0 {
+            return Err(format!("these are {count} speeds, expected at most {MAX_SPEEDS}"));
         }
         Ok(Self { text: text.split_whitespace().collect(), values_rpm })
     }
 }
 
-/// Even speeds at which the drum turns.
+/// Parses equally spaced speeds above 0.
 ///
 /// # Errors
-/// What is no such range, in words.
-pub(crate) fn turning(text: &str) -> Result<Speeds, String> {
+/// Returns a description of the expected text.
+pub(crate) fn parse_speeds_above_zero(text: &str) -> Result<Speeds, String> {
     let speeds: Speeds = text.parse()?;
     if speeds.from > 0.0 {
         return Ok(speeds);
     }
-    Err("expected speeds above 0 rpm, as in 60:400:1: a drum that does not turn has no turn to \
-         answer over"
+    Err("expected speeds above 0 rpm, as in 60:400:1: a drum at rest has no turn whose response \
+         could be found"
         .to_owned())
 }
 
@@ -147,12 +148,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_list_has_single_speeds_and_even_ones() {
+    fn a_list_has_single_and_equally_spaced_speeds() {
         let values = |text: &str| text.parse::<SpeedList>().map(|list| list.values_rpm);
         assert_eq!(values("250").unwrap(), [250.0]);
         assert_eq!(values("240, 250:260:5,305.5").unwrap(), [240.0, 250.0, 255.0, 260.0, 305.5]);
         assert_eq!("60:400:1".parse::<SpeedList>().unwrap().to_string(), "60:400:1");
-        for (text, said) in [
+        for (text, expected) in [
             ("", "above 0 rpm"),
             ("0", "above 0 rpm"),
             ("nan", "above 0 rpm"),
@@ -162,18 +163,18 @@ mod tests {
             ("0:10:1", "above 0 rpm"),
         ] {
             let refused = values(text).unwrap_err();
-            assert!(refused.contains(said), "{text}: {refused}");
+            assert!(refused.contains(expected), "{text}: {refused}");
         }
     }
 
     #[test]
-    fn speeds_are_even_and_end_where_told() {
+    fn speeds_are_equally_spaced_and_include_the_end() {
         let values = |text: &str| text.parse::<Speeds>().map(Speeds::values);
         assert_eq!(values("0:40:10").unwrap(), [0.0, 10.0, 20.0, 30.0, 40.0]);
         assert_eq!(values("0:25:10").unwrap(), [0.0, 10.0, 20.0, 25.0]);
         assert_eq!(values("5:6:100").unwrap(), [5.0, 6.0]);
         assert_eq!(values("0:0.3:0.1").unwrap().len(), 4);
-        for (text, said) in [
+        for (text, expected) in [
             ("", "FROM:TO:STEP"),
             ("0:1", "FROM:TO:STEP"),
             ("0:x:1", "FROM:TO:STEP"),
@@ -185,19 +186,22 @@ mod tests {
             ("0:1e9:1", "at most"),
         ] {
             let refused = values(text).unwrap_err();
-            assert!(refused.contains(said), "{text}: {refused}");
+            assert!(refused.contains(expected), "{text}: {refused}");
         }
         for text in ["0:40:10", "0:25:10", "5:6:100", "0:0.3:0.1", "60:400:1"] {
             let speeds: Speeds = text.parse().unwrap();
-            let again = Speeds::of_values(&speeds.values()).unwrap();
+            let again = Speeds::from_values(&speeds.values()).unwrap();
             assert_eq!(again.values().len(), speeds.values().len(), "{text}");
         }
         for uneven in
             [&[][..], &[1.0], &[1.0, 1.0], &[1.0, 2.0, 4.0], &[2.0, 1.0], &[1.0, f64::NAN]]
         {
-            assert_eq!(Speeds::of_values(uneven), None, "{uneven:?}");
+            assert_eq!(Speeds::from_values(uneven), None, "{uneven:?}");
         }
-        assert!(turning("0:10:1").unwrap_err().contains("above 0 rpm"));
-        assert!(turning("-5:10:1").is_err() && turning("5:10:1").is_ok());
+        assert!(parse_speeds_above_zero("0:10:1").unwrap_err().contains("above 0 rpm"));
+        assert!(
+            parse_speeds_above_zero("-5:10:1").is_err()
+                && parse_speeds_above_zero("5:10:1").is_ok()
+        );
     }
 }

@@ -14,7 +14,7 @@ use washer_model::{Dwell, Machine, Point, Response, Spin, Target, prepare};
 use washer_row::{Growth, Outcome, Status, Trajectory};
 
 use crate::columns::Columns;
-use crate::dwell::{Motions, Search};
+use crate::dwell::{AttractorEngine, AttractorSearch};
 use crate::engine::{
     Engine, RunContext, find_responses, map_isolating_panics, simd_from_environment,
 };
@@ -23,16 +23,21 @@ use sweep_engine::store::{Column, Holds, Layout, axis_columns};
 use sweep_engine::{Error, Job, RowSink, RowSource};
 use sweep_files::{FileKind, key};
 
-/// Rows that a thread takes at once: those of enough points to fill lanes, because a point's rows
-/// share its curve of responses; but no fewer and no more than these.
-const POINTS_AT_ONCE: u64 = 8;
-const AT_ONCE: [u64; 2] = [32, 2048];
+/// Number of points whose rows a thread computes together. Basis: they fill the lanes, because the
+/// rows of a point share its curve of responses. Doubling it leaves threads without work at the end
+/// of a run.
+const POINTS_TOGETHER: u64 = 8;
 
-/// Refuses a grid whose axes contradict the speeds, or mean nothing at a constant speed. `option`
-/// is what gave the speeds.
+/// Minimum and maximum number of rows that a thread computes together. Basis: less than the minimum
+/// leaves lanes empty, and more than the maximum delays the first rows. Doubling them doubles these
+/// delays.
+const ROWS_TOGETHER: [u64; 2] = [32, 2048];
+
+/// Refuses a grid with an axis of the spin, which contradicts held speeds, or of the window, which
+/// has no meaning at them. `option` is the name of the option that gave the speeds.
 ///
 /// # Errors
-/// [`Error::Refused`].
+/// Returns [`Error::Refused`] for such an axis.
 pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<(), Error> {
     let refuse = |expected: String| Err(Error::option(option, given, expected));
     for axis in &plan.axes {
@@ -40,9 +45,9 @@ pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<()
         match axis.parameter.target() {
             Target::Spin => {
                 return refuse(format!(
-                    "a grid without the axis `{name}`: here the drum turns at each speed of \
-                     {option} in turn, whatever its profile; remove the axis, and give its range \
-                     as {option}"
+                    "a grid without the axis `{name}`: here the drum is held at each speed of \
+                     {option}, whatever its profile; remove the axis, and give its range as \
+                     {option}"
                 ));
             }
             Target::Window(_) => {
@@ -61,16 +66,16 @@ pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<()
     Ok(())
 }
 
-/// A plan's points at constant speeds, speeds varying fastest: by a search the motions that they
-/// end in, else their periodic responses.
+/// The points of a plan at held speeds, of which the speeds vary fastest. With a search its rows
+/// are motions in which the machines end, otherwise periodic responses.
 #[derive(Clone, Copy)]
-pub(crate) struct Held<'a> {
+pub(crate) struct HeldPlan<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) speeds_rpm: &'a [f64],
-    pub(crate) search: Option<Search>,
+    pub(crate) search: Option<AttractorSearch>,
 }
 
-impl<'a> Held<'a> {
+impl<'a> HeldPlan<'a> {
     const fn kind(&self) -> FileKind<'static> {
         match self.search {
             Some(_) => FileKind::Dwell,
@@ -78,29 +83,29 @@ impl<'a> Held<'a> {
         }
     }
 
-    /// The command that does it.
+    /// Returns the name of the command.
     pub(crate) fn verb(&self) -> &'static str {
         self.kind().word()
     }
 
-    /// Where its result goes, unless it is said.
+    /// Returns the path of the result, by default one in `results`.
     pub(crate) fn output(&self, out: Option<&Path>) -> PathBuf {
         let default = || format!("results/{}-{}.parquet", self.plan.name, self.verb()).into();
         out.map_or_else(default, Path::to_owned)
     }
 
-    /// A row for each point and speed, or several.
+    /// Returns the job of the engine, with one or several rows for each point and speed.
     pub(crate) fn job(&self) -> Job<'a> {
         let Self { plan, speeds_rpm, search } = *self;
-        let (columns, asked, metadata) = match search {
+        let (columns, options, metadata) = match search {
             Some(search) => {
-                let asked = search.json(speeds_rpm);
-                (search.columns(plan), asked.clone(), (key::DWELL, asked))
+                let options = search.json(speeds_rpm);
+                (search.columns(plan), options.clone(), (key::DWELL, options))
             }
             None => {
-                let asked = json!({ "speed_rpm": speeds_rpm });
+                let options = json!({ "speed_rpm": speeds_rpm });
                 let metadata = (key::STABILITY, json!({ "speeds_rpm": speeds_rpm }));
-                (Columns::of_dwells(plan).declared(), asked, metadata)
+                (Columns::of_dwells(plan).declared(), options, metadata)
             }
         };
         let mut axes = axis_columns(plan);
@@ -115,7 +120,7 @@ impl<'a> Held<'a> {
             metadata: vec![metadata],
         };
         let mut job = Job::of(plan);
-        job.plan[self.verb()] = asked;
+        job.plan[self.verb()] = options;
         Job {
             points: plan.points() * speeds,
             layout,
@@ -128,135 +133,139 @@ impl<'a> Held<'a> {
         }
     }
 
-    /// What does it, on the best instruction set or the one asked for.
+    /// Returns the engine, with the instruction set that `SWEEP_SIMD` names, if it is set.
     ///
     /// # Errors
-    /// An instruction set that is not there.
-    pub(crate) fn engine(&self) -> Result<DwellEngine<'a>, Error> {
-        let asked = match self.search {
-            Some(search) => Asked::Motions(Motions::new(self.plan, search)),
-            None => Asked::Responses(Columns::of_dwells(self.plan)),
+    /// Returns an error if this processor has no instruction set of that name.
+    pub(crate) fn engine(&self) -> Result<HeldSpeedEngine<'a>, Error> {
+        let analysis = match self.search {
+            Some(search) => HeldAnalysis::Attractors(AttractorEngine::new(self.plan, search)),
+            None => HeldAnalysis::Responses(Columns::of_dwells(self.plan)),
         };
-        Ok(DwellEngine { held: *self, simd: simd_from_environment()?, asked })
+        Ok(HeldSpeedEngine { held: *self, simd: simd_from_environment()?, analysis })
     }
 }
 
-/// What is asked of a plan's points at its speeds.
-enum Asked {
+/// The kind of motions that are sought at held speeds.
+enum HeldAnalysis {
     /// The periodic responses of both models.
     Responses(Columns),
-    /// The motions that the nonlinear one ends in.
-    Motions(Motions),
+    /// The motions in which the nonlinear model ends.
+    Attractors(AttractorEngine),
 }
 
-/// What is asked of a plan's points at constant speeds. Row r is the point r / speeds at the speed
-/// r % speeds.
-pub(crate) struct DwellEngine<'a> {
-    held: Held<'a>,
+/// An engine for rows at held speeds. Row r is the point r / speeds at the speed r % speeds.
+pub(crate) struct HeldSpeedEngine<'a> {
+    held: HeldPlan<'a>,
     simd: Simd,
-    asked: Asked,
+    analysis: HeldAnalysis,
 }
 
-impl DwellEngine<'_> {
-    /// Keeps these rows, those of neighbouring points and speeds in lanes together, as they come.
-    fn rows(&self, rows: &[u64], keep: &RowSink<'_>, watch: &RunContext<'_>) {
-        // What comes of a search that was stopped means nothing.
-        let is_stopped = || watch.stopped();
+impl HeldSpeedEngine<'_> {
+    /// Computes these rows, which share the lanes, and passes them to `keep`.
+    fn evaluate_rows(&self, rows: &[u64], keep: &RowSink<'_>, context: &RunContext<'_>) {
+        // Rows of a stopped search are meaningless.
+        let is_stopped = || context.stopped();
         let keep = |done| {
             if !is_stopped() {
                 keep(done)
             }
         };
         let speeds = self.held.speeds_rpm.len() as u64;
-        let mut wanted: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
-        wanted.dedup();
+        let mut numbers: Vec<u64> = rows.iter().map(|row| row / speeds).collect();
+        numbers.dedup();
         let points: BTreeMap<u64, Result<Point, Status>> =
-            wanted.iter().copied().zip(self.ready(&wanted)).collect();
-        let mut asked = Vec::new();
+            numbers.iter().copied().zip(self.prepare(&numbers)).collect();
+        let mut requests = Vec::new();
         for &row in rows {
             let speed_rpm = self.held.speeds_rpm[(row % speeds) as usize];
             match &points[&(row / speeds)] {
-                Ok(point) => asked.push((row, Dwell { point, speed_rpm })),
-                Err(status) => keep(match &self.asked {
-                    Asked::Responses(columns) => columns.done(Outcome::failed(row, *status)),
-                    Asked::Motions(motions) => motions.failed(row, *status),
+                Ok(point) => requests.push((row, Dwell { point, speed_rpm })),
+                Err(status) => keep(match &self.analysis {
+                    HeldAnalysis::Responses(columns) => columns.done(Outcome::failed(row, *status)),
+                    HeldAnalysis::Attractors(engine) => engine.failed_row(row, *status),
                 }),
             }
         }
-        match &self.asked {
-            Asked::Responses(columns) => {
-                let dwells: Vec<Dwell<'_>> = asked.iter().map(|(_, dwell)| *dwell).collect();
-                for ((row, _), found) in asked.iter().zip(find_responses(&dwells, &is_stopped)) {
-                    let none = |status| Outcome::failed(*row, status);
-                    let outcome = found.map_or_else(none, |found| self.outcome(*row, &found));
+        match &self.analysis {
+            HeldAnalysis::Responses(columns) => {
+                let dwells: Vec<Dwell<'_>> = requests.iter().map(|(_, dwell)| *dwell).collect();
+                for ((row, _), found) in requests.iter().zip(find_responses(&dwells, &is_stopped)) {
+                    let failed = |status| Outcome::failed(*row, status);
+                    let outcome = found.map_or_else(failed, |found| self.outcome(*row, &found));
                     keep(columns.done(outcome));
                 }
             }
-            Asked::Motions(motions) => {
-                motions.find(self.simd, self.held.speeds_rpm, &asked, &keep, watch);
+            HeldAnalysis::Attractors(engine) => {
+                engine.find(self.simd, self.held.speeds_rpm, &requests, &keep, context);
             }
         }
     }
 
-    fn ready(&self, points: &[u64]) -> Vec<Result<Point, Status>> {
+    /// Prepares points for integration, each for all rows at its speeds.
+    fn prepare(&self, points: &[u64]) -> Vec<Result<Point, Status>> {
         let scenarios = points.iter().map(|&point| self.held.plan.scenario(point));
         let machines: Vec<(Machine, Spin)> =
             scenarios.map(|scenario| (scenario.model.machine, scenario.model.spin)).collect();
-        let together = |machines: &[(Machine, Spin)]| {
-            let ready = prepare(self.simd, machines, &timing(self.held.plan)).into_iter();
-            ready.map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
+        let prepare_group = |machines: &[(Machine, Spin)]| {
+            let points = prepare(self.simd, machines, &timing(self.held.plan)).into_iter();
+            points.map(|point| point.map_err(|_| Status::NoEquilibrium)).collect()
         };
-        map_isolating_panics(&machines, together, || Err(Status::Panicked))
+        map_isolating_panics(&machines, prepare_group, || Err(Status::Panicked))
     }
 
+    /// Returns the outcome of a row: that of the first response, with the others beside it.
     fn outcome(&self, row: u64, responses: &[Response]) -> Outcome {
-        let mut outcomes = responses.iter().map(|response| self.outcome_of(row, response));
+        let mut outcomes = responses.iter().map(|response| self.response_outcome(row, response));
         let first = outcomes.next().unwrap_or_else(|| Outcome::failed(row, Status::NoResponse));
         Outcome { coexisting: outcomes.collect(), ..first }
     }
 
-    fn outcome_of(&self, row: u64, response: &Response) -> Outcome {
+    fn response_outcome(&self, row: u64, response: &Response) -> Outcome {
         let channels = &self.held.plan.reliability.channels;
-        let of_model = |amplitudes: &[f64]| Trajectory {
+        let trajectory = |amplitudes: &[f64]| Trajectory {
             amplitudes: channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
             ..Trajectory::default()
         };
-        let (nonlinear, linear) = (of_model(&response.nonlinear), of_model(&response.linear));
+        let nonlinear = trajectory(&response.nonlinear);
+        let linear = trajectory(&response.linear);
         Outcome { growth: Some(Growth::from(response)), ..Outcome::new(row, nonlinear, linear) }
     }
 }
 
-impl Engine for DwellEngine<'_> {
-    fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, watch: &RunContext<'_>) {
+impl Engine for HeldSpeedEngine<'_> {
+    fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, context: &RunContext<'_>) {
         let speeds = self.held.speeds_rpm.len() as u64;
-        // All threads have some of few rows.
+        // A small job is divided between all threads.
         let share =
             self.held.plan.points().saturating_mul(speeds) / rayon::current_num_threads() as u64;
-        let at_once = match &self.asked {
-            Asked::Responses(_) => share.min(POINTS_AT_ONCE * speeds).clamp(AT_ONCE[0], AT_ONCE[1]),
-            Asked::Motions(motions) => motions.at_once(share, speeds),
+        let row_count = match &self.analysis {
+            HeldAnalysis::Responses(_) => {
+                share.min(POINTS_TOGETHER * speeds).clamp(ROWS_TOGETHER[0], ROWS_TOGETHER[1])
+            }
+            HeldAnalysis::Attractors(engine) => engine.rows_together(share, speeds),
         };
         rayon::broadcast(|_| {
-            while !watch.stopped() {
+            while !context.stopped() {
                 let rows = std::iter::from_fn(next).map(|(row, _)| row);
-                let rows: Vec<u64> = rows.take(at_once as usize).collect();
+                let rows: Vec<u64> = rows.take(row_count as usize).collect();
                 if rows.is_empty() {
                     break;
                 }
-                self.rows(&rows, keep, watch);
+                self.evaluate_rows(&rows, keep, context);
             }
         });
     }
 
-    /// A point's rows share its machine made ready, and the curve of its responses.
+    /// Returns true, because the rows of a point share its curve of responses.
     fn is_helped_by_neighbours(&self) -> bool {
         true
     }
 
     fn simd(&self) -> &str {
-        match self.asked {
-            Asked::Responses(_) => Simd::best().name(),
-            Asked::Motions(_) => self.simd.name(),
+        match self.analysis {
+            HeldAnalysis::Responses(_) => Simd::best().name(),
+            HeldAnalysis::Attractors(_) => self.simd.name(),
         }
     }
 }

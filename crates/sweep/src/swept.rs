@@ -1,47 +1,51 @@
-//! What computes the washing machine's rows, for the engine's commands.
+//! The washing machine as a model of the engine's commands.
 
 use sweep_engine::{Engine, Error, Estimate, Swept};
 use washer_model::{Machine, Parameter, Point, Profile, Spin, Target, stops_at_rest_n};
 use washer_row::{Criterion, Demand, Metric};
 
-use crate::config::grid::lacking;
+use crate::config::grid::missing_part;
 use crate::engine::ModelEngine;
 use crate::model::Washer;
-use crate::plan::{Plan, ready, timing};
+use crate::plan::{Plan, prepare_point, timing};
 
-/// A stop that carries more than this share of the machine's weight at rest is told.
-const RESTS_FROM: f64 = 0.01;
+/// Minimum force of a stop at rest, as a share of the machine's weight, at which a note reports it.
+/// Basis: softened stops that are open have a small force. Doubling it may hide a stop that is
+/// barely closed.
+const RESTING_SHARE: f64 = 0.01;
 
-/// Returns the place of rest of the first point's machine in words: why it has none, or the stop on
-/// which it rests most, if it rests on one.
-fn rest(plan: &Plan) -> Option<(&'static str, String)> {
+/// Returns a note on the equilibrium of the first point's machine: the reason why it has none, or
+/// the stop with the greatest load, if it rests on one.
+fn rest_note(plan: &Plan) -> Option<(&'static str, String)> {
     let Washer { machine, spin, .. } = plan.scenario(0).model;
-    match ready(machine, spin, &timing(plan)) {
-        Ok(point) => resting_on(&point).map(|stop| ("stops", stop)),
+    match prepare_point(machine, spin, &timing(plan)) {
+        Ok(point) => most_loaded_stop(&point).map(|stop| ("stops", stop)),
         Err(why) => Some(("rest", format!("{why} (first point)"))),
     }
 }
 
-fn resting_on(point: &Point) -> Option<String> {
-    let pushes_n = stops_at_rest_n(point).into_iter().map(f64::abs).zip(1..);
-    let (push_n, stop) = pushes_n.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (push_n > RESTS_FROM * point.weight_n()).then(|| {
-        let [push_n, weight_n] = [push_n, point.weight_n()].map(f64::round);
+/// Returns a text on the stop with the greatest force at rest, if the machine rests on it.
+fn most_loaded_stop(point: &Point) -> Option<String> {
+    let forces_n = stops_at_rest_n(point).into_iter().map(f64::abs).zip(1..);
+    let (force_n, stop) = forces_n.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (force_n > RESTING_SHARE * point.weight_n()).then(|| {
+        let [force_n, weight_n] = [force_n, point.weight_n()].map(f64::round);
         format!(
-            "stop {stop} carries {push_n} of {weight_n} N at rest: both models have it closed, and \
-             `clearance_m` counts from where the springs carry nothing"
+            "stop {stop} carries {force_n} of {weight_n} N at rest: it is closed in both models, \
+             and `clearance_m` is measured from the position before loading"
         )
     })
 }
 
 impl Swept for Washer {
     fn engine<'a>(plan: &'a Plan, only: Option<&str>) -> Result<Box<dyn Engine + 'a>, Error> {
-        // It makes sure of a ratio's side, and knows nothing of the limits of other columns.
-        let is_of = |kind| only.is_some_and(|only| only.starts_with(kind));
+        // A search for a ratio's limit needs only the side of the limit. The limits of other
+        // columns are not known to the engine, so these need complete rows.
+        let has_prefix = |prefix| only.is_some_and(|only| only.starts_with(prefix));
         let mut engine = ModelEngine::new(plan)?;
-        engine.demand = if is_of("ratio_") {
+        engine.demand = if has_prefix("ratio_") {
             Demand::Side
-        } else if is_of("growth_") || is_of("dwell_") {
+        } else if has_prefix("growth_") || has_prefix("dwell_") {
             Demand::Growth
         } else {
             Demand::Row
@@ -50,7 +54,7 @@ impl Swept for Washer {
     }
 
     fn estimate(plan: &Plan, threads: usize) -> Result<Estimate, Error> {
-        crate::estimate::of(plan, threads)
+        crate::estimate::estimate(plan, threads)
     }
 
     fn words(plan: &Plan) -> Vec<(&'static str, String)> {
@@ -62,10 +66,10 @@ impl Swept for Washer {
         if let Spin::Table { speed_rpm, .. } = &plan.model.spin
             && let Some(first) = speed_rpm.first().filter(|first| **first != 0.0)
         {
-            let how = "from the first instant, with the suspension at rest: it begins by a jump";
-            words.push(("spin", format!("{first} rpm {how}")));
+            let note = "from the first instant, with the suspension at rest: the speed jumps";
+            words.push(("spin", format!("{first} rpm {note}")));
         }
-        words.extend(rest(plan));
+        words.extend(rest_note(plan));
         words
     }
 
@@ -90,12 +94,12 @@ impl Swept for Washer {
                                    file with [stability] have more";
 
     fn variants(plan: &Plan) -> Vec<Plan> {
-        let with = |metric| {
+        let with_metric = |metric| {
             let mut plan = plan.clone();
             plan.model.measures.metrics = vec![metric];
             plan
         };
-        metrics(plan).map(with).collect()
+        metrics(plan).map(with_metric).collect()
     }
 
     fn complete(plan: &Plan) -> Plan {
@@ -104,25 +108,23 @@ impl Swept for Washer {
         complete
     }
 
-    fn listed(plan: Option<&Plan>) -> Vec<Listed> {
-        // The spin's parameters exist without a grid, but have no value.
-        let (paper, spin) = (
-            Machine::paper(),
-            Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 },
-        );
+    fn listed(plan: Option<&Plan>) -> Vec<ListedParameter> {
+        let paper = Machine::paper();
+        // Without a grid the spin's parameters are listed without a value.
+        let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
         let (machine, spin) =
             plan.map_or((&paper, &spin), |plan| (&plan.model.machine, &plan.model.spin));
         let row = |parameter: Parameter| {
-            let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
+            let is_in_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
             let value = match parameter.target() {
                 Target::Window(edge) => plan.map(|plan| plan.window_s[edge]),
-                _ => parameter.get(machine, spin).filter(|_| plan.is_some() || !of_grid),
+                _ => parameter.get(machine, spin).filter(|_| plan.is_some() || !is_in_grid),
             };
-            // A parameter of several numbers: each may have been written elsewhere.
+            // A parameter of several elements has the sources of all of them.
             let given = |plan: &Plan| plan.written.source(&parameter.parts(machine));
-            let given = plan.filter(|_| !of_grid).and_then(given);
+            let given = plan.filter(|_| !is_in_grid).and_then(given);
             let source = given.unwrap_or_else(|| parameter.source().to_owned());
-            Listed { parameter, value, source }
+            ListedParameter { parameter, value, source }
         };
         Parameter::all(machine, spin).into_iter().map(row).collect()
     }
@@ -132,13 +134,13 @@ impl Swept for Washer {
 fn metrics(plan: &Plan) -> impl Iterator<Item = Metric> {
     let can_have = |metric: &Metric| match metric {
         metric if metric.is_at_held_speeds() => plan.model.held_speeds.is_some(),
-        metric => lacking(*metric, &plan.model.machine).is_none(),
+        metric => missing_part(*metric, &plan.model.machine).is_none(),
     };
     Metric::ALL.into_iter().filter(can_have)
 }
 
 /// A line of the listing.
-pub(crate) type Listed = sweep_engine::Listed<Washer>;
+pub(crate) type ListedParameter = sweep_engine::Listed<Washer>;
 
 #[cfg(test)]
 mod tests {
@@ -149,7 +151,7 @@ mod tests {
     use sweep_engine::plan::WrittenIn;
 
     #[test]
-    fn json_holds_every_parameter() {
+    fn json_has_every_parameter() {
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 120.0, ramp_s: 2.0 };
         let json: Value = serde_json::from_str(&as_json(&Washer::listed(None))).unwrap();
         assert_eq!(
@@ -160,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_user_wrote_is_not_ascribed_to_the_paper_whatever_its_value() {
+    fn a_number_that_a_user_wrote_has_the_user_as_its_source() {
         let folder = tempfile::tempdir().unwrap();
         let machine = crate::config::machine_file(&Machine::paper(), &WrittenIn::default())
             + "friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n";
@@ -183,7 +185,7 @@ mod tests {
         assert_eq!(own("damping_n_s_per_m"), format!("given: --set, {file}"));
         assert_eq!(own("spring_1_cubic_n_per_m3"), "assumed: none unless given");
         assert_eq!(own("damper_2_friction_n"), format!("given: {file}"));
-        // It is left to the program.
+        // The word "auto" in the file leaves this number to the program.
         let speed = own("damper_2_friction_linear_speed_m_per_s");
         assert_eq!(speed, "assumed: that of the linear motion");
         assert_eq!(own("spin_peak_rpm"), "the grid file's [spin]");

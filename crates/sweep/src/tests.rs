@@ -1,4 +1,4 @@
-//! The search over the real models, against the grid it stands for.
+//! Tests of boundary searches with the real models against grids.
 
 use crate::config;
 use crate::engine::ModelEngine;
@@ -28,7 +28,7 @@ method = "rk4"
 step_s = 2.5e-4
 "#;
 
-/// Fig. 12 at three masses, every 12 N s/m.
+/// The axes of Fig. 12 at three masses, with dampings 12 N s/m apart.
 const GRID: &str = r#"
 [[axis]]
 parameter = "unbalance_mass_kg"
@@ -57,35 +57,35 @@ fn a_held_speed_may_be_a_number() {
 
 type Task = BoundaryTask<Washer>;
 
-/// The boundary of the greatest ratio.
-fn asked(tolerance: Option<f64>, lattice: u16) -> BoundaryOptions {
+/// Returns the options for the boundary of the greatest ratio.
+fn boundary_options(tolerance: Option<f64>, lattice: u16) -> BoundaryOptions {
     BoundaryOptions { quantity: "ratio_max".to_owned(), limit: None, tolerance, lattice }
 }
 
-fn traced(task: &Task, threads: usize, interrupt: &Interrupt) -> Result<Traced, Stopped> {
+fn trace_boundary(task: &Task, threads: usize, interrupt: &Interrupt) -> Result<Traced, Stopped> {
     let engine = Washer::engine(&task.plan, task.column()).unwrap();
-    let asking = CachedEvaluator::new(engine, threads, interrupt, None, &|_| {}).unwrap();
-    trace(&task.distances(&asking), &task.firsts, task.curves, &task.search, &mut |_| {})
+    let evaluator = CachedEvaluator::new(engine, threads, interrupt, None, &|_| {}).unwrap();
+    trace(&task.distances(&evaluator), &task.firsts, task.curves, &task.search, &mut |_| {})
 }
 
-/// Axis values of every point of the grid.
+/// Returns the axis values of all points of a grid.
 fn all_points(plan: &Plan) -> Vec<Vec<f64>> {
     (0..plan.points()).map(|point| plan.axis_values(point)).collect()
 }
 
 #[test]
-fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads() {
+fn a_boundary_agrees_with_the_grid_and_does_not_depend_on_the_threads() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, &asked(Some(0.5), 3)).unwrap();
+    let task = Task::new(&plan, &boundary_options(Some(0.5), 3)).unwrap();
     let interrupt = Interrupt::new();
-    let traced = [1, 3].map(|threads| traced(&task, threads, &interrupt).unwrap());
-    let [one, three] = [0, 1].map(|k| task.table(&traced[k]).finish().unwrap().1);
+    let trace_boundary = [1, 3].map(|threads| trace_boundary(&task, threads, &interrupt).unwrap());
+    let [one, three] = [0, 1].map(|k| task.table(&trace_boundary[k]).finish().unwrap().1);
     assert!(one == three, "other bytes on three threads");
 
     let engine = ModelEngine::new(&plan).unwrap();
     let outcomes = engine.evaluate_at(&all_points(&plan));
     let channels = plan.reliability.channels.len();
-    for (row, outcomes) in traced[0].curves[0].iter().zip(outcomes.chunks(21)) {
+    for (row, outcomes) in trace_boundary[0].curves[0].iter().zip(outcomes.chunks(21)) {
         assert!(row.trials < 21, "{row:?}");
         let edge = row.edges[0];
         let logs: Vec<(f64, f64)> = outcomes
@@ -118,15 +118,15 @@ fn it_agrees_with_the_grid_it_replaces_and_with_itself_on_any_number_of_threads(
     }
 }
 
-/// The distance of an outcome's greatest ratio from the limit.
+/// Returns the distance of an outcome's greatest ratio from the limit.
 fn distance(outcome: &Outcome, plan: &Plan) -> f64 {
     let (quantity, _) = quantity::traced(plan, "ratio_max", None).unwrap();
     let verdict = Verdict::new(outcome, plan.reliability.channels.len(), quantity.limit);
     quantity.distance(verdict.greatest.unwrap().1)
 }
 
-/// The logarithm of a grid's greatest ratios over the limit, its columns by the first axis.
-fn grid_logs(plan: &Plan) -> Vec<Vec<f64>> {
+/// Returns the distances of a grid's greatest ratios from the limit, in rows by the first axis.
+fn grid_distances(plan: &Plan) -> Vec<Vec<f64>> {
     let engine = ModelEngine::new(plan).unwrap();
     let outcomes = engine.evaluate_at(&all_points(plan));
     let log = |outcome: &Outcome| distance(outcome, plan);
@@ -137,8 +137,8 @@ fn grid_logs(plan: &Plan) -> Vec<Vec<f64>> {
 }
 
 #[test]
-fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
-    // Around 0.4 kg, and one mass between the grid's columns.
+fn a_boundary_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
+    // The masses are about 0.4 kg; one mass of the search lies between those of the grid.
     let head = HEAD.split("[integrator]").next().unwrap();
     let masses = [0.39, 0.40, 0.41];
     let axes = |masses: &[f64], from: f64, to: f64, count: u32| {
@@ -149,21 +149,22 @@ fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
         )
     };
     for criterion in Criterion::ALL {
-        let told = format!("{head}[reliability]\ncriterion = \"{}\"\n", criterion.name());
-        let wide = plan(&format!("{told}{}", axes(&[0.39, 0.395, 0.41], 60.0, 300.0, 33)));
-        let task = Task::new(&wide, &asked(Some(0.5), 4)).unwrap();
-        let rows = traced(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+        let criterion_head = format!("{head}[reliability]\ncriterion = \"{}\"\n", criterion.name());
+        let wide =
+            plan(&format!("{criterion_head}{}", axes(&[0.39, 0.395, 0.41], 60.0, 300.0, 33)));
+        let task = Task::new(&wide, &boundary_options(Some(0.5), 4)).unwrap();
+        let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
         let edges: Vec<_> = rows.iter().map(|row| row.edges.last().copied().unwrap()).collect();
         assert!(
             edges.iter().all(|edge| edge.kind == EdgeKind::Crossing),
             "{criterion:?}: {edges:?}"
         );
-        // Dampings 0.5 N s/m apart around the last crossing.
-        let middle = edges[0].at.unwrap().round();
-        let (from, count) = (middle - 4.0, 29);
-        let fine = plan(&format!("{told}{}", axes(&masses, from, from + 14.0, count)));
+        // The dampings are 0.5 N s/m apart about the last crossing.
+        let from = edges[0].at.unwrap().round() - 4.0;
+        let count = 29;
+        let fine = plan(&format!("{criterion_head}{}", axes(&masses, from, from + 14.0, count)));
         let dampings: Vec<f64> = (0..count).map(|k| from + 0.5 * f64::from(k)).collect();
-        let logs = grid_logs(&fine);
+        let logs = grid_distances(&fine);
         let contour = zero_lines(&masses, &dampings, |i, j| logs[i][j]).concat();
         for (row, edge) in rows.iter().zip(&edges) {
             let nearest = contour.windows(2).find_map(|pair| {
@@ -171,7 +172,8 @@ fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
                 let inside = (x0.min(x1)..=x0.max(x1)).contains(&row.first) && x0 != x1;
                 inside.then(|| y0 + (y1 - y0) * (row.first - x0) / (x1 - x0))
             });
-            let (contour, at) = (nearest.unwrap(), edge.at.unwrap());
+            let contour = nearest.unwrap();
+            let at = edge.at.unwrap();
             assert!(
                 (contour - at).abs() < 0.25,
                 "{criterion:?} at {} kg: {contour} and {at}",
@@ -181,7 +183,7 @@ fn it_agrees_with_the_contour_of_a_fine_grid_by_every_criterion() {
     }
 }
 
-/// A bracket that a search before found: the value of the first axis, and both ends.
+/// A bracket that an earlier search found: the value of the first axis, and both ends.
 struct ReferenceBracket {
     first: f64,
     low: f64,
@@ -202,7 +204,7 @@ fn reference_brackets(grid: &str) -> Vec<ReferenceBracket> {
 }
 
 #[test]
-fn committed_grids_have_the_brackets_of_the_search_before() {
+fn committed_grids_have_the_brackets_of_an_earlier_search() {
     let grids = [
         ("fig12", include_str!("../../../sweeps/fig12.toml"), 400),
         ("fig12_envelope", include_str!("../../../sweeps/fig12_envelope.toml"), 120),
@@ -210,8 +212,8 @@ fn committed_grids_have_the_brackets_of_the_search_before() {
         ("quick", include_str!("../../../sweeps/quick.toml"), 170),
     ];
     for (name, text, most_trials) in grids {
-        let task = Task::new(&plan(text), &asked(None, 6)).unwrap();
-        let found = traced(&task, 2, &Interrupt::new()).unwrap();
+        let task = Task::new(&plan(text), &boundary_options(None, 6)).unwrap();
+        let found = trace_boundary(&task, 2, &Interrupt::new()).unwrap();
         println!("{name}: {} points in {} rounds", found.trials, found.rounds);
         assert!(found.trials <= most_trials, "{name}: {} points", found.trials);
         let mut brackets = Vec::new();
@@ -225,7 +227,7 @@ fn committed_grids_have_the_brackets_of_the_search_before() {
         assert_eq!(brackets.len(), expected.len(), "{name}: {brackets:?}");
         for ((first, [low, high]), expected) in brackets.iter().zip(expected) {
             assert!((first - expected.first).abs() < 1e-4 && high - low <= 0.5);
-            // An error of 1e-3 in the ratio moves the flattest of these crossings by so much.
+            // An error of 1e-3 in the ratio moves the flattest of these crossings by this margin.
             let margin = 0.05;
             let is_same = *low <= expected.high + margin && expected.low <= high + margin;
             assert!(is_same, "{name} at {first} kg: {low} to {high}");
@@ -234,20 +236,20 @@ fn committed_grids_have_the_brackets_of_the_search_before() {
 }
 
 #[test]
-fn a_stop_is_heeded_before_the_next_group() {
+fn an_interrupt_stops_a_search_before_the_next_group() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, &asked(None, 6)).unwrap();
+    let task = Task::new(&plan, &boundary_options(None, 6)).unwrap();
     assert_eq!(task.search.tolerance, 0.5, "1/480 of 240 N s/m");
     let interrupt = Interrupt::new();
     interrupt.raise(2);
-    assert!(matches!(traced(&task, 2, &interrupt), Err(Stopped::Interrupted)));
+    assert!(matches!(trace_boundary(&task, 2, &interrupt), Err(Stopped::Interrupted)));
 }
 
 #[test]
-fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
+fn an_interrupted_search_repeats_no_trial_and_ends_the_same() {
     let plan = plan(&format!("{HEAD}{GRID}"));
-    let task = Task::new(&plan, &asked(Some(2.0), 2)).unwrap();
-    let whole = traced(&task, 1, &Interrupt::new()).unwrap();
+    let task = Task::new(&plan, &boundary_options(Some(2.0), 2)).unwrap();
+    let whole = trace_boundary(&task, 1, &Interrupt::new()).unwrap();
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.parquet");
     let job = task.job();
@@ -259,18 +261,18 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
         };
         let interrupt = Interrupt::new();
         let there = trials.count();
-        // The first to be told so much stops it, wherever it is in its batch.
+        // The search is interrupted after five trials, in the middle of a batch.
         let tell = |done: u64| {
             if done >= there as u64 + 5 {
                 interrupt.raise(2);
             }
         };
         let engine = Washer::engine(&task.plan, task.column()).unwrap();
-        let asking = CachedEvaluator::new(engine, 2, &interrupt, Some(trials), &tell).unwrap();
-        let distances = task.distances(&asking);
+        let evaluator = CachedEvaluator::new(engine, 2, &interrupt, Some(trials), &tell).unwrap();
+        let distances = task.distances(&evaluator);
         let found = trace(&distances, &task.firsts, task.curves, &task.search, &mut |_| {});
         drop(distances);
-        let trials = asking.into_cache().unwrap();
+        let trials = evaluator.into_cache().unwrap();
         match found {
             Ok(found) => break (found, trials),
             Err(Stopped::Interrupted) => assert!(trials.count() > there),
@@ -283,18 +285,18 @@ fn a_search_stopped_again_and_again_makes_no_trial_twice_and_ends_the_same() {
 }
 
 #[test]
-fn a_pocket_is_followed_along_a_damper_that_is_moved() {
-    // Where one damper is hung up decides for which dampings there is a reliable stretch at all.
+fn a_narrow_reliable_interval_is_followed_over_a_dampers_position() {
+    // The position of one damper decides which dampings are reliable, if any are.
     let head = HEAD.split("[integrator]").next().unwrap();
     let axes = "[[axis]]\nparameter = \"damper_1_cabinet_z_m\"\n\
                 range = { from = 0.1, to = 0.3, count = 17 }\n\
                 [[axis]]\nparameter = \"damping_n_s_per_m\"\n\
                 range = { from = 60.0, to = 300.0, count = 33 }\n";
     let plan = plan(&format!("{head}{axes}"));
-    let task = Task::new(&plan, &asked(None, 6)).unwrap();
-    let rows = traced(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
-    // At 0.1 m nothing is reliable, from 0.125 m on all is from a crossing upwards; the row between
-    // has a part of that, which no point of the lattice meets.
+    let task = Task::new(&plan, &boundary_options(None, 6)).unwrap();
+    let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+    // At 0.1 m no damping is reliable. From 0.125 m on all dampings above a crossing are. The row
+    // between has a reliable interval that no point of the lattice meets.
     let kinds: Vec<EdgeKind> = rows.iter().map(|row| row.edges[0].kind).collect();
     assert_eq!(
         kinds[..3],
@@ -317,18 +319,18 @@ fn a_pocket_is_followed_along_a_damper_that_is_moved() {
             };
             let is_bracketed =
                 |edge: &Edge| edge.bracket.is_some_and(|b| b[0] < *damping && *damping < b[1]);
-            let said = (row.first, damping, &row.edges);
-            assert!(found == is_reliable || row.edges.iter().any(is_bracketed), "{said:?}");
+            let context = (row.first, damping, &row.edges);
+            assert!(found == is_reliable || row.edges.iter().any(is_bracketed), "{context:?}");
         }
     }
 }
 
 #[test]
-fn plans_without_a_boundary_say_why() {
+fn plans_without_a_boundary_are_refused_with_the_reason() {
     let mass = "[[axis]]\nparameter = \"unbalance_mass_kg\"\nvalues = [0.1, 0.2]\n";
     let refused = |text: &str, tolerance: Option<f64>| {
         let plan = plan(&format!("{HEAD}{text}"));
-        Task::new(&plan, &asked(tolerance, 6)).unwrap_err().to_string()
+        Task::new(&plan, &boundary_options(tolerance, 6)).unwrap_err().to_string()
     };
     assert_eq!(
         refused(mass, None),
@@ -357,7 +359,7 @@ fn plans_without_a_boundary_say_why() {
 }
 
 #[test]
-fn every_column_of_numbers_that_is_bad_one_way_has_a_boundary() {
+fn every_column_that_is_worse_in_one_direction_has_a_boundary() {
     let plan = plan(&format!("{HEAD}{GRID}"));
     let offered = quantity::offered(&plan);
     let names: Vec<&str> = offered.iter().map(|(column, _)| column.name.as_str()).collect();
@@ -373,7 +375,7 @@ fn every_column_of_numbers_that_is_bad_one_way_has_a_boundary() {
     ] {
         assert!(names.contains(&name), "{name}: {names:?}");
     }
-    // The paper's machine has no feet and no stops, and the grid no speeds.
+    // The paper's machine has no feet and no stops, and the grid has no held speeds.
     for name in ["steps_nonlinear", "slip_margin_nonlinear_n", "growth_per_s", "damping_n_s_per_m"]
     {
         assert!(!names.contains(&name), "{name}");
@@ -388,9 +390,10 @@ fn every_column_of_numbers_that_is_bad_one_way_has_a_boundary() {
         }
         assert!(Washer::layout(&plan).position(name).is_some(), "{name}");
     }
-    let (_, of_one) = quantity::traced(&plan, "ratio_tub_yaw", None).unwrap();
-    assert_eq!(of_one.reliability.channels, [washer_model::Channel::TubYaw]);
-    let refused = |name, limit| quantity::traced(&plan, name, limit).unwrap_err().to_string();
+    let (_, single_channel_plan) = quantity::traced(&plan, "ratio_tub_yaw", None).unwrap();
+    assert_eq!(single_channel_plan.reliability.channels, [washer_model::Channel::TubYaw]);
+    let refused =
+        |name, limit| quantity::traced(&plan, name, limit).unwrap_err().to_string();
     assert!(refused("growth_per_s", None).contains("[stability]"));
     assert!(refused("cabinet_force", None).contains("did you mean `cabinet_force_nonlinear_n`?"));
     assert!(refused("cabinet_force_linear_n", None).contains("no limit of its own"));
@@ -403,10 +406,10 @@ fn a_boundary_of_an_expression_or_a_condition_is_where_rows_say_so() {
     let plan = plan(&format!("{HEAD}{GRID}"));
     let ask = |quantity: &str, limit| {
         let quantity = quantity.to_owned();
-        Task::new(&plan, &BoundaryOptions { quantity, limit, ..asked(Some(2.0), 3) })
+        Task::new(&plan, &BoundaryOptions { quantity, limit, ..boundary_options(Some(2.0), 3) })
     };
     let crossings = |task: &Task| {
-        let rows = traced(task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+        let rows = trace_boundary(task, 2, &Interrupt::new()).unwrap().curves.remove(0);
         let edges = rows.into_iter().flat_map(|row| row.edges);
         let at: Vec<f64> = edges.filter_map(|edge| edge.at).collect();
         assert!(!at.is_empty());
@@ -433,14 +436,16 @@ fn a_boundary_of_an_expression_or_a_condition_is_where_rows_say_so() {
 }
 
 #[test]
-fn a_force_crosses_its_limit_where_the_grid_says_so() {
+fn a_force_crosses_its_limit_within_the_bracket() {
     let plan = plan(&format!("{HEAD}{GRID}"));
     let limit = 900.0;
     let quantity = "cabinet_force_nonlinear_n".to_owned();
-    let task =
-        Task::new(&plan, &BoundaryOptions { quantity, limit: Some(limit), ..asked(Some(2.0), 3) })
-            .unwrap();
-    let rows = traced(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
+    let task = Task::new(
+        &plan,
+        &BoundaryOptions { quantity, limit: Some(limit), ..boundary_options(Some(2.0), 3) },
+    )
+    .unwrap();
+    let rows = trace_boundary(&task, 2, &Interrupt::new()).unwrap().curves.remove(0);
     let crossings = rows.iter().flat_map(|row| row.edges.iter().map(|edge| (row.first, edge)));
     let mut found = 0;
     for (mass, edge) in crossings.filter(|(_, edge)| edge.kind == EdgeKind::Crossing) {

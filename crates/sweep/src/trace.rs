@@ -16,7 +16,7 @@ use washer_model::{
 use crate::engine::{CappedRun, reference_method};
 use crate::method::Integrator;
 use crate::model::Washer;
-use crate::plan::{Plan, Scenario, friction_speeds, ready};
+use crate::plan::{Plan, Scenario, friction_speeds, prepare_point};
 use sweep_engine::config::NamedValues;
 use sweep_engine::method::Integrator as _;
 use sweep_engine::threads::Cancel;
@@ -288,7 +288,7 @@ impl TraceRun {
         let Scenario { model: Washer { machine, spin, .. }, window_s } = scenario;
         let checkpoints = settings.capped.map_or(0, |capped| capped.checkpoints);
         let timing = Timing { end_s: plan.end_s, window_s, checkpoints };
-        let point = ready(machine, spin.clone(), &timing)?;
+        let point = prepare_point(machine, spin.clone(), &timing)?;
         let (methods, level, method_json) = methods(plan, &point, &spin, settings.capped);
         let times_s = match settings.every_s {
             Some(every_s) => {
@@ -323,7 +323,8 @@ fn integrate<'a>(
     };
     let by_group: Vec<Vec<History<'a>>> = match rayon::current_thread_index() {
         Some(_) => groups.par_iter().map(integrate_group).collect(),
-        // Outside of a pool rayon would start its global one, and panic if the system has no threads.
+        // Outside of a pool rayon would start its global one, and panic if the system has no
+        // threads.
         None => groups.iter().map(integrate_group).collect(),
     };
     let mut all = by_group.into_iter().flatten();
@@ -331,7 +332,10 @@ fn integrate<'a>(
 }
 
 fn start_json(start: &Start) -> Value {
-    json!({ "deviations": numbered('q', &start.deviations), "speeds": numbered('u', &start.speeds) })
+    json!({
+        "deviations": numbered('q', &start.deviations),
+        "speeds": numbered('u', &start.speeds),
+    })
 }
 
 /// Returns ten numbers with the names q1 to q10, or u1 to u10, by the letter.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sweep::{Error, MemoryTable, RanToFile, Task};
+use sweep::{Error, EvaluationTask, MemoryTable, RanToFile};
 
 use crate::errors;
 use crate::result::PyResultTable;
@@ -31,7 +31,7 @@ pub(crate) fn rows_or_raise(
 /// prints what the command prints.
 pub(crate) fn rows_or_file(
     py: Python<'_>,
-    task: Result<Task<'_>, Error>,
+    task: Result<EvaluationTask<'_>, Error>,
     (out, fresh): (Option<PathBuf>, bool),
     options: WorkOptions,
 ) -> PyResult<PyResultTable> {

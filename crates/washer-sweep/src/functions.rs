@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyMapping};
-use sweep::{Explained, FitOptions, Search};
+use sweep::{AttractorSearch, Explained, FitOptions};
 
 use crate::columns::{numbers, points};
 use crate::errors;
@@ -72,7 +72,7 @@ pub(crate) fn dwell(
 ) -> PyResult<PyResultTable> {
     let carry = carry.map(str::parse).transpose();
     let carry = carry.map_err(|wrong: String| PyValueError::new_err(format!("carry: {wrong}")))?;
-    let search = Search { starts, kick, carry, threshold, sections, longest };
+    let search = AttractorSearch { starts, kick, carry, threshold, sections, longest };
     held_speeds(plan, speeds_rpm, Some(search), (out, fresh), WorkOptions { threads, progress })
 }
 
@@ -80,13 +80,13 @@ pub(crate) fn dwell(
 fn held_speeds(
     plan: &Bound<'_, PyPlan>,
     speeds_rpm: &Bound<'_, PyAny>,
-    search: Option<Search>,
+    search: Option<AttractorSearch>,
     into: (Option<PathBuf>, bool),
     options: WorkOptions,
 ) -> PyResult<PyResultTable> {
     let py = plan.py();
     let speeds_rpm = &numbers(speeds_rpm)?;
-    let task = sweep::held(plan.get().evaluator.plan(), speeds_rpm, search);
+    let task = sweep::hold_speeds(plan.get().evaluator.plan(), speeds_rpm, search);
     finish::rows_or_file(py, task, into, options)
 }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
-use sweep::{BoundaryOptions, Evaluator, GridInput, TraceExtras, TraceOptions};
+use sweep::{BoundaryOptions, PlanEvaluator, TraceExtras, TraceOptions, WasherGridInput};
 
 use crate::mappings::{self, assignments};
 use crate::result::PyResultTable;
@@ -17,8 +17,8 @@ const UNNAMED: &str = "plan";
 /// A validated plan.
 #[pyclass(name = "Plan", module = "washer_sweep", frozen)]
 pub(crate) struct PyPlan {
-    pub(crate) input: GridInput,
-    pub(crate) evaluator: Evaluator,
+    pub(crate) input: WasherGridInput,
+    pub(crate) evaluator: PlanEvaluator,
     source: PlanSource,
 }
 
@@ -32,18 +32,18 @@ struct PlanSource {
 }
 
 impl PlanSource {
-    fn input(&self) -> GridInput {
+    fn input(&self) -> WasherGridInput {
         match self.is_file {
-            true => GridInput::file(self.text.clone().into(), self.sets.clone()),
-            false => GridInput::text(UNNAMED, self.text.clone(), self.sets.clone()),
+            true => WasherGridInput::file(self.text.clone().into(), self.sets.clone()),
+            false => WasherGridInput::text(UNNAMED, self.text.clone(), self.sets.clone()),
         }
     }
 }
 
 impl PyPlan {
-    fn load(py: Python<'_>, input: GridInput, source: PlanSource) -> PyResult<Self> {
+    fn load(py: Python<'_>, input: WasherGridInput, source: PlanSource) -> PyResult<Self> {
         let plan = py.detach(|| input.load()).map_err(|wrong| errors::plan_error(py, &wrong))?;
-        Ok(Self { input, evaluator: Evaluator::new(plan), source })
+        Ok(Self { input, evaluator: PlanEvaluator::new(plan), source })
     }
 }
 
@@ -80,7 +80,7 @@ impl PyPlan {
                 let whole = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
                 let text = whole.to_string_lossy().into_owned();
                 let source = PlanSource { text, is_file: true, sets: sets.clone() };
-                (GridInput::file(path, sets), source)
+                (WasherGridInput::file(path, sets), source)
             }
         };
         Self::load(py, input, source)
@@ -137,7 +137,7 @@ impl PyPlan {
     ) -> PyResult<PyResultTable> {
         finish::rows_or_file(
             py,
-            self.evaluator.whole(),
+            self.evaluator.all_points(),
             (out, fresh),
             WorkOptions { threads, progress },
         )

@@ -120,7 +120,7 @@ def test_differences_are_read(sweep, tmp_path):
     (lambda plan: washer_sweep.stability(plan, [100.0, 100.0]), "each above the one before"),
     (lambda plan: washer_sweep.stability(plan, [float("inf")]), "finite"),
     (lambda plan: washer_sweep.explain(plan), "needs a value of"),
-    (lambda plan: washer_sweep.explain(plan, POINT, speeds_rpm=[200, 210, 230]), "even distances"),
+    (lambda plan: washer_sweep.explain(plan, POINT, speeds_rpm=[200, 210, 230]), "equally spaced"),
     (lambda plan: washer_sweep.explain(plan, POINT, speeds_rpm=[0, 10]), "above 0"),
     (lambda plan: washer_sweep.explain(plan, POINT, threads=0), "expected a number from 1"),
     (lambda plan: washer_sweep.fit(plan, [], ["tub_mass_kg"]), "a table or more"),

@@ -7,7 +7,7 @@ use sweep_files::cells;
 use washer_model::{Parameter, Range, decimal};
 use washer_row::Metric;
 
-use crate::library::Evaluator;
+use crate::library::PlanEvaluator;
 use crate::model::Washer;
 use crate::plan::Plan;
 
@@ -158,8 +158,8 @@ impl Trial {
 
     /// Computes every row; `None` if it was interrupted.
     fn outcomes(&self, effort: Effort<'_>) -> Result<Option<Vec<Outcome>>, Error> {
-        let evaluator = Evaluator::new(self.plan.clone());
-        let found = evaluator.whole()?.in_memory(effort)?;
+        let evaluator = PlanEvaluator::new(self.plan.clone());
+        let found = evaluator.all_points()?.in_memory(effort)?;
         let mut outcomes: Vec<Outcome> = Vec::new();
         for batch in found.batches() {
             let numbers = |name: &str| {
@@ -265,7 +265,7 @@ fn rounded(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::GridInput;
+    use crate::config::WasherGridInput;
 
     const SHEET: &str = include_str!("starter_machine.toml");
 
@@ -279,7 +279,9 @@ mod tests {
         );
         let path = folder.path().join("g.toml");
         std::fs::write(&path, grid).expect("it is written");
-        GridInput::file(path, Vec::new()).load().unwrap_or_else(|mistakes| panic!("{mistakes}"))
+        WasherGridInput::file(path, Vec::new())
+            .load()
+            .unwrap_or_else(|mistakes| panic!("{mistakes}"))
     }
 
     #[test]
@@ -293,8 +295,8 @@ mod tests {
         let outcomes = trial.outcomes(effort()).unwrap().expect("nobody interrupts");
         assert_eq!(outcomes.len(), 2 * trial.stride);
         // The rows of the machine as it is are those of the plan itself, but for their steps.
-        let own = Evaluator::new(plan.clone());
-        let own = own.whole().unwrap().in_memory(effort()).unwrap();
+        let own = PlanEvaluator::new(plan.clone());
+        let own = own.all_points().unwrap().in_memory(effort()).unwrap();
         let column = own.batches()[0].column_by_name("ratio_max").expect("it is there");
         let ratios = cells::numbers(column).unwrap();
         for (point, ratio) in ratios.into_iter().enumerate() {

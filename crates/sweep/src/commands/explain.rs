@@ -1,7 +1,7 @@
 //! `sweep explain GRID.toml --at NAME=VALUE`: why the linear model fails at a point.
 
 use crate::explain::{explain, format, json};
-use crate::speeds::{Speeds, turning};
+use crate::speeds::{Speeds, parse_speeds_above_zero};
 use sweep_engine::commands::grid::GridArgs;
 use sweep_engine::{EffortArgs, Error, Exit, Interrupt, show};
 
@@ -13,7 +13,8 @@ pub struct Args {
     grid: GridArgs,
     /// Speeds to look at, in rpm, above 0 [default: from half of the slowest mode's frequency to
     /// the profile's fastest speed, by 1]
-    #[arg(long, value_name = "FROM:TO:STEP", value_parser = turning, allow_hyphen_values = true)]
+    #[arg(long, value_name = "FROM:TO:STEP", value_parser = parse_speeds_above_zero)]
+    #[arg(allow_hyphen_values = true)]
     speed: Option<Speeds>,
     /// Print everything as JSON
     #[arg(long)]
@@ -39,7 +40,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let interrupt = Interrupt::new();
     let found = explain(&plan, at, args.speed, args.effort.with(&interrupt))?;
     if args.json {
-        return show(&format!("{:#}\n", json::of(&found)));
+        return show(&format!("{:#}\n", json::to_json(&found)));
     }
-    show(&format::of(&found))
+    show(&format::to_text(&found))
 }

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::config::{self, GridInput};
+use crate::config::{self, WasherGridInput};
 use crate::fit::{self, Evaluations, FitOptions, Measured, Work};
 use sweep_engine::commands::grid::{GridArgs, typed};
 use sweep_engine::{EffortArgs, Error, Exit, Interrupt, Progress, show, tell, threads};
@@ -59,7 +59,7 @@ on from there. docs/fit.md explains every line.";
 /// Mistakes in the grid file, the measurements or the options; data that cannot tell; and a machine
 /// file that cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let grid: GridInput = args.grid.input().with_fixed(&args.grid.at);
+    let grid: WasherGridInput = args.grid.input().with_fixed(&args.grid.at);
     let mut cases = Vec::new();
     let columns = [args.columns.clone(), grid.load()?.aside.columns].concat();
     for text in &args.measured {

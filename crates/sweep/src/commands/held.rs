@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use super::show::FURTHER;
-use crate::dwell::Search;
+use crate::dwell::AttractorSearch;
 use crate::plan::Plan;
 use crate::speeds::SpeedList;
-use crate::stability::{Held, check};
+use crate::stability::{HeldPlan, check};
 use sweep_engine::commands::cells::Lines as _;
 use sweep_engine::commands::grid::ResultArgs;
 use sweep_engine::commands::run::{RunCommand, WorkArgs, exit, installed};
@@ -35,7 +35,7 @@ pub struct Args<Asked: clap::Args> {
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct Responses {}
 
-impl From<Responses> for Option<Search> {
+impl From<Responses> for Option<AttractorSearch> {
     fn from(_: Responses) -> Self {
         None
     }
@@ -66,7 +66,7 @@ The result is written to results/NAME-dwell.parquet unless --out names a file. T
 function of its input, whatever the number of threads, shards and interruptions. What an \
 interrupted command has computed stays in FILE.partial, and the same command goes on from there.";
 
-impl<Asked: clap::Args + Copy + Into<Option<Search>>> Args<Asked> {
+impl<Asked: clap::Args + Copy + Into<Option<AttractorSearch>>> Args<Asked> {
     /// Does what a search asks at these speeds, or finds the periodic responses there; says what
     /// came of it, and how the program ends.
     ///
@@ -75,10 +75,10 @@ impl<Asked: clap::Args + Copy + Into<Option<Search>>> Args<Asked> {
     /// finished chunks are kept.
     pub(super) fn run(&self) -> Result<Exit, Error> {
         let Self { target, speed, asked, work } = self;
-        let search: Option<Search> = (*asked).into();
+        let search: Option<AttractorSearch> = (*asked).into();
         let plan: Plan = target.grid.load()?;
         check(&plan, "--speed", &speed.to_string())?;
-        let held = Held { plan: &plan, speeds_rpm: speed.values(), search };
+        let held = HeldPlan { plan: &plan, speeds_rpm: speed.values(), search };
         let (job, output) = (held.job(), held.output(target.out.as_deref()));
         let [own, of_merge] = options(speed, search);
         let command = RunCommand {
@@ -103,7 +103,7 @@ impl<Asked: clap::Args + Copy + Into<Option<Search>>> Args<Asked> {
 }
 
 /// The options of a command line that ask the same, and those of `merge`.
-fn options(speed: &SpeedList, search: Option<Search>) -> [String; 2] {
+fn options(speed: &SpeedList, search: Option<AttractorSearch>) -> [String; 2] {
     let own = search.map(|search| search.to_string()).unwrap_or_default();
     let own = format!(" --speed {speed}{own}");
     let of_merge = format!("{}{own}", if search.is_some() { " --dwell" } else { "" });
@@ -154,7 +154,7 @@ struct HeldArgs {
     dwell: bool,
     /// How it looks for motions.
     #[command(flatten)]
-    search: Search,
+    search: AttractorSearch,
 }
 
 impl HeldArgs {
@@ -165,7 +165,7 @@ impl HeldArgs {
             return (Job::of(plan), target.output(plan), ["run", "", ""].map(str::to_owned));
         };
         let search = self.dwell.then_some(self.search);
-        let held = Held { plan, speeds_rpm: speed.values(), search };
+        let held = HeldPlan { plan, speeds_rpm: speed.values(), search };
         let [own, of_merge] = options(speed, search);
         let again = [held.verb().to_owned(), own, of_merge];
         (held.job(), held.output(target.out.as_deref()), again)

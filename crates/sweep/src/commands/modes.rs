@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use washer_model::{Exact, ModeAtSpeed, ModeOverSpeed, decimal};
 
-use crate::config::GridInput;
-use crate::library::modes::{Analysis, Asked};
+use crate::config::WasherGridInput;
+use crate::library::modes::{ModeAnalysis, ModesInput};
 use crate::speeds::Speeds;
 use sweep_engine::{Error, Exit, show, tell};
 use sweep_files::{FileKind, Output};
@@ -48,13 +48,13 @@ pub struct Args {
 /// Mistakes in the grid file or the options, a machine without equilibrium or modes, and what
 /// cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let grid = args.grid.clone().map(|grid| GridInput::file(grid, args.sets.clone()));
-    let asked = Asked::of(grid.as_ref(), &args.at, args.speed.to)?;
+    let grid = args.grid.clone().map(|grid| WasherGridInput::file(grid, args.sets.clone()));
+    let asked = ModesInput::new(grid.as_ref(), &args.at, args.speed.to)?;
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
     let speeds = args.speed.values();
     // A signal ends the process: there is nothing to keep.
-    let found = Analysis::new(&asked, &speeds, args.exact, &|| false)?;
+    let found = ModeAnalysis::new(&asked, &speeds, args.exact, &|| false)?;
     let Some(analysis) = found else { return Ok(Exit::Interrupted) };
     if let (Some(path), Some(output)) = (&args.out, output) {
         output.finish(&analysis.table(&asked).into_bytes(path)?)?;
@@ -78,7 +78,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 }
 
 /// How far the suspension's frozen and exact motions differ, where they were asked for.
-fn differences(analysis: &Analysis) -> String {
+fn differences(analysis: &ModeAnalysis) -> String {
     let Some(exact) = &analysis.exact else { return String::new() };
     let (speeds, modes) = (&analysis.speeds_rpm, &analysis.modes);
     let mut text =

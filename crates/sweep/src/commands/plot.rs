@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::live::{SliderRange, live, slider_range};
+use crate::live::{SliderRange, live, parse_slider_range};
 use sweep_engine::commands::plot;
 use sweep_engine::config::written::finite;
 use sweep_engine::{Error, Exit};
@@ -45,7 +45,7 @@ pub struct Args {
 
     /// With --live: a slider for this parameter; may be repeated [default: a usual choice]
     #[arg(long = "slider", value_name = "NAME=FROM:TO", requires = "live")]
-    #[arg(value_parser = slider_range)]
+    #[arg(value_parser = parse_slider_range)]
     pub sliders: Vec<SliderRange>,
 
     /// Map as .html: folder of trace files; clicking a point that has one shows its time histories

@@ -13,7 +13,7 @@ pub(super) const FURTHER: Further<'static> = Further { lines: &lines, is_of_a_me
 /// What a file about held speeds says as a whole: lines, each with its name.
 fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
     Ok(match file.kind() {
-        Some(FileKind::Stability) => tongues::summary(file)?.lines(),
+        Some(FileKind::Stability) => tongues::summarise(file)?.lines(),
         Some(FileKind::Dwell) => dwell::summary::lines(file)?,
         _ => Vec::new(),
     })

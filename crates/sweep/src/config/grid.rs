@@ -12,23 +12,29 @@ use sweep_engine::config::{
 use washer_model::Machine;
 use washer_row::{Metric, PartKind};
 
-use super::{GridInput, machine, machine_json};
+use super::{WasherGridInput, machine, machine_json};
 use crate::model::Washer;
 use crate::speeds::SpeedList;
 
-/// `machine` when the grid names none.
+/// The machine of a grid that names none.
 pub(super) const DEFAULT_MACHINE: &str = "paper";
-/// Most characters of a path in a message; no system takes much longer ones.
-const LONGEST_PATH: usize = 1000;
+
+/// Maximum number of characters of a path in a message. Basis: no system has much longer paths.
+/// Doubling it doubles the longest message.
+const MAX_PATH_CHARS: usize = 1000;
 
 /// Names of machines that need no file.
 const MACHINES: [&str; 1] = [DEFAULT_MACHINE];
 
-/// The machine that a grid names, or the one given in its place.
-pub(super) fn machine(machine: &mut Machine, keys: &mut Keys<'_>, input: Option<&GridInput>) {
+/// Reads or describes the key `machine`. The grid's machine may be given in place of its file.
+pub(super) fn walk_machine(
+    machine: &mut Machine,
+    keys: &mut Keys<'_>,
+    input: Option<&WasherGridInput>,
+) {
     let key = Key::new("machine", "\"paper\", or a machine file relative to this file");
     if let (Some(root), Some(input)) = (keys.section(), input) {
-        *machine = named(input, root);
+        *machine = grid_machine(input, root);
     }
     keys.describe(key, |is_schema| match is_schema {
         true => json!({ "type": "string", "default": DEFAULT_MACHINE }),
@@ -36,10 +42,11 @@ pub(super) fn machine(machine: &mut Machine, keys: &mut Keys<'_>, input: Option<
     });
 }
 
-fn named(input: &GridInput, root: &Section<'_>) -> Machine {
+/// Returns the machine that a grid names, or the one given in its place.
+fn grid_machine(input: &WasherGridInput, root: &Section<'_>) -> Machine {
     let report = root.report;
     if let Some(text) = &input.own_file {
-        return machine_of(text, "its machine", report);
+        return parse_machine(text, "its machine", report);
     }
     let Some(named) = root.text("machine").given() else { return Machine::paper() };
     if named.value == DEFAULT_MACHINE {
@@ -47,9 +54,9 @@ fn named(input: &GridInput, root: &Section<'_>) -> Machine {
     }
     let path = beside(&input.path, named.value);
     match read(&path) {
-        Ok(text) => machine_of(&text, &path.display().to_string(), report),
+        Ok(text) => parse_machine(&text, &path.display().to_string(), report),
         Err(error) => {
-            let shown = cut(&path.display().to_string(), LONGEST_PATH);
+            let shown = cut(&path.display().to_string(), MAX_PATH_CHARS);
             let title = format!("cannot read the machine file {shown}: {error}");
             let expected =
                 format!("expected \"{DEFAULT_MACHINE}\", or a machine file relative to this file");
@@ -60,8 +67,8 @@ fn named(input: &GridInput, root: &Section<'_>) -> Machine {
     }
 }
 
-/// The machine of a machine file's text.
-fn machine_of(text: &str, name: &str, report: &Report) -> Machine {
+/// Parses the text of a machine file.
+fn parse_machine(text: &str, name: &str, report: &Report) -> Machine {
     let source = report.add(name, text);
     let table = parse(text, source, report);
     if is_another::<Washer>("machine", table.get_ref(), source, report) {
@@ -71,22 +78,23 @@ fn machine_of(text: &str, name: &str, report: &Report) -> Machine {
     machine::read(text, Section::new("the machine file", at, table.get_ref(), report))
 }
 
-/// The speeds of the metrics that are of constant ones. The section and these need each other.
-/// `found` is where the metrics were, if they were written.
-pub(super) fn stability(
+/// Reads or describes the section `[stability]`, which has the held speeds of metrics. Such a
+/// metric needs the section, and the section needs such a metric. `found` has the place of the
+/// metrics.
+pub(super) fn walk_stability(
     metrics: &[Metric],
     found: Field<()>,
     speeds: &mut Option<SpeedList>,
     keys: &mut Keys<'_>,
 ) {
-    let of_speeds = metrics.iter().find(|metric| metric.is_at_held_speeds());
-    let lacking = |metric: &Metric| format!("the metric `{}` needs speeds", metric.name());
+    let held_metric = metrics.iter().find(|metric| metric.is_at_held_speeds());
+    let needs_speeds = |metric: &Metric| format!("the metric `{}` needs speeds", metric.name());
     if let (KeyWalk::Set(_), Field::Given(found)) = (&keys.walk, found) {
-        if let (Some(metric), None, Some(report)) = (of_speeds, &speeds, keys.report()) {
+        if let (Some(metric), None, Some(report)) = (held_metric, &speeds, keys.report()) {
             let expected = "expected a grid file with this metric and a section [stability]";
-            report.refuse::<()>(&found.at, lacking(metric), expected);
+            report.refuse::<()>(&found.at, needs_speeds(metric), expected);
         }
-        speeds.take_if(|_| of_speeds.is_none());
+        speeds.take_if(|_| held_metric.is_none());
     }
     let about = "constant spin speeds in rpm, above 0, as 250, \"240,305\" or \"60:400:1\": those \
                  of the metrics `growth` and `dwell`";
@@ -110,7 +118,7 @@ pub(super) fn stability(
         }
     });
     let Some(root) = keys.section() else { return };
-    match (field, of_speeds) {
+    match (field, held_metric) {
         (Field::Given(section), None) => {
             let title =
                 "[stability] is for the metrics `growth` and `dwell`, and neither is asked for";
@@ -121,16 +129,16 @@ pub(super) fn stability(
         (Field::Absent, Some(metric)) => {
             let expected =
                 "expected a section [stability] with speed_rpm = 250 or \"FROM:TO:STEP\"";
-            let refusal = Diagnostic::new(lacking(metric)).at(root.at(), expected);
+            let refusal = Diagnostic::new(needs_speeds(metric)).at(root.at(), expected);
             root.report.push_missing(refusal);
         }
         _ => {}
     }
 }
 
-/// What a machine has not got and this metric is of.
-pub(crate) fn lacking(metric: Metric, machine: &Machine) -> Option<&'static str> {
-    let (is_there, what) = match metric.facts().part? {
+/// Returns the part that a metric needs and the machine lacks, with the expected sections.
+pub(crate) fn missing_part(metric: Metric, machine: &Machine) -> Option<&'static str> {
+    let (has_part, part) = match metric.facts().part? {
         PartKind::Stop => {
             (!machine.stops.is_empty(), "stops: expected [[stops]] in the machine file")
         }
@@ -142,16 +150,16 @@ pub(crate) fn lacking(metric: Metric, machine: &Machine) -> Option<&'static str>
             (!machine.dampers.is_empty(), "dampers: expected [[dampers]] in the machine file")
         }
     };
-    (!is_there).then_some(what)
+    (!has_part).then_some(part)
 }
 
-/// Metrics of what the machine has not got.
-pub(crate) fn judge_metrics(metrics: &[Metric], machine: &Machine, root: &Section<'_>) {
+/// Refuses metrics of parts that the machine lacks.
+pub(crate) fn check_metrics(metrics: &[Metric], machine: &Machine, root: &Section<'_>) {
     for metric in metrics {
-        if let Some(what) = lacking(*metric, machine) {
+        if let Some(part) = missing_part(*metric, machine) {
             let title = format!("the metric `{}` needs a machine with more parts", metric.name());
             let refusal =
-                Diagnostic::new(title).at(root.at(), format!("the machine has no {what}"));
+                Diagnostic::new(title).at(root.at(), format!("the machine has no {part}"));
             root.report.push(refusal);
         }
     }

@@ -1,24 +1,25 @@
-//! Typed numbers that no washing machine has: in most cases they are in another unit. They are
-//! accepted, and the user is told.
+//! Notes on numbers that no washing machine has, which are mostly in another unit. They are
+//! accepted.
 
 use sweep_engine::config::Draft;
 use washer_model::{Parameter, Target, decimal};
 
 use crate::model::Washer;
 
-/// Numbers that machines have.
-struct Usual {
+/// The values that a parameter has in washing machines.
+struct UsualRange {
     /// The least and the greatest magnitude; 0 is always accepted.
     bounds: [f64; 2],
-    /// Units in which such a number is written by mistake, with their size.
-    mistaken: &'static [(&'static str, f64)],
+    /// The units that are used by mistake, each with its size in the parameter's unit.
+    mistaken_units: &'static [(&'static str, f64)],
 }
 
-/// Notes that are shown; further ones are counted.
-const MOST_NOTES: usize = 8;
+/// Maximum number of notes that are shown; further ones are counted. Basis: they fit on a screen.
+/// Doubling it doubles the longest list.
+const MAX_NOTES: usize = 8;
 
-/// Notes what of the typed numbers no machine has.
-pub(super) fn note(draft: &Draft<'_, Washer>) {
+/// Adds notes on unusual numbers among those that the user has written.
+pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
     let plan = &draft.plan;
     let Washer { machine, spin, .. } = &plan.model;
     let written = draft.report.written();
@@ -26,12 +27,12 @@ pub(super) fn note(draft: &Draft<'_, Washer>) {
     for parameter in Parameter::all(machine, spin) {
         let is_typed = written.contains_key(parameter.name()) && !parameter.target().is_several();
         if let Some(value) = parameter.get(machine, spin).filter(|_| is_typed) {
-            notes.extend(doubt(&parameter, value));
+            notes.extend(unusual_note(&parameter, value));
         }
     }
     for axis in &plan.axes {
         let ends = axis.values.extremes();
-        notes.extend(ends.into_iter().find_map(|end| doubt(&axis.parameter, end)));
+        notes.extend(ends.into_iter().find_map(|end| unusual_note(&axis.parameter, end)));
     }
     let unbalance_kg = machine.unbalance.mass_kg;
     let moving_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;
@@ -42,32 +43,32 @@ pub(super) fn note(draft: &Draft<'_, Washer>) {
             decimal(moving_kg)
         ));
     }
-    let further = notes.len().saturating_sub(MOST_NOTES);
-    notes.into_iter().take(MOST_NOTES).for_each(|note| draft.report.note(note));
+    let further = notes.len().saturating_sub(MAX_NOTES);
+    notes.into_iter().take(MAX_NOTES).for_each(|note| draft.report.note(note));
     if further > 0 {
         draft.report.note(format!("{further} more numbers are as unusual"));
     }
 }
 
-/// Returns what is unusual about a parameter's value, if anything is.
-fn doubt(parameter: &Parameter, value: f64) -> Option<String> {
-    let usual = usual(parameter)?;
+/// Returns a note if a parameter's value is unusual.
+fn unusual_note(parameter: &Parameter, value: f64) -> Option<String> {
+    let usual = usual_range(parameter)?;
     let [least, most] = usual.bounds;
     let is_usual = |value: f64| value == 0.0 || (least..=most).contains(&value.abs());
     if is_usual(value) {
         return None;
     }
     let unit = parameter.unit();
-    let [name, value_said] = [parameter.name().to_owned(), decimal(value)];
+    let name = parameter.name();
+    let shown = decimal(value);
     let range = format!("machines have {} to {}", decimal(least), decimal(most));
-    // 10 m for a gap of 10 mm: a mistaken unit makes it a usual number.
-    let meant = usual.mistaken.iter().find(|(_, size)| is_usual(value * size));
+    // With the unit that was meant the number is usual, such as 10 mm for a gap of "10" m.
+    let meant = usual.mistaken_units.iter().find(|(_, size)| is_usual(value * size));
     let meant = meant.map(|(other, size)| {
-        let times = value * size;
-        format!(": {value_said} {other} would be {} {unit}", decimal(rounded(times)))
+        format!(": {shown} {other} would be {} {unit}", decimal(rounded(value * size)))
     });
     let meant = meant.unwrap_or_default();
-    Some(format!("unusual: {name} = {value_said} {unit}, {range}{meant}"))
+    Some(format!("unusual: {name} = {shown} {unit}, {range}{meant}"))
 }
 
 /// Returns a number of at most six digits, for a message.
@@ -75,20 +76,26 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 
+/// Units of mass in place of kg.
 const MASSES: &[(&str, f64)] = &[("g", 1e-3)];
+/// Units of length in place of m.
 const LENGTHS: &[(&str, f64)] = &[("mm", 1e-3), ("cm", 1e-2)];
+/// Units of stiffness in place of N/m.
 const STIFFNESSES: &[(&str, f64)] = &[("N/mm", 1e3), ("kN/m", 1e3)];
+/// Units of damping in place of N s/m.
 const DAMPINGS: &[(&str, f64)] = &[("N s/mm", 1e3)];
+/// Units of moments of inertia in place of kg m^2.
 const INERTIAS: &[(&str, f64)] = &[("kg mm^2", 1e-6), ("g m^2", 1e-3)];
+/// Units of time in place of s.
 const TIMES: &[(&str, f64)] = &[("ms", 1e-3)];
 
-/// Returns the numbers that machines have of a parameter: from the smallest toy to the largest
-/// washer-extractor (some 400 kg of laundry), with a margin of about three on both sides. A wider
-/// margin would let grams pass for kilograms.
-fn usual(parameter: &Parameter) -> Option<Usual> {
+/// Returns the usual range of a parameter, if it has one: from the smallest toy to the largest
+/// washer-extractor (some 400 kg of laundry), with a factor of about three on both sides. With a
+/// greater factor grams would pass for kilograms.
+fn usual_range(parameter: &Parameter) -> Option<UsualRange> {
     let name = parameter.name();
     let has = |word: &str| name.contains(word);
-    let (bounds, mistaken) = match parameter.unit() {
+    let (bounds, mistaken_units) = match parameter.unit() {
         "kg" if has("unbalance") => ([1e-6, 100.0], MASSES),
         "kg" if has("tub") => ([0.3, 1e4], MASSES),
         "kg" if has("cabinet") => ([1.0, 1e5], MASSES),
@@ -106,5 +113,5 @@ fn usual(parameter: &Parameter) -> Option<Usual> {
         "s" if parameter.target() == Target::Spin && !has("table") => ([0.05, 7200.0], TIMES),
         _ => return None,
     };
-    Some(Usual { bounds, mistaken })
+    Some(UsualRange { bounds, mistaken_units })
 }

@@ -7,7 +7,7 @@ use sweep_engine::config::{Draft, Form, Key, KeyWalk, Keys, Read};
 use washer_model::Machine;
 use washer_row::{Criterion, Measures, Metric};
 
-use super::{GridInput, grid, machine, plausible, schema, spin, validate};
+use super::{WasherGridInput, grid, machine, plausible, schema, spin, validate};
 use crate::model::Washer;
 
 impl Read for Washer {
@@ -21,13 +21,17 @@ impl Read for Washer {
     }
 
     fn blank() -> Self {
-        let (machine, spin) = (Machine::paper(), spin::BLANK);
-        Self { machine, spin, measures: Measures::default(), held_speeds: None }
+        Self {
+            machine: Machine::paper(),
+            spin: spin::BLANK,
+            measures: Measures::default(),
+            held_speeds: None,
+        }
     }
 
-    fn walk(&mut self, keys: &mut Keys<'_>, input: Option<&GridInput>) {
+    fn walk(&mut self, keys: &mut Keys<'_>, input: Option<&WasherGridInput>) {
         let Self { machine, spin, measures, held_speeds } = self;
-        grid::machine(machine, keys, input);
+        grid::walk_machine(machine, keys, input);
         let path = input.map_or(Path::new(""), |input| &input.path);
         spin::walk(spin, path, keys);
         let key = Key::new("metrics", "further columns of the result").set();
@@ -36,18 +40,18 @@ impl Read for Washer {
         measures.feet = machine.feet.len();
         measures.dampers = machine.dampers.len();
         if let Some(root) = keys.section() {
-            grid::judge_metrics(&measures.metrics, machine, root);
+            grid::check_metrics(&measures.metrics, machine, root);
         }
-        grid::stability(&measures.metrics, found, held_speeds, keys);
+        grid::walk_stability(&measures.metrics, found, held_speeds, keys);
     }
 
     fn walk_reliability(&mut self, keys: &mut Keys<'_>) {
         let misplaced = "it belongs at the top of the file, before the first [section]";
         keys.misplace(&["metrics"], misplaced);
-        let about = "what the models are compared by: largest deviations, the same turn by turn \
-                     of the drum, or root mean squares";
+        let about = "amplitudes by which the models are compared: largest deviations, the same \
+                     turn by turn of the drum, or root mean squares";
         let criterion = &mut self.measures.criterion;
-        // Plans that do not ask for another read as ever.
+        // A plan with the default criterion omits it, so that its hash stays the same.
         if !matches!(keys.walk, KeyWalk::Describe(_))
             || keys.is_schema()
             || *criterion != Criterion::default()
@@ -60,12 +64,12 @@ impl Read for Washer {
     }
 
     fn check(draft: &Draft<'_, Self>) {
-        validate::scenarios(draft);
-        validate::stability(draft);
-        plausible::note(draft);
+        validate::check_scenarios(draft);
+        validate::check_stability(draft);
+        plausible::note_unusual_numbers(draft);
     }
 
     fn schema_of_set() -> Value {
-        schema::set()
+        schema::schema_of_set()
     }
 }

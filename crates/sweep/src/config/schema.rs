@@ -6,14 +6,16 @@ use washer_model::{ElementList, Parameter, Profile, Spin};
 
 use super::machine::with_one_of_each;
 
-/// `[set]`: names of the table as properties; those of numbered elements as patterns.
-pub(super) fn set() -> Value {
+/// Returns the schema of `[set]`. Parameters are properties; those of numbered elements are
+/// patterns.
+pub(super) fn schema_of_set() -> Value {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
     let machine = with_one_of_each();
     let mut all = Parameter::all(&machine, &spin);
     let table = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     all.extend(Parameter::all(&machine, &table));
-    let (mut single, mut patterns) = (Vec::new(), Map::new());
+    let mut single = Vec::new();
+    let mut patterns = Map::new();
     for parameter in &all {
         let name = parameter.name();
         let lists = ElementList::all().map(|list| (list.element, list.first));

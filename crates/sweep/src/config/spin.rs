@@ -1,4 +1,4 @@
-//! `[spin]`: the profiles by name, and what each is given by.
+//! The section `[spin]`: the profiles by name, and the keys of each.
 
 mod cycle;
 
@@ -12,15 +12,15 @@ use washer_model::{Machine, Parameter, Profile, Range, Spin};
 
 use cycle::Joints;
 
-/// Most rows of a table. Each is a leg of every trajectory, kept in memory for all points that are
-/// made ready together.
-pub(super) const MOST_ROWS: usize = 20_000;
+/// Maximum number of rows of a table. Basis: each is a segment of every trajectory, kept in memory
+/// for all points that are prepared together. Doubling it doubles that memory.
+pub(super) const MAX_ROWS: usize = 20_000;
 
-/// Stands in for a wrong spin, so that axes over its numbers are still known.
+/// The spin in place of a wrong one, so that axes over its numbers are known.
 pub(super) const BLANK: Spin =
     Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
 
-/// What a profile is that a peak and a ramp give.
+/// Returns a description of a profile that is given by a peak and a ramp.
 const fn about_profile(profile: Profile) -> &'static str {
     match profile {
         Profile::Cycloidal => "smooth run-up, then constant",
@@ -30,34 +30,34 @@ const fn about_profile(profile: Profile) -> &'static str {
 }
 
 /// The profile that is given as a table.
-const TABLE: &str = "table";
+const TABLE_PROFILE: &str = "table";
 
 /// The profile that is read from a file.
-const FILE: &str = "file";
+const FILE_PROFILE: &str = "file";
 
-/// Why keys of a file are refused beside another profile.
+/// The reason for which keys of a file are refused beside another profile.
 const ONLY_FILE: &str = "only the profile \"file\" has it, which needs no `profile`";
 
 /// Walks over the section of the grid file at `path`.
 pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     keys.table(Key::new("spin", "").needed("a section [spin]"), |keys| {
         keys.places = "spin_".to_owned();
-        let said = (
-            TABLE,
+        let from_table = (
+            TABLE_PROFILE,
             "linear between given points, constant after the last; a first speed other than 0 is \
              there at once",
         );
         let from_file = (
-            FILE,
+            FILE_PROFILE,
             "a cycle from a file with columns of time and speed; constant after its last row",
         );
         let all = Profile::ALL.map(|profile| (profile.name(), about_profile(profile)));
         let set = all.len();
-        // A file says by itself that it is meant.
-        let has_file = keys.section().is_some_and(|section| section.key_at(FILE).is_some());
+        // The key `file` implies its profile.
+        let has_file = keys.section().is_some_and(|section| section.key_at(FILE_PROFILE).is_some());
         let is_default = has_file || keys.is_schema();
         let variants = Variants {
-            all: all.into_iter().chain([said, from_file]).collect(),
+            all: all.into_iter().chain([from_table, from_file]).collect(),
             default: is_default.then_some(set + 1),
             set,
         };
@@ -68,9 +68,9 @@ pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
         let key = Key::new("profile", "").set();
         let chosen =
             keys.variants(key, &variants, Some(now), |keys, k| match Profile::ALL.get(k) {
-                Some(&profile) => ramped(profile, spin, keys),
-                None if k == set => table(spin, keys),
-                None => file(spin, path, keys),
+                Some(&profile) => walk_ramp(profile, spin, keys),
+                None if k == set => walk_table(spin, keys),
+                None => walk_file(spin, path, keys),
             });
         if chosen.is_none() && keys.section().is_some() {
             *spin = BLANK;
@@ -78,14 +78,14 @@ pub(super) fn walk(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     });
 }
 
-/// A cycle in a file of its own: the plan has its rows, as of a table.
-fn file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
+/// Walks over the keys of a cycle in a file. The plan has its rows, like those of a table.
+fn walk_file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     let reason = "the file gives times and speeds";
     keys.misplace(&["time_s", "speed_rpm", "peak_rpm", "ramp_s"], reason);
     let about = "CSV or Parquet file with columns of time and speed and their units, relative to \
                  this file";
     let mut named = String::new();
-    let key = Key::new(FILE, about).needed("a CSV or Parquet file of times and speeds");
+    let key = Key::new(FILE_PROFILE, about).needed("a CSV or Parquet file of times and speeds");
     let found = keys.key(key, &Form::Text, &mut named);
     let about = "straight lines between the rows, or monotone cubics";
     let names = Joints::ALL.map(|(_, name)| name);
@@ -112,9 +112,9 @@ fn file(spin: &mut Spin, path: &Path, keys: &mut Keys<'_>) {
     };
 }
 
-/// Peak and ramp.
-fn ramped(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
-    let reason = format!("only the profile \"{TABLE}\" has it, not \"{}\"", profile.name());
+/// Walks over the keys of a peak and a ramp.
+fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
+    let reason = format!("only the profile \"{TABLE_PROFILE}\" has it, not \"{}\"", profile.name());
     keys.misplace(&["time_s", "speed_rpm"], &reason);
     keys.misplace(&["file", "joints"], ONLY_FILE);
     let Spin::Ramped { profile: now, peak_rpm, ramp_s } = spin else {
@@ -140,8 +140,8 @@ fn ramped(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
     }
 }
 
-/// Speeds at times.
-fn table(spin: &mut Spin, keys: &mut Keys<'_>) {
+/// Walks over the keys of a table of times and speeds.
+fn walk_table(spin: &mut Spin, keys: &mut Keys<'_>) {
     keys.misplace(&["peak_rpm", "ramp_s"], "a table gives `time_s` and `speed_rpm` instead");
     keys.misplace(&["file", "joints"], ONLY_FILE);
     let (mut time_s, mut speed_rpm) = match std::mem::replace(spin, BLANK) {
@@ -150,9 +150,9 @@ fn table(spin: &mut Spin, keys: &mut Keys<'_>) {
     };
     let times = Numbers {
         help: Some("leave out rows between which the speed is linear"),
-        ..Numbers::new(Range::NonNegative, 0..=MOST_ROWS, format!("expected at most {MOST_ROWS}"))
+        ..Numbers::new(Range::NonNegative, 0..=MAX_ROWS, format!("expected at most {MAX_ROWS}"))
     };
-    // Whether they are in range is judged with the rest of the table.
+    // The range of the speeds is checked with the whole table.
     let speeds = Numbers { range: Range::Within(-1e5, 1e5), read: Range::Any, ..times.clone() };
     let mut column = |key: &'static str, about: &'static str, numbers, column: &mut Vec<f64>| {
         let key = Key::new(key, about).needed("an array of numbers");
@@ -163,7 +163,7 @@ fn table(spin: &mut Spin, keys: &mut Keys<'_>) {
         column("speed_rpm", "speeds at these times, rpm", speeds, &mut speed_rpm),
     ];
     if keys.section().is_some() && found != [true; 2] {
-        // Their mistakes are reported; that the stand-in has no rows is not one of them.
+        // Mistakes of the columns are reported; the empty table in their place is not one.
         if let Some(report) = keys.report() {
             report.doubt("spin_time_s");
         }

@@ -1,9 +1,8 @@
-//! Every kind of mistake with its whole message, the defaults, precedence, and inputs no user would
-//! type.
+//! Tests of mistakes with their whole messages, of defaults and precedence, and of arbitrary input.
 //!
-//! Each file of `testdata/broken` is a grid with mistakes; its snapshot is beside it. A first
-//! line `# args: --set NAME=VALUE ...` adds the command line's part; `--at` makes it the load of a
-//! point.
+//! Each file of `testdata/broken` is a grid with mistakes, and its snapshot is beside it. A first
+//! line `# args: --set NAME=VALUE ...` has the arguments of the command line. With `--at` the grid
+//! is loaded as a single point.
 
 mod again;
 mod bounds;
@@ -27,7 +26,7 @@ use crate::plan::AxisValues;
 use sweep_engine::design::{Design, DesignRule};
 use sweep_engine::plan::WrittenIn;
 
-/// What the fuzzer's inputs are read as.
+/// The format of the fuzzer's inputs.
 #[path = "../../../../fuzz/src/input.rs"]
 mod input;
 
@@ -47,28 +46,29 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Loads a grid as its first line says.
-fn load_as_told(path: &Path) -> Result<Plan, Diagnostics> {
+/// Loads a grid with the arguments in its first line.
+fn load_with_arguments(path: &Path) -> Result<Plan, Diagnostics> {
     let text = std::fs::read_to_string(path).unwrap();
     let first = text.lines().next().unwrap_or_default();
     let arguments: Vec<_> =
         first.strip_prefix("# args: ").unwrap_or_default().split_whitespace().collect();
-    let of = |option: &str| -> Vec<String> {
+    let values = |option: &str| -> Vec<String> {
         arguments
             .chunks(2)
             .filter(|pair| pair[0] == option)
             .map(|pair| pair[1].to_owned())
             .collect()
     };
-    let (sets, at) = (of("--set"), of("--at"));
+    let sets = values("--set");
+    let at = values("--at");
     if at.is_empty() {
         load(path, &sets)
     } else {
-        GridInput::file(path.to_owned(), sets).load_point(&at).map(|(plan, _)| plan)
+        WasherGridInput::file(path.to_owned(), sets).load_point(&at).map(|(plan, _)| plan)
     }
 }
 
-/// A grid written to a folder of its own.
+/// Loads the text of a grid, written to a folder of its own.
 pub(super) fn load_text(text: impl AsRef<[u8]>, sets: &[&str]) -> Result<Plan, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grid.toml");
@@ -92,7 +92,7 @@ fn broken_files_are_refused_with_these_messages() {
     settings.bind(|| {
         for path in broken {
             let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
-            match load_as_told(&path) {
+            match load_with_arguments(&path) {
                 Ok(_) => accepted.push(name),
                 Err(found) => {
                     let folder = format!("{}/", testdata().join("broken").display());
@@ -115,7 +115,7 @@ fn every_sweep_of_the_repository_loads() {
 }
 
 #[test]
-fn what_is_left_out_has_its_default() {
+fn omitted_keys_have_their_defaults() {
     let plan = load_text(SMALLEST, &[]).unwrap();
     assert_eq!(plan.name, "grid");
     assert_eq!(plan.model.machine, Machine::paper());
@@ -153,7 +153,7 @@ fn a_starter_grid_is_the_documented_one() {
 }
 
 #[test]
-fn what_is_measured_is_part_of_the_plan_only_where_it_is_not_the_default() {
+fn criterion_and_metrics_are_part_of_the_plan_unless_they_are_the_default() {
     let plain = load_text(SMALLEST, &[]).unwrap();
     assert_eq!(plain.model.measures, Measures { dampers: 2, ..Measures::default() });
     let told = load_text(format!("{SMALLEST}[reliability]\ncriterion = \"peak\"\n"), &[]).unwrap();
@@ -183,7 +183,7 @@ fn later_layers_override_earlier_ones() {
         plan.model.spin,
         Spin::Ramped { profile: Profile::Triangular, peak_rpm: 600.0, ramp_s: 50.0 }
     );
-    // An axis of one damper beside a constant for all of them.
+    // An axis of one damper overrides a constant for all of them.
     let axis = "[[axis]]\nparameter = \"damper_1_damping_n_s_per_m\"\nvalues = [50, 60]\n";
     let plan = load_text(format!("{grid}{axis}"), &[]).unwrap();
     let dampings = plan
@@ -198,10 +198,10 @@ fn later_layers_override_earlier_ones() {
 }
 
 #[test]
-fn a_point_may_lie_between_the_grids() {
+fn a_point_may_lie_between_grid_points() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sweeps/fig12.toml");
     let at = |at: &[&str]| {
-        GridInput::file(path.clone(), Vec::new())
+        WasherGridInput::file(path.clone(), Vec::new())
             .load_point(&at.iter().map(|&at| at.to_owned()).collect::<Vec<_>>())
             .map(|(plan, _)| plan)
     };
@@ -245,8 +245,8 @@ fn a_written_machine_reads_back_the_same_bits() {
     }
 }
 
-/// What is wrong with a machine file, made from the built-in one's.
-fn mistakes_of_machine(change: impl FnOnce(String) -> String, sets: &[&str]) -> String {
+/// Returns the message about a machine file, which is changed from that of the built-in machine.
+fn machine_mistakes(change: impl FnOnce(String) -> String, sets: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let file = change(machine_file(&Machine::paper(), &WrittenIn::default()));
     std::fs::write(folder.path().join("machine.toml"), file).unwrap();
@@ -257,19 +257,20 @@ fn mistakes_of_machine(change: impl FnOnce(String) -> String, sets: &[&str]) -> 
 }
 
 #[test]
-fn mistakes_in_elements_are_pointed_at() {
-    let with = |text: &'static str| mistakes_of_machine(|file| format!("{file}{text}"), &[]);
+fn mistakes_in_elements_are_reported_with_their_place() {
+    let with = |text: &'static str| machine_mistakes(|file| format!("{file}{text}"), &[]);
     let damper = "[[dampers]]\ncabinet_m = [0, -0.3, 0]\ntub_m = [0, -0.1, 0]\n\
                   damping_n_s_per_m = 0\n";
-    let of_damper = |text: &str| mistakes_of_machine(|file| format!("{file}{damper}{text}"), &[]);
-    let found = of_damper("friction_n = -40\nfriction_linear_speed_m_per_s = 0.3\n");
+    let damper_mistakes =
+        |text: &str| machine_mistakes(|file| format!("{file}{damper}{text}"), &[]);
+    let found = damper_mistakes("friction_n = -40\nfriction_linear_speed_m_per_s = 0.3\n");
     assert!(found.contains("expected a number, 0 or greater"), "{found}");
-    let found = of_damper("friction_n = 40\nfriction_linear_speed_m_per_s = \"atuo\"\n");
+    let found = damper_mistakes("friction_n = 40\nfriction_linear_speed_m_per_s = \"atuo\"\n");
     assert!(found.contains("did you mean `auto`?"), "{found}");
-    assert_eq!(of_damper("friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n"), "");
-    let found = of_damper("friction_n = 40\nfriction_speed_m_per_s = 0\n");
+    assert_eq!(damper_mistakes("friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n"), "");
+    let found = damper_mistakes("friction_n = 40\nfriction_speed_m_per_s = 0\n");
     assert!(found.contains("a number from 1e-6 to 1000"), "{found}");
-    assert_eq!(of_damper("friction_n = 40\nfriction_linear_speed_m_per_s = 0.3\n"), "");
+    assert_eq!(damper_mistakes("friction_n = 40\nfriction_linear_speed_m_per_s = 0.3\n"), "");
 
     let found =
         with("[[stops]]\ntub_m = [0.4, 0, 0.2]\nclearance_m = 0.01\nstiffness_n_per_m = 4e4\n");
@@ -279,29 +280,29 @@ fn mistakes_in_elements_are_pointed_at() {
             "[[stops]]\ntub_m = [0.4, 0, 0.2]\ndirection = {direction}\nclearance_m = \
              0.01\nstiffness_n_per_m = 4e4\n"
         );
-        mistakes_of_machine(|file| format!("{file}{text}"), &[])
+        machine_mistakes(|file| format!("{file}{text}"), &[])
     };
     assert!(stop("[0, 0]").contains("`direction` has 2 numbers"));
     assert!(stop("[0, 0, 0]").contains("stop 1 has no direction"));
     assert_eq!(stop("[0, 3, -4]"), "", "any length is made 1");
 
     let unbalance = "[[further_unbalances]]\nmass_kg = 0.2\nx_m = 0.1\nradius_m = 0\n";
-    let found = mistakes_of_machine(|file| format!("{file}{unbalance}"), &[]);
+    let found = machine_mistakes(|file| format!("{file}{unbalance}"), &[]);
     assert!(found.contains("unbalance 2 is on the drum's axis"), "{found}");
     assert!(found.contains("radius_m = 0"), "{found}");
     let found = with("[[bushings]]\ntub_m = [0.4, 0, 0]\nstiffness_n_per_m = 600\n");
     assert!(found.contains("an array of numbers"), "{found}");
 
-    // What an option sets.
-    assert_eq!(mistakes_of_machine(|file| file, &["friction_n=50"]), "");
-    let found = mistakes_of_machine(|file| file, &["stop_1_clearance_m=0.01"]);
+    // Options set the numbers of elements that exist.
+    assert_eq!(machine_mistakes(|file| file, &["friction_n=50"]), "");
+    let found = machine_mistakes(|file| file, &["stop_1_clearance_m=0.01"]);
     assert!(found.contains("the machine has 0 stops"), "{found}");
-    let found = mistakes_of_machine(|file| file, &["unbalance_2_mass_kg=0.01"]);
+    let found = machine_mistakes(|file| file, &["unbalance_2_mass_kg=0.01"]);
     assert!(found.contains("the machine has 1 unbalance, numbered from 1"), "{found}");
 }
 
 #[test]
-fn a_machine_of_a_thousand_springs_is_enough() {
+fn a_machine_has_at_most_a_thousand_springs() {
     let load_with = |springs: usize| {
         let mut machine = Machine::paper();
         machine.springs = vec![machine.springs[0]; springs];
@@ -320,7 +321,7 @@ fn a_machine_of_a_thousand_springs_is_enough() {
 }
 
 #[test]
-fn the_canonical_plan_tells_plans_apart_and_keeps_every_bit() {
+fn the_canonical_plan_distinguishes_plans_and_keeps_every_bit() {
     let json = |grid: &str, sets: &[&str]| load_text(grid, sets).unwrap().to_json().to_string();
     let reordered =
         "[time]\nend_s = 5e1\n[spin]\nramp_s = 50.0\npeak_rpm = 3.5e2\nprofile = \"triangular\"\n";
@@ -335,7 +336,7 @@ fn the_canonical_plan_tells_plans_apart_and_keeps_every_bit() {
 }
 
 #[test]
-fn a_byte_order_mark_and_windows_line_ends_are_read_over() {
+fn a_byte_order_mark_and_windows_line_ends_are_ignored() {
     let dressed = format!("\u{feff}{}", SMALLEST.replace('\n', "\r\n"));
     assert_eq!(load_text(dressed, &[]).unwrap(), load_text(SMALLEST, &[]).unwrap());
 }
@@ -360,7 +361,7 @@ fn files_that_cannot_be_read_are_refused() {
 }
 
 #[test]
-fn a_file_of_nothing_but_mistakes_is_refused_in_bounded_text_and_time() {
+fn files_with_many_mistakes_have_short_messages() {
     let lines = (0..100_000).map(|k| format!("k{k}=1\n"));
     let unknown = load_text(lines.collect::<String>(), &[]).unwrap_err();
     assert!(unknown.contains("100002 mistakes (100 shown)"), "{}", &unknown[unknown.len() - 200..]);
@@ -372,7 +373,8 @@ fn a_file_of_nothing_but_mistakes_is_refused_in_bounded_text_and_time() {
         "{}",
         &repeated[repeated.len() - 200..]
     );
-    let (times, speeds) = ("1,".repeat(20_000), "2,".repeat(20_000));
+    let times = "1,".repeat(20_000);
+    let speeds = "2,".repeat(20_000);
     let table = format!(
         "[spin]\nprofile = \"table\"\ntime_s = [{times}]\nspeed_rpm = [{speeds}]\n[time]\nend_s = \
          9\n"
@@ -385,7 +387,7 @@ fn a_file_of_nothing_but_mistakes_is_refused_in_bounded_text_and_time() {
 }
 
 #[test]
-fn a_grid_of_as_many_points_as_allowed_takes_no_memory() {
+fn the_largest_grid_takes_no_memory() {
     let axis = |name: &str, count: u64| {
         format!(
             "[[axis]]\nparameter = \"{name}\"\nrange = {{ from = 1.0, to = 2.0, count = {count} \
@@ -407,13 +409,13 @@ fn a_grid_of_as_many_points_as_allowed_takes_no_memory() {
 }
 
 #[test]
-fn an_axis_value_is_what_stands_in_the_file() {
+fn axis_values_keep_the_order_of_the_file() {
     let grid = format!("{SMALLEST}[[axis]]\nparameter = \"tub_mass_kg\"\nvalues = [3, 1, 0x10]\n");
     let plan = load_text(grid, &[]).unwrap();
     assert_eq!(plan.axes[0].values, AxisValues::List(vec![3.0, 1.0, 16.0]));
 }
 
-/// Pieces that mutations splice into a valid grid.
+/// Texts that mutations insert into a valid grid.
 const PIECES: [&str; 24] = [
     "nan",
     "inf",
@@ -441,7 +443,8 @@ const PIECES: [&str; 24] = [
     "99999999999999999999",
 ];
 
-/// Either a plan whose every corner is sound, or mistakes; nothing else.
+/// Asserts that a text is a plan with possible machines at all corners, or is refused with a
+/// message.
 fn loads_or_explains(text: &[u8]) {
     match load_text(text, &[]) {
         Ok(plan) => {
@@ -568,7 +571,7 @@ fn a_design_is_ranges_and_a_number_of_points() {
 }
 
 #[test]
-fn a_list_is_a_file_of_points_whose_content_counts() {
+fn a_plan_with_a_list_depends_on_the_content_of_its_file() {
     let folder = tempfile::tempdir().unwrap();
     let grid = folder.path().join("grid.toml");
     std::fs::write(
@@ -595,7 +598,7 @@ fn a_list_is_a_file_of_points_whose_content_counts() {
     let other = load_list(&text.replace("40", "41"));
     assert_ne!(plan.to_json()["design"]["hash"], other.to_json()["design"]["hash"]);
     assert_eq!(plan.to_json()["axis"], other.to_json()["axis"]);
-    let point = GridInput::file(grid, Vec::new())
+    let point = WasherGridInput::file(grid, Vec::new())
         .load_point(&["unbalance_mass_kg=0.1".into(), "spin_ramp_s=9".into()])
         .unwrap()
         .0;
@@ -603,10 +606,10 @@ fn a_list_is_a_file_of_points_whose_content_counts() {
 }
 
 #[test]
-fn a_name_from_outside_stands_in_for_one_that_a_file_cannot_give() {
+fn a_name_from_the_command_line_replaces_an_invalid_file_name() {
     let text = include_str!("../../../../sweeps/quick.toml").lines();
     let text = text.filter(|line| !line.starts_with("name")).map(|line| format!("{line}\n"));
-    let input = GridInput::text("my grid", text.collect(), Vec::new());
+    let input = WasherGridInput::text("my grid", text.collect(), Vec::new());
     let refused = input.load().unwrap_err().to_string();
     assert!(refused.contains("or pass `--name`"), "{refused}");
     assert_eq!(input.with_name(Some("mine".to_owned())).load().unwrap().name, "mine");

@@ -1,4 +1,4 @@
-//! Checks of the resolved plan as a whole, each pointing back at the numbers it concerns.
+//! Checks of the plan as a whole. Each mistake refers to the numbers in the files that cause it.
 
 use std::collections::BTreeSet;
 
@@ -18,57 +18,65 @@ use sweep_engine::config::{Diagnostic, Draft};
 use sweep_engine::method::{Integrator as _, Steps};
 use sweep_engine::plan::{MAX_STEPS, shortest_step_s};
 
-/// Most turns of the drum in a window that are compared one by one: 20 minutes at 1000 rpm. They
-/// stay in memory for a group of points.
-const MOST_TURNS: f64 = 20_000.0;
+/// Maximum number of turns of the drum in a window for the criterion that compares turns. Basis: 20
+/// minutes at 1000 rpm; their peaks stay in memory for a group of points. Doubling it doubles that
+/// memory.
+const MAX_COMPARED_TURNS: f64 = 20_000.0;
 
-/// Greatest frequency in the steps of the additive method, as a share of the machine's, at which a
-/// user is pointed to that method. Basis: below it stiff bearings or a stiff hinge make the
-/// machine's frequency. A value twice as large would point everybody there.
-const MOSTLY_BY_BEARINGS: f64 = 0.9;
+/// Maximum frequency that limits the steps of the additive method, as a share of the machine's
+/// highest, at which a message recommends that method. Basis: below it the highest frequency is due
+/// to stiff bearings or a stiff hinge. Doubling it recommends the method always.
+const ADDITIVE_HINT_SHARE: f64 = 0.9;
 
-/// Elements and rows of a spin's table that are looked at before a run, over all points of a list:
-/// some seconds' worth.
-const MOST_JUDGED: u64 = 1_000_000_000;
+/// Maximum number of elements and of rows of a spin's table that are checked before a run, over all
+/// points. Basis: some seconds of work. Doubling it doubles that time.
+const MAX_CHECKED_ROWS: u64 = 1_000_000_000;
 
-/// Counting a row's turns takes as long as judging so many rows.
-const TURNS_PER_ROW: u64 = 50;
+/// Time to count the turns in a row of a spin's table, in units of the time to check a row.
+/// Doubling it halves the number of points that are accepted with the criterion that compares
+/// turns.
+const TURN_COUNT_COST: u64 = 50;
 
-/// A machine or spin that cannot be, at any corner of the grid. Inertia and bearings are linear
-/// conditions, so a machine that meets them at the corners meets them between; a spring that
-/// shrinks to nothing only in between is left to the run, as a failed row.
-pub(crate) fn scenarios(draft: &Draft<'_, Washer>) {
+/// Refuses impossible machines and spins at the corners of the grid.
+///
+/// The conditions on inertia and bearings are linear, so a grid that meets them at its corners
+/// meets them everywhere. A spring whose length vanishes only between corners is a failed row of
+/// the run.
+pub(crate) fn check_scenarios(draft: &Draft<'_, Washer>) {
     let plan = &draft.plan;
     let mut scenario = plan.scenario_at(&plan.corner(0));
-    let swept = Swept::of(plan);
-    if swept.is_too_much(draft, &scenario) {
+    let varying = VaryingParts::new(plan);
+    if varying.refuse_too_many_points(draft, &scenario) {
         return;
     }
-    let mut judge = Judge { draft, reported: BTreeSet::new(), spin_is_sound: true };
-    judge.corner(&scenario, Swept::EVERYTHING);
+    let mut check = CornerCheck { draft, reported: BTreeSet::new(), spin_is_sound: true };
+    check.check_corner(&scenario, VaryingParts::ALL);
     for corner in 1..plan.corners() {
         if draft.report.is_full() {
-            // A corner's mistakes are mostly another's, and none would be shown.
+            // No further mistake would be shown.
             break;
         }
         plan.place(&mut scenario, &plan.corner(corner));
-        judge.corner(&scenario, swept);
+        check.check_corner(&scenario, varying);
     }
 }
 
-/// What of a scenario differs from corner to corner.
+/// The parts of a scenario that differ from corner to corner.
 #[derive(Clone, Copy)]
-struct Swept {
+struct VaryingParts {
     machine: bool,
     spin: bool,
     window: bool,
 }
 
-impl Swept {
-    const EVERYTHING: Self = Self { machine: true, spin: true, window: true };
+impl VaryingParts {
+    /// All parts, for the first corner.
+    const ALL: Self = Self { machine: true, spin: true, window: true };
 
-    fn of(plan: &Plan) -> Self {
-        let any = |of: fn(Target) -> bool| plan.axes.iter().any(|axis| of(axis.parameter.target()));
+    fn new(plan: &Plan) -> Self {
+        let any = |is_part: fn(Target) -> bool| {
+            plan.axes.iter().any(|axis| is_part(axis.parameter.target()))
+        };
         Self {
             machine: any(|target| !matches!(target, Target::Spin | Target::Window(_))),
             spin: any(|target| target == Target::Spin),
@@ -76,9 +84,8 @@ impl Swept {
         }
     }
 
-    /// Refuses a list so long, of a machine or a spin so large, that judging its points would take
-    /// minutes.
-    fn is_too_much(self, draft: &Draft<'_, Washer>, scenario: &Scenario) -> bool {
+    /// Refuses a list of points whose check would take minutes, and returns whether it did.
+    fn refuse_too_many_points(self, draft: &Draft<'_, Washer>, scenario: &Scenario) -> bool {
         let Washer { machine, spin, .. } = &scenario.model;
         let elements = ElementList::all().map(|list| (list.count)(machine) as u64).sum::<u64>();
         let rows = match spin {
@@ -87,10 +94,11 @@ impl Swept {
         };
         let counts_turns = draft.plan.model.measures.criterion == Criterion::Envelope
             && (self.spin || self.window);
-        let a_point = u64::from(self.machine) * elements
+        let cost_per_point = u64::from(self.machine) * elements
             + u64::from(self.spin) * rows
-            + u64::from(counts_turns) * rows * TURNS_PER_ROW;
-        let (points, most) = (draft.plan.corners(), MOST_JUDGED / a_point.max(1));
+            + u64::from(counts_turns) * rows * TURN_COUNT_COST;
+        let points = draft.plan.corners();
+        let most = MAX_CHECKED_ROWS / cost_per_point.max(1);
         if points <= most {
             return false;
         }
@@ -106,17 +114,17 @@ impl Swept {
     }
 }
 
-/// Judges corner after corner, and reports each mistake once.
-struct Judge<'a> {
+/// A check of corners that reports each mistake once.
+struct CornerCheck<'a> {
     draft: &'a Draft<'a, Washer>,
     reported: BTreeSet<Vec<String>>,
     spin_is_sound: bool,
 }
 
-impl Judge<'_> {
-    /// Judges what is new at a corner. Single numbers were judged where they were read; left is how
-    /// they go together.
-    fn corner(&mut self, scenario: &Scenario, new: Swept) {
+impl CornerCheck<'_> {
+    /// Checks the parts that are new at a corner. Single numbers were checked as they were read;
+    /// here their combinations are.
+    fn check_corner(&mut self, scenario: &Scenario, new: VaryingParts) {
         if new.machine {
             self.violations(scenario.model.machine.joint_violations());
         }
@@ -129,42 +137,46 @@ impl Judge<'_> {
             window(self.draft, scenario, &mut self.reported);
         }
         if (new.spin || new.window) && self.spin_is_sound {
-            turns(self.draft, scenario, &mut self.reported);
+            check_turns(self.draft, scenario, &mut self.reported);
         }
     }
 
     fn violations(&mut self, found: Vec<Violation>) {
         for Violation { title, concerns, expected } in found {
-            let judged = !concerns.iter().any(|key| self.draft.report.is_doubtful(key));
-            if judged && self.reported.insert(concerns.clone()) {
+            let is_certain = !concerns.iter().any(|key| self.draft.report.is_doubtful(key));
+            if is_certain && self.reported.insert(concerns.clone()) {
                 refuse(self.draft, title, &concerns, &format!("expected {expected}"));
             }
         }
     }
 }
 
-/// More turns of the drum in the window than are compared one by one.
-fn turns(draft: &Draft<'_, Washer>, scenario: &Scenario, reported: &mut BTreeSet<Vec<String>>) {
+/// Refuses a window with more turns of the drum than the criterion that compares turns accepts.
+fn check_turns(
+    draft: &Draft<'_, Washer>,
+    scenario: &Scenario,
+    reported: &mut BTreeSet<Vec<String>>,
+) {
     let Some(criterion) = draft.report.place("reliability.criterion") else { return };
     if draft.plan.model.measures.criterion != Criterion::Envelope {
         return;
     }
     let turns = scenario.model.spin.turns_within(scenario.window_s);
-    if turns <= MOST_TURNS || !reported.insert(vec!["reliability.criterion".to_owned()]) {
+    if turns <= MAX_COMPARED_TURNS || !reported.insert(vec!["reliability.criterion".to_owned()]) {
         return;
     }
     let name = Criterion::Envelope.name();
     let title =
         format!("the drum makes {turns:.0} turns in the window, too many to compare one by one");
     let expected =
-        format!("expected at most {MOST_TURNS} turns for \"{name}\": shorten the window");
+        format!("expected at most {MAX_COMPARED_TURNS} turns for \"{name}\": shorten the window");
     draft.report.push(Diagnostic::new(title).at(&criterion, expected));
 }
 
-/// Refuses a machine whose fastest motion is too fast for the method: for any number of steps that
-/// is accepted, or for the plan's own step. Only a sound plan can be judged.
-pub(crate) fn stability(draft: &Draft<'_, Washer>) {
-    // As a share of the longest stable step: that which the method takes at its slowest.
+/// Refuses a machine whose highest frequency is too high for the method: for the greatest number of
+/// steps that is accepted, or for the plan's own step. It does nothing if the plan has mistakes.
+pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
+    // `share` is the shortest step that the method takes over the longest stable one.
     let (step_s, share) = match draft.plan.integrator.steps() {
         Steps::Fixed(step_s) => (Some(step_s), 1.0),
         Steps::ByError => (None, 1.0),
@@ -197,14 +209,14 @@ pub(crate) fn stability(draft: &Draft<'_, Washer>) {
         let refusal = place.into_iter().fold(Diagnostic::new(title), |diagnostic, at| {
             diagnostic.at(&at, format!("expected at most {MAX_STEPS:e} steps"))
         });
-        let way_out = if is_too_fast(by_additive(draft)) {
+        let way_out = if is_too_fast(highest_additive_rad_per_s(draft)) {
             ""
         } else {
             ", or use method = \"additive\", which takes stiff bearings in long steps"
         };
         draft.report.push(refusal.help(format!(
-            "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mass, a moment \
-             of inertia or a stiffness that is not meant so{way_out}"
+            "its highest natural frequency is {frequency:.1e} rad/s{at}: look for a mistaken mass, \
+             moment of inertia or stiffness{way_out}"
         )));
     } else if let Some(step_s) = step_s.filter(|&step_s| step_s > limit_s) {
         let title = format!(
@@ -212,7 +224,7 @@ pub(crate) fn stability(draft: &Draft<'_, Washer>) {
             decimal(step_s)
         );
         let expected = format!("expected a step of at most {limit_s:.2e} s");
-        let way_out = if by_additive(draft) > MOSTLY_BY_BEARINGS * frequency {
+        let way_out = if highest_additive_rad_per_s(draft) > ADDITIVE_HINT_SHARE * frequency {
             ""
         } else {
             "; method = \"additive\" takes stiff bearings in longer steps"
@@ -224,14 +236,13 @@ pub(crate) fn stability(draft: &Draft<'_, Washer>) {
     }
 }
 
-/// Returns the highest frequency that limits the steps of the additive method.
-fn by_additive(draft: &Draft<'_, Washer>) -> f64 {
+/// Returns the highest frequency that limits the steps of the additive method, over the corners.
+fn highest_additive_rad_per_s(draft: &Draft<'_, Washer>) -> f64 {
     highest_of_corners_rad_per_s(draft, highest_explicit_frequency_rad_per_s)
 }
 
-/// Returns the highest natural frequency of any corner's machine, turning at its greatest speed. As
-/// a rule it is that of undamped bearings against their mass. A machine without equilibrium has
-/// none, and its rows will say so.
+/// Returns the highest natural frequency over the corners, each at its greatest speed. It is mostly
+/// that of the bearings. A machine without equilibrium has none, and its rows fail.
 fn highest_of_corners_rad_per_s(
     draft: &Draft<'_, Washer>,
     highest_rad_per_s: fn(&Point, f64) -> Result<f64, NoModes>,
@@ -249,8 +260,7 @@ fn highest_of_corners_rad_per_s(
         }
         let speed = spin.greatest_speed_rad_per_s(plan.end_s);
         for point in prepare(Simd::Scalar, &[(machine, spin)], &timing).into_iter().flatten() {
-            // Matrices without eigenvalues leave it to the run to tell whether the machine can
-            // move.
+            // A machine whose eigenvalues do not converge is left to the run.
             highest = highest.max(highest_rad_per_s(&point, speed).unwrap_or(0.0));
         }
     }

@@ -7,22 +7,25 @@ use sweep_engine::store::{Done, Holds};
 use washer_model::{COORDINATES, Channel, Ending, Endings, Response, STATE_LEN, Settled, State};
 use washer_row::{Measures, MetricColumn, Status};
 
-use super::last_state;
+use super::final_state;
 use crate::engine::Carried;
 
-/// A row: one of the motions of a dwell, at one of its turns from 0 if these are kept; or none.
-pub(crate) struct RowOf {
+/// The data of a row: a motion of a point at a held speed, and one of its turns.
+pub(crate) struct DwellRow {
+    /// All motions of the point at this speed, or the reason why there are none.
     pub(super) found: Result<Arc<Endings>, Status>,
+    /// The number of the motion.
     pub(super) motion: usize,
+    /// The number of the turn among those that are kept; 0 if none are.
     pub(super) turn: usize,
 }
 
-pub(crate) type DwellColumn = ResultColumn<RowOf>;
+pub(crate) type DwellColumn = ResultColumn<DwellRow>;
 
-/// Kinds of motions that have settled, of [`Ending::KINDS`].
-const SETTLED: usize = 5;
+/// Number of the kinds of settled motions, which are the first of [`Ending::KINDS`].
+const SETTLED_KINDS: usize = 5;
 
-/// How a row came about.
+/// The statuses of rows.
 const STATUSES: [&str; 9] = [
     "ok",
     "left_range",
@@ -35,7 +38,7 @@ const STATUSES: [&str; 9] = [
     "no_response",
 ];
 
-impl RowOf {
+impl DwellRow {
     fn found(&self) -> Option<&Endings> {
         self.found.as_deref().ok()
     }
@@ -44,18 +47,18 @@ impl RowOf {
         self.found()?.motions.get(self.motion)
     }
 
-    /// The motion, if it stayed within what the model is good for.
+    /// Returns the motion, if it stayed within the model's range.
     fn within(&self) -> Option<&Ending> {
         self.motion().filter(|motion| !matches!(motion.state, State::LeftRange { .. }))
     }
 
-    /// The periodic response that a machine is in that runs up.
+    /// Returns the periodic response of a machine that runs up.
     fn response(&self) -> Option<&Response> {
         self.found()?.responses.first()
     }
 
     fn kind(&self) -> Option<usize> {
-        Some(self.motion()?.kind()).filter(|kind| *kind < SETTLED)
+        Some(self.motion()?.kind()).filter(|kind| *kind < SETTLED_KINDS)
     }
 
     fn period_turns(&self) -> Option<u64> {
@@ -101,14 +104,14 @@ impl RowOf {
     }
 }
 
-/// Counts, null where they are not known.
-fn counts(name: &str, text: &str, of: fn(&RowOf) -> Option<u64>) -> DwellColumn {
-    ResultColumn::new(name, "1", text, Holds::KnownCount, of)
+/// Returns a column of counts, which are null if they are not known.
+fn count_column(name: &str, text: &str, count: fn(&DwellRow) -> Option<u64>) -> DwellColumn {
+    ResultColumn::new(name, "1", text, Holds::KnownCount, count)
 }
 
-/// Numbers of both models' motions at each channel.
+/// Returns the columns of the amplitudes of both models, by channel.
 fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
-    let numbers: [(&str, &str, fn(&RowOf) -> Option<&[f64; Channel::ALL.len()]>); 3] = [
+    let numbers: [(&str, &str, fn(&DwellRow) -> Option<&[f64; Channel::ALL.len()]>); 3] = [
         (
             MODELS[0],
             "largest deviation from equilibrium over the motion's last turns; null where it left \
@@ -123,54 +126,62 @@ fn channel_columns(channels: &[Channel]) -> Vec<DwellColumn> {
         }),
     ];
     let mut columns = Vec::new();
-    for (what, text, of) in numbers {
+    for (prefix, text, amplitudes) in numbers {
         for &channel in channels {
             let text = format!("{}: {text}", channel.description());
-            let name = format!("{what}_{}", channel.name());
-            let number = move |row: &RowOf| Some(of(row)?[channel.index()]);
-            columns.push(ResultColumn::measured(name, channel.unit(), text, number));
+            let name = format!("{prefix}_{}", channel.name());
+            let amplitude = move |row: &DwellRow| Some(amplitudes(row)?[channel.index()]);
+            columns.push(ResultColumn::measured(name, channel.unit(), text, amplitude));
         }
     }
     columns
 }
 
-/// Every column, in order; with those of states once a turn, if these are kept.
+/// Returns all columns in order. `with_sections` adds those of states once a turn.
 pub(crate) fn columns(
     channels: &[Channel],
     measures: &Measures,
     with_sections: bool,
 ) -> Vec<DwellColumn> {
-    let motion = |row: &RowOf| Some(row.motion as u64);
+    let motion = |row: &DwellRow| Some(row.motion as u64);
     let text = "number of the motion at this speed: 0 is the one that the disturbed periodic \
                 response ends in";
     let mut columns = vec![ResultColumn::new("motion", "1", text, Holds::Count, motion)];
     let text = "how many starts ended in it; 0 where only a transient did";
-    columns.push(counts("starts", text, |row| Some(u64::from(row.motion()?.starts))));
+    columns.push(count_column("starts", text, |row| Some(u64::from(row.motion()?.starts))));
     let text = "how many starts there were: the disturbed periodic responses, then kicks, two \
                 thirds of them along the modes that rock most, the others in random directions, \
                 every other one of the machine at rest";
-    columns.push(counts("starts_made", text, |row| Some(u64::from(row.found()?.starts))));
+    columns.push(count_column("starts_made", text, |row| Some(u64::from(row.found()?.starts))));
     let text = "smallest kick off the periodic response that led to it; 0: a disturbed periodic \
                 response did; null where only a kick of the machine at rest, a transient or the \
                 last speed's motion did";
-    columns.push(ResultColumn::measured("least_kick_rad_per_s", "rad/s", text, |row: &RowOf| {
-        row.motion()?.least_kick_rad_per_s
-    }));
+    columns.push(ResultColumn::measured(
+        "least_kick_rad_per_s",
+        "rad/s",
+        text,
+        |row: &DwellRow| row.motion()?.least_kick_rad_per_s,
+    ));
     let text = "periodic: it repeats every turn; periodic_2: every second; periodic_m: every \
                 period_turns; quasi_periodic: two frequencies; chaotic: neighbours part, and eight \
                 trajectories from its states stayed in it for 240 s; null where it did not settle";
-    columns.push(ResultColumn::name("kind", text, Ending::KINDS[..SETTLED].to_vec(), RowOf::kind));
+    columns.push(ResultColumn::name(
+        "kind",
+        text,
+        Ending::KINDS[..SETTLED_KINDS].to_vec(),
+        DwellRow::kind,
+    ));
     let text = "after how many turns it repeats; null where it does not";
-    columns.push(counts("period_turns", text, RowOf::period_turns));
+    columns.push(count_column("period_turns", text, DwellRow::period_turns));
     columns.extend(channel_columns(channels));
     let is_periodic = |number: &MetricColumn| number.metric.has_periodic_value();
     for number in measures.per_model().filter(is_periodic) {
         let text = format!("{}, over 128 further turns of the motion", number.description());
         let (name, unit) = (number.column(MODELS[0]), number.metric.facts().unit);
-        let of = move |row: &RowOf| number.value(&row.within()?.extra);
-        columns.push(ResultColumn::measured(name, unit, text.replace(" in the window", ""), of));
+        let value = move |row: &DwellRow| number.value(&row.within()?.extra);
+        columns.push(ResultColumn::measured(name, unit, text.replace(" in the window", ""), value));
     }
-    let numbers: [(&str, &str, &str, fn(&RowOf) -> Option<f64>); 7] = [
+    let numbers: [(&str, &str, &str, fn(&DwellRow) -> Option<f64>); 7] = [
         (
             "growth_per_s",
             "1/s",
@@ -182,7 +193,7 @@ pub(crate) fn columns(
             "frequency_cpm",
             "1/min",
             "of two frequencies the strongest line once a turn, from 0 to half the speed",
-            RowOf::frequency_cpm,
+            DwellRow::frequency_cpm,
         ),
         ("other_frequency_cpm", "1/min", "the speed less frequency_cpm", |row| {
             Some(row.response()?.speed_rpm - row.frequency_cpm()?)
@@ -212,22 +223,22 @@ pub(crate) fn columns(
             |row| row.found()?.threshold_rad_per_s,
         ),
     ];
-    for (name, unit, text, of) in numbers {
-        columns.push(ResultColumn::measured(name, unit, text, of));
+    for (name, unit, text, value) in numbers {
+        columns.push(ResultColumn::measured(name, unit, text, value));
     }
     let text = "of a motion that did not settle: whether its largest deviations are within a \
                 factor of two of the periodic response's, which it then comes to or leaves slowly";
-    columns.push(ResultColumn::flag("near_response", text, RowOf::is_near_response));
+    columns.push(ResultColumn::flag("near_response", text, DwellRow::is_near_response));
     let text = "mean life of a transient; null of other motions";
-    columns.push(ResultColumn::measured("life_s", "s", text, RowOf::life_s));
+    columns.push(ResultColumn::measured("life_s", "s", text, DwellRow::life_s));
     let text = "how long its first trajectory was followed";
-    columns.push(ResultColumn::measured("followed_s", "s", text, |row: &RowOf| {
+    columns.push(ResultColumn::measured("followed_s", "s", text, |row: &DwellRow| {
         Some(row.motion()?.time_s)
     }));
     let text = "ok; left_range: it went farther than the model is good for, after followed_s; \
                 not_settled: the largest deviations still change; transient: it wanders as chaos \
                 does, but ends elsewhere after life_s; or why there is no motion";
-    columns.push(ResultColumn::name("status", text, STATUSES.to_vec(), |row: &RowOf| {
+    columns.push(ResultColumn::name("status", text, STATUSES.to_vec(), |row: &DwellRow| {
         STATUSES.iter().position(|status| *status == row.status())
     }));
     if with_sections {
@@ -236,34 +247,35 @@ pub(crate) fn columns(
     columns
 }
 
-/// The state in which a machine is taken to the next speed, kept for whoever goes on from there.
-pub(super) fn carried() -> impl Iterator<Item = DwellColumn> {
-    let of = |i: usize| move |row: &RowOf| Some(last_state(row.found()?)?[i].to_bits());
+/// Returns the columns of the state from which a machine is taken to the next speed. Chunks have
+/// them, so that an interrupted run can continue.
+pub(super) fn carried_columns() -> impl Iterator<Item = DwellColumn> {
+    let bits = |i: usize| move |row: &DwellRow| Some(final_state(row.found()?)?[i].to_bits());
     (0..STATE_LEN)
-        .map(move |i| ResultColumn::new(format!("carried_{i}"), "", "", Holds::Kept, of(i)))
+        .map(move |i| ResultColumn::new(format!("carried_{i}"), "", "", Holds::Kept, bits(i)))
 }
 
-/// The state that a row was kept with.
-pub(super) fn carried_by(known: &Done) -> Carried {
+/// Returns the state of a known row from which a machine is taken to the next speed.
+pub(super) fn carried_state(known: &Done) -> Carried {
     let cells = known.rows.first()?.last_chunk::<STATE_LEN>()?;
     let state: Option<Vec<f64>> = cells.iter().map(|cell| cell.map(f64::from_bits)).collect();
     state?.try_into().ok()
 }
 
-/// Columns of states once a turn.
+/// Returns the columns of states once a turn.
 fn section_columns() -> Vec<DwellColumn> {
     let text = "number of the turn among those kept, from 0: what follows is where it ends";
-    let mut columns = vec![counts("turn", text, |row| row.found().map(|_| row.turn as u64))];
+    let mut columns = vec![count_column("turn", text, |row| row.found().map(|_| row.turn as u64))];
     for i in 0..STATE_LEN {
         let q = i % COORDINATES;
         let unit = if q < 4 { "m" } else { "rad" };
-        let (name, unit, text) = match i < COORDINATES {
+        let (name, unit, description) = match i < COORDINATES {
             true => (format!("q{}_{unit}", q + 1), unit.to_owned(), "coordinate from equilibrium"),
             false => (format!("u{}_{unit}_per_s", q + 1), format!("{unit}/s"), "its speed"),
         };
-        let of = move |row: &RowOf| Some(row.motion()?.sections.get(row.turn)?[i]);
-        let text = format!("{text}, where the unbalance is up");
-        columns.push(ResultColumn::measured(name, &unit, text, of));
+        let value = move |row: &DwellRow| Some(row.motion()?.sections.get(row.turn)?[i]);
+        let text = format!("{description}, where the unbalance is up");
+        columns.push(ResultColumn::measured(name, &unit, text, value));
     }
     columns
 }

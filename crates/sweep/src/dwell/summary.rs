@@ -1,59 +1,60 @@
-//! What a file of `sweep dwell` says as a whole.
+//! The summary of a file of `sweep dwell`.
 
 use std::collections::BTreeMap;
 
 use crate::places;
 use sweep_files::{FileError, ParquetFile, key};
 
-/// The channels whose deviations the summary gives.
+/// The channels whose amplitudes the summary gives.
 const CHANNELS: [&str; 2] = ["tub_yaw", "tub_pitch"];
 
-/// The largest number of motions that have a line each. Basis: they fit on a screen. Doubling it
+/// Maximum number of motions that have a line each. Basis: they fit on a screen. Doubling it
 /// doubles the longest summary.
 const MAX_LISTED_MOTIONS: usize = 12;
 
-/// Reads through a file: lines, each with its name.
+/// Returns the lines of the summary, each with its name.
 ///
 /// # Errors
-/// As [`ParquetFile::read`].
+/// Returns an error if the file cannot be read.
 pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, FileError> {
-    let mut axes = places::axes(file);
+    let mut axes = places::axis_names(file);
     axes.push("speed_rpm".to_owned());
     let mut kinds: BTreeMap<String, u64> = BTreeMap::new();
-    let (mut rows, mut places) = (0_u64, 0_u64);
-    // Where there are several motions, and how many.
+    let mut rows = 0_u64;
+    let mut places = 0_u64;
+    // Points and speeds with several motions, and their number.
     let mut several: Vec<(Vec<f64>, u64)> = Vec::new();
-    // By channel: how far, which kind of motion, where.
+    // The greatest amplitude by channel, with the kind of the motion, and the point and speed.
     let mut farthest: [Option<(f64, String, Vec<f64>)>; CHANNELS.len()] = [None, None];
     let has_turns = file.schema().index_of("turn").is_ok();
     let channels = CHANNELS.map(|name| format!("nonlinear_{name}"));
     let has_kicks = file.schema().index_of("least_kick_rad_per_s").is_ok();
-    let mut listed: Vec<Listed> = Vec::new();
+    let mut listed: Vec<MotionLine> = Vec::new();
     let names = ["kind", "status", "motion", "turn", "starts", "starts_made"].into_iter();
     let names = names.chain(has_kicks.then_some("least_kick_rad_per_s"));
     let names = names.chain(channels.iter().map(String::as_str));
     let names: Vec<&str> = names.chain(axes.iter().map(String::as_str)).collect();
     file.each_row(&names, |row| {
-        // A motion counts by the first of its turns, if these were kept.
+        // A motion is counted by the first of its turns.
         if has_turns && row.value(3) > 0.0 {
             return Ok(());
         }
         let first_channel = 6 + usize::from(has_kicks);
         let first_axis = first_channel + CHANNELS.len();
         let place = || (first_axis..names.len()).map(|column| row.value(column)).collect();
-        let what = row.word(0).or(row.word(1)).unwrap_or_default();
+        let kind_text = row.word(0).or(row.word(1)).unwrap_or_default();
         rows += 1;
         if listed.len() <= MAX_LISTED_MOTIONS {
-            listed.push(Listed {
+            listed.push(MotionLine {
                 at: place(),
                 motion: row.value(2),
-                what: what.replace('_', " "),
+                kind_text: kind_text.replace('_', " "),
                 deviations: [0, 1].map(|k| row.value(first_channel + k)),
                 starts: [row.value(4), row.value(5)],
                 least_kick: if has_kicks { row.value(6) } else { f64::NAN },
             });
         }
-        *kinds.entry(what.to_owned()).or_default() += 1;
+        *kinds.entry(kind_text.to_owned()).or_default() += 1;
         match row.value(2) {
             0.0 => places += 1,
             1.0 => several.push((place(), 2)),
@@ -62,7 +63,7 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
         for (column, farthest) in (first_channel..).zip(&mut farthest) {
             let value = row.value(column);
             if value > farthest.as_ref().map_or(f64::NEG_INFINITY, |(known, ..)| *known) {
-                *farthest = Some((value, what.to_owned(), place()));
+                *farthest = Some((value, kind_text.to_owned(), place()));
             }
         }
         Ok::<(), FileError>(())
@@ -74,39 +75,40 @@ pub(crate) fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, F
     let mut lines = vec![("motions", counted)];
     if rows as usize <= MAX_LISTED_MOTIONS {
         lines.extend(listed.iter().map(|motion| ("motion", motion.sentence(&axes))));
-        lines.extend(pushes(file, &axes, &listed).into_iter().map(|line| ("push", line)));
+        lines.extend(push_sentences(file, &axes, &listed).into_iter().map(|line| ("push", line)));
     }
     for (name, farthest) in CHANNELS.iter().zip(&farthest) {
         if let Some((value, kind, at)) = farthest {
-            let (name, kind) = (name.replace('_', " "), kind.replace('_', " "));
-            let at = places::words(&axes, at);
+            let name = name.replace('_', " ");
+            let kind = kind.replace('_', " ");
+            let at = places::point_text(&axes, at);
             lines.push(("farthest", format!("{name} {:.1} mrad, {kind}, at {at}", 1e3 * value)));
         }
     }
     for (at, motions) in &several {
-        lines.push(("several", format!("{motions} motions at {}", places::words(&axes, at))));
+        lines.push(("several", format!("{motions} motions at {}", places::point_text(&axes, at))));
     }
     Ok(lines)
 }
 
 /// A motion that has a line.
-struct Listed {
+struct MotionLine {
     /// The point and the speed.
     at: Vec<f64>,
     motion: f64,
-    /// The kind, or why there is none.
-    what: String,
-    /// Yaw and pitch (rad).
+    /// The kind, or the reason why there is none.
+    kind_text: String,
+    /// The amplitudes of yaw and pitch (rad).
     deviations: [f64; CHANNELS.len()],
-    /// The number of starts that ended in it, and of all starts.
+    /// The number of starts that ended in this motion, and that of all starts.
     starts: [f64; 2],
-    /// The smallest kick that led to it (rad/s), not finite where it is not known.
+    /// The smallest kick that led to this motion (rad/s); not finite if it is not known.
     least_kick: f64,
 }
 
-impl Listed {
+impl MotionLine {
     fn sentence(&self, axes: &[String]) -> String {
-        let mut text = format!("{} at {}", self.what, places::words(axes, &self.at));
+        let mut text = format!("{} at {}", self.kind_text, places::point_text(axes, &self.at));
         for (name, value) in CHANNELS.iter().zip(self.deviations) {
             if value.is_finite() {
                 text += &format!(", {} {:.1} mrad", name.replace('_', " "), 1e3 * value);
@@ -128,19 +130,19 @@ impl Listed {
         text
     }
 
-    /// Whether its numbers are those of a motion that was found.
+    /// Whether the row has a motion.
     fn is_found(&self) -> bool {
         self.starts[1] > 0.0
     }
 }
 
-/// Returns for each point and speed whether a push leads from motion 0 to another.
-fn pushes(file: &ParquetFile, axes: &[String], listed: &[Listed]) -> Vec<String> {
+/// Returns for each point and speed a sentence on the pushes that lead from motion 0 to another.
+fn push_sentences(file: &ParquetFile, axes: &[String], listed: &[MotionLine]) -> Vec<String> {
     let search = file.json(key::DWELL).unwrap_or_default();
     let Some(hardest) = search["kick_rad_per_s"].as_f64() else { return Vec::new() };
     let mut lines = Vec::new();
     for motions in listed.chunk_by(|a, b| a.at == b.at) {
-        let at = places::words(axes, &motions[0].at);
+        let at = places::point_text(axes, &motions[0].at);
         let others = motions.iter().filter(|other| other.motion > 0.0);
         let kicks = others.map(|other| other.least_kick).filter(|kick| kick.is_finite());
         if !motions[0].is_found() {

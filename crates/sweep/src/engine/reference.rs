@@ -9,9 +9,9 @@ use crate::method::REFERENCE_SHARE;
 /// have an error of some 1e-9. Doubling it makes the error 16 times as large.
 const REFERENCE_STEP_S: f64 = 2e-4;
 
-/// Maximum step (s) of the method of order 8 where forces have corners. Basis: in three rows of four
-/// of `sweeps/friction.toml` the errors are below 1e-4. Doubling it halves the time and at least
-/// doubles the errors.
+/// Maximum step (s) of the method of order 8 where forces have corners. Basis: in three rows of
+/// four of `sweeps/friction.toml` the errors are below 1e-4. Doubling it halves the time and at
+/// least doubles the errors.
 const CORNER_STEP_S: f64 = 2.5e-4;
 
 /// Returns the method of a single trajectory of a model.

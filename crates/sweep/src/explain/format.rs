@@ -1,24 +1,28 @@
-//! An explanation in words.
+//! An explanation as text.
 
 use washer_model::{Channel, Ending, Kind, LeftRange, Settled, State, decimal};
 
 use sweep_engine::commands::cells::short;
 
-use super::{Cause, Closing, End, Explanation, Passage, Resonance, Seen, Swept, Tongue};
+use super::{
+    Cause, Closing, Explanation, ModeResonance, Passage, SpeedScan, SweptResult, Tongue, TongueEnd,
+};
 
-/// Where a line ends.
-const WIDTH: usize = 96;
+/// Maximum width of a line, in characters. Basis: the width of common terminals. Doubling it makes
+/// lines twice as long.
+const LINE_WIDTH: usize = 96;
 
-/// Width of the names before the text.
-const MARGIN: usize = 10;
+/// Width of the column of names before the text, in characters. Basis: the longest name. Doubling
+/// it indents the text further.
+const NAME_WIDTH: usize = 10;
 
-/// Adds a line with a name; what follows in a paragraph is put beneath its start.
-fn line(text: &mut String, name: &str, words: impl AsRef<str>) {
-    let mut line = format!("{name:>MARGIN$} ");
+/// Appends a paragraph with a name. Long paragraphs are wrapped, and aligned with their first word.
+fn push_line(text: &mut String, name: &str, words: impl AsRef<str>) {
+    let mut line = format!("{name:>NAME_WIDTH$} ");
     for word in words.as_ref().split_whitespace() {
-        if line.chars().count() + 1 + word.chars().count() > WIDTH {
+        if line.chars().count() + 1 + word.chars().count() > LINE_WIDTH {
             *text += &(line + "\n");
-            line = " ".repeat(MARGIN + 1);
+            line = " ".repeat(NAME_WIDTH + 1);
         }
         line.push(' ');
         line.push_str(word);
@@ -26,76 +30,77 @@ fn line(text: &mut String, name: &str, words: impl AsRef<str>) {
     *text += &(line + "\n");
 }
 
-/// All of it.
-pub(crate) fn of(found: &Explanation) -> String {
+/// Returns an explanation as text.
+pub(crate) fn to_text(found: &Explanation) -> String {
     let mut text = String::new();
     let at: Vec<String> =
         found.at.iter().map(|(name, value)| format!("{name} {}", decimal(*value))).collect();
     let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
     text += format!("{}{place}", found.name).trim_end();
     text.push('\n');
-    verdict(&mut text, &found.swept);
-    for seen in &found.seen {
-        beside_tongues(&mut text, found, seen);
+    push_verdict(&mut text, &found.swept);
+    for scan in &found.scans {
+        push_scan(&mut text, found, scan);
     }
     for (tongue, passages) in &found.tongues {
         text.push('\n');
-        of_tongue(&mut text, found, tongue, passages);
+        push_tongue(&mut text, found, tongue, passages);
     }
     text.push('\n');
-    judgement(&mut text, found);
-    limits(&mut text, found);
+    push_conclusion(&mut text, found);
+    push_limitations(&mut text, found);
     text
 }
 
-/// Adds what is seen over the speeds of one way of turning beside tongues.
-fn beside_tongues(text: &mut String, found: &Explanation, seen: &Seen) {
-    let way = way(seen.is_backward);
-    line(text, "dwells", format!("{way}{}", stable_speeds(found, seen)));
-    for rpm in &seen.jumps_rpm {
+/// Appends the stability over the speeds of one direction of turning.
+fn push_scan(text: &mut String, found: &Explanation, scan: &SpeedScan) {
+    let direction = direction_prefix(scan.is_backward);
+    push_line(text, "dwells", format!("{direction}{}", stable_speeds(found, scan)));
+    for rpm in &scan.jumps_rpm {
         let words = format!(
-            "{way}at {rpm:.2} rpm the response folds back: a machine that runs up jumps to another \
-             there"
+            "{direction}at {rpm:.2} rpm the response folds back: a machine that runs up jumps to \
+             another there"
         );
-        line(text, "jump", words);
+        push_line(text, "jump", words);
     }
-    if let Some(words) = off_curve(&seen.off_curve_rpm) {
-        line(text, "off curve", format!("{way}{words}"));
+    if let Some(words) = off_curve_words(&scan.off_curve_rpm) {
+        push_line(text, "off curve", format!("{direction}{words}"));
     }
-    if let (Some((from, what)), Some((to, _))) = (seen.beyond.first(), seen.beyond.last()) {
+    if let (Some((from, limit)), Some((to, _))) = (scan.beyond.first(), scan.beyond.last()) {
         let [from, to] = [from, to].map(|rpm| short(*rpm));
-        let (count, what) = (seen.beyond.len(), what.name().replace('_', " "));
+        let count = scan.beyond.len();
+        let limit = limit.name().replace('_', " ");
         let words = format!(
-            "{way}at {count} of the speeds, from {from} to {to} rpm, the response passes what no \
-             machine can ({what}): there growth says nothing of a machine"
+            "{direction}at {count} of the speeds, from {from} to {to} rpm, the response exceeds \
+             the machine's geometry ({limit}): its growth there has no meaning for a machine"
         );
-        line(text, "beyond", words);
+        push_line(text, "beyond", words);
     }
 }
 
-/// Returns the beginning of what is said of a way of turning.
-const fn way(is_backward: bool) -> &'static str {
+/// Returns the prefix of sentences about a direction of turning.
+const fn direction_prefix(is_backward: bool) -> &'static str {
     if is_backward { "backwards, " } else { "" }
 }
 
-/// Returns at which of the speeds that were looked at the response is stable. Speeds without a
-/// response are no evidence.
-fn stable_speeds(found: &Explanation, seen: &Seen) -> String {
-    let [from, to] = [seen.looked.from, seen.looked.to].map(decimal);
-    let (count, missing) = (seen.looked.values().len(), seen.without_response);
+/// Returns a sentence on the speeds at which the response is stable, unstable or not known.
+fn stable_speeds(found: &Explanation, scan: &SpeedScan) -> String {
+    let [from, to] = [scan.speeds.from, scan.speeds.to].map(decimal);
+    let count = scan.speeds.values().len();
+    let missing = scan.without_response;
     let unknown = format!(
-        "at {missing} of {count} speeds from {from} to {to} rpm no periodic response was found, \
-         and whether it is stable is not known (`sweep dwell`)"
+        "at {missing} of {count} speeds from {from} to {to} rpm no periodic response was found; \
+         `sweep dwell` finds the motions there"
     );
     if missing == count {
         return unknown;
     }
-    let tongues = found.tongues.iter().filter(|(it, _)| it.is_backward == seen.is_backward);
-    let ends: Vec<[End; 2]> = tongues.map(|(tongue, _)| tongue.ends).collect();
+    let tongues = found.tongues.iter().filter(|(it, _)| it.is_backward == scan.is_backward);
+    let ends: Vec<[TongueEnd; 2]> = tongues.map(|(tongue, _)| tongue.ends).collect();
     if !ends.is_empty() {
-        let unstable = bands(ends.into_iter());
+        let bands = bands_words(ends.into_iter());
         let unstable =
-            format!("the periodic response is unstable in {unstable} from {from} to {to} rpm");
+            format!("the periodic response is unstable in {bands} from {from} to {to} rpm");
         return if missing == 0 {
             format!("{unstable}:")
         } else {
@@ -109,8 +114,8 @@ fn stable_speeds(found: &Explanation, seen: &Seen) -> String {
     format!("the periodic response is stable at {known} of the speeds looked at; {unknown}")
 }
 
-/// At which speeds (rpm) another response was found than that of a machine that runs up.
-fn off_curve(speeds_rpm: &[f64]) -> Option<String> {
+/// Returns a sentence on the speeds (rpm) at which the response is not on the curve of a run-up.
+fn off_curve_words(speeds_rpm: &[f64]) -> Option<String> {
     let [from, to] = [speeds_rpm.first()?, speeds_rpm.last()?].map(|rpm| short(*rpm));
     Some(format!(
         "at {} of the speeds, from {from} to {to} rpm, the response is off the curve: a machine \
@@ -119,16 +124,16 @@ fn off_curve(speeds_rpm: &[f64]) -> Option<String> {
     ))
 }
 
-/// How many bands of speed there are, and tongues in them. Where a tongue ends because the motion
-/// grows in another way, its band goes on.
-fn bands(ends: impl ExactSizeIterator<Item = [End; 2]>) -> String {
+/// Returns the numbers of unstable bands of speed and of the tongues in them. A tongue that ends
+/// because the kind of instability changes does not end its band.
+fn bands_words(ends: impl ExactSizeIterator<Item = [TongueEnd; 2]>) -> String {
     let tongues = ends.len();
-    let bands = ends.filter(|[from, _]| *from != End::OtherKind).count().max(1);
+    let bands = ends.filter(|[from, _]| *from != TongueEnd::OtherKind).count().max(1);
     match (bands, tongues) {
         (1, 1) => "one band of speed (a \"tongue\")".to_owned(),
-        (1, _) => format!("one band of speed, with {tongues} ways to grow (\"tongues\"),"),
+        (1, _) => format!("one band of speed, with {tongues} kinds of growth (\"tongues\"),"),
         _ if bands == tongues => format!("{bands} bands of speed (\"tongues\")"),
-        _ => format!("{bands} bands of speed, with {tongues} ways to grow (\"tongues\"),"),
+        _ => format!("{bands} bands of speed, with {tongues} kinds of growth (\"tongues\"),"),
     }
 }
 
@@ -136,7 +141,7 @@ fn milli(value: f64, channel: Channel) -> String {
     format!("{} m{}", significant(1e3 * value), channel.unit())
 }
 
-/// Three digits that count.
+/// Returns a number with three significant digits.
 fn significant(value: f64) -> String {
     let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
     if !(-3.0..6.0).contains(&magnitude) {
@@ -145,27 +150,27 @@ fn significant(value: f64) -> String {
     format!("{value:.*}", (2.0 - magnitude).max(0.0) as usize)
 }
 
-fn verdict(text: &mut String, swept: &Swept) {
+fn push_verdict(text: &mut String, swept: &SweptResult) {
     let [from, to] = swept.window_s.map(decimal);
-    let Some((place, ratio)) = swept.verdict.greatest else {
+    let Some((position, ratio)) = swept.verdict.greatest else {
         let when = swept.fail_time_s.map_or(String::new(), |at| format!(" at {at:.3} s"));
         let why = match swept.status {
             "ok" => "every linear amplitude is zero".to_owned(),
             status => format!("the run ends as `{status}`{when}"),
         };
-        line(text, "swept", format!("no ratio is defined: {why}"));
+        push_line(text, "swept", format!("no ratio is defined: {why}"));
         return;
     };
-    let channel = swept.channels[place];
+    let channel = swept.channels[position];
     let word = if swept.verdict.reliable == Some(true) { "reliable" } else { "not reliable" };
     let amplitudes: Vec<String> = swept
         .amplitudes
         .iter()
-        .filter_map(|of| of.get(place).map(|value| milli(*value, channel)))
+        .filter_map(|model| model.get(position).map(|value| milli(*value, channel)))
         .collect();
     let words = format!(
-        "the linear model is {word}: most in {}, where the nonlinear motion is {} times the \
-         linear one ({} from {from} to {to} s); {}",
+        "the linear model is {word}: the greatest ratio is that of {}, where the nonlinear \
+         amplitude is {} times the linear one ({} from {from} to {to} s); {}",
         channel.name(),
         significant(ratio),
         amplitudes.join(" against "),
@@ -174,42 +179,44 @@ fn verdict(text: &mut String, swept: &Swept) {
             (most, Some(least)) => format!("the limits are {} and {most}", decimal(least)),
         }
     );
-    line(text, "swept", words);
+    push_line(text, "swept", words);
     if over_estimates(swept) {
         let below = short(swept.limits.over_estimate());
-        let words = format!("the linear model over-estimates, a ratio is below {below}");
-        line(text, "too high", words);
+        let words = format!("the linear model over-estimates: a ratio is below {below}");
+        push_line(text, "too high", words);
     }
     let ratios = swept.channels.iter().zip(&swept.verdict.ratios);
-    let others = ratios.filter(|(of, _)| **of != channel).map(|(of, ratio)| {
+    let others = ratios.filter(|(other, _)| **other != channel).map(|(other, ratio)| {
         let ratio = ratio.map_or("none".to_owned(), significant);
-        format!("{} {ratio}", of.name())
+        format!("{} {ratio}", other.name())
     });
     let others: Vec<String> = others.collect();
     if !others.is_empty() {
-        line(text, "ratios", others.join(", "));
+        push_line(text, "ratios", others.join(", "));
     }
 }
 
-/// Whether the linear model gives a channel too much, as summaries of runs count it.
-fn over_estimates(swept: &Swept) -> bool {
+/// Whether the linear model over-estimates a channel, by the limit that summaries of runs use.
+fn over_estimates(swept: &SweptResult) -> bool {
     swept.verdict.least.is_some_and(|(_, least)| least < swept.limits.over_estimate())
 }
 
-fn of_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages: &[Passage]) {
+fn push_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages: &[Passage]) {
     let at = &tongue.at;
     let kind = match at.kind() {
         Kind::PeriodDoubling => "its period doubles",
-        Kind::QuasiPeriodic => "two frequencies grow that no turn locks",
+        Kind::QuasiPeriodic => "a second frequency appears that is no multiple of the speed",
         Kind::Fold => "it jumps to another motion",
         Kind::Stable => "it is stable",
     };
     let [from, to] = tongue.from_to_rpm;
-    let grows = format!("{kind}, at up to {:.4} /s at {:.2} rpm", at.growth_per_s(), at.speed_rpm);
-    let way = way(tongue.is_backward);
-    let words = format!("{way}{from:.2} to {to:.2} rpm: {grows}{}", ends(tongue));
-    line(text, "tongue", words);
-    let (low, high) = (at.frequency_cpm(), at.speed_rpm - at.frequency_cpm());
+    let growth =
+        format!("{kind}, growing at up to {:.4} /s at {:.2} rpm", at.growth_per_s(), at.speed_rpm);
+    let direction = direction_prefix(tongue.is_backward);
+    let words = format!("{direction}{from:.2} to {to:.2} rpm: {growth}{}", ends_words(tongue));
+    push_line(text, "tongue", words);
+    let low = at.frequency_cpm();
+    let high = at.speed_rpm - at.frequency_cpm();
     let lines = match at.kind() {
         Kind::PeriodDoubling => format!("at half the speed, {low:.2} per minute"),
         Kind::Fold => "none beside those of the turn".to_owned(),
@@ -217,73 +224,75 @@ fn of_tongue(text: &mut String, found: &Explanation, tongue: &Tongue, passages: 
             format!("at {low:.2} and {high:.2} per minute, which add up to the speed")
         }
     };
-    line(text, "lines", lines);
+    push_line(text, "lines", lines);
     for mode in &at.participants {
-        let (number, motion) = (mode.mode, mode.motion);
-        let (cpm, percent) = (mode.frequency_cpm, 100.0 * mode.share);
-        let place = format!("{number}, {motion}: {cpm:.2} per minute at this speed");
-        line(text, "mode", format!("{place}; {percent:.0} % of the energy"));
+        let number = mode.mode;
+        let motion = mode.motion;
+        let cpm = mode.frequency_cpm;
+        let percent = 100.0 * mode.share;
+        let frequency = format!("{number}, {motion}: {cpm:.2} per minute at this speed");
+        push_line(text, "mode", format!("{frequency}; {percent:.0} % of the energy"));
     }
     let words = match &tongue.resonance {
-        Some(resonance) => meeting(resonance, at.speed_rpm),
+        Some(resonance) => resonance_words(resonance, at.speed_rpm),
         None => "no sum or difference of these modes' frequencies is within 5 % of a multiple of \
-                 the speed: what feeds this is not explained"
+                 the speed: the source of the growth is not explained"
             .to_owned(),
     };
-    line(text, "meeting", words);
+    push_line(text, "resonance", words);
     if let Some(ends_in) = &tongue.ends_in {
-        line(text, "ends in", end(ends_in));
+        push_line(text, "ends in", ending_words(ends_in));
     }
     if passages.is_empty() {
         let [least, most] = found.profile_rpm.map(decimal);
         let words = format!("never: the profile stays between {least} and {most} rpm in this run");
-        line(text, "crossed", words);
+        push_line(text, "crossed", words);
     }
     for passage in passages {
-        crossed(text, passage);
+        push_passage(text, passage);
     }
-    closes(text, tongue);
+    push_remedy(text, tongue);
 }
 
-/// What a held speed ends in.
-fn end(motion: &Ending) -> String {
-    let far = [Channel::TubYaw, Channel::TubPitch].map(|channel| {
+/// Returns a description of the motion in which a machine ends.
+fn ending_words(motion: &Ending) -> String {
+    let amplitudes = [Channel::TubYaw, Channel::TubPitch].map(|channel| {
         let name = channel.name().replace('_', " ");
         format!("{name} {}", milli(motion.peaks[channel.index()], channel))
     });
     let after = format!("after {:.0} s", motion.time_s);
-    let what = match (motion.settled, motion.state) {
+    let kind = match (motion.settled, motion.state) {
         (Some(Settled::Periodic { turns: 1 }), _) => "repeating every turn".to_owned(),
         (Some(Settled::Periodic { turns }), _) => format!("repeating every {turns} turns"),
         (Some(Settled::QuasiPeriodic { .. }), _) => "with two frequencies".to_owned(),
         (Some(Settled::Chaotic), _) => "chaotic".to_owned(),
         (None, State::LeftRange { .. }) => {
-            return format!("farther than the model is good for, {after}");
+            return format!("beyond the model's range, {after}");
         }
         (None, State::Transient { life_s }) => {
-            format!("a transient that wanders for {life_s:.0} s on average, then ends elsewhere")
+            format!("a transient that lasts {life_s:.0} s on average and then ends elsewhere")
         }
         (None, State::Ok | State::NotSettled) => format!("not settled {after}"),
     };
-    format!("{}, {what}, if the drum is held there (`sweep dwell`)", far.join(", "))
+    format!("{}, {kind}, if the drum is held there (`sweep dwell`)", amplitudes.join(", "))
 }
 
-fn ends(tongue: &Tongue) -> String {
+fn ends_words(tongue: &Tongue) -> String {
     let mut words = String::new();
     for (rpm, end) in tongue.from_to_rpm.iter().zip(tongue.ends) {
         let why = match end {
-            End::Edge => continue,
-            End::OtherKind => "the motion grows on, in another way",
-            End::Range => "the speeds looked at end, and not the growth",
-            End::NoResponse => "no response is found beyond",
+            TongueEnd::Edge => continue,
+            TongueEnd::OtherKind => "the kind of growth changes",
+            TongueEnd::Range => "the speeds looked at end, but the growth does not",
+            TongueEnd::NoResponse => "no response is found beyond",
         };
         words += &format!("; at {rpm:.2} rpm {why}");
     }
     words
 }
 
-/// `f1 + f2`, `2 f2` or `f3 - f1`.
-fn sum_words(resonance: &Resonance) -> String {
+/// Returns the sum or difference of a resonance, such as `f1 + f2`, `2 f2` or `f3 - f1`.
+fn sum_words(resonance: &ModeResonance) -> String {
     let [a, b] = resonance.modes;
     match (a == b, resonance.sign > 0.0) {
         (true, _) => format!("2 f{a}"),
@@ -292,21 +301,23 @@ fn sum_words(resonance: &Resonance) -> String {
     }
 }
 
-fn meeting(resonance: &Resonance, speed_rpm: f64) -> String {
+fn resonance_words(resonance: &ModeResonance, speed_rpm: f64) -> String {
     let target = match resonance.order {
         1 => "the speed".to_owned(),
         order => format!("{order} times the speed"),
     };
     let multiple = f64::from(resonance.order) * speed_rpm;
     let miss = 100.0 * (resonance.sum_cpm / multiple - 1.0);
-    let (sum, cpm) = (sum_words(resonance), resonance.sum_cpm);
+    let sum = sum_words(resonance);
+    let cpm = resonance.sum_cpm;
     format!("{sum} = {cpm:.2} per minute, against {target}, {multiple:.2} ({miss:+.2} %)")
 }
 
-fn crossed(text: &mut String, passage: &Passage) {
+fn push_passage(text: &mut String, passage: &Passage) {
     let [from, to] = passage.from_to_s;
     let cut = if passage.is_cut { ", where the run ends" } else { "" };
-    let (folds, factor) = (passage.e_folds, significant(passage.e_folds.exp()));
+    let folds = passage.e_folds;
+    let factor = significant(passage.e_folds.exp());
     let mut words =
         format!("from {from:.3} to {to:.3} s{cut}: {folds:.2} e-folds, a factor of {factor}");
     match &passage.crossed {
@@ -315,24 +326,23 @@ fn crossed(text: &mut String, passage: &Passage) {
         }
         Ok(crossed) => {
             let most = significant(crossed.amplification);
-            words +=
-                &format!("; in truth a small disturbance of the run grows at most {most}-fold");
+            words += &format!("; a small disturbance of the actual run grows at most {most}-fold");
             if let [Some(before), Some(after)] = crossed.departure_j {
                 let numbers = [1e3 * before, 1e3 * after, (after / before).sqrt()];
                 let [before, after, factor] = numbers.map(significant);
                 words += &format!(
-                    "; the run's own departure from the periodic response goes from {before} to \
-                     {after} mJ, a factor of {factor} in amplitude"
+                    "; the run's own departure from the periodic response changes from {before} \
+                     to {after} mJ, a factor of {factor} in amplitude"
                 );
             }
         }
     }
-    line(text, "crossed", words);
+    push_line(text, "crossed", words);
 }
 
-fn closes(text: &mut String, tongue: &Tongue) {
+fn push_remedy(text: &mut String, tongue: &Tongue) {
     let words = match tongue.closing {
-        Some(Closing::Factor { factor, damping_n_s_per_m, looked_rpm: [from, to] }) => {
+        Some(Closing::Factor { factor, damping_n_s_per_m, stable_rpm: [from, to] }) => {
             let dampers = match damping_n_s_per_m {
                 Some(damping) => format!("{damping:.1} N s/m in every damper ({factor:.2} times)"),
                 None => format!("every damper {factor:.2} times as strong"),
@@ -344,14 +354,14 @@ fn closes(text: &mut String, tongue: &Tongue) {
         }
         Some(Closing::NoDampers) | None => "the machine has no damping to raise".to_owned(),
     };
-    line(text, "remedy", words);
+    push_line(text, "remedy", words);
 }
 
-/// What the tongues have to do with the swept verdict.
-fn judgement(text: &mut String, found: &Explanation) {
+/// Appends the part of the tongues in the swept verdict.
+fn push_conclusion(text: &mut String, found: &Explanation) {
     let swept = &found.swept;
     let Some((_, greatest)) = swept.verdict.greatest else {
-        line(text, "so", "there is no verdict to explain");
+        push_line(text, "so", "there is no verdict to explain");
         return;
     };
     let is_within = greatest < swept.limits.most;
@@ -359,17 +369,17 @@ fn judgement(text: &mut String, found: &Explanation) {
         None if is_within && !over_estimates(swept) => {
             "no tongue is crossed before the window ends, and the models agree".to_owned()
         }
-        None => {
-            "no tongue is crossed before the window ends: what the linear model misses here is \
-                 not explained by an unstable response"
-                .to_owned()
-        }
+        None => "no tongue is crossed before the window ends: no unstable response explains the \
+             difference of the models"
+            .to_owned(),
         Some(Err(LeftRange { time_s })) => format!(
-            "entered on its periodic responses, the run leaves the model's range at {time_s:.3} s: \
-             the failure does not rest on what earlier resonances left"
+            "put on the periodic response as it enters each tongue, the run leaves the model's \
+             range at {time_s:.3} s: the failure is not due to motion left over from earlier \
+             resonances"
         ),
-        Some(Ok(amplitudes)) => match swept.greatest_of(amplitudes) {
-            None => "entered on its periodic responses, the run has no ratio".to_owned(),
+        Some(Ok(amplitudes)) => match swept.greatest_ratio(amplitudes) {
+            None => "put on the periodic response as it enters each tongue, the run has no ratio"
+                .to_owned(),
             Some((ratio, channel)) => {
                 let same = format!(
                     "the same run, put on the periodic response as it enters each tongue, has a \
@@ -377,46 +387,47 @@ fn judgement(text: &mut String, found: &Explanation) {
                     significant(ratio),
                     channel.name()
                 );
-                let grows = growth_until(found.cause.as_ref());
+                let growth = growth_until(found.cause.as_ref());
                 let is_cause = found.cause.is_some_and(|cause| cause.is_enough);
                 match (is_within, ratio < swept.limits.most) {
                     (false, true) if is_cause => format!(
-                        "{same}, within the limit: the verdict rests on motion left over from \
-                         before the tongue, and would change with the ramp; {grows}"
+                        "{same}, within the limit: the verdict is due to motion left over from \
+                         before the tongue, and would change with the ramp; {growth}"
                     ),
                     (false, true) => format!(
-                        "{same}, within the limit: the verdict rests on motion left over from \
-                         before the tongue, which the tongues do not make large: {grows}"
+                        "{same}, within the limit: the verdict is due to motion left over from \
+                         before the tongue, but the tongues are not what made it large: {growth}"
                     ),
                     (false, false) if is_cause => format!(
-                        "{same}, still beyond the limit: the tongues alone make the verdict, \
-                         without what earlier resonances left; {grows}"
+                        "{same}, still beyond the limit: the tongues alone cause the verdict, \
+                         without motion left over from earlier resonances; {growth}"
                     ),
                     (false, false) => format!(
                         "{same}, still beyond the limit, but the tongues are not its cause: \
-                         {grows}; what the linear model misses is the nonlinear motion itself"
+                         {growth}; the linear model fails on the nonlinear motion itself"
                     ),
                     (true, true) => format!(
-                        "{same}: the motion keeps the limit because the ramp is through before \
-                         a disturbance has grown; a dwell inside a tongue would not"
+                        "{same}: the motion keeps the limit because the ramp leaves the tongue \
+                         before a disturbance has grown; at a speed held inside a tongue it would \
+                         not"
                     ),
                     (true, false) => format!(
-                        "{same}, beyond the limit: here what earlier resonances left keeps the \
-                         motion down by chance"
+                        "{same}, beyond the limit: motion left over from earlier resonances \
+                         happens to reduce the deviation"
                     ),
                 }
             }
         },
     };
-    line(text, "so", words);
+    push_line(text, "so", words);
 }
 
-/// Returns when the motion deviates, and what the tongues before that have to do with it.
+/// Returns a sentence on the time of the deviation and the growth in tongues before it.
 fn growth_until(cause: Option<&Cause>) -> String {
     let Some(cause) = cause else { return "the deviation's time is not known".to_owned() };
     format!(
-        "the motion deviates from {:.2} s and {:.0} rpm on; until it is greatest the tongues make \
-         {:.2} e-folds, and without what they add the ratio is {}",
+        "the motion deviates from {:.2} s and {:.0} rpm on; until the greatest deviation the \
+         growth in tongues is {:.2} e-folds, and without it the ratio is {}",
         cause.time_s,
         cause.speed_rpm,
         cause.e_folds,
@@ -424,18 +435,18 @@ fn growth_until(cause: Option<&Cause>) -> String {
     )
 }
 
-fn limits(text: &mut String, found: &Explanation) {
+fn push_limitations(text: &mut String, found: &Explanation) {
     let mut words = format!(
-        "a tongue narrower than {} rpm may be missed. E-folds hold the speed still at each \
-         instant; equal e-folds do not mean equal ratios, and a map's boundary is not the edge of \
-         a tongue",
-        found.seen.first().map_or_else(String::new, |seen| decimal(seen.looked.step))
+        "a tongue narrower than {} rpm may be missed. E-folds take the growth at each instant as \
+         that at its speed, held constant; equal e-folds do not mean equal ratios, and a map's \
+         boundary is not the edge of a tongue",
+        found.scans.first().map_or_else(String::new, |scan| decimal(scan.speeds.step))
     );
-    let without: usize = found.seen.iter().map(|seen| seen.without_response).sum();
+    let without: usize = found.scans.iter().map(|scan| scan.without_response).sum();
     if without > 0 {
         words += &format!(". No response was found at {without} of the speeds, which are left out");
     }
-    line(text, "limits", words);
+    push_line(text, "limits", words);
 }
 
 #[cfg(test)]
@@ -443,49 +454,55 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_digits_count() {
+    fn numbers_have_three_significant_digits() {
         let shown = [0.0, 1.0, 12.345, 123.45, 0.01234, 1234.5, 1e-5, 1e7].map(significant);
         assert_eq!(shown, ["0.00", "1.00", "12.3", "123", "0.0123", "1234", "1.00e-5", "1.00e7"]);
     }
 
     #[test]
-    fn long_lines_are_folded_beneath_their_start() {
+    fn long_paragraphs_are_wrapped_and_aligned() {
         let mut text = String::new();
-        line(&mut text, "name", "word ".repeat(40));
+        push_line(&mut text, "name", "word ".repeat(40));
         let lines: Vec<&str> = text.lines().collect();
-        assert!(lines.len() > 1 && lines.iter().all(|line| line.chars().count() <= WIDTH));
+        assert!(
+            lines.len() > 1
+                && lines.iter().all(|push_line| push_line.chars().count() <= LINE_WIDTH)
+        );
         assert!(lines[0].starts_with("      name  word"), "{}", lines[0]);
         assert!(lines[1].starts_with("            word"), "{}", lines[1]);
     }
 
     #[test]
-    fn responses_off_the_curve_are_not_taken_for_those_of_a_run_up() {
-        assert_eq!(off_curve(&[]), None);
-        let words = off_curve(&[255.0, 256.0, 270.0]).unwrap();
+    fn responses_off_the_curve_are_reported() {
+        assert_eq!(off_curve_words(&[]), None);
+        let words = off_curve_words(&[255.0, 256.0, 270.0]).unwrap();
         assert!(words.starts_with("at 3 of the speeds, from 255 to 270 rpm, the response is off"));
         assert!(words.ends_with("(`sweep dwell`)"));
     }
 
     #[test]
-    fn a_band_goes_on_where_the_motion_grows_in_another_way() {
-        let of = |ends: &[[End; 2]]| bands(ends.iter().copied());
-        let (edge, other) = (End::Edge, End::OtherKind);
-        assert_eq!(of(&[[edge, edge]]), "one band of speed (a \"tongue\")");
-        assert_eq!(of(&[[edge, edge], [edge, edge]]), "2 bands of speed (\"tongues\")");
-        let words = of(&[[edge, edge], [edge, other], [other, edge]]);
-        assert_eq!(words, "2 bands of speed, with 3 ways to grow (\"tongues\"),");
+    fn a_band_continues_where_the_kind_of_growth_changes() {
+        let words = |ends: &[[TongueEnd; 2]]| bands_words(ends.iter().copied());
+        let edge = TongueEnd::Edge;
+        let other = TongueEnd::OtherKind;
+        assert_eq!(words(&[[edge, edge]]), "one band of speed (a \"tongue\")");
+        assert_eq!(words(&[[edge, edge], [edge, edge]]), "2 bands of speed (\"tongues\")");
+        assert_eq!(
+            words(&[[edge, edge], [edge, other], [other, edge]]),
+            "2 bands of speed, with 3 kinds of growth (\"tongues\"),"
+        );
     }
 
     #[test]
     fn a_resonance_is_named_by_its_modes() {
-        let of = |modes, sign, order| {
+        let resonance = |modes, sign, order| {
             let frequencies_cpm = [150.0, 100.0];
-            Resonance { modes, frequencies_cpm, sign, sum_cpm: 150.0 + sign * 100.0, order }
+            ModeResonance { modes, frequencies_cpm, sign, sum_cpm: 150.0 + sign * 100.0, order }
         };
-        assert_eq!(sum_words(&of([2, 2], 1.0, 1)), "2 f2");
-        assert_eq!(sum_words(&of([1, 2], 1.0, 1)), "f1 + f2");
-        assert_eq!(sum_words(&of([2, 1], -1.0, 1)), "f2 - f1");
-        let words = meeting(&of([1, 2], 1.0, 2), 125.0);
+        assert_eq!(sum_words(&resonance([2, 2], 1.0, 1)), "2 f2");
+        assert_eq!(sum_words(&resonance([1, 2], 1.0, 1)), "f1 + f2");
+        assert_eq!(sum_words(&resonance([2, 1], -1.0, 1)), "f2 - f1");
+        let words = resonance_words(&resonance([1, 2], 1.0, 2), 125.0);
         assert_eq!(
             words,
             "f1 + f2 = 250.00 per minute, against 2 times the speed, 250.00 (+0.00 %)"

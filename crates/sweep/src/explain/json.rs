@@ -5,15 +5,15 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use washer_model::{Channel, Ending, LeftRange, Participant};
 
-use super::{Explanation, Passage, Seen, Swept, Tongue};
+use super::{Explanation, Passage, SpeedScan, SweptResult, Tongue};
 
-/// Everything that was found; units stand in the names.
-pub(crate) fn of(found: &Explanation) -> Value {
+/// Returns an explanation as JSON. Units are part of the names.
+pub(crate) fn to_json(found: &Explanation) -> Value {
     let tongues =
-        found.tongues.iter().map(|(tongue, passages)| of_tongue(tongue, passages, &found.swept));
+        found.tongues.iter().map(|(tongue, passages)| tongue_json(tongue, passages, &found.swept));
     let without = found.without_departures.as_ref().map(|entered| match entered {
         Ok(amplitudes) => {
-            let greatest = found.swept.greatest_of(amplitudes);
+            let greatest = found.swept.greatest_ratio(amplitudes);
             json!({
                 "amplitudes": by_channel(&found.swept, amplitudes),
                 "ratio_max": greatest.map(|(ratio, _)| ratio),
@@ -22,15 +22,15 @@ pub(crate) fn of(found: &Explanation) -> Value {
         }
         Err(LeftRange { time_s }) => json!({ "left_range_at_s": time_s }),
     });
-    let seen = |is_backward: bool| {
-        found.seen.iter().find(|seen| seen.is_backward == is_backward).map(of_seen)
+    let scan = |is_backward: bool| {
+        found.scans.iter().find(|scan| scan.is_backward == is_backward).map(scan_json)
     };
     json!({
         "name": found.name,
         "at": found.at.iter().cloned().collect::<BTreeMap<_, _>>(),
-        "swept": of_swept(&found.swept),
-        "speeds": seen(false),
-        "speeds_backwards": seen(true),
+        "swept": swept_json(&found.swept),
+        "speeds": scan(false),
+        "speeds_backwards": scan(true),
         "profile_rpm": found.profile_rpm,
         "tongues": tongues.collect::<Value>(),
         "entered_on_responses": without,
@@ -44,27 +44,27 @@ pub(crate) fn of(found: &Explanation) -> Value {
     })
 }
 
-/// The speeds that were looked at in one way of turning.
-fn of_seen(seen: &Seen) -> Value {
-    let beyond = seen.beyond.iter();
-    let beyond = beyond.map(|(rpm, what)| json!({ "speed_rpm": rpm, "passes": what.name() }));
+/// Returns the scan over the speeds of one direction of turning.
+fn scan_json(scan: &SpeedScan) -> Value {
+    let beyond =
+        scan.beyond.iter().map(|(rpm, limit)| json!({ "speed_rpm": rpm, "passes": limit.name() }));
     json!({
-        "from_rpm": seen.looked.from,
-        "to_rpm": seen.looked.to,
-        "step_rpm": seen.looked.step,
-        "without_response": seen.without_response,
-        "jumps_rpm": seen.jumps_rpm,
-        "off_curve_rpm": seen.off_curve_rpm,
+        "from_rpm": scan.speeds.from,
+        "to_rpm": scan.speeds.to,
+        "step_rpm": scan.speeds.step,
+        "without_response": scan.without_response,
+        "jumps_rpm": scan.jumps_rpm,
+        "off_curve_rpm": scan.off_curve_rpm,
         "beyond": beyond.collect::<Value>(),
     })
 }
 
-fn by_channel(swept: &Swept, amplitudes: &[f64]) -> Value {
+fn by_channel(swept: &SweptResult, amplitudes: &[f64]) -> Value {
     let name = |channel: &Channel| format!("{}_{}", channel.name(), channel.unit());
     swept.channels.iter().map(name).zip(amplitudes.iter().copied()).collect()
 }
 
-fn of_swept(swept: &Swept) -> Value {
+fn swept_json(swept: &SweptResult) -> Value {
     let ratios = swept.channels.iter().zip(&swept.verdict.ratios);
     let greatest = swept.verdict.greatest;
     json!({
@@ -84,7 +84,7 @@ fn of_swept(swept: &Swept) -> Value {
     })
 }
 
-fn of_tongue(tongue: &Tongue, passages: &[Passage], swept: &Swept) -> Value {
+fn tongue_json(tongue: &Tongue, passages: &[Passage], swept: &SweptResult) -> Value {
     let at = &tongue.at;
     json!({
         "is_backward": tongue.is_backward,
@@ -101,7 +101,7 @@ fn of_tongue(tongue: &Tongue, passages: &[Passage], swept: &Swept) -> Value {
         "crossed": passages.iter().map(passage).collect::<Value>(),
         "ends_in": tongue.ends_in.as_ref().map(|motion| json!({
             "kind": Ending::KINDS[motion.kind()],
-            "amplitudes": by_channel(swept, &swept.of_plan(&motion.peaks)),
+            "amplitudes": by_channel(swept, &swept.plan_channels(&motion.peaks)),
             "followed_s": motion.time_s,
         })),
         "closed_by": tongue.closing,

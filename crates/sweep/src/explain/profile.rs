@@ -1,31 +1,36 @@
-//! The spin profile in time: its range, and when it is within a band of speeds.
+//! The spin profile over time: its range, and the times at which it is within a band of speeds.
 
 use washer_model::{Profile, Spin};
 
-/// Even instants at which a profile is looked at; it is smooth between kinks.
-const INSTANTS: usize = 4000;
+/// Number of equal intervals at whose ends a profile is sampled. Basis: profiles are smooth between
+/// kinks, which are sampled, too. Doubling it doubles the time of a search.
+const SAMPLE_INTERVALS: usize = 4000;
 
-/// Halvings of a stretch between two instants.
-const HALVINGS: usize = 50;
+/// Bisections of an interval. Basis: they exhaust the digits of a double. Doubling it changes
+/// nothing.
+const BISECTIONS: usize = 50;
 
-/// Parts of a passage over which growth is integrated.
-const PARTS: usize = 1000;
+/// Number of equal parts of a passage over which growth is integrated by the midpoint rule. Basis:
+/// test `e_folds_are_the_area_under_growth_over_time`, with an error below 1e-5. Doubling it
+/// divides the error by 4.
+const INTEGRATION_PARTS: usize = 1000;
 
-/// Returns the lowest and the fastest speed (rpm) up to the run's end, below 0 backwards.
+/// Returns the lowest and the greatest speed (rpm) up to the run's end, negative backwards.
 pub(super) fn range(spin: &Spin, end_s: f64) -> [f64; 2] {
-    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut least = f64::INFINITY;
+    let mut most = f64::NEG_INFINITY;
     for speed in spin.speeds_rpm(instants_s(spin, end_s)) {
         least = least.min(speed);
         most = most.max(speed);
     }
-    // As they were written, without the last bits of the way through rad/s.
+    // Speeds are stored in rad/s; rounding gives back the digits that the user wrote.
     [least, most].map(|rpm| (1e9 * rpm).round() / 1e9)
 }
 
-/// Even instants, and the kinks between them.
+/// Returns equally spaced instants and the kinks of the profile, in order.
 fn instants_s(spin: &Spin, end_s: f64) -> Vec<f64> {
     let mut times: Vec<f64> =
-        (0..=INSTANTS).map(|k| end_s * (k as f64 / INSTANTS as f64)).collect();
+        (0..=SAMPLE_INTERVALS).map(|k| end_s * (k as f64 / SAMPLE_INTERVALS as f64)).collect();
     let kinks = match spin {
         Spin::Ramped { profile: Profile::Triangular, ramp_s, .. } => vec![*ramp_s, 2.0 * ramp_s],
         Spin::Ramped { ramp_s, .. } => vec![*ramp_s],
@@ -37,56 +42,59 @@ fn instants_s(spin: &Spin, end_s: f64) -> Vec<f64> {
     times
 }
 
-/// The stretches of time (s) in which the speed is within a band (rpm), in order.
+/// Returns the intervals of time (s) in which the speed is within a band (rpm), in order.
 pub(super) fn times_inside_s(spin: &Spin, end_s: f64, [low, high]: [f64; 2]) -> Vec<[f64; 2]> {
     let speed = |at_s: f64| spin.speeds_rpm([at_s]).next().unwrap_or(0.0);
     let is_inside = |at_s: f64| (low..=high).contains(&speed(at_s));
     let times = instants_s(spin, end_s);
-    let mut stretches: Vec<[f64; 2]> = Vec::new();
+    let mut intervals: Vec<[f64; 2]> = Vec::new();
     let mut since_s = is_inside(0.0).then_some(0.0);
     for pair in times.windows(2) {
         let [from_s, to_s] = [pair[0], pair[1]];
-        let (was, is) = (since_s.is_some(), is_inside(to_s));
+        let was_inside = since_s.is_some();
+        let ends_inside = is_inside(to_s);
         // A ramp may pass the whole band between two instants.
-        let (from_rpm, to_rpm) = (speed(from_s), speed(to_s));
-        let passes = !was && !is && (from_rpm < low) != (to_rpm < low);
+        let from_rpm = speed(from_s);
+        let to_rpm = speed(to_s);
+        let passes = !was_inside && !ends_inside && (from_rpm < low) != (to_rpm < low);
         if passes {
             let up = from_rpm < to_rpm;
             let below = |edge: f64| move |speed: f64| (speed < edge) == up;
             let (first, last) = if up { (low, high) } else { (high, low) };
-            let at = |edge: f64| turning_s(&|at_s| below(edge)(speed(at_s)), from_s, to_s);
-            stretches.push([at(first), at(last)]);
-        } else if was != is {
-            let at_s = turning_s(&|at_s| is_inside(at_s) == was, from_s, to_s);
+            let at = |edge: f64| bisect_s(&|at_s| below(edge)(speed(at_s)), from_s, to_s);
+            intervals.push([at(first), at(last)]);
+        } else if was_inside != ends_inside {
+            let at_s = bisect_s(&|at_s| is_inside(at_s) == was_inside, from_s, to_s);
             match since_s.take() {
-                Some(since_s) => stretches.push([since_s, at_s]),
+                Some(since_s) => intervals.push([since_s, at_s]),
                 None => since_s = Some(at_s),
             }
         }
     }
-    stretches.extend(since_s.map(|since_s| [since_s, end_s]));
-    stretches.retain(|[from_s, to_s]| to_s > from_s);
-    stretches
+    intervals.extend(since_s.map(|since_s| [since_s, end_s]));
+    intervals.retain(|[from_s, to_s]| to_s > from_s);
+    intervals
 }
 
-/// Where something that holds at the one time ceases to hold before the other.
-fn turning_s(holds: &dyn Fn(f64) -> bool, mut from_s: f64, mut to_s: f64) -> f64 {
-    for _ in 0..HALVINGS {
+/// Returns the time (s) at which a condition ceases to hold, by bisection. It must hold at `from_s`
+/// and not at `to_s`.
+fn bisect_s(holds: &dyn Fn(f64) -> bool, mut from_s: f64, mut to_s: f64) -> f64 {
+    for _ in 0..BISECTIONS {
         let middle_s = 0.5 * (from_s + to_s);
         if holds(middle_s) { from_s = middle_s } else { to_s = middle_s }
     }
     0.5 * (from_s + to_s)
 }
 
-/// The integral over time of the growth at the speed of each instant, either way; of `growths`
-/// (rpm, 1/s) in order of speed, straight between them.
+/// Returns the integral over time of the growth at the magnitude of the speed. `growths` has pairs
+/// of speed (rpm) and growth (1/s) in order of speed.
 pub(super) fn e_folds(spin: &Spin, [from_s, to_s]: [f64; 2], growths: &[[f64; 2]]) -> f64 {
-    let part_s = (to_s - from_s) / PARTS as f64;
-    let middles = (0..PARTS).map(|k| from_s + (k as f64 + 0.5) * part_s);
+    let part_s = (to_s - from_s) / INTEGRATION_PARTS as f64;
+    let middles = (0..INTEGRATION_PARTS).map(|k| from_s + (k as f64 + 0.5) * part_s);
     spin.speeds_rpm(middles).map(|speed| part_s * growth_at(growths, speed.abs())).sum()
 }
 
-/// Returns the growth (1/s) at a speed (rpm).
+/// Returns the growth (1/s) at a speed (rpm), by linear interpolation.
 pub(super) fn growth_at(growths: &[[f64; 2]], speed_rpm: f64) -> f64 {
     let above = growths.partition_point(|[rpm, _]| *rpm < speed_rpm);
     match (above.checked_sub(1).map(|below| growths[below]), growths.get(above)) {
@@ -122,7 +130,7 @@ mod tests {
         for (found, meant) in inside.iter().flatten().zip([20.0, 30.0, 70.0, 80.0]) {
             assert!(close(*found, meant), "{found} {meant}");
         }
-        // Cut short by the run's end, and from the start of a run that begins inside.
+        // A run that ends inside the band, and one that begins inside.
         let inside = times_inside_s(&spin, 25.0, [140.0, 210.0]);
         assert!(inside.len() == 1 && close(inside[0][0], 20.0) && inside[0][1] == 25.0);
         assert_eq!(times_inside_s(&table(&[(0.0, 200.0)]), 9.0, [140.0, 210.0]), [[0.0, 9.0]]);
@@ -130,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_band_is_seen_however_quickly_it_is_passed() {
+    fn a_band_is_found_even_if_it_is_passed_quickly() {
         let spin = table(&[(0.0, 0.0), (50.0, 0.0), (50.001, 400.0), (70.0, 400.0), (70.01, 0.0)]);
         let inside = times_inside_s(&spin, 100.0, [100.0, 200.0]);
         assert_eq!(inside.len(), 2);
@@ -142,14 +150,14 @@ mod tests {
     #[test]
     fn e_folds_are_the_area_under_growth_over_time() {
         let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 100.0, ramp_s: 10.0 };
-        // A triangle of 20 rpm, which take 2 s, and a height of 0.5 /s.
+        // The growth is a triangle of height 0.5 /s and base 20 rpm, which the ramp passes in 2 s.
         let growths = [[40.0, 0.0], [50.0, 0.5], [60.0, 0.0]];
         assert!((e_folds(&spin, [4.0, 6.0], &growths) - 0.5).abs() < 1e-5);
         assert_eq!(growth_at(&growths, 30.0), 0.0);
     }
 
     #[test]
-    fn a_profile_may_turn_either_way_and_wait() {
+    fn a_profile_may_turn_both_ways_and_pause() {
         let spin = table(&[(0.0, 0.0), (3.0, 100.0), (6.0, -50.0), (8.0, -50.0), (9.0, 0.0)]);
         assert_eq!(range(&spin, 12.0), [-50.0, 100.0]);
         assert_eq!(range(&spin, 3.0), [0.0, 100.0]);

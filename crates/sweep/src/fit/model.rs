@@ -16,7 +16,7 @@ use super::algebra::{centred, dot};
 use super::measured::{Measured, Quantity, Signal};
 use super::speed::Smoothed;
 use crate::engine::reference_step_s;
-use crate::plan::{Plan, ready};
+use crate::plan::{Plan, prepare_point};
 use sweep_engine::plan::WrittenIn;
 use sweep_engine::threads::Cancel;
 
@@ -136,7 +136,7 @@ impl Problem<'_> {
         for case in cases {
             let (end_s, machine) = (case.end_s(), case.plan.model.machine.clone());
             let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
-            let point = ready(machine, case.spin().clone(), &timing)?;
+            let point = prepare_point(machine, case.spin().clone(), &timing)?;
             step_s =
                 step_s.min(reference_step_s(&StepSelector::new([(&point, case.spin())], end_s)));
         }

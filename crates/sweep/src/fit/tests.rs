@@ -41,7 +41,7 @@ fn reference(name: &str, end_s: f64) -> Measured {
 fn case_at(numbers: &[(&str, f64)], factor: f64, measured: Measured) -> Case {
     let at = numbers.iter().map(|(name, value)| format!("{name}={}", value * factor));
     let at: Vec<String> = at.chain(["friction_linear_speed_m_per_s=0.1".to_owned()]).collect();
-    case(&GridInput::text("reference", GRID.to_owned(), Vec::new()), &at, measured).unwrap()
+    case(&WasherGridInput::text("reference", GRID.to_owned(), Vec::new()), &at, measured).unwrap()
 }
 
 fn options(free: &[&str]) -> FitOptions {

@@ -12,7 +12,7 @@ use super::known::Influence;
 use super::model::Problem;
 use super::statistics::{Statistics, Z_975};
 use crate::engine::{ModelEngine, fastest_growth, find_responses};
-use crate::plan::{Axis, AxisValues, Plan, between, ready, timing};
+use crate::plan::{Axis, AxisValues, Plan, axis_between, prepare_point, timing};
 use sweep_engine::Error;
 use sweep_engine::commands::cells::span;
 
@@ -108,7 +108,7 @@ impl OnMap<'_> {
             let to = values().fold(f64::NEG_INFINITY, f64::max);
             let parameter = problem.free[k].parameter.clone();
             plan.axes.push(match from < to {
-                true => between(parameter, from, to),
+                true => axis_between(parameter, from, to),
                 false => Axis { parameter, values: AxisValues::List(vec![from]) },
             });
         }
@@ -178,7 +178,7 @@ impl OnMap<'_> {
         {
             parameter.set(&mut machine, &mut spin, value + fixed.tolerance);
         }
-        let point = ready(machine, spin, &timing(plan)).ok()?;
+        let point = prepare_point(machine, spin, &timing(plan)).ok()?;
         let dwells: Vec<Dwell<'_>> =
             speeds.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
         Some(find_responses(&dwells, &|| (self.problem.stop)()))

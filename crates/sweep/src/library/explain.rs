@@ -1,49 +1,51 @@
-//! Why the linear model fails at a point, as data and in words.
+//! The cause of a failure of the linear model at a point, as data and as text.
 
 use serde_json::Value;
 
 use super::{Effort, refused_speeds};
-use crate::config::GridInput;
+use crate::config::WasherGridInput;
 use crate::explain::{explain, format, json};
 use crate::speeds::Speeds;
 use sweep_engine::Error;
 
-/// What is found at a point.
+/// The result of a command as data and as text.
 #[derive(Debug)]
 pub struct Explained {
-    /// Everything, as `sweep explain --json` prints it.
+    /// The data, which the command prints with `--json`.
     pub found: Value,
-    /// What `sweep explain` prints.
+    /// The text that the command prints.
     pub text: String,
 }
 
-/// Explains a point of a grid, or its only one: `at` gives each axis a value, and any other
-/// parameter, as `NAME=VALUE`. Looks at even speeds (rpm), without any from half of the slowest
-/// mode's frequency to the profile's fastest speed; `None` if it was interrupted.
+/// Explains the verdict of a point of a grid; `None` if it was interrupted.
+///
+/// `at` has texts `NAME=VALUE`, which give every axis its value and may set other parameters.
+/// `speeds_rpm` are equally spaced; without them they go from half of the slowest mode's frequency
+/// to the profile's greatest speed.
 ///
 /// # Errors
-/// Mistakes in the grid or the options, a profile that cannot be explained, and a machine without
-/// equilibrium or modes.
+/// Returns an error for mistakes in the grid or the options, if the profile reaches no speed at
+/// which responses are sought, and if the machine has no equilibrium or no modes.
 pub fn explain_point(
-    grid: &GridInput,
+    grid: &WasherGridInput,
     at: &[String],
     speeds_rpm: Option<&[f64]>,
     effort: Effort<'_>,
 ) -> Result<Option<Explained>, Error> {
     let (plan, at) = grid.load_point(at)?;
-    let even = |speeds: &[f64]| {
-        Speeds::of_values(speeds).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {
-            let expected = "at least two speeds in rpm above 0 at even distances, as those of \
+    let parse = |speeds: &[f64]| {
+        Speeds::from_values(speeds).filter(|speeds| speeds.from > 0.0).ok_or_else(|| {
+            let expected = "at least two equally spaced speeds in rpm above 0, as those of \
                             range(200, 351)";
             refused_speeds(speeds.len(), expected.to_owned())
         })
     };
-    let speeds = speeds_rpm.map(even).transpose()?;
+    let speeds = speeds_rpm.map(parse).transpose()?;
     let found = explain(&plan, at, speeds, effort)?;
     if effort.interrupt.stopped() {
         return Ok(None);
     }
-    Ok(Some(Explained { found: json::of(&found), text: format::of(&found) }))
+    Ok(Some(Explained { found: json::to_json(&found), text: format::to_text(&found) }))
 }
 
 #[cfg(test)]
@@ -55,11 +57,11 @@ mod tests {
     use sweep_engine::progress::ProgressMode;
 
     #[test]
-    fn an_interrupt_ends_it() {
+    fn an_interrupt_ends_an_explanation() {
         let text =
             "spin = { profile = \"ramp\", peak_rpm = 350, ramp_s = 5 }\ntime = { end_s = 5 }\n";
-        let grid = GridInput::text("grid", text.to_owned(), Vec::new());
-        // Minutes of work.
+        let grid = WasherGridInput::text("grid", text.to_owned(), Vec::new());
+        // This would take minutes.
         let speeds: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
         let interrupt = Interrupt::new();
         let effort =

@@ -1,19 +1,20 @@
-//! Numbers of a machine from measured run-ups, as data and in words.
+//! Fits of a machine's parameters to measured run-ups, as data and as text.
 
 use serde_json::json;
 
 use super::{Effort, Explained, PointTable};
-use crate::config::GridInput;
+use crate::config::WasherGridInput;
 use crate::fit::{self, FitOptions, Measured, Work};
 use sweep_engine::{Error, threads};
 
-/// Fits numbers of a grid's machine to measurements: tables of `time_s`, perhaps `speed_rpm`, and
-/// channels, each with constants of its own (`NAME=VALUE`). `None` if it was interrupted.
+/// Fits parameters of a grid's machine to measurements; `None` if it was interrupted. A measurement
+/// is a table of `time_s`, channels and possibly `speed_rpm`, with its own constants `NAME=VALUE`.
 ///
 /// # Errors
-/// Mistakes in the grid, the tables or the options; data that cannot tell.
+/// Returns an error for mistakes in the grid, the tables or the options, and for data that do not
+/// determine the parameters.
 pub fn fit_tables(
-    grid: &GridInput,
+    grid: &WasherGridInput,
     tables: Vec<(PointTable, Vec<String>)>,
     options: &FitOptions,
     effort: Effort<'_>,
@@ -57,7 +58,7 @@ mod tests {
             known: Vec::new(),
             draws: 0,
         };
-        let grid = GridInput::text("fit", String::new(), Vec::new());
+        let grid = WasherGridInput::text("fit", String::new(), Vec::new());
         let message = |options: &FitOptions| {
             fit_tables(&grid, Vec::new(), options, effort()).unwrap_err().to_string()
         };

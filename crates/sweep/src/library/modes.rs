@@ -8,48 +8,51 @@ use washer_model::{
 
 use super::check_speeds;
 use super::result::MemoryTable;
-use crate::config::{self, Diagnostics, GridInput};
+use crate::config::{self, Diagnostics, WasherGridInput};
 use crate::model::Washer;
-use crate::plan::{friction_speeds, ready, timing};
+use crate::plan::{friction_speeds, prepare_point, timing};
 use sweep_engine::{Error, Interrupt, Table};
 use sweep_files::{FileKind, key};
 
-/// The modes of a grid's machine at spin speeds (rpm, rising); `at` gives axes a value, which have
-/// none otherwise. Without a grid, those of the built-in machine. `None` if it was interrupted.
+/// Computes the modes of a grid's machine at increasing spin speeds (rpm); `None` if it was
+/// interrupted. `at` has texts `NAME=VALUE` of the point, if the grid has axes. Without a grid the
+/// machine is the built-in one.
 ///
 /// # Errors
-/// Mistakes in the grid, speeds that do not rise, a machine without equilibrium or modes.
+/// Returns an error for mistakes in the grid, for speeds that do not increase, and for a machine
+/// without equilibrium or modes.
 pub fn find_modes(
-    grid: Option<&GridInput>,
+    grid: Option<&WasherGridInput>,
     at: &[String],
     speeds_rpm: &[f64],
     interrupt: &Interrupt,
 ) -> Result<Option<MemoryTable>, Error> {
     check_speeds(speeds_rpm, 2, |speed| speed >= 0.0, ", 0 or greater")?;
-    let asked = Asked::of(grid, at, speeds_rpm[speeds_rpm.len() - 1])?;
-    let analysis = Analysis::new(&asked, speeds_rpm, false, &|| interrupt.stopped())?;
-    let table = |analysis: Analysis| MemoryTable::of_table(FileKind::Modes, analysis.table(&asked));
+    let input = ModesInput::new(grid, at, speeds_rpm[speeds_rpm.len() - 1])?;
+    let analysis = ModeAnalysis::new(&input, speeds_rpm, false, &|| interrupt.stopped())?;
+    let table =
+        |analysis: ModeAnalysis| MemoryTable::from_table(FileKind::Modes, analysis.table(&input));
     analysis.map(table).transpose()
 }
 
-/// A machine whose modes are asked for, by its name, and the run that it is in.
-pub(crate) struct Asked {
+/// A machine whose modes are computed, with its name and the run for which friction is linearised.
+pub(crate) struct ModesInput {
     pub(crate) name: String,
-    /// Constants that were set, and the point, by name.
+    /// The constants that were set and the values of the axes, by name.
     set: Map<String, Value>,
     machine: Machine,
     spin: Spin,
     timing: Timing,
 }
 
-impl Asked {
-    /// The machine of a grid, at a point of it if `at` names one; without a grid the built-in
-    /// machine, on its way to a speed (rpm).
+impl ModesInput {
+    /// Returns the machine of a grid, at the point of `at` if it is not empty. Without a grid it is
+    /// the built-in machine in a run-up to a speed (rpm).
     ///
     /// # Errors
-    /// Mistakes in the grid.
-    pub(crate) fn of(
-        grid: Option<&GridInput>,
+    /// Returns the mistakes in the grid.
+    pub(crate) fn new(
+        grid: Option<&WasherGridInput>,
         at: &[String],
         greatest_rpm: f64,
     ) -> Result<Self, Diagnostics> {
@@ -66,44 +69,46 @@ impl Asked {
             if at.is_empty() { (grid.load()?, Vec::new()) } else { grid.load_point(at)? };
         let at = at.into_iter().map(|(name, value)| (name, value.into()));
         let set = plan.set.iter().cloned().chain(at).collect();
-        let (timing, Washer { machine, spin, .. }) = (timing(&plan), plan.model);
+        let timing = timing(&plan);
+        let Washer { machine, spin, .. } = plan.model;
         Ok(Self { name: plan.name, set, machine, spin, timing })
     }
 }
 
 /// The modes of a machine at spin speeds.
-pub(crate) struct Analysis {
+pub(crate) struct ModeAnalysis {
     pub(crate) speeds_rpm: Vec<f64>,
     pub(crate) modes: Vec<ModeOverSpeed>,
-    /// The exact motion of each mode at each speed, if it was asked for. There is none at
-    /// standstill, where theta is frozen, and where a mode was not found at theta = 0.
+    /// The exact motion of each mode at each speed, if it was requested. There is none at
+    /// standstill, where theta is frozen, nor for a mode that was not found at theta = 0.
     pub(crate) exact: Option<Vec<Vec<Option<Exact>>>>,
-    /// At which speeds (m/s) friction is taken, by damper.
+    /// The speed amplitudes (m/s) at which friction is linearised, by damper.
     pub(crate) friction_speeds: Map<String, Value>,
 }
 
-impl Analysis {
-    /// The modes at each speed (rpm), with exact motions if wanted; `None` once `stop` says so.
-    /// Friction is taken at the speeds that it has in the run.
+impl ModeAnalysis {
+    /// Computes the modes at each speed (rpm), with exact motions if `is_exact`; `None` once `stop`
+    /// returns true. Friction is linearised at the speeds of the run.
     ///
     /// # Errors
-    /// A machine without equilibrium, or whose modes cannot be computed.
+    /// Returns an error if the machine has no equilibrium, or if its modes cannot be computed.
     pub(crate) fn new(
-        asked: &Asked,
+        input: &ModesInput,
         speeds_rpm: &[f64],
         is_exact: bool,
         stop: StopRequest<'_>,
     ) -> Result<Option<Self>, Error> {
-        let point = ready(asked.machine.clone(), asked.spin.clone(), &asked.timing);
+        let point = prepare_point(input.machine.clone(), input.spin.clone(), &input.timing);
         let point = point.map_err(Error::model)?;
         let modes = campbell_until(&point, speeds_rpm, stop).map_err(Error::model)?;
         let Some(modes) = modes else { return Ok(None) };
-        let exact = if is_exact { Some(exact_over(&point, speeds_rpm, &modes)?) } else { None };
+        let exact =
+            if is_exact { Some(exact_at_speeds(&point, speeds_rpm, &modes)?) } else { None };
         let friction_speeds = friction_speeds(&point);
         Ok(Some(Self { speeds_rpm: speeds_rpm.to_vec(), modes, exact, friction_speeds }))
     }
 
-    /// The modes as JSON.
+    /// Returns the modes as JSON.
     pub(crate) fn to_json(&self, name: &str) -> Value {
         let modes = self.modes.iter().enumerate().map(|(k, mode)| {
             let mut facts = facts(k, mode);
@@ -125,45 +130,47 @@ impl Analysis {
         found
     }
 
-    /// The modes as columns, with what is known of each in the metadata.
-    pub(crate) fn table(&self, Asked { name, set, machine, .. }: &Asked) -> Table {
-        let (speeds, modes) = (&self.speeds_rpm, &self.modes);
+    /// Returns the modes as a table, with the facts of each mode in the metadata.
+    pub(crate) fn table(&self, ModesInput { name, set, machine, .. }: &ModesInput) -> Table {
+        let speeds = &self.speeds_rpm;
+        let modes = &self.modes;
         let rows = || (0..speeds.len()).flat_map(|k| (0..modes.len()).map(move |mode| (k, mode)));
         let mut table = Table::new(crate::identity::BUILD);
         let speed = rows().map(|(k, _)| Some(speeds[k]));
         table.numbers("speed_rpm", "rpm", "spin of the shaft", speed);
-        let said = "number of the mode, by its frequency at the lowest speed";
-        table.counts("mode", said, rows().map(|(_, mode)| mode as u64 + 1));
+        let description = "number of the mode, by its frequency at the lowest speed";
+        table.counts("mode", description, rows().map(|(_, mode)| mode as u64 + 1));
         let names: Vec<String> = modes.iter().map(|mode| mode.motion.to_string()).collect();
-        let said = "what moves, at the first resonance or the lowest speed";
-        table.words("name", said, rows().map(|(_, mode)| names[mode].as_str()));
-        let mut add = |name: &str, unit: &str, said: &str, of: fn(&ModeAtSpeed) -> f64| {
-            let values = rows().map(|(k, mode)| Some(of(&modes[mode].at_speed[k])));
-            table.numbers(name, unit, said, values);
-        };
-        let said = "damped natural frequency in cycles per minute, mean over a turn";
-        add("frequency_rpm", "rpm", said, |at| at.frequency_rpm);
-        add("frequency_hz", "Hz", "the same in cycles per second", |at| at.frequency_rpm / 60.0);
-        let said = "share of critical damping, mean over a turn";
-        add("damping_ratio", "1", said, |at| at.damping_ratio);
-        let said = "real part of the eigenvalue, mean over a turn";
-        add("eigenvalue_re", "1/s", said, |at| at.re_per_s);
-        let said = "imaginary part of the eigenvalue, mean over a turn";
-        add("eigenvalue_im", "rad/s", said, |at| at.im_rad_per_s);
-        let said = "least damped natural frequency over a turn";
-        add("frequency_min_rpm", "rpm", said, |at| at.least_rpm);
-        let said = "greatest damped natural frequency over a turn";
-        add("frequency_max_rpm", "rpm", said, |at| at.greatest_rpm);
-        if let Some(exact) = &self.exact {
-            let mut add = |name: &str, unit: &str, said: &str, of: fn(&Exact) -> f64| {
-                let values = rows().map(|(k, mode)| exact[k][mode].as_ref().map(of));
-                table.numbers(name, unit, said, values);
+        let description = "what moves, at the first resonance or the lowest speed";
+        table.words("name", description, rows().map(|(_, mode)| names[mode].as_str()));
+        let mut add =
+            |name: &str, unit: &str, description: &str, value: fn(&ModeAtSpeed) -> f64| {
+                let values = rows().map(|(k, mode)| Some(value(&modes[mode].at_speed[k])));
+                table.numbers(name, unit, description, values);
             };
-            let said = "frequency by the linear model's Floquet exponent over whole turns, nearest \
-                        to frequency_rpm; null at standstill";
-            add("exact_frequency_rpm", "rpm", said, Exact::frequency_rpm);
-            let said = "share of critical damping by it";
-            add("exact_damping_ratio", "1", said, Exact::damping_ratio);
+        let description = "damped natural frequency in cycles per minute, mean over a turn";
+        add("frequency_rpm", "rpm", description, |at| at.frequency_rpm);
+        add("frequency_hz", "Hz", "the same in cycles per second", |at| at.frequency_rpm / 60.0);
+        let description = "share of critical damping, mean over a turn";
+        add("damping_ratio", "1", description, |at| at.damping_ratio);
+        let description = "real part of the eigenvalue, mean over a turn";
+        add("eigenvalue_re", "1/s", description, |at| at.re_per_s);
+        let description = "imaginary part of the eigenvalue, mean over a turn";
+        add("eigenvalue_im", "rad/s", description, |at| at.im_rad_per_s);
+        let description = "least damped natural frequency over a turn";
+        add("frequency_min_rpm", "rpm", description, |at| at.least_rpm);
+        let description = "greatest damped natural frequency over a turn";
+        add("frequency_max_rpm", "rpm", description, |at| at.greatest_rpm);
+        if let Some(exact) = &self.exact {
+            let mut add = |name: &str, unit: &str, description: &str, value: fn(&Exact) -> f64| {
+                let values = rows().map(|(k, mode)| exact[k][mode].as_ref().map(value));
+                table.numbers(name, unit, description, values);
+            };
+            let description = "frequency by the linear model's Floquet exponent over whole turns, \
+                               nearest to frequency_rpm; null at standstill";
+            add("exact_frequency_rpm", "rpm", description, Exact::frequency_rpm);
+            let description = "share of critical damping by it";
+            add("exact_damping_ratio", "1", description, Exact::damping_ratio);
         }
         let mut plan = json!({ "name": name, "machine": config::machine_json(machine) });
         if !set.is_empty() {
@@ -176,8 +183,8 @@ impl Analysis {
     }
 }
 
-/// The exact motions beside modes.
-fn exact_over(
+/// Returns the exact motion of each mode at each speed (rpm).
+fn exact_at_speeds(
     point: &Point,
     speeds_rpm: &[f64],
     modes: &[ModeOverSpeed],
@@ -187,15 +194,15 @@ fn exact_over(
             return Ok(vec![None; modes.len()]);
         }
         let motions = exact_motions(point, speed).map_err(Error::model)?;
-        let of = |mode: &ModeOverSpeed| {
+        let exact = |mode: &ModeOverSpeed| {
             motions.iter().find(|motion| motion.frozen.shape == mode.at_speed[k].shape).copied()
         };
-        Ok(modes.iter().map(of).collect())
+        Ok(modes.iter().map(exact).collect())
     };
     speeds_rpm.iter().enumerate().map(at).collect()
 }
 
-/// A mode's name, what it moves, its resonances.
+/// Returns the name, the participation of motions and the resonances of a mode.
 fn facts(k: usize, mode: &ModeOverSpeed) -> Value {
     let resonance =
         |resonance: &washer_model::Resonance| at_speed(resonance.speed_rpm, &resonance.mode);

@@ -1,4 +1,4 @@
-//! Points in memory: a table whose columns are parameters and whose rows are points.
+//! Points in memory: tables whose columns are parameters and whose rows are points.
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::Float64Type;
@@ -19,23 +19,23 @@ pub struct PointTable {
 }
 
 impl PointTable {
-    /// From batches of a schema; those of a stream, or of a table in one piece.
+    /// Creates a table from record batches of a schema.
     ///
     /// # Errors
-    /// [`Diagnostics`] for a column that holds no numbers.
+    /// Returns [`Diagnostics`] for a column that has no numbers.
     pub fn new(schema: &Schema, batches: &[RecordBatch]) -> Result<Self, Diagnostics> {
-        // A data frame that was filtered or sorted brings the numbers of its rows along.
-        let is_taken = |k: &usize| !is_index(schema.field(*k).name());
-        let taken: Vec<usize> = (0..schema.fields().len()).filter(is_taken).collect();
-        let names: Vec<String> = taken.iter().map(|k| schema.field(*k).name().clone()).collect();
+        // Filtered or sorted data frames have an index column, which is ignored.
+        let is_data = |k: &usize| !is_index(schema.field(*k).name());
+        let used: Vec<usize> = (0..schema.fields().len()).filter(is_data).collect();
+        let names: Vec<String> = used.iter().map(|k| schema.field(*k).name().clone()).collect();
         let mut columns = Vec::with_capacity(names.len());
-        for (place, k) in taken.into_iter().enumerate() {
+        for (place, k) in used.into_iter().enumerate() {
             let field = schema.field(k);
             let refused = || not_numbers(&names, place, &field.data_type().to_string());
             if !cells::is_number(field.data_type()) {
                 return Err(refused());
             }
-            // A column in one piece is taken as it is: tables may be of a memory's size.
+            // A single batch without nulls is shared, not copied: tables may fill the memory.
             if let [batch] = batches
                 && let Some(whole) = batch.column(k).as_primitive_opt::<Float64Type>()
                 && whole.null_count() == 0
@@ -50,10 +50,10 @@ impl PointTable {
         Ok(Self { names, columns, rows: batches.iter().map(RecordBatch::num_rows).sum() })
     }
 
-    /// From columns of equal length, each with its name.
+    /// Creates a table from named columns of equal length.
     ///
     /// # Errors
-    /// [`Diagnostics`] for a column of another length than the first.
+    /// Returns [`Diagnostics`] for a column of another length than the first.
     pub fn from_columns(columns: Vec<(String, Vec<f64>)>) -> Result<Self, Diagnostics> {
         let rows = columns.first().map_or(0, |(_, values)| values.len());
         let names: Vec<String> = columns.iter().map(|(name, _)| name.clone()).collect();
@@ -64,12 +64,12 @@ impl PointTable {
         Ok(Self { names, columns, rows })
     }
 
-    /// How many points.
+    /// Returns the number of points.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// The columns, NaN where a value is missing.
+    /// Returns the columns with their names; a missing value is NaN.
     pub(super) fn into_columns(self) -> Vec<(String, Vec<f64>)> {
         let values = |column: &Float64Array| -> Vec<f64> {
             column.iter().map(|value| value.unwrap_or(f64::NAN)).collect()
@@ -77,28 +77,33 @@ impl PointTable {
         self.names.iter().cloned().zip(self.columns.iter().map(values)).collect()
     }
 
-    /// The points as those of a plan.
+    /// Assigns the columns to the axes of a plan.
     ///
     /// # Errors
-    /// Every column that is unknown, no axis of the plan or missing, and every value off its axis.
-    pub(super) fn on<'a>(&'a self, plan: &'a Plan) -> Result<PointsOnAxes<'a>, Diagnostics> {
+    /// Returns a mistake for every column that is missing, unknown or no axis of the plan, and for
+    /// every value outside of its axis.
+    pub(super) fn assign_to_axes<'a>(
+        &'a self,
+        plan: &'a Plan,
+    ) -> Result<PointsOnAxes<'a>, Diagnostics> {
         let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
         let columns = check_columns(plan, &names, |column| self.columns[column].iter())?;
         Ok(PointsOnAxes { table: self, plan, columns })
     }
 }
 
-/// A table's points with the axes in a plan's order.
+/// The points of a table as points of a plan.
 pub(super) struct PointsOnAxes<'a> {
     table: &'a PointTable,
     plan: &'a Plan,
+    /// The column of each axis; `None` for an axis with one value that the table omits.
     columns: Vec<Option<usize>>,
 }
 
 impl PointsOnAxes<'_> {
-    /// The value of each axis at a point.
+    /// Returns the values of the axes at a point.
     pub(super) fn axis_values(&self, point: u64) -> Vec<f64> {
-        // A row of the table, whose rows are counted by `usize`.
+        // The number of a row always fits into `usize`.
         let row = usize::try_from(point).unwrap_or(usize::MAX);
         let value = |(axis, column): (&crate::plan::Axis, &Option<usize>)| match column {
             Some(column) => self.table.columns[*column].value(row),
@@ -107,7 +112,7 @@ impl PointsOnAxes<'_> {
         self.plan.axes.iter().zip(&self.columns).map(value).collect()
     }
 
-    /// BLAKE3 hash of the values, row by row, hexadecimal.
+    /// Returns the hexadecimal BLAKE3 hash of the values, row by row.
     pub(super) fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         for row in 0..self.table.rows as u64 {

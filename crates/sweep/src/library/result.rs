@@ -1,4 +1,4 @@
-//! Results in memory: rows as columns, and the file that they are or would be.
+//! Results in memory, and their files.
 
 use std::path::Path;
 
@@ -23,37 +23,45 @@ pub struct MemoryTable {
     file: FileContent,
 }
 
-/// What a result's file is made of.
+/// The source of a result's file.
 #[derive(Debug)]
 enum FileContent {
-    /// These bytes. Of a file that was read, those of then: another may lie there by now.
+    /// The bytes of the file. A file that was read is kept, because it may be replaced later.
     Bytes(Vec<u8>),
-    /// The rows, by the rules of a run's file of so many points.
+    /// The rows of a run with a number of points, written in the layout of its file.
     Rows { points: u64, layout: Box<Layout>, is_whole: bool },
 }
 
 impl MemoryTable {
-    /// The rows of a run, or of one at constant speeds.
-    pub(super) fn of_rows(job: &Job<'_>, batches: Vec<RecordBatch>, is_whole: bool) -> Self {
-        let (plan, layout) = (job.plan.clone(), Box::new(job.layout.clone()));
-        let (kind, schema) = (layout.kind, layout.schema());
+    /// Creates a table from the rows of a job.
+    pub(super) fn from_rows(job: &Job<'_>, batches: Vec<RecordBatch>, is_whole: bool) -> Self {
+        let plan = job.plan.clone();
+        let layout = Box::new(job.layout.clone());
+        let kind = layout.kind;
+        let schema = layout.schema();
         let file = FileContent::Rows { points: job.points, layout, is_whole };
         Self { kind, plan, schema, batches, file }
     }
 
-    /// A small result.
-    pub(super) fn of_table(kind: FileKind<'static>, table: Table) -> Result<Self, Error> {
+    /// Creates a table from a small result, which is a single batch.
+    pub(super) fn from_table(kind: FileKind<'static>, table: Table) -> Result<Self, Error> {
         let plan = table.plan();
         let (batch, bytes) =
             table.finish().map_err(StoreError::parquet("write", Path::new("a table")))?;
-        let (schema, batches) = (batch.schema(), vec![batch]);
-        Ok(Self { kind, plan, schema, batches, file: FileContent::Bytes(bytes) })
+        Ok(Self {
+            kind,
+            plan,
+            schema: batch.schema(),
+            batches: vec![batch],
+            file: FileContent::Bytes(bytes),
+        })
     }
 
-    /// Reads a result file of any kind, and checks its digest.
+    /// Reads a result file of any kind and checks its digest.
     ///
     /// # Errors
-    /// A file that cannot be read, is damaged, or is no result of this program.
+    /// Returns an error if the file cannot be read, if it is damaged, or if this program did not
+    /// write it.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let file = ParquetFile::open(path)?;
         let not_ours = || FileError::NotParquet {
@@ -70,36 +78,36 @@ impl MemoryTable {
         Ok(Self { kind, plan, schema, batches, file })
     }
 
-    /// What it is.
+    /// Returns the kind of the result.
     pub fn kind(&self) -> FileKind<'static> {
         self.kind
     }
 
-    /// The plan as JSON, as the file carries it; of differences, what was compared.
+    /// Returns the plan as JSON, as the file has it; for differences, the two files compared.
     pub fn plan(&self) -> &Value {
         &self.plan
     }
 
-    /// The columns: names, types, and in each field's metadata `unit` and `description`.
+    /// Returns the schema. The metadata of each field have `unit` and `description`.
     pub fn schema(&self) -> &SchemaRef {
         &self.schema
     }
 
-    /// The rows.
+    /// Returns the rows as record batches.
     pub fn batches(&self) -> &[RecordBatch] {
         &self.batches
     }
 
-    /// How many rows.
+    /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.batches.iter().map(RecordBatch::num_rows).sum()
     }
 
-    /// Writes the Parquet file: the bytes that the command writes.
+    /// Writes the result as a Parquet file, with the bytes that the command writes.
     ///
     /// # Errors
-    /// A path that holds something else, what the file system refuses, and the rows of an
-    /// evaluation that was interrupted, which are no result.
+    /// Returns an error if the path has a file of another kind, if the file cannot be written, and
+    /// if the evaluation was interrupted.
     pub fn save(&self, path: &Path) -> Result<(), Error> {
         let FileContent::Rows { points, layout, is_whole } = &self.file else {
             return self.finish(Output::begin(path, self.kind)?);
@@ -114,14 +122,14 @@ impl MemoryTable {
             numerics: identity::NUMERICS_VERSION,
             points: *points,
             layout: Layout::clone(layout),
-            // Tables and progress alone need these.
+            // Only summaries and progress use these.
             limits: f64::NAN.into(),
             axis_values: Box::new(|_| Vec::new()),
         };
         Ok(write_map(&job, &self.batches, path)?)
     }
 
-    /// Writes a small result, or a copy of the file that this one was, to an output already begun.
+    /// Writes the bytes of a small result, or of a file that was read, to an output.
     pub(super) fn finish(&self, output: Output<'_>) -> Result<(), Error> {
         match &self.file {
             FileContent::Bytes(bytes) => Ok(output.finish(bytes)?),
@@ -132,13 +140,12 @@ impl MemoryTable {
     /// Draws the figure of it; the output's ending (`.svg`, `.pdf`, `.png`, `.html`) says how.
     ///
     /// # Errors
-    /// As [`sweep_plot::render`] and [`Self::save`].
+    /// Returns the errors of [`sweep_plot::render`] and [`Self::save`].
     pub fn draw(&self, output: &Path) -> Result<(), Error> {
-        let here = Path::new("a temporary folder");
-        let folder = tempfile::tempdir().map_err(FileError::io("make", here))?;
+        let shown = Path::new("a temporary folder");
+        let folder = tempfile::tempdir().map_err(FileError::io("make", shown))?;
         let path = folder.path().join("result.parquet");
         self.save(&path)?;
-        let (options, figures) = (PlotOptions::default(), WasherFigures::default());
-        Ok(render(&path, &options, &figures, output)?)
+        Ok(render(&path, &PlotOptions::default(), &WasherFigures::default(), output)?)
     }
 }

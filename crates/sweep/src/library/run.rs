@@ -1,4 +1,4 @@
-//! Rows that are computed in memory, or into a file as the command does.
+//! Computation of rows in memory, or into a file like that of the command.
 
 use std::path::Path;
 
@@ -7,32 +7,32 @@ use super::result::MemoryTable;
 use sweep_engine::run::{Ended, RunOptions};
 use sweep_engine::{Engine, Error, Job, run as runner};
 
-/// How a run into a file ended.
+/// The end of a run into a file.
 #[derive(Debug)]
 pub enum RanToFile {
-    /// The file is in place; these are its rows.
+    /// The run is complete; the table has the rows of its file.
     Whole(MemoryTable),
-    /// The interrupt was raised. What is done is kept, and the same call goes on.
+    /// The interrupt was raised. Finished chunks are kept, and another call continues the run.
     Interrupted {
-        /// Rows that are there.
+        /// The number of rows that are kept.
         kept: u64,
-        /// Points in all.
+        /// The number of all points.
         points: u64,
     },
 }
 
-/// Rows to be computed, and what computes them.
-pub struct Task<'a> {
+/// A job with the engine that computes its rows.
+pub struct EvaluationTask<'a> {
     pub(super) job: Job<'a>,
     pub(super) engine: Box<dyn Engine + 'a>,
 }
 
-impl Task<'_> {
-    /// Computes the rows into a result file: the same bytes as the command, resumed if it was
-    /// interrupted. The whole of it, also in a task of a Slurm array.
+impl EvaluationTask<'_> {
+    /// Computes the rows into a result file with the bytes of the command's. An interrupted run
+    /// continues. All rows are computed, also in a task of a Slurm array.
     ///
     /// # Errors
-    /// Everything that keeps the command from its end; finished chunks are kept whatever it is.
+    /// Returns the errors of the command. Finished chunks are kept.
     pub fn to_file(
         &self,
         output: &Path,
@@ -53,7 +53,7 @@ impl Task<'_> {
         Ok(match report.ended {
             Ended::Already(..) | Ended::Finished(_) => RanToFile::Whole(MemoryTable::read(output)?),
             Ended::Interrupted { kept, points, .. } => RanToFile::Interrupted { kept, points },
-            // Only what a scheduler's variables say makes a shard of a run.
+            // Without a scheduler's variables a run has no shards.
             Ended::Shard(..) => RanToFile::Interrupted { kept: 0, points: self.job.points },
         })
     }

@@ -1,4 +1,4 @@
-//! Searches, with or without a file that keeps what they find out.
+//! Searches, with or without a file that keeps their trials.
 
 use std::path::Path;
 
@@ -16,12 +16,13 @@ use sweep_engine::store::{Opened, TrialColumns, Trials};
 use sweep_engine::{Error, Job, Table};
 use sweep_files::Output;
 
-/// Traces the boundary of a plan's grid; `None` if the interrupt was raised. The output keeps what
-/// an interrupted search has found out, and goes on there; `fresh` starts over.
+/// Traces the boundary of a plan's grid; `None` if the interrupt was raised. With an output, the
+/// trials of an interrupted search are kept beside it, and another call continues from them unless
+/// it is `fresh`.
 ///
 /// # Errors
-/// A plan without a range to search, options that make no sense, and whatever keeps the file from
-/// being written.
+/// Returns an error if the plan has no range to search, if an option is out of bounds, and if the
+/// file cannot be written.
 pub fn find_boundary(
     plan: &Plan,
     options: &BoundaryOptions,
@@ -38,12 +39,13 @@ pub fn find_boundary(
     found(stored, search, |found| task.table(found))
 }
 
-/// The candidates of a study file, constants `NAME=VALUE` over those of its grid; `None` if the
-/// interrupt was raised. With an output it writes that file, byte for byte as `sweep optimise`
-/// does, and goes on there after an interruption; `fresh` starts over.
+/// Computes the candidates of a study file; `None` if the interrupt was raised. `sets` has
+/// constants `NAME=VALUE` for its grid. With an output, it writes the file of `sweep optimise`, and
+/// keeps the trials of an interrupted search, from which another call continues unless it is
+/// `fresh`.
 ///
 /// # Errors
-/// Mistakes in the study and its grid file, and whatever keeps the file from being written.
+/// Returns an error for mistakes in the study or its grid file, and if the file cannot be written.
 pub fn optimise_study(
     path: &Path,
     sets: &[String],
@@ -83,11 +85,11 @@ fn found<T>(
     };
     let (found, trials) = search(trials)?;
     let Some(found) = found else { return Ok(None) };
-    let found = MemoryTable::of_table(kind, table(&found))?;
+    let result = MemoryTable::from_table(kind, table(&found))?;
     if let Some(file) = file {
-        found.finish(file)?;
+        result.finish(file)?;
     }
-    // What it says matters where a user watches the folder.
+    // The result is complete, so a folder of trials that cannot be removed is no error.
     let _ = trials.and_then(Trials::complete);
-    Ok(Some(found))
+    Ok(Some(result))
 }

@@ -1,27 +1,28 @@
-//! Machines at constant speeds.
+//! Machines at held speeds.
 
 use super::check_speeds;
-use super::run::Task;
-use crate::dwell::Search;
+use super::run::EvaluationTask;
+use crate::dwell::AttractorSearch;
 use crate::plan::Plan;
-use crate::stability::{Held, check};
+use crate::stability::{HeldPlan, check};
 use sweep_engine::Error;
 
-/// What becomes of each point of a plan's grid at each constant speed (rpm, rising): by a search
-/// the motions that it ends in, else the periodic responses of both models and how fast
-/// disturbances of them grow. Speeds vary fastest.
+/// Returns the task to find the motions of each point of a plan's grid at increasing held speeds
+/// (rpm). With a search they are those in which the machine ends, otherwise the periodic responses
+/// of both models with the growth of disturbances. Speeds vary fastest.
 ///
 /// # Errors
-/// Speeds that do not rise, an axis that means nothing at a constant speed, a search out of bounds;
-/// `SWEEP_SIMD` naming nothing this machine has.
-pub fn held<'a>(
+/// Returns an error if speeds do not increase, if an axis has no meaning at a held speed, if an
+/// option of the search is out of bounds, and if `SWEEP_SIMD` names no instruction set of this
+/// processor.
+pub fn hold_speeds<'a>(
     plan: &'a Plan,
     speeds_rpm: &'a [f64],
-    search: Option<Search>,
-) -> Result<Task<'a>, Error> {
+    search: Option<AttractorSearch>,
+) -> Result<EvaluationTask<'a>, Error> {
     check_speeds(speeds_rpm, 1, |speed| speed > 0.0, " above 0")?;
     check(plan, "speeds", &format!("with {} values", speeds_rpm.len()))?;
     search.map_or(Ok(()), |search| search.check())?;
-    let held = Held { plan, speeds_rpm, search };
-    Ok(Task { job: held.job(), engine: Box::new(held.engine()?) })
+    let held = HeldPlan { plan, speeds_rpm, search };
+    Ok(EvaluationTask { job: held.job(), engine: Box::new(held.engine()?) })
 }

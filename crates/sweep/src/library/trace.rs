@@ -3,7 +3,7 @@
 use clap::ValueEnum as _;
 
 use super::result::MemoryTable;
-use crate::config::GridInput;
+use crate::config::WasherGridInput;
 use crate::trace::{
     Models, TraceExtras, TraceSettings, check_spacing, parse_start_value, start_from, trace_in_pool,
 };
@@ -36,7 +36,7 @@ pub struct TraceOptions {
 /// # Errors
 /// Returns an error for mistakes in the grid or the options, and for a machine without equilibrium.
 pub fn trace_point(
-    grid: &GridInput,
+    grid: &WasherGridInput,
     at: &[String],
     options: &TraceOptions,
     interrupt: &Interrupt,
@@ -63,7 +63,7 @@ pub fn trace_point(
     if interrupt.stopped() {
         return Ok(None);
     }
-    Ok(Some((MemoryTable::of_table(FileKind::Trace, trace.table)?, trace.failures)))
+    Ok(Some((MemoryTable::from_table(FileKind::Trace, trace.table)?, trace.failures)))
 }
 
 #[cfg(test)]
@@ -76,7 +76,7 @@ mod tests {
         // Each of the two would take hours.
         let text = "spin = { profile = \"ramp\", peak_rpm = 350, ramp_s = 5 }\n\
              time = { end_s = 1e5 }\nintegrator = { method = \"rk4\", step_s = 1e-5 }\n";
-        let grid = GridInput::text("grid", text.to_owned(), Vec::new());
+        let grid = WasherGridInput::text("grid", text.to_owned(), Vec::new());
         let speeds: Vec<f64> = (0..60_000_u32).map(|k| 100.0 + 0.005 * f64::from(k)).collect();
         let interrupt = Interrupt::new();
         interrupt.raise(2);

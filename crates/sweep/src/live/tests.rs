@@ -1,4 +1,4 @@
-//! A page's checked points against the program's rows: the same levels, errors and bits.
+//! Tests of a page's checked points, which have the levels, errors and bits of the program's rows.
 
 use washer_row::{Criterion, Outcome, Status, Verdict};
 
@@ -17,10 +17,11 @@ values = [60, 180, 300]
 "#;
 
 fn plan(text: &str) -> Plan {
-    GridInput::text("live", text.to_owned(), Vec::new()).load().unwrap()
+    WasherGridInput::text("live", text.to_owned(), Vec::new()).load().unwrap()
 }
 
-fn is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
+/// Asserts that a checked point of a page is a row of the program.
+fn assert_is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
     let checked = washer_live::check(setup, values).unwrap();
     let errors = checked.errors[0].zip(checked.errors[1]).map(|(a, b)| a.max(b));
     assert_eq!(errors, outcome.error, "{values:?}");
@@ -29,9 +30,10 @@ fn is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
     row.drop_turns();
     assert_eq!((row, values), (Outcome { point: 0, ..outcome.clone() }, values));
     for (amplitudes, run) in checked.amplitudes.iter().zip([&outcome.nonlinear, &outcome.linear]) {
-        let of_channels = setup.rule.channels.iter().map(|of| amplitudes[of.index()]);
+        let channels = setup.rule.channels.iter();
+        let amplitudes: Vec<f64> = channels.map(|channel| amplitudes[channel.index()]).collect();
         if run.status == Status::Ok {
-            assert_eq!(of_channels.collect::<Vec<_>>(), run.amplitudes, "{values:?}");
+            assert_eq!(amplitudes, run.amplitudes, "{values:?}");
         }
     }
 }
@@ -39,14 +41,14 @@ fn is_row(outcome: &Outcome, setup: &Setup, values: &[f64]) {
 #[test]
 fn a_checked_point_is_the_row_of_the_map() {
     let plan = plan(GRID);
-    let (setup, _) = setup(&plan, &usual(&plan)).unwrap();
-    // What a page computes with is what came back from its numbers.
+    let (setup, _) = setup(&plan, &usual_sliders(&plan)).unwrap();
+    // A page has the setup that its numbers give back.
     let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
     let engine = ModelEngine::new(&plan).unwrap();
-    // Settled at once, settled late, and chaotic.
+    // The first point converges at once, the second late, and the third is chaotic.
     for values in [[0.1, 300.0], [0.4, 180.0], [0.95, 180.0]] {
         let outcomes = engine.evaluate_at(&[values.to_vec()]);
-        is_row(&outcomes[0], &setup, &values);
+        assert_is_row(&outcomes[0], &setup, &values);
     }
 }
 
@@ -60,7 +62,7 @@ stability = { speed_rpm = "200:240:20" }
     for criterion in ["rms", "envelope"] {
         let further = further.replace("CRITERION", criterion);
         let mut plan = plan(&(further + GRID));
-        assert_eq!(take_held(&mut plan), (vec![200.0, 220.0, 240.0], vec![Metric::Growth]));
+        assert_eq!(take_held_metrics(&mut plan), (vec![200.0, 220.0, 240.0], vec![Metric::Growth]));
         let (setup, _) = setup(&plan, &[]).unwrap();
         let setup = Setup::from_numbers(&setup.to_numbers()).unwrap();
         let engine = ModelEngine::new(&plan).unwrap();
@@ -68,13 +70,13 @@ stability = { speed_rpm = "200:240:20" }
         let outcome = &engine.evaluate_at(&[values.to_vec()])[0];
         assert_eq!(outcome.linear.metrics.len(), 2);
         assert!(outcome.static_sag_m > Some(0.0));
-        is_row(outcome, &setup, &values);
+        assert_is_row(outcome, &setup, &values);
         let answer = washer_live::check(&setup, &values).unwrap();
         let limit = plan.reliability.limits;
         let verdict = Verdict::new(outcome, setup.rule.channels.len(), limit);
-        // The page has them of every channel.
-        let of_turns = answer.outcome.turn_ratios;
-        assert!(criterion == "rms" || of_turns == verdict.ratios);
+        // The page has the ratios by turn of every channel.
+        let turn_ratios = answer.outcome.turn_ratios;
+        assert!(criterion == "rms" || turn_ratios == verdict.ratios);
         let ratios = setup.rule.channels.iter().map(|of| answer.ratios[of.index()]);
         assert_eq!(ratios.collect::<Vec<_>>(), verdict.ratios, "{criterion}");
     }
@@ -86,7 +88,7 @@ fn motions_of_held_speeds_are_the_rows() {
     let mut plan = plan(&(further.to_owned() + GRID));
     let values = [0.4, 140.0];
     let outcome = &ModelEngine::new(&plan).unwrap().evaluate_at(&[values.to_vec()])[0];
-    let (speeds_rpm, metrics) = take_held(&mut plan);
+    let (speeds_rpm, metrics) = take_held_metrics(&mut plan);
     assert_eq!(metrics, [Metric::Dwell]);
     let (setup, _) = setup(&plan, &[]).unwrap();
     assert!(outcome.dwelt.is_some());
@@ -96,12 +98,13 @@ fn motions_of_held_speeds_are_the_rows() {
 #[test]
 fn a_point_beyond_the_axes_is_the_row_of_a_wider_grid() {
     let plan = plan(GRID);
-    let sliders = chosen(&plan, &[slider_range("tub_mass_kg=20:28").unwrap()]).unwrap();
+    let sliders =
+        requested_sliders(&plan, &[parse_slider_range("tub_mass_kg=20:28").unwrap()]).unwrap();
     let (setup, _) = setup(&plan, &sliders).unwrap();
-    let wide = widened(&plan, &sliders);
+    let wide = with_sliders(&plan, &sliders);
     let engine = ModelEngine::new(&wide).unwrap();
     let values = [0.4, 240.0, 26.0];
-    is_row(&engine.evaluate_at(&[values.to_vec()])[0], &setup, &values);
+    assert_is_row(&engine.evaluate_at(&[values.to_vec()])[0], &setup, &values);
 }
 
 #[test]
@@ -137,13 +140,14 @@ fn sliders_that_cannot_be_are_refused() {
         ("damping_n_s_per_m=1:2", "no slider yet"),
         ("tub_mass_kg=-1:2", "greater than 0"),
     ] {
-        let error = chosen(&plan, &[slider_range(text).unwrap()]).unwrap_err().to_string();
+        let error =
+            requested_sliders(&plan, &[parse_slider_range(text).unwrap()]).unwrap_err().to_string();
         assert!(error.contains(expected), "{text}: {error}");
     }
     for text in ["tub_mass_kg", "tub_mass_kg=1", "tub_mass_kg=2:1", "tub_mass_kg=a:b"] {
-        assert!(slider_range(text).is_err(), "{text}");
+        assert!(parse_slider_range(text).is_err(), "{text}");
     }
-    assert!(usual(&plan).iter().all(|Axis { parameter, values }| {
+    assert!(usual_sliders(&plan).iter().all(|Axis { parameter, values }| {
         let names = ["unbalance_mass_kg", "damping_n_s_per_m"];
         values.value(0) < values.value(1) && !names.contains(&parameter.name())
     }));

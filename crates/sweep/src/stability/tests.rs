@@ -1,19 +1,20 @@
-//! Machines whose responses and endings independent programs know. Files: `tests/held`.
+//! Tests against responses and attractors that independent programs found. The machines are in
+//! `tests/held`.
 
 use lane_ode::Simd;
 use washer_model::{Channel, Dwell, Point, Response, Settled, Starts, State, endings, respond};
 
-use crate::plan::{ready, timing};
+use crate::plan::{prepare_point, timing};
 
-/// The last point of a grid in `tests/held`.
+/// Returns the last point of a grid in `tests/held`.
 fn point(name: &str) -> Point {
     let path = format!("{}/tests/held/g_{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let plan = crate::config::load(path.as_ref(), &[]).unwrap();
     let model = plan.scenario(plan.points() - 1).model;
-    ready(model.machine, model.spin, &timing(&plan)).unwrap()
+    prepare_point(model.machine, model.spin, &timing(&plan)).unwrap()
 }
 
-fn responses(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {
+fn find_responses(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
     respond(&dwells, &|| false).into_iter().map(|found| found.unwrap_or_default()).collect()
@@ -22,33 +23,34 @@ fn responses(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {
 #[test]
 fn a_textbook_machine_has_a_response_at_every_speed() {
     let speeds_rpm = [452.0, 500.0, 532.0, 660.0, 700.0];
-    for (found, rpm) in responses(&point("textbook"), &speeds_rpm).iter().zip(speeds_rpm) {
+    for (found, rpm) in find_responses(&point("textbook"), &speeds_rpm).iter().zip(speeds_rpm) {
         assert!(!found.is_empty(), "{rpm} rpm");
     }
 }
 
-/// Branches between two others are not lost to them.
+/// A search for the branches between two others must not end on these.
 #[test]
 fn branches_of_a_folded_curve_are_all_found() {
     let speeds_rpm: Vec<f64> = (0..25).map(|k| 144.2 + 0.05 * f64::from(k)).collect();
-    for (found, rpm) in responses(&point("fine17"), &speeds_rpm).iter().zip(&speeds_rpm) {
+    for (found, rpm) in find_responses(&point("fine17"), &speeds_rpm).iter().zip(&speeds_rpm) {
         let branches: Vec<u32> = found.iter().map(|response| response.branch).collect();
         assert_eq!(branches, [2, 3, 4], "{rpm} rpm");
     }
 }
 
-/// Friction rings the hinge by harmonics without end: 7.786 mm by rk4 at 5e-5 s, 7.767 with caps.
+/// The corners of friction make the hinge ring. Its deflection is 7.786 mm by rk4 at 5e-5 s, and
+/// 7.767 mm with capped modes.
 #[test]
-fn a_response_with_friction_is_that_of_the_machine_as_it_is() {
-    let found = responses(&point("72001_10"), &[264.61]);
+fn a_response_with_friction_is_found_without_caps() {
+    let found = find_responses(&point("72001_10"), &[264.61]);
     let drum_m = found[0][0].nonlinear[Channel::DrumFrontZ.index()];
     assert!((drum_m / 7.786e-3 - 1.0).abs() < 3e-4, "{drum_m}");
 }
 
-/// A motion that repeats every second turn has a multiplier of -1.092 there; what it leaves for
-/// repeats every fourth.
+/// At this speed a motion that repeats every second turn has a multiplier of -1.092, so it is
+/// unstable. Trajectories leave it for a motion that repeats every fourth turn.
 #[test]
-fn a_saddle_is_no_ending() {
+fn a_saddle_is_no_attractor() {
     let point = point("74002_13");
     let dwells = [Dwell { point: &point, speed_rpm: 414.0 }];
     let starts = Starts { count: 1, ..Starts::default() };
@@ -72,27 +74,27 @@ fn chaos_survives_or_is_a_transient() {
     assert!(found.motions.iter().any(|motion| is_transient(motion.state)));
 }
 
-/// Motions of period 4, 0.1166 and 0.1471 rad, that kicks off the wide periodic response do not
-/// lead to, but those of the machine at rest do.
+/// A motion repeats every fourth turn, with amplitudes of 0.1166 and 0.1471 rad. Kicks from the
+/// wide periodic response do not lead to it, but kicks of the machine at rest do.
 #[test]
 #[ignore = "half a minute"]
-fn a_basin_beside_the_response_is_found_from_rest() {
+fn an_attractor_far_from_the_response_is_found_from_rest() {
     let point = point("74001_11");
     let dwells = [Dwell { point: &point, speed_rpm: 404.1 }];
     let found = endings(Simd::best(), &dwells, &[], &Starts::default(), &|| false);
     let found = found.into_iter().next().unwrap().unwrap();
-    let is_it = |motion: &&washer_model::Ending| {
+    let is_expected = |motion: &&washer_model::Ending| {
         motion.settled == Some(Settled::Periodic { turns: 4 })
             && (motion.peaks[Channel::TubYaw.index()] / 0.1166 - 1.0).abs() < 0.02
             && (motion.peaks[Channel::TubPitch.index()] / 0.1471 - 1.0).abs() < 0.02
     };
-    let motion = found.motions.iter().find(is_it);
+    let motion = found.motions.iter().find(is_expected);
     let motion = motion.unwrap_or_else(|| panic!("{:?}", found.motions));
     assert!(motion.exponent.is_some_and(|exponent| exponent.per_s < 0.0), "{motion:?}");
 }
 
-/// Where the textbook machine had no response by `sweep stability`, the periodic motion that it
-/// ends in is the one of the row.
+/// The textbook machine ends in the periodic response that `sweep stability` finds, also at speeds
+/// where that response is hard to find.
 #[test]
 fn a_textbook_machine_ends_in_its_response() {
     let point = point("textbook");

@@ -1,4 +1,5 @@
-//! Tongues: runs of speeds at which a response is unstable, found in the rows of a stability file.
+//! The summary of a stability file, with its tongues: runs of speeds at which a response is
+//! unstable.
 
 use std::fmt::Write as _;
 
@@ -7,91 +8,92 @@ use sweep_engine::commands::cells::short;
 use sweep_engine::config::section::counted;
 use sweep_files::{FileError, ParquetFile};
 
-/// What is read of a row.
+/// The columns of a row that the summary uses.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Row {
+pub(crate) struct StabilityRow {
     pub(crate) point: f64,
     /// The values of the point's axes.
     pub(crate) at: Vec<f64>,
     pub(crate) speed_rpm: f64,
-    /// Not finite where there is no response.
+    /// The growth; not finite if there is no response.
     pub(crate) growth_per_s: f64,
     pub(crate) frequency_cpm: f64,
     pub(crate) kind: String,
-    /// The speed (rpm) above which its branch is not.
+    /// The speed (rpm) of the fold at which the branch ends, if it does.
     pub(crate) branch_to_rpm: Option<f64>,
-    /// What of the machine's geometry it passes.
+    /// The limit of the machine's geometry that the response exceeds, if it does.
     pub(crate) beyond: Option<String>,
-    /// Whether it is not on the curve of responses.
+    /// Whether the response is not on the curve of a machine that runs up.
     pub(crate) is_off_curve: bool,
-    /// What moves in the modes that take part, and their numbers.
+    /// The modes that take part, with their numbers and names.
     pub(crate) modes: Vec<(f64, String)>,
     pub(crate) status: String,
 }
 
-/// A run of unstable speeds of one point.
+/// A run of speeds of one point that are unstable in the same way.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Tongue {
+pub(crate) struct TongueRows {
     /// The row of the largest growth.
-    pub(crate) at: Row,
-    /// First and last unstable speed (rpm).
+    pub(crate) at: StabilityRow,
+    /// The first and the last unstable speed (rpm).
     pub(crate) from_to_rpm: [f64; 2],
 }
 
-/// What a file says as a whole.
+/// The counts and lists of a summary.
 #[derive(Debug, Default)]
-pub(crate) struct Summary {
+pub(crate) struct StabilitySummary {
     axes: Vec<String>,
     rows: u64,
     points: u64,
-    without: u64,
+    without_response: u64,
     unstable: u64,
-    /// Rows that are stable by their multipliers, and pass what no machine can.
+    /// Rows that are stable by their multipliers, but exceed the machine's geometry.
     beyond: u64,
-    /// Rows, each the first of its speed, that are not on the curve of responses.
+    /// First rows of their speed that are not on the curve of responses.
     off_curve: u64,
-    /// Stable rows above an unstable speed of their point, which a drum that runs up has passed.
-    passed: u64,
-    /// Rows behind another of the same point and speed, which all else leaves out.
+    /// Stable rows above an unstable speed of their point, which a run-up passes first.
+    above_tongue: u64,
+    /// Further rows of the same point and speed, which the other counts omit.
     coexisting: u64,
-    tongues: Vec<Tongue>,
-    /// Rows on branches whose end a machine that runs up comes to.
-    jumps: Vec<Row>,
-    /// The fastest of all rows.
+    tongues: Vec<TongueRows>,
+    /// Rows on branches that end at a fold which a machine that runs up reaches.
+    jumps: Vec<StabilityRow>,
+    /// The greatest speed of all rows.
     fastest_rpm: f64,
-    last: Option<Row>,
+    last: Option<StabilityRow>,
 }
 
-impl Summary {
-    /// Takes in the next row.
-    pub(crate) fn add(&mut self, row: Row) {
+impl StabilitySummary {
+    /// Adds the next row of the file.
+    pub(crate) fn add(&mut self, row: StabilityRow) {
         let same_point = self.last.as_ref().is_some_and(|last| last.point == row.point);
-        let is_other = |last: &Row| same_point && last.speed_rpm == row.speed_rpm;
-        // A machine that runs up is on the first branch that there is at a speed.
+        let is_other = |last: &StabilityRow| same_point && last.speed_rpm == row.speed_rpm;
+        // A machine that runs up is on the first branch at a speed.
         if self.last.as_ref().is_some_and(is_other) {
             self.coexisting += 1;
             return;
         }
         self.rows += 1;
         self.fastest_rpm = self.fastest_rpm.max(row.speed_rpm);
-        let end = |row: &Row| (row.point, row.branch_to_rpm);
+        let end = |row: &StabilityRow| (row.point, row.branch_to_rpm);
         let has_end = row.branch_to_rpm.is_some() && !row.is_off_curve;
         if has_end && self.jumps.last().map(end) != Some(end(&row)) {
             self.jumps.push(row.clone());
         }
         let follows = same_point && self.last.as_ref().is_some_and(|last| last.growth_per_s > 0.0);
         self.points += u64::from(!same_point);
-        self.without += u64::from(row.status != "ok");
+        self.without_response += u64::from(row.status != "ok");
         self.off_curve += u64::from(row.is_off_curve);
         self.beyond += u64::from(row.growth_per_s <= 0.0 && row.beyond.is_some());
-        let is_passed =
-            |tongue: &Tongue| tongue.at.point == row.point && tongue.from_to_rpm[1] < row.speed_rpm;
+        let is_passed = |tongue: &TongueRows| {
+            tongue.at.point == row.point && tongue.from_to_rpm[1] < row.speed_rpm
+        };
         let is_stable = row.growth_per_s <= 0.0 && row.beyond.is_none();
-        self.passed += u64::from(is_stable && self.tongues.last().is_some_and(is_passed));
+        self.above_tongue += u64::from(is_stable && self.tongues.last().is_some_and(is_passed));
         if row.growth_per_s > 0.0 {
             self.unstable += 1;
             match self.tongues.last_mut() {
-                // One tongue ends where the kind changes, even if the next begins at once.
+                // A tongue ends where the kind changes, even if the next one begins at once.
                 Some(tongue) if follows && tongue.at.kind == row.kind => {
                     tongue.from_to_rpm[1] = row.speed_rpm;
                     if row.growth_per_s > tongue.at.growth_per_s {
@@ -99,33 +101,34 @@ impl Summary {
                     }
                 }
                 _ => {
-                    self.tongues.push(Tongue { at: row.clone(), from_to_rpm: [row.speed_rpm; 2] });
+                    self.tongues
+                        .push(TongueRows { at: row.clone(), from_to_rpm: [row.speed_rpm; 2] });
                 }
             }
         }
         self.last = Some(row);
     }
 
-    /// In words, a line each with its name.
+    /// Returns the lines of the summary, each with its name.
     pub(crate) fn lines(&self) -> Vec<(&'static str, String)> {
         let mut lines = vec![(
             "stable",
             format!(
                 "{} of {} rows, {} not, {} without a response; {}",
-                self.rows - self.unstable - self.without - self.beyond,
+                self.rows - self.unstable - self.without_response - self.beyond,
                 self.rows,
                 self.unstable,
-                self.without,
+                self.without_response,
                 counted(self.points as usize, "point")
             ),
         )];
-        if self.passed > 0 {
-            let words = "above an unstable speed: a drum that was carried up may be in another \
-                         motion (`sweep dwell --carry up`)";
-            lines[0].1.push_str(&format!("; {} {words}", self.passed));
+        if self.above_tongue > 0 {
+            let words = "above an unstable speed: a machine that runs up may be in another motion \
+                         there (`sweep dwell --carry up`)";
+            lines[0].1.push_str(&format!("; {} {words}", self.above_tongue));
         }
         if self.beyond > 0 {
-            let words = "rows pass what no machine can (column beyond), and count for neither";
+            let words = "rows exceed the machine's geometry (column beyond), and count as neither";
             lines.push(("beyond", format!("{} {words}", self.beyond)));
         }
         if self.off_curve > 0 {
@@ -138,33 +141,34 @@ impl Summary {
             lines.push(("others", format!("{} {words}", self.coexisting)));
         }
         for row in &self.jumps {
-            let (of_point, rpm) = (self.of_point(row), row.branch_to_rpm.unwrap_or_default());
+            let point_prefix = self.point_prefix(row);
+            let rpm = row.branch_to_rpm.unwrap_or_default();
             if rpm > self.fastest_rpm {
                 continue;
             }
             let words = "running up, the response folds back and the motion jumps";
-            lines.push(("jump", format!("{of_point}at {rpm:.2} rpm, {words}")));
+            lines.push(("jump", format!("{point_prefix}at {rpm:.2} rpm, {words}")));
         }
-        // All of one point; else the worst.
-        let mut listed: Vec<&Tongue> = self.tongues.iter().collect();
+        // The tongues of a single point are in order of speed, those of several by their growth.
+        let mut listed: Vec<&TongueRows> = self.tongues.iter().collect();
         if self.points > 1 {
             listed.sort_by(|a, b| b.at.growth_per_s.total_cmp(&a.at.growth_per_s));
         }
-        lines.extend(listed.iter().map(|tongue| ("unstable", self.words(tongue))));
+        lines.extend(listed.iter().map(|tongue| ("unstable", self.tongue_line(tongue))));
         lines
     }
 
-    /// Which of several points.
-    fn of_point(&self, row: &Row) -> String {
+    /// Returns the point of a row, if there are several.
+    fn point_prefix(&self, row: &StabilityRow) -> String {
         match self.points {
             0 | 1 => String::new(),
-            _ => format!("{}: ", places::words(&self.axes, &row.at)),
+            _ => format!("{}: ", places::point_text(&self.axes, &row.at)),
         }
     }
 
-    fn words(&self, tongue: &Tongue) -> String {
-        let Tongue { at, from_to_rpm: [from, to] } = tongue;
-        let mut text = self.of_point(at);
+    fn tongue_line(&self, tongue: &TongueRows) -> String {
+        let TongueRows { at, from_to_rpm: [from, to] } = tongue;
+        let mut text = self.point_prefix(at);
         let [speed, first, last] = [at.speed_rpm, *from, *to].map(short);
         let to = if first == last { String::new() } else { format!(" to {last}") };
         // Writing to a String cannot fail.
@@ -183,18 +187,18 @@ impl Summary {
     }
 }
 
-/// Reads through a stability file.
+/// Summarises a stability file.
 ///
 /// # Errors
-/// As [`ParquetFile::read`].
-pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, FileError> {
-    let axes = places::axes(file);
+/// Returns an error if the file cannot be read.
+pub(crate) fn summarise(file: &ParquetFile) -> Result<StabilitySummary, FileError> {
+    let axes = places::axis_names(file);
     let numbers = ["point", "speed_rpm", "growth_per_s", "frequency_cpm", "branch_to_rpm"];
     let modes = ["mode_1", "mode_2", "mode_1_name", "mode_2_name"];
     let words = ["kind", "status", "beyond", "on_curve"];
     let own = [&numbers[..], &modes, &words].concat();
     let names = [&own[..], &axes.iter().map(String::as_str).collect::<Vec<_>>()].concat();
-    let mut summary = Summary { axes: axes.clone(), ..Summary::default() };
+    let mut summary = StabilitySummary { axes: axes.clone(), ..StabilitySummary::default() };
     file.each_row(&names, |row| {
         let [point, speed_rpm, growth_per_s, frequency_cpm, branch_to_rpm] =
             std::array::from_fn(|column| row.value(column));
@@ -202,7 +206,7 @@ pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, FileError> {
         let is_off_curve = row.word(12) == Some("false");
         let modes = [5, 6].map(|column| (row.value(column), row.word(column + 2)));
         let modes = modes.into_iter().filter(|(number, _)| !number.is_nan());
-        summary.add(Row {
+        summary.add(StabilityRow {
             point,
             at: (own.len()..names.len()).map(|column| row.value(column)).collect(),
             speed_rpm,
@@ -229,7 +233,7 @@ mod tests {
     #[test]
     fn tongues_are_runs_of_one_point_and_kind() {
         let axes = vec!["unbalance_mass_kg".to_owned()];
-        let mut summary = Summary { axes, ..Summary::default() };
+        let mut summary = StabilitySummary { axes, ..StabilitySummary::default() };
         let rows = [
             (0.0, 1.0, -0.1, "stable"),
             (0.0, 2.0, 0.1, "quasi_periodic"),
@@ -241,10 +245,10 @@ mod tests {
             (1.0, 3.0, 0.1, "fold"),
             (1.0, 4.0, -0.1, "stable"),
         ];
-        // A second row of a speed is another response, and no speed.
+        // A second row of a speed is another response, which does not count as a speed.
         for (point, speed_rpm, growth_per_s, kind) in rows {
             let status = if growth_per_s.is_nan() { "no_response" } else { "ok" };
-            summary.add(Row {
+            summary.add(StabilityRow {
                 point,
                 at: vec![0.1 * (point + 1.0)],
                 speed_rpm,
@@ -252,7 +256,7 @@ mod tests {
                 kind: kind.to_owned(),
                 status: status.to_owned(),
                 is_off_curve: kind == "period_doubling",
-                ..Row::default()
+                ..StabilityRow::default()
             });
         }
         let found: Vec<_> =
@@ -273,13 +277,18 @@ mod tests {
     }
 
     #[test]
-    fn jumps_are_those_of_the_curve_at_speeds_that_were_asked() {
-        let mut summary = Summary::default();
+    fn jumps_are_at_folds_of_the_curve_within_the_speeds() {
+        let mut summary = StabilitySummary::default();
         for (speed_rpm, ends_rpm, is_off_curve) in
             [(240.0, 245.0, false), (245.0, 248.0, true), (250.0, 260.0, false)]
         {
             let branch_to_rpm = Some(ends_rpm);
-            summary.add(Row { speed_rpm, branch_to_rpm, is_off_curve, ..Row::default() });
+            summary.add(StabilityRow {
+                speed_rpm,
+                branch_to_rpm,
+                is_off_curve,
+                ..StabilityRow::default()
+            });
         }
         let lines = summary.lines();
         let jumps: Vec<_> = lines.iter().filter(|(name, _)| *name == "jump").collect();
@@ -288,10 +297,10 @@ mod tests {
     }
 
     #[test]
-    fn speeds_are_rounded_for_people() {
-        let mut summary = Summary::default();
+    fn speeds_are_rounded() {
+        let mut summary = StabilitySummary::default();
         for speed_rpm in [0.1 + 0.2, 249.700_000_000_000_02] {
-            summary.add(Row { speed_rpm, growth_per_s: 1.0, ..Row::default() });
+            summary.add(StabilityRow { speed_rpm, growth_per_s: 1.0, ..StabilityRow::default() });
         }
         let (_, tongue) = summary.lines().pop().unwrap();
         assert!(tongue.starts_with("0.3 to 249.7 rpm"), "{tongue}");

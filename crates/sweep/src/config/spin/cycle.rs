@@ -1,4 +1,4 @@
-//! A cycle from a file: the drum's speed over time, with straight or smooth joints.
+//! A cycle from a file: the drum's speed over time, with straight or smooth joints between points.
 
 use std::path::Path;
 
@@ -7,15 +7,16 @@ use sweep_engine::config::section::counted;
 use sweep_engine::config::{Diagnostic, Location, Report};
 use washer_model::{Range, decimal};
 
-use super::MOST_ROWS;
+use super::MAX_ROWS;
 
-/// Speeds that a cycle may have (rpm), as those of a table in the grid file.
+/// Range of a cycle's speeds (rpm), that of a table in the grid file. Basis: far above any washing
+/// machine. Doubling it accepts more mistakes of units.
 const SPEEDS_RPM: Range = Range::Within(-1e5, 1e5);
 
-/// The greatest distance of the straight pieces from a smooth joint, as a part of the greatest
-/// speed. At 1e-4 a joint from rest to full speed has some 60 pieces and the speed is off by less
-/// than a tachometer's digit; half of it takes 1.4 times as many pieces, each a leg of every run.
-const OFF_CURVE: f64 = 1e-4;
+/// Maximum distance of the straight pieces from a smooth joint, as a share of the greatest speed.
+/// Basis: less than a digit of a tachometer; a joint from rest to full speed has some 60 pieces,
+/// each a segment of every run. Doubling it takes 1.4 times fewer pieces.
+const JOINT_TOLERANCE: f64 = 1e-4;
 
 /// The joints between a cycle's points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,21 +33,27 @@ impl Joints {
         [(Self::Straight, "straight"), (Self::Smooth, "smooth")];
 }
 
-/// Times (s) and speeds (rpm).
-pub(super) type Points = (Vec<f64>, Vec<f64>);
+/// The times (s) and speeds (rpm) of a cycle's points.
+pub(super) type CyclePoints = (Vec<f64>, Vec<f64>);
 
 /// Reads a cycle's points and joins them; mistakes are reported. The file is named at `at`.
-pub(super) fn read(path: &Path, joints: Joints, at: &Location, report: &Report) -> Option<Points> {
+pub(super) fn read(
+    path: &Path,
+    joints: Joints,
+    at: &Location,
+    report: &Report,
+) -> Option<CyclePoints> {
     let table = NumberTable::read(path, &Names { known: &known, renamed: &[] }, report)?;
     table.notes().into_iter().for_each(|note| report.note(format!("the cycle: {note}")));
     let times = column(&table, "time_s", "time", at, report);
     let speeds = column(&table, "speed_rpm", "speed", at, report);
-    let (times, speeds) = (times?, speeds?);
-    if !judge(&table, times, speeds, report) {
+    let times = times?;
+    let speeds = speeds?;
+    if !check_columns(&table, times, speeds, report) {
         return None;
     }
-    // Joints multiply rows by up to a hundred: too many are not joined at all.
-    let is_short = |rows: usize| rows <= MOST_ROWS;
+    // Smooth joints multiply rows by up to a hundred, so a table that is too long is not joined.
+    let is_short = |rows: usize| rows <= MAX_ROWS;
     let points = match joints {
         Joints::Smooth if is_short(times.values.len()) => smooth(&times.values, &speeds.values),
         _ => (times.values.clone(), speeds.values.clone()),
@@ -54,14 +61,14 @@ pub(super) fn read(path: &Path, joints: Joints, at: &Location, report: &Report) 
     if !is_short(points.0.len()) {
         let title = format!("the cycle has {} with its joints", counted(points.0.len(), "row"));
         let expected = format!(
-            "expected at most {MOST_ROWS}: leave out rows between which the speed is straight"
+            "expected at most {MAX_ROWS}: leave out rows between which the speed is straight"
         );
         return report.refuse(at, title, expected);
     }
     Some(points)
 }
 
-/// Returns the name of a quantity that a header names, and its unit.
+/// Returns the name and the unit of the quantity of a header, if it is known.
 fn known(header: &str) -> Option<(String, String)> {
     let [name, unit] = match header {
         "time_s" | "t_s" | "zeit_s" => ["time_s", "s"],
@@ -98,9 +105,14 @@ fn column<'t>(
     first
 }
 
-/// Whether times rise from 0 and every speed is there and in its range; what is not is reported, of
-/// each mistake the first row.
-fn judge(table: &NumberTable, times: &ListColumn, speeds: &ListColumn, report: &Report) -> bool {
+/// Returns whether times rise from 0 and all speeds are given and within their range. It reports
+/// the first row of each mistake.
+fn check_columns(
+    table: &NumberTable,
+    times: &ListColumn,
+    speeds: &ListColumn,
+    report: &Report,
+) -> bool {
     let refuse = |column: &ListColumn, row: usize, title: String, expected: &str| {
         report.push_with(|sources| {
             let at = table.place(sources, column.place, row);
@@ -134,21 +146,22 @@ fn judge(table: &NumberTable, times: &ListColumn, speeds: &ListColumn, report: &
     report.is_clean()
 }
 
-/// Returns monotone cubics through points as straight pieces: between two speeds there is none
-/// beyond them. The drum is at rest before, and keeps its speed behind.
+/// Returns monotone cubics through points, as straight pieces. Between two points no speed is
+/// beyond theirs.
 ///
 /// F. N. Fritsch, R. E. Carlson, Monotone piecewise cubic interpolation, SIAM Journal on Numerical
 /// Analysis 17 (1980), 238-246.
-fn smooth(time_s: &[f64], speed_rpm: &[f64]) -> Points {
+fn smooth(time_s: &[f64], speed_rpm: &[f64]) -> CyclePoints {
     let slopes = slopes(time_s, speed_rpm);
     let greatest = speed_rpm.iter().fold(0.0, |most: f64, speed| most.max(speed.abs()));
-    let off = OFF_CURVE * greatest;
+    let off = JOINT_TOLERANCE * greatest;
     let mut points = (vec![time_s[0]], vec![speed_rpm[0]]);
     for k in 1..time_s.len() {
         let length_s = time_s[k] - time_s[k - 1];
         let change = speed_rpm[k] - speed_rpm[k - 1];
         let [begin, end] = [slopes[k - 1] * length_s, slopes[k] * length_s];
-        // The second derivative is straight between its ends, by which a chord is off.
+        // The second derivative is linear, so its greatest value is that of an end. It bounds the
+        // distance of a chord.
         let bends =
             [6.0 * change - 4.0 * begin - 2.0 * end, 2.0 * begin + 4.0 * end - 6.0 * change];
         let bend = bends[0].abs().max(bends[1].abs());
@@ -184,7 +197,7 @@ fn slopes(time_s: &[f64], speed_rpm: &[f64]) -> Vec<f64> {
         }
         let [begin, end] = [slopes[k] / chord, slopes[k + 1] / chord];
         let size = (begin * begin + end * end).sqrt();
-        // Within this circle the cubic does not turn.
+        // Within this circle the cubic is monotone.
         if size > 3.0 {
             slopes[k] = 3.0 / size * begin * chord;
             slopes[k + 1] = 3.0 / size * end * chord;
@@ -202,7 +215,7 @@ mod tests {
     const SPEEDS: [f64; 8] = [0.0, 50.0, 50.0, 90.0, 800.0, 1200.0, 0.0, -45.0];
 
     #[test]
-    fn smooth_joints_stay_between_their_ends_and_pass_through_the_points() {
+    fn smooth_joints_are_monotone_and_pass_through_the_points() {
         let (times, speeds) = smooth(&TIMES_S, &SPEEDS);
         assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
         for (time_s, speed) in TIMES_S.iter().zip(SPEEDS) {
@@ -223,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_are_as_near_to_the_cubic_as_promised() {
+    fn pieces_are_within_the_tolerance_of_the_cubic() {
         // From rest to rest the cubic is 3 x^2 - 2 x^3.
         let (times, speeds) = smooth(&[0.0, 10.0], &[0.0, 1000.0]);
         let mut off: f64 = 0.0;

@@ -1,8 +1,8 @@
-//! A plan in a result is read as grid files are.
+//! Tests of plans that are read back from results.
 
 use washer_row::Metric;
 
-use super::super::GridInput;
+use super::super::WasherGridInput;
 use super::super::machine::with_one_of_each;
 
 const GRID: &str = r#"
@@ -23,15 +23,16 @@ range = { from = 1e7, to = 2e8, count = 4, spacing = "log" }
 "#;
 
 #[test]
-fn a_plan_is_read_again_from_its_own_json() {
-    let mut plan = GridInput::text("again", GRID.to_owned(), Vec::new()).load().unwrap();
+fn a_plan_is_read_back_from_its_json() {
+    let mut plan = WasherGridInput::text("again", GRID.to_owned(), Vec::new()).load().unwrap();
     let again = |plan: &crate::Plan| {
-        let input = GridInput::from_plan("again", &plan.to_json());
+        let input = WasherGridInput::from_plan("again", &plan.to_json());
         input.load().unwrap_or_else(|mistakes| panic!("{mistakes}"))
     };
     assert_eq!(again(&plan), plan);
-    // Its stops have no growth.
-    (plan.model.measures.metrics, plan.model.held_speeds) = (vec![Metric::StopForce], None);
+    // With stops there is no metric at held speeds.
+    plan.model.measures.metrics = vec![Metric::StopForce];
+    plan.model.held_speeds = None;
     plan.model.machine = with_one_of_each();
     plan.model.machine.feet = [[0.5, -0.4, 0.3], [0.5, -0.4, -0.3], [-0.2, -0.4, 0.0]]
         .map(|foot_m| washer_model::Foot { foot_m })

@@ -1,4 +1,4 @@
-//! Bounds on input: each at its edge, and that input within it is checked at once.
+//! Tests of the bounds on input, and of the time to check input within them.
 
 use std::fmt::Write as _;
 
@@ -8,22 +8,23 @@ use super::super::*;
 use super::{SMALLEST, load_text};
 use crate::estimate;
 
-/// A grid whose spin is a table of so many rows.
+/// Returns a grid whose spin is a table with a number of rows.
 fn with_a_table(rows: usize, more: &str) -> String {
-    let column = |of: fn(usize) -> f64| {
+    let column = |value: fn(usize) -> f64| {
         (0..rows).fold(String::new(), |mut text, k| {
-            let _ = write!(text, "{},", of(k));
+            let _ = write!(text, "{},", value(k));
             text
         })
     };
-    let (times, speeds) = (column(|k| k as f64 / 64.0), column(|k| (k % 100) as f64));
+    let times = column(|k| k as f64 / 64.0);
+    let speeds = column(|k| (k % 100) as f64);
     format!(
         "[spin]\nprofile = \"table\"\ntime_s = [{times}]\nspeed_rpm = [{speeds}]\n\
          [time]\nend_s = 320\n{more}"
     )
 }
 
-/// A grid beside a list of points.
+/// Loads a grid with a list of points.
 fn load_list(grid: &str, list: &str) -> Result<Plan, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grid.toml");
@@ -34,17 +35,17 @@ fn load_list(grid: &str, list: &str) -> Result<Plan, String> {
 }
 
 #[test]
-fn a_spin_of_as_many_rows_as_allowed_is_checked_and_one_more_is_refused() {
-    // Seven axes more: 128 corners, at each of which the machine and the whole table are looked at.
+fn the_longest_spin_is_checked_and_a_longer_one_is_refused() {
+    // Six axes have 64 corners, at each of which the machine and the whole table are checked.
     let masses = ["tub_mass_kg", "shaft_mass_kg", "drum_mass_kg", "unbalance_mass_kg"];
     let range = "range = { from = 1, to = 2, count = 2 }\n";
     let axis = |name: &str| format!("[[axis]]\nparameter = \"{name}\"\n{range}");
     let mut axes: String = masses.map(axis).concat();
     axes.push_str(&axis("damping_n_s_per_m"));
     axes.push_str(&axis("spin_table_2_speed_rpm"));
-    let plan = load_text(with_a_table(spin::MOST_ROWS, &axes), &[]).unwrap();
+    let plan = load_text(with_a_table(spin::MAX_ROWS, &axes), &[]).unwrap();
     assert_eq!(plan.corners(), 64);
-    let refused = load_text(with_a_table(spin::MOST_ROWS + 1, &axes), &[]).unwrap_err();
+    let refused = load_text(with_a_table(spin::MAX_ROWS + 1, &axes), &[]).unwrap_err();
     assert!(refused.contains("`time_s` has 20001 numbers"), "{refused}");
     assert!(refused.contains("at most 20000"), "{refused}");
     assert!(!refused.contains("is empty"), "{refused}");
@@ -52,7 +53,7 @@ fn a_spin_of_as_many_rows_as_allowed_is_checked_and_one_more_is_refused() {
 
 #[test]
 fn a_list_of_millions_of_points_is_checked() {
-    // A wrong one among them is found, in the last row.
+    // The only wrong point is in the last row.
     let mut list = "spring_1_cabinet_x_m,shaft_mass_kg\n".to_owned();
     list.push_str(&"0.1,1e0\n".repeat(3_000_000));
     let plan = load_list(SMALLEST, &list).unwrap();
@@ -84,12 +85,12 @@ fn points_that_would_take_minutes_to_check_are_refused() {
     list.push_str(&"5\n".repeat(50_001));
     let refused = load_list(&with_a_table(20_000, ""), &list).unwrap_err();
     assert!(refused.contains("50001") && refused.contains("at most 50000 points"), "{refused}");
-    // The same points do not touch the table: nothing is to be judged again.
+    // An axis of a mass leaves the table as it is, so that it is checked once.
     let list = list.replace("spin_table_2_speed_rpm", "tub_mass_kg");
     assert_eq!(load_list(&with_a_table(20_000, ""), &list).unwrap().points(), 50_001);
 }
 
-/// The grid with a tub so light that its dampers make it stiff.
+/// Loads a grid with a tub so light that its dampers make it stiff.
 fn light(tub_mass_kg: f64, end_s: f64, integrator: &str) -> Result<Plan, String> {
     let grid = SMALLEST.replace("end_s = 50", &format!("end_s = {end_s}"));
     let set = format!("[set]\ntub_mass_kg = {tub_mass_kg:e}\n");
@@ -97,7 +98,7 @@ fn light(tub_mass_kg: f64, end_s: f64, integrator: &str) -> Result<Plan, String>
 }
 
 #[test]
-fn a_machine_too_stiff_for_any_number_of_steps_is_refused_by_every_explicit_method() {
+fn a_machine_that_is_too_stiff_is_refused_with_every_explicit_method() {
     for method in ["rk4-mass-scaled", "dopri5", "rk4"] {
         let refused = light(1e-9, 50.0, &format!("method = \"{method}\"")).unwrap_err();
         assert!(refused.contains("the machine is too stiff"), "{refused}");
@@ -108,7 +109,7 @@ fn a_machine_too_stiff_for_any_number_of_steps_is_refused_by_every_explicit_meth
 }
 
 #[test]
-fn a_machine_whose_dampers_are_too_stiff_is_refused_by_the_additive_method_too() {
+fn a_machine_with_too_stiff_dampers_is_refused_with_the_additive_method() {
     for method in ["dopri5", "additive"] {
         let set = "[set]\ndamping_n_s_per_m = 1e12\n";
         let grid = format!("{SMALLEST}{set}[integrator]\nmethod = \"{method}\"\n");
@@ -119,7 +120,7 @@ fn a_machine_whose_dampers_are_too_stiff_is_refused_by_the_additive_method_too()
 }
 
 #[test]
-fn a_step_above_the_limit_of_stability_is_refused_with_the_method_that_takes_it() {
+fn a_step_above_the_stability_limit_is_refused_with_a_suitable_method() {
     let grid = format!("{SMALLEST}[integrator]\nmethod = \"rk4\"\nstep_s = 1e-3\n");
     let refused = load_text(grid, &[]).unwrap_err();
     assert!(refused.contains("past the stability limit of rk4"), "{refused}");
@@ -127,14 +128,14 @@ fn a_step_above_the_limit_of_stability_is_refused_with_the_method_that_takes_it(
 }
 
 #[test]
-fn a_stiff_machine_that_is_accepted_is_estimated_from_a_beginning() {
+fn the_estimate_of_a_stiff_machine_is_from_a_beginning() {
     let plan = light(1e-6, 10.0, "method = \"dopri5\"").unwrap();
-    let estimate = estimate::of(&plan, 1).unwrap();
+    let estimate = estimate::estimate(&plan, 1).unwrap();
     assert!(estimate.sampled_s < 1.0, "{estimate:?}");
 }
 
 #[test]
-fn a_wrong_choice_hides_no_mistake_beside_it() {
+fn mistakes_beside_an_unknown_choice_are_reported() {
     let refused = |text: &str, parts: &[&str]| {
         let refused = load_text(text, &[]).unwrap_err();
         for part in parts {
@@ -177,7 +178,7 @@ fn a_wrong_choice_hides_no_mistake_beside_it() {
 }
 
 #[test]
-fn a_range_without_room_for_its_values_is_refused() {
+fn a_range_with_too_few_different_values_is_refused() {
     let load = |from: f64, to: f64, count: u64, spacing: &str| {
         let ends = format!("from = {from:?}, to = {to:?}");
         let range = format!("{{ {ends}, count = {count}, spacing = \"{spacing}\" }}");
@@ -215,7 +216,7 @@ proptest! {
         log in any::<bool>(),
     ) {
         let to = f64::from_bits(from.to_bits() + ulps);
-        let (from, to) = if down { (to, from) } else { (from, to) };
+        let [from, to] = if down { [to, from] } else { [from, to] };
         let spacing = if log { "log" } else { "linear" };
         let ends = format!("from = {from:?}, to = {to:?}");
         let range = format!("{{ {ends}, count = {count}, spacing = \"{spacing}\" }}");

@@ -1,4 +1,4 @@
-//! Cycles from files.
+//! Tests of cycles from files.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::plan::Plan;
 
 const END: &str = "[time]\nend_s = 50\n";
 
-/// A grid beside a cycle.
+/// Loads a grid with a cycle in a file.
 fn load_cycle(spin: &str, cycle: &str) -> Result<Plan, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grids/grid.toml");
@@ -29,7 +29,7 @@ fn table(plan: &Plan) -> (&[f64], &[f64]) {
 }
 
 #[test]
-fn a_cycle_is_read_from_a_file_with_its_units() {
+fn a_cycle_is_read_with_its_units() {
     for text in [
         "time_s,speed_rpm\n0,0\n30,300\n60,0\n",
         "Time [min];Speed [Hz]\n0;0\n0,5;5\n1;0\n",
@@ -49,7 +49,7 @@ fn a_cycle_is_read_from_a_file_with_its_units() {
 }
 
 #[test]
-fn another_cycle_is_another_plan_and_the_plan_holds_it() {
+fn the_plan_has_the_cycle() {
     let text = "time_s,speed_rpm\n0,0\n30,300\n60,0\n";
     let plan = load_cycle("", text).unwrap();
     let other = load_cycle("", &text.replace("300", "301")).unwrap();
@@ -58,7 +58,7 @@ fn another_cycle_is_another_plan_and_the_plan_holds_it() {
 }
 
 #[test]
-fn what_is_no_cycle_is_told_with_its_place() {
+fn mistakes_in_a_cycle_are_reported() {
     for (text, said) in [
         ("time_s,speed_rpm\n0,0\n30,300\n20,0\n", "time goes from 30 s to 20 s"),
         ("time_s,speed_rpm\n3,0\n30,300\n", "begins at 3 s"),

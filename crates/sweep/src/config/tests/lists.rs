@@ -1,4 +1,4 @@
-//! Lists of points as loggers and spreadsheets write them.
+//! Tests of lists of points as loggers and spreadsheets write them.
 
 use super::super::load;
 use crate::plan::Plan;
@@ -6,7 +6,7 @@ use crate::plan::Plan;
 const GRID: &str = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[time]\nend_s = 2\n\
     [design]\nmethod = \"list\"\nfile = \"points.csv\"\n";
 
-/// A grid beside a list of points.
+/// Loads a grid with a list of points.
 fn load_list(more: &str, list: &str) -> Result<Plan, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grid.toml");
@@ -16,7 +16,7 @@ fn load_list(more: &str, list: &str) -> Result<Plan, String> {
 }
 
 #[test]
-fn units_are_converted_and_further_columns_are_named() {
+fn units_are_converted_and_ignored_columns_are_noted() {
     let list = "Unbalance mass [g];weather;damping_n_s_per_mm\n300;fair;0,12\n450;foul;0,1\n";
     let plan = load_list("", list).unwrap();
     let names: Vec<&str> = plan.axes.iter().map(|axis| axis.parameter.name()).collect();
@@ -28,7 +28,7 @@ fn units_are_converted_and_further_columns_are_named() {
 }
 
 #[test]
-fn the_grid_file_may_name_what_columns_hold() {
+fn the_grid_file_may_name_the_parameters_of_columns() {
     let columns = "[columns]\n\"m_u [g]\" = \"unbalance_mass_kg\"\n";
     let plan = load_list(columns, "m_u [g]\n300\n").unwrap();
     assert_eq!(plan.axis_values(0), [0.3]);

@@ -1,12 +1,12 @@
-//! Unbalances in planes of the drum by their names.
+//! Tests of unbalances in named planes of the drum.
 
 use washer_model::Machine;
 
-use super::super::GridInput;
+use super::super::WasherGridInput;
 use super::super::machine_file;
 use sweep_engine::plan::WrittenIn;
 
-/// The machine of a file that is the built-in one's with changed unbalances.
+/// Loads the file of the built-in machine with a change.
 fn load(change: impl Fn(String) -> String) -> Result<Machine, String> {
     let folder = tempfile::tempdir().unwrap();
     let machine = change(machine_file(&Machine::paper(), &WrittenIn::default()));
@@ -15,15 +15,15 @@ fn load(change: impl Fn(String) -> String) -> Result<Machine, String> {
         [time]\nend_s = 2\n";
     let path = folder.path().join("g.toml");
     std::fs::write(&path, grid).unwrap();
-    let plan = GridInput::file(path, Vec::new()).load();
+    let plan = WasherGridInput::file(path, Vec::new()).load();
     plan.map(|plan| plan.model.machine).map_err(|mistakes| mistakes.to_string())
 }
 
 const FURTHER: &str =
     "\n[[further_unbalances]]\nplane = \"front\"\nmass_kg = 0.2\nradius_m = -0.2\n";
 
-/// The file with the unbalance's place by the name of a plane.
-fn rear(file: &str) -> String {
+/// Returns a machine file in which the unbalance's position is that of the rear plane.
+fn with_rear_unbalance(file: &str) -> String {
     let lines = file.lines().scan(false, |is_unbalance, line| {
         *is_unbalance = if line.starts_with('[') { line == "[unbalance]" } else { *is_unbalance };
         let is_place = *is_unbalance && line.starts_with("x_m");
@@ -33,8 +33,8 @@ fn rear(file: &str) -> String {
 }
 
 #[test]
-fn loads_of_two_planes_are_given_by_their_names() {
-    let machine = load(|file| rear(&file) + FURTHER).unwrap();
+fn unbalances_lie_in_named_planes() {
+    let machine = load(|file| with_rear_unbalance(&file) + FURTHER).unwrap();
     let paper = Machine::paper();
     assert_eq!(machine.unbalance.x_m, paper.drum.hinge_x_m);
     assert_eq!(machine.further_unbalances[0].x_m, paper.drum.front_x_m);
@@ -66,7 +66,7 @@ fn loads_have_angles_and_dampers_have_stages() {
 }
 
 #[test]
-fn a_plane_and_a_place_contradict_each_other() {
+fn an_unbalance_has_either_a_plane_or_a_position() {
     let both = FURTHER.replace("mass_kg", "x_m = 0.1\nmass_kg");
     let refused = load(|file| file + &both).unwrap_err();
     assert!(refused.contains("`plane` beside `x_m`"), "{refused}");

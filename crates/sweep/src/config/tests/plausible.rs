@@ -1,17 +1,17 @@
-//! Numbers that no machine has.
+//! Tests of notes on unusual numbers.
 
-use super::super::GridInput;
+use super::super::WasherGridInput;
 
 fn notes(more: &str, sets: &[&str]) -> Vec<String> {
     let grid =
         "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[time]\nend_s = 2\n".to_owned();
     let sets = sets.iter().map(|set| (*set).to_owned()).collect();
-    let input = GridInput::text("plan", format!("{grid}{more}"), sets);
+    let input = WasherGridInput::text("plan", format!("{grid}{more}"), sets);
     input.load().unwrap_or_else(|mistakes| panic!("{mistakes}")).aside.notes
 }
 
 #[test]
-fn what_is_in_another_unit_is_told_with_the_number_that_it_would_be() {
+fn a_number_in_another_unit_is_noted_with_its_converted_value() {
     for (set, said) in [
         ("tub_mass_kg=23870", "23870 g would be 23.87 kg"),
         ("radial_clearance_m=10", "10 mm would be 0.01 m"),
@@ -29,12 +29,12 @@ fn what_is_in_another_unit_is_told_with_the_number_that_it_would_be() {
 }
 
 #[test]
-fn usual_numbers_are_not_told() {
+fn usual_numbers_have_no_notes() {
     assert_eq!(notes("", &[]), [""; 0]);
     assert_eq!(notes("", &["damping_n_s_per_m=0", "unbalance_mass_kg=1.5"]), [""; 0]);
     let [compact, industrial] = ["compact_grid", "industrial_grid"].map(|name| {
         let path = format!("{}/../../docs/examples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-        GridInput::file(path.into(), Vec::new()).load().expect("it is right").aside.notes
+        WasherGridInput::file(path.into(), Vec::new()).load().expect("it is right").aside.notes
     });
     assert_eq!((compact, industrial), (Vec::new(), Vec::new()));
 }

@@ -1,6 +1,6 @@
-//! Columns of a table as the axes of a plan.
+//! Tests of tables of points whose columns are the axes of a plan.
 
-use super::super::{GridInput, check_columns};
+use super::super::{WasherGridInput, check_columns};
 
 const GRID: &str = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n\
     [time]\nend_s = 2\n\
@@ -8,14 +8,14 @@ const GRID: &str = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n\
     [[axis]]\nparameter = \"tub_mass_kg\"\nvalues = [20]\n";
 
 fn check(columns: &[(&str, &[f64])]) -> Result<Vec<Option<usize>>, String> {
-    let plan = GridInput::text("plan", GRID.to_owned(), Vec::new()).load().unwrap();
+    let plan = WasherGridInput::text("plan", GRID.to_owned(), Vec::new()).load().unwrap();
     let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
     let values = |k: usize| columns[k].1.iter().map(|&value| value.is_finite().then_some(value));
     check_columns(&plan, &names, values).map_err(|mistakes| mistakes.to_string())
 }
 
 #[test]
-fn what_is_wrong_a_million_times_is_counted() {
+fn a_million_mistakes_are_counted() {
     let text = check(&[("unbalance_mass_kg", &[9.0; 1_000_000])]).unwrap_err();
     assert!(text.contains("1000000 mistakes (100 shown)"), "{}", &text[text.len() - 200..]);
 }

@@ -1,12 +1,12 @@
-//! Machine files that leave out what a data sheet does not say.
+//! Tests of machine files with the numbers of a data sheet.
 
 use super::*;
 
 /// The short file that `sweep init --machine --short` writes.
 const SHORT_MACHINE: &str = include_str!("../../commands/starter_machine.toml");
 
-/// The plan of a machine file's text, or what is wrong.
-fn plan_of_machine(text: &str) -> Result<Plan, String> {
+/// Loads a plan with a machine file of this text.
+fn load_machine(text: &str) -> Result<Plan, String> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("machine.toml"), text).unwrap();
     let grid = folder.path().join("grid.toml");
@@ -16,7 +16,7 @@ fn plan_of_machine(text: &str) -> Result<Plan, String> {
 
 #[test]
 fn a_data_sheet_makes_a_machine_near_the_built_in_one() {
-    let plan = plan_of_machine(SHORT_MACHINE).unwrap();
+    let plan = load_machine(SHORT_MACHINE).unwrap();
     let Washer { machine, spin, .. } = &plan.model;
     assert_eq!(machine.violations(), []);
     let built_in = Machine::paper();
@@ -32,30 +32,30 @@ fn a_data_sheet_makes_a_machine_near_the_built_in_one() {
         let [value, paper] = [machine, &built_in].map(|one| parameter.get(one, spin).unwrap());
         let [least, most] = assumption.ends(value, machine);
         let name = parameter.name();
-        // What the paper's machine has lies within the range about what is assumed of it.
+        // The paper's value lies within the range about the assumed value.
         let is_within = least.min(most) - 1e-9 <= paper && paper <= least.max(most) + 1e-9;
         assert!(is_within, "{name}: {paper} is not from {least} to {most}");
     }
     assert_eq!(assumed, 27);
-    // The long form lists each rule.
+    // The complete file has the rule of each number.
     let long = machine_file(machine, &plan.written);
     assert!(long.contains("[assumed: half the drum's depth before O, as the built-in machine]"));
-    assert_eq!(plan_of_machine(&long).unwrap().model.machine, *machine);
+    assert_eq!(load_machine(&long).unwrap().model.machine, *machine);
 }
 
 #[test]
-fn a_given_number_takes_the_place_of_a_rule() {
+fn a_given_number_replaces_a_rule() {
     let short = SHORT_MACHINE;
     let text = short.replace("[drum]\n", "[shaft]\nmass_kg = 5\n[drum]\nmass_kg = 4\n");
-    let machine = plan_of_machine(&text).unwrap().model.machine;
+    let machine = load_machine(&text).unwrap().model.machine;
     assert_eq!((machine.shaft.mass_kg, machine.drum.mass_kg), (5.0, 4.0));
     assert!((machine.tub.mass_kg - 22.85).abs() < 1e-12);
 }
 
 #[test]
-fn a_data_sheet_that_says_too_little_or_too_much_is_told() {
+fn missing_and_contradicting_numbers_of_a_data_sheet_are_reported() {
     let short = SHORT_MACHINE;
-    let with = |from: &str, to: &str| plan_of_machine(&short.replace(from, to)).unwrap_err();
+    let with = |from: &str, to: &str| load_machine(&short.replace(from, to)).unwrap_err();
     let found = with("moving_mass_kg = 31.85", "");
     assert!(found.contains("`moving_mass_kg` is missing"), "{found}");
     let found = with("[drum]\n", "[tub]\nmass_kg = 20\n[drum]\n");
@@ -67,16 +67,16 @@ fn a_data_sheet_that_says_too_little_or_too_much_is_told() {
 }
 
 #[test]
-fn bushings_alone_carry_a_machine() {
+fn bushings_alone_can_carry_a_machine() {
     let file = include_str!("../../../../../docs/examples/industrial.toml");
-    let plan = plan_of_machine(file).unwrap();
+    let plan = load_machine(file).unwrap();
     assert!(plan.model.machine.springs.is_empty());
-    let (machine, spin) = (plan.model.machine.clone(), plan.model.spin.clone());
-    let point = crate::plan::ready(machine, spin, &crate::plan::timing(&plan)).unwrap();
-    // 689 kg on 1,467,056 N/m.
+    let Washer { machine, spin, .. } = plan.model.clone();
+    let point = crate::plan::prepare_point(machine, spin, &crate::plan::timing(&plan)).unwrap();
+    // The static deflection of 689 kg on 1,467,056 N/m.
     let middle_m = 689.0 * 9.81 / 1_467_056.0;
     assert!((point.static_sag_m() / middle_m - 1.0).abs() < 0.3, "{}", point.static_sag_m());
     let none = file.split("[[bushings]]").next().unwrap();
-    let found = plan_of_machine(none).unwrap_err();
+    let found = load_machine(none).unwrap_err();
     assert!(found.contains("at least one [[springs]] or [[bushings]]"), "{found}");
 }

@@ -1,18 +1,18 @@
-//! Ranges about the machine's own numbers.
+//! Tests of ranges that are given as tolerances about the machine's numbers.
 
-use super::super::GridInput;
+use super::super::WasherGridInput;
 use crate::plan::Plan;
 
 const GRID: &str = "[spin]\nprofile = \"ramp\"\npeak_rpm = 300\nramp_s = 2\n[time]\nend_s = 2\n";
 
 fn load(more: &str, sets: &[&str]) -> Result<Plan, String> {
     let sets = sets.iter().map(|set| (*set).to_owned()).collect();
-    let input = GridInput::text("plan", format!("{GRID}{more}"), sets);
+    let input = WasherGridInput::text("plan", format!("{GRID}{more}"), sets);
     input.load().map_err(|mistakes| mistakes.to_string())
 }
 
 #[test]
-fn an_axis_is_about_the_machines_own_number_and_moves_with_it() {
+fn an_axis_with_a_tolerance_is_about_the_machines_number() {
     let axis = |parameter: &str, tolerance: &str| {
         format!("[[axis]]\nparameter = \"{parameter}\"\ntolerance = {tolerance}\ncount = 3\n")
     };
@@ -25,12 +25,12 @@ fn an_axis_is_about_the_machines_own_number_and_moves_with_it() {
     let mass = axis("drum_mass_kg", "0.5") + "[set]\ndrum_mass_kg = 8\n";
     let plan = load(&mass, &[]).unwrap();
     assert_eq!(values(&plan), [7.5, 8.0, 8.5]);
-    // What an option fixes has no axis.
+    // An option with the axis' name fixes it.
     assert_eq!(load(&mass, &["drum_mass_kg=9"]).unwrap().axes.len(), 0);
 }
 
 #[test]
-fn a_distribution_is_about_it_too() {
+fn a_distribution_with_a_tolerance_is_about_the_machines_number() {
     let design = |kind: &str| {
         format!(
             "[design]\nmethod = \"monte_carlo\"\npoints = 16\n[[axis]]\nparameter = \
@@ -56,7 +56,7 @@ fn a_distribution_is_about_it_too() {
 }
 
 #[test]
-fn what_is_no_tolerance_is_told() {
+fn wrong_tolerances_are_refused() {
     let axis = |tolerance: &str, more: &str| {
         format!("[[axis]]\nparameter = \"drum_mass_kg\"\ntolerance = {tolerance}\n{more}")
     };
@@ -74,7 +74,7 @@ fn what_is_no_tolerance_is_told() {
     let axis = "[[axis]]\nparameter = \"damping_n_s_per_m\"\ntolerance = \"5 %\"\ncount = 3\n";
     let refused = load(axis, &["damper_1_damping_n_s_per_m=90"]).unwrap_err();
     assert!(refused.contains("has no single number"), "{refused}");
-    // Springs without friction have none of it.
+    // A percentage of 0 is no range.
     let axis = "[[axis]]\nparameter = \"friction_n\"\ntolerance = \"5 %\"\ncount = 3\n";
     let refused = load(axis, &[]).unwrap_err();
     assert!(refused.contains("percents are 0"), "{refused}");

@@ -325,8 +325,8 @@ fn rows_of_a_drum_that_brakes_hard_follow_the_bearings() {
     }
 }
 
-/// With friction no ringing of the bearings counts as decayed. The additive method damps it, so that
-/// its runs agree on a wrong result; these rows must be refined beyond it.
+/// With friction no ringing of the bearings counts as decayed. The additive method damps it, so
+/// that its runs agree on a wrong result; these rows must be refined beyond it.
 #[test]
 fn rows_with_friction_and_ringing_bearings_converge() {
     let plan = load_with_elements(

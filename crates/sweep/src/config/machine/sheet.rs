@@ -1,0 +1,170 @@
+//! The keys of a data sheet in a machine file, and the planes of unbalances.
+
+use sweep_engine::config::{Field, Form, Keys, Section, keys};
+use sweep_parameter::Range;
+use washer_model::{DataSheet, Machine, Parameter};
+
+use super::{MachineSection, find_parameter, no_spin};
+
+/// The key of the data sheet's mass, at the top of a machine file.
+pub(super) const MOVING_MASS: &str = "moving_mass_kg";
+
+/// The numbers of a data sheet in a machine file, from which the numbers that the file omits
+/// follow.
+#[derive(Default)]
+pub(super) struct SheetKeys {
+    /// Whether the file gives the drum's radius and depth, so that it may omit other numbers.
+    pub(super) is_given: bool,
+    moving_mass_kg: Option<f64>,
+    drum_radius_m: Option<f64>,
+    drum_depth_m: Option<f64>,
+    /// The parameters that the file omits.
+    pub(super) omitted: Vec<Parameter>,
+    /// The positions along the axis that the file gives by the name of a plane.
+    pub(super) planes: Vec<(Parameter, DrumPlane)>,
+}
+
+/// A plane of the drum in which an unbalance lies.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum DrumPlane {
+    /// The drum's front, whose motion is reported.
+    Front,
+    /// The drum's back, where it is fixed to the shaft.
+    Rear,
+}
+
+impl DrumPlane {
+    /// All planes with their names in machine files.
+    const ALL: [(Self, &'static str); 2] = [(Self::Front, "front"), (Self::Rear, "rear")];
+
+    /// Returns the plane's position along the axis (m).
+    pub(super) fn x_m(self, machine: &Machine) -> f64 {
+        match self {
+            Self::Front => machine.drum.front_x_m,
+            Self::Rear => machine.drum.hinge_x_m,
+        }
+    }
+}
+
+/// Sections of unbalances.
+pub(super) const UNBALANCES: [&str; 2] = ["unbalance", "further_unbalances"];
+
+/// The key of an unbalance's position along the axis.
+pub(super) const UNBALANCE_X: &str = "x_m";
+
+/// The key that gives the position of an unbalance by the name of a plane.
+const UNBALANCE_PLANE: &str = "plane";
+
+/// The key of the drum's inner radius.
+const DRUM_RADIUS: &str = "radius_m";
+
+/// The key of the drum's inner depth.
+const DRUM_DEPTH: &str = "depth_m";
+
+/// The range of the drum's inner radius and depth (m).
+const DRUM_SIZE: Form<'_> = Form::Number(Range::Within(1e-3, 10.0));
+
+impl SheetKeys {
+    /// Returns the data sheet of a file whose keys are not yet read.
+    pub(super) fn new(keys: &Keys<'_>) -> Self {
+        let has_both = |root: &Section<'_>| {
+            let at = |key| root.key_inside("drum", key);
+            at(DRUM_RADIUS) && at(DRUM_DEPTH)
+        };
+        Self { is_given: keys.section().is_some_and(has_both), ..Self::default() }
+    }
+
+    /// Walks over the data sheet's keys of element `k` of a section.
+    pub(super) fn walk(&mut self, section: &MachineSection, k: usize, keys: &mut Keys<'_>) {
+        match section.name {
+            "" => {
+                let about =
+                    "mass of tub, shaft and drum without laundry, in place of the tub's, kg";
+                let key = keys::Key::new(MOVING_MASS, about);
+                keys.key(key, &Form::Number(Range::Positive), &mut self.moving_mass_kg);
+            }
+            "drum" => {
+                let key =
+                    keys::Key::new(DRUM_RADIUS, "inner radius; other numbers follow from it, m");
+                keys.key(key, &DRUM_SIZE, &mut self.drum_radius_m);
+                let key =
+                    keys::Key::new(DRUM_DEPTH, "inner depth; other numbers follow from it, m");
+                keys.key(key, &DRUM_SIZE, &mut self.drum_depth_m);
+            }
+            name if UNBALANCES.contains(&name) => self.walk_plane(section, k, keys),
+            _ => {}
+        }
+    }
+
+    /// Walks over the name of an unbalance's plane, which replaces its position along the axis.
+    fn walk_plane(&mut self, section: &MachineSection, k: usize, keys: &mut Keys<'_>) {
+        let about = "the drum's front, or its rear where it is fixed: in place of x_m";
+        let mut word: Option<String> = None;
+        let names = DrumPlane::ALL.map(|(_, name)| name);
+        let found =
+            keys.key(keys::Key::new(UNBALANCE_PLANE, about), &Form::Word(&names), &mut word);
+        let plane = DrumPlane::ALL.into_iter().find(|(_, name)| word.as_deref() == Some(name));
+        let (Field::Given(found), Some((plane, _))) = (found, plane) else { return };
+        let Some(table) = keys.section() else { return };
+        if table.key_at(UNBALANCE_X).is_some() {
+            let title = format!("`{UNBALANCE_PLANE}` beside `{UNBALANCE_X}`");
+            let expected = "expected only one of them: both say where the unbalance is";
+            table.report.refuse::<()>(&found.at, title, expected);
+        }
+        let name = format!("{}{UNBALANCE_X}", section.prefix(k));
+        table.report.put(name.as_str(), found.at);
+        // The paper's machine has no further unbalances, so it has no parameters of them.
+        let machine = with_unbalances(k + 1);
+        self.planes.extend(find_parameter(&name, &machine).map(|parameter| (parameter, plane)));
+    }
+
+    /// Whether the position of element `k` along the axis is given by the name of a plane.
+    pub(super) fn has_plane(&self, section: &MachineSection, k: usize, key: &str) -> bool {
+        let name = format!("{}{UNBALANCE_X}", section.prefix(k));
+        key == UNBALANCE_X && self.planes.iter().any(|(parameter, _)| parameter.name() == name)
+    }
+
+    /// Sets the parameters that the file omits by their rules, which become their sources.
+    pub(super) fn fill_omitted(self, machine: &mut Machine, root: &Section<'_>) {
+        let report = root.report;
+        let is_omitted = |name: &str| self.omitted.iter().any(|one| one.name() == name);
+        let needs_mass = ["tub_mass_kg", "shaft_mass_kg", "drum_mass_kg"].map(is_omitted);
+        let sheet = DataSheet {
+            moving_mass_kg: self.moving_mass_kg,
+            drum_radius_m: self.drum_radius_m.unwrap_or_default(),
+            drum_depth_m: self.drum_depth_m.unwrap_or_default(),
+        };
+        let is_whole = self.drum_radius_m.is_some() && self.drum_depth_m.is_some();
+        if sheet.moving_mass_kg.is_some() && !needs_mass[0] {
+            let title = format!("`{MOVING_MASS}` beside the tub's mass");
+            let expected =
+                "expected no `mass_kg` in [tub]: it is the moving mass less shaft and drum";
+            let at = root.key_at(MOVING_MASS).unwrap_or_else(|| root.at().clone());
+            report.refuse::<()>(&at, title, expected);
+        } else if needs_mass.contains(&true) && sheet.moving_mass_kg.is_none() {
+            let expected = "the mass of tub, shaft and drum without laundry, or `mass_kg` of each";
+            root.missing(MOVING_MASS, expected);
+        } else if is_whole {
+            sheet.fill(&self.omitted, machine);
+        }
+        for parameter in &self.omitted {
+            let Some(value) = parameter.get(machine, &no_spin()) else { continue };
+            if is_whole && !parameter.range().contains(value) {
+                let name = parameter.name();
+                let range = parameter.range();
+                let title = format!("the rule for the left-out `{name}` gives {value:.4}");
+                report.refuse::<()>(root.at(), title, format!("expected {range}: give the number"));
+            }
+            if let Some(assumption) = parameter.assumption() {
+                report.assume(parameter.name(), assumption.rule);
+            }
+        }
+    }
+}
+
+/// Returns the paper's machine with a number of further unbalances.
+fn with_unbalances(count: usize) -> Machine {
+    let mut machine = Machine::paper();
+    machine.further_unbalances = vec![Default::default(); count];
+    machine
+}
