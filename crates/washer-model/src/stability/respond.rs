@@ -519,12 +519,17 @@ pub(crate) fn leading_multiplier(case: &Case<'_>, matrix: &Mat<f64>) -> Option<(
         return None;
     }
     multipliers.retain(|mu| mu.im >= 0.0);
+///
+/// The hinge's motion, where it is not capped, counts if it grows. It hardly decays, so that a
+/// stable response would else be said to be near an edge at speeds and stiffnesses without caps
+/// alone.
     multipliers
         .sort_by(|a, b| b.norm_sqr().total_cmp(&a.norm_sqr()).then_with(|| b.im.total_cmp(&a.im)));
     multipliers.into_iter().find_map(|mu| {
         let vector = vector_of(matrix, mu);
         let shares = shares(&case.frozen, &vector, unit_per_s);
-        let judged = shares.iter().filter(|(mode, _)| *mode < case.judged);
+        let count = if mu.norm_sqr() > 1.0 { case.judged } else { SUSPENSION_MODES };
+        let judged = shares.iter().filter(|(mode, _)| *mode < count);
         let share: f64 = judged.map(|(_, energy)| energy).sum();
         // Not finite where there is no such disturbance.
         (share >= JUDGED_SHARE).then_some((mu, vector))
