@@ -19,7 +19,7 @@ pub(crate) struct RowOf {
 
 pub(crate) type DwellColumn = ResultColumn<RowOf>;
 
-/// Kinds of motions that have settled, of [`Ending::KINDS`].
+/// Kinds of motions that have settled, of [`Ending::KIND_NAMES`].
 const SETTLED: usize = 5;
 
 /// How a row came about.
@@ -159,7 +159,12 @@ pub(crate) fn columns(
     let text = "periodic: it repeats every turn; periodic_2: every second; periodic_m: every \
                 period_turns; quasi_periodic: two frequencies; chaotic: neighbours part, and eight \
                 trajectories from its states stayed in it for 240 s; null where it did not settle";
-    columns.push(ResultColumn::name("kind", text, Ending::KINDS[..SETTLED].to_vec(), RowOf::kind));
+    columns.push(ResultColumn::name(
+        "kind",
+        text,
+        Ending::KIND_NAMES[..SETTLED].to_vec(),
+        RowOf::kind,
+    ));
     let text = "after how many turns it repeats; null where it does not";
     columns.push(counts("period_turns", text, RowOf::period_turns));
     columns.extend(channel_columns(channels));
