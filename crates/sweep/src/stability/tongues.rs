@@ -40,7 +40,7 @@ pub(crate) struct Tongue {
 
 /// What a file says as a whole.
 #[derive(Debug, Default)]
-pub(crate) struct Summary {
+pub(crate) struct StabilitySummary {
     axes: Vec<String>,
     rows: u64,
     points: u64,
@@ -62,7 +62,7 @@ pub(crate) struct Summary {
     last: Option<Row>,
 }
 
-impl Summary {
+impl StabilitySummary {
     /// Takes in the next row.
     pub(crate) fn add(&mut self, row: Row) {
         let same_point = self.last.as_ref().is_some_and(|last| last.point == row.point);
@@ -187,14 +187,14 @@ impl Summary {
 ///
 /// # Errors
 /// As [`ParquetFile::read`].
-pub(crate) fn summary(file: &ParquetFile) -> Result<Summary, FileError> {
+pub(crate) fn summary(file: &ParquetFile) -> Result<StabilitySummary, FileError> {
     let axes = places::axes(file);
     let numbers = ["point", "speed_rpm", "growth_per_s", "frequency_cpm", "branch_to_rpm"];
     let modes = ["mode_1", "mode_2", "mode_1_name", "mode_2_name"];
     let words = ["kind", "status", "beyond", "on_curve"];
     let own = [&numbers[..], &modes, &words].concat();
     let names = [&own[..], &axes.iter().map(String::as_str).collect::<Vec<_>>()].concat();
-    let mut summary = Summary { axes: axes.clone(), ..Summary::default() };
+    let mut summary = StabilitySummary { axes: axes.clone(), ..StabilitySummary::default() };
     file.each_row(&names, |row| {
         let [point, speed_rpm, growth_per_s, frequency_cpm, branch_to_rpm] =
             std::array::from_fn(|column| row.value(column));
@@ -229,7 +229,7 @@ mod tests {
     #[test]
     fn tongues_are_runs_of_one_point_and_kind() {
         let axes = vec!["unbalance_mass_kg".to_owned()];
-        let mut summary = Summary { axes, ..Summary::default() };
+        let mut summary = StabilitySummary { axes, ..StabilitySummary::default() };
         let rows = [
             (0.0, 1.0, -0.1, "stable"),
             (0.0, 2.0, 0.1, "quasi_periodic"),
@@ -274,7 +274,7 @@ mod tests {
 
     #[test]
     fn jumps_are_those_of_the_curve_at_speeds_that_were_asked() {
-        let mut summary = Summary::default();
+        let mut summary = StabilitySummary::default();
         for (speed_rpm, ends_rpm, is_off_curve) in
             [(240.0, 245.0, false), (245.0, 248.0, true), (250.0, 260.0, false)]
         {
@@ -289,7 +289,7 @@ mod tests {
 
     #[test]
     fn speeds_are_rounded_for_people() {
-        let mut summary = Summary::default();
+        let mut summary = StabilitySummary::default();
         for speed_rpm in [0.1 + 0.2, 249.700_000_000_000_02] {
             summary.add(Row { speed_rpm, growth_per_s: 1.0, ..Row::default() });
         }
