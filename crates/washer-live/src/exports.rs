@@ -133,7 +133,7 @@ pub extern "C" fn growth(values: usize) -> usize {
 
 /// How far the motions go that a point of so many values ends in at the constant speeds (rpm)
 /// behind them: 1, 0 or -1 as above; the speed at which the tub turns farthest (NaN where nothing
-/// was found), what that motion is, by its place among [`washer_model::Ending::KINDS`], and the
+/// was found), what that motion is, by its place among [`washer_model::Ending::KIND_NAMES`], and the
 /// largest deviation of each channel (m, rad).
 #[unsafe(no_mangle)]
 pub extern "C" fn dwell(values: usize) -> usize {

@@ -131,7 +131,7 @@ pub struct Dwelt {
     pub deviations: Deviations,
     /// The speed (rpm) at which the tub turns farthest, by yaw or by pitch.
     pub speed_rpm: f64,
-    /// What that motion is: position in [`washer_model::Ending::KINDS`].
+    /// What that motion is: position in [`washer_model::Ending::KIND_NAMES`].
     pub kind: usize,
 }
 
