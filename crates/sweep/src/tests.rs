@@ -392,8 +392,7 @@ fn every_column_that_is_worse_in_one_direction_has_a_boundary() {
     }
     let (_, single_channel_plan) = quantity::traced(&plan, "ratio_tub_yaw", None).unwrap();
     assert_eq!(single_channel_plan.reliability.channels, [washer_model::Channel::TubYaw]);
-    let refused =
-        |name, limit| quantity::traced(&plan, name, limit).unwrap_err().to_string();
+    let refused = |name, limit| quantity::traced(&plan, name, limit).unwrap_err().to_string();
     assert!(refused("growth_per_s", None).contains("[stability]"));
     assert!(refused("cabinet_force", None).contains("did you mean `cabinet_force_nonlinear_n`?"));
     assert!(refused("cabinet_force_linear_n", None).contains("no limit of its own"));

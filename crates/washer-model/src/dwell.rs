@@ -1,4 +1,4 @@
-//! What a machine held at a speed ends in: its motions, by trajectories from many starts.
+//! Attractors of a machine held at a speed: its motions, by trajectories from many starts.
 //!
 //! A search, not a proof: a motion that no start leads to is not found.
 
@@ -30,11 +30,15 @@ use std::sync::Arc;
 
 pub use exponent::Exponent;
 
-/// Motions are the same whose largest deviations agree to this share in all channels; chaotic ones,
-/// of which no two stretches agree, and those that have not settled, to the second. What has not
-/// settled is on its way to a motion that has, if they agree to the third.
+/// The relative difference of largest deviations, in all channels, within which motions are one.
+/// Basis: windows of a settled motion differ by a third of it. Doubling it takes near motions for
+/// one.
 const SAME: f64 = 0.01;
+/// That of chaotic motions, of which no two stretches agree, and of those that have not settled.
+/// Basis: stretches of chaos differ by less. Doubling it takes any two for one.
 const SAME_ROUGHLY: f64 = 0.5;
+/// That of a motion that has not settled and one that has, on its way to which it is. Basis: it is
+/// between both others. Doubling it takes other motions for such.
 const SAME_NEARLY: f64 = 0.05;
 
 /// Rounds in which the gap between a kick that comes back and one that does not is halved.
@@ -43,11 +47,11 @@ const HALVINGS: usize = 5;
 /// From where and for how long motions are looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Starts {
-    /// How many at least, the disturbed responses among them.
+    /// The least number of starts, the disturbed responses among them.
     pub count: usize,
     /// The hardest kick (rad/s of the tub's rocking).
     pub kick_rad_per_s: f64,
-    /// How long a trajectory may take (s).
+    /// The longest time of a trajectory (s).
     pub longest_s: f64,
     /// Whether to look for the smallest kick that does not come back.
     pub with_threshold: bool,
@@ -67,7 +71,7 @@ impl Default for Starts {
     }
 }
 
-/// How a trajectory ended.
+/// The end of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum State {
     /// It settled.
@@ -81,13 +85,13 @@ pub enum State {
     NotSettled,
     /// It wandered as chaos does, but trajectories from its own states ended elsewhere.
     Transient {
-        /// Its mean life (s): the time that these trajectories took together, by the number of
+        /// The mean life (s): the time that these trajectories took together, by the number of
         /// those that ended.
         life_s: f64,
     },
 }
 
-/// What a motion settled into.
+/// The kind of a motion that has settled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settled {
     /// It repeats.
@@ -109,11 +113,11 @@ pub enum Settled {
 /// A motion that a held speed ends in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending {
-    /// How its first trajectory ended.
+    /// The end of its first trajectory.
     pub state: State,
-    /// What it is, once it has settled.
+    /// The kind, once it has settled.
     pub settled: Option<Settled>,
-    /// How many starts ended in it; none where only a transient did.
+    /// The number of starts that ended in it; none where only a transient did.
     pub starts: u32,
     /// The smallest kick (rad/s) off the response that led to it: 0 where a disturbed response did,
     /// none where only a kick of the machine at rest, a transient or a carried state did.
@@ -123,20 +127,20 @@ pub struct Ending {
     pub peaks: [f64; CHANNELS],
     /// Least gap between drum and tub at the ends of steps of these turns (m).
     pub min_gap_m: f64,
-    /// How fast neighbours part: of periodic motions by their multipliers, without an error; of
-    /// others by a perturbed run, where their spectrum does not say what they are.
+    /// The rate at which neighbours part: of periodic motions by their multipliers, without an
+    /// error; of others by a perturbed run, where their spectrum does not say what they are.
     pub exponent: Option<Exponent>,
-    /// How long the trajectory was followed (s).
+    /// The time that the trajectory was followed (s).
     pub time_s: f64,
-    /// Its last state where the unbalance is up: coordinates (m, rad), then their speeds (per s).
+    /// The last state where the unbalance is up: coordinates (m, rad), then their speeds (per s).
     pub end: [f64; STATES],
     /// Such states, once a turn, of its last 256 turns at most; coordinates from equilibrium.
     pub sections: Vec<[f64; STATES]>,
-    /// What [`Starts::wanted`] asks for, over 128 further turns.
+    /// The records that [`Starts::wanted`] asks for, over 128 further turns.
     pub extra: Reading,
 }
 
-/// What was found at a speed.
+/// The motions that were found at a speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Endings {
     /// The periodic responses: none where none was found, and the machine then starts from rest.
@@ -144,7 +148,7 @@ pub struct Endings {
     /// The motions in the order in which starts led to them: the first is the one that the
     /// disturbed periodic response ends in.
     pub motions: Vec<Ending>,
-    /// How many starts there were.
+    /// The number of starts.
     pub starts: u32,
     /// The smallest kick (rad/s) that does not come back to the first motion, of those that were
     /// tried; none where all do, or it was not asked for.
@@ -167,7 +171,8 @@ pub fn endings(
     endings_beside(simd, dwells, respond(dwells, is_stopped), carried, starts, is_stopped)
 }
 
-/// As [`endings`], of dwells whose periodic responses are known, as [`respond`] gives them.
+/// Finds what [`endings`] does, of dwells whose periodic responses are known, as [`respond`] gives
+/// them.
 ///
 /// # Errors
 /// As there.
@@ -241,7 +246,8 @@ fn record<'a, 'f>(
 ) where
     'a: 'f,
 {
-    let (mut motions, mut held) = (Vec::new(), Vec::new());
+    let mut motions = Vec::new();
+    let mut held = Vec::new();
     for (endings, row) in found {
         let within = |motion: &&mut Ending| !matches!(motion.state, State::LeftRange { .. });
         for motion in endings.motions.iter_mut().filter(within) {
@@ -336,7 +342,7 @@ struct Hunt<'a> {
     starts: usize,
     /// The number of a chaotic course, and those of the courses from its states.
     survivors: Vec<(usize, core::ops::Range<usize>)>,
-    /// By direction along mode shapes, sizes of kicks that come back and that do not (rad/s).
+    /// The sizes, by direction along mode shapes, of kicks that come back and that do not (rad/s).
     brackets: [Option<[f64; 2]>; MODE_DIRECTIONS],
     /// The smallest kick in a random direction that does not come back (rad/s).
     random_gone: Option<f64>,
@@ -419,10 +425,10 @@ impl<'a> Hunt<'a> {
     /// Returns the trajectories from states of the motion that a course is in.
     fn survivors_of(&self, course: usize) -> Option<core::ops::Range<usize>> {
         let ending = self.courses[course].ending();
-        let of_same = |(other, _): &&(usize, core::ops::Range<usize>)| {
+        let has_survived = |(other, _): &&(usize, core::ops::Range<usize>)| {
             are_same(&self.courses[*other].ending(), &ending)
         };
-        self.survivors.iter().find(of_same).map(|(_, survivors)| survivors.clone())
+        self.survivors.iter().find(has_survived).map(|(_, survivors)| survivors.clone())
     }
 
     /// Calls what is chaotic a transient where one of the trajectories from its states ended
@@ -448,7 +454,7 @@ impl<'a> Hunt<'a> {
         are_same(&self.courses[0].ending(), &self.courses[course].ending())
     }
 
-    /// Of every direction the kicks between which some stop coming back.
+    /// Returns the kicks, for every direction, between which some stop coming back.
     fn bracket(&mut self) {
         for (course, origin) in self.origins.iter().enumerate() {
             if let Origin::Kicked((direction, size)) = *origin
@@ -558,8 +564,8 @@ impl Endings {
 }
 
 impl Ending {
-    /// What motions are, by name: in words what they do once a turn, then why that is not known.
-    pub const KINDS: [&str; 8] = [
+    /// The names of motions: in words what they do once a turn, then why that is not known.
+    pub const KIND_NAMES: [&str; 8] = [
         "periodic",
         "periodic_2",
         "periodic_m",
@@ -570,7 +576,7 @@ impl Ending {
         "not_settled",
     ];
 
-    /// Its position in [`Self::KINDS`].
+    /// Returns the position in [`Self::KIND_NAMES`].
     pub fn kind(&self) -> usize {
         match (self.settled, self.state) {
             (Some(Settled::Periodic { turns }), _) => (turns as usize).min(3) - 1,
@@ -582,8 +588,8 @@ impl Ending {
         }
     }
 
-    /// Another start ended here. Of chaotic motions, and of what has not settled, the largest
-    /// deviations are those of all starts.
+    /// Counts another start that ended here. Of chaotic motions, and of what has not settled, the
+    /// largest deviations are those of all starts.
     fn also(&mut self, other: &Self) {
         let starts = self.starts + 1;
         let kicks = [self.least_kick_rad_per_s, other.least_kick_rad_per_s];
