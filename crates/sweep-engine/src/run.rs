@@ -2,7 +2,8 @@
 //!
 //! 1. Open or create the run's folder, and find the missing chunks.
 //! 2. Have the engine evaluate their rows on all cores.
-//! 3. Write each chunk as a part when its rows are complete, and at the end the rows of incomplete chunks,
+//! 3. Write each chunk as a part when its rows are complete, and at the end the rows of incomplete
+//!    chunks,
 //!    which a signal or an error leaves.
 //! 4. Join their parts to the result file.
 //!

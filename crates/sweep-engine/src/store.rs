@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `plan.json` | the frozen plan, written first (`plan_file`) |
 //! | `shards.json` | into how many shards the run was dealt, if it was (`shard`) |
-//! | `part-<index>.parquet` | finished rows (`part`): of a chunk of points (`point_parts`), or the trials of a search (`trials`) |
+//! | `part-<index>.parquet` | finished rows of a chunk (`point_parts`), or trials (`trials`) |
 //! | `*.damaged` | what was not as it had been written; kept |
 //! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
 //! | `lock`, `shard-<i>.lock` | who is at work (`lock`) |

@@ -111,7 +111,7 @@ fn format_from_ending(path: &Path) -> Result<Format> {
         "png" => Ok(Format::Png),
         "html" | "htm" => Ok(Format::Html),
         _ => Err(PlotError::Unfit(format!(
-            "{}: the figure's format follows from the ending of its name: .svg, .pdf, .png or .html",
+            "{}: the ending of a figure's name says its format: .svg, .pdf, .png or .html",
             path.display()
         ))),
     }

@@ -400,7 +400,7 @@ fn by_tachometer(problem: &Problem<'_>, best: &Descent, against: &[Against]) -> 
         let pulls: Vec<Vec<f64>> = pulls.into_iter().flatten().collect();
         for pull in &pulls {
             let moved: Vec<f64> = bread.iter().map(|row| algebra::dot(row, pull)).collect();
-            statistics::add_outer(&mut covariance, &moved, 1.0 / pulls.len() as f64);
+            algebra::add_outer(&mut covariance, &moved, 1.0 / pulls.len() as f64);
         }
     }
     covariance

@@ -35,7 +35,7 @@
 use lane_ode::Tolerance;
 use washer_model::{Formula, Level, Method, ModelKind, StepSelector, capped_method};
 
-use crate::levels::{RefinementLevel, RefinementLevels};
+use crate::levels::{RESOLVING_LEVELS, RefinementLevel, RefinementLevels};
 
 /// The error of a level over its difference from the level before.
 ///
@@ -94,13 +94,10 @@ const CORNER_LEVELS: usize = 3;
 /// the formula of each model: of order 8 for the nonlinear one, of order 4 for the linear one.
 ///
 /// Basis: a step of order 4 damps by z^6 / 144 where z is this product, so ringing at 10^4 rad/s
-/// loses a fifth in 10 s at 0.2; order 8 errs by 5e-5 a radian at 1.4. `differential_test 180
-/// 965457 jumps` has rows that are off by up to 3.5e-4 where order 4 takes 0.7. Doubling it damps the
+/// loses a fifth in 10 s at 0.2; order 8 errs by 5e-5 a radian at 1.4. With 0.7 for order 4, rows
+/// of `differential_test -- 180 965457 jumps` are off by up to 3.5e-4. Doubling it damps the
 /// ringing away.
 const RESOLVING_RAD: [f64; 2] = [1.4, 0.2];
-
-/// The number of levels that resolve the bearings' modes: two make one difference.
-pub(crate) const RESOLVING_LEVELS: usize = 2;
 
 /// The greatest number of steps of an adaptive trajectory.
 ///

@@ -1,7 +1,9 @@
 //! Refinement levels: the methods by which a trajectory is integrated, coarsest first.
 
-use crate::error_control::RESOLVING_LEVELS;
 use washer_model::{Formula, Level, Method, MethodNumbers, ModelKind, UnresolvedModes};
+
+/// The number of levels that resolve the bearings' modes, the last ones: two make one difference.
+pub(crate) const RESOLVING_LEVELS: usize = 2;
 
 /// A refinement level.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -16,6 +16,7 @@ use sweep::{
 };
 use tempfile::TempDir;
 
+/// The names of the files that an input can replace.
 const NAMES: [&str; 8] = [
     "plan.json",
     "shards.json",
@@ -27,6 +28,7 @@ const NAMES: [&str; 8] = [
     "../x.run.json",
     PART,
 ];
+/// The name of the only part.
 const PART: &str = "part-00000000.parquet";
 
 /// Tries one input; a panic is a finding.
@@ -75,6 +77,7 @@ fn options() -> OpenOptions<'static> {
 /// Returns a part with the input in place of its first or last bytes, between the magic numbers,
 /// and the digest of that where there is still a place for it.
 fn as_part(input: &[u8], is_at_end: bool, part: &[u8]) -> Vec<u8> {
+    /// The number of bytes of the magic number at either end of a Parquet file.
     const MAGIC: usize = 4;
     let mut bytes = part.to_vec();
     let room = bytes.len() - 2 * MAGIC;
@@ -108,6 +111,7 @@ fn reset(home: &Home, partial: &Path) {
 }
 
 fn home() -> &'static Home {
+    /// The run, computed once.
     static HOME: OnceLock<Home> = OnceLock::new();
     HOME.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a temporary folder");

@@ -30,8 +30,8 @@ const MAX_ROWS: u64 = 100_000;
 /// Maximum number of parameters. Basis: differential evolution converges slowly with more.
 const MAX_PARAMETERS: u64 = 20;
 
-/// Generations in the default number of candidates. Basis: a study of a washing machine's sum of a
-/// few parameters has converged by then. Doubling it doubles the time of a study.
+/// Generations in the default number of candidates. Basis: a study of a few parameters has
+/// converged by then. Doubling it doubles the time of a study.
 const GENERATIONS: u64 = 24;
 
 /// A search for the minimum of some objectives over some parameters.

@@ -112,6 +112,13 @@ pub(super) fn middle_95(values: impl Iterator<Item = f64> + Clone) -> Option<[f6
     Some([quantile(values.clone(), 0.025)?, quantile(values, 0.975)?])
 }
 
+/// Adds the outer product of a vector with itself, times a factor.
+pub(super) fn add_outer(sum: &mut [Vec<f64>], vector: &[f64], factor: f64) {
+    for (row, a) in sum.iter_mut().zip(vector) {
+        row.iter_mut().zip(vector).for_each(|(sum, b)| *sum += factor * a * b);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

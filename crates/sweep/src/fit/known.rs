@@ -14,10 +14,9 @@
 
 use washer_model::{Machine, Parameter, Spin, Target};
 
-use super::algebra::{Symmetric, centred, dot, inverse};
+use super::algebra::{Symmetric, add_outer, centred, dot, inverse};
 use super::measured::Signal;
 use super::model::{Against, FitCase, Free, Problem, Summary};
-use super::statistics::add_outer;
 use sweep_engine::Diagnostics;
 use sweep_engine::config::{Location, Report as Mistakes};
 

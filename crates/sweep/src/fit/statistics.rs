@@ -1,6 +1,6 @@
 //! Errors of fitted numbers, and whether the model follows the data at all.
 
-use super::algebra::{Symmetric, centred, dot, inverse, scaled};
+use super::algebra::{Symmetric, add_outer, centred, dot, inverse, scaled};
 use super::known::{FixedInfluence, FixedInfluences};
 use super::measured::Signal;
 use super::model::{Against, Problem, Summary};
@@ -435,13 +435,6 @@ fn noise_scale(one: &Against, signal: &Signal) -> Vec<f64> {
     }
     let variance = |energy: &f64| 1.0 + growth * energy / mean_square;
     energy.iter().map(|energy| variance(energy).sqrt()).collect()
-}
-
-/// Adds the outer product of a vector with itself, times a factor.
-pub(super) fn add_outer(sum: &mut [Vec<f64>], vector: &[f64], factor: f64) {
-    for (row, a) in sum.iter_mut().zip(vector) {
-        row.iter_mut().zip(vector).for_each(|(sum, b)| *sum += factor * a * b);
-    }
 }
 
 fn product(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {

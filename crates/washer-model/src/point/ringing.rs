@@ -1,10 +1,10 @@
 //! A bound on the swing of hinge and bearings after jumps of the drum's acceleration.
 //!
-//! Where the acceleration jumps, so do the loads of everything that turns with the drum: unbalances,
-//! and bodies whose weight holds them beside the axis. Every method follows the slow modes. Hinge
-//! and bearings have no damping of their own and swing about their new deflection from then on.
-//! Steps longer than their periods do not resolve that swing, and two runs with such steps lose the
-//! same part of it, so that their comparison does not show the error.
+//! Where the acceleration jumps, so do the loads of everything that turns with the drum:
+//! unbalances, and bodies whose weight holds them beside the axis. Every method follows the slow
+//! modes. Hinge and bearings have no damping of their own and swing about their new deflection from
+//! then on. Steps longer than their periods do not resolve that swing, and two runs with such steps
+//! lose the same part of it, so that their comparison does not show the error.
 //!
 //! The static deflection under the jump bounds the swing, without eigenvalues. The machine is free
 //! meanwhile, because its suspension is slow: the load is that of the linear model (Eq. 41) less

@@ -379,7 +379,10 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn the_rows_of_a_part_are_those_that_were_written(
-        points in prop::collection::vec(prop::collection::vec(any_row(&wide_layout().columns), 1..4), 1..8),
+        points in prop::collection::vec(
+            prop::collection::vec(any_row(&wide_layout().columns), 1..4),
+            1..8,
+        ),
     ) {
         let home = Home::new();
         let job = Job { layout: wide_layout(), ..synthetic::job(POINTS) };
