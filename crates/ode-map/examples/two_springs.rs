@@ -81,8 +81,8 @@ impl Oscillator<2, 4, 6> for TwoSprings {
     #[inline(always)]
     fn forcing<T: Real>(p: &[N<T>; 6], t: N<T>) -> [N<T>; 2] {
         let [.., amplitude, frequency] = *p;
-        let (_, cos) = (frequency * t).v().0.sin_cos();
-        [(amplitude * N(cos)).v(), t.lit(0.0)]
+        let (_, cos) = (frequency * t).v().sin_cos();
+        [(amplitude * cos).v(), t.lit(0.0)]
     }
 }
 

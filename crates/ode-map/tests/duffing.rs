@@ -1,0 +1,86 @@
+//! The example `duffing` against what textbooks say of it.
+
+#![allow(clippy::unwrap_used, reason = "a test fails where it must")]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use arrow_array::RecordBatch;
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float64Type, Int32Type};
+
+/// Returns the example, which cargo builds beside this test.
+fn program() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    let folder = test.parent().and_then(Path::parent).unwrap();
+    folder.join("examples").join(format!("duffing{}", std::env::consts::EXE_SUFFIX))
+}
+
+/// Runs a grid and returns its rows.
+fn run(grid: &str) -> RecordBatch {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("grid.toml"), grid).unwrap();
+    let mut command = Command::new(program());
+    let words = ["run", "grid.toml", "--out", "x.parquet", "--progress", "none"];
+    let output = command.current_dir(home.path()).args(words).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let file = sweep_files::ParquetFile::open(&home.path().join("x.parquet")).unwrap();
+    file.batches((0..file.schema().fields().len()).collect()).unwrap().next().unwrap().unwrap()
+}
+
+fn numbers(rows: &RecordBatch, name: &str) -> Vec<f64> {
+    rows.column_by_name(name).unwrap().as_primitive::<Float64Type>().values().to_vec()
+}
+
+/// Returns whether each row is `ok`.
+fn are_ok(rows: &RecordBatch) -> Vec<bool> {
+    let statuses = rows.column_by_name("status").unwrap().as_dictionary::<Int32Type>();
+    let statuses = statuses.downcast_dict::<arrow_array::StringArray>().unwrap();
+    statuses.into_iter().map(|status| status == Some("ok")).collect()
+}
+
+/// Returns the left side less the right of the frequency-response equation for an amplitude: Nayfeh
+/// and Mook, Nonlinear Oscillations (1979), equation (4.1.19), here without the assumption that the
+/// frequency is near 1, as harmonic balance with one harmonic has it.
+fn frequency_response(amplitude: f64, frequency: f64) -> f64 {
+    let [damping, cubic, forcing] = [0.05, 0.1, 0.18];
+    let square = amplitude * amplitude;
+    let stiffness = 1.0 - frequency * frequency + 0.75 * cubic * square;
+    square * (stiffness * stiffness + (damping * frequency).powi(2)) - forcing * forcing
+}
+
+#[test]
+fn steady_amplitudes_meet_the_frequency_response_equation() {
+    let frequencies = [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.3, 1.4, 1.5, 1.6, 1.7, 1.8];
+    let rows = run(&format!(
+        "name = \"duffing\"\ntime = {{ end_s = 500, window_s = [450, 500] }}\n\
+         integrator = {{ method = \"rk4-halved\", accuracy = 1e-7 }}\n\
+         [[axis]]\nparameter = \"frequency\"\nvalues = {frequencies:?}\n"
+    ));
+    let amplitudes = numbers(&rows, "nonlinear_x");
+    assert_eq!(amplitudes.len(), frequencies.len());
+    for (frequency, amplitude) in frequencies.into_iter().zip(amplitudes) {
+        // Each of these frequencies has one response, so that the equation has one root. Higher
+        // harmonics, which the equation leaves out, add at most 0.6 %.
+        let [below, above] = [0.99, 1.01].map(|by| frequency_response(by * amplitude, frequency));
+        assert!(below < 0.0 && above > 0.0, "frequency {frequency}: amplitude {amplitude}");
+    }
+}
+
+#[test]
+fn a_softening_spring_breaks_most_easily_where_davis_found_it() {
+    // Davis, Introduction to Nonlinear Differential and Integral Equations (1962): from rest, the
+    // least forcing that breaks the spring x - x^3 / 6 without damping has its minimum over the
+    // frequency at 0.8852.
+    let rows = run("name = \"davis\"\nset = { damping = 0, cubic = -0.16666666666666666 }\n\
+         time = { end_s = 100 }\nintegrator = { method = \"rk4\", step_s = 0.02 }\n\
+         [[axis]]\nparameter = \"frequency\"\nrange = { from = 0.86, to = 0.91, count = 21 }\n\
+         [[axis]]\nparameter = \"forcing\"\nrange = { from = 0.07, to = 0.13, count = 61 }\n");
+    let frequencies = numbers(&rows, "frequency");
+    let forcings = numbers(&rows, "forcing");
+    let broken = are_ok(&rows).into_iter().map(|is_ok| !is_ok);
+    let places = (0..rows.num_rows()).zip(broken).filter_map(|(row, is)| is.then_some(row));
+    let least = places.min_by(|a, b| forcings[*a].total_cmp(&forcings[*b])).unwrap();
+    let frequency = frequencies[least];
+    assert!((frequency - 0.8852).abs() < 0.003, "{frequency} by {}", forcings[least]);
+}
