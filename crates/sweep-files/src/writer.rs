@@ -187,7 +187,7 @@ mod tests {
     fn bytes_do_not_depend_on_batches() {
         const ROWS: usize = 100_000;
         let counts: ArrayRef = Arc::new((0..ROWS as u64).map(Some).collect::<UInt64Array>());
-        let number = |row: usize| (row % 7 != 0).then_some(row as f64 / 3.0);
+        let number = |row: usize| (!row.is_multiple_of(7)).then_some(row as f64 / 3.0);
         let numbers: ArrayRef = Arc::new((0..ROWS).map(number).collect::<Float64Array>());
         let batch = RecordBatch::try_from_iter([("count", counts), ("number", numbers)]).unwrap();
         let written = |batch_rows: usize| {

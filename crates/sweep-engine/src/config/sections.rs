@@ -221,10 +221,8 @@ fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
             let mut number = was.map_or(default, |(_, number)| *number);
             let setting = Key::new(key, description).set();
             let field = keys.key(setting, &Form::Number(range), &mut number);
-            if let (Field::Bad, Some(report)) = (field, keys.report()) {
-                if !help.is_empty() {
-                    report.add_help(help);
-                }
+            if let (Field::Bad, false, Some(report)) = (field, help.is_empty(), keys.report()) {
+                report.add_help(help);
             }
             if let Some((section, at)) = keys.section().and_then(|s| Some((s, s.key_at(key)?))) {
                 section.report.put(format!("integrator.{key}"), at);

@@ -23,7 +23,7 @@ pub fn known_words<'t>(
     report: &Report,
 ) -> (Vec<&'t str>, bool) {
     let mut chosen: Vec<Located<&str>> = Vec::new();
-    let mut is_sound: _ = true;
+    let mut is_sound = true;
     for found in found {
         let is_known = all.contains(&found.value);
         let first = chosen.iter().find(|other| other.value == found.value);

@@ -1,10 +1,10 @@
 //! Differential evolution towards a Pareto front (GDE3).
 //!
 //! 1. Each member of a generation is challenged by a trial: another member plus a multiple of the
-//! difference of two more.
+//!    difference of two more.
 //! 2. The better one of member and trial survives; both survive if neither dominates.
 //! 3. Survivors beyond the size of the population are removed by fronts and crowding, as in
-//! NSGA-II.
+//!    NSGA-II.
 //!
 //! With one objective this is plain differential evolution; the last third of its trials start from
 //! the best candidate instead, with half the multiple. A candidate that violates constraints less

@@ -1,6 +1,6 @@
 //! Errors of fitted numbers, and whether the model follows the data at all.
 
-use super::algebra::{Symmetric, add_outer, centred, dot, inverse, scaled};
+use super::algebra::{Symmetric, centred, dot, inverse, scaled};
 use super::known::{FixedInfluence, FixedInfluences};
 use super::measured::Signal;
 use super::model::{Against, Problem, Summary};

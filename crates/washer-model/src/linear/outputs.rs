@@ -191,9 +191,7 @@ impl<T: Real> LinearMotion<T> {
     fn columns(&self) -> [[N<T>; 3]; COLUMNS] {
         let zero = self.cos[0].lit(0.0);
         let mut columns = [[zero.lit(1.0), zero, zero]; COLUMNS];
-        for j in 0..COORDINATES {
-            columns[j] = self.coordinates[j];
-        }
+        columns[..COORDINATES].copy_from_slice(&self.coordinates);
         columns
     }
 
