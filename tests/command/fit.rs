@@ -78,7 +78,7 @@ fn a_fit_writes_a_machine_file_that_runs() {
     }
     let offset = found["offset"]["tub_front_y_m_per_s2"].as_f64().expect("a number");
     assert!((offset - 9.81).abs() < 0.05, "{found}");
-    for key in ["correlations", "noise", "shift_s", "residual_rms", "iso18571", "verdict"] {
+    for key in ["correlations", "noise", "shift_s", "residual_rms", "explained", "verdict"] {
         assert!(!found[key].is_null(), "{key}: {found}");
     }
     // The machine file has the fitted numbers to the last bit.

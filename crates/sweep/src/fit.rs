@@ -8,7 +8,6 @@
 mod algebra;
 mod curves;
 mod evaluations;
-mod iso18571;
 mod known;
 mod measured;
 mod model;

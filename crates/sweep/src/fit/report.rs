@@ -7,7 +7,6 @@ use serde_json::Value;
 use washer_model::Method;
 
 use super::algebra::{centred, dot, middle_95};
-use super::iso18571::{Rating, rate};
 use super::model::{Against, Problem};
 use super::search::Descent;
 use super::speed::Smoothed;
@@ -123,7 +122,6 @@ pub(crate) struct OfFile {
     pub(crate) autocorrelation: ByColumn<f64>,
     /// The factor by which that widens variances.
     pub(crate) widening: ByColumn<f64>,
-    pub(crate) iso18571: ByColumn<Rating>,
     /// Noise (rpm) and knots of the measured spin.
     pub(crate) spin: Option<Smoothed>,
     pub(crate) gaps_s: Vec<[f64; 2]>,
@@ -270,13 +268,6 @@ impl ReportData<'_> {
             explained: by(&|k, _| self.statistics.explained[k]),
             autocorrelation: by(&|k, _| self.statistics.neighbours[k]),
             widening: by(&|k, _| self.statistics.widening[k]),
-            iso18571: own()
-                .map(|(_, ((.., it), one))| {
-                    let pairs = it.samples().map(|(row, v)| (v - one.offset, one.model[row]));
-                    let (measured, model): (Vec<f64>, Vec<f64>) = pairs.unzip();
-                    (it.quantity.column(), rate(&measured, &model))
-                })
-                .collect(),
             spin: problem.cases[case].smoothed.clone(),
             gaps_s: measured.gaps_s.clone(),
             machine: config::machine_json(&problem.machine(case, x).0),
@@ -411,12 +402,13 @@ impl FitReport {
         }
         for file in &self.files {
             let column = |(column, noise): (&String, &f64)| {
-                let rating = file.iso18571.get(column).map_or(0.0, |rating| rating.overall);
-                format!("{column} {} ({rating:.3})", short(*noise))
+                let explained = file.explained.get(column).copied().unwrap_or_default();
+                let residual = 100.0 * (1.0 - explained).max(0.0).sqrt();
+                format!("{column} {} ({residual:.1} %)", short(*noise))
             };
             let columns: Vec<String> = file.noise.iter().map(column).collect();
             say("file", &format!("{}: {} samples", file.file, file.samples));
-            say("noise", &format!("{} (ISO/TS 18571)", columns.join(", ")));
+            say("noise", &format!("{} (residual over signal)", columns.join(", ")));
             if let Some(shift_s) = file.shift_s {
                 let way = if shift_s < 0.0 { "late" } else { "early" };
                 say("clock", &format!("{:.6} s {way}", shift_s.abs()));
