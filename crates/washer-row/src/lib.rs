@@ -17,6 +17,7 @@
 mod error_control;
 mod levels;
 mod measures;
+mod metrics;
 mod outcome;
 mod refinement;
 mod run;
@@ -25,9 +26,8 @@ mod verdict;
 
 pub use error_control::{MAX_ADAPTIVE_STEPS, refinement_levels};
 pub use levels::{RefinementLevel, RefinementLevels};
-pub use measures::{
-    CREEP_M_PER_S, Criterion, Measures, Metric, MetricColumn, MetricFacts, PartKind,
-};
+pub use measures::{CREEP_M_PER_S, Criterion, Measures, MetricColumn};
+pub use metrics::{Metric, MetricFacts, MetricSource, PartKind};
 pub use outcome::{Deviations, DwellPeaks, GrowingMode, Growth, Outcome, Status, Trajectory};
 pub use refinement::{Demand, Next, RefinementRule, RowRefinement};
 pub use run::{LevelRun, RowRule, integrate_points};

@@ -1,8 +1,9 @@
 //! Measures of a trajectory: the amplitude by which the two models are compared, and metrics.
 
-use sweep_parameter::{Limit, Worse, named};
+use sweep_parameter::{Worse, named};
 use washer_model::{Channel, Gauge, Reading, Recorders};
 
+use crate::metrics::{LeastScale, Metric, MetricFacts, MetricSource, PartKind};
 use crate::outcome::{Deviations, Outcome};
 
 /// The greatest deviation of a machine at rest, as a share of the clearance between drum and tub
@@ -68,54 +69,29 @@ impl Criterion {
     }
 }
 
-named! {
-    /// An optional number of a row beside the amplitudes, with columns of its own.
-    pub enum Metric {
-        /// The greatest force on the cabinet.
-        CabinetForce = "cabinet_force",
-        /// The time for which drum and tub overlap.
-        ClashTime = "clash_time",
-        /// The sag of the machine under its weight.
-        StaticSag = "static_sag",
-        /// The greatest force of a stop.
-        StopForce = "stop_force",
-        /// The time for which a stop is closed.
-        StopContact = "stop_contact",
-        /// The least load of a foot of the cabinet.
-        FootLoad = "foot_load",
-        /// The least margin of the cabinet against slipping.
-        SlipMargin = "slip_margin",
-        /// The least margin of the cabinet against slipping, turning or both.
-        WalkMargin = "walk_margin",
-        /// The growth of disturbances at held speeds.
-        Growth = "growth",
-        /// The greatest speed of a damper.
-        DamperSpeed = "damper_speed",
-        /// The deviations of the attractors at held speeds.
-        Dwell = "dwell",
-    }
-}
-
 impl Metric {
-    /// Returns the gauge with the metric's name; `None` if models do not have it one by one.
-    fn gauge(self) -> Option<Gauge> {
-        Gauge::named(self.name())
+    /// Returns the gauge that records the metric; `None` if models do not have it one by one.
+    const fn gauge(self) -> Option<Gauge> {
+        match self.facts().source {
+            MetricSource::Gauge(gauge) => Some(gauge),
+            MetricSource::Machine | MetricSource::HeldSpeeds => None,
+        }
     }
 
     /// Whether each model has a value of its own. Otherwise the value belongs to the machine.
-    pub fn is_per_model(self) -> bool {
+    pub const fn is_per_model(self) -> bool {
         self.gauge().is_some()
     }
 
     /// Whether the metric is taken at the held speeds of `[stability]`.
     pub const fn is_at_held_speeds(self) -> bool {
-        matches!(self, Self::Growth | Self::Dwell)
+        matches!(self.facts().source, MetricSource::HeldSpeeds)
     }
 
     /// Whether the metric has a value for a periodic motion, which has no window: forces and speeds
     /// do, times within the window do not.
     pub fn has_periodic_value(self) -> bool {
-        self.is_per_model() && !matches!(self, Self::ClashTime | Self::StopContact)
+        self.is_per_model() && self.facts().scale != LeastScale::Window
     }
 
     /// Returns the name of the column. It contains `model` only if each model has a value.
@@ -133,100 +109,6 @@ impl Metric {
             LeastScale::Creep => CREEP_M_PER_S,
         }
     }
-
-    /// Returns the metric's unit, description, parts, scale, bad direction and limit.
-    pub const fn facts(self) -> MetricFacts {
-        match self {
-            Self::CabinetForce => MetricFacts {
-                unit: "N",
-                description: "greatest magnitude in the window of the sum of the forces of all \
-                              springs, dampers, stops and bushings on the cabinet (at rest the \
-                              weight)",
-                ..MACHINE_METRIC
-            },
-            Self::ClashTime => MetricFacts {
-                unit: "s",
-                description: "time in the window with a gap between drum and tub below zero; its \
-                              error is a share of the window",
-                scale: LeastScale::Window,
-                ..MACHINE_METRIC
-            },
-            Self::StaticSag => MetricFacts {
-                unit: "m",
-                description: "how far the tub's mass centre sinks from where the machine file \
-                              draws it to the static equilibrium; null if there is none",
-                ..MACHINE_METRIC
-            },
-            Self::StopForce => MetricFacts {
-                unit: "N",
-                description: "greatest push of any stop in the window; the linear model has the \
-                              tangents of the stops at equilibrium, next to nothing while they are \
-                              open",
-                part: Some(PartKind::Stop),
-                each_part: Some([
-                    "force",
-                    "greatest push of the stop in the window; the linear model has its tangent at \
-                     equilibrium, next to nothing while it is open",
-                ]),
-                scale: LeastScale::Weight,
-                ..MACHINE_METRIC
-            },
-            Self::StopContact => MetricFacts {
-                unit: "s",
-                description: "longest time in the window for which any one stop is closed",
-                part: Some(PartKind::Stop),
-                each_part: Some(["contact", "time in the window for which the stop is closed"]),
-                scale: LeastScale::Window,
-                ..MACHINE_METRIC
-            },
-            Self::FootLoad => MetricFacts {
-                unit: "N",
-                description: "least vertical load of any foot of the cabinet in the window, by \
-                              statics; below zero it would lift",
-                each_part: Some([
-                    "load",
-                    "least vertical load of the foot in the window, by statics; below zero it \
-                     would lift",
-                ]),
-                ..FEET_METRIC
-            },
-            Self::SlipMargin => MetricFacts {
-                unit: "N",
-                description: "least margin of the cabinet against slipping in the window: friction \
-                              on all feet together less the horizontal force",
-                ..FEET_METRIC
-            },
-            Self::WalkMargin => MetricFacts {
-                unit: "N",
-                description: "least margin of the cabinet against slipping, turning or both in the \
-                              window: the margin against slipping less what the moment about the \
-                              vertical takes of it",
-                ..FEET_METRIC
-            },
-            Self::Growth => MetricFacts {
-                unit: "1/s",
-                description: "how fast the fastest growing disturbance of the nonlinear response \
-                              grows, at that of the speeds of [stability] at which it is greatest",
-                limit: Some(Limit { value: 0.0, scale: 1.0 }),
-                ..MACHINE_METRIC
-            },
-            Self::DamperSpeed => MetricFacts {
-                unit: "m/s",
-                description: "greatest speed along any damper in the window: what \
-                              `friction_linear_speed_m_per_s` should be near",
-                part: Some(PartKind::Damper),
-                each_part: Some(["speed", "greatest speed along the damper in the window"]),
-                scale: LeastScale::Creep,
-                ..MACHINE_METRIC
-            },
-            // Each channel has a column of its own, in its unit.
-            Self::Dwell => MetricFacts {
-                description: "largest deviation of any motion that the drum held at any of the \
-                              speeds of [stability] ends in (`sweep dwell`)",
-                ..MACHINE_METRIC
-            },
-        }
-    }
 }
 
 /// Returns the name of a column: quantity, model and unit, without those that are empty.
@@ -235,66 +117,6 @@ fn column(quantity: &str, model: &str, unit: &str) -> String {
     let words = [quantity, model, &unit].into_iter().filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join("_")
 }
-
-named! {
-    /// A kind of parts of which a machine may have several.
-    pub enum PartKind {
-        Stop = "stop",
-        Foot = "foot",
-        Damper = "damper",
-    }
-}
-
-/// The least scale of relative differences of a metric.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum LeastScale {
-    /// No least scale: differences are relative to the value itself.
-    Value,
-    /// The length of the window.
-    Window,
-    /// The weight of everything that moves.
-    Weight,
-    /// The speed [`CREEP_M_PER_S`].
-    Creep,
-}
-
-/// The properties of a metric.
-pub struct MetricFacts {
-    pub unit: &'static str,
-    /// The description in column dictionaries and in docs, in one line.
-    pub description: &'static str,
-    /// The parts that the machine must have.
-    pub part: Option<PartKind>,
-    /// The quantity in the name of one part's column, and that column's description; `None` if
-    /// parts have no columns.
-    each_part: Option<[&'static str; 2]>,
-    /// The least scale of relative differences.
-    scale: LeastScale,
-    /// The direction in which values are bad. The value of all parts is that of the worst part.
-    pub worse: Worse,
-    /// The limit of good values, if the metric has a natural one.
-    pub limit: Option<Limit>,
-}
-
-/// The facts of a metric of the whole machine that every machine has.
-const MACHINE_METRIC: MetricFacts = MetricFacts {
-    unit: "",
-    description: "",
-    part: None,
-    each_part: None,
-    scale: LeastScale::Value,
-    worse: Worse::Greater,
-    limit: None,
-};
-
-/// The common facts of the metrics of the cabinet's feet.
-const FEET_METRIC: MetricFacts = MetricFacts {
-    part: Some(PartKind::Foot),
-    scale: LeastScale::Weight,
-    worse: Worse::Less,
-    limit: Some(Limit { value: 0.0, scale: 100.0 }),
-    ..MACHINE_METRIC
-};
 
 /// A column of each model: a metric of the whole machine, or of one stop, foot or damper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -499,6 +321,13 @@ mod tests {
         let columns = [Metric::StaticSag, Metric::Growth, Metric::DamperSpeed];
         let columns = columns.map(|metric| metric.column("linear"));
         assert_eq!(columns, ["static_sag_m", "growth_per_s", "damper_speed_linear_m_per_s"]);
+    }
+
+    #[test]
+    fn a_metric_is_read_from_the_gauge_of_its_name() {
+        for metric in Metric::ALL {
+            assert_eq!(metric.gauge(), Gauge::named(metric.name()), "{metric:?}");
+        }
     }
 
     #[test]

@@ -5,7 +5,8 @@ use washer_model::{ModelKind, Point, UnresolvedModes};
 
 use crate::error_control::{amplification, error_of_chaos, error_of_level};
 use crate::levels::RefinementLevels;
-use crate::measures::{Metric, TURN_FLOOR};
+use crate::measures::TURN_FLOOR;
+use crate::metrics::Metric;
 use crate::outcome::{Outcome, Status, Trajectory};
 use crate::run::{LevelRun, RowRule};
 use crate::separation::Separation;

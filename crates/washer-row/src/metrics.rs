@@ -1,0 +1,212 @@
+//! The table of metrics, the optional numbers of a row beside the amplitudes.
+
+use sweep_parameter::{Limit, Worse, named};
+use washer_model::Gauge;
+
+named! {
+    /// A kind of parts of which a machine may have several.
+    pub enum PartKind {
+        Stop = "stop",
+        Foot = "foot",
+        Damper = "damper",
+    }
+}
+
+/// The source of a metric's value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MetricSource {
+    /// A gauge of each model's trajectory.
+    Gauge(Gauge),
+    /// The machine at rest.
+    Machine,
+    /// The held speeds of `[stability]`.
+    HeldSpeeds,
+}
+
+/// The least scale of relative differences of a metric.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LeastScale {
+    /// No least scale: differences are relative to the value itself.
+    Value,
+    /// The length of the window.
+    Window,
+    /// The weight of everything that moves.
+    Weight,
+    /// The speed [`CREEP_M_PER_S`](crate::CREEP_M_PER_S).
+    Creep,
+}
+
+/// The properties of a metric.
+pub struct MetricFacts {
+    pub unit: &'static str,
+    /// The description in column dictionaries and in docs, in one line.
+    pub description: &'static str,
+    /// The source of the value.
+    pub source: MetricSource,
+    /// The parts that the machine must have.
+    pub part: Option<PartKind>,
+    /// The quantity in the name of one part's column, and that column's description; `None` if
+    /// parts have no columns.
+    pub(crate) each_part: Option<[&'static str; 2]>,
+    /// The least scale of relative differences.
+    pub(crate) scale: LeastScale,
+    /// The direction in which values are bad. The value of all parts is that of the worst part.
+    pub worse: Worse,
+    /// The limit of good values, if the metric has a natural one.
+    pub limit: Option<Limit>,
+}
+
+/// The facts of a metric of the whole machine that every machine has.
+const MACHINE_METRIC: MetricFacts = MetricFacts {
+    unit: "",
+    description: "",
+    source: MetricSource::Machine,
+    part: None,
+    each_part: None,
+    scale: LeastScale::Value,
+    worse: Worse::Greater,
+    limit: None,
+};
+
+/// The common facts of the metrics of the cabinet's feet.
+const FEET_METRIC: MetricFacts = MetricFacts {
+    part: Some(PartKind::Foot),
+    scale: LeastScale::Weight,
+    worse: Worse::Less,
+    limit: Some(Limit { value: 0.0, scale: 100.0 }),
+    ..MACHINE_METRIC
+};
+
+/// Declares the metrics by the rows of their table.
+macro_rules! metrics {
+    ($($(#[$attribute:meta])* $Metric:ident = $name:literal: $facts:expr;)+) => {
+        named! {
+            /// An optional number of a row beside the amplitudes, with columns of its own.
+            pub enum Metric {
+                $($(#[$attribute])* $Metric = $name,)+
+            }
+        }
+
+        impl Metric {
+            /// Returns the metric's unit, description, source, parts, scale, bad direction and
+            /// limit.
+            pub const fn facts(self) -> MetricFacts {
+                match self {
+                    $(Self::$Metric => $facts,)+
+                }
+            }
+        }
+    };
+}
+
+metrics! {
+    /// The greatest force on the cabinet.
+    CabinetForce = "cabinet_force": MetricFacts {
+        unit: "N",
+        description: "greatest magnitude in the window of the sum of the forces of all \
+                      springs, dampers, stops and bushings on the cabinet (at rest the \
+                      weight)",
+        source: MetricSource::Gauge(Gauge::CabinetForce),
+        ..MACHINE_METRIC
+    };
+    /// The time for which drum and tub overlap.
+    ClashTime = "clash_time": MetricFacts {
+        unit: "s",
+        description: "time in the window with a gap between drum and tub below zero; its \
+                      error is a share of the window",
+        scale: LeastScale::Window,
+        source: MetricSource::Gauge(Gauge::ClashTime),
+        ..MACHINE_METRIC
+    };
+    /// The sag of the machine under its weight.
+    StaticSag = "static_sag": MetricFacts {
+        unit: "m",
+        description: "how far the tub's mass centre sinks from where the machine file \
+                      draws it to the static equilibrium; null if there is none",
+        ..MACHINE_METRIC
+    };
+    /// The greatest force of a stop.
+    StopForce = "stop_force": MetricFacts {
+        unit: "N",
+        description: "greatest push of any stop in the window; the linear model has the \
+                      tangents of the stops at equilibrium, next to nothing while they are \
+                      open",
+        part: Some(PartKind::Stop),
+        each_part: Some([
+            "force",
+            "greatest push of the stop in the window; the linear model has its tangent at \
+             equilibrium, next to nothing while it is open",
+        ]),
+        scale: LeastScale::Weight,
+        source: MetricSource::Gauge(Gauge::StopForce),
+        ..MACHINE_METRIC
+    };
+    /// The time for which a stop is closed.
+    StopContact = "stop_contact": MetricFacts {
+        unit: "s",
+        description: "longest time in the window for which any one stop is closed",
+        part: Some(PartKind::Stop),
+        each_part: Some(["contact", "time in the window for which the stop is closed"]),
+        scale: LeastScale::Window,
+        source: MetricSource::Gauge(Gauge::StopContact),
+        ..MACHINE_METRIC
+    };
+    /// The least load of a foot of the cabinet.
+    FootLoad = "foot_load": MetricFacts {
+        unit: "N",
+        description: "least vertical load of any foot of the cabinet in the window, by \
+                      statics; below zero it would lift",
+        each_part: Some([
+            "load",
+            "least vertical load of the foot in the window, by statics; below zero it \
+             would lift",
+        ]),
+        source: MetricSource::Gauge(Gauge::FootLoad),
+        ..FEET_METRIC
+    };
+    /// The least margin of the cabinet against slipping.
+    SlipMargin = "slip_margin": MetricFacts {
+        unit: "N",
+        description: "least margin of the cabinet against slipping in the window: friction \
+                      on all feet together less the horizontal force",
+        source: MetricSource::Gauge(Gauge::SlipMargin),
+        ..FEET_METRIC
+    };
+    /// The least margin of the cabinet against slipping, turning or both.
+    WalkMargin = "walk_margin": MetricFacts {
+        unit: "N",
+        description: "least margin of the cabinet against slipping, turning or both in the \
+                      window: the margin against slipping less what the moment about the \
+                      vertical takes of it",
+        source: MetricSource::Gauge(Gauge::WalkMargin),
+        ..FEET_METRIC
+    };
+    /// The growth of disturbances at held speeds.
+    Growth = "growth": MetricFacts {
+        unit: "1/s",
+        description: "how fast the fastest growing disturbance of the nonlinear response \
+                      grows, at that of the speeds of [stability] at which it is greatest",
+        limit: Some(Limit { value: 0.0, scale: 1.0 }),
+        source: MetricSource::HeldSpeeds,
+        ..MACHINE_METRIC
+    };
+    /// The greatest speed of a damper.
+    DamperSpeed = "damper_speed": MetricFacts {
+        unit: "m/s",
+        description: "greatest speed along any damper in the window: what \
+                      `friction_linear_speed_m_per_s` should be near",
+        part: Some(PartKind::Damper),
+        each_part: Some(["speed", "greatest speed along the damper in the window"]),
+        scale: LeastScale::Creep,
+        source: MetricSource::Gauge(Gauge::DamperSpeed),
+        ..MACHINE_METRIC
+    };
+    // Each channel has a column of its own, in its unit.
+    /// The deviations of the attractors at held speeds.
+    Dwell = "dwell": MetricFacts {
+        description: "largest deviation of any motion that the drum held at any of the \
+                      speeds of [stability] ends in (`sweep dwell`)",
+        source: MetricSource::HeldSpeeds,
+        ..MACHINE_METRIC
+    };
+}
