@@ -19,6 +19,7 @@ pub mod schema;
 pub mod show;
 pub mod status;
 
+use std::fmt;
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
@@ -30,27 +31,50 @@ use grid::{GridArgs, ResultArgs, quoted};
 use run::installed;
 use sweep_plot::CommonFigures;
 
-#[derive(Debug, Parser)]
-#[command(after_help = Exit::table(), disable_help_subcommand = true)]
-struct Cli {
-    #[command(subcommand)]
-    command: Command,
+/// The arguments of those general subcommands to which a program may add options.
+pub trait Arguments {
+    /// The arguments of `run`.
+    type Run: clap::Args + fmt::Debug;
+    /// The arguments of `check`.
+    type Check: clap::Args + fmt::Debug;
+    /// The arguments of `plot`.
+    type Plot: clap::Args + fmt::Debug;
+    /// The arguments of `status`.
+    type Status: clap::Args + fmt::Debug;
+    /// The arguments of `merge`.
+    type Merge: clap::Args + fmt::Debug;
+    /// The arguments of `schema`.
+    type Schema: clap::Args + fmt::Debug;
 }
 
+/// The arguments without added options.
+#[derive(Debug)]
+pub enum Unextended {}
+
+impl Arguments for Unextended {
+    type Run = run::Args;
+    type Check = check::Args;
+    type Plot = plot::Args;
+    type Status = status::Args;
+    type Merge = merge::Args;
+    type Schema = schema::Args;
+}
+
+/// A general subcommand, which the program of every model has.
 #[derive(Debug, Subcommand)]
-enum Command {
+pub enum GeneralCommand<A: Arguments> {
     /// Integrate every grid point, or go on after an interruption
-    Run(run::Args),
+    Run(A::Run),
     /// Check a grid file and show what it would do, without doing it
-    Check(check::Args),
+    Check(A::Check),
     /// Trace the curve where a ratio, or any number, is at its limit
     Boundary(boundary::Args),
     /// Find parameters at which numbers are least within limits
     Optimise(optimise::Args),
-    /// Show what a result file holds: verdicts and extremes
+    /// Show what a result file holds: verdicts, extremes, metrics
     Show(show::Args),
-    /// Draw a map or a boundary
-    Plot(plot::Args),
+    /// Draw a result file
+    Plot(A::Plot),
     /// Write one page to print: verdict, worst values, pictures
     Report(report::Args),
     /// Check expressions on a result, and show the rows that break them
@@ -60,13 +84,20 @@ enum Command {
     /// Write a result as CSV or as an Excel workbook, with units
     Export(export::Args),
     /// Show how far a run is: done, missing, failed, running
-    Status(status::Args),
+    Status(A::Status),
     /// Join the finished shards of a run into its one result file
-    Merge(merge::Args),
+    Merge(A::Merge),
     /// List every parameter that can be set or swept
     Parameters(parameters::Args),
-    /// Print the JSON Schema of grid files, for editors
-    Schema(schema::Args),
+    /// Print the JSON Schema of input files, for editors
+    Schema(A::Schema),
+}
+
+#[derive(Debug, Parser)]
+#[command(after_help = Exit::table(), disable_help_subcommand = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: GeneralCommand<Unextended>,
 }
 
 /// The program of a model: does what this process's arguments say. `name` is how it is called.
@@ -81,25 +112,25 @@ pub fn main<M: Swept>(name: &'static str) -> ExitCode {
     exit.into()
 }
 
-fn run<M: Swept>(command: &Command) -> Result<Exit, Error> {
+fn run<M: Swept>(command: &GeneralCommand<Unextended>) -> Result<Exit, Error> {
     survive_file_size_limits().map_err(Error::signals)?;
     expect_random_numbers()?;
     match command {
-        Command::Run(args) => run::run::<M>(args),
-        Command::Check(args) => check::run::<M>(args),
-        Command::Boundary(args) => boundary::run::<M>(args),
-        Command::Optimise(args) => optimise::run::<M>(args),
-        Command::Show(args) => show::run(args, &show::Further::NONE),
-        Command::Plot(args) => plot::run(args),
-        Command::Report(args) => {
+        GeneralCommand::Run(args) => run::run::<M>(args),
+        GeneralCommand::Check(args) => check::run::<M>(args),
+        GeneralCommand::Boundary(args) => boundary::run::<M>(args),
+        GeneralCommand::Optimise(args) => optimise::run::<M>(args),
+        GeneralCommand::Show(args) => show::run(args, &show::Further::NONE),
+        GeneralCommand::Plot(args) => plot::run(args),
+        GeneralCommand::Report(args) => {
             report::run::<M>(args, &show::Further::NONE, &|_| Vec::new(), &CommonFigures)
         }
-        Command::Require(args) => require::run(args),
-        Command::Compare(args) => compare::run(args, M::BUILD),
-        Command::Export(args) => export::run(args),
-        Command::Status(args) => status::run::<M>(args),
-        Command::Merge(args) => merge::run::<M>(args),
-        Command::Parameters(args) => parameters::run::<M>(args),
-        Command::Schema(args) => schema::run::<M>(args),
+        GeneralCommand::Require(args) => require::run(args),
+        GeneralCommand::Compare(args) => compare::run(args, M::BUILD),
+        GeneralCommand::Export(args) => export::run(args),
+        GeneralCommand::Status(args) => status::run::<M>(args),
+        GeneralCommand::Merge(args) => merge::run::<M>(args),
+        GeneralCommand::Parameters(args) => parameters::run::<M>(args),
+        GeneralCommand::Schema(args) => schema::run::<M>(args),
     }
 }

@@ -1,4 +1,5 @@
-//! The command line: one module a subcommand, each with its arguments and `run`.
+//! The command line: a module for each subcommand of this program, and for each general one to
+//! which it adds options.
 
 mod check;
 mod completions;
@@ -23,8 +24,8 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use crate::dwell::AttractorSearch;
 use sweep_engine::commands::examples::Examples;
 use sweep_engine::commands::{
-    boundary, compare, examples, export, merge, optimise, parameters, report, require,
-    show as show_engine, status,
+    Arguments, GeneralCommand, boundary, compare, examples, export, merge, optimise, parameters,
+    report, require, show as show_engine, status,
 };
 use sweep_engine::{Error, Exit, nearest};
 use washer_plot::WasherFigures;
@@ -52,20 +53,30 @@ const EXAMPLES: &str = include_str!("commands/examples.txt");
     disable_help_subcommand = true,
 )]
 pub struct Cli {
-    /// What to do.
+    /// The subcommand.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// What to do.
+/// The arguments of general subcommands, with the options that this program adds.
+#[derive(Debug)]
+pub enum WasherArguments {}
+
+impl Arguments for WasherArguments {
+    type Run = run::Args;
+    type Check = check::Args;
+    type Plot = plot::Args;
+    type Status = held::JobArgs<status::Args>;
+    type Merge = held::JobArgs<merge::Args>;
+    type Schema = schema::Args;
+}
+
+/// A subcommand.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Integrate every grid point, or go on after an interruption
-    Run(run::Args),
-    /// Check a grid file and show what it would do, without doing it
-    Check(check::Args),
-    /// Trace the curve where a ratio, or any number, is at its limit
-    Boundary(boundary::Args),
+    /// A subcommand of every model's program.
+    #[command(flatten)]
+    General(GeneralCommand<WasherArguments>),
     /// Write time histories of both models at one point
     Trace(trace::Args),
     /// Find resonance speeds, mode shapes and frequencies over speed
@@ -82,32 +93,10 @@ pub enum Command {
     Explain(explain::Args),
     /// Find the numbers of a machine from measured run-ups
     Fit(fit::Args),
-    /// Find parameters at which numbers are least within limits
-    Optimise(optimise::Args),
-    /// Show what a result file holds: verdicts, extremes, metrics
-    Show(show_engine::Args),
-    /// Draw a file: map, boundary, time histories, Campbell diagram
-    Plot(plot::Args),
-    /// Write one page to print: verdict, worst values, pictures
-    Report(report::Args),
-    /// Check expressions on a result, and show the rows that break them
-    Require(require::Args),
-    /// Say what differs between two results
-    Compare(compare::Args),
-    /// Write a result as CSV or as an Excel workbook, with units
-    Export(export::Args),
-    /// Show how far a run is: done, missing, failed, running
-    Status(held::JobArgs<status::Args>),
-    /// Join the finished shards of a run into its one result file
-    Merge(held::JobArgs<merge::Args>),
     /// Print the script that submits a run to a Slurm cluster
     Slurm(slurm::Args),
     /// Write a commented grid file, or a machine file, to start from
     Init(init::Args),
-    /// List every parameter that can be set or swept
-    Parameters(parameters::Args),
-    /// Print the JSON Schema of grid or machine files, for editors
-    Schema(schema::Args),
     /// Write manual pages
     Man(man::Args),
     /// Print shell completions
@@ -140,7 +129,17 @@ pub(crate) fn command() -> clap::Command {
         program.mut_subcommand(&name, |command| with(command, examples_of(&name)))
     });
     let template = grouped_help(&program);
-    program.help_template(template)
+    in_groups(program).help_template(template)
+}
+
+/// Sorts the subcommands by the order of [`GROUPS`], which manual pages and documents follow.
+fn in_groups(mut program: clap::Command) -> clap::Command {
+    let mut sorted: Vec<clap::Command> = program.get_subcommands().cloned().collect();
+    sorted.sort_by_key(|command| {
+        GROUPS.iter().flat_map(|(_, names)| *names).position(|name| *name == command.get_name())
+    });
+    program.get_subcommands_mut().zip(sorted).for_each(|(place, command)| *place = command);
+    program
 }
 
 /// The template of the program's help. clap has headings for arguments only, so the subcommands
@@ -201,40 +200,47 @@ impl Cli {
 }
 
 impl Command {
-    /// Does it.
+    /// Runs the subcommand.
     ///
     /// # Errors
-    /// Whatever kept the command from its end.
+    /// The errors of the subcommand.
     pub fn run(&self) -> Result<Exit, Error> {
         match self {
-            Self::Run(args) => run::run(args),
-            Self::Check(args) => check::run(args),
-            Self::Merge(args) => args.merge(),
-            Self::Status(args) => args.status(),
+            Self::General(general) => run_general(general),
             Self::Slurm(args) => slurm::run(args),
-            Self::Show(args) => show_engine::run(args, &show::FURTHER),
-            Self::Report(args) => {
-                let figures = WasherFigures::default();
-                report::run(args, &show::FURTHER, &crate::live::resonance_rows, &figures)
-            }
-            Self::Require(args) => require::run(args),
-            Self::Compare(args) => compare::run(args, crate::identity::BUILD),
-            Self::Export(args) => export::run(args),
             Self::Trace(args) => trace::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Stability(args) => args.run(),
             Self::Dwell(args) => args.run(),
             Self::Explain(args) => explain::run(args),
             Self::Fit(args) => fit::run(args),
-            Self::Boundary(args) => boundary::run::<crate::Washer>(args),
-            Self::Optimise(args) => optimise::run::<crate::Washer>(args),
-            Self::Plot(args) => plot::run(args),
-            Self::Parameters(args) => parameters::run::<crate::Washer>(args),
             Self::Init(args) => init::run(args),
-            Self::Schema(args) => schema::run(args),
             Self::Completions(args) => completions::run(args, shown_command()),
             Self::Man(args) => man::run(args, command(), &examples_of),
         }
+    }
+}
+
+/// Runs a general subcommand over the washing machine.
+fn run_general(command: &GeneralCommand<WasherArguments>) -> Result<Exit, Error> {
+    match command {
+        GeneralCommand::Run(args) => run::run(args),
+        GeneralCommand::Check(args) => check::run(args),
+        GeneralCommand::Boundary(args) => boundary::run::<crate::Washer>(args),
+        GeneralCommand::Optimise(args) => optimise::run::<crate::Washer>(args),
+        GeneralCommand::Show(args) => show_engine::run(args, &show::FURTHER),
+        GeneralCommand::Plot(args) => plot::run(args),
+        GeneralCommand::Report(args) => {
+            let figures = WasherFigures::default();
+            report::run(args, &show::FURTHER, &crate::live::resonance_rows, &figures)
+        }
+        GeneralCommand::Require(args) => require::run(args),
+        GeneralCommand::Compare(args) => compare::run(args, crate::identity::BUILD),
+        GeneralCommand::Export(args) => export::run(args),
+        GeneralCommand::Status(args) => args.status(),
+        GeneralCommand::Merge(args) => args.merge(),
+        GeneralCommand::Parameters(args) => parameters::run::<crate::Washer>(args),
+        GeneralCommand::Schema(args) => schema::run(args),
     }
 }
 
