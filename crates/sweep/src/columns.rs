@@ -197,7 +197,7 @@ fn dwelt_columns(channels: &[Channel]) -> Vec<WasherColumn> {
     let text = "what that motion is, as in a file of `sweep dwell`, or that it left the model's \
                 range or did not settle";
     let kind = move |row: &ResultRow| Some(dwelt(row)?.kind);
-    columns.push(ResultColumn::name("dwell_kind", text, Ending::KIND_NAMES.to_vec(), kind));
+    columns.push(ResultColumn::name("dwell_kind", text, Ending::KINDS.to_vec(), kind));
     columns
 }
 

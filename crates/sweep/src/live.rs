@@ -109,7 +109,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         held_speeds_rpm,
         held_metrics: held_metrics.iter().map(|metric| metric.name().to_owned()).collect(),
         has_slow_growth,
-        motions: Ending::KIND_NAMES.map(str::to_owned).to_vec(),
+        motions: Ending::KINDS.map(str::to_owned).to_vec(),
         has_static_sag: plan.model.measures.metrics.contains(&Metric::StaticSag),
         kinds: Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
         compared: plan.reliability.channels.iter().map(|channel| channel.index()).collect(),

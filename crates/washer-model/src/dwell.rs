@@ -1,4 +1,4 @@
-//! Attractors of a machine held at a speed: its motions, by trajectories from many starts.
+//! What a machine held at a speed ends in: its motions, by trajectories from many starts.
 //!
 //! A search, not a proof: a motion that no start leads to is not found.
 
@@ -30,15 +30,11 @@ use std::sync::Arc;
 
 pub use exponent::Exponent;
 
-/// The relative difference of largest deviations, in all channels, within which motions are one.
-/// Basis: windows of a settled motion differ by a third of it. Doubling it takes near motions for
-/// one.
+/// Motions are the same whose largest deviations agree to this share in all channels; chaotic ones,
+/// of which no two stretches agree, and those that have not settled, to the second. What has not
+/// settled is on its way to a motion that has, if they agree to the third.
 const SAME: f64 = 0.01;
-/// That of chaotic motions, of which no two stretches agree, and of those that have not settled.
-/// Basis: stretches of chaos differ by less. Doubling it takes any two for one.
 const SAME_ROUGHLY: f64 = 0.5;
-/// That of a motion that has not settled and one that has, on its way to which it is. Basis: it is
-/// between both others. Doubling it takes other motions for such.
 const SAME_NEARLY: f64 = 0.05;
 
 /// Rounds in which the gap between a kick that comes back and one that does not is halved.
@@ -47,11 +43,11 @@ const HALVINGS: usize = 5;
 /// From where and for how long motions are looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Starts {
-    /// The least number of starts, the disturbed responses among them.
+    /// How many at least, the disturbed responses among them.
     pub count: usize,
     /// The hardest kick (rad/s of the tub's rocking).
     pub kick_rad_per_s: f64,
-    /// The longest time of a trajectory (s).
+    /// How long a trajectory may take (s).
     pub longest_s: f64,
     /// Whether to look for the smallest kick that does not come back.
     pub with_threshold: bool,
@@ -71,7 +67,7 @@ impl Default for Starts {
     }
 }
 
-/// The end of a trajectory.
+/// How a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum State {
     /// It settled.
@@ -85,13 +81,13 @@ pub enum State {
     NotSettled,
     /// It wandered as chaos does, but trajectories from its own states ended elsewhere.
     Transient {
-        /// The mean life (s): the time that these trajectories took together, by the number of
+        /// Its mean life (s): the time that these trajectories took together, by the number of
         /// those that ended.
         life_s: f64,
     },
 }
 
-/// The kind of a motion that has settled.
+/// What a motion settled into.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settled {
     /// It repeats.
@@ -113,11 +109,11 @@ pub enum Settled {
 /// A motion that a held speed ends in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending {
-    /// The end of its first trajectory.
+    /// How its first trajectory ended.
     pub state: State,
-    /// The kind, once it has settled.
+    /// What it is, once it has settled.
     pub settled: Option<Settled>,
-    /// The number of starts that ended in it; none where only a transient did.
+    /// How many starts ended in it; none where only a transient did.
     pub starts: u32,
     /// The smallest kick (rad/s) off the response that led to it: 0 where a disturbed response did,
     /// none where only a kick of the machine at rest, a transient or a carried state did.
@@ -127,20 +123,20 @@ pub struct Ending {
     pub peaks: [f64; CHANNELS],
     /// Least gap between drum and tub at the ends of steps of these turns (m).
     pub min_gap_m: f64,
-    /// The rate at which neighbours part: of periodic motions by their multipliers, without an
-    /// error; of others by a perturbed run, where their spectrum does not say what they are.
+    /// How fast neighbours part: of periodic motions by their multipliers, without an error; of
+    /// others by a perturbed run, where their spectrum does not say what they are.
     pub exponent: Option<Exponent>,
-    /// The time that the trajectory was followed (s).
+    /// How long the trajectory was followed (s).
     pub time_s: f64,
-    /// The last state where the unbalance is up: coordinates (m, rad), then their speeds (per s).
+    /// Its last state where the unbalance is up: coordinates (m, rad), then their speeds (per s).
     pub end: [f64; STATES],
     /// Such states, once a turn, of its last 256 turns at most; coordinates from equilibrium.
     pub sections: Vec<[f64; STATES]>,
-    /// The records that [`Starts::wanted`] asks for, over 128 further turns.
+    /// What [`Starts::wanted`] asks for, over 128 further turns.
     pub extra: Reading,
 }
 
-/// The motions that were found at a speed.
+/// What was found at a speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Endings {
     /// The periodic responses: none where none was found, and the machine then starts from rest.
@@ -148,7 +144,7 @@ pub struct Endings {
     /// The motions in the order in which starts led to them: the first is the one that the
     /// disturbed periodic response ends in.
     pub motions: Vec<Ending>,
-    /// The number of starts.
+    /// How many starts there were.
     pub starts: u32,
     /// The smallest kick (rad/s) that does not come back to the first motion, of those that were
     /// tried; none where all do, or it was not asked for.
@@ -171,8 +167,7 @@ pub fn endings(
     endings_beside(simd, dwells, respond(dwells, is_stopped), carried, starts, is_stopped)
 }
 
-/// Finds what [`endings`] does, of dwells whose periodic responses are known, as [`respond`] gives
-/// them.
+/// As [`endings`], of dwells whose periodic responses are known, as [`respond`] gives them.
 ///
 /// # Errors
 /// As there.
@@ -246,8 +241,7 @@ fn record<'a, 'f>(
 ) where
     'a: 'f,
 {
-    let mut motions = Vec::new();
-    let mut held = Vec::new();
+    let (mut motions, mut held) = (Vec::new(), Vec::new());
     for (endings, row) in found {
         let within = |motion: &&mut Ending| !matches!(motion.state, State::LeftRange { .. });
         for motion in endings.motions.iter_mut().filter(within) {
@@ -342,7 +336,7 @@ struct Hunt<'a> {
     starts: usize,
     /// The number of a chaotic course, and those of the courses from its states.
     survivors: Vec<(usize, core::ops::Range<usize>)>,
-    /// The sizes, by direction along mode shapes, of kicks that come back and that do not (rad/s).
+    /// By direction along mode shapes, sizes of kicks that come back and that do not (rad/s).
     brackets: [Option<[f64; 2]>; MODE_DIRECTIONS],
     /// The smallest kick in a random direction that does not come back (rad/s).
     random_gone: Option<f64>,
@@ -425,10 +419,10 @@ impl<'a> Hunt<'a> {
     /// Returns the trajectories from states of the motion that a course is in.
     fn survivors_of(&self, course: usize) -> Option<core::ops::Range<usize>> {
         let ending = self.courses[course].ending();
-        let has_survived = |(other, _): &&(usize, core::ops::Range<usize>)| {
+        let of_same = |(other, _): &&(usize, core::ops::Range<usize>)| {
             are_same(&self.courses[*other].ending(), &ending)
         };
-        self.survivors.iter().find(has_survived).map(|(_, survivors)| survivors.clone())
+        self.survivors.iter().find(of_same).map(|(_, survivors)| survivors.clone())
     }
 
     /// Calls what is chaotic a transient where one of the trajectories from its states ended
@@ -454,7 +448,7 @@ impl<'a> Hunt<'a> {
         are_same(&self.courses[0].ending(), &self.courses[course].ending())
     }
 
-    /// Returns the kicks, for every direction, between which some stop coming back.
+    /// Of every direction the kicks between which some stop coming back.
     fn bracket(&mut self) {
         for (course, origin) in self.origins.iter().enumerate() {
             if let Origin::Kicked((direction, size)) = *origin
@@ -564,8 +558,8 @@ impl Endings {
 }
 
 impl Ending {
-    /// The names of motions: in words what they do once a turn, then why that is not known.
-    pub const KIND_NAMES: [&str; 8] = [
+    /// What motions are, by name: in words what they do once a turn, then why that is not known.
+    pub const KINDS: [&str; 8] = [
         "periodic",
         "periodic_2",
         "periodic_m",
@@ -576,7 +570,7 @@ impl Ending {
         "not_settled",
     ];
 
-    /// Returns the position in [`Self::KIND_NAMES`].
+    /// Its position in [`Self::KINDS`].
     pub fn kind(&self) -> usize {
         match (self.settled, self.state) {
             (Some(Settled::Periodic { turns }), _) => (turns as usize).min(3) - 1,
@@ -588,8 +582,8 @@ impl Ending {
         }
     }
 
-    /// Counts another start that ended here. Of chaotic motions, and of what has not settled, the
-    /// largest deviations are those of all starts.
+    /// Another start ended here. Of chaotic motions, and of what has not settled, the largest
+    /// deviations are those of all starts.
     fn also(&mut self, other: &Self) {
         let starts = self.starts + 1;
         let kicks = [self.least_kick_rad_per_s, other.least_kick_rad_per_s];

@@ -22,7 +22,7 @@ pub(crate) struct DwellRow {
 
 pub(crate) type DwellColumn = ResultColumn<DwellRow>;
 
-/// Number of the kinds of settled motions, which are the first of [`Ending::KIND_NAMES`].
+/// Number of the kinds of settled motions, which are the first of [`Ending::KINDS`].
 const SETTLED_KINDS: usize = 5;
 
 /// The statuses of rows.
@@ -168,7 +168,7 @@ pub(crate) fn columns(
     columns.push(ResultColumn::name(
         "kind",
         text,
-        Ending::KIND_NAMES[..SETTLED_KINDS].to_vec(),
+        Ending::KINDS[..SETTLED_KINDS].to_vec(),
         DwellRow::kind,
     ));
     let text = "after how many turns it repeats; null where it does not";

@@ -1,4 +1,4 @@
-//! The report of a fit: one structure, as text and as JSON.
+//! What a fit has to say: one structure, as text and as JSON.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::model::{Against, Problem};
 use super::search::Descent;
 use super::speed::Smoothed;
 use super::statistics::{Statistics, Z_975};
-use super::verdict::{FittedVerdict, OnMap};
+use super::verdict::{OnMap, Verdict};
 use crate::config;
 use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, span, table};
@@ -19,19 +19,16 @@ use sweep_engine::config::section::counted;
 
 /// Between which share of two units a signal is taken for one in the other.
 const UNIT_SLACK: f64 = 1.5;
-/// The part of a fixed number's tolerance below which the record limits its error. Basis: less of a
-/// limit does not show in two digits of an interval. Doubling it says so of every number.
-const SEEN_RATIO: f64 = 0.9;
-/// The objection to a search that came to no end.
+/// What is said of a search that came to no end.
 const UNSETTLED: &str = "not known: the search did not come to its end, so no intervals; expected \
                          a nearer start (`--set NAME=VALUE`), ranges, or fewer `--free`";
 
 /// Numbers by the name of their column.
 type ByColumn<T> = BTreeMap<String, T>;
 
-/// The result of a fit. Numbers that are not known are null.
+/// What a fit found. Numbers that are not known are null.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct FitReport {
+pub(crate) struct Report {
     /// Whether the model is known to follow the measurement within its noise. If not, there are no
     /// intervals.
     pub(crate) follows: bool,
@@ -40,10 +37,12 @@ pub(crate) struct FitReport {
     pub(crate) parameters: Vec<Fit>,
     /// Row by row in the order of the parameters.
     pub(crate) correlations: Vec<Vec<f64>>,
-    /// Statements of what the data cannot tell.
+    /// What the data cannot tell, in words.
     pub(crate) untold: Vec<String>,
     /// The number of fixed numbers that have a tolerance.
     pub(crate) fixed_numbers: usize,
+    /// Whether these tolerances widen intervals.
+    pub(crate) is_widened: bool,
     /// The first file's entries, as in `files`.
     #[serde(flatten)]
     pub(crate) first: OfFile,
@@ -56,9 +55,9 @@ pub(crate) struct FitReport {
     pub(crate) evaluations: usize,
     /// The integration's step (s), if it is fixed.
     pub(crate) step_s: Option<f64>,
-    /// The number of standard errors by which half the step moves the number that it moves most.
+    /// By how many standard errors half the step moves the number that it moves most.
     pub(crate) step_effect: Option<f64>,
-    /// Notes on units, clocks and gaps.
+    /// What else a reader should know.
     pub(crate) notes: Vec<String>,
 }
 
@@ -72,13 +71,13 @@ pub(crate) struct Fit {
     pub(crate) start: f64,
     pub(crate) value: f64,
     pub(crate) standard_error: Option<f64>,
-    /// The standard error by the measurement's noise alone.
+    /// By the measurement's noise alone.
     pub(crate) noise_error: Option<f64>,
     /// The fixed number whose tolerance moves it most.
     pub(crate) depends_on: Option<Dependence>,
     /// No farther than its range.
     pub(crate) interval_95: Option<[f64; 2]>,
-    /// The interval by fits of resampled residuals, if they were asked for.
+    /// By the fits of resampled residuals, if they were asked for.
     pub(crate) bootstrap_95: Option<[f64; 2]>,
     /// Whether it is at an end of its range.
     pub(crate) at_bound: bool,
@@ -91,21 +90,19 @@ pub(crate) struct Dependence {
     pub(crate) unit: String,
     /// The standard deviation of the fixed number.
     pub(crate) tolerance: f64,
-    /// The error of the fixed number that the record leaves open.
-    pub(crate) error: f64,
-    /// The change of the fitted number by that error.
+    /// The change of the fitted number by an error of the fixed one of one standard deviation.
     pub(crate) moves_by: f64,
 }
 
 impl Fit {
-    /// Returns the name, with the file of a file's own.
+    /// Its name; of a file's own, with the file.
     fn label(&self) -> String {
         let file = self.file.iter().map(|file| format!(" ({file})"));
         std::iter::once(self.name.clone()).chain(file).collect()
     }
 }
 
-/// The report of a measurement.
+/// What is said of one measurement.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct OfFile {
     pub(crate) file: String,
@@ -113,24 +110,24 @@ pub(crate) struct OfFile {
     /// Standard deviation of the part of the residual that is noise.
     pub(crate) noise: ByColumn<f64>,
     pub(crate) offset: ByColumn<f64>,
-    /// The time (s) by which the model's clock is ahead.
+    /// By how much the model's clock is ahead (s).
     pub(crate) shift_s: Option<f64>,
     pub(crate) residual_rms: ByColumn<f64>,
     /// The part of the variance that the model explains.
     pub(crate) explained: ByColumn<f64>,
     /// Correlation of neighbouring residuals.
     pub(crate) autocorrelation: ByColumn<f64>,
-    /// The factor by which that widens variances.
+    /// By how much that widens variances.
     pub(crate) widening: ByColumn<f64>,
     /// Noise (rpm) and knots of the measured spin.
     pub(crate) spin: Option<Smoothed>,
     pub(crate) gaps_s: Vec<[f64; 2]>,
     /// The fitted machine, as a machine file has it.
     pub(crate) machine: Value,
-    pub(crate) verdict: Option<FittedVerdict>,
+    pub(crate) verdict: Option<Verdict>,
 }
 
-/// A minimum of the cost.
+/// One minimum.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Minimum {
     pub(crate) values: ByColumn<f64>,
@@ -139,8 +136,8 @@ pub(crate) struct Minimum {
     pub(crate) evaluations: usize,
 }
 
-/// The data that a report is made of.
-pub(super) struct ReportData<'a> {
+/// What a report is made of.
+pub(super) struct Found<'a> {
     pub(super) problem: &'a Problem<'a>,
     /// Columns that seem to be in another unit, each a clause.
     pub(super) suspicions: &'a [String],
@@ -155,9 +152,9 @@ pub(super) struct ReportData<'a> {
     pub(super) draws: u64,
 }
 
-impl ReportData<'_> {
-    /// Makes the report.
-    pub(super) fn report(&self) -> Result<FitReport, Error> {
+impl Found<'_> {
+    /// The whole.
+    pub(super) fn report(&self) -> Result<Report, Error> {
         let Self { problem, statistics, .. } = *self;
         let best = &self.minima[0];
         let unsettled = (!best.is_settled).then(|| UNSETTLED.to_owned());
@@ -166,7 +163,7 @@ impl ReportData<'_> {
             clauses.map(String::as_str).collect::<Vec<_>>().join("; ")
         });
         let follows = objection.is_none();
-        let covariance = statistics.free_covariance(problem);
+        let covariance = statistics.of_free(problem);
         let by_noise = statistics.by_noise(problem);
         let error = |k: usize| covariance[k][k].max(0.0).sqrt();
         let noise_error = |k: usize| by_noise[k][k].max(0.0).sqrt();
@@ -177,7 +174,7 @@ impl ReportData<'_> {
             _ => 0.0,
         };
         let correlations = |i: usize| (0..free).map(|j| correlation(i, j)).collect();
-        let files = (0..problem.cases.len()).map(|case| self.file_report(case, follows));
+        let files = (0..problem.cases.len()).map(|case| self.of_file(case, follows));
         let files = files.collect::<Result<Vec<OfFile>, Error>>()?;
         let parameters: Vec<Fit> =
             (0..free).map(|k| self.parameter(k, [error(k), noise_error(k)], follows)).collect();
@@ -186,12 +183,13 @@ impl ReportData<'_> {
             cost_above: descent.summary.cost - best.summary.cost,
             evaluations: descent.evaluations,
         };
-        Ok(FitReport {
+        Ok(Report {
             follows,
             objection,
             correlations: (0..free).map(correlations).collect(),
             untold: statistics.untold(problem, &best.x),
-            fixed_numbers: statistics.influences().len(),
+            fixed_numbers: statistics.influences.len(),
+            is_widened: statistics.is_widened,
             first: files[0].clone(),
             files,
             minima: self.minima.iter().map(minimum).collect(),
@@ -213,10 +211,7 @@ impl ReportData<'_> {
         let at_bound = free.range.contains(&value);
         let known = follows && !at_bound && error > 0.0;
         let [least, most] = self.problem.range(k);
-        let by_noise = self.statistics.quantiles[k] * noise_error;
-        let by_fixed = Z_975 * Z_975 * (error * error - noise_error * noise_error).max(0.0);
-        let reach = (by_noise * by_noise + by_fixed).sqrt();
-        let reached = [(value - reach).max(least), (value + reach).min(most)];
+        let reached = [(value - Z_975 * error).max(least), (value + Z_975 * error).min(most)];
         Fit {
             name: free.parameter.name().to_owned(),
             unit: free.parameter.unit().to_owned(),
@@ -234,18 +229,17 @@ impl ReportData<'_> {
 
     /// Returns the strongest dependence of a free number on a fixed one.
     fn dependence(&self, k: usize) -> Option<Dependence> {
-        let influences = self.statistics.influences().iter();
+        let influences = self.statistics.influences.iter();
         let strongest = influences.max_by(|a, b| a.moves[k].abs().total_cmp(&b.moves[k].abs()))?;
         Some(Dependence {
             name: strongest.name.clone(),
             unit: strongest.unit.to_owned(),
             tolerance: strongest.tolerance,
-            error: strongest.error,
             moves_by: strongest.moves[k],
         })
     }
 
-    fn file_report(&self, case: usize, follows: bool) -> Result<OfFile, Error> {
+    fn of_file(&self, case: usize, follows: bool) -> Result<OfFile, Error> {
         let problem = self.problem;
         let x = &self.minima[0].x;
         let measured = &problem.cases[case].measured;
@@ -275,7 +269,7 @@ impl ReportData<'_> {
         })
     }
 
-    /// Returns notes on units, clocks and gaps.
+    /// What else a reader should know.
     fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         // The start may be wrong by as much as a unit. Where channels of several units follow, it
@@ -337,8 +331,8 @@ impl ReportData<'_> {
     }
 }
 
-impl FitReport {
-    /// Formats the report as a command prints it.
+impl Report {
+    /// As a command prints it.
     pub(crate) fn text(&self) -> String {
         let short = |value: f64| {
             if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
@@ -378,15 +372,9 @@ impl FitReport {
         self.untold.iter().for_each(|untold| say("untold", untold));
         for fit in &self.parameters {
             let Some(on) = &fit.depends_on else { continue };
-            let error = format!("{} {}", short(on.error), on.unit);
-            // The record says nothing of an error as large as the tolerance.
-            let limit = if on.error < SEEN_RATIO * on.tolerance {
-                format!(" (of {}: the record limits it)", short(on.tolerance))
-            } else {
-                String::new()
-            };
+            let error = format!("{} {}", short(on.tolerance), on.unit);
             let effect = format!(
-                "{} on {}: an error of {}{limit} moves it by {} {}, most of {}",
+                "{} on {}: an error of {} moves it by {} {}, most of {}",
                 fit.label(),
                 on.name,
                 error.trim_end(),
@@ -395,7 +383,12 @@ impl FitReport {
                 counted(self.fixed_numbers, "fixed number"),
             );
             let noise = fit.noise_error.map_or_else(|| "-".to_owned(), short);
-            say("depends", &format!("{effect}; by noise alone its standard error is {noise}"));
+            let interval = if self.is_widened {
+                format!("; by noise alone its standard error is {noise}")
+            } else {
+                "; intervals take these as exact (`--known`)".to_owned()
+            };
+            say("depends", &(effect + &interval));
         }
         if self.follows && self.fixed_numbers == 0 && !self.parameters.is_empty() {
             say("depends", "on nothing: fixed numbers are taken as exact");

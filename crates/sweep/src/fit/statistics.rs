@@ -1,27 +1,22 @@
-//! Errors of fitted numbers, and whether the model follows the data at all.
+//! How well numbers are known, and whether the model follows the data at all.
 
-use super::algebra::{Symmetric, centred, dot, inverse, scaled};
-use super::known::{FixedInfluence, FixedInfluences};
+use super::algebra::{Symmetric, add_outer, centred, dot, inverse, scaled};
+use super::known::Influence;
 use super::measured::Signal;
 use super::model::{Against, Problem, Summary};
 
-/// The greatest lag of a residual's autocorrelation. Basis: a second at some hundred samples a
-/// second. Doubling it sees slower noise, and doubles the time.
+/// Most lags of a residual's autocorrelation that are looked at.
 const MOST_LAGS: usize = 400;
-/// The shortest time of a motion of a suspension, as a share of the drum's fastest turn. Basis:
-/// four times the fastest turn is above every mode. Doubling it leaves out faster motions.
+/// No motion of a suspension is faster than this share of the drum's fastest turn.
 const FASTEST: f64 = 0.25;
-/// The time within which every motion of a suspension swings back (s). Basis: modes of a suspension
-/// are faster than 1 Hz. Doubling it takes slower noise for a motion.
+/// Within this time every motion of a suspension swings back (s).
 const SLOWEST_S: f64 = 1.0;
-/// The number of standard deviations of a correlation that chance makes. Basis: in some ten
-/// thousand correlations none is larger. Doubling it sees motions of twice the size only.
+/// Standard deviations of a correlation that chance makes.
 const CHANCE: f64 = 4.0;
-/// The number of parts that each record is cut into. Basis: a part of the tests is a second, which
-/// a disturbance fills. Doubling it halves the shortest disturbance that is seen.
+/// Into how many parts each record is cut.
 const PARTS: usize = 24;
-/// The factor by which the variance of the parts' disagreement may exceed that by noise before the
-/// model does not follow. Basis: twice the noise's deviation. Doubling it lets worse models pass.
+/// By how much more parts of the record may disagree than noise makes them, before the model is
+/// said not to follow.
 const DISAGREEMENT: f64 = 4.0;
 /// The least part of a signal's variance that a model explains which follows it. Basis: a motion of
 /// the right size that lags by an angle explains the square of the angle's cosine at best. A half
@@ -33,11 +28,9 @@ pub(super) const EXPLAINED_RATIO: f64 = 0.5;
 /// suspension lasts longer than twenty samples, unless it is sampled twice a turn. Doubling it sees
 /// slower motions in more noise.
 const WHITE_LAGS: usize = 20;
-/// The greatest motion that may be left over, as a share of the signal. Basis: a tenth is seen in a
-/// figure. Doubling it lets worse models pass.
+/// How large a motion may be left over, as a share of the signal.
 const MOTION: f64 = 0.1;
-/// The number of standard errors by which the nonlinear model may move a number of the linear one.
-/// Basis: beyond it intervals would be wrong. Doubling it lets worse models pass.
+/// By how many standard errors the nonlinear model may move a number of the linear one.
 const BIAS: f64 = 1.0;
 /// The least part of a sample's freedom that is left beside its leverage. Basis: a sample that
 /// alone determines a number has none, and its residual says nothing of its noise. Doubling it
@@ -55,74 +48,65 @@ const TOGETHER: f64 = 0.95;
 /// Standard errors to either end of a 95 % interval: the normal distribution's quantile of 0.975.
 pub(super) const Z_975: f64 = 1.959_964;
 
-/// Statistics of the residuals at a fit.
+/// What the residuals at a fit say.
 pub(crate) struct Statistics {
     /// Covariance of the unknowns, by the residuals' own correlation in time.
     pub(crate) covariance: Vec<Vec<f64>>,
-    /// The quantile of 0.975 of each unknown's error over its standard error: Student's, by the
-    /// degrees of freedom of its variance.
-    pub(crate) quantiles: Vec<f64>,
-    /// The dependence of the unknowns on fixed numbers, which widens intervals.
-    pub(crate) influences: FixedInfluences,
-    /// The factor by which autocorrelation widens variances: for each signal, the variance of a
-    /// mean over that of independent samples.
+    /// The dependence of the unknowns on fixed numbers, the strongest first.
+    pub(crate) influences: Vec<Influence>,
+    /// Whether these widen intervals.
+    pub(crate) is_widened: bool,
+    /// By how much autocorrelation widens intervals: of each signal, the variance of a mean over
+    /// that of independent samples.
     pub(crate) widening: Vec<f64>,
-    /// The correlation of neighbouring residuals of each signal.
+    /// Of each signal: the correlation of neighbouring residuals.
     pub(crate) neighbours: Vec<f64>,
     /// The part of each signal's variance that the model explains.
     pub(crate) explained: Vec<f64>,
     /// Whether each signal's residual is white noise.
     pub(crate) is_white: Vec<bool>,
-    /// The variance of the parts' disagreement on the unknowns, over that by noise.
+    /// How much more the parts of the records disagree on the unknowns than noise makes them.
     pub(crate) disagreement: f64,
-    /// The residual of each signal that is a motion, as a share of the residual and of the signal,
+    /// Of each signal: the residual that is a motion, as a share of the residual and of the signal,
     /// mean squares.
     pub(crate) motion: Vec<[f64; 2]>,
-    /// The signal that is worst off, and the times (s) between which it is.
+    /// Of the signal that is worst off in it: signal, and the time (s) around which it is.
     pub(crate) worst: (usize, [f64; 2]),
-    /// The number of standard errors by which the nonlinear model would move each unknown of the
-    /// linear one.
+    /// By how many standard errors the nonlinear model would move each unknown of the linear one.
     pub(crate) bias: Option<Vec<f64>>,
 }
 
 impl Statistics {
-    /// Computes the statistics at the end of a descent.
+    /// At the end of a descent.
     pub(crate) fn of(problem: &Problem<'_>, against: &[Against], summary: &Summary) -> Self {
         let n = problem.unknowns();
         let bread = inverse(&summary.normal);
         let mut meat = vec![vec![0.0; n]; n];
         let mut own_meat = vec![vec![0.0; n]; n];
         let mut own_white_meat = vec![vec![0.0; n]; n];
-        let mut widening = Vec::new();
-        let mut neighbours = Vec::new();
-        let mut motion = Vec::new();
+        let (mut widening, mut neighbours, mut motion) = (Vec::new(), Vec::new(), Vec::new());
         let mut explained = Vec::new();
         let mut is_white = Vec::new();
-        let mut disagreement = 0.0;
-        let mut freedom = 0.0;
-        let mut spread = vec![VarianceEstimate::default(); n];
+        let (mut disagreement, mut freedom) = (0.0, 0.0);
         let mut worst = (0, [0.0; 2], 0.0);
         for (k, (((_, _, signal), one), sigma)) in
             problem.signals().zip(against).zip(&summary.sigma).enumerate()
         {
             let rho = autocorrelation(&one.residual);
-            let by_lags = correlated(&one.slopes, &rho, 1.0 / (sigma * sigma));
+            let of_signal = correlated(&one.slopes, &rho, 1.0 / (sigma * sigma));
             let plain = correlated(&one.slopes, &[1.0], 1.0 / (sigma * sigma));
             // Intervals are widened, never narrowed.
             let wider = (0..n).fold(1.0_f64, |most, i| {
-                if plain[i][i] > 0.0 { most.max(by_lags[i][i] / plain[i][i]) } else { most }
+                if plain[i][i] > 0.0 { most.max(of_signal[i][i] / plain[i][i]) } else { most }
             });
-            let narrower = (0..n).any(|i| by_lags[i][i] < plain[i][i]);
-            let own = if narrower { &plain } else { &by_lags };
+            let narrower = (0..n).any(|i| of_signal[i][i] < plain[i][i]);
+            let own = if narrower { &plain } else { &of_signal };
             add(&mut meat, own, if narrower { wider } else { 1.0 });
             let window = lag_window(&one.residual);
             let scores = scores(one, &bread, *sigma);
             add(&mut own_meat, &correlated(&scores, &window, 1.0), 1.0);
             add(&mut own_white_meat, &correlated(&scores, &[1.0], 1.0), 1.0);
             let noise = noise_scale(one, signal);
-            for (spread, row) in spread.iter_mut().zip(&bread) {
-                spread.add(one, row, &noise, wider / (sigma * sigma), &window);
-            }
             let square = dot(&one.residual, &one.residual);
             let swing = signal.swing();
             let case = &problem.cases[one.case];
@@ -134,7 +118,7 @@ impl Statistics {
             is_white.push(is_white_noise(&one.residual));
             neighbours.push(correlation(&one.residual, 1));
             widening.push(wider);
-            // Each part of the record pulls at the unknowns on its own.
+            // What each part of the record alone would pull at the unknowns.
             let count = one.residual.len();
             for part in 0..PARTS {
                 let range = part * count / PARTS..(part + 1) * count / PARTS;
@@ -176,17 +160,16 @@ impl Statistics {
         let sandwich = |meat: &[Vec<f64>]| product(&product(&bread, meat), &bread);
         let middle = widened(sandwich(&meat), &sandwich(&own_meat));
         let middle = widened(middle, &sandwich(&own_white_meat));
-        // Disagreement of the record's parts beyond their noise is an error of the unknowns.
+        // What parts of the record disagree on beyond their noise is not known any better.
         let covariance = middle
             .iter()
             .map(|row| row.iter().map(|x| x * disagreement.max(1.0)).collect())
             .collect();
         let worst = (worst.0, worst.1);
-        let quantiles = spread.iter().map(|spread| student_975(spread.freedom())).collect();
         Self {
             covariance,
-            quantiles,
-            influences: FixedInfluences::default(),
+            influences: Vec::new(),
+            is_widened: false,
             widening,
             neighbours,
             explained,
@@ -208,7 +191,7 @@ impl Statistics {
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Returns the reason why the model does not follow, if it does not.
+    /// Why the model does not follow, if it does not.
     pub(crate) fn objection(&self, problem: &Problem<'_>) -> Option<String> {
         let mut reasons = Vec::new();
         let named = |k: usize| {
@@ -218,12 +201,11 @@ impl Statistics {
             let percent = 100.0 * ratio.max(0.0);
             reasons.push(format!("the model explains {percent:.0} % of {}'s variance", named(k)));
         }
-        let shares = self.motion.iter().map(|[_, by_lags]| by_lags.sqrt()).enumerate();
+        let shares = self.motion.iter().map(|[_, of_signal]| of_signal.sqrt()).enumerate();
         if let Some((k, share)) = shares.max_by(|a, b| a.1.total_cmp(&b.1))
             && share > MOTION
         {
-            let percent = 100.0 * share;
-            let of = named(k);
+            let (percent, of) = (100.0 * share, named(k));
             reasons.push(format!("{percent:.0} % of {of} are left over as a motion, not as noise"));
         }
         if self.disagreement > DISAGREEMENT {
@@ -249,23 +231,25 @@ impl Statistics {
         Some(reasons.join(", and ") + &place)
     }
 
-    /// Returns the dependences on fixed numbers, the strongest first.
-    pub(super) fn influences(&self) -> &[FixedInfluence] {
-        &self.influences.numbers
+    /// Takes up what errors of the fixed numbers do to the unknowns, and whether that widens
+    /// intervals.
+    pub(super) fn take_influences(&mut self, influences: Vec<Influence>, is_widening: bool) {
+        self.influences = influences;
+        self.is_widened = is_widening;
     }
 
-    /// Returns the variance of each signal's noise over its independent samples.
-    pub(super) fn variances(&self, summary: &Summary) -> Vec<f64> {
-        let disagreement = self.disagreement.max(1.0);
-        let signals = summary.sigma.iter().zip(&self.widening);
-        signals.map(|(sigma, widening)| sigma * sigma * widening * disagreement).collect()
+    /// Returns the dependences on fixed numbers that widen intervals.
+    pub(super) fn widening_influences(&self) -> &[Influence] {
+        if self.is_widened { &self.influences } else { &[] }
     }
 
     /// Returns the covariance of the free numbers by the measurement's noise and the tolerances of
     /// the fixed numbers.
-    pub(crate) fn free_covariance(&self, problem: &Problem<'_>) -> Vec<Vec<f64>> {
+    pub(crate) fn of_free(&self, problem: &Problem<'_>) -> Vec<Vec<f64>> {
         let mut covariance = self.by_noise(problem);
-        add(&mut covariance, &self.influences.covariance, 1.0);
+        for influence in self.widening_influences() {
+            add_outer(&mut covariance, &influence.moves[..problem.free.len()], 1.0);
+        }
         covariance
     }
 
@@ -275,11 +259,11 @@ impl Statistics {
         self.covariance[..free].iter().map(|row| row[..free].to_vec()).collect()
     }
 
-    /// Returns what the data cannot tell, in words.
+    /// What the data cannot tell, in words.
     pub(crate) fn untold(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<String> {
         let covariance = self.by_noise(problem);
         let names: Vec<&str> = problem.free.iter().map(|free| free.parameter.name()).collect();
-        // Nothing is relative to a number that is 0.
+        // Of a number that is 0 nothing is relative.
         let greater = problem.free.iter().zip(x).map(|(free, x)| x.abs().max(free.start.abs()));
         let sizes: Vec<f64> = greater.map(|size| if size > 0.0 { size } else { 1.0 }).collect();
         let row = |(i, row): (usize, &Vec<f64>)| -> Vec<f64> {
@@ -342,8 +326,8 @@ fn widened(mut covariance: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Vec<Vec<f64>> {
         if variance > 0.0 { (other[k][k] / variance).max(1.0).sqrt() } else { 1.0 }
     };
     let ratios: Vec<f64> = (0..covariance.len()).map(ratio).collect();
-    for (row, row_ratio) in covariance.iter_mut().zip(&ratios) {
-        row.iter_mut().zip(&ratios).for_each(|(entry, ratio)| *entry *= row_ratio * ratio);
+    for (row, of_row) in covariance.iter_mut().zip(&ratios) {
+        row.iter_mut().zip(&ratios).for_each(|(entry, ratio)| *entry *= of_row * ratio);
     }
     covariance
 }
@@ -366,57 +350,6 @@ fn scores(one: &Against, bread: &[Vec<f64>], sigma: f64) -> Vec<Vec<f64>> {
         .collect();
     let score = |slope: &Vec<f64>| slope.iter().zip(&predicted).map(|(g, r)| g * r).collect();
     one.slopes.iter().map(score).collect()
-}
-
-/// The variance of an estimate, and the variance of that variance.
-///
-/// F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114; for variances by residuals
-/// G. W. Imbens, M. Kolesár, Review of Economics and Statistics 98 (2016), 701-712.
-#[derive(Clone, Debug, Default)]
-struct VarianceEstimate {
-    variance: f64,
-    half_variance: f64,
-}
-
-impl VarianceEstimate {
-    /// Adds a signal, by the row of the inverse of the normal matrix for the unknown, the noise of
-    /// each sample over its mean, the weight of a sample, and the window of its correlations.
-    fn add(&mut self, one: &Against, row: &[f64], noise: &[f64], weight: f64, window: &[f64]) {
-        let shares = noise.iter().enumerate().map(|(sample, noise)| {
-            let along = one.slopes.iter().zip(row);
-            let along: f64 = along.filter_map(|(slope, b)| Some(slope.get(sample)? * b)).sum();
-            weight * (along * noise).powi(2)
-        });
-        let mut sum = 0.0;
-        let mut squares = 0.0;
-        for share in shares {
-            sum += share;
-            squares += share * share;
-        }
-        // Correlations that are estimated beside the variance add their own errors: at a motion's
-        // frequency half as much as at none.
-        let lags = dot(window, window);
-        self.variance += sum;
-        self.half_variance += squares * lags;
-    }
-
-    /// Returns the degrees of freedom of the variance.
-    fn freedom(&self) -> f64 {
-        self.variance * self.variance / self.half_variance.max(f64::MIN_POSITIVE)
-    }
-}
-
-/// Returns Student's quantile of 0.975, by Cornish and Fisher's expansion: within 1 % from three
-/// degrees of freedom, fewer are taken as three.
-///
-/// M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 26.7.5.
-fn student_975(freedom: f64) -> f64 {
-    let z = Z_975;
-    let inverse = 1.0 / freedom.max(3.0);
-    let first = (z.powi(3) + z) / 4.0;
-    let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0;
-    let third = (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0;
-    z + inverse * (first + inverse * (second + inverse * third))
 }
 
 /// Estimates the standard deviation of a residual's noise at every sample, over its mean: its
@@ -442,8 +375,7 @@ fn product(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
     a.iter().map(|row| b.iter().map(|column| dot(row, column)).collect()).collect()
 }
 
-/// Computes the sum over all pairs of samples of slope, correlation by lag and slope, times a
-/// weight.
+/// Sum over all pairs of samples of slope, correlation by lag, slope; once over the noise squared.
 fn correlated(slopes: &[Vec<f64>], rho: &[f64], weight: f64) -> Vec<Vec<f64>> {
     let n = slopes.len();
     let mut sum = vec![vec![0.0; n]; n];
@@ -462,8 +394,8 @@ fn correlated(slopes: &[Vec<f64>], rho: &[f64], weight: f64) -> Vec<Vec<f64>> {
     sum
 }
 
-/// Returns the correlation of values with those so many places later; as if they were even in time,
-/// which gaps only interrupt.
+/// The correlation of values with those so many places later; as if they were even in time, which
+/// gaps only interrupt.
 fn correlation(values: &[f64], lag: usize) -> f64 {
     dot(values, &values[lag..]) / dot(values, values).max(f64::MIN_POSITIVE)
 }
@@ -479,8 +411,8 @@ fn is_white_noise(residual: &[f64]) -> bool {
     residual.len() as f64 * squares <= expected + CHANCE * (2.0 * expected).sqrt()
 }
 
-/// Returns the autocorrelation by lag, tapered to nothing where it is no more than chance. The
-/// taper's flat top keeps what slow noise has: Bartlett's would take a third.
+/// The autocorrelation by lag, tapered to nothing where it is no more than chance. The taper's flat
+/// top keeps what slow noise has: Bartlett's would take a third.
 ///
 /// D. N. Politis, J. P. Romano, Journal of Time Series Analysis 16 (1995), 67-103.
 fn autocorrelation(residual: &[f64]) -> Vec<f64> {
@@ -496,8 +428,7 @@ fn lag_window(residual: &[f64]) -> Vec<f64> {
     // White's variance of a correlation: of noise that is greater at times fewer values count.
     let chance = |lag: usize| 2.0 * dot(&squares, &squares[lag..]).sqrt() / total;
     let most = MOST_LAGS.min(residual.len() / 4);
-    let mut last = 0;
-    let mut lag = 1;
+    let (mut last, mut lag) = (0, 1);
     while lag < most && lag <= last + 5 {
         if correlation(residual, lag).abs() > chance(lag) {
             last = lag;
@@ -508,9 +439,8 @@ fn lag_window(residual: &[f64]) -> Vec<f64> {
     std::iter::once(1.0).chain((1..most.min(2 * last)).map(taper)).collect()
 }
 
-/// Returns the share of a residual's mean square that is a motion: as much as it swings back, if
-/// that is more than chance. Noise may be slow, but does not swing; and hum is faster than a
-/// suspension.
+/// The share of a residual's mean square that is a motion: as much as it swings back, if that is
+/// more than chance. Noise may be slow, but does not swing; and hum is faster than a suspension.
 fn swinging(residual: &[f64], rate_hz: f64, turn_s: f64) -> f64 {
     let block = ((FASTEST * turn_s * rate_hz) as usize).clamp(1, residual.len());
     let mean = |some: &[f64]| some.iter().sum::<f64>() / block as f64;
@@ -557,8 +487,7 @@ mod tests {
 
     #[test]
     fn a_motion_is_told_from_noise_and_hum() {
-        let rate_hz = 500.0;
-        let turn_s = 60.0 / 350.0;
+        let (rate_hz, turn_s) = (500.0, 60.0 / 350.0);
         let tone = |hz: f64| move |k: usize| (TAU * hz * k as f64 / rate_hz).sin();
         for correlation in [0.0, 0.6, 0.9, 0.97] {
             let noise = noise(5, 0, 12_000, correlation);

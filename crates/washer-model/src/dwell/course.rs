@@ -1,4 +1,4 @@
-//! A trajectory at a constant speed, turn by turn until what is seen of it no longer changes.
+//! One trajectory at a constant speed, turn by turn until what is seen of it no longer changes.
 
 use super::exponent::apart;
 use super::hold::{Held, Turn};
@@ -18,32 +18,24 @@ pub(super) const WINDOW: usize = 128;
 /// The longest period, in turns.
 const LONGEST_PERIOD: usize = 16;
 
-/// The number of turns that must repeat. Basis: twice the longest period. Doubling it doubles the
-/// least time to settle.
+/// Turns that must repeat, and how well: soon, or once the windows are alike.
 const REPEATING: usize = 32;
-/// The share of the motion's size to which turns repeat that have settled. Basis: a tenth of what
-/// files are compared to. Doubling it settles sooner.
 const REPEATS: f64 = 1e-4;
-/// That share once the windows are alike. Basis: ten times the first. Doubling it takes slow
-/// beats for periods.
 const ROUGHLY_REPEATS: f64 = 1e-3;
 
 /// A motion has a longer period where it misses shorter ones by this much more; else it still
 /// settles.
 const CLEARLY: f64 = 20.0;
 
-/// The share of its size that a motion that repeats may have to go when it has settled. Basis: less
-/// than half of what references are compared to. Doubling it settles sooner.
+/// A motion that repeats has settled where it has less than this share of its size to go.
+/// Changes that shrink by less than the second in [`REPEATING`] / 2 turns are taken to shrink by
+/// that.
 const TO_GO: f64 = 2e-3;
-/// The least part by which changes are taken to shrink in [`REPEATING`] / 2 turns. Basis: slower
-/// ones would take longer than any trajectory. Doubling it settles sooner.
 const SLOWEST: f64 = 1e-3;
 
-/// The relative difference of largest deviations below which windows are alike. Basis: a third of
-/// what tells motions apart. Doubling it settles sooner.
+/// Windows are alike whose largest deviations differ by less than this share; those of chaotic
+/// motions by less than the second.
 const ALIKE: f64 = 3e-3;
-/// That of chaotic motions. Basis: their windows differ by less. Doubling it takes a transient for
-/// chaos.
 const ROUGHLY_ALIKE: f64 = 0.4;
 
 /// The first window after which a motion that does not settle is asked for its exponent; each next
@@ -53,18 +45,14 @@ const FIRST_ASKED: usize = 4;
 /// A spectrum whose strongest line and multiples leave less than this share is of two frequencies.
 const TWO_LINES: f64 = 0.1;
 
-/// A motion that repeats this well, or has a line this strong, is on its way from one motion to
-/// another where neighbours part: chaos does neither.
+/// What repeats this well, or has a line this strong, is on its way from one motion to another
+/// where neighbours part: chaos does neither.
 const ON_ITS_WAY: [f64; 2] = [0.05, 0.3];
 
-/// The share of its size to which a motion near an unstable response is not settled. Basis: it
-/// leaves from there by any disturbance. Doubling it takes small motions for leaving ones.
-const LEAVING_SHARE: f64 = 1e-2;
-/// That share while windows are farther and farther from the response. Basis: half of it is farther
-/// than any start. Doubling it takes large motions for leaving ones.
-const DEPARTING_SHARE: f64 = 0.5;
-/// The factor by which a window is then farther from the response than the one before. Basis:
-/// beyond the difference of windows that are alike. Doubling its excess misses slow departures.
+/// Closer than the first share to an unstable response nothing is settled; nor closer than the
+/// second while a window is farther from it than the one before, by more than the third.
+const CLOSE: f64 = 1e-2;
+const NEAR: f64 = 0.5;
 const FARTHER: f64 = 1.02;
 
 /// The time (s) that trajectories from states of a chaotic motion have to stay in it, and the
@@ -73,11 +61,9 @@ const FARTHER: f64 = 1.02;
 /// `chaos_survives_or_is_a_transient` has it. Doubling either halves the rate of escape that is
 /// seen with the same probability.
 const SURVIVAL_S: f64 = 240.0;
-/// The number of these trajectories, on the basis of [`SURVIVAL_S`]. Doubling it doubles what chaos
-/// costs.
 const SURVIVORS: usize = 8;
 
-/// The next need of a trajectory.
+/// What a trajectory needs next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Need {
     Turns,
@@ -159,7 +145,7 @@ impl<'a> Course<'a> {
         self.settled.is_some() || matches!(self.state, State::LeftRange { .. })
     }
 
-    /// Returns the next [`BLOCK`] turns.
+    /// Its next [`BLOCK`] turns.
     pub(super) fn take(&mut self, turns: Vec<Turn>) {
         self.made += turns.len();
         if turns.len() < BLOCK {
@@ -225,7 +211,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// Returns how fast its neighbours part.
+    /// How fast its neighbours part.
     pub(super) fn take_exponent(&mut self, exponent: Option<Exponent>) {
         (self.need, self.exponent) = (Need::Turns, exponent);
         self.asked_from = 2 * self.made;
@@ -257,7 +243,7 @@ impl<'a> Course<'a> {
         core::array::from_fn(|i| state[i] - rest.get(i).copied().unwrap_or(0.0))
     }
 
-    /// Returns the state where it ended.
+    /// Where it ended.
     pub(super) fn ending(&self) -> Ending {
         let of = match self.settled {
             Some(Settled::Periodic { .. }) => REPEATING,
@@ -294,7 +280,7 @@ impl<'a> Course<'a> {
             let farthest = |turns: &[Turn]| turns.iter().map(of).fold(0.0, f64::max);
             let now = farthest(after);
             let then = farthest(&before[before.len() - window..]);
-            now < LEAVING_SHARE || (now < DEPARTING_SHARE && now > FARTHER * then)
+            now < CLOSE || (now < NEAR && now > FARTHER * then)
         })
     }
 
@@ -305,7 +291,7 @@ impl<'a> Course<'a> {
         are_alike(&peaks(before), &peaks(after), share)
     }
 
-    /// Returns after how many turns the last ones repeat, to this share of the motion's size.
+    /// After how many turns the last ones repeat, to this share of the motion's size.
     fn period(&self, share: f64) -> Option<u32> {
         let first = self.turns.len().checked_sub(REPEATING)?;
         let of = |turn: &Turn| size(self.held.row.point, &turn.end);
@@ -320,13 +306,13 @@ impl<'a> Course<'a> {
         (1..=LONGEST_PERIOD).find(repeats).map(|period| period as u32)
     }
 
-    /// Returns what [`Self::period`] does where shorter ones are clearly none.
+    /// As [`Self::period`], where shorter ones are clearly none.
     fn clear_period(&self, share: f64) -> Option<u32> {
         let period = self.period(share)?;
         (self.period(CLEARLY * share) == Some(period)).then_some(period)
     }
 
-    /// Returns how far it is, as a share of its size, from where it comes to if each change between
+    /// How far it is, as a share of its size, from where it comes to if each change between
     /// stretches of whole periods is as large a part of the last as that was of the one before.
     fn to_go(&self, period: u32) -> f64 {
         let stretch = REPEATING / 2 / period as usize * period as usize;
@@ -336,14 +322,12 @@ impl<'a> Course<'a> {
                 |k: usize| apart(&self.held.row, &self.turns[k].end, &self.turns[k + stretch].end);
             (from..from + stretch).map(of).fold(0.0, f64::max)
         };
-        let then = change(first);
-        let now = change(first + stretch);
+        let (then, now) = (change(first), change(first + stretch));
         let part = (now / then).min(1.0 - SLOWEST);
         now * part / (1.0 - part) / size(self.held.row.point, &self.held.state)
     }
 
-    /// Returns two frequencies, if their lines leave no more than this share of yaw and pitch once
-    /// a turn.
+    /// Two frequencies, if their lines leave no more than this share of yaw and pitch once a turn.
     fn two_frequencies(&self, most: f64) -> Option<Settled> {
         let signal = |i: usize| -> Vec<f64> { self.turns.iter().map(|turn| turn.end[i]).collect() };
         let line = strongest(&[signal(TUB_YAW), signal(TUB_PITCH)])?;

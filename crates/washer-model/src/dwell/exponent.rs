@@ -7,25 +7,20 @@ use crate::stability::orbit::Row;
 use core::f64::consts::TAU;
 use lane_ode::Simd;
 
-/// The distance of a twin, as a share of the greatest coordinate. Basis: far from rounding, and so
-/// small that the twin stays in the tangent space for a part. Doubling it changes nothing.
-const TWIN_DISTANCE: f64 = 1e-7;
+/// How close a twin is, as a share of the greatest coordinate.
+const CLOSE: f64 = 1e-7;
 
-/// The number of turns before any count. Basis: the twin has turned to the direction that grows.
-/// Doubling it costs as many more.
+/// Turns before any count, and turns that do, in parts whose scatter gives the error.
 const FIRST_TURNS: usize = 16;
-/// The number of parts whose scatter gives the error. Basis: it is known to a quarter. Doubling it
-/// doubles the time.
 const PARTS: usize = 8;
-/// The number of turns of a part. Basis: twice the longest period. Doubling it doubles the time.
 const TURNS_A_PART: usize = 32;
 
-/// The rate at which neighbours part.
+/// How fast neighbours part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exponent {
     /// Largest Lyapunov exponent (1/s).
     pub per_s: f64,
-    /// The standard error (1/s), from the scatter of its parts.
+    /// Its standard error (1/s), from the scatter of its parts.
     pub error_per_s: f64,
 }
 
@@ -36,8 +31,7 @@ impl Exponent {
     }
 }
 
-/// Returns how far two states are apart, in the tub's coordinates (m, rad) and their speeds by the
-/// drum's.
+/// How far two states are apart, in the tub's coordinates (m, rad) and their speeds by the drum's.
 pub(super) fn apart(row: &Row<'_>, a: &[f64; STATES], b: &[f64; STATES]) -> f64 {
     let speed = row.speed_rpm * TAU / 60.0;
     let gap = |&i: &usize| {
@@ -47,14 +41,14 @@ pub(super) fn apart(row: &Row<'_>, a: &[f64; STATES], b: &[f64; STATES]) -> f64 
     TUB.iter().map(gap).fold(0.0, f64::max)
 }
 
-/// Computes the exponent of each from here on, with a direction of speeds in which the twin starts
-/// off; none where one leaves the model's range.
+/// Of each the exponent from here on, with a direction of speeds in which the twin starts off; none
+/// where one leaves the model's range.
 pub(super) fn exponents(
     simd: Simd,
     asked: &[(Held<'_>, [f64; COORDINATES])],
 ) -> Vec<Option<Exponent>> {
     let close: Vec<f64> =
-        asked.iter().map(|(held, _)| TWIN_DISTANCE * size(held.row.point, &held.state)).collect();
+        asked.iter().map(|(held, _)| CLOSE * size(held.row.point, &held.state)).collect();
     let mut pairs = Vec::with_capacity(2 * asked.len());
     for ((held, direction), close) in asked.iter().zip(&close) {
         let speed = held.row.speed_rpm * TAU / 60.0;

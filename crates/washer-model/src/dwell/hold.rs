@@ -13,11 +13,11 @@ use lane_ode::{Kernel, Lane, N, Simd, System as _};
 #[derive(Clone, Copy)]
 pub(super) struct Held<'a> {
     pub(super) row: Row<'a>,
-    /// The state where the unbalance is up: coordinates (m, rad), then their speeds (per s).
+    /// Where the unbalance is up: coordinates (m, rad), then their speeds (per s).
     pub(super) state: [f64; STATES],
 }
 
-/// The record of a turn.
+/// What is seen of a turn.
 #[derive(Clone, Debug)]
 pub(super) struct Turn {
     /// The state at its end.
@@ -28,14 +28,14 @@ pub(super) struct Turn {
     pub(super) gap_m: f64,
 }
 
-/// Integrates so many turns of each; fewer where one leaves the model's range. They share lanes of
-/// `simd` at most, and what is found of one does not depend on the others.
+/// So many turns of each; fewer where one leaves the model's range. They share lanes of `simd` at
+/// most, and what is found of one does not depend on the others.
 pub(super) fn hold(simd: Simd, held: &[Held<'_>], turns: usize) -> Vec<Vec<Turn>> {
     let found = recorded(simd, held, turns, Recorders::default());
     found.into_iter().map(|(turns, _)| turns).collect()
 }
 
-/// Integrates as [`hold`] does, with further records of these turns if any are wanted.
+/// As [`hold`], with further records of these turns if any are wanted.
 pub(super) fn recorded(
     simd: Simd,
     held: &[Held<'_>],
@@ -103,10 +103,10 @@ fn hold_lanes<T: Lane>(
         turn(&model, &clock, &mut states, Some(&mut watched));
         let in_range = T::bits(model.in_range(&states[0]));
         for (lane, held) in held.iter().enumerate() {
-            let (turns_of_lane, _) = &mut found[first + lane];
-            if in_range >> lane & 1 == 1 && turns_of_lane.len() == made {
+            let (of_lane, _) = &mut found[first + lane];
+            if in_range >> lane & 1 == 1 && of_lane.len() == made {
                 let radial_m = watched.radial_squared.0.get(lane).sqrt();
-                turns_of_lane.push(Turn {
+                of_lane.push(Turn {
                     end: core::array::from_fn(|i| states[0][i].0.get(lane)),
                     peaks: watched.peaks.lane(lane),
                     gap_m: held.row.point.clearance_m() - radial_m,

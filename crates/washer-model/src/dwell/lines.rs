@@ -12,11 +12,8 @@ const AT_ONCE: usize = 8;
 /// Rounds in which the interval around a line shrinks to two thirds.
 const ROUNDS: usize = 40;
 
-/// The number of multiples of a frequency that are taken out of a signal. Basis: higher ones are
-/// below the windows' side lobes. Doubling it doubles the time.
+/// Multiples of a frequency that are taken out of a signal, and how often.
 const HARMONICS: usize = 12;
-/// The number of times that these are taken out. Basis: each takes out what the others leaked.
-/// Doubling it doubles the time.
 const SWEEPS: usize = 4;
 
 /// The strongest line of some signals, and how much of them is not of its multiples.
@@ -28,20 +25,18 @@ pub(super) struct Line {
     pub(super) rest: f64,
 }
 
-/// Returns Hann's window.
+/// Hann's window.
 fn window(n: usize, count: usize) -> f64 {
     let sin = libm::sin(0.5 * TAU * (n as f64 + 0.5) / count as f64);
     sin * sin
 }
 
-/// Returns the means of a signal times exp(-2 pi i f n), through the window, at some frequencies.
+/// The means of a signal times exp(-2 pi i f n), through the window, at some frequencies.
 fn parts<const M: usize>(signal: &[f64], windows: &[f64], frequencies: [f64; M]) -> [[f64; 2]; M] {
     let sin = frequencies.map(|frequency| libm::sin(TAU * frequency));
     let cos = frequencies.map(|frequency| libm::cos(TAU * frequency));
-    let mut re = [1.0_f64; M];
-    let mut im = [0.0_f64; M];
-    let mut sums = [[0.0; 2]; M];
-    let mut whole = 0.0;
+    let (mut re, mut im) = ([1.0_f64; M], [0.0_f64; M]);
+    let (mut sums, mut whole) = ([[0.0; 2]; M], 0.0);
     for (value, window) in signal.iter().zip(windows) {
         let seen = window * value;
         whole += window;
@@ -54,7 +49,7 @@ fn parts<const M: usize>(signal: &[f64], windows: &[f64], frequencies: [f64; M])
     sums.map(|sum| sum.map(|part| part / whole))
 }
 
-/// Returns the power of signals at some frequencies.
+/// The power of signals at some frequencies.
 fn powers<const M: usize>(
     signals: &[Vec<f64>],
     windows: &[f64],
@@ -69,7 +64,7 @@ fn powers<const M: usize>(
     powers
 }
 
-/// Returns the strongest line of signals of one length.
+/// The strongest line of signals of one length.
 pub(super) fn strongest(signals: &[Vec<f64>]) -> Option<Line> {
     let count = signals.first()?.len();
     let windows: Vec<f64> = (0..count).map(|n| window(n, count)).collect();
@@ -96,8 +91,7 @@ pub(super) fn strongest(signals: &[Vec<f64>]) -> Option<Line> {
         best = found.fold(best, |best, found| if found.0 < best.0 { best } else { found });
     }
     let (_, best) = best;
-    let mut low = at(best - 1);
-    let mut high = at(best + 1).min(0.5);
+    let (mut low, mut high) = (at(best - 1), at(best + 1).min(0.5));
     for _ in 0..ROUNDS {
         let third = (high - low) / 3.0;
         let [below, above] = powers(&rests, &windows, [low + third, high - third]);

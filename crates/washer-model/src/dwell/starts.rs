@@ -1,4 +1,4 @@
-//! Starts of trajectories: beside a periodic response, and kicked off it.
+//! Where trajectories start: beside a periodic response, and kicked off it.
 
 use crate::coordinates::{STATES, TUB, TUB_PITCH, TUB_YAW};
 use crate::modes::shape;
@@ -25,13 +25,13 @@ pub(super) type Kick = (usize, f64);
 /// The velocities of a kick of 1 rad/s, by direction.
 pub(super) type Directions = Vec<[f64; COORDINATES]>;
 
-/// Returns the largest coordinate of the tub (m, rad), from rest.
+/// The largest coordinate of the tub (m, rad), from rest.
 pub(super) fn size(point: &Point, state: &[f64; STATES]) -> f64 {
     let rest = point.equilibrium();
     TUB.iter().map(|&i| (state[i] - rest[i]).abs()).fold(1e-4, f64::max)
 }
 
-/// Returns a state beside this one, in the suspension's modes.
+/// A state beside this one, in the suspension's modes.
 pub(super) fn disturbed(point: &Point, frozen: &Modes, state: &[f64; STATES]) -> [f64; STATES] {
     let by = DISTURBED * size(point, state);
     let mut beside = *state;
@@ -61,16 +61,14 @@ pub(super) fn directions(point: &Point, frozen: &Modes, random: usize) -> Direct
     // The amplitude of a mode of unit modal mass that turns the tub by 1.
     let amplitude = |place: usize| -> f64 {
         let shape = &frozen.modes[modes[place].0].shape;
-        let yaw = shape[TUB_YAW][0];
-        let pitch = shape[TUB_PITCH][0];
+        let (yaw, pitch) = (shape[TUB_YAW][0], shape[TUB_PITCH][0]);
         1.0 / (yaw * yaw + pitch * pitch).sqrt()
     };
     let unit = |place: usize| -> [f64; COORDINATES] {
         let shape = &frozen.modes[modes[place].0].shape;
         core::array::from_fn(|i| rounded(shape[i][0] * amplitude(place)))
     };
-    let first = unit(0);
-    let second = unit(1);
+    let (first, second) = (unit(0), unit(1));
     let mut directions = vec![first, second, core::array::from_fn(|i| first[i] + second[i])];
     let mut numbers = fastrand::Rng::with_seed(SEED);
     for _ in 0..random {
@@ -124,7 +122,7 @@ pub(super) fn kicks(count: usize, greatest_rad_per_s: f64) -> Vec<Kick> {
     kicks
 }
 
-/// Returns a state with a kick added.
+/// A state with a kick added.
 pub(super) fn kicked(
     state: &[f64; STATES],
     directions: &Directions,

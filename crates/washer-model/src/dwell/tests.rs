@@ -168,7 +168,7 @@ fn random(number: u64, numbers: &mut fastrand::Rng) -> (Value, f64) {
     (keys, between(230.0, 330.0))
 }
 
-/// Returns what SEED or MACHINES says.
+/// What SEED or MACHINES says.
 fn given(name: &str, or: u64) -> u64 {
     std::env::var(name).map_or(or, |given| given.parse().unwrap())
 }
@@ -179,8 +179,7 @@ fn given(name: &str, or: u64) -> u64 {
 #[ignore = "short steps: minutes"]
 fn random_motions_go_on_in_short_steps() {
     let mut numbers = fastrand::Rng::with_seed(given("SEED", 35));
-    let mut counts = [0; Ending::KIND_NAMES.len()];
-    let mut worst = [0.0_f64; 3];
+    let (mut counts, mut worst) = ([0; Ending::KINDS.len()], [0.0_f64; 3]);
     for number in 0..given("MACHINES", 12) {
         let kind = (number % 3) as usize;
         let (keys, speed_rpm) = random(number, &mut numbers);
@@ -211,7 +210,7 @@ fn random_motions_go_on_in_short_steps() {
             }
         }
     }
-    println!("{:?} {counts:?}, worst {worst:?}", Ending::KIND_NAMES);
+    println!("{:?} {counts:?}, worst {worst:?}", Ending::KINDS);
     assert!(counts[0] > 0 && counts[1..4].iter().sum::<u32>() > 0);
     assert!(worst.iter().all(|worst| *worst < 1e-2), "{worst:?}");
 }
@@ -224,8 +223,7 @@ fn random_motions_go_on_in_short_steps() {
 fn plain_kicks_end_in_motions_that_are_found() {
     const FOLLOWED_S: f64 = 180.0;
     let mut numbers = fastrand::Rng::with_seed(given("SEED", 404));
-    let mut settled = 0;
-    let mut missed = Vec::new();
+    let (mut settled, mut missed) = (0, Vec::new());
     for number in 0..given("MACHINES", 6) {
         let (keys, speed_rpm) = random(number, &mut numbers);
         let point = at(&keys, 100.0, 1.0);
@@ -244,8 +242,8 @@ fn plain_kicks_end_in_motions_that_are_found() {
                 // Tub and shaft together; a quarter of a metre is an arm of the tub's.
                 let arms_m = [0.25, 0.25, 1.0, 1.0];
                 for (k, (part, arm_m)) in parts.iter().zip(arms_m).enumerate() {
-                    let tub = if k < 2 { k } else { k + 2 };
-                    for coordinate in [tub, tub + 2] {
+                    let of_tub = if k < 2 { k } else { k + 2 };
+                    for coordinate in [of_tub, of_tub + 2] {
                         state[COORDINATES + coordinate] += size_rad_per_s * arm_m * part / length;
                     }
                 }
@@ -309,8 +307,7 @@ fn in_short_steps(
     let method = Method::Rk4 { step_s: STEP_S };
     let history = history(ModelKind::Nonlinear, &method, &point, &start, turn_s / LOOKS as f64);
     assert!(history.failure.is_none());
-    let mut peaks = [0.0_f64; CHANNELS];
-    let mut states = Vec::new();
+    let (mut peaks, mut states) = ([0.0_f64; CHANNELS], Vec::new());
     for k in 0..TURNS * LOOKS {
         let instant = history.instant(k).unwrap();
         if k % LOOKS == 0 {

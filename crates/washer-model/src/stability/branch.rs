@@ -33,44 +33,32 @@ const UNIT_OF_SPEED: f64 = 0.02;
 /// A response may lie on the curve after this many times its speed, but no later.
 pub(super) const BEYOND: f64 = 1.25;
 
-/// The length of the first step. Basis: a centimetre, or 2 % of the speed. Doubling it makes the
-/// first step fail more often.
+/// Length of the first step, of the longest, which no correction exceeds, and of the shortest,
+/// after which the curve is lost.
 const FIRST_STEP: f64 = 1.0;
-/// The length of the longest step, which no correction exceeds. Basis: longer ones are shortened by
-/// the tangent's turning. Doubling it makes few curves faster.
 const LONGEST_STEP: f64 = 4.0;
-/// The length of the shortest step, after which the curve is lost. Basis: ten halvings. Doubling it
-/// loses curves at narrow folds.
 const SHORTEST_STEP: f64 = 1e-3;
 
 /// Once a step is shorter than this, derivatives are taken at all instants of a turn until one is
 /// the longest: those at a few may be what makes it short.
 const SHORT_STEP: f64 = 0.5;
 
-/// The factor of a step's length after few corrections. Basis: steps of most curves are as long as
-/// they may be. Doubling it makes steps fail.
+/// A step is longer than the last by as much where it took at most so many corrections,
 const LONGER: f64 = 1.6;
-/// The greatest number of corrections that are few. Basis: a curve that hardly bends takes four.
-/// Doubling it makes all steps longer until they fail.
-const FEW_CORRECTIONS: usize = 4;
+const FEW: usize = 4;
 
-/// The factor of a step's length after many corrections. Basis: about half the bend of the curve.
-/// Doubling it makes steps longer.
+/// shorter where it took as many as this,
 const SHORTER: f64 = 0.7;
-/// The least number of corrections that are many. Basis: one more than keeps the length. Doubling
-/// it shortens no step.
-const MANY_CORRECTIONS: usize = 6;
+const MANY: usize = 6;
 
-/// The greatest number of corrections; then the step is done again, half as long. Basis: a step
-/// that converges takes fewer. Doubling it wastes turns.
-const MAX_CORRECTIONS: usize = 9;
+/// and done again, half as long, after this many.
+const MOST: usize = 9;
 
 /// A correction is to leave less than this share of what was missing.
 const FAST_ENOUGH: f64 = 0.5;
 
-/// The greatest miss of a turn (`missing`) of a place on the curve. Basis: a thousandth of the
-/// greatest distance of guesses. Doubling it saves less than a correction.
-const CLOSED_TURN: f64 = 1e-7;
+/// A place is on the curve once a turn misses less than this (`missing`).
+const CLOSE: f64 = 1e-7;
 
 /// Cosine of the most that the tangent may turn in a step.
 const MOST_TURNED: f64 = 0.8;
@@ -85,18 +73,13 @@ const OWN: f64 = 1e-3;
 /// Relative difference of speeds by which the curve's slope along the speed is taken.
 const BESIDE: f64 = 1e-5;
 
-/// The relative error of a fold's speed. Basis: less than any file's digits. Doubling it saves less
-/// than a round.
+/// A fold is found this closely (relative, of its speed), in so many rounds.
 const FOLD: f64 = 1e-6;
-/// The greatest number of rounds in which a fold is found. Basis: each squares the error. Doubling
-/// it changes nothing.
 const FOLD_ROUNDS: usize = 5;
 
-/// The relative difference of the speeds of two folds, in steps of a turn, below which they are
-/// none. Where forces have corners, a motion meets them a step earlier or later as the speed
-/// changes by a step of a turn, which makes stairs of a curve. Basis: those of a machine that hits
-/// a stop are up to 0.45 steps high. Doubling it takes narrow folds of the machine for stairs.
-const STAIR_STEPS: f64 = 0.5;
+/// Where forces have corners, steps that are longer than these are wide make stairs of a curve: two
+/// folds whose speeds are closer than this (relative) are such a stair, and no jump of the machine.
+const STAIR: f64 = 4e-4;
 
 /// Nodes on either side of a fold are no farther from it than this.
 const BY_FOLD: f64 = 0.3;
@@ -148,22 +131,21 @@ fn speed_of(place: &Place) -> f64 {
 #[derive(Clone)]
 struct Node {
     at: Place,
-    /// The tangent onwards, of length 1.
+    /// Of length 1, onwards.
     tangent: Place,
     /// Whether that is the place's own, not one close by.
     is_own: bool,
     /// Length of the curve up to here.
     length: f64,
-    /// The monodromy matrix, here or close by.
+    /// What a turn makes of disturbances, here or close by.
     monodromy: Square,
 }
 
-/// Interpolates between two nodes, at a share of the length: the cubic through both along both
-/// tangents, and its slope by the length.
+/// Between two nodes, at a share of the length: the cubic through both along both tangents, and
+/// its slope by the length.
 fn between(a: &Node, b: &Node, share: f64) -> (Place, Place) {
     let length = b.length - a.length;
-    let t = share;
-    let u = 1.0 - share;
+    let (t, u) = (share, 1.0 - share);
     let at = core::array::from_fn(|i| {
         u * u * ((1.0 + 2.0 * t) * a.at[i] + t * length * a.tangent[i])
             + t * t * ((1.0 + 2.0 * u) * b.at[i] - u * length * b.tangent[i])
@@ -175,10 +157,9 @@ fn between(a: &Node, b: &Node, share: f64) -> (Place, Place) {
     (at, slope)
 }
 
-/// Returns the share up to which something is so.
+/// The share up to which something is so.
 fn bisected(is_before: impl Fn(f64) -> bool) -> f64 {
-    let mut low = 0.0;
-    let mut high = 1.0;
+    let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
         if is_before(middle) { low = middle } else { high = middle }
@@ -192,10 +173,10 @@ struct Step {
     onto: Place,
     across: Place,
     corrections: usize,
-    /// The number of these by the derivatives in use.
+    /// How many of these by the derivatives in use.
     since: usize,
     missing: f64,
-    /// The curve's equations at `onto`, once that is seen.
+    /// What is known of the curve at `onto`, once that is seen.
     seen: Option<Box<Jacobian>>,
 }
 
@@ -203,7 +184,7 @@ struct Step {
 #[derive(Clone)]
 struct Jacobian {
     monodromy: Square,
-    /// The factors of the equations with the step's plane below.
+    /// Of the equations with the step's plane below.
     factors: Lu<PLACE>,
 }
 
@@ -217,12 +198,12 @@ struct Turning {
 
 /// A response at a speed that was asked for, as the curve has it: where to look for it.
 pub(super) struct Guess {
-    /// The number of folds before it on the curve.
+    /// How many folds are before it on the curve.
     pub(super) branch: u32,
     /// Speeds (rpm) of the folds between which the branch is, lower and upper; none where it has no
     /// end that counts.
     pub(super) between_rpm: [Option<f64>; 2],
-    /// The state where the unbalance is up.
+    /// Where the unbalance is up.
     pub(super) state: [f64; STATES],
     /// Factors of 1 - Phi nearby.
     pub(super) factors: Option<Lu<STATES>>,
@@ -259,7 +240,7 @@ pub(super) struct Curve<'a> {
 }
 
 impl<'a> Curve<'a> {
-    /// Returns a curve of which nothing is known.
+    /// One of which nothing is known.
     pub(super) fn new(settings: Settings<'a>) -> Self {
         Self {
             settings,
@@ -275,7 +256,7 @@ impl<'a> Curve<'a> {
         }
     }
 
-    /// Begins to follow the curve from a response at a speed (rpm) up or down to another speed.
+    /// Is to follow it from a response at a speed (rpm) up or down to another speed.
     pub(super) fn begin(&mut self, speed_rpm: f64, start: &[f64; STATES], until_rpm: f64) {
         (self.until_rpm, self.is_down) = (until_rpm, until_rpm < speed_rpm);
         let mut across = [0.0; PLACE];
@@ -287,8 +268,7 @@ impl<'a> Curve<'a> {
     fn advance(&mut self) {
         self.step = None;
         let Some(last) = self.nodes.last() else { return };
-        let at_rpm = speed_of(&last.at);
-        let count = self.nodes.len();
+        let (at_rpm, count) = (speed_of(&last.at), self.nodes.len());
         let is_far = (0..COORDINATES).any(|i| (last.at[i] * UNIT).abs() > FARTHEST);
         let begins_rpm = speed_of(&self.nodes[0].at);
         let [low_rpm, high_rpm] = match self.is_down {
@@ -338,7 +318,7 @@ impl<'a> Curve<'a> {
         self.step = Some(Step { onto, across, corrections: 0, since: 0, missing, seen: None });
     }
 
-    /// Shortens a step that led nowhere.
+    /// The step led nowhere.
     fn shorten(&mut self) {
         match self.turning.take() {
             // A fold that cannot be found more closely is where it is.
@@ -349,8 +329,8 @@ impl<'a> Curve<'a> {
         self.advance();
     }
 
-    /// Takes in what a turn from where the step begins makes of the state, of disturbances and,
-    /// beside it, of the speed.
+    /// What a turn from where the step begins makes of the state, of disturbances and, beside it,
+    /// of the speed.
     fn saw(&mut self, step: Step, seen: &Turned, beside: &Turned) {
         let Some(monodromy) = seen.seen.as_ref().map(|seen| seen.monodromy) else {
             return self.shorten();
@@ -370,14 +350,13 @@ impl<'a> Curve<'a> {
         self.corrected(Step { seen: Some(jacobian), since: 0, ..step }, &seen.end);
     }
 
-    /// Takes in what a turn from where the step has come makes of the state.
+    /// What a turn from where the step has come makes of the state.
     fn corrected(&mut self, mut step: Step, end: &[f64; STATES]) {
         let Some(jacobian) = &step.seen else { return self.shorten() };
         let speed_rpm = speed_of(&self.at);
         let missing = missing(self.settings.point, speed_rpm, &state_of(&self.at), end);
         let is_slow = step.corrections > 1 && missing > FAST_ENOUGH * step.missing;
-        if !missing.is_finite() || step.corrections == MAX_CORRECTIONS || is_slow && step.since == 0
-        {
+        if !missing.is_finite() || step.corrections == MOST || is_slow && step.since == 0 {
             return self.shorten();
         }
         if is_slow {
@@ -402,7 +381,7 @@ impl<'a> Curve<'a> {
         }
         (step.corrections, step.since, step.missing) =
             (step.corrections + 1, step.since + 1, missing);
-        if missing < CLOSED_TURN { self.arrived(step) } else { self.step = Some(step) }
+        if missing < CLOSE { self.arrived(step) } else { self.step = Some(step) }
     }
 
     /// Whether the curve goes on up in speed: each fold turns it.
@@ -435,8 +414,7 @@ impl<'a> Curve<'a> {
             dot(&apart, &apart).sqrt()
         };
         let off = apart(&step.onto);
-        let mut length = 0.0;
-        let mut turns_back = false;
+        let (mut length, mut turns_back) = (0.0, false);
         if let Some(before) = before {
             let gone = apart(&before.at);
             let cosine = dot(&before.tangent, &tangent);
@@ -451,16 +429,15 @@ impl<'a> Curve<'a> {
             // which way the curve goes on, and two of them close by are not taken for one.
             turns_back = self.rises() == (tangent[SPEED] < 0.0);
         }
-        let is_own = off < OWN && self.is_careful;
-        let monodromy = jacobian.monodromy;
+        let (is_own, monodromy) = (off < OWN && self.is_careful, jacobian.monodromy);
         let node = Node { at: self.at, tangent, is_own, length, monodromy };
         if let Some(turning) = self.turning {
             return self.closer(node, turning);
         }
         self.nodes.push(node);
-        if step.corrections <= FEW_CORRECTIONS {
+        if step.corrections <= FEW {
             self.scale(LONGER);
-        } else if step.corrections >= MANY_CORRECTIONS {
+        } else if step.corrections >= MANY {
             self.scale(SHORTER);
         }
         if turns_back {
@@ -526,23 +503,20 @@ impl<'a> Curve<'a> {
         self.turning = Some(turning);
     }
 
-    /// Returns the folds without stairs: the pairs of neighbours that are nearest in speed cancel
-    /// out, as long as they are as near as a stair.
+    /// Its folds without stairs.
     fn folds_of_machine(&self) -> Vec<usize> {
-        let mut folds = self.folds.clone();
-        let Some(steps) = self.settings.steps_at_corners() else { return folds };
+        let has_corners = self.settings.point.machine.elements.are_nonsmooth();
         let at = |fold: usize| self.nodes[fold].at[SPEED] * UNIT_OF_SPEED;
-        let height = |pair: &[usize]| (at(pair[0]) - at(pair[1])).abs();
-        loop {
-            let pairs = folds.windows(2).map(height).enumerate();
-            let lowest = pairs.min_by(|a, b| a.1.total_cmp(&b.1));
-            match lowest {
-                Some((pair, height)) if height * (steps as f64) < STAIR_STEPS => {
-                    folds.drain(pair..pair + 2);
+        let mut folds: Vec<usize> = Vec::new();
+        for &fold in &self.folds {
+            match folds.last() {
+                Some(&last) if has_corners && (at(fold) - at(last)).abs() < STAIR => {
+                    folds.pop();
                 }
-                _ => return folds,
+                _ => folds.push(fold),
             }
         }
+        folds
     }
 
     /// Whether it ends before what counts of it at a speed (rpm) does.
@@ -552,13 +526,13 @@ impl<'a> Curve<'a> {
         begins_rpm.is_ok_and(|it| it < speed_rpm) && self.nodes.iter().all(is_short)
     }
 
-    /// Returns the number of folds.
+    /// How many folds it has.
     pub(super) fn folds(&self) -> u32 {
         self.folds_of_machine().len() as u32
     }
 
-    /// Returns where responses at a speed (rpm) are to be looked for, in the order of the curve;
-    /// none where the curve does not get there.
+    /// Where responses at a speed (rpm) are to be looked for, in the order of the curve; none where
+    /// the curve does not get there.
     pub(super) fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
         let is_past = |node: &Node| !self.is_down && speed_of(&node.at) >= BEYOND * speed_rpm;
         let end = self.nodes.iter().position(is_past);
@@ -654,8 +628,7 @@ mod tests {
         let mut curve = Curve::new(Settings::new(point));
         for (k, &speed_rpm) in speeds_rpm.iter().enumerate() {
             let at = place_of(&[0.0; STATES], speed_rpm);
-            let tangent = [0.0; PLACE];
-            let monodromy = [[N(0.0); STATES]; STATES];
+            let (tangent, monodromy) = ([0.0; PLACE], [[N(0.0); STATES]; STATES]);
             curve.nodes.push(Node { at, tangent, is_own: true, length: k as f64, monodromy });
         }
         curve.folds = folds.to_vec();
@@ -675,22 +648,6 @@ mod tests {
         assert_eq!(found(true, 210.0), [(0, true)]);
         assert_eq!(found(true, 225.0), [(0, true)]);
         assert_eq!(found(true, 250.0), [(2, false)]);
-    }
-
-    /// Of many stairs by a fold, the fold itself is left.
-    #[test]
-    fn stairs_by_a_fold_leave_its_farthest_speed() {
-        let point = point(true);
-        let speeds_rpm = [200.0, 229.9, 229.8, 230.1, 229.7, 229.9, 171.0, 260.0];
-        let guesses = curve(&point, &speeds_rpm, &[1, 2, 3, 4, 5, 6]).guesses(180.0);
-        let ends =
-            guesses.iter().map(|it| (it.branch, it.between_rpm.map(|rpm| rpm.map(f64::round))));
-        assert_eq!(
-            ends.collect::<Vec<_>>(),
-            [(1, [Some(171.0), Some(230.0)]), (2, [Some(171.0), None])]
-        );
-        let end = curve(&point, &speeds_rpm, &[1, 2, 3, 4, 5, 6]).guesses(180.0)[0].between_rpm[1];
-        assert!((end.unwrap() - 230.1).abs() < 1e-9, "{end:?}");
     }
 
     #[test]

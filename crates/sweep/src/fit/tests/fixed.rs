@@ -15,45 +15,33 @@ fn intervals_count_what_the_fixed_numbers_may_be_off() {
         let known = known.iter().map(|text| (*text).to_owned()).collect();
         FitOptions { known, ..options(&names) }
     };
-    for options in [with(&[]), with(&["none", "unbalance_radius_m=5%"])] {
+    // Without a word, what matters most is said, and widens nothing.
+    let silent = fitted(vec![case.clone()], &with(&[]));
+    assert!(silent.text().contains("intervals take these as exact"), "{}", silent.text());
+    assert!(silent.parameters[0].depends_on.is_some() && silent.fixed_numbers > 20);
+    assert_eq!(silent.parameters[0].interval_95, exact.parameters[0].interval_95);
+    for options in [with(&["default"]), with(&["unbalance_radius_m=5%"])] {
         let report = fitted(vec![case.clone()], &options);
         let mass = &report.parameters[0];
         assert!(off(&report, &VISCOUS).iter().all(|off| off.abs() < 3.0), "{}", report.text());
         assert_eq!(mass.value, exact.parameters[0].value);
         assert_eq!(mass.noise_error, exact.parameters[0].standard_error);
         let on = mass.depends_on.as_ref().unwrap();
-        // Mass times radius is what shakes; and all that the record says of the machine leaves the
-        // mass no farther off than the radius does.
-        assert_eq!(on.name, "unbalance_radius_m", "{}", report.text());
-        assert!((on.moves_by.abs() / mass.value / 0.05 - 1.0).abs() < 0.1, "{report:?}");
-        assert!(mass.standard_error.unwrap() < 0.08 * mass.value, "{}", report.text());
-        assert_eq!(report.fixed_numbers == 1, !options.known.is_empty());
+        if options.known[0] == "default" {
+            assert!(report.fixed_numbers > 20, "{report:?}");
+            continue;
+        }
+        assert_eq!((report.fixed_numbers, &*on.name), (1, "unbalance_radius_m"));
+        // Mass times radius is what shakes.
+        assert!((on.moves_by.abs() / mass.value / 0.05 - 1.0).abs() < 0.05, "{report:?}");
         let text = report.text();
         assert!(text.contains("unbalance_mass_kg on unbalance_radius_m: an error of"), "{text}");
     }
 }
 
-/// A number that the record tells from all free ones widens intervals no farther than it leaves the
-/// number open.
-#[test]
-fn the_record_limits_errors_of_fixed_numbers() {
-    let names = ["unbalance_mass_kg", "damping_n_s_per_m"];
-    let with = |known: &str| {
-        let known = vec!["none".to_owned(), known.to_owned()];
-        let options = FitOptions { known, ..options(&names) };
-        fitted(vec![case_at(&VISCOUS, 1.0, reference("viscous", 8.0))], &options)
-    };
-    let [narrow, wide] =
-        [with("spring_1_stiffness_n_per_m=5%"), with("spring_1_stiffness_n_per_m=20%")];
-    let error = |report: &FitReport| report.parameters[1].depends_on.as_ref().unwrap().error;
-    assert!(error(&narrow) < 0.02 * 8350.0, "{}", narrow.text());
-    assert!((error(&wide) / error(&narrow) - 1.0).abs() < 0.1, "{}", wide.text());
-    assert!(wide.text().contains("the record limits it"), "{}", wide.text());
-}
-
 #[test]
 fn a_gain_moves_the_estimates_that_it_scales() {
-    let known = ["none", "gain=3%"].map(str::to_owned).to_vec();
+    let known = vec!["gain=3%".to_owned()];
     let options = FitOptions { known, ..options(&["unbalance_mass_kg"]) };
     let mut measured = reference("viscous", 8.0);
     measured.signals.truncate(1);
@@ -99,15 +87,11 @@ fn intervals_hold_the_truth_as_often_as_the_fixed_numbers_are_known() {
         ("shaft_mass_kg", 0.02),
     ];
     let names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
-    let mut known = ["none", "gain=3%"].map(str::to_owned).to_vec();
+    let mut known = vec!["gain=3%".to_owned()];
     known.extend(FIXED.map(|(name, ratio)| format!("{name}={}%", 100.0 * ratio)));
     let with_known = FitOptions { known, ..options(&names) };
-    let with_defaults = FitOptions { known: Vec::new(), ..options(&names) };
     let mut held = vec![0; VISCOUS.len()];
     let mut held_without = vec![0; VISCOUS.len()];
-    let mut held_by_defaults = vec![0; VISCOUS.len()];
-    let mut widths = vec![[0.0; 3]; VISCOUS.len()];
-    let mut farthest = 0.0_f64;
     let mut following = 0;
     for draw in 0..DRAWS {
         let draw = DRAWS * seed() + draw;
@@ -130,37 +114,19 @@ fn intervals_hold_the_truth_as_often_as_the_fixed_numbers_are_known() {
             let value = parameter.get(machine, &spin).unwrap();
             parameter.set(machine, &mut spin, value * (1.0 + ratio * error));
         }
-        let by_defaults = fitted(vec![case.clone()], &with_defaults);
         let report = fitted(vec![case], &with_known);
         // A machine that is far off may not follow, and then has no intervals to be wrong.
         following += usize::from(report.follows);
-        let fits = report.parameters.iter().zip(&by_defaults.parameters).zip(VISCOUS);
-        for (k, ((fit, by_defaults), (_, truth))) in fits.enumerate() {
-            let Some([from, to]) = fit.interval_95 else { continue };
-            let [default_from, default_to] = by_defaults.interval_95.unwrap();
-            let noise_error = fit.noise_error.unwrap();
+        for (k, (fit, (_, truth))) in report.parameters.iter().zip(VISCOUS).enumerate() {
+            let Some(error) = fit.standard_error else { continue };
             let off = (fit.value - truth).abs();
-            farthest = farthest.max(off / noise_error);
-            held[k] += usize::from((from..=to).contains(&truth));
-            held_by_defaults[k] += usize::from((default_from..=default_to).contains(&truth));
-            held_without[k] += usize::from(off <= 1.96 * noise_error);
-            let all = [1.96 * noise_error, 0.5 * (to - from), 0.5 * (default_to - default_from)];
-            widths[k].iter_mut().zip(all).for_each(|(sum, width)| *sum += width / truth);
+            held[k] += usize::from(off <= 1.96 * error);
+            held_without[k] += usize::from(off <= 1.96 * fit.noise_error.unwrap());
         }
     }
-    println!(
-        "{following} of {DRAWS} follow; hold the truth: {held:?}, by defaults \
-         {held_by_defaults:?}, by noise {held_without:?}; at most {farthest:.0} standard errors off"
-    );
-    let mean = |sum: &f64| 100.0 * sum / following as f64;
-    for ((name, _), widths) in VISCOUS.iter().zip(&widths) {
-        let widths: Vec<f64> = widths.iter().map(mean).collect();
-        println!("{name}: half widths by noise, tolerances and defaults {widths:.2?} %");
-    }
+    println!("{following} of {DRAWS} follow; hold the truth: {held:?}, by noise {held_without:?}");
     let all: usize = held.iter().sum();
-    let share =
-        |held: &[usize]| held.iter().sum::<usize>() as f64 / (following * VISCOUS.len()) as f64;
-    assert!(following >= 3 && share(&held) >= 0.8, "{held:?}");
-    assert!(share(&held_by_defaults) >= 0.9, "{held_by_defaults:?}");
+    let share = all as f64 / (following * VISCOUS.len()) as f64;
+    assert!(following >= 3 && (0.8..=1.0).contains(&share), "{share}: {held:?}");
     assert!(5 * held_without.iter().sum::<usize>() < 4 * all, "{held_without:?}");
 }
