@@ -122,7 +122,7 @@ fn a_stable_machine_has_no_tongues() {
     let at = ["--at", "damping_n_s_per_m=300", "--at", "friction_n=60", "--speed", "300:340:20"];
     let done = explain(&strict, &at);
     let messages = all_output(&done);
-    for line in ["0.98 and 2", "over-estimates, a ratio is below 0.98"] {
+    for line in ["0.98 and 2", "over-estimates: a ratio is below 0.98"] {
         assert!(messages.contains(line), "{line}\n{messages}");
     }
     assert!(!messages.contains("the models agree"), "{messages}");
