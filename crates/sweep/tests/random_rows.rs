@@ -52,9 +52,9 @@ fn rows_behind_a_brake_are_within_their_accuracy() {
     holds(TrialKind::Jumps, 0.01, 0.2);
 }
 
-/// The drum's weight excites what an unbalance below a gram hardly does, and the linear model's
-/// levels agree on it before it has converged: by up to four times an accuracy of 1e-4.
+/// Limits of 1.0001 are so near 1 that an error within the accuracy turns a verdict in one row of
+/// fifty.
 #[test]
 fn most_rows_of_micrometres_are_within_their_accuracy() {
-    holds(TrialKind::Tiny, 0.3, 0.2);
+    holds(TrialKind::Tiny, 0.15, 0.2);
 }
