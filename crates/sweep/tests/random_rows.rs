@@ -34,7 +34,7 @@ fn holds(kind: TrialKind, greatest_exceptional_share: f64, greatest_unconverged_
 
 #[test]
 fn rows_of_random_machines_are_within_their_accuracy() {
-    holds(TrialKind::Plain, 0.01, 0.1);
+    holds(TrialKind::Plain, 0.02, 0.1);
 }
 
 #[test]
@@ -56,5 +56,5 @@ fn rows_behind_a_brake_are_within_their_accuracy() {
 /// fifty.
 #[test]
 fn most_rows_of_micrometres_are_within_their_accuracy() {
-    holds(TrialKind::Tiny, 0.15, 0.2);
+    holds(TrialKind::Tiny, 0.15, 0.3);
 }
