@@ -16,7 +16,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use lane_ode::{Failure, Simd};
-use washer_model::{Channel, ModelKind, instants};
+use washer_model::{Channel, ModelKind, instant_count};
 use washer_row::{Status, Trajectory};
 
 use crate::point::{Answer, NoPoint, PointScenario, check, motion};
@@ -159,7 +159,7 @@ pub extern "C" fn dwell(values: usize) -> usize {
 pub extern "C" fn speeds(every_s: f64) -> usize {
     answer(|setup, input, output| {
         if let Ok(scenario) = PointScenario::new(setup, input) {
-            let places = 0..instants(setup.rule.end_s, every_s);
+            let places = 0..instant_count(setup.rule.end_s, every_s);
             let times_s = places.map(|k| k as f64 * every_s);
             output.extend(scenario.spin.speeds_rpm(times_s));
         }
