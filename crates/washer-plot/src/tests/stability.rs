@@ -143,7 +143,7 @@ fn a_map_shows_the_curve_of_a_boundary_over_its_axes() {
     for (path, format, phrase) in [
         (&other, "a.svg", "is a boundary over unbalance_mass_kg, tub_mass_kg"),
         (&no_boundary, "a.svg", "`sweep boundary` writes a boundary file"),
-        (&same, "a.html", "`--boundary` is for maps drawn as .svg or .png"),
+        (&same, "a.html", "`--boundary` is for maps drawn as .svg, .pdf or .png"),
     ] {
         let refused = message(draw(map(), &with(path), format));
         assert!(refused.contains(phrase), "{refused}");
