@@ -24,11 +24,13 @@ fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Bounds of --check, about a tenth above what Rust 1.95 gives: instructions, reads, writes.
+# Bounds of --check, at most a tenth above what Rust 1.95 gives: instructions, reads, writes. Writes
+# of avx2 count 331: the choice between a drum with its unbalances in one plane and a skewed one
+# leaves the rotor's half in memory.
 bounds() {
   case $1 in
     scalar) echo 6800 2570 1020 ;;
-    avx2) echo 1950 1400 320 ;;
+    avx2) echo 1950 1400 360 ;;
   esac
 }
 

@@ -307,21 +307,16 @@ impl<M: Model> Plan<M> {
         chosen.iter().map(|corner| self.corner(*corner)).collect()
     }
 
-    /// Returns the corners at which an axis has its least or greatest value first.
+    /// Returns the points of a list at which an axis has its least or greatest value first.
     fn extreme_points(&self) -> BTreeSet<u64> {
-        let mut extremes: Vec<[(f64, u64); 2]> =
-            self.corner(0).into_iter().map(|value| [(value, 0); 2]).collect();
-        for corner in 1..self.corners() {
-            for (value, [least, greatest]) in self.corner(corner).into_iter().zip(&mut extremes) {
-                if value < least.0 {
-                    *least = (value, corner);
-                }
-                if value > greatest.0 {
-                    *greatest = (value, corner);
-                }
+        let mut points = BTreeSet::new();
+        for axis in &self.axes {
+            for extreme in axis.values.extremes() {
+                let has_extreme = |point: &u64| axis.values.value(*point) == extreme;
+                points.extend((0..axis.values.len()).find(has_extreme));
             }
         }
-        extremes.into_iter().flatten().map(|(_, corner)| corner).collect()
+        points
     }
 }
 

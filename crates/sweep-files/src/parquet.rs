@@ -107,7 +107,7 @@ impl ParquetFile {
     /// Opens a file to find out its writer. It is read through only if it cannot be parsed.
     ///
     /// # Errors
-    /// Those of [`ParquetFile::open`].
+    /// Returns the errors of [`ParquetFile::open`].
     pub fn look(path: &Path) -> Result<Self, FileError> {
         let open = || regular::open(path).map_err(FileError::io("open", path));
         let parsed = Self::parse(path, open()?, Seal::Absent);

@@ -7,7 +7,8 @@ use super::axis::{AxisScale, extremes, has_logarithm};
 use super::colour::{BOTH as BOTH_SIDES, ColourScale, UNSTABLE_SHADE};
 use super::decimate::envelope;
 use super::frame::{
-    HEADING_HEIGHT, LegendSymbol, Panel, TICK_SIZE, heading, legend, legend_height,
+    BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LegendSymbol, Panel, TICK_SIZE, heading, legend,
+    legend_height,
 };
 use super::label::Label;
 use super::raster::text_width;
@@ -113,14 +114,10 @@ pub struct Mark {
     pub label: String,
 }
 
-/// Width of a chart, px. Basis: a figure across a page. Twice the width halves the type in print.
-const CHART_WIDTH: f64 = 880.0;
 /// Left margin for the numbers and the label of the y axis, px.
 const LEFT_MARGIN: f64 = 92.0;
 /// Right margin, px.
 const RIGHT_MARGIN: f64 = 26.0;
-/// Margin for the numbers and the label of the x axis, px.
-const BOTTOM_MARGIN: f64 = 64.0;
 /// Gap between two panels, px.
 const PANEL_GAP: f64 = 14.0;
 
@@ -136,13 +133,13 @@ const OVERLAP_MEANING: &str = "both, one over the other";
 pub(crate) fn draw(chart: &Chart) -> Scene {
     let panels: Vec<&ChartPanel> = chart.panels.iter().filter(|panel| panel.shown).collect();
     let entries = entries(chart, &panels);
-    let width = CHART_WIDTH - LEFT_MARGIN - RIGHT_MARGIN;
+    let width = FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN;
     let legend_height = legend_height(&entries, width);
     let heights: f64 = panels.iter().map(|panel| panel.height + PANEL_GAP).sum();
     let labels = chart.marks.iter().map(|mark| text_width(&mark.label, TICK_SIZE, false) + 22.0);
     let strip = labels.fold(0.0, f64::max);
     let total = HEADING_HEIGHT + strip + heights + BOTTOM_MARGIN + legend_height + 4.0;
-    let mut scene = Scene::new(CHART_WIDTH, total, format!("{}. {}", chart.title, chart.subtitle));
+    let mut scene = Scene::new(FIGURE_WIDTH, total, format!("{}. {}", chart.title, chart.subtitle));
     heading(&mut scene, &chart.title, &chart.subtitle);
     let xs = x_scale(chart);
     let mut y = HEADING_HEIGHT + strip;
@@ -500,7 +497,7 @@ mod tests {
         let panel = Panel {
             x,
             y,
-            width: CHART_WIDTH - LEFT_MARGIN - RIGHT_MARGIN,
+            width: FIGURE_WIDTH - LEFT_MARGIN - RIGHT_MARGIN,
             height: content.height,
             xs,
             ys,

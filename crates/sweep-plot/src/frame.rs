@@ -5,6 +5,11 @@ use super::colour::FAILED;
 use super::raster::text_width;
 use super::scene::{Anchor, Colour, FAINT, Hatch, INK, MUTED, Outline, PAPER, Scene, Stroke, Text};
 
+/// Width of a figure, px. Basis: a figure across a page. Twice the width halves the type in print.
+pub(crate) const FIGURE_WIDTH: f64 = 880.0;
+/// Margin below panels for the numbers and the label of the x axis, px.
+pub(crate) const BOTTOM_MARGIN: f64 = 64.0;
+
 /// Type size of titles, px. Basis: legible at half a figure's size.
 pub(crate) const TITLE_SIZE: f64 = 20.0;
 /// Type size of axis labels, legends and panel texts, px.

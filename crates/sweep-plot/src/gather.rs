@@ -86,7 +86,8 @@ impl CellMap {
     /// Reads the named columns of a map file into the cells of a grid.
     ///
     /// # Errors
-    /// As [`FigureFile::each_row`]; [`PlotError::NotAGrid`] for two rows at one point.
+    /// Returns the errors of [`FigureFile::each_row`]; [`PlotError::NotAGrid`] for two rows at one
+    /// point.
     pub(crate) fn read(source: FigureFile, grid: Grid, columns: &[String]) -> Result<Self> {
         let names = grid.axes.iter().map(|axis| axis.swept.name.as_str());
         let names = names.chain(["status", "reliable", "sensitive", "ratio_max"]);

@@ -100,8 +100,9 @@ impl Scatter {
     /// Reads the file of a design: every point for the counts, and as many as a figure keeps.
     ///
     /// # Errors
-    /// As [`FigureFile::each_row`] and [`layer::requested_one`]; [`PlotError::Undrawable`] without
-    /// points or parameters that vary; [`PlotError::Unfit`] for a quantity that is no number.
+    /// Returns the errors of [`FigureFile::each_row`] and [`layer::requested_one`];
+    /// [`PlotError::Undrawable`] without points or parameters that vary; [`PlotError::Unfit`] for a
+    /// quantity that is no number.
     pub(crate) fn read(source: FigureFile, options: &PlotOptions) -> Result<Self> {
         let Some(shown) = layer::requested_one(&source, options)? else {
             return Err(PlotError::Unfit(

@@ -110,7 +110,7 @@ pub fn columns(source: &FigureFile) -> Vec<&ColumnFacts> {
 /// one.
 ///
 /// # Errors
-/// As [`axes`], but for rows that do not lie on a grid, which give `false`.
+/// Returns the errors of [`axes`], except for rows that do not lie on a grid, which give `false`.
 pub fn is_whole(source: &FigureFile) -> Result<bool> {
     let axes = match axes(source) {
         Ok(axes) => axes,
@@ -126,7 +126,7 @@ pub fn is_whole(source: &FigureFile) -> Result<bool> {
 /// Finds the axes of a map file, in file order.
 ///
 /// # Errors
-/// As [`FigureFile::each_row`]; [`PlotError::Undrawable`] without rows or axes;
+/// Returns the errors of [`FigureFile::each_row`]; [`PlotError::Undrawable`] without rows or axes;
 /// [`PlotError::NotAGrid`] for an axis value that is not a number, or rows that do not lie on a
 /// grid.
 pub fn axes(source: &FigureFile) -> Result<Vec<SweptAxis>> {

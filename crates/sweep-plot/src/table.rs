@@ -125,8 +125,8 @@ impl FigureTable {
     /// decimated, as [`FigureTable::read_decimated`] does.
     ///
     /// # Errors
-    /// As [`FigureFile::each_row`]; [`crate::PlotError::Undrawable`] for other files with more
-    /// values than a figure keeps.
+    /// Returns the errors of [`FigureFile::each_row`]; [`crate::PlotError::Undrawable`] for other
+    /// files with more values than a figure keeps.
     pub fn read(source: FigureFile) -> Result<Self> {
         let most = MAX_NUMBERS / source.numeric().count().max(1);
         if source.rows > most {
@@ -170,7 +170,7 @@ impl FigureTable {
     /// middle instant of the bucket.
     ///
     /// # Errors
-    /// As [`FigureFile::each_row`].
+    /// Returns the errors of [`FigureFile::each_row`].
     pub fn read_decimated(source: FigureFile, count: usize) -> Result<Self> {
         let buckets = Buckets::new(source.rows, count);
         let names: Vec<&str> = source.numeric().map(|column| column.name.as_str()).collect();
@@ -194,7 +194,7 @@ impl FigureTable {
     /// Opens a file and reads it by [`FigureTable::read`].
     ///
     /// # Errors
-    /// As [`FigureFile::open`] and [`FigureTable::read`].
+    /// Returns the errors of [`FigureFile::open`] and [`FigureTable::read`].
     pub fn open(path: &Path, model_kinds: ModelKinds) -> Result<Self> {
         Self::read(FigureFile::open(path, model_kinds)?)
     }

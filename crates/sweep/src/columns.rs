@@ -331,7 +331,8 @@ fn growing_mode_columns(prefix: &str, place: usize) -> [WasherColumn; 3] {
          where nothing grows, or no such mode is needed"
     );
     let number = move |row: &ResultRow| Some(u64::from(mode(row)?.number));
-    let (moves, names) = ("what moves in it", ModeMotion::NAMES.to_vec());
+    let moves = "what moves in it";
+    let names = ModeMotion::NAMES.to_vec();
     let frequency = "its damped natural frequency at this speed in cycles per minute";
     [
         ResultColumn::new(name.clone(), "1", text, Holds::KnownCount, number),

@@ -17,8 +17,8 @@ fn from_environment(name: &str) -> Option<u64> {
 
 /// Tries rows of a kind, and holds what was found against the promise.
 ///
-/// One row in some thousand is beyond its accuracy, so one exception is allowed beside the stated
-/// share of rows.
+/// About one row in some thousand is beyond its accuracy, so an exception is allowed beside the
+/// stated share of rows.
 fn holds(kind: TrialKind, greatest_exceptional_share: f64, greatest_unconverged_share: f64) {
     let rows = from_environment("ROWS").unwrap_or(72);
     let seed = from_environment("SEED").unwrap_or_else(seed_from_clock);

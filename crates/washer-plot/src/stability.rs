@@ -95,7 +95,7 @@ pub(crate) fn growth(source: &FigureFile, at: &NamedPoint) -> Result<Chart, Plot
 /// over speed.
 ///
 /// # Errors
-/// As [`HeldPoints::one`]; [`PlotError::Unfit`] for an unknown channel.
+/// Returns the errors of [`HeldPoints::one`]; [`PlotError::Unfit`] for an unknown channel.
 pub(crate) fn responses(
     source: &FigureFile,
     at: &NamedPoint,
@@ -283,8 +283,8 @@ impl<'a> HeldPoints<'a> {
     /// Returns the points of the file at the requested values.
     ///
     /// # Errors
-    /// As [`FigureFile::each_row`]; [`PlotError::Unfit`] for what is no axis, or no value of it;
-    /// [`PlotError::Undrawable`] without rows.
+    /// Returns the errors of [`FigureFile::each_row`]; [`PlotError::Unfit`] for a name that is no
+    /// axis or a number that is no value of it; [`PlotError::Undrawable`] without rows.
     fn at(source: &'a FigureFile, at: &NamedPoint, option: &str) -> Result<Self, PlotError> {
         let mut held = Self { source, axes: swept::columns(source), points: Vec::new() };
         let place = |name: &str| {
@@ -320,7 +320,7 @@ impl<'a> HeldPoints<'a> {
     /// Returns the only point of the file, or the one at the requested values.
     ///
     /// # Errors
-    /// As [`Self::at`]; [`PlotError::Unfit`] where there are several.
+    /// Returns the errors of [`Self::at`]; [`PlotError::Unfit`] where there are several.
     pub(crate) fn one(
         source: &'a FigureFile,
         at: &NamedPoint,
@@ -357,7 +357,7 @@ impl<'a> HeldPoints<'a> {
     /// Calls `take` for each row of the points, with the index of its point.
     ///
     /// # Errors
-    /// As [`FigureFile::each_row`].
+    /// Returns the errors of [`FigureFile::each_row`].
     pub(crate) fn each_row<S: AsRef<str>>(
         &self,
         columns: &[S],
@@ -394,7 +394,7 @@ impl<'a> HeldPoints<'a> {
     /// Reads the points over speed with some columns.
     ///
     /// # Errors
-    /// As [`FigureFile::each_row`].
+    /// Returns the errors of [`FigureFile::each_row`].
     pub(crate) fn read(&self, columns: &[String]) -> Result<Vec<SpeedCurves>, PlotError> {
         let empty =
             SpeedCurves { columns: vec![Vec::new(); columns.len()], ..SpeedCurves::default() };

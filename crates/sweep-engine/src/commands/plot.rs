@@ -18,7 +18,7 @@ pub struct Args<V: ValueEnum + Send + Sync + 'static = DesignView> {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
-    /// Where to write; the ending .svg, .pdf, .png or .html says how [default: FILE with .svg]
+    /// Figure to write; the ending .svg, .pdf, .png or .html says how [default: FILE with .svg]
     #[arg(short, long, visible_alias = "out", value_name = "IMAGE")]
     pub output: Option<PathBuf>,
 

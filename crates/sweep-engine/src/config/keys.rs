@@ -1,6 +1,5 @@
 //! A walk over the keys of a file, which states each key once with its kind, description and value.
-//! The same walk reads a file, applies `--set`, writes a plan as JSON, and makes the schema of
-//! files.
+//! A walk reads a file, applies `--set`, writes a plan as JSON, or makes the schema of files.
 
 use std::cell::RefCell;
 

@@ -112,7 +112,7 @@ impl PartSchema {
     /// Encodes rows of these columns as the part at a place.
     ///
     /// # Errors
-    /// Those of the library: a defect of this program.
+    /// Returns the errors of the library, which are a defect of this program.
     pub(super) fn encode(&self, place: &str, rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
         let arrays =
             self.columns.iter().enumerate().map(|(k, column)| {

@@ -75,7 +75,8 @@ fn finish(mut run: OpenRun, job: &Job<'_>) -> (Tally, Vec<String>) {
 
 /// The bytes of an undisturbed run.
 fn undisturbed(points: u64) -> Vec<u8> {
-    let (home, job) = (Home::new(), synthetic::job(points));
+    let home = Home::new();
+    let job = synthetic::job(points);
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);

@@ -3,7 +3,8 @@
 use crate::axis::AxisScale;
 use crate::colour::{FAILED, GOOD_SIDE};
 use crate::frame::{
-    HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, TICK_SIZE, heading, legend, legend_height,
+    BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, TICK_SIZE,
+    heading, legend, legend_height,
 };
 use crate::influence::chance_correlation;
 use crate::label;
@@ -11,8 +12,6 @@ use crate::raster::text_width;
 use crate::scatter::Scatter;
 use crate::scene::{Anchor, Colour, INK, Outline, Scene, Stroke, Text};
 
-/// Width of the figure, px.
-const FIGURE_WIDTH: f64 = 880.0;
 /// Right margin for the numbers beside the bars, px.
 const RIGHT_MARGIN: f64 = 70.0;
 /// Distance between two bars, px.
@@ -20,8 +19,6 @@ const ROW_HEIGHT: f64 = 40.0;
 
 /// Height of a bar, px.
 const BAR_HEIGHT: f64 = 20.0;
-/// Margin for the numbers and the label of the x axis, px.
-const BOTTOM_MARGIN: f64 = 64.0;
 
 /// Maximum number of parameters shown, the most influential ones. Basis: a figure of one page.
 const MAX_PARAMETERS: usize = 24;

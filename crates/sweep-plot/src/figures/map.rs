@@ -9,8 +9,8 @@ use crate::cuts::Cuts;
 use crate::error::Result;
 use crate::figures::boundary::Overlay;
 use crate::frame::{
-    self, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, TICK_SIZE, failed, failed_hatch,
-    heading, legend_height, sensitive_hatch, undefined,
+    self, BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, TICK_SIZE,
+    failed, failed_hatch, heading, legend_height, sensitive_hatch, undefined,
 };
 use crate::gather::{CellMap, OK};
 use crate::grid::GridAxis;
@@ -19,16 +19,12 @@ use crate::raster::text_width;
 use crate::region::roomiest_place;
 use crate::scene::{Anchor, Colour, Hatch, INK, Outline, PAPER, Scene, Stroke, Text};
 
-/// Width of the figure, px.
-const FIGURE_WIDTH: f64 = 880.0;
 /// The colour of a boundary file's curve, which no colour scale has.
 const OVERLAY_COLOUR: Colour = Colour::hex(0x0b6b3a);
 /// Left margin for the numbers and the label of the y axis, px.
 const LEFT_MARGIN: f64 = 86.0;
 /// Right margin for the colour bar with its numbers and label, px.
 const RIGHT_MARGIN: f64 = 128.0;
-/// Margin below a panel for the numbers and the label of the x axis, px.
-const BOTTOM_MARGIN: f64 = 64.0;
 /// Draws a map of two axes or more.
 ///
 /// A map over two axes is one panel. A third axis becomes one panel for each of its values (at most
@@ -36,7 +32,7 @@ const BOTTOM_MARGIN: f64 = 64.0;
 /// fourth on, has one value (its first unless fixed), which the subtitle names.
 ///
 /// # Errors
-/// As [`ShownColumn::layer`].
+/// Returns the errors of [`ShownColumn::layer`].
 pub(crate) fn draw(
     map: &CellMap,
     cuts: &Cuts,

@@ -5,7 +5,8 @@ use crate::axis::{AxisScale, extremes};
 use crate::chart::level_stroke;
 use crate::colour::{BAD_SIDE, GOOD_SIDE};
 use crate::frame::{
-    HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, heading, legend, legend_height,
+    BOTTOM_MARGIN, FIGURE_WIDTH, HEADING_HEIGHT, LABEL_SIZE, LegendSymbol, Panel, heading, legend,
+    legend_height,
 };
 use crate::label::Label;
 use crate::layer::DividingLimit;
@@ -19,14 +20,10 @@ pub(crate) const MAX_PARAMETERS: usize = 5;
 /// of the figure.
 pub(crate) const MAX_POINTS: usize = 4000;
 
-/// Width of the figure, px.
-const FIGURE_WIDTH: f64 = 880.0;
 /// Left margin for the numbers and labels of the y axes, px.
 const LEFT_MARGIN: f64 = 100.0;
 /// Right margin, px.
 const RIGHT_MARGIN: f64 = 24.0;
-/// Margin below the panels for the numbers and labels of the x axes, px.
-const BOTTOM_MARGIN: f64 = 64.0;
 /// Gap between two panels, px.
 const PANEL_GAP: f64 = 20.0;
 /// Maximum height of a panel, px.

@@ -116,7 +116,7 @@ function themed(name) {
 
 const darkTheme = matchMedia("(prefers-color-scheme: dark)");
 
-// The same hues in lighter shades, for lines on a dark ground.
+// Returns a lighter shade of a hue, for lines on a dark ground.
 function lineColour(colour) {
   if (colour === "ink") return themed("ink");
   return darkTheme.matches ? `color-mix(in srgb, ${colour} 65%, white)` : colour;

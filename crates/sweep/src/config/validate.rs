@@ -252,8 +252,8 @@ fn highest_of_corners_rad_per_s(
     let mut highest = 0.0_f64;
     for values in plan.some_corners() {
         let Washer { mut machine, spin, .. } = plan.scenario_at(&values).model;
-        // What friction is taken at bounds no frequency: its steepest slope does, beyond any free
-        // stroke.
+        // The steepest slope of friction bounds the frequency: linearised about no motion, and
+        // beyond any free stroke.
         for damper in &mut machine.dampers {
             damper.free_stroke_m = 0.0;
             damper.friction_linear_speed_m_per_s.get_or_insert(damper.friction_speed_m_per_s);

@@ -29,7 +29,7 @@ impl Evaluations {
     /// Opens the evaluations of a problem whose machine file goes to `output`.
     ///
     /// # Errors
-    /// Those of [`Trials::open`].
+    /// Returns the errors of [`Trials::open`].
     pub(crate) fn open(
         output: &Path,
         problem: &Problem<'_>,
@@ -53,7 +53,7 @@ impl Evaluations {
     /// Returns the answer for some unknowns, kept or found now.
     ///
     /// # Errors
-    /// Those of `find`, and of the file system.
+    /// Returns the errors of `find` and of the file system.
     pub(crate) fn answer<E: From<StoreError>>(
         &self,
         x: &[f64],

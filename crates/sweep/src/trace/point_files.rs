@@ -25,7 +25,7 @@ const TIME_STEPS: f64 = 2000.0;
 /// `stop` returns true. A point without equilibrium gets no file. `on_point` is called after each
 /// point.
 ///
-/// Where a row was computed with capped modes, its trace is integrated in the same way, in a
+/// The trace of a row that was computed with capped modes is integrated in the same way, in a
 /// fraction of the time that `sweep trace` takes.
 ///
 /// # Errors

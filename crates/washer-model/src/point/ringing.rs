@@ -1,6 +1,6 @@
 //! A bound on the swing of hinge and bearings after jumps of the drum's acceleration.
 //!
-//! Where the acceleration jumps, so do the loads of everything that turns with the drum:
+//! A jump of the acceleration is a jump of the loads of everything that turns with the drum:
 //! unbalances, and bodies whose weight holds them beside the axis. Every method follows the slow
 //! modes. Hinge and bearings have no damping of their own and swing about their new deflection from
 //! then on. Steps longer than their periods do not resolve that swing, and two runs with such steps
@@ -32,8 +32,8 @@ const RIGID: [[usize; 2]; 4] =
 /// The coordinates that deflect bearings and hinge while the tub is held.
 const ELASTIC: [usize; 6] = [SHAFT_Y, SHAFT_Z, SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];
 
-/// The angles (rad) of the unbalance at which loads are computed: a load turns with the drum, or
-/// with the weight, or stands.
+/// The angles (rad) of the unbalance at which loads are computed. A load turns with the drum, or
+/// stands as the weight does, so that four angles have its greatest parts along both axes.
 const ANGLES_RAD: [f64; 4] = [0.0, 0.5 * PI, PI, 1.5 * PI];
 
 /// The deflections of the free machine.
@@ -114,14 +114,14 @@ impl Ringing {
             let load: [f64; COORDINATES] =
                 core::array::from_fn(|i| accelerated.force[i] - still.force[i]);
             // Without a solution, springs of bearings or hinge are missing, and no level is stable.
-            let Some(elastic) = static_deflection(&still, &load) else { continue };
+            let Some(free) = FreeMachine::new(&still) else { continue };
+            let Some(elastic) = free.static_deflection(&load) else { continue };
             let mut bearings = elastic;
             bearings[HINGE_YAW] = 0.0;
             bearings[HINGE_PITCH] = 0.0;
-            let deflections = [bearings, elastic]
-                .map(|elastic| deflection_of_free_machine(machine, &still, &elastic));
-            ringing.bearings = ringing.bearings.max(deflections[0]);
-            ringing.hinge_and_bearings = ringing.hinge_and_bearings.max(deflections[1]);
+            ringing.bearings = ringing.bearings.max(free.deflection(machine, &bearings));
+            ringing.hinge_and_bearings =
+                ringing.hinge_and_bearings.max(free.deflection(machine, &elastic));
         }
         ringing
     }
@@ -146,61 +146,77 @@ impl Ringing {
     }
 }
 
-/// Returns the static deflection of bearings and hinge under a load (N, N m) on the free machine,
-/// relative to the tub; `None` if nothing holds them.
-fn static_deflection(matrices: &Matrices, load: &[f64; COORDINATES]) -> Option<[f64; COORDINATES]> {
-    let rigid = rigid_motion(matrices, load)?;
-    let relieved = |i: usize| {
-        let inertial: f64 = (0..COORDINATES).map(|j| matrices.mass[i][j] * rigid[j]).sum();
-        N(load[i] - inertial)
-    };
-    let stiffness = ELASTIC.map(|i| ELASTIC.map(|j| N(matrices.stiffness[i][j])));
-    let solution = Lu::new(stiffness)?.solve(&ELASTIC.map(relieved));
-    let mut deflection = [0.0; COORDINATES];
-    for (i, value) in ELASTIC.into_iter().zip(solution) {
-        deflection[i] = value.0;
-    }
-    Some(deflection)
+/// The linear model of the machine without its suspension, which moves as a rigid body and deflects
+/// bearings and hinge.
+struct FreeMachine<'a> {
+    matrices: &'a Matrices,
+    /// The factors of the rigid body's mass matrix S' M S, with the sums S over the coordinates
+    /// of tub and shaft.
+    rigid_mass: Lu<4>,
 }
 
-/// Returns the rigid-body acceleration of the machine under a load: with S the sums over
-/// coordinates of tub and shaft, (S' M S) a = S' f.
-fn rigid_motion(matrices: &Matrices, load: &[f64; COORDINATES]) -> Option<[f64; COORDINATES]> {
-    let sum = |of: &dyn Fn(usize) -> f64, pair: [usize; 2]| of(pair[0]) + of(pair[1]);
-    let mass = RIGID
-        .map(|row| RIGID.map(|column| N(sum(&|i| sum(&|j| matrices.mass[i][j], column), row))));
-    let force = RIGID.map(|row| N(sum(&|i| load[i], row)));
-    let accelerations = Lu::new(mass)?.solve(&force);
-    let mut rigid = [0.0; COORDINATES];
-    for (pair, acceleration) in RIGID.into_iter().zip(accelerations) {
-        pair.into_iter().for_each(|i| rigid[i] = acceleration.0);
+impl<'a> FreeMachine<'a> {
+    /// Creates the free machine; `None` if it has no mass.
+    fn new(matrices: &'a Matrices) -> Option<Self> {
+        let rigid_mass = RIGID.map(|row| {
+            RIGID.map(|column| {
+                let sum = |i: usize| matrices.mass[i][column[0]] + matrices.mass[i][column[1]];
+                N(sum(row[0]) + sum(row[1]))
+            })
+        });
+        Some(Self { matrices, rigid_mass: Lu::new(rigid_mass)? })
     }
-    Some(rigid)
-}
 
-/// Returns the deflections of the free machine, whose tub moves against shaft and drum so that
-/// momentum is conserved.
-fn deflection_of_free_machine(
-    machine: &Machine,
-    matrices: &Matrices,
-    elastic: &[f64; COORDINATES],
-) -> Deflection {
-    let momentum: [f64; COORDINATES] = core::array::from_fn(|i| {
-        (0..COORDINATES).map(|j| matrices.mass[i][j] * elastic[j]).sum::<f64>()
-    });
-    let rigid = rigid_motion(matrices, &momentum).unwrap_or([0.0; COORDINATES]);
-    let drum = &machine.drum;
-    let tub_rad = rigid[TUB_YAW].hypot(rigid[TUB_PITCH]);
-    let bearings_m = elastic[SHAFT_Y].hypot(elastic[SHAFT_Z]);
-    let bearings_rad = elastic[SHAFT_YAW].hypot(elastic[SHAFT_PITCH]);
-    let hinge_rad = elastic[HINGE_YAW].hypot(elastic[HINGE_PITCH]);
-    let tub_m = rigid[TUB_Y].hypot(rigid[TUB_Z]);
-    let drum_front_m = bearings_m
-        + drum.front_x_m.abs() * bearings_rad
-        + (drum.front_x_m - drum.hinge_x_m).abs() * hinge_rad;
-    Deflection {
-        drum_front_m: drum_front_m + tub_m + drum.front_x_m.abs() * tub_rad,
-        tub_front_m: tub_m + machine.tub.front_x_m.abs() * tub_rad,
-        tub_rad,
+    /// Returns the product of the mass matrix and a vector of coordinates.
+    fn mass_times(&self, vector: &[f64; COORDINATES]) -> [f64; COORDINATES] {
+        self.matrices
+            .mass
+            .map(|row| row.iter().zip(vector).map(|(entry, value)| entry * value).sum())
+    }
+
+    /// Returns the rigid-body acceleration a under a load f: (S' M S) a = S' f.
+    fn rigid_motion(&self, load: &[f64; COORDINATES]) -> [f64; COORDINATES] {
+        let force = RIGID.map(|[tub, shaft]| N(load[tub] + load[shaft]));
+        let accelerations = self.rigid_mass.solve(&force);
+        let mut rigid = [0.0; COORDINATES];
+        for ([tub, shaft], acceleration) in RIGID.into_iter().zip(accelerations) {
+            rigid[tub] = acceleration.0;
+            rigid[shaft] = acceleration.0;
+        }
+        rigid
+    }
+
+    /// Returns the static deflection of bearings and hinge under a load (N, N m), relative to the
+    /// tub; `None` if nothing holds them.
+    fn static_deflection(&self, load: &[f64; COORDINATES]) -> Option<[f64; COORDINATES]> {
+        let inertial = self.mass_times(&self.rigid_motion(load));
+        let stiffness = ELASTIC.map(|i| ELASTIC.map(|j| N(self.matrices.stiffness[i][j])));
+        let relieved = ELASTIC.map(|i| N(load[i] - inertial[i]));
+        let solution = Lu::new(stiffness)?.solve(&relieved);
+        let mut deflection = [0.0; COORDINATES];
+        for (i, value) in ELASTIC.into_iter().zip(solution) {
+            deflection[i] = value.0;
+        }
+        Some(deflection)
+    }
+
+    /// Returns the deflections where bearings and hinge deflect by `elastic`: the tub moves against
+    /// shaft and drum so that momentum is conserved.
+    fn deflection(&self, machine: &Machine, elastic: &[f64; COORDINATES]) -> Deflection {
+        let rigid = self.rigid_motion(&self.mass_times(elastic));
+        let drum = &machine.drum;
+        let tub_m = rigid[TUB_Y].hypot(rigid[TUB_Z]);
+        let tub_rad = rigid[TUB_YAW].hypot(rigid[TUB_PITCH]);
+        let bearings_m = elastic[SHAFT_Y].hypot(elastic[SHAFT_Z]);
+        let bearings_rad = elastic[SHAFT_YAW].hypot(elastic[SHAFT_PITCH]);
+        let hinge_rad = elastic[HINGE_YAW].hypot(elastic[HINGE_PITCH]);
+        let drum_front_m = bearings_m
+            + drum.front_x_m.abs() * bearings_rad
+            + (drum.front_x_m - drum.hinge_x_m).abs() * hinge_rad;
+        Deflection {
+            drum_front_m: drum_front_m + tub_m + drum.front_x_m.abs() * tub_rad,
+            tub_front_m: tub_m + machine.tub.front_x_m.abs() * tub_rad,
+            tub_rad,
+        }
     }
 }

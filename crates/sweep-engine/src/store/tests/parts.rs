@@ -49,7 +49,8 @@ proptest! {
     fn damage_to_any_chunks_is_set_aside_told_and_mended(
         harm in prop::collection::vec((0..11_u64, any::<prop::sample::Index>(), 0..4_u8), 0..6)
     ) {
-        let (home, job) = (Home::new(), synthetic::job(POINTS));
+        let home = Home::new();
+        let job = synthetic::job(POINTS);
         let run = open(&home.output(), &job);
         write_missing(&run);
         drop(run);
@@ -82,7 +83,8 @@ proptest! {
 
 #[test]
 fn damage_after_opening_is_met_at_the_join() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let mut run = open(&home.output(), &job);
     write_missing(&run);
     fs::write(home.partial().join(part_name(4)), b"not a part").unwrap();
@@ -98,7 +100,8 @@ fn damage_after_opening_is_met_at_the_join() {
 
 #[test]
 fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let shard = |index| {
         let shard = Some(ShardRequest::Given(Shard { index, of: 4 }));
         match OpenRun::open(&home.output(), &job, OpenOptions { shard, ..options() }).unwrap() {
@@ -173,7 +176,8 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
 
 #[test]
 fn status_counts_without_touching_anything() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     assert_eq!(status(&home.output(), &job).unwrap().state, State::NotStarted);
     assert_eq!(fs::read_dir(home.0.path()).unwrap().count(), 0);
     let run = open(&home.output(), &job);
@@ -198,7 +202,8 @@ fn outcomes(points: impl Iterator<Item = u64>) -> Vec<Done> {
 
 #[test]
 fn a_part_is_gone_on_from_until_its_chunk_is_whole() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write(&run, 0);
     // As rows come: in any order.
@@ -224,7 +229,8 @@ fn a_part_is_gone_on_from_until_its_chunk_is_whole() {
 
 #[test]
 fn an_unfinished_run_is_found_by_its_result_and_by_its_folder() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     assert_eq!(unfinished(&home.output()).unwrap(), None);
     let run = open(&home.output(), &job);
     write(&run, 0);
@@ -253,7 +259,8 @@ fn an_unfinished_run_is_found_by_its_result_and_by_its_folder() {
 
 #[test]
 fn an_unfinished_search_counts_its_trials() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let mut trials = trials(&home.output(), &job);
     for k in 0..5 {
         trials.add(vec![k, 0], vec![Some(1)]).unwrap();
@@ -266,7 +273,8 @@ fn an_unfinished_search_counts_its_trials() {
 
 #[test]
 fn a_damaged_part_is_set_aside_and_a_whole_chunk_takes_its_place() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     run.write_chunk(&job, 1, outcomes(8..10)).unwrap();
     run.write_chunk(&job, 2, outcomes(16..20)).unwrap();
@@ -297,7 +305,8 @@ fn damage(home: &Home, job: &Job<'_>, index: u64, bytes: &[u8]) -> Option<Damage
 
 #[test]
 fn a_flipped_bit_anywhere_in_a_part_is_found() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let bytes = write_bytes(&job, 3);
     assert_eq!(damage(&home, &job, 3, &bytes), None);
     for at in 0..bytes.len() {
@@ -309,7 +318,8 @@ fn a_flipped_bit_anywhere_in_a_part_is_found() {
 
 #[test]
 fn a_truncation_anywhere_in_a_part_is_found() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let bytes = write_bytes(&job, 3);
     for length in (0..bytes.len()).step_by(3) {
         assert!(damage(&home, &job, 3, &bytes[..length]).is_some(), "cut to {length}");
@@ -320,7 +330,8 @@ fn a_truncation_anywhere_in_a_part_is_found() {
 
 #[test]
 fn a_whole_part_of_another_plan_place_or_layout_is_foreign() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let bytes = write_bytes(&job, 3);
     assert_eq!(damage(&home, &job, 4, &bytes), Some(Damage::Foreign), "another place");
     let other = Job { numerics: 2, ..synthetic::job(POINTS) };
@@ -407,7 +418,8 @@ proptest! {
 
 #[test]
 fn a_part_has_the_columns_of_the_result_for_any_reader() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write(&run, 2);
     let part = ParquetFile::open(&home.partial().join(part_name(2))).unwrap();

@@ -58,7 +58,7 @@ fn loads_have_angles_and_dampers_have_stages() {
     assert_eq!(machine.dampers[0].free_stroke_m, 0.006);
     assert_eq!(machine.dampers[0].outer_damping_n_s_per_m, 30.0);
     assert_eq!(machine.dampers[1].free_stroke_m, 0.0);
-    // What is written is read again.
+    // A machine file that is written is read again.
     let written = machine_file(&machine, &WrittenIn::default());
     assert_eq!(load(|_| written.clone()).unwrap(), machine);
     let refused = load(|file| file + &turned.replace("-120", "500")).unwrap_err();
