@@ -35,7 +35,7 @@ use sweep::{Integrator, Level, ModelEngine, Outcome, Plan, Status, Trajectory, V
 const ACCURACIES: [f64; 4] = [1e-3, 1e-3, 1e-4, 1e-2];
 
 /// The number of points of a grid.
-const ROWS_OF_GRID: u64 = 9;
+pub(crate) const ROWS_OF_GRID: u64 = 9;
 
 /// The number of grids that are tried, one after the other, until a valid one is found.
 ///
@@ -217,9 +217,11 @@ pub(crate) struct Found {
     above_error: u64,
     worst: f64,
     by_method: [u64; Level::ALL.len()],
-    /// The greatest error as a share of what the row says, by method.
-    of_said: [f64; Level::ALL.len()],
+    /// The greatest error as a share of the row's `error`, by method.
+    greatest_shares: [f64; Level::ALL.len()],
     pub(crate) exceptions: Vec<String>,
+    /// The number of grids with exceptions. A grid is one machine, whose rows fail together.
+    pub(crate) exceptional_grids: u64,
 }
 
 impl Found {
@@ -230,7 +232,7 @@ impl Found {
         self.needlessly += other.needlessly;
         self.unconverged += other.unconverged;
         self.doubted += other.doubted;
-        for (share, more) in self.of_said.iter_mut().zip(other.of_said) {
+        for (share, more) in self.greatest_shares.iter_mut().zip(other.greatest_shares) {
             *share = share.max(more);
         }
         self.failed += other.failed;
@@ -243,6 +245,7 @@ impl Found {
             *count += more;
         }
         self.exceptions.extend(other.exceptions);
+        self.exceptional_grids += other.exceptional_grids;
         self
     }
 }
@@ -251,7 +254,8 @@ fn relative((a, b): (&f64, &f64)) -> f64 {
     relative_from(0.0, *a, *b)
 }
 
-/// As [`relative`], where numbers below `least` count as that.
+/// Returns the difference of two numbers as a share of the second, or of `least` where that is
+/// greater.
 fn relative_from(least: f64, a: f64, b: f64) -> f64 {
     if a == b { 0.0 } else { (a - b).abs() / b.abs().max(least) }
 }
@@ -260,7 +264,10 @@ fn amplitudes_differ(a: &Trajectory, b: &Trajectory) -> f64 {
     a.amplitudes.iter().zip(&b.amplitudes).map(relative).fold(0.0, f64::max)
 }
 
-/// Of errors below this nothing is asked.
+/// The error below which nothing is asked.
+///
+/// Basis: RK4 at 1e-4 s has errors of that size. Doubling it accepts rows twice as far beyond their
+/// `error` where that is below it.
 const ERROR_FLOOR: f64 = 1e-6;
 
 /// The greatest relative difference of two rows' numbers.
@@ -327,7 +334,7 @@ fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
 fn with_elements(seed: u64, grid: &str, folder: &std::path::Path) -> String {
     let mut rng = Rng(seed.rotate_left(32));
     let unbalance = "[[further_unbalances]]\nmass_kg = 0.1\nx_m = 0.1\nradius_m = -0.2\n";
-    // Of its own: grids are read while others are written.
+    // Each grid has its own file, because grids are read while others are written.
     let machine = format!("machine-{seed}.toml");
     std::fs::write(folder.join(&machine), format!("{WITH_ELEMENTS}\n{unbalance}"))
         .expect("the temporary folder can be written to");
@@ -411,7 +418,8 @@ fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
     let evaluate = |integrator| evaluated(&plan, integrator);
     let rows = evaluate(Integrator::Rk4MassScaled { accuracy });
     let halved = evaluate(Integrator::Rk4 { step_s });
-    let (mut reference, mut quarter) = (None, None);
+    let mut reference = None;
+    let mut quarter = None;
     let mut found = Found { rows: rows.len() as u64, ..Found::default() };
     for (i, (row, halved)) in rows.iter().zip(&halved).enumerate() {
         found.by_method[row.method as usize] += 1;
@@ -429,15 +437,16 @@ fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
             continue;
         }
         let mut judge = halved;
-        let said = row.error.unwrap_or(f64::INFINITY).max(ERROR_FLOOR);
-        let differs = difference(&plan, row, judge) > accuracy.min(said)
+        let stated = row.error.unwrap_or(f64::INFINITY).max(ERROR_FLOOR);
+        let differs = difference(&plan, row, judge) > accuracy.min(stated)
             || verdict(&plan, row) != verdict(&plan, judge);
         if differs {
-            // It may be the judge that is off: rows climb to shorter steps.
+            // The judge may be the one that is off: rows are refined to shorter steps.
             let finer = Integrator::Rk4 { step_s: step_s / 8.0 };
             judge = &quarter.get_or_insert_with(|| evaluate(finer))[i];
         }
-        let (halved, error) = (judge, difference(&plan, row, judge));
+        let halved = judge;
+        let error = difference(&plan, row, judge);
         if row.converged == Some(false) {
             found.unconverged += 1;
             let is_right = statuses(row) == statuses(halved) && error <= accuracy;
@@ -446,14 +455,15 @@ fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
         }
         let mut complain = |count: fn(&mut Found) -> &mut u64, what: &str| {
             *count(&mut found) += 1;
-            let (method, said) = (row.method.name(), row.error.unwrap_or(f64::NAN));
+            let method = row.method.name();
+            let stated = row.error.unwrap_or(f64::NAN);
             let of_linear = amplitudes_differ(&row.linear, &halved.linear);
             let metrics = metrics_differ(&plan, row, halved).into_iter();
             let worst = metrics.max_by(|(_, a), (_, b)| a.total_cmp(b));
             let (metric, share) = worst.unwrap_or_default();
             found.exceptions.push(format!(
                 "seed {seed}, row {i}, {method}: {what}; {error:.2e} ({of_linear:.2e} linear, \
-                 {share:.2e} {metric}), said {said:.2e}"
+                 {share:.2e} {metric}), stated {stated:.2e}"
             ));
         };
         if statuses(row) != statuses(halved) {
@@ -464,12 +474,13 @@ fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
             complain(|found| &mut found.wrong_verdict, "verdict");
         } else {
             found.worst = found.worst.max(error / accuracy);
-            let share = &mut found.of_said[row.method as usize];
-            *share = share.max(error / said);
+            let share = &mut found.greatest_shares[row.method as usize];
+            *share = share.max(error / stated);
             found.above_error +=
-                u64::from(row.error.is_some_and(|said| error > said.max(ERROR_FLOOR)));
+                u64::from(row.error.is_some_and(|stated| error > stated.max(ERROR_FLOOR)));
         }
     }
+    found.exceptional_grids = u64::from(!found.exceptions.is_empty());
     found
 }
 
@@ -543,7 +554,7 @@ fn main() -> ExitCode {
          {} above their `error`",
         found.wrong_status, found.wrong_verdict, found.inaccurate, found.worst, found.above_error
     );
-    eprintln!("  greatest error as a share of `error`, by method: {:.2?}", found.of_said);
+    eprintln!("  greatest error as a share of `error`, by method: {:.2?}", found.greatest_shares);
     found.exceptions.iter().for_each(|line| eprintln!("  {line}"));
     if found.exceptions.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

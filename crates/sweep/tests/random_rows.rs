@@ -8,7 +8,13 @@
 #[allow(dead_code, reason = "the example's own command line")]
 mod differential_test;
 
-use differential_test::{Found, TrialKind, seed_from_clock, try_grids};
+use differential_test::{Found, ROWS_OF_GRID, TrialKind, seed_from_clock, try_grids};
+
+/// The share of machines that may have rows beyond their accuracy, beside one more.
+///
+/// Basis: of 228 machines in runs of `differential_test` four had some. With 72 rows a machine is a
+/// share of 0.125. Doubling it allows three machines instead of two.
+const EXCEPTIONAL_SHARE: f64 = 0.15;
 
 /// Returns a number from the environment.
 fn from_environment(name: &str) -> Option<u64> {
@@ -17,16 +23,18 @@ fn from_environment(name: &str) -> Option<u64> {
 
 /// Tries rows of a kind, and holds what was found against the promise.
 ///
-/// About one row in some thousand is beyond its accuracy, so an exception is allowed beside the
-/// stated share of rows.
-fn holds(kind: TrialKind, greatest_exceptional_share: f64, greatest_unconverged_share: f64) {
+/// The rows of a machine fail together, so machines are counted. One machine may be exceptional
+/// beside the stated share: at the rate of [`EXCEPTIONAL_SHARE`]'s basis, more than that are
+/// exceptional in one run of some 2,000.
+fn holds(kind: TrialKind, exceptional_share: f64, greatest_unconverged_share: f64) {
     let rows = from_environment("ROWS").unwrap_or(72);
     let seed = from_environment("SEED").unwrap_or_else(seed_from_clock);
     let found: Found = try_grids(rows, seed, kind);
     // `cargo test` shows it of a test that fails.
     eprintln!("seed {seed}: {found:?}");
-    let allowed = 1 + (greatest_exceptional_share * found.rows as f64) as usize;
-    assert!(found.exceptions.len() <= allowed, "seed {seed}: {:#?}", found.exceptions);
+    let machines = rows.div_ceil(ROWS_OF_GRID);
+    let allowed = 1 + (exceptional_share * machines as f64) as u64;
+    assert!(found.exceptional_grids <= allowed, "seed {seed}: {:#?}", found.exceptions);
     let unconverged = found.unconverged as f64 / found.rows.max(1) as f64;
     assert!(unconverged <= greatest_unconverged_share, "seed {seed}: {unconverged} of {rows} rows");
     assert!(found.rows >= rows, "seed {seed}: {} rows of {rows}", found.rows);
@@ -34,27 +42,27 @@ fn holds(kind: TrialKind, greatest_exceptional_share: f64, greatest_unconverged_
 
 #[test]
 fn rows_of_random_machines_are_within_their_accuracy() {
-    holds(TrialKind::Plain, 0.02, 0.1);
+    holds(TrialKind::Plain, EXCEPTIONAL_SHARE, 0.1);
 }
 
 #[test]
 fn rows_that_graze_are_within_their_accuracy() {
-    holds(TrialKind::Grazing, 0.01, 0.1);
+    holds(TrialKind::Grazing, EXCEPTIONAL_SHARE, 0.1);
 }
 
 #[test]
 fn rows_with_friction_and_stops_are_within_their_accuracy() {
-    holds(TrialKind::Elements, 0.01, 0.3);
+    holds(TrialKind::Elements, EXCEPTIONAL_SHARE, 0.3);
 }
 
 #[test]
 fn rows_behind_a_brake_are_within_their_accuracy() {
-    holds(TrialKind::Jumps, 0.01, 0.2);
+    holds(TrialKind::Jumps, EXCEPTIONAL_SHARE, 0.2);
 }
 
-/// Limits of 1.0001 are so near 1 that an error within the accuracy turns a verdict in one row of
-/// fifty.
+/// Limits of 1.0001 are so near 1 that an error within the accuracy turns a verdict in one machine
+/// of five.
 #[test]
 fn most_rows_of_micrometres_are_within_their_accuracy() {
-    holds(TrialKind::Tiny, 0.15, 0.3);
+    holds(TrialKind::Tiny, 0.5, 0.3);
 }
