@@ -360,6 +360,12 @@ fn exports_overwrite_only_files_of_the_same_kind() {
         let bytes = fs::read(test_folder.path(name)).expect("the export is there");
         assert!(bytes.starts_with(begins), "{name}");
     }
+    // The output may be an option, as with every other command.
+    assert_eq!(exit_code(&test_folder.sweep(&["export", MAP, "--out", "o.csv"])), Some(0));
+    let bytes = |name| fs::read(test_folder.path(name)).expect("the export is there");
+    assert_eq!(bytes("o.csv"), bytes("m.csv"));
+    assert_eq!(exit_code(&test_folder.sweep(&["export", MAP, "p.csv", "-o", "q.csv"])), Some(2));
+    assert_eq!(exit_code(&test_folder.sweep(&["export", MAP])), Some(2));
     fs::write(test_folder.path("mine.csv"), "my,own\n1,2\n").expect("written");
     assert_eq!(exit_code(&test_folder.sweep(&["export", MAP, "mine.csv"])), Some(2));
     assert_eq!(exit_code(&test_folder.sweep(&["export", MAP, "m.ods"])), Some(2));

@@ -1,6 +1,6 @@
 //! `sweep export FILE OUT`: a result in another format.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::exit::{Error, Exit, tell};
 use crate::store::refuse_unfinished;
@@ -13,10 +13,21 @@ pub struct Args {
     /// A result, trace, modes or boundary file, or any other Parquet file of this program
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Where to write; the ending says how
-    #[arg(value_name = "OUT")]
-    #[arg(help = format!("Where to write; the ending {} says how", endings()))]
-    out: PathBuf,
+    /// File to write; the ending says the format
+    #[arg(value_name = "OUT", required_unless_present = "output")]
+    #[arg(help = format!("File to write; the ending {} says the format", endings()))]
+    out: Option<PathBuf>,
+
+    /// File to write, as an option instead of the second argument
+    #[arg(short, long, visible_alias = "out", value_name = "FILE", conflicts_with = "out")]
+    output: Option<PathBuf>,
+}
+
+impl Args {
+    /// Returns the file to write, which the command line requires in one of two places.
+    fn to_write(&self) -> &Path {
+        self.out.as_ref().or(self.output.as_ref()).expect("required")
+    }
 }
 
 /// Writes the result in the format of the output's ending.
@@ -25,15 +36,16 @@ pub struct Args {
 /// An ending of no format, a file that cannot be read or is too large for the format, an output
 /// that cannot be written.
 pub fn run(args: &Args) -> Result<Exit, Error> {
-    let Some(format) = ExportFormat::from_path(&args.out) else {
+    let out = args.to_write();
+    let Some(format) = ExportFormat::from_path(out) else {
         let expected = format!("a name that ends in {}", endings());
-        return Err(Error::option("OUT", args.out.display(), &expected));
+        return Err(Error::option("OUT", out.display(), &expected));
     };
     refuse_unfinished(&args.file)?;
     let file = ResultTable::open(&args.file)?;
-    let output = Output::begin(&args.out, format.kind())?;
+    let output = Output::begin(out, format.kind())?;
     export(&file, format, output)?;
-    tell(&format!("wrote {}: {} rows", args.out.display(), file.rows()));
+    tell(&format!("wrote {}: {} rows", out.display(), file.rows()));
     Ok(Exit::Done)
 }
 
