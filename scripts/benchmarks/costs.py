@@ -234,7 +234,7 @@ def duration(seconds):
 
 def estimates(per_core_s, chunks_mb, result_mb, join_s):
     """What a million and a billion points of 50 s would cost."""
-    fast, _, plain = per_core_s
+    fast, plain = per_core_s
     chunks = [(1e6, 1024), (1e9, 4096)]
     whole = [(count, math.ceil(count / size), size) for count, size in chunks]
     rows = [
