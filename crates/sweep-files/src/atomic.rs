@@ -16,41 +16,42 @@ const PREFIX: &str = ".sweep-";
 /// Ending of the name of a temporary file.
 const SUFFIX: &str = ".tmp";
 
-/// Greatest number of attempts to make a temporary file that nobody removes before it is locked,
-/// and whose name nobody has taken. Basis: either happens in an instant alone. Twice as many change
-/// nothing.
+/// Greatest number of attempts to make a temporary file. An attempt fails if another process has a
+/// file of this name, or removes the new file before it is locked. Basis: both are rare. Doubling
+/// it makes no difference.
 const ATTEMPTS: u32 = 5;
 
-/// Number of hexadecimal digits of either part of such a name. Basis: at 48 bits, two processes of
-/// a cluster do not make the same name, nor does a user choose a name with its check. Twice as many
-/// make long names.
+/// Number of hexadecimal digits of each of the two parts of a temporary file's name. Basis: with 48
+/// bits, two processes of a cluster do not choose the same name, and no name that a user chooses
+/// passes the check of its second part. Doubling it makes longer names.
 const DIGITS: usize = 12;
 
-/// Whether a name is that of a temporary file. A part of it is the check of the other, so that no
-/// file of a user's is taken for a temporary one.
+/// Whether a name is that of a temporary file. The second part of such a name is a hash of the
+/// first, so that no user's file is taken for a temporary one.
 pub fn is_temporary(name: &str) -> bool {
     let parts = name.strip_prefix(PREFIX).and_then(|rest| rest.strip_suffix(SUFFIX));
     let parts = parts.and_then(|parts| parts.split_once('-'));
-    parts.is_some_and(|(own, check)| own.len() == DIGITS && check == digits(own))
+    parts.is_some_and(|(token, check)| token.len() == DIGITS && check == hash_digits(token))
 }
 
 /// Makes a name of a temporary file that this process has not made before.
 pub fn temporary_name() -> String {
-    static MADE: AtomicU64 = AtomicU64::new(0);
-    let made = MADE.fetch_add(1, Ordering::Relaxed);
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let sequence = COUNT.fetch_add(1, Ordering::Relaxed);
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
-    let own = digits(&format!("{} {now} {made}", std::process::id()));
-    format!("{PREFIX}{own}-{}{SUFFIX}", digits(&own))
+    let token = hash_digits(&format!("{} {now} {sequence}", std::process::id()));
+    format!("{PREFIX}{token}-{}{SUFFIX}", hash_digits(&token))
 }
 
-/// Computes the digits that stand for a text.
-fn digits(text: &str) -> String {
+/// Computes the first digits of a text's hash.
+fn hash_digits(text: &str) -> String {
     let hash = blake3::hash(text.as_bytes()).to_hex();
     hash.chars().take(DIGITS).collect()
 }
 
-/// Makes a temporary file in `folder`, which disappears unless it is [`publish`]ed. It is locked,
-/// so that [`clear_leftovers`] tells it from files that killed processes left.
+/// Makes a temporary file in `folder`, which is deleted unless it is [`publish`]ed. The file is
+/// locked while its process lives, so that [`clear_leftovers`] deletes only the files of killed
+/// processes.
 ///
 /// # Errors
 /// [`FileError::Io`].
@@ -69,15 +70,15 @@ pub fn begin(folder: &Path) -> Result<NamedTempFile, FileError> {
                 attempt += 1;
                 continue;
             }
-            made => made.map_err(FileError::io("create a file in", folder))?,
+            created => created.map_err(FileError::io("create a file in", folder))?,
         };
-        let lost = match file.as_file().try_lock() {
+        let is_lost = match file.as_file().try_lock() {
             Ok(()) => !is_named(file.as_file(), file.path()),
             Err(TryLockError::WouldBlock) => true,
-            // Without locks nobody takes the file for a leftover.
+            // On a file system without locks, [`clear_leftovers`] deletes no file.
             Err(TryLockError::Error(_)) => false,
         };
-        if !lost || attempt == ATTEMPTS {
+        if !is_lost || attempt == ATTEMPTS {
             return Ok(file);
         }
         attempt += 1;
@@ -94,13 +95,15 @@ pub fn is_named(file: &File, path: &Path) -> bool {
     }
 }
 
-/// Whether the path exists: an open file cannot be deleted on other systems.
+/// Whether the path exists. On systems other than Unix an open file cannot be deleted, so that a
+/// file at the path is the open one.
 #[cfg(not(unix))]
 pub fn is_named(_file: &File, path: &Path) -> bool {
     path.exists()
 }
 
-/// Syncs a file, gives it its name on the same file system, and syncs that name.
+/// Syncs a finished file, renames it to `target` on the same file system, and syncs the target's
+/// folder.
 ///
 /// # Errors
 /// [`FileError::Io`].
@@ -111,9 +114,10 @@ pub fn publish(file: NamedTempFile, target: &Path) -> Result<(), FileError> {
     sync_folder(parent(target))
 }
 
-/// Writes a file whole, over an older one if there is one. The temporary name lives in `folder`.
+/// Writes a file in one step, and replaces an older one. The temporary file is made in `folder`.
 ///
-/// For a run's own folder; what a user named goes through [`crate::Output`].
+/// This function is for files in a run's own folder; files that a user has named are written by
+/// [`crate::Output`].
 ///
 /// # Errors
 /// [`FileError::Io`].
@@ -123,7 +127,7 @@ pub fn write(folder: &Path, target: &Path, bytes: &[u8]) -> Result<(), FileError
     publish(file, target)
 }
 
-/// Writes a file whole unless something is there. Returns whether it was written.
+/// Writes a file in one step, unless there is already one. Returns whether it was written.
 ///
 /// # Errors
 /// [`FileError::Io`].
@@ -145,7 +149,7 @@ pub fn create(folder: &Path, target: &Path, bytes: &[u8]) -> Result<bool, FileEr
 pub fn sync_folder(folder: &Path) -> Result<(), FileError> {
     let synced = File::open(folder).and_then(|folder| folder.sync_all());
     match synced {
-        // Some network file systems cannot sync a folder; there is nothing more to ask of them.
+        // Some network file systems cannot sync a folder; this is no error.
         Err(error)
             if matches!(error.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) =>
         {
@@ -155,8 +159,8 @@ pub fn sync_folder(folder: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Deletes what killed processes left in a folder: temporary files that nobody holds locked. A
-/// leftover that cannot be deleted hinders nobody, so nothing of this is an error.
+/// Deletes the temporary files in a folder that killed processes have left: those that nobody holds
+/// locked. A file that cannot be deleted does no harm, so that no failure is an error.
 pub fn clear_leftovers(folder: &Path) {
     let names = regular::names(folder).unwrap_or_default();
     for name in names.iter().filter(|name| name.to_str().is_some_and(is_temporary)) {
@@ -169,7 +173,7 @@ pub fn clear_leftovers(folder: &Path) {
     }
 }
 
-/// Deletes a file; one that is already gone is fine.
+/// Deletes a file, if there is one.
 ///
 /// # Errors
 /// [`FileError::Io`].
@@ -191,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn create_leaves_the_first_and_write_replaces() {
+    fn create_keeps_an_existing_file_and_write_replaces_it() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("x");
         assert!(create(folder.path(), &target, b"first").unwrap());
@@ -203,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn names_of_files_in_the_making_are_known_by_their_check() {
+    fn a_change_of_any_character_makes_another_name_than_a_temporary_file_has() {
         let names = [temporary_name(), temporary_name()];
         assert_ne!(names[0], names[1]);
         for name in names {
@@ -218,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn leftovers_go_and_everything_else_stays() {
+    fn only_unlocked_temporary_files_are_cleared() {
         let folder = tempfile::tempdir().unwrap();
         let left = folder.path().join(temporary_name());
         let held = begin(folder.path()).unwrap();
@@ -242,7 +246,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn others_may_read_what_the_umask_lets_them() {
+    fn files_have_the_permissions_that_the_umask_allows() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
         let ours = folder.path().join("ours");
@@ -254,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vanished_folder_is_named_with_advice() {
+    fn the_error_for_a_missing_folder_names_it_and_advises() {
         let error = write(Path::new("/nonexistent/x.partial"), Path::new("/nonexistent/x"), b"")
             .unwrap_err();
         let text = error.to_string();

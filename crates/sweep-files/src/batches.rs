@@ -24,19 +24,19 @@ use serde_json::Value;
 
 use crate::key;
 
-/// Greatest number of rows of a batch, which never come from two row groups. Basis: a batch of a
-/// hundred columns takes 3 MB. Twice as many take twice the memory.
+/// Greatest number of rows in a batch; a batch has rows of one row group. Basis: a batch of a
+/// hundred columns takes 3 MB. Doubling it doubles the memory.
 const BATCH_ROWS: usize = 1 << 12;
 
-/// Number of words that are read at once. Basis: a few bytes of a file may decode to many long
-/// words, whose bytes are counted after each read. Twice as many may take twice the memory.
+/// Number of words that are decoded before their bytes are counted. Basis: a few bytes of a damaged
+/// file may decode to many long words. Doubling it may double the memory.
 const WORDS_AT_ONCE: usize = 32;
-/// Greatest number of bytes of the different words of a batch. Basis: as [`WORDS_AT_ONCE`]. Twice
-/// as many may take 2 GB.
+/// Greatest total size of a batch's distinct words, in bytes. Basis: the same damaged files.
+/// Doubling it may take 2 GB.
 const MAX_WORD_BYTES: usize = 1 << 30;
 
-/// Returns the columns of a file. A column that is not read, such as a group or a time, is of no
-/// type.
+/// Returns the columns of a file. A column of a type that is not supported, such as a group or a
+/// time, has the type [`DataType::Null`].
 pub fn schema(file: &ParquetMetaData) -> SchemaRef {
     let about = file.file_metadata();
     let pairs = about.key_value_metadata().into_iter().flatten();
@@ -56,7 +56,8 @@ pub fn schema(file: &ParquetMetaData) -> SchemaRef {
     Arc::new(Schema::new(fields.collect::<Vec<_>>()))
 }
 
-/// Returns a column's type. Numbers are of the widest type of their kind.
+/// Returns the type as which a column is read. Integers and floats are read as the widest type of
+/// their kind.
 fn data_type(declared: &Declared) -> DataType {
     use ConvertedType as As;
     let about = declared.get_basic_info();
@@ -69,11 +70,11 @@ fn data_type(declared: &Declared) -> DataType {
         (Type::INT32 | Type::INT64 | Type::FIXED_LEN_BYTE_ARRAY, As::DECIMAL) => DataType::Float64,
         (_, As::INT_8 | As::INT_16 | As::INT_32 | As::INT_64) => DataType::Int64,
         (_, As::UINT_8 | As::UINT_16 | As::UINT_32 | As::UINT_64) => DataType::UInt64,
-        // Nanoseconds are said by a logical type alone.
+        // Times in nanoseconds have a logical type but no converted one.
         (Type::INT32 | Type::INT64, As::NONE) if about.logical_type_ref().is_none() => {
             DataType::Int64
         }
-        // A word takes memory once, however many rows have it.
+        // Words are read as a dictionary, so that each distinct word takes memory once.
         (_, As::UTF8 | As::JSON) => {
             DataType::Dictionary(DataType::Int32.into(), DataType::Utf8.into())
         }
@@ -81,27 +82,27 @@ fn data_type(declared: &Declared) -> DataType {
     }
 }
 
-/// The rows of some columns of a file.
+/// A reader of some columns of a file, batch by batch.
 pub struct Batches<R> {
     source: Arc<R>,
     file: Arc<ParquetMetaData>,
     schema: SchemaRef,
-    /// The place of each column among those of a row group.
+    /// The index of each column among those of a row group.
     leaves: Vec<usize>,
-    /// The decimal places of each column of decimals.
+    /// The number of decimal places of each column; `None` if it has no decimals.
     scales: Vec<Option<i32>>,
     /// The next row group.
     group: usize,
-    /// Rows left in this one.
+    /// The number of rows that are still to be read of the current row group.
     left: usize,
     columns: Vec<ColumnReader>,
 }
 
 impl<R: ChunkReader + 'static> Batches<R> {
-    /// Opens the columns at these places of a file's [`schema`].
+    /// Opens some columns of a file, which are given by their indices in its [`schema`].
     ///
     /// # Errors
-    /// A column of a type that is not read.
+    /// Fails if the type of a column is not supported.
     pub fn new(
         source: R,
         file: Arc<ParquetMetaData>,
@@ -139,7 +140,7 @@ impl<R: ChunkReader + 'static> Batches<R> {
     /// Reads the next rows; `None` after the last.
     ///
     /// # Errors
-    /// A damaged file.
+    /// Fails if the file is damaged.
     pub fn batch(&mut self) -> Result<Option<RecordBatch>, ParquetError> {
         while self.left == 0 {
             let Some(group) = self.file.row_groups().get(self.group) else { return Ok(None) };
@@ -161,7 +162,7 @@ impl<R: ChunkReader + 'static> Batches<R> {
             None => array(column, field.data_type(), rows),
         });
         let arrays = arrays.collect::<Result<Vec<_>, _>>()?;
-        // There may be no column.
+        // The number of rows is given because there may be no column.
         let count = RecordBatchOptions::new().with_row_count(Some(rows));
         let batch = RecordBatch::try_new_with_options(Arc::clone(&self.schema), arrays, &count);
         batch.map(Some).map_err(from_arrow)
@@ -178,28 +179,28 @@ fn array(
     data_type: &DataType,
     rows: usize,
 ) -> Result<ArrayRef, ParquetError> {
-    use ColumnReader as By;
+    use ColumnReader as Reader;
     let is_unsigned = *data_type == DataType::UInt64;
     match column {
-        By::BoolColumnReader(column) => {
+        Reader::BoolColumnReader(column) => {
             Ok(Arc::new(cells(read(column, rows)?).collect::<BooleanArray>()))
         }
-        By::Int32ColumnReader(column) if is_unsigned => {
+        Reader::Int32ColumnReader(column) if is_unsigned => {
             numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned().into())
         }
-        By::Int32ColumnReader(column) => numbers::<_, Int64Type>(column, rows, i64::from),
-        By::Int64ColumnReader(column) if is_unsigned => {
+        Reader::Int32ColumnReader(column) => numbers::<_, Int64Type>(column, rows, i64::from),
+        Reader::Int64ColumnReader(column) if is_unsigned => {
             numbers::<_, UInt64Type>(column, rows, |cell| cell.cast_unsigned())
         }
-        By::Int64ColumnReader(column) => numbers::<_, Int64Type>(column, rows, |cell| cell),
-        By::FloatColumnReader(column) => numbers::<_, Float64Type>(column, rows, f64::from),
-        By::DoubleColumnReader(column) => numbers::<_, Float64Type>(column, rows, |cell| cell),
-        By::ByteArrayColumnReader(column) => words(column, rows),
+        Reader::Int64ColumnReader(column) => numbers::<_, Int64Type>(column, rows, |cell| cell),
+        Reader::FloatColumnReader(column) => numbers::<_, Float64Type>(column, rows, f64::from),
+        Reader::DoubleColumnReader(column) => numbers::<_, Float64Type>(column, rows, |cell| cell),
+        Reader::ByteArrayColumnReader(column) => words(column, rows),
         _ => unreachable!("`data_type` takes no others"),
     }
 }
 
-/// Reads the next values of a column, and the levels that tell which rows have one.
+/// Reads the next values of a column, and a level for each row: 1 if it has a value, else 0.
 fn read<T: Physical>(
     column: &mut ColumnReaderImpl<T>,
     rows: usize,
@@ -210,12 +211,12 @@ fn read<T: Physical>(
     if read != rows {
         return Err(ParquetError::General("a column has fewer rows than it should".to_owned()));
     }
-    // A column that is never null has no levels.
+    // The library gives no levels for a column without nulls.
     levels.resize(rows, 1);
     Ok((levels, values))
 }
 
-/// Puts each value in its row.
+/// Returns the value of each row, if it has one.
 fn cells<T>((levels, values): (Vec<i16>, Vec<T>)) -> impl Iterator<Item = Option<T>> {
     let mut values = values.into_iter();
     levels.into_iter().map(move |level| if level == 1 { values.next() } else { None })
@@ -235,10 +236,12 @@ fn numbers<T: Physical, A: ArrowPrimitiveType>(
     }))
 }
 
-/// Most bytes of a decimal that is read: 38 digits.
-const MOST_DECIMAL_BYTES: usize = 16;
+/// Greatest size of a decimal that is read in full, in bytes. Basis: 38 digits, which is the most
+/// that other programs write. Doubling it needs wider integers than i128.
+const MAX_DECIMAL_BYTES: usize = 16;
 
-/// Decimals as numbers: whole numbers of so many decimal places.
+/// Reads decimals as numbers. They are stored as whole numbers, in units of the last of `scale`
+/// decimal places.
 fn decimals(column: &mut ColumnReader, scale: i32, rows: usize) -> Result<ArrayRef, ParquetError> {
     let size = 10_f64.powi(scale);
     match column {
@@ -249,18 +252,20 @@ fn decimals(column: &mut ColumnReader, scale: i32, rows: usize) -> Result<ArrayR
             numbers::<_, Float64Type>(column, rows, |cell| cell as f64 / size)
         }
         ColumnReader::FixedLenByteArrayColumnReader(column) => {
-            numbers::<_, Float64Type>(column, rows, |cell| whole(cell.data()) as f64 / size)
+            numbers::<_, Float64Type>(column, rows, |cell| {
+                big_endian_integer(cell.data()) as f64 / size
+            })
         }
         _ => Err(ParquetError::General("a column of decimals holds something else".to_owned())),
     }
 }
 
-/// Returns the whole number of a decimal's bytes, the most significant first; of more than fit, the
-/// last.
-fn whole(bytes: &[u8]) -> i128 {
+/// Returns the integer that big-endian bytes in two's complement stand for; only the last bytes if
+/// there are more than an i128 holds.
+fn big_endian_integer(bytes: &[u8]) -> i128 {
     let sign = bytes.first().is_some_and(|first| *first >= 0x80);
     let filled: i128 = if sign { -1 } else { 0 };
-    let last = bytes.len().saturating_sub(MOST_DECIMAL_BYTES);
+    let last = bytes.len().saturating_sub(MAX_DECIMAL_BYTES);
     bytes[last..].iter().fold(filled, |sum, byte| (sum << 8) | i128::from(*byte))
 }
 
@@ -270,12 +275,12 @@ fn words(
 ) -> Result<ArrayRef, ParquetError> {
     let mut words = Vec::<String>::new();
     let mut bytes = 0;
-    // Codes by the words' addresses: a dictionary has each word once. The next page may have
-    // another word at an address.
+    // A word's code by its address in a page's dictionary, which has each word once. Another page
+    // may have another word at the same address, so that the words are compared too.
     let mut codes = HashMap::new();
     let mut keys = Vec::with_capacity(rows);
     while keys.len() < rows {
-        // Neighbours mostly have the same word.
+        // Neighbouring rows mostly have the same word: `last` spares the look-up.
         let mut last = (("".as_ptr(), usize::MAX), 0);
         for word in cells(read(column, WORDS_AT_ONCE.min(rows - keys.len()))?) {
             let Some(word) = word else {

@@ -1,4 +1,4 @@
-//! A column's cells, whatever type of numbers or text holds them: other programs may have rewritten
+//! Reads the cells of a column, of any type of numbers or text: other programs may have rewritten
 //! our files.
 
 use arrow_array::cast::AsArray;
@@ -20,7 +20,7 @@ fn unreadable(array: &dyn Array, wanted: &str) -> ArrowError {
 pub fn numbers(array: &dyn Array) -> Result<Vec<Option<f64>>, ArrowError> {
     macro_rules! widened {
         ($type:ty) => {
-            // Counts above 2^53 lose digits, as they would in any program that plots them.
+            // Integers above 2^53 lose digits, as in any program that plots them.
             array.as_primitive::<$type>().iter().map(|cell| cell.map(|cell| cell as f64)).collect()
         };
     }
@@ -39,7 +39,7 @@ pub fn numbers(array: &dyn Array) -> Result<Vec<Option<f64>>, ArrowError> {
     })
 }
 
-/// Whether [`numbers`] can read it.
+/// Whether [`numbers`] can read a column of this type.
 pub fn is_number(data_type: &DataType) -> bool {
     data_type.is_integer() || matches!(data_type, DataType::Float64 | DataType::Float32)
 }
@@ -47,7 +47,7 @@ pub fn is_number(data_type: &DataType) -> bool {
 /// Reads truth values, one per row.
 ///
 /// # Errors
-/// [`ArrowError::SchemaError`] if the column does not hold such.
+/// [`ArrowError::SchemaError`] if the column has another type.
 pub fn flags(array: &dyn Array) -> Result<&BooleanArray, ArrowError> {
     array.as_boolean_opt().ok_or_else(|| unreadable(array, "true and false"))
 }
@@ -55,7 +55,7 @@ pub fn flags(array: &dyn Array) -> Result<&BooleanArray, ArrowError> {
 /// Reads words, one per row. A word is stored once, however many rows have it.
 ///
 /// # Errors
-/// [`ArrowError::SchemaError`] if the column does not hold such.
+/// [`ArrowError::SchemaError`] if the column has another type.
 pub fn words(
     array: &dyn Array,
 ) -> Result<TypedDictionaryArray<'_, Int32Type, StringArray>, ArrowError> {
@@ -64,7 +64,7 @@ pub fn words(
     typed.ok_or_else(|| unreadable(array, "words"))
 }
 
-/// Whether [`words`] can read it.
+/// Whether [`words`] can read a column of this type.
 pub fn is_text(data_type: &DataType) -> bool {
     *data_type == DataType::Dictionary(DataType::Int32.into(), DataType::Utf8.into())
 }
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_of_every_width_read_alike_and_nulls_stay_nulls() {
+    fn numbers_of_every_width_are_read_and_nulls_stay_nulls() {
         let arrays: [ArrayRef; 4] = [
             Arc::new(UInt64Array::from(vec![Some(3), None])),
             Arc::new(Int8Array::from(vec![Some(3), None])),
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_an_error_that_names_both_types() {
+    fn the_error_for_a_column_of_another_type_names_both_types() {
         let names: ArrayRef = Arc::new(StringArray::from(vec!["ok"]));
         let error = numbers(&names).unwrap_err().to_string();
         assert!(error.contains("numbers") && error.contains("Utf8"), "{error}");

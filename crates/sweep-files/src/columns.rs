@@ -17,7 +17,7 @@ pub enum CellKind {
 }
 
 impl CellKind {
-    /// Names it for a sentence: "a number".
+    /// Returns the kind's name with its article, as in "a number".
     pub const fn name(self) -> &'static str {
         match self {
             Self::Number => "a number",
@@ -27,35 +27,35 @@ impl CellKind {
     }
 }
 
-/// A column, without its rows.
+/// The description of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// The name in the file.
     pub name: String,
-    /// The unit by the field's metadata; empty for pure numbers and words.
+    /// The unit, from the field's metadata; empty for pure numbers and words.
     pub unit: String,
-    /// The description by the field's metadata; may be empty.
+    /// The description, from the field's metadata; may be empty.
     pub description: String,
     /// The kind of the cells.
     pub kind: CellKind,
-    /// Whether the file keeps it as whole numbers.
+    /// Whether the column's type in the file is an integer.
     pub whole: bool,
-    /// The direction in which it is bad, if the file says so.
+    /// The direction in which values of the column get worse, if the file's metadata has one.
     pub worse: Option<Worse>,
-    /// The value up to which it is good, if the file says so.
+    /// The limit between good and bad values, if the file's metadata has one.
     pub limit: Option<f64>,
-    /// The place among the fields.
+    /// The index among the fields of the schema.
     pub field: usize,
 }
 
 impl Column {
-    /// Whether its cells are numbers.
+    /// Whether the column's cells are numbers.
     pub fn is_number(&self) -> bool {
         self.kind == CellKind::Number
     }
 }
 
-/// Returns the columns of rows, without those of types that none of our files has.
+/// Returns the columns of a schema that have a supported type.
 pub fn columns(schema: &Schema) -> Vec<Column> {
     let fields = schema.fields().iter().enumerate();
     fields.filter_map(|(place, field)| column(field, place)).collect()

@@ -19,7 +19,7 @@ pub enum FileError {
         /// The system's error.
         source: io::Error,
     },
-    /// There is something at a path where this program must not write.
+    /// An output path at which there is something that must not be overwritten.
     #[error("{} cannot be an output: {reason}\n  = help: {help}", path.display())]
     Refused {
         /// The path as given.
@@ -29,15 +29,15 @@ pub enum FileError {
         /// The advice.
         help: &'static str,
     },
-    /// A file that is not Parquet, or only a part of one.
+    /// A file that is not Parquet or is truncated.
     #[error("{} is not a readable Parquet file: {reason}", path.display())]
     NotParquet {
         /// The file.
         path: PathBuf,
-        /// The reason, by the reader.
+        /// The reason that the reader gives.
         reason: String,
     },
-    /// A file of this program whose bytes have changed since it was written.
+    /// A result of this program whose bytes have changed since it was written.
     #[error(
         "{} is damaged: {DAMAGED}\n  = help: \
          restore it from a copy, or move it away and run the command again that wrote it",
@@ -47,7 +47,7 @@ pub enum FileError {
         /// The file.
         path: PathBuf,
     },
-    /// A result of this program that another one has written anew.
+    /// A result of this program that another program has read and written again.
     #[error(
         "{} carries no digest: another program has rewritten it\n  = help: \
          restore it from a copy, or move it away and run the command again that wrote it",
@@ -59,33 +59,33 @@ pub enum FileError {
     },
 }
 
-/// The reason why a file is called damaged.
+/// Reason in the message about a damaged file.
 const DAMAGED: &str = "the digest that it carries is not that of its bytes";
 
 impl FileError {
-    /// Makes [`FileError::Io`] of a system's error; `action` in the infinitive.
+    /// Makes a [`FileError::Io`] from a system's error; `action` is a verb in the infinitive.
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_path_buf();
         move |source| Self::Io { action, path, source }
     }
 
-    /// Makes the error of cells that are not of their schema's types.
+    /// Makes the error for cells of another type than the schema has.
     pub fn cells(path: &Path) -> impl FnOnce(ArrowError) -> Self {
         move |error| Self::not_parquet(path, error.to_string())
     }
 
-    /// Makes the error of a file that cannot be read, for this reason.
+    /// Makes the error for a file that cannot be read.
     pub(crate) fn not_parquet(path: &Path, reason: impl Into<String>) -> Self {
         Self::NotParquet { path: path.to_path_buf(), reason: reason.into() }
     }
 
-    /// Makes the error of a file of this program that has changed.
+    /// Makes the error for a result of this program that has changed.
     pub fn damaged(path: &Path) -> Self {
         Self::Damaged { path: path.to_path_buf() }
     }
 
-    /// Whether the request is at fault, and nothing was done: a file that is not there or is not
-    /// what it must be.
+    /// Whether the user's input is the cause, and nothing was done: a file is missing or is of
+    /// another kind than the command needs.
     pub fn is_refusal(&self) -> bool {
         use io::ErrorKind::{InvalidInput, NotADirectory, NotFound, PermissionDenied};
         let Self::Io { action, source, .. } = self else { return true };
@@ -94,8 +94,8 @@ impl FileError {
     }
 }
 
-/// Returns the advice about a failed operation. Finished chunks are whole whatever happened, so
-/// that it ends alike.
+/// Returns the advice about a failed operation. Most end in running the same command again, because
+/// finished chunks of a run are kept in any case.
 fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
     let advice = match source.kind() {
         io::ErrorKind::StorageFull => {
@@ -114,8 +114,8 @@ fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
             "give this user the right to it, or another path"
         }
         io::ErrorKind::NotFound => {
-            if let Some(near) = near(path) {
-                return format!("{} is there: is it meant?", near.display()).into();
+            if let Some(similar) = find_similar(path) {
+                return format!("{} is there: is it meant?", similar.display()).into();
             }
             "check the name and its folder; if it has vanished, bring it back and run the same \
              command again"
@@ -132,8 +132,8 @@ fn advice(path: &Path, source: &io::Error) -> Cow<'static, str> {
     advice.into()
 }
 
-/// Finds the result that a path without its folder or ending means.
-fn near(path: &Path) -> Option<PathBuf> {
+/// Finds the result that was probably meant by a path that lacks its folder or its ending.
+fn find_similar(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?;
     let mut whole = name.to_owned();
     if path.extension().is_none_or(|ending| ending != "parquet") {

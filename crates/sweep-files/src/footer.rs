@@ -8,20 +8,24 @@ use std::io::{self, Read, Seek, SeekFrom};
 use crate::thrift::{self, Found, Shape, Wire};
 use Wire::{Binary, Bool, Byte, Double, List, Number, Struct};
 
-/// The end of a file: the footer's length (bytes) and a mark.
+/// Length of a file's end, in bytes: the footer's length (4) and the mark.
 const TAIL_BYTES: u64 = 8;
 const MARK: &[u8] = b"PAR1";
 
-/// Most bytes of a footer. The library makes up to 25 bytes of one, beside columns.
+/// Greatest length of a footer, in bytes. Basis: the library allocates up to 25 bytes per byte of a
+/// footer, beside its columns. Doubling it doubles this memory.
 pub(crate) const LONGEST_BYTES: u64 = 16 << 20;
 
-/// Columns and groups of columns. The library makes up to 2 kB of one, whose name may be empty.
+/// Greatest number of columns and groups of columns. Basis: the library allocates up to 2 kB for
+/// each, even if the name is empty. Doubling it doubles this memory.
 pub(crate) const MOST_COLUMNS: u64 = 100_000;
 
-/// Groups of columns within each other. The library recurses through them.
+/// Greatest depth of nested groups of columns. Basis: the library recurses through them. Doubling
+/// it doubles the stack that is needed.
 pub(crate) const DEEPEST: usize = 100;
 
-// What version 60 of the library takes the fields for, by the names of Parquet's own format.
+// The types as which version 60 of the Parquet library reads the fields. The names are those of
+// Parquet's format.
 const FILE: Shape = &[
     (1..=1, Number),
     (2..=2, List(&Struct(SCHEMA_ELEMENT))),
@@ -65,36 +69,37 @@ pub(crate) const STATISTICS: Shape =
     &[(1..=2, Binary), (3..=4, Number), (5..=6, Binary), (7..=8, Bool), (9..=9, Number)];
 const EMPTY: Wire = Struct(&[]);
 
-/// Why a Parquet file is not read, found before the library would fail at it.
+/// The reason why a Parquet file is refused before the library reads it.
 #[derive(Debug, thiserror::Error)]
 pub enum Refused {
     /// The file cannot be read.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// A footer that is none, or declares what cannot be.
+    /// A footer that cannot be parsed, or declares impossible counts.
     #[error("its footer makes no sense")]
     Footer,
-    /// A footer of more bytes than any file needs.
+    /// A footer that is longer than any sound file's.
     #[error("its footer is longer than {} MiB", LONGEST_BYTES >> 20)]
     LongFooter,
-    /// Columns and groups of them, more than any file needs.
+    /// More columns and groups of columns than any sound file has.
     #[error("it has more than {} columns", MOST_COLUMNS)]
     TooManyColumns,
-    /// Groups of columns within each other, more than any file needs.
+    /// Groups of columns that are nested more deeply than in any sound file.
     #[error("its columns are nested more than {} deep", DEEPEST)]
     TooDeep,
-    /// A page's header that is none, or declares what cannot be.
+    /// A page header that cannot be parsed, or declares impossible sizes.
     #[error("the header of a page makes no sense")]
     PageHeader,
-    /// Pages that unpack into more bytes than was said to be the most.
+    /// Pages that unpack into more bytes than the caller allows.
     #[error("its pages unpack into too many bytes")]
     TooLong,
 }
 
-/// The path to a group's number of columns.
+/// Path of field numbers to a group's number of children.
 const CHILDREN: &[i16] = &[2, 5];
 
-/// Whether the library can read a file's footer. The library itself reports a file without one.
+/// Checks that the library can safely read a file's footer. A file without a footer passes: the
+/// library reports it.
 ///
 /// # Errors
 /// [`Refused::Io`], [`Refused::Footer`], [`Refused::LongFooter`], [`Refused::TooManyColumns`],
@@ -133,7 +138,7 @@ fn check_footer(footer: &[u8]) -> Result<(), Refused> {
         }
         _ => {}
     });
-    // Room is made for as many columns as a group declares.
+    // The library allocates as many columns as a group declares.
     if rest.is_none() || declared >= elements.max(1) {
         return Err(Refused::Footer);
     }
@@ -143,12 +148,12 @@ fn check_footer(footer: &[u8]) -> Result<(), Refused> {
     if tree.depth > DEEPEST { Err(Refused::TooDeep) } else { Ok(()) }
 }
 
-/// Columns and groups of them, each group before its own.
+/// The nesting of columns and groups; each group comes before its children.
 #[derive(Default)]
 struct Tree {
-    /// How many are yet to come, of each group that is not whole.
+    /// The number of children that are still to come, for each open group.
     open: Vec<u64>,
-    /// Most groups within each other so far.
+    /// The greatest depth so far.
     depth: usize,
 }
 
@@ -180,7 +185,7 @@ mod tests {
     use super::*;
     use crate::thrift::encode::varint;
 
-    /// A column, or with children a group of them.
+    /// Encodes a column, or a group if `children` is not zero.
     fn element(children: u64) -> Vec<u8> {
         match children {
             0 => vec![0x15, 10, 0x25, 0, 0x18, 1, b'x', 0],
@@ -188,7 +193,8 @@ mod tests {
         }
     }
 
-    /// A file without rows that has these groups and columns, and more fields at its footer's end.
+    /// Encodes a file without rows that has these groups and columns, given by their numbers of
+    /// children, and `more` fields at the footer's end.
     fn file(children: impl IntoIterator<Item = u64>, more: &[u8]) -> Vec<u8> {
         let elements: Vec<_> = children.into_iter().map(element).collect();
         let footer = [
@@ -203,12 +209,12 @@ mod tests {
         [MARK, &footer, &(footer.len() as u32).to_le_bytes(), MARK].concat()
     }
 
-    fn told(file: &[u8]) -> String {
+    fn message(file: &[u8]) -> String {
         check(&mut Cursor::new(file)).map_or_else(|error| error.to_string(), |()| "fine".to_owned())
     }
 
     #[test]
-    fn footers_of_every_type_and_setting_are_fine() {
+    fn footers_with_every_type_and_setting_pass() {
         let schema = "message x {
             required double double;
             optional boolean truth;
@@ -266,14 +272,14 @@ mod tests {
                 column.close().unwrap();
             }
             group.close().unwrap();
-            assert_eq!(told(&writer.into_inner().unwrap()), "fine");
+            assert_eq!(message(&writer.into_inner().unwrap()), "fine");
         }
     }
 
     #[test]
-    fn what_has_no_footer_is_left_to_the_library() {
+    fn files_without_a_footer_pass() {
         for bytes in [&b""[..], b"PAR1", b"time_s,x\n1,2\n", b"PAR1\xff\0\0\0PAR1", &[0; 100]] {
-            assert_eq!(told(bytes), "fine");
+            assert_eq!(message(bytes), "fine");
         }
     }
 
@@ -281,45 +287,45 @@ mod tests {
     fn lists_that_take_no_bytes_are_refused() {
         // Field 9 and those after it: each declares 2^31 - 1 booleans.
         let lists = [0x59, 0xf1, 0xff, 0xff, 0xff, 0xff, 7].repeat(3);
-        assert_eq!(told(&file([1, 0], &[])), "fine");
-        assert_eq!(told(&file([1, 0], &lists)), "its footer makes no sense");
+        assert_eq!(message(&file([1, 0], &[])), "fine");
+        assert_eq!(message(&file([1, 0], &lists)), "its footer makes no sense");
     }
 
     #[test]
-    fn groups_within_groups_have_an_end() {
+    fn groups_that_are_nested_too_deeply_are_refused() {
         // The root is a group too.
         let chain = |groups| std::iter::repeat_n(1, groups).chain([0]);
-        assert_eq!(told(&file(chain(DEEPEST), &[])), "fine");
-        let told_of = told(&file(chain(DEEPEST + 1), &[]));
-        assert_eq!(told_of, "its columns are nested more than 100 deep");
-        // Groups beside each other are none within each other.
+        assert_eq!(message(&file(chain(DEEPEST), &[])), "fine");
+        let refusal = message(&file(chain(DEEPEST + 1), &[]));
+        assert_eq!(refusal, "its columns are nested more than 100 deep");
+        // Groups side by side are not nested.
         let beside = [150].into_iter().chain([1, 0].repeat(150));
-        assert_eq!(told(&file(beside, &[])), "fine");
-        // The last of a group may be one, too.
+        assert_eq!(message(&file(beside, &[])), "fine");
+        // The last child of a group may be a group too.
         let comb = [2].into_iter().chain([0, 2].repeat(DEEPEST)).chain([0, 0]);
-        assert_eq!(told(&file(comb, &[])), "its columns are nested more than 100 deep");
+        assert_eq!(message(&file(comb, &[])), "its columns are nested more than 100 deep");
     }
 
     #[test]
-    fn columns_have_an_end() {
+    fn too_many_columns_are_refused() {
         let flat = |columns: u64| std::iter::once(columns).chain((0..columns).map(|_| 0));
-        assert_eq!(told(&file(flat(MOST_COLUMNS - 1), &[])), "fine");
-        assert_eq!(told(&file(flat(MOST_COLUMNS), &[])), "it has more than 100000 columns");
+        assert_eq!(message(&file(flat(MOST_COLUMNS - 1), &[])), "fine");
+        assert_eq!(message(&file(flat(MOST_COLUMNS), &[])), "it has more than 100000 columns");
     }
 
     #[test]
-    fn a_group_has_no_more_columns_than_there_are() {
-        assert_eq!(told(&file([2, 0, 0], &[])), "fine");
-        assert_eq!(told(&file([3, 0, 0], &[])), "its footer makes no sense");
-        assert_eq!(told(&file([0x3fff_ffff, 0], &[])), "its footer makes no sense");
+    fn a_group_that_declares_more_columns_than_there_are_is_refused() {
+        assert_eq!(message(&file([2, 0, 0], &[])), "fine");
+        assert_eq!(message(&file([3, 0, 0], &[])), "its footer makes no sense");
+        assert_eq!(message(&file([0x3fff_ffff, 0], &[])), "its footer makes no sense");
     }
 
     #[test]
-    fn a_footer_has_a_length_that_fits_in_memory() {
+    fn a_footer_that_is_too_long_is_refused() {
         let mut bytes = file([1, 0], &[]);
         let length = (LONGEST_BYTES as usize) + 1;
         let footer = [vec![0; length], (length as u32).to_le_bytes().to_vec(), MARK.to_vec()];
         bytes.extend(footer.concat());
-        assert_eq!(told(&bytes), "its footer is longer than 16 MiB");
+        assert_eq!(message(&bytes), "its footer is longer than 16 MiB");
     }
 }

@@ -52,7 +52,8 @@ pub enum FileKind<'a> {
     ManPage,
 }
 
-/// Results that are no maps: each kind in a word, the key that only its files have, and its name.
+/// Results other than maps: for each kind its word, the metadata key that only its files have, and
+/// its name.
 const OWN: [(FileKind<'static>, &str, &str, &str); 8] = [
     (FileKind::Trace, "trace", key::TRACE, "result of `sweep trace`"),
     (FileKind::Modes, "modes", key::MODES, "result of `sweep modes`"),
@@ -67,14 +68,14 @@ const OWN: [(FileKind<'static>, &str, &str, &str); 8] = [
 /// Beginning of the model's own file.
 pub const OWN_FILE: &str = "# Written by sweep: ";
 
-/// The first lines of a PDF figure: other documents differ in the second.
+/// The first lines of our PDF figures. The second line distinguishes them from other documents.
 pub const PDF_START: &[u8] = b"%PDF-1.7\n%\xe2\xe3\xcf\xd3 sweep plot\n";
 
 /// The first line of an exported CSV file.
 pub const EXPORTED_CSV: &str = "# exported by sweep ";
 
 impl FileKind<'_> {
-    /// Names the kind: "the file there is no NAME".
+    /// Returns the kind's name, as in "the file there is no NAME".
     pub fn name(self) -> &'static str {
         match self {
             Self::Own => "file of `sweep optimise --best` or `sweep fit --out`",
@@ -111,7 +112,7 @@ impl FileKind<'_> {
             _ => match ParquetFile::look(path) {
                 Ok(file) if file.kind() == Some(self) => true,
                 Ok(_) => {
-                    // A damaged key makes one of ours look like another's.
+                    // A result with a damaged key looks like one of another kind.
                     ParquetFile::open(path)?;
                     false
                 }
@@ -129,7 +130,7 @@ impl FileKind<'_> {
         self.own().map_or("map", |(_, word, ..)| word)
     }
 
-    /// Returns the format that an ending says, if files of this kind are of another.
+    /// Returns the ending of a path if it stands for a format that files of this kind do not have.
     pub(crate) fn other_format(self, path: &Path) -> Option<&'static str> {
         // Endings of formats that are not Parquet.
         const OTHERS: &str = "csv tsv txt json toml xlsx ods nc h5 svg png pdf html zip";
@@ -144,7 +145,7 @@ impl FileKind<'_> {
 }
 
 impl ParquetFile {
-    /// Returns the kind of result by the metadata, if it is one.
+    /// Returns the kind of result that the metadata tells, if the file is a result.
     pub fn kind(&self) -> Option<FileKind<'static>> {
         let has = |key: &str| self.value(key).is_some();
         let own = OWN.iter().find(|(_, _, key, _)| has(key)).map(|(kind, ..)| *kind);
@@ -166,8 +167,9 @@ pub fn beside(output: &Path, ending: &str) -> PathBuf {
     output.with_file_name(name)
 }
 
-/// Whether the file is an account, and not that of another result in its place: an account that was
-/// renamed together with its result still has the old name in it.
+/// Whether the file at `path` is an account that may be overwritten. It must not be that of another
+/// result with the same sidecar path; but an account that was renamed together with its result
+/// still names the old file.
 fn is_account(path: &Path, of: &OsStr) -> std::io::Result<bool> {
     let text = regular::read_json(path)?;
     let account: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();

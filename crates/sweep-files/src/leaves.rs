@@ -1,15 +1,15 @@
-//! Two JSON values side by side, such as the plans of two files.
+//! Compares two JSON values, such as the plans of two files, leaf by leaf.
 
 use std::fmt;
 
 use serde_json::Value;
 
-/// A step of the path that leads into a value.
+/// A step of the path to a value inside another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step<'a> {
-    /// To a value by its name.
+    /// The name of a value in an object.
     Name(&'a str),
-    /// To an element of a list, from 0.
+    /// The index of an element in a list, from 0.
     Place(usize),
 }
 
@@ -23,13 +23,13 @@ impl fmt::Display for Step<'_> {
     }
 }
 
-/// Writes a path with dots: `machine.dampers.1.damping_n_s_per_m`.
+/// Returns a path as text with dots: `machine.dampers.1.damping_n_s_per_m`.
 pub fn dotted(path: &[Step<'_>]) -> String {
     path.iter().map(Step::to_string).collect::<Vec<_>>().join(".")
 }
 
-/// Calls `take` with each pair of leaves of two values and the path to it; a side without a value
-/// there has none. Two lists are leaves unless `opens` says so.
+/// Calls `take` with each pair of leaves of two values and the path to them; `None` stands for a
+/// value that one side lacks. Two lists are leaves unless `opens` returns true for them.
 pub fn leaves<'a>(
     sides: [Option<&'a Value>; 2],
     opens: fn(&[Value], &[Value]) -> bool,

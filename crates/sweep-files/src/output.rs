@@ -8,9 +8,9 @@ use tempfile::NamedTempFile;
 
 use crate::{FileError, FileKind, atomic, regular};
 
-/// A file that is not finished. Before the command does any work, its path is checked, a missing
-/// folder is made, and its temporary file is opened: so a folder that cannot be written fails
-/// early.
+/// An output file that is not yet finished. Before the command does any work, its path is checked,
+/// a missing folder is made, and the temporary file is opened, so that a folder without write
+/// permission is reported early.
 #[derive(Debug)]
 pub struct Output<'a> {
     path: &'a Path,
@@ -19,7 +19,7 @@ pub struct Output<'a> {
 }
 
 impl<'a> Output<'a> {
-    /// Claims a path for a file of this kind. Without [`Output::finish`] nothing there changes.
+    /// Begins a file of this kind. Nothing changes at its path before [`Output::finish`].
     ///
     /// # Errors
     /// [`FileError::Refused`] for what must not be overwritten, [`FileError::Io`].
@@ -41,7 +41,7 @@ impl<'a> Output<'a> {
     /// Writes the last bytes and publishes the file at its path.
     ///
     /// # Errors
-    /// Those of [`Output::begin`], for a file that has appeared there meanwhile.
+    /// The errors of [`Output::begin`], also for a file that has appeared at the path meanwhile.
     pub fn finish(mut self, bytes: &[u8]) -> Result<(), FileError> {
         self.write(bytes)?;
         judge(self.path, self.kind)?;
@@ -49,7 +49,7 @@ impl<'a> Output<'a> {
     }
 }
 
-/// Writes a file in a folder that is [`ready`].
+/// Writes a file of this kind into a folder that [`ready`] has prepared.
 ///
 /// # Errors
 /// Those of [`Output::begin`].
@@ -59,7 +59,7 @@ pub fn write(path: &Path, kind: FileKind<'_>, bytes: &[u8]) -> Result<(), FileEr
     output.finish(bytes)
 }
 
-/// Makes a folder with all above it, and clears it of what killed processes left.
+/// Makes a folder and its parents, and deletes the temporary files of killed processes in it.
 ///
 /// # Errors
 /// [`FileError::Io`].
@@ -78,7 +78,7 @@ pub fn judge(path: &Path, kind: FileKind<'_>) -> Result<(), FileError> {
     let refuse = |reason: &str, help| {
         Err(FileError::Refused { path: path.to_path_buf(), reason: reason.to_owned(), help })
     };
-    // The advice about a path that is no file's.
+    // Advice about a path that cannot be a file's.
     const NAME_A_FILE: &str = "give the name of a file, such as results/x.parquet";
     if path.file_name().is_none() {
         return refuse("it has no file name", NAME_A_FILE);
@@ -141,7 +141,7 @@ mod tests {
         FileKind::Differences,
     ];
 
-    /// A file as the commands write it, of each kind.
+    /// Returns the bytes of a file of this kind, as the commands write it.
     fn example(kind: FileKind<'_>) -> Vec<u8> {
         let own = match kind {
             FileKind::Map => key::PLAN,
@@ -172,7 +172,7 @@ mod tests {
         sealed(&[key::PLAN, own])
     }
 
-    /// A Parquet file of one number, with a digest and with these keys in its metadata.
+    /// Makes a Parquet file of one number, with a digest and with these keys in its metadata.
     fn sealed(keys: &[&str]) -> Vec<u8> {
         let numbers: ArrayRef = Arc::new(Float64Array::from(vec![1.0]));
         let batch = RecordBatch::try_from_iter([("x", numbers)]).unwrap();
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_differ_have_neighbours_that_differ() {
+    fn results_with_different_names_have_sidecars_with_different_names() {
         let named = |output| crate::beside(Path::new(output), "svg");
         assert_eq!(named("maps/x.parquet"), Path::new("maps/x.svg"));
         assert_eq!(named("v1.0"), Path::new("v1.0.svg"));
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_changes_before_the_end() {
+    fn an_output_changes_nothing_before_it_is_finished() {
         let home = tempfile::tempdir().unwrap();
         let path = home.path().join("made/for/it/x.svg");
         let output = Output::begin(&path, FileKind::Svg).unwrap();
@@ -290,7 +290,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_and_devices_are_refused_and_what_they_lead_to_stays() {
+    fn links_and_devices_are_refused_and_the_targets_of_links_stay() {
         let home = tempfile::tempdir().unwrap();
         let [fifo, target, link, dangling] =
             ["fifo", "target", "link", "dangling"].map(|name| home.path().join(name));

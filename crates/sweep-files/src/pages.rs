@@ -1,7 +1,7 @@
-//! The unpacked size of a column's pages, from their own headers.
+//! Computes the unpacked size of a column's pages from the page headers.
 //!
-//! A page of a few kilobytes may unpack into gigabytes, and the library makes room for whatever a
-//! header declares. So the headers are walked beforehand.
+//! A page of a few kilobytes may unpack into gigabytes, and the library allocates whatever a header
+//! declares. So the headers are read before the library reads the pages.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -12,14 +12,14 @@ use crate::footer::{Refused, STATISTICS};
 use crate::thrift::{self, Found, Shape, Wire};
 use Wire::{Bool, Number, Struct};
 
-/// How many bytes are read for a header: the first number is enough for nearly every one, and no
-/// header has more than the last.
+/// Numbers of bytes that are read to parse a header, one after the other until it is complete. The
+/// first is enough for nearly every header, and no sound header is longer than the last.
 const HEADER_BYTES: [u64; 3] = [256, 4 << 10, 64 << 10];
 
-/// Bytes of the smallest number that a dictionary holds.
+/// Size of the smallest number in a dictionary, in bytes.
 const SMALLEST_NUMBER_BYTES: u64 = 4;
 
-/// What the library takes the fields of a page header for.
+/// The types as which the library reads the fields of a page header.
 const PAGE_HEADER: Shape = &[
     (1..=4, Number),
     (5..=5, Struct(&[(1..=4, Number), (5..=5, Struct(STATISTICS))])),
@@ -28,33 +28,34 @@ const PAGE_HEADER: Shape = &[
     (8..=8, Struct(&[(1..=6, Number), (7..=7, Bool), (8..=8, Struct(STATISTICS))])),
 ];
 
-/// Numbers of a page header that matter here.
+/// The fields of a page header that are used here.
 #[derive(Default)]
 struct Header {
-    /// Bytes with and without compression.
+    /// The page's sizes without and with compression (bytes).
     unpacked: i32,
     packed: i32,
-    /// Entries of a dictionary.
+    /// The number of entries, if the page is a dictionary.
     dictionary: i32,
-    /// Bytes before what is compressed, in pages of the second version.
+    /// The sizes of the two parts before the compressed one, in data pages of version 2 (bytes).
     levels: [i32; 2],
     is_plain: bool,
 }
 
-/// Sizes of a column chunk, unpacked (bytes).
+/// The unpacked sizes of a column chunk (bytes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Unpacked {
-    /// All its pages together.
+    /// The sum over all pages.
     pub total: u64,
-    /// The dictionary and the largest page together: what a reader holds at once.
+    /// The dictionary and the largest page together, which a reader holds at once.
     pub at_once: u64,
 }
 
-/// Sizes of the column chunk in these bytes of a file, which are at most these. What its headers
-/// declare is true, or at most what the library would unpack.
+/// Computes the unpacked sizes of the column chunk that takes `length` bytes of a file from
+/// `start`. A page counts as its header declares; pages that the library would unpack further than
+/// that are refused.
 ///
 /// # Errors
-/// [`Refused`].
+/// [`Refused::TooLong`] if a size exceeds that in `most`, [`Refused::PageHeader`], [`Refused::Io`].
 pub fn unpacked(
     file: &mut (impl Read + Seek),
     start: u64,
@@ -83,15 +84,15 @@ pub fn unpacked(
         if matches!(codec, Compression::GZIP(_)) && !header.is_plain {
             let levels = size(header.levels[0])? + size(header.levels[1])?;
             file.seek(SeekFrom::Start(at.saturating_add(levels)))?;
-            let page = packed.checked_sub(levels).ok_or(Refused::PageHeader)?;
-            check_gzip(file.take(page), unpacked.saturating_sub(levels))?;
+            let compressed_bytes = packed.checked_sub(levels).ok_or(Refused::PageHeader)?;
+            check_gzip(file.take(compressed_bytes), unpacked.saturating_sub(levels))?;
         }
         at += packed;
     }
     Ok(sizes)
 }
 
-/// The header of the page that begins here, and how many bytes it takes.
+/// Reads the header of the page that begins at `at`, and returns it with its length (bytes).
 fn header(file: &mut (impl Read + Seek), at: u64, end: u64) -> Result<(Header, u64), Refused> {
     let mut bytes = Vec::new();
     for most in HEADER_BYTES {
@@ -105,10 +106,11 @@ fn header(file: &mut (impl Read + Seek), at: u64, end: u64) -> Result<(Header, u
     Err(Refused::PageHeader)
 }
 
-/// Gzip is the only codec that is unpacked to its end whatever the header declares.
+/// Checks that a page unpacks into at most `most` bytes. The library unpacks gzip, and no other
+/// codec, to its end whatever the header declares.
 fn check_gzip(packed: impl Read, most: u64) -> Result<(), Refused> {
     let mut decoder = MultiGzDecoder::new(packed).take(most + 1);
-    // The library reports bytes that are not gzip.
+    // Bytes that are not gzip pass: the library reports them.
     match io::copy(&mut decoder, &mut io::sink()) {
         Ok(found) if found > most => Err(Refused::PageHeader),
         _ => Ok(()),
@@ -116,12 +118,12 @@ fn check_gzip(packed: impl Read, most: u64) -> Result<(), Refused> {
 }
 
 impl Header {
-    /// The header at the beginning of some bytes, and what follows it.
+    /// Parses the header at the beginning of `bytes`, and returns it with the bytes behind it.
     fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let mut header = Self::default();
         let rest = thrift::walk(bytes, PAGE_HEADER, &mut |path, found| {
             let Found::Number(number) = found else { return };
-            // As the library does, which drops what is beyond the type.
+            // The library truncates numbers to this type too.
             let number = number as i32;
             match path {
                 [2] => header.unpacked = number,
@@ -146,18 +148,18 @@ mod tests {
     use super::*;
     use crate::thrift::encode::{number, varint};
 
-    /// A page of the first version with a header that declares these sizes.
+    /// Encodes a page of version 1 whose header declares these sizes.
     fn page(unpacked: i32, packed: &[u8]) -> Vec<u8> {
         let sizes = [number(0), number(unpacked), number(packed.len() as i32)];
         let size = |size: &Vec<u8>| [&[0x15], size.as_slice()].concat();
         let mut bytes: Vec<u8> = sizes.iter().flat_map(size).collect();
-        // Field 5, the data page's own: four numbers.
+        // Field 5, the data page's header: four numbers.
         bytes.extend([0x2c, 0x15, 2, 0x15, 0, 0x15, 6, 0x15, 6, 0, 0]);
         bytes.extend(packed);
         bytes
     }
 
-    /// A dictionary's, with so many entries.
+    /// Encodes a dictionary page that declares this number of entries.
     fn dictionary(unpacked: i32, entries: i32) -> Vec<u8> {
         let unpacked = number(unpacked);
         let mut bytes = [&[0x15, 4, 0x15], unpacked.as_slice(), &[0x15, 0, 0x4c, 0x15]].concat();
@@ -167,13 +169,13 @@ mod tests {
     }
 
     fn sizes(chunk: &[u8], codec: Compression) -> Result<Unpacked, Refused> {
-        // Something stands before and behind it.
+        // Other bytes stand before and behind the column chunk.
         let file = [&[9; 5], chunk, &[9; 500]].concat();
         let most = Unpacked { total: 10 << 30, at_once: 0x7fff_ffff };
         unpacked(&mut Cursor::new(file), 5, chunk.len() as u64, codec, most)
     }
 
-    fn told(chunk: &[u8], codec: Compression) -> String {
+    fn size_or_error(chunk: &[u8], codec: Compression) -> String {
         match sizes(chunk, codec) {
             Ok(sizes) => sizes.total.to_string(),
             Err(error) => error.to_string(),
@@ -181,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn pages_add_up_and_one_is_held_at_once_beside_its_dictionary() {
+    fn sizes_are_the_sum_of_pages_and_the_largest_page_with_the_dictionary() {
         let chunk = [dictionary(80, 10), page(100, &[1; 10]), page(50, &[2; 60])].concat();
         let found = sizes(&chunk, Compression::SNAPPY).unwrap();
         assert_eq!(found, Unpacked { total: 230, at_once: 180 });
@@ -189,15 +191,18 @@ mod tests {
         let found = sizes(&many, Compression::ZSTD(Default::default())).unwrap();
         assert_eq!(found, Unpacked { total: 3 * 0x7fff_ffff, at_once: 0x7fff_ffff });
         let many = page(i32::MAX, &[0; 40]).repeat(6);
-        assert!(told(&many, Compression::SNAPPY).contains("too many bytes"));
+        assert!(size_or_error(&many, Compression::SNAPPY).contains("too many bytes"));
         let both = [dictionary(80, 10), page(i32::MAX, &[0; 40])].concat();
-        assert!(told(&both, Compression::SNAPPY).contains("too many bytes"));
+        assert!(size_or_error(&both, Compression::SNAPPY).contains("too many bytes"));
     }
 
     #[test]
-    fn a_dictionary_has_no_more_entries_than_fit() {
-        assert_eq!(told(&dictionary(80, 10), Compression::UNCOMPRESSED), "80");
-        assert!(told(&dictionary(80, i32::MAX), Compression::UNCOMPRESSED).contains("no sense"));
+    fn a_dictionary_that_declares_more_entries_than_fit_is_refused() {
+        assert_eq!(size_or_error(&dictionary(80, 10), Compression::UNCOMPRESSED), "80");
+        assert!(
+            size_or_error(&dictionary(80, i32::MAX), Compression::UNCOMPRESSED)
+                .contains("no sense")
+        );
     }
 
     #[test]
@@ -207,8 +212,8 @@ mod tests {
         let packed = encoder.finish().unwrap();
         assert!(packed.len() < 100_000, "{}", packed.len());
         let gzip = Compression::GZIP(Default::default());
-        assert_eq!(told(&page(50_000_000, &packed), gzip), "50000000");
-        assert!(told(&page(49_999_999, &packed), gzip).contains("no sense"));
+        assert_eq!(size_or_error(&page(50_000_000, &packed), gzip), "50000000");
+        assert!(size_or_error(&page(49_999_999, &packed), gzip).contains("no sense"));
     }
 
     #[test]
@@ -221,7 +226,7 @@ mod tests {
             bytes.extend(vec![7; length]);
             bytes.extend([0, 0, 0]);
             let expected = if length < 65_000 { "100" } else { "no sense" };
-            assert!(told(&bytes, Compression::SNAPPY).contains(expected), "{length}");
+            assert!(size_or_error(&bytes, Compression::SNAPPY).contains(expected), "{length}");
         }
     }
 
@@ -229,12 +234,15 @@ mod tests {
     fn headers_that_make_no_sense_are_refused() {
         let sound = page(100, &[1; 10]);
         for length in 1..sound.len() {
-            assert!(told(&sound[..length], Compression::SNAPPY).contains("no sense"), "{length}");
+            assert!(
+                size_or_error(&sound[..length], Compression::SNAPPY).contains("no sense"),
+                "{length}"
+            );
         }
         // A size as a text, which a reader that trusts the schema would take for a number.
         let mut other = sound;
         other[2] = 0x18;
-        assert!(told(&other, Compression::SNAPPY).contains("no sense"));
-        assert!(told(&page(-1, &[1; 10]), Compression::SNAPPY).contains("no sense"));
+        assert!(size_or_error(&other, Compression::SNAPPY).contains("no sense"));
+        assert!(size_or_error(&page(-1, &[1; 10]), Compression::SNAPPY).contains("no sense"));
     }
 }

@@ -1,4 +1,4 @@
-//! Panics of libraries, on data that is not under our control.
+//! Catches panics of libraries that read data from outside.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 use parquet::errors::ParquetError;
 
 thread_local! {
-    /// Whether a panic of this thread is caught and reported by [`caught`].
+    /// Whether this thread is inside [`caught`], which reports panics.
     static CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
@@ -18,7 +18,7 @@ thread_local! {
 /// # Errors
 /// The message of a panic.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
-    // The hook of panics is set once per process.
+    // The panic hook is set once per process.
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let before = panic::take_hook();
@@ -34,9 +34,9 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     result.map_err(|panic| text(panic.as_ref()).to_owned())
 }
 
-/// Calls `work` of the Parquet library like [`caught`]; `what` says the meaning of a panic. The
-/// library panics when it reads some damaged files and some of other programs, and when it writes
-/// and gets no memory.
+/// Calls the Parquet library like [`caught`]; `what` begins the message about a panic. The library
+/// panics on some damaged files and some files of other programs, and when it writes and gets no
+/// memory.
 ///
 /// # Errors
 /// The library's own; [`ParquetError::General`] for a panic.

@@ -1,4 +1,4 @@
-//! The gate through which every Parquet file is read.
+//! Opens, checks and reads Parquet files; all of them are read here.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -20,17 +20,17 @@ use crate::{FileError, Refused, footer, key, panics, regular};
 /// Greatest number of bytes that the pages of a file may unpack into at once. Basis: our pages have
 /// 1 MiB, and half of 2 GB is left for everything else. Twice as many may take 2 GB.
 const MAX_UNPACKED_BYTES: u64 = 1 << 30;
-/// Number of bytes that a byte of words counts as. Basis: the library takes 32 for a word of a
-/// dictionary, which may be empty after its length of 4. Twice as many refuse files of half as many
-/// words.
+/// Weight of a byte of words against [`MAX_UNPACKED_BYTES`]. Basis: the library takes 32 bytes for
+/// each word of a dictionary, which may have only 4 in the file, its length. Doubling it halves the
+/// number of words in the longest file that is read.
 const BYTES_PER_WORD_BYTE: u64 = 8;
 
 /// Beginning of the name by which this program signs its files, before a version.
 pub const CREATED_BY: &str = "sweep version ";
 
-/// The beginnings of the names by which other writers sign their files. Some of these writers keep
-/// the digest of a result that they write again, where it fits no more. A damaged file of ours
-/// bears none of these names.
+/// The beginnings of the names by which other programs sign their files. Some of them copy the
+/// digest of a result that they write again, where it no longer fits. A damaged file of ours has
+/// none of these names.
 const OTHER_WRITERS: [&str; 6] =
     ["parquet-cpp", "Polars", "DuckDB", "fastparquet", "parquet-mr", "parquet-rs"];
 
@@ -72,8 +72,8 @@ impl ParquetFile {
         if seal == Seal::Broken {
             return Err(FileError::damaged(path));
         }
-        // The library finds a digest where `seal` does not. Every file of this program has one in
-        // `seal`'s place, so the name before it has changed.
+        // This program writes a digest where `seal` finds it. So a file that has one elsewhere, or
+        // none but our name, was changed.
         let is_ours = file.created_by().is_some_and(|by| by.starts_with(CREATED_BY));
         let has_digest = file.pairs().any(|pair| pair.key == key::DIGEST);
         if seal == Seal::Absent && (is_ours || has_digest) {
@@ -88,7 +88,7 @@ impl ParquetFile {
         for group in self.metadata.row_groups() {
             let mut at_once = 0_u64;
             for column in group.columns() {
-                // It panics where the file places a column before its beginning.
+                // The library panics if the file places a column before the file's beginning.
                 let range = panics::caught(|| column.byte_range());
                 let outside = |_| FileError::not_parquet(&self.path, "a column lies outside of it");
                 let (start, length) = range.map_err(outside)?;
@@ -104,7 +104,7 @@ impl ParquetFile {
         Ok(())
     }
 
-    /// Opens a file to find out its writer. It is read through only if it cannot be parsed.
+    /// Opens a file to find out its kind. Its digest is checked only if it cannot be parsed.
     ///
     /// # Errors
     /// Returns the errors of [`ParquetFile::open`].
@@ -137,7 +137,7 @@ impl ParquetFile {
         self.created_by().is_some_and(is_others) && self.pairs().any(|pair| pair.key == key::DIGEST)
     }
 
-    /// Whether it carries a digest that fits.
+    /// Whether the file has a digest that fits its bytes.
     pub fn is_sealed(&self) -> bool {
         self.seal == Seal::Whole
     }
@@ -192,7 +192,8 @@ impl ParquetFile {
         serde_json::from_str(self.value(key)?).ok()
     }
 
-    /// Reads the rows of the columns at these places. After an error there are no more.
+    /// Reads the rows of the columns with these indices, batch by batch. The iterator ends after an
+    /// error.
     ///
     /// # Errors
     /// [`FileError::Io`], [`FileError::NotParquet`].
@@ -207,7 +208,7 @@ impl ParquetFile {
             let reader = batches.as_mut()?;
             let batch = guarded(|| reader.batch()).transpose();
             if !matches!(batch, Some(Ok(_))) {
-                // A panic has left the reader in no useful state.
+                // After an error or a panic the reader is not used again.
                 batches = None;
             }
             batch.map(|batch| batch.map_err(not_parquet(&self.path)))
@@ -215,12 +216,12 @@ impl ParquetFile {
     }
 }
 
-/// Runs a call of the library that may panic.
+/// Calls the library, and turns a panic into an error.
 fn guarded<T>(work: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
     panics::in_parquet("it makes no sense inside", work)
 }
 
-/// Makes an error of a file that is refused before the library reads it.
+/// Returns a function that makes a file's error from the reason why it is refused.
 fn refused(path: &Path) -> impl FnOnce(Refused) -> FileError {
     move |refused| match refused {
         Refused::Io(source) => FileError::io("read", path)(source),
@@ -236,11 +237,13 @@ fn refused(path: &Path) -> impl FnOnce(Refused) -> FileError {
     }
 }
 
-/// Makes an error of one of the library: [`FileError::Io`] if the system reported it.
+/// Returns a function that makes a file's error from one of the library: [`FileError::Io`] if the
+/// system reported it.
 fn not_parquet(path: &Path) -> impl FnOnce(ParquetError) -> FileError {
     move |error| match error {
         ParquetError::External(inner) => match inner.downcast::<io::Error>() {
-            // A decompressor fails so too, but not by the system's word.
+            // Decompressors report their own failures as `io::Error` too, but without the system's
+            // number.
             Ok(source) if source.raw_os_error().is_some() => FileError::io("read", path)(*source),
             Ok(inner) => FileError::not_parquet(path, inner.to_string()),
             Err(inner) => FileError::not_parquet(path, inner.to_string()),
@@ -312,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn no_flipped_bit_makes_a_file_of_ours_one_without_a_digest() {
+    fn a_result_with_any_bit_flipped_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
         let sound = ours();
@@ -327,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bytes_of_an_open_file_are_those_that_were_checked() {
+    fn bytes_of_an_open_file_that_has_changed_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
         let sound = ours();
@@ -350,7 +353,7 @@ mod tests {
     fn a_word_that_many_rows_have_is_read_once() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
-        // 3 GB if it were read row by row, more than Arrow's offsets can count.
+        // Reading the word for each row would take 3 GB, more than Arrow's offsets can count.
         let long = "a".repeat(1 << 20);
         let words: DictionaryArray<Int32Type> = [long.as_str(); 3].into_iter().collect();
         let batch = RecordBatch::try_from_iter([("status", Arc::new(words) as _)]).unwrap();
@@ -370,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn words_that_are_not_coded_are_few_bytes_at_once() {
+    fn words_without_a_dictionary_are_refused_beyond_128_mebibytes() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
         let properties = WriterProperties::builder()
@@ -391,28 +394,28 @@ mod tests {
             ParquetFile::open(&path)
         };
         assert_eq!(write(10).unwrap().rows(), 10);
-        let told = write(130).unwrap_err().to_string();
-        assert!(told.contains("into 128 MiB of words"), "{told}");
+        let message = write(130).unwrap_err().to_string();
+        assert!(message.contains("into 128 MiB of words"), "{message}");
     }
 
     #[test]
-    fn a_mistyped_name_and_a_grid_file_say_what_to_do() {
+    fn errors_about_mistyped_names_and_grid_files_say_what_to_do() {
         let folder = tempfile::tempdir().unwrap();
         let result = folder.path().join("results/tol60.parquet");
         std::fs::create_dir(folder.path().join("results")).unwrap();
         std::fs::write(&result, ours()).unwrap();
         std::fs::write(folder.path().join("g.toml"), "name = \"tol60\"\n").unwrap();
-        let told =
+        let message =
             |name: &str| ParquetFile::open(&folder.path().join(name)).unwrap_err().to_string();
         for name in ["tol60.parquet", "tol60", "results/tol60"] {
-            assert!(told(name).contains(&format!("{} is there", result.display())), "{name}");
+            assert!(message(name).contains(&format!("{} is there", result.display())), "{name}");
         }
-        assert!(told("none.parquet").contains("check the name"), "{}", told("none.parquet"));
-        assert!(told("g.toml").contains("`sweep run GRID.toml`"), "{}", told("g.toml"));
+        assert!(message("none.parquet").contains("check the name"), "{}", message("none.parquet"));
+        assert!(message("g.toml").contains("`sweep run GRID.toml`"), "{}", message("g.toml"));
     }
 
     #[test]
-    fn a_dictionary_that_cannot_be_is_refused_before_there_is_room_for_it() {
+    fn a_dictionary_of_too_many_entries_is_refused_before_it_is_allocated() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
         let values: Float64Array = (0..3000).map(|k| f64::from(k % 1500)).collect();
@@ -429,11 +432,12 @@ mod tests {
         let mut other = sound;
         other[at + 2..at + 4].copy_from_slice(&[0xfe, 0x7f]);
         std::fs::write(&path, &other).unwrap();
-        let told = ParquetFile::open(&path).unwrap_err().to_string();
-        assert!(told.contains("the header of a page makes no sense"), "{told}");
+        let message = ParquetFile::open(&path).unwrap_err().to_string();
+        assert!(message.contains("the header of a page makes no sense"), "{message}");
     }
 
-    /// A file of two rows, in each column something and, where there may be, nothing.
+    /// Opens a file of two rows with columns of these types. The second row is null in columns that
+    /// may be.
     fn foreign(schema: &str) -> ParquetFile {
         let schema = parse_message_type(schema).unwrap();
         let mut writer =
@@ -471,7 +475,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_truths_and_words_of_other_programs_are_read() {
+    fn numbers_flags_and_words_of_other_programs_are_read() {
         let file = foreign(
             "message x {
                 optional int32 a (INTEGER(8, true));
@@ -505,7 +509,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_none_of_them_is_refused_by_name() {
+    fn columns_of_other_types_are_refused_by_name() {
         for column in [
             "optional int32 x (DATE);",
             "optional int64 x (TIMESTAMP(NANOS, true));",
@@ -515,8 +519,8 @@ mod tests {
             "optional group x (LIST) { repeated group list { optional int64 element; } }",
         ] {
             let file = foreign(&format!("message m {{ required double y; {column} }}"));
-            let told = rows(&file).unwrap_err().to_string();
-            assert!(told.contains("`x` is of a type that is not read"), "{column}: {told}");
+            let message = rows(&file).unwrap_err().to_string();
+            assert!(message.contains("`x` is of a type that is not read"), "{column}: {message}");
         }
     }
 }

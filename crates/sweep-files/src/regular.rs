@@ -12,20 +12,20 @@ use std::time::{Duration, Instant};
 /// # Errors
 /// An error of the system, or one that names the type of a file that is not regular.
 pub fn open(path: &Path) -> io::Result<File> {
-    // Checked before opening too: opening is enough to start some devices.
+    // The type is checked before opening too, because opening alone starts some devices.
     expect_regular(fs::metadata(path)?.file_type())?;
-    let file = careful(OpenOptions::new().read(true), true).open(path)?;
+    let file = without_waiting(OpenOptions::new().read(true), true).open(path)?;
     expect_regular(file.metadata()?.file_type())?;
     Ok(file)
 }
 
-/// How long a named pipe may stay without a writer. Basis: a program that a script starts beside
-/// this one opens its pipe within milliseconds. Doubling it doubles the time until a pipe that
-/// nobody writes to is refused.
+/// Time for which a named pipe may have no writer. Basis: a program that a script starts beside
+/// this one opens its pipe within milliseconds. Doubling it doubles the time until a pipe without a
+/// writer is refused.
 #[cfg(unix)]
 const WRITER_WAIT: Duration = Duration::from_secs(2);
 
-/// How often a pipe without data is looked at again.
+/// Time between two attempts to read a pipe without data.
 #[cfg(unix)]
 const LOOK_AGAIN: Duration = Duration::from_millis(5);
 
@@ -38,18 +38,20 @@ const LOOK_AGAIN: Duration = Duration::from_millis(5);
 #[cfg(unix)]
 pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     use std::os::unix::fs::FileTypeExt as _;
-    // Descriptors that somebody passed: the other end of such a pipe was opened before.
+    // The parent process passed these descriptors, and has opened the other end of such a pipe
+    // before.
     let is_passed = path.starts_with("/dev/fd")
         || path.starts_with("/proc/self/fd")
         || path == Path::new("/dev/stdin");
-    let found = fs::metadata(path)?.file_type();
-    if !found.is_fifo() && !is_passed {
+    let file_type = fs::metadata(path)?.file_type();
+    if !file_type.is_fifo() && !is_passed {
         let mut bytes = Vec::new();
         open(path)?.take(most).read_to_end(&mut bytes)?;
         return Ok(bytes);
     }
-    // Opening to read waits for nobody this way, and lets writers that wait for a reader go on.
-    let file = careful(OpenOptions::new().read(true), true).open(path)?;
+    // Opening a pipe in this way does not wait for a writer, and unblocks writers that wait for a
+    // reader.
+    let file = without_waiting(OpenOptions::new().read(true), true).open(path)?;
     let begun = Instant::now();
     let mut bytes = Vec::new();
     while (bytes.len() as u64) < most {
@@ -85,14 +87,14 @@ pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Turns "not found" into `None`.
+/// Returns `None` instead of the error "not found".
 ///
 /// # Errors
 /// Any other error of the system.
-pub fn if_there<T>(found: io::Result<T>) -> io::Result<Option<T>> {
-    match found {
+pub fn if_there<T>(result: io::Result<T>) -> io::Result<Option<T>> {
+    match result {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        found => found.map(Some),
+        result => result.map(Some),
     }
 }
 
@@ -114,7 +116,7 @@ pub fn read_json(path: &Path) -> io::Result<Vec<u8>> {
 /// Opens a regular file to read and write. Follows no symbolic link.
 pub(crate) fn open_to_write(path: &Path) -> io::Result<File> {
     expect_regular(fs::symlink_metadata(path)?.file_type())?;
-    let file = careful(OpenOptions::new().read(true).write(true), false).open(path)?;
+    let file = without_waiting(OpenOptions::new().read(true).write(true), false).open(path)?;
     expect_regular(file.metadata()?.file_type())?;
     Ok(file)
 }
@@ -125,14 +127,14 @@ pub(crate) fn open_to_write(path: &Path) -> io::Result<File> {
 /// An error of the system, or one that names the type of a file that is not regular.
 pub fn open_or_create(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
-    match careful(options.read(true).write(true).create_new(true), false).open(path) {
+    match without_waiting(options.read(true).write(true).create_new(true), false).open(path) {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => open_to_write(path),
         made => made,
     }
 }
 
-fn expect_regular(found: FileType) -> io::Result<()> {
-    match what(found) {
+fn expect_regular(file_type: FileType) -> io::Result<()> {
+    match what(file_type) {
         None => Ok(()),
         Some(what) => Err(io::Error::new(
             io::ErrorKind::InvalidInput,
@@ -142,33 +144,33 @@ fn expect_regular(found: FileType) -> io::Result<()> {
 }
 
 /// Names the type of a file; `None` for a regular one.
-pub(crate) fn what(found: FileType) -> Option<&'static str> {
+pub(crate) fn what(file_type: FileType) -> Option<&'static str> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::FileTypeExt as _;
-        if found.is_fifo() {
+        if file_type.is_fifo() {
             return Some("a FIFO");
         }
-        if found.is_socket() {
+        if file_type.is_socket() {
             return Some("a socket");
         }
-        if found.is_block_device() || found.is_char_device() {
+        if file_type.is_block_device() || file_type.is_char_device() {
             return Some("a device");
         }
     }
-    if found.is_dir() {
+    if file_type.is_dir() {
         Some("a folder")
-    } else if found.is_symlink() {
+    } else if file_type.is_symlink() {
         Some("a symbolic link")
     } else {
         None
     }
 }
 
-/// Sets options that wait for nobody, and follow symbolic links only if asked to. On other systems
-/// than Unix no path that a user would give names a file of either kind.
+/// Sets the options so that opening does not wait, and follows symbolic links only if asked to. On
+/// systems other than Unix, paths of users lead to neither pipes nor links.
 #[cfg_attr(not(unix), allow(unused_variables))]
-fn careful(options: &mut OpenOptions, follows_links: bool) -> &mut OpenOptions {
+fn without_waiting(options: &mut OpenOptions, follows_links: bool) -> &mut OpenOptions {
     #[cfg(unix)]
     {
         use rustix::fs::OFlags;
@@ -232,7 +234,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn what_is_no_regular_file_is_named_and_not_waited_for() {
+    fn errors_name_the_type_of_a_file_that_is_not_regular() {
         let folder = tempfile::tempdir().unwrap();
         let fifo = folder.path().join("fifo");
         rustix::fs::mkfifoat(rustix::fs::CWD, &fifo, rustix::fs::Mode::RUSR).unwrap();
@@ -280,7 +282,7 @@ mod tests {
         assert_eq!(read_text(&fifo, 1000).unwrap(), b"name = \"a\"\n");
         writer.join().unwrap();
 
-        // As a shell's `<(...)`: the writer is done before this is opened.
+        // A pipe as a shell's `<(...)` passes it: the writer is done before this end is opened.
         let (reader, mut writer) = io::pipe().unwrap();
         writer.write_all(b"name").unwrap();
         drop(writer);
@@ -293,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_is_read_than_json_of_ours_may_have() {
+    fn json_is_read_up_to_the_greatest_length() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("plan.json");
         File::create(&path).unwrap().set_len(1 << 40).unwrap();

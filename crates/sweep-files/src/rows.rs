@@ -17,10 +17,10 @@ use crate::{CellKind, Column, FileError, ParquetFile, cells, columns, key};
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Cell {
-    /// No value; a number that is none counts as such.
+    /// No value, or a number that is NaN.
     Null,
-    /// A number; JSON has one that is whole without a point.
-    Number(#[serde(serialize_with = "plainly")] f64),
+    /// A number; in JSON, whole numbers have no decimal point.
+    Number(#[serde(serialize_with = "without_point")] f64),
     /// Words.
     Text(String),
     /// True or false.
@@ -28,27 +28,27 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// Whether it is true or false, if it is either.
+    /// Returns the cell's truth value, if it is one.
     pub const fn flag(&self) -> Option<bool> {
         let Self::Flag(flag) = self else { return None };
         Some(*flag)
     }
 
-    /// Returns the number, if it is one.
+    /// Returns the cell's number, if it is one.
     pub const fn number(&self) -> Option<f64> {
         let Self::Number(number) = self else { return None };
         Some(*number)
     }
 }
 
-fn plainly<S: serde::Serializer>(number: &f64, to: S) -> Result<S::Ok, S::Error> {
+fn without_point<S: serde::Serializer>(number: &f64, to: S) -> Result<S::Ok, S::Error> {
     let whole = *number as i64;
-    // Whole numbers up to this are exact.
+    // An f64 holds every whole number up to 2^53.
     let is_whole = whole as f64 == *number && number.abs() < 2_f64.powi(53);
     if is_whole { to.serialize_i64(whole) } else { to.serialize_f64(*number) }
 }
 
-/// Returns the limits of a plan's ratios.
+/// Returns the limits of ratios in a plan.
 pub fn ratio_limits(plan: &Value) -> Option<RatioLimits> {
     let reliability = &plan["reliability"];
     let most = reliability["ratio_limit"].as_f64()?;
@@ -58,9 +58,9 @@ pub fn ratio_limits(plan: &Value) -> Option<RatioLimits> {
 /// An open result file of any kind.
 #[derive(Debug)]
 pub struct ResultTable {
-    /// The columns in file order, without those of types that none of our files has.
+    /// The columns that have a supported type, in the order of the file.
     pub columns: Vec<Column>,
-    /// The grid as run, the machine and the method, if it carries them.
+    /// The plan in the file's metadata: the grid as run, the machine and the method.
     pub plan: Option<Value>,
     file: ParquetFile,
 }
@@ -101,14 +101,15 @@ impl ResultTable {
         self.columns.iter().find(|column| column.name == name)
     }
 
-    /// Returns the names of the swept parameters that have a column: all of a map's, in order.
+    /// Returns the names of the swept parameters that have a column, in order; in a map, all have
+    /// one.
     pub fn axes(&self) -> Vec<&str> {
         let planned = self.plan.as_ref().and_then(|plan| plan["axis"].as_array());
         if let Some(axes) = planned {
             let names = axes.iter().filter_map(|axis| axis["parameter"].as_str());
             return names.filter_map(|name| Some(self.column(name)?.name.as_str())).collect();
         }
-        // Files that have been through other programs have lost the plan.
+        // Files that other programs have rewritten lack the plan.
         let is_amplitude =
             |name: &str| name.starts_with("nonlinear_") || name.starts_with("linear_");
         let before = self.columns.iter().take_while(|column| !is_amplitude(&column.name));
@@ -122,7 +123,7 @@ impl ResultTable {
     }
 
     /// Returns the names of the columns that identify a row: the point's index, the axes, and in
-    /// files that are no maps the counters along them.
+    /// results other than maps the further columns that number their rows.
     pub fn places(&self) -> Vec<&str> {
         let further = ["crossing", "speed_rpm", "branch", "motion", "mode", "time_s"];
         let mut names: Vec<&str> = ["point"].into_iter().chain(self.axes()).collect();
@@ -133,7 +134,7 @@ impl ResultTable {
 }
 
 impl ParquetFile {
-    /// Reads the rows batch by batch, of the columns of these names. A column that the file lacks
+    /// Reads the rows batch by batch, with the columns of these names. A column that the file lacks
     /// is null.
     ///
     /// # Errors
@@ -189,16 +190,16 @@ pub struct Rows {
     pub first: u64,
     /// The number of rows.
     pub count: usize,
-    /// The place of each of the requested columns, if the file has it.
+    /// The index in `columns` of each requested column, if the file has it.
     places: Vec<Option<usize>>,
     columns: Vec<Cells>,
 }
 
 impl Rows {
-    /// Decodes these columns of rows in memory.
+    /// Decodes these columns of a batch in memory.
     ///
     /// # Errors
-    /// Rows of other columns.
+    /// Fails if the batch's columns have other types.
     pub fn of(batch: &RecordBatch, columns: &[Column]) -> Result<Self, ArrowError> {
         let decoded = |column: &Column| decode(batch.column(column.field), column.kind);
         let columns = columns.iter().map(decoded).collect::<Result<Vec<_>, _>>()?;
@@ -220,7 +221,7 @@ pub struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// Returns the number in the file, from 0.
+    /// Returns the row's index in the file, from 0.
     pub const fn index(self) -> u64 {
         self.rows.first + self.at as u64
     }
@@ -264,9 +265,9 @@ impl<'a> Row<'a> {
 /// The cells of a column.
 #[derive(Debug)]
 enum Cells {
-    /// Missing ones are NaN.
+    /// Numbers, with NaN for missing ones.
     Numbers(Vec<f64>),
-    /// The place of each row's word among the different words, and these.
+    /// The index of each row's word in the list of distinct words, and this list.
     Words(Int32Array, StringArray),
     Flags(Vec<Option<bool>>),
 }

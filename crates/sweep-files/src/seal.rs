@@ -1,9 +1,9 @@
 //! The digest in our Parquet files, which shows that their bytes are unchanged.
 //!
-//! It is the last entry of the file's key-value metadata ([`key::DIGEST`]): the BLAKE3 hash of the
-//! whole file with zeros in the digest's own place. It covers the columns, the metadata and the
-//! file's structure, and is checked without trusting any of them. It depends on the other bytes
-//! alone, so the file stays a pure function of its input.
+//! The digest is the last entry of the file's key-value metadata ([`key::DIGEST`]): the BLAKE3 hash
+//! of the whole file with zeros in the digest's own place. It covers the columns, the metadata and
+//! the file's structure, and is checked before any of them is parsed. The digest depends on the
+//! other bytes alone, so that the same input still makes the same file.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
@@ -13,7 +13,7 @@ use crate::key;
 
 /// Number of hexadecimal digits of a digest.
 const DIGITS: usize = 2 * blake3::OUT_LEN;
-/// A digest that is not computed yet.
+/// Placeholder for a digest that is not computed yet.
 const BLANK: [u8; DIGITS] = [b'0'; DIGITS];
 
 /// Greatest distance of a digest from the end of its file, in bytes. Basis: only the number of
@@ -31,7 +31,7 @@ pub(crate) enum Seal {
     Absent,
 }
 
-/// Returns the metadata's last entry, for [`seal`] to fill.
+/// Returns the metadata's last entry with a placeholder, which [`seal`] overwrites.
 pub fn blank() -> KeyValue {
     KeyValue::new(key::DIGEST.to_owned(), String::from_utf8_lossy(&BLANK).into_owned())
 }
@@ -39,7 +39,7 @@ pub fn blank() -> KeyValue {
 /// Writes the digest into a finished file that has a [`blank`] one.
 ///
 /// # Errors
-/// Those of the system, and a file without a [`blank`] digest.
+/// Fails if the file cannot be read or written, or has no [`blank`] digest.
 pub fn seal(file: &mut (impl Read + Write + Seek)) -> io::Result<()> {
     let place = place(file)?.ok_or_else(|| io::Error::other("it has no place for its digest"))?;
     let digest = digest(file, place)?;
@@ -64,7 +64,7 @@ fn place(file: &mut (impl Read + Seek)) -> io::Result<Option<u64>> {
     let mut tail = Vec::new();
     file.seek(SeekFrom::Start(start))?;
     file.take(TAIL_BYTES).read_to_end(&mut tail)?;
-    // Thrift's compact protocol writes the key, then a text of so many bytes.
+    // Thrift's compact protocol writes the key, then 0x18 for a text, its length, and the text.
     let mut entry = key::DIGEST.as_bytes().to_vec();
     entry.extend_from_slice(&[0x18, DIGITS as u8]);
     let found = tail.windows(entry.len()).rposition(|window| window == entry);

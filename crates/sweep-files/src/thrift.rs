@@ -1,16 +1,17 @@
-//! Structs in Thrift's compact protocol: what the Parquet library reads, walked before it does.
+//! Walks structs in Thrift's compact protocol before the Parquet library reads them.
 //!
-//! The library assumes the kind of every field that it knows, whatever kind the file declares. It
-//! also counts through an unknown list of booleans without reading a byte. So the walk follows the
-//! file's kinds, and refuses a file whose kinds are not the library's. The library then reads the
-//! file as it was walked here.
+//! The library assumes the type of every field that it knows, whatever type the file declares, and
+//! counts through an unknown list of booleans without reading a byte. So this walk follows the
+//! types that the file declares, and refuses a file where these are not the types that the library
+//! assumes. The library then reads the file in the same way as this walk.
 
 use std::ops::RangeInclusive;
 
-/// Structs and lists within each other. Parquet's own have seven.
+/// Greatest depth of nested structs and lists. Basis: Parquet's own have seven levels. Doubling it
+/// accepts deeper files.
 const DEEPEST: usize = 16;
 
-/// Kinds of a field, as a file declares them.
+/// Codes of the types of fields, as a file declares them.
 const TRUE: u8 = 1;
 const FALSE: u8 = 2;
 const BYTE: u8 = 3;
@@ -25,12 +26,12 @@ const MAP: u8 = 11;
 const STRUCT: u8 = 12;
 const UUID: u8 = 13;
 
-/// What the library takes a field for.
+/// The type as which the library reads a field.
 #[derive(Clone, Copy)]
 pub(crate) enum Wire {
     Bool,
     Byte,
-    /// A number of any width: all are read alike.
+    /// An integer of any width; all widths are encoded alike.
     Number,
     Double,
     Binary,
@@ -38,23 +39,24 @@ pub(crate) enum Wire {
     Struct(Shape),
 }
 
-/// The fields of a struct that the library knows, by their numbers. It skips any other.
+/// The types of a struct's fields that the library knows, by field numbers. It skips other fields.
 pub(crate) type Shape = &'static [(RangeInclusive<i16>, Wire)];
 
-/// What a walk comes past.
+/// An item that a walk reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Found {
-    /// A number or a truth, which is 1 or 0.
+    /// An integer, or 1 or 0 for a boolean.
     Number(i64),
     /// The end of a struct.
     End,
 }
 
-/// Walks the struct at the beginning of some bytes, and returns the bytes behind it. `found` gets
-/// each number by the fields that lead to it; elements of a list have the list's.
+/// Walks the struct at the beginning of some bytes, and returns the bytes behind it. Calls `found`
+/// with each number and the path of field numbers that leads to it; elements of a list have the
+/// path of the list.
 ///
-/// None where the bytes end too early, a kind is not the one that the library takes the field for,
-/// or a collection holds booleans.
+/// Returns `None` if the bytes end too early, a declared type is not that in `shape`, or a
+/// collection holds booleans.
 pub(crate) fn walk<'a>(
     bytes: &'a [u8],
     shape: Shape,
@@ -97,7 +99,7 @@ impl Walk<'_, '_> {
                 return Some(());
             }
             field = match step {
-                // As the library does, which drops what is beyond the type.
+                // The library truncates field numbers to this type too.
                 0 => self.number()? as i16,
                 step => field.checked_add(i16::from(step))?,
             };
@@ -105,7 +107,7 @@ impl Walk<'_, '_> {
             let known = known.map(|(_, kind)| *kind);
             self.path.push(field);
             if matches!(declared, TRUE | FALSE) {
-                // The one kind whose value stands in the head.
+                // Only a boolean has its value in the byte of its type.
                 if !known.is_none_or(|kind| kind.is(declared)) {
                     return None;
                 }
@@ -154,7 +156,8 @@ impl Walk<'_, '_> {
                 self.fields(shape)?;
             }
             UUID => self.skip(16)?,
-            // Booleans of a collection, to which the library gives no bytes, are among them.
+            // Among these are booleans in a collection, which take no bytes by the library's
+            // reading.
             _ => return None,
         }
         self.depth -= 1;
@@ -172,7 +175,7 @@ impl Walk<'_, '_> {
         Some(())
     }
 
-    /// A number in groups of seven bits, the lowest first.
+    /// Reads an unsigned number in groups of seven bits, the lowest group first.
     fn varint(&mut self) -> Option<u64> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {
@@ -222,7 +225,7 @@ mod tests {
         (4..=4, Wire::List(&Wire::Number)),
     ];
 
-    /// What a walk finds in some bytes, and how many stand behind it.
+    /// Returns the items that a walk reports, and the number of bytes behind the struct.
     fn walked(bytes: &[u8]) -> Option<(Vec<(Vec<i16>, Found)>, usize)> {
         let mut all = Vec::new();
         let rest = walk(bytes, SHAPE, &mut |path, found| all.push((path.to_vec(), found)))?;
@@ -230,14 +233,14 @@ mod tests {
     }
 
     #[test]
-    fn numbers_come_with_the_fields_that_lead_to_them() {
+    fn numbers_are_reported_with_their_paths() {
         use Found::{End, Number};
         let bytes = [
             // Field 1 is -3, in groups of seven bits; field 2, its number in full, 300.
             &[0x15, 0x05, 0x06, 0x04, 0xd8, 0x04][..],
             // A list of two structs: true and a text; nothing.
             &[0x19, 0x2c, 0x11, 0x18, 0x02, 7, 7, 0, 0],
-            // Three numbers, and what nobody knows: a double, a map, a set, a uuid and a struct.
+            // Three numbers, and unknown fields: a double, a map, a set, a uuid and a struct.
             &[0x19, 0x36, 2, 4, 6, 0x17, 1, 2, 3, 4, 5, 6, 7, 8],
             &[0x1b, 1, 0x85, 1, 9, 2, 0x1a, 0x23, 1, 2, 0x1d],
             &[0; 16],
@@ -265,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_field_of_another_kind_than_the_library_takes_it_for_ends_the_walk() {
+    fn a_field_of_another_type_than_the_library_assumes_ends_the_walk() {
         assert!(walked(&[0x15, 2, 0]).is_some());
         for other in [0x11, 0x13, 0x17, 0x18, 0x19, 0x1c] {
             assert_eq!(walked(&[other, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]), None, "{other:#x}");
@@ -276,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn collections_of_booleans_end_the_walk_however_long_they_say_they_are() {
+    fn collections_of_booleans_end_the_walk_whatever_length_they_declare() {
         assert!(walked(&[0x59, 0x02, 0]).is_some(), "there is none in it");
         for kind in [1, 2] {
             assert_eq!(walked(&[0x59, 0x10 | kind, 1, 0]), None);
@@ -287,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_nested_without_end_ends_the_walk() {
+    fn structs_and_lists_that_are_nested_too_deeply_end_the_walk() {
         let nested = |depth: usize| [vec![0x5c; depth], vec![0; depth + 1]].concat();
         assert!(walked(&nested(DEEPEST)).is_some());
         assert_eq!(walked(&nested(DEEPEST + 1)), None);

@@ -18,10 +18,10 @@ use serde_json::Value;
 
 use crate::key;
 
-/// An unfinished Parquet file of counts, numbers, truth values, and words of a dictionary.
+/// A writer of a Parquet file of counts, numbers, truth values, and words of a dictionary.
 pub struct Writer<W: Write> {
     file: SerializedFileWriter<W>,
-    /// The number of rows of a whole row group.
+    /// The number of rows of a full row group.
     group_rows: usize,
     /// The number of rows of the unfinished group.
     count: usize,
@@ -29,7 +29,7 @@ pub struct Writer<W: Write> {
 }
 
 impl<W: Write + Send> Writer<W> {
-    /// Begins a file of these columns, which are described under [`key::COLUMNS`].
+    /// Begins a file of these columns, and describes them in the metadata under [`key::COLUMNS`].
     ///
     /// # Errors
     /// Those of the library.
@@ -47,7 +47,7 @@ impl<W: Write + Send> Writer<W> {
         Ok(Self { file, group_rows, count: 0, rows: Vec::new() })
     }
 
-    /// Adds rows. They are held until their group is whole.
+    /// Adds rows, which are held until their row group is full.
     ///
     /// # Errors
     /// Those of the library.
@@ -65,7 +65,8 @@ impl<W: Write + Send> Writer<W> {
         Ok(())
     }
 
-    /// Writes the last row group. The returned file is open for its last metadata and its end.
+    /// Writes the last row group. Further metadata can be added to the returned file before it is
+    /// closed.
     ///
     /// # Errors
     /// Those of the library.
@@ -76,8 +77,8 @@ impl<W: Write + Send> Writer<W> {
         Ok(self.file)
     }
 
-    /// Writes a row group. Each of its columns is handed to the library at once: the library ends
-    /// pages by the rows of a call, and the file must not depend on the batches that rows came in.
+    /// Writes a row group. The library gets each column in one call: it ends pages by the rows of a
+    /// call, and the file must not depend on the batches in which the rows came.
     fn flush(&mut self) -> Result<(), ParquetError> {
         let mut group = self.file.next_row_group()?;
         let mut place = 0;
@@ -95,8 +96,8 @@ impl<W: Write + Send> Writer<W> {
     }
 }
 
-/// Returns the fields' metadata as an entry of the file's, because Parquet has no place for it
-/// beside the columns.
+/// Returns the metadata of all columns as one entry of the file's metadata, because Parquet has
+/// none for a column.
 fn column_metadata(schema: &Schema) -> KeyValue {
     let entry = |field: &FieldRef| {
         let kind = match field.data_type() {
@@ -130,7 +131,7 @@ fn declared(field: &Field) -> Result<Declared, ParquetError> {
         .build()
 }
 
-/// Writes the arrays of a column, one behind the other.
+/// Writes the arrays of a column one after the other.
 fn write(column: &mut ColumnWriter<'_>, arrays: &[&dyn Array]) -> Result<usize, ParquetError> {
     let mut levels: Vec<i16> = Vec::new();
     for array in arrays {
