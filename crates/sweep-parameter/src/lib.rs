@@ -1,6 +1,6 @@
-//! Numbers that can be set and swept: their ranges, their form in messages, and the unit at the end
-//! of their names; also the direction in which a number of a result is bad. Models, the engine and
-//! readers of results share them.
+//! The parameters of models: numbers that can be set and swept, with their ranges, their form in
+//! messages, and the unit at the end of their names; also the direction in which a column of a
+//! result is bad. Models, the engine and the readers of results use them.
 
 mod named;
 
@@ -14,10 +14,10 @@ pub trait Parameter: Clone + PartialEq + fmt::Debug + Send + Sync {
     fn unit(&self) -> &'static str;
     /// Returns the meaning, in a phrase.
     fn description(&self) -> &'static str;
-    /// Returns the values that it may take.
+    /// Returns the values that the parameter may take.
     fn range(&self) -> Range;
-    /// Returns the edge of the window that it is (0: the beginning, 1: the end), if any. The window
-    /// belongs to no model.
+    /// Returns which edge of the window this parameter sets (0: the beginning, 1: the end), if it
+    /// sets one. The window is part of the plan, not of the model.
     fn window_edge(&self) -> Option<usize>;
 }
 
@@ -27,16 +27,16 @@ pub trait Channel: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
     fn name(self) -> &'static str;
     /// Returns the unit.
     fn unit(self) -> &'static str;
-    /// Returns a line for column dictionaries and pages.
+    /// Returns a one-line description, for column dictionaries and pages.
     fn description(self) -> &'static str;
 }
 
-/// The reason why a name is no parameter.
+/// The reason why a name is not that of a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownParameter {
     /// The reason, in words.
     pub reason: String,
-    /// Whether no model has a parameter of this name: there may be one of a name near to it.
+    /// Whether no model has a parameter of this name, so that it may be a typing error.
     pub is_strange: bool,
 }
 
@@ -46,7 +46,7 @@ impl UnknownParameter {
         Self { reason: "no parameter has this name".to_owned(), is_strange: true }
     }
 
-    /// Returns the reason for a name that this model lacks, and others have.
+    /// Returns the reason for a name that other models have, but not this one.
     pub fn not_here(reason: impl Into<String>) -> Self {
         Self { reason: reason.into(), is_strange: false }
     }
@@ -75,11 +75,11 @@ pub enum Range {
 }
 
 impl Range {
-    /// Greatest magnitude of any number, in its own unit. Basis: products of a few of them, and
-    /// squares of these, stay finite. Twice as much would be as good.
+    /// Greatest magnitude of any parameter, in its own unit. Basis: products of a few of them, and
+    /// the squares of such products, stay finite. Doubling it makes no difference.
     pub const LARGEST: f64 = 1e12;
 
-    /// Whether `value` is allowed; never for NaN or infinity.
+    /// Whether `value` is allowed; NaN and infinity never are.
     pub fn contains(self, value: f64) -> bool {
         let [least, greatest] = self.bounds();
         value.abs() <= Self::LARGEST
@@ -87,8 +87,8 @@ impl Range {
             && !(value == 0.0 && self.excludes_zero())
     }
 
-    /// Returns the least and the greatest value; infinite where there is no bound but
-    /// [`Self::LARGEST`].
+    /// Returns the least and the greatest value. They are infinite where only [`Self::LARGEST`]
+    /// limits them.
     pub const fn bounds(self) -> [f64; 2] {
         match self {
             Self::Any => [f64::NEG_INFINITY, f64::INFINITY],
@@ -98,12 +98,12 @@ impl Range {
         }
     }
 
-    /// Whether 0 bounds it and is not allowed.
+    /// Whether 0 is a bound that is itself not allowed.
     pub const fn excludes_zero(self) -> bool {
         matches!(self, Self::Positive | Self::Negative)
     }
 
-    /// Describes the accepted values, for the message about a refused one.
+    /// Describes the allowed values, for the message about a refused `value`.
     pub fn instead_of(self, value: f64) -> String {
         if value.is_finite() && value.abs() > Self::LARGEST && !matches!(self, Self::Within(..)) {
             format!("{self}, at most {:e} in magnitude", Self::LARGEST)
@@ -114,17 +114,17 @@ impl Range {
 }
 
 named! {
-    /// The direction in which a number is bad; named as in column dictionaries.
+    /// The direction in which a number gets worse, with its name in column dictionaries.
     pub enum Worse {
-        /// The greater it is.
+        /// A greater number is worse.
         Greater = "greater",
-        /// The less it is.
+        /// A smaller number is worse.
         Less = "less",
     }
 }
 
 impl Worse {
-    /// Names the worst value: the greatest or the least.
+    /// Returns the word for the worst value: greatest or least.
     pub const fn extreme(self) -> &'static str {
         match self {
             Self::Greater => "greatest",
@@ -132,8 +132,8 @@ impl Worse {
         }
     }
 
-    /// Returns by how much `a` is worse than `b`; at most 0 if it is not.
-    pub fn by(self, a: f64, b: f64) -> f64 {
+    /// Returns by how much `a` is worse than `b`; negative if `a` is better.
+    pub fn excess(self, a: f64, b: f64) -> f64 {
         match self {
             Self::Greater => a - b,
             Self::Less => b - a,
@@ -141,22 +141,23 @@ impl Worse {
     }
 }
 
-/// The value up to which a number is good, which has a meaning of its own.
+/// The limit between the good and the bad values of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
     /// The limit, in the number's unit.
     pub value: f64,
-    /// A difference from the limit that counts as much as a factor of e counts of a ratio, in the
+    /// The difference from the limit that is as important as a factor of e is for a ratio, in the
     /// number's unit.
     pub scale: f64,
 }
 
-/// The ratios, nonlinear over linear, between which a linear model is trusted.
+/// The limits of the ratios, nonlinear over linear amplitude, between which the linear model is
+/// trusted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RatioLimits {
     /// The greatest ratio must be below this.
     pub most: f64,
-    /// The least ratio must be above this, if it is asked for.
+    /// The least ratio must be above this, if there is a lower limit.
     pub least: Option<f64>,
 }
 
@@ -173,22 +174,23 @@ impl RatioLimits {
         greatest < self.most && self.least.is_none_or(|limit| least > limit)
     }
 
-    /// Returns the distance of such a point from the other verdict, as a share of the limit.
+    /// Returns how far a point with these least and greatest ratios is from the other verdict,
+    /// relative to the limit.
     pub fn margin(self, least: f64, greatest: f64) -> f64 {
         let from = |ratio: f64, limit: f64| (ratio / limit - 1.0).abs();
         let from_least = self.least.map_or(f64::INFINITY, |limit| from(least, limit));
         from(greatest, self.most).min(from_least)
     }
 
-    /// Returns the ratio below which the linear model over-estimates by more than it may
-    /// under-estimate.
+    /// Returns the ratio below which the linear model over-estimates too much: the lower limit, or
+    /// without one the reciprocal of the upper limit.
     pub fn over_estimate(self) -> f64 {
         self.least.unwrap_or(1.0 / self.most)
     }
 }
 
-/// Writes a number for a message: the shortest decimal that reads back the same, in powers of ten
-/// if it would be long.
+/// Returns a number as text for a message: the shortest decimal that parses to the same number,
+/// with an exponent if it would be long.
 pub fn decimal(value: f64) -> String {
     let text = format!("{value:?}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
@@ -208,7 +210,7 @@ impl fmt::Display for Range {
     }
 }
 
-/// Returns the ending of names of numbers in this unit; `None` if names do not show it.
+/// Returns the suffix of parameters' names for this unit; `None` if names do not show the unit.
 pub fn unit_suffix(unit: &str) -> Option<&'static str> {
     Some(match unit {
         "m" => "_m",

@@ -1,7 +1,7 @@
 //! Enumerations whose values have names.
 
-/// Declares an enumeration of values without data, each with its name in files: the type, `ALL` of
-/// its values in the order of their codes, `name`, and `named`.
+/// Declares an enumeration whose values have no data, each with its name in files. Adds `ALL` (its
+/// values in the order of their codes), `name` and `named`.
 #[macro_export]
 macro_rules! named {
     (

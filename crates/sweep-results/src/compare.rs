@@ -27,7 +27,7 @@ named! {
         Lost = "lost",
         /// The row was not reliable and is.
         Gained = "gained",
-        /// Only one of the files has a verdict for the row.
+        /// One of the files has a verdict for the row, and the other has none.
         Defined = "defined",
     }
 }
@@ -68,20 +68,19 @@ impl SharedRow {
         Some(self.gap_m[1]? - self.gap_m[0]?)
     }
 
-    /// Returns the larger ratio over the smaller, less 1; infinite where one file alone has a
-    /// ratio.
+    /// Returns the larger ratio over the smaller, less 1; infinite if only one file has a ratio.
     pub fn ratio_deviation(&self) -> f64 {
         deviation(self.ratio, |first, second| (second / first).max(first / second) - 1.0)
     }
 
-    /// Returns the distance of the two gaps, m; infinite where one file alone has a gap.
+    /// Returns the distance of the two gaps (m); infinite if only one file has a gap.
     pub fn gap_deviation_m(&self) -> f64 {
         deviation(self.gap_m, |first, second| (second - first).abs())
     }
 }
 
-/// Returns the distance of two values by a measure, infinite where only one of them exists, so
-/// that values that came or went are listed first.
+/// Returns the distance of two values by a measure. It is infinite if only one of them exists, so
+/// that such rows are listed first.
 fn deviation(values: [Option<f64>; 2], distance: fn(f64, f64) -> f64) -> f64 {
     match values {
         [first, second] if first == second => 0.0,
@@ -106,8 +105,8 @@ pub struct ColumnChange {
     pub worst: Vec<ColumnRow>,
 }
 
-/// The greatest number of rows that are kept of a column. Basis: what a table shows. Doubling it
-/// doubles the rows that a table of a column can show.
+/// Greatest number of rows that are kept for each column that differs. Basis: what a table shows.
+/// Doubling it doubles the rows that a table of a column can show.
 pub const MAX_WORST: usize = 20;
 
 /// A row in which a column's numbers differ.
@@ -120,7 +119,7 @@ pub struct ColumnRow {
 }
 
 impl ColumnRow {
-    /// Returns the distance of the two numbers; infinite where one file alone has one.
+    /// Returns the distance of the two numbers; infinite if only one file has a number.
     pub fn deviation(&self) -> f64 {
         deviation(self.values, |first, second| (second - first).abs())
     }
@@ -135,11 +134,12 @@ pub struct Comparison {
     pub keys: Vec<String>,
     /// The units of the key columns.
     pub key_units: Vec<String>,
-    /// The axes of a single value that only one file has: the file (0 or 1), the axis, the value.
+    /// The axes that only one file has, with a single value there: the file (0 or 1), the axis, the
+    /// value.
     pub fixed: Vec<(usize, String, f64)>,
-    /// The numbers of rows that only the first and only the second file has.
+    /// The number of rows that only the first file has, and that only the second has.
     pub unmatched_rows: [u64; 2],
-    /// The columns that only the first and only the second file has.
+    /// The names of the columns that only the first file has, and that only the second has.
     pub unmatched_columns: [Vec<String>; 2],
     /// The rows that both files have, in the order of the first.
     pub shared: Vec<SharedRow>,
@@ -192,7 +192,7 @@ impl Comparison {
     }
 }
 
-/// Returns the kind of a file, by which files that cannot be compared are told apart.
+/// Returns the kind of a file; only files of the same kind are compared.
 fn kind(table: &ResultTable) -> &'static str {
     let is_map = table.column("ratio_max").is_some() && table.column("status").is_some();
     let other = if is_map { "map" } else { "other" };
@@ -202,7 +202,8 @@ fn kind(table: &ResultTable) -> &'static str {
 /// Compares the second file with the first.
 ///
 /// Rows match if their key columns agree to nine digits: a grid's axes, and any further column that
-/// counts on along them. An axis that only one file has is left out if it has one value there.
+/// numbers the rows of one point. An axis that only one file has is ignored if it has a single
+/// value.
 ///
 /// # Errors
 /// [`ResultsError::Refused`] with the reason, [`ResultsError::File`].

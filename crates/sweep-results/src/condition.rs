@@ -146,13 +146,13 @@ fn and(left: Option<bool>, right: Option<bool>) -> Option<bool> {
     left.and(right)
 }
 
-/// Returns a cell of a number, null for none and for NaN.
+/// Returns a cell with a number; a null cell without one, or for NaN.
 fn number_cell(number: Option<f64>) -> Cell {
     number.filter(|number| !number.is_nan()).map_or(Cell::Null, Cell::Number)
 }
 
 impl ComparisonOperator {
-    /// Returns the distance of the operands from satisfying the comparison, 0 where they do. Equal
+    /// Returns how far the operands are from satisfying the comparison; 0 if they satisfy it. Equal
     /// operands violate `!=` by 1.
     pub(crate) fn violation(self, left: f64, right: f64) -> f64 {
         match [Ordering::Less, Ordering::Greater].map(self.0) {

@@ -1,8 +1,8 @@
-//! Errors of questions to results.
+//! Errors of queries of results.
 
 use sweep_files::FileError;
 
-/// An error of a question to a result.
+/// An error of a query of a result.
 #[derive(Debug, thiserror::Error)]
 pub enum ResultsError {
     /// A file that cannot be read.

@@ -29,9 +29,9 @@ impl Goal {
     }
 
     /// Parses a constraint over rows of these columns. Its number is its violation, in the units of
-    /// its comparisons: 0 where all rows satisfy it, else that of the row with the greatest one.
-    /// The violations of comparisons joined by `and` are added, of those joined by `or` the least
-    /// counts. An expression that compares no numbers is violated by 1.
+    /// its comparisons: 0 if all rows satisfy it, else that of the row that violates it most. The
+    /// violation of comparisons joined by `and` is their sum, and of comparisons joined by `or` the
+    /// least. An expression that compares no numbers is violated by 1.
     ///
     /// # Errors
     /// The first error in the text.
@@ -55,7 +55,7 @@ impl Goal {
         &self.expression.text
     }
 
-    /// Returns whether it is a constraint.
+    /// Whether the goal is a constraint.
     pub const fn is_constraint(&self) -> bool {
         self.is_constraint
     }
@@ -70,12 +70,13 @@ impl Goal {
         self.expression.by_row
     }
 
-    /// Returns the unit of a single column or of an aggregate of one, else an empty text.
+    /// Returns the unit, if the expression is a single column or an aggregate of one, else an empty
+    /// text.
     pub fn unit(&self) -> &str {
         let is_column = |node: &ExpressionNode| matches!(node, ExpressionNode::Column(_));
         let has_unit = match (&self.expression.root, self.expression.aggregates.as_slice()) {
             (root, []) => is_column(root),
-            // A count or a share is of a condition, which is no single number column.
+            // A count or a share has a condition as its argument, not a column of numbers.
             (ExpressionNode::Aggregate(_), [(_, node)]) => is_column(node),
             _ => false,
         };
@@ -85,12 +86,12 @@ impl Goal {
         }
     }
 
-    /// Computes how far the rows are from violating a constraint, in the units of its comparison,
-    /// and that over the greater operand: of the row and the comparison with the least. Below 0
-    /// where they violate it; `None` where it compares no numbers or one of them is missing.
+    /// Computes how far the rows are from violating a constraint: the slack of the row and the
+    /// comparison that are nearest to it, below 0 if they violate it. `None` if the constraint
+    /// compares no numbers, or one of them is missing.
     ///
     /// # Errors
-    /// A batch without the columns of the expression.
+    /// Fails if the batch lacks columns of the expression.
     pub fn slack(&self, batch: &RecordBatch) -> Result<Option<Slack>, ArrowError> {
         self.least(
             batch,
@@ -99,10 +100,11 @@ impl Goal {
         )
     }
 
-    /// Evaluates the number over all rows; `None` where a value that it needs is missing.
+    /// Evaluates the objective, or the violation of the constraint, over all rows; `None` if a
+    /// value that it needs is missing.
     ///
     /// # Errors
-    /// A batch without the columns of the expression.
+    /// Fails if the batch lacks columns of the expression.
     pub fn evaluate(&self, batch: &RecordBatch) -> Result<Option<f64>, ArrowError> {
         let number = |root: &ExpressionNode, context: &EvaluationContext<'_>| {
             if self.is_constraint { root.violation(context) } else { root.value(context).number() }
@@ -110,7 +112,8 @@ impl Goal {
         self.least(batch, number, f64::max)
     }
 
-    /// Reduces what `of` finds of every row to one; `None` where it finds nothing of one of them.
+    /// Evaluates `of` for each row and reduces the results to one; `None` if it has no result for
+    /// one of the rows.
     fn least<T>(
         &self,
         batch: &RecordBatch,
@@ -139,24 +142,24 @@ impl Goal {
     }
 }
 
-/// A distance from a constraint's limit.
+/// The distance of a row from the limit of a constraint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slack {
     /// The distance, in the units of the comparison; below 0 beyond the limit.
     pub distance: f64,
-    /// The slack over the magnitude of the greater operand.
+    /// The distance, divided by the magnitude of the greater operand.
     pub part: f64,
 }
 
 impl ExpressionNode {
-    /// Returns the distance of a row from the limit of a condition; `None` where it compares no
-    /// numbers.
+    /// Returns the distance of a row from the limit of a condition; `None` if the condition
+    /// compares no numbers.
     fn slack(&self, context: &EvaluationContext<'_>) -> Option<Slack> {
         match self {
             Self::And(left, right) | Self::Or(left, right) => {
                 let is_and = matches!(self, Self::And(..));
                 let [left, right] = [left.slack(context)?, right.slack(context)?];
-                // The nearer limit decides of both, the farther of either.
+                // For `and` the nearer limit decides, for `or` the farther one.
                 Some(if (left.part < right.part) == is_and { left } else { right })
             }
             Self::Compare(operator, left, right) => {
@@ -170,8 +173,8 @@ impl ExpressionNode {
         }
     }
 
-    /// Returns the violation of a condition by a row; `None` where the condition is neither true
-    /// nor false.
+    /// Returns by how much a row violates a condition; `None` if the condition is neither true nor
+    /// false.
     fn violation(&self, context: &EvaluationContext<'_>) -> Option<f64> {
         if self.truth(context)? {
             return Some(0.0);
@@ -185,7 +188,8 @@ impl ExpressionNode {
             Self::Or(left, right) => left.violation(context)?.min(right.violation(context)?),
             Self::Compare(operator, left, right) => {
                 match (left.value(context).number(), right.value(context).number()) {
-                    // Equal operands violate a strict comparison by 0, which would count as none.
+                    // The distance of equal operands from a strict comparison is 0, which would
+                    // count as no violation.
                     (Some(l), Some(r)) => operator.violation(l, r).max(f64::MIN_POSITIVE),
                     _ => 1.0,
                 }
@@ -222,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn an_objective_covers_all_rows_and_is_missing_where_a_value_is() {
+    fn objectives_cover_all_rows_and_are_missing_if_a_value_is() {
         let batch = batch();
         let parse = |text: &str| Goal::objective(text, &columns(&batch.schema())).unwrap();
         for (text, value, unit) in [

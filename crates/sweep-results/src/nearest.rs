@@ -5,7 +5,7 @@
 const MIN_SIMILARITY: f64 = 0.8;
 
 /// The number of characters of a misspelt name that are compared. Basis: no valid name is longer.
-/// Doubling it takes four times the time for texts that are longer still.
+/// Doubling it takes four times the time for longer texts.
 const MAX_COMPARED_CHARACTERS: usize = 80;
 
 /// Returns the valid name most similar to the typed one, if any is similar enough.
@@ -29,7 +29,7 @@ where
 
 /// Returns the similarity of a typed name to a valid one, from 0 to 1.
 fn similarity(typed: &str, name: &str) -> f64 {
-    // People leave out the unit or the first words as often as they mistype a letter.
+    // Users leave out the unit or the first words as often as they mistype a letter.
     if typed.len() >= 4 {
         if name.starts_with(typed) {
             return 1.0;
@@ -40,7 +40,8 @@ fn similarity(typed: &str, name: &str) -> f64 {
     }
     let measured = strsim::jaro_winkler(typed, name)
         .min(strsim::normalized_damerau_levenshtein(typed, name) + 0.45);
-    // Both measures are low for a short word with one wrong letter.
+    // Both measures are low for a short word with one wrong letter, so that it is counted as
+    // similar.
     let has_one_typo = typed.len() >= 3 && strsim::damerau_levenshtein(typed, name) == 1;
     if has_one_typo { measured.max(0.9) } else { measured }
 }

@@ -36,8 +36,7 @@ enum Token {
     End,
 }
 
-/// The operators and separators. A sign stands before its own beginning (`<=` before `<`), because
-/// the first match is taken.
+/// The operators and separators. The first match is taken, so that `<=` stands before `<`.
 const SIGNS: [&str; 13] = ["<=", ">=", "==", "!=", "<", ">", "(", ")", "+", "-", "*", "/", ","];
 
 /// Operators of other languages, and the ones to use.
@@ -52,7 +51,7 @@ const FUNCTIONS: [(&str, Option<Aggregate>); 7] = [
     ("min", Some(Aggregate::Least)),
     ("max", Some(Aggregate::Greatest)),
     ("mean", Some(Aggregate::Mean)),
-    // The parser replaces the probability.
+    // NaN is a placeholder for the probability that the parser reads.
     ("quantile", Some(Aggregate::Quantile(f64::NAN))),
 ];
 
@@ -154,8 +153,8 @@ fn tokenize(text: &str) -> Result<Vec<SpannedToken>, ExpressionError> {
     Ok(found)
 }
 
-/// Returns the length of the number at the beginning of a text, with everything that cannot begin
-/// another token, so that `1.5.2` and `2kg` are one invalid number each.
+/// Returns the length of the number at the beginning of a text. All characters count that cannot
+/// begin another token, so that `1.5.2` and `2kg` are each one invalid number.
 fn number_length(text: &str) -> usize {
     let mut previous = ' ';
     text.find(|c: char| {
@@ -176,8 +175,8 @@ impl Condition {
         parse_expression(text, &table.columns, CellKind::Flag)
     }
 
-    /// Returns the conditions that the expression joins by `and`; the whole text where it joins
-    /// none, or joins by `or` too.
+    /// Returns the conditions that the expression joins by `and`; the whole text if it joins none,
+    /// or joins some by `or` too.
     pub fn conjuncts(&self) -> Vec<&str> {
         let Ok(tokens) = tokenize(&self.text) else { return vec![&self.text] };
         let mut depth = 0_usize;

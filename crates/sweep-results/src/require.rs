@@ -23,7 +23,8 @@ pub struct Offender {
 pub struct Checked {
     /// The condition as typed.
     pub expression: String,
-    /// Whether the condition is true for every row, or for the file as a whole.
+    /// Whether the condition is true for every checked row; a condition of aggregates alone, for
+    /// the file.
     pub holds: bool,
     /// Whether the condition reads columns outside of aggregates.
     pub by_row: bool,
@@ -40,16 +41,16 @@ pub struct Checked {
     pub folded_rows: Vec<u64>,
     /// For each aggregate that is a share, the number of rows for which its condition is true.
     pub share_counts: Vec<Option<u64>>,
-    /// The rows that violate the condition, the worst first: by the first of its columns that has
-    /// a bad direction.
+    /// The rows that violate the condition. They are sorted by the first column of the condition
+    /// that has a direction in which it is bad, the worst first.
     pub offenders: Vec<Offender>,
 }
 
 /// Checks a condition on the rows that a filter accepts.
 ///
-/// A row with a missing value violates a condition whose truth depends on it, and an aggregate
-/// without a value of every row is unknown. With `allow_null` such rows pass, and aggregates skip
-/// them. A condition never holds for no rows at all.
+/// A row with a missing value violates a condition whose truth depends on it, and an aggregate is
+/// unknown unless every row has a value. With `allow_null` such rows pass, and aggregates skip
+/// them. A condition never holds for an empty set of rows.
 ///
 /// # Errors
 /// [`ResultsError::File`].
@@ -165,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn filtered_rows_are_not_checked_and_no_rows_violate_everything() {
+    fn rows_outside_the_filter_are_not_checked_and_no_condition_holds_for_no_rows() {
         let found = checked("ratio_max < 3", Some("not sensitive and status == \"ok\""), false);
         assert!(found.holds, "{found:?}");
         assert_eq!(found.rows, 4);
@@ -207,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_conjunction_is_split_at_its_own_ands() {
+    fn a_conjunction_is_split_at_its_outermost_ands() {
         let table = sample::table();
         for (text, parts) in [
             ("ratio_max < 2", &["ratio_max < 2"][..]),

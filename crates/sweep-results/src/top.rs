@@ -1,4 +1,4 @@
-//! The selection of rows that come first in an order.
+//! Selects the rows that come first in an order.
 
 use crate::condition::{Condition, for_each_row};
 use crate::error::ResultsError;
@@ -53,7 +53,7 @@ pub fn top(
     Ok(worst.finish())
 }
 
-/// A selection of the worst rows, or of the first ones where no direction is worse.
+/// A selection of the worst rows, or of the first rows if there is no direction that is worse.
 pub(crate) struct WorstRows<T> {
     worse: Option<Worse>,
     count: usize,
@@ -66,13 +66,14 @@ impl<T> WorstRows<T> {
         Self { worse, count, selected: Vec::new() }
     }
 
-    /// Offers a row, which is made only if it may be selected.
+    /// Adds a row if it may be among the selected ones; `row` is called only then.
     pub(crate) fn insert(&mut self, value: Option<f64>, row: impl FnOnce() -> T) {
         if self.worse.is_none() && self.selected.len() == self.count {
             return;
         }
         self.selected.push((value, row()));
-        // Sorting at twice the count keeps the memory small and the time of a row constant.
+        // The rows are sorted when there are twice as many as needed, which limits the memory, and
+        // the time for a row.
         if self.selected.len() == self.count.saturating_mul(2).max(1024) {
             self.sort();
         }

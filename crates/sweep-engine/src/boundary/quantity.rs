@@ -44,18 +44,18 @@ impl TracedQuantity {
     pub fn distance(&self, value: f64) -> f64 {
         match (self.scale, self.worse) {
             (Scale::Logarithm, worse) => {
-                let distance = worse.by(libm::log(value / self.limit), 0.0);
+                let distance = worse.excess(libm::log(value / self.limit), 0.0);
                 // A ratio one rounding on the good side of the limit is still there.
-                let is_good = worse.by(value, self.limit) < 0.0;
+                let is_good = worse.excess(value, self.limit) < 0.0;
                 if is_good { distance.min(-f64::MIN_POSITIVE) } else { distance }
             }
-            (Scale::Over(per), worse) => worse.by(value, self.limit) / per,
+            (Scale::Over(per), worse) => worse.excess(value, self.limit) / per,
         }
     }
 
     /// Returns the quantity at a signed distance from the limit.
     pub fn value(&self, distance: f64) -> f64 {
-        let away = self.worse.by(distance, 0.0);
+        let away = self.worse.excess(distance, 0.0);
         match self.scale {
             Scale::Logarithm => self.limit * libm::exp(away),
             Scale::Over(per) => self.limit + away * per,

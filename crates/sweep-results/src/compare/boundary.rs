@@ -13,7 +13,7 @@ use sweep_files::ResultTable;
 pub struct BoundaryCrossing {
     /// The values of the other axes.
     pub place: Vec<f64>,
-    /// The crossing's number along the second axis, from 1.
+    /// The index of the crossing among those along the second axis, from 1.
     pub number: usize,
     /// The estimated position in either file, within its bracket.
     pub at: [f64; 2],
@@ -49,14 +49,14 @@ pub struct BoundaryShift {
     pub keys: Vec<String>,
     /// The crossings that are in both files, in order.
     pub crossings: Vec<BoundaryCrossing>,
-    /// The lines along the second axis that have other numbers of crossings in the two files: the
-    /// values of the other axes, and the numbers.
+    /// The lines along the second axis on which the two files have different numbers of crossings:
+    /// the values of the other axes, and the two numbers.
     pub unmatched_lines: Vec<(Vec<f64>, [usize; 2])>,
 }
 
 impl BoundaryShift {
-    /// Returns the crossing with the greatest certain shift; among equals, with the greatest
-    /// estimated one.
+    /// Returns the crossing with the greatest certain shift; if several have it, that with the
+    /// greatest estimated shift.
     pub fn farthest(&self) -> Option<&BoundaryCrossing> {
         let estimated = |crossing: &BoundaryCrossing| (crossing.at[1] - crossing.at[0]).abs();
         self.crossings.iter().max_by(|a, b| {
@@ -66,7 +66,8 @@ impl BoundaryShift {
         })
     }
 
-    /// Returns the means of the least and of the greatest shifts that the brackets allow.
+    /// Returns the mean of the least shifts and the mean of the greatest shifts that the brackets
+    /// allow.
     pub fn mean_range(&self) -> Option<[f64; 2]> {
         if self.crossings.is_empty() {
             return None;
@@ -125,11 +126,11 @@ fn pair_crossings(
     BoundaryShift { axis: axis.to_owned(), unit, keys, crossings, unmatched_lines }
 }
 
-/// Returns integers that sort as the numbers do.
+/// Returns integers that sort in the same order as the numbers.
 fn sort_key(place: &[f64]) -> Vec<u64> {
     let key = |value: &f64| {
         let bits = (value + 0.0).to_bits();
-        // Bits of negative numbers grow with the magnitude.
+        // The bits of negative numbers sort in reverse order.
         if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
     };
     place.iter().map(key).collect()

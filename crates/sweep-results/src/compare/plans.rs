@@ -15,7 +15,8 @@ pub struct PlanChange {
     pub second: Value,
 }
 
-/// Returns a file's plan and versions, and the request behind a trace or modes, as one JSON object.
+/// Returns a file's plan and versions, and for a trace or modes the settings of the request, as one
+/// JSON object.
 fn provenance(file: &ParquetFile) -> Value {
     let read = |name: &str| {
         let text = file.value(name)?;

@@ -1,4 +1,4 @@
-//! A compared file, in memory.
+//! The contents of one of the two compared files.
 
 use super::{Flip, SharedRow};
 use crate::error::ResultsError;
@@ -105,8 +105,8 @@ impl ComparedFile {
         (0..self.keys).map(|key| self.cell(key, row).number().unwrap_or(f64::NAN)).collect()
     }
 
-    /// Returns a row's key values rounded to nine digits, because grids of other counts have common
-    /// points whose values differ by rounding.
+    /// Returns a row's key values rounded to nine digits, because grids with different numbers of
+    /// values have common points whose values differ by rounding.
     pub(super) fn key(&self, row: usize) -> Vec<u64> {
         self.key_values(row).into_iter().map(rounded_bits).collect()
     }

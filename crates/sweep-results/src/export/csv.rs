@@ -6,12 +6,12 @@ use sweep_files::{Cell, EXPORTED_CSV, FileError, ResultTable, key};
 
 use super::column_names;
 
-/// The least number of bytes that one call writes. Basis: any size
-/// far above that of a row will do. Doubling it halves the number of writes.
+/// Number of bytes that are collected before they are written. Basis: it need only be far greater
+/// than a row. Doubling it halves the number of writes.
 const WRITE_SIZE: usize = 1 << 16;
 
-/// Writes rows as they are read. The whole text may be far larger than the file, in which a word
-/// that all rows share is stored once.
+/// Writes rows as they are read, because the whole text may be far larger than the file, which
+/// stores a word only once however many rows have it.
 pub(super) fn write(
     table: &ResultTable,
     write: &mut dyn FnMut(&str) -> Result<(), FileError>,
@@ -54,8 +54,8 @@ pub(super) fn write(
     write(&text)
 }
 
-/// Formats a number by the fewest digits that read back to the same number, with an exponent where
-/// that is shorter.
+/// Formats a number with the fewest digits that parse to the same number, with an exponent if that
+/// is shorter.
 fn format_number(number: f64) -> String {
     let plain = number.to_string();
     let with_exponent = format!("{number:e}");
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn no_cell_of_a_comment_begins_as_a_formula() {
+    fn comments_are_escaped_so_that_no_cell_is_a_formula() {
         assert_eq!(
             escape_comment(r#"{"name":"x","values":[1.0,-2.0]}"#),
             r#"{"name":"x","values":[1.0,-2.0]}"#

@@ -193,7 +193,7 @@ mod tests {
         assert_eq!(first, encode(&sample::table()).unwrap());
     }
 
-    /// Extracts a file of the workbook, a ZIP archive, from behind its local header.
+    /// Extracts a file of the workbook, which is a ZIP archive. Its data follow the local header.
     fn extract(archive: &[u8], name: &str) -> String {
         let at = archive.windows(name.len()).position(|part| part == name.as_bytes()).unwrap();
         let extra = u16::from_le_bytes([archive[at - 2], archive[at - 1]]);
