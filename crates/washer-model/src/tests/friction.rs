@@ -61,6 +61,60 @@ fn own_speeds_are_those_of_the_linear_motion() {
     assert!((factor - 5.0).abs() < 1e-12, "{factor}: below 4 v_s / pi friction is viscous");
 }
 
+/// Between friction and the unbalance's force little is left for the viscous dampers, so that a
+/// small error of a speed moves the motion by nearly as much, and the fixed point is far away.
+#[test]
+fn own_speeds_near_a_resonance_are_a_fixed_point() {
+    let with = |given_m_per_s: Option<f64>, friction_n: f64| {
+        let mut machine = machine(0.5, [friction_n; 2], given_m_per_s);
+        machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 4.0);
+        machine
+    };
+    let method = Method::Rk4 { step_s: 2e-4 };
+    let wanted = Recorders::gauge(Gauge::DamperSpeed);
+    for friction_n in [45.0, 50.0, 55.0] {
+        let point = prepared(&[with(None, friction_n)]).remove(0);
+        let found = point.friction_speeds().iter().map(|it| it.speed_m_per_s);
+        let found: Vec<f64> = found.collect();
+        // Newton's method for both speeds, with finite differences of long runs.
+        let motion = |speeds: &[f64]| -> Vec<f64> {
+            let mut machine = with(Some(1.0), friction_n);
+            for (damper, speed) in machine.dampers.iter_mut().zip(speeds) {
+                damper.friction_linear_speed_m_per_s = Some(*speed);
+            }
+            let point = prepared(&[machine]).remove(0);
+            let (_, extras) =
+                simulate_with(Simd::best(), ModelKind::Linear, &method, &[&point], wanted);
+            let reciprocals = extras[0].gauge(Gauge::DamperSpeed).iter().map(|speed| 1.0 / speed);
+            reciprocals.collect()
+        };
+        let mut reciprocals: Vec<f64> = found.iter().map(|speed| 1.0 / speed).collect();
+        for _ in 0..4 {
+            let speeds = |x: &[f64]| -> Vec<f64> { x.iter().map(|x| 1.0 / x).collect() };
+            let residual = |x: &[f64]| -> [f64; 2] {
+                let motion = motion(&speeds(x));
+                [motion[0] - x[0], motion[1] - x[1]]
+            };
+            let here = residual(&reciprocals);
+            let column = |k: usize| {
+                let mut beside = reciprocals.clone();
+                let step = 1e-3 * beside[k];
+                beside[k] += step;
+                let there = residual(&beside);
+                [(there[0] - here[0]) / step, (there[1] - here[1]) / step]
+            };
+            let [[a, c], [b, d]] = [column(0), column(1)];
+            let determinant = a * d - b * c;
+            reciprocals[0] -= (d * here[0] - b * here[1]) / determinant;
+            reciprocals[1] -= (a * here[1] - c * here[0]) / determinant;
+        }
+        let off = found.iter().zip(&reciprocals).map(|(speed, reciprocal)| speed * reciprocal);
+        let off: Vec<f64> = off.collect();
+        println!("{friction_n} N: {found:?} are {off:?} of the fixed point");
+        assert!(off.iter().all(|off| (off - 1.0).abs() < 0.01), "{friction_n} N: {off:?}");
+    }
+}
+
 #[test]
 fn a_stuck_damper_has_the_least_speed_amplitude() {
     let machine = machine(0.01, [120.0, 120.0], None);
