@@ -32,11 +32,11 @@ pub use respond::{Responses, respond};
 pub struct Dwell<'a> {
     /// The machine.
     pub point: &'a Point,
-    /// Its drum's speed (rpm), above 0.
+    /// The drum's speed (rpm), above 0.
     pub speed_rpm: f64,
 }
 
-/// How a periodic response loses its stability, or that it does not.
+/// The way in which a periodic response loses its stability, if it does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// Every disturbance decays.
@@ -54,7 +54,7 @@ impl Kind {
     pub const ALL: [Self; 4] =
         [Self::Stable, Self::PeriodDoubling, Self::QuasiPeriodic, Self::Fold];
 
-    /// Name in result files.
+    /// Returns the name in result files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -73,19 +73,19 @@ pub struct Response {
     pub speed_rpm: f64,
     /// Whether it is on the curve of responses that begins at a low speed.
     pub is_on_curve: bool,
-    /// How many folds the curve has before this one: 0 is the branch of a machine that runs up. It
-    /// counts on where that curve is lost and another comes down from a high speed; a response
-    /// beside both has one more than the last at its speed.
+    /// The number of folds that the curve has before this one: 0 is the branch of a machine that
+    /// runs up. It counts on where that curve is lost and another comes down from a high speed; a
+    /// response beside both has one more than the last at its speed.
     pub branch: u32,
     /// Speeds (rpm) of the folds between which that branch lies, lower and upper: none where it
     /// goes on.
     pub between_rpm: [Option<f64>; 2],
-    /// What of the machine's geometry the nonlinear response passes, if it does.
+    /// The part of the machine's geometry that the nonlinear response passes, if it does.
     pub beyond: Option<Beyond>,
     /// Largest deviation from equilibrium over a turn by the nonlinear model, in the order of
     /// [`Channel::ALL`](crate::Channel::ALL) (m, rad).
     pub nonlinear: [f64; CHANNELS],
-    /// The same by the linear model.
+    /// The deviations by the linear model.
     pub linear: [f64; CHANNELS],
     /// The nonlinear response where the unbalance is up: coordinates q1 to q10 (m, rad), then their
     /// speeds (per s).
@@ -98,7 +98,7 @@ pub struct Response {
     pub participants: Vec<Participant>,
 }
 
-/// What a motion passes that no machine can: the equations do not know it.
+/// A limit of the machine that a motion passes: the equations do not know it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Beyond {
     /// A spring's end at the tub passes its hook.
@@ -113,7 +113,7 @@ impl Beyond {
     /// All of it.
     pub const ALL: [Self; 3] = [Self::SpringHooks, Self::DamperEnds, Self::Clearance];
 
-    /// Name in result files.
+    /// Returns the name in result files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -127,9 +127,9 @@ impl Beyond {
 /// A mode of the linear model that takes part in what grows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Participant {
-    /// Its number, the slowest's being 1.
+    /// The mode's number, the slowest's being 1.
     pub mode: usize,
-    /// Its damped natural frequency while the drum turns (cycles per minute).
+    /// The damped natural frequency while the drum turns (cycles per minute).
     pub frequency_cpm: f64,
     /// What moves.
     pub motion: ModeMotion,
@@ -147,27 +147,27 @@ pub struct Disturbance {
 }
 
 impl Disturbance {
-    /// How fast it grows (1/s); below 0 where it decays.
+    /// Returns how fast it grows (1/s); below 0 where it decays.
     #[must_use]
     pub fn growth_per_s(&self) -> f64 {
         growth_per_s(self.multiplier, self.speed_rpm)
     }
 
-    /// Its frequency (cycles per minute), known up to whole multiples of the drum's speed and sign:
-    /// the one from 0 to half the speed.
+    /// Returns the frequency (cycles per minute), known up to whole multiples of the drum's speed
+    /// and sign: the one from 0 to half the speed.
     #[must_use]
     pub fn frequency_cpm(&self) -> f64 {
         let [re, im] = self.multiplier;
         libm::atan2(im.abs(), re) / TAU * self.speed_rpm
     }
 
-    /// The speed less the frequency: another that the same multiplier belongs to.
+    /// Returns the speed less the frequency: another that the same multiplier belongs to.
     #[must_use]
     pub fn other_frequency_cpm(&self) -> f64 {
         self.speed_rpm - self.frequency_cpm()
     }
 
-    /// What it turns the response into.
+    /// Returns the kind of response that it leads to.
     #[must_use]
     pub fn kind(&self) -> Kind {
         let [re, im] = self.multiplier;
@@ -184,32 +184,32 @@ impl Disturbance {
 }
 
 impl Response {
-    /// The fastest growing disturbance, or the slowest to decay.
+    /// Returns the fastest growing disturbance, or the slowest to decay.
     #[must_use]
     pub fn disturbance(&self) -> Disturbance {
         Disturbance { speed_rpm: self.speed_rpm, multiplier: self.multiplier }
     }
 
-    /// How fast the fastest growing disturbance grows (1/s); below 0 where all decay.
+    /// Returns how fast the fastest growing disturbance grows (1/s); below 0 where all decay.
     #[must_use]
     pub fn growth_per_s(&self) -> f64 {
         self.disturbance().growth_per_s()
     }
 
-    /// As [`Disturbance::frequency_cpm`].
+    /// Returns the frequency as [`Disturbance::frequency_cpm`] does.
     #[must_use]
     pub fn frequency_cpm(&self) -> f64 {
         self.disturbance().frequency_cpm()
     }
 
-    /// What a disturbance turns the response into.
+    /// Returns the kind of response that a disturbance leads to.
     #[must_use]
     pub fn kind(&self) -> Kind {
         self.disturbance().kind()
     }
 }
 
-/// ln |mu| / T.
+/// Returns ln |mu| / T.
 fn growth_per_s([re, im]: [f64; 2], speed_rpm: f64) -> f64 {
     0.5 * libm::log(re * re + im * im) * speed_rpm / 60.0
 }

@@ -33,32 +33,44 @@ const UNIT_OF_SPEED: f64 = 0.02;
 /// A response may lie on the curve after this many times its speed, but no later.
 pub(super) const BEYOND: f64 = 1.25;
 
-/// Length of the first step, of the longest, which no correction exceeds, and of the shortest,
-/// after which the curve is lost.
+/// The length of the first step. Basis: a centimetre, or 2 % of the speed. Doubling it makes the
+/// first step fail more often.
 const FIRST_STEP: f64 = 1.0;
+/// The length of the longest step, which no correction exceeds. Basis: longer ones are shortened by
+/// the tangent's turning. Doubling it makes few curves faster.
 const LONGEST_STEP: f64 = 4.0;
+/// The length of the shortest step, after which the curve is lost. Basis: ten halvings. Doubling it
+/// loses curves at narrow folds.
 const SHORTEST_STEP: f64 = 1e-3;
 
 /// Once a step is shorter than this, derivatives are taken at all instants of a turn until one is
 /// the longest: those at a few may be what makes it short.
 const SHORT_STEP: f64 = 0.5;
 
-/// A step is longer than the last by as much where it took at most so many corrections,
+/// The factor of a step's length after few corrections. Basis: steps of most curves are as long as
+/// they may be. Doubling it makes steps fail.
 const LONGER: f64 = 1.6;
-const FEW: usize = 4;
+/// The greatest number of corrections that are few. Basis: a curve that hardly bends takes four.
+/// Doubling it makes all steps longer until they fail.
+const FEW_CORRECTIONS: usize = 4;
 
-/// shorter where it took as many as this,
+/// The factor of a step's length after many corrections. Basis: about half the bend of the curve.
+/// Doubling it makes steps longer.
 const SHORTER: f64 = 0.7;
-const MANY: usize = 6;
+/// The least number of corrections that are many. Basis: one more than keeps the length. Doubling
+/// it shortens no step.
+const MANY_CORRECTIONS: usize = 6;
 
-/// and done again, half as long, after this many.
-const MOST: usize = 9;
+/// The greatest number of corrections; then the step is done again, half as long. Basis: a step
+/// that converges takes fewer. Doubling it wastes turns.
+const MAX_CORRECTIONS: usize = 9;
 
 /// A correction is to leave less than this share of what was missing.
 const FAST_ENOUGH: f64 = 0.5;
 
-/// A place is on the curve once a turn misses less than this (`missing`).
-const CLOSE: f64 = 1e-7;
+/// The greatest miss of a turn (`missing`) of a place on the curve. Basis: a thousandth of the
+/// greatest distance of guesses. Doubling it saves less than a correction.
+const CLOSED_TURN: f64 = 1e-7;
 
 /// Cosine of the most that the tangent may turn in a step.
 const MOST_TURNED: f64 = 0.8;
@@ -73,8 +85,11 @@ const OWN: f64 = 1e-3;
 /// Relative difference of speeds by which the curve's slope along the speed is taken.
 const BESIDE: f64 = 1e-5;
 
-/// A fold is found this closely (relative, of its speed), in so many rounds.
+/// The relative error of a fold's speed. Basis: less than any file's digits. Doubling it saves less
+/// than a round.
 const FOLD: f64 = 1e-6;
+/// The greatest number of rounds in which a fold is found. Basis: each squares the error. Doubling
+/// it changes nothing.
 const FOLD_ROUNDS: usize = 5;
 
 /// Where forces have corners, steps that are longer than these are wide make stairs of a curve: two
@@ -131,21 +146,22 @@ fn speed_of(place: &Place) -> f64 {
 #[derive(Clone)]
 struct Node {
     at: Place,
-    /// Of length 1, onwards.
+    /// The tangent onwards, of length 1.
     tangent: Place,
     /// Whether that is the place's own, not one close by.
     is_own: bool,
     /// Length of the curve up to here.
     length: f64,
-    /// What a turn makes of disturbances, here or close by.
+    /// The monodromy matrix, here or close by.
     monodromy: Square,
 }
 
-/// Between two nodes, at a share of the length: the cubic through both along both tangents, and
-/// its slope by the length.
+/// Interpolates between two nodes, at a share of the length: the cubic through both along both
+/// tangents, and its slope by the length.
 fn between(a: &Node, b: &Node, share: f64) -> (Place, Place) {
     let length = b.length - a.length;
-    let (t, u) = (share, 1.0 - share);
+    let t = share;
+    let u = 1.0 - share;
     let at = core::array::from_fn(|i| {
         u * u * ((1.0 + 2.0 * t) * a.at[i] + t * length * a.tangent[i])
             + t * t * ((1.0 + 2.0 * u) * b.at[i] - u * length * b.tangent[i])
@@ -157,9 +173,10 @@ fn between(a: &Node, b: &Node, share: f64) -> (Place, Place) {
     (at, slope)
 }
 
-/// The share up to which something is so.
+/// Returns the share up to which something is so.
 fn bisected(is_before: impl Fn(f64) -> bool) -> f64 {
-    let (mut low, mut high) = (0.0, 1.0);
+    let mut low = 0.0;
+    let mut high = 1.0;
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
         if is_before(middle) { low = middle } else { high = middle }
@@ -173,10 +190,10 @@ struct Step {
     onto: Place,
     across: Place,
     corrections: usize,
-    /// How many of these by the derivatives in use.
+    /// The number of these by the derivatives in use.
     since: usize,
     missing: f64,
-    /// What is known of the curve at `onto`, once that is seen.
+    /// The curve's equations at `onto`, once that is seen.
     seen: Option<Box<Jacobian>>,
 }
 
@@ -184,7 +201,7 @@ struct Step {
 #[derive(Clone)]
 struct Jacobian {
     monodromy: Square,
-    /// Of the equations with the step's plane below.
+    /// The factors of the equations with the step's plane below.
     factors: Lu<PLACE>,
 }
 
@@ -198,12 +215,12 @@ struct Turning {
 
 /// A response at a speed that was asked for, as the curve has it: where to look for it.
 pub(super) struct Guess {
-    /// How many folds are before it on the curve.
+    /// The number of folds before it on the curve.
     pub(super) branch: u32,
     /// Speeds (rpm) of the folds between which the branch is, lower and upper; none where it has no
     /// end that counts.
     pub(super) between_rpm: [Option<f64>; 2],
-    /// Where the unbalance is up.
+    /// The state where the unbalance is up.
     pub(super) state: [f64; STATES],
     /// Factors of 1 - Phi nearby.
     pub(super) factors: Option<Lu<STATES>>,
@@ -240,7 +257,7 @@ pub(super) struct Curve<'a> {
 }
 
 impl<'a> Curve<'a> {
-    /// One of which nothing is known.
+    /// Returns a curve of which nothing is known.
     pub(super) fn new(settings: Settings<'a>) -> Self {
         Self {
             settings,
@@ -256,7 +273,7 @@ impl<'a> Curve<'a> {
         }
     }
 
-    /// Is to follow it from a response at a speed (rpm) up or down to another speed.
+    /// Begins to follow the curve from a response at a speed (rpm) up or down to another speed.
     pub(super) fn begin(&mut self, speed_rpm: f64, start: &[f64; STATES], until_rpm: f64) {
         (self.until_rpm, self.is_down) = (until_rpm, until_rpm < speed_rpm);
         let mut across = [0.0; PLACE];
@@ -268,7 +285,8 @@ impl<'a> Curve<'a> {
     fn advance(&mut self) {
         self.step = None;
         let Some(last) = self.nodes.last() else { return };
-        let (at_rpm, count) = (speed_of(&last.at), self.nodes.len());
+        let at_rpm = speed_of(&last.at);
+        let count = self.nodes.len();
         let is_far = (0..COORDINATES).any(|i| (last.at[i] * UNIT).abs() > FARTHEST);
         let begins_rpm = speed_of(&self.nodes[0].at);
         let [low_rpm, high_rpm] = match self.is_down {
@@ -318,7 +336,7 @@ impl<'a> Curve<'a> {
         self.step = Some(Step { onto, across, corrections: 0, since: 0, missing, seen: None });
     }
 
-    /// The step led nowhere.
+    /// Shortens a step that led nowhere.
     fn shorten(&mut self) {
         match self.turning.take() {
             // A fold that cannot be found more closely is where it is.
@@ -329,8 +347,8 @@ impl<'a> Curve<'a> {
         self.advance();
     }
 
-    /// What a turn from where the step begins makes of the state, of disturbances and, beside it,
-    /// of the speed.
+    /// Takes in what a turn from where the step begins makes of the state, of disturbances and,
+    /// beside it, of the speed.
     fn saw(&mut self, step: Step, seen: &Turned, beside: &Turned) {
         let Some(monodromy) = seen.seen.as_ref().map(|seen| seen.monodromy) else {
             return self.shorten();
@@ -350,13 +368,14 @@ impl<'a> Curve<'a> {
         self.corrected(Step { seen: Some(jacobian), since: 0, ..step }, &seen.end);
     }
 
-    /// What a turn from where the step has come makes of the state.
+    /// Takes in what a turn from where the step has come makes of the state.
     fn corrected(&mut self, mut step: Step, end: &[f64; STATES]) {
         let Some(jacobian) = &step.seen else { return self.shorten() };
         let speed_rpm = speed_of(&self.at);
         let missing = missing(self.settings.point, speed_rpm, &state_of(&self.at), end);
         let is_slow = step.corrections > 1 && missing > FAST_ENOUGH * step.missing;
-        if !missing.is_finite() || step.corrections == MOST || is_slow && step.since == 0 {
+        if !missing.is_finite() || step.corrections == MAX_CORRECTIONS || is_slow && step.since == 0
+        {
             return self.shorten();
         }
         if is_slow {
@@ -381,7 +400,7 @@ impl<'a> Curve<'a> {
         }
         (step.corrections, step.since, step.missing) =
             (step.corrections + 1, step.since + 1, missing);
-        if missing < CLOSE { self.arrived(step) } else { self.step = Some(step) }
+        if missing < CLOSED_TURN { self.arrived(step) } else { self.step = Some(step) }
     }
 
     /// Whether the curve goes on up in speed: each fold turns it.
@@ -414,7 +433,8 @@ impl<'a> Curve<'a> {
             dot(&apart, &apart).sqrt()
         };
         let off = apart(&step.onto);
-        let (mut length, mut turns_back) = (0.0, false);
+        let mut length = 0.0;
+        let mut turns_back = false;
         if let Some(before) = before {
             let gone = apart(&before.at);
             let cosine = dot(&before.tangent, &tangent);
@@ -429,15 +449,16 @@ impl<'a> Curve<'a> {
             // which way the curve goes on, and two of them close by are not taken for one.
             turns_back = self.rises() == (tangent[SPEED] < 0.0);
         }
-        let (is_own, monodromy) = (off < OWN && self.is_careful, jacobian.monodromy);
+        let is_own = off < OWN && self.is_careful;
+        let monodromy = jacobian.monodromy;
         let node = Node { at: self.at, tangent, is_own, length, monodromy };
         if let Some(turning) = self.turning {
             return self.closer(node, turning);
         }
         self.nodes.push(node);
-        if step.corrections <= FEW {
+        if step.corrections <= FEW_CORRECTIONS {
             self.scale(LONGER);
-        } else if step.corrections >= MANY {
+        } else if step.corrections >= MANY_CORRECTIONS {
             self.scale(SHORTER);
         }
         if turns_back {
@@ -516,7 +537,6 @@ impl<'a> Curve<'a> {
                 _ => folds.push(fold),
             }
         }
-        folds
     }
 
     /// Whether it ends before what counts of it at a speed (rpm) does.
@@ -526,13 +546,13 @@ impl<'a> Curve<'a> {
         begins_rpm.is_ok_and(|it| it < speed_rpm) && self.nodes.iter().all(is_short)
     }
 
-    /// How many folds it has.
+    /// Returns the number of folds.
     pub(super) fn folds(&self) -> u32 {
         self.folds_of_machine().len() as u32
     }
 
-    /// Where responses at a speed (rpm) are to be looked for, in the order of the curve; none where
-    /// the curve does not get there.
+    /// Returns where responses at a speed (rpm) are to be looked for, in the order of the curve;
+    /// none where the curve does not get there.
     pub(super) fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
         let is_past = |node: &Node| !self.is_down && speed_of(&node.at) >= BEYOND * speed_rpm;
         let end = self.nodes.iter().position(is_past);
@@ -628,7 +648,8 @@ mod tests {
         let mut curve = Curve::new(Settings::new(point));
         for (k, &speed_rpm) in speeds_rpm.iter().enumerate() {
             let at = place_of(&[0.0; STATES], speed_rpm);
-            let (tangent, monodromy) = ([0.0; PLACE], [[N(0.0); STATES]; STATES]);
+            let tangent = [0.0; PLACE];
+            let monodromy = [[N(0.0); STATES]; STATES];
             curve.nodes.push(Node { at, tangent, is_own: true, length: k as f64, monodromy });
         }
         curve.folds = folds.to_vec();

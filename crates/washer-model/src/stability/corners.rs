@@ -1,4 +1,4 @@
-//! What forces with corners do to disturbances.
+//! Effects of forces with corners on disturbances.
 //!
 //! A force F along a motion of the tub adds the response r F to the accelerations. Its derivatives
 //! are r dF + F dr: F and its slopes turn within a step, while r, dr and how the motion hangs on
@@ -11,7 +11,7 @@ use crate::nonlinear::elements::corners::CornerForce;
 use crate::run::model::Nonlinear;
 use lane_ode::{Aside, Dual, Lane, N};
 
-/// Of every acceleration, its derivative by each coordinate, then by each speed.
+/// The derivative of every acceleration by each coordinate, then by each speed.
 pub(super) type Slopes = [[N<f64>; STATES]; COORDINATES];
 
 /// Coordinates on which responses hang, the tub's first.
@@ -29,7 +29,7 @@ lane_struct! {
         by_speed: [N<T>; TUB.len()],
         /// and of its speed by the coordinates.
         by_place: [N<T>; TUB.len()],
-        /// What a unit of force along it adds to the accelerations,
+        /// The addition of a unit of force along it to the accelerations,
         response: [N<T>; COORDINATES],
         /// and how that changes with coordinates.
         bend: [[N<T>; BENDS.len()]; COORDINATES],
@@ -39,10 +39,10 @@ lane_struct! {
 impl<T: Lane> Corner<T> {
     #[inline(always)]
     pub(super) fn none(zero: N<T>) -> Self {
-        let of_tub = [zero; TUB.len()];
+        let none = [zero; TUB.len()];
         Self {
-            by_speed: of_tub,
-            by_place: of_tub,
+            by_speed: none,
+            by_place: none,
             response: [zero; COORDINATES],
             bend: [[zero; BENDS.len()]; COORDINATES],
         }
@@ -87,7 +87,8 @@ impl<T: Lane> Aside for Corners<'_, T> {
                 unit[COORDINATES + TUB[k]] = zero.lit(1.0).constant();
                 let speeds = model.corner_motions(&unit);
                 for m in 0..corners.len() {
-                    let (corner, speed) = (&mut corners[m], speeds[m][1]);
+                    let corner = &mut corners[m];
+                    let speed = speeds[m][1];
                     corner.by_speed[k] = N(speed.0.value);
                     for i in 0..COORDINATES {
                         let Dual { value, slope } = (speed * by_load[k][i]).v().0;

@@ -1,5 +1,5 @@
-//! What becomes of disturbances while a run crosses a band of speeds: the run itself by classical
-//! Runge-Kutta on the machine as it is, its tangent map by dual numbers along it.
+//! Disturbances while a run crosses a band of speeds: the run itself by classical Runge-Kutta on
+//! the machine as it is, its tangent map by dual numbers along it.
 
 use super::Response;
 use super::turn::step;
@@ -26,8 +26,8 @@ pub struct Crossing<'a> {
     pub is_backward: bool,
 }
 
-/// What a crossing does to disturbances, measured by their energy: kinetic, and that of the linear
-/// stiffness.
+/// The effect of a crossing on disturbances, measured by their energy: kinetic, and that of the
+/// linear stiffness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossed {
     /// Largest factor by which the amplitude of a small disturbance grows: the largest singular
@@ -58,7 +58,8 @@ pub fn cross(
     crossings: &[Crossing<'_>],
 ) -> Vec<Result<Crossed, LeftRange>> {
     let start = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
-    let (mut time_s, mut state) = (0.0, start);
+    let mut time_s = 0.0;
+    let mut state = start;
     let mut failure = None;
     let mut crossed = Vec::with_capacity(crossings.len());
     for crossing in crossings {
@@ -92,10 +93,10 @@ pub fn cross(
     crossed
 }
 
-/// The largest deviations (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL)) of the
-/// nonlinear model within a window, in a run that enters each crossing on the periodic response
-/// instead of on what is left from before. The run is otherwise that of [`cross`]. None of a
-/// crossing's own responses is there where it is `None`: the run then goes on as it is.
+/// Returns the largest deviations (m, rad; in the order of [`Channel::ALL`](crate::Channel::ALL))
+/// of the nonlinear model within a window, in a run that enters each crossing on the periodic
+/// response instead of on what is left from before. The run is otherwise that of [`cross`]. None of
+/// a crossing's own responses is there where it is `None`: the run then goes on as it is.
 ///
 /// # Errors
 /// [`LeftRange`].
@@ -117,8 +118,8 @@ pub fn peaks_without_departures(
                     return Err(failure);
                 }
                 if time_s >= window_s[0] && edge_s <= window_s[1] {
-                    for (peak, of_stretch) in peaks.iter_mut().zip(followed.peaks) {
-                        *peak = peak.max(of_stretch);
+                    for (peak, further) in peaks.iter_mut().zip(followed.peaks) {
+                        *peak = peak.max(further);
                     }
                 }
                 (time_s, *state) = (edge_s, followed.end);
@@ -153,7 +154,7 @@ impl Leg {
         self.start_s + self.step_s * steps
     }
 
-    /// The forcing of step `k`: at its start, its middle and its end.
+    /// Returns the forcing of step `k`: at its start, its middle and its end.
     #[inline(always)]
     fn forcings<T: Lane, S: System<T, STATES>>(
         &self,
@@ -171,7 +172,7 @@ impl Leg {
     }
 }
 
-/// The time from `from_s` to `to_s`, cut where the spin has a kink.
+/// Returns the time from `from_s` to `to_s`, cut where the spin has a kink.
 fn legs(point: &Point, step_s: f64, [from_s, to_s]: [f64; 2]) -> Vec<Leg> {
     let kinks = point.stretches.iter().map(|stretch| stretch.start_s.0);
     let inside = kinks.filter(|&kink_s| kink_s > from_s && kink_s < to_s);
@@ -298,7 +299,7 @@ impl Kernel for Tangent<'_> {
     }
 }
 
-/// The periodic response at the drum's angle of a time.
+/// Returns the periodic response at the drum's angle of a time.
 fn response_at(
     point: &Point,
     step_s: f64,
@@ -326,7 +327,7 @@ fn response_at(
     Simd::one_lane(Run { point, legs: &[leg], start: &start }).end
 }
 
-/// The drum's angle (rad) at a time, up to whole turns.
+/// Returns the drum's angle (rad) at a time, up to whole turns.
 fn theta_rad(point: &Point, at_s: f64) -> f64 {
     let spin = point.stretches[stretch_at(&point.stretches, at_s)].at(N(at_s));
     libm::atan2(spin.sin.0, spin.cos.0)
@@ -342,8 +343,10 @@ impl Energy {
     fn new(point: &Point, at_s: f64) -> Self {
         let matrices = point.matrices(theta_rad(point, at_s), 0.0, 0.0);
         let twice = Mat::from_fn(STATES, STATES, |i, j| {
-            let (block_i, block_j) = (i / COORDINATES, j / COORDINATES);
-            let (i, j) = (i % COORDINATES, j % COORDINATES);
+            let block_i = i / COORDINATES;
+            let block_j = j / COORDINATES;
+            let i = i % COORDINATES;
+            let j = j % COORDINATES;
             match (block_i, block_j) {
                 (0, 0) => 0.5 * (matrices.stiffness[i][j] + matrices.stiffness[j][i]),
                 (1, 1) => matrices.mass[i][j],
@@ -354,7 +357,7 @@ impl Energy {
         Self { root }
     }
 
-    /// Energy (J) of a disturbance; not finite without a stable equilibrium.
+    /// Returns the energy (J) of a disturbance; not finite without a stable equilibrium.
     fn of(&self, disturbance: &[f64; STATES]) -> f64 {
         let Some(root) = &self.root else { return f64::NAN };
         let part = |j: usize| (j..STATES).map(|i| root[(i, j)] * disturbance[i]).sum::<f64>();
@@ -362,7 +365,7 @@ impl Energy {
     }
 }
 
-/// The largest singular value of L2^T Phi L1^-T.
+/// Returns the largest singular value of L2^T Phi L1^-T.
 fn amplification([before, after]: &[Energy; 2], map: &[[f64; STATES]]) -> f64 {
     let (Some(before), Some(after)) = (&before.root, &after.root) else { return f64::NAN };
     let map = Mat::from_fn(STATES, STATES, |i, j| map[j][i]);

@@ -36,13 +36,13 @@ pub struct Exact {
 }
 
 impl Exact {
-    /// Frequency in cycles per minute.
+    /// Returns the frequency in cycles per minute.
     #[must_use]
     pub fn frequency_rpm(&self) -> f64 {
         self.im_rad_per_s * 60.0 / TAU
     }
 
-    /// Share of critical damping.
+    /// Returns the share of critical damping.
     #[must_use]
     pub fn damping_ratio(&self) -> f64 {
         let squared = self.re_per_s * self.re_per_s + self.im_rad_per_s * self.im_rad_per_s;
@@ -50,9 +50,9 @@ impl Exact {
     }
 }
 
-/// The linear model's motions while the drum turns at `speed_rpm`, above 0, one for each mode with
-/// theta frozen at 0, the slowest mode first; without those that decay so far within a turn that
-/// nothing is left to see.
+/// Returns the linear model's motions while the drum turns at `speed_rpm`, above 0, one for each
+/// mode with theta frozen at 0, the slowest mode first; without those that decay so far within a
+/// turn that nothing is left to see.
 ///
 /// # Errors
 /// [`NoAnswer::Eigenvalues`].
@@ -64,9 +64,10 @@ pub fn exact_motions(point: &Point, speed_rpm: f64) -> Result<Vec<Exact>, NoAnsw
     let unit_per_s = row.unit_per_s();
     let matrix = per_unit(&Simd::dispatch_narrow(OfTurn(row)), unit_per_s);
     let decomposition = matrix.eigen().map_err(|_| NoAnswer::Eigenvalues)?;
-    let (values, vectors) = (decomposition.S().column_vector(), decomposition.U());
+    let values = decomposition.S().column_vector();
+    let vectors = decomposition.U();
     let frozen = modes(point, 0.0, speed).map_err(|_| NoAnswer::Eigenvalues)?;
-    // How much each motion is of each mode.
+    // The part of each mode in each motion.
     let mut likeness = Vec::with_capacity(STATES * COORDINATES);
     for k in 0..STATES {
         let vector = Mat::from_fn(STATES, 1, |i, _| vectors[(i, k)]);
@@ -80,7 +81,8 @@ pub fn exact_motions(point: &Point, speed_rpm: f64) -> Result<Vec<Exact>, NoAnsw
     likeness.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     // A pair of conjugates belongs to one mode, and the likest pairs are taken first.
     let mut exact = Vec::with_capacity(COORDINATES);
-    let (mut is_given, mut is_taken) = ([false; COORDINATES], [false; STATES]);
+    let mut is_given = [false; COORDINATES];
+    let mut is_taken = [false; STATES];
     for (_, mode, k) in likeness {
         if is_given[mode] || is_taken[k] {
             continue;
@@ -103,9 +105,10 @@ pub fn exact_motions(point: &Point, speed_rpm: f64) -> Result<Vec<Exact>, NoAnsw
     Ok(exact)
 }
 
-/// The exponent of a multiplier, the nearest to a mode.
+/// Returns the exponent of a multiplier, the nearest to a mode.
 fn exponent(frozen: &Mode, mu: c64, speed_rpm: f64) -> Exact {
-    let (re, im) = (rounded(mu.re), rounded(mu.im));
+    let re = rounded(mu.re);
+    let im = rounded(mu.im);
     let speed = speed_rpm * TAU / 60.0;
     let re_per_s = super::growth_per_s([re, im], speed_rpm);
     let turns = libm::atan2(im, re) / TAU;
@@ -113,7 +116,7 @@ fn exponent(frozen: &Mode, mu: c64, speed_rpm: f64) -> Exact {
         let whole = (frozen.im_rad_per_s / speed - turns).round_ties_even();
         (turns + whole) * speed
     };
-    // Of the conjugate too.
+    // The conjugate belongs to it too.
     let [one, other] = [nearest(turns), nearest(-turns)];
     let apart = |im: f64| (im - frozen.im_rad_per_s).abs();
     let im_rad_per_s = if apart(one) <= apart(other) { one } else { other };
@@ -124,12 +127,13 @@ fn exponent(frozen: &Mode, mu: c64, speed_rpm: f64) -> Exact {
 struct OfTurn<'a>(Row<'a>);
 
 impl Kernel for OfTurn<'_> {
-    /// What it does to disturbances.
+    /// The monodromy matrix.
     type Output = Square;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Square {
-        let (zero, row) = (N(zero), self.0);
+        let zero = N(zero);
+        let row = self.0;
         // The one machine in every lane, a disturbance in each; the first group has none.
         let linear: Linear<T> = model(zero, &[row]);
         let clock = Clock { step_s: zero.lit(row.step_s()), steps: row.steps, hinge_kept: None };

@@ -1,4 +1,4 @@
-//! What a turn does to small disturbances of a response.
+//! The effect of a turn on small disturbances of a response.
 //!
 //! A disturbance d obeys d'' = K(t) d + C(t) d', with the partial derivatives of the accelerations
 //! along the response, which dual numbers give. Over a turn these are smooth and periodic but for
@@ -7,7 +7,7 @@
 //! disturbances through the turn together. Lanes share a row's instants, then its disturbances.
 
 use super::corners::{Corner, Corners, Slopes};
-use super::turn::{Clock, REACH, WEIGHT};
+use super::turn::{Clock, NEXT_STAGE, WEIGHT};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::lanes::InLanes as _;
 use crate::nonlinear::elements::corners::CornerForce;
@@ -19,21 +19,23 @@ use lane_ode::{Aside, Dual, Lane, MAX_LANES, N, System, trig};
 /// seventh.
 pub(super) const INSTANTS: usize = 16;
 
-/// The same where forces have corners, which give motions more harmonics.
+/// The number of instants where forces have corners, which give motions more harmonics.
 pub(super) const INSTANTS_AT_CORNERS: usize = 32;
 
 /// Rows and columns of a state's disturbance.
 pub(crate) type Square = [[N<f64>; STATES]; STATES];
 
-/// The matrix of disturbances whose speeds count per a unit (1/s).
+/// Returns the matrix of disturbances whose speeds count per a unit (1/s).
 pub(crate) fn per_unit(matrix: &Square, unit_per_s: f64) -> Mat<f64> {
     let unit = |i: usize| if i < COORDINATES { 1.0 } else { unit_per_s };
     Mat::from_fn(STATES, STATES, |i, j| matrix[i][j].0 * unit(j) / unit(i))
 }
 
-/// Lanes of disturbances taken through a step at once, so that they stay in the nearest cache; the
-/// same for wide lanes, of which so many are enough.
+/// The number of lanes of disturbances taken through a step at once. Basis: they stay in the
+/// nearest cache. Doubling it is slower.
 const BLOCK: usize = 5;
+/// The number of wide lanes that hold all disturbances. Basis: the number of states. Doubling it
+/// leaves lanes empty.
 const WIDE_BLOCK: usize = STATES.div_ceil(MAX_LANES);
 
 /// Steps whose derivatives are kept at once: as many for every turn.
@@ -46,7 +48,7 @@ const PLACES: usize = 2 * AT_ONCE + 1;
 /// Rows along their turns.
 pub(super) struct Along<'a, T> {
     pub(super) zero: N<T>,
-    /// Those of [`weights`].
+    /// The weights of [`weights`].
     pub(super) weights: &'a [Vec<f64>],
     /// In lanes one row after another, again and again.
     pub(super) model: Nonlinear<Dual<T>>,
@@ -60,7 +62,7 @@ pub(super) struct Along<'a, T> {
     pub(super) forces: &'a [CornerForce<T>],
 }
 
-/// What is smooth over a turn of a row.
+/// The smooth coefficients over a turn of a row.
 #[derive(Clone)]
 struct Smooth {
     /// Derivatives, less those of forces with corners.
@@ -70,10 +72,11 @@ struct Smooth {
 }
 
 impl Smooth {
+    /// The coefficients of no forces.
     const NONE: Self = Self { slopes: [[N(0.0); STATES]; COORDINATES], corners: Vec::new() };
 }
 
-/// How often each of what is summed counts.
+/// The number of times that each summand counts.
 type Times = [f64; INSTANTS_AT_CORNERS];
 
 /// Sums of the same, each by times of its own. Coordinate by coordinate, so that what is summed
@@ -102,7 +105,7 @@ fn sum(of: &[Smooth], times: &[Times], sums: &mut [Smooth]) {
     }
 }
 
-/// The derivatives of one acceleration.
+/// Returns the derivatives of one acceleration.
 #[inline(always)]
 fn sum_slopes<const SUMS: usize>(
     of: &[Smooth],
@@ -123,7 +126,7 @@ fn sum_slopes<const SUMS: usize>(
     }
 }
 
-/// Of each row what its turn makes of disturbances of its start.
+/// Computes the monodromy matrix of each row's turn.
 impl<T: Lane> Aside for Along<'_, T> {
     type Output = Vec<Square>;
 
@@ -160,7 +163,8 @@ impl<T: Lane> Aside for Along<'_, T> {
                 }
                 let step_s = zero.lit(self.clock.step_s.0.get(row));
                 for k in 0..AT_ONCE {
-                    let (start, middle) = (&at[2 * k].slopes, &at[2 * k + 1].slopes);
+                    let start = &at[2 * k].slopes;
+                    let middle = &at[2 * k + 1].slopes;
                     let end = &at[2 * k + 2].slopes;
                     let at = [start, middle, middle, end];
                     if T::LANES == MAX_LANES {
@@ -188,16 +192,19 @@ impl<T: Lane> Aside for Along<'_, T> {
 }
 
 impl<T: Lane> Along<'_, T> {
-    /// Of each row what is taken at its instants.
+    /// Computes what is taken of each row at its instants.
     #[inline(always)]
     fn take(&self, zero: N<T>) -> Vec<Vec<Smooth>> {
-        let (shares, last) = (T::LANES / self.rows, self.instants - 1);
-        let (every, steps) = (self.path.len() / self.instants, self.clock.steps / self.instants);
+        let shares = T::LANES / self.rows;
+        let last = self.instants - 1;
+        let every = self.path.len() / self.instants;
+        let steps = self.clock.steps / self.instants;
         let mut taken = vec![vec![Smooth::NONE; self.instants]; self.rows];
         let mut at = [0; MAX_LANES];
         let mut found = [[zero; STATES]; COORDINATES];
         for instant in (0..self.instants).step_by(shares) {
-            let (mut step, mut state) = (zero, [zero; STATES]);
+            let mut step = zero;
+            let mut state = [zero; STATES];
             for lane in 0..T::LANES {
                 at[lane] = (instant + (lane / self.rows).min(shares - 1)).min(last);
                 step.0.set(lane, (at[lane] * steps) as f64);
@@ -236,7 +243,7 @@ impl<T: Lane> Along<'_, T> {
         }
     }
 
-    /// The derivatives at a state.
+    /// Returns the derivatives at a state.
     #[inline(always)]
     fn slopes(
         &self,
@@ -282,8 +289,8 @@ pub(super) fn weights(steps: usize, instants: usize) -> Vec<Vec<f64>> {
     weights
 }
 
-/// What is smooth from a place of [`weights`] on, counted through the turn, at even places of the
-/// next [`PLACES`].
+/// Returns what is smooth from a place of [`weights`] on, counted through the turn, at even places
+/// of the next [`PLACES`].
 #[inline(always)]
 fn interpolate(taken: &[Smooth], weights: &[Vec<f64>], from: usize, at: &mut [Smooth]) {
     let mut times = [[0.0; INSTANTS_AT_CORNERS]; PLACES];
@@ -291,7 +298,8 @@ fn interpolate(taken: &[Smooth], weights: &[Vec<f64>], from: usize, at: &mut [Sm
     let every = (PLACES - 1) / (at.len() - 1);
     for (k, times) in times.iter_mut().enumerate() {
         let place = from + k * every;
-        let (first, part) = (place / weights.len(), place % weights.len());
+        let first = place / weights.len();
+        let part = place % weights.len();
         for (instant, weight) in weights[part].iter().enumerate() {
             times[(first + instant) % taken.len()] = *weight;
         }
@@ -299,7 +307,7 @@ fn interpolate(taken: &[Smooth], weights: &[Vec<f64>], from: usize, at: &mut [Sm
     sum(taken, times, at);
 }
 
-/// One step of some disturbances; the derivatives are those at its stages.
+/// Integrates a step of some disturbances; the derivatives are those at its stages.
 #[inline(always)]
 fn step<T: Lane, const BLOCK: usize>(
     zero: N<T>,
@@ -327,10 +335,12 @@ fn step<T: Lane, const BLOCK: usize>(
                 accelerations[c][i + 1] = sums[1][c];
             }
         }
-        let (reach, weight) = ((h * REACH[stage]).v(), (h * WEIGHT[stage]).v());
+        let reach = (h * NEXT_STAGE[stage]).v();
+        let weight = (h * WEIGHT[stage]).v();
         for c in 0..BLOCK {
             for i in 0..COORDINATES {
-                let (speed, acceleration) = (along[c][COORDINATES + i], accelerations[c][i]);
+                let speed = along[c][COORDINATES + i];
+                let acceleration = accelerations[c][i];
                 along[c][i] = start[c][i] + reach * speed;
                 block[c][i] += weight * speed;
                 along[c][COORDINATES + i] = start[c][COORDINATES + i] + reach * acceleration;

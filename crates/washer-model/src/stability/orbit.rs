@@ -27,8 +27,8 @@ use lane_ode::{Aside, Kernel, Lane, Lu, N, Peaks, Simd};
 /// capped hinge faster than its cap.
 const CAP_SHARE: f64 = 0.7;
 
-/// Where derivatives are those of the steps, as where responses with corners are followed, a turn's
-/// steps take so many nepers off the hinge's speeds: of its swing that leaves 2 %. Where it is in
+/// The nepers that a turn's steps take off the hinge's speeds, where derivatives are those of the
+/// steps, as where responses with corners are followed: 2 % of its swing is left. Where it is in
 /// tune with a multiple of the drum's speed, hits of stops would make it swing so far that the
 /// curve is not followed over it.
 const OFF_HINGE: f64 = 8.0;
@@ -46,11 +46,12 @@ pub(crate) struct Row<'a> {
     pub(crate) caps: Option<Caps>,
 }
 
-/// What must be equal of rows that turn side by side.
+/// The properties that rows share that turn side by side.
 pub(crate) type Kind = (usize, usize, bool, bool);
 
 impl Row<'_> {
-    /// The same at another speed close by, with the steps and caps of this one as shares of a turn.
+    /// Returns the row at another speed close by, with the steps and caps of this one as shares of
+    /// a turn.
     pub(super) fn beside(self, speed_rpm: f64) -> Self {
         let caps = self.caps.map(|_| caps(self.steps, 60.0 / speed_rpm));
         Self { speed_rpm, caps, ..self }
@@ -89,7 +90,7 @@ impl Row<'_> {
 #[derive(Clone, Copy)]
 pub(crate) struct Asked<'a> {
     pub(crate) row: Row<'a>,
-    /// Where the unbalance is up: coordinates (m, rad), then their speeds (per s).
+    /// The state where the unbalance is up: coordinates (m, rad), then their speeds (per s).
     pub(crate) start: [f64; STATES],
     /// Whether to see all of it, not its end alone.
     pub(crate) is_seen: bool,
@@ -99,13 +100,13 @@ pub(crate) struct Asked<'a> {
 pub(crate) struct Turned {
     /// The state at its end.
     pub(crate) end: [f64; STATES],
-    /// What was asked to be seen.
+    /// The record, if one was asked for.
     pub(crate) seen: Option<Box<Seen>>,
 }
 
-/// What is seen of a turn.
+/// The record of a turn.
 pub(crate) struct Seen {
-    /// What it makes of disturbances of its start.
+    /// The monodromy matrix.
     pub(crate) monodromy: Square,
     /// Largest deviations from equilibrium (m, rad).
     pub(crate) peaks: [f64; CHANNELS],
@@ -118,7 +119,7 @@ pub(crate) struct Seen {
 /// Takes turns, in lanes, those of a kind together. What is found of one does not depend on the
 /// others. Once `is_stopped` says so, some are missing.
 pub(crate) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<Turned> {
-    // Of a kind, what is seen comes first.
+    // Turns of a kind that are seen come first.
     let kind = |asked: &Asked<'_>| (asked.row.kind(), !asked.is_seen);
     by_kind(asked, kind, |asked| {
         let turns = Turns { asked, is_stopped };
@@ -134,8 +135,8 @@ pub(crate) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<T
     })
 }
 
-/// What is found of each: of those of a row's kind together, which come in the order of `kind`'s
-/// second part. What is missing of some is missing at the end.
+/// Computes what is asked of each: of those of a row's kind together, which come in the order of
+/// `kind`'s second part. What is missing of some is missing at the end.
 pub(crate) fn by_kind<A: Copy, R>(
     all: &[A],
     kind: impl Fn(&A) -> (Kind, bool),
@@ -179,13 +180,13 @@ impl Kernel for Turns<'_> {
     }
 }
 
-/// As high as so many steps a turn allow.
+/// Returns the caps that so many steps a turn allow.
 pub(super) fn caps(steps: usize, turn_s: f64) -> Caps {
     let cap = CAP_SHARE * RK4_STABILITY_LIMIT * steps as f64 / turn_s;
     Caps { bearings_rad_per_s: cap, hinge_rad_per_s: Some(cap) }
 }
 
-/// A model with each row in its lane, and the last in those that are left over.
+/// Returns a model with each row in its lane, and the last in those that are left over.
 #[inline(always)]
 pub(crate) fn model<T: Lane, M: LaneModel<T>>(zero: N<T>, rows: &[Row<'_>]) -> M {
     let coupling = Coupling::new(zero, rows[0].caps.as_ref());
@@ -201,7 +202,7 @@ pub(crate) fn model<T: Lane, M: LaneModel<T>>(zero: N<T>, rows: &[Row<'_>]) -> M
     model
 }
 
-/// The clock of rows in lanes, the last in those that are left over.
+/// Returns the clock of rows in lanes, the last in those that are left over.
 #[inline(always)]
 pub(crate) fn clock<T: Lane>(zero: N<T>, rows: &[Row<'_>]) -> Clock<T> {
     let kept = || libm::exp(-OFF_HINGE / rows[0].steps as f64);
@@ -234,8 +235,10 @@ fn see<T: Lane>(zero: N<T>, asked: &[Asked<'_>], weights: &[Vec<f64>], turned: &
     let mut monodromies: Vec<Square> = Vec::new();
     if rows[0].is_stepwise() {
         for Asked { row, start, .. } in &asked[..seen] {
-            let (constant, row) = (zero.constant(), [*row]);
-            let (model, clock) = (self::model(constant, &row), self::clock(constant, &row));
+            let constant = zero.constant();
+            let row = [*row];
+            let model = self::model(constant, &row);
+            let clock = self::clock(constant, &row);
             monodromies.push(zero.0.aside(Stepwise { zero, model, clock, start: *start }));
         }
     } else if seen > 0 {
@@ -280,7 +283,7 @@ pub(super) struct LinearResponse {
 }
 
 impl LinearResponse {
-    /// The speed amplitudes (m/s) of dampers.
+    /// Returns the speed amplitudes (m/s) of dampers.
     fn damper_speeds_m_per_s(&self, point: &Point) -> Vec<f64> {
         let at = |state| damper_speeds_m_per_s(point, state);
         let along: Vec<Vec<f64>> = self.states[..INSTANTS].iter().map(at).collect();
@@ -289,8 +292,8 @@ impl LinearResponse {
     }
 }
 
-/// The linear model's responses. Where the speeds at which it takes friction are the motion's own,
-/// they are those of the response. Once `is_stopped` says so, some are missing.
+/// Returns the linear model's responses. Where the speeds at which it takes friction are the
+/// motion's own, they are those of the response. Once `is_stopped` says so, some are missing.
 pub(super) fn linear_responses(
     rows: &[Row<'_>],
     is_stopped: &dyn Fn() -> bool,
@@ -320,13 +323,15 @@ pub(super) fn linear_responses(
     found
 }
 
-/// The same with friction taken at the points' speeds, in lanes, those of a kind together.
+/// Computes the responses with friction taken at the points' speeds, in lanes, those of a kind
+/// together.
 pub(super) fn together(rows: &[Row<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<LinearResponse> {
     let find = |rows: &[Row<'_>]| Simd::dispatch_narrow(OfLinear { rows, is_stopped });
     by_kind(rows, |row| (row.kind(), false), find)
 }
 
-/// Those of one kind. The map is affine, so that one linear solve finds what it returns to.
+/// Computes the responses of one kind. The map is affine, so that one linear solve finds what it
+/// returns to.
 struct OfLinear<'a> {
     rows: &'a [Row<'a>],
     is_stopped: &'a dyn Fn() -> bool,
@@ -392,11 +397,11 @@ fn linear<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<LinearResponse>
     }
 }
 
-/// What is seen of a turn.
+/// The record of a turn in the making.
 pub(crate) struct Watched<'m, T, M> {
     model: &'m M,
     clock: &'m Clock<T>,
-    /// How many even instants there are in a turn.
+    /// The number of even instants in a turn.
     instants: usize,
     /// Whether to keep states at these.
     pub(crate) with_states: bool,
@@ -457,7 +462,8 @@ impl<'m, T: Lane, M: LaneModel<T>> Watch<T, M> for Watched<'m, T, M> {
         }
         if self.with_corners {
             if k > 0 {
-                let ([start, rate], eighth) = (&self.before, (self.clock.step_s * 0.125).v());
+                let [start, rate] = &self.before;
+                let eighth = (self.clock.step_s * 0.125).v();
                 let mut middle = *x;
                 for i in 0..STATES {
                     middle[i] = (0.5 * (start[i] + x[i])).v() + eighth * (rate[i] - dx[i]);
@@ -475,7 +481,9 @@ impl<'m, T: Lane, M: LaneModel<T>> Watch<T, M> for Watched<'m, T, M> {
                 self.peaks.advance(self.clock.step_s, &channels, everywhere);
             }
             if let Some(extras) = &mut self.extras {
-                let (radial, channels, inside) = (&radial, &channels, everywhere);
+                let radial = &radial;
+                let channels = &channels;
+                let inside = everywhere;
                 let step = if k == 0 {
                     None
                 } else {
@@ -491,7 +499,8 @@ impl<'m, T: Lane, M: LaneModel<T>> Watch<T, M> for Watched<'m, T, M> {
                     inside,
                 });
             }
-            let (most, here) = (self.radial_squared.0, squared(&radial).value.0);
+            let most = self.radial_squared.0;
+            let here = squared(&radial).value.0;
             self.radial_squared = N(T::select(most.less(here), here, most));
         }
     }

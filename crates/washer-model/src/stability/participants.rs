@@ -9,22 +9,24 @@ use crate::point::Point;
 use faer::linalg::solvers::Solve as _;
 use faer::{Mat, c64};
 
-/// Modes are named until together they carry this share of the energy,
+/// The share of the energy that the modes carry that are named. Basis: what is left is no part of
+/// the motion's name. Doubling it names two modes always.
 const ENOUGH: f64 = 0.9;
 
-/// but no more than these.
-const MOST: usize = 2;
+/// The greatest number of modes that are named. Basis: a resonance is of one or two. Doubling it
+/// names accidental ones.
+const MAX_NAMED: usize = 2;
 
 /// Rounds of inverse iteration; the first leaves what the shift's distance is to the next
 /// eigenvalue's.
 const ROUNDS: usize = 3;
 
-/// How far from the multiplier, relative, its vector is looked for: exactly there the matrix is
-/// singular.
+/// The distance from the multiplier, relative, at which its vector is looked for: exactly there the
+/// matrix is singular.
 const BESIDE: f64 = 1e-9;
 
-/// Of every mode, by its place, the share of a disturbance's energy at theta = 0; not finite where
-/// there is no such disturbance.
+/// Returns for every mode, by its place, the share of a disturbance's energy at theta = 0; not
+/// finite where there is no such disturbance.
 pub(super) fn shares(frozen: &Modes, vector: &Mat<c64>, unit_per_s: f64) -> Vec<(usize, f64)> {
     let mut shares = energies(frozen, vector, unit_per_s);
     let whole: f64 = shares.iter().map(|(_, energy)| energy).sum();
@@ -32,7 +34,7 @@ pub(super) fn shares(frozen: &Modes, vector: &Mat<c64>, unit_per_s: f64) -> Vec<
     shares
 }
 
-/// The one or two modes that have most of a disturbance's energy.
+/// Returns the one or two modes that have most of a disturbance's energy.
 pub(super) fn named(
     point: &Point,
     frozen: &Modes,
@@ -41,9 +43,9 @@ pub(super) fn named(
 ) -> Vec<Participant> {
     let mut shares = shares(frozen, vector, unit_per_s);
     shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let mut named = Vec::with_capacity(MOST);
+    let mut named = Vec::with_capacity(MAX_NAMED);
     let mut sum = 0.0;
-    for (k, share) in shares.into_iter().take(MOST) {
+    for (k, share) in shares.into_iter().take(MAX_NAMED) {
         if sum >= ENOUGH {
             break;
         }
@@ -59,7 +61,7 @@ pub(super) fn named(
     named
 }
 
-/// The eigenvector of a multiplier, by inverse iteration.
+/// Returns the eigenvector of a multiplier, by inverse iteration.
 pub(super) fn vector_of(monodromy: &Mat<f64>, multiplier: c64) -> Mat<c64> {
     let beside = multiplier * (1.0 + BESIDE);
     let shifted = Mat::from_fn(STATES, STATES, |i, j| {
@@ -76,8 +78,8 @@ pub(super) fn vector_of(monodromy: &Mat<f64>, multiplier: c64) -> Mat<c64> {
     vector
 }
 
-/// What every mode has of a disturbance's energy: its modal coordinates, which are its products
-/// with the left eigenvectors, squared and weighted by the energy of a unit.
+/// Computes what every mode has of a disturbance's energy: its modal coordinates, which are its
+/// products with the left eigenvectors, squared and weighted by the energy of a unit.
 pub(super) fn energies(frozen: &Modes, vector: &Mat<c64>, unit_per_s: f64) -> Vec<(usize, f64)> {
     // Right eigenvectors, two columns a mode: the pair's, or for a motion that does not swing its
     // shape standing and its shape moving.
@@ -96,7 +98,7 @@ pub(super) fn energies(frozen: &Modes, vector: &Mat<c64>, unit_per_s: f64) -> Ve
         if is_speed { entry * s / unit_per_s } else { entry }
     });
     let coordinates = columns.partial_piv_lu().solve(vector);
-    let of_mode = |k: usize| {
+    let energy = |k: usize| {
         let mode = &frozen.modes[k];
         let squares = [2 * k, 2 * k + 1].map(|i| coordinates[(i, 0)].norm_sqr());
         let stiffness = mode.magnitude_rad_per_s * mode.magnitude_rad_per_s;
@@ -106,5 +108,5 @@ pub(super) fn energies(frozen: &Modes, vector: &Mat<c64>, unit_per_s: f64) -> Ve
             stiffness * (squares[0] + squares[1])
         }
     };
-    (0..COORDINATES).map(|k| (k, of_mode(k))).collect()
+    (0..COORDINATES).map(|k| (k, energy(k))).collect()
 }

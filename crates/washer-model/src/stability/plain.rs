@@ -1,4 +1,4 @@
-//! The same question put to the machine as it is, by classical Runge-Kutta in steps that follow its
+//! The monodromy matrix of the machine as it is, by classical Runge-Kutta in steps that follow its
 //! bearings: slow, and without anything that the fast answer rests on.
 
 use super::monodromy::Square;
@@ -13,8 +13,9 @@ use lane_ode::{Aside, Dual, Lu, N, System as _};
 /// Step times the greatest frequency.
 const STEP_PHASE: f64 = 1.0;
 
-/// A turn that brings a response back this close, relative, has closed.
-const CLOSE: f64 = 1e-9;
+/// The relative miss of a turn that has closed. Basis: a tenth of what rows have. Doubling it
+/// changes nothing.
+const CLOSED_TURN: f64 = 1e-9;
 
 /// Rounds of Newton's method: it starts where the fast answer ended.
 const MOST_ROUNDS: usize = 6;
@@ -72,7 +73,8 @@ impl Aside for Plain<'_> {
                 apart[i][i] = apart[i][i] + 1.0;
             }
             let correction = Lu::new(apart)?.solve(&missing);
-            let (mut moved, mut size) = (0.0_f64, 0.0_f64);
+            let mut moved = 0.0_f64;
+            let mut size = 0.0_f64;
             for i in 0..STATES {
                 if !correction[i].0.is_finite() {
                     return None;
@@ -83,7 +85,7 @@ impl Aside for Plain<'_> {
                     size = size.max((x[i] - self.row.point.equilibrium()[i]).abs());
                 }
             }
-            if moved <= CLOSE * size {
+            if moved <= CLOSED_TURN * size {
                 return Some(per_unit(&matrix, self.unit_per_s));
             }
         }
@@ -91,7 +93,7 @@ impl Aside for Plain<'_> {
     }
 }
 
-/// Over speeds per `unit_per_s`.
+/// Returns the matrix over speeds per `unit_per_s`.
 fn per_unit(matrix: &Square, unit_per_s: f64) -> Square {
     let unit = |i: usize| if i < STATES / 2 { 1.0 } else { unit_per_s };
     let mut scaled = *matrix;
@@ -142,7 +144,8 @@ impl Aside for Trace<'_> {
     fn run(self) -> f64 {
         let zero = N(0.0).constant();
         let model: Nonlinear<Dual<f64>> = model(zero, &[self.row]);
-        let (step_s, steps) = (self.row.step_s(), self.row.steps);
+        let step_s = self.row.step_s();
+        let steps = self.row.steps;
         let clock = Clock { step_s: zero.lit(step_s), steps, hinge_kept: None };
         let mut states = [self.start.map(|x| zero.lit(x))];
         let mut diagonal = Diagonal { model: &model, step_s, steps, sum: 0.0 };

@@ -24,12 +24,14 @@ const JUDGED_SHARE: f64 = 0.5;
 /// move it.
 const CLOSE_TO_EDGE_PER_S: f64 = 2e-3;
 
-/// Where so many times the drum's speed exceed the hinge's frequency, a harmonic may ring it; where
-/// forces have corners, harmonics have no end. A response that a turn of the machine as it is then
-/// misses by more than this share is asked of that machine: less is what caps leave out of the
-/// bearings' own deflection.
+/// The highest harmonic of the drum's speed that may ring the hinge; where forces have corners,
+/// harmonics have no end. Basis: higher ones of smooth forces are below the tolerance. Doubling it
+/// checks more responses.
 const HARMONICS_OF_HINGE: f64 = 7.0;
-const RETURNS: f64 = 2e-4;
+/// The miss of a turn of the machine as it is beyond which a response is found for that machine.
+/// Basis: caps leave as much out of the bearings' own deflection. Doubling it keeps responses of
+/// the capped machine that are as far off.
+const RETURN_MISS: f64 = 2e-4;
 
 /// A response that is farther than this (m, rad) from where the curve has it is another.
 const FARTHEST_FROM_GUESS: f64 = 5e-3;
@@ -56,14 +58,15 @@ const TRANSIENT_LEFT: f64 = 1e-3;
 /// 0.06 /s or more. Doubling it doubles what a speed without any response costs.
 const LONGEST_TRANSIENT_S: f64 = 120.0;
 
-/// The periodic responses at constant speeds, on lanes; a run of dwells of one point shares its
-/// curve of responses. Per dwell as [`Responses::at`].
+/// Returns the periodic responses at constant speeds, on lanes; a run of dwells of one point shares
+/// its curve of responses. Per dwell as [`Responses::at`].
 pub fn respond(
     dwells: &[Dwell<'_>],
     is_stopped: &dyn Fn() -> bool,
 ) -> Vec<Result<Vec<Response>, NoAnswer>> {
     let same = |a: &Dwell<'_>, b: &Dwell<'_>| core::ptr::eq(a.point, b.point);
-    let (mut points, mut asked) = (Vec::new(), Vec::new());
+    let mut points = Vec::new();
+    let mut asked = Vec::new();
     for group in dwells.chunk_by(same) {
         let fastest_rpm = group.iter().map(|dwell| dwell.speed_rpm).fold(0.0, f64::max);
         asked.extend(group.iter().map(|dwell| (points.len(), dwell.speed_rpm)));
@@ -78,7 +81,7 @@ pub fn respond(
 pub struct Responses<'a> {
     /// Their curve from a low speed up.
     up: Curve<'a>,
-    /// Where that is lost, the one from a high speed down.
+    /// The one, if that is lost, from a high speed down.
     down: Option<Curve<'a>>,
 }
 
@@ -117,8 +120,8 @@ impl<'a> Responses<'a> {
         all.collect()
     }
 
-    /// Where responses at a speed (rpm) are to be looked for: on the curve, and where that is lost
-    /// on the second, whose branches count on.
+    /// Returns where responses at a speed (rpm) are to be looked for: on the curve, and where that
+    /// is lost on the second, whose branches count on.
     fn guesses(&self, speed_rpm: f64) -> Vec<Guess> {
         let mut guesses = self.up.guesses(speed_rpm);
         if let Some(down) = self.down.as_ref().filter(|_| self.up.is_lost(speed_rpm)) {
@@ -129,8 +132,8 @@ impl<'a> Responses<'a> {
         guesses
     }
 
-    /// Of each place in `followed` and speed (rpm) the responses that the point's curve passes
-    /// there, in its order, on lanes. The first is that of a machine that runs up, until its
+    /// Finds for each place in `followed` and speed (rpm) the responses that the point's curve
+    /// passes there, in its order, on lanes. The first is that of a machine that runs up, until its
     /// branch ends. Behind them are those of the second curve, where the first is lost, and what a
     /// search from the linear model's response finds beside both, where the machine has friction or
     /// stops; where the first curve has none, this search's comes first. What is found does not
@@ -150,7 +153,8 @@ impl<'a> Responses<'a> {
         if is_stopped() {
             return stopped();
         }
-        let (mut cases, mut rows) = (Vec::with_capacity(asked.len()), Vec::new());
+        let mut cases = Vec::with_capacity(asked.len());
+        let mut rows = Vec::new();
         for &(place, speed_rpm) in asked {
             let Some(Self { up, .. }) = followed.get_mut(place) else { return stopped() };
             let case = up.settings.case(speed_rpm);
@@ -191,7 +195,7 @@ impl<'a> Responses<'a> {
         if !find_lost_branches(&looked, &mut found, is_stopped) {
             return stopped();
         }
-        // What is close to an edge, or moved by the caps, is asked of the machine as it is.
+        // Responses close to an edge, or moved by the caps, are asked of the machine as it is.
         let are_moved = are_moved(&looked, &found, is_stopped);
         let mut close = Vec::new();
         for (place, response) in found.iter().enumerate() {
@@ -310,11 +314,12 @@ fn search_again(
     }
     let mut again: Vec<(usize, Solve<'_>)> = Vec::new();
     for (place, look) in looked.iter().enumerate() {
-        let mut of_speed =
+        let mut at_speed =
             looked.iter().zip(found.iter()).filter(|(it, _)| it.number == look.number);
-        if !look.guess.is_followed() && of_speed.all(|(_, response)| is_missing(response)) {
+        if !look.guess.is_followed() && at_speed.all(|(_, response)| is_missing(response)) {
             let turns = transient_turns(&look.case);
-            let (row, state) = (look.case.row, look.guess.state);
+            let row = look.case.row;
+            let state = look.guess.state;
             again.push((place, Solve::after_transient(row, state, turns)));
         }
     }
@@ -338,14 +343,14 @@ fn find_lost_branches(
     let places: Vec<usize> =
         (0..looked.len()).filter(|&place| looked[place].guess.is_followed()).collect();
     let curve = |place: usize| (looked[place].number, looked[place].guess.is_on_curve);
-    for of_curve in places.chunk_by(|&a, &b| curve(a) == curve(b)) {
-        let lost = of_curve.iter().filter(|&&place| is_missing(&found[place]));
+    for on_curve in places.chunk_by(|&a, &b| curve(a) == curve(b)) {
+        let lost = on_curve.iter().filter(|&&place| is_missing(&found[place]));
         let lost: Vec<usize> = lost.copied().collect();
         if lost.len().is_multiple_of(2) {
             continue;
         }
         let known: Vec<[f64; STATES]> =
-            of_curve.iter().filter_map(|&place| Some(found[place].as_ref().ok()?.start)).collect();
+            on_curve.iter().filter_map(|&place| Some(found[place].as_ref().ok()?.start)).collect();
         for place in lost {
             let Look { case, guess, .. } = &looked[place];
             let solve = Solve::deflated(case.row, guess.state, DAMPED_STEP, known.clone());
@@ -365,16 +370,17 @@ fn forget_twice_found(looked: &[Look<'_>], found: &mut [Result<Response, NoAnswe
     };
     for place in 0..found.len() {
         for other in place + 1..found.len() {
-            let (Look { guess, number, .. }, of_other) = (&looked[place], &looked[other]);
-            if of_other.number != *number {
+            let Look { guess, number, .. } = &looked[place];
+            let other_look = &looked[other];
+            if other_look.number != *number {
                 break;
             }
-            let are_of_curve = guess.is_followed() && of_other.guess.is_followed();
-            let are_apart = farthest(&guess.state, &of_other.guess.state) > APART_GUESSES;
+            let are_followed = guess.is_followed() && other_look.guess.is_followed();
+            let are_apart = farthest(&guess.state, &other_look.guess.state) > APART_GUESSES;
             let (Ok(a), Ok(b)) = (&found[place], &found[other]) else { continue };
-            if are_of_curve && are_apart && farthest(&a.start, &b.start) < SAME {
+            if are_followed && are_apart && farthest(&a.start, &b.start) < SAME {
                 let from_first = farthest(&a.start, &guess.state);
-                let from_second = farthest(&b.start, &of_other.guess.state);
+                let from_second = farthest(&b.start, &other_look.guess.state);
                 let farther = if from_first > from_second { place } else { other };
                 found[farther] = Err(NoAnswer::NoResponse);
             }
@@ -430,15 +436,16 @@ fn forget_known(looked: &[Look<'_>], found: &mut [Result<Response, NoAnswer>]) {
     }
 }
 
-/// Whether a turn of the machine as it is leaves these responses, where a harmonic of the drum's
-/// speed may be near the hinge's frequency.
+/// Checks whether a turn of the machine as it is leaves these responses, where a harmonic of the
+/// drum's speed may be near the hinge's frequency.
 fn are_moved(
     looked: &[Look<'_>],
     found: &[Result<Response, NoAnswer>],
     is_stopped: &dyn Fn() -> bool,
 ) -> Vec<bool> {
     let mut are_moved = vec![false; looked.len()];
-    let (mut places, mut asked) = (Vec::new(), Vec::new());
+    let mut places = Vec::new();
+    let mut asked = Vec::new();
     for (place, (look, response)) in looked.iter().zip(found).enumerate() {
         let hinge = look.case.frozen.modes[SUSPENSION_MODES].frequency_rpm();
         let is_near =
@@ -453,12 +460,12 @@ fn are_moved(
     for ((place, asked), turned) in places.into_iter().zip(&asked).zip(turns(&asked, is_stopped)) {
         let Row { point, speed_rpm, .. } = asked.row;
         let missing = missing(point, speed_rpm, &asked.start, &turned.end);
-        are_moved[place] = missing.is_nan() || missing > RETURNS;
+        are_moved[place] = missing.is_nan() || missing > RETURN_MISS;
     }
     are_moved
 }
 
-/// The linear model's response, where there is one; else the machine at rest.
+/// Returns the linear model's response, where there is one; else the machine at rest.
 fn from_linear(point: &Point, linear: &LinearResponse) -> Guess {
     let rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
     let is_known = linear.start.iter().all(|x| x.is_finite());
@@ -512,6 +519,10 @@ impl Look<'_> {
 /// Returns the largest of a monodromy matrix's multipliers whose motion is the suspension's, in the
 /// upper half plane, and its vector; none where the eigenvalues are not finite. The matrix's speeds
 /// count per the row's unit.
+///
+/// The hinge's motion, where it is not capped, counts if it grows. It hardly decays, so that a
+/// stable response would else be said to be near an edge at speeds and stiffnesses without caps
+/// alone.
 pub(crate) fn leading_multiplier(case: &Case<'_>, matrix: &Mat<f64>) -> Option<(c64, Mat<c64>)> {
     let unit_per_s = case.row.unit_per_s();
     let mut multipliers = matrix.eigenvalues().ok()?;
@@ -531,7 +542,7 @@ pub(crate) fn leading_multiplier(case: &Case<'_>, matrix: &Mat<f64>) -> Option<(
     })
 }
 
-/// What of the machine's geometry a motion passes.
+/// Returns what of the machine's geometry a motion passes.
 fn beyond(point: &Point, seen: &Seen) -> Option<Beyond> {
     let rest = attachments(point, point.equilibrium());
     let mut is_past = [false; 2];

@@ -10,10 +10,10 @@ use lane_ode::{Aside, Lu, N, Simd};
 
 /// A search that asks for turns until it is over.
 pub(super) trait Search<'a> {
-    /// The turns that it needs next; none once it is over.
+    /// Returns the turns that it needs next; none once it is over.
     fn wants(&mut self) -> Vec<Asked<'a>>;
 
-    /// What it asked for, in that order.
+    /// Takes in what it asked for, in that order.
     fn take(&mut self, turned: Vec<Turned>);
 }
 
@@ -41,12 +41,13 @@ pub(super) fn finish<'a, S: Search<'a>>(searches: &mut [S], is_stopped: &dyn Fn(
 /// Turns that the search for a response may take.
 const MOST_TURNS: usize = 80;
 
-/// A response is looked at for the last time once another turn should move it by less than this
-/// share of its greatest coordinate,
-const CLOSE: f64 = 1e-10;
+/// The share of a response's greatest coordinate by which another turn should move it when it is
+/// looked at for the last time. Basis: a hundredth of what it may be. Doubling it saves few turns.
+const LAST_LOOK_MISS: f64 = 1e-10;
 
-/// and is found if that turn moves it by less than this.
-const CLOSE_AT_LAST: f64 = 1e-8;
+/// The share by which that turn may move it. Basis: amplitudes are compared to 1e-5. Doubling it
+/// changes nothing.
+const FOUND_MISS: f64 = 1e-8;
 
 /// Smaller deviations (m, rad) count as this: without unbalance there is none but rounding.
 const LEAST_SIZE: f64 = 1e-4;
@@ -68,8 +69,8 @@ const REPULSION_RANGE: f64 = 5e-3;
 /// 1 by as much. Doubling it changes nothing there.
 const DEFLATION_LEFT: f64 = 1e-3;
 
-/// How far a turn is from closing, as a share of its deviation; not finite if it left the model's
-/// range.
+/// Returns how far a turn is from closing, as a share of its deviation; not finite if it left the
+/// model's range.
 pub(crate) fn missing(
     point: &Point,
     speed_rpm: f64,
@@ -78,7 +79,8 @@ pub(crate) fn missing(
 ) -> f64 {
     let rest = point.equilibrium();
     let speed = speed_rpm * TAU / 60.0;
-    let (mut missing, mut size) = (0.0_f64, LEAST_SIZE);
+    let mut missing = 0.0_f64;
+    let mut size = LEAST_SIZE;
     for i in 0..COORDINATES {
         size = size.max((start[i] - rest[i]).abs());
         let by_speed = end[COORDINATES + i] - start[COORDINATES + i];
@@ -120,7 +122,7 @@ impl<const C: usize> Aside for Factor<'_, C> {
 pub(super) struct Solve<'a> {
     row: Row<'a>,
     state: [f64; STATES],
-    /// Of 1 - Phi; none where the next turn is to give it.
+    /// The factors of 1 - Phi; none where the next turn is to give it.
     factors: Option<Lu<STATES>>,
     turns: usize,
     /// Turns that the motion itself takes before the first correction.
@@ -136,7 +138,8 @@ pub(super) struct Solve<'a> {
 }
 
 impl<'a> Solve<'a> {
-    /// From a state nearby, with factors of 1 - Phi of a response nearby if there are any.
+    /// Returns a search from a state nearby, with factors of 1 - Phi of a response nearby if there
+    /// are any.
     pub(super) fn new(row: Row<'a>, state: [f64; STATES], factors: Option<Lu<STATES>>) -> Self {
         Self {
             row,
@@ -180,7 +183,8 @@ impl<'a> Solve<'a> {
         };
         let mut along = 0.0;
         for known in &self.known {
-            let (mut squared, mut product) = (0.0, 0.0);
+            let mut squared = 0.0;
+            let mut product = 0.0;
             for i in 0..STATES {
                 let offset = (self.state[i] - known[i]) / unit(i);
                 squared += offset * offset;
@@ -201,8 +205,8 @@ impl<'a> Solve<'a> {
         self.state
     }
 
-    /// The state where the unbalance is up, and what is seen of the turn from there; none where
-    /// there is no response.
+    /// Returns the state where the unbalance is up, and what is seen of the turn from there; none
+    /// where there is no response.
     pub(super) fn found(self) -> Option<([f64; STATES], Box<Seen>)> {
         Some((self.state, self.found?))
     }
@@ -238,11 +242,12 @@ impl<'a> Search<'a> for Solve<'a> {
         }
         self.turns += 1;
         let missing = missing(self.row.point, self.row.speed_rpm, &self.state, &end);
-        if self.is_last && missing < CLOSE_AT_LAST {
+        if self.is_last && missing < FOUND_MISS {
             (self.is_over, self.found) = (true, seen);
             return;
         }
-        let (is_own, is_borrowed) = (seen.is_some(), self.turns == 1 && seen.is_none());
+        let is_own = seen.is_some();
+        let is_borrowed = self.turns == 1 && seen.is_none();
         match seen {
             Some(seen) => {
                 self.factors = apart(&seen.monodromy);
@@ -263,7 +268,8 @@ impl<'a> Search<'a> for Solve<'a> {
             }
             // The next correction leaves as much less as the last one did.
             let rate = if self.missing.is_finite() { missing / self.missing } else { 1.0 };
-            let is_close = missing * rate.min(1.0) < CLOSE || is_own && missing < NEXT_IS_LAST;
+            let is_close =
+                missing * rate.min(1.0) < LAST_LOOK_MISS || is_own && missing < NEXT_IS_LAST;
             // A search that known responses still push is not there.
             self.is_last = is_close && (share - 1.0).abs() < DEFLATION_LEFT;
             if is_borrowed {

@@ -13,7 +13,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// By how much there are more steps where so many are not enough.
+/// The factor of the number of steps where so many are not enough.
 const MORE_STEPS: f64 = 1.5;
 
 /// The part of a capped hinge's shift that affects motions: its law is exact for motion that turns
@@ -23,7 +23,7 @@ const FREE_SHARE: f64 = 0.1;
 /// Step times the fastest mode, where none is capped.
 const PLAIN_PHASE: f64 = 1.0;
 
-/// What steps, caps and derivatives are to keep to.
+/// The limits for steps, caps and derivatives.
 struct Care {
     /// Steps of a turn, at least.
     steps: usize,
@@ -31,40 +31,46 @@ struct Care {
     instants: usize,
     /// Longest step times the fastest of the suspension's modes.
     phase: f64,
-    /// How much caps may move these modes (1/s, rad/s).
+    /// The greatest shift of these modes by caps (1/s, rad/s).
     shift_per_s: f64,
     /// Longest steps (s) where friction and stops give forces corners.
     at_corners_s: f64,
 }
 
-/// What a setting is for.
+/// The use of a setting.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Use {
     Rows,
     Followed,
 }
 
-/// Of rows.
+/// The limits for rows.
 const OF_ROWS: Care =
     Care { steps: 96, instants: INSTANTS, phase: 0.25, shift_per_s: 3e-4, at_corners_s: 1e-4 };
 
-/// Of the linear model, whose forces have no corners, and whose response turns with the drum; and
-/// where smooth responses are only followed: what lies on the curve is looked for anew.
+/// The limits for the linear model, whose forces have no corners, and whose response turns with the
+/// drum; and where smooth responses are only followed: what lies on the curve is looked for anew.
 const OF_FOLLOWED: Care =
     Care { steps: 48, instants: 8, phase: 0.4, shift_per_s: 3e-3, at_corners_s: f64::INFINITY };
 
-/// Steps of every turn where responses with corners are followed, and others that ranges' own steps
-/// lose: at least, and at most. A hit of a stop rings the hinge, by other steps or caps otherwise,
-/// so that a change of these would break the curve.
+/// The least number of steps of every turn where responses with corners are followed, and others
+/// that ranges' own steps lose. A hit of a stop rings the hinge, by other steps or caps otherwise,
+/// so that a change of these would break the curve. Basis: it is twice what smooth forces take at
+/// low speeds. Doubling it doubles the time.
 const LEAST_STEPS: usize = 256;
+/// The greatest number of these steps. Basis: they are as short as contacts at usual speeds.
+/// Doubling it makes a curve that is lost take twice as long.
 const MOST_STEPS_FOLLOWED: usize = 2048;
 
-/// Responses are followed from this share of the slowest mode's frequency, a multiple of so many
-/// parts of a turn per minute.
+/// The share of the slowest mode's frequency from which responses are followed. Basis: the second
+/// harmonic is still below it. Doubling it begins amid resonances.
 const LOWEST_SHARE: f64 = 0.45;
+/// The number of parts of a turn per minute of which that is a multiple. Basis: an eigenvalue's
+/// last digits are below it. Doubling it changes the speed by less than a hundredth rpm.
 const LOWEST_DIGITS: f64 = 64.0;
 
-/// and where that curve is lost, from so many times the fastest's down: responses are small there.
+/// The speed from which a second curve is followed down, over the fastest mode's frequency. Basis:
+/// responses are small there. Doubling it takes more steps.
 const HIGHEST_SHARE: f64 = 2.0;
 
 /// Steps of a turn, at most: a drum so slow that it asks for more leaves its machine at rest, but
@@ -85,9 +91,9 @@ pub(crate) struct Case<'a> {
 }
 
 impl<'a> Case<'a> {
-    /// The same for the machine as it is. A harmonic of the turn may ring its hinge, so derivatives
-    /// are taken at as many instants as where forces have corners: fewer do not see that harmonic,
-    /// and Newton's method fails.
+    /// Returns the case for the machine as it is. A harmonic of the turn may ring its hinge, so
+    /// derivatives are taken at as many instants as where forces have corners: fewer do not see
+    /// that harmonic, and Newton's method fails.
     pub(crate) fn without_caps(&self) -> Result<Self, NoAnswer> {
         let steps = plain_steps(self.row.point, self.row.speed_rpm, self.row.turn_s())?;
         let steps = steps.next_multiple_of(INSTANTS_AT_CORNERS);
@@ -103,12 +109,12 @@ fn plain_steps(point: &Point, speed_rpm: f64, turn_s: f64) -> Result<usize, NoAn
     whole(point, highest * turn_s / PLAIN_PHASE)
 }
 
-/// At how many instants of a machine's turn derivatives are taken, at most.
+/// Returns at how many instants of a machine's turn derivatives are taken, at most.
 fn most_instants(point: &Point) -> usize {
     if point.machine.elements.are_nonsmooth() { INSTANTS_AT_CORNERS } else { INSTANTS }
 }
 
-/// At least so many steps, a multiple of [`most_instants`].
+/// Returns at least so many steps, a multiple of [`most_instants`].
 fn whole(point: &Point, steps: f64) -> Result<usize, NoAnswer> {
     let of = most_instants(point) as f64;
     let steps = of * (steps / of).ceil().max(1.0);
@@ -127,11 +133,11 @@ pub(crate) struct Settings<'a> {
     frozen: BTreeMap<i64, Result<Arc<Modes>, NoAnswer>>,
     /// Steps of every turn where responses are followed, at least, if ranges do not choose them.
     steps: Option<usize>,
-    /// By range and use.
+    /// The settings by range and use.
     ranges: BTreeMap<(i64, Use), Result<Setting, NoAnswer>>,
 }
 
-/// Those of a range of speeds.
+/// The setting of a range of speeds.
 #[derive(Clone)]
 struct Setting {
     frozen: Arc<Modes>,
@@ -139,7 +145,7 @@ struct Setting {
     is_capped: bool,
 }
 
-/// Where a range begins (rpm).
+/// Returns where a range begins (rpm).
 fn begins_rpm(range: i64) -> f64 {
     libm::exp2(range as f64 / RANGES)
 }
@@ -161,17 +167,17 @@ impl<'a> Settings<'a> {
         }
     }
 
-    /// The machine without friction.
+    /// Returns the machine without friction.
     pub(super) fn without_friction(&self) -> &Point {
         &self.free
     }
 
-    /// From where responses are followed (rpm): below all that the suspension answers to.
+    /// Returns from where responses are followed (rpm): below all that the suspension answers to.
     pub(super) fn lowest_rpm(&self) -> Result<f64, NoAnswer> {
         self.share_of_mode(LOWEST_SHARE, 0)
     }
 
-    /// From where they are followed down: above all that it answers to.
+    /// Returns from where they are followed down: above all that it answers to.
     pub(super) fn highest_rpm(&self) -> Result<f64, NoAnswer> {
         self.share_of_mode(HIGHEST_SHARE, SUSPENSION_MODES - 1)
     }
@@ -182,7 +188,7 @@ impl<'a> Settings<'a> {
         Ok((share * rpm * LOWEST_DIGITS).ceil() / LOWEST_DIGITS)
     }
 
-    /// That of a speed.
+    /// Returns the case of a speed.
     ///
     /// # Errors
     /// [`NoAnswer::Eigenvalues`]; [`NoAnswer::TooSlow`].
@@ -190,12 +196,12 @@ impl<'a> Settings<'a> {
         self.chosen(speed_rpm, Use::Rows)
     }
 
-    /// A row for the linear model.
+    /// Returns a row for the linear model.
     pub(super) fn linear(&mut self, row: Row<'a>) -> Row<'a> {
         self.chosen(row.speed_rpm, Use::Followed).map_or(row, |case| case.row)
     }
 
-    /// As [`Self::case`], where responses are only followed.
+    /// Returns the row of a speed where responses are only followed.
     ///
     /// # Errors
     /// As [`Self::case`].
@@ -213,7 +219,7 @@ impl<'a> Settings<'a> {
         Ok(Row { point, speed_rpm, steps, instants: steps, caps })
     }
 
-    /// From now on, responses are followed by turns of more steps; false if there are enough.
+    /// Follows responses by turns of more steps from now on; false if there are enough.
     pub(super) fn follow_closer(&mut self) -> bool {
         let steps = self.steps.map_or(LEAST_STEPS, |steps| 2 * steps);
         self.steps = Some(steps);
@@ -232,7 +238,8 @@ impl<'a> Settings<'a> {
             self.ranges.insert((range, of), setting.clone());
             setting
         });
-        let (Setting { frozen, steps, is_capped }, point) = (setting?, self.point);
+        let Setting { frozen, steps, is_capped } = setting?;
+        let point = self.point;
         let caps = is_capped.then(|| caps(steps, 60.0 / speed_rpm));
         let instants = care.instants * most_instants(point) / INSTANTS;
         let row = Row { point, speed_rpm, steps, instants, caps };
@@ -247,9 +254,9 @@ impl<'a> Settings<'a> {
         self.frozen.entry(range).or_insert_with(found).clone()
     }
 
-    /// As many steps a turn as the suspension's modes ask for in a range of speeds, and caps as
-    /// high as these steps allow. Where these would move the suspension's modes, there are more
-    /// steps; where the drum is not slow beside the hinge, there are no caps.
+    /// Chooses as many steps a turn as the suspension's modes ask for in a range of speeds, and
+    /// caps as high as these steps allow. Where these would move the suspension's modes, there are
+    /// more steps; where the drum is not slow beside the hinge, there are no caps.
     fn setting(&mut self, range: i64, care: &Care) -> Result<Setting, NoAnswer> {
         let point = self.point;
         let ends_rpm = [range, range + 1].map(begins_rpm);
@@ -303,20 +310,21 @@ fn hinge_shift(
     FREE_SHARE * 0.5 * mode.hinge_share(point) * frequency * in_hinge
 }
 
-/// How far caps move the suspension's modes.
+/// Returns how far caps move the suspension's modes.
 fn shift_per_s(
     point: &Point,
     speed_rad_per_s: f64,
     frozen: &Modes,
     caps: &Caps,
 ) -> Result<f64, NoAnswer> {
-    let of_bearings = Caps { hinge_rad_per_s: None, ..*caps };
+    let bearing_caps = Caps { hinge_rad_per_s: None, ..*caps };
     let capped =
-        motions(point, speed_rad_per_s, Some(&of_bearings)).map_err(|_| NoAnswer::Eigenvalues)?;
+        motions(point, speed_rad_per_s, Some(&bearing_caps)).map_err(|_| NoAnswer::Eigenvalues)?;
     let shifts = frozen.modes.iter().zip(&capped).take(SUSPENSION_MODES).map(|(mode, capped)| {
-        let (slower, detuned) = (capped.s.re - mode.re_per_s, capped.s.im - mode.im_rad_per_s);
-        let of_hinge = hinge_shift(point, mode, speed_rad_per_s, caps.hinge_rad_per_s);
-        (slower * slower + detuned * detuned).sqrt() + of_hinge
+        let slower = capped.s.re - mode.re_per_s;
+        let detuned = capped.s.im - mode.im_rad_per_s;
+        let hinge_shift_per_s = hinge_shift(point, mode, speed_rad_per_s, caps.hinge_rad_per_s);
+        (slower * slower + detuned * detuned).sqrt() + hinge_shift_per_s
     });
     Ok(shifts.fold(0.0, f64::max))
 }

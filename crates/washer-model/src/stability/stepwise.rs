@@ -1,4 +1,4 @@
-//! What the steps of a turn themselves do to small disturbances of its start: the turn once more,
+//! The effect of a turn's steps themselves on small disturbances of its start: the turn once more,
 //! over dual numbers.
 //!
 //! Steps that are longer than forces' corners are wide land beside these or on them, and what they
@@ -14,7 +14,7 @@ use lane_ode::{Aside, Dual, Lane, N};
 /// A turn from a state. Lanes share its disturbances.
 pub(super) struct Stepwise<T> {
     pub(super) zero: N<T>,
-    /// The same in every lane.
+    /// A number that is the same in every lane.
     pub(super) model: Nonlinear<Dual<T>>,
     pub(super) clock: Clock<Dual<T>>,
     pub(super) start: [f64; STATES],

@@ -85,7 +85,7 @@ fn plain(machine: Machine, speed_rpm: f64, start: [f64; STATES]) -> Vec<c64> {
     multipliers
 }
 
-/// Of one row the response near a state, and every multiplier.
+/// Finds a row's response near a state, and every multiplier.
 fn found(row: &Row<'_>, start: [f64; STATES]) -> ([f64; STATES], Vec<c64>) {
     let mut solves = [Solve::new(*row, start, None)];
     assert!(finish(&mut solves, &|| false));
@@ -101,7 +101,7 @@ fn val_growth_and_amplitudes_match_an_independent_program() {
     for case in list("points") {
         let ours = at(paper(&case), number(&case, "speed_rpm"));
         let [growth, frequency] = ["growth_per_s", "frequency_cpm"].map(|name| number(&case, name));
-        // Where all decays, what decays slowest is the hinge, which is left out here.
+        // If all decays, the hinge decays slowest, which is left out here.
         if growth > 0.0 {
             let apart = ours.growth_per_s() - growth;
             assert!(apart.abs() < 1e-3, "{case}: {apart:e}");
@@ -204,7 +204,7 @@ fn simulated(machine: Machine, response: &Response, end_s: f64) -> Vec<[f64; COO
     states.windows(2).map(|pair| core::array::from_fn(|i| pair[1][i] - pair[0][i])).collect()
 }
 
-/// How fast that grows.
+/// Returns how fast that grows.
 fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
     // A thousandfold at most: after that the disturbance is not small.
     let moved = simulated(machine, response, 7.0 / response.growth_per_s());
@@ -220,7 +220,8 @@ fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
 /// one multiplier leaves more than a millionth: rounding leaves less.
 fn largest_multiplier(moved: &[[f64; COORDINATES]]) -> f64 {
     const SINGLE: f64 = 1e-6;
-    let (mut g, mut h) = ([[0.0; 2]; 2], [0.0; 2]);
+    let mut g = [[0.0; 2]; 2];
+    let mut h = [0.0; 2];
     let mut after = 0.0;
     for k in moved.len().div_ceil(2)..moved.len() - 2 {
         for i in 0..COORDINATES {
@@ -290,7 +291,8 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
     machine.drum.inertia_kg_m2[2] = machine.drum.inertia_kg_m2[1];
     for speed_rpm in [60.0, 250.0, 900.0] {
         let point = prepared(machine.clone(), speed_rpm);
-        let (turn_s, speed) = (60.0 / speed_rpm, speed_rpm * TAU / 60.0);
+        let turn_s = 60.0 / speed_rpm;
+        let speed = speed_rpm * TAU / 60.0;
         let matrices = point.matrices(0.0, speed, 0.0);
         let full = |m: &[[f64; COORDINATES]; COORDINATES]| {
             Mat::from_fn(COORDINATES, COORDINATES, |i, j| m[i][j])
@@ -300,8 +302,9 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
         let [k, c] = [&matrices.stiffness, &matrices.damping].map(|m| mass.solve(full(m)));
         let unit = 1e4;
         let system = Mat::from_fn(STATES, STATES, |i, j| {
-            let (row, column) = (i % COORDINATES, j % COORDINATES);
-            let of_model = match (i < COORDINATES, j < COORDINATES) {
+            let row = i % COORDINATES;
+            let column = j % COORDINATES;
+            let model = match (i < COORDINATES, j < COORDINATES) {
                 (true, true) => 0.0,
                 (true, false) => f64::from(u8::from(row == column)) * unit,
                 (false, true) => -k[(row, column)] / unit,
@@ -312,7 +315,7 @@ fn multipliers_of_a_round_drum_are_exponentials_of_eigenvalues() {
                 (9, 8, true) => speed,
                 _ => 0.0,
             };
-            of_model + turning
+            model + turning
         });
         let row = Settings::new(&point).case(speed_rpm).unwrap().row;
         let rest =
@@ -407,7 +410,7 @@ fn where_the_curve_is_lost_another_comes_down() {
     let point = prepared(with(0.9, 20.0), 100.0);
     let dwells = [240.0, 260.0, 340.0].map(|speed_rpm| Dwell { point: &point, speed_rpm });
     let found: Vec<_> = all(&dwells).into_iter().map(Result::unwrap).collect();
-    // One that a search finds comes first.
+    // A response that a search finds comes first.
     let [beside, down] = &found[0][..] else { panic!("{found:?}") };
     assert_eq!((beside.branch, beside.between_rpm), (down.branch + 1, [None; 2]));
     for responses in &found[1..] {
@@ -454,15 +457,17 @@ fn add_elements(machine: &mut Machine, random: &mut fastrand::Rng) {
         .into();
 }
 
-/// Of random machines, every other with friction and stops: disturbances of simulated dwells grow
-/// as fast as is said, or decay where the response is said to be stable. SEED and MACHINES choose
+/// Random machines, every other with friction and stops: disturbances of simulated dwells grow as
+/// fast as is said, or decay where the response is said to be stable. SEED and MACHINES choose
 /// others.
 #[test]
 #[ignore = "minutes of work"]
 fn random_machines_do_what_is_said() {
     let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
     let mut numbers = fastrand::Rng::with_seed(given("SEED", 2026));
-    let (mut grown, mut decayed, mut worst) = ([0, 0], [0, 0], [0.0_f64; 2]);
+    let mut grown = [0, 0];
+    let mut decayed = [0, 0];
+    let mut worst = [0.0_f64; 2];
     let machines = given("MACHINES", 3);
     // Few machines may have no growing response: more are drawn until there is one of either kind.
     let lacks = |counts: &[i32]| counts.contains(&0);
@@ -514,7 +519,8 @@ fn random_machines_do_what_is_said() {
 fn no_branch_is_lost_between_two_others() {
     let given = |name: &str, or: u64| std::env::var(name).map_or(or, |it| it.parse().unwrap());
     let mut numbers = fastrand::Rng::with_seed(given("SEED", 61));
-    let (mut folded, mut lost) = (0, Vec::new());
+    let mut folded = 0;
+    let mut lost = Vec::new();
     for number in 0..given("MACHINES", 4) {
         let mut machine = random(&mut numbers);
         let damping_n_s_per_m = 10.0 + 50.0 * numbers.f64();
@@ -551,10 +557,12 @@ fn followed_responses_are_those_of_short_steps() {
     let mut settings: Vec<Settings<'_>> = points.iter().map(Settings::new).collect();
     let mut states: Vec<Option<[f64; STATES]>> =
         points.iter().map(|point| Some(over_point(point, &[speed(0)])[0].start)).collect();
-    // By how much the last step moved each: across a resonance steps move a response far, but the
+    // The change of each by the last step: across a resonance steps move a response far, but the
     // next one hardly farther than the last.
     let mut moved = vec![0.0_f64; count];
-    let (mut kept, mut worst, mut jumps) = (Vec::new(), 0.0_f64, Vec::new());
+    let mut kept = Vec::new();
+    let mut worst = 0.0_f64;
+    let mut jumps = Vec::new();
     for step in 1..=6000 {
         let followed = settings.iter_mut().zip(&states);
         let mut solves: Vec<Solve<'_>> = followed
@@ -658,7 +666,7 @@ fn val_machines_with_elements_match_an_independent_program() {
                 let error = ours.nonlinear[channel] / theirs - 1.0;
                 assert!(error.abs() < 1.2e-5, "{place}: {name} {error:e}");
             }
-            // Where all decays, what decays slowest is the hinge, which is left out here.
+            // If all decays, the hinge decays slowest, which is left out here.
             let growth = number(row, "growth_per_s");
             if growth > 0.0 {
                 let apart = ours.growth_per_s() - growth;
@@ -672,7 +680,7 @@ fn val_machines_with_elements_match_an_independent_program() {
 
 #[test]
 fn val_the_linear_models_exact_motions_differ_from_frozen_ones() {
-    // By another program: 65.20 against 65.95 per minute in the first mode at 1200 rpm, and a
+    // Another program has 65.20 against 65.95 per minute in the first mode at 1200 rpm, and a
     // second mode whose damping differs by 8 % at its resonance.
     let point = prepared(with(0.4, 140.0), 100.0);
     let first = exact_motions(&point, 1200.0).unwrap()[0];

@@ -10,29 +10,30 @@ pub(crate) struct Clock<T> {
     pub(super) step_s: N<T>,
     /// Steps a turn.
     pub(super) steps: usize,
-    /// What a step leaves of the hinge's speeds, where it is damped.
+    /// The part of the hinge's speeds that a step leaves, where it is damped.
     pub(super) hinge_kept: Option<f64>,
 }
 
 impl<T: Lane> Clock<T> {
-    /// Time (s) at a number of steps.
+    /// Returns the time (s) at a number of steps.
     #[inline(always)]
     pub(super) fn time_s(&self, steps: f64) -> N<T> {
         (self.step_s * steps).v()
     }
 }
 
-/// Of each stage of the formula which of start, middle and end of a step it is evaluated at,
+/// The instants of the formula's stages: 0 is the start of a step, 1 its middle, 2 its end.
 const AT: [usize; 4] = [0, 1, 1, 2];
-/// how far along its slope the next stage is, as a share of the step,
-pub(super) const REACH: [f64; 4] = [0.5, 0.5, 1.0, 0.0];
-/// and what its slope has in the step.
+/// The distance of the next stage along each stage's slope, as a share of the step: the
+/// coefficients a of the tableau.
+pub(super) const NEXT_STAGE: [f64; 4] = [0.5, 0.5, 1.0, 0.0];
+/// The weights of the stages' slopes in the step: the coefficients b of the tableau.
 pub(super) const WEIGHT: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
 
 /// The forcing of a step: at its start, its middle and its end.
 pub(super) type Forcings<F> = [F; 3];
 
-/// Those of the first step.
+/// Returns the instants of the first step.
 #[inline(always)]
 fn first<T: Lane, S: System<T, STATES>>(system: &S, clock: &Clock<T>) -> Forcings<S::Forcing> {
     let mut forcings = [system.forcing_aside(clock.time_s(0.0)); 3];
@@ -43,7 +44,7 @@ fn first<T: Lane, S: System<T, STATES>>(system: &S, clock: &Clock<T>) -> Forcing
     forcings
 }
 
-/// Those of step `k`, from those of the one before.
+/// Returns the instants of step `k`, from those of the step before.
 #[inline(always)]
 fn next<T: Lane, S: System<T, STATES>>(
     system: &S,
@@ -59,7 +60,7 @@ fn next<T: Lane, S: System<T, STATES>>(
     }
 }
 
-/// One step.
+/// Integrates a step.
 #[inline(always)]
 pub(super) fn step<T: Lane, S: System<T, STATES>>(
     system: &S,
@@ -70,7 +71,7 @@ pub(super) fn step<T: Lane, S: System<T, STATES>>(
     stages(system, h, forcings, x, AT.len(), None::<(usize, &mut Unwatched)>);
 }
 
-/// The first stages of a step, which all of them take. Its start is seen.
+/// Computes the first stages of a step, which all of them take. Its start is seen.
 #[inline(always)]
 fn stages<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
     system: &S,
@@ -80,7 +81,8 @@ fn stages<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
     count: usize,
     mut watch: Option<(usize, &mut W)>,
 ) {
-    let (mut along, mut end) = (*x, *x);
+    let mut along = *x;
+    let mut end = *x;
     for stage in 0..count {
         let slope = system.derivative(&forcings[AT[stage]], &along);
         if stage == 0
@@ -88,7 +90,8 @@ fn stages<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
         {
             watch.see(*k, &forcings[0], x, &slope);
         }
-        let (reach, weight) = ((h * REACH[stage]).v(), (h * WEIGHT[stage]).v());
+        let reach = (h * NEXT_STAGE[stage]).v();
+        let weight = (h * WEIGHT[stage]).v();
         if stage == AT.len() - 1 {
             for i in 0..STATES {
                 x[i] = end[i] + weight * slope[i];
@@ -104,7 +107,7 @@ fn stages<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
 
 /// Takes what is to be seen of a turn.
 pub(crate) trait Watch<T: Lane, S: System<T, STATES>> {
-    /// The state at the start of step `k`, with its slope; at last the turn's end.
+    /// Returns the state at the start of step `k`, with its slope; at last the turn's end.
     fn see(&mut self, k: usize, forcing: &S::Forcing, x: &[N<T>; STATES], dx: &[N<T>; STATES]);
 }
 
@@ -116,7 +119,7 @@ impl<T: Lane, S: System<T, STATES>> Watch<T, S> for Unwatched {
     fn see(&mut self, _: usize, _: &S::Forcing, _: &[N<T>; STATES], _: &[N<T>; STATES]) {}
 }
 
-/// One turn of every one of these states; the first is watched, if any is.
+/// Integrates a turn of every one of these states; the first is watched, if any is.
 #[inline(always)]
 pub(crate) fn turn<T: Lane, S: System<T, STATES>, W: Watch<T, S>>(
     system: &S,

@@ -41,7 +41,8 @@ fn the_tangent_map_is_what_nearby_runs_do() {
     };
     for place in 0..STATES {
         let size = if place < COORDINATES { 1e-7 } else { 1e-5 };
-        let (above, below) = (end(size, place), end(-size, place));
+        let above = end(size, place);
+        let below = end(-size, place);
         let largest = map[place].iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
         for i in 0..STATES {
             let slope = (above[i] - below[i]) / (2.0 * size);
@@ -121,7 +122,8 @@ fn backwards_the_response_is_the_mirrored_machines() {
         let timing = Timing { end_s: 4.0, window_s: [0.0, 4.0], checkpoints: 0 };
         prepare(&[(machine.clone(), spin)], &timing).remove(0).unwrap()
     };
-    let (point, image) = (held(&machine, -225.0), held(&machine.mirrored(), 225.0));
+    let point = held(&machine, -225.0);
+    let image = held(&machine.mirrored(), 225.0);
     let response = respond(&[Dwell { point: &image, speed_rpm: 225.0 }], &|| false);
     let response = response.into_iter().next().unwrap().unwrap().remove(0);
     for at_s in [1e-12, 0.1, 0.2, 1.0] {

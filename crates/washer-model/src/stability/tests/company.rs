@@ -38,7 +38,8 @@ fn with_elements(kinds: u64, numbers: &mut fastrand::Rng) -> Machine {
         });
     }
     if kinds & 16 != 0 {
-        let (mass_kg, x_m) = (between(0.05, 0.4), between(0.1, 0.3));
+        let mass_kg = between(0.05, 0.4);
+        let x_m = between(0.1, 0.3);
         machine.further_unbalances.push(Unbalance { mass_kg, x_m, radius_m: 0.18, angle_deg: 0.0 });
     }
     machine
