@@ -92,9 +92,11 @@ const FOLD: f64 = 1e-6;
 /// it changes nothing.
 const FOLD_ROUNDS: usize = 5;
 
-/// Where forces have corners, steps that are longer than these are wide make stairs of a curve: two
-/// folds whose speeds are closer than this (relative) are such a stair, and no jump of the machine.
-const STAIR: f64 = 4e-4;
+/// The relative difference of the speeds of two folds, in steps of a turn, below which they are
+/// none. Where forces have corners, a motion meets them a step earlier or later as the speed
+/// changes by a step of a turn, which makes stairs of a curve. Basis: those of a machine that hits
+/// a stop are up to 0.45 steps high. Doubling it takes narrow folds of the machine for stairs.
+const STAIR_STEPS: f64 = 0.5;
 
 /// Nodes on either side of a fold are no farther from it than this.
 const BY_FOLD: f64 = 0.3;
@@ -524,17 +526,21 @@ impl<'a> Curve<'a> {
         self.turning = Some(turning);
     }
 
-    /// Its folds without stairs.
+    /// Returns the folds without stairs: the pairs of neighbours that are nearest in speed cancel
+    /// out, as long as they are as near as a stair.
     fn folds_of_machine(&self) -> Vec<usize> {
-        let has_corners = self.settings.point.machine.elements.are_nonsmooth();
+        let mut folds = self.folds.clone();
+        let Some(steps) = self.settings.steps_at_corners() else { return folds };
         let at = |fold: usize| self.nodes[fold].at[SPEED] * UNIT_OF_SPEED;
-        let mut folds: Vec<usize> = Vec::new();
-        for &fold in &self.folds {
-            match folds.last() {
-                Some(&last) if has_corners && (at(fold) - at(last)).abs() < STAIR => {
-                    folds.pop();
+        let height = |pair: &[usize]| (at(pair[0]) - at(pair[1])).abs();
+        loop {
+            let pairs = folds.windows(2).map(height).enumerate();
+            let lowest = pairs.min_by(|a, b| a.1.total_cmp(&b.1));
+            match lowest {
+                Some((pair, height)) if height * (steps as f64) < STAIR_STEPS => {
+                    folds.drain(pair..pair + 2);
                 }
-                _ => folds.push(fold),
+                _ => return folds,
             }
         }
     }
@@ -669,6 +675,25 @@ mod tests {
         assert_eq!(found(true, 210.0), [(0, true)]);
         assert_eq!(found(true, 225.0), [(0, true)]);
         assert_eq!(found(true, 250.0), [(2, false)]);
+    }
+
+    /// Many stairs by a fold leave the fold itself.
+    #[test]
+    fn stairs_by_a_fold_leave_its_farthest_speed() {
+        let point = point(true);
+        let steps = Settings::new(&point).steps_at_corners().unwrap() as f64;
+        let stair_rpm = |height_steps: f64| 230.0 * libm::exp(height_steps / steps);
+        let mut speeds_rpm = vec![200.0];
+        speeds_rpm.extend([0.0, -0.2, 0.4, -0.4, 0.0].map(stair_rpm));
+        speeds_rpm.extend([171.0, 260.0]);
+        let guesses = curve(&point, &speeds_rpm, &[1, 2, 3, 4, 5, 6]).guesses(190.0);
+        let [back, on] = &guesses[..] else { panic!("{} guesses", guesses.len()) };
+        assert_eq!([back.branch, on.branch], [1, 2]);
+        let is_at = |end_rpm: Option<f64>, rpm: f64| (end_rpm.unwrap() - rpm).abs() < 1e-9;
+        assert!(is_at(back.between_rpm[0], 171.0), "{:?}", back.between_rpm);
+        assert!(is_at(back.between_rpm[1], stair_rpm(0.4)), "{:?}", back.between_rpm);
+        assert!(is_at(on.between_rpm[0], 171.0), "{:?}", on.between_rpm);
+        assert_eq!(on.between_rpm[1], None);
     }
 
     #[test]

@@ -210,13 +210,24 @@ impl<'a> Settings<'a> {
         let Some(least) = self.steps else {
             return Ok(self.chosen(speed_rpm, Use::Followed)?.row);
         };
+        let steps = self.steps_of_every_turn(least)?;
+        let caps = Some(caps(steps, 60.0 / speed_rpm));
+        Ok(Row { point, speed_rpm, steps, instants: steps, caps })
+    }
+
+    /// Returns the steps of every turn where responses are followed, at least so many.
+    fn steps_of_every_turn(&self, least: usize) -> Result<usize, NoAnswer> {
         let rest = self.rest.as_ref().ok_or(NoAnswer::Eigenvalues)?;
         let fastest = rest.modes[SUSPENSION_MODES - 1].magnitude_rad_per_s;
         let longest_turn_s = 60.0 / self.lowest_rpm()?;
-        let steps = whole(point, fastest * longest_turn_s / OF_FOLLOWED.phase)?;
-        let steps = steps.max(least);
-        let caps = Some(caps(steps, 60.0 / speed_rpm));
-        Ok(Row { point, speed_rpm, steps, instants: steps, caps })
+        let steps = whole(self.point, fastest * longest_turn_s / OF_FOLLOWED.phase)?;
+        Ok(steps.max(least))
+    }
+
+    /// Returns the steps of a turn where responses are followed, if forces have corners.
+    pub(super) fn steps_at_corners(&self) -> Option<usize> {
+        let least = self.steps.filter(|_| self.point.machine.elements.are_nonsmooth())?;
+        self.steps_of_every_turn(least).ok()
     }
 
     /// Follows responses by turns of more steps from now on; false if there are enough.
