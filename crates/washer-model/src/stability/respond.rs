@@ -535,7 +535,8 @@ pub(crate) fn leading_multiplier(case: &Case<'_>, matrix: &Mat<f64>) -> Option<(
     multipliers.into_iter().find_map(|mu| {
         let vector = vector_of(matrix, mu);
         let shares = shares(&case.frozen, &vector, unit_per_s);
-        let judged = shares.iter().filter(|(mode, _)| *mode < case.judged);
+        let count = if mu.norm_sqr() > 1.0 { case.judged } else { SUSPENSION_MODES };
+        let judged = shares.iter().filter(|(mode, _)| *mode < count);
         let share: f64 = judged.map(|(_, energy)| energy).sum();
         // Not finite where there is no such disturbance.
         (share >= JUDGED_SHARE).then_some((mu, vector))

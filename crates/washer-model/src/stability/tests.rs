@@ -181,8 +181,27 @@ fn multipliers_are_those_of_the_machine_as_it_is() {
     }
 }
 
-/// How far a small disturbance of a dwell moves the machine from turn to turn: what the response
-/// itself has in it drops out.
+/// Stiff bearings are capped with the hinge, and soft ones are not. The growth is that of the
+/// suspension either way, not that of the hinge, which decays half as fast.
+#[test]
+fn growth_of_a_stable_response_hardly_depends_on_stiff_bearings() {
+    let at = |stiffness_n_per_m: f64| {
+        let mut machine = crate::tests::friction::machine(0.4, [40.0, 40.0], None);
+        machine.bearings.front_stiffness_n_per_m = stiffness_n_per_m;
+        machine.bearings.rear_stiffness_n_per_m = stiffness_n_per_m;
+        at(machine, 420.0).growth_per_s()
+    };
+    let uncapped_per_s = at(1e8);
+    for stiffness_n_per_m in [1e9, 5e10] {
+        let growth_per_s = at(stiffness_n_per_m);
+        println!("{stiffness_n_per_m:e} N/m: {growth_per_s}, uncapped {uncapped_per_s}");
+        let apart = growth_per_s / uncapped_per_s - 1.0;
+        assert!(apart.abs() < 0.1, "{stiffness_n_per_m:e} N/m: {growth_per_s}, {uncapped_per_s}");
+    }
+}
+
+/// Returns how far a small disturbance of a dwell moves the machine from turn to turn: what the
+/// response itself has in it drops out.
 fn simulated(machine: Machine, response: &Response, end_s: f64) -> Vec<[f64; COORDINATES]> {
     let speed_rpm = response.speed_rpm;
     let point = prepared(machine, speed_rpm);
