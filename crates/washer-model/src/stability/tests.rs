@@ -233,41 +233,44 @@ fn simulated_growth_per_s(machine: Machine, response: &Response) -> f64 {
 
 /// Returns the size of the multiplier that these moves of once a turn grow by.
 ///
-/// Once the others have decayed, a pair of multipliers is left, or a single real one. With a pair,
-/// least squares of d[k + 2] = a d[k + 1] + b d[k] give it; with one, d[k + 1] = mu d[k], and the
-/// equations of the pair are singular: their solution is rounding. So the pair is fitted only where
-/// one multiplier leaves more than a millionth: rounding leaves less.
+/// Once the others have decayed, a single real multiplier is left, a pair, or one beside a pair. By
+/// the characteristic polynomial of these n, each move is a linear combination of the n before it,
+/// which least squares give: the multipliers are the eigenvalues of its companion matrix. With too
+/// many the equations are singular, and their solution is rounding, so a further one is fitted only
+/// if fewer leave more than rounding, and a third only if a pair leaves more than motions that have
+/// nearly decayed.
 fn largest_multiplier(moved: &[[f64; COORDINATES]]) -> f64 {
-    const SINGLE: f64 = 1e-6;
-    let mut g = [[0.0; 2]; 2];
-    let mut h = [0.0; 2];
-    let mut after = 0.0;
-    for k in moved.len().div_ceil(2)..moved.len() - 2 {
-        for i in 0..COORDINATES {
-            let [d0, d1, d2] = [moved[k][i], moved[k + 1][i], moved[k + 2][i]];
-            g[0][0] += d1 * d1;
-            g[0][1] += d1 * d0;
-            g[1][1] += d0 * d0;
-            h[0] += d1 * d2;
-            h[1] += d0 * d2;
-            after += d2 * d2;
-        }
+    /// The greatest parts of the moves that a single multiplier and a pair leave, if they are all.
+    const LEFT: [f64; 2] = [1e-6, 1e-2];
+    let late = &moved[moved.len().div_ceil(2)..];
+    let fit = |count: usize| {
+        use faer::linalg::solvers::SolveLstsq as _;
+        let rows = (late.len() - count) * COORDINATES;
+        let at = |row: usize, turn: usize| late[row / COORDINATES + turn][row % COORDINATES];
+        let before = Mat::from_fn(rows, count, at);
+        let after = Mat::from_fn(rows, 1, |i, _| at(i, count));
+        let factors = before.qr().solve_lstsq(&after);
+        let left = (&before * &factors - &after).norm_l2() / after.norm_l2();
+        let companion = Mat::from_fn(count, count, |i, k| match i + 1 == count {
+            true => factors[(k, 0)],
+            false => f64::from(u8::from(k == i + 1)),
+        });
+        let sizes = companion.eigenvalues().unwrap().into_iter().map(|mu| mu.norm());
+        (sizes.fold(0.0, f64::max), left)
+    };
+    let [single, pair] = [1, 2].map(fit);
+    if single.1 < LEFT[0] {
+        single.0
+    } else if pair.1 < LEFT[1] {
+        pair.0
+    } else {
+        fit(3).0
     }
-    let single = h[0] / g[0][0];
-    let left = ((after - single * h[0]) / after).max(0.0).sqrt();
-    if left < SINGLE {
-        return single.abs();
-    }
-    let determinant = g[0][0] * g[1][1] - g[0][1] * g[0][1];
-    let a = (h[0] * g[1][1] - h[1] * g[0][1]) / determinant;
-    let b = (g[0][0] * h[1] - g[0][1] * h[0]) / determinant;
-    let discriminant = 0.25 * a * a + b;
-    if discriminant < 0.0 { (-b).sqrt() } else { (0.5 * a).abs() + discriminant.sqrt() }
 }
 
-/// A single multiplier, beside which another has decayed to rounding, and a pair.
+/// A single multiplier, beside which another has decayed to rounding, a pair, and both.
 #[test]
-fn the_largest_multiplier_is_found_of_one_and_of_two() {
+fn the_largest_multiplier_is_found_of_one_to_three() {
     let shape: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (1.0 + i as f64));
     let other: [f64; COORDINATES] = core::array::from_fn(|i| 1e-6 * (i as f64 - 4.3));
     let moves = |of: &dyn Fn(i32) -> [f64; 2]| -> Vec<[f64; COORDINATES]> {
@@ -286,6 +289,13 @@ fn the_largest_multiplier_is_found_of_one_and_of_two() {
     assert!((largest_multiplier(&pair) - 1.07).abs() < 1e-6, "{}", largest_multiplier(&pair));
     let two = moves(&|k| [(-1.09_f64).powi(k), 1.05_f64.powi(k)]);
     assert!((largest_multiplier(&two) - 1.09).abs() < 1e-6, "{}", largest_multiplier(&two));
+    // The shares of a machine whose pair and third multiplier grow nearly as fast.
+    let three = moves(&|k| {
+        let size = 1.25_f64.powi(k);
+        let pair = size * (2.1 * f64::from(k)).cos();
+        [pair, 0.5 * size * (2.1 * f64::from(k)).sin() + (-1.2_f64).powi(k)]
+    });
+    assert!((largest_multiplier(&three) - 1.25).abs() < 1e-6, "{}", largest_multiplier(&three));
 }
 
 #[test]
