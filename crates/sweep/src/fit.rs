@@ -37,12 +37,12 @@ use sweep_engine::{Design, Diagnostics, Distribution, Error};
 use algebra::Symmetric;
 pub(crate) use evaluations::Evaluations;
 use known::Known;
-pub(crate) use measured::Measured;
+pub(crate) use measured::Measurement;
 use measured::REST_SPEED_RATIO;
-pub(crate) use model::Case;
+pub(crate) use model::FitCase;
 use model::{Against, Free, Problem, Summary};
-pub(crate) use report::Report;
-use search::{Descent, Ended, MAX_EVALUATIONS, descend};
+pub(crate) use report::FitReport;
+use search::{Descent, DescentEnd, MAX_EVALUATIONS, descend};
 use statistics::Statistics;
 
 /// Shares of a start between which further starts lie, where no range is given.
@@ -53,10 +53,11 @@ const DESCENTS: usize = 3;
 const SEED: u64 = 1;
 /// Half the step may move no number by more than this share of its standard error.
 const STEP_EFFECT: f64 = 0.3;
-/// How often the step is halved.
+/// The greatest number of halvings of the step. Basis: test `reference_data_lead_to_the_truth`
+/// needs none. Doubling it makes a fit that needs them four times as long.
 const HALVINGS: usize = 2;
 
-/// What is asked of a fit.
+/// The options of a fit.
 #[derive(Clone, Debug, clap::Args)]
 pub struct FitOptions {
     /// Parameters to fit, each perhaps between two values; separated by commas
@@ -80,8 +81,8 @@ pub struct FitOptions {
     #[arg(long, value_name = "N", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub bootstrap: u32,
-    /// Standard deviations of fixed numbers, which widen intervals; `gain` is that of the sensors,
-    /// `default` takes those by kind for all others, and `none` takes fixed numbers as exact
+    /// Standard deviations of fixed numbers, which widen intervals; `gain` is that of the sensors.
+    /// All others have those of their kind, or with `none` are taken as exact
     #[arg(long, value_name = "NAME=TOLERANCE[%],...", value_delimiter = ',')]
     pub known: Vec<String>,
     /// Rows of the map over the fitted distribution, for the verdict's probability; 0 for none
@@ -115,13 +116,13 @@ pub(crate) struct Fitted<'a> {
     pub(crate) problem: Problem<'a>,
     pub(crate) x: Vec<f64>,
     against: Vec<Against>,
-    pub(crate) report: Report,
+    pub(crate) report: FitReport,
     /// The evaluations that it keeps until its machine file is in place.
     pub(crate) evaluations: Option<Evaluations>,
 }
 
-/// How a fit goes about its work.
-pub(crate) struct Work<'a> {
+/// The means of a fit: its end, its listener and its journal.
+pub(crate) struct FitWork<'a> {
     /// Ends it early; what comes then means nothing.
     pub(crate) stop: Cancel<'a>,
     /// Hears of every evaluation: how many there were.
@@ -132,20 +133,20 @@ pub(crate) struct Work<'a> {
     pub(crate) fresh: bool,
 }
 
-/// The cases of a fit: each measurement with the grid and its own constants.
+/// Prepares a case of a fit: a measurement with the grid and its own constants.
 ///
 /// # Errors
 /// Mistakes in the grid and the constants. An axis without a constant stands at its middle.
 pub(crate) fn case(
     grid: &WasherGridInput,
     constants: &[String],
-    mut measured: Measured,
-) -> Result<Case, Error> {
+    mut measured: Measurement,
+) -> Result<FitCase, Error> {
     let (plan, _) = grid.load_point(&[&middle(grid, constants)?, constants].concat())?;
     measured.count_from_first_row(plan.end_s);
     let smoothed = measured.speed_rpm.as_ref();
     let smoothed = smoothed.and_then(|speed| speed::smoothed(&measured.time_s, speed));
-    Ok(Case { plan, measured, smoothed })
+    Ok(FitCase { plan, measured, smoothed })
 }
 
 /// A value for every axis of several that has no constant.
@@ -161,8 +162,8 @@ fn middle(grid: &WasherGridInput, constants: &[String]) -> Result<Vec<String>, D
     Ok(several.map(value).collect())
 }
 
-/// The free numbers as they are asked for.
-fn free(options: &FitOptions, cases: &[Case]) -> Result<Vec<Free>, Diagnostics> {
+/// Reads the free numbers.
+fn free(options: &FitOptions, cases: &[FitCase]) -> Result<Vec<Free>, Diagnostics> {
     let mistakes = Mistakes::default();
     let mut found: Vec<Free> = Vec::new();
     let shared = options.free.iter().map(|text| (text, "--free", &cases[..1]));
@@ -178,10 +179,10 @@ fn free(options: &FitOptions, cases: &[Case]) -> Result<Vec<Free>, Diagnostics> 
     mistakes.finish(Some(found))
 }
 
-/// One of them, of a case, beside those that are known; what is wrong with it is reported.
+/// Reads a free number of a case, beside those that are known, and reports what is wrong with it.
 fn free_number(
     text: &str,
-    case: &Case,
+    case: &FitCase,
     known: &[Free],
     (at, mistakes): (&Location, &Mistakes),
 ) -> Option<Free> {
@@ -190,7 +191,8 @@ fn free_number(
         Some((name, range)) => (name.trim(), Some(range)),
         None => (text.trim(), None),
     };
-    let (machine, spin) = (&case.plan.model.machine, case.spin());
+    let machine = &case.plan.model.machine;
+    let spin = case.spin();
     let parameter = match Parameter::find(name, machine, spin) {
         Ok(parameter) if !matches!(parameter.target(), Target::Window(_)) => parameter,
         Ok(_) => {
@@ -236,28 +238,29 @@ fn free_number(
 /// # Errors
 /// Mistakes in the options; data that cannot tell; a model that does not get through.
 pub(crate) fn fit<'a>(
-    cases: Vec<Case>,
+    cases: Vec<FitCase>,
     options: &FitOptions,
-    work: &Work<'a>,
+    work: &FitWork<'a>,
 ) -> Result<Option<Fitted<'a>>, Error> {
     match fitted(cases, options, work) {
         Ok(fitted) => Ok(Some(fitted)),
-        Err(Ended::Stopped) => Ok(None),
-        Err(Ended::Refused(error)) => Err(error),
+        Err(DescentEnd::Stopped) => Ok(None),
+        Err(DescentEnd::Refused(error)) => Err(error),
     }
 }
 
 fn fitted<'a>(
-    cases: Vec<Case>,
+    cases: Vec<FitCase>,
     options: &FitOptions,
-    work: &Work<'a>,
-) -> Result<Fitted<'a>, Ended> {
+    work: &FitWork<'a>,
+) -> Result<Fitted<'a>, DescentEnd> {
     let free = free(options, &cases)?;
     let known = Known::read(&options.known, &cases[0], &free)?;
     let method = Problem::method(&cases).map_err(Error::model)?;
     let model = ModelKind::named(&options.model).unwrap_or(ModelKind::Nonlinear);
     let simd = simd_from_environment()?;
-    let (with_shift, stop) = (!options.no_shift, work.stop);
+    let with_shift = !options.no_shift;
+    let stop = work.stop;
     let mut problem = Problem { cases, free, model, with_shift, method, simd, stop };
     let samples: usize = problem.cases.iter().map(|case| case.measured.count()).sum();
     let unknowns = problem.unknowns() + problem.signals().count();
@@ -278,7 +281,7 @@ fn fitted<'a>(
     let open = |output| Evaluations::open(output, &problem, work.fresh);
     let kept = work.output.map(open).transpose()?;
     let made = AtomicUsize::new(0);
-    let search = Search { problem: &problem, kept: kept.as_ref(), work, made: &made };
+    let search = MinimumSearch { problem: &problem, kept: kept.as_ref(), work, made: &made };
     let minima = search.minima(u64::from(options.starts));
     kept.as_ref().map_or(Ok(()), Evaluations::write)?;
     let mut minima = minima?;
@@ -290,9 +293,9 @@ fn fitted<'a>(
         if !best.is_settled {
             break;
         }
-        let against = problem.against(&best.x).ok_or(Ended::Stopped)?;
+        let against = problem.against(&best.x).ok_or(DescentEnd::Stopped)?;
         problem.method = Method::Rk4 { step_s: 0.5 * step_s };
-        let finer = problem.against(&best.x).ok_or(Ended::Stopped)?;
+        let finer = problem.against(&best.x).ok_or(DescentEnd::Stopped)?;
         let bread = algebra::inverse(&best.summary.normal);
         let moved = effect(&bread, &best.summary, &against, &finer);
         let moved = moved.into_iter().fold(0.0, f64::max);
@@ -301,19 +304,19 @@ fn fitted<'a>(
             problem.method = Method::Rk4 { step_s };
             break;
         }
-        let search = Search { problem: &problem, kept: None, work, made: &made };
+        let search = MinimumSearch { problem: &problem, kept: None, work, made: &made };
         best = search.from(&best.x)?.ok_or_else(no_answer)?;
         minima[0] = best.clone();
     }
     let evaluations = made.load(Ordering::Relaxed);
-    let against = problem.against(&best.x).ok_or(Ended::Stopped)?;
+    let against = problem.against(&best.x).ok_or(DescentEnd::Stopped)?;
     // A wrong unit may lead numbers so far away that only the start shows it.
     let at_start = problem.against(&problem.start()).unwrap_or_else(|| against.clone());
     let mut statistics = Statistics::of(&problem, &against, &best.summary);
     let further = by_tachometer(&problem, &best, &against);
     statistics::add(&mut statistics.covariance, &further, 1.0);
     if problem.model == ModelKind::Linear {
-        // What the linear model does not have may hide in the numbers and leave no residual.
+        // The numbers may make up for what the linear model lacks and leave no residual.
         problem.model = ModelKind::Nonlinear;
         statistics.bias = problem
             .against(&best.x)
@@ -325,14 +328,15 @@ fn fitted<'a>(
         repeated = Some(bootstrap(&mut problem, &best.x, &against, options.bootstrap, work)?);
     }
     if best.is_settled && statistics.objection(&problem).is_none() {
-        let influences = known.influences(&problem, &best.x, &against, &best.summary);
-        statistics.take_influences(influences, known.is_widening);
+        let variances = statistics.variances(&best.summary);
+        statistics.influences =
+            known.influences(&problem, &best.x, &against, &best.summary, &variances);
     }
     let suspicions = match statistics.unexplained() {
         Some(_) => units::suspicions(&problem)?,
         None => Vec::new(),
     };
-    let found = report::Found {
+    let found = report::ReportData {
         problem: &problem,
         suspicions: &suspicions,
         minima: &minima,
@@ -346,7 +350,7 @@ fn fitted<'a>(
     };
     let report = found.report()?;
     if stop() {
-        return Err(Ended::Stopped);
+        return Err(DescentEnd::Stopped);
     }
     Ok(Fitted { problem, x: best.x, against, report, evaluations: kept })
 }
@@ -381,13 +385,13 @@ fn effect(
     (0..pull.len()).map(share).collect()
 }
 
-/// The covariance that noise of the tachometers gives the unknowns.
+/// Computes the covariance that noise of the tachometers gives the unknowns.
 fn by_tachometer(problem: &Problem<'_>, best: &Descent, against: &[Against]) -> Vec<Vec<f64>> {
     let n = problem.unknowns();
     let bread = algebra::inverse(&best.summary.normal);
     let mut covariance = vec![vec![0.0; n]; n];
-    for (case, of_case) in problem.cases.iter().enumerate() {
-        let drawn = of_case.smoothed.as_ref().map(|it| &it.drawn[..]).unwrap_or_default();
+    for (case, one_case) in problem.cases.iter().enumerate() {
+        let drawn = one_case.smoothed.as_ref().map(|it| &it.drawn[..]).unwrap_or_default();
         let sigma = &best.summary.sigma[..];
         let pulls = problem.pulls(case, &best.x, (against, sigma), drawn.len(), |k, _, spin| {
             *spin = drawn[k].clone();
@@ -401,15 +405,17 @@ fn by_tachometer(problem: &Problem<'_>, best: &Descent, against: &[Against]) -> 
     covariance
 }
 
-/// The fit again and again, with its residuals resampled in blocks longer than they are correlated:
-/// the free numbers of each.
+/// Fits so many times again, with residuals resampled in blocks longer than they are correlated,
+/// and returns the free numbers of each fit.
 fn bootstrap(
     problem: &mut Problem<'_>,
     x: &[f64],
     against: &[Against],
     count: u32,
-    work: &Work<'_>,
-) -> Result<Vec<Vec<f64>>, Ended> {
+    work: &FitWork<'_>,
+) -> Result<Vec<Vec<f64>>, DescentEnd> {
+    /// The number of samples of a block. Basis: residuals of the tests are correlated over some
+    /// ten. Doubling it keeps slower correlations, and has fewer blocks.
     const BLOCK: usize = 100;
     let measured = problem.cases.clone();
     let draw = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: SEED };
@@ -432,7 +438,7 @@ fn bootstrap(
             }
         }
         let made = AtomicUsize::new(0);
-        let search = Search { problem, kept: None, work, made: &made };
+        let search = MinimumSearch { problem, kept: None, work, made: &made };
         let again = search.from(x)?.filter(|again| again.is_settled);
         found.extend(again.map(|again| again.x[..problem.free.len()].to_vec()));
     }
@@ -441,20 +447,20 @@ fn bootstrap(
 }
 
 /// A search for the least cost of a problem.
-struct Search<'a> {
+struct MinimumSearch<'a> {
     problem: &'a Problem<'a>,
     kept: Option<&'a Evaluations>,
-    work: &'a Work<'a>,
+    work: &'a FitWork<'a>,
     /// How many evaluations were made.
     made: &'a AtomicUsize,
 }
 
-impl Search<'_> {
-    fn evaluate(&self, x: &[f64]) -> Result<Option<Summary>, Ended> {
+impl MinimumSearch<'_> {
+    fn evaluate(&self, x: &[f64]) -> Result<Option<Summary>, DescentEnd> {
         let find = || {
             let found = self.problem.against(x);
             if (self.problem.stop)() {
-                return Err(Ended::Stopped);
+                return Err(DescentEnd::Stopped);
             }
             Ok(found.map(|against| self.problem.summary(&against)))
         };
@@ -463,15 +469,15 @@ impl Search<'_> {
         Ok(found)
     }
 
-    /// The descent from a start.
-    fn from(&self, start: &[f64]) -> Result<Option<Descent>, Ended> {
+    /// Descends from a start.
+    fn from(&self, start: &[f64]) -> Result<Option<Descent>, DescentEnd> {
         let ranges: Vec<[f64; 2]> =
             (0..self.problem.unknowns()).map(|k| self.problem.range(k)).collect();
         descend(start, &ranges, MAX_EVALUATIONS, &|x| self.evaluate(x))
     }
 
-    /// Every minimum that is found from so many starts, the least first.
-    fn minima(&self, starts: u64) -> Result<Vec<Descent>, Ended> {
+    /// Finds the minima from so many starts, the least first.
+    fn minima(&self, starts: u64) -> Result<Vec<Descent>, DescentEnd> {
         let start = self.problem.start();
         let dead = |summary: &Summary| {
             let dead = |k: &usize| summary.normal[*k][*k] == 0.0;
@@ -518,7 +524,7 @@ impl Search<'_> {
             minima.extend(descent?);
         }
         minima.sort_by(|a, b| a.summary.cost.total_cmp(&b.summary.cost));
-        // Of several starts another may be where all count.
+        // From another start all numbers may count.
         let is_dead = |minimum: &Descent| dead(&minimum.summary).is_some();
         if let Some(names) = dead_at_start.filter(|_| minima.iter().all(is_dead)) {
             return Err(no_influence(&names).into());
@@ -542,7 +548,8 @@ impl Search<'_> {
     }
 }
 
-/// So many draws from the standard normal distribution, evenly spread: of a draw the k-th number.
+/// Returns so many draws from the standard normal distribution, evenly spread: the k-th number of a
+/// draw.
 fn evenly(count: u64) -> impl Fn(u64, usize) -> f64 {
     let design = Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed: SEED };
     let shape = DistributionShape::Normal { mean: 0.0, sd: 1.0 };
@@ -550,7 +557,7 @@ fn evenly(count: u64) -> impl Fn(u64, usize) -> f64 {
     move |point, k| normal.quantile(design.place(point, k).unwrap_or(0.5))
 }
 
-/// Free numbers drawn from the fitted distribution, evenly spread, each within its range.
+/// Draws free numbers from the fitted distribution, evenly spread, each within its range.
 fn draws(problem: &Problem<'_>, x: &[f64], covariance: &[Vec<f64>], count: u64) -> Vec<Vec<f64>> {
     let normal = evenly(count);
     let (unit, scale) = algebra::scaled(covariance);

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::config::{self, WasherGridInput};
-use crate::fit::{self, Evaluations, FitOptions, Measured, Work};
+use crate::fit::{self, Evaluations, FitOptions, FitWork, Measurement};
 use sweep_engine::commands::grid::{GridArgs, typed};
 use sweep_engine::{EffortArgs, Error, Exit, Interrupt, Progress, show, tell, threads};
 use sweep_files::{FileKind, OWN_FILE, Output};
@@ -64,13 +64,13 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let columns = [args.columns.clone(), grid.load()?.aside.columns].concat();
     for text in &args.measured {
         let (path, constants) = parted(text);
-        let measured = Measured::read(path, &columns)?;
+        let measured = Measurement::read(path, &columns)?;
         measured.notes.iter().for_each(|note| tell(&format!("{}: {note}", measured.name)));
         cases.push(fit::case(&grid, &constants, measured)?);
     }
     for (header, _) in &args.columns {
         let has =
-            |case: &fit::Case| case.measured.headers.iter().any(|own| own.starts_with(header));
+            |case: &fit::FitCase| case.measured.headers.iter().any(|own| own.starts_with(header));
         if !cases.iter().any(has) {
             let all: Vec<&String> =
                 cases.iter().flat_map(|case| &case.measured.headers).take(20).collect();
@@ -89,7 +89,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let seen = |made: usize| progress.show_search(0, made as u64);
     let stop = || interrupt.stopped();
     let output = args.out.as_deref();
-    let work = Work { stop: &stop, seen: &seen, output, fresh: args.fresh };
+    let work = FitWork { stop: &stop, seen: &seen, output, fresh: args.fresh };
     let threads = threads::count(args.effort.threads, &threads::process)?;
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &work))?;
     progress.finish();
@@ -120,7 +120,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 /// Returns a header and the name of what its column holds. Headers may have an equals sign.
 fn header_and_name(text: &str) -> Result<(String, String), String> {
     match text.rsplit_once('=') {
-        Some((header, name)) if Measured::is_name(name) => Ok((header.to_owned(), name.to_owned())),
+        Some((header, name)) if Measurement::is_name(name) => {
+            Ok((header.to_owned(), name.to_owned()))
+        }
         Some((_, name)) => Err(format!("`{name}` is no channel with its unit")),
         None => Err("expected HEADER=NAME".to_owned()),
     }

@@ -4,12 +4,12 @@
 pub(crate) struct Symmetric {
     /// In rising order.
     pub(crate) values: Vec<f64>,
-    /// Of each eigenvalue, of unit length.
+    /// The eigenvector of each eigenvalue, of unit length.
     pub(crate) vectors: Vec<Vec<f64>>,
 }
 
 impl Symmetric {
-    /// By Jacobi's rotations: the same bits on any machine.
+    /// Decomposes a matrix by Jacobi's rotations, to the same bits on any machine.
     ///
     /// G. H. Golub, C. F. Van Loan, Matrix Computations, section 8.5.
     pub(crate) fn of(matrix: &[Vec<f64>]) -> Self {
@@ -51,7 +51,7 @@ impl Symmetric {
         }
     }
 
-    /// f of the matrix, times a vector, with f of the eigenvalues.
+    /// Returns f of the matrix times a vector, with f of the eigenvalues.
     pub(crate) fn apply(&self, x: &[f64], f: impl Fn(f64) -> f64) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
         for (value, vector) in self.values.iter().zip(&self.vectors) {
@@ -62,13 +62,13 @@ impl Symmetric {
     }
 }
 
-/// a b
+/// Returns the scalar product of two vectors.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// A matrix with unit diagonal and the square roots that were its scale. A row of zeros keeps its
-/// zero, on scale 1.
+/// Returns a matrix with unit diagonal and the square roots that were its scale. A row of zeros
+/// keeps its zero, on scale 1.
 pub(crate) fn scaled(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
     let scale: Vec<f64> = (0..matrix.len())
         .map(|i| if matrix[i][i] > 0.0 { matrix[i][i].sqrt() } else { 1.0 })
@@ -79,8 +79,8 @@ pub(crate) fn scaled(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
     (matrix.iter().enumerate().map(row).collect(), scale)
 }
 
-/// The inverse of a symmetric matrix, without directions that it does not know: those of which
-/// nothing is left in double precision once its diagonal is one.
+/// Returns the inverse of a symmetric matrix, without directions that it does not know: those of
+/// which nothing is left in double precision once its diagonal is one.
 pub(crate) fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let (unit, scale) = scaled(matrix);
     let eigen = Symmetric::of(&unit);
@@ -100,7 +100,7 @@ pub(super) fn centred(mut values: Vec<f64>) -> (Vec<f64>, f64) {
     (values, mean)
 }
 
-/// The value below which such a part of some numbers lies; `None` of none.
+/// Returns the value below which such a part of some numbers lies; `None` of none.
 pub(super) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);

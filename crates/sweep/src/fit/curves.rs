@@ -14,7 +14,7 @@ use super::{Fitted, Problem};
 const REACH: i32 = 6;
 
 impl Fitted<'_> {
-    /// How the cost rises beside each free number, the others fitted again as far as they go along
+    /// The cost's rise beside each free number, the others fitted again as far as they go along
     /// straight lines.
     fn profiles(&self) -> Value {
         let Problem { free, .. } = &self.problem;
@@ -47,7 +47,7 @@ impl Fitted<'_> {
         (0..free.len()).map(of).collect()
     }
 
-    /// What was measured in a case and what is left over, by frequency; a missing sample is as
+    /// The spectra of a case's measurement and of what is left over; a missing sample is as
     /// good as none.
     fn spectra(&self, case: usize) -> Value {
         let measured = &self.problem.cases[case].measured;
@@ -74,7 +74,7 @@ impl Fitted<'_> {
         json!({ "hz": hz, "columns": columns })
     }
 
-    /// The curves of one case.
+    /// Returns the curves of a case.
     pub(crate) fn curves(&self, case: usize) -> Table {
         let at = &self.problem.cases[case];
         let measured = &at.measured;

@@ -1,21 +1,32 @@
 //! Tolerances of the numbers that are not fitted, and how estimates depend on them.
 //!
-//! An estimate holds for the fixed numbers of its machine. If one of those is off, the free numbers
-//! make up for it and the model may follow as well as before. So to first order, with the slopes J
-//! of the model by the unknowns, those K by a fixed number, and weights W, an error d of the fixed
-//! number moves the unknowns by (J' W J)^-1 J' W K d, and its variance adds to theirs.
+//! An estimate holds for the fixed numbers of its machine. If these are off by d, the free numbers
+//! make up for it as far as they can. Let J be the slopes of the model by the unknowns, K those by
+//! the fixed numbers in standard deviations, W the weights, A = J' W J, and r the residual. To first
+//! order, unknowns and fixed numbers together have the posterior information [J K]' W [J K] +
+//! diag(0, 1), since d has the covariance 1 before the record. By its Schur complement, with B =
+//! A^-1 J' W K and M = 1 - J A^-1 J' W,
+//!
+//! - d has the covariance S = (1 + K' M' W M K)^-1 and the mean m = S K' M' W r,
+//! - the unknowns have the covariance A^-1 + B S B', and their mean is B m below the estimate.
+//!
+//! The estimate keeps d = 0, so that the fitted machine with its fixed numbers follows the record.
+//! The mean square of its error is the unknowns' covariance and the square of their mean's distance
+//! from it, A^-1 + B (S + m m') B'. Averaged over records, S + m m' is 1, the covariance of d.
+//!
+//! A. Tarantola, Inverse Problem Theory and Methods for Model Parameter Estimation (2005), chapter
+//! 3: the least-squares criterion.
 
 use washer_model::{Machine, Parameter, Spin, Target};
 
-use super::algebra::{centred, dot, inverse};
-use super::model::{Against, Case, Free, Problem, Summary};
+use super::algebra::{Symmetric, add_outer, centred, dot, inverse};
+use super::measured::Signal;
+use super::model::{Against, FitCase, Free, Problem, Summary};
 use sweep_engine::Diagnostics;
 use sweep_engine::config::{Location, Report as Mistakes};
 
-/// The word for exact fixed numbers.
+/// The word that takes numbers without a tolerance of their own as exact.
 const NONE: &str = "none";
-/// The word for tolerances by kind of all numbers that none is given for.
-const DEFAULT: &str = "default";
 /// The name of the sensors' gains among the fixed numbers.
 const GAIN: &str = "gain";
 /// The default standard deviation of a sensor's gain. Basis: an accelerometer without a calibration
@@ -25,21 +36,31 @@ const GAIN_RATIO: f64 = 0.03;
 /// 1e-3, as far from rounding as from curvature. Doubling it doubles the derivative's error by
 /// curvature.
 const STEP_TOLERANCES: f64 = 0.02;
+/// The greatest number of values of the slopes by fixed numbers; of longer records every second
+/// sample counts twice, and so on. Basis: 160 MB. Doubling it takes as much more, and is as exact.
+const MAX_VALUES: usize = 20_000_000;
+
+/// The endings of the names of lengths that are shorter than a tape measure is exact.
+const SHORT_LENGTHS: [&str; 2] = ["clearance_m", "softness_m"];
 
 /// A standard deviation: a part of the number, or in its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Tolerance {
+enum FixedTolerance {
     Relative(f64),
     Absolute(f64),
 }
 
-impl Tolerance {
-    /// Returns the default for numbers of a unit. Basis: a scale, a tape measure along bent sheet,
-    /// drawings without ribs, springs and dampers of a catalogue. Doubling one doubles what numbers
-    /// of its kind add to intervals.
-    fn by_unit(unit: &str) -> Self {
+impl FixedTolerance {
+    /// Returns the default for numbers of a name and a unit. Basis: masses by a scale; lengths by a
+    /// tape measure along bent sheet, short ones by a caliper; the place of a load by eye; moments
+    /// of inertia from drawings without ribs; springs of a catalogue; hardly more of dampers and
+    /// friction. Doubling one doubles what numbers of its kind add to intervals, unless the record
+    /// limits them.
+    fn by_kind(name: &str, unit: &str) -> Self {
         match unit {
             "kg" => Self::Relative(0.02),
+            "m" if name.ends_with("radius_m") => Self::Relative(0.05),
+            "m" if SHORT_LENGTHS.iter().any(|end| name.ends_with(end)) => Self::Relative(0.1),
             "m" => Self::Absolute(0.005),
             "kg m^2" | "N/m" => Self::Relative(0.05),
             // Gravity is known.
@@ -78,56 +99,90 @@ impl Tolerance {
 pub(super) struct Known {
     numbers: Vec<(Parameter, f64)>,
     gain_ratio: f64,
-    /// Whether the tolerances widen intervals; else they only say which number matters most.
-    pub(super) is_widening: bool,
 }
 
-/// What an error of a fixed number does to the unknowns.
+/// The effect of a fixed number's error on the unknowns.
 #[derive(Clone, Debug)]
-pub(crate) struct Influence {
+pub(crate) struct FixedInfluence {
     pub(crate) name: String,
     pub(crate) unit: &'static str,
-    /// The standard deviation.
+    /// The standard deviation before the record.
     pub(crate) tolerance: f64,
+    /// The standard deviation after the record.
+    pub(crate) error: f64,
     /// The number of the machine; none of a sensor's gain.
     pub(crate) parameter: Option<Parameter>,
-    /// The change of each unknown by an error of one standard deviation.
+    /// The mean change of each unknown by that error, with the errors of other fixed numbers that
+    /// the record leaves open together with it: what knowing the number would take off the
+    /// unknowns' errors.
     pub(crate) moves: Vec<f64>,
 }
 
+/// Errors of all fixed numbers together, of one standard deviation, that are independent of those
+/// of other directions.
+#[derive(Clone, Debug)]
+pub(crate) struct Direction {
+    /// The changes of numbers of the machine.
+    pub(crate) changes: Vec<(Parameter, f64)>,
+    /// The change of each unknown.
+    pub(crate) moves: Vec<f64>,
+}
+
+/// The effects of all fixed numbers.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FixedInfluences {
+    /// The strongest dependence of any unknown first.
+    pub(crate) numbers: Vec<FixedInfluence>,
+    /// The addition to the covariance of the unknowns.
+    pub(crate) covariance: Vec<Vec<f64>>,
+    /// The principal directions of the errors, those first that move the unknowns most.
+    pub(crate) directions: Vec<Direction>,
+}
+
+/// An error of a fixed number of one standard deviation.
+struct FixedError {
+    influence: FixedInfluence,
+    /// The change of every signal at every sample, or at each of so many.
+    change: Vec<Vec<f64>>,
+}
+
 impl Known {
-    /// Reads the tolerances that are given. Those by kind are taken for all other numbers of the
-    /// machine that are not free if `default` is among the given; and if nothing is given, without
-    /// widening an interval.
+    /// Reads the tolerances that are given. All other numbers of the machine that are not free have
+    /// those of their kind, unless `none` is among the given.
     ///
     /// # Errors
     /// Every mistake in them.
-    pub(super) fn read(given: &[String], case: &Case, free: &[Free]) -> Result<Self, Diagnostics> {
+    pub(super) fn read(
+        given: &[String],
+        case: &FitCase,
+        free: &[Free],
+    ) -> Result<Self, Diagnostics> {
         let mistakes = Mistakes::default();
-        let mut parameters: Vec<(Parameter, Tolerance)> = Vec::new();
-        let mut gain: Option<Tolerance> = None;
-        let is_word = |text: &String, word: &str| text.trim() == word;
-        for text in given.iter().filter(|text| !is_word(text, NONE) && !is_word(text, DEFAULT)) {
+        let mut parameters: Vec<(Parameter, FixedTolerance)> = Vec::new();
+        let mut gain: Option<FixedTolerance> = None;
+        let is_none = |text: &&String| text.trim() == NONE;
+        for text in given.iter().filter(|text| !is_none(text)) {
             let at = Location::new(mistakes.add("--known", text.as_str()), 0..text.len());
             let refuse = |title: String| {
-                let expected =
-                    "expected NAME=2% or NAME=0.01 in its unit, gain=3%, default or none";
+                let expected = "expected NAME=2% or NAME=0.01 in its unit, gain=3% or none";
                 mistakes.refuse::<()>(&at, title, expected);
             };
             let Some((name, tolerance)) = text.split_once('=') else {
                 refuse(format!("`{text}` has no tolerance"));
                 continue;
             };
-            let Some(tolerance) = Tolerance::parse(tolerance) else {
+            let Some(tolerance) = FixedTolerance::parse(tolerance) else {
                 refuse(format!("`{}` is no tolerance", tolerance.trim()));
                 continue;
             };
             match (name.trim(), tolerance) {
-                (GAIN, Tolerance::Relative(_)) => gain = Some(tolerance),
-                (GAIN, Tolerance::Absolute(_)) => refuse("a gain's tolerance is a part".to_owned()),
+                (GAIN, FixedTolerance::Relative(_)) => gain = Some(tolerance),
+                (GAIN, FixedTolerance::Absolute(_)) => {
+                    refuse("a gain's tolerance is a part".to_owned())
+                }
                 (name, _) => match single_numbers(name, case, free) {
                     Ok(numbers) => {
-                        if tolerance == Tolerance::Relative(0.0)
+                        if tolerance == FixedTolerance::Relative(0.0)
                             || numbers.iter().all(|(_, value)| tolerance.deviation(*value) > 0.0)
                         {
                             let numbers = numbers.into_iter();
@@ -140,71 +195,116 @@ impl Known {
                 },
             }
         }
-        let with_defaults = given.is_empty() || given.iter().any(|text| is_word(text, DEFAULT));
+        let with_defaults = !given.iter().any(|text| is_none(&text));
         let default_gain = if with_defaults { GAIN_RATIO } else { 0.0 };
         let known = Self {
             numbers: fixed_numbers(case, free, &parameters, with_defaults),
             gain_ratio: gain.map_or(default_gain, |gain| gain.deviation(1.0)),
-            is_widening: !given.is_empty(),
         };
         mistakes.finish(Some(known))
     }
 
-    /// Computes how the unknowns depend on the fixed numbers, the strongest dependence of any
-    /// unknown first. On all threads of the rayon pool it is called in.
+    /// Computes how the unknowns depend on the fixed numbers. `variances` are those of each
+    /// signal's noise over its independent samples. On all threads of the rayon pool it is called
+    /// in.
     pub(super) fn influences(
         &self,
         problem: &Problem<'_>,
         x: &[f64],
         against: &[Against],
         summary: &Summary,
-    ) -> Vec<Influence> {
+        variances: &[f64],
+    ) -> FixedInfluences {
+        let gains = if self.gain_ratio > 0.0 { against.len() } else { 0 };
+        let samples: usize = against.iter().map(|one| one.residual.len()).sum();
+        let stride = (samples * (self.numbers.len() + gains)).div_ceil(MAX_VALUES).max(1);
+        let mut errors = self.machine_errors(problem, x, against, summary, stride);
+        if gains > 0 {
+            errors.extend(self.gain_errors(problem, against, summary, stride));
+        }
         let bread = inverse(&summary.normal);
-        let moves = |pull: &[f64]| -> Vec<f64> { bread.iter().map(|row| dot(row, pull)).collect() };
-        let mut found: Vec<Influence> = self
-            .pulls(problem, x, against, summary)
-            .into_iter()
-            .zip(&self.numbers)
-            .map(|(pull, (parameter, tolerance))| Influence {
-                name: parameter.name().to_owned(),
-                unit: parameter.unit(),
-                tolerance: *tolerance,
-                parameter: Some(parameter.clone()),
-                moves: moves(&pull),
-            })
-            .collect();
-        if self.gain_ratio > 0.0 {
-            for (((.., signal), one), sigma) in problem.signals().zip(against).zip(&summary.sigma) {
-                let model = signal.samples().map(|(row, _)| one.model[row]);
-                let error = centred(model.map(|value| self.gain_ratio * value).collect()).0;
-                let pull = one.slopes.iter().map(|slope| dot(slope, &error) / (sigma * sigma));
-                found.push(Influence {
-                    name: format!("{GAIN} of {}", signal.quantity.column()),
-                    unit: "",
-                    tolerance: self.gain_ratio,
-                    parameter: None,
-                    moves: moves(&pull.collect::<Vec<f64>>()),
-                });
+        for FixedError { influence, .. } in &mut errors {
+            influence.moves = bread.iter().map(|row| dot(row, &influence.moves)).collect();
+        }
+        let Posterior { covariance: open, mean } = posterior(&errors, against, variances, stride);
+        let mut moment = open.clone();
+        add_outer(&mut moment, &mean, 1.0);
+        let unknowns = problem.unknowns();
+        // B times a vector of errors in standard deviations.
+        let moved = |by: &[f64]| -> Vec<f64> {
+            let mut moved = vec![0.0; unknowns];
+            for (FixedError { influence, .. }, by) in errors.iter().zip(by) {
+                moved
+                    .iter_mut()
+                    .zip(&influence.moves)
+                    .for_each(|(sum, move_by)| *sum += by * move_by);
+            }
+            moved
+        };
+        let together: Vec<Vec<f64>> = moment.iter().map(|row| moved(row)).collect();
+        let mut covariance = vec![vec![0.0; unknowns]; unknowns];
+        for (FixedError { influence, .. }, together) in errors.iter().zip(&together) {
+            for (row, by) in covariance.iter_mut().zip(&influence.moves) {
+                row.iter_mut().zip(together).for_each(|(sum, together)| *sum += by * together);
             }
         }
-        let strength = |influence: &Influence| {
-            let moves = influence.moves.iter().enumerate();
+        let strength = |moves: &[f64]| {
+            let moves = moves.iter().enumerate();
             moves.fold(0.0_f64, |most, (k, by)| most.max(by * by / bread[k][k].max(1e-300)))
         };
-        found.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
-        found
+        let eigen = Symmetric::of(&moment);
+        let direction = |(value, vector): (&f64, &Vec<f64>)| {
+            let size = value.max(0.0).sqrt();
+            let errors_by = vector.iter().map(|entry| size * entry);
+            let errors_by: Vec<f64> = errors_by.collect();
+            let changes = errors.iter().zip(&errors_by).filter_map(|(error, by)| {
+                let parameter = error.influence.parameter.clone()?;
+                Some((parameter, by * error.influence.tolerance))
+            });
+            Direction { changes: changes.collect(), moves: moved(&errors_by) }
+        };
+        let mut directions: Vec<Direction> =
+            eigen.values.iter().zip(&eigen.vectors).map(direction).collect();
+        directions.sort_by(|a, b| strength(&b.moves).total_cmp(&strength(&a.moves)));
+        let by_error: Vec<Vec<f64>> = open.iter().map(|row| moved(row)).collect();
+        let mut numbers: Vec<FixedInfluence> =
+            errors.into_iter().map(|error| error.influence).collect();
+        for (k, influence) in numbers.iter_mut().enumerate() {
+            let ratio = open[k][k].max(0.0).sqrt();
+            influence.error = ratio * influence.tolerance;
+            let moves = influence.moves.iter_mut().zip(&by_error[k]);
+            moves.for_each(|(by, moved)| *by = if ratio > 0.0 { moved / ratio } else { 0.0 });
+        }
+        numbers.sort_by(|a, b| strength(&b.moves).total_cmp(&strength(&a.moves)));
+        FixedInfluences { numbers, covariance, directions }
     }
 
-    /// Computes by how much an error of one standard deviation of each fixed number pulls at the
-    /// unknowns; not at all where the machine cannot have it.
-    fn pulls(
+    /// Computes the effect on the signals of an error of one standard deviation of each number of
+    /// the machine, with the pull at the unknowns in place of their moves; none where the machine
+    /// cannot have it.
+    fn machine_errors(
         &self,
         problem: &Problem<'_>,
         x: &[f64],
         against: &[Against],
         summary: &Summary,
-    ) -> Vec<Vec<f64>> {
-        let mut sums = vec![vec![0.0; x.len()]; self.numbers.len()];
+        stride: usize,
+    ) -> Vec<FixedError> {
+        let error = |(parameter, tolerance): &(Parameter, f64)| FixedError {
+            influence: FixedInfluence {
+                name: parameter.name().to_owned(),
+                unit: parameter.unit(),
+                tolerance: *tolerance,
+                error: *tolerance,
+                parameter: Some(parameter.clone()),
+                moves: vec![0.0; x.len()],
+            },
+            change: against
+                .iter()
+                .map(|one| vec![0.0; one.residual.len().div_ceil(stride)])
+                .collect(),
+        };
+        let mut errors: Vec<FixedError> = self.numbers.iter().map(error).collect();
         for case in 0..problem.cases.len() {
             // A number at an end of its range can change one way only.
             let way = |k: usize| {
@@ -213,17 +313,116 @@ impl Known {
                 if machine.violations().is_empty() { STEP_TOLERANCES } else { -STEP_TOLERANCES }
             };
             let steps: Vec<f64> = (0..self.numbers.len()).map(way).collect();
-            let pulls =
-                problem.pulls(case, x, (against, &summary.sigma[..]), steps.len(), |k, m, s| {
-                    change(&self.numbers[k], steps[k], m, s);
-                });
-            for ((sum, pull), step) in sums.iter_mut().zip(pulls).zip(&steps) {
-                let pull = pull.into_iter().flatten();
-                sum.iter_mut().zip(pull).for_each(|(sum, pull)| *sum += pull / step);
+            let own: Vec<usize> =
+                (0..against.len()).filter(|&signal| against[signal].case == case).collect();
+            let reduce = |changes: Vec<Vec<f64>>| {
+                let mut pull = vec![0.0; x.len()];
+                let mut thinned = Vec::with_capacity(changes.len());
+                for (change, &signal) in changes.into_iter().zip(&own) {
+                    let change = centred(change).0;
+                    let variance = summary.sigma[signal] * summary.sigma[signal];
+                    for (pull, slope) in pull.iter_mut().zip(&against[signal].slopes) {
+                        *pull += dot(slope, &change) / variance;
+                    }
+                    thinned.push(change.into_iter().step_by(stride).collect::<Vec<f64>>());
+                }
+                (pull, thinned)
+            };
+            let apply = |k: usize, machine: &mut Machine, spin: &mut Spin| {
+                change(&self.numbers[k], steps[k], machine, spin);
+            };
+            let found = problem.changes(case, x, against, (steps.len(), apply), reduce);
+            for ((error, found), step) in errors.iter_mut().zip(found).zip(&steps) {
+                let Some((pull, changes)) = found else { continue };
+                let moves = error.influence.moves.iter_mut().zip(pull);
+                moves.for_each(|(sum, pull)| *sum += pull / step);
+                for (change, &signal) in changes.into_iter().zip(&own) {
+                    error.change[signal] = change.into_iter().map(|value| value / step).collect();
+                }
             }
         }
-        sums
+        errors
     }
+
+    /// Computes the effect of an error of each sensor's gain of one standard deviation, with the
+    /// pull at the unknowns in place of their moves.
+    fn gain_errors(
+        &self,
+        problem: &Problem<'_>,
+        against: &[Against],
+        summary: &Summary,
+        stride: usize,
+    ) -> Vec<FixedError> {
+        let error = |(k, ((.., signal), one)): (usize, ((usize, usize, &Signal), &Against))| {
+            let variance = summary.sigma[k] * summary.sigma[k];
+            let motion = signal.samples().map(|(row, _)| self.gain_ratio * one.model[row]);
+            let motion = centred(motion.collect()).0;
+            let mut change: Vec<Vec<f64>> =
+                against.iter().map(|one| vec![0.0; one.residual.len().div_ceil(stride)]).collect();
+            change[k] = motion.iter().copied().step_by(stride).collect();
+            let influence = FixedInfluence {
+                name: format!("{GAIN} of {}", signal.quantity.column()),
+                unit: "",
+                tolerance: self.gain_ratio,
+                error: self.gain_ratio,
+                parameter: None,
+                moves: one.slopes.iter().map(|slope| dot(slope, &motion) / variance).collect(),
+            };
+            FixedError { influence, change }
+        };
+        problem.signals().zip(against).enumerate().map(error).collect()
+    }
+}
+
+/// The errors of fixed numbers after the record, in standard deviations before it.
+struct Posterior {
+    covariance: Vec<Vec<f64>>,
+    mean: Vec<f64>,
+}
+
+/// Computes the errors of fixed numbers after the record.
+fn posterior(
+    errors: &[FixedError],
+    against: &[Against],
+    variances: &[f64],
+    stride: usize,
+) -> Posterior {
+    let weights: Vec<f64> =
+        variances.iter().map(|variance| (stride as f64 / variance).sqrt()).collect();
+    let residual: Vec<f64> = against
+        .iter()
+        .zip(&weights)
+        .flat_map(|(one, weight)| {
+            one.residual.iter().step_by(stride).map(move |residual| weight * residual)
+        })
+        .collect();
+    // The part of each change that the unknowns do not make up for.
+    let left = |error: &FixedError| -> Vec<f64> {
+        let mut left = Vec::with_capacity(residual.len());
+        for ((change, one), weight) in error.change.iter().zip(against).zip(&weights) {
+            let mut change = change.clone();
+            for (slope, by) in one.slopes.iter().zip(&error.influence.moves) {
+                let slope = slope.iter().step_by(stride);
+                change.iter_mut().zip(slope).for_each(|(change, slope)| *change -= by * slope);
+            }
+            left.extend(change.iter().map(|change| weight * change));
+        }
+        left
+    };
+    let left: Vec<Vec<f64>> = errors.iter().map(left).collect();
+    let mut information = vec![vec![0.0; errors.len()]; errors.len()];
+    for i in 0..errors.len() {
+        for j in 0..=i {
+            let product = dot(&left[i], &left[j]);
+            information[i][j] = product;
+            information[j][i] = product;
+        }
+        information[i][i] += 1.0;
+    }
+    let covariance = inverse(&information);
+    let scores: Vec<f64> = left.iter().map(|left| dot(left, &residual)).collect();
+    let mean = covariance.iter().map(|row| dot(row, &scores)).collect();
+    Posterior { covariance, mean }
 }
 
 /// Changes a number by so many tolerances.
@@ -240,7 +439,11 @@ fn change(
 
 /// Returns the fixed numbers of a name with their values: one, or one for every element where a
 /// name is of several elements that differ; or why there are none.
-fn single_numbers(name: &str, case: &Case, free: &[Free]) -> Result<Vec<(Parameter, f64)>, String> {
+fn single_numbers(
+    name: &str,
+    case: &FitCase,
+    free: &[Free],
+) -> Result<Vec<(Parameter, f64)>, String> {
     let machine = &case.plan.model.machine;
     let spin = case.spin();
     let found = Parameter::find(name, machine, spin)
@@ -276,9 +479,9 @@ fn is_fixed_kind(parameter: &Parameter) -> bool {
 /// Returns the numbers of a machine that have a tolerance. What several elements share is one
 /// number: they are of one batch.
 fn fixed_numbers(
-    case: &Case,
+    case: &FitCase,
     free: &[Free],
-    given: &[(Parameter, Tolerance)],
+    given: &[(Parameter, FixedTolerance)],
     with_defaults: bool,
 ) -> Vec<(Parameter, f64)> {
     let machine = &case.plan.model.machine;
@@ -296,7 +499,7 @@ fn fixed_numbers(
         parameter.left_out().is_none_or(|value| parameter.get(machine, spin) != Some(value))
     };
     let by_kind = |parameter: Parameter| {
-        let tolerance = Tolerance::by_unit(parameter.unit());
+        let tolerance = FixedTolerance::by_kind(parameter.name(), parameter.unit());
         (parameter, tolerance)
     };
     let defaults = shared.chain(single).filter(is_there).map(by_kind).filter(|_| with_defaults);

@@ -11,7 +11,7 @@ use washer_model::Channel;
 
 /// Fewest samples of a column: fewer say nothing of their noise.
 const FEWEST: usize = 16;
-/// What names of the nonlinear model's channels begin with in a file of `sweep trace`.
+/// The beginning of the names of the nonlinear model's channels in a file of `sweep trace`.
 const TRACED: &str = "nonlinear_";
 /// Rows that are usually farther apart (s) show no turn of a drum.
 pub(super) const SLOWEST_S: f64 = 0.2;
@@ -24,17 +24,17 @@ pub(super) const LONGEST_RUN_S: f64 = 3600.0;
 /// greatest. Doubling it lets a run begin with four times that.
 pub(super) const REST_SPEED_RATIO: f64 = 0.1;
 
-/// What a column measures.
+/// The quantity of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Quantity {
+pub(crate) enum SignalQuantity {
     /// A channel, its rate or its acceleration (0, 1, 2).
     Motion(Channel, usize),
     /// The force on the cabinet along c1, c2 or c3 (0, 1, 2).
     CabinetForce(usize),
 }
 
-impl Quantity {
-    /// Everything that can be measured.
+impl SignalQuantity {
+    /// Returns every quantity that can be measured.
     fn all() -> impl Iterator<Item = Self> {
         let motions = Channel::ALL
             .into_iter()
@@ -42,7 +42,7 @@ impl Quantity {
         motions.chain((0..3).map(Self::CabinetForce))
     }
 
-    /// Its unit, and the one in which it is measured by mistake, with that one's size.
+    /// Returns the unit, and the one in which it is measured by mistake, with that one's size.
     pub(crate) fn units(self) -> (String, Option<(&'static str, f64)>) {
         const G: f64 = 9.806_65;
         let Self::Motion(channel, order) = self else { return ("N".to_owned(), None) };
@@ -56,18 +56,19 @@ impl Quantity {
         (format!("{unit}{}", ["", "/s", "/s^2"][order]), mistaken)
     }
 
-    /// The name of its column.
+    /// Returns the name of the column.
     pub(crate) fn column(self) -> String {
         match self {
             Self::Motion(channel, order) => {
-                let (name, unit) = (channel.name(), channel.unit());
+                let name = channel.name();
+                let unit = channel.unit();
                 format!("{name}_{unit}{}", ["", "_per_s", "_per_s2"][order])
             }
             Self::CabinetForce(axis) => format!("cabinet_force_{}_n", ["x", "y", "z"][axis]),
         }
     }
 
-    /// What a column of this name measures. A place or an angle may go without its unit.
+    /// Returns the quantity of a column of this name. A place or an angle may go without its unit.
     fn named(name: &str) -> Option<Self> {
         let is = |quantity: &Self| match quantity {
             Self::Motion(channel, 0) if channel.name() == name => true,
@@ -77,21 +78,21 @@ impl Quantity {
     }
 }
 
-/// One column of a measurement.
+/// A column of a measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Signal {
-    pub(crate) quantity: Quantity,
+    pub(crate) quantity: SignalQuantity,
     /// NaN where there is no sample.
     pub(crate) values: Vec<f64>,
 }
 
 impl Signal {
-    /// The samples that there are, with their places in time.
+    /// Returns the samples that there are, with their places in time.
     pub(crate) fn samples(&self) -> impl Iterator<Item = (usize, f64)> {
         self.values.iter().copied().enumerate().filter(|(_, value)| !value.is_nan())
     }
 
-    /// The samples less their mean.
+    /// Returns the samples less their mean.
     pub(crate) fn swing(&self) -> Vec<f64> {
         centred(self.samples().map(|(_, value)| value).collect()).0
     }
@@ -99,7 +100,7 @@ impl Signal {
 
 /// A measurement of one run.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Measured {
+pub(crate) struct Measurement {
     /// The file's name, as messages and reports have it.
     pub(crate) name: String,
     /// Rising, from 0 on or later (s).
@@ -114,13 +115,13 @@ pub(crate) struct Measured {
     pub(crate) clock_start_s: Option<f64>,
     /// Stretches of time without any row (s).
     pub(crate) gaps_s: Vec<[f64; 2]>,
-    /// What of the file was read otherwise than it stands, or not at all.
+    /// Notes on the parts of the file that were read otherwise than they stand, or not at all.
     pub(crate) notes: Vec<String>,
     /// The names of its columns in the file.
     pub(crate) headers: Vec<String>,
 }
 
-impl Measured {
+impl Measurement {
     /// Reads a file. `renamed` are headers of its columns with the names of what they hold.
     ///
     /// # Errors
@@ -134,11 +135,11 @@ impl Measured {
         report.finish(found)
     }
 
-    /// A measurement in memory; `renamed` as of [`Self::read`].
+    /// Returns a measurement in memory; `renamed` as of [`Self::read`].
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub(crate) fn of_columns(
+    pub(crate) fn from_columns(
         columns: Vec<(String, Vec<f64>)>,
         renamed: &[(String, String)],
     ) -> Result<Self, Diagnostics> {
@@ -189,14 +190,14 @@ fn known(header: &str) -> Option<(String, String)> {
             ["time_s", "s"].map(str::to_owned)
         }
         "speed_rpm" | "rpm" | "drehzahl_rpm" => ["speed_rpm", "rpm"].map(str::to_owned),
-        _ => [name.to_owned(), Quantity::named(name)?.units().0],
+        _ => [name.to_owned(), SignalQuantity::named(name)?.units().0],
     };
     Some((name, unit))
 }
 
 /// Returns every name that a column may have.
 fn all_names() -> Vec<String> {
-    let names = Quantity::all().map(Quantity::column);
+    let names = SignalQuantity::all().map(SignalQuantity::column);
     names.chain(["time_s", "speed_rpm"].map(str::to_owned)).collect()
 }
 
@@ -213,15 +214,15 @@ fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
     Some(refusal.nearest(&column.header, names.iter().map(String::as_str)))
 }
 
-/// The table as a measurement; what is wrong with it is reported.
-fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
+/// Reads the table as a measurement and reports what is wrong with it.
+fn judged(name: String, table: NumberTable, report: &Report) -> Measurement {
     let clock = table.columns.iter().find(|column| column.name.value == "time_s");
     let early = clock.map_or(0, |clock| clock.values.iter().take_while(|t| **t < 0.0).count());
     // Of a file of `sweep trace` the nonlinear motion is taken.
     let is_trace = table.columns.iter().any(|column| column.header.starts_with(TRACED));
     let notes = if is_trace { Vec::new() } else { table.notes() };
     let headers = table.columns.iter().map(|column| column.header.clone()).collect();
-    let mut measured = Measured { name, early, notes, headers, ..Measured::default() };
+    let mut measured = Measurement { name, early, notes, headers, ..Measurement::default() };
     let mut seen: Vec<&str> = Vec::new();
     for column in &table.columns {
         if !column.is_known {
@@ -246,7 +247,7 @@ fn judged(name: String, table: NumberTable, report: &Report) -> Measured {
         }
         let values = &column.values[early..];
         let samples = values.iter().filter(|value| !value.is_nan()).count();
-        match (name, Quantity::named(name)) {
+        match (name, SignalQuantity::named(name)) {
             ("time_s", _) => {
                 measured.time_s = values.to_vec();
                 times(&table, column, report);
@@ -354,7 +355,7 @@ fn refuse_long_run(table: &NumberTable, column: &ListColumn, report: &Report) {
     });
 }
 
-/// The usual distance of two rows: the median.
+/// Returns the usual distance of two rows: the median.
 pub(super) fn usual_step(time_s: &[f64]) -> Option<f64> {
     quantile(time_s.windows(2).map(|pair| pair[1] - pair[0]), 0.5)
 }
@@ -374,12 +375,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
         std::fs::write(&path, text).unwrap();
-        Measured::read(&path, &[]).unwrap_err().to_string()
+        Measurement::read(&path, &[]).unwrap_err().to_string()
     }
 
     #[test]
     fn columns_are_known_by_their_units() {
-        let named = |name| Quantity::named(name).map(Quantity::column);
+        let named = |name| SignalQuantity::named(name).map(SignalQuantity::column);
         for name in ["tub_front_y_m_per_s2", "tub_yaw_rad_per_s", "tub_pitch_rad"] {
             assert_eq!(named(name).as_deref(), Some(name));
         }
@@ -394,7 +395,7 @@ mod tests {
         let column = |name: &str| {
             (name.to_owned(), (0..20).map(|k| 0.01 * f64::from(k)).collect::<Vec<f64>>())
         };
-        let measured = Measured::of_columns(names.map(column).to_vec(), &[]).unwrap();
+        let measured = Measurement::from_columns(names.map(column).to_vec(), &[]).unwrap();
         let columns: Vec<String> =
             measured.signals.iter().map(|signal| signal.quantity.column()).collect();
         assert_eq!(columns, ["tub_yaw_rad"]);
@@ -454,7 +455,7 @@ mod tests {
             if with_tachometer {
                 columns.push(column("speed_rpm", &|t| first_rpm + 20.0 * t));
             }
-            let mut measured = Measured::of_columns(columns, &[]).unwrap();
+            let mut measured = Measurement::from_columns(columns, &[]).unwrap();
             measured.count_from_first_row(24.0);
             measured
         };
@@ -488,7 +489,7 @@ mod tests {
         std::fs::write(&path, &text).unwrap();
         let renamed = [("Acc front", "tub_front_y_m_per_s2"), ("Drum", "speed_rpm")];
         let renamed = renamed.map(|(header, name)| (header.to_owned(), name.to_owned()));
-        let measured = Measured::read(&path, &renamed).unwrap();
+        let measured = Measurement::read(&path, &renamed).unwrap();
         assert_eq!(measured.time_s[19], 0.38);
         assert_eq!(measured.speed_rpm.expect("it is there")[2], 12_000.0);
         let columns: Vec<String> = measured.signals.iter().map(|it| it.quantity.column()).collect();
@@ -498,11 +499,11 @@ mod tests {
         // Times of a clock are seconds since midnight.
         let rows: String = (0..20).map(|k| format!("12:00:0{}.{},{k}\n", k / 10, k % 10)).collect();
         std::fs::write(&path, format!("Time,tub_yaw [deg]\n{rows}")).unwrap();
-        let clock = Measured::read(&path, &[]).unwrap();
+        let clock = Measurement::read(&path, &[]).unwrap();
         assert_eq!((clock.time_s[0], clock.time_s[19]), (43_200.0, 43_201.9));
         std::fs::write(&path, &text).unwrap();
         // Without the user's names nothing is measured, and what to do is said.
-        let refused = Measured::read(&path, &[]).unwrap_err().to_string();
+        let refused = Measurement::read(&path, &[]).unwrap_err().to_string();
         assert!(refused.contains("--column 'Acc front=tub_front_y_m_per_s2'"), "{refused}");
     }
 
@@ -513,8 +514,9 @@ mod tests {
             let named = |(name, by): (&str, f64)| (name.to_owned(), numbers(by));
             [("time_s", 0.01), ("tub_yaw", 1.0), ("speed_rpm", 2.0)].map(named).to_vec()
         };
-        let [whole, early] = [0, -30].map(|from| Measured::of_columns(columns(from), &[]).unwrap());
-        assert_eq!(early, Measured { early: 30, ..whole });
+        let [whole, early] =
+            [0, -30].map(|from| Measurement::from_columns(columns(from), &[]).unwrap());
+        assert_eq!(early, Measurement { early: 30, ..whole });
     }
 
     #[test]
@@ -525,7 +527,7 @@ mod tests {
         };
         let (time_s, yaw) = (0..40).map(row).unzip();
         let columns = vec![("time_s".to_owned(), time_s), ("tub_yaw".to_owned(), yaw)];
-        let measured = Measured::of_columns(columns, &[]).unwrap();
+        let measured = Measurement::from_columns(columns, &[]).unwrap();
         assert_eq!(measured.count(), 26);
         assert_eq!(measured.gaps_s.len(), 1);
         assert!((measured.gaps_s[0][1] - 5.1).abs() < 1e-12);

@@ -1,5 +1,5 @@
-//! What is fitted, and what the model says of it: trajectories of a point and its neighbours side
-//! by side in lanes.
+//! The problem of a fit and the model's signals: trajectories of a point and its neighbours side by
+//! side in lanes.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use washer_model::{
 };
 
 use super::algebra::{centred, dot};
-use super::measured::{Measured, Quantity, Signal};
+use super::measured::{Measurement, Signal, SignalQuantity};
 use super::speed::Smoothed;
 use crate::engine::reference_step_s;
 use crate::plan::{Plan, prepare_point};
@@ -27,39 +27,39 @@ pub(super) const MOST_SHIFT_S: f64 = 0.25;
 /// A neighbour in time (s).
 const NEAR_S: f64 = 1e-5;
 
-/// One measurement, and the run that it is of.
+/// A measurement and the run that it is of.
 #[derive(Clone, Debug)]
-pub(crate) struct Case {
+pub(crate) struct FitCase {
     /// The grid with this run's own constants.
     pub(crate) plan: Plan,
-    pub(crate) measured: Measured,
+    pub(crate) measured: Measurement,
     /// The spin, if it was measured.
     pub(crate) smoothed: Option<Smoothed>,
 }
 
-impl Case {
-    /// The run's spin.
+impl FitCase {
+    /// Returns the run's spin.
     pub(crate) fn spin(&self) -> &Spin {
         self.smoothed.as_ref().map_or(&self.plan.model.spin, |smoothed| &smoothed.spin)
     }
 
-    /// The measured spin at time 0 (rpm).
+    /// Returns the measured spin at time 0 (rpm).
     pub(crate) fn first_rpm(&self) -> Option<f64> {
         self.smoothed.as_ref()?.spin.speeds_rpm([0.0]).next()
     }
 
-    /// The run's greatest speed (rpm).
+    /// Returns the run's greatest speed (rpm).
     pub(crate) fn greatest_rpm(&self) -> f64 {
         self.spin().greatest_speed_rad_per_s(self.end_s()) * 60.0 / TAU
     }
 
-    /// How many samples a signal has in a second, on average.
+    /// Returns the number of samples of a signal in a second, on average.
     pub(crate) fn rate_hz(&self, signal: &Signal) -> f64 {
         let times = &self.measured.time_s;
         signal.samples().count() as f64 / (times[times.len() - 1] - times[0])
     }
 
-    /// When its run ends: late enough for a late clock.
+    /// Returns the end of the run (s): late enough for a late clock.
     fn end_s(&self) -> f64 {
         self.measured.time_s.last().copied().unwrap_or_default() + MOST_SHIFT_S
     }
@@ -85,7 +85,7 @@ impl Free {
 /// The fit's question. Its unknowns are the free numbers, then the shift of each case's clock if
 /// those are wanted. The offsets of signals are no unknowns: means are taken off.
 pub(crate) struct Problem<'a> {
-    pub(crate) cases: Vec<Case>,
+    pub(crate) cases: Vec<FitCase>,
     pub(crate) free: Vec<Free>,
     pub(crate) model: ModelKind,
     pub(crate) with_shift: bool,
@@ -96,9 +96,9 @@ pub(crate) struct Problem<'a> {
 }
 
 /// A machine, its spin, and the shift of the clock that it is seen by (s).
-type Run = (Machine, Spin, f64);
+type CaseRun = (Machine, Spin, f64);
 
-/// One signal against the model.
+/// A signal against the model.
 #[derive(Clone, Debug)]
 pub(crate) struct Against {
     pub(crate) case: usize,
@@ -112,7 +112,7 @@ pub(crate) struct Against {
     pub(crate) slopes: Vec<Vec<f64>>,
 }
 
-/// What a descent needs to know of a point. Costs are twice a negative log-likelihood, with every
+/// The cost at a point and its derivatives. Costs are twice a negative log-likelihood, with every
 /// signal's noise as its residual says.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Summary {
@@ -126,15 +126,16 @@ pub(crate) struct Summary {
 }
 
 impl Problem<'_> {
-    /// How the model is integrated: by the grid's method where that is one, else by the reference's
-    /// step, which depends on the machine at the start alone.
-    pub(crate) fn method(cases: &[Case]) -> Result<Method, washer_model::NoEquilibrium> {
+    /// Selects the integration method: the grid's where that is one, else the reference's step,
+    /// which depends on the machine at the start alone.
+    pub(crate) fn method(cases: &[FitCase]) -> Result<Method, washer_model::NoEquilibrium> {
         if let Some((_, method)) = cases.iter().find_map(|case| case.plan.integrator.direct()) {
             return Ok(method);
         }
         let mut step_s = f64::INFINITY;
         for case in cases {
-            let (end_s, machine) = (case.end_s(), case.plan.model.machine.clone());
+            let end_s = case.end_s();
+            let machine = case.plan.model.machine.clone();
             let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
             let point = prepare_point(machine, case.spin().clone(), &timing)?;
             step_s =
@@ -143,35 +144,35 @@ impl Problem<'_> {
         Ok(Method::Rk4 { step_s })
     }
 
-    /// How many unknowns there are.
+    /// Returns the number of unknowns.
     pub(crate) fn unknowns(&self) -> usize {
         self.free.len() + if self.with_shift { self.cases.len() } else { 0 }
     }
 
-    /// What an unknown may be.
+    /// Returns the range of an unknown.
     pub(crate) fn range(&self, unknown: usize) -> [f64; 2] {
         self.free.get(unknown).map_or([-MOST_SHIFT_S, MOST_SHIFT_S], |free| free.range)
     }
 
-    /// Where the unknowns start.
+    /// Returns the unknowns at the start.
     pub(crate) fn start(&self) -> Vec<f64> {
         let shifts = self.unknowns() - self.free.len();
         self.free.iter().map(|free| free.start).chain(std::iter::repeat_n(0.0, shifts)).collect()
     }
 
-    /// Every signal of every case, in order.
+    /// Iterates over the signals of all cases, in order.
     pub(crate) fn signals(&self) -> impl Iterator<Item = (usize, usize, &Signal)> {
         self.cases.iter().enumerate().flat_map(|(c, case)| {
             case.measured.signals.iter().enumerate().map(move |(s, signal)| (c, s, signal))
         })
     }
 
-    /// The shift of a case's clock (s).
+    /// Returns the shift of a case's clock (s).
     pub(crate) fn shift_s(&self, case: usize, x: &[f64]) -> f64 {
         if self.with_shift { x[self.free.len() + case] } else { 0.0 }
     }
 
-    /// The machine and the spin of a case.
+    /// Returns the machine and the spin of a case.
     pub(crate) fn machine(&self, case: usize, x: &[f64]) -> (Machine, Spin) {
         let mut machine = self.cases[case].plan.model.machine.clone();
         let mut spin = self.cases[case].spin().clone();
@@ -181,7 +182,7 @@ impl Problem<'_> {
         (machine, spin)
     }
 
-    /// Where the numbers of the first case's machine are from.
+    /// Returns the sources of the numbers of the first case's machine.
     pub(crate) fn written(&self) -> WrittenIn {
         let plan = &self.cases[0].plan;
         let mut written = plan.written.clone();
@@ -203,7 +204,7 @@ impl Problem<'_> {
         }
     }
 
-    /// By how much a neighbour is away along an unknown, to the inside of its range.
+    /// Returns the distance of the neighbour along an unknown, to the inside of its range.
     fn nudge(&self, unknown: usize, x: &[f64]) -> f64 {
         let step = self.free.get(unknown).map_or(NEAR_S, |free| {
             let width = free.range[1] - free.range[0];
@@ -213,26 +214,27 @@ impl Problem<'_> {
         if x[unknown] + step > self.range(unknown)[1] { -step } else { step }
     }
 
-    /// The run of a case at some unknowns.
-    fn run(&self, case: usize, x: &[f64]) -> Run {
+    /// Returns the run of a case at some unknowns.
+    fn run(&self, case: usize, x: &[f64]) -> CaseRun {
         let (machine, spin) = self.machine(case, x);
         (machine, spin, self.shift_s(case, x))
     }
 
-    /// What `of` makes of every signal of a case by each of so many runs; `None` of one whose
-    /// machine is none, or whose trajectory fails, and of all once the work is stopped. In lanes,
-    /// on all threads of the rayon pool it is called in.
+    /// Computes what `of` makes of every signal of a case by each of so many runs; `None` of one
+    /// whose machine is none, or whose trajectory fails, and of all once the work is stopped. In
+    /// lanes, on all threads of the rayon pool it is called in.
     fn seen<T: Send>(
         &self,
         case: usize,
         count: usize,
-        run: impl Fn(usize) -> Run + Sync,
+        run: impl Fn(usize) -> CaseRun + Sync,
         of: impl Fn(Vec<Vec<f64>>) -> T + Sync,
     ) -> Vec<Option<T>> {
-        let (measured, end_s) = (&self.cases[case].measured, self.cases[case].end_s());
+        let measured = &self.cases[case].measured;
+        let end_s = self.cases[case].end_s();
         let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
         let wanted = Recorders { snapshots: true, ..Recorders::default() };
-        let of_group = |group: &[usize]| {
+        let group_values = |group: &[usize]| {
             let runs = group.iter().map(|&k| run(k)).enumerate();
             let sound = runs.filter(|(_, (machine, ..))| machine.violations().is_empty());
             let (shifts, machines): (Vec<(usize, f64)>, Vec<(Machine, Spin)>) = sound
@@ -248,7 +250,8 @@ impl Problem<'_> {
                 })
                 .collect();
             let all: Vec<&Point> = points.iter().map(|(_, point)| point).collect();
-            let (model, stop) = (self.model, || (self.stop)());
+            let model = self.model;
+            let stop = || (self.stop)();
             let ended = simulate_until(self.simd, model, &self.method, &all, wanted, &stop);
             let extras = ended.map_or_else(Vec::new, |(_, extras)| extras);
             let mut found: Vec<Option<T>> = group.iter().map(|_| None).collect();
@@ -265,22 +268,22 @@ impl Problem<'_> {
             found
         };
         let places: Vec<usize> = (0..count).collect();
-        places.par_chunks(self.simd.lanes().max(2)).flat_map_iter(of_group).collect()
+        places.par_chunks(self.simd.lanes().max(2)).flat_map_iter(group_values).collect()
     }
 
     fn value(&self, shot: &Snapshot, signal: &Signal, point: &Point) -> f64 {
         match signal.quantity {
-            Quantity::Motion(channel, order) => shot.channels[channel.index()][order],
-            Quantity::CabinetForce(axis) => shot.cabinet_force_n(point, self.model)[axis],
+            SignalQuantity::Motion(channel, order) => shot.channels[channel.index()][order],
+            SignalQuantity::CabinetForce(axis) => shot.cabinet_force_n(point, self.model)[axis],
         }
     }
 
-    /// Every signal against the model. On all threads of the rayon pool it is called in.
+    /// Compares every signal with the model. On all threads of the rayon pool it is called in.
     pub(crate) fn against(&self, x: &[f64]) -> Option<Vec<Against>> {
         let unknowns = self.unknowns();
         let nudges: Vec<f64> = (0..unknowns).map(|k| self.nudge(k, x)).collect();
         // The point, and a neighbour along each unknown that matters to the case.
-        let of_case = |case: usize| {
+        let in_case = |case: usize| {
             let near: Vec<usize> = (0..unknowns).filter(|&k| self.matters(k, case)).collect();
             let run = |place: usize| {
                 let mut x = x.to_vec();
@@ -297,7 +300,7 @@ impl Problem<'_> {
             }
             Some((here, beside))
         };
-        let seen = (0..self.cases.len()).into_par_iter().map(of_case);
+        let seen = (0..self.cases.len()).into_par_iter().map(in_case);
         let seen: Vec<_> = seen.collect::<Option<_>>()?;
         let of = |(case, s, signal): (usize, usize, &Signal)| {
             let (here, beside) = &seen[case];
@@ -316,6 +319,33 @@ impl Problem<'_> {
         Some(self.signals().map(of).collect())
     }
 
+    /// Computes for each of so many changes of a case's machine and spin `reduce` of what it does
+    /// to the case's signals at their samples; none where the changed run fails. `against` is the
+    /// comparison without a change.
+    pub(crate) fn changes<T: Send>(
+        &self,
+        case: usize,
+        x: &[f64],
+        against: &[Against],
+        (count, change): (usize, impl Fn(usize, &mut Machine, &mut Spin) + Sync),
+        reduce: impl Fn(Vec<Vec<f64>>) -> T + Sync,
+    ) -> Vec<Option<T>> {
+        let run = |k: usize| {
+            let (mut machine, mut spin, shift_s) = self.run(case, x);
+            change(k, &mut machine, &mut spin);
+            (machine, spin, shift_s)
+        };
+        let own: Vec<&Against> = against.iter().filter(|one| one.case == case).collect();
+        let reduced = |values: Vec<Vec<f64>>| {
+            let change = |(values, one): (&Vec<f64>, &&Against)| -> Vec<f64> {
+                let signal = &self.cases[case].measured.signals[one.signal];
+                signal.samples().map(|(row, _)| values[row] - one.model[row]).collect()
+            };
+            reduce(values.iter().zip(&own).map(change).collect())
+        };
+        self.seen(case, count, run, reduced)
+    }
+
     /// Computes for each of so many changes of a case's machine and spin the pull at the unknowns
     /// of what it does to the signals; none where the changed run fails. `against` is the
     /// comparison without a change, with the noise of each signal.
@@ -327,35 +357,28 @@ impl Problem<'_> {
         count: usize,
         change: impl Fn(usize, &mut Machine, &mut Spin) + Sync,
     ) -> Vec<Option<Vec<f64>>> {
-        let run = |k: usize| {
-            let (mut machine, mut spin, shift_s) = self.run(case, x);
-            change(k, &mut machine, &mut spin);
-            (machine, spin, shift_s)
-        };
         let own: Vec<(&Against, f64)> = against
             .iter()
             .zip(sigma)
             .filter(|(one, _)| one.case == case)
             .map(|(one, sigma)| (one, *sigma))
             .collect();
-        let pull = |values: Vec<Vec<f64>>| {
+        let pull = |changes: Vec<Vec<f64>>| {
             let mut pull = vec![0.0; self.unknowns()];
-            for (values, (one, sigma)) in values.iter().zip(&own) {
-                let signal = &self.cases[case].measured.signals[one.signal];
-                let apart: Vec<f64> =
-                    signal.samples().map(|(row, _)| values[row] - one.model[row]).collect();
+            for (change, (one, sigma)) in changes.iter().zip(&own) {
                 for (pull, slope) in pull.iter_mut().zip(&one.slopes) {
-                    *pull += dot(slope, &apart) / (sigma * sigma);
+                    *pull += dot(slope, change) / (sigma * sigma);
                 }
             }
             pull
         };
-        self.seen(case, count, run, pull)
+        self.changes(case, x, against, (count, change), pull)
     }
 
-    /// The cost of many sets of unknowns, without derivatives; infinite where there is no answer.
+    /// Computes the costs of many sets of unknowns, without derivatives; infinite where there is no
+    /// answer.
     pub(crate) fn costs(&self, sets: &[Vec<f64>]) -> Vec<f64> {
-        let of_case = |case: usize| {
+        let in_case = |case: usize| {
             let cost = |models: Vec<Vec<f64>>| -> f64 {
                 let signals = self.cases[case].measured.signals.iter().zip(models);
                 let of = |(signal, model): (&Signal, Vec<f64>)| {
@@ -367,7 +390,7 @@ impl Problem<'_> {
             };
             self.seen(case, sets.len(), |k| self.run(case, &sets[k]), cost)
         };
-        let parts: Vec<_> = (0..self.cases.len()).into_par_iter().map(of_case).collect();
+        let parts: Vec<_> = (0..self.cases.len()).into_par_iter().map(in_case).collect();
         let mut costs = vec![0.0; sets.len()];
         for part in parts {
             for (sum, cost) in costs.iter_mut().zip(part) {
@@ -377,7 +400,7 @@ impl Problem<'_> {
         costs
     }
 
-    /// The summary of a comparison.
+    /// Summarises a comparison.
     pub(crate) fn summary(&self, against: &[Against]) -> Summary {
         let n = self.unknowns();
         let mut summary = Summary {
@@ -406,7 +429,7 @@ impl Problem<'_> {
     }
 }
 
-/// A signal's share of the cost, and its noise: the residual's, and of one that is exact a
+/// Returns a signal's part of the cost and its noise: the residual's, and for an exact signal a
 /// millionth of the signal.
 fn likelihood(residual: &[f64], signal: &Signal) -> (f64, f64) {
     let swing = signal.swing();

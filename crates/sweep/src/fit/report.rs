@@ -1,4 +1,4 @@
-//! What a fit has to say: one structure, as text and as JSON.
+//! The report of a fit: one structure, as text and as JSON.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::model::{Against, Problem};
 use super::search::Descent;
 use super::speed::Smoothed;
 use super::statistics::{Statistics, Z_975};
-use super::verdict::{OnMap, Verdict};
+use super::verdict::{FittedVerdict, OnMap};
 use crate::config;
 use sweep_engine::Error;
 use sweep_engine::commands::cells::{Lines as _, span, table};
@@ -19,16 +19,19 @@ use sweep_engine::config::section::counted;
 
 /// Between which share of two units a signal is taken for one in the other.
 const UNIT_SLACK: f64 = 1.5;
-/// What is said of a search that came to no end.
+/// The part of a fixed number's tolerance below which the record limits its error. Basis: less of a
+/// limit does not show in two digits of an interval. Doubling it says so of every number.
+const SEEN_RATIO: f64 = 0.9;
+/// The objection to a search that came to no end.
 const UNSETTLED: &str = "not known: the search did not come to its end, so no intervals; expected \
                          a nearer start (`--set NAME=VALUE`), ranges, or fewer `--free`";
 
 /// Numbers by the name of their column.
 type ByColumn<T> = BTreeMap<String, T>;
 
-/// What a fit found. Numbers that are not known are null.
+/// The result of a fit. Numbers that are not known are null.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Report {
+pub(crate) struct FitReport {
     /// Whether the model is known to follow the measurement within its noise. If not, there are no
     /// intervals.
     pub(crate) follows: bool,
@@ -37,12 +40,10 @@ pub(crate) struct Report {
     pub(crate) parameters: Vec<Fit>,
     /// Row by row in the order of the parameters.
     pub(crate) correlations: Vec<Vec<f64>>,
-    /// What the data cannot tell, in words.
+    /// Statements of what the data cannot tell.
     pub(crate) untold: Vec<String>,
     /// The number of fixed numbers that have a tolerance.
     pub(crate) fixed_numbers: usize,
-    /// Whether these tolerances widen intervals.
-    pub(crate) is_widened: bool,
     /// The first file's entries, as in `files`.
     #[serde(flatten)]
     pub(crate) first: OfFile,
@@ -55,9 +56,9 @@ pub(crate) struct Report {
     pub(crate) evaluations: usize,
     /// The integration's step (s), if it is fixed.
     pub(crate) step_s: Option<f64>,
-    /// By how many standard errors half the step moves the number that it moves most.
+    /// The number of standard errors by which half the step moves the number that it moves most.
     pub(crate) step_effect: Option<f64>,
-    /// What else a reader should know.
+    /// Notes on units, clocks and gaps.
     pub(crate) notes: Vec<String>,
 }
 
@@ -71,13 +72,13 @@ pub(crate) struct Fit {
     pub(crate) start: f64,
     pub(crate) value: f64,
     pub(crate) standard_error: Option<f64>,
-    /// By the measurement's noise alone.
+    /// The standard error by the measurement's noise alone.
     pub(crate) noise_error: Option<f64>,
     /// The fixed number whose tolerance moves it most.
     pub(crate) depends_on: Option<Dependence>,
     /// No farther than its range.
     pub(crate) interval_95: Option<[f64; 2]>,
-    /// By the fits of resampled residuals, if they were asked for.
+    /// The interval by fits of resampled residuals, if they were asked for.
     pub(crate) bootstrap_95: Option<[f64; 2]>,
     /// Whether it is at an end of its range.
     pub(crate) at_bound: bool,
@@ -90,19 +91,21 @@ pub(crate) struct Dependence {
     pub(crate) unit: String,
     /// The standard deviation of the fixed number.
     pub(crate) tolerance: f64,
-    /// The change of the fitted number by an error of the fixed one of one standard deviation.
+    /// The error of the fixed number that the record leaves open.
+    pub(crate) error: f64,
+    /// The change of the fitted number by that error.
     pub(crate) moves_by: f64,
 }
 
 impl Fit {
-    /// Its name; of a file's own, with the file.
+    /// Returns the name, with the file of a file's own.
     fn label(&self) -> String {
         let file = self.file.iter().map(|file| format!(" ({file})"));
         std::iter::once(self.name.clone()).chain(file).collect()
     }
 }
 
-/// What is said of one measurement.
+/// The report of a measurement.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct OfFile {
     pub(crate) file: String,
@@ -110,24 +113,24 @@ pub(crate) struct OfFile {
     /// Standard deviation of the part of the residual that is noise.
     pub(crate) noise: ByColumn<f64>,
     pub(crate) offset: ByColumn<f64>,
-    /// By how much the model's clock is ahead (s).
+    /// The time (s) by which the model's clock is ahead.
     pub(crate) shift_s: Option<f64>,
     pub(crate) residual_rms: ByColumn<f64>,
     /// The part of the variance that the model explains.
     pub(crate) explained: ByColumn<f64>,
     /// Correlation of neighbouring residuals.
     pub(crate) autocorrelation: ByColumn<f64>,
-    /// By how much that widens variances.
+    /// The factor by which that widens variances.
     pub(crate) widening: ByColumn<f64>,
     /// Noise (rpm) and knots of the measured spin.
     pub(crate) spin: Option<Smoothed>,
     pub(crate) gaps_s: Vec<[f64; 2]>,
     /// The fitted machine, as a machine file has it.
     pub(crate) machine: Value,
-    pub(crate) verdict: Option<Verdict>,
+    pub(crate) verdict: Option<FittedVerdict>,
 }
 
-/// One minimum.
+/// A minimum of the cost.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Minimum {
     pub(crate) values: ByColumn<f64>,
@@ -136,8 +139,8 @@ pub(crate) struct Minimum {
     pub(crate) evaluations: usize,
 }
 
-/// What a report is made of.
-pub(super) struct Found<'a> {
+/// The data that a report is made of.
+pub(super) struct ReportData<'a> {
     pub(super) problem: &'a Problem<'a>,
     /// Columns that seem to be in another unit, each a clause.
     pub(super) suspicions: &'a [String],
@@ -152,9 +155,9 @@ pub(super) struct Found<'a> {
     pub(super) draws: u64,
 }
 
-impl Found<'_> {
-    /// The whole.
-    pub(super) fn report(&self) -> Result<Report, Error> {
+impl ReportData<'_> {
+    /// Makes the report.
+    pub(super) fn report(&self) -> Result<FitReport, Error> {
         let Self { problem, statistics, .. } = *self;
         let best = &self.minima[0];
         let unsettled = (!best.is_settled).then(|| UNSETTLED.to_owned());
@@ -163,7 +166,7 @@ impl Found<'_> {
             clauses.map(String::as_str).collect::<Vec<_>>().join("; ")
         });
         let follows = objection.is_none();
-        let covariance = statistics.of_free(problem);
+        let covariance = statistics.free_covariance(problem);
         let by_noise = statistics.by_noise(problem);
         let error = |k: usize| covariance[k][k].max(0.0).sqrt();
         let noise_error = |k: usize| by_noise[k][k].max(0.0).sqrt();
@@ -174,7 +177,7 @@ impl Found<'_> {
             _ => 0.0,
         };
         let correlations = |i: usize| (0..free).map(|j| correlation(i, j)).collect();
-        let files = (0..problem.cases.len()).map(|case| self.of_file(case, follows));
+        let files = (0..problem.cases.len()).map(|case| self.file_report(case, follows));
         let files = files.collect::<Result<Vec<OfFile>, Error>>()?;
         let parameters: Vec<Fit> =
             (0..free).map(|k| self.parameter(k, [error(k), noise_error(k)], follows)).collect();
@@ -183,13 +186,12 @@ impl Found<'_> {
             cost_above: descent.summary.cost - best.summary.cost,
             evaluations: descent.evaluations,
         };
-        Ok(Report {
+        Ok(FitReport {
             follows,
             objection,
             correlations: (0..free).map(correlations).collect(),
             untold: statistics.untold(problem, &best.x),
-            fixed_numbers: statistics.influences.len(),
-            is_widened: statistics.is_widened,
+            fixed_numbers: statistics.influences().len(),
             first: files[0].clone(),
             files,
             minima: self.minima.iter().map(minimum).collect(),
@@ -229,17 +231,18 @@ impl Found<'_> {
 
     /// Returns the strongest dependence of a free number on a fixed one.
     fn dependence(&self, k: usize) -> Option<Dependence> {
-        let influences = self.statistics.influences.iter();
+        let influences = self.statistics.influences().iter();
         let strongest = influences.max_by(|a, b| a.moves[k].abs().total_cmp(&b.moves[k].abs()))?;
         Some(Dependence {
             name: strongest.name.clone(),
             unit: strongest.unit.to_owned(),
             tolerance: strongest.tolerance,
+            error: strongest.error,
             moves_by: strongest.moves[k],
         })
     }
 
-    fn of_file(&self, case: usize, follows: bool) -> Result<OfFile, Error> {
+    fn file_report(&self, case: usize, follows: bool) -> Result<OfFile, Error> {
         let problem = self.problem;
         let x = &self.minima[0].x;
         let measured = &problem.cases[case].measured;
@@ -269,7 +272,7 @@ impl Found<'_> {
         })
     }
 
-    /// What else a reader should know.
+    /// Returns notes on units, clocks and gaps.
     fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         // The start may be wrong by as much as a unit. Where channels of several units follow, it
@@ -331,8 +334,8 @@ impl Found<'_> {
     }
 }
 
-impl Report {
-    /// As a command prints it.
+impl FitReport {
+    /// Formats the report as a command prints it.
     pub(crate) fn text(&self) -> String {
         let short = |value: f64| {
             if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
@@ -372,9 +375,15 @@ impl Report {
         self.untold.iter().for_each(|untold| say("untold", untold));
         for fit in &self.parameters {
             let Some(on) = &fit.depends_on else { continue };
-            let error = format!("{} {}", short(on.tolerance), on.unit);
+            let error = format!("{} {}", short(on.error), on.unit);
+            // The record says nothing of an error as large as the tolerance.
+            let limit = if on.error < SEEN_RATIO * on.tolerance {
+                format!(" (of {}: the record limits it)", short(on.tolerance))
+            } else {
+                String::new()
+            };
             let effect = format!(
-                "{} on {}: an error of {} moves it by {} {}, most of {}",
+                "{} on {}: an error of {}{limit} moves it by {} {}, most of {}",
                 fit.label(),
                 on.name,
                 error.trim_end(),
@@ -383,12 +392,7 @@ impl Report {
                 counted(self.fixed_numbers, "fixed number"),
             );
             let noise = fit.noise_error.map_or_else(|| "-".to_owned(), short);
-            let interval = if self.is_widened {
-                format!("; by noise alone its standard error is {noise}")
-            } else {
-                "; intervals take these as exact (`--known`)".to_owned()
-            };
-            say("depends", &(effect + &interval));
+            say("depends", &format!("{effect}; by noise alone its standard error is {noise}"));
         }
         if self.follows && self.fixed_numbers == 0 && !self.parameters.is_empty() {
             say("depends", "on nothing: fixed numbers are taken as exact");

@@ -9,7 +9,7 @@ use sweep_engine::Error;
 
 /// A descent ends where a step would lower the cost by less: some hundredth of a standard error.
 const WORTH: f64 = 2e-4;
-/// As little may be left to gain where no step gains it.
+/// The fall of the cost that may be left where no step gains it.
 const ROUGH: f64 = 0.1;
 /// No step changes a number by more than this share of it, or of a tenth of its range.
 const LONGEST: f64 = 0.5;
@@ -19,7 +19,7 @@ const LEAST: f64 = 1e-9;
 /// Doubling it makes searches without an end twice as long.
 pub(super) const MAX_EVALUATIONS: usize = 200;
 
-/// Where a descent ended.
+/// The end of a descent.
 #[derive(Clone, Debug)]
 pub(crate) struct Descent {
     pub(crate) x: Vec<f64>,
@@ -36,11 +36,13 @@ pub(crate) fn descend(
     start: &[f64],
     ranges: &[[f64; 2]],
     max_evaluations: usize,
-    evaluate: &dyn Fn(&[f64]) -> Result<Option<Summary>, Ended>,
-) -> Result<Option<Descent>, Ended> {
+    evaluate: &dyn Fn(&[f64]) -> Result<Option<Summary>, DescentEnd>,
+) -> Result<Option<Descent>, DescentEnd> {
     let Some(mut now) = evaluate(start)? else { return Ok(None) };
     let mut x = start.to_vec();
-    let (mut evaluations, mut damping, mut stretch) = (1, 1e-3, 1.0);
+    let mut evaluations = 1;
+    let mut damping = 1e-3;
+    let mut stretch = 1.0;
     let done = |x, summary, evaluations, is_settled| {
         Ok(Some(Descent { x, summary, evaluations, is_settled }))
     };
@@ -59,7 +61,7 @@ pub(crate) fn descend(
         let eigen = Symmetric::of(&unit);
         let pull: Vec<f64> = moving.iter().zip(&scale).map(|(&k, s)| now.pull[k] / s).collect();
         let solved = |damping: f64| eigen.apply(&pull, |value| 1.0 / (value.max(0.0) + damping));
-        // By how much the cost would fall if it were quadratic.
+        // The fall of the cost if it were quadratic.
         let left = dot(&solved(LEAST), &pull);
         if left < WORTH {
             return done(x, now, evaluations, true);
@@ -77,15 +79,16 @@ pub(crate) fn descend(
             for (&k, step) in moving.iter().zip(&step) {
                 trial[k] = (trial[k] + length * step).clamp(ranges[k][0], ranges[k][1]);
             }
-            // Where rounding hides what is left to gain, as corners of friction do, it ends too.
+            // Rounding may hide what is left to gain, as corners of friction do: that is an end
+            // too.
             if evaluations >= max_evaluations || damping > 1e4 {
                 return done(x, now, evaluations, damping > 1e4 && left < ROUGH);
             }
             evaluations += 1;
             match evaluate(&trial)? {
                 Some(found) if found.cost < now.cost => {
-                    // Where steps go well and still come to no end, a large residual's curvature
-                    // makes them too short: the next is as long as this one's gain asks for.
+                    // If steps go well and still come to no end, a large residual's curvature makes
+                    // them too short: the next is as long as this step's gain asks for.
                     let gain = (now.cost - found.cost) / (length * dot(&solution, &pull));
                     let longer = (length / (2.0 - gain).max(0.25)).max(1.0);
                     stretch = if damping > LEAST { 1.0 } else { longer };
@@ -102,14 +105,14 @@ pub(crate) fn descend(
 
 /// Why a search came to no end.
 #[derive(Debug)]
-pub(crate) enum Ended {
+pub(crate) enum DescentEnd {
     /// The work was stopped.
     Stopped,
-    /// What was asked cannot be answered.
+    /// A request that cannot be answered.
     Refused(Error),
 }
 
-impl<E: Into<Error>> From<E> for Ended {
+impl<E: Into<Error>> From<E> for DescentEnd {
     fn from(error: E) -> Self {
         Self::Refused(error.into())
     }
@@ -120,7 +123,7 @@ mod tests {
     use super::*;
 
     /// Rosenbrock's valley as residuals 10 (b - a^2) and 1 - a of noise 1.
-    fn valley(x: &[f64]) -> Result<Option<Summary>, Ended> {
+    fn valley(x: &[f64]) -> Result<Option<Summary>, DescentEnd> {
         let residual = [-10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
         let slopes = [[-20.0 * x[0], 1.0], [10.0, 0.0]];
         let normal = slopes.map(|a| slopes.map(|b| dot(&a, &b)).to_vec()).to_vec();
@@ -132,10 +135,11 @@ mod tests {
     fn steps_grow_where_a_large_residual_makes_them_short() {
         // Residuals x + 1 and bend x^2 + x - 1: Gauss and Newton's steps leave `bend` of the way.
         let bend = 0.97;
-        let evaluate = |x: &[f64]| -> Result<Option<Summary>, Ended> {
+        let evaluate = |x: &[f64]| -> Result<Option<Summary>, DescentEnd> {
             let residual = [x[0] + 1.0, bend * x[0] * x[0] + x[0] - 1.0].map(|r| 100.0 * r);
             let slopes = [-100.0, -100.0 * (2.0 * bend * x[0] + 1.0)];
-            let (normal, pull) = (vec![vec![dot(&slopes, &slopes)]], vec![dot(&slopes, &residual)]);
+            let normal = vec![vec![dot(&slopes, &slopes)]];
+            let pull = vec![dot(&slopes, &residual)];
             Ok(Some(Summary { cost: dot(&residual, &residual), sigma: vec![1.0; 2], normal, pull }))
         };
         let free = [[f64::NEG_INFINITY, f64::INFINITY]];

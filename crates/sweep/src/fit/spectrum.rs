@@ -1,4 +1,4 @@
-//! What is left over by frequency: a motion that the model does not have stands above the noise.
+//! The spectrum of what is left over: a motion that the model does not have stands above the noise.
 //!
 //! P. D. Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
 
@@ -23,7 +23,8 @@ pub(crate) fn spectrum(values: &[f64], step_s: f64) -> (Vec<f64>, Vec<f64>) {
     let bins = 1..=(1..=length / 2).take_while(|&bin| hz(bin) <= HIGHEST_HZ).count();
     let density = |bin: usize| {
         let power = |segment: &&[f64]| {
-            let (mut along, mut across) = (0.0, 0.0);
+            let mut along = 0.0;
+            let mut across = 0.0;
             for (k, (value, weight)) in segment.iter().zip(&window).enumerate() {
                 let (sin, cos) = circle[k * bin % length];
                 along += weight * value * cos;

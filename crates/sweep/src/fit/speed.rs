@@ -20,17 +20,18 @@ const MOST_KNOTS: usize = 1000;
 pub(crate) struct Smoothed {
     #[serde(skip)]
     pub(crate) spin: Spin,
-    /// Its noise, from second differences (rpm).
+    /// The noise, from second differences (rpm).
     pub(crate) noise_rpm: f64,
-    /// Of the spline.
+    /// The number of the spline's knots.
     pub(crate) knots: usize,
     /// Splines that noise might have made as well.
     #[serde(skip)]
     pub(crate) drawn: Vec<Spin>,
 }
 
-/// The least-squares spline of first degree, with a knot wherever one more explains what noise does
-/// not. Its angle keeps to the measured one: over any span the residuals add up to nearly nothing.
+/// Fits the least-squares spline of first degree, with a knot wherever one more explains what noise
+/// does not. Its angle keeps to the measured one: over any span the residuals add up to nearly
+/// nothing.
 pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
     let samples: Vec<[f64; 2]> = time_s
         .iter()
@@ -38,7 +39,8 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
         .filter(|(_, speed)| !speed.is_nan())
         .map(|(time, speed)| [*time, *speed])
         .collect();
-    let ([first, _], [last, _]) = (samples.first()?, samples.last()?);
+    let [first, _] = samples.first()?;
+    let [last, _] = samples.last()?;
     let greatest = samples.iter().fold(0.0_f64, |most, [_, speed]| most.max(speed.abs()));
     let (rounding_rpm, held) = stairs(&samples).unwrap_or((0.0, 0.0));
     let noise_rpm = noise(&samples).max(LEAST_NOISE * greatest).max(rounding_rpm);
@@ -79,8 +81,8 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
     Some(Smoothed { spin: spin(speeds), noise_rpm, knots: knots.len(), drawn })
 }
 
-/// Standard deviation of white noise about a smooth course, from the distance of every sample to
-/// the line through its neighbours; the median, which jumps do not move.
+/// Estimates the standard deviation of white noise about a smooth course, from the distance of
+/// every sample to the line through its neighbours; the median, which jumps do not move.
 fn noise(samples: &[[f64; 2]]) -> f64 {
     let distances = samples.windows(3).map(|three| {
         let share = (three[1][0] - three[0][0]) / (three[2][0] - three[0][0]);
@@ -102,7 +104,7 @@ fn stairs(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
     Some((step / 12.0_f64.sqrt(), samples.len() as f64 / count as f64))
 }
 
-/// Between which knots a time lies, and its share of the way.
+/// Returns the knots between which a time lies, and its share of the way.
 fn place(knots: &[f64], time_s: f64) -> (usize, f64) {
     let span = knots.partition_point(|&knot| knot <= time_s).clamp(1, knots.len() - 1) - 1;
     (span, (time_s - knots[span]) / (knots[span + 1] - knots[span]))
@@ -146,20 +148,20 @@ impl Normal {
         right
     }
 
-    /// Independent numbers of one variance as numbers whose covariance is the inverse's.
+    /// Returns independent numbers of one variance as numbers whose covariance is the inverse's.
     fn drawn(&self, even: &[f64]) -> Vec<f64> {
         self.back(even.iter().zip(&self.diagonal).map(|(even, size)| even / size.sqrt()).collect())
     }
 }
 
-/// The spline's values at its knots, by least squares. `None` if they are not all determined.
+/// Fits the spline's values at its knots, by least squares. `None` if they are not all determined.
 fn fitted(samples: &[[f64; 2]], knots: &[f64]) -> Option<Vec<f64>> {
     let (normal, right) = Normal::of(samples, knots);
     let speeds = normal.back(right);
     speeds.iter().all(|speed| speed.is_finite()).then_some(speeds)
 }
 
-/// The best further knot of each span that is worth one.
+/// Finds the best further knot of each span that is worth one.
 fn further(samples: &[[f64; 2]], knots: &[f64], speeds: &[f64], worth: f64) -> Vec<f64> {
     let mut found = Vec::new();
     for (span, ends) in knots.windows(2).enumerate() {
@@ -174,7 +176,8 @@ fn further(samples: &[[f64; 2]], knots: &[f64], speeds: &[f64], worth: f64) -> V
                 continue;
             }
             let knot = inside[place][0];
-            let (mut along, mut size) = (0.0, 0.0);
+            let mut along = 0.0;
+            let mut size = 0.0;
             for &[time, speed] in inside {
                 let share = (time - ends[0]) / (ends[1] - ends[0]);
                 let residual = speed - speeds[span] * (1.0 - share) - speeds[span + 1] * share;

@@ -1,22 +1,27 @@
-//! How well numbers are known, and whether the model follows the data at all.
+//! Errors of fitted numbers, and whether the model follows the data at all.
 
-use super::algebra::{Symmetric, add_outer, centred, dot, inverse, scaled};
-use super::known::Influence;
+use super::algebra::{Symmetric, centred, dot, inverse, scaled};
+use super::known::{FixedInfluence, FixedInfluences};
 use super::measured::Signal;
 use super::model::{Against, Problem, Summary};
 
-/// Most lags of a residual's autocorrelation that are looked at.
+/// The greatest lag of a residual's autocorrelation. Basis: a second at some hundred samples a
+/// second. Doubling it sees slower noise, and doubles the time.
 const MOST_LAGS: usize = 400;
-/// No motion of a suspension is faster than this share of the drum's fastest turn.
+/// The shortest time of a motion of a suspension, as a share of the drum's fastest turn. Basis:
+/// four times the fastest turn is above every mode. Doubling it leaves out faster motions.
 const FASTEST: f64 = 0.25;
-/// Within this time every motion of a suspension swings back (s).
+/// The time within which every motion of a suspension swings back (s). Basis: modes of a suspension
+/// are faster than 1 Hz. Doubling it takes slower noise for a motion.
 const SLOWEST_S: f64 = 1.0;
-/// Standard deviations of a correlation that chance makes.
+/// The number of standard deviations of a correlation that chance makes. Basis: in some ten
+/// thousand correlations none is larger. Doubling it sees motions of twice the size only.
 const CHANCE: f64 = 4.0;
-/// Into how many parts each record is cut.
+/// The number of parts that each record is cut into. Basis: a part of the tests is a second, which
+/// a disturbance fills. Doubling it halves the shortest disturbance that is seen.
 const PARTS: usize = 24;
-/// By how much more parts of the record may disagree than noise makes them, before the model is
-/// said not to follow.
+/// The factor by which the variance of the parts' disagreement may exceed that by noise before the
+/// model does not follow. Basis: twice the noise's deviation. Doubling it lets worse models pass.
 const DISAGREEMENT: f64 = 4.0;
 /// The least part of a signal's variance that a model explains which follows it. Basis: a motion of
 /// the right size that lags by an angle explains the square of the angle's cosine at best. A half
@@ -28,9 +33,11 @@ pub(super) const EXPLAINED_RATIO: f64 = 0.5;
 /// suspension lasts longer than twenty samples, unless it is sampled twice a turn. Doubling it sees
 /// slower motions in more noise.
 const WHITE_LAGS: usize = 20;
-/// How large a motion may be left over, as a share of the signal.
+/// The greatest motion that may be left over, as a share of the signal. Basis: a tenth is seen in a
+/// figure. Doubling it lets worse models pass.
 const MOTION: f64 = 0.1;
-/// By how many standard errors the nonlinear model may move a number of the linear one.
+/// The number of standard errors by which the nonlinear model may move a number of the linear one.
+/// Basis: beyond it intervals would be wrong. Doubling it lets worse models pass.
 const BIAS: f64 = 1.0;
 /// The least part of a sample's freedom that is left beside its leverage. Basis: a sample that
 /// alone determines a number has none, and its residual says nothing of its noise. Doubling it
@@ -48,59 +55,61 @@ const TOGETHER: f64 = 0.95;
 /// Standard errors to either end of a 95 % interval: the normal distribution's quantile of 0.975.
 pub(super) const Z_975: f64 = 1.959_964;
 
-/// What the residuals at a fit say.
+/// Statistics of the residuals at a fit.
 pub(crate) struct Statistics {
     /// Covariance of the unknowns, by the residuals' own correlation in time.
     pub(crate) covariance: Vec<Vec<f64>>,
-    /// The dependence of the unknowns on fixed numbers, the strongest first.
-    pub(crate) influences: Vec<Influence>,
-    /// Whether these widen intervals.
-    pub(crate) is_widened: bool,
-    /// By how much autocorrelation widens intervals: of each signal, the variance of a mean over
-    /// that of independent samples.
+    /// The dependence of the unknowns on fixed numbers, which widens intervals.
+    pub(crate) influences: FixedInfluences,
+    /// The factor by which autocorrelation widens variances: for each signal, the variance of a
+    /// mean over that of independent samples.
     pub(crate) widening: Vec<f64>,
-    /// Of each signal: the correlation of neighbouring residuals.
+    /// The correlation of neighbouring residuals of each signal.
     pub(crate) neighbours: Vec<f64>,
     /// The part of each signal's variance that the model explains.
     pub(crate) explained: Vec<f64>,
     /// Whether each signal's residual is white noise.
     pub(crate) is_white: Vec<bool>,
-    /// How much more the parts of the records disagree on the unknowns than noise makes them.
+    /// The variance of the parts' disagreement on the unknowns, over that by noise.
     pub(crate) disagreement: f64,
-    /// Of each signal: the residual that is a motion, as a share of the residual and of the signal,
+    /// The residual of each signal that is a motion, as a share of the residual and of the signal,
     /// mean squares.
     pub(crate) motion: Vec<[f64; 2]>,
-    /// Of the signal that is worst off in it: signal, and the time (s) around which it is.
+    /// The signal that is worst off, and the times (s) between which it is.
     pub(crate) worst: (usize, [f64; 2]),
-    /// By how many standard errors the nonlinear model would move each unknown of the linear one.
+    /// The number of standard errors by which the nonlinear model would move each unknown of the
+    /// linear one.
     pub(crate) bias: Option<Vec<f64>>,
 }
 
 impl Statistics {
-    /// At the end of a descent.
+    /// Computes the statistics at the end of a descent.
     pub(crate) fn of(problem: &Problem<'_>, against: &[Against], summary: &Summary) -> Self {
         let n = problem.unknowns();
         let bread = inverse(&summary.normal);
         let mut meat = vec![vec![0.0; n]; n];
         let mut own_meat = vec![vec![0.0; n]; n];
         let mut own_white_meat = vec![vec![0.0; n]; n];
-        let (mut widening, mut neighbours, mut motion) = (Vec::new(), Vec::new(), Vec::new());
+        let mut widening = Vec::new();
+        let mut neighbours = Vec::new();
+        let mut motion = Vec::new();
         let mut explained = Vec::new();
         let mut is_white = Vec::new();
-        let (mut disagreement, mut freedom) = (0.0, 0.0);
+        let mut disagreement = 0.0;
+        let mut freedom = 0.0;
         let mut worst = (0, [0.0; 2], 0.0);
         for (k, (((_, _, signal), one), sigma)) in
             problem.signals().zip(against).zip(&summary.sigma).enumerate()
         {
             let rho = autocorrelation(&one.residual);
-            let of_signal = correlated(&one.slopes, &rho, 1.0 / (sigma * sigma));
+            let by_lags = correlated(&one.slopes, &rho, 1.0 / (sigma * sigma));
             let plain = correlated(&one.slopes, &[1.0], 1.0 / (sigma * sigma));
             // Intervals are widened, never narrowed.
             let wider = (0..n).fold(1.0_f64, |most, i| {
-                if plain[i][i] > 0.0 { most.max(of_signal[i][i] / plain[i][i]) } else { most }
+                if plain[i][i] > 0.0 { most.max(by_lags[i][i] / plain[i][i]) } else { most }
             });
-            let narrower = (0..n).any(|i| of_signal[i][i] < plain[i][i]);
-            let own = if narrower { &plain } else { &of_signal };
+            let narrower = (0..n).any(|i| by_lags[i][i] < plain[i][i]);
+            let own = if narrower { &plain } else { &by_lags };
             add(&mut meat, own, if narrower { wider } else { 1.0 });
             let window = lag_window(&one.residual);
             let scores = scores(one, &bread, *sigma);
@@ -118,7 +127,7 @@ impl Statistics {
             is_white.push(is_white_noise(&one.residual));
             neighbours.push(correlation(&one.residual, 1));
             widening.push(wider);
-            // What each part of the record alone would pull at the unknowns.
+            // Each part of the record pulls at the unknowns on its own.
             let count = one.residual.len();
             for part in 0..PARTS {
                 let range = part * count / PARTS..(part + 1) * count / PARTS;
@@ -160,7 +169,7 @@ impl Statistics {
         let sandwich = |meat: &[Vec<f64>]| product(&product(&bread, meat), &bread);
         let middle = widened(sandwich(&meat), &sandwich(&own_meat));
         let middle = widened(middle, &sandwich(&own_white_meat));
-        // What parts of the record disagree on beyond their noise is not known any better.
+        // Disagreement of the record's parts beyond their noise is an error of the unknowns.
         let covariance = middle
             .iter()
             .map(|row| row.iter().map(|x| x * disagreement.max(1.0)).collect())
@@ -168,8 +177,7 @@ impl Statistics {
         let worst = (worst.0, worst.1);
         Self {
             covariance,
-            influences: Vec::new(),
-            is_widened: false,
+            influences: FixedInfluences::default(),
             widening,
             neighbours,
             explained,
@@ -191,7 +199,7 @@ impl Statistics {
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Why the model does not follow, if it does not.
+    /// Returns the reason why the model does not follow, if it does not.
     pub(crate) fn objection(&self, problem: &Problem<'_>) -> Option<String> {
         let mut reasons = Vec::new();
         let named = |k: usize| {
@@ -201,11 +209,12 @@ impl Statistics {
             let percent = 100.0 * ratio.max(0.0);
             reasons.push(format!("the model explains {percent:.0} % of {}'s variance", named(k)));
         }
-        let shares = self.motion.iter().map(|[_, of_signal]| of_signal.sqrt()).enumerate();
+        let shares = self.motion.iter().map(|[_, by_lags]| by_lags.sqrt()).enumerate();
         if let Some((k, share)) = shares.max_by(|a, b| a.1.total_cmp(&b.1))
             && share > MOTION
         {
-            let (percent, of) = (100.0 * share, named(k));
+            let percent = 100.0 * share;
+            let of = named(k);
             reasons.push(format!("{percent:.0} % of {of} are left over as a motion, not as noise"));
         }
         if self.disagreement > DISAGREEMENT {
@@ -231,25 +240,23 @@ impl Statistics {
         Some(reasons.join(", and ") + &place)
     }
 
-    /// Takes up what errors of the fixed numbers do to the unknowns, and whether that widens
-    /// intervals.
-    pub(super) fn take_influences(&mut self, influences: Vec<Influence>, is_widening: bool) {
-        self.influences = influences;
-        self.is_widened = is_widening;
+    /// Returns the dependences on fixed numbers, the strongest first.
+    pub(super) fn influences(&self) -> &[FixedInfluence] {
+        &self.influences.numbers
     }
 
-    /// Returns the dependences on fixed numbers that widen intervals.
-    pub(super) fn widening_influences(&self) -> &[Influence] {
-        if self.is_widened { &self.influences } else { &[] }
+    /// Returns the variance of each signal's noise over its independent samples.
+    pub(super) fn variances(&self, summary: &Summary) -> Vec<f64> {
+        let disagreement = self.disagreement.max(1.0);
+        let signals = summary.sigma.iter().zip(&self.widening);
+        signals.map(|(sigma, widening)| sigma * sigma * widening * disagreement).collect()
     }
 
     /// Returns the covariance of the free numbers by the measurement's noise and the tolerances of
     /// the fixed numbers.
-    pub(crate) fn of_free(&self, problem: &Problem<'_>) -> Vec<Vec<f64>> {
+    pub(crate) fn free_covariance(&self, problem: &Problem<'_>) -> Vec<Vec<f64>> {
         let mut covariance = self.by_noise(problem);
-        for influence in self.widening_influences() {
-            add_outer(&mut covariance, &influence.moves[..problem.free.len()], 1.0);
-        }
+        add(&mut covariance, &self.influences.covariance, 1.0);
         covariance
     }
 
@@ -259,11 +266,11 @@ impl Statistics {
         self.covariance[..free].iter().map(|row| row[..free].to_vec()).collect()
     }
 
-    /// What the data cannot tell, in words.
+    /// Returns what the data cannot tell, in words.
     pub(crate) fn untold(&self, problem: &Problem<'_>, x: &[f64]) -> Vec<String> {
         let covariance = self.by_noise(problem);
         let names: Vec<&str> = problem.free.iter().map(|free| free.parameter.name()).collect();
-        // Of a number that is 0 nothing is relative.
+        // Nothing is relative to a number that is 0.
         let greater = problem.free.iter().zip(x).map(|(free, x)| x.abs().max(free.start.abs()));
         let sizes: Vec<f64> = greater.map(|size| if size > 0.0 { size } else { 1.0 }).collect();
         let row = |(i, row): (usize, &Vec<f64>)| -> Vec<f64> {
@@ -326,8 +333,8 @@ fn widened(mut covariance: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Vec<Vec<f64>> {
         if variance > 0.0 { (other[k][k] / variance).max(1.0).sqrt() } else { 1.0 }
     };
     let ratios: Vec<f64> = (0..covariance.len()).map(ratio).collect();
-    for (row, of_row) in covariance.iter_mut().zip(&ratios) {
-        row.iter_mut().zip(&ratios).for_each(|(entry, ratio)| *entry *= of_row * ratio);
+    for (row, row_ratio) in covariance.iter_mut().zip(&ratios) {
+        row.iter_mut().zip(&ratios).for_each(|(entry, ratio)| *entry *= row_ratio * ratio);
     }
     covariance
 }
@@ -375,7 +382,8 @@ fn product(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
     a.iter().map(|row| b.iter().map(|column| dot(row, column)).collect()).collect()
 }
 
-/// Sum over all pairs of samples of slope, correlation by lag, slope; once over the noise squared.
+/// Computes the sum over all pairs of samples of slope, correlation by lag and slope, times a
+/// weight.
 fn correlated(slopes: &[Vec<f64>], rho: &[f64], weight: f64) -> Vec<Vec<f64>> {
     let n = slopes.len();
     let mut sum = vec![vec![0.0; n]; n];
@@ -394,8 +402,8 @@ fn correlated(slopes: &[Vec<f64>], rho: &[f64], weight: f64) -> Vec<Vec<f64>> {
     sum
 }
 
-/// The correlation of values with those so many places later; as if they were even in time, which
-/// gaps only interrupt.
+/// Returns the correlation of values with those so many places later; as if they were even in time,
+/// which gaps only interrupt.
 fn correlation(values: &[f64], lag: usize) -> f64 {
     dot(values, &values[lag..]) / dot(values, values).max(f64::MIN_POSITIVE)
 }
@@ -411,8 +419,8 @@ fn is_white_noise(residual: &[f64]) -> bool {
     residual.len() as f64 * squares <= expected + CHANCE * (2.0 * expected).sqrt()
 }
 
-/// The autocorrelation by lag, tapered to nothing where it is no more than chance. The taper's flat
-/// top keeps what slow noise has: Bartlett's would take a third.
+/// Returns the autocorrelation by lag, tapered to nothing where it is no more than chance. The
+/// taper's flat top keeps what slow noise has: Bartlett's would take a third.
 ///
 /// D. N. Politis, J. P. Romano, Journal of Time Series Analysis 16 (1995), 67-103.
 fn autocorrelation(residual: &[f64]) -> Vec<f64> {
@@ -428,7 +436,8 @@ fn lag_window(residual: &[f64]) -> Vec<f64> {
     // White's variance of a correlation: of noise that is greater at times fewer values count.
     let chance = |lag: usize| 2.0 * dot(&squares, &squares[lag..]).sqrt() / total;
     let most = MOST_LAGS.min(residual.len() / 4);
-    let (mut last, mut lag) = (0, 1);
+    let mut last = 0;
+    let mut lag = 1;
     while lag < most && lag <= last + 5 {
         if correlation(residual, lag).abs() > chance(lag) {
             last = lag;
@@ -439,8 +448,9 @@ fn lag_window(residual: &[f64]) -> Vec<f64> {
     std::iter::once(1.0).chain((1..most.min(2 * last)).map(taper)).collect()
 }
 
-/// The share of a residual's mean square that is a motion: as much as it swings back, if that is
-/// more than chance. Noise may be slow, but does not swing; and hum is faster than a suspension.
+/// Returns the share of a residual's mean square that is a motion: as much as it swings back, if
+/// that is more than chance. Noise may be slow, but does not swing; and hum is faster than a
+/// suspension.
 fn swinging(residual: &[f64], rate_hz: f64, turn_s: f64) -> f64 {
     let block = ((FASTEST * turn_s * rate_hz) as usize).clamp(1, residual.len());
     let mean = |some: &[f64]| some.iter().sum::<f64>() / block as f64;
@@ -487,7 +497,8 @@ mod tests {
 
     #[test]
     fn a_motion_is_told_from_noise_and_hum() {
-        let (rate_hz, turn_s) = (500.0, 60.0 / 350.0);
+        let rate_hz = 500.0;
+        let turn_s = 60.0 / 350.0;
         let tone = |hz: f64| move |k: usize| (TAU * hz * k as f64 / rate_hz).sin();
         for correlation in [0.0, 0.6, 0.9, 0.97] {
             let noise = noise(5, 0, 12_000, correlation);

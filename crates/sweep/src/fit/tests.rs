@@ -11,7 +11,7 @@ use sweep_files::ParquetFile;
 /// The reference's spin; of a run shorter than it, less.
 const GRID: &str = "spin = { profile = \"triangular\", peak_rpm = 350, ramp_s = 12 }\n\
                     time = { end_s = 24 }\n";
-/// What the noisy files' noise is (m/s^2, rad).
+/// The noise of the noisy files (m/s^2, rad). Basis: their `.json`. Doubling it contradicts them.
 const NOISE: [f64; 4] = [0.3, 0.3, 5e-4, 5e-4];
 
 const VISCOUS: [(&str, f64); 3] = [
@@ -28,9 +28,9 @@ const FRICTION: [(&str, f64); 5] = [
 ];
 
 /// A reference file up to a time.
-fn reference(name: &str, end_s: f64) -> Measured {
+fn reference(name: &str, end_s: f64) -> Measurement {
     let path = format!("{}/testdata/fit/{name}.csv", env!("CARGO_MANIFEST_DIR"));
-    let mut measured = Measured::read(Path::new(&path), &[]).unwrap();
+    let mut measured = Measurement::read(Path::new(&path), &[]).unwrap();
     let rows = measured.time_s.partition_point(|time| *time <= end_s);
     measured.time_s.truncate(rows);
     measured.speed_rpm.iter_mut().for_each(|speed| speed.truncate(rows));
@@ -38,7 +38,7 @@ fn reference(name: &str, end_s: f64) -> Measured {
     measured
 }
 
-fn case_at(numbers: &[(&str, f64)], factor: f64, measured: Measured) -> Case {
+fn case_at(numbers: &[(&str, f64)], factor: f64, measured: Measurement) -> FitCase {
     let at = numbers.iter().map(|(name, value)| format!("{name}={}", value * factor));
     let at: Vec<String> = at.chain(["friction_linear_speed_m_per_s=0.1".to_owned()]).collect();
     case(&WasherGridInput::text("reference", GRID.to_owned(), Vec::new()), &at, measured).unwrap()
@@ -57,13 +57,13 @@ fn options(free: &[&str]) -> FitOptions {
     }
 }
 
-fn fitted(cases: Vec<Case>, options: &FitOptions) -> Report {
-    let work = Work { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
+fn fitted(cases: Vec<FitCase>, options: &FitOptions) -> FitReport {
+    let work = FitWork { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
     fit(cases, options, &work).unwrap().unwrap().report
 }
 
-/// How many standard errors each number is from the truth.
-fn off(report: &Report, truth: &[(&str, f64)]) -> Vec<f64> {
+/// Returns by how many standard errors each number is from the truth.
+fn off(report: &FitReport, truth: &[(&str, f64)]) -> Vec<f64> {
     let off = |fit: &report::Fit| {
         let (_, truth) = truth.iter().find(|(name, _)| *name == fit.name).unwrap();
         (fit.value - truth) / fit.standard_error.unwrap()
@@ -94,7 +94,8 @@ fn the_model_at_the_truth_is_the_exact_record() {
     for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
         let cases = vec![case_at(truth, 1.0, reference(name, 8.0))];
         let method = Problem::method(&cases).unwrap();
-        let (model, simd) = (ModelKind::Nonlinear, simd_from_environment().unwrap());
+        let model = ModelKind::Nonlinear;
+        let simd = simd_from_environment().unwrap();
         let free = Vec::new();
         let with_shift = false;
         let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
@@ -156,7 +157,8 @@ fn an_interval_goes_no_farther_than_its_range() {
 fn a_search_that_came_to_no_end_gives_no_intervals() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 3.0))];
     let method = Problem::method(&cases).unwrap();
-    let (model, simd) = (ModelKind::Nonlinear, simd_from_environment().unwrap());
+    let model = ModelKind::Nonlinear;
+    let simd = simd_from_environment().unwrap();
     let free = free(&options(&["damping_n_s_per_m"]), &cases).unwrap();
     let with_shift = false;
     let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
@@ -165,8 +167,9 @@ fn a_search_that_came_to_no_end_gives_no_intervals() {
     let summary = problem.summary(&against);
     let statistics = Statistics::of(&problem, &against, &summary);
     for is_settled in [true, false] {
-        let (x, summary) = (x.clone(), summary.clone());
-        let found = report::Found {
+        let x = x.clone();
+        let summary = summary.clone();
+        let found = report::ReportData {
             problem: &problem,
             suspicions: &[],
             minima: &[Descent { x, summary, evaluations: 1, is_settled }],
@@ -194,7 +197,8 @@ fn a_fitted_machine_file_says_where_its_numbers_are_from() {
     let start = [VISCOUS[0], VISCOUS[1], ("friction_n", 5.0)];
     let cases = vec![case_at(&start, 1.0, reference("viscous", 1.0))];
     let free = free(&options(&["damping_n_s_per_m"]), &cases).unwrap();
-    let (method, model) = (Problem::method(&cases).unwrap(), ModelKind::Nonlinear);
+    let method = Problem::method(&cases).unwrap();
+    let model = ModelKind::Nonlinear;
     let simd = simd_from_environment().unwrap();
     let with_shift = false;
     let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
@@ -252,12 +256,13 @@ fn seed() -> u64 {
 
 #[test]
 fn intervals_know_that_noise_is_correlated_or_grows() {
-    const DRAWS: u64 = 50;
+    const DRAWS: u64 = 100;
     for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
         let names: Vec<&str> = truth.iter().map(|(name, _)| *name).collect();
         let cases = vec![case_at(truth, 1.0, reference(name, 24.0))];
         let method = Problem::method(&cases).unwrap();
-        let (model, simd) = (ModelKind::Nonlinear, simd_from_environment().unwrap());
+        let model = ModelKind::Nonlinear;
+        let simd = simd_from_environment().unwrap();
         let free = free(&options(&names), &cases).unwrap();
         let with_shift = true;
         let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
@@ -306,7 +311,12 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
                 }
                 let summary = problem.summary(&against);
                 let statistics = Statistics::of(&problem, &against, &summary);
-                objections += u64::from(statistics.objection(&problem).is_some());
+                if let Some(objection) = statistics.objection(&problem) {
+                    if objections == 0 {
+                        println!("{objection}");
+                    }
+                    objections += 1;
+                }
                 for (k, held) in held.iter_mut().enumerate() {
                     *held += u64::from(moved[k].abs() < 1.96 * statistics.covariance[k][k].sqrt());
                 }
@@ -315,8 +325,8 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
             let kind = format!("{name}, {correlation}, {growth}, {by_envelope}");
             println!("{kind}: {held:?} of {DRAWS} hold the truth: {share:.3}; {objections} object");
             assert!(growth > 0.0 || objections == 0, "{kind}: {objections}");
-            // Noise that grows leaves fewer rows that count: the share is known less well.
-            let expected = if growth > 0.0 { 0.88..=1.0 } else { 0.90..=0.99 };
+            // Correlations are known less well than variances, and the widest estimate counts.
+            let expected = if correlation > 0.0 || growth > 0.0 { 0.90..=1.0 } else { 0.90..=0.99 };
             assert!(expected.contains(&share), "{kind}: {held:?}");
         }
     }
@@ -336,8 +346,8 @@ fn a_linear_model_says_what_the_nonlinear_one_would_have() {
 
 #[test]
 fn what_cannot_be_fitted_is_said() {
-    let wrong = |free: &[&str], measured: Measured| {
-        let work = Work { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
+    let wrong = |free: &[&str], measured: Measurement| {
+        let work = FitWork { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
         let cases = vec![case_at(&VISCOUS, 1.0, measured)];
         match fit(cases, &options(free), &work) {
             Err(error) => error.to_string(),
@@ -416,7 +426,7 @@ fn a_number_that_does_not_count_at_the_start_is_found_from_others() {
     let start = [("friction_n", 0.0), FRICTION[0], FRICTION[1], FRICTION[2]];
     let cases = || vec![case_at(&start, 1.0, reference("friction", 8.0))];
     let mut options = options(&["friction_n=0:60", "friction_speed_m_per_s=0.005:0.02"]);
-    let work = Work { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
+    let work = FitWork { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
     let error = fit(cases(), &options, &work).err().unwrap().to_string();
     assert!(error.contains("does not depend on friction_speed_m_per_s"), "{error}");
     options.starts = 6;
@@ -498,7 +508,7 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
         made.fetch_add(1, Ordering::Relaxed);
     };
     let stop = || made.load(Ordering::Relaxed) >= 3;
-    let work = Work { stop: &stop, seen: &seen, output: Some(&output), fresh: false };
+    let work = FitWork { stop: &stop, seen: &seen, output: Some(&output), fresh: false };
     assert!(fit(cases(), &options, &work).unwrap().is_none());
     let part = ParquetFile::open(&partial.join("part-00000000.parquet")).unwrap();
     // The start is evaluated once, though a descent asks for it again.
@@ -509,7 +519,7 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
 
     // Another fit leaves them alone, and so does a second process.
     let stopped = || true;
-    let work = Work { stop: &stopped, seen: &|_| {}, output: Some(&output), fresh: false };
+    let work = FitWork { stop: &stopped, seen: &|_| {}, output: Some(&output), fresh: false };
     let other = FitOptions { no_shift: true, ..options.clone() };
     let error = fit(cases(), &other, &work).err().unwrap().to_string();
     assert!(error.contains("/fit/shift: was true, is false"), "{error}");
@@ -518,7 +528,7 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     let seen = |_| {
         made.fetch_add(1, Ordering::Relaxed);
     };
-    let work = Work { stop: &|| false, seen: &seen, output: Some(&output), fresh: false };
+    let work = FitWork { stop: &|| false, seen: &seen, output: Some(&output), fresh: false };
     let resumed = fit(cases(), &options, &work).unwrap().unwrap();
     assert_eq!(serde_json::json!(resumed.report), serde_json::json!(whole));
     let busy = fit(cases(), &options, &work).err().unwrap().to_string();
@@ -536,7 +546,7 @@ fn a_damaged_part_of_a_fit_costs_its_evaluations() {
     let options = options(&["damping_n_s_per_m"]);
     let whole = fitted(cases(), &options);
     let fit = || {
-        let work = Work { stop: &|| false, seen: &|_| {}, output: Some(&output), fresh: false };
+        let work = FitWork { stop: &|| false, seen: &|_| {}, output: Some(&output), fresh: false };
         fit(cases(), &options, &work).unwrap().unwrap()
     };
     drop(fit());

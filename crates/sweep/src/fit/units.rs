@@ -8,8 +8,8 @@ use std::f64::consts::TAU;
 
 use super::algebra::{Symmetric, centred, dot, scaled};
 use super::measured::{LONGEST_RUN_S, SLOWEST_S, Signal, usual_step};
-use super::model::{Case, Free, Problem};
-use super::search::{Descent, Ended, descend};
+use super::model::{FitCase, Free, Problem};
+use super::search::{Descent, DescentEnd, descend};
 use super::speed;
 use super::statistics::EXPLAINED_RATIO;
 
@@ -27,8 +27,9 @@ const SAMPLES_PER_TURN: f64 = 4.0;
 /// of noise none does; and in a band of instability most of a record turns otherwise, in any unit.
 /// Doubling it leaves out such records.
 const TURNING_RATIO: f64 = 0.1;
-/// How many times that of the unit as given. Basis: a right unit's part is no such multiple of it
-/// in another. Doubling it leaves out records that turn a little in wrong units too.
+/// The least ratio of the part by a unit to that by the unit as given. Basis: a right unit's part
+/// is no such multiple of it in another. Doubling it leaves out records that turn a little in wrong
+/// units too.
 const TURNING_GAIN: f64 = 2.0;
 /// The greatest number of evaluations of a short fit. Basis: test
 /// `a_wrong_unit_of_speed_or_time_is_named`. Doubling it makes a trial as long as a fit.
@@ -38,38 +39,38 @@ const TRIAL_PARAMETERS: usize = 2;
 
 /// The column whose unit may be wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Column {
+enum ClockColumn {
     Speed,
     Time,
 }
 
 /// A unit other than the column's own.
 #[derive(Clone, Copy, Debug)]
-struct Unit {
-    column: Column,
+struct ClockUnit {
+    column: ClockColumn,
     name: &'static str,
     /// The size of the unit in the column's own.
     factor: f64,
 }
 
 /// Units in which speeds and times are recorded by mistake.
-const UNITS: [Unit; 12] = [
-    Unit { column: Column::Speed, name: "rad/s", factor: 60.0 / TAU },
-    Unit { column: Column::Speed, name: "Hz", factor: 60.0 },
-    Unit { column: Column::Speed, name: "degrees per s", factor: 1.0 / 6.0 },
-    Unit { column: Column::Speed, name: "tenths of rpm", factor: 0.1 },
-    Unit { column: Column::Speed, name: "tens of rpm", factor: 10.0 },
-    Unit { column: Column::Speed, name: "thousands of rpm", factor: 1e3 },
-    Unit { column: Column::Time, name: "min", factor: 60.0 },
-    Unit { column: Column::Time, name: "h", factor: 3600.0 },
-    Unit { column: Column::Time, name: "ms", factor: 1e-3 },
-    Unit { column: Column::Time, name: "hundredths of s", factor: 1e-2 },
-    Unit { column: Column::Time, name: "tenths of s", factor: 0.1 },
-    Unit { column: Column::Time, name: "tens of s", factor: 10.0 },
+const UNITS: [ClockUnit; 12] = [
+    ClockUnit { column: ClockColumn::Speed, name: "rad/s", factor: 60.0 / TAU },
+    ClockUnit { column: ClockColumn::Speed, name: "Hz", factor: 60.0 },
+    ClockUnit { column: ClockColumn::Speed, name: "degrees per s", factor: 1.0 / 6.0 },
+    ClockUnit { column: ClockColumn::Speed, name: "tenths of rpm", factor: 0.1 },
+    ClockUnit { column: ClockColumn::Speed, name: "tens of rpm", factor: 10.0 },
+    ClockUnit { column: ClockColumn::Speed, name: "thousands of rpm", factor: 1e3 },
+    ClockUnit { column: ClockColumn::Time, name: "min", factor: 60.0 },
+    ClockUnit { column: ClockColumn::Time, name: "h", factor: 3600.0 },
+    ClockUnit { column: ClockColumn::Time, name: "ms", factor: 1e-3 },
+    ClockUnit { column: ClockColumn::Time, name: "hundredths of s", factor: 1e-2 },
+    ClockUnit { column: ClockColumn::Time, name: "tenths of s", factor: 0.1 },
+    ClockUnit { column: ClockColumn::Time, name: "tens of s", factor: 10.0 },
 ];
 
 /// Returns for each file whose columns seem to be in another unit a clause that says so.
-pub(super) fn suspicions(problem: &Problem<'_>) -> Result<Vec<String>, Ended> {
+pub(super) fn suspicions(problem: &Problem<'_>) -> Result<Vec<String>, DescentEnd> {
     let mut found = Vec::new();
     for case in 0..problem.cases.len() {
         found.extend(suspicion(problem, case)?);
@@ -77,10 +78,10 @@ pub(super) fn suspicions(problem: &Problem<'_>) -> Result<Vec<String>, Ended> {
     Ok(found)
 }
 
-fn suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, Ended> {
+fn suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, DescentEnd> {
     let as_given = &problem.cases[case];
     let least_ratio = TURNING_RATIO.max(TURNING_GAIN * turning_ratio(as_given));
-    let mut best: Option<(Unit, f64)> = None;
+    let mut best: Option<(ClockUnit, f64)> = None;
     for unit in UNITS {
         let Some(converted) = converted(as_given, unit) else { continue };
         let turning = turning_ratio(&converted);
@@ -96,8 +97,8 @@ fn suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, Ended
     }
     Ok(best.map(|(unit, ratio)| {
         let (column, own) = match unit.column {
-            Column::Speed => ("speed_rpm", "rpm"),
-            Column::Time => ("time_s", "s"),
+            ClockColumn::Speed => ("speed_rpm", "rpm"),
+            ClockColumn::Time => ("time_s", "s"),
         };
         let (name, factor, file) = (unit.name, unit.factor, &as_given.measured.name);
         let gain = if ratio > EXPLAINED_RATIO {
@@ -113,11 +114,11 @@ fn suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, Ended
 
 /// Returns a case whose column is converted from a unit; none if there is no such column, the run
 /// would be too long, or its rows would show no turn of a drum.
-fn converted(case: &Case, unit: Unit) -> Option<Case> {
+fn converted(case: &FitCase, unit: ClockUnit) -> Option<FitCase> {
     let mut measured = case.measured.clone();
     let column = match unit.column {
-        Column::Speed => measured.speed_rpm.as_mut()?,
-        Column::Time => &mut measured.time_s,
+        ClockColumn::Speed => measured.speed_rpm.as_mut()?,
+        ClockColumn::Time => &mut measured.time_s,
     };
     column.iter_mut().for_each(|value| *value *= unit.factor);
     let end_s = *measured.time_s.last()?;
@@ -126,12 +127,12 @@ fn converted(case: &Case, unit: Unit) -> Option<Case> {
     }
     let speed = measured.speed_rpm.as_ref();
     let smoothed = speed.and_then(|speed| speed::smoothed(&measured.time_s, speed));
-    Some(Case { plan: case.plan.clone(), measured, smoothed })
+    Some(FitCase { plan: case.plan.clone(), measured, smoothed })
 }
 
 /// Computes the part of a record's variance that turns with the drum, the mean of its signals: by
 /// least squares, block by block, a constant and the drum's sine and cosine.
-fn turning_ratio(case: &Case) -> f64 {
+fn turning_ratio(case: &FitCase) -> f64 {
     let turns = turns(case);
     let signals = &case.measured.signals;
     let ratio = |signal: &Signal| {
@@ -144,7 +145,7 @@ fn turning_ratio(case: &Case) -> f64 {
 }
 
 /// Computes the turns of the drum up to every row, by the trapezoidal rule.
-fn turns(case: &Case) -> Vec<f64> {
+fn turns(case: &FitCase) -> Vec<f64> {
     let times = &case.measured.time_s;
     let speeds: Vec<f64> = case.spin().speeds_rpm(times.iter().copied()).collect();
     let mut turns = vec![0.0; times.len()];
@@ -200,8 +201,8 @@ fn block_square(block: &[[f64; 2]]) -> f64 {
 fn explained_by_short_fit(
     problem: &Problem<'_>,
     case: usize,
-    converted: Case,
-) -> Result<f64, Ended> {
+    converted: FitCase,
+) -> Result<f64, DescentEnd> {
     let cases = vec![converted];
     let Ok(method) = Problem::method(&cases) else { return Ok(0.0) };
     let own = problem.free.iter().filter(|free| free.is_of(case));
@@ -211,7 +212,7 @@ fn explained_by_short_fit(
     let evaluate = |x: &[f64]| {
         let against = trial.against(x);
         if (trial.stop)() {
-            return Err(Ended::Stopped);
+            return Err(DescentEnd::Stopped);
         }
         Ok(against.map(|against| trial.summary(&against)))
     };

@@ -1,14 +1,13 @@
-//! What the map says of a fitted machine, and its margin to instability.
+//! The map's row of a fitted machine, and its margin to instability.
 
 use std::f64::consts::TAU;
 
 use serde::Serialize;
-use washer_model::{Dwell, Response};
+use washer_model::{Dwell, Parameter, Response};
 use washer_row::{Growth, Outcome, Status, Verdict as RowVerdict};
 
 use super::algebra::{dot, middle_95};
 use super::draws;
-use super::known::Influence;
 use super::model::Problem;
 use super::statistics::{Statistics, Z_975};
 use crate::engine::{ModelEngine, fastest_growth, find_responses};
@@ -19,14 +18,14 @@ use sweep_engine::commands::cells::span;
 /// Speeds at which the fitted machine's stability is looked at.
 const SPEEDS: u32 = 120;
 
-/// The number of fixed numbers whose errors count in a margin, those that move the estimates most.
-/// Basis: the tolerance of the eighth adds some percent to an interval. Doubling it doubles the
-/// time that the interval takes.
-const MARGIN_NUMBERS: usize = 8;
+/// The number of directions of fixed numbers' errors that count in a margin, those that move the
+/// estimates most. Basis: the eighth adds some percent to an interval. Doubling it doubles the time
+/// that the interval takes.
+const MARGIN_DIRECTIONS: usize = 8;
 
 /// The map's row at the fitted machine.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Verdict {
+pub(crate) struct FittedVerdict {
     pub(crate) reliable: Option<bool>,
     pub(crate) ratio_max: Option<f64>,
     pub(crate) ratio_limit: f64,
@@ -34,7 +33,7 @@ pub(crate) struct Verdict {
     pub(crate) probability_reliable: Option<f64>,
     /// Between which the greatest ratio lies in 95 % of them.
     pub(crate) ratio_max_95: Option<[f64; 2]>,
-    /// How many there are.
+    /// The number of these rows.
     pub(crate) draws: usize,
     /// The fastest growing disturbance of the periodic responses up to the fastest speed: below
     /// zero, the machine is outside every band of instability, by so much.
@@ -46,7 +45,7 @@ pub(crate) struct Verdict {
     pub(crate) growth_on_curve: Option<bool>,
 }
 
-impl Verdict {
+impl FittedVerdict {
     /// Says on which side of a band of instability the machine is, if its growth is known; at the
     /// edge, if the interval of its growth holds 0.
     pub(super) fn margin(&self, short: &dyn Fn(f64) -> String) -> Option<String> {
@@ -88,8 +87,8 @@ pub(super) struct OnMap<'a> {
 }
 
 impl OnMap<'_> {
-    /// The row of a case's map at its fitted machine, and over the fitted distribution.
-    pub(super) fn verdict(&self, case: usize, follows: bool) -> Result<Verdict, Error> {
+    /// Computes the row of a case's map at its fitted machine, and over the fitted distribution.
+    pub(super) fn verdict(&self, case: usize, follows: bool) -> Result<FittedVerdict, Error> {
         let problem = self.problem;
         let x = self.x;
         // The map's spin is the grid's, of which a measured one has no numbers.
@@ -116,7 +115,8 @@ impl OnMap<'_> {
             sets.iter().map(|set| own.iter().map(|&k| set[k]).collect()).collect();
         let engine = ModelEngine::new(&plan)?;
         let outcomes = if (problem.stop)() { Vec::new() } else { engine.evaluate_at(&points) };
-        let (channels, limits) = (plan.reliability.channels.len(), plan.reliability.limits);
+        let channels = plan.reliability.channels.len();
+        let limits = plan.reliability.limits;
         let verdict = |outcome: &Outcome| RowVerdict::new(outcome, channels, limits);
         let verdicts: Vec<RowVerdict> = outcomes.iter().map(verdict).collect();
         let ratio = |verdict: &RowVerdict| verdict.greatest.map(|(_, ratio)| ratio);
@@ -127,7 +127,7 @@ impl OnMap<'_> {
             Some((growth, interval)) => (Some(growth), interval),
             None => (None, None),
         };
-        Ok(Verdict {
+        Ok(FittedVerdict {
             reliable: verdicts.first().and_then(|verdict| verdict.reliable),
             ratio_max: verdicts.first().and_then(ratio),
             ratio_limit: limits.most,
@@ -157,26 +157,28 @@ impl OnMap<'_> {
             .map(|k| step_rpm * f64::from(k))
             .filter(|speed| *speed > 0.0)
             .collect();
-        let growth = fastest_growth(&self.responses_at(case, plan, (x, None), &speeds)?)?;
+        let growth = fastest_growth(&self.responses_at(case, plan, (x, &[]), &speeds)?)?;
         let interval = covariance
             .and_then(|covariance| self.growth_95(case, plan, (&growth, step_rpm), covariance));
         Some((growth, interval))
     }
 
-    /// Returns the responses of a case's machine at some speeds, with another fixed number perhaps.
+    /// Returns the responses of a case's machine at some speeds, with changed fixed numbers.
     fn responses_at(
         &self,
         case: usize,
         plan: &Plan,
-        (x, fixed): (&[f64], Option<&Influence>),
+        (x, fixed): (&[f64], &[(Parameter, f64)]),
         speeds: &[f64],
     ) -> Option<Vec<Result<Vec<Response>, Status>>> {
         let (mut machine, mut spin) = self.problem.machine(case, x);
-        if let Some(fixed) = fixed
-            && let Some(parameter) = &fixed.parameter
-            && let Some(value) = parameter.get(&machine, &spin)
-        {
-            parameter.set(&mut machine, &mut spin, value + fixed.tolerance);
+        for (parameter, change) in fixed {
+            if let Some(value) = parameter.get(&machine, &spin) {
+                parameter.set(&mut machine, &mut spin, value + change);
+            }
+        }
+        if !machine.violations().is_empty() {
+            return None;
         }
         let point = prepare_point(machine, spin, &timing(plan)).ok()?;
         let dwells: Vec<Dwell<'_>> =
@@ -198,12 +200,12 @@ impl OnMap<'_> {
         let x = self.x;
         let middle_rpm = growth.fastest.speed_rpm;
         let speeds = [middle_rpm - step_rpm, middle_rpm, middle_rpm + step_rpm];
-        let growths = |x: &[f64], fixed: Option<&Influence>| -> Option<Vec<f64>> {
+        let growths = |x: &[f64], fixed: &[(Parameter, f64)]| -> Option<Vec<f64>> {
             let found = self.responses_at(case, plan, (x, fixed), &speeds)?;
             found.iter().map(|found| Some(found.as_ref().ok()?.first()?.growth_per_s())).collect()
         };
         let greatest = |growths: &[f64]| growths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let here = growths(x, None)?;
+        let here = growths(x, &[])?;
         let mut slopes = vec![0.0; covariance.len()];
         for (k, free) in self.problem.free.iter().enumerate() {
             let error = covariance[k][k].max(0.0).sqrt();
@@ -213,20 +215,28 @@ impl OnMap<'_> {
             let mut beside = x.to_vec();
             let step = if x[k] + error > free.range[1] { -error } else { error };
             beside[k] = (x[k] + step).max(free.range[0]);
-            let change = greatest(&growths(&beside, None)?) - greatest(&here);
+            let change = greatest(&growths(&beside, &[])?) - greatest(&here);
             if beside[k] != x[k] {
                 slopes[k] = change / (beside[k] - x[k]);
             }
         }
         let mut variance: f64 =
             covariance.iter().zip(&slopes).map(|(row, slope)| slope * dot(row, &slopes)).sum();
-        for fixed in self.statistics.widening_influences().iter().take(MARGIN_NUMBERS) {
-            let moved = |(k, (x, by)): (usize, (&f64, &f64))| {
-                let [from, to] = self.problem.range(k);
-                (x - by).clamp(from, to)
-            };
-            let beside: Vec<f64> = x.iter().zip(&fixed.moves).enumerate().map(moved).collect();
-            let change = greatest(&growths(&beside, Some(fixed))?) - greatest(&here);
+        for direction in self.statistics.influences.directions.iter().take(MARGIN_DIRECTIONS) {
+            // A number at an end of its range can change one way only.
+            let found = [1.0, -1.0].into_iter().find_map(|sign| {
+                let moved = |(k, (x, by)): (usize, (&f64, &f64))| {
+                    let [from, to] = self.problem.range(k);
+                    (x - sign * by).clamp(from, to)
+                };
+                let moves = x.iter().zip(&direction.moves).enumerate();
+                let beside: Vec<f64> = moves.map(moved).collect();
+                let changes = direction.changes.iter();
+                let changes: Vec<(Parameter, f64)> =
+                    changes.map(|(parameter, by)| (parameter.clone(), sign * by)).collect();
+                growths(&beside, &changes)
+            });
+            let change = greatest(&found?) - greatest(&here);
             variance += change * change;
         }
         let reach = Z_975 * variance.max(0.0).sqrt();
@@ -244,7 +254,7 @@ mod tests {
     #[test]
     fn a_margin_within_its_error_is_at_the_edge() {
         let said = |growth: f64, interval: Option<[f64; 2]>| {
-            let verdict = Verdict {
+            let verdict = FittedVerdict {
                 reliable: None,
                 ratio_max: None,
                 ratio_limit: 1.2,

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::{Effort, Explained, PointTable};
 use crate::config::WasherGridInput;
-use crate::fit::{self, FitOptions, Measured, Work};
+use crate::fit::{self, FitOptions, FitWork, Measurement};
 use sweep_engine::{Error, threads};
 
 /// Fits parameters of a grid's machine to measurements; `None` if it was interrupted. A measurement
@@ -26,14 +26,14 @@ pub fn fit_tables(
     let columns = grid.load()?.aside.columns;
     let mut cases = Vec::with_capacity(tables.len());
     for (k, (table, constants)) in tables.into_iter().enumerate() {
-        let mut measured = Measured::of_columns(table.into_columns(), &columns)?;
+        let mut measured = Measurement::from_columns(table.into_columns(), &columns)?;
         if k > 0 {
             measured.name = format!("table {}", k + 1);
         }
         cases.push(fit::case(grid, &constants, measured)?);
     }
     let stop = || effort.interrupt.stopped();
-    let work = Work { stop: &stop, seen: &|_| {}, output: None, fresh: false };
+    let work = FitWork { stop: &stop, seen: &|_| {}, output: None, fresh: false };
     let found = threads::pool(effort.threads()?)?.install(|| fit::fit(cases, options, &work))?;
     Ok(found.map(|fitted| Explained { found: json!(fitted.report), text: fitted.report.text() }))
 }

@@ -294,8 +294,8 @@ def fit(
     A table has the column `time_s`, optionally `speed_rpm`, and channels with their units, such as
     `tub_front_y_m_per_s2`, with NaN where there is no sample. `free` are the names of the numbers
     to fit, or `name=from:to`; `own` are further ones that have a value for each table. `at` has
-    the constants of each table. `known` are tolerances of fixed numbers, such as `tub_mass_kg=2%`,
-    `default` or `none`. The keys of the result are those of `sweep fit --json`.
+    the constants of each table. `known` are tolerances of fixed numbers, such as `tub_mass_kg=2%`;
+    all others have those of their kind, or with `none` are exact. The keys of the result are those of `sweep fit --json`.
     """
 
 def parameters(plan: Plan | None = None) -> list[Parameter]:
