@@ -213,7 +213,10 @@ impl ReportData<'_> {
         let at_bound = free.range.contains(&value);
         let known = follows && !at_bound && error > 0.0;
         let [least, most] = self.problem.range(k);
-        let reached = [(value - Z_975 * error).max(least), (value + Z_975 * error).min(most)];
+        let by_noise = self.statistics.quantiles[k] * noise_error;
+        let by_fixed = Z_975 * Z_975 * (error * error - noise_error * noise_error).max(0.0);
+        let reach = (by_noise * by_noise + by_fixed).sqrt();
+        let reached = [(value - reach).max(least), (value + reach).min(most)];
         Fit {
             name: free.parameter.name().to_owned(),
             unit: free.parameter.unit().to_owned(),

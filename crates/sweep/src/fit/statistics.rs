@@ -59,6 +59,9 @@ pub(super) const Z_975: f64 = 1.959_964;
 pub(crate) struct Statistics {
     /// Covariance of the unknowns, by the residuals' own correlation in time.
     pub(crate) covariance: Vec<Vec<f64>>,
+    /// The quantile of 0.975 of each unknown's error over its standard error: Student's, by the
+    /// degrees of freedom of its variance.
+    pub(crate) quantiles: Vec<f64>,
     /// The dependence of the unknowns on fixed numbers, which widens intervals.
     pub(crate) influences: FixedInfluences,
     /// The factor by which autocorrelation widens variances: for each signal, the variance of a
@@ -97,6 +100,7 @@ impl Statistics {
         let mut is_white = Vec::new();
         let mut disagreement = 0.0;
         let mut freedom = 0.0;
+        let mut spread = vec![VarianceEstimate::default(); n];
         let mut worst = (0, [0.0; 2], 0.0);
         for (k, (((_, _, signal), one), sigma)) in
             problem.signals().zip(against).zip(&summary.sigma).enumerate()
@@ -116,6 +120,9 @@ impl Statistics {
             add(&mut own_meat, &correlated(&scores, &window, 1.0), 1.0);
             add(&mut own_white_meat, &correlated(&scores, &[1.0], 1.0), 1.0);
             let noise = noise_scale(one, signal);
+            for (spread, row) in spread.iter_mut().zip(&bread) {
+                spread.add(one, row, &noise, wider / (sigma * sigma), &window);
+            }
             let square = dot(&one.residual, &one.residual);
             let swing = signal.swing();
             let case = &problem.cases[one.case];
@@ -175,8 +182,10 @@ impl Statistics {
             .map(|row| row.iter().map(|x| x * disagreement.max(1.0)).collect())
             .collect();
         let worst = (worst.0, worst.1);
+        let quantiles = spread.iter().map(|spread| student_975(spread.freedom())).collect();
         Self {
             covariance,
+            quantiles,
             influences: FixedInfluences::default(),
             widening,
             neighbours,
@@ -357,6 +366,57 @@ fn scores(one: &Against, bread: &[Vec<f64>], sigma: f64) -> Vec<Vec<f64>> {
         .collect();
     let score = |slope: &Vec<f64>| slope.iter().zip(&predicted).map(|(g, r)| g * r).collect();
     one.slopes.iter().map(score).collect()
+}
+
+/// The variance of an estimate, and the variance of that variance.
+///
+/// F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114; for variances by residuals
+/// G. W. Imbens, M. Kolesár, Review of Economics and Statistics 98 (2016), 701-712.
+#[derive(Clone, Debug, Default)]
+struct VarianceEstimate {
+    variance: f64,
+    half_variance: f64,
+}
+
+impl VarianceEstimate {
+    /// Adds a signal, by the row of the inverse of the normal matrix for the unknown, the noise of
+    /// each sample over its mean, the weight of a sample, and the window of its correlations.
+    fn add(&mut self, one: &Against, row: &[f64], noise: &[f64], weight: f64, window: &[f64]) {
+        let shares = noise.iter().enumerate().map(|(sample, noise)| {
+            let along = one.slopes.iter().zip(row);
+            let along: f64 = along.filter_map(|(slope, b)| Some(slope.get(sample)? * b)).sum();
+            weight * (along * noise).powi(2)
+        });
+        let mut sum = 0.0;
+        let mut squares = 0.0;
+        for share in shares {
+            sum += share;
+            squares += share * share;
+        }
+        // Correlations that are estimated beside the variance add their own errors: at a motion's
+        // frequency half as much as at none.
+        let lags = dot(window, window);
+        self.variance += sum;
+        self.half_variance += squares * lags;
+    }
+
+    /// Returns the degrees of freedom of the variance.
+    fn freedom(&self) -> f64 {
+        self.variance * self.variance / self.half_variance.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Returns Student's quantile of 0.975, by Cornish and Fisher's expansion: within 1 % from three
+/// degrees of freedom, fewer are taken as three.
+///
+/// M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 26.7.5.
+fn student_975(freedom: f64) -> f64 {
+    let z = Z_975;
+    let inverse = 1.0 / freedom.max(3.0);
+    let first = (z.powi(3) + z) / 4.0;
+    let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0;
+    let third = (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0;
+    z + inverse * (first + inverse * (second + inverse * third))
 }
 
 /// Estimates the standard deviation of a residual's noise at every sample, over its mean: its

@@ -280,6 +280,7 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
         ] {
             let mut held = vec![0; truth.len()];
             let mut objections = 0;
+            let mut quantile: f64 = 0.0;
             for draw in 0..DRAWS {
                 let mut against = exact.clone();
                 for (one, (.., signal)) in against.iter_mut().zip(problem.signals()) {
@@ -318,12 +319,17 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
                     objections += 1;
                 }
                 for (k, held) in held.iter_mut().enumerate() {
-                    *held += u64::from(moved[k].abs() < 1.96 * statistics.covariance[k][k].sqrt());
+                    let reach = statistics.quantiles[k] * statistics.covariance[k][k].sqrt();
+                    *held += u64::from(moved[k].abs() < reach);
                 }
+                quantile = f64::max(quantile, statistics.quantiles[0]);
             }
             let share = held.iter().sum::<u64>() as f64 / (DRAWS * truth.len() as u64) as f64;
             let kind = format!("{name}, {correlation}, {growth}, {by_envelope}");
-            println!("{kind}: {held:?} of {DRAWS} hold the truth: {share:.3}; {objections} object");
+            println!(
+                "{kind}: {held:?} of {DRAWS} hold the truth: {share:.3}; {objections} object; \
+                 quantile up to {quantile:.2}"
+            );
             assert!(growth > 0.0 || objections == 0, "{kind}: {objections}");
             // Correlations are known less well than variances, and the widest estimate counts.
             let expected = if correlation > 0.0 || growth > 0.0 { 0.90..=1.0 } else { 0.90..=0.99 };
