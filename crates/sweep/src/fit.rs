@@ -334,7 +334,7 @@ fn fitted<'a>(
     }
     let suspicions = match statistics.unexplained() {
         Some(_) => units::suspicions(&problem)?,
-        None => Vec::new(),
+        None => vec![None; problem.cases.len()],
     };
     let found = report::ReportData {
         problem: &problem,

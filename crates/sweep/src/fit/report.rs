@@ -142,8 +142,8 @@ pub(crate) struct Minimum {
 /// The data that a report is made of.
 pub(super) struct ReportData<'a> {
     pub(super) problem: &'a Problem<'a>,
-    /// Columns that seem to be in another unit, each a clause.
-    pub(super) suspicions: &'a [String],
+    /// The clause of each case that its speed or time seems to be in another unit, if it does.
+    pub(super) suspicions: &'a [Option<String>],
     pub(super) minima: &'a [Descent],
     pub(super) against: &'a [Against],
     pub(super) at_start: &'a [Against],
@@ -162,7 +162,7 @@ impl ReportData<'_> {
         let best = &self.minima[0];
         let unsettled = (!best.is_settled).then(|| UNSETTLED.to_owned());
         let objection = unsettled.or_else(|| statistics.objection(problem)).map(|reason| {
-            let clauses = std::iter::once(&reason).chain(self.suspicions);
+            let clauses = std::iter::once(&reason).chain(self.suspicions.iter().flatten());
             clauses.map(String::as_str).collect::<Vec<_>>().join("; ")
         });
         let follows = objection.is_none();
@@ -285,6 +285,10 @@ impl ReportData<'_> {
         let by_start = is_one || self.statistics.objection(self.problem).is_some();
         let signals = self.problem.signals().zip(self.against.iter().zip(self.at_start));
         for ((case, _, signal), (end, start)) in signals {
+            // At wrong speeds the model's size says nothing of a channel's unit.
+            if self.suspicions[case].is_some() {
+                continue;
+            }
             let (unit, mistaken) = signal.quantity.units();
             let Some((other, factor)) = mistaken else { continue };
             let swing = signal.swing();

@@ -171,7 +171,7 @@ fn a_search_that_came_to_no_end_gives_no_intervals() {
         let summary = summary.clone();
         let found = report::ReportData {
             problem: &problem,
-            suspicions: &[],
+            suspicions: &[None],
             minima: &[Descent { x, summary, evaluations: 1, is_settled }],
             against: &against,
             at_start: &against,
@@ -467,6 +467,8 @@ fn a_wrong_unit_of_speed_or_time_is_named() {
         assert!(!report.follows && objection.contains(said), "{said}: {}", report.text());
         assert!(objection.contains("converted, a short fit explains"), "{objection}");
         assert!(report.first.explained.values().all(|ratio| *ratio < 0.25), "{report:?}");
+        let is_of_unit = |note: &String| note.contains("it seems to");
+        assert!(!report.notes.iter().any(is_of_unit), "{said}: {:?}", report.notes);
     }
     let report = fitted(vec![case_at(&start, 1.0, record(1.0, 1.0))], &free);
     println!("right units: {:?}", report.first.explained);
@@ -475,6 +477,45 @@ fn a_wrong_unit_of_speed_or_time_is_named() {
     let report = fitted(vec![case_at(&VISCOUS, 0.8, record(1.0, 1.0))], &options(&[start[0].0]));
     let objection = report.objection.unwrap_or_default();
     assert!(objection.contains("the model explains") && !objection.contains("seems to be"));
+}
+
+/// A model at wrong speeds may be as much smaller than a channel as another unit makes it.
+#[test]
+fn a_wrong_unit_of_speed_is_no_wrong_unit_of_a_channel() {
+    let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 3.0))];
+    let method = Problem::method(&cases).unwrap();
+    let model = ModelKind::Nonlinear;
+    let simd = simd_from_environment().unwrap();
+    let free = Vec::new();
+    let with_shift = false;
+    let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
+    let mut against = problem.against(&[]).unwrap();
+    let yaw = &mut against[2];
+    let column = problem.cases[0].measured.signals[2].quantity.column();
+    yaw.model.iter_mut().for_each(|value| *value = value.to_radians());
+    let summary = problem.summary(&against);
+    let statistics = Statistics::of(&problem, &against, &summary);
+    let is_settled = true;
+    let minima = [Descent { x: Vec::new(), summary, evaluations: 1, is_settled }];
+    let notes = |suspicions: &[Option<String>]| {
+        let found = report::ReportData {
+            problem: &problem,
+            suspicions,
+            minima: &minima,
+            against: &against,
+            at_start: &against,
+            statistics: &statistics,
+            evaluations: 1,
+            step_effect: None,
+            repeated: None,
+            draws: 0,
+        };
+        found.report().unwrap().notes
+    };
+    let said = notes(&[None]);
+    let is_named = |note: &String| note.starts_with(&column) && note.contains("in degrees");
+    assert!(said.iter().any(is_named), "{said:?}");
+    assert!(notes(&[Some("speed_rpm seems to be in rad/s".to_owned())]).is_empty());
 }
 
 #[test]

@@ -69,13 +69,9 @@ const UNITS: [ClockUnit; 12] = [
     ClockUnit { column: ClockColumn::Time, name: "tens of s", factor: 10.0 },
 ];
 
-/// Returns for each file whose columns seem to be in another unit a clause that says so.
-pub(super) fn suspicions(problem: &Problem<'_>) -> Result<Vec<String>, DescentEnd> {
-    let mut found = Vec::new();
-    for case in 0..problem.cases.len() {
-        found.extend(suspicion(problem, case)?);
-    }
-    Ok(found)
+/// Returns for each file a clause that its column seems to be in another unit, if it does.
+pub(super) fn suspicions(problem: &Problem<'_>) -> Result<Vec<Option<String>>, DescentEnd> {
+    (0..problem.cases.len()).map(|case| suspicion(problem, case)).collect()
 }
 
 fn suspicion(problem: &Problem<'_>, case: usize) -> Result<Option<String>, DescentEnd> {
