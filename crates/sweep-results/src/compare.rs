@@ -27,7 +27,7 @@ named! {
         Lost = "lost",
         /// The row was not reliable and is.
         Gained = "gained",
-        /// One of the files has a verdict for the row, and the other has none.
+        /// Only one file has a verdict for the row.
         Defined = "defined",
     }
 }

@@ -1,5 +1,5 @@
-//! RK4 on the paper's machine in full lanes, for `scripts/benchmarks/arm_cycles.py`:
-//! `trajectory scalar|avx2|avx512|neon`.
+//! Integrates the paper's machine by RK4 in every lane of a register, for
+//! `scripts/benchmarks/arm_cycles.py`: `trajectory scalar|avx2|avx512|neon`.
 
 use lane_ode::Simd;
 use washer_model::{Machine, Method, ModelKind, Profile, Spin, Timing, prepare, simulate};

@@ -27,11 +27,11 @@ pub struct WasherSetup {
     pub profile: *const c_char,
     /// Greatest speed (rpm) of every profile but "table".
     pub peak_rpm: f64,
-    /// Duration of their run-up (s).
+    /// Duration of the run-up (s) of every profile but "table".
     pub ramp_s: f64,
-    /// Times (s) of "table".
+    /// Times (s) of the profile "table".
     pub time_s: *const f64,
-    /// Speeds (rpm) of "table" at these times.
+    /// Speeds (rpm) of the profile "table" at these times.
     pub speed_rpm: *const f64,
     /// The number of times, and of speeds.
     pub spin_points: usize,
@@ -49,9 +49,9 @@ pub struct WasherSetup {
 pub enum WasherStatus {
     /// The machine was made.
     Ok = 0,
-    /// A pointer that must not be null is, or a text is not UTF-8.
+    /// A pointer that must not be null is null, or a text is not UTF-8.
     Null = 1,
-    /// No such model, profile or parameter.
+    /// There is no model, profile or parameter of the given name.
     UnknownName = 2,
     /// The machine or the spin is impossible.
     OutOfRange = 3,
@@ -62,7 +62,7 @@ pub enum WasherStatus {
 /// Reads a text that ends with a zero byte.
 ///
 /// # Safety
-/// `text` is null or points at such a text.
+/// `text` is null or points at a text that ends with a zero byte.
 unsafe fn text<'a>(text: *const c_char) -> Result<&'a str, WasherStatus> {
     if text.is_null() {
         return Err(WasherStatus::Null);
@@ -117,7 +117,7 @@ unsafe fn make(setup: &WasherSetup) -> Result<WasherEquations, WasherStatus> {
     if !machine.violations().is_empty() || !spin.violations().is_empty() {
         return Err(WasherStatus::OutOfRange);
     }
-    // Only the equations are used, so any time will do.
+    // Only the equations are used, which do not depend on the times of a run.
     let timing = Timing { end_s: 1.0, window_s: [0.0, 1.0], checkpoints: 0 };
     let point = prepare(Simd::best(), &[(machine, spin)], &timing).pop();
     match point {
@@ -168,7 +168,7 @@ pub extern "C" fn washer_dimension() -> usize {
     STATE_LEN
 }
 
-/// Writes the state at rest.
+/// Writes the state of the machine at rest.
 ///
 /// # Safety
 /// `machine` is alive and `x` has room for a state.
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_made_says_why() {
+    fn each_invalid_setup_has_its_own_status() {
         assert_eq!(status(&setup()), WasherStatus::Ok);
         assert_eq!(status(&WasherSetup { model: ptr::null(), ..setup() }), WasherStatus::Null);
         assert_eq!(
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn the_jacobian_is_that_of_the_right_hand_side() {
+    fn the_jacobian_agrees_with_differences_of_the_right_hand_side() {
         for model in [c"nonlinear", c"linear"] {
             let mut made = ptr::null_mut();
             let setup = WasherSetup { model: model.as_ptr(), ..setup() };
@@ -329,9 +329,9 @@ mod tests {
                     let step = 1e-5;
                     let mut column = [[0.0; STATE_LEN]; 2];
                     for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
-                        let mut moved = x;
-                        moved[j] += sign * step;
-                        washer_rhs(20.0, moved.as_ptr(), column[side].as_mut_ptr(), made);
+                        let mut shifted = x;
+                        shifted[j] += sign * step;
+                        washer_rhs(20.0, shifted.as_ptr(), column[side].as_mut_ptr(), made);
                     }
                     let largest =
                         (0..STATE_LEN).fold(1.0_f64, |m, i| m.max(f64::abs(jacobian[i][j])));

@@ -37,7 +37,7 @@ fn state() -> MutexGuard<'static, ModuleState> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Makes room for `count` numbers and returns its address.
+/// Allocates the input for `count` numbers and returns its address.
 // SAFETY (of every export): no other symbol of the module has its name.
 #[unsafe(no_mangle)]
 pub extern "C" fn input(count: usize) -> *mut f64 {
@@ -67,7 +67,7 @@ pub extern "C" fn setup() -> usize {
     usize::from(state.setup.is_some())
 }
 
-/// Writes an answer by the setup and the input, and returns its length; 0 without a setup.
+/// Writes an answer from the setup and the input, and returns its length; 0 without a setup.
 fn answer(write: impl FnOnce(&Setup, &[f64], &mut Vec<f64>)) -> usize {
     let ModuleState { input, output, setup } = &mut *state();
     output.clear();

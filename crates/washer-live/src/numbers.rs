@@ -1,11 +1,11 @@
-//! Conversion of structures to arrays of numbers and back: one walk over the fields serves both
+//! Converts structures to arrays of numbers and back. A single walk over the fields serves both
 //! directions.
 
 /// Upper bound of counts and indices; larger ones are rejected. Basis: no setup comes near it, and
-/// a damaged page must not allocate more.
+/// reading a damaged page must not allocate much memory. Doubling it doubles that memory.
 const COUNT_LIMIT: usize = 100_000;
 
-/// A walk over the fields of a structure. Each step writes a number or reads the next one; it
+/// A walk over the fields of a structure. Each step writes a number or reads the next one, and
 /// returns `None` if the number is missing or invalid.
 pub(crate) enum NumberWalk<'a> {
     /// The numbers written so far.
@@ -40,7 +40,7 @@ impl NumberWalk<'_> {
         Some(())
     }
 
-    /// Writes a count, or reads one in its place.
+    /// Writes `count` and returns it, or reads another count and returns that.
     pub(crate) fn count(&mut self, count: usize) -> Option<usize> {
         let mut value = count as f64;
         self.numbers([&mut value])?;
@@ -48,14 +48,14 @@ impl NumberWalk<'_> {
         is_count.then_some(value as usize)
     }
 
-    /// Writes or reads one of `all` by its index.
+    /// Writes or reads an element of `all` as its index.
     pub(crate) fn choice<T: Clone + PartialEq>(&mut self, one: &mut T, all: &[T]) -> Option<()> {
         let place = all.iter().position(|known| known == one).unwrap_or(all.len());
         *one = all.get(self.count(place)?)?.clone();
         Some(())
     }
 
-    /// Writes or reads some of `all` by their indices.
+    /// Writes or reads some elements of `all` as their indices.
     pub(crate) fn choices<T: Clone + PartialEq>(
         &mut self,
         some: &mut Vec<T>,
@@ -65,8 +65,8 @@ impl NumberWalk<'_> {
         some.iter_mut().try_for_each(|one| self.choice(one, all))
     }
 
-    /// Writes the length of a list, or reads it and resizes the list; elements are passed
-    /// separately.
+    /// Writes the length of a list, or reads a length and resizes the list. Its elements are
+    /// written or read separately.
     pub(crate) fn sized<T: Clone>(&mut self, list: &mut Vec<T>, blank: &T) -> Option<()> {
         list.resize(self.count(list.len())?, blank.clone());
         Some(())

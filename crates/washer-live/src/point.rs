@@ -22,20 +22,21 @@ pub enum NoPoint {
     NoEquilibrium,
 }
 
-/// The results of both models at a point; pairs have the nonlinear model first.
+/// The results of both models at a point. Arrays of two have the nonlinear model first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// The row of a map; a quick answer lacks the numbers that follow from comparing runs.
     pub outcome: Outcome,
-    /// The amplitudes of all channels by the criterion, compared or not (m, rad).
+    /// The amplitudes of all channels by the criterion (m, rad), also of channels that the verdict
+    /// does not compare.
     pub amplitudes: [Deviations; 2],
     /// The ratios, as if every channel were compared.
     pub ratios: Vec<Option<f64>>,
-    /// The indices of the refinement levels that the models' numbers come from.
+    /// The index of the refinement level of each model's numbers.
     pub places: [usize; 2],
-    /// The names of these levels.
+    /// The name of the refinement level of each model's numbers.
     pub levels: [Level; 2],
-    /// The remaining relative errors, if they are known.
+    /// The estimated relative error of each model's numbers, if it is known.
     pub errors: [Option<f64>; 2],
 }
 
@@ -81,7 +82,8 @@ pub(crate) struct PointScenario {
 }
 
 impl PointScenario {
-    /// Returns the setup with these values of its sliders; missing values stay those of the setup.
+    /// Returns the scenario with these values of the setup's sliders; sliders without a value keep
+    /// that of the setup.
     pub(crate) fn new(setup: &Setup, values: &[f64]) -> Result<Self, NoPoint> {
         let Setup { machine, spin, rule, .. } = setup;
         let machine = machine.clone();
@@ -131,19 +133,19 @@ fn ready_point(setup: &Setup, values: &[f64]) -> Result<Point, NoPoint> {
     points.pop().and_then(Result::ok).ok_or(NoPoint::NoEquilibrium)
 }
 
-/// Integrates both models at points at the quick level, in lanes, without comparing runs.
+/// Integrates both models at some points at the quick level, in lanes, without an error estimate.
 pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
     let ready = points.iter();
     let ready = ready.map(|values| (refinement_levels(setup, values), ready_point(setup, values)));
     let ready: Vec<_> = ready.collect();
     let rule = RowRule { accuracy: f64::INFINITY, ..setup.rule.clone() };
     let mut found: Vec<Result<Answer, NoPoint>> = Vec::with_capacity(points.len());
-    // Runs at the same levels share the lanes.
-    for alike in ready.chunk_by(|(a, _), (b, _)| core::ptr::eq(*a, *b)) {
-        let levels = alike[0].0;
+    // Points with the same refinement levels are integrated together in lanes.
+    for group in ready.chunk_by(|(a, _), (b, _)| core::ptr::eq(*a, *b)) {
+        let levels = group[0].0;
         let sound: Vec<&Point> =
-            alike.iter().filter_map(|(_, ready)| ready.as_ref().ok()).collect();
-        let places = [0, 1].map(|model| quick_place(&levels[model]));
+            group.iter().filter_map(|(_, ready)| ready.as_ref().ok()).collect();
+        let places = [0, 1].map(|model| quick_level_index(&levels[model]));
         let [nonlinear, linear] = [0, 1]
             .map(|model| run_method(model, levels[model].method(places[model]), &sound, &rule));
         let mut pairs = nonlinear.into_iter().zip(linear);
@@ -153,7 +155,7 @@ pub fn quick(setup: &Setup, points: &[&[f64]]) -> Vec<Result<Answer, NoPoint>> {
             outcome.compare_turns(&rule.channels);
             Answer::new(outcome, amplitudes, places, levels, rule.limits)
         };
-        found.extend(alike.iter().map(|(_, ready)| match ready {
+        found.extend(group.iter().map(|(_, ready)| match ready {
             Ok(_) => pairs.next().map(answer).ok_or(NoPoint::NoEquilibrium),
             Err(why) => Err(*why),
         }));
@@ -201,9 +203,9 @@ fn run_method(model: usize, method: &Method, points: &[&Point], rule: &RowRule) 
     found.unwrap_or_default()
 }
 
-/// Returns the index of the level of quick answers: the second, at which most rows are accepted, or
-/// the first if no mode is capped.
-fn quick_place(levels: &RefinementLevels) -> usize {
+/// Returns the index of the quick level: the second, which is accurate enough for most rows, or the
+/// first if no modes are capped.
+fn quick_level_index(levels: &RefinementLevels) -> usize {
     usize::from(levels.levels.get(1).is_some_and(|second| second.level.is_capped()))
 }
 
@@ -222,7 +224,7 @@ pub fn motion(
     let point = ready_point(setup, values)?;
     let levels = &refinement_levels(setup, values)[model as usize];
     let level = place.and_then(|place| levels.levels.get(place));
-    let level = level.unwrap_or(&levels.levels[quick_place(levels)]);
+    let level = level.unwrap_or(&levels.levels[quick_level_index(levels)]);
     let history = history(model, &level.method, &point, &Start::default(), every_s);
     let instants = (0..history.len()).filter_map(|k| history.instant(k));
     let (channels, gaps_m) = instants.map(|instant| (instant.channels, instant.gap_m)).unzip();

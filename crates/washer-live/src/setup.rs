@@ -22,10 +22,10 @@ pub struct Setup {
     pub rule: RowRule,
     /// The parameters that a point sets.
     pub sliders: Sliders,
-    /// The refinement levels of the nonlinear and of the linear model while only axes move. Their
-    /// notes are not encoded.
+    /// The refinement levels of the nonlinear and of the linear model for points that change axes
+    /// only. The levels' notes are not encoded.
     pub levels: [RefinementLevels; 2],
-    /// The refinement levels while any slider may be anywhere in its range.
+    /// The refinement levels for points that change any slider within its range.
     pub wide_levels: [RefinementLevels; 2],
 }
 

@@ -206,7 +206,8 @@ fn terms_of_lane<T: Lane>(
     Terms::gather(&inertia, &core::array::from_fn(coefficients), skewed)
 }
 
-/// The matrices M, C, K and F of Eq. 41 in the coordinates q, for one machine at one instant.
+/// The matrices M, C and K and the force F of Eq. 41 in the coordinates q, for one machine at one
+/// instant.
 #[derive(Clone, Debug)]
 pub struct Matrices {
     /// The mass matrix.
@@ -290,8 +291,7 @@ impl LinearPoint {
     }
 }
 
-/// The map between a half's mass centre and the coordinates: the positions of the coordinates, and
-/// the partial velocities of the mass centre.
+/// The map between a half's mass centre and the coordinates.
 struct HalfMap<const R: usize> {
     midpoint: [usize; 2],
     turns: [usize; R],

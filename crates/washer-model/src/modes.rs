@@ -21,7 +21,7 @@ use lane_ode::additive::GAMMA;
 const HINGE: [usize; 2] = [HINGE_YAW, HINGE_PITCH];
 
 /// The number of angles over a turn at which the highest frequency is computed. Basis: M and K have
-/// harmonics 0 to 2 of theta. Doubling it costs twice the time for nothing.
+/// harmonics 0 to 2 of theta, for which eight angles suffice. Doubling it doubles the time.
 const ANGLES: usize = 8;
 
 /// A failure to compute the modes of a machine.
@@ -77,8 +77,7 @@ impl Mode {
 /// The modes at an instant, the slowest first, and the mass matrix by which shapes are compared.
 #[derive(Clone, Debug)]
 pub struct Modes {
-    /// The modes, one for each coordinate: conjugate eigenvalues give one mode, and so do two real
-    /// ones.
+    /// The modes, one for each coordinate. A mode has two conjugate eigenvalues, or two real ones.
     pub modes: [Mode; COORDINATES],
     pub(crate) mass: [[f64; COORDINATES]; COORDINATES],
 }
@@ -154,7 +153,8 @@ pub(crate) fn motions(
     let system = first_order(point, &point.linear, 0.0, speed_rad_per_s, caps)?;
     let values = system.matrix.eigenvalues().map_err(|_| NoModes::Eigenvalues)?;
     if values.iter().filter(|s| s.im == 0.0).count() > 2 {
-        // Shapes decide which two real rates belong to one mode.
+        // If several modes are overdamped, their shapes decide which two real rates belong to one
+        // mode.
         return Ok(modes_with_caps(point, 0.0, speed_rad_per_s, caps)?.modes.map(|mode| Root {
             s: c64::new(mode.re_per_s, mode.im_rad_per_s),
             magnitude_rad_per_s: mode.magnitude_rad_per_s,
@@ -173,9 +173,9 @@ pub(crate) struct Root {
     pub(crate) magnitude_rad_per_s: f64,
 }
 
-/// Sorts eigenvalues into modes, the slowest first. Each mode comes with the index of its
-/// eigenvalue, or of the slower one of two real ones. `similarity` compares the shapes of two
-/// indices.
+/// Sorts eigenvalues into modes, the slowest first. Each mode has the index of its eigenvalue, or
+/// of the slower one of two real ones. `similarity` compares the shapes of the eigenvectors with
+/// two indices.
 fn sort_into_modes(
     values: impl Iterator<Item = c64>,
     similarity: &dyn Fn(usize, usize) -> f64,
@@ -208,7 +208,8 @@ fn sort_into_modes(
     modes.try_into().map_err(|_| NoModes::Eigenvalues)
 }
 
-/// Returns |s|. The system's `hypot` would round differently on other systems.
+/// Returns |s|. The function `hypot` of the system's library would round differently on other
+/// systems.
 fn magnitude(s: c64) -> f64 {
     s.norm_sqr().sqrt()
 }

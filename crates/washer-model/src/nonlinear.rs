@@ -1,8 +1,9 @@
 //! The nonlinear equations of motion (section 4 of the model page; Eqs. 19 to 37 of the paper).
 //!
 //! Kane's equations are evaluated as recursive Newton-Euler in the frames in which vectors are
-//! sparse. Frame A is the shaft's before the spin (yaw q7, pitch q8). Frame S is A turned by the
-//! spin theta, frame E is S turned by q9, and frame D is E turned by q10.
+//! sparse. Frame A has the shaft's yaw q7 and pitch q8, but not its spin. Frame S (the shaft's) is
+//! A turned by the spin theta, frame E (the hinge's) is S turned by q9, and frame D (the drum's) is
+//! E turned by q10. Names end in `_a`, `_s` or `_e` where the frame is not clear.
 
 pub(crate) mod ahead;
 pub(crate) mod coefficients;
@@ -27,8 +28,7 @@ use crate::nonlinear::forces::{Deflection, flexure};
 use crate::nonlinear::frame::{Tilt, Vec3, combination, difference, scaled, sum};
 use lane_ode::{Aside, Lane, N, Real};
 
-/// A half of the machine: the equations of motion, the lower triangle of the inertia, and the
-/// orientation.
+/// The tub or the rotor: equations of motion, lower triangle of the inertia, and orientation.
 pub(crate) struct Half<T, const R: usize> {
     pub(crate) floating: Floating<T, R>,
     pub(crate) inertia: [[N<T>; R]; R],
@@ -58,7 +58,7 @@ pub(crate) fn halves<T: Lane>(
     Halves { tub, rotor }
 }
 
-/// Computes the accelerations du/dt of all ten coordinates. `sag` is that of the machine's
+/// Computes the accelerations du/dt of all ten coordinates. `sag` is the machine's sag at the
 /// equilibrium.
 #[inline(always)]
 pub(crate) fn accelerations<T: Lane>(
@@ -97,7 +97,7 @@ pub(crate) fn accelerations_per_load<T: Lane>(
     let speed = spin.speed;
     let mut free = [speed; COORDINATES];
     let mut per_load = [[speed; COORDINATES]; 4];
-    // The first turn of the loop is without a load, so that the code is compiled once.
+    // The first pass of the loop has no load, so that the code for both cases is compiled once.
     for loaded in 0..=TUB.len() {
         let mut floating = tub.floating;
         if loaded > 0 {
@@ -115,8 +115,8 @@ pub(crate) fn accelerations_per_load<T: Lane>(
     per_load
 }
 
-/// Computes both halves without the bearings' forces, and with the hinge's scaled mass where it is
-/// capped.
+/// Computes both halves without the bearings' forces. If the hinge's mode is capped, they include
+/// its scaled mass.
 #[inline(always)]
 fn uncoupled_halves<T: Lane>(
     machine: &Coefficients<T>,
@@ -139,7 +139,7 @@ fn uncoupled_halves<T: Lane>(
     (tub, rotor)
 }
 
-/// Computes the equations of body T about its mass centre.
+/// Computes the equations of the tub T about its mass centre.
 #[inline(always)]
 pub(crate) fn tub<T: Lane>(
     machine: &Coefficients<T>,
@@ -154,14 +154,14 @@ pub(crate) fn tub<T: Lane>(
     let velocity = [u[TUB_Y], u[TUB_Z]];
     let tub = TubMotion::from_rate(tilt, motion.rate, midpoint, velocity);
     let (force, moment) = machine.elements.load_on_tub(&tub);
-    // The y and z components in cabinet axes.
+    // The force's components along c2 and c3.
     let force = [
         tilt.axis_c[1] * force[0] + tilt.second_c[1] * force[1],
         tilt.axis_c[2] * force[0] + tilt.second_c[2] * force[1] + tilt.cos_yaw * force[2],
     ];
     let centre = b.tub_centre;
 
-    // Inertia moments I alpha + omega x I omega at constant speeds, in tub axes.
+    // Inertia moments I alpha + omega x I omega in tub axes, for constant generalised speeds u.
     let inertia_moment = [
         b.tub_i11 * motion.acceleration_x + (b.tub_i33 - b.tub_i22) * (y * z),
         b.tub_i22 * motion.acceleration_y + (b.tub_i11 - b.tub_i33) * (x * z),
@@ -208,7 +208,7 @@ pub(crate) fn tub<T: Lane>(
     }
 }
 
-/// Computes the equations of bodies S and D about their common mass centre.
+/// Computes the equations of the shaft S and the drum D about their common mass centre.
 ///
 /// The vector l s1 + rho between the centres of S and D moves like the arm of a point of the
 /// reduced mass mu. The terms in mu rho^2 are part of the drum's inertia about the hinge
@@ -227,8 +227,9 @@ pub(crate) fn rotor<T: Lane>(
     assemble_rotor::<T, false>(b, spin, q, u)
 }
 
-/// The equations of bodies S and D with an unbalance outside the plane of d1 and d2. Coefficients
-/// of zero add zeros, so that no machine's bits depend on the machines in the other lanes.
+/// The equations of the shaft S and the drum D with an unbalance outside the plane of d1 and d2.
+/// Coefficients of zero add zeros, so that no machine's bits depend on the machines in the other
+/// lanes.
 struct SkewedRotor<'a, T> {
     b: &'a Bodies<T>,
     spin: &'a SpinState<T>,
@@ -245,8 +246,8 @@ impl<T: Lane> Aside for SkewedRotor<'_, T> {
     }
 }
 
-/// Assembles the equations of bodies S and D, with the terms in rho_3, I_13 and I_23 where the drum
-/// is `SKEWED`.
+/// Assembles the equations of the shaft S and the drum D. The terms in rho_3, I_13 and I_23 are
+/// only computed if the drum is `SKEWED`: with an unbalance outside the plane of d1 and d2.
 #[inline(always)]
 fn assemble_rotor<T: Real, const SKEWED: bool>(
     b: &Bodies<T>,
@@ -261,7 +262,8 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
     let (s9, c9) = q[HINGE_YAW].sin_cos();
     let (s10, c10) = q[HINGE_PITCH].sin_cos();
 
-    // Angular velocities and their rates at constant speeds: S in S, then D in E.
+    // Angular velocities, and angular accelerations for constant generalised speeds u: of the shaft
+    // in axes S, then of the drum in axes E.
     let omega_s = {
         let [x, y, z] = into_spin(spin, &motion.rate);
         [x + spin.speed, y, z]
@@ -280,7 +282,7 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
     ];
     let omega_d = [ex, ey, ez + u10];
 
-    // The drum about the hinge, in E.
+    // The drum's mass centre rho and inertia K about the hinge, in axes E.
     let rho = [c10 * b.rho_1 - s10 * b.rho_2, s10 * b.rho_1 + c10 * b.rho_2];
     let k = drum_inertia_in_e::<T, SKEWED>(b, s10, c10);
     let mut rho_acceleration = second_derivative(&rho, &omega_d, &alpha_d);
@@ -302,7 +304,8 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         moment
     };
 
-    // Inertia moment of S and D together, in A; the shaft's is added where both are in S.
+    // Inertia moment of shaft and drum together, in axes A. The shaft's and the drum's are added in
+    // axes S.
     let shaft_moment = {
         let [x, y, z] = omega_s;
         [
@@ -321,8 +324,9 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
         moment[2] + (b.mu_l * rho_acceleration_a[1] + b.mu_l2 * axis_acceleration[1]),
     ];
 
-    // The common centre w = along_shaft s1 + drum_share rho: place, partial velocities,
-    // acceleration; in cabinet axes.
+    // The common mass centre w = along_shaft s1 + drum_share rho: its position from the bearing
+    // midpoint, its partial velocities (`arm`), and its acceleration for constant speeds (`drift`),
+    // all in cabinet axes.
     let mut rho_s = [(c9 * rho[0]).v(), rho[1], -(s9 * rho[0]).v()];
     if SKEWED {
         rho_s[0] += s9 * b.rho_3;
@@ -337,14 +341,14 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
     let drift = combination(b.along_shaft, axis_acceleration, b.drum_share, &rho_acceleration_a);
     let drift = tilt.in_cabinet_axes(&drift);
     let mut arm_9 = {
-        let share = -(b.drum_share * rho[0]).v();
+        let offset = -(b.drum_share * rho[0]).v();
         let d3_a = [s9, -(spin.sin * c9).v(), (spin.cos * c9).v()];
-        scaled(share, tilt.in_cabinet_axes(&d3_a))
+        scaled(offset, tilt.in_cabinet_axes(&d3_a))
     };
     if SKEWED {
-        let share = (b.drum_share * b.rho_3).v();
+        let offset = (b.drum_share * b.rho_3).v();
         let e1_a = [c9, (spin.sin * s9).v(), -(spin.cos * s9).v()];
-        arm_9 = sum(arm_9, &scaled(share, tilt.in_cabinet_axes(&e1_a)));
+        arm_9 = sum(arm_9, &scaled(offset, tilt.in_cabinet_axes(&e1_a)));
     }
     let arm_10 = {
         let [x, y] = [-(b.drum_share * rho[1]).v(), (b.drum_share * rho[0]).v()];
@@ -389,8 +393,8 @@ fn assemble_rotor<T: Real, const SKEWED: bool>(
     }
 }
 
-/// The drum's inertia K about the hinge in E. Its 1-3 and 2-3 entries are zero where all unbalances
-/// are in the plane of d1 and d2.
+/// The drum's inertia K about the hinge, in axes E. The entries k13 and k23 are zero if all
+/// unbalances are in the plane of d1 and d2.
 struct DrumInertia<T> {
     k11: N<T>,
     k22: N<T>,
@@ -462,7 +466,7 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
     rho_s: &Vec3<T>,
     (s9, c9): (N<T>, N<T>),
 ) -> [[N<T>; 4]; 4] {
-    // The drum's K turned by q9 into S.
+    // The matrix L: the drum's inertia K transformed by q9 to axes S.
     let ss = (s9 * s9).v();
     let difference = k.k33 - k.k11;
     let mut l12 = (c9 * k.k12).v();
@@ -478,7 +482,7 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
     }
     let mu_rho = scaled(b.mu_l, *rho_s);
 
-    // The whole rotor in S, then its rows in A.
+    // The matrix J: the whole rotor's inertia in axes S; then its entries in axes A (suffix `_a`).
     let across = 2.0 * mu_rho[0] + b.mu_l2;
     let j11 = l11 + b.shaft_i11;
     let j22 = k.k22 + b.shaft_i22 + across;
@@ -520,7 +524,7 @@ fn rotor_inertia<T: Real, const SKEWED: bool>(
     ]
 }
 
-/// Computes the second derivative of a vector (rho_1, rho_2, 0) fixed in a body.
+/// Computes the second time derivative of a vector (rho_1, rho_2, 0) that is fixed in a body.
 #[inline(always)]
 fn second_derivative<T: Real>(rho: &[N<T>; 2], omega: &Vec3<T>, alpha: &Vec3<T>) -> Vec3<T> {
     let [x, y, z] = *omega;
@@ -533,25 +537,25 @@ fn second_derivative<T: Real>(rho: &[N<T>; 2], omega: &Vec3<T>, alpha: &Vec3<T>)
     ]
 }
 
-/// Transforms a vector from A to S.
+/// Transforms a vector from axes A, which do not spin, to the shaft's axes S.
 #[inline(always)]
 pub(crate) fn into_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
     [v[0], spin.cos * v[1] + spin.sin * v[2], spin.cos * v[2] - spin.sin * v[1]]
 }
 
-/// Transforms a vector from S to A.
+/// Transforms a vector from the shaft's axes S to axes A, which do not spin.
 #[inline(always)]
 pub(crate) fn out_of_spin<T: Real>(spin: &SpinState<T>, v: &Vec3<T>) -> Vec3<T> {
     [v[0], spin.cos * v[1] - spin.sin * v[2], spin.sin * v[1] + spin.cos * v[2]]
 }
 
-/// Transforms a vector from S to E.
+/// Transforms a vector from the shaft's axes S to the hinge's axes E.
 #[inline(always)]
 fn into_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
     [c9 * v[0] - s9 * v[2], v[1], s9 * v[0] + c9 * v[2]]
 }
 
-/// Transforms a vector from E to S.
+/// Transforms a vector from the hinge's axes E to the shaft's axes S.
 #[inline(always)]
 pub(crate) fn out_of_hinge<T: Real>(s9: N<T>, c9: N<T>, v: &Vec3<T>) -> Vec3<T> {
     [c9 * v[0] + s9 * v[2], v[1], c9 * v[2] - s9 * v[0]]

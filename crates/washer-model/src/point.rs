@@ -34,8 +34,8 @@ pub struct Timing {
 
 /// The initial distance of a perturbed run from its original (m, rad).
 ///
-/// Basis: far above rounding, and a chaotic motion has some twenty e-foldings to grow until it is
-/// as far as the motion itself. Doubling it takes off less than one.
+/// Basis: far above rounding, and so small that the separation of a chaotic motion grows by twenty
+/// factors of e before it is as large as the motion. Doubling it reduces these by less than one.
 const PERTURBATION: f64 = 1e-10;
 
 /// The machine has no static equilibrium, or none that is stable.
@@ -146,9 +146,9 @@ impl Point {
 
     /// Returns the edges of the window (s).
     pub fn window_s(&self) -> [f64; 2] {
-        let inside = || self.segments.iter().filter(|segment| segment.in_window);
-        let from = inside().next().map_or(0.0, |segment| segment.start_s);
-        [from, inside().next_back().map_or(from, |segment| segment.end_s)]
+        let window_segments = || self.segments.iter().filter(|segment| segment.in_window);
+        let from = window_segments().next().map_or(0.0, |segment| segment.start_s);
+        [from, window_segments().next_back().map_or(from, |segment| segment.end_s)]
     }
 
     /// Returns the speed amplitudes at which the linear model takes the friction of dampers.
@@ -157,9 +157,10 @@ impl Point {
     }
 
     /// Returns the greatest factor between the speed amplitude of a damper's friction and the
-    /// damper's greatest speed (m/s, all dampers) in a motion of this model; `None` if no friction
-    /// is compared. Own speed amplitudes are those of the linear motion by definition, so that the
-    /// nonlinear motion is compared with given ones alone.
+    /// damper's greatest speed (m/s, for all dampers) in a motion of this model; `None` if no
+    /// friction is compared. A speed amplitude that was found from the linear motion agrees with
+    /// that motion by definition. So the nonlinear motion is compared only with amplitudes that the
+    /// user gave.
     pub fn friction_speed_factor(&self, model: ModelKind, speeds_m_per_s: &[f64]) -> Option<f64> {
         let is_compared = |assumed: &&FrictionSpeed| model == ModelKind::Linear || !assumed.is_own;
         let factor = |assumed: &FrictionSpeed| {
@@ -214,7 +215,7 @@ impl Point {
     }
 }
 
-/// Prepares points on lanes, all but the speed amplitudes of friction that depend on the motion.
+/// Prepares points on lanes, except for friction's speed amplitudes that depend on the motion.
 ///
 /// # Errors
 /// [`NoEquilibrium`] for each point without one.
@@ -294,7 +295,7 @@ impl Kernel for Prepare<'_> {
     }
 }
 
-/// Puts machines into lanes, and the first one also into lanes that have none.
+/// Copies machines into lanes, and the first one also into lanes without a machine.
 #[inline(always)]
 fn in_lanes<T: Lane>(zero: N<T>, machines: &[Coefficients<f64>]) -> Coefficients<T> {
     let mut lanes = Coefficients::splat(zero, &machines[0]);
@@ -327,8 +328,8 @@ struct SpinCourse {
     jumps_rad_per_s2: f64,
 }
 
-/// Computes the course of each point's spin. Neighbours with the same spin share it, because a
-/// table may have thousands of rows.
+/// Computes the course of each point's spin. Consecutive points with the same spin share a course,
+/// because a table may have thousands of rows.
 fn courses(points: &[(Machine, Spin)], timing: &Timing) -> Vec<SpinCourse> {
     let mut courses: Vec<SpinCourse> = Vec::with_capacity(points.len());
     for (k, (_, spin)) in points.iter().enumerate() {

@@ -1,10 +1,9 @@
-//! Step sizes: the longest stable steps of the explicit formulas, with and without capped bearing
-//! modes.
+//! Finds the longest stable steps of the explicit formulas, with and without capped bearing modes.
 //!
-//! Bearings hold an explicit method to steps of some 0.4 ms, though they hardly move. Caps on
-//! their modes (section 4.3 of the model page) leave the hinge as the fastest motion, and steps may
-//! be twenty times as long. The cap follows from the step: the formula's limit of stability,
-//! less a reserve, over the step. Where that is above the bearings' own modes, nothing is capped.
+//! The stiff bearings limit an explicit method to steps of some 0.4 ms, although they hardly move.
+//! With caps on their modes (section 4.3 of the model page) the hinge is the fastest part, and
+//! steps may be twenty times as long. The cap is the formula's limit of stability, less a reserve,
+//! divided by the step. If it is above the bearings' own modes, no modes are capped.
 
 pub(crate) mod formula;
 
@@ -12,28 +11,34 @@ use crate::highest_frequency_rad_per_s;
 use crate::modes::{highest_with_caps, motions};
 use crate::{Caps, Formula, Method, ModelKind, NoModes, Point, Spin};
 
-/// Modes of the suspension: yaw, pitch, two translations.
+/// The number of modes of the suspension: yaw, pitch and two translations.
 pub(crate) const SUSPENSION_MODES: usize = 4;
 
 /// The least ratio of the hinge's frequency to the drum's speed at which modes are capped.
 ///
-/// Derived: at drum speeds near (f + f_i) / 3, f being a frequency of the hinge and f_i one of the
-/// suspension, whirls of the hinge grow from the ringing of the bearings, which caps leave out.
-/// The rest is for f_i. Doubling it caps nothing above 600 rpm on the paper's machine.
+/// Derived: at drum speeds near (f + f_i) / 3, with a frequency f of the hinge and f_i of the
+/// suspension, whirls of the hinge grow from the ringing of the bearings, which caps leave out. So
+/// the ratio is 3, and the rest allows for f_i. Doubling it leaves no capped modes above 600 rpm on
+/// the paper's machine.
 pub(crate) const HINGE_TO_DRUM: f64 = 3.2;
 
-/// The product of step and cap as a share of [`Formula::limit`].
+/// The product of step and cap, relative to [`Formula::limit`]. The reserve is for the hinge, whose
+/// modes are raised by a cap near them. Basis: `sweep check` finds the longest stable step with
+/// this value; with 0.84 caps are lower and errors larger, with 0.99 steps are shorter. Doubling it
+/// leaves no step stable.
 ///
 /// The rest is for the hinge, whose modes a cap near them pushes up. Basis: `sweep check` finds the
 /// longest stable step with it; with 0.84 caps are lower and errors larger, with 0.99 steps are
 /// shorter. Doubling it leaves no step stable.
 const CAP_SHARE: f64 = 0.85;
 
-/// Bits of a step's fraction that are kept: the last digits of an eigenvalue depend on the
-/// processor and on the system's mathematical library; a step must not. 1e-6 of the step.
+/// The number of bits of a step's fraction that are kept, which is 1e-6 of the step. Basis: the
+/// last digits of an eigenvalue depend on the processor and on the system's mathematical library,
+/// and a step must not. Doubling it keeps such digits.
 const STEP_BITS: u32 = 20;
 
-/// Bisections of the interval that holds the longest step: 2^-10 of its logarithm, about 0.6 %.
+/// The number of bisections of the interval of the longest step. Basis: they find its logarithm to
+/// 2^-10 of the interval, about 0.6 % of the step. Doubling it doubles the time.
 const BISECTIONS: usize = 10;
 
 /// The machines of a run with the frequencies that bound their steps.
@@ -70,7 +75,7 @@ impl<'a> Frequencies<'a> {
         })
     }
 
-    /// Returns whether a capped step is stable, at rest and at the drum's greatest speed.
+    /// Whether a step with capped modes is stable, at rest and at the drum's greatest speed.
     fn is_stable(&self, model: ModelKind, step_s: f64) -> Result<bool, NoModes> {
         let caps = caps(model, step_s);
         let limit = Formula::for_model(model).limit();
@@ -101,9 +106,10 @@ impl<'a> StepSelector<'a> {
         Self::until(points, end_s, &|| false)
     }
 
-    /// Creates a selector that asks `is_stopped` before it finds a machine's eigenvalues.
+    /// Creates a selector as [`Self::new`] does, but calls `is_stopped` before each machine's
+    /// eigenvalues.
     ///
-    /// Once `is_stopped` returns true, the selector's answers mean nothing.
+    /// After `is_stopped` has returned true, the selector must not be used.
     pub fn until(
         points: impl IntoIterator<Item = (&'a Point, &'a Spin)>,
         end_s: f64,
@@ -114,21 +120,21 @@ impl<'a> StepSelector<'a> {
         Self { machines, is_stopped }
     }
 
-    /// Returns the longest step (s) at which a formula is stable at all points with nothing
-    /// capped; `None` if there are no points. Machines without modes are left out.
+    /// Returns the longest step (s) at which a formula is stable at all points without capped
+    /// modes; `None` if there are no points. Machines whose modes are unknown are left out.
     pub fn plain_step_s(&self, formula: Formula) -> Option<f64> {
         let machines = self.machines.iter().flatten();
         let steps = machines.map(|machine| formula.limit() / machine.fastest_rad_per_s);
         steps.reduce(f64::min).map(rounded_down)
     }
 
-    /// Returns the longest stable step (s) of a model's formula with nothing capped.
+    /// Returns the longest stable step (s) of a model's formula without capped modes.
     pub fn uncapped_step_s(&self, model: ModelKind) -> Option<f64> {
         self.plain_step_s(Formula::for_model(model))
     }
 
-    /// Returns whether some machine's forces have corners: friction and stops. There errors do not
-    /// shrink with the step by the order of a formula.
+    /// Whether the forces of any machine have corners, as those of friction and stops. At corners
+    /// errors do not decrease with the step by the order of a formula.
     pub fn are_nonsmooth(&self) -> bool {
         let mut machines = self.machines.iter().flatten();
         machines.any(|machine| machine.point.machine.elements.are_nonsmooth())
@@ -176,13 +182,13 @@ impl<'a> StepSelector<'a> {
     }
 }
 
-/// Returns a number of few digits. The last digits of an eigenvalue depend on the processor and on
-/// the system's mathematical library; a result must not.
+/// Rounds a positive number down to few digits. The last digits of an eigenvalue depend on the
+/// processor and on the system's mathematical library, and a result must not.
 pub(crate) fn rounded_down(number: f64) -> f64 {
     to_bits(number, STEP_BITS)
 }
 
-/// Returns a positive number with so many binary digits behind the first; the others are dropped.
+/// Rounds a positive number down to `bits` binary digits behind the first.
 pub(crate) fn to_bits(number: f64, bits: u32) -> f64 {
     let dropped = f64::MANTISSA_DIGITS - 1 - bits;
     f64::from_bits(number.to_bits() >> dropped << dropped)

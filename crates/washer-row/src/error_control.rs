@@ -14,33 +14,36 @@
 //! of the error from level to level that the family guarantees, 1.5 where the step shrinks
 //! ([`STEP_CONTRACTION`]) and 10 where the tolerance does ([`TOLERANCE_RATIO`]).
 //!
-//! 1. With smooth forces, levels 0 to 5 cap the bearings' modes ([`StepSelector`]). The hinge is as
-//!    it is, and bounds the first step.
-//! 2. Two more levels cap nothing. They are of order 4, which bears long steps at the least cost.
+//! 1. With smooth forces, levels 0 to 5 cap the bearings' modes ([`StepSelector`]). The hinge's
+//!    mode is not capped, and limits the first step.
+//! 2. Two more levels have no capped modes. They are of order 4, which is stable at long steps at
+//!    the least cost.
 //! 3. With friction and stops, no modes are capped: the first levels are the additive method's at
 //!    falling tolerances, then come three of order 8 at falling steps.
 //! 4. The last two levels resolve the bearings' modes. They are for rows in which bearings that
 //!    ring after a jump of the drum's acceleration matter.
 //!
-//! Levels that leave the same ringing unresolved agree on an error that no difference shows. The
-//! static deflection under the jump bounds it ([`Point::ringing`](washer_model::Point::ringing)),
-//! and a motion whose first difference is beyond the accuracy amplifies it as much. A row goes to
-//! the first level whose unresolved ringing is within the accuracy.
+//! Two levels that leave the same ringing unresolved share its error, so that their difference does
+//! not show it. This error is bounded by the static deflection under the jump
+//! ([`Point::ringing`](washer_model::Point::ringing)), times the amplification of a motion whose
+//! first difference is beyond the accuracy. A row goes to the first level whose unresolved ringing
+//! is within the accuracy.
 //!
-//! All numbers that decide `error`, `converged` and `sensitive` stand here, but for the three of
-//! chaos (`separation.rs`), the shares of the limit of stability (`STABILITY_SHARE`, `CAP_SHARE`
-//! and `HINGE_TO_DRUM` beside [`StepSelector`]), the swing of a free body (`SWING_FACTOR`) and each
-//! metric's scale.
+//! This file has all constants on which `error`, `converged` and `sensitive` depend, except the
+//! three of chaos (`separation.rs`), the shares of the limit of stability (`STABILITY_SHARE`,
+//! `CAP_SHARE` and `HINGE_TO_DRUM` beside [`StepSelector`]), the swing of a free body
+//! (`SWING_FACTOR`), and each metric's scale.
 
 use lane_ode::Tolerance;
 use washer_model::{Formula, Level, Method, ModelKind, StepSelector, capped_method};
 
 use crate::levels::{RESOLVING_LEVELS, RefinementLevel, RefinementLevels};
 
-/// The error of a level over its difference from the level before.
+/// Safety factor: the estimated error of a level, divided by its difference from the level before.
 ///
 /// Basis: 2 is the least whole number at which steps may shrink by less than a half from level to
-/// level ([`step_ratio`]). Doubling it doubles every `error`, and sends twice as many rows on.
+/// level ([`step_ratio`]). Doubling it doubles every `error`, and sends twice as many rows to the
+/// next level.
 const SAFETY_FACTOR: f64 = 2.0;
 
 /// The guaranteed contraction of the error from one step to the next: 1.5.
@@ -49,19 +52,19 @@ const SAFETY_FACTOR: f64 = 2.0;
 /// [`SAFETY_FACTOR`] s times that is at least E / c where c is at least 1 + 1 / s.
 const STEP_CONTRACTION: f64 = 1.0 + 1.0 / SAFETY_FACTOR;
 
-/// The order in which errors shrink with the step where modes are capped: a cap's error is as its
-/// inverse square, and the cap as the inverse step.
+/// The order in which errors decrease with the step for capped modes: the error of a cap is
+/// proportional to its inverse square, and the cap to the inverse step.
 const CAPPED_ORDER: f64 = 2.0;
 
-/// The order in which errors shrink with the step where steps cross corners.
+/// The order in which errors decrease with the step where steps cross corners of forces.
 const CORNER_ORDER: f64 = 1.0;
 
-/// The ratio of the additive method's relative tolerances from level to level; the first is this
-/// part of the accuracy.
+/// The ratio of the additive method's relative tolerances from level to level; the first tolerance
+/// is the accuracy times this ratio.
 ///
 /// Basis: `sweeps/friction.toml`, where the error of a trajectory is some ten times its tolerance
 /// per step and shrinks with it. Doubling it saves a third of the first level and sends more rows
-/// on.
+/// to the next level.
 const TOLERANCE_RATIO: f64 = 0.1;
 
 /// The least relative tolerance of the additive method.
@@ -70,9 +73,9 @@ const TOLERANCE_RATIO: f64 = 0.1;
 /// [`CORNER_STEP_S`] 31 ms. Doubling it leaves a level out at an accuracy of 1e-3.
 const LEAST_TOLERANCE: f64 = 1e-6;
 
-/// The absolute tolerance (m, rad, m/s, rad/s) of the additive method over the relative one.
+/// The absolute tolerance (m, rad, m/s, rad/s) of the additive method, divided by the relative one.
 ///
-/// Basis: a motion of 2 cm has both alike. Doubling it lengthens the steps of smaller motions.
+/// Basis: for a motion of 2 cm both are equal. Doubling it lengthens the steps of smaller motions.
 const ABSOLUTE_TO_RELATIVE: f64 = 2e-2;
 
 /// The longest step (s) of order 8 where forces have corners.
@@ -81,13 +84,13 @@ const ABSOLUTE_TO_RELATIVE: f64 = 2e-2;
 /// first of these levels useless: its median error grows from 7e-8 to that of the levels before.
 const CORNER_STEP_S: f64 = 5e-4;
 
-/// The number of levels with nothing capped: two make one difference.
+/// The number of levels without capped modes: two give one difference.
 const UNCAPPED_LEVELS: usize = 2;
 
 /// The number of levels of order 8 at corners.
 ///
-/// Basis: corners leave errors of first order, which a second difference settles. Each further one
-/// costs a row that does not converge as much as all others together.
+/// Basis: corners leave errors of first order, which a second difference settles. Each further
+/// level costs a row that does not converge as much as all others together.
 const CORNER_LEVELS: usize = 3;
 
 /// The product of the first step that resolves the bearings' modes and their frequency (rad), for
@@ -105,7 +108,8 @@ const RESOLVING_RAD: [f64; 2] = [1.4, 0.2];
 /// it doubles the time until such a row fails.
 pub const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
 
-/// Returns the ratio of one level's step to the next one's, where errors shrink by this order.
+/// Returns the ratio of one level's step to that of the next, for errors that decrease with this
+/// order.
 fn step_ratio(order: f64) -> f64 {
     STEP_CONTRACTION.powf(1.0 / order)
 }
@@ -118,8 +122,8 @@ fn contraction(level: Level) -> f64 {
     }
 }
 
-/// Returns the error of a level from its difference and the one before; `None` if there is no
-/// difference, or none that is a number.
+/// Returns the error of a level from its difference and that of the level before; `None` if there
+/// is no difference, or it is not a number.
 pub(crate) fn error_of_level(level: Level, differences: &[Option<f64>]) -> Option<f64> {
     let (last, earlier) = differences.split_last()?;
     let difference = (*last)?;
@@ -132,6 +136,8 @@ pub(crate) fn error_of_level(level: Level, differences: &[Option<f64>]) -> Optio
 }
 
 /// Returns the amplification of unresolved ringing, from the difference of the first two levels.
+/// For a motion that amplifies nothing, this difference is below the accuracy, because the levels
+/// are chosen so; for any other, the amplification is at least the quotient of the two.
 ///
 /// A motion that amplifies nothing differs there by less than the accuracy, because the levels are
 /// chosen so; one that differs by more amplifies by at least the quotient.
@@ -157,7 +163,7 @@ pub fn refinement_levels(
     let mut levels = Vec::new();
     let first_s = steps.plain_step_s(Formula::Rk4).unwrap_or(CORNER_STEP_S);
     let ratio = step_ratio(CAPPED_ORDER);
-    // A machine without modes has rows that say so.
+    // For a machine whose modes are unknown, the rows report it.
     if let Ok(Some(longest_s)) = steps.capped_step_s(model) {
         let mut step_s = longest_s;
         for level in Level::CAPPED {
@@ -177,7 +183,7 @@ pub fn refinement_levels(
 fn levels_at_corners(steps: &StepSelector<'_>, accuracy: f64) -> RefinementLevels {
     let mut levels = Vec::new();
     let mut relative = TOLERANCE_RATIO * accuracy;
-    // The product of powers of ten may come out a hair below the least.
+    // Rounding may leave the product of powers of ten slightly below the least tolerance.
     while relative > 0.999 * LEAST_TOLERANCE {
         let absolute = ABSOLUTE_TO_RELATIVE * relative;
         let tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
@@ -214,8 +220,8 @@ fn push_resolving(
     push_uncapped(levels, RESOLVING_LEVELS, level, [first_s, step_ratio(CAPPED_ORDER)]);
 }
 
-/// Adds levels with nothing capped from a first step (s), each a ratio shorter than the one before,
-/// and returns the step that would come next.
+/// Adds levels with no capped modes from a first step (s), each shorter than the one before by a
+/// ratio, and returns the step that would come next.
 fn push_uncapped(
     levels: &mut Vec<RefinementLevel>,
     count: usize,
@@ -230,12 +236,12 @@ fn push_uncapped(
     step_s
 }
 
-/// Returns the level of order 4 with nothing capped.
+/// Returns the level of order 4 with no capped modes.
 fn rk4(step_s: f64) -> RefinementLevel {
     RefinementLevel { level: Level::Rk4, method: Method::Rk4 { step_s } }
 }
 
-/// Returns the level of order 8 with nothing capped.
+/// Returns the level of order 8 with no capped modes.
 fn dop853(step_s: f64) -> RefinementLevel {
     RefinementLevel { level: Level::Dop853, method: Method::Dop853 { step_s } }
 }
@@ -254,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_is_twice_the_difference_and_not_less_than_a_contraction_of_the_one_before() {
+    fn the_error_is_twice_the_difference_or_more_if_the_difference_before_was_great() {
         assert_eq!(error_of_level(Level::Capped1, &[Some(1e-4)]), Some(2e-4));
         assert_eq!(error_of_level(Level::Capped1, &[Some(1e-4), Some(2e-4)]), Some(4e-4));
         let by_chance = error_of_level(Level::Capped1, &[Some(1e-2), Some(1e-6)]).unwrap();
@@ -262,16 +268,15 @@ mod tests {
     }
 
     #[test]
-    fn levels_that_do_not_compare_leave_no_error() {
+    fn levels_that_cannot_be_compared_have_no_error() {
         assert_eq!(error_of_level(Level::Capped1, &[Some(1e-3), None]), None);
         assert_eq!(error_of_level(Level::Capped1, &[None, Some(1e-3)]), None);
         assert_eq!(error_of_level(Level::Capped1, &[Some(f64::INFINITY)]), None);
     }
 
-    /// Levels of any error that shrinks at least as the ratio says are never further off than
-    /// their error says.
+    /// Levels whose errors decrease at least by the ratio are never less accurate than estimated.
     #[test]
-    fn the_ratio_bounds_errors_of_its_order() {
+    fn the_step_ratio_bounds_errors_of_the_order_that_it_is_made_for() {
         for order in [CAPPED_ORDER, CORNER_ORDER] {
             let ratio = step_ratio(order);
             for steeper in [0.0, 0.5, 1.0, 4.0, 8.0] {

@@ -2,7 +2,7 @@
 
 use washer_model::{Formula, Level, Method, MethodNumbers, ModelKind, UnresolvedModes};
 
-/// The number of levels that resolve the bearings' modes, the last ones: two make one difference.
+/// The number of levels that resolve the bearings' modes, which come last. Two give one difference.
 pub(crate) const RESOLVING_LEVELS: usize = 2;
 
 /// A refinement level.
@@ -15,7 +15,7 @@ pub struct RefinementLevel {
 }
 
 impl RefinementLevel {
-    /// Returns a line on the level, as one of this model's.
+    /// Returns a one-line description of the level for this model.
     pub fn describe(&self, model: ModelKind) -> String {
         let name = self.level.name();
         let mut method = self.method;
@@ -42,38 +42,39 @@ impl RefinementLevel {
 /// The refinement levels of one model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RefinementLevels {
-    /// Coarsest first; at least one.
+    /// The levels, coarsest first; at least one.
     pub levels: Vec<RefinementLevel>,
-    /// Whether each is compared with the one before.
+    /// Whether each level is compared with the one before.
     is_checked: bool,
     /// The reason why no modes are capped, if there is one.
     pub note: Option<String>,
 }
 
 impl RefinementLevels {
-    /// Creates the single level of a method that is compared with nothing.
+    /// Creates a single level of this method, without a comparison.
     pub fn direct(level: Level, method: Method) -> Self {
         Self { levels: vec![RefinementLevel { level, method }], is_checked: false, note: None }
     }
 
-    /// Creates levels that are compared with one another; at least two.
+    /// Creates levels each of which is compared with the one before; at least two.
     pub const fn checked(levels: Vec<RefinementLevel>, note: Option<String>) -> Self {
         Self { levels, is_checked: true, note }
     }
 
-    /// Returns whether each level is compared with the one before.
+    /// Whether each level is compared with the one before.
     pub const fn is_checked(&self) -> bool {
         self.is_checked
     }
 
-    /// Returns the place of the first level with nothing capped.
+    /// Returns the index of the first level without capped modes.
     pub fn first_uncapped(&self) -> usize {
         let is_capped = |level: &RefinementLevel| level.level.is_capped();
         self.levels.iter().take_while(|level| is_capped(level)).count()
     }
 
-    /// Returns whether the level at a place is another method than the one before: capped modes,
-    /// the additive method and the formulas with nothing capped err by different terms.
+    /// Whether the level at this index has another method than the one before, so that its error
+    /// has other terms. The methods are capped modes, the additive method, and the formulas without
+    /// capped modes.
     pub fn begins_family(&self, place: usize) -> bool {
         let family = |place: usize| {
             let level = self.levels[place].level;
@@ -83,12 +84,12 @@ impl RefinementLevels {
         place > 0 && family(place) != family(place - 1)
     }
 
-    /// Returns the place of the first level whose steps resolve the bearings' modes.
+    /// Returns the index of the first level whose steps resolve the bearings' modes.
     pub const fn first_resolving(&self) -> usize {
         self.levels.len().saturating_sub(RESOLVING_LEVELS)
     }
 
-    /// Returns the modes that a level does not resolve.
+    /// Returns the modes that a level does not resolve, if there are any.
     pub fn unresolved(&self, place: usize) -> Option<UnresolvedModes> {
         if self.levels[place].level.is_capped() {
             Some(UnresolvedModes::HingeAndBearings)
@@ -99,13 +100,13 @@ impl RefinementLevels {
         }
     }
 
-    /// Returns the place that stands for the perturbed run of a level: the same method from a start
-    /// beside the row's own ([`Point::perturbed`](washer_model::Point::perturbed)).
+    /// Returns the index that stands for the perturbed run of a level: the same method from a
+    /// slightly different start ([`Point::perturbed`](washer_model::Point::perturbed)).
     pub const fn perturbed(&self, place: usize) -> usize {
         self.levels.len() + place
     }
 
-    /// Returns whether a place stands for a perturbed run.
+    /// Whether an index stands for a perturbed run.
     pub const fn is_perturbed(&self, place: usize) -> bool {
         place >= self.levels.len()
     }
@@ -115,8 +116,8 @@ impl RefinementLevels {
         &self.levels[place % self.levels.len()].method
     }
 
-    /// Returns the method of the rows that capped modes of this level hold; of a model without that
-    /// level, the finest capped one below it.
+    /// Returns the method of the given capped level; if the model lacks that level, of the finest
+    /// coarser capped level.
     pub fn capped(&self, level: Level) -> Option<Method> {
         let is_within = |one: &&RefinementLevel| one.level.is_capped() && one.level <= level;
         self.levels.iter().rfind(is_within).map(|one| one.method)

@@ -13,16 +13,17 @@ use crate::outcome::{Deviations, Outcome};
 /// billionth of it. Doubling it is without effect.
 pub(crate) const REST_SHARE: f64 = 1e-9;
 
-/// The least deviation (m, rad) in the ratio of two turns: smaller ones count as this.
+/// The least deviation (m, rad) in the ratio of the models' deviations in a turn; smaller ones are
+/// replaced by it.
 ///
-/// Basis: 10 um are no visible motion, and the quotient of two such motions says nothing of the
-/// models. Doubling it lowers the ratios of turns in which the machine hardly moves.
+/// Basis: a motion of 10 um is invisible, and the quotient of two such motions says nothing about
+/// the models. Doubling it lowers the ratios of turns in which the machine hardly moves.
 pub(crate) const TURN_FLOOR: f64 = 1e-5;
 
 /// The least scale of differences of a damper's speed (m/s).
 ///
-/// Basis: at lower speeds friction all but holds the damper, and ringing bearings contribute much
-/// of the speed. Doubling it halves the relative differences of slower dampers.
+/// Basis: at lower speeds friction nearly holds the damper, and much of the speed comes from
+/// ringing bearings. Doubling it halves the relative differences of slower dampers.
 pub const CREEP_M_PER_S: f64 = 0.01;
 
 named! {
@@ -48,7 +49,7 @@ impl Criterion {
         }
     }
 
-    /// Describes a channel's ratio, and when it is null.
+    /// Describes the column of a channel's ratio, and when it is null.
     pub const fn ratio(self) -> &'static str {
         match self {
             Self::Peak => {
@@ -70,7 +71,7 @@ impl Criterion {
 }
 
 impl Metric {
-    /// Returns the gauge that records the metric; `None` if models do not have it one by one.
+    /// Returns the gauge that records the metric; `None` if the models do not have separate values.
     const fn gauge(self) -> Option<Gauge> {
         match self.facts().source {
             MetricSource::Gauge(gauge) => Some(gauge),
@@ -88,8 +89,8 @@ impl Metric {
         matches!(self.facts().source, MetricSource::HeldSpeeds)
     }
 
-    /// Whether the metric has a value for a periodic motion, which has no window: forces and speeds
-    /// do, times within the window do not.
+    /// Whether the metric has a value for a periodic motion, which has no window. Forces and speeds
+    /// have one, times within the window do not.
     pub fn has_periodic_value(self) -> bool {
         self.is_per_model() && self.facts().scale != LeastScale::Window
     }
@@ -99,8 +100,8 @@ impl Metric {
         column(self.name(), if self.is_per_model() { model } else { "" }, self.facts().unit)
     }
 
-    /// Returns the least scale of relative differences of the metric, in its unit. Greater values
-    /// are their own scale.
+    /// Returns the scale that relative differences of smaller values have, in the metric's unit.
+    /// Differences of greater values are relative to the value itself.
     pub fn scale(self, window_s: [f64; 2], weight_n: f64) -> f64 {
         match self.facts().scale {
             LeastScale::Value => 0.0,
@@ -111,14 +112,15 @@ impl Metric {
     }
 }
 
-/// Returns the name of a column: quantity, model and unit, without those that are empty.
+/// Returns the name of a column from the quantity, the model and the unit, without those that are
+/// empty.
 fn column(quantity: &str, model: &str, unit: &str) -> String {
     let unit = unit.to_lowercase().replace("1/", "per_").replace('/', "_per_");
     let words = [quantity, model, &unit].into_iter().filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join("_")
 }
 
-/// A column of each model: a metric of the whole machine, or of one stop, foot or damper.
+/// A metric's column that each model has: for the whole machine, or for one stop, foot or damper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MetricColumn {
     /// The metric.
@@ -154,7 +156,7 @@ impl MetricColumn {
         }
     }
 
-    /// Returns the value in a trajectory's reading; `None` if it was not recorded.
+    /// Returns the value from a trajectory's reading; `None` if it was not recorded.
     pub fn value(self, reading: &Reading) -> Option<f64> {
         let mut values = reading.gauge(self.metric.gauge()?).iter().copied();
         match self.part {
@@ -178,8 +180,8 @@ pub struct Measures {
 }
 
 impl Measures {
-    /// Returns the columns that each model has, in their order, which is also that of
-    /// [`Trajectory::metrics`](crate::Trajectory::metrics).
+    /// Returns the columns that each model has. [`Trajectory::metrics`](crate::Trajectory::metrics)
+    /// has the same order.
     pub fn per_model(&self) -> impl Iterator<Item = MetricColumn> + '_ {
         self.metrics
             .iter()
@@ -187,7 +189,8 @@ impl Measures {
             .flat_map(|metric| self.metric_columns(*metric))
     }
 
-    /// Returns the columns of a metric: that of all parts, then that of each if there are several.
+    /// Returns the columns of a metric: first that of all parts together, then one for each part if
+    /// there are several.
     pub fn metric_columns(&self, metric: Metric) -> impl Iterator<Item = MetricColumn> + use<> {
         let parts = match metric.facts().each_part.and(metric.facts().part) {
             Some(PartKind::Stop) => self.stops,
@@ -276,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_of_single_parts_follow_that_of_all_parts() {
+    fn columns_for_single_parts_follow_the_column_for_all() {
         let metrics = vec![Metric::SlipMargin, Metric::StopContact, Metric::FootLoad];
         let mut measures = Measures { metrics, stops: 3, feet: 1, ..Measures::default() };
         let columns = |measures: &Measures| -> Vec<String> {
@@ -298,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn the_value_of_all_parts_is_that_of_the_worst() {
+    fn the_value_for_all_parts_is_that_of_the_worst_part() {
         let mut reading = Reading::default();
         for (gauge, numbers) in [
             (Gauge::StopForce, vec![20.0, 50.0]),
@@ -315,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn names_of_metrics_are_those_of_their_variants() {
+    fn names_of_metrics_equal_the_names_of_their_variants() {
         let names = Metric::ALL.map(|metric| format!("{metric:?}").to_lowercase());
         assert_eq!(names, Metric::ALL.map(|metric| metric.name().replace('_', "")));
         let columns = [Metric::StaticSag, Metric::Growth, Metric::DamperSpeed];
@@ -324,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_metric_is_read_from_the_gauge_of_its_name() {
+    fn metrics_are_read_from_the_gauges_with_their_names() {
         for metric in Metric::ALL {
             assert_eq!(metric.gauge(), Gauge::named(metric.name()), "{metric:?}");
         }

@@ -43,7 +43,8 @@ pub struct MetricFacts {
     pub description: &'static str,
     /// The source of the value.
     pub source: MetricSource,
-    /// The parts that the machine must have.
+    /// The kind of parts to which the metric applies; a machine without such parts lacks the
+    /// metric.
     pub part: Option<PartKind>,
     /// The quantity in the name of one part's column, and that column's description; `None` if
     /// parts have no columns.
@@ -56,7 +57,7 @@ pub struct MetricFacts {
     pub limit: Option<Limit>,
 }
 
-/// The facts of a metric of the whole machine that every machine has.
+/// The facts shared by metrics of the whole machine that every machine has.
 const MACHINE_METRIC: MetricFacts = MetricFacts {
     unit: "",
     description: "",
@@ -77,7 +78,7 @@ const FEET_METRIC: MetricFacts = MetricFacts {
     ..MACHINE_METRIC
 };
 
-/// Declares the metrics by the rows of their table.
+/// Declares the metrics from a table with a row for each.
 macro_rules! metrics {
     ($($(#[$attribute:meta])* $Metric:ident = $name:literal: $facts:expr;)+) => {
         named! {
@@ -201,7 +202,7 @@ metrics! {
         source: MetricSource::Gauge(Gauge::DamperSpeed),
         ..MACHINE_METRIC
     };
-    // Each channel has a column of its own, in its unit.
+    // The metric has a column for each channel, in the channel's unit.
     /// The deviations of the attractors at held speeds.
     Dwell = "dwell": MetricFacts {
         description: "largest deviation of any motion that the drum held at any of the \

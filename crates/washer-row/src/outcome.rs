@@ -4,8 +4,8 @@ use washer_model::{Beyond, Channel, Disturbance, Endings, NoAnswer, Response};
 
 use crate::Level;
 
-/// The reason why a trajectory ended. The position is the code in chunk files, so that new reasons
-/// go to the end.
+/// The reason why a trajectory ended. The position in this list is the code in chunk files, so that
+/// new reasons are added at the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Status {
     /// The trajectory reached the end of the run.
@@ -43,7 +43,7 @@ impl From<NoAnswer> for Status {
 /// The trajectory of one model at one grid point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
-    /// The reason why it ended.
+    /// The reason why the trajectory ended.
     pub status: Status,
     /// The time of a failure during the integration.
     pub fail_time_s: Option<f64>,
@@ -56,9 +56,9 @@ pub struct Trajectory {
     pub rejected: u64,
     /// The model's metrics that the plan asks for, in column order; empty if the model failed.
     pub metrics: Vec<f64>,
-    /// The greatest factor between a damper's speed amplitude in this motion and the speed
-    /// amplitude at which the linear model takes its friction. `None` without friction, if the
-    /// model failed, and for the nonlinear model if no speed amplitude is given.
+    /// The greatest factor by which a damper's speed amplitude in this motion differs from the one
+    /// at which the linear model takes its friction. `None` without friction, if the model failed,
+    /// and for the nonlinear model if no speed amplitude is given.
     pub friction_speed_off: Option<f64>,
     /// The largest deviations in each turn of the drum. They are dropped once both models are
     /// compared by them.
@@ -84,7 +84,7 @@ pub struct Growth {
     pub branch: u32,
     /// The speeds (rpm) of the lower and of the upper fold at the ends of the branch.
     pub between_rpm: [Option<f64>; 2],
-    /// The limit of the machine's geometry that the response exceeds.
+    /// The limit of the machine's geometry that the response exceeds, if it does.
     pub beyond: Option<Beyond>,
     /// The disturbance that grows fastest.
     pub fastest: Disturbance,
@@ -128,7 +128,7 @@ impl From<&Response> for Growth {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DwellPeaks {
     /// The largest deviations over all attractors. A motion that leaves the range of the model
-    /// counts up to then.
+    /// counts until it does.
     pub deviations: Deviations,
     /// The speed (rpm) at which the tub has the greatest yaw or pitch.
     pub speed_rpm: f64,
@@ -174,7 +174,7 @@ pub struct Outcome {
     pub point: u64,
     pub nonlinear: Trajectory,
     pub linear: Trajectory,
-    /// The method and level of the nonlinear trajectory.
+    /// The refinement level of the nonlinear trajectory.
     pub method: Level,
     /// The estimate of the row's relative error by the differences of its levels; `None` if no
     /// levels were compared.
@@ -189,8 +189,8 @@ pub struct Outcome {
     pub turn_ratios: Vec<Option<f64>>,
     /// The sag of the machine, if the plan asks for it and there is an equilibrium.
     pub static_sag_m: Option<f64>,
-    /// The growth of disturbances at the row's held speed, or at that of the plan's speeds at which
-    /// they grow fastest. `None` if the plan does not ask for it or it is unknown.
+    /// The growth of disturbances at the row's held speed, or the greatest growth over the plan's
+    /// held speeds. `None` if the plan does not ask for it or it is unknown.
     pub growth: Option<Growth>,
     /// The largest deviations at the plan's held speeds, if the plan asks for them.
     pub dwelt: Option<DwellPeaks>,

@@ -1,5 +1,5 @@
-//! A row under refinement: both models' trajectories, each at the finest level that it needed so
-//! far.
+//! Refines a row: keeps the finest trajectory so far of each model, and decides which level is
+//! integrated next.
 
 use washer_model::{ModelKind, Point, UnresolvedModes};
 
@@ -12,14 +12,14 @@ use crate::run::{LevelRun, RowRule};
 use crate::separation::Separation;
 use crate::verdict::Verdict;
 
-/// The purpose of an outcome, which says how exact it must be.
+/// The purpose of an outcome, on which its accuracy depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demand {
     /// A row: every number within the accuracy, and the verdict.
     Row,
-    /// The side of the limit on which the ratio is, and the ratio if it is near the limit.
+    /// The ratio's side of the limit, and the ratio itself if it is near the limit.
     Side,
-    /// The growth of disturbances at constant speeds, and nothing of the run.
+    /// The growth of disturbances at constant speeds, without a run.
     Growth,
 }
 
@@ -52,8 +52,8 @@ struct ModelRule<'a> {
 }
 
 impl ModelRule<'_> {
-    /// Returns the unresolved ringing of a level as a share of the motion, amplified as the motion
-    /// amplifies.
+    /// Returns the ringing that a level leaves unresolved, relative to the motion and with the
+    /// motion's amplification.
     fn ringing(&self, level: usize, refinement: &ModelRefinement) -> f64 {
         let Some(run) = &refinement.run else { return 0.0 };
         let Some(unresolved) = self.levels.unresolved(level) else { return 0.0 };
@@ -79,17 +79,17 @@ impl ModelRule<'_> {
 struct ModelRefinement {
     /// The level of `run`.
     level: usize,
-    /// The finest run, but for a perturbed one.
+    /// The finest run that is not a perturbed one.
     run: Option<LevelRun>,
-    /// The relative difference of each run from the one before; `None` where they do not compare.
+    /// The relative difference of each run from the one before; `None` if they cannot be compared.
     differences: Vec<Option<f64>>,
-    /// The difference of the first two levels; before it, zero.
+    /// The difference of the first two levels; zero before there are two.
     first_difference: f64,
-    /// The outcome of a perturbed run, once there was one.
+    /// The comparison with a perturbed run, once there was one.
     perturbed: Option<Perturbed>,
 }
 
-/// A perturbed run beside its original.
+/// The comparison of a perturbed run with its original.
 #[derive(Clone, Copy, Debug)]
 struct Perturbed {
     is_chaotic: bool,
@@ -113,7 +113,7 @@ impl ModelRefinement {
             self.run = Some(before);
             return;
         }
-        // The difference before is of another method's error, which this one need not have.
+        // The earlier differences estimate the error of another method, so that they are dropped.
         if rule.levels.begins_family(self.level) {
             self.differences.clear();
         }
@@ -133,7 +133,7 @@ impl ModelRefinement {
         self.run.as_ref().is_some_and(|run| run.trajectory.status != Status::Ok)
     }
 
-    /// Returns the error of the finest run; `None` where nothing says how large it is.
+    /// Returns the error of the finest run; `None` if there is no estimate.
     fn error(&self, rule: ModelRule<'_>) -> Option<f64> {
         if let Some(Perturbed { is_chaotic: true, difference }) = self.perturbed {
             return error_of_chaos((*self.differences.last()?)?, difference?);
@@ -142,8 +142,8 @@ impl ModelRefinement {
         Some(error.max(rule.ringing(self.level, self)))
     }
 
-    /// Returns the level to run next, if the error is above the accuracy or `is_in_doubt`; `None`
-    /// if the run is fine enough, or if no further one would help.
+    /// Returns the level to run next if the error is above the accuracy or the verdict
+    /// `is_in_doubt`; `None` if the run is accurate enough, or no finer level would help.
     fn next_level(&self, rule: ModelRule<'_>, is_in_doubt: bool) -> Option<usize> {
         let levels = rule.levels;
         if self.run.is_none() {
@@ -157,22 +157,23 @@ impl ModelRefinement {
         if is_converged && !is_in_doubt {
             return None;
         }
-        let rings_little = |level: &usize| rule.ringing(*level, self) <= accuracy;
+        let has_little_ringing = |level: &usize| rule.ringing(*level, self) <= accuracy;
         let is_last = self.level + 1 == levels.levels.len()
-            || self.level + 1 == levels.first_resolving() && rings_little(&self.level);
+            || self.level + 1 == levels.first_resolving() && has_little_ringing(&self.level);
         if is_last {
-            // Chaos leaves the finest steps in doubt, and no step settles it.
+            // A chaotic motion does not converge at any step, which a perturbed run shows.
             let may_be_chaos = !is_converged && rule.kind == ModelKind::Nonlinear;
             let needs_perturbed = may_be_chaos && self.perturbed.is_none();
             return needs_perturbed.then(|| levels.perturbed(self.level));
         }
         let mut next = self.level + 1;
-        // It may be the capped modes that fail.
+        // The failure may be due to the capped modes.
         if self.has_failed() {
             next = next.max(levels.first_uncapped());
         }
-        // Levels with the same unresolved ringing would agree on an error that no difference shows.
-        (next..levels.levels.len()).find(rings_little)
+        // Levels with the same unresolved ringing share its error, which their difference does not
+        // show.
+        (next..levels.levels.len()).find(has_little_ringing)
     }
 }
 
@@ -183,14 +184,15 @@ pub struct RowRefinement([ModelRefinement; 2]);
 /// The next step of a row.
 #[derive(Clone, Debug)]
 pub enum Next {
-    /// Runs to do: positions in [`ModelKind::ALL`] and among that model's levels.
+    /// The runs to do: for each the position of the model in [`ModelKind::ALL`] and the index of
+    /// its level.
     Runs(Vec<(usize, usize)>),
     /// The row is done.
     Done(Box<Outcome>),
 }
 
 impl RowRefinement {
-    /// Takes a run that [`Self::next`] asked for.
+    /// Takes a run that [`Self::next`] has requested.
     pub fn take(
         &mut self,
         (model, level): (usize, usize),
@@ -202,7 +204,7 @@ impl RowRefinement {
     }
 
     /// Returns the finest run of a model with its level and its error, once there is one. The error
-    /// is absent where nothing says how large it is.
+    /// is `None` if there is no estimate.
     pub fn finest(
         &self,
         model: usize,
@@ -214,13 +216,13 @@ impl RowRefinement {
         refinement.run.as_ref().map(|run| (run, refinement.level, error))
     }
 
-    /// Returns the steps of a model's finest run; none before it.
+    /// Returns the number of steps of a model's finest run; zero before there is one.
     pub fn steps(&self, model: usize) -> u64 {
         self.0[model].run.as_ref().map_or(0, |run| run.trajectory.steps)
     }
 
-    /// Returns the next step once every run that was asked for is there. `id` is the outcome's
-    /// point.
+    /// Returns the next step, once every requested run has been taken. `id` is the point of the
+    /// outcome.
     pub fn next(&self, id: u64, point: &Point, with: RefinementRule<'_>) -> Next {
         if with.demand == Demand::Growth {
             return Next::Done(Box::new(Outcome::failed(id, Status::Ok)));
@@ -229,11 +231,11 @@ impl RowRefinement {
         let outcome = self.outcome(id, point, with, errors);
         let margin = outcome.as_ref().and_then(|outcome| margin(outcome, with.rule));
         let error = errors[0].zip(errors[1]).map(|(nonlinear, linear)| nonlinear + linear);
-        let is_on_its_side = margin.zip(error).is_some_and(|(margin, error)| error < margin);
+        let is_verdict_certain = margin.zip(error).is_some_and(|(margin, error)| error < margin);
         let mut runs = Vec::new();
-        if !(with.demand == Demand::Side && is_on_its_side) {
-            // An error beyond the margin could turn the verdict.
-            let is_in_doubt = margin.is_some() && error.is_some() && !is_on_its_side;
+        if !(with.demand == Demand::Side && is_verdict_certain) {
+            // An error greater than the margin could change the verdict.
+            let is_in_doubt = margin.is_some() && error.is_some() && !is_verdict_certain;
             for (model, refinement) in self.0.iter().enumerate() {
                 let next = refinement.next_level(with.for_model(model, point), is_in_doubt);
                 runs.extend(next.map(|level| (model, level)));
@@ -245,7 +247,7 @@ impl RowRefinement {
         }
     }
 
-    /// Returns the row as it is now, once both models have run.
+    /// Returns the outcome of the runs so far, once both models have run.
     fn outcome(
         &self,
         id: u64,
@@ -269,7 +271,8 @@ impl RowRefinement {
             let greatest = |(one, other): (f64, f64)| one.max(other);
             outcome.error = nonlinear_error.zip(linear_error).map(greatest);
             outcome.converged = Some(outcome.error.is_some_and(|error| error <= rule.accuracy));
-            // Two levels that agree leave an error by a perturbed run, and no chaos.
+            // If two levels agree, the motion is not chaotic, and its error is known without a
+            // perturbed run.
             let last = nonlinear.differences.last().copied().flatten();
             let disagrees = last.is_none_or(|difference| difference > rule.accuracy);
             outcome.sensitive = Some(nonlinear.is_chaotic() && disagrees);
@@ -278,14 +281,15 @@ impl RowRefinement {
     }
 }
 
-/// Returns the distance of the ratios from a limit, as a share of the limit.
+/// Returns the distance of the ratios from the nearest limit, relative to the limit.
 fn margin(outcome: &Outcome, rule: &RowRule) -> Option<f64> {
     let Verdict { least, greatest, .. } = Verdict::new(outcome, rule.channels.len(), rule.limits);
     Some(rule.limits.margin(least?.1, greatest?.1))
 }
 
-/// Returns the greatest relative difference of what a row takes from two trajectories; `None` if
-/// one of them failed. Of two that failed the times differ, as a share of the run.
+/// Returns the greatest relative difference of the numbers that a row takes from two trajectories;
+/// `None` if one of them failed. If both failed, the times of failure are compared, relative to the
+/// run's length.
 fn difference(a: &Trajectory, b: &Trajectory, point: &Point, rule: &RowRule) -> Option<f64> {
     if a.status != b.status {
         return None;
@@ -298,7 +302,7 @@ fn difference(a: &Trajectory, b: &Trajectory, point: &Point, rule: &RowRule) -> 
     let mut compare = |a: f64, b: f64, scale: f64| {
         if a != b {
             let share = (a - b).abs() / b.abs().max(scale);
-            // A quotient that is no number must not pass for none.
+            // A quotient that is NaN counts as an infinite difference.
             greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
         }
     };

@@ -15,7 +15,7 @@ use crate::{Criterion, Deviations, Measures, Status, Trajectory};
 pub struct RowRule {
     /// The end of the run, which starts at 0.
     pub end_s: f64,
-    /// The window of points that have no window of their own, a closed interval.
+    /// The window (s) of points that do not set their own, a closed interval.
     pub window_s: [f64; 2],
     /// The largest relative error of a row's numbers; infinite if levels are not compared.
     pub accuracy: f64,
@@ -37,7 +37,7 @@ impl RowRule {
 /// A trajectory at one refinement level.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LevelRun {
-    /// The numbers that a row takes from it.
+    /// The numbers that a row takes from the trajectory.
     pub trajectory: Trajectory,
     /// The amplitudes of all channels by the rule's criterion.
     pub amplitudes: Deviations,

@@ -1,9 +1,10 @@
-//! The separation of a perturbed run from its original, which tells chaos.
+//! Measures the separation of a perturbed run from its original, whose exponential growth is the
+//! sign of chaos.
 
-/// The least separation of a chaotic motion, as a share of the motion.
+/// The least separation at which a motion counts as chaotic, relative to the motion.
 ///
-/// Basis: a tenth is far beyond what any step leaves. Doubling it misses chaos that begins late in
-/// the run.
+/// Basis: a tenth is far more than the error of any step. Doubling it misses chaos that begins late
+/// in the run.
 const LEAST_SEPARATION: f64 = 0.1;
 
 /// The least growth of the separation, as a logarithm.
@@ -14,23 +15,23 @@ const LEAST_GROWTH: f64 = 9.0;
 
 /// The least mean exponent of the growth (1/s).
 ///
-/// Basis: of the attractors in `docs/dwell.md` every chaotic one has more. Doubling it misses the
+/// Basis: every chaotic attractor in `docs/dwell.md` has a greater exponent. Doubling it misses the
 /// weakest.
 const LEAST_EXPONENT_PER_S: f64 = 0.1;
 
-/// The growth of a separation, from where it was least to where it was greatest.
+/// The growth of a separation from its least value to the greatest value after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Separation {
-    /// The greatest distance, as a share of the motion.
+    /// The greatest distance, relative to the motion.
     pub(crate) greatest: f64,
-    /// The logarithm of the growth, from the least distance before.
+    /// The logarithm of the greatest distance over the least distance before it.
     pub(crate) rise: f64,
-    /// The time that it took (s).
+    /// The time between these two distances (s).
     pub(crate) time_s: f64,
 }
 
 impl Separation {
-    /// Finds the separation in distances at instants (s, share of the motion).
+    /// Finds the separation in a list of instants (s) and distances (relative to the motion).
     pub(crate) fn new(distances: &[(f64, f64)]) -> Self {
         let apart = distances.iter().filter(|(_, distance)| *distance > 0.0);
         let mut least: Option<(f64, f64)> = None;
@@ -52,7 +53,7 @@ impl Separation {
         if self.time_s > 0.0 { self.rise / self.time_s } else { 0.0 }
     }
 
-    /// Returns whether the motion is chaotic.
+    /// Whether the motion is chaotic.
     pub(crate) fn is_exponential(&self) -> bool {
         self.greatest >= LEAST_SEPARATION
             && self.rise >= LEAST_GROWTH
@@ -71,7 +72,8 @@ mod tests {
 
     #[test]
     fn exponential_separation_is_chaos() {
-        // It decays, then grows by 1.5 a second until it is as far as the motion.
+        // The separation decays, then grows with an exponent of 1.5 per second until it is as large
+        // as the motion.
         let chaos = separation(|at_s| match at_s < 8.0 {
             true => 1e-8 * (-at_s).exp(),
             false => (1e-8 * (-8.0_f64).exp() * (1.5 * (at_s - 8.0)).exp()).min(0.8),
@@ -81,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_band_of_instability_and_a_drift_are_no_chaos() {
+    fn bands_of_instability_and_drifts_are_not_chaotic() {
         let band = separation(|at_s| 1e-9 + 1e-3 * (-(at_s - 16.0) * (at_s - 16.0)).exp());
         assert!(!band.is_exponential(), "{band:?}");
         let drift = separation(|at_s| 0.01 * at_s);

@@ -7,8 +7,8 @@ use crate::outcome::{Outcome, Status};
 
 /// The values of the result file's `status` column, in the order of its dictionary.
 ///
-/// A row whose nonlinear model failed has that model's reason, also if the linear model failed too.
-/// A row whose linear model alone failed has that reason with the prefix `linear_`.
+/// If the nonlinear model failed, the row has that model's status, even if the linear model failed
+/// too. If only the linear model failed, the row has its status with the prefix `linear_`.
 pub const ROW_STATUSES: [&str; 14] = [
     "ok",
     "diverged",
@@ -32,7 +32,7 @@ const MODEL_STATUSES: usize = Status::Panicked as usize + 1;
 
 /// Returns the row's index in [`ROW_STATUSES`], and the failing model's time of failure.
 pub fn row_status(outcome: &Outcome) -> (usize, Option<f64>) {
-    // The statuses of both models together follow those with the prefix.
+    // The statuses that only a whole row can have follow those with the prefix.
     let code = |status: Status, linear_offset: usize| match status as usize {
         code if code < MODEL_STATUSES => code + linear_offset,
         code => code + MODEL_STATUSES - 1,
@@ -52,11 +52,11 @@ pub struct Verdict {
     /// The ratio of nonlinear to linear amplitude per channel of the plan, or the greatest such
     /// ratio over the drum's turns; `None` if the linear amplitude is zero or a model failed.
     pub ratios: Vec<Option<f64>>,
-    /// The greatest defined ratio, after its channel's position in the plan; the first channel wins
-    /// a tie.
+    /// The channel's position in the plan and the value of the greatest defined ratio; of equal
+    /// ones, the first channel's.
     pub greatest: Option<(usize, f64)>,
-    /// The least defined ratio, after its channel's position in the plan; the first channel wins a
-    /// tie.
+    /// The channel's position in the plan and the value of the least defined ratio; of equal ones,
+    /// the first channel's.
     pub least: Option<(usize, f64)>,
     /// Whether the ratios are between the limits; `None` where no ratio is defined.
     pub reliable: Option<bool>,

@@ -15,9 +15,9 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 
-/// The name of capsules with a stream, by the protocol.
+/// The name of capsules with a stream, which the protocol defines.
 const STREAM: &CStr = c"arrow_array_stream";
-/// The name of capsules with a schema, by the protocol.
+/// The name of capsules with a schema, which the protocol defines.
 const SCHEMA: &CStr = c"arrow_schema";
 
 /// Returns rows as a stream.

@@ -1,4 +1,4 @@
-//! Tables that users pass: anything with Arrow's C stream, or a mapping of columns.
+//! Reads tables that users pass: any object with Arrow's C stream, or a mapping of columns.
 
 use std::ffi::CStr;
 
@@ -47,7 +47,8 @@ pub(crate) fn numbers(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
         return Err(PyTypeError::new_err(text));
     }
     match PyBuffer::<f64>::get(values) {
-        // PyO3 does not check the order of bytes, so that other ones are read value by value.
+        // PyO3 does not check the byte order, so that arrays with another one are read value by
+        // value.
         Ok(buffer) if [c"d", NATIVE].contains(&buffer.format()) => buffer.to_vec(values.py()),
         _ => values.try_iter()?.map(|value| number(&value?)).collect(),
     }

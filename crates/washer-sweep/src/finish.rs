@@ -1,4 +1,4 @@
-//! Tables from work that has ended, and exceptions if it was interrupted.
+//! Returns tables from work that has ended, and raises exceptions if it was interrupted.
 
 use std::path::PathBuf;
 
@@ -26,9 +26,9 @@ pub(crate) fn rows_or_raise(
     Ok(PyResultTable::new(table))
 }
 
-/// Runs a task in memory, or into a file if there is one, and returns the rows. A file is started
-/// over if `fresh`; otherwise the call continues an unfinished one. With progress the task also
-/// prints what the command prints.
+/// Runs a task in memory, or into a file if there is one, and returns the rows. With `fresh` the
+/// file is started anew; otherwise the call continues an unfinished one. With progress, the task
+/// prints the same lines as the command.
 pub(crate) fn rows_or_file(
     py: Python<'_>,
     task: Result<EvaluationTask<'_>, Error>,

@@ -66,7 +66,7 @@ impl PyPlan {
     fn from_toml(source: &Bound<'_, PyAny>, set: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
         let py = source.py();
         let sets = assignments(set)?;
-        // A text has a line break or an assignment, which paths do not have.
+        // The text of a grid file has a line break or an assignment, and a path has neither.
         let text = source.cast::<PyString>().ok().map(|text| text.to_string());
         let text = text.filter(|text| text.contains('\n') || text.contains('='));
         let (input, source) = match text {
@@ -76,7 +76,7 @@ impl PyPlan {
             }
             None => {
                 let path: PathBuf = source.extract()?;
-                // Another process may work in another folder.
+                // The path is made absolute because another process may work in another folder.
                 let whole = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
                 let text = whole.to_string_lossy().into_owned();
                 let source = PlanSource { text, is_file: true, sets: sets.clone() };

@@ -1,4 +1,4 @@
-//! Execution of the engine's work without the interpreter's lock, which Python's signals stop.
+//! Runs the engine's work without the interpreter's lock, and lets Python's signals stop it.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread::Builder;
@@ -10,8 +10,8 @@ use sweep::{Effort, Error, Interrupt, ProgressMode};
 
 use crate::errors;
 
-/// The interval at which signals are checked. Basis: Ctrl-C seems immediate. Doubling it delays the
-/// end by up to as long.
+/// The interval at which signals are checked. Basis: Ctrl-C seems immediate. Doubling it doubles
+/// the delay.
 const SIGNAL_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The options of work that keywords set.

@@ -29,7 +29,7 @@ pub(crate) fn coefficients(values: [f64; HARMONICS]) -> [f64; HARMONICS] {
     c
 }
 
-/// The index of 1.
+/// The index of the constant function 1.
 pub(crate) const ONE: usize = 0;
 /// The index of cos theta.
 pub(crate) const COS: usize = 1;

@@ -1,5 +1,5 @@
-//! The outputs of the linear model: exact first order in the coordinates, with harmonics 0 and 1 in
-//! theta.
+//! The outputs of the linear model, which are exact to first order in the coordinates, with
+//! harmonics 0 and 1 in theta.
 //!
 //! The part of order zero is the motion of the turning drum while the machine is at its
 //! equilibrium.
@@ -30,7 +30,7 @@ const OUTPUTS: usize = CHANNELS + RADIAL;
 const SAMPLES: [(f64, f64); 3] =
     [(1.0, 0.0), (-0.5, 0.866_025_403_784_438_6), (-0.5, -0.866_025_403_784_438_6)];
 
-/// Returns the entry of a part (0: steady, 1: cosine, 2: sine of theta) of an output, among the
+/// Returns the index of a part of an output (part 0: steady, 1: cosine, 2: sine of theta) among the
 /// terms of `outputs` outputs. Steady parts come first. Only the outputs in `turning` have the
 /// other parts.
 const fn entry(output: usize, part: usize, turning: &[usize], outputs: usize) -> usize {
@@ -81,11 +81,11 @@ const fn channel_entry(channel: Channel, part: usize) -> usize {
     entry(channel.index(), part, TURNING, CHANNELS)
 }
 
-/// The components of the radial distance with harmonics of theta: both.
+/// The components of the radial distance that have harmonics of theta, which are both.
 const RADIAL_TURNING: [usize; RADIAL] = [0, 1];
 /// The number of entries of the radial distance's terms.
 const RADIAL_ENTRIES: usize = 3 * RADIAL;
-/// The entries of the radial distance's parts of order zero: all.
+/// The entries of the radial distance's parts of order zero, which are all.
 const RADIAL_AT_REST: [usize; RADIAL_ENTRIES] = [0, 1, 2, 3, 4, 5];
 
 const fn radial_entry(component: usize, part: usize) -> usize {
@@ -105,7 +105,7 @@ sparse_sums! {
 }
 
 lane_struct! {
-    /// The coefficients of the outputs, of one machine in `f64`, of one machine per lane in `T`.
+    /// The coefficients of the outputs, for one machine in `f64`, for one machine per lane in `T`.
     #[derive(Clone, Debug)]
     LinearOutputs {
         channels: ChannelTerms<T>,
@@ -144,7 +144,7 @@ impl<T: Lane> LinearOutputs<T> {
     }
 }
 
-/// Adds the parts of order zero. They are constants in the drum's frame; the turn adds their
+/// Adds the parts of order zero, which are constant in the drum's frame; the spin gives them time
 /// derivatives.
 #[inline(always)]
 fn add_at_rest<T: Real, const ENTRIES: usize, const K: usize>(

@@ -47,7 +47,7 @@ pub(crate) const fn force(row: usize) -> usize {
     FORCE + row
 }
 
-/// Returns whether a force depends on a rotation and its speed. The midpoint's y does not depend on
+/// Whether a force depends on a rotation and its speed. Only the force along y does not depend on
 /// the yaw.
 pub(crate) const fn moves(row: usize, column: usize) -> bool {
     row > 0 || column > 0
@@ -64,8 +64,8 @@ pub(crate) const fn damping(row: usize, column: usize) -> usize {
 }
 
 lane_struct! {
-    /// The coefficients of all terms of the rotor, of one machine in `f64`, of one machine per lane
-    /// in `T`.
+    /// The coefficients of all terms of the rotor, for one machine in `f64`, for one machine per
+    /// lane in `T`.
     #[derive(Clone, Debug)]
     Terms {
         inertia: InertiaTerms<T>,

@@ -1,12 +1,13 @@
 //! Sparse linear combinations whose pattern is known at compile time.
 //!
-//! Most coefficients of the linear model vanish for every machine. A table in the source names the
-//! others. It compiles to code without loops, indices or branches: one multiplication per term.
+//! Most coefficients of the linear model vanish for every machine. A table in the source lists
+//! those that do not. It compiles to code without loops, indices or branches: one multiplication
+//! per term.
 
 /// Declares a set of coefficients, and the entries as sums of coefficients times functions:
 /// `entry => function function ...;`.
 ///
-/// Entries that are not named keep their values. `Name<f64>` holds the coefficients of one machine,
+/// Entries that the table lacks keep their values. `Name<f64>` has the coefficients of one machine,
 /// `Name<T>` those of one machine per lane.
 use crate::lanes::{InLanes, ToDual};
 use lane_ode::{Aside, Dual, Lane, N, Real};
@@ -31,7 +32,7 @@ macro_rules! sparse_sums {
             pub(crate) const PLACES: [(usize, usize); [$($first $(, $other)*),+].len()] =
                 [$(($entry, $first) $(, ($entry, $other))*),+];
 
-            /// Selects the coefficients that the table names.
+            /// Selects the coefficients that the table lists.
             pub(crate) fn gather(all: &[[f64; $functions]; $entries]) -> Self {
                 let coefficient = |(entry, function): (usize, usize)| all[entry][function];
                 Self { terms: Self::PLACES.map(|place| lane_ode::N(coefficient(place))) }
@@ -39,7 +40,7 @@ macro_rules! sparse_sums {
         }
 
         impl<T: lane_ode::Lane> $name<T> {
-            /// Computes the entries that the table names.
+            /// Computes the entries that the table lists.
             #[inline(always)]
             pub(crate) fn sum<V: $crate::linear::sparse::Summand<T>>(
                 &self,
@@ -63,7 +64,7 @@ macro_rules! sparse_sums {
 }
 pub(crate) use sparse_sums;
 
-/// The coefficients that a table does not name, by entry, then function. There are none where they
+/// The coefficients that a table lacks, by entry, then function. The list is empty if all of them
 /// vanish.
 #[derive(Clone, Debug)]
 pub(crate) struct FurtherTerms<T> {
@@ -75,7 +76,7 @@ impl FurtherTerms<f64> {
     /// Creates a set without coefficients.
     pub(crate) const NONE: Self = Self { zero: N(0.0), coefficients: Vec::new() };
 
-    /// Selects the coefficients of the table's entries that are not at one of its `places`.
+    /// Selects the coefficients of the table's entries, except those at one of its `places`.
     pub(crate) fn gather<const FUNCTIONS: usize, const ENTRIES: usize>(
         all: &[[f64; FUNCTIONS]; ENTRIES],
         places: &[(usize, usize)],
@@ -102,7 +103,7 @@ impl<T> FurtherTerms<T> {
 }
 
 impl<T: Lane> FurtherTerms<T> {
-    /// Adds the terms to the sums of the table's.
+    /// Adds these terms to sums that have the table's terms.
     #[inline(always)]
     pub(crate) fn add<V: Summand<T>, const FUNCTIONS: usize, const ENTRIES: usize>(
         &self,
@@ -150,7 +151,7 @@ impl<T: Lane> InLanes<T> for FurtherTerms<T> {
         Self { zero: zero.lit(0.0), coefficients: Vec::splat(zero, &one.coefficients) }
     }
 
-    /// Overwrites a lane. Lists without coefficients are lists of zeros.
+    /// Overwrites a lane. An empty list counts as a list of zeros.
     #[inline(always)]
     fn set_lane(&mut self, lane: usize, one: &FurtherTerms<f64>) {
         let count = self.coefficients.len().max(one.coefficients.len());

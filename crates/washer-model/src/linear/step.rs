@@ -1,7 +1,7 @@
 //! The linear model in the form that an integrator evaluates.
 //!
 //! The constants of a trajectory are computed once, and functions of theta once per instant. A
-//! stage only multiplies known matrices with coordinates, speeds and loads. The terms of the
+//! stage only multiplies known matrices by coordinates, speeds and loads. The terms of the
 //! coordinates are computed before those of the speeds: a stage's coordinates are known one stage
 //! earlier, so that few operations wait for the accelerations of the stage before.
 
@@ -22,8 +22,8 @@ lane_struct! {
     /// The constants of one machine that the stages read; `N<f64>` for one, `N<T>` for one per
     /// lane.
     ///
-    /// Accelerations of the tub are those of `TUB`; loads are forces (y, z) and moments (y, z) on
-    /// the shaft's axis.
+    /// The tub's accelerations are in the order of `TUB`; loads are forces (y, z) and moments (y,
+    /// z) on the shaft's axis.
     #[derive(Clone, Copy, Debug)]
     StepConstants {
         tub_per_position: [[N<T>; 4]; 4],
@@ -47,9 +47,9 @@ impl StepConstants<f64> {
     pub(crate) fn new(b: &Bodies<f64>, c: &Constants<f64>) -> Self {
         let zero = N(0.0);
         let inertia = Factors::new(c.tub_inertia);
-        // Computes accelerations by forces and torques about the mass centre and by loads on the
-        // axis.
-        let under = |[y, z, yaw, pitch]: [N<f64>; 4], load: [N<f64>; 4]| {
+        // Computes the tub's accelerations from forces and torques about its mass centre and from
+        // loads on its axis.
+        let accelerations_under = |[y, z, yaw, pitch]: [N<f64>; 4], load: [N<f64>; 4]| {
             let floating = Floating {
                 per_mass: c.tub_per_mass,
                 force: [y, z],
@@ -83,9 +83,9 @@ impl StepConstants<f64> {
             let force_by_column = |matrix: &[[N<f64>; 4]; 4]| matrix.map(|row| -row[column]);
             let mut reaction = [zero; 4];
             reaction[column] = N(-1.0);
-            let by_position = under(force_by_column(&c.tub_stiffness), [zero; 4]);
-            let by_speed = under(force_by_column(&c.tub_damping), [zero; 4]);
-            let by_load = under([zero; 4], reaction);
+            let by_position = accelerations_under(force_by_column(&c.tub_stiffness), [zero; 4]);
+            let by_speed = accelerations_under(force_by_column(&c.tub_damping), [zero; 4]);
+            let by_load = accelerations_under([zero; 4], reaction);
             for row in 0..4 {
                 constants.tub_per_position[row][column] = by_position[row];
                 constants.tub_per_speed[row][column] = by_speed[row];
@@ -218,8 +218,8 @@ impl<T: Lane> RotorAt<T> {
 }
 
 impl<T: Lane> RotorPerLoad<T> {
-    /// Computes them, and the rotor's C, from the inverse of its inertia and the partial velocities
-    /// of its mass centre.
+    /// Computes these accelerations and the rotor's compliance C, from the inverse of the rotor's
+    /// inertia and the partial velocities of its mass centre.
     #[inline(always)]
     fn new(
         c: &StepConstants<T>,
@@ -244,7 +244,7 @@ impl<T: Lane> RotorPerLoad<T> {
                 [(by_pitch * axis[1][0]).v(), by_yaw * axis[0][1] + by_pitch * axis[1][1]];
             rotation[row] = [by_force[0], by_force[1], by_moment[0], by_moment[1]];
         }
-        // C: the accelerations of midpoint and axis by loads, on the rotor's side.
+        // The rotor's compliance C: the accelerations of its midpoint and axis per unit of load.
         let mut compliance = [[zero; 4]; 4];
         compliance[0][0] = c.rotor_per_mass;
         compliance[1][1] = c.rotor_per_mass;
@@ -273,7 +273,8 @@ impl<T: Lane> RotorPerLoad<T> {
     }
 }
 
-/// Computes w^2 K^-1 + C of both halves, from the rotor's C; its lower triangle.
+/// Computes the lower triangle of w^2 K^-1 + C, with the compliance C of both halves, from the
+/// rotor's C.
 #[inline(always)]
 fn bearing_system<T: Lane>(
     c: &StepConstants<T>,
@@ -322,9 +323,10 @@ pub(crate) fn accelerations<T: Lane>(
     }
 }
 
-/// Computes the derivative k of a state with all forces and inertia at deviations `q` from
-/// equilibrium and speeds `u`, but for the springs of bearings and hinge, which are at r + g k:
-/// `nonlinear/ahead.rs` for the linear model. `g` is in s.
+/// Computes the derivative k of a state for the implicit part of the additive method, as
+/// `nonlinear/ahead.rs` does for the nonlinear model. The springs of bearings and hinge are
+/// evaluated at r + g k with `g` in s, all other forces and the inertia at deviations `q` from
+/// equilibrium and speeds `u`.
 #[inline(always)]
 pub(crate) fn derivative_ahead<T: Lane>(
     c: &StepConstants<T>,
@@ -359,7 +361,8 @@ pub(crate) fn derivative_ahead<T: Lane>(
     for i in 0..4 {
         sum[i] += per_g_squared * deflection[i];
     }
-    // Elimination by pivots, because determinants overflow in idle lanes, whose g is almost zero.
+    // The system is solved by elimination, because determinants overflow in idle lanes, whose g is
+    // almost zero.
     let reaction = Factors::new(bearing_system(c, per_g_squared, &compliance)).solve(sum);
     halves.push_apart(c, &by_load, &reaction);
     let a = halves.in_order();

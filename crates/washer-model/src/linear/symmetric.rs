@@ -79,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_the_inverse_times_the_matrix_is_the_identity() {
+    fn the_inverse_times_the_matrix_is_the_identity() {
         let mut random = fastrand::Rng::with_seed(7);
         for _ in 0..100 {
             // G G^T + 0.1 is positive definite and not nearly singular.

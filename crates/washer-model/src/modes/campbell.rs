@@ -1,5 +1,5 @@
-//! The Campbell diagram: modes over spin speed, and the speeds at which they resonate (Eqs. 43 to
-//! 45, the paper's Fig. 7).
+//! Computes the Campbell diagram: the modes over spin speed, and the speeds at which they resonate
+//! (Eqs. 43 to 45, the paper's Fig. 7).
 //!
 //! The order of eigenvalues does not identify modes where two frequencies cross, but shapes do.
 //! From speed to speed and from angle to angle, a mode continues as the mode with the greatest
@@ -11,17 +11,19 @@ use crate::modes::shape::motion;
 use crate::{COORDINATES, Mode, ModeMotion, Modes, NoModes, Point, modes};
 use core::f64::consts::TAU;
 
-/// The number of angles over which frequencies are averaged. Basis: a dozen would do for the mean
-/// of harmonics 1 and 2 of theta; with 36 the least and the greatest frequency are within 1 -
+/// The number of angles over which frequencies are averaged. Basis: twelve suffice for the mean
+/// over harmonics 1 and 2 of theta; with 36 the least and the greatest frequency are within 1 -
 /// cos(pi / 36), or 0.4 %, of the variation. Doubling it reduces that to 0.1 %.
 const ANGLES: usize = 36;
 
-/// The least MAC of shapes of one mode. Basis: the usual threshold of modal analysis. Doubling it
-/// halves every interval to the end.
+/// The least MAC at which two shapes count as those of one mode. Basis: the usual threshold of
+/// modal analysis. With twice this value, which no MAC reaches, every interval would be halved to
+/// the limit.
 const MIN_ASSURANCE: f64 = 0.9;
 
-/// The greatest number of halvings of an interval. Basis: modes of a shaft without a preferred
-/// direction are not told apart at any distance. Doubling it takes up to 64 times as long for them.
+/// The greatest number of halvings of an interval. Basis: the two modes of a shaft without a
+/// preferred direction are indistinguishable, however short the interval is. Doubling it takes up
+/// to 64 times as long for them.
 const MAX_HALVINGS: u32 = 6;
 
 /// The tolerance of a resonance speed (rpm). Basis: far below any printed digit. Doubling it saves
@@ -227,9 +229,9 @@ fn find_resonance(
     let mut side = 0;
     for _ in 0..MAX_SEARCH {
         let speed_rpm = (low * high_excess - high * low_excess) / (high_excess - low_excess);
-        let there = follow(from, start, speed_rpm, &|rpm| modes(point, 0.0, rad_per_s(rpm)))?;
+        let end_modes = follow(from, start, speed_rpm, &|rpm| modes(point, 0.0, rad_per_s(rpm)))?;
         let found =
-            Resonance { speed_rpm, mode: average_over_turn(point, speed_rpm, &there)?[mode] };
+            Resonance { speed_rpm, mode: average_over_turn(point, speed_rpm, &end_modes)?[mode] };
         let excess = found.mode.frequency_rpm - speed_rpm;
         if excess.abs() < RESONANCE_RPM {
             return Ok(Some(found));

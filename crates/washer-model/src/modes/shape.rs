@@ -8,14 +8,14 @@ use crate::modes::inner;
 use crate::{COORDINATES, Point};
 use core::fmt;
 
-/// A plane through the drum axis, or both.
+/// The plane of a motion, through the drum axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MotionPlane {
-    /// Along c3, about c2.
+    /// The horizontal plane: translation along c3, rotation about c2.
     Horizontal,
-    /// Along c2, about c3.
+    /// The vertical plane: translation along c2, rotation about c3.
     Vertical,
-    /// Neither prevails.
+    /// Neither plane has most of the energy.
     Both,
 }
 
@@ -32,7 +32,7 @@ pub enum Movement {
     BearingTranslation,
     /// Tilt of the shaft against the tub.
     BearingTilt,
-    /// No movement with more than half of the energy.
+    /// No movement has more than half of the energy.
     Mixed,
 }
 
@@ -205,7 +205,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mode_has_the_name_of_the_movement_with_most_of_its_energy() {
+    fn a_mode_is_named_after_the_movement_with_most_of_its_energy() {
         for (shares, movement) in [
             ([0.1, 0.6, 0.3, 0.0], Movement::Translation),
             ([0.4, 0.4, 0.1, 0.1], Movement::Translation),
@@ -220,7 +220,8 @@ mod tests {
         }
     }
 
-    /// Names of random machines' modes follow the greatest of their shares; the seed is printed.
+    /// Checks that the names of random machines' modes follow the greatest of their shares; the
+    /// seed is printed.
     #[test]
     fn names_of_random_machines_follow_the_shares() {
         let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();

@@ -1,10 +1,11 @@
-//! The equations with the springs of bearings and hinge at the end of a stage, for the implicit
-//! part of the additive Runge-Kutta method.
+//! The equations of motion for the implicit part of the additive Runge-Kutta method, in which the
+//! springs of bearings and hinge are evaluated at the end of a stage.
 //!
-//! A stage solves k = f(q, u) + f_springs(r + g k). Its derivative k = (u, a) gives u = r_u + g a
-//! and q = r_q + g r_u + g^2 a there. The springs are linearised about a nearby state. This leaves
-//! J + g^2 K_D for the hinge's inertia and one 4x4 system for the bearings' load, which is that of
-//! section 4.3 of the model page with 1 / g for both caps.
+//! A stage solves k = f(q, u) + f_springs(r + g k) for its derivative k = (u, a), where r is the
+//! known part of the state and g the implicit coefficient times the step. At the stage's end u =
+//! r_u + g a and q = r_q + g r_u + g^2 a. The springs are linearised about a nearby state. This
+//! leaves J + g^2 K_D for the hinge's inertia and one 4x4 system for the bearings' load, which is
+//! that of section 4.3 of the model page with 1 / g for both caps.
 
 use crate::coordinates::{COORDINATES, HINGE_PITCH, HINGE_YAW, STATES};
 use crate::machine::spin::SpinState;
@@ -29,7 +30,7 @@ pub(crate) fn derivative_ahead<T: Lane>(
     let b = &machine.bodies;
     let mut tub = tub(machine, q, u);
     let mut rotor = rotor(b, spin, q, u);
-    // The displacement from `q`, without g^2 a.
+    // The change of the coordinates from `q` to the end of the stage, without the term g^2 a.
     let mut ahead = *q;
     for i in 0..COORDINATES {
         ahead[i] = r[i] + g * r[COORDINATES + i] - q[i];

@@ -16,7 +16,8 @@ impl Coefficients<f64> {
         Self { bodies: Bodies::new(machine), elements: Elements::new(machine) }
     }
 
-    /// Returns the machine that the linear model linearises, with viscous damping for friction.
+    /// Returns the coefficients that the linear model linearises, with viscous damping in place of
+    /// friction.
     pub(crate) fn with_viscous_friction(&self) -> Self {
         Self { bodies: self.bodies, elements: self.elements.with_viscous_friction() }
     }
@@ -32,9 +33,9 @@ lane_struct! {
         shaft_i11: N<T>, shaft_i22: N<T>, shaft_i33: N<T>,
         /// The mass of shaft, drum and unbalance.
         rotor_mass: N<T>, rotor_per_mass: N<T>,
-        /// The shares of tub and rotor in the total mass.
+        /// The tub's and the rotor's shares of the total mass.
         tub_share: N<T>, rotor_share: N<T>,
-        /// The rotor's mass centre is at `along_shaft * s1 + drum_share * rho` from P_S.
+        /// The position of the rotor's mass centre from P_S: `along_shaft * s1 + drum_share * rho`.
         along_shaft: N<T>, drum_share: N<T>,
         /// The vector rho from the hinge P_D to the drum's mass centre, in drum axes: (L_DM, e, 0)
         /// where all unbalances are in the plane of d1 and d2.
@@ -44,10 +45,10 @@ lane_struct! {
         mu_l: N<T>,
         /// mu l^2.
         mu_l2: N<T>,
-        /// The inertia of the drum and of the reduced mass at rho about the hinge, in drum axes.
+        /// The inertia about the hinge of the drum, and of a reduced mass mu at rho, in drum axes.
         drum_i11: N<T>, drum_i22: N<T>, drum_i33: N<T>, drum_i12: N<T>, drum_i13: N<T>,
         drum_i23: N<T>,
-        /// A flag of drums with an unbalance outside the plane of d1 and d2. Without it `rho_3`,
+        /// Whether the drum has an unbalance outside the plane of d1 and d2. Otherwise `rho_3`,
         /// `drum_i13` and `drum_i23` are zero, and the equations skip their terms.
         is_skewed: InAnyLane<T>,
         flexure_stiffness: N<T>,
@@ -82,7 +83,8 @@ impl<T: Lane> Bodies<T> {
 impl Bodies<f64> {
     pub(crate) fn new(machine: &Machine) -> Self {
         let Machine { tub, shaft, drum, flexure, bearings, .. } = machine;
-        // Section 2: the drum of Tables 2 and 3 with its unbalances, added one by one.
+        // The drum of Tables 2 and 3, with its unbalances added one by one (section 2 of the model
+        // page).
         let mut m_d = drum.mass_kg;
         let [mut x_d, mut e, mut e_3] = [drum.centre_x_m, 0.0, 0.0];
         let [mut i11, mut i22, mut i33] = drum.inertia_kg_m2;
@@ -112,8 +114,8 @@ impl Bodies<f64> {
         let rho_1 = x_d - drum.hinge_x_m;
         let rho_2 = e;
         let rho_3 = e_3;
-        // Shaft and drum about their common mass centre: the vector between their centres moves
-        // with the reduced mass.
+        // Shaft and drum about their common mass centre: the vector between their own centres moves
+        // like the arm of the reduced mass mu.
         let m_s = shaft.mass_kg;
         let rotor_mass = m_s + m_d;
         let mu = m_s * m_d / rotor_mass;

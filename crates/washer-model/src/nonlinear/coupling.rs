@@ -1,5 +1,5 @@
-//! The coupling of tub and rotor by the bearings: springs, or springs with scaled mass, which caps
-//! their modes. The hinge's modes are capped in the same way.
+//! Couples tub and rotor by the bearings: by springs, or by springs with scaled mass, which caps
+//! the frequencies of the bearings' modes. The hinge's modes are capped in the same way.
 //!
 //! Section 4.3 of the model page derives the force laws and lists the quantities that stay exact.
 
@@ -51,9 +51,9 @@ impl<T: Real> Deflection<T> {
     }
 }
 
-/// The speed of the backward whirl for which the hinge's scaled mass is exact, as a share of the
-/// drum's speed. Basis: motions of doubled period have it, which a capped hinge disturbs most.
-/// Doubling it makes a backward whirl at the drum's speed exact instead.
+/// The speed of the backward whirl for which the hinge's scaled mass is exact, relative to the
+/// drum's speed. Basis: motions with twice the period of a turn whirl at this speed, and a capped
+/// hinge disturbs them most. Doubling it makes a backward whirl at the drum's speed exact instead.
 pub(crate) const BACKWARD_SHARE: f64 = 0.5;
 
 /// The model of the bearings.
@@ -61,7 +61,7 @@ pub(crate) const BACKWARD_SHARE: f64 = 0.5;
 pub(crate) enum Coupling<T> {
     /// Springs.
     Springs,
-    /// Springs with scaled mass, so that none of their modes is faster than a cap.
+    /// Springs with scaled mass, so that no mode of the bearings is faster than a cap.
     MassScaled(Scaling<T>),
 }
 
@@ -100,7 +100,7 @@ lane_struct! {
     #[derive(Clone, Copy, Debug)]
     Sag {
         bearings: Deflection<T>,
-        /// q9, q10.
+        /// The hinge's angles q9 and q10.
         hinge: [N<T>; 2],
     }
 }
@@ -128,7 +128,7 @@ impl<T: Lane> Coupling<T> {
     /// Creates springs, or springs with mass scaled to caps.
     #[inline(always)]
     pub(crate) fn new(zero: N<T>, caps: Option<&Caps>) -> Self {
-        // A closure would be compiled without the lanes' instruction set.
+        // Not `Option::map_or`: its closure would be compiled without the kernel's instruction set.
         let Some(caps) = caps else { return Self::Springs };
         Self::MassScaled(Scaling::splat(zero, &Scaling::new(caps)))
     }
@@ -162,9 +162,9 @@ impl<T: Lane> Coupling<T> {
         })
     }
 
-    /// Computes the accelerations du/dt of both halves, which come without the bearings' forces, at
-    /// theta' = `speed`. `sag` is the part of the deflection that does not turn with the drum.
-    /// `linear/step.rs` computes those of the linear model.
+    /// Computes the accelerations du/dt of both halves, which are given without the bearings'
+    /// forces, at the spin speed theta' = `speed`. `sag` is the part of the deflection that does
+    /// not turn with the drum. `linear/step.rs` computes the accelerations of the linear model.
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,
@@ -225,7 +225,7 @@ pub(crate) fn mass_scaled_system<T: Real>(
     system
 }
 
-/// Solves for the bearing load on the shaft with scaled mass.
+/// Computes the bearing load on the shaft for springs with scaled mass.
 #[inline(always)]
 pub(crate) fn mass_scaled_load<T: Real>(
     b: &Bodies<T>,

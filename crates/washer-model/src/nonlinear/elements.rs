@@ -24,12 +24,12 @@ lane_struct! {
         dampers: Vec<DamperCoefficients<T>>,
         stops: Vec<StopCoefficients<T>>,
         bushings: Vec<BushingCoefficients<T>>,
-        /// A flag of machines that have springs with a cubic term.
+        /// Whether the machine has springs with a cubic term.
         has_cubic_springs: InAnyLane<T>,
-        /// A flag of machines that have dampers with friction or outer damping.
+        /// Whether the machine has dampers with friction or outer damping.
         has_friction: InAnyLane<T>,
-        /// A flag of machines that have optional forces: cubic springs, friction, stops or
-        /// bushings. Without them the equations skip their evaluation.
+        /// Whether the machine has optional forces: cubic springs, friction, stops or bushings.
+        /// Without them the equations skip their evaluation.
         has_optional: InAnyLane<T>,
     }
 }
@@ -53,8 +53,8 @@ impl Elements<f64> {
         }
     }
 
-    /// Returns whether a force is not smooth, as those of friction and stops. Steps longer than
-    /// such a force's corner is wide miss it.
+    /// Whether a force is not smooth, as those of friction and stops. Steps must not be longer than
+    /// the corner of such a force is wide.
     pub(crate) fn are_nonsmooth(&self) -> bool {
         let is_nonsmooth = |damper: &DamperCoefficients<f64>| {
             damper.friction.0 != 0.0 || damper.has_step_of_damping()
@@ -101,7 +101,7 @@ impl<T: Lane> Elements<T> {
         add_forces(&mut load, &self.springs, tub, false);
         add_forces(&mut load, &self.dampers, tub, false);
         if self.has_optional.holds() {
-            // A copy, so that without optional forces `load` stays in registers.
+            // The copy lets `load` stay in registers if there are no optional forces.
             let mut whole = load;
             let motion = *tub;
             zero.0.aside(OptionalForces { elements: self, tub: &motion, load: &mut whole });
@@ -188,7 +188,7 @@ lane_struct! {
         ends: Ends<T>,
         stiffness: N<T>,
         stiffness_times_free_length: N<T>,
-        /// k_3.
+        /// The cubic stiffness k_3.
         cubic: N<T>,
         free_length: N<T>,
     }
@@ -213,9 +213,9 @@ lane_struct! {
     DamperCoefficients {
         ends: Ends<T>,
         damping: N<T>,
-        /// F_f.
+        /// The friction force F_f.
         friction: N<T>,
-        /// v_s^2.
+        /// The square of the speed v_s below which friction fades.
         speed_squared: N<T>,
         /// The equivalent viscous damping of the linear model (N s/m).
         viscous: N<T>,
@@ -223,13 +223,14 @@ lane_struct! {
         outer_damping: N<T>,
         /// The length at rest, about which the stroke is free.
         rest_length: N<T>,
-        /// 1 / (2 s) and s / 2 for a free stroke s; without one 0 and -1, so that the stage is
-        /// always engaged.
+        /// The numbers 1 / (2 s) and s / 2 for a free stroke s. Without a free stroke they are 0
+        /// and -1, so that friction always acts in full.
         half_per_stroke: N<T>,
         half_stroke: N<T>,
-        /// The square of the width over which forces beyond the free stroke set in; 0 without one.
+        /// The square of the length sigma over which forces beyond the free stroke set in; 0
+        /// without a free stroke.
         softness_squared: N<T>,
-        /// A flag of dampers with a free stroke or outer damping.
+        /// Whether the damper has a free stroke or outer damping.
         has_stage: InAnyLane<T>,
     }
 }
@@ -416,13 +417,13 @@ pub(crate) trait ElementLine<T> {
 pub(crate) trait ForceLaw<T> {
     /// Returns the ends of the element.
     fn ends(&self) -> &Ends<T>;
-    /// Returns the force that is linear along the line, which every machine has.
+    /// Returns the linear force along the line, which elements of every machine have.
     fn force<L: ElementLine<T>>(&self, line: &L) -> N<T>;
     /// Returns the optional force.
     fn optional_force<L: ElementLine<T>>(&self, line: &L) -> N<T>;
 }
 
-/// F = -k e, and optionally F = -k_3 e^3, with the elongation e.
+/// The force F = -k e, and the optional force F = -k_3 e^3, with the elongation e.
 impl<T: Real> ForceLaw<T> for SpringCoefficients<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
@@ -440,8 +441,9 @@ impl<T: Real> ForceLaw<T> for SpringCoefficients<T> {
     }
 }
 
-/// Eqs. 33 to 35: F = -C (v . n) n, and optionally F = -h (F_f v / sqrt(v^2 + v_s^2) + C_o v), with
-/// the speed v along the damper and the share h of the stage beyond the free stroke.
+/// The force F = -C (v . n) n (Eqs. 33 to 35), and the optional force F = -h (F_f v / sqrt(v^2 +
+/// v_s^2) + C_o v), with the speed v along the damper and the share h of the stage beyond the free
+/// stroke.
 impl<T: Real> ForceLaw<T> for DamperCoefficients<T> {
     #[inline(always)]
     fn ends(&self) -> &Ends<T> {
@@ -632,7 +634,8 @@ fn add_force<T: Real>((total, moment): &mut (Vec3<T>, Vec3<T>), at: &Vec3<T>, fo
     *moment = plus_cross(moment, at, force);
 }
 
-/// Returns the vector from the cabinet end to the tub end, in tub axes. t3 has no y component.
+/// Returns the vector from the cabinet end to the tub end, in tub axes. The axis t3 has no
+/// component along c2.
 #[inline(always)]
 fn span<T: Real>(tilt: &Tilt<T>, midpoint: &[N<T>; 2], ends: &Ends<T>) -> Vec3<T> {
     let [x, y, z] = [ends.cabinet[0], ends.cabinet[1] - midpoint[0], ends.cabinet[2] - midpoint[1]];

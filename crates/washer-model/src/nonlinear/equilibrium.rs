@@ -1,9 +1,10 @@
-//! Static equilibrium under the machine's weight, unbalance up (section 4.2 of the model page).
+//! Finds the static equilibrium under the machine's weight, unbalance up (section 4.2 of the model
+//! page).
 //!
 //! 1. Linearise the static forces by automatic differentiation.
 //! 2. Solve for the Newton step, with a shift added to the stiffness where it is not positive
 //!    definite.
-//! 3. Shorten the step to a bound, and from a later iteration on damp it.
+//! 3. Shorten the step to a bound, and in later iterations damp it.
 //! 4. Stop when an unshifted step is below the tolerance, or when the shift exceeds its limit.
 
 use crate::coordinates::{
@@ -17,28 +18,30 @@ use crate::nonlinear::{Halves, halves};
 use lane_ode::{Aside, Lane, N};
 
 /// The greatest number of Newton steps. Basis: twice the number of undamped ones. Doubling it costs
-/// time only where no equilibrium is found.
+/// time for machines without an equilibrium.
 const MAX_ITERATIONS: usize = 120;
 /// The iteration from which steps are damped. Basis: half of all iterations.
 /// Doubling it delays the equilibria of machines whose stops open and close in turn, between which
 /// undamped steps cycle.
 const DAMPED_FROM: usize = 60;
-/// The part of a damped step that is taken. Basis: below 1, so that a cycle of two contracts.
-/// Doubling it damps nothing.
+/// The factor of a damped step. Basis: below 1, so that a cycle of two iterations contracts.
+/// Doubling it would lengthen the steps instead.
 const DAMPING_FACTOR: f64 = 0.6;
-/// The greatest step in any coordinate (m, rad). Basis: shorter than the machine, so that a soft
-/// one does not turn over on the way. Doubling it halves the steps of machines that sag far.
+/// The greatest step in any coordinate (m, rad). Basis: short against the machine, so that a soft
+/// machine does not turn over on the way. Doubling it halves the number of steps of machines that
+/// sag far.
 const MAX_STEP: f64 = 0.1;
 /// The tolerance of the last step (m, rad). Basis: Newton's method squares the error, so that only
 /// rounding remains. Doubling it changes nothing.
 const STEP_TOLERANCE: f64 = 1e-12;
-/// The least shift of an indefinite stiffness (N/m, N m/rad), raised tenfold until the sum is
-/// positive definite. Vertical springs without load have no stiffness sideways; they get one once
-/// the machine has sagged. Basis: small beside any suspension's stiffness. Doubling it changes
-/// nothing but the path.
+/// The least shift that is added to a stiffness matrix that is not positive definite (N/m, N
+/// m/rad); the shift is raised tenfold until the sum is. Vertical springs, for example, have no
+/// stiffness sideways before they carry load. Basis: small against any suspension's stiffness.
+/// Doubling it changes the path, not the equilibrium.
 const MIN_SHIFT: f64 = 10.0;
 /// The greatest shift (N/m, N m/rad). Basis: far above any suspension's stiffness, so that a
-/// machine that needs more has no equilibrium. Doubling it costs a fraction of an iteration.
+/// machine that needs a greater one has no equilibrium. Doubling it costs a fraction of an
+/// iteration.
 const MAX_SHIFT: f64 = 1e9;
 
 /// A call of [`solve_equilibrium`] that is not inlined into kernels.
@@ -56,8 +59,8 @@ impl<T: Lane> Aside for SolveEquilibrium<'_, T> {
     }
 }
 
-/// Returns the equilibrium coordinates, and a bit for each lane in which they were found. An
-/// equilibrium has a positive definite stiffness.
+/// Returns the equilibrium coordinates, and a mask of the lanes in which an equilibrium was found.
+/// Its stiffness matrix is positive definite there.
 #[inline(always)]
 pub(crate) fn solve_equilibrium<T: Lane>(
     zero: N<T>,
@@ -111,8 +114,7 @@ pub(crate) fn solve_equilibrium<T: Lane>(
     (q, found)
 }
 
-/// The rigid motions of tub and drum together: the name, the coordinates, the unit of the
-/// stiffness.
+/// The rigid motions of tub and drum together: name, coordinates, and unit of the stiffness.
 const RIGID_MOTIONS: [(&str, [usize; 2], &str); 4] = [
     ("up or down", [TUB_Y, SHAFT_Y], "N/m"),
     ("sideways", [TUB_Z, SHAFT_Z], "N/m"),
@@ -120,9 +122,9 @@ const RIGID_MOTIONS: [(&str, [usize; 2], &str); 4] = [
     ("over its front or back (pitch)", [TUB_PITCH, SHAFT_PITCH], "N m/rad"),
 ];
 
-/// Returns the motion of tub and drum together that is least stable at coordinates `q`, with its
-/// stiffness and unit, if some stiffness is negative. Stiffnesses of translations and rotations are
-/// compared as shares of the greatest of their kind.
+/// Returns the least stable motion of tub and drum together at coordinates `q`, with its stiffness
+/// and unit, if any stiffness is negative. The stiffnesses of translations are compared relative to
+/// the greatest of them, and those of rotations likewise.
 #[inline(never)]
 pub(crate) fn unstable_motion(
     machine: &Coefficients<f64>,
@@ -130,12 +132,12 @@ pub(crate) fn unstable_motion(
 ) -> Option<(&'static str, f64, &'static str)> {
     let machine = machine.constant();
     let q = q.map(N);
-    let stiffness = RIGID_MOTIONS.map(|(_, moved, _)| {
+    let stiffness = RIGID_MOTIONS.map(|(_, coordinates, _)| {
         let stiffness_along = |along: usize| {
             let forces = static_forces(&machine, &seeded(&q, along, 1.0));
-            moved.iter().map(|&i| -forces[i].0.slope).sum::<f64>()
+            coordinates.iter().map(|&i| -forces[i].0.slope).sum::<f64>()
         };
-        moved.into_iter().map(stiffness_along).sum::<f64>()
+        coordinates.into_iter().map(stiffness_along).sum::<f64>()
     });
     let greatest = |kind: &[f64]| kind.iter().fold(0.0_f64, |most, k| most.max(k.abs()));
     let scales = [greatest(&stiffness[..2]), greatest(&stiffness[2..])];
@@ -183,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_rests_on_a_stop_however_stiff() {
+    fn a_machine_rests_on_a_stop_of_any_stiffness() {
         for stiffness_n_per_m in [4e4, 1e7, 1e9] {
             let mut machine = Machine::paper();
             // The stop is 5 mm below the tub's front, which sags by 14 mm without it.

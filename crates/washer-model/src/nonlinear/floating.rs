@@ -1,8 +1,9 @@
-//! A chain of bodies that floats in the cabinet's y-z plane, as both halves of the machine do: the
-//! tub (q1, q2; q5, q6) and the rotor (q3, q4; q7 to q10).
+//! The equations of motion of a chain of bodies that floats in the c2-c3 plane of the cabinet (here
+//! y and z). Both halves of the machine are such chains: the tub (q1, q2; q5, q6) and the rotor
+//! (q3, q4; q7 to q10).
 //!
 //! About the chain's mass centre the two translations decouple from the rotations (section 4.1 of
-//! the model page). J is 2x2 for the tub and 4x4 for the rotor.
+//! the model page). Their inertia matrix J is 2x2 for the tub and 4x4 for the rotor.
 
 use crate::nonlinear::forces::AxisLoad;
 use lane_ode::{Lane, N, Real};
@@ -11,8 +12,8 @@ use lane_ode::{Lane, N, Real};
 pub(crate) struct AxisResponse<T> {
     /// The accelerations without forces on the axis.
     pub(crate) free: [N<T>; 4],
-    /// The accelerations per unit of force (y, z) and moment (y, z): the lower triangle of a
-    /// symmetric matrix.
+    /// The accelerations per unit of force (y, z) and moment (y, z) on the axis: the lower triangle
+    /// of a symmetric matrix.
     pub(crate) compliance: [[N<T>; 4]; 4],
 }
 
@@ -123,8 +124,8 @@ impl<T: Real, const R: usize> Floating<T, R> {
         AxisResponse { free, compliance }
     }
 
-    /// Computes the accelerations with forces on the axis: y and z of the bearing midpoint, then
-    /// the rotations. `inertia` holds the factors of J.
+    /// Computes the accelerations under forces on the axis: those of the bearing midpoint along y
+    /// and z, then those of the rotations. `inertia` holds the factors of J.
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,
@@ -144,8 +145,8 @@ impl<T: Real, const R: usize> Floating<T, R> {
         (translation, rotation)
     }
 
-    /// Computes the generalised forces f in M q'' = f: y and z of the bearing midpoint, then the
-    /// rotations.
+    /// Computes the generalised forces f in M q'' = f: for the bearing midpoint along y and z, then
+    /// for the rotations.
     #[inline(always)]
     pub(crate) fn generalised_forces(&self) -> ([N<T>; 2], [N<T>; R]) {
         let midpoint = [
@@ -176,12 +177,13 @@ impl<T: Real, const R: usize> Factors<T, R> {
             for i in j + 1..R {
                 let l = (a[i][j] * pivot).v();
                 for k in j + 1..=i {
-                    // Row i still holds the unscaled column; the rows above it hold it in their
-                    // upper triangle.
+                    // Row i still has the column before its division by the pivot; for the rows
+                    // above, the upper triangle has it.
                     let unscaled = if k == i { a[i][j] } else { a[j][k] };
                     a[i][k] -= l * unscaled;
                 }
-                // The strict upper triangle keeps the unscaled column for the rows below.
+                // The strict upper triangle keeps the column before its division, for the rows
+                // below.
                 a[j][i] = a[i][j];
                 a[i][j] = l;
             }
@@ -202,7 +204,7 @@ impl<T: Real, const R: usize> Factors<T, R> {
         self.packed[row][row]
     }
 
-    /// Returns a bit for each lane whose matrix is positive definite.
+    /// Returns a mask of the lanes whose matrix is positive definite.
     #[inline(always)]
     pub(crate) fn is_positive(&self) -> u32
     where

@@ -17,7 +17,7 @@ lane_struct! {
 }
 
 impl<T: Real> AxisLoad<T> {
-    /// Returns the load on the other body.
+    /// Returns the opposite load, which acts on the other body.
     #[inline(always)]
     pub(crate) fn reaction(&self) -> Self {
         let [[fy, fz], [my, mz]] = [self.force, self.moment];
@@ -27,7 +27,7 @@ impl<T: Real> AxisLoad<T> {
 
 lane_struct! {
     /// The offset of the shaft's bearing midpoint from the tub's, and the tilt of the shaft's axis
-    /// against the tub's; y and z.
+    /// against the tub's, both along c2 and c3.
     #[derive(Clone, Copy, Debug)]
     Deflection { offset: [N<T>; 2], tilt: [N<T>; 2] }
 }
@@ -90,7 +90,7 @@ fn phi_over_sin<T: Real>(sin_squared: N<T>, cos: N<T>) -> N<T> {
     }
     let bound = sin_squared.lit(SMALL_SIN_SQUARED);
     let is_small = sin_squared.0.less(bound.0);
-    // Beyond pi/2 the sine is small again, so that the cosine's sign decides as well.
+    // The sine decreases again beyond pi/2, so that the sign of the cosine is tested too.
     let is_ahead = cos.lit(0.0).0.less(cos.0);
     if T::all(is_small) && T::all(is_ahead) {
         return short;

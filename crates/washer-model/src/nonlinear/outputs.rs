@@ -72,8 +72,8 @@ fn blend<T: Real>(j: N<T>, a: &MovingVector<T>, k: N<T>, b: &MovingVector<T>) ->
     }
 }
 
-/// The body axes with their derivatives, from which every output is computed; in cabinet axes
-/// unless noted.
+/// The bodies' axes with their time derivatives, from which every output is computed; in cabinet
+/// axes unless noted.
 pub(crate) struct Axes<T> {
     tub: Tilt<T>,
     /// The angular velocity and acceleration of the tub, in tub axes.
@@ -94,8 +94,8 @@ impl<T: Real> Axes<T> {
         let shaft_motion = shaft.motion(u[SHAFT_YAW], u[SHAFT_PITCH]);
         let (s9, c9) = q[HINGE_YAW].sin_cos();
 
-        // Angular velocities and accelerations of the shaft in S and of the drum in E, as in
-        // `nonlinear::rotor` but with u'.
+        // Angular velocities and accelerations of the shaft in axes S and of the drum in axes E, as
+        // in `nonlinear::rotor` but with u'.
         let omega_s = {
             let [x, y, z] = into_spin(spin, &shaft_motion.rate);
             [x + spin.speed, y, z]
@@ -240,8 +240,8 @@ fn moving_axis<T: Real>(
     }
 }
 
-/// Computes the motion of a vector fixed in the drum, given in E. `turn` holds the drum's angular
-/// velocity and acceleration in E.
+/// Computes the motion of a vector that is fixed in the drum and given in axes E. `turn` holds the
+/// drum's angular velocity and acceleration in axes E.
 #[inline(always)]
 fn moving_drum_vector<T: Real>(
     shaft: &Tilt<T>,
@@ -272,7 +272,7 @@ fn moving_cross<T: Real>(a: &MovingVector<T>, b: &MovingVector<T>) -> MovingVect
     MovingVector { value, rate, second: plus_cross(&second, &a.value, &b.second) }
 }
 
-/// Transforms a vector from E to cabinet axes.
+/// Transforms a vector from the hinge's axes E to cabinet axes.
 #[inline(always)]
 fn out_of_drum<T: Real>(
     shaft: &Tilt<T>,
@@ -283,8 +283,9 @@ fn out_of_drum<T: Real>(
     shaft.in_cabinet_axes(&out_of_spin(spin, &out_of_hinge(s9, c9, v)))
 }
 
-/// Computes the motion of a point at `distance` along an axis from a bearing midpoint, whose y is
-/// coordinate `first`. Midpoints do not move along x.
+/// Computes the motion of the point at `distance` along an axis from a bearing midpoint. Coordinate
+/// `first` is the midpoint's displacement along c2 and the next one that along c3; midpoints do not
+/// move along c1.
 #[inline(always)]
 fn point<T: Real>(
     motion: &MovingCoordinates<T>,

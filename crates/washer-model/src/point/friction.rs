@@ -8,15 +8,16 @@ use core::f64::consts::PI;
 pub struct FrictionSpeed {
     pub damper: usize,
     pub speed_m_per_s: f64,
-    /// Whether the speed is that of the linear motion, not a given one.
+    /// Whether the speed was found from the linear motion, not given by the user.
     pub is_own: bool,
-    /// The speed (m/s) below which friction is viscous by its force law.
+    /// The speed v_s (m/s), below which the force law of friction is that of a viscous damper.
     pub(crate) least_m_per_s: f64,
 }
 
 impl FrictionSpeed {
-    /// Returns the speeds of every damper with friction, with a default for those of the motion.
-    /// Friction beyond a free stroke is linearised about the place at rest and has none.
+    /// Returns the speed amplitude of every damper with friction; a default stands for amplitudes
+    /// that follow from the motion. Friction beyond a free stroke is linearised about the position
+    /// at rest and has no speed amplitude.
     pub(crate) fn all(machine: &Machine) -> Vec<Self> {
         let friction_speed = |(index, damper): (usize, &Damper)| {
             let given = damper.friction_linear_speed_m_per_s;

@@ -1,10 +1,10 @@
-//! A bound on the swing of hinge and bearings after jumps of the drum's acceleration.
+//! Bounds the swing of hinge and bearings after jumps of the drum's acceleration.
 //!
 //! A jump of the acceleration is a jump of the loads of everything that turns with the drum:
-//! unbalances, and bodies whose weight holds them beside the axis. Every method follows the slow
-//! modes. Hinge and bearings have no damping of their own and swing about their new deflection from
-//! then on. Steps longer than their periods do not resolve that swing, and two runs with such steps
-//! lose the same part of it, so that their comparison does not show the error.
+//! unbalances, and bodies that their own weight holds off the spin axis. Every method follows the
+//! slow modes. Hinge and bearings have no damping of their own, so that they swing about their new
+//! deflection from then on. Steps longer than the periods do not resolve this swing, and two runs
+//! with such steps lose the same part of it, so that their comparison does not show the error.
 //!
 //! The static deflection under the jump bounds the swing, without eigenvalues. The machine is free
 //! meanwhile, because its suspension is slow: the load is that of the linear model (Eq. 41) less
@@ -22,18 +22,19 @@ use crate::coordinates::{
 use crate::machine::spin::SpinStretch;
 use crate::{COORDINATES, Channel, Machine, Matrices};
 
-/// The greatest swing over the static deflection: of a free body about its new place of rest.
+/// The greatest swing of an undamped body after a jump of its load, as a multiple of the static
+/// deflection.
 const SWING_FACTOR: f64 = 2.0;
 
 /// The coordinates of the tub, and of the shaft in the same order.
 const RIGID: [[usize; 2]; 4] =
     [[TUB_Y, SHAFT_Y], [TUB_Z, SHAFT_Z], [TUB_YAW, SHAFT_YAW], [TUB_PITCH, SHAFT_PITCH]];
 
-/// The coordinates that deflect bearings and hinge while the tub is held.
+/// The coordinates that deflect bearings and hinge while the tub stands still.
 const ELASTIC: [usize; 6] = [SHAFT_Y, SHAFT_Z, SHAFT_YAW, SHAFT_PITCH, HINGE_YAW, HINGE_PITCH];
 
-/// The angles (rad) of the unbalance at which loads are computed. A load turns with the drum, or
-/// stands as the weight does, so that four angles have its greatest parts along both axes.
+/// The angles (rad) of the unbalance at which loads are computed. A load turns with the drum or is
+/// fixed in direction, so that four angles include its greatest components along both axes.
 const ANGLES_RAD: [f64; 4] = [0.0, 0.5 * PI, PI, 1.5 * PI];
 
 /// The deflections of the free machine.
@@ -45,7 +46,7 @@ struct Deflection {
 }
 
 impl Deflection {
-    /// Returns the greater deflection of each kind.
+    /// Returns the component-wise maximum.
     fn max(self, other: Self) -> Self {
         Self {
             drum_front_m: self.drum_front_m.max(other.drum_front_m),
@@ -79,7 +80,7 @@ pub(crate) fn jumps_rad_per_s2(stretches: &[SpinStretch], end_s: f64) -> f64 {
     sum
 }
 
-/// The modes that a step does not resolve: it is longer than their periods.
+/// The modes that a step does not resolve, because it is longer than their periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnresolvedModes {
     /// Hinge and bearings.
@@ -88,12 +89,12 @@ pub enum UnresolvedModes {
     Bearings,
 }
 
-/// A swing of everything that a row takes from a motion.
+/// The swing of the numbers that a row takes from a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
-    /// Of each channel (m, rad), in the order of [`Channel::ALL`].
+    /// The swing of each channel (m, rad), in the order of [`Channel::ALL`].
     pub channels: [f64; CHANNELS],
-    /// Of the gap between drum and tub (m).
+    /// The swing of the gap between drum and tub (m).
     pub gap_m: f64,
 }
 
@@ -113,7 +114,8 @@ impl Ringing {
             let accelerated = matrices_at(angle_rad, jumps_rad_per_s2);
             let load: [f64; COORDINATES] =
                 core::array::from_fn(|i| accelerated.force[i] - still.force[i]);
-            // Without a solution, springs of bearings or hinge are missing, and no level is stable.
+            // A system without a solution lacks springs of bearings or hinge, and no level is
+            // stable for such a machine.
             let Some(free) = FreeMachine::new(&still) else { continue };
             let Some(elastic) = free.static_deflection(&load) else { continue };
             let mut bearings = elastic;
@@ -187,7 +189,7 @@ impl<'a> FreeMachine<'a> {
     }
 
     /// Returns the static deflection of bearings and hinge under a load (N, N m), relative to the
-    /// tub; `None` if nothing holds them.
+    /// tub; `None` if a spring is missing.
     fn static_deflection(&self, load: &[f64; COORDINATES]) -> Option<[f64; COORDINATES]> {
         let inertial = self.mass_times(&self.rigid_motion(load));
         let stiffness = ELASTIC.map(|i| ELASTIC.map(|j| N(self.matrices.stiffness[i][j])));
@@ -200,7 +202,7 @@ impl<'a> FreeMachine<'a> {
         Some(deflection)
     }
 
-    /// Returns the deflections where bearings and hinge deflect by `elastic`: the tub moves against
+    /// Returns the deflections if bearings and hinge deflect by `elastic`. The tub moves against
     /// shaft and drum so that momentum is conserved.
     fn deflection(&self, machine: &Machine, elastic: &[f64; COORDINATES]) -> Deflection {
         let rigid = self.rigid_motion(&self.mass_times(elastic));

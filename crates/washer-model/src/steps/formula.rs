@@ -1,10 +1,11 @@
-//! The explicit Runge-Kutta formulas that run in fixed steps, and the longest steps they bear.
+//! The explicit Runge-Kutta formulas that run in fixed steps, and the longest steps at which they
+//! are stable.
 
 use crate::ModelKind;
 use lane_ode::dop853::DOP853_STABILITY_LIMIT;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
 
-/// The part of a formula's limit of stability in use.
+/// The part of a formula's limit of stability that is used.
 ///
 /// Basis: random machines (`examples/differential_test.rs`) stay within their errors. Halving it
 /// doubles the cost of every level.
@@ -22,8 +23,8 @@ pub enum Formula {
 impl Formula {
     /// Returns the formula that integrates a model with capped modes.
     ///
-    /// The linear model spends most of its time in its matrices at every instant that a formula
-    /// asks for: two a step for order 4, eleven for order 8. So order 4 takes less time.
+    /// The linear model spends most of its time on its matrices, which are computed at every
+    /// distinct instant of a step: two for order 4, eleven for order 8. So order 4 takes less time.
     pub const fn for_model(model: ModelKind) -> Self {
         match model {
             ModelKind::Nonlinear => Self::Dop853,
@@ -31,10 +32,10 @@ impl Formula {
         }
     }
 
-    /// Returns the greatest product of step and frequency (rad) in use.
+    /// Returns the greatest product of step and frequency (rad) that is used.
     ///
-    /// A share of the limit of stability; the rest is for what eigenvalues about an equilibrium do
-    /// not say of large motions.
+    /// It is below the limit of stability, because large motions may be faster than the eigenvalues
+    /// about an equilibrium say.
     pub const fn limit(self) -> f64 {
         match self {
             Self::Rk4 => STABILITY_SHARE * RK4_STABILITY_LIMIT,

@@ -23,15 +23,15 @@ fn paper() -> &'static [ModeOverSpeed] {
 }
 
 #[test]
-fn val_resonances_are_the_papers() {
+fn resonances_agree_with_the_paper() {
     let modes = paper();
-    let theirs = [
+    let references = [
         (99.9, 99.86, Movement::Rocking, MotionPlane::Horizontal),
         (147.6, 147.76, Movement::Rocking, MotionPlane::Vertical),
         (162.3, 162.08, Movement::Translation, MotionPlane::Horizontal),
         (261.6, 261.48, Movement::Translation, MotionPlane::Vertical),
     ];
-    for (mode, (paper, independent, movement, plane)) in modes.iter().zip(theirs) {
+    for (mode, (paper, independent, movement, plane)) in modes.iter().zip(references) {
         let [resonance] = mode.resonances[..] else { panic!("{:?}", mode.resonances) };
         let speed = resonance.speed_rpm;
         assert!((speed / paper - 1.0).abs() < 2e-3, "{speed} against the paper's {paper}");
@@ -85,15 +85,15 @@ fn loaded_springs_at_the_tabulated_positions_do_not_give_the_papers_resonances()
     }
 }
 
-/// Returns half the distance from the least to the greatest frequency over a turn, as a share of
-/// the mean.
+/// Returns half the range of the frequency over a turn, relative to the mean.
 fn swing(at: &ModeAtSpeed) -> f64 {
     0.5 * (at.greatest_rpm - at.least_rpm) / at.frequency_rpm
 }
 
 #[test]
-fn val_frequencies_hardly_vary_over_a_turn() {
-    // The paper says less than 0.3 % up to 1200 rpm. This holds but for the first mode at 1200 rpm.
+fn frequencies_hardly_vary_over_a_turn() {
+    // The paper gives less than 0.3 % up to 1200 rpm. This is true except for the first mode at
+    // 1200 rpm.
     for (k, mode) in paper()[..4].iter().enumerate() {
         for (at, step) in mode.at_speed.iter().zip(0..) {
             let speed = 50 * step;
@@ -171,7 +171,7 @@ fn a_mode_solves_the_equations_of_motion() {
 }
 
 #[test]
-fn an_overdamped_machine_has_ten_modes_too() {
+fn an_overdamped_machine_has_ten_modes() {
     let mut machine = Machine::paper();
     machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 3000.0);
     let modes = campbell(&point(machine), &[0.0, 100.0, 200.0]).unwrap();

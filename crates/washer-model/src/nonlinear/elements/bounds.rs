@@ -1,5 +1,5 @@
-//! Bounds of the elements' tangents: linear elements with the greatest stiffness and damping that a
-//! machine's elements reach, from which the integrators' steps are chosen.
+//! Bounds the tangents of the elements by linear elements with the greatest stiffness and damping
+//! that the machine's elements reach. The integrators' steps are chosen from these.
 
 use crate::coordinates::{COORDINATES, TUB};
 use crate::nonlinear::elements::{
@@ -8,17 +8,18 @@ use crate::nonlinear::elements::{
 use crate::nonlinear::frame::{difference, dot};
 use lane_ode::N;
 
-/// The greatest travel of a tub point from its place at rest (m). Basis: more than any machine has
-/// room for. Doubling it quadruples the bound of cubic stiffnesses.
+/// The greatest travel of a tub point from its place at rest (m). Basis: no machine has room for
+/// more. Doubling it quadruples the bound of cubic stiffnesses.
 const MAX_TRAVEL_M: f64 = 0.05;
 
-/// The depth of a stop in contact, in softnesses. Basis: the force law is linear there to less than
-/// a thousandth. Doubling it makes that a quarter.
+/// The depth at which a stop counts as in full contact, as a multiple of its softness. Basis: there
+/// the slope of its force is constant to less than a thousandth. Doubling it reduces that to a
+/// quarter.
 const CONTACT_DEPTH: f64 = 20.0;
 
 impl Elements<f64> {
-    /// Returns linear elements with the greatest tangents that these have near the equilibrium `q`;
-    /// `None` if these are linear along their lines.
+    /// Returns linear elements with the greatest tangents that the elements have near the
+    /// equilibrium `q`; `None` if all elements are linear along their lines.
     pub(crate) fn steepest(&self, q: &[f64; COORDINATES]) -> Option<Self> {
         if !self.has_optional.holds() {
             return None;
@@ -36,7 +37,7 @@ impl Elements<f64> {
                 + cubic * elongation * elongation * elongation;
             let farthest = elongation.abs() + MAX_TRAVEL_M;
             spring.stiffness += 3.0 * (cubic * farthest * farthest).v();
-            // Keeps the tension at rest, on which the stiffness across the line depends.
+            // The tension at rest is kept, because the stiffness across the line depends on it.
             spring.stiffness_times_free_length = spring.stiffness * length - tension;
             spring.cubic = N(0.0);
         }
@@ -67,8 +68,8 @@ impl Elements<f64> {
 
 impl DamperCoefficients<f64> {
     /// Returns a spring without tension at rest that is as stiff as the onset of friction at the
-    /// end of the free stroke: the share of friction that acts grows by up to 1 / (2 sigma) per
-    /// length.
+    /// end of the free stroke, where the acting share of friction grows by up to 1 / (2 sigma) per
+    /// unit of length.
     fn onset(&self) -> Option<SpringCoefficients<f64>> {
         if !self.has_free_stroke() {
             return None;

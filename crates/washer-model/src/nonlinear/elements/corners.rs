@@ -1,12 +1,13 @@
-//! Forces with corners as functions of one motion each: a damper's friction of the length of the
-//! damper and the speed along it, a stop's force of depth and speed.
+//! Computes the forces with corners as functions of one motion each: the friction of a damper as a
+//! function of its length and speed, and the force of a stop as a function of depth and speed.
 
 use super::{CabinetLine, Elements, ForceLaw as _, TubMotion};
 use crate::lanes::{ToDual as _, lane_struct};
 use lane_ode::{Lane, N};
 
 lane_struct! {
-    /// A force along a motion of the tub (N), and the derivatives by depth (N/m) and speed (N s/m).
+    /// A force along a motion of the tub (N), and its derivatives with respect to depth (N/m) and
+    /// speed (N s/m).
     #[derive(Clone, Copy)]
     CornerForce { force, by_depth, by_speed }
 }
@@ -26,7 +27,7 @@ impl<T: Lane> Elements<T> {
         motions
     }
 
-    /// Appends the forces at such motions to a list.
+    /// Appends the forces at these motions to a list.
     #[inline(always)]
     pub(crate) fn corner_forces(&self, motions: &[[N<T>; 2]], forces: &mut Vec<CornerForce<T>>) {
         let (damper_motions, stop_motions) = motions.split_at(self.dampers.len());
