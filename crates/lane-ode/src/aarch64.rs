@@ -1,11 +1,11 @@
 //! NEON lanes: intrinsics behind a newtype.
 //!
 //! Every processor of this target has NEON. As on other architectures, only the entry function
-//! makes a first value: a value of this type exists only where the instructions do, which makes the
-//! `unsafe` below sound.
+//! makes the first value of this type: a value of this type exists only where the instructions do,
+//! which makes the `unsafe` below sound.
 //!
-//! A value has one register. With two, the right-hand sides outgrow the 32 registers, and a lane's
-//! step takes a sixth more instructions (results/benchmarks/arm.md).
+//! A value takes one register. With two, the right-hand sides need more than the 32 registers, and
+//! a lane's step takes a sixth more instructions (results/benchmarks/arm.md).
 #![allow(unsafe_code)]
 
 use crate::vector::vector;
@@ -22,7 +22,8 @@ vector!(
         div |a, b| vdivq_f64(a, b),
         sqrt |a| vsqrtq_f64(a),
         mul_add |a, b, c| vfmaq_f64(c, a, b),
-        // There is no a b - c, and -(c - a b) is -0 where the others give 0.
+        // NEON has no instruction for a b - c, and -(c - a b) is -0 where the other instruction
+        // sets give 0.
         mul_sub |a, b, c| vfmaq_f64(vnegq_f64(c), a, b),
         neg_mul_add |a, b, c| vfmsq_f64(c, a, b),
         neg |a| vnegq_f64(a),
@@ -38,7 +39,7 @@ vector!(
     }
 );
 
-/// Returns `-x`, by an instruction of its own.
+/// Returns `-x`, computed by a separate instruction.
 ///
 /// LLVM 22 turns the negative of a fused a b + c into one `fnmadd`, which is -a b - c: 0 in place
 /// of -0 where the terms cancel. NEON's vectors have no such instruction.

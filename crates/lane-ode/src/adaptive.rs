@@ -1,4 +1,4 @@
-//! Time of the lanes in adaptive methods: every lane has its own time, step and end.
+//! Times, steps and segments of the lanes in adaptive methods. Each lane has its own.
 
 use crate::control::StepControl;
 use crate::{Count, Failure, Lane, MAX_LANES, N, SegmentEnd, Task, Tolerance};
@@ -56,14 +56,14 @@ impl<T: Lane> Lanes<T> {
         has_begun
     }
 
-    /// Whether some lane has a segment.
+    /// Whether any lane has a segment.
     #[inline(always)]
     pub(crate) fn are_active(&self) -> bool {
         self.segments[..T::LANES].iter().any(|segment| segment.is_active)
     }
 
-    /// Returns the steps to try. A step that would end just short of its segment's end, or beyond
-    /// it, ends there.
+    /// Returns the steps to try. A step that would end beyond its segment's end, or just before it,
+    /// is changed to end there.
     #[inline(always)]
     pub(crate) fn steps(&self) -> N<T> {
         let mut h = self.control.step;
@@ -88,8 +88,8 @@ impl<T: Lane> Lanes<T> {
     }
 
     /// Accepts or rejects steps `h` by their error, and ends segments. `lanes` holds the lanes
-    /// whose steps are good, and those whose new states are in range. Returns the length that each
-    /// lane has gone.
+    /// whose errors are small enough, and the lanes whose new states are in range. Returns the
+    /// length that each lane has advanced.
     #[inline(always)]
     pub(crate) fn accept_or_reject(
         &mut self,
@@ -101,7 +101,7 @@ impl<T: Lane> Lanes<T> {
         let mut length = h.lit(0.0);
         let lanes = lanes.map(T::bits);
         let next = self.control.proposals(error, h);
-        // Lane by lane: bookkeeping in scalars is small beside a step's evaluations.
+        // The lanes are handled one by one, which costs little against the evaluations of a step.
         for lane in 0..T::LANES {
             if !self.segments[lane].is_active {
                 continue;

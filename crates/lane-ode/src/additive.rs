@@ -1,16 +1,17 @@
 //! Kennedy and Carpenter's additive method of order 5(4), `ARK5(4)8L[2]SA`: adaptive, every lane
 //! with its own time and step, for systems with a stiff part ([`SemiImplicit`]).
 //!
-//! Every stage has two states, by the explicit and by the implicit formula. The stiff part is taken
-//! at the second, in an equation that is linear, and is damped where steps are long for it
-//! (L-stable); all else is taken at the first. A stiff part that changes with the state, as springs
-//! do between bodies that turn, may be as stiff at the end of a step as at its beginning.
+//! Every stage has two states, one by the explicit and one by the implicit formula. The stiff part
+//! is evaluated at the second state, by solving a linear equation, and is damped if steps are long
+//! against its periods (the method is L-stable). All other terms are evaluated at the first state.
+//! A stiff part that changes with the state, as springs between turning bodies do, may be as stiff
+//! at the end of a step as at its beginning.
 //!
 //! Coefficients: C. A. Kennedy, M. H. Carpenter, Additive Runge-Kutta schemes for
 //! convection-diffusion-reaction equations, Applied Numerical Mathematics 44 (2003) 139. Two states
-//! a stage, which keep the order: S. Boscarino, F. Filbet, G. Russo, High order semi-implicit
+//! per stage, which keep the order: S. Boscarino, F. Filbet, G. Russo, High order semi-implicit
 //! schemes for time dependent partial differential equations, Journal of Scientific Computing 68
-//! (2016) 975. The tests measure the order that they give.
+//! (2016) 975. The tests measure the resulting order.
 
 use crate::adaptive::Lanes;
 use crate::control::padded;
@@ -19,7 +20,7 @@ use crate::{Lane, N, SemiImplicit, Step, System as _, Task, Tolerance};
 /// Number of stages.
 const STAGES: usize = 8;
 
-/// Diagonal coefficient of the implicit matrix, in every row but the first.
+/// Diagonal coefficient of the implicit matrix, in every row except the first.
 pub const GAMMA: f64 = 41.0 / 200.0;
 
 /// Nodes.
@@ -72,7 +73,7 @@ const A_EXPLICIT: [[f64; STAGES]; STAGES] = padded([
     ],
 ]);
 
-/// Weights of order 5, of both parts.
+/// Weights of order 5, for both parts.
 const B: [f64; STAGES] = [
     -872_700_587_467.0 / 9_133_579_230_613.0,
     0.0,
@@ -84,7 +85,7 @@ const B: [f64; STAGES] = [
     41.0 / 200.0,
 ];
 
-/// Matrix of the implicit part below its diagonal. Its last row is the weights.
+/// Matrix of the implicit part below its diagonal. Its last row equals the weights.
 const A_IMPLICIT: [[f64; STAGES]; STAGES] = padded([
     &[],
     &[41.0 / 200.0],
@@ -126,7 +127,7 @@ const B_HAT: [f64; STAGES] = [
     4_035_322_873_751.0 / 18_575_991_585_200.0,
 ];
 
-/// Integrates every trajectory that the task has. No lane waits for another's error.
+/// Integrates every trajectory of the task. The lanes accept and reject steps independently.
 #[inline(always)]
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     zero: T,
@@ -169,7 +170,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         is_fresh = false;
 
         let h = lanes.steps();
-        // An idle lane needs some g above zero.
+        // The equations of an idle lane need a positive g too.
         let g = N((h * GAMMA).v().0.larger(zero.lit(f64::MIN_POSITIVE.sqrt()).0));
         let mut y = x;
         let mut r = x;

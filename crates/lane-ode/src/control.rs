@@ -2,20 +2,20 @@
 
 use crate::{Lane, N};
 
-/// Limits of an adaptive method.
+/// The tolerances and the step limit of an adaptive method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
-    /// Relative error per component and step.
+    /// The relative tolerance of the error of each component in a step.
     pub relative: f64,
-    /// Absolute error per component and step, in the component's unit.
+    /// The absolute tolerance of the error of each component in a step, in the component's unit.
     pub absolute: f64,
-    /// Greatest number of steps of one segment, accepted and rejected ones together.
+    /// The greatest number of steps of one segment, accepted and rejected ones together.
     pub max_steps: u64,
 }
 
 impl Tolerance {
-    /// Returns the largest component of the error over its tolerance. A step is good below 1. The
-    /// result is NaN if any component is not finite.
+    /// Returns the largest ratio of a component's error to its tolerance. A step is accepted if it
+    /// is below 1. The result is NaN if any component is not finite.
     #[inline(always)]
     pub(crate) fn norm<T: Lane, const D: usize>(
         &self,
@@ -30,14 +30,14 @@ impl Tolerance {
             let size = N(before[i].0.abs().larger(after[i].0.abs()));
             let ratio = error[i].abs() / (size * self.relative + self.absolute);
             largest = N(ratio.0.larger(largest.0));
-            // Comparisons drop a NaN; a product with zero keeps it.
+            // Comparisons lose a NaN, so that a product with zero carries it on.
             poison += ratio * zero;
         }
         largest + poison
     }
 }
 
-/// Returns a formula's matrix from its rows. Zeros at the end of a row may be left out.
+/// Returns a formula's matrix from its rows, which may omit zeros at their ends.
 pub(crate) const fn padded<const ROWS: usize, const COLUMNS: usize>(
     rows: [&[f64]; ROWS],
 ) -> [[f64; COLUMNS]; ROWS] {
@@ -54,14 +54,14 @@ pub(crate) const fn padded<const ROWS: usize, const COLUMNS: usize>(
 /// Proportional-integral step control (Hairer and Wanner II, section IV.2): h grows by
 /// 0.9 err^-alpha err_before^beta, within 0.2 to 5.
 ///
-/// The exponents are sums of powers of one half, so that square roots are enough: the same bits
-/// everywhere.
+/// The exponents are sums of powers of one half, so that they need square roots only and the bits
+/// are the same everywhere.
 pub(crate) struct StepControl<T> {
     /// The step to try next.
     pub(crate) step: N<T>,
-    /// err^beta of the last accepted step.
+    /// The number err^beta of the last accepted step.
     memory: N<T>,
-    /// Lanes whose last attempt was rejected: their next step must not grow.
+    /// A mask of the lanes whose last step was rejected: their next step must not grow.
     was_rejected: u32,
 }
 
@@ -81,17 +81,17 @@ fn clamped<T: Lane>(factor: N<T>, greatest: f64) -> N<T> {
     least.where_less(factor, factor, least)
 }
 
-/// Factor of a step beside the one whose error would be the tolerance. Basis: `dopri5.f` (0.9).
-/// Twice as much would have nearly every step rejected.
+/// The safety factor of the step size. Basis: `dopri5.f` (0.9). Doubling it would have nearly every
+/// step rejected.
 const SAFETY: f64 = 0.9;
-/// Least factor from one step to the next. Basis: `dopri5.f` (0.2). Twice as much takes more
+/// The least factor from one step to the next. Basis: `dopri5.f` (0.2). Doubling it takes more
 /// rejected steps where the motion suddenly becomes faster.
 const SHRINK_LIMIT: f64 = 0.2;
-/// Greatest factor from one step to the next. Basis: half of `dopri5.f`'s 10. Twice as much has
+/// The greatest factor from one step to the next. Basis: half of `dopri5.f`'s 10. Doubling it has
 /// more steps rejected after the first one of a segment.
 const GROWTH_LIMIT: f64 = 5.0;
-/// Least error, in tolerances, that the next step is computed from. Basis: the factor of such an
-/// error is far above [`GROWTH_LIMIT`], so twice as much changes no step.
+/// The least error, relative to the tolerance, from which the next step is computed. Basis: such an
+/// error gives a factor far above [`GROWTH_LIMIT`], so that doubling it changes no step.
 const LEAST_ERROR: f64 = 1e-10;
 
 impl<T: Lane> StepControl<T> {
@@ -100,8 +100,8 @@ impl<T: Lane> StepControl<T> {
         Self { step: zero, memory: zero.lit(1.0), was_rejected: 0 }
     }
 
-    /// Starts a segment. Nothing is kept of the lane's earlier trajectories, so that results do not
-    /// depend on them.
+    /// Starts a segment. It discards the control's memory of the lane's earlier trajectories, so
+    /// that results do not depend on them.
     #[inline(always)]
     pub(crate) fn start(&mut self, lane: usize, first_step_s: f64) {
         self.step.0.set(lane, first_step_s);
@@ -112,7 +112,7 @@ impl<T: Lane> StepControl<T> {
     /// Computes the next steps after error `error` over step `h`.
     #[inline(always)]
     pub(crate) fn proposals(&self, error: N<T>, h: N<T>) -> Proposals<T> {
-        // NaN is far too large.
+        // An error that is NaN counts as far too large.
         let error = error.where_less(error.lit(1e30), error, error.lit(1e30));
         let error = error.lit(LEAST_ERROR).where_less(error, error, error.lit(LEAST_ERROR));
         let root_2 = error.sqrt();
@@ -130,7 +130,7 @@ impl<T: Lane> StepControl<T> {
         }
     }
 
-    /// Sets a lane's next step, after a step that was accepted or not.
+    /// Sets a lane's next step, after an accepted or a rejected one.
     #[inline(always)]
     pub(crate) fn update(&mut self, lane: usize, is_accepted: bool, next: &Proposals<T>) {
         let bit = 1 << lane;

@@ -1,21 +1,21 @@
 //! The eighth-order Runge-Kutta method of Dormand and Prince with a fixed step.
 //!
 //! Coefficients: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.5
-//! and the program `dop853.f` that goes with it. Its error estimate is left out: callers compare
-//! whole trajectories.
+//! and the program `dop853.f` that goes with it. The formula's error estimate is omitted, because
+//! callers compare whole trajectories.
 //!
-//! On the imaginary axis it is stable up to |h w| = 5.96: half a radian per stage, against 0.71 of
-//! classical Runge-Kutta. It is cheaper where accuracy, not stability, limits the steps of the
-//! latter.
+//! On the imaginary axis the method is stable up to |h w| = 5.96. This is half a radian per stage,
+//! against 0.71 of the classical method of order 4. The method is cheaper than the classical one
+//! where accuracy, not stability, limits the steps of the latter.
 
 use crate::fixed::FixedSegments;
 use crate::{Lane, N, Step, System as _, Task};
 use core::hint::black_box;
 
-/// On the imaginary axis the method is stable up to |h w| = 5.96.
+/// The limit of stability on the imaginary axis: the method is stable up to this |h w|.
 pub const DOP853_STABILITY_LIMIT: f64 = 5.96;
 
-/// Number of stages, and of evaluations of the right-hand side, in a step.
+/// Number of stages, which is the number of evaluations of the right-hand side in a step.
 pub const DOP853_STAGES: usize = 12;
 
 /// Nodes.
@@ -34,7 +34,7 @@ const C: [f64; DOP853_STAGES] = [
     1.0,
 ];
 
-/// The coefficients of a row that do not vanish, each with its stage.
+/// The nonzero coefficients of a row, each after the index of its stage.
 type SparseRow = &'static [(usize, f64)];
 
 /// Rows of the matrix, from the second stage on.
@@ -117,7 +117,8 @@ const B: SparseRow = &[
     (11, 4.47106157277725905176885569043e-2),
 ];
 
-/// Integrates every trajectory that the task has. A lane takes the next one as soon as it is free.
+/// Integrates every trajectory of the task. A lane starts the next trajectory as soon as its own
+/// has ended.
 #[inline(always)]
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) {
     let zero = N(zero);
@@ -128,24 +129,25 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let mut index = segments.index;
         let h = clock.h;
         let mut time = clock.at(index);
-        // Hidden from the compiler, which would copy it from place to place.
+        // The compiler must not see through this call, or it copies the forcing repeatedly.
         let mut forcing = task.system().forcing_aside(time);
         let forcing = black_box(&mut forcing);
-        // States of this step's start and of the last one's, which change places, and the stage's;
-        // the last step's first slope, which observers want, after this step's.
+        // The states at the start of this step and of the last one, which swap places, and the
+        // stage's state; then the slopes, with the first slope of the last step, which observers
+        // need, at the end.
         let mut states = [x; 3];
         let mut slopes = [x; DOP853_STAGES + 1];
-        // The place of a stage's state among states.
+        // Index of a stage's state among the states.
         const STAGE: usize = 2;
-        // The place of the last step's first slope among slopes.
+        // Index of the last step's first slope among the slopes.
         const BEFORE: usize = DOP853_STAGES;
         let mut now = 0;
         let mut last = 1;
         let mut is_fresh = true;
         let mut done = 0;
         loop {
-            // The one after the last is an evaluation only: observers want the slope at both ends
-            // of a step.
+            // The pass after the last step only evaluates the slope, because observers need it at
+            // both ends of a step.
             let is_last = done == run;
             let next_time = clock.at(index + 1.0);
             for stage in 0..DOP853_STAGES {
@@ -201,11 +203,11 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
     }
 }
 
-/// Number of sums that are kept in registers. Basis: AVX2 has sixteen registers. Twice as many are
-/// kept in memory.
+/// Number of sums that are kept in registers. Basis: AVX2 has sixteen registers. Doubling it has
+/// sums stored in memory.
 const SUMS_IN_REGISTERS: usize = 10;
 
-/// Computes a stage's state: another one plus a row's sum of slopes.
+/// Computes a stage's state: a given state plus the sum of slopes weighted by a row's coefficients.
 #[expect(clippy::manual_memcpy, reason = "sums are registers, not memory")]
 #[inline(always)]
 fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
@@ -216,8 +218,8 @@ fn add_slopes<T: Lane, const D: usize, const K: usize, const S: usize>(
     from: usize,
     to: usize,
 ) {
-    // So many coordinates at once that their sums stay in registers: each weight is read once for
-    // all of them, and no sum waits for itself.
+    // Coordinates are summed in groups whose sums fit in registers: each weight is read once for a
+    // group, and no sum waits for its own last term.
     for first in (0..D).step_by(SUMS_IN_REGISTERS) {
         let mut x = [h; SUMS_IN_REGISTERS];
         for i in 0..SUMS_IN_REGISTERS.min(D - first) {

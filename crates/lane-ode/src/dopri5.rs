@@ -14,7 +14,7 @@ const STAGES: usize = 7;
 /// Nodes.
 const C: [f64; STAGES] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
 
-/// Matrix. Its last row is also the weights of order 5.
+/// Matrix. Its last row equals the weights of order 5.
 const A: [[f64; 6]; STAGES] = padded([
     &[],
     &[1.0 / 5.0],
@@ -64,7 +64,7 @@ fn combined<T: Lane, const D: usize>(
     sums
 }
 
-/// Integrates every trajectory that the task has. No lane waits for another's error.
+/// Integrates every trajectory of the task. The lanes accept and reject steps independently.
 #[inline(always)]
 pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     zero: T,
@@ -84,7 +84,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
         }
         let h = lanes.steps();
 
-        // The last stage of a step is the first of the next, unless something new has begun.
+        // The last stage of a step is the first of the next, except after the start of a segment.
         let mut y = x;
         for stage in usize::from(!is_fresh)..STAGES {
             let forcing = task.system().forcing(h * C[stage] + lanes.time);

@@ -1,9 +1,9 @@
-//! Forward automatic differentiation: the same source, with one derivative carried along.
+//! Forward automatic differentiation: numbers that carry one derivative along.
 
 use crate::real::operations;
 use crate::{Aside, Lane, N, Real};
 
-/// A value and its derivative along one direction. Nest it for second derivatives.
+/// A value and its derivative along one direction. Nested dual numbers have second derivatives.
 #[derive(Clone, Copy, Debug)]
 pub struct Dual<T> {
     /// The value.
@@ -21,7 +21,7 @@ impl<T: Real> Dual<T> {
 }
 
 impl<T: Real> N<T> {
-    /// Returns this value as a constant of a dual number.
+    /// Returns this value as a dual number with a slope of zero.
     #[inline(always)]
     pub fn constant(self) -> N<Dual<T>> {
         N(Dual::constant(self.0))

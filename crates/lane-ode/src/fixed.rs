@@ -3,19 +3,19 @@
 use crate::{Count, Failure, Lane, MAX_LANES, N, Segment, SegmentEnd, Task};
 
 /// Greatest number of steps between two calls of [`Task::is_stopped`]. Basis: they take some
-/// hundredths of a second. Twice as many make a user who interrupts wait twice as long.
+/// hundredths of a second. Doubling it doubles the time until an interrupt takes effect.
 pub const STEPS_AT_ONCE: u64 = 1 << 14;
 
-/// Returns the number of steps in a segment: the least for which equal steps are no longer than the
-/// segment's own.
+/// Returns the number of equal steps in a segment: the least for which they are no longer than the
+/// segment's `step_s`.
 pub(crate) fn fixed_steps(segment: &Segment) -> u64 {
-    // Rounding may leave the quotient just above the intended whole number.
+    // Rounding may make the quotient slightly greater than the intended whole number.
     let steps =
         ((segment.end_s - segment.start_s) / segment.step_s * (1.0 - 1e-12)).ceil().max(1.0);
     steps as u64
 }
 
-/// The time of each lane's segment. The end is exact, whatever the rounding error of the step.
+/// The time of each lane's segment. The end is exact in spite of the step's rounding error.
 #[derive(Clone, Copy)]
 pub(crate) struct SegmentClock<T> {
     start: N<T>,
@@ -34,7 +34,7 @@ impl<T: Lane> SegmentClock<T> {
     }
 }
 
-/// The steps of a lane's segment, made and to make.
+/// The number of steps of a lane's segment, done and remaining.
 #[derive(Clone, Copy, Default)]
 struct FixedProgress {
     is_active: bool,
@@ -42,7 +42,7 @@ struct FixedProgress {
     left: u64,
 }
 
-/// The segments that the lanes are in.
+/// The current segments of the lanes.
 pub(crate) struct FixedSegments<T> {
     pub(crate) clock: SegmentClock<T>,
     /// The number of steps made in the segment.
@@ -64,8 +64,8 @@ impl<T: Lane> FixedSegments<T> {
     }
 
     /// Requests the next segment for every lane whose segment has ended. Returns the number of
-    /// steps that all lanes can make before one of them is at its end, or the task wants to be
-    /// asked whether it is stopped; `None` when it is, or when no lane has anything left to do.
+    /// steps that all lanes can make before one of them is at its end, or before
+    /// [`Task::is_stopped`] is called next; `None` if the task is stopped or no lane has a segment.
     #[inline(always)]
     pub(crate) fn start_pending_lanes<const D: usize, P: Task<T, D>>(
         &mut self,

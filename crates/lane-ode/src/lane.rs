@@ -1,12 +1,12 @@
-//! Lanes: independent trajectories side by side in one number.
+//! Lanes: numbers of independent trajectories side by side in one register.
 
 use crate::Real;
 
-/// Greatest number of lanes of any instruction set here. Twice as many would serve registers of
-/// 1024 bits.
+/// Greatest number of lanes of any instruction set. Basis: AVX-512 has eight. Doubling it would
+/// serve registers of 1024 bits.
 pub const MAX_LANES: usize = 8;
 
-/// A [`Real`] whose lanes can be reached one by one.
+/// A [`Real`] whose lanes can be read and written one by one.
 pub trait Lane: Real {
     /// The number of trajectories that one value carries.
     const LANES: usize;
@@ -23,7 +23,7 @@ pub trait Lane: Real {
     /// Rounds to the nearest integer, ties to even.
     #[must_use]
     fn round(self) -> Self;
-    /// Packs the truth values: bit `i` is that of lane `i`.
+    /// Packs the truth values of all lanes: bit `i` is that of lane `i`.
     fn bits(mask: Self::Mask) -> u32;
     /// Returns the larger of each pair; `b` where either is NaN.
     #[inline(always)]
@@ -31,22 +31,22 @@ pub trait Lane: Real {
     fn larger(self, b: Self) -> Self {
         Self::select(b.less(self), self, b)
     }
-    /// Runs work over lanes of this type as a function of its own, compiled with the type's
-    /// instructions once for all callers.
+    /// Runs work over lanes of this type as a separate function, compiled once for all callers with
+    /// the type's instructions.
     #[inline(always)]
     fn aside<W: Aside>(self, work: W) -> W::Output {
         out_of_line(work)
     }
 }
 
-/// Work over lanes of one type that is compiled once, as a function of its own, not wherever it is
-/// called from: for what is long and runs seldom beside what surrounds it. [`Lane::aside`] runs it,
-/// and [`Simd::one_lane`](crate::Simd::one_lane) what comes singly. The time that a function takes
-/// to compile grows faster than its length.
+/// Work over lanes of one type that is compiled once, as a separate function instead of inline in
+/// each caller. It suits long code that runs rarely, because the time to compile a function grows
+/// faster than its length. [`Lane::aside`] runs it in lanes,
+/// [`Simd::one_lane`](crate::Simd::one_lane) in a single one.
 pub trait Aside {
     /// The result of the work.
     type Output;
-    /// Does the work. Mark it `#[inline(always)]` as [`Kernel::run`](crate::Kernel::run).
+    /// Does the work. Mark it `#[inline(always)]`, like [`Kernel::run`](crate::Kernel::run).
     fn run(self) -> Self::Output;
 }
 

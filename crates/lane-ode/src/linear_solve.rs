@@ -1,21 +1,21 @@
-//! Linear equations of a fixed size: Gauss's elimination, on the stack.
+//! Solves linear equations of a fixed size by Gauss's elimination, on the stack.
 
 use crate::N;
 
-/// Row-pivoted triangular factors of a square matrix.
+/// The triangular factors of a square matrix with row pivoting.
 #[derive(Clone)]
 pub struct Lu<const C: usize> {
-    /// L below the diagonal (its unit diagonal not stored), U above it, the reciprocals of U's
-    /// diagonal on it.
+    /// The factor L below the diagonal (without its unit diagonal), the factor U above it, and the
+    /// reciprocals of U's diagonal on it.
     packed: [[N<f64>; C]; C],
-    /// Row `i` of the factors comes from row `order[i]` of the matrix.
+    /// The row of the matrix for each row of the factors.
     order: [usize; C],
 }
 
 impl<const C: usize> Lu<C> {
-    /// Factors `a`, always with the largest remaining entry of a column as pivot (Golub and Van
-    /// Loan, Matrix Computations, Algorithm 3.4.1). `None` if a column has nothing left but zeros,
-    /// or something not finite.
+    /// Factors `a`, with the largest remaining entry of a column as pivot (Golub and Van Loan,
+    /// Matrix Computations, Algorithm 3.4.1). Returns `None` if a column has only zeros left, or an
+    /// entry is not finite.
     #[inline(always)]
     pub fn new(mut a: [[N<f64>; C]; C]) -> Option<Self> {
         let mut order = [0; C];
@@ -56,7 +56,7 @@ impl<const C: usize> Lu<C> {
         for i in 0..C {
             x[i] = b[self.order[i]];
         }
-        // Column by column: each pass is independent over the rows.
+        // The elimination goes by columns, so that each pass is independent over the rows.
         for j in 0..C {
             for i in j + 1..C {
                 x[i] -= self.packed[i][j] * x[j];
@@ -77,8 +77,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn solutions_solve() {
-        // Zero pivots on the way: only exchanges of rows get through.
+    fn solutions_satisfy_the_equations() {
+        // Some pivots are zero, so that rows must be exchanged.
         let a = [
             [0.0, 2.0, -1.0, 3.0],
             [0.0, 0.0, 4.0, 1e-3],
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_solution_has_no_factors() {
+    fn singular_matrices_have_no_factors() {
         assert!(Lu::new([[1.0, 2.0], [2.0, 4.0]].map(|row| row.map(N))).is_none());
         assert!(Lu::new([[1.0, 2.0], [f64::NAN, 4.0]].map(|row| row.map(N))).is_none());
         assert!(Lu::new([[f64::INFINITY, 2.0], [1.0, 4.0]].map(|row| row.map(N))).is_none());

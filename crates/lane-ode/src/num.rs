@@ -1,9 +1,9 @@
 //! Operators that fuse by their types: a product is rounded together with the sum that it is part
 //! of.
 //!
-//! `a * b` is a pending [`Product`]; adding to it or subtracting from it makes one fused operation.
-//! So `m * v + k * (x - y)` compiles to one multiplication and one fused multiply-add, in the order
-//! its types say, on every instruction set. The rules, for a sum of two products, are
+//! `a * b` is a [`Product`] that is not rounded yet; an addition or subtraction fuses with it. So
+//! `m * v + k * (x - y)` compiles to one multiplication and one fused multiply-add, in the order
+//! that the types determine, on every instruction set. The rules, for a sum of two products, are
 //! `a*b + c*d = fma(a, b, c*d)`.
 
 use crate::Real;
@@ -34,7 +34,7 @@ impl<T: Real> From<Product<T>> for N<T> {
 }
 
 impl<T: Real> N<T> {
-    /// Returns the constant `value` in every lane of a number like this one.
+    /// Returns a number of this type with the constant `value` in every lane.
     #[inline(always)]
     #[must_use]
     pub fn lit(self, value: f64) -> Self {
@@ -69,7 +69,7 @@ impl<T: Real> N<T> {
         let (sin, cos) = self.0.sin_cos();
         (Self(sin), Self(cos))
     }
-    /// Selects `a` where `self < bound`, else `b`.
+    /// Returns `a` in lanes where `self < bound`, else `b`.
     #[inline(always)]
     #[must_use]
     pub fn where_less(self, bound: Self, a: Self, b: Self) -> Self {

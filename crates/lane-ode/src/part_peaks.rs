@@ -1,22 +1,22 @@
-//! Peaks of every part of a trajectory that is cut at known instants.
+//! Finds the peaks in every part of a trajectory that is cut at given instants.
 
 use crate::quintic::{Quintic, within_step};
 use crate::{Lane, MAX_LANES, N, Peaks, Sample};
 
 /// The largest magnitudes of `M` outputs in every part of each lane's trajectory. Each lane has its
-/// own instants, which divide the parts.
+/// own instants (cuts) between the parts.
 ///
-/// Steps need not end at the instants. A step that spans one is divided there by the polynomial of
-/// degree 5 through values, slopes and curvatures at its ends. A lane allocates when it takes up a
-/// trajectory, not in steps.
+/// Steps need not end at the cuts. A step with a cut is divided there, by the polynomial of degree
+/// 5 through values, slopes and curvatures at both ends of the step. A lane allocates when it
+/// starts a trajectory, not in steps.
 #[derive(Clone, Debug)]
 pub struct PartPeaks<T, const M: usize> {
     peaks: Peaks<T, M>,
-    /// The end of each lane's current part; infinity in its last.
+    /// The end of each lane's current part; infinity for the last part.
     part_end_s: N<T>,
-    /// Later cuts of each lane, the next one last.
+    /// The later cuts of each lane, with the next one last in the list.
     cuts_s: [Vec<f64>; MAX_LANES],
-    /// Peaks of the parts that each lane has behind it.
+    /// The peaks of each lane's completed parts.
     parts: [Vec<[f64; M]>; MAX_LANES],
 }
 
@@ -32,7 +32,7 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
         }
     }
 
-    /// Begins another trajectory in one lane; `cuts_s` increase, and lie where the outputs count.
+    /// Begins another trajectory in one lane. The cuts increase and are within the window.
     pub fn reset(&mut self, lane: usize, cuts_s: &[f64]) {
         self.peaks.reset(lane);
         self.cuts_s[lane].clear();
@@ -43,8 +43,8 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
         self.part_end_s.0.set(lane, first);
     }
 
-    /// Returns the peaks of one lane's parts, the last one as far as it has come. The lane's
-    /// trajectory ends here.
+    /// Returns the peaks of one lane's parts and ends its trajectory. The last part may be
+    /// incomplete.
     pub fn finish(&mut self, lane: usize) -> Vec<[f64; M]> {
         self.part_end_s.0.set(lane, f64::INFINITY);
         let mut parts = core::mem::take(&mut self.parts[lane]);
@@ -52,13 +52,14 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
         parts
     }
 
-    /// Adds samples that no step leads to, in the lanes that count.
+    /// Adds samples without a step before them, in the lanes in which `counts` is true.
     #[inline(always)]
     pub fn begin(&mut self, samples: &[Sample<T>; M], counts: T::Mask) {
         self.peaks.begin(samples, counts);
     }
 
-    /// Adds the samples at `end_s`, the end of a step of `length_s` that began at the last ones.
+    /// Adds the samples at `end_s`, the end of a step of `length_s` that began at the samples
+    /// before.
     #[inline(always)]
     pub fn advance(
         &mut self,
@@ -74,7 +75,7 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
             let mut there = *samples;
             let mut part_s = rest_s;
             if lanes_cut != 0 {
-                // Lanes without a cut go to the step's end at once.
+                // Lanes without a cut in the step advance to its end at once.
                 let to_cut = self.part_end_s - (end_s - rest_s);
                 let share = N(T::select(cut, within_step(to_cut / rest_s).0, rest_s.lit(1.0).0));
                 for i in 0..M {

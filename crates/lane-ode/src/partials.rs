@@ -1,17 +1,16 @@
-//! Partial derivatives of a second-order system, exact to rounding: the same source over dual
-//! numbers.
+//! Computes the partial derivatives of a second-order system by dual numbers, exact to rounding.
 
 use crate::{Dual, Lane, N, System};
 
 /// The derivatives of the accelerations of a system of `C` coordinates by its state.
 ///
-/// The state is C coordinates q, then their speeds u, so that q' = u and only u' = a(t, q, u) has
-/// derivatives worth storing.
+/// The state is C coordinates q, then their speeds u, so that q' = u and only the derivatives of u'
+/// = a(t, q, u) are stored.
 #[derive(Clone, Debug)]
 pub struct Partials<const C: usize> {
-    /// Row i, column j: by coordinate j.
+    /// The derivative of acceleration i with respect to coordinate j, in row i and column j.
     pub by_coordinate: [[N<f64>; C]; C],
-    /// Row i, column j: by speed j.
+    /// The derivative of acceleration i with respect to speed j, in row i and column j.
     pub by_speed: [[N<f64>; C]; C],
 }
 
@@ -22,8 +21,8 @@ impl<const C: usize> Partials<C> {
     }
 
     /// Computes the derivatives at time `t_s` and state `x`. `system` has the same parameters in
-    /// every lane; each lane takes a direction of its own, and the results do not depend on how
-    /// many there are.
+    /// every lane; each lane differentiates along its own direction, and the results do not depend
+    /// on the number of lanes.
     #[inline(always)]
     pub fn find<T: Lane, const D: usize, S: System<Dual<T>, D>>(
         &mut self,
@@ -67,7 +66,7 @@ mod tests {
     use super::*;
     use crate::tests::array::Array;
 
-    /// A driven pendulum, and a mass on a spring of stiffness `stiffness` (1/s^2) to it.
+    /// A driven pendulum with a mass that a spring of stiffness `stiffness` (1/s^2) connects to it.
     struct SprungPendulum {
         stiffness: f64,
     }

@@ -1,4 +1,5 @@
-//! Streaming peaks: the largest magnitude of each output between steps as well as at them.
+//! Finds peaks during integration: the largest magnitude of each output at the ends of steps and
+//! between them.
 
 use crate::quintic::Quintic;
 use crate::{Lane, N, Sample};
@@ -6,8 +7,8 @@ use crate::{Lane, N, Sample};
 /// The largest magnitudes so far of `M` outputs.
 ///
 /// Between two steps an output stays within the control polygon of the cubic through its values and
-/// slopes. Only where that reaches above the peak so far is a step looked into, with second
-/// derivatives: then the sampling error is of sixth order in the step.
+/// slopes. Only a step whose polygon exceeds the peak so far is searched, with second derivatives,
+/// so that the sampling error is of sixth order in the step.
 #[derive(Clone, Copy, Debug)]
 pub struct Peaks<T, const M: usize> {
     peak: [N<T>; M],
@@ -21,7 +22,7 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         Self { peak: [zero; M], last: [Sample::still(zero, zero); M] }
     }
 
-    /// Forgets one lane.
+    /// Resets one lane.
     #[inline(always)]
     pub fn reset(&mut self, lane: usize) {
         self.peak.iter_mut().for_each(|peak| peak.0.set(lane, 0.0));
@@ -42,8 +43,8 @@ impl<T: Lane, const M: usize> Peaks<T, M> {
         self.last = *samples;
     }
 
-    /// Adds the samples at the end of a step of `length_s` that began at the last ones, in the
-    /// lanes that count.
+    /// Adds the samples at the end of a step of `length_s` that began at the samples before, in the
+    /// lanes in which `counts` is true.
     #[inline(always)]
     pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let zero = length_s.lit(0.0);

@@ -1,4 +1,5 @@
-//! An output between the ends of a step: the polynomial through values, slopes and curvatures.
+//! Interpolates an output between the ends of a step by the polynomial through values, slopes and
+//! curvatures.
 
 use crate::{Lane, N};
 
@@ -22,7 +23,7 @@ impl<T: Copy> Sample<T> {
 }
 
 impl<T: Lane> Sample<T> {
-    /// Gives the ends of a step the curvatures of the cubic through their values and slopes.
+    /// Sets the curvatures at both ends of a step to those of the cubic through values and slopes.
     #[inline(always)]
     pub(crate) fn curve_as_cubic(length_s: N<T>, last: &mut Self, now: &mut Self) {
         let mean_slope = (now.value - last.value) / length_s;
@@ -31,14 +32,14 @@ impl<T: Lane> Sample<T> {
     }
 
     /// Interpolates between two samples, at a `share` (0 to 1) of the step of `length_s` from one
-    /// to the other, by the polynomial of degree 5 that meets both.
+    /// to the other, by the polynomial of degree 5 with the values, slopes and curvatures of both.
     #[inline(always)]
     pub fn between(start: &Self, end: &Self, length_s: N<T>, share: f64) -> Self {
         Quintic::new(length_s, start, end).sample(length_s.lit(share), length_s)
     }
 }
 
-/// The polynomial of degree 5 that meets values, slopes and curvatures at both ends of a step; over
+/// The polynomial of degree 5 with given values, slopes and curvatures at both ends of a step, over
 /// s from 0 to 1.
 pub(crate) struct Quintic<T> {
     c: [N<T>; 6],
@@ -72,14 +73,14 @@ impl<T: Lane> Quintic<T> {
         }
     }
 
-    /// Returns the value at the place where the slope vanishes, or at an end if there is none.
+    /// Returns the value where the slope vanishes, or at an end if it does not.
     #[inline(always)]
     pub(crate) fn extremum(&self) -> N<T> {
         self.value(self.extremum_at())
     }
 
-    /// Finds the place where the slope vanishes by Newton's method, from that of a slope that is a
-    /// straight line. Returns an end if there is none.
+    /// Finds the s at which the slope vanishes, by Newton's method from the zero of a linear slope.
+    /// Returns an end if there is none.
     #[inline(always)]
     pub(crate) fn extremum_at(&self) -> N<T> {
         let c = &self.c;
@@ -123,7 +124,7 @@ impl<T: Lane> Quintic<T> {
     }
 }
 
-/// Limits s to 0 to 1; NaN becomes 1.
+/// Clamps s to the range from 0 to 1; NaN becomes 1.
 #[inline(always)]
 pub(crate) fn within_step<T: Lane>(s: N<T>) -> N<T> {
     let s = s.where_less(s.lit(1.0), s, s.lit(1.0));

@@ -1,12 +1,12 @@
 //! The operations that equations need of a number.
 
-/// A real number, or several side by side, or one with derivatives: physics written over this trait
-/// runs on all.
+/// A real number, several of them side by side, or one with derivatives. Equations written over
+/// this trait can be evaluated for all of these.
 ///
-/// Every operation is correctly rounded (IEEE 754), or built from such in a fixed order, so that
-/// one source gives the same bits on every type of lane. [`Real::lit`] makes a constant out of a
-/// value that exists already, because a vector type's first value proves that the processor has its
-/// instructions.
+/// Every operation is correctly rounded (IEEE 754), or a fixed sequence of such operations, so that
+/// the same source gives the same bits for every type of lane. [`Real::lit`] needs an existing
+/// value to make a constant, because the first value of a vector type proves that the processor has
+/// the type's instructions.
 pub trait Real: Copy {
     /// A truth value per lane.
     type Mask: Copy;
@@ -48,9 +48,9 @@ pub trait Real: Copy {
     fn sin_cos(self) -> (Self, Self);
     /// Compares: true where `self < b`, false where either is NaN.
     fn less(self, b: Self) -> Self::Mask;
-    /// Selects `a` where the mask holds, else `b`.
+    /// Returns `a` in lanes where the mask is true, else `b`.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
-    /// Whether the mask holds in every lane.
+    /// Whether the mask is true in every lane.
     fn all(mask: Self::Mask) -> bool;
 }
 

@@ -7,10 +7,10 @@ use crate::fixed::FixedSegments;
 use crate::{Lane, N, Step, System as _, Task};
 use core::hint::black_box;
 
-/// On the imaginary axis the method is stable up to |h w| = 2 sqrt(2).
+/// The limit of stability on the imaginary axis: the method is stable up to |h w| = 2 sqrt(2).
 pub const RK4_STABILITY_LIMIT: f64 = 2.828_427_124_746_190_3;
 
-/// Coefficients a21, a32 and a43, which are all that do not vanish.
+/// The coefficients a21, a32 and a43; all others are zero.
 const A: [f64; 3] = [0.5, 0.5, 1.0];
 
 /// Integrates every trajectory that the task has. A lane takes the next one as soon as it is free.
@@ -26,14 +26,14 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
         let one_third = zero.lit(1.0 / 3.0);
         let h_sixth = h / zero.lit(6.0);
         let mut time = clock.at(index);
-        // At the step's start, then its middle, then its end, which is the next one's start. Hidden
-        // from the compiler, which would hold it in variables, and copy all of them from place to
-        // place in every step.
+        // The forcing at the step's start, then at its middle, then at its end, which is the start
+        // of the next step. The compiler must not see through the call, or it keeps the forcing in
+        // variables and copies all of them in every step.
         let mut forcing = task.system().forcing_aside(time);
         let forcing = black_box(&mut forcing);
-        // States and slopes of this step's start and of the last one's, which change places too;
-        // then two more for the states of stages. All states in one array, so that a stage's is one
-        // address away. Few places, for the first cache is small.
+        // The states and slopes at the start of this step and of the last one, which swap places,
+        // and the states of two stages. They are in one array, so that their addresses need no
+        // further registers, and few, so that they fit in the first cache.
         let mut states = [x; 4];
         let mut slopes = [x; 2];
         let mut now = 0;
@@ -45,11 +45,12 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
             // of a step.
             let is_last = done == run;
             let next_time = clock.at(index + 1.0);
-            // The last step's start is not read any more once this step's has been observed.
+            // The state at the last step's start is free once this step has been observed.
             let second = 2;
             let third = last;
             let fourth = 3;
-            // A loop, because four copies of the right-hand side do not fit the instruction cache.
+            // The stages are a loop, because four copies of the right-hand side do not fit in the
+            // instruction cache.
             let from = [now, second, third, fourth];
             for stage in 0..4 {
                 if stage % 2 == 1 {
@@ -59,7 +60,8 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(zero: T, task: &mut P) 
                 let slope = task.system().derivative(forcing, &states[from[stage]]);
                 if stage == 3 {
                     // x + h (k1 + 2 k2 + 2 k3 + k4) / 6, with h k1 to h k3 from the later stages'
-                    // states. No sum of slopes is kept: stores are the bottleneck of this loop.
+                    // states. No sum of slopes is stored, because stores are the bottleneck of this
+                    // loop.
                     for i in 0..D {
                         let x = states[now][i];
                         let moved = states[second][i] + states[fourth][i] + 2.0 * states[third][i]

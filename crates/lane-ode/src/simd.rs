@@ -11,8 +11,8 @@ use x86::one_lane;
 /// An instruction set the integrators can run on. Results are the same bits on all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Simd {
-    /// A single lane, with the processor's fused multiply-add: on x86-64 that of AVX2's processors.
-    /// A processor without it runs nothing.
+    /// A single lane, with the processor's fused multiply-add. On x86-64 this needs a processor
+    /// with AVX2 and FMA.
     Scalar,
     /// Four lanes of AVX2 with FMA.
     Avx2,
@@ -25,7 +25,7 @@ pub enum Simd {
     Simd128,
 }
 
-/// This processor has no instruction set that work is compiled for.
+/// The error of a processor without any instruction set that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnsupportedProcessor;
 
@@ -42,8 +42,8 @@ impl core::error::Error for UnsupportedProcessor {}
 
 /// Work that is written once and compiled for every instruction set.
 ///
-/// Mark `run`, and all that it calls in a loop, `#[inline(always)]`: only code that ends up inside
-/// the entry function of an instruction set is compiled with its instructions.
+/// Mark `run`, and every function that it calls in a loop, `#[inline(always)]`: only code that is
+/// inlined into the entry function of an instruction set is compiled with its instructions.
 pub trait Kernel {
     /// The result of the work.
     type Output;
@@ -56,29 +56,30 @@ impl Simd {
     /// Every instruction set, the widest first.
     pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Simd128, Self::Scalar];
 
-    /// Checks that this processor runs any of them. A program asks before it begins.
+    /// Checks that this processor has any of these instruction sets. Programs call it before they
+    /// begin.
     ///
     /// # Errors
-    /// [`UnsupportedProcessor`] if it runs none.
+    /// [`UnsupportedProcessor`] if it has none.
     pub fn check() -> Result<(), UnsupportedProcessor> {
         if Self::Scalar.is_available() { Ok(()) } else { Err(UnsupportedProcessor) }
     }
 
-    /// Returns the widest that this processor has.
+    /// Returns the widest instruction set that this processor has.
     pub fn best() -> Self {
         Self::ALL.into_iter().find(|simd| simd.is_available()).unwrap_or(Self::Scalar)
     }
 
-    /// Returns the one with the fewest lanes, no more than this one has, that takes so many
-    /// trajectories at once; this one if none does. Half the lanes cost little more than half the
-    /// time on a processor that splits its widest instructions.
+    /// Returns the instruction set with the fewest lanes, at most as many as this one has, that
+    /// holds `trajectories` at once; this one if none does. Half the lanes cost little more than
+    /// half the time on a processor that splits its widest instructions.
     pub fn narrowed(self, trajectories: usize) -> Self {
         let fits = |simd: &Self| (trajectories..=self.lanes()).contains(&simd.lanes());
         let mut narrowest_first = Self::ALL.into_iter().rev().filter(|simd| simd.is_available());
         narrowest_first.find(fits).unwrap_or(self)
     }
 
-    /// Returns the one that [`Self::dispatch_narrow`] runs on.
+    /// Returns the instruction set that [`Self::dispatch_narrow`] uses.
     pub fn narrow() -> Self {
         [Self::Avx2, Self::Neon, Self::Simd128]
             .into_iter()
@@ -86,7 +87,7 @@ impl Simd {
             .unwrap_or(Self::Scalar)
     }
 
-    /// Whether this processor has it.
+    /// Whether this processor has the instruction set.
     pub fn is_available(self) -> bool {
         match self {
             #[cfg(target_arch = "x86_64")]
@@ -103,7 +104,7 @@ impl Simd {
                     && is_x86_feature_detected!("avx512vl")
             }
             Self::Neon => cfg!(target_arch = "aarch64"),
-            // A module with these instructions is loaded where they are, or not at all.
+            // A WebAssembly engine without these instructions does not load the module at all.
             Self::Simd128 => cfg!(target_arch = "wasm32"),
             #[cfg(not(target_arch = "x86_64"))]
             Self::Avx2 | Self::Avx512 => false,
@@ -121,7 +122,7 @@ impl Simd {
         }
     }
 
-    /// Returns the number of trajectories side by side.
+    /// Returns the number of lanes.
     pub const fn lanes(self) -> usize {
         match self {
             Self::Scalar => 1,
@@ -154,8 +155,8 @@ impl Simd {
         }
     }
 
-    /// Runs work on one lane, for what comes singly: compiled once, not for every width. The same
-    /// bits as in any lane.
+    /// Runs work on one lane, for single trajectories. The work is compiled once, not for every
+    /// width, and has the same bits as in any lane.
     ///
     /// # Panics
     /// Like [`Self::dispatch`], on an [`UnsupportedProcessor`].
@@ -164,9 +165,9 @@ impl Simd {
         one_lane(work)
     }
 
-    /// Runs a kernel that follows one trajectory and uses lanes for something else, on a few lanes.
-    /// The result is the same on any number of them; few are enough, and the kernel is compiled for
-    /// one instruction set instead of all.
+    /// Runs a kernel that integrates one trajectory and uses lanes for another purpose, on a few
+    /// lanes. The result is the same on any number of lanes. Few suffice, and the kernel is
+    /// compiled for one instruction set instead of all.
     ///
     /// # Panics
     /// Like [`Self::dispatch`], on an [`UnsupportedProcessor`].

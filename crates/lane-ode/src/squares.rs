@@ -1,4 +1,4 @@
-//! Streaming integrals of squares, for root mean squares.
+//! Integrates squares of outputs during integration, for root mean squares.
 
 use crate::{Lane, N, Sample};
 
@@ -30,7 +30,7 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
         self.integral.map(|integral| integral.0.get(lane))
     }
 
-    /// Sets samples that no step leads to.
+    /// Sets samples without a step before them.
     #[inline(always)]
     pub fn begin(&mut self, samples: &[Sample<T>; M]) {
         for i in 0..M {
@@ -38,14 +38,15 @@ impl<T: Lane, const M: usize> SquareIntegrals<T, M> {
         }
     }
 
-    /// Adds a step of `length_s` from the last samples to these, in the lanes that count.
+    /// Adds a step of `length_s` from the last samples to these, in the lanes in which `counts` is
+    /// true.
     #[inline(always)]
     pub fn advance(&mut self, length_s: N<T>, samples: &[Sample<T>; M], counts: T::Mask) {
         let zero = length_s.lit(0.0);
         for i in 0..M {
             let start = self.last[i];
             let end = square(&samples[i]);
-            // Hermite's rule: 1/2, 1/10 and 1/120 of the step's powers.
+            // Hermite's rule, with the weights 1/2, 1/10 and 1/120 for the powers of the step.
             let ends = (0.5 * (start.value + end.value)).v();
             let slopes = (0.1 * (start.slope - end.slope)).v();
             let curvatures = ((1.0 / 120.0) * (start.curvature + end.curvature)).v();

@@ -1,24 +1,24 @@
-//! The interface of integrators: systems, their trajectories, and the steps that are reported.
+//! The interface of integrators: systems, trajectories, and the steps that observers receive.
 
 use crate::{Aside, Lane, N};
 
-/// A first-order system x' = f(t, x) with `D` states, in lanes.
+/// A first-order system x' = f(t, x) with `D` states, over lanes.
 pub trait System<T: Lane, const D: usize> {
-    /// The part of f that depends on time alone; computed once where several stages share a time.
+    /// The part of f that depends on time only. It is computed once for stages at the same time.
     type Forcing: Copy;
 
     /// Computes the forcing at time `t_s`, which may differ between lanes.
     fn forcing(&self, t_s: N<T>) -> Self::Forcing;
 
-    /// Overwrites a forcing of this system with that at another time; cheaper than a new one where
-    /// forcings are large.
+    /// Overwrites a forcing of this system with that at another time, which is cheaper than a new
+    /// one if forcings are large.
     #[inline(always)]
     fn renew(&self, t_s: N<T>, forcing: &mut Self::Forcing) {
         *forcing = self.forcing(t_s);
     }
 
-    /// Computes [`Self::forcing`] as a function that all callers share, for callers that spend
-    /// little of their time in it.
+    /// Computes [`Self::forcing`] as a function that all callers share, for callers that call it
+    /// rarely.
     #[inline(always)]
     fn forcing_aside(&self, t_s: N<T>) -> Self::Forcing
     where
@@ -39,8 +39,8 @@ pub trait System<T: Lane, const D: usize> {
         x[0].0.aside(DerivativeAside { system: self, forcing, x })
     }
 
-    /// Returns the lanes whose states are in the model's range. A lane that leaves it has diverged.
-    /// NaN is outside.
+    /// Returns the lanes whose states are in the model's range. The trajectory of a lane that
+    /// leaves it has diverged. NaN is out of range.
     fn in_range(&self, x: &[N<T>; D]) -> T::Mask;
 }
 
@@ -73,8 +73,8 @@ impl<T: Lane, const D: usize, S: System<T, D>> Aside for DerivativeAside<'_, T, 
     }
 }
 
-/// A system x' = H(t, x, x) with a part that is too stiff for explicit formulas: the part is in the
-/// last argument, in which H is linear.
+/// A system x' = H(t, x, x) with a part that is too stiff for explicit formulas. This part depends
+/// on the last argument, in which H is linear.
 pub trait SemiImplicit<T: Lane, const D: usize>: System<T, D> {
     /// Solves k = H(t, x, r + g k) for k, with `g_s` above zero.
     fn derivative_ahead(
@@ -86,28 +86,29 @@ pub trait SemiImplicit<T: Lane, const D: usize>: System<T, D> {
     ) -> [N<T>; D];
 }
 
-/// A queue of trajectories. A lane whose trajectory has ended takes the next one at once.
+/// A queue of trajectories. A lane whose trajectory has ended starts the next one at once.
 pub trait Task<T: Lane, const D: usize> {
     /// The system that is integrated.
     type System: System<T, D>;
 
-    /// Returns the system with the parameters that the lanes hold.
+    /// Returns the system with the lanes' current parameters.
     fn system(&self) -> &Self::System;
 
-    /// Receives the end of lane `lane`'s segment, and returns the next one: another segment of the
-    /// same trajectory, the first segment of a new one (write its parameters and its state), or
-    /// none.
+    /// Receives the end of the segment in lane `lane`, and returns the next segment: of the same
+    /// trajectory, or of a new one, whose parameters and state are then written; `None` if there is
+    /// no further trajectory.
     fn next_segment(&mut self, lane: usize, end: SegmentEnd, x: &mut [N<T>; D]) -> Option<Segment>;
 
-    /// Receives the state at the start of a segment of some lane: the trajectory may have a kink
-    /// here, or be a new one. Lanes whose segments go on are given the sample that they had.
+    /// Receives the state at the start of a segment in one or more lanes, where the trajectory may
+    /// have a kink or be a new one. Lanes that are inside a segment are passed the same sample as
+    /// before.
     fn begin(&mut self, forcing: &Forcing<Self, T, D>, x: &[N<T>; D], dx: &[N<T>; D]);
 
     /// Receives a step of every lane, of zero length in idle lanes.
     fn observe(&mut self, forcing: &Forcing<Self, T, D>, step: &Step<'_, T, D>);
 
-    /// Whether to stop; trajectories that have not ended by then never do. It is called every
-    /// [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps at least, because a segment may take hours.
+    /// Whether to stop; unfinished trajectories are then abandoned. It is called at least every
+    /// [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps, because a segment may take hours.
     fn is_stopped(&self) -> bool {
         false
     }
@@ -119,9 +120,9 @@ pub type Forcing<P, T, const D: usize> = <<P as Task<T, D>>::System as System<T,
 /// A segment of a trajectory without kinks. The last step ends exactly at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
-    /// The time of its start.
+    /// The time of the segment's start.
     pub start_s: f64,
-    /// The time of its end.
+    /// The time of the segment's end.
     pub end_s: f64,
     /// The longest step of fixed-step methods, which fill the segment with a whole number of equal
     /// steps; the first step that adaptive methods try.
@@ -135,25 +136,25 @@ pub enum SegmentEnd {
     Idle,
     /// The segment was integrated to its end.
     Completed(Count),
-    /// The trajectory cannot go on.
+    /// The trajectory cannot be continued.
     Failed {
         /// The reason.
         reason: Failure,
-        /// The time of the last good state.
+        /// The time of the last valid state.
         time_s: f64,
         /// The number of steps so far.
         count: Count,
     },
 }
 
-/// The reason why a trajectory cannot go on.
+/// The reason why a trajectory cannot be continued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Failure {
-    /// The state left the range of the model, or is not finite.
+    /// The state left the range of the model, or became non-finite.
     Diverged,
-    /// The error asked for needs steps that time cannot resolve.
+    /// The tolerance requires steps below the resolution of time.
     StepTooSmall,
-    /// The allowance of steps is used up.
+    /// The greatest number of steps was reached.
     StepLimit,
 }
 
@@ -174,7 +175,7 @@ impl Count {
     }
 }
 
-/// A step, with all that an observer needs to interpolate in it.
+/// A step with the data that an observer needs to interpolate in it.
 pub struct Step<'a, T, const D: usize> {
     /// The time at the end.
     pub end_s: N<T>,
@@ -196,7 +197,8 @@ impl<T: Lane, const D: usize> Step<'_, T, D> {
     /// Interpolates the state a fraction `s` (0 to 1) into the step, by the method's dense output
     /// or the cubic through both ends.
     ///
-    /// Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.6 (`contd5`).
+    /// The formula is that of Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I,
+    /// section II.6 (`contd5`).
     #[inline(always)]
     pub fn at(&self, s: N<T>) -> [N<T>; D] {
         let rest = 1.0 - s;

@@ -16,7 +16,7 @@ use crate::{
 };
 use core::marker::PhantomData;
 
-/// A family of equations x' = f(p, t, x), with `P` parameters of each lane's own.
+/// A family of equations x' = f(p, t, x), with `P` parameters that each lane has for itself.
 trait Equation<const D: usize, const P: usize> {
     /// The limit of the components' magnitudes, beyond which a state is out of range.
     const FARTHEST: f64 = 1e6;
@@ -130,7 +130,7 @@ impl<E: Equation<D, P>, const D: usize, const P: usize> Kernel for Solve<'_, E, 
     }
 }
 
-/// Trajectories through lanes, one after another.
+/// A task that passes trajectories through the lanes, one after another.
 struct Batch<'a, T, E, const D: usize, const P: usize> {
     member: Member<T, E, P>,
     trajectories: &'a [Trajectory<D, P>],

@@ -1,13 +1,13 @@
-//! The time that an output is above zero, between steps as well as at them.
+//! Measures the time for which an output is positive, between the ends of steps too.
 
 use crate::quintic::Quintic;
 use crate::{Lane, N, Sample};
 
-/// Number of bisections that find a zero. Basis: 2^-40 of the step, far below any step's error.
-/// Twice as many cost twice the time and change nothing above rounding.
+/// Number of bisections that find a zero. Basis: 2^-40 of the step is far below any step's error.
+/// Doubling it doubles the time and changes nothing above rounding.
 const HALVINGS: usize = 40;
 
-/// The time that one output has spent above zero.
+/// The time for which one output was positive.
 ///
 /// A step is examined where the control polygon of the cubic through its values and slopes crosses
 /// zero. On each side of its extremum the output crosses zero at most once.
@@ -34,13 +34,14 @@ impl<T: Lane> TimeAbove<T> {
         self.time_s.0.get(lane)
     }
 
-    /// Sets a sample that no step leads to.
+    /// Sets a sample without a step before it.
     #[inline(always)]
     pub fn begin(&mut self, sample: &Sample<T>) {
         self.last = *sample;
     }
 
-    /// Adds a step of `length_s` from the last sample to this one, in the lanes that count.
+    /// Adds a step of `length_s` from the last sample to this one, in the lanes in which `counts`
+    /// is true.
     #[inline(always)]
     pub fn advance(&mut self, length_s: N<T>, sample: &Sample<T>, counts: T::Mask) {
         let zero = length_s.lit(0.0);
@@ -51,7 +52,7 @@ impl<T: Lane> TimeAbove<T> {
         let d = sample.value;
         let b = a + third * self.last.slope;
         let c = d - third * sample.slope;
-        // Bounds of the cubic above zero, and below.
+        // The greatest and the least height of the control polygon, which bound the cubic.
         let height = N(a.0.larger(b.0).larger(c.0.larger(d.0)));
         let depth = N((-a).0.larger((-b).0).larger((-c).0.larger((-d).0)));
         let mut share = depth.where_less(zero, one, zero);
@@ -83,7 +84,8 @@ fn share_above<T: Lane>(quintic: &Quintic<T>) -> N<T> {
     above_between(quintic, zero, turn) + above_between(quintic, turn, turn.lit(1.0))
 }
 
-/// Returns the length above zero between two places, between which it passes zero at most once.
+/// Returns the length for which the polynomial is positive between two points, between which it
+/// crosses zero at most once.
 #[inline(always)]
 fn above_between<T: Lane>(quintic: &Quintic<T>, from: N<T>, to: N<T>) -> N<T> {
     let zero = from.lit(0.0);
@@ -91,8 +93,8 @@ fn above_between<T: Lane>(quintic: &Quintic<T>, from: N<T>, to: N<T>) -> N<T> {
     let at_to = quintic.value(to);
     let mut low = from;
     let mut high = to;
-    // Bisects towards the place where the sign changes from that at `from`; without one, towards
-    // `to`.
+    // Bisects towards the point where the sign changes from that at `from`; if it does not change,
+    // towards `to`.
     for _ in 0..HALVINGS {
         let middle = (0.5 * (low + high)).v();
         let value = quintic.value(middle);

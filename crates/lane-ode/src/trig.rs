@@ -51,17 +51,17 @@ fn polynomial<T: Real>(c: &[f64; 6], z: N<T>) -> N<T> {
     sum
 }
 
-/// Turns a pair within quadrant 0 on by `quadrant` (an integer) quarter turns.
+/// Rotates sine and cosine of an angle in quadrant 0 by `quadrant` (an integer) quarter turns.
 #[inline(always)]
 fn turned_on<T: Lane>(quadrant: N<T>, sin: N<T>, cos: N<T>) -> (N<T>, N<T>) {
-    // In quarters: 0, 0.25, 0.5 or 0.75 of four quadrants. A multiple of 1/4 less 3/8 rounds to its
-    // floor.
+    // The quadrant as a fraction of a turn: 0, 0.25, 0.5 or 0.75. A multiple of 1/4 less 3/8 rounds
+    // to its floor.
     let quarter = (quadrant * 0.25).v();
     let part = quarter - N((quarter - 0.375).0.round());
     (by_quadrant(part, [sin, cos, -sin, -cos]), by_quadrant(part, [cos, -sin, -cos, sin]))
 }
 
-/// Selects the value of the quadrant that `part` (0, 0.25, 0.5 or 0.75) names.
+/// Selects the value of the quadrant that `part` (0, 0.25, 0.5 or 0.75 of a turn) stands for.
 #[inline(always)]
 fn by_quadrant<T: Real>(part: N<T>, values: [N<T>; 4]) -> N<T> {
     let upper = part.where_less(part.lit(0.625), values[2], values[3]);
@@ -80,8 +80,8 @@ pub(crate) fn sin_cos<T: Lane>(x: T) -> (T, T) {
 }
 
 /// Computes sine and cosine lane by lane, out of line, so that the common path stays short. An
-/// angle within a quarter turn gets the bits of the common path, so that a lane does not depend on
-/// its neighbours.
+/// angle within a quarter turn has the same bits as on the common path, so that a lane does not
+/// depend on the others.
 #[cold]
 #[inline(never)]
 fn wide<T: Lane>(x: T) -> (T, T) {
@@ -100,7 +100,7 @@ fn wide<T: Lane>(x: T) -> (T, T) {
     (sin, cos)
 }
 
-/// Computes sine and cosine of an angle in turns, whose integer part drops out exactly.
+/// Computes sine and cosine of an angle in turns, whose integer part is removed without rounding.
 #[inline(always)]
 pub fn sin_cos_turns<T: Lane>(turns: N<T>) -> (N<T>, N<T>) {
     let part = turns - N(turns.0.round());

@@ -1,10 +1,11 @@
 //! Lane types made of vector registers: the part common to all instruction sets.
 //!
-//! The module that invokes the macro gives each operation in its instructions, and guarantees that
-//! its values exist only where the processor has them. The `unsafe` below relies on that guarantee.
+//! The module that invokes the macro defines each operation by its instructions, and guarantees
+//! that values of its types exist only on processors that have them. The `unsafe` code below relies
+//! on this guarantee.
 
-/// Makes `$name`, `$lanes` numbers in one register of type `$raw`, a [`Lane`](crate::Lane) compiled
-/// with `$features`.
+/// Defines `$name`, a [`Lane`](crate::Lane) of `$lanes` numbers in one register of type `$raw`,
+/// compiled with `$features`.
 macro_rules! vector {
     ($name:ident, $raw:ty, $lanes:literal, $mask:ty, $features:literal, $doc:literal,
      set1 $set1:ident,

@@ -9,7 +9,7 @@
 //! An engine validates a module before it runs, so a value of this type exists only where the
 //! instructions do, which makes the `unsafe` below sound.
 #![allow(unsafe_code)]
-// Not even that makes its intrinsics unsafe to call on this target.
+// On this target the intrinsics are safe to call, which the lint would report.
 #![allow(unused_unsafe)]
 
 use crate::vector::vector;

@@ -12,14 +12,14 @@ use lane_ode::{Kernel, Lane, N, Simd, System};
 /// A part of the right-hand side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RhsPart {
-    /// The functions of time alone, which an RK4 step evaluates twice.
+    /// The functions that depend on time only, which an RK4 step evaluates twice.
     Forcing,
     /// The derivative of the state, which an RK4 step evaluates four times.
     Derivative,
 }
 
-/// Evaluates a part of one model's right-hand side `evaluations` times in a row, each after the one
-/// before, with the same point in every lane; with modes capped if caps are given.
+/// Evaluates a part of one model's right-hand side `evaluations` times, each after the one before,
+/// with the same point in every lane; with capped modes if caps are given.
 pub fn evaluate(
     simd: Simd,
     model: ModelKind,

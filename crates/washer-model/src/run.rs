@@ -1,4 +1,4 @@
-//! Integration of trajectories: points pass through the lanes of an integrator, and each leaves a
+//! Integrates trajectories: points pass through the lanes of an integrator, and each leaves a
 //! record.
 
 pub(crate) mod active_recorders;
@@ -131,7 +131,7 @@ impl<F: ModelFamily, S: Stepper> Kernel for Simulate<'_, F, S> {
     }
 }
 
-/// The record of a trajectory that has not ended, or of one that failed.
+/// The record of a trajectory that has not ended or has failed.
 const EMPTY: Record = Record {
     failure: None,
     amplitudes: [f64::NAN; CHANNELS],
@@ -229,13 +229,17 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
 
     #[inline(always)]
     fn observe(&mut self, forcing: &M::Forcing, step: &Step<'_, T, STATES>) {
-        let inside = self.inside();
-        let (radial, channels) =
-            self.model.observe(forcing, step.after, step.slope_after, T::bits(inside) != 0);
+        let lanes_in_window = self.lanes_in_window();
+        let (radial, channels) = self.model.observe(
+            forcing,
+            step.after,
+            step.slope_after,
+            T::bits(lanes_in_window) != 0,
+        );
         if let Some(channels) = channels {
-            self.channels.advance(step.length_s, &channels, inside);
+            self.channels.advance(step.length_s, &channels, lanes_in_window);
             let times = Some((step.end_s, step.length_s));
-            self.record(times, (step.after, step.slope_after), &radial, &channels, inside);
+            self.record(times, (step.after, step.slope_after), &radial, &channels, lanes_in_window);
         }
         self.radial.advance(step.length_s, &[squared(&radial)], all_lanes(self.windows));
     }
@@ -245,8 +249,8 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
     }
 }
 
-/// A function that records the state at the start of a segment. It runs seldom, so that it is not
-/// inlined into the loop over steps.
+/// A function that records the state at the start of a segment. It is called rarely, so that it is
+/// not inlined into the loop over steps.
 struct RecordStart<'r, 'a, T: Lane, M: LaneModel<T>> {
     task: &'r mut SimulationTask<'a, T, M>,
     forcing: &'r M::Forcing,
@@ -260,11 +264,11 @@ impl<T: Lane, M: LaneModel<T>> Aside for RecordStart<'_, '_, T, M> {
     #[inline(always)]
     fn run(self) {
         let Self { task, forcing, x, dx } = self;
-        let inside = task.inside();
-        let (radial, channels) = task.model.observe(forcing, x, dx, T::bits(inside) != 0);
+        let lanes_in_window = task.lanes_in_window();
+        let (radial, channels) = task.model.observe(forcing, x, dx, T::bits(lanes_in_window) != 0);
         if let Some(channels) = channels {
-            task.channels.begin(&channels, inside);
-            task.record(None, (x, dx), &radial, &channels, inside);
+            task.channels.begin(&channels, lanes_in_window);
+            task.record(None, (x, dx), &radial, &channels, lanes_in_window);
         }
         task.radial.begin(&[squared(&radial)], all_lanes(task.windows));
     }
@@ -327,7 +331,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         (x, dx): (&[N<T>; STATES], &[N<T>; STATES]),
         radial: &[Sample<T>; RADIAL],
         channels: &[Sample<T>; CHANNELS],
-        inside: T::Mask,
+        lanes_in_window: T::Mask,
     ) {
         if let Some(recorders) = &mut self.active {
             self.windows.0.aside(ObservedState {
@@ -337,21 +341,21 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
                 dx,
                 radial,
                 channels,
-                inside,
+                lanes_in_window,
             });
         }
     }
 
     /// Returns the lanes that are inside their windows.
     #[inline(always)]
-    fn inside(&self) -> T::Mask {
+    fn lanes_in_window(&self) -> T::Mask {
         self.windows.lit(0.0).0.less(self.windows.0)
     }
 
     /// Starts the next point in a lane, if there is one.
     fn start_next_point(&mut self, lane: usize, x: &mut [N<T>; STATES]) -> Option<Segment> {
         self.windows.0.set(lane, 0.0);
-        // An idle lane rests at the start of its last point, where the model is defined.
+        // An idle lane has the initial state of its last point, at which the model is defined.
         let is_idle = self.started == self.points.len();
         let index = if is_idle { self.lanes[lane].point } else { self.started };
         let point = self.points[index];

@@ -1,16 +1,16 @@
-//! After set-up the integrators leave the heap alone.
+//! Tests that the integrators allocate no memory after set-up.
 
 use super::{Method, Swing, Trajectory, instruction_sets, solve};
 use crate::{SegmentEnd, Tolerance};
 
 #[test]
-fn the_counter_counts() {
+fn the_allocation_counter_counts() {
     let heap = allocation_counter::measure(|| drop(core::hint::black_box(vec![1.0_f64; 8])));
     assert_eq!(heap.count_total, 1);
 }
 
 #[test]
-fn a_whole_integration_asks_nothing_of_the_heap() {
+fn an_integration_allocates_nothing() {
     let trajectories: Vec<_> = (0..21)
         .map(|i| Trajectory::swing(1.0 + 0.1 * f64::from(i), 3.0, 1 + i % 3, 1e-3))
         .collect();

@@ -1,4 +1,5 @@
-//! Any number of lanes on any processor, for what concerns lanes but no instruction set.
+//! Lanes in a plain array, of any number and on any processor, for tests that need no instruction
+//! set.
 
 use crate::lane::Lane;
 use crate::real::Real;

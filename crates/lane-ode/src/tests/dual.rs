@@ -1,8 +1,9 @@
-//! Derivatives carried along against derivatives by hand and by differences.
+//! Tests of the derivatives of dual numbers against closed forms and differences.
 
 use crate::{Dual, N, Real};
 
-/// f(x) in plain numbers, with one derivative, and with two; f' and f'' by hand.
+/// The function f(x) over plain numbers, with one derivative, and with two; and f' and f'' in
+/// closed form.
 struct Case {
     name: &'static str,
     plain: fn(N<f64>) -> N<f64>,
@@ -65,7 +66,7 @@ fn is_close(a: f64, b: f64, tolerance: f64) -> bool {
 }
 
 #[test]
-fn first_and_second_derivatives_are_those_by_hand() {
+fn first_and_second_derivatives_agree_with_closed_forms() {
     for case in CASES {
         for x in ARGUMENTS {
             let [first, second] = (case.by_hand)(x);
@@ -97,7 +98,7 @@ fn first_and_second_derivatives_are_those_by_hand() {
 }
 
 #[test]
-fn derivatives_are_what_differences_tend_to() {
+fn derivatives_agree_with_differences() {
     const H: f64 = 1e-5;
     for case in CASES {
         for x in ARGUMENTS {
@@ -114,7 +115,7 @@ fn derivatives_are_what_differences_tend_to() {
 }
 
 #[test]
-fn a_slope_scales_its_derivative_and_a_constant_has_none() {
+fn the_derivative_is_proportional_to_the_slope_and_zero_for_constants() {
     for case in CASES {
         let one = (case.first)(N(Dual { value: 1.1, slope: 1.0 })).0.slope;
         let many = (case.first)(N(Dual { value: 1.1, slope: -3.0 })).0.slope;

@@ -1,14 +1,15 @@
-//! Orders of convergence, of both methods and of what they say between steps.
+//! Tests of the orders of convergence, at the ends of steps and inside them.
 
 use super::{Coupled, Equation, Method, Outcome, Swing, Trajectory, solve};
 use crate::{Segment, SegmentEnd, Simd, Tolerance};
 
 const END_S: f64 = 6.0;
 
-/// Accepts any step: with segments of one step each, an adaptive method becomes one of fixed step.
+/// A tolerance that accepts any step: with segments of one step each, an adaptive method has fixed
+/// steps.
 const ANYTHING: Tolerance = Tolerance { relative: 1e30, absolute: 1e30, max_steps: u64::MAX };
 
-/// Error at the end, and the largest inside a step, for each number of steps.
+/// Returns the error at the end and the largest error inside a step, for each number of steps.
 fn errors(method: Method, steps: &[u32]) -> Vec<[f64; 2]> {
     let trajectories: Vec<_> = steps
         .iter()
@@ -28,7 +29,7 @@ fn errors(method: Method, steps: &[u32]) -> Vec<[f64; 2]> {
     steps.iter().zip(outcomes).map(of).collect()
 }
 
-/// Slope of log error over log step, by least squares.
+/// Computes the slope of the logarithm of the error over that of the step, by least squares.
 fn slope(steps: &[u32], errors: impl Iterator<Item = f64>) -> f64 {
     let points: Vec<_> =
         steps.iter().zip(errors).map(|(&n, e)| (-f64::from(n).ln(), e.ln())).collect();
@@ -40,7 +41,7 @@ fn slope(steps: &[u32], errors: impl Iterator<Item = f64>) -> f64 {
     xy / xx
 }
 
-/// Measured slopes at the end and between steps.
+/// Measures the slopes at the end and inside steps.
 fn slopes(name: &str, method: Method, steps: &[u32]) -> [f64; 2] {
     let errors = errors(method, steps);
     let slopes = [0, 1].map(|which| slope(steps, errors.iter().map(|e| e[which])));
@@ -53,7 +54,7 @@ fn slopes(name: &str, method: Method, steps: &[u32]) -> [f64; 2] {
 }
 
 #[test]
-fn rk4_has_order_4_and_so_has_the_cubic_between_its_steps() {
+fn rk4_and_the_cubic_inside_its_steps_have_order_4() {
     let [order, between] = slopes("rk4", Method::Rk4, &[200, 283, 400, 566, 800]);
     assert!((order - 4.0).abs() < 0.1, "order {order}");
     assert!((between - 4.0).abs() < 0.1, "between steps {between}");
@@ -76,25 +77,25 @@ fn dop853_is_stable_on_the_imaginary_axis_to_its_limit() {
 }
 
 #[test]
-fn dopri5_has_order_5_and_so_has_its_dense_output() {
-    // Dense output of order 4 has a local error of h^5, which is not summed up: it keeps pace with
-    // the method.
+fn dopri5_and_its_dense_output_have_order_5() {
+    // Dense output of order 4 has a local error of order h^5, which does not accumulate, so that it
+    // is as accurate as the method.
     let [order, between] = slopes("dopri5", Method::Dopri5(ANYTHING), &[64, 91, 128, 181, 256]);
     assert!((order - 5.0).abs() < 0.1, "order {order}");
     assert!((between - 5.0).abs() < 0.1, "between steps {between}");
 }
 
 #[test]
-fn additive_has_order_5_with_a_part_that_is_implicit() {
+fn the_additive_method_has_order_5() {
     let [order, between] = slopes("additive", Method::Additive(ANYTHING), &[64, 91, 128, 181, 256]);
     assert!((order - 5.0).abs() < 0.1, "order {order}");
-    // The cubic.
+    // The cubic inside steps has order 4.
     assert!((between - 4.0).abs() < 0.1, "between steps {between}");
 }
 
 #[test]
-fn additive_steps_over_a_stiff_part_and_keeps_its_tolerance() {
-    // Rigid, they swing at the root of 1/2.
+fn the_additive_method_keeps_the_tolerance_at_steps_beyond_the_stiff_period() {
+    // If the stiff spring were rigid, the masses would swing at the square root of 1/2.
     let segments = vec![Segment { start_s: 0.0, end_s: 10.0, step_s: 1e-4 }];
     let trajectory = Trajectory { parameters: [1e8], start: [1.0, 1.0, 0.0, 0.0], segments };
     for tolerance in [1e-4, 1e-6] {
@@ -109,13 +110,13 @@ fn additive_steps_over_a_stiff_part_and_keeps_its_tolerance() {
         let error = (x[0] - (10.0 * 0.5_f64.sqrt()).cos()).abs();
         eprintln!("additive at {tolerance:e}: error {error:.1e}, {count:?}");
         assert!(error < 10.0 * tolerance, "{tolerance:e} gave {error:e}");
-        // An explicit formula would take some 5e4.
+        // An explicit formula would need some 5e4 steps.
         assert!(count.accepted + count.rejected < 1_000, "{count:?}");
     }
 }
 
 #[test]
-fn dopri5_keeps_the_tolerance_it_is_given_with_steps_by_the_fifth_root() {
+fn steps_of_dopri5_are_proportional_to_the_fifth_root_of_the_tolerance() {
     let trajectory = Trajectory::swing(1.0, 20.0, 1, 1e-3);
     let exact = Swing::exact(&[1.0], 20.0);
     let mut steps = Vec::new();
@@ -133,8 +134,8 @@ fn dopri5_keeps_the_tolerance_it_is_given_with_steps_by_the_fifth_root() {
         assert!(error < 30.0 * tolerance, "{tolerance:e} gave {error:e}");
         steps.push(count.accepted as f64);
     }
-    // Local error is h^5 against the tolerance: a hundredth of it takes 100^(1/5) = 2.51 times as
-    // many steps.
+    // The local error is proportional to h^5: a hundredth of the tolerance takes 100^(1/5) = 2.51
+    // times as many steps.
     for pair in steps.windows(2) {
         assert!((2.1..2.9).contains(&(pair[1] / pair[0])), "{steps:?}");
     }
@@ -177,7 +178,7 @@ fn every_segment_ends_where_it_should() {
 }
 
 #[test]
-fn a_fixed_step_fills_its_leg_with_the_fewest_equal_steps() {
+fn fixed_steps_divide_a_segment_into_the_fewest_equal_steps() {
     let steps = |end_s: f64, step_s: f64| {
         crate::fixed::fixed_steps(&Segment { start_s: 0.0, end_s, step_s })
     };

@@ -1,11 +1,11 @@
-//! Sine and cosine against arbitrary precision.
+//! Tests of sine and cosine against arbitrary precision.
 
 use crate::{N, trig};
 use astro_float_num::{BigFloat, Consts, RoundingMode};
 use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-/// Bits of the reference: the closest that an argument here comes to a multiple of pi/2 costs some
-/// 60 to 80 of them.
+/// The precision of the reference in bits. Basis: arguments close to a multiple of pi/2 lose 60 to
+/// 80 bits. Doubling it doubles the time.
 const BITS: usize = 320;
 const NEAREST: RoundingMode = RoundingMode::ToEven;
 
@@ -18,8 +18,8 @@ impl Reference {
         Self { constants: Consts::new().unwrap() }
     }
 
-    /// Errors of `computed` sine and cosine of `angle`, in units in the last place of the true
-    /// values.
+    /// Returns the greater error of `computed` sine and cosine of `angle`, in units in the last
+    /// place of the true values.
     fn errors(&mut self, angle: &BigFloat, (sin, cos): (f64, f64)) -> f64 {
         let true_sin = angle.sin(BITS, NEAREST, &mut self.constants);
         let true_cos = angle.cos(BITS, NEAREST, &mut self.constants);
@@ -41,21 +41,20 @@ impl Reference {
     }
 }
 
-/// Distance between `computed` and `exact` in units of the last place that a double of `exact`'s
-/// size has.
+/// Returns the distance between `computed` and `exact` in units in the last place of `exact`.
 fn ulps(computed: f64, exact: &BigFloat) -> f64 {
     let difference = BigFloat::from_f64(computed, BITS).sub(exact, BITS, NEAREST);
     if difference.is_zero() {
         return 0.0;
     }
-    // m 2^e with m from 1/2 to 1: the last of 53 places counts 2^(e - 53).
+    // A double m 2^e with m from 1/2 to 1 has 53 places, of which the last counts 2^(e - 53).
     let place = exact.exponent().unwrap() - 53;
     let (words, _, _, exponent, _) = difference.as_raw_parts().unwrap();
     let leading = *words.last().unwrap() as f64 / 2.0_f64.powi(64);
     leading * 2.0_f64.powi(exponent - place)
 }
 
-/// The largest error over many angles.
+/// Returns the largest error over many angles.
 fn largest(
     name: &str,
     angles: impl Iterator<Item = f64>,
@@ -74,7 +73,7 @@ fn largest(
     most
 }
 
-/// `count` numbers, as often of either sign, from a seed.
+/// Generates `count` random numbers of either sign from a seed.
 fn random(seed: u64, count: usize, number: impl Fn(f64) -> f64) -> impl Iterator<Item = f64> {
     let mut rng = fastrand::Rng::with_seed(seed);
     (0..count).map(move |_| number(rng.f64()).copysign(rng.f64() - 0.5))
@@ -104,18 +103,19 @@ fn sines_of_any_angle_are_within_1_5_ulp() {
 }
 
 #[test]
-fn sines_of_turns_are_within_1_6_ulp_however_many() {
+fn sines_of_any_number_of_turns_are_within_1_6_ulp() {
     let mut reference = Reference::new();
     assert!(largest("turns below 1/2", random(5, 3000, |u| 0.5 * u), |t| reference.turns(t)) < 1.6);
     let many = random(6, 3000, |u| 10.0_f64.powf(9.0 * u));
     assert!(largest("up to 1e9 turns", many, |t| reference.turns(t)) < 1.6);
-    // Not quarters themselves, where one of the two is zero and has no units.
+    // Angles near multiples of a quarter turn, but not the multiples themselves, at which sine or
+    // cosine is zero and has no unit in the last place.
     let close = (0..2000_i32).map(|k| f64::from(k) * 0.125 + 1e-9 * (0.5 + f64::from(k % 7 - 3)));
     assert!(largest("near eighths of a turn", close, |t| reference.turns(t)) < 1.6);
 }
 
 #[test]
-fn whole_turns_drop_out_exactly() {
+fn whole_turns_are_removed_without_rounding() {
     for part in [0.0, 0.125, 0.2, -0.3, 0.499] {
         let [a, b] = [1.0, 1048576.0].map(|turns| {
             // The rest of `part` after the whole turns have been added and taken away again.

@@ -1,7 +1,7 @@
 //! The recorders that are in use only on request: root mean squares, turns, gauges and snapshots.
 //!
-//! They run over lanes after every step, in a function that is not inlined ([`Lane::aside`]), so
-//! that the loop over steps is not slower without them.
+//! These recorders run over lanes after every step, in a function that is not inlined
+//! ([`Lane::aside`]), so that the loop over steps is not slower if they are not in use.
 
 use super::Method;
 use super::loads::{Gauge, Loads};
@@ -33,12 +33,13 @@ pub(crate) struct StepParts {
 }
 
 impl StepParts {
-    /// Returns the parts of steps that are short, because the bearings limit them, or long.
+    /// Returns into how many parts each step is divided: one if steps are short because the
+    /// bearings limit them, else [`LONG_STEP_PARTS`].
     pub(crate) const fn new(are_short: bool) -> Self {
         Self { count: if are_short { 1 } else { LONG_STEP_PARTS } }
     }
 
-    /// Returns the parts of a method's steps.
+    /// Returns into how many parts the steps of a method are divided.
     pub(crate) fn for_method(method: &Method) -> Self {
         match method {
             Method::Rk4 { .. } => Self::new(true),
@@ -66,7 +67,7 @@ pub(crate) struct ActiveRecorders<T> {
 }
 
 impl<T: Lane> ActiveRecorders<T> {
-    /// Creates the recorders for `count` points, of which `point` is any; `None` if none of these
+    /// Creates the recorders for `count` points, one of which is `point`; `None` if none of these
     /// recorders is in use.
     #[inline(always)]
     pub(crate) fn new(
@@ -76,7 +77,7 @@ impl<T: Lane> ActiveRecorders<T> {
         point: &Point,
         count: usize,
     ) -> Option<Self> {
-        // A closure would be compiled without the instruction set.
+        // Not `bool::then`: its closure would be compiled without the kernel's instruction set.
         if !recorders.need_all_states() {
             return None;
         }
@@ -122,7 +123,7 @@ impl<T: Lane> ActiveRecorders<T> {
             return;
         }
         let [from_s, to_s] = point.window_s();
-        // Rounding can leave an integral of a motion at rest below zero.
+        // Rounding may make the integral of a motion at rest negative.
         let root_mean = |integral: f64| (integral / (to_s - from_s)).max(0.0).sqrt();
         let gauges = Gauge::ALL.map(|gauge| match &self.loads {
             _ if !recorders.has_gauge(gauge) => Vec::new(),
@@ -150,7 +151,7 @@ pub(crate) struct ObservedState<'a, T: Lane> {
     pub(crate) radial: &'a [Sample<T>; RADIAL],
     pub(crate) channels: &'a [Sample<T>; CHANNELS],
     /// The lanes that are inside their windows.
-    pub(crate) inside: T::Mask,
+    pub(crate) lanes_in_window: T::Mask,
 }
 
 impl<T: Lane> Aside for ObservedState<'_, T> {
@@ -158,33 +159,35 @@ impl<T: Lane> Aside for ObservedState<'_, T> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { recorders: active, step, x, dx, radial, channels, inside } = self;
+        let Self { recorders: active, step, x, dx, radial, channels, lanes_in_window } = self;
         let recorders = active.recorders;
         if recorders.root_mean_squares {
             match step {
-                Some((_, length_s)) => active.squares.advance(length_s, channels, inside),
+                Some((_, length_s)) => active.squares.advance(length_s, channels, lanes_in_window),
                 None => active.squares.begin(channels),
             }
         }
         if recorders.turns {
             match step {
-                Some((end_s, length_s)) => active.turns.advance(end_s, length_s, channels, inside),
-                None => active.turns.begin(channels, inside),
+                Some((end_s, length_s)) => {
+                    active.turns.advance(end_s, length_s, channels, lanes_in_window)
+                }
+                None => active.turns.begin(channels, lanes_in_window),
             }
         }
         if let Some(loads) = &mut active.loads {
-            loads.record(step, x, dx, inside);
+            loads.record(step, x, dx, lanes_in_window);
         }
         if let Some(snapshots) = &mut active.snapshots {
             snapshots.record(step, (x, dx), channels);
         }
         if recorders.has_gauge(Gauge::ClashTime) {
-            // The gap is below zero where the square of the radial distance exceeds that of the
+            // The gap is negative where the square of the radial distance exceeds that of the
             // clearance.
             let mut overlap = squared(radial);
             overlap.value -= active.clearance_squared;
             match step {
-                Some((_, length_s)) => active.clash.advance(length_s, &overlap, inside),
+                Some((_, length_s)) => active.clash.advance(length_s, &overlap, lanes_in_window),
                 None => active.clash.begin(&overlap),
             }
         }

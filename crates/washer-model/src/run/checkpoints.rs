@@ -1,17 +1,17 @@
-//! The separation of two runs of the same point.
+//! Computes the separation of two runs of the same point.
 
 use super::{Checkpoint, Checkpoints};
 use crate::point::PlannedSegment;
 use crate::{COORDINATES, Point};
 
-/// The number of coordinates that are compared. The last two are those of the hinge, which rings
-/// with little damping, mostly without effect on any output.
+/// The number of coordinates that are compared. The last two, the hinge's, are left out: the hinge
+/// rings with little damping, mostly without effect on any output.
 const COMPARED: usize = COORDINATES - 2;
 
 impl Point {
     /// Computes the separation of two runs of the nonlinear model at their common checkpoints.
-    /// Returns the instants (s) and the greatest differences of any coordinate but the hinge's, as
-    /// shares of that coordinate's greatest deviation from equilibrium in the whole run `b`.
+    /// Returns for each instant (s) the greatest difference of any coordinate except the hinge's,
+    /// relative to the greatest deviation of this coordinate from equilibrium in the whole run `b`.
     pub fn separations(&self, a: &Checkpoints, b: &Checkpoints) -> Vec<(f64, f64)> {
         let mut greatest = [0.0_f64; COMPARED];
         for checkpoint in b {

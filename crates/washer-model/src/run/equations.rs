@@ -64,7 +64,7 @@ impl PointEquations {
 
     /// Computes f at time `t_s`; at a kink, its limit from the right.
     pub fn derivative(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [f64; STATE_LEN] {
-        self.move_to(t_s);
+        self.select_stretch(t_s);
         match &self.model {
             EitherModel::Nonlinear(models) => {
                 Simd::one_lane(Derivative { model: &models.model, t_s, x })
@@ -77,7 +77,7 @@ impl PointEquations {
 
     /// Computes the Jacobian of f with respect to the state, by rows, exact to rounding.
     pub fn jacobian(&mut self, t_s: f64, x: &[f64; STATE_LEN]) -> [[f64; STATE_LEN]; STATE_LEN] {
-        self.move_to(t_s);
+        self.select_stretch(t_s);
         let partials = match &self.model {
             EitherModel::Nonlinear(models) => {
                 Simd::one_lane(Jacobian { dual: &models.dual, t_s, x })
@@ -102,7 +102,7 @@ impl PointEquations {
         t_s: f64,
         x: &[f64; STATE_LEN],
     ) -> ([f64; CHANNELS], [f64; CHANNELS]) {
-        self.move_to(t_s);
+        self.select_stretch(t_s);
         match &self.model {
             EitherModel::Nonlinear(models) => {
                 Simd::one_lane(Outputs { model: &models.model, t_s, x })
@@ -111,8 +111,8 @@ impl PointEquations {
         }
     }
 
-    /// Sets the stretch of the spin at a time in the models.
-    fn move_to(&mut self, t_s: f64) {
+    /// Gives the models the stretch of the spin at a time.
+    fn select_stretch(&mut self, t_s: f64) {
         let is_before =
             |k: usize| self.stretches.get(k).is_none_or(|stretch| t_s < stretch.start_s.0);
         if is_before(self.stretch + 1) && (self.stretch == 0 || !is_before(self.stretch)) {

@@ -1,10 +1,10 @@
 //! Time histories: trajectories at given instants, independent of their steps.
 //!
 //! The trajectory is the one whose peaks [`simulate`](crate::simulate) records, with the same bits
-//! in every step: steps do not end at the instants, which are interpolated. Inside a step the state
-//! is the method's dense output, or for RK4 the cubic Hermite polynomial of the states and slopes
-//! at both ends. It has order 4 like the method: the relative error is at most (h w)^4 / 384 for a
-//! motion of frequency w, or 1e-9 at 1200 rpm and a step of 2e-4 s.
+//! in every step: steps do not end at the requested instants, at which states are interpolated.
+//! Inside a step the state is the method's dense output, or for RK4 the cubic Hermite polynomial of
+//! the states and slopes at both ends. It has order 4 like the method: the relative error is at
+//! most (h w)^4 / 384 for a motion of frequency w, or 1e-9 at 1200 rpm and a step of 2e-4 s.
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -80,7 +80,7 @@ pub fn history<'a>(
 
 /// Returns the number of instants from 0 to `end_s` at intervals of `every_s`.
 pub fn instant_count(end_s: f64, every_s: f64) -> usize {
-    // Rounding may leave the quotient just below a whole number.
+    // Rounding may make the quotient slightly less than a whole number.
     1 + (end_s / every_s * (1.0 + 1e-12)).floor() as usize
 }
 
@@ -97,8 +97,8 @@ pub struct HistoryRequest<'a> {
 }
 
 /// Integrates one model at several points. If the method of all is RK4, as many points as there are
-/// lanes are integrated at once. The bits of a history do not depend on the other points.
-/// Histories are shorter once `stop` returned true, which is called at least every
+/// lanes are integrated at once. The bits of a history do not depend on the other points. Histories
+/// end early once `stop` has returned true, which is called at least every
 /// [`STEPS_AT_ONCE`](lane_ode::STEPS_AT_ONCE) steps.
 pub fn histories<'a>(
     model: ModelKind,
@@ -138,7 +138,7 @@ fn integrate(
     }
 }
 
-/// Integrates a single request in one lane by any method, several ones side by side by RK4.
+/// Integrates a single request in one lane by any method, or several ones in lanes by RK4.
 fn integrate_family<F: ModelFamily>(
     requests: &[HistoryRequest<'_>],
     stop: StopRequest<'_>,
@@ -285,7 +285,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
         for (lane, request) in requests.iter().enumerate().skip(1) {
             model.set_point(lane, request.point);
         }
-        let start_alone = |request: &HistoryRequest<'_>| {
+        let initial_state_only = |request: &HistoryRequest<'_>| {
             let mut start = M::at_rest(request.point);
             for i in 0..COORDINATES {
                 start[i] += request.start.deviations[i];
@@ -293,7 +293,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
             }
             SampledStates { states: vec![start], failure: None }
         };
-        let sampled = requests.iter().map(start_alone).collect();
+        let sampled = requests.iter().map(initial_state_only).collect();
         Self { model, zero, requests, stop, segments: [None; MAX_LANES], sampled }
     }
 }
@@ -313,11 +313,11 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
         ended: SegmentEnd,
         x: &mut [N<T>; STATES],
     ) -> Option<Segment> {
-        // Lanes without a request rest at the start of the last one.
+        // Lanes without a request keep the initial state of the last one.
         let index = lane.min(self.requests.len() - 1);
         let HistoryRequest { point, method, .. } = &self.requests[index];
         let sampled = &mut self.sampled[index];
-        let next = match ended {
+        let next_segment_index = match ended {
             SegmentEnd::Idle if index < lane => point.segments.len(),
             SegmentEnd::Idle => 0,
             SegmentEnd::Completed(_) => self.segments[lane].map_or(0, |segment| segment + 1),
@@ -326,15 +326,15 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
                 point.segments.len()
             }
         };
-        let segment = point.segments.get(next);
-        if next == 0 || segment.is_none() {
-            // The state of an idle lane is one at which the model is defined.
+        let segment = point.segments.get(next_segment_index);
+        if next_segment_index == 0 || segment.is_none() {
+            // An idle lane has a state at which the model is defined.
             for (x, start) in x.iter_mut().zip(sampled.states[0]) {
                 x.0.set(lane, start);
             }
         }
         let segment = segment?;
-        self.segments[lane] = Some(next);
+        self.segments[lane] = Some(next_segment_index);
         Some(start_segment(&mut self.model, lane, *method, point, segment))
     }
 
@@ -343,7 +343,7 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
 
     #[inline(always)]
     fn observe(&mut self, _: &M::Forcing, step: &Step<'_, T, STATES>) {
-        // States inside a step that left the range of the model are not meaningful either.
+        // If a step leaves the range of the model, the states inside it are meaningless too.
         let in_range = T::bits(self.model.in_range(step.after));
         loop {
             let mut share = self.zero;
@@ -351,8 +351,8 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
             for (lane, request) in self.requests.iter().enumerate() {
                 let end_s = step.end_s.0.get(lane);
                 let length_s = step.length_s.0.get(lane);
-                let next = request.times_s.get(self.sampled[lane].states.len());
-                if let Some(time_s) = next
+                let next_time_s = request.times_s.get(self.sampled[lane].states.len());
+                if let Some(time_s) = next_time_s
                     && in_range >> lane & 1 == 1
                     && let Some(at) = share_of_step(*time_s, end_s, length_s)
                 {

@@ -1,4 +1,4 @@
-//! A recorder of the loads on the cabinet, on its feet and on stops, and of the speeds of dampers.
+//! Records the loads on the cabinet, on its feet and on stops, and the speeds of dampers.
 //!
 //! The force laws are those of the equations (`nonlinear/elements.rs`), evaluated over dual numbers
 //! for their rates. The linear model's loads are first order in its deviations from equilibrium.
@@ -16,7 +16,7 @@ use lane_ode::{Dual, Lane, N, Peaks, Sample, TimeAbove};
 sweep_parameter::named! {
     /// A quantity of a trajectory that can be recorded within the window.
     pub enum Gauge {
-        /// The time with a gap below zero (s).
+        /// The time for which the gap is negative (s).
         ClashTime = "clash_time",
         /// The greatest magnitude of the sum of all forces of the suspension on the cabinet (N);
         /// at rest it is the weight.
@@ -42,17 +42,17 @@ sweep_parameter::named! {
 /// The gauges in use, in the order of [`Gauge::ALL`].
 pub(crate) type Gauges = [bool; Gauge::ALL.len()];
 
-/// A reference above all loads (N). The least of several loads is the reference less the greatest
-/// distance below it, because only greatest values are recorded.
+/// A reference that is greater than all loads (N). Recorders find only greatest values, so that the
+/// least load is the reference less the greatest distance below it.
 ///
-/// Basis: a power of two, so that differences keep most digits of loads. Doubling it loses one
-/// binary digit.
+/// Basis: a power of two, so that differences from it keep most digits of loads. Doubling it loses
+/// one binary digit.
 const REFERENCE_N: f64 = 1_048_576.0;
 
-/// The summand under the root of the horizontal force (N^2), without which the root has no
+/// The summand under the square root of the horizontal force (N^2). Without it the root has no
 /// derivative at zero force.
 ///
-/// Basis: the force is off by at most 1 nN. Doubling it changes no digit of any result.
+/// Basis: it changes the force by at most 1 nN. Doubling it changes no digit of any result.
 const ROOT_SUMMAND_N2: f64 = 1e-18;
 
 /// The index of the margin against slipping, after the loads of the feet.
@@ -187,7 +187,7 @@ impl<T: Lane> LoadLaws<T> {
 /// The records of one stop.
 struct StopRecord<T> {
     force: Peaks<T, 1>,
-    /// The time with a depth above zero.
+    /// The time for which the depth is positive.
     contact: TimeAbove<T>,
 }
 
@@ -237,7 +237,7 @@ impl<T: Lane> Loads<T> {
             stops: if with_elements { elements.stops.len() } else { 0 },
             dampers: if with_dampers { elements.dampers.len() } else { 0 },
         };
-        // Closures would be compiled without the instruction set.
+        // Not `Option::map`: its closure would be compiled without the kernel's instruction set.
         let laws = match model {
             ModelKind::Nonlinear => LoadLaws::Nonlinear(Elements::splat(zero.constant(), elements)),
             ModelKind::Linear => {
@@ -356,7 +356,8 @@ impl<T: Lane> Loads<T> {
                     q[k] = N(Dual { value: tub[k].value.0, slope: tub[k].slope.0 });
                     u[k] = N(Dual { value: tub[k].slope.0, slope: tub[k].curvature.0 });
                 }
-                // The force on the tub in tub axes is as great as that on the cabinet.
+                // The force on the tub in tub axes has the same magnitude as the force on the
+                // cabinet.
                 let force = selection.evaluate(elements, &TubMotion::new(&q, &u), components);
                 force_squared = sample(dot(&force, &force));
             }
@@ -377,7 +378,7 @@ impl<T: Lane> Loads<T> {
             record_peaks(&mut self.force_squared, step_s, &[force_squared], inside);
         }
         if let Some(distribution) = &self.distribution {
-            let below = below_reference(distribution, &self.components);
+            let below = distances_below_reference(distribution, &self.components);
             record_peaks(&mut self.below, step_s, &below, inside);
         }
         let (stops, damper_speeds) = self.components[LOAD..].split_at(2 * self.stops.len());
@@ -399,7 +400,7 @@ impl<T: Lane> Loads<T> {
 /// Computes the distances below [`REFERENCE_N`] of the load of each foot and of both margins, from
 /// the load on the cabinet.
 #[inline(always)]
-fn below_reference<T: Lane>(
+fn distances_below_reference<T: Lane>(
     distribution: &LoadDistribution<T>,
     components: &[N<Dual<T>>],
 ) -> [Sample<T>; FEET + 2] {

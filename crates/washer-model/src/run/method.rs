@@ -15,9 +15,9 @@ use lane_ode::{Lane, N, Segment, Task, Tolerance, additive, dop853, dopri5, rk4}
 pub enum Method {
     /// Classical Runge-Kutta of order 4.
     Rk4 { step_s: f64 },
-    /// The model's formula ([`Formula::for_model`]) on the machine whose bearings, and hinge if it
-    /// has a cap, have scaled mass, so that none of their modes is faster than a cap (section 4.3
-    /// of the model page).
+    /// The model's formula ([`Formula::for_model`]) for the machine with scaled mass at the
+    /// bearings, and at the hinge if that has a cap, so that none of their modes is faster than its
+    /// cap (section 4.3 of the model page).
     Capped { step_s: f64, caps: Caps },
     /// Dormand and Prince's formula of order 8 with fixed steps, without caps. The linear model
     /// uses RK4 instead.
@@ -31,7 +31,7 @@ pub enum Method {
 
 sweep_parameter::named! {
     /// The method of a row's numbers, with the refinement level if modes are capped. The position
-    /// is the code in unfinished files, so that new methods go to the end.
+    /// in this list is the code in unfinished files, so that new methods are added at the end.
     #[derive(Default)]
     pub enum Level {
         /// Capped bearing modes, the longest stable steps.
@@ -46,14 +46,14 @@ sweep_parameter::named! {
         Capped4 = "capped_4",
         /// Capped bearing modes, the shortest steps.
         Capped5 = "capped_5",
-        /// Plain RK4.
+        /// RK4 without capped modes.
         #[default]
         Rk4 = "rk4",
         /// Dormand-Prince 5(4).
         Dopri5 = "dopri5",
         /// The additive method.
         Additive = "additive",
-        /// Dormand and Prince's formula of order 8 with nothing capped.
+        /// Dormand and Prince's formula of order 8 without capped modes.
         Dop853 = "dop853",
     }
 }
@@ -116,7 +116,7 @@ impl Method {
         }
     }
 
-    /// Returns whether each lane has steps of its own, which an adaptive method chooses.
+    /// Whether each lane has its own steps, which an adaptive method chooses.
     pub const fn has_own_steps(&self) -> bool {
         matches!(self, Self::Dopri5(_) | Self::Additive(_))
     }
@@ -126,7 +126,7 @@ impl Method {
         &self,
         visitor: V,
     ) -> V::Output {
-        // A match on the formula would compile both of its arms for each model.
+        // A match on the formula would compile both arms for each model.
         const { assert!(F::Capped::FORMULA as u8 == Formula::for_model(F::KIND) as u8) };
         match *self {
             Self::Rk4 { .. } => visitor.visit(Rk4Stepper),

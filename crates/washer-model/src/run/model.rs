@@ -69,11 +69,11 @@ fn joined<T: Copy>(u: &[N<T>; COORDINATES], a: &[N<T>; COORDINATES]) -> [N<T>; S
     core::array::from_fn(|i| if i < COORDINATES { u[i] } else { a[i - COORDINATES] })
 }
 
-/// Returns the lanes that are in the range of the model: the sum of the squares of all coordinates,
-/// each over its limit of a quarter turn or [`MAX_COORDINATE_M`], is less than 1.
+/// Returns the lanes that are in the range of the model. There the sum of squares over all
+/// coordinates, each divided by its limit (a quarter turn or [`MAX_COORDINATE_M`]), is less than 1.
 #[inline(always)]
 fn in_range<T: Lane>(x: &[N<T>; STATES]) -> T::Mask {
-    // A single comparison, which NaN and infinity fail too.
+    // A single comparison of the sum is enough; NaN and infinity fail it too.
     let mut sum = x[0].lit(0.0);
     for (i, q) in x[..COORDINATES].iter().enumerate() {
         let limit = if i < FIRST_ANGLE { MAX_COORDINATE_M } else { FRAC_PI_2 };
@@ -114,7 +114,7 @@ impl<T: Lane> System<T, STATES> for Nonlinear<T> {
     }
 }
 
-/// Bearings and hinge must not be capped.
+/// Requires that bearings and hinge are not capped.
 impl<T: Lane> SemiImplicit<T, STATES> for Nonlinear<T> {
     #[inline(always)]
     fn derivative_ahead(
@@ -259,7 +259,7 @@ impl<T: Lane> System<T, STATES> for Linear<T> {
     }
 }
 
-/// Bearings and hinge must not be capped.
+/// Requires that bearings and hinge are not capped.
 impl<T: Lane> SemiImplicit<T, STATES> for Linear<T> {
     #[inline(always)]
     fn derivative_ahead(

@@ -1,4 +1,4 @@
-//! A recorder of the outputs at given instants, which fits compare with measurements.
+//! Records the outputs at given instants, which fits compare with measurements.
 
 use crate::channel::CHANNELS;
 use crate::coordinates::{STATES, TUB};
@@ -8,13 +8,12 @@ use crate::{COORDINATES, ModelKind, Point};
 use lane_ode::{Lane, MAX_LANES, N, Sample};
 use std::sync::Arc;
 
-/// The tolerance of an instant at the end of a step, as a share of the step: an instant so little
-/// beyond the end is at the end. Basis: rounding of times is far below. Doubling it changes
-/// nothing.
+/// The tolerance within which an instant beyond the end of a step counts as at the end, relative to
+/// the step. Basis: the rounding errors of times are far smaller. Doubling it makes no difference.
 const END_TOLERANCE: f64 = 1e-9;
 
-/// Returns the position of an instant (s) in a lane's step, as a share of the step; `None` if the
-/// instant is beyond the end of the step.
+/// Returns the position of an instant (s) in a lane's step, from 0 at the start to 1 at the end;
+/// `None` if the instant is beyond the end of the step.
 pub(super) fn share_of_step(time_s: f64, end_s: f64, length_s: f64) -> Option<f64> {
     // The step of an idle lane has no length.
     let is_reached = length_s != 0.0 && time_s <= end_s + END_TOLERANCE * length_s;
@@ -44,15 +43,15 @@ impl Snapshot {
     }
 }
 
-/// The instants of one lane, and the snapshots up to the present.
+/// The instants of one lane, and the snapshots so far.
 #[derive(Default)]
 struct LaneSnapshots {
     instants_s: Arc<[f64]>,
     taken: Vec<Snapshot>,
 }
 
-/// The recorder of snapshots over lanes. Inside a step an output is the polynomial of degree 5 that
-/// has the output's values, rates and accelerations at both ends.
+/// The recorder of snapshots over lanes. Inside a step, an output is the polynomial of degree 5
+/// with the output's values, rates and accelerations at both ends.
 pub(super) struct Snapshots<T> {
     lanes: [LaneSnapshots; MAX_LANES],
     channels: [Sample<T>; CHANNELS],

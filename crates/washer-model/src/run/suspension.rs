@@ -1,5 +1,5 @@
-//! The forces of the elements between cabinet and tub, their sum on the cabinet, and the loads of
-//! the feet.
+//! Computes the forces of the elements between cabinet and tub, their sum on the cabinet, and the
+//! loads of the feet.
 //!
 //! The force laws are those of the equations (`nonlinear/elements.rs`). The linear model's forces
 //! are first order in its deviations, by automatic differentiation at the equilibrium.

@@ -1,4 +1,4 @@
-//! Test that the integration of a trajectory allocates nothing after set-up.
+//! Tests that the integration of a trajectory allocates nothing after set-up.
 
 use super::instruments::{ALL_RECORDERS, paper, prepared, triangular};
 use crate::{Method, ModelKind, Recorders, simulate_with};

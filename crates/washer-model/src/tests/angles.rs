@@ -11,7 +11,7 @@ use crate::{
 };
 use lane_ode::{Dual, N, Real, Simd};
 
-/// Computes a point of the drum in cabinet axes, from its place in drum axes.
+/// Computes the position of a drum's point in cabinet axes from its coordinates in drum axes.
 fn drum_point<T: Real>(
     q: &[N<T>; COORDINATES],
     theta: N<T>,
@@ -31,7 +31,8 @@ fn drum_point<T: Real>(
     [x, y + q[2], z + q[3]]
 }
 
-/// A mass m at p adds m (p'' + g) . dp/dq to M a - f, whatever else the machine has.
+/// Checks that a mass m at p adds m (p'' + g) . dp/dq to M a - f, whatever other masses the machine
+/// has.
 #[test]
 fn an_unbalance_at_an_angle_is_a_point_mass() {
     let mut rng = fastrand::Rng::with_seed(81);
@@ -100,7 +101,8 @@ fn quarter_turns_are_exact() {
     assert!((y + 0.1 * 3.0_f64.sqrt()).abs() < 1e-16 && (z - 0.1).abs() < 1e-16, "{y} {z}");
 }
 
-/// A drum and a shaft that are alike in all directions across their axis.
+/// Returns a machine whose drum and shaft are rotationally symmetric about their axis, with an
+/// unbalance at an angle.
 fn symmetric(angle_deg: f64) -> Machine {
     let mut machine = paper(0.4, 400.0);
     machine.drum.inertia_kg_m2[2] = machine.drum.inertia_kg_m2[1];
@@ -108,8 +110,8 @@ fn symmetric(angle_deg: f64) -> Machine {
     machine
 }
 
-/// Returns the tub's coordinates over the last turns at constant speed, 24 times a turn. The run-up
-/// is smooth, because hinge and bearings, which nothing damps, would ring after a jump.
+/// Returns the tub's coordinates over the last turns at constant speed, at 24 instants of each
+/// turn. The run-up is smooth, because hinge and bearings are undamped and would ring after a jump.
 fn settled(model: ModelKind, machine: Machine, rpm: f64) -> Vec<[f64; 4]> {
     let spin = Spin::Ramped { profile: Profile::Cycloidal, peak_rpm: rpm, ramp_s: 8.0 };
     let every_s = 60.0 / rpm.abs() / 24.0;
@@ -125,12 +127,12 @@ fn settled(model: ModelKind, machine: Machine, rpm: f64) -> Vec<[f64; 4]> {
 }
 
 #[test]
-fn at_constant_speed_an_angle_is_a_shift_in_time() {
+fn at_constant_speed_an_angle_of_the_unbalance_is_a_shift_in_time() {
     for model in [ModelKind::Nonlinear, ModelKind::Linear] {
         for rpm in [310.0, -310.0] {
             let straight = settled(model, symmetric(0.0), rpm);
-            // 60 degrees are four instants of 24 a turn. The unbalance is ahead by them where the
-            // drum turns forwards.
+            // An angle of 60 degrees is four of the 24 instants of a turn. An unbalance at this
+            // angle is ahead by these if the drum turns forwards.
             let turned = settled(model, symmetric(60.0), rpm);
             let ahead: isize = if rpm > 0.0 { 4 } else { -4 };
             let mut worst = 0.0_f64;
@@ -144,7 +146,8 @@ fn at_constant_speed_an_angle_is_a_shift_in_time() {
                 }
             }
             eprintln!("{model:?} at {rpm} rpm: {worst:.1e} of {peak:.1e} m or rad");
-            // The linear model is taken about the equilibrium of the drum's first angle.
+            // The linear model is linearised about the equilibrium at the drum's first angle, which
+            // differs.
             let bound = if model == ModelKind::Nonlinear { 1e-8 } else { 1e-4 };
             assert!(peak > 1e-4 && worst < bound * peak, "{model:?}: {worst:e} of {peak:e}");
         }
@@ -164,7 +167,7 @@ fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
         (0..history.len()).map(|k| history.instant(k).unwrap().deviations).collect()
     };
     let [forwards, mirrored] = [run(&machine, 300.0), run(&machine.mirrored(), -300.0)];
-    // Translations along z, and turns about y.
+    // The mirror reverses translations along z and rotations about y.
     let signs = [1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
     for (k, (one, other)) in forwards.iter().zip(&mirrored).enumerate() {
         for i in 0..COORDINATES {
@@ -175,7 +178,7 @@ fn a_mirrored_machine_that_turns_backwards_moves_mirrored() {
 }
 
 #[test]
-fn a_turned_unbalance_in_other_lanes_leaves_the_bits_alone() {
+fn an_unbalance_at_an_angle_in_other_lanes_does_not_change_the_bits() {
     let mut turned = paper(0.6, 90.0);
     turned.unbalance.angle_deg = 40.0;
     let [plain, turned] = [paper(0.6, 90.0), turned].map(|m| prepared(m, triangular(), 1.5));
@@ -192,7 +195,7 @@ fn a_turned_unbalance_in_other_lanes_leaves_the_bits_alone() {
 }
 
 #[test]
-fn slopes_of_staged_dampers_are_those_of_their_force() {
+fn slopes_of_dampers_in_two_stages_are_derivatives_of_their_force() {
     let mut machine = paper(0.4, 50.0);
     machine.dampers[0] = Damper {
         friction_n: 60.0,
@@ -225,7 +228,7 @@ fn slopes_of_staged_dampers_are_those_of_their_force() {
                 / (2.0 * d);
             assert!((at.by_depth.0 - by_depth).abs() < 1e-3 + 1e-5 * by_depth.abs());
             assert!((at.by_speed.0 - by_speed).abs() < 1e-3 + 1e-5 * by_speed.abs());
-            // It opposes the motion.
+            // The force opposes the motion.
             assert!(at.force.0 * speed <= 0.0);
         }
     }

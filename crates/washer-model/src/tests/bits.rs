@@ -23,8 +23,9 @@ const METHODS: [Method; 5] = [
     Method::Additive(Tolerance { relative: 1e-5, absolute: 1e-8, max_steps: 1_000_000 }),
 ];
 
-/// Returns the corners, the edges' middles and the centre of the quick map with two more points,
-/// with a spin of a second. They are eleven, so that some of four or eight lanes stay idle.
+/// Returns eleven scenarios, so that some of four or eight lanes stay idle: the corners, the
+/// middles of the edges and the centre of the quick map, and two more points, with a spin of one
+/// second.
 fn quick_map() -> Vec<Scenario> {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 0.6 };
     let corners = [0.05, 0.525, 1.0].into_iter().flat_map(|m| [60.0, 180.0, 300.0].map(|c| (m, c)));
@@ -52,7 +53,7 @@ fn bits((record, reading): (&Record, &Reading)) -> Vec<u64> {
         turns,
         gauges,
         checkpoints,
-        // The tests of `run/snapshots.rs` compare them.
+        // Snapshots are compared by the tests of `run/snapshots.rs`.
         snapshots: _,
     } = reading;
     bits.extend(turns.iter().chain(root_mean_squares).flatten().map(|a| a.to_bits()));
@@ -78,7 +79,7 @@ fn batch(simd: Simd, scenarios: &[Scenario]) -> Vec<Vec<Vec<u64>>> {
 }
 
 /// Selects scenarios by their indices for every model and method.
-fn picked(all: &[Vec<Vec<u64>>], indices: &[usize]) -> Vec<Vec<Vec<u64>>> {
+fn select_scenarios(all: &[Vec<Vec<u64>>], indices: &[usize]) -> Vec<Vec<Vec<u64>>> {
     all.iter().map(|records| indices.iter().map(|&i| records[i].clone()).collect()).collect()
 }
 
@@ -95,20 +96,23 @@ fn same_at_any_position(scenarios: &[Scenario]) {
     for turn in [1, 2, 3, 5, 7] {
         let order: Vec<_> = (0..count).map(|i| (i + turn) % count).collect();
         let moved: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
-        assert!(batch(Simd::best(), &moved) == picked(&as_given, &order), "moved by {turn}");
+        assert!(
+            batch(Simd::best(), &moved) == select_scenarios(&as_given, &order),
+            "moved by {turn}"
+        );
     }
     let order: Vec<_> = (0..count).rev().collect();
     let moved: Vec<_> = order.iter().map(|&i| scenarios[i].clone()).collect();
-    assert!(batch(Simd::best(), &moved) == picked(&as_given, &order), "backwards");
+    assert!(batch(Simd::best(), &moved) == select_scenarios(&as_given, &order), "backwards");
 }
 
 fn same_beside_any_points(scenarios: &[Scenario]) {
     let together = batch(Simd::best(), scenarios);
     for (i, scenario) in scenarios.iter().enumerate() {
         let alone = batch(Simd::best(), core::slice::from_ref(scenario));
-        assert!(alone == picked(&together, &[i]), "scenario {i} alone");
+        assert!(alone == select_scenarios(&together, &[i]), "scenario {i} alone");
     }
-    // Two neighbours fail, one early and one late, and other points start in their lanes.
+    // Two consecutive points fail, one early and one late, and other points start in their lanes.
     let wild = |ramp_s: f64| {
         (paper(30.0, 0.0), Spin::Ramped { profile: Profile::Ramp, peak_rpm: 9e4, ramp_s })
     };
@@ -119,7 +123,7 @@ fn same_beside_any_points(scenarios: &[Scenario]) {
     let with_wild = batch(Simd::best(), &mixed);
     let nonlinear = &with_wild[0];
     assert!([1, 5].iter().all(|&i| nonlinear[i].len() < nonlinear[0].len()), "the wild ones fail");
-    assert!(picked(&with_wild, &others) == together, "beside failing neighbours");
+    assert!(select_scenarios(&with_wild, &others) == together, "beside failing neighbours");
 }
 
 #[test]
@@ -152,8 +156,8 @@ fn same_bits_beside_any_points_random_machines() {
     same_beside_any_points(&random_machines());
 }
 
-/// A segment has more steps than the integrator makes between two calls of `is_stopped`, while
-/// segments in other lanes end before.
+/// Integrates a segment with more steps than the integrator makes between two calls of
+/// `is_stopped`, while segments in other lanes end before.
 #[test]
 fn blocks_of_steps_do_not_change_bits() {
     let timing = Timing { end_s: 1.0, window_s: [0.9, 1.0], checkpoints: 0 };

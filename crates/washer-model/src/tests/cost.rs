@@ -135,7 +135,7 @@ impl Lane for Counting {
 }
 
 /// Counts the operations of the forcing, which stages at the same time share, and of the
-/// derivative. Asserts that the derivative has the bits of plain numbers.
+/// derivative. Asserts that the derivative has the same bits as with plain numbers.
 fn evaluation_cost<M: LaneModel<Counting>, P: LaneModel<f64>>(
     caps: Option<Caps>,
 ) -> [Operations; 2] {

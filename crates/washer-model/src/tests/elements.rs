@@ -120,7 +120,7 @@ fn reference_errors<const N: usize>(name: &str, methods: [Method; N]) -> [f64; N
 }
 
 #[test]
-fn val_histories_with_every_element_match_independent_ones() {
+fn val_histories_with_every_element_match_those_of_independent_programs() {
     for name in ["friction", "stops", "gasket_cubic", "second_unbalance", "all"] {
         let rk4 = |step_s| Method::Rk4 { step_s };
         let tolerance = Tolerance { relative: 1e-7, absolute: 1e-9, max_steps: 10_000_000 };
@@ -135,8 +135,8 @@ fn val_histories_with_every_element_match_independent_ones() {
     }
 }
 
-/// The tolerance of the closed forms (m), which have no bearings: the rotor's inertia deflects
-/// these by 8 kg x 20 m/s^2 / 4e8 N/m = 4e-7 m, and they ring with as much.
+/// The tolerance of the closed forms (m), which neglect the bearings: the rotor's inertia deflects
+/// these by 8 kg x 20 m/s^2 / 4e8 N/m = 4e-7 m, and they ring with the same amplitude.
 const BEARING_DEFLECTION_M: f64 = 8e-7;
 
 /// Returns a machine that moves only up and down, and the natural frequency (rad/s) of this motion.
@@ -200,7 +200,7 @@ fn friction_shortens_every_half_swing_by_the_same_length() {
 }
 
 #[test]
-fn friction_beyond_a_free_stroke_takes_the_work_done_there_off_every_half_swing() {
+fn friction_beyond_a_free_stroke_dissipates_its_work_in_every_half_swing() {
     let (mut machine, _) = heaving();
     let stiffness = 32_000.0;
     let friction_n = 40.0;
@@ -218,7 +218,8 @@ fn friction_beyond_a_free_stroke_takes_the_work_done_there_off_every_half_swing(
     let heights = heights_m(machine, 0.02, 2e-4, 9000);
     let turns = |w: &[f64]| (w[1] - w[0]) * (w[2] - w[1]) <= 0.0;
     let extremes: Vec<f64> = heights.windows(3).filter(|w| turns(w)).map(|w| w[1].abs()).collect();
-    // k (a^2 - b^2) / 2 = F (a - s) + F (b - s), or without the last where it is negative.
+    // The energy lost from amplitude a to b is k (a^2 - b^2) / 2 = F (a - s) + F (b - s), without
+    // the last term if it is negative.
     let next_m = |a: f64| {
         let left = stiffness * a * a / 2.0 - friction_n * (a - stroke_m);
         let c = left + friction_n * stroke_m;
@@ -231,7 +232,7 @@ fn friction_beyond_a_free_stroke_takes_the_work_done_there_off_every_half_swing(
         expected = if expected > stroke_m { next_m(expected) } else { expected };
         assert!((found - expected).abs() < 1e-5, "half swing {n}: {found} m, not {expected} m");
     }
-    // The swing tends to the free stroke.
+    // The amplitude tends to the free stroke.
     let last = extremes[extremes.len() - 1];
     assert!(last > stroke_m && last < 1.05 * stroke_m, "{last}");
 }
@@ -246,7 +247,7 @@ fn the_linear_model_takes_the_tangent_of_a_damper_within_its_free_stroke() {
         damper.free_stroke_softness_m = softness_m;
         damper.outer_damping_n_s_per_m = 300.0;
     }
-    // h at rest, for delta = -s / 2.
+    // The engagement h at rest, where delta = -s / 2.
     let engaged = 0.5 * (1.0 - 0.005 / 0.005_f64.hypot(softness_m));
     let mut viscous = paper(0.4, 80.0);
     for damper in &mut viscous.dampers {
@@ -272,14 +273,15 @@ fn a_closed_stop_is_a_spring_in_parallel() {
     let stop_stiffness = 40_000.0;
     machine.stops = vec![BumpStop {
         tub_m: [0.0, 0.1, 0.0],
-        // The length of a direction does not matter.
+        // The force does not depend on the length of the direction vector.
         direction: [0.0, 2.0, 0.0],
         clearance_m: 0.0,
         stiffness_n_per_m: stop_stiffness,
         damping_n_s_per_m: 0.0,
         softness_m: 1e-6,
     }];
-    // The gap of the stop at rest is the sag of the machine. The swing from 20 mm below closes it.
+    // The gap of the stop at rest is the sag of the machine. A swing that starts 20 mm below closes
+    // the gap.
     let gap_m = 9.81 / (w * w);
     let below_m = 0.02;
     let stiffer = w * (1.0 + stop_stiffness / stiffness).sqrt();
@@ -346,7 +348,7 @@ fn linear_forces_of_stops_and_bushings_are_first_order() {
     let large = difference(1e-3);
     let small = difference(1e-4);
     assert!(large > 1e-4, "{large}");
-    // A tenth of the motion has a hundredth of the difference, which is of second order.
+    // The difference is of second order: a tenth of the motion has a hundredth of it.
     assert!((large / small - 100.0).abs() < 10.0, "{large} {small}");
 }
 

@@ -18,7 +18,7 @@ pub(super) fn axes(yaw: f64, pitch: f64) -> [Vec3; 3] {
     [[cy * cp, sp, -sy * cp], [-cy * sp, cp, sy * sp], [sy, 0.0, cy]]
 }
 
-/// Returns start + the sum of components times axes.
+/// Returns `start` plus the sum of the components times the axes.
 pub(super) fn place(start: Vec3, axes: &[Vec3; 3], components: Vec3) -> Vec3 {
     std::array::from_fn(|i| start[i] + (0..3).map(|k| components[k] * axes[k][i]).sum::<f64>())
 }
@@ -34,7 +34,7 @@ fn potential_j(m: &Machine, q: &[f64; COORDINATES]) -> f64 {
     let shaft = axes(q[6], q[7]);
     let p_t = [0.0, q[0], q[1]];
     let p_s = [0.0, q[2], q[3]];
-    // D's axes are those of S turned by q9 about s2, then by q10.
+    // The drum's axes are those of the shaft, turned by q9 about s2, then by q10.
     let turned = axes(q[8], q[9]);
     let drum: [Vec3; 3] = std::array::from_fn(|k| place([0.0; 3], &shaft, turned[k]));
     let hinge = place(p_s, &shaft, [m.drum.hinge_x_m, 0.0, 0.0]);
@@ -108,7 +108,7 @@ fn losses_w(
     let rest = axes(at_rest[4], at_rest[5]);
     let tub = axes(q[4], q[5]);
     let tub_point = |at: Vec3| place([0.0, q[0], q[1]], &tub, at);
-    // Angular velocity: yaw about c2, pitch about t3.
+    // The tub's angular velocity: yaw rate about c2, pitch rate about t3.
     let turn: Vec3 = [u[5] * tub[2][0], u[4], u[5] * tub[2][2]];
     let velocity = |at: Vec3| -> Vec3 {
         let arm = place([0.0; 3], &tub, at);
@@ -161,10 +161,15 @@ fn kinetic_j(machine: &Coefficients<f64>, q: &[f64; COORDINATES], u: &[f64; COOR
 }
 
 /// Returns the history of a machine without spin that starts at its equilibrium with a velocity.
-fn thrown(machine: &Machine, end_s: f64, step_s: f64, every_s: f64) -> Vec<Instant> {
+fn history_from_initial_velocity(
+    machine: &Machine,
+    end_s: f64,
+    step_s: f64,
+    every_s: f64,
+) -> Vec<Instant> {
     let still = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
     let point = prepared(machine.clone(), still, end_s);
-    // 0.1 and 0.15 m/s, 0.5 and -0.4 rad/s: some 20 mm and 40 mrad.
+    // Velocities of 0.1 and 0.15 m/s, 0.5 and -0.4 rad/s give motions of some 20 mm and 40 mrad.
     let mut start = Start::default();
     for (tub, rotor, speed) in [(0, 2, 0.1), (1, 3, 0.15), (4, 6, 0.5), (5, 7, -0.4)] {
         (start.speeds[tub], start.speeds[rotor]) = (speed, speed);
@@ -185,7 +190,7 @@ fn energies_j(step_s: f64) -> Vec<f64> {
     let mut machine = Machine::paper();
     machine.dampers.clear();
     let coefficients = Coefficients::new(&machine);
-    let instants = thrown(&machine, 10.0, step_s, 0.05);
+    let instants = history_from_initial_velocity(&machine, 10.0, step_s, 0.05);
     let at_rest = potential_j(&machine, &equilibrium(&machine));
     let energy = |Instant { deviations: q, speeds: u, .. }: &Instant| {
         potential_j(&machine, q) - at_rest + kinetic_j(&coefficients, q, u)
@@ -208,11 +213,11 @@ fn energy_drifts_by_less_than_1e_9_in_10_s_at_the_default_step() {
 }
 
 #[test]
-fn the_energy_falls_by_what_the_elements_dissipate() {
+fn the_energy_decreases_by_the_work_of_the_dissipative_elements() {
     let mut machine = with_every_element();
-    // A softness that is wide enough for the trapezoidal rule.
+    // The softness is wide enough for the trapezoidal rule.
     machine.stops.iter_mut().for_each(|stop| stop.softness_m = 1e-3);
-    // A clearance within the motion, which friction ends after some 4 mm.
+    // The clearance is small enough that the motion closes the stop before friction ends it.
     machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.001);
     machine.dampers.iter_mut().for_each(|damper| damper.friction_speed_m_per_s = 0.05);
     machine.dampers[0].free_stroke_m = 0.003;
@@ -221,7 +226,7 @@ fn the_energy_falls_by_what_the_elements_dissipate() {
     machine.unbalance.angle_deg = 35.0;
     let coefficients = Coefficients::new(&machine);
     let every_s = 1e-4;
-    let instants = thrown(&machine, 3.0, every_s, every_s);
+    let instants = history_from_initial_velocity(&machine, 3.0, every_s, every_s);
     let energy = |at: &Instant| {
         potential_j(&machine, &at.deviations) + kinetic_j(&coefficients, &at.deviations, &at.speeds)
     };
@@ -240,7 +245,7 @@ fn the_energy_falls_by_what_the_elements_dissipate() {
     // Most of the energy is dissipated within 3 s.
     assert!(lost > 0.5 * given && lost < given * (1.0 + 1e-6), "{lost} of {given} J");
     assert!(worst < 1e-6, "{worst:e}");
-    // A stop is hit.
+    // At least one stop closes.
     let closes = |stop: &BumpStop| {
         let depth = |at: &Instant| {
             let q = &at.deviations;

@@ -187,9 +187,10 @@ fn outputs_are_the_first_order_of_the_nonlinear_outputs() {
 }
 
 #[test]
-fn the_outputs_of_a_linear_machine_at_rest_turn_with_the_drum() {
-    // (kg, mm at the mass centre, micrometres at the drum's front): from independent linear
-    // histories of these two machines, with this part and without.
+fn outputs_of_order_zero_turn_with_the_drum() {
+    // Unbalance mass (kg), motion of the mass centre (mm) and of the drum's front (micrometres),
+    // from an independent program: linear histories of these two machines, with and without the
+    // part of order zero.
     for (unbalance_mass_kg, centre_mm, front_um) in [(0.4, 4.960, 47.96), (0.7, 8.600, 56.86)] {
         let machine = paper(unbalance_mass_kg, 140.0);
         let mass =
@@ -203,7 +204,8 @@ fn the_outputs_of_a_linear_machine_at_rest_turn_with_the_drum() {
         let mut equations = PointEquations::new(&point, ModelKind::Linear);
         let mut at =
             |t_s: f64, channel: Channel| equations.channels(t_s, &[0.0; STATES]).0[channel.index()];
-        // Weight tilts the shaft by q8 and bends the hinge by q10, which turns with the drum.
+        // The weight tilts the shaft by q8 and bends the hinge by q10. The bend turns with the
+        // drum.
         let lean = point.equilibrium[7].cos();
         let bend = point.equilibrium[9];
         let along =
@@ -237,7 +239,8 @@ fn the_outputs_of_a_linear_machine_at_rest_turn_with_the_drum() {
         {
             assert_eq!(at(0.5, channel), 0.0);
         }
-        // At a half turn the front of the drum, which weight has bent, is higher.
+        // After half a turn the front of the drum is higher, because the bend of the hinge by the
+        // weight has turned.
         for (channel, expected_m) in
             [(Channel::TotalCentreY, -1e-3 * centre_mm), (Channel::DrumFrontY, 1e-6 * front_um)]
         {

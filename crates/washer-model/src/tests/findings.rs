@@ -5,7 +5,7 @@ use crate::{Channel, Method, ModelKind, Record, Timing, prepare, simulate};
 use lane_ode::Simd;
 
 /// Simulates both models at each unbalance mass (kg) and damping (N s/m).
-fn both(points: &[(f64, f64)]) -> Vec<[Record; 2]> {
+fn simulate_both_models(points: &[(f64, f64)]) -> Vec<[Record; 2]> {
     let scenarios: Vec<_> = points.iter().map(|&(m, c)| (paper(m, c), triangular())).collect();
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
     let simd = Simd::best();
@@ -35,7 +35,7 @@ fn ratio([nonlinear, linear]: &[Record; 2]) -> f64 {
 
 #[test]
 fn the_linear_model_is_reliable_at_a_damping_of_140_but_not_at_100() {
-    let records = both(&[(0.4, 140.0), (0.4, 100.0)]);
+    let records = simulate_both_models(&[(0.4, 140.0), (0.4, 100.0)]);
     let [reliable, missed] = [&records[0], &records[1]].map(ratio);
     let yaw = records[1].map(|r| r.amplitudes[Channel::TubYaw.index()]);
     eprintln!(
@@ -57,7 +57,7 @@ fn the_boundary_rises_with_the_unbalance_mass() {
     let brackets = [(0.15, [55.0, 75.0]), (0.4, [110.0, 135.0]), (1.0, [240.0, 290.0])];
     let points: Vec<_> =
         brackets.iter().flat_map(|&(m, [low, high])| [(m, low), (m, high)]).collect();
-    let ratios: Vec<_> = both(&points).iter().map(ratio).collect();
+    let ratios: Vec<_> = simulate_both_models(&points).iter().map(ratio).collect();
     for ((m, [low, high]), pair) in brackets.into_iter().zip(ratios.chunks(2)) {
         eprintln!("m_u = {m} kg: ratio {:.2} at {low} N s/m, {:.2} at {high}", pair[0], pair[1]);
         assert!(pair[0] >= 2.0 && pair[1] < 2.0, "m_u = {m} kg: {pair:?}");

@@ -37,7 +37,7 @@ fn prepared(machines: &[Machine]) -> Vec<Point> {
 }
 
 #[test]
-fn own_speeds_are_those_of_the_linear_motion() {
+fn speed_amplitudes_that_are_not_given_follow_from_the_linear_motion() {
     let cases = [(0.4, [60.0, 60.0]), (0.2, [20.0, 60.0]), (0.9, [10.0, 0.0]), (0.5, [80.0, 81.0])];
     let machines = cases.map(|(mass_kg, frictions_n)| machine(mass_kg, frictions_n, None));
     let points = prepared(&machines);
@@ -50,7 +50,7 @@ fn own_speeds_are_those_of_the_linear_motion() {
         let speeds = reading.gauge(Gauge::DamperSpeed);
         let factor = point.friction_speed_factor(ModelKind::Linear, speeds).unwrap();
         assert!(factor < 1.01, "{factor}: {:?} for {reading:?}", point.friction_speeds());
-        // They do not depend on the other points.
+        // The speeds do not depend on the other points.
         let alone = prepared(std::slice::from_ref(machine)).remove(0);
         assert_eq!(alone.friction_speeds(), point.friction_speeds());
         let count = machine.dampers.iter().filter(|damper| damper.friction_n > 0.0).count();
@@ -125,8 +125,9 @@ fn a_stuck_damper_has_the_least_speed_amplitude() {
     }
 }
 
-/// Pairs of neighbouring rates would give a mode of two slow rates, and another of two fast rates
-/// that is as fast as the hinge's modes.
+/// Checks that the two rates of an overdamped mode are paired by their shapes. Pairs of consecutive
+/// rates would give a mode of two slow rates, and another of two fast rates that is as fast as the
+/// hinge's modes.
 #[test]
 fn the_two_rates_of_an_overdamped_mode_have_one_shape() {
     let frequencies = |frictions_n: [f64; 2]| {

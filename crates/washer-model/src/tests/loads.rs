@@ -94,7 +94,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     let mut machine = on_feet(with_every_element());
     machine.unbalance.mass_kg = 0.9;
     machine.stops[..2].iter_mut().for_each(|stop| stop.clearance_m = 0.003);
-    // The cabinet is so heavy that no foot lifts. On a single foot it would have no margin against
+    // The cabinet is so heavy that no foot lifts. On a single foot there would be no resistance to
     // turning.
     machine.cabinet.as_mut().unwrap().mass_kg = 1000.0;
     let point = point(machine.clone());
@@ -121,7 +121,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
         let margin_now_n = 0.4 * (feet.spread.weight.0 - load[1]) - horizontal_n;
         assert!((forces.slip_margin_n.unwrap() - margin_now_n).abs() < 1e-9);
         margin_n = margin_n.min(margin_now_n);
-        // The moment is that about the centre of the feet's loads, and feet that lift bear none.
+        // The moment is taken about the centre of the feet's loads; feet that lift have no load.
         let loaded_n: Vec<f64> = loads_n.iter().map(|n| n.max(0.0)).collect();
         let all_n: f64 = loaded_n.iter().sum();
         let mean = |axis: usize| {
@@ -130,10 +130,11 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
         };
         let arm = |foot: &Foot| (foot.foot_m[0] - mean(0)).hypot(foot.foot_m[2] - mean(2));
         let arms: Vec<f64> = machine.feet.iter().map(arm).collect();
-        let held: f64 = arms.iter().zip(&loaded_n).map(|(arm, n)| n / all_n * arm * arm).sum();
+        let mean_square_arm_m2: f64 =
+            arms.iter().zip(&loaded_n).map(|(arm, n)| n / all_n * arm * arm).sum();
         let longest = arms.iter().copied().fold(0.0, f64::max);
         let moment = load[4] + mean(0) * load[2] - mean(2) * load[0];
-        let walk_now_n = margin_now_n - moment.abs() * longest / held;
+        let walk_now_n = margin_now_n - moment.abs() * longest / mean_square_arm_m2;
         assert!((forces.walk_margin_n.unwrap() - walk_now_n).abs() < 1e-6);
         walk_n = walk_n.min(walk_now_n);
         feet_n = least([feet_n, loads_n].into_iter());
@@ -161,7 +162,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
     assert!(walk_n < margin_n - 1.0, "{walk_n} N, {margin_n} N: this machine turns");
     let greatest_n = stops_n.iter().copied().fold(0.0, f64::max);
     all_close("force of stop", reading.gauge(Gauge::StopForce), &stops_n, 1e-3 * greatest_n);
-    // A damper's tension grows with its speed, so that both are greatest at the same instant.
+    // A damper's tension increases with its speed, so that both are greatest at the same instant.
     let tensions_n: Vec<f64> = reading
         .gauge(Gauge::DamperSpeed)
         .iter()
@@ -180,7 +181,7 @@ fn recorded_loads_agree_with_a_densely_sampled_history() {
 }
 
 #[test]
-fn the_linear_models_loads_are_those_of_its_history() {
+fn loads_of_the_linear_model_agree_with_its_history() {
     let mut machine = on_feet(with_every_element());
     machine.unbalance.mass_kg = 0.9;
     let point = point(machine.clone());

@@ -12,7 +12,7 @@ use crate::tests::reference::{machine, numbers, reference, spin};
 use lane_ode::{Dual, N};
 
 #[test]
-fn val_mass_matrix_matches_an_independent_one() {
+fn val_mass_matrix_matches_that_of_an_independent_program() {
     let mut worst = 0.0_f64;
     for case in reference("rhs.json")["cases"].as_array().unwrap() {
         let ours =
@@ -69,7 +69,7 @@ fn accelerations_solve_the_equations_of_motion_of_any_machine() {
     assert!(worst < 1e-12, "{worst:e}");
 }
 
-/// Returns a sag of any size, because the law of mass scaling holds about every sag.
+/// Returns a sag of any size, because mass scaling is correct for any sag.
 fn sag() -> Sag<f64> {
     let bearings = Deflection { offset: [N(-3e-6), N(1e-6)], tilt: [N(2e-5), N(-1e-5)] };
     Sag { bearings, hinge: [N(2e-4), N(-7e-4)] }
@@ -106,8 +106,8 @@ fn mass_scaling_changes_only_the_forces_of_bearings_and_hinge() {
             both.tub.floating.apply(&load.reaction());
             both.rotor.floating.apply(&load);
             if let Some(cap) = hinge_rad_per_s {
-                // The sag by weight does not turn with the drum, so that it turns backwards in the
-                // shaft's frame.
+                // The deflection by weight does not turn with the drum, so that it turns backwards
+                // in the shaft's frame.
                 let [nine, ten] = sag.hinge;
                 let turned = [spin.cos * nine + spin.sin * ten, spin.cos * ten - spin.sin * nine];
                 let mass = N(machine.bodies.flexure_stiffness.0 / (cap * cap));

@@ -85,8 +85,8 @@ fn readings_agree_with_densely_sampled_histories() {
             close(name, rms[i], expected.root_mean_squares[i], 1e-5);
             let mut exact = 0;
             for (found, expected) in reading.turns.iter().zip(&expected.turns) {
-                // A sample near a crest has almost the value of the crest. A turn whose largest
-                // deviation is at its end, on a flank, has a greater error.
+                // A sample near a crest has almost the crest's value. The error is greater for a
+                // turn whose largest deviation is at its end, on a flank.
                 close(name, found[i], expected[i], 2e-2);
                 exact += usize::from((found[i] - expected[i]).abs() < 1e-4 * found[i]);
             }
@@ -188,7 +188,7 @@ fn at_rest_the_cabinet_carries_the_weight() {
 }
 
 #[test]
-fn the_sag_of_the_papers_machine_is_that_of_the_model_page() {
+fn the_sag_of_the_papers_machine_agrees_with_the_model_page() {
     let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 0.0, ramp_s: 1.0 };
     let machine = Machine::paper();
     let centre_m = machine.tub.centre_x_m;

@@ -1,5 +1,5 @@
-//! Against numbers from programs independent of this one (`tests/reference/README.md` says how they
-//! were made).
+//! Tests against numbers from independent programs (`tests/reference/README.md` says how they were
+//! made).
 
 use crate::coordinates::COORDINATES;
 use crate::linear;
@@ -27,7 +27,7 @@ pub(crate) fn numbers<const K: usize>(value: &Value) -> [f64; K] {
     std::array::from_fn(|i| list[i].as_f64().unwrap())
 }
 
-/// The paper's machine at a case's unbalance mass and damping.
+/// Returns the paper's machine with the unbalance mass and damping of a case.
 pub(crate) fn machine(case: &Value) -> Machine {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = case["unbalance_mass"].as_f64().unwrap();
@@ -129,12 +129,12 @@ fn val_eigenvalues_match_an_independent_solution() {
         }
         let highest = highest_frequency_rad_per_s(&point, speed).unwrap();
         let [re, im] = numbers(case["eigenvalues"].as_array().unwrap().last().unwrap());
-        // Theirs is at theta = 0 only.
+        // The reference's highest frequency is that at theta = 0 only.
         assert!((highest / f64::hypot(re, im) - 1.0).abs() < 2e-3, "{highest} against {im}");
     }
 }
 
-/// Columns of a reference CSV by name.
+/// Reads the names of the columns and the rows of a reference CSV file.
 fn table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
@@ -145,7 +145,7 @@ fn table(file: &str) -> (Vec<String>, Vec<Vec<f64>>) {
 }
 
 #[test]
-fn val_reliability_map_matches_an_independent_one() {
+fn val_reliability_map_matches_that_of_an_independent_program() {
     let (names, rows) = table("reliability_map.csv");
     let scenarios: Vec<_> = rows
         .iter()

@@ -23,7 +23,7 @@ fn paper() -> &'static [ModeOverSpeed] {
 }
 
 #[test]
-fn resonances_agree_with_the_paper() {
+fn val_resonances_agree_with_the_paper() {
     let modes = paper();
     let references = [
         (99.9, 99.86, Movement::Rocking, MotionPlane::Horizontal),
@@ -91,7 +91,7 @@ fn swing(at: &ModeAtSpeed) -> f64 {
 }
 
 #[test]
-fn frequencies_hardly_vary_over_a_turn() {
+fn val_frequencies_hardly_vary_over_a_turn() {
     // The paper gives less than 0.3 % up to 1200 rpm. This is true except for the first mode at
     // 1200 rpm.
     for (k, mode) in paper()[..4].iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Tests of time histories against independent ones, and of their general properties.
+//! Tests of time histories against those of independent programs, and of their general properties.
 
 use crate::coordinates::COORDINATES;
 use crate::{
@@ -12,7 +12,8 @@ fn point(machine: Machine, spin: Spin, end_s: f64) -> Point {
     prepare(Simd::Scalar, &[(machine, spin)], &timing).remove(0).unwrap()
 }
 
-/// Returns the largest difference from the channels of a reference file, as a share of their peaks.
+/// Returns the largest difference from the channels of a reference file, relative to the peaks of
+/// the reference.
 fn difference(file: &str, history: &History<'_>) -> f64 {
     let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
@@ -35,10 +36,11 @@ fn difference(file: &str, history: &History<'_>) -> f64 {
 }
 
 #[test]
-fn val_a_run_up_matches_an_independent_one() {
+fn val_a_run_up_matches_that_of_an_independent_program() {
     let spin = Spin::Ramped { profile: Profile::Cycloidal, peak_rpm: 600.0, ramp_s: 4.0 };
     let point = point(Machine::paper(), spin, 6.0);
-    // Most instants lie inside a step, because steps do not divide the time between instants.
+    // Most instants are inside a step, because the interval between instants is no multiple of the
+    // step.
     let method = Method::Rk4 { step_s: 0.97e-4 };
     for (model, file) in [(ModelKind::Nonlinear, "nonlinear"), (ModelKind::Linear, "linear")] {
         let history = history(model, &method, &point, &Start::default(), 0.01);
@@ -48,7 +50,7 @@ fn val_a_run_up_matches_an_independent_one() {
 }
 
 #[test]
-fn val_a_run_up_and_down_matches_an_independent_one() {
+fn val_a_run_up_and_down_matches_that_of_an_independent_program() {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = 0.7;
     machine.dampers.iter_mut().for_each(|damper| damper.damping_n_s_per_m = 110.0);
@@ -121,7 +123,7 @@ fn at_rest_the_cabinet_carries_the_weight() {
         let history = history(model, &Method::Rk4 { step_s: 1e-4 }, &point, &Start::default(), 0.1);
         let forces = history.forces(0).unwrap();
         let [x, y, z] = forces.cabinet_n;
-        // The force along c1 need not vanish, because the model does not move along it.
+        // The force along c1 may differ from zero, because the model does not move along c1.
         assert!((y + weight).abs() < 1e-9 * weight && z.abs() < 1e-9 * weight, "{x} {y} {z}");
         assert_eq!(forces.dampers_n, [0.0; 2]);
         assert!(forces.springs_n.iter().all(|tension| *tension > 0.0), "{:?}", forces.springs_n);
@@ -129,7 +131,7 @@ fn at_rest_the_cabinet_carries_the_weight() {
 }
 
 #[test]
-fn linear_forces_are_the_nonlinear_ones_to_first_order() {
+fn linear_forces_equal_the_nonlinear_forces_to_first_order() {
     let point = point(
         Machine::paper(),
         Spin::Ramped { profile: Profile::Ramp, peak_rpm: 60.0, ramp_s: 1.0 },
@@ -152,7 +154,7 @@ fn linear_forces_are_the_nonlinear_ones_to_first_order() {
     let large = difference(1e-2);
     let small = difference(1e-3);
     assert!(large > 1e-3, "{large}");
-    // A tenth of the motion has a hundredth of the difference, which is of second order.
+    // The difference is of second order: a tenth of the motion has a hundredth of it.
     assert!((large / small - 100.0).abs() < 10.0, "{large} {small}");
 }
 
