@@ -1,5 +1,5 @@
-//! Both models of an oscillator in lanes: the equations as they are, and their tangent at the
-//! equilibrium.
+//! The two models of an oscillator, over lanes: the nonlinear equations, and their linearisation
+//! about the equilibrium.
 
 use std::marker::PhantomData;
 
@@ -7,40 +7,43 @@ use lane_ode::{Dual, Lane, Lu, N, Partials, System};
 
 use crate::Oscillator;
 
-/// Newton steps to the equilibrium, from all coordinates at zero.
-const MOST_STEPS: usize = 50;
-/// Coordinates beyond this have diverged.
-const FARTHEST: f64 = 1e12;
+/// Greatest number of Newton steps to the equilibrium, which start with all coordinates at zero.
+/// Basis: Newton's method needs a few. Doubling it costs time for oscillators without an
+/// equilibrium near zero.
+const MAX_NEWTON_STEPS: usize = 50;
+/// Limit of the magnitude of coordinates, beyond which a trajectory has diverged. Basis: far above
+/// any motion. Doubling it makes no difference.
+const DIVERGENCE_LIMIT: f64 = 1e12;
 
-/// Both models, in the order of columns.
+/// The two models, in the order of columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Model {
-    /// The equations as they are.
+    /// The nonlinear equations.
     Nonlinear,
-    /// The tangent at the equilibrium.
+    /// The linearisation about the equilibrium.
     Linear,
 }
 
-/// A point made ready once.
+/// The parameters of a point, with what is computed once for all of its trajectories.
 #[derive(Clone, Debug)]
-pub(crate) struct Case<const C: usize, const P: usize> {
+pub(crate) struct PreparedPoint<const C: usize, const P: usize> {
     pub(crate) p: [f64; P],
     pub(crate) window_s: [f64; 2],
     equilibrium: [f64; C],
-    /// Of the free motion at the equilibrium.
+    /// The derivatives of the free motion's accelerations at the equilibrium.
     tangent: Partials<C>,
 }
 
-impl<const C: usize, const P: usize> Case<C, P> {
-    /// The point at these parameters; none without an equilibrium near zero.
+impl<const C: usize, const P: usize> PreparedPoint<C, P> {
+    /// Prepares the point with these parameters; `None` if there is no equilibrium near zero.
     pub(crate) fn new<O: Oscillator<C, D, P>, const D: usize>(
         p: [f64; P],
         window_s: [f64; 2],
     ) -> Option<Self> {
         let still = [0.0; C];
         let (mut equilibrium, mut tangent) = (still, tangent::<O, C, D, P>(&p, &still, &still));
-        // Rounding may keep it from standing still.
-        for _ in 0..MOST_STEPS {
+        // Because of rounding, the iteration may not end before the limit of steps.
+        for _ in 0..MAX_NEWTON_STEPS {
             let rest = O::accelerations(&p.map(N), &equilibrium.map(N), &still.map(N));
             if rest.iter().all(|a| a.0 == 0.0) {
                 break;
@@ -61,17 +64,18 @@ impl<const C: usize, const P: usize> Case<C, P> {
         Some(Self { p, window_s, equilibrium, tangent })
     }
 
-    /// No free motion of the linear model is faster (rad/s): norms of its matrices.
+    /// Returns a bound of the frequencies of the linear model's free motions (rad/s), from the
+    /// norms of its matrices.
     pub(crate) fn fastest_rad_per_s(&self) -> f64 {
         let norm = |matrix: &[[N<f64>; C]; C]| {
-            let of = |row: &[N<f64>; C]| row.iter().map(|entry| entry.0.abs()).sum::<f64>();
-            matrix.iter().map(of).fold(0.0, f64::max)
+            let row_sum = |row: &[N<f64>; C]| row.iter().map(|entry| entry.0.abs()).sum::<f64>();
+            matrix.iter().map(row_sum).fold(0.0, f64::max)
         };
         norm(&self.tangent.by_coordinate).sqrt() + norm(&self.tangent.by_speed)
     }
 }
 
-/// The derivatives of the free motion at a state, by dual numbers.
+/// Computes the derivatives of the free motion's accelerations at a state, by dual numbers.
 fn tangent<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
     p: &[f64; P],
     q: &[f64; C],
@@ -95,8 +99,8 @@ fn tangent<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usiz
     found
 }
 
-/// One of the models as a first-order system, in lanes that hold a point each. States are
-/// deviations from equilibrium.
+/// A model as a first-order system over lanes, with one point in each lane. States are deviations
+/// from equilibrium.
 pub(crate) struct Equations<O, T, const C: usize, const D: usize, const P: usize> {
     model: Model,
     p: [N<T>; P],
@@ -104,13 +108,13 @@ pub(crate) struct Equations<O, T, const C: usize, const D: usize, const P: usize
     by_coordinate: [[N<T>; C]; C],
     by_speed: [[N<T>; C]; C],
     farthest: N<T>,
-    of: PhantomData<O>,
+    oscillator: PhantomData<O>,
 }
 
 impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: usize>
     Equations<O, T, C, D, P>
 {
-    /// Lanes without points.
+    /// Creates the system without points in its lanes.
     pub(crate) fn new(model: Model, zero: N<T>) -> Self {
         Self {
             model,
@@ -118,13 +122,13 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
             equilibrium: [zero; C],
             by_coordinate: [[zero; C]; C],
             by_speed: [[zero; C]; C],
-            farthest: zero.lit(FARTHEST),
-            of: PhantomData,
+            farthest: zero.lit(DIVERGENCE_LIMIT),
+            oscillator: PhantomData,
         }
     }
 
-    /// Gives a lane a point.
-    pub(crate) fn take(&mut self, lane: usize, case: &Case<C, P>) {
+    /// Writes a point into a lane.
+    pub(crate) fn set_point(&mut self, lane: usize, case: &PreparedPoint<C, P>) {
         set(&mut self.p, lane, &case.p.map(N));
         set(&mut self.equilibrium, lane, &case.equilibrium.map(N));
         let Partials { by_coordinate, by_speed } = &case.tangent;
@@ -178,14 +182,15 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
     fn in_range(&self, x: &[N<T>; D]) -> T::Mask {
         let mut largest = x[0].abs();
         for i in 1..C {
-            // A coordinate that is not finite is the larger one, and not below the limit.
+            // A coordinate that is NaN is selected as the larger one, and fails the comparison with
+            // the limit.
             largest = N(T::select(x[i].abs().0.less(largest.0), largest.0, x[i].abs().0));
         }
         largest.0.less(self.farthest.0)
     }
 }
 
-/// The coordinates of a state, and their speeds.
+/// Splits a state into coordinates and speeds.
 fn halves<T: Copy, const C: usize, const D: usize>(x: &[T; D]) -> ([T; C], [T; C]) {
     const { assert!(D == 2 * C, "a state is the coordinates and their speeds") };
     (std::array::from_fn(|i| x[i]), std::array::from_fn(|i| x[C + i]))

@@ -1,9 +1,9 @@
-//! Any oscillator as a model of the engine: its equations once over [`lane_ode::Real`], and every
-//! command of `sweep_engine::commands`.
+//! Makes any oscillator a model of the engine: its equations are written once over
+//! [`lane_ode::Real`], and have every command of `sweep_engine::commands`.
 //!
-//! An [`Oscillator`] declares its parameters, coordinates and accelerations. The linear model comes
-//! from dual numbers at the equilibrium. Both models run through lanes, by fixed steps that are
-//! halved until two runs agree, or by one of two methods.
+//! An [`Oscillator`] declares its parameters, coordinates and accelerations. The linear model
+//! follows from them by dual numbers at the equilibrium. Both models are integrated in lanes, by
+//! RK4 or Dormand-Prince 5(4), or by RK4 in fixed steps that are halved until two runs agree.
 
 mod equations;
 mod map;
@@ -19,33 +19,33 @@ use lane_ode::{N, Real};
 /// A parameter of an oscillator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
-    /// Name in grid files and of the result's column; it ends with the unit.
+    /// The name in grid files and of the result's column, which ends with the unit.
     pub name: &'static str,
-    /// Unit; "1" for none.
+    /// The unit; "1" for none.
     pub unit: &'static str,
-    /// What it is, in a phrase.
+    /// The meaning, in a phrase.
     pub description: &'static str,
-    /// Values it may take.
+    /// The values that the parameter may take.
     pub range: Range,
-    /// Its default.
+    /// The default value.
     pub default: f64,
-    /// Where that comes from.
+    /// The source of the default value.
     pub source: &'static str,
 }
 
 /// A coordinate of an oscillator, which is compared between the models.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordinate {
-    /// Name in grid files; columns are called `nonlinear_NAME` and the like.
+    /// The name in grid files; columns are called `nonlinear_NAME` and the like.
     pub name: &'static str,
-    /// Unit.
+    /// The unit.
     pub unit: &'static str,
-    /// What it is, in a phrase.
+    /// The meaning, in a phrase.
     pub description: &'static str,
 }
 
-/// Coordinates q with q'' = accelerations(q, q') + forcing(t): `C` coordinates, `P` parameters. `D`
-/// is twice `C`.
+/// An oscillator with `C` coordinates q, for which q'' = accelerations(q, q') + forcing(t), and `P`
+/// parameters. `D` is twice `C`.
 pub trait Oscillator<const C: usize, const D: usize, const P: usize>:
     Clone + std::fmt::Debug + PartialEq + Send + Sync + 'static
 {
@@ -53,17 +53,17 @@ pub trait Oscillator<const C: usize, const D: usize, const P: usize>:
     const PARAMETERS: [Parameter; P];
     /// The coordinates.
     const COORDINATES: [Coordinate; C];
-    /// Version of the equations: results of different versions are never mixed.
+    /// The version of the equations: results of different versions are never mixed.
     const VERSION: &'static str;
 
-    /// The free motion: q'' at coordinates `q` with speeds `u`.
+    /// Computes the accelerations q'' of the free motion at coordinates `q` with speeds `u`.
     fn accelerations<T: Real>(p: &[N<T>; P], q: &[N<T>; C], u: &[N<T>; C]) -> [N<T>; C];
 
-    /// The drive at time `t`, added to the accelerations of both models.
+    /// Computes the forcing at time `t`, which is added to the accelerations of both models.
     fn forcing<T: Real>(p: &[N<T>; P], t: N<T>) -> [N<T>; C];
 }
 
-/// The program of an oscillator: does what this process's arguments say. `name` is its name.
+/// Runs the program of an oscillator with this process's arguments. `name` is the program's name.
 pub fn main<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>(
     name: &'static str,
 ) -> ExitCode {

@@ -19,8 +19,8 @@ use sweep_engine::{
 };
 use sweep_parameter::{Channel, Range, UnknownParameter};
 
-use crate::equations::{Case, Model};
-use crate::run::{Method, Run, Work};
+use crate::equations::{Model, PreparedPoint};
+use crate::run::{Integration, Method, ModelRun};
 use crate::{Coordinate, Oscillator, Parameter};
 
 methods! {
@@ -32,19 +32,25 @@ methods! {
     } Steps::Checked(accuracy);
 }
 
-/// Steps of the first rung over a radian of the linear model's fastest motion.
+/// First step of the halving method, as the product of step and the linear model's highest
+/// frequency (rad). Basis: order 4 is then stable. Doubling it adds a useless first run.
 const FIRST_STEP_RAD: f64 = 0.5;
-/// Rungs at most, each of half the step of the one before.
-const MOST_RUNGS: u32 = 12;
-/// The error left in a run of order 4, as a share of its difference from one of twice the step.
+/// Greatest number of runs of the halving method, each with half the step of the one before. Basis:
+/// the last step is 1/2048 of the first. Doubling it makes rows that do not converge take 4096
+/// times as long.
+const MAX_HALVING_RUNS: u32 = 12;
+/// The error of a run of order 4, relative to its difference from the run with twice the step.
+/// Derived: 1 / (2^4 - 1). Doubling it doubles the estimate.
 const CONTRACTION: f64 = 1.0 / 15.0;
-/// An amplitude below this share of the row's greatest is compared with that share.
+/// Least scale of the difference of amplitudes, relative to the row's greatest amplitude. Basis:
+/// rounding errors are smaller. Doubling it halves the relative differences of smaller amplitudes.
 const FLOOR: f64 = 1e-9;
 
 /// Names of methods in results.
 const METHODS: [&str; 2] = ["rk4", "dopri5"];
-/// Values of `status`: those of the nonlinear model, with `Failure`'s in their order behind the
-/// first, then those of the linear one alone.
+/// Values of `status`. First those of the nonlinear model: `ok`, then the reasons of
+/// [`lane_ode::Failure`] in their order, then that of a point without equilibrium. The last three
+/// are those of the linear model if it alone fails.
 const STATUSES: [&str; 8] = [
     "ok",
     "diverged",
@@ -57,14 +63,14 @@ const STATUSES: [&str; 8] = [
 ];
 const NO_EQUILIBRIUM: usize = 4;
 
-/// What a grid file sets of an oscillator: a value for every parameter.
+/// The model that a grid file describes: an oscillator with a value for every parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map<O, const C: usize, const D: usize, const P: usize> {
     values: [f64; P],
-    of: PhantomData<O>,
+    oscillator: PhantomData<O>,
 }
 
-/// Edges of the window, which are parameters like others.
+/// The edges of the window, which can be set and swept like parameters.
 const EDGES: [Parameter; 2] = [
     edge("window_from_s", "where the window begins"),
     edge("window_to_s", "where the window ends"),
@@ -144,7 +150,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Rea
     for Map<O, C, D, P>
 {
     fn blank() -> Self {
-        Self { values: O::PARAMETERS.map(|one| one.default), of: PhantomData }
+        Self { values: O::PARAMETERS.map(|one| one.default), oscillator: PhantomData }
     }
 
     fn walk(&mut self, keys: &mut Keys<'_>, _: Option<&GridInput<Self>>) {
@@ -196,7 +202,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
             core_s_per_point,
             sampled,
             sampled_s: plan.end_s,
-            // Chunks in hand, or a row group.
+            // The memory of unfinished chunks, or of a row group.
             memory_bytes: 14e6 + result_bytes.min(40e6),
             disk_bytes: result_bytes,
             result_bytes,
@@ -218,15 +224,15 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
     }
 }
 
-/// A row as it is computed: the runs of both models.
+/// The runs of both models at a point, and their error.
 #[derive(Clone)]
-struct Row<const C: usize> {
-    runs: [Run<C>; 2],
+struct PointRuns<const C: usize> {
+    runs: [ModelRun<C>; 2],
     error: Option<f64>,
     converged: Option<bool>,
 }
 
-impl<const C: usize> Row<C> {
+impl<const C: usize> PointRuns<C> {
     fn status(&self) -> usize {
         match self.runs.map(|run| run.failure.map_or(0, |(status, _)| status)) {
             [0, 0] => 0,
@@ -245,13 +251,13 @@ fn columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usiz
                  failed";
     let (limits, methods) = (reliability.limits, METHODS.to_vec());
     let mut columns = amplitude_columns(&reliability.channels, limits, amplitude, ratio);
-    let told = "the method that the row's numbers come from";
-    columns.extend(verdict_columns(&reliability.channels, limits, methods, told));
+    let method_description = "the method that the row's numbers come from";
+    columns.extend(verdict_columns(&reliability.channels, limits, methods, method_description));
     columns.extend(run_columns(STATUSES.to_vec()));
     columns
 }
 
-/// What computes rows.
+/// The engine that computes the rows of a plan.
 struct Evaluator<'a, O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> {
     plan: &'a Plan<Map<O, C, D, P>>,
 }
@@ -259,12 +265,12 @@ struct Evaluator<'a, O: Oscillator<C, D, P>, const C: usize, const D: usize, con
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     Evaluator<'_, O, C, D, P>
 {
-    /// Points given by the values of the axes, a lane each, as results tell of them.
+    /// Computes rows at points with these values of the axes, in lanes.
     fn compared(&self, axis_values: &[Vec<f64>], is_stopped: &dyn Fn() -> bool) -> Vec<Compared> {
         let channels = self.channels();
         let limits = self.plan.reliability.limits;
-        let method = self.direct().1;
-        let compared = |row: Row<C>| {
+        let method = self.common_method().1;
+        let compared = |row: PointRuns<C>| {
             let amplitudes = row.runs.map(|run| {
                 let sound = channels.iter().filter(|_| run.failure.is_none());
                 sound.map(|k| run.peaks[*k]).collect::<Vec<_>>()
@@ -274,7 +280,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
                 Some(amplitudes[0].get(k)? / linear)
             };
             let ratios: Vec<Option<f64>> = (0..channels.len()).map(ratio).collect();
-            let defined = || ratios.iter().enumerate().filter_map(|(k, of)| Some((k, (*of)?)));
+            let defined =
+                || ratios.iter().enumerate().filter_map(|(k, ratio)| Some((k, (*ratio)?)));
             let greatest = defined().reduce(|most, next| if next.1 > most.1 { next } else { most });
             let least = defined().reduce(|least, next| if next.1 < least.1 { next } else { least });
             Compared {
@@ -282,7 +289,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
                 greatest,
                 least,
                 converged: row.converged,
-                // No twin is run.
+                // Chaos is not examined.
                 sensitive: None,
                 method,
                 error: row.error,
@@ -297,14 +304,14 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         self.rows(axis_values, is_stopped).into_iter().map(compared).collect()
     }
 
-    /// Coordinates that the plan compares.
+    /// Returns the indices of the coordinates that the plan compares.
     fn channels(&self) -> Vec<usize> {
         let place = |channel: &Coordinate| O::COORDINATES.iter().position(|one| one == channel);
         self.plan.reliability.channels.iter().filter_map(place).collect()
     }
 
-    /// The method of all rows, if it is one, and its name's position.
-    fn direct(&self) -> (Option<Method>, usize) {
+    /// Returns the method if it is the same for all rows, and the index of its name.
+    fn common_method(&self) -> (Option<Method>, usize) {
         match self.plan.integrator {
             Integrator::Rk4 { step_s } => (Some(Method::Rk4(step_s)), 0),
             Integrator::Dopri5 { rtol, atol } => (Some(Method::Dopri5(rtol, atol)), 1),
@@ -312,25 +319,28 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         }
     }
 
-    fn rows(&self, axis_values: &[Vec<f64>], is_stopped: &dyn Fn() -> bool) -> Vec<Row<C>> {
+    fn rows(&self, axis_values: &[Vec<f64>], is_stopped: &dyn Fn() -> bool) -> Vec<PointRuns<C>> {
         let ready = |values: &Vec<f64>| {
             let Scenario { model, window_s } = self.plan.scenario_at(values);
-            Case::new::<O, D>(model.values, window_s)
+            PreparedPoint::new::<O, D>(model.values, window_s)
         };
-        let cases: Vec<Option<Case<C, P>>> = axis_values.iter().map(ready).collect();
+        let cases: Vec<Option<PreparedPoint<C, P>>> = axis_values.iter().map(ready).collect();
         let places: Vec<usize> = (0..cases.len()).filter(|k| cases[*k].is_some()).collect();
-        let there: Vec<&Case<C, P>> = cases.iter().flatten().collect();
-        let none = Run { failure: Some((NO_EQUILIBRIUM, None)), ..Run::NONE };
-        let mut rows = vec![Row { runs: [none; 2], error: None, converged: None }; cases.len()];
-        if let (Some(method), _) = self.direct() {
-            for (place, runs) in places.into_iter().zip(self.both(method, &there, is_stopped)) {
+        let prepared: Vec<&PreparedPoint<C, P>> = cases.iter().flatten().collect();
+        let none = ModelRun { failure: Some((NO_EQUILIBRIUM, None)), ..ModelRun::NONE };
+        let mut rows =
+            vec![PointRuns { runs: [none; 2], error: None, converged: None }; cases.len()];
+        if let (Some(method), _) = self.common_method() {
+            for (place, runs) in
+                places.into_iter().zip(self.run_both_models(method, &prepared, is_stopped))
+            {
                 rows[place].runs = runs;
             }
             return rows;
         }
-        // Each point has steps of its own, so that a row does not depend on its company.
-        for (place, case) in places.into_iter().zip(there) {
-            self.climb(&mut rows[place], case, is_stopped);
+        // Each point has its own steps, so that a row does not depend on the other points.
+        for (place, case) in places.into_iter().zip(prepared) {
+            self.refine(&mut rows[place], case, is_stopped);
             if is_stopped() {
                 break;
             }
@@ -338,28 +348,43 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         rows
     }
 
-    /// Both models at some points, by one method.
-    fn both(
+    /// Integrates both models at some points by one method.
+    fn run_both_models(
         &self,
         method: Method,
-        cases: &[&Case<C, P>],
+        cases: &[&PreparedPoint<C, P>],
         is_stopped: &dyn Fn() -> bool,
-    ) -> Vec<[Run<C>; 2]> {
-        let (end_s, of) = (self.plan.end_s, PhantomData);
-        let runs =
-            |model| Work::<O, C, D, P> { model, method, cases, end_s, is_stopped, of }.runs();
+    ) -> Vec<[ModelRun<C>; 2]> {
+        let end_s = self.plan.end_s;
+        let runs = |model| {
+            Integration::<O, C, D, P> {
+                model,
+                method,
+                cases,
+                end_s,
+                is_stopped,
+                oscillator: PhantomData,
+            }
+            .runs()
+        };
         let pairs = runs(Model::Nonlinear).into_iter().zip(runs(Model::Linear));
         pairs.map(|(nonlinear, linear)| [nonlinear, linear]).collect()
     }
 
-    /// Halves the step until two runs agree.
-    fn climb(&self, row: &mut Row<C>, case: &Case<C, P>, is_stopped: &dyn Fn() -> bool) {
+    /// Integrates both models with steps that are halved until two runs agree.
+    fn refine(
+        &self,
+        row: &mut PointRuns<C>,
+        case: &PreparedPoint<C, P>,
+        is_stopped: &dyn Fn() -> bool,
+    ) {
         let Steps::Checked(accuracy) = self.plan.integrator.steps() else { return };
         let channels = self.channels();
         let mut step_s = (FIRST_STEP_RAD / case.fastest_rad_per_s()).min(self.plan.end_s / 8.0);
-        for rung in 0..MOST_RUNGS {
-            let now = self.both(Method::Rk4(step_s), &[case], is_stopped)[0];
-            row.error = if rung > 0 { error_left(&row.runs, &now, &channels) } else { None };
+        for run_index in 0..MAX_HALVING_RUNS {
+            let now = self.run_both_models(Method::Rk4(step_s), &[case], is_stopped)[0];
+            row.error =
+                if run_index > 0 { error_of_finer(&row.runs, &now, &channels) } else { None };
             row.converged = Some(row.error.is_some_and(|error| error <= accuracy));
             row.runs = now;
             if row.converged == Some(true) {
@@ -370,10 +395,10 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     }
 }
 
-/// The relative error left in the finer runs; none where one of them failed.
-fn error_left<const C: usize>(
-    coarse: &[Run<C>; 2],
-    fine: &[Run<C>; 2],
+/// Returns the relative error of the finer runs; `None` if any run failed.
+fn error_of_finer<const C: usize>(
+    coarse: &[ModelRun<C>; 2],
+    fine: &[ModelRun<C>; 2],
     channels: &[usize],
 ) -> Option<f64> {
     let mut greatest = 0.0_f64;
@@ -405,7 +430,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
                     break;
                 }
                 let rows = self.compared(&axis_values, &|| context.stopped());
-                // A stop may have cut the rows short.
+                // The rows may be incomplete if the engine was stopped.
                 if context.stopped() {
                     break;
                 }

@@ -1,4 +1,4 @@
-//! Trajectories of one model through the lanes of a method, and the peaks of each.
+//! Integrates trajectories of one model in lanes, and finds the peaks of each.
 
 use std::marker::PhantomData;
 
@@ -10,28 +10,31 @@ use lane_ode::{
 use crate::Oscillator;
 use crate::equations::{Case, Equations, Model};
 
-/// Accepted and rejected steps of a trajectory at most.
-const MOST_STEPS: u64 = 100_000_000;
+/// Greatest number of steps of a trajectory, accepted and rejected ones together. Basis: it takes
+/// hours. Doubling it doubles the time until such a trajectory fails.
+const MAX_STEPS: u64 = 100_000_000;
 
-/// The first step that adaptive methods try, as a part of the run; its error says what follows.
+/// First step that adaptive methods try, relative to the run. Basis: far shorter than any motion's
+/// period; the step control then corrects it. Doubling it saves less than a step.
 const FIRST_STEP: f64 = 1e-6;
 
-/// Stretches of a trajectory: before its window, in it and behind it.
-const LEGS: usize = 3;
+/// Number of segments of a trajectory: before its window, in it and after it.
+const SEGMENTS: usize = 3;
 
-/// How a trajectory is integrated.
+/// A method of integration with its parameters.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Method {
-    /// Fixed steps (s).
+    /// RK4 with this fixed step (s).
     Rk4(f64),
-    /// Dormand-Prince, relative and absolute tolerance.
+    /// Dormand-Prince 5(4) with these relative and absolute tolerances.
     Dopri5(f64, f64),
 }
 
-/// What came of a trajectory.
+/// The result of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Run<const C: usize> {
-    /// Why it ended early, as a position among statuses; and when (s), if it had begun.
+pub(crate) struct ModelRun<const C: usize> {
+    /// The reason of a failure, as an index into the list of statuses, and its time (s) if the
+    /// trajectory had begun.
     pub(crate) failure: Option<(usize, Option<f64>)>,
     /// Largest deviations from equilibrium in the window.
     pub(crate) peaks: [f64; C],
@@ -39,37 +42,39 @@ pub(crate) struct Run<const C: usize> {
     pub(crate) rejected: u64,
 }
 
-impl<const C: usize> Run<C> {
-    /// A trajectory that has not begun.
+impl<const C: usize> ModelRun<C> {
+    /// The result of a trajectory that has not begun.
     pub(crate) const NONE: Self = Self { failure: None, peaks: [0.0; C], steps: 0, rejected: 0 };
 }
 
-/// One model at every point from rest to `end_s`, by one method.
-pub(crate) struct Work<'a, O, const C: usize, const D: usize, const P: usize> {
+/// The integration of one model at every point, from rest to `end_s`, by one method.
+pub(crate) struct Integration<'a, O, const C: usize, const D: usize, const P: usize> {
     pub(crate) model: Model,
     pub(crate) method: Method,
     pub(crate) cases: &'a [&'a Case<C, P>],
     pub(crate) end_s: f64,
-    /// Once it says so, what comes means nothing.
+    /// Whether to stop; the results are then meaningless.
     pub(crate) is_stopped: &'a dyn Fn() -> bool,
-    pub(crate) of: PhantomData<O>,
+    pub(crate) oscillator: PhantomData<O>,
 }
 
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Work<'_, O, C, D, P> {
-    /// What comes of every point.
-    pub(crate) fn runs(self) -> Vec<Run<C>> {
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
+    Integration<'_, O, C, D, P>
+{
+    /// Integrates every point and returns the results.
+    pub(crate) fn runs(self) -> Vec<ModelRun<C>> {
         Simd::best().dispatch(self)
     }
 }
 
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Kernel
-    for Work<'_, O, C, D, P>
+    for Integration<'_, O, C, D, P>
 {
-    type Output = Vec<Run<C>>;
+    type Output = Vec<ModelRun<C>>;
 
     #[inline(always)]
-    fn run<T: Lane>(self, zero: T) -> Vec<Run<C>> {
-        let of = |relative, absolute| Tolerance { relative, absolute, max_steps: MOST_STEPS };
+    fn run<T: Lane>(self, zero: T) -> Vec<ModelRun<C>> {
+        let tolerance = |relative, absolute| Tolerance { relative, absolute, max_steps: MAX_STEPS };
         match self.method {
             Method::Rk4(step_s) => {
                 let mut task = Trajectories::new(zero, &self, step_s);
@@ -78,42 +83,42 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Ker
             }
             Method::Dopri5(relative, absolute) => {
                 let mut task = Trajectories::new(zero, &self, FIRST_STEP * self.end_s);
-                dopri5::integrate(zero, &mut task, &of(relative, absolute));
+                dopri5::integrate(zero, &mut task, &tolerance(relative, absolute));
                 task.runs
             }
         }
     }
 }
 
-/// Trajectories fed into lanes, and their peaks.
+/// The task that passes the trajectories through lanes, and records their peaks.
 struct Trajectories<'a, O, T, const C: usize, const D: usize, const P: usize> {
-    work: &'a Work<'a, O, C, D, P>,
+    integration: &'a Integration<'a, O, C, D, P>,
     system: Equations<O, T, C, D, P>,
     step_s: f64,
-    taken: usize,
-    /// Which trajectory and which of its legs each lane holds.
-    held: [(usize, usize); MAX_LANES],
+    started: usize,
+    /// The index of the trajectory and of its segment in each lane.
+    current: [(usize, usize); MAX_LANES],
     peaks: Peaks<T, C>,
-    /// One where a lane is in its window.
-    inside: N<T>,
-    runs: Vec<Run<C>>,
+    /// A number for each lane: 1 within the window, else 0.
+    in_window: N<T>,
+    runs: Vec<ModelRun<C>>,
 }
 
 impl<'a, O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: usize>
     Trajectories<'a, O, T, C, D, P>
 {
-    /// In steps of `step_s`, or for adaptive methods with that to try first.
-    fn new(zero: T, work: &'a Work<'a, O, C, D, P>, step_s: f64) -> Self {
+    /// Creates the task with steps of `step_s`, which is the first step for adaptive methods.
+    fn new(zero: T, integration: &'a Integration<'a, O, C, D, P>, step_s: f64) -> Self {
         let zero = N(zero);
         Self {
-            work,
-            system: Equations::new(work.model, zero),
+            integration,
+            system: Equations::new(integration.model, zero),
             step_s,
-            taken: 0,
-            held: [(0, 0); MAX_LANES],
+            started: 0,
+            current: [(0, 0); MAX_LANES],
             peaks: Peaks::new(zero),
-            inside: zero,
-            runs: vec![Run::NONE; work.cases.len()],
+            in_window: zero,
+            runs: vec![ModelRun::NONE; integration.cases.len()],
         }
     }
 
@@ -123,7 +128,7 @@ impl<'a, O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const 
     }
 
     fn counts(&self) -> T::Mask {
-        self.inside.lit(0.5).0.less(self.inside.0)
+        self.in_window.lit(0.5).0.less(self.in_window.0)
     }
 }
 
@@ -142,7 +147,7 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
         ended: SegmentEnd,
         x: &mut [N<T>; D],
     ) -> Option<Segment> {
-        let (trajectory, mut leg) = self.held[lane];
+        let (trajectory, mut segment) = self.current[lane];
         if let SegmentEnd::Completed(count) | SegmentEnd::Failed { count, .. } = ended {
             let run = &mut self.runs[trajectory];
             run.steps += count.accepted;
@@ -150,39 +155,39 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
             run.peaks = self.peaks.lane(lane);
         }
         match ended {
-            SegmentEnd::Completed(_) => leg += 1,
+            SegmentEnd::Completed(_) => segment += 1,
             SegmentEnd::Failed { reason, time_s, .. } => {
                 self.runs[trajectory].failure = Some((1 + reason as usize, Some(time_s)));
-                leg = LEGS;
+                segment = SEGMENTS;
             }
-            SegmentEnd::Idle => leg = LEGS,
+            SegmentEnd::Idle => segment = SEGMENTS,
         }
         loop {
-            while leg < LEGS {
-                // The window's edges cut the run.
-                let [from_s, to_s] = self.work.cases[self.held[lane].0].window_s;
-                let ends = [0.0, from_s, to_s, self.work.end_s];
-                let (start_s, end_s) = (ends[leg], ends[leg + 1]);
-                // A window may begin with the run, or end with it.
+            while segment < SEGMENTS {
+                // The run is divided into segments at the edges of the window.
+                let [from_s, to_s] = self.integration.cases[self.current[lane].0].window_s;
+                let ends = [0.0, from_s, to_s, self.integration.end_s];
+                let (start_s, end_s) = (ends[segment], ends[segment + 1]);
+                // A segment is empty if the window begins with the run or ends with it.
                 if start_s < end_s {
-                    self.held[lane].1 = leg;
-                    self.inside.0.set(lane, if leg == 1 { 1.0 } else { 0.0 });
+                    self.current[lane].1 = segment;
+                    self.in_window.0.set(lane, if segment == 1 { 1.0 } else { 0.0 });
                     return Some(Segment {
                         start_s,
                         end_s,
                         step_s: self.step_s.min(end_s - start_s),
                     });
                 }
-                leg += 1;
+                segment += 1;
             }
             self.peaks.reset(lane);
-            self.inside.0.set(lane, 0.0);
-            let case = *self.work.cases.get(self.taken)?;
-            self.held[lane] = (self.taken, 0);
-            self.taken += 1;
-            self.system.take(lane, case);
+            self.in_window.0.set(lane, 0.0);
+            let case = *self.integration.cases.get(self.started)?;
+            self.current[lane] = (self.started, 0);
+            self.started += 1;
+            self.system.set_point(lane, case);
             x.iter_mut().for_each(|value| value.0.set(lane, 0.0));
-            leg = 0;
+            segment = 0;
         }
     }
 
@@ -199,6 +204,6 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
     }
 
     fn is_stopped(&self) -> bool {
-        (self.work.is_stopped)()
+        (self.integration.is_stopped)()
     }
 }

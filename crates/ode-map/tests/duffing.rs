@@ -1,4 +1,4 @@
-//! The example `duffing` against what textbooks say of it.
+//! Tests of the example `duffing` against results from textbooks.
 
 #![allow(clippy::unwrap_used, reason = "a test fails where it must")]
 
@@ -50,7 +50,7 @@ fn frequency_response(amplitude: f64, frequency: f64) -> f64 {
 }
 
 #[test]
-fn steady_amplitudes_meet_the_frequency_response_equation() {
+fn steady_amplitudes_satisfy_the_frequency_response_equation() {
     let frequencies = [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.3, 1.4, 1.5, 1.6, 1.7, 1.8];
     let rows = run(&format!(
         "name = \"duffing\"\ntime = {{ end_s = 500, window_s = [450, 500] }}\n\
@@ -62,13 +62,14 @@ fn steady_amplitudes_meet_the_frequency_response_equation() {
     for (frequency, amplitude) in frequencies.into_iter().zip(amplitudes) {
         // Each of these frequencies has one response, so that the equation has one root. Higher
         // harmonics, which the equation leaves out, add at most 0.6 %.
-        let [below, above] = [0.99, 1.01].map(|by| frequency_response(by * amplitude, frequency));
+        let [below, above] =
+            [0.99, 1.01].map(|factor| frequency_response(factor * amplitude, frequency));
         assert!(below < 0.0 && above > 0.0, "frequency {frequency}: amplitude {amplitude}");
     }
 }
 
 #[test]
-fn a_softening_spring_breaks_most_easily_where_davis_found_it() {
+fn a_softening_spring_breaks_most_easily_at_the_frequency_given_by_davis() {
     // Davis, Introduction to Nonlinear Differential and Integral Equations (1962): from rest, the
     // least forcing that breaks the spring x - x^3 / 6 without damping has its minimum over the
     // frequency at 0.8852.

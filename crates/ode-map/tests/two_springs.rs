@@ -1,4 +1,4 @@
-//! The example against an independent program, and every command that it has.
+//! Tests of the example `two_springs` against an independent program, and of every command.
 
 #![allow(clippy::unwrap_used, reason = "a test fails where it must")]
 
@@ -9,7 +9,7 @@ use arrow_array::cast::AsArray;
 use arrow_array::types::Float64Type;
 use arrow_array::{Array, RecordBatch};
 
-/// The example, which cargo builds beside this test.
+/// Returns the example, which cargo builds beside this test.
 fn program() -> PathBuf {
     let test = std::env::current_exe().unwrap();
     let folder = test.parent().and_then(Path::parent).unwrap();
@@ -41,8 +41,8 @@ impl Home {
         command.current_dir(self.0.path()).args(words.split(' ')).output().unwrap()
     }
 
-    /// Standard output and error of a command that ends well.
-    fn does(&self, words: &str) -> String {
+    /// Runs a command, which must succeed, and returns its standard output and error.
+    fn run_successfully(&self, words: &str) -> String {
         let output = self.output(words);
         let text = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
         assert!(output.status.success(), "{words}: {}", text.concat());
@@ -64,50 +64,50 @@ fn number(rows: &RecordBatch, name: &str, row: usize) -> Option<f64> {
     column.is_valid(row).then(|| column.value(row))
 }
 
-/// The greatest difference from the reference, as a share of the peak.
-fn off(integrator: &str) -> f64 {
+/// Returns the greatest difference from the reference, relative to the peak.
+fn greatest_difference(integrator: &str) -> f64 {
     let home = Home::new(&grid(integrator, AXES));
-    home.does("run grid.toml --out x.parquet --progress none");
+    home.run_successfully("run grid.toml --out x.parquet --progress none");
     let rows = home.rows("x.parquet");
     let text = include_str!("../testdata/two_springs.json");
     let reference: serde_json::Value = serde_json::from_str(text).unwrap();
     let expected = reference["rows"].as_array().unwrap();
     assert_eq!(rows.num_rows(), expected.len());
-    let mut off = 0.0_f64;
+    let mut difference = 0.0_f64;
     for (row, expected) in expected.iter().enumerate() {
         for key in ["forcing", "forcing_rad_per_s"] {
             assert_eq!(number(&rows, key, row), expected[key].as_f64());
         }
         for (k, name) in ["x1", "x2"].into_iter().enumerate() {
-            let of = |model: &str| number(&rows, &format!("{model}_{name}"), row).unwrap();
+            let amplitude = |model: &str| number(&rows, &format!("{model}_{name}"), row).unwrap();
             let peak = expected["nonlinear"][k].as_f64().unwrap();
-            off = off.max((of("nonlinear") / peak - 1.0).abs());
+            difference = difference.max((amplitude("nonlinear") / peak - 1.0).abs());
             let linear = expected["linear"][k].as_f64().unwrap();
-            off = off.max((of("linear") - linear).abs() / linear.max(1e-9));
+            difference = difference.max((amplitude("linear") - linear).abs() / linear.max(1e-9));
         }
         assert_eq!(number(&rows, "ratio_x2", row), None, "its linear motion is zero");
         let ratio = expected["ratio"].as_f64().unwrap();
-        off = off.max((number(&rows, "ratio_x1", row).unwrap() / ratio - 1.0).abs());
+        difference = difference.max((number(&rows, "ratio_x1", row).unwrap() / ratio - 1.0).abs());
     }
-    off
+    difference
 }
 
 #[test]
-fn every_method_meets_the_independent_program() {
+fn every_method_agrees_with_the_independent_program() {
     for integrator in [
         "{ method = \"rk4\", step_s = 5e-3 }",
         "{ method = \"dopri5\", rtol = 1e-11, atol = 1e-15 }",
         "{ method = \"rk4-halved\", accuracy = 1e-8 }",
     ] {
-        let off = off(integrator);
-        assert!(off < 1e-6, "{integrator}: {off:e}");
+        let difference = greatest_difference(integrator);
+        assert!(difference < 1e-6, "{integrator}: {difference:e}");
     }
 }
 
 const FAST: &str = "{ method = \"rk4\", step_s = 0.05 }";
 
 #[test]
-fn every_mistake_is_told_at_once_with_its_place_and_the_nearest_name() {
+fn all_mistakes_are_reported_together_with_their_places_and_suggestions() {
     let wrong = grid("{ method = \"rk5\" }", "[[axis]]\nparameter = \"forcin\"\nvalues = [1, 1]\n");
     let output = Home::new(&wrong).output("check grid.toml");
     let text = String::from_utf8(output.stderr).unwrap();
@@ -118,42 +118,49 @@ fn every_mistake_is_told_at_once_with_its_place_and_the_nearest_name() {
 }
 
 #[test]
-fn shards_join_to_the_bytes_of_one_run() {
+fn merged_shards_have_the_same_bytes_as_one_run() {
     let home = Home::new(&grid(FAST, AXES));
-    home.does("run grid.toml --out whole.parquet --threads 1 --progress none");
+    home.run_successfully("run grid.toml --out whole.parquet --threads 1 --progress none");
     for shard in ["1/2", "2/2"] {
-        home.does(&format!("run grid.toml --out x.parquet --shard {shard} --progress none"));
+        home.run_successfully(&format!(
+            "run grid.toml --out x.parquet --shard {shard} --progress none"
+        ));
     }
-    assert!(home.does("status grid.toml --out x.parquet").contains("complete, to be merged"));
-    home.does("merge grid.toml --out x.parquet");
+    assert!(
+        home.run_successfully("status grid.toml --out x.parquet")
+            .contains("complete, to be merged")
+    );
+    home.run_successfully("merge grid.toml --out x.parquet");
     assert!(home.bytes("whole.parquet") == home.bytes("x.parquet"));
 }
 
 #[test]
-fn every_command_has_something_to_say() {
+fn every_command_works() {
     let axes = "[[axis]]\nparameter = \"forcing_rad_per_s\"\nvalues = [1.05, 1.1]\n\
                 [[axis]]\nparameter = \"forcing\"\n\
                 range = { from = 0.001, to = 0.05, count = 9 }\n";
     let home = Home::new(&format!("{}[reliability]\nratio_limit = 1.02\n", grid(FAST, axes)));
-    assert!(home.does("check grid.toml").contains("18"));
-    home.does("run grid.toml --out x.parquet --progress none");
-    assert!(home.does("show x.parquet").contains("below ratio 1.02"));
-    assert!(home.does("show x.parquet --top 1 --by ratio_x1").contains("forcing_rad_per_s"));
-    home.does("plot x.parquet -o x.svg");
+    assert!(home.run_successfully("check grid.toml").contains("18"));
+    home.run_successfully("run grid.toml --out x.parquet --progress none");
+    assert!(home.run_successfully("show x.parquet").contains("below ratio 1.02"));
+    assert!(
+        home.run_successfully("show x.parquet --top 1 --by ratio_x1").contains("forcing_rad_per_s")
+    );
+    home.run_successfully("plot x.parquet -o x.svg");
     assert!(String::from_utf8(home.bytes("x.svg")).unwrap().starts_with("<svg"));
-    home.does("export x.parquet x.csv");
+    home.run_successfully("export x.parquet x.csv");
     assert!(String::from_utf8(home.bytes("x.csv")).unwrap().contains("nonlinear_x1"));
-    home.does("require x.parquet count(status=='ok')==18");
+    home.run_successfully("require x.parquet count(status=='ok')==18");
     let broken = home.output("require x.parquet ratio_x1<1");
     assert_eq!(broken.status.code(), Some(4), "{broken:?}");
-    home.does("run grid.toml --set zeta_1=0.02 --out y.parquet --progress none");
-    assert!(home.does("compare x.parquet y.parquet").contains("zeta_1"));
-    let found = home.does("boundary grid.toml --out b.parquet --progress none");
+    home.run_successfully("run grid.toml --set zeta_1=0.02 --out y.parquet --progress none");
+    assert!(home.run_successfully("compare x.parquet y.parquet").contains("zeta_1"));
+    let found = home.run_successfully("boundary grid.toml --out b.parquet --progress none");
     assert!(found.contains("crossing"), "{found}");
-    home.does("plot x.parquet --boundary b.parquet -o y.svg");
-    let listed = home.does("parameters grid.toml");
+    home.run_successfully("plot x.parquet --boundary b.parquet -o y.svg");
+    let listed = home.run_successfully("parameters grid.toml");
     assert!(listed.contains("omega_1_rad_per_s") && listed.contains("window_to_s"), "{listed}");
-    let schema: serde_json::Value = serde_json::from_str(&home.does("schema")).unwrap();
+    let schema: serde_json::Value = serde_json::from_str(&home.run_successfully("schema")).unwrap();
     assert!(schema["properties"]["set"]["properties"]["zeta_2"].is_object());
 }
 
@@ -162,7 +169,7 @@ fn a_study_finds_the_resonance_that_a_fine_map_shows() {
     let axis = "[[axis]]\nparameter = \"forcing_rad_per_s\"\n\
                 range = { from = 0.7, to = 1.5, count = 401 }\n";
     let home = Home::new(&grid(FAST, axis));
-    home.does("run grid.toml --out x.parquet --progress none");
+    home.run_successfully("run grid.toml --out x.parquet --progress none");
     let rows = home.rows("x.parquet");
     let at = |row| number(&rows, "linear_x1", row).unwrap();
     let highest = (0..rows.num_rows()).max_by(|a, b| at(*a).total_cmp(&at(*b))).unwrap();
@@ -177,12 +184,13 @@ fn a_study_finds_the_resonance_that_a_fine_map_shows() {
     );
     for threads in [1, 2] {
         let line = format!("optimise study.toml --threads {threads} --progress none --out");
-        let text = home.does(&format!("{line} {threads}.parquet"));
+        let text = home.run_successfully(&format!("{line} {threads}.parquet"));
         assert!(text.contains("feasible  160 of 160\n"), "{text}");
     }
     assert!(home.bytes("1.parquet") == home.bytes("2.parquet"));
-    let best =
-        home.does("show 1.parquet --where on_front --json --columns forcing_rad_per_s,linear_x1");
+    let best = home.run_successfully(
+        "show 1.parquet --where on_front --json --columns forcing_rad_per_s,linear_x1",
+    );
     let best: serde_json::Value = serde_json::from_str(&best).unwrap();
     let found = best[0]["forcing_rad_per_s"].as_f64().unwrap();
     assert!((found - resonance).abs() <= 0.003, "{found} for {resonance}");
@@ -190,10 +198,10 @@ fn a_study_finds_the_resonance_that_a_fine_map_shows() {
 }
 
 #[test]
-fn designs_spread_points() {
+fn a_design_has_its_number_of_points() {
     let design = "[design]\nmethod = \"sobol\"\npoints = 16\n\
                   [[axis]]\nparameter = \"zeta_1\"\nrange = { from = 0.005, to = 0.05 }\n";
     let home = Home::new(&grid(FAST, design));
-    home.does("run grid.toml --out x.parquet --progress none");
+    home.run_successfully("run grid.toml --out x.parquet --progress none");
     assert_eq!(home.rows("x.parquet").num_rows(), 16);
 }

@@ -35,8 +35,8 @@ impl AxisScale {
         }
     }
 
-    /// Returns a linear scale that holds all `values` with a margin of 5 % at both ends; 0 to 1 if
-    /// there are none.
+    /// Returns a linear scale that includes all `values` with a margin of 5 % at both ends; 0 to 1
+    /// if there are none.
     pub(crate) fn around(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extremes(values).unwrap_or((0.0, 1.0));
         let room = if high > low { 0.05 * (high - low) } else { 0.05 * high.abs().max(1.0) };
@@ -64,7 +64,7 @@ impl AxisScale {
     }
 }
 
-/// Returns whether a value has a place on a logarithmic scale.
+/// Whether a value can be shown on a logarithmic scale.
 pub(crate) const fn has_logarithm(value: f64) -> bool {
     value > 0.0 && value < f64::INFINITY
 }
@@ -127,7 +127,7 @@ fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     }
     let finest = f64::EPSILON * low.abs().max(high.abs());
     let mut step = TickStep::at_least(SLACK * rough);
-    // A step can leave fewer than `MIN_TICKS` ticks. Then shorter ones are tried, as long as the
+    // A step may give fewer than `MIN_TICKS` ticks. Then shorter ones are tried, as long as the
     // labels of neighbouring ticks differ.
     while step.length() > finest {
         let length = step.length();
@@ -154,9 +154,9 @@ fn even_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
 /// dense ticks on short axes.
 pub(crate) const MIN_TICKS: i64 = 3;
 
-/// Share of the wanted step that a round step may be shorter by. Basis: rounding of the range must
-/// not choose a step twice as long. It lies close below 1; half of it would choose steps that are
-/// half as long as wanted.
+/// Factor of the wanted step that a round step must reach. Basis: rounding of the range must not
+/// choose a step twice as long. It is just below 1; half of it would allow steps that are half as
+/// long as wanted.
 pub(crate) const SLACK: f64 = 0.999;
 
 /// Returns the candidate sets of ticks of a logarithmic scale, from sparse to dense; empty sets if

@@ -42,7 +42,7 @@ pub struct ChartPanel {
     /// The label of the y axis.
     #[serde(flatten)]
     pub label: Label,
-    /// Whether the panel is drawn in a picture, and at first in a page.
+    /// Whether the panel is drawn in a picture, and shown when a page opens.
     pub shown: bool,
     /// Whether the y axis is logarithmic.
     pub log: bool,
@@ -158,7 +158,7 @@ pub(crate) fn draw(chart: &Chart) -> Scene {
         draw_stars(&mut scene, content, &panel);
         let last = index + 1 == panels.len();
         panel.draw_frame(&mut scene, last, true);
-        // Dots are drawn after the frame and outside the clip, so that they are whole at the edge
+        // Dots are drawn after the frame and without clipping, so that they are whole at the edge
         // too.
         let within = |y: f64| (panel.y..=panel.y + panel.height).contains(&y);
         for (place, radius, colour) in dots.into_iter().filter(|([_, y], ..)| within(*y)) {
@@ -187,7 +187,7 @@ pub(crate) fn x_scale(chart: &Chart) -> AxisScale {
         return AxisScale::log(low, if high > low { high } else { 10.0 * low });
     }
     let (low, high) = extremes(xs).unwrap_or((0.0, 1.0));
-    // If all series have the same single x, it lies in the middle, so that its dots are whole.
+    // If all series have only one x, it is in the middle, so that its dots are whole.
     if high <= low {
         let half = 0.5_f64.max(1e-6 * low.abs());
         return AxisScale::linear(low - half, low + half);

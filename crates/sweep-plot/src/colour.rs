@@ -59,7 +59,7 @@ pub(crate) const UNSTABLE_SHADE: Colour = Colour::hex(0xcc79a7).with_alpha(70);
 pub const FAILED: Colour = Colour::hex(0xbfc5cc);
 
 /// Number of steps of a colour scale. Basis: few enough that neighbouring cells merge to one shape,
-/// enough to look continuous. Doubling it nearly doubles the size of an SVG map.
+/// and enough to look continuous. Doubling it nearly doubles the size of an SVG map.
 pub(crate) const COLOUR_STEPS: usize = 64;
 
 /// A scale from values to colours.
@@ -70,9 +70,9 @@ pub(crate) struct ColourScale {
     /// The value in the middle of a diverging scale; both of its sides have half of the colours,
     /// whatever their extent. `None` for a sequential scale, from dark to light.
     pub(crate) centre: Option<f64>,
-    /// Whether the bad side, in red, is the low one.
+    /// Whether low values are the bad ones, which are red.
     reversed: bool,
-    /// Whether the centre is no limit: values near it are grey.
+    /// Whether the centre is not a limit, so that values near it are grey.
     neutral: bool,
 }
 

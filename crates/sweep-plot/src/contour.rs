@@ -161,8 +161,8 @@ mod tests {
     fn the_two_lines_of_a_saddle_do_not_meet() {
         let corners = [[1.0, -1.0], [-1.0, 3.0]];
         let lines = zero_lines(&numbers(2), &numbers(2), |i, j| corners[i][j]);
-        // The middle is positive, so the positive corners are connected and the negative ones cut
-        // off.
+        // The mean of the corners is positive, so that the positive corners are connected and the
+        // negative ones cut off.
         assert_eq!(lines.len(), 2);
         for line in lines {
             let cut_off = if line[0][0] + line[1][0] > line[0][1] + line[1][1] {

@@ -14,9 +14,10 @@ const MAX_PANELS: usize = 9;
 /// Maximum number of values of an axis that a message lists. Basis: a message of a few lines.
 const MAX_LISTED: usize = 24;
 
-/// Cells along either of the first two axes that a page keeps before it leaves out cuts. Basis:
-/// fewer blur a boundary. Doubling it leaves a quarter of the cuts.
-const MIN_SIDE: usize = 64;
+/// Minimum number of cells along each of the first two axes of a page; a map with more cuts than
+/// then fit shows only some of them. Basis: fewer cells blur a boundary. Doubling it leaves a
+/// quarter of the cuts.
+const MIN_CELLS_ALONG_AXIS: usize = 64;
 
 /// The cuts through a map that a figure shows.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,9 +33,9 @@ pub(crate) struct Cuts {
 /// A cut through a map: the first two axes at fixed values of the others.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Cut {
-    /// The index among the picks of each axis beyond the second.
+    /// The position of the cut's value in the picks, for each axis beyond the second.
     pub(crate) rest: Vec<usize>,
-    /// The name that tells it from the other cuts.
+    /// The name that distinguishes it from the other cuts.
     pub(crate) name: Option<String>,
 }
 
@@ -76,9 +77,9 @@ impl Cuts {
         Ok(Self { picks, cuts, notes })
     }
 
-    /// Returns the cuts of a page of at most `most` cells: all of them, or else those at the fixed
-    /// values and at evenly picked values of the other axes. The page opens with the fixed values,
-    /// or else with the first cut.
+    /// Returns the cuts of a page of at most `most` cells. If not all cuts fit, it shows those at
+    /// the fixed values and at evenly picked values of the other axes. The page opens with the
+    /// fixed values, or else with the first cut.
     ///
     /// # Errors
     /// The errors of [`fixed_values`].
@@ -90,7 +91,7 @@ impl Cuts {
     ) -> Result<Self> {
         let extra = axes.get(2..).unwrap_or_default();
         let fixed_values = fixed_values(source, extra, at)?;
-        let side = |axis: &SweptAxis| axis.values.len().min(MIN_SIDE);
+        let side = |axis: &SweptAxis| axis.values.len().min(MIN_CELLS_ALONG_AXIS);
         let most_cuts = (most / axes.iter().take(2).map(side).product::<usize>()).max(1);
         let mut counts: Vec<usize> = extra.iter().map(|axis| axis.values.len()).collect();
         let too_many = |counts: &[usize]| {
@@ -118,8 +119,8 @@ impl Cuts {
     }
 }
 
-/// Returns the indices of the values shown of each axis: the fixed one where not all fit, or else
-/// `counts` of them, evenly picked.
+/// Returns the indices of the values shown for each axis: the fixed value if not all values fit, or
+/// else `counts` of them, evenly picked.
 fn picks(extra: &[SweptAxis], fixed_values: &[Option<usize>], counts: &[usize]) -> Vec<Vec<usize>> {
     let pick = |((axis, pin), &count): ((&SweptAxis, &Option<usize>), &usize)| match pin {
         Some(pin) if count < axis.values.len() => vec![*pin],

@@ -1,8 +1,9 @@
-//! Checks of files that are drawn together: their plans must agree in everything that the figure
+//! Checks that the plans of files that are drawn together agree in everything that the figure
 //! shows.
 //!
-//! A figure of two plans would be taken for one of a single machine. Other differences, such as a
-//! name or the levels of an integrator, do not matter. A file without a plan is not checked.
+//! Otherwise a figure of two machines would look like one of a single machine. Other differences,
+//! such as a name or the levels of an integrator, do not matter. A file without a plan is not
+//! checked.
 
 use std::path::Path;
 
@@ -12,12 +13,12 @@ use sweep_files::{Step, dotted, key, leaves};
 use crate::error::{PlotError, Result};
 use crate::read::{FigureFile, ModelKinds};
 
-/// Returns the parts of a plan that time histories and their extremes follow from.
+/// Returns the parts of a plan on which time histories and their extremes depend.
 pub(crate) fn history_parts(model_kinds: ModelKinds) -> Vec<&'static str> {
     [model_kinds.history_sections, &["time.end_s"]].concat()
 }
 
-/// Returns the parts of a plan that ratios follow from.
+/// Returns the parts of a plan on which ratios depend.
 pub(crate) fn ratio_parts(model_kinds: ModelKinds) -> Vec<&'static str> {
     [model_kinds.history_sections, &["time", "reliability.channels", "reliability.criterion"]]
         .concat()
@@ -87,7 +88,7 @@ fn collect_differences<'a>(
 ) {
     let opens = |first: &[Value], second: &[Value]| first.len() == second.len();
     leaves(sides, opens, &mut path, &mut |path, own| {
-        let [first, second] = [0, 1].map(|side| moved(own[side], points[side], path));
+        let [first, second] = [0, 1].map(|side| value_at_point(own[side], points[side], path));
         if first != second && !is_of_point([&first, &second], points, path) {
             let [first, second] = [first, second].map(|value| match value {
                 Value::Null => "none".to_owned(),
@@ -104,7 +105,7 @@ fn collect_differences<'a>(
 }
 
 /// Returns the value at a path of the plan, or the value of the point that replaces it.
-fn moved(value: Option<&Value>, at: &NamedPoint, path: &[Step<'_>]) -> Value {
+fn value_at_point(value: Option<&Value>, at: &NamedPoint, path: &[Step<'_>]) -> Value {
     let named = at.iter().find(|(name, _)| names(name, path));
     named.map_or_else(|| value.cloned().unwrap_or_default(), |(_, value)| (*value).into())
 }

@@ -23,9 +23,9 @@ impl NumberWalk<'_> {
         for value in values {
             match self {
                 Self::Write(numbers) => numbers.push(*value),
-                Self::Read(left) => {
-                    let (first, rest) = left.split_first()?;
-                    (*value, *left) = (*first, rest);
+                Self::Read(remaining) => {
+                    let (first, rest) = remaining.split_first()?;
+                    (*value, *remaining) = (*first, rest);
                 }
             }
         }
@@ -49,20 +49,20 @@ impl NumberWalk<'_> {
     }
 
     /// Writes or reads an element of `all` as its index.
-    pub(crate) fn choice<T: Clone + PartialEq>(&mut self, one: &mut T, all: &[T]) -> Option<()> {
-        let place = all.iter().position(|known| known == one).unwrap_or(all.len());
-        *one = all.get(self.count(place)?)?.clone();
+    pub(crate) fn choice<T: Clone + PartialEq>(&mut self, value: &mut T, all: &[T]) -> Option<()> {
+        let place = all.iter().position(|known| known == value).unwrap_or(all.len());
+        *value = all.get(self.count(place)?)?.clone();
         Some(())
     }
 
     /// Writes or reads some elements of `all` as their indices.
     pub(crate) fn choices<T: Clone + PartialEq>(
         &mut self,
-        some: &mut Vec<T>,
+        values: &mut Vec<T>,
         all: &[T],
     ) -> Option<()> {
-        self.sized(some, all.first()?)?;
-        some.iter_mut().try_for_each(|one| self.choice(one, all))
+        self.sized(values, all.first()?)?;
+        values.iter_mut().try_for_each(|value| self.choice(value, all))
     }
 
     /// Writes the length of a list, or reads a length and resizes the list. Its elements are

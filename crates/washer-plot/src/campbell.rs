@@ -15,7 +15,7 @@ pub(crate) struct FrequencyCurve {
     pub(crate) name: String,
     pub(crate) speed: Vec<f64>,
     pub(crate) frequency: Vec<f64>,
-    /// The speeds at which the frequency is the speed.
+    /// The speeds (rpm) that equal the frequency.
     pub(crate) resonances: Vec<f64>,
     /// The least and the greatest frequency over a turn, if the file has them.
     pub(crate) band: Option<(Vec<f64>, Vec<f64>)>,

@@ -33,7 +33,7 @@ const RISING: &str = "nonlinear model, speed rising";
 /// linear axis the smaller ones would be flat.
 const LOG_RATIO: f64 = 10.0;
 
-/// The column of a state's turn.
+/// The column of the turn at which a state was recorded.
 const TURN: &str = "turn";
 /// The column of the tub's yaw in states once a turn.
 const YAW: &str = "q5_rad";

@@ -14,7 +14,7 @@ pub(crate) const STABILITY: FigureKind =
 pub(crate) const MODES: FigureKind =
     FigureKind::new("modes", &["mode", "frequency_rpm", "speed_rpm"]);
 
-/// The sections of a plan that modes, and responses at constant speeds, follow from.
+/// The sections of a plan on which modes, and responses at constant speeds, depend.
 pub(crate) const MACHINE: &[&str] = &["machine"];
 
 /// The kinds and sections for `sweep-plot`.

@@ -24,7 +24,7 @@ const PARTS: &str = concat!(
     "</script>\n"
 );
 
-/// The data of the live part, beside the module that every live page has.
+/// The data of the live part of a page, in addition to the module that every live page has.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Live {

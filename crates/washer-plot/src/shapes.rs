@@ -8,7 +8,7 @@ use sweep_plot::label::{self, Label};
 use sweep_plot::table::FigureTable;
 use sweep_plot::{DISTINCT, PlotError};
 
-/// Minimum separation of the drum's axis from the tub's that is drawn, as a share of the greatest
+/// Minimum separation of the drum's axis from the tub's that is drawn, relative to the greatest
 /// deflection. Basis: smaller ones cannot be seen. Doubling it hides slight bending.
 const MIN_SEPARATION: f64 = 0.02;
 
@@ -99,7 +99,8 @@ fn axis_shapes(places: &AxisPositions, q: &[Phasor]) -> [AxisShape; 2] {
     let AxisPositions { tub, drum } = places;
     let tub = [straight(q[0], q[5], 1.0, tub), straight(q[1], q[4], -1.0, tub)];
     let mut drum = [straight(q[2], q[7], 1.0, drum), straight(q[3], q[6], -1.0, drum)];
-    // Beyond the hinge the drum is bent; at theta = 0 its angles are about c2 and c3.
+    // Beyond the hinge the drum's axis is bent against the shaft; at theta = 0 its angles are about
+    // c2 and c3.
     let beyond = places.drum[2] - places.drum[1];
     drum[0][2] = plus(drum[0][2], beyond, q[9]);
     drum[1][2] = plus(drum[1][2], -beyond, q[8]);

@@ -30,8 +30,8 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
             "{path} holds traces of many points, and a figure shows one: `sweep trace --point N`"
         )));
     }
-    let sides = sides(table);
-    let found = quantities(table, sides);
+    let model_prefixes = model_prefixes(table);
+    let found = quantities(table, model_prefixes);
     let names: Vec<&str> = found.iter().map(|quantity| quantity.name).collect();
     let is_shown = stability::shown_channels(&table.source, &names, &options.channels)?;
     // States and forces are drawn on request only.
@@ -44,7 +44,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     let other = options.against.as_ref().map(|path| other_trace(path)).transpose()?;
     let names = match &other {
         Some(other) => distinct_names(table, other),
-        None => sides.map(format_side),
+        None => model_prefixes.map(format_side),
     };
     // The second curve is translucent, so that the first one shows through.
     let front = other.as_ref().unwrap_or(table);
@@ -61,7 +61,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     };
     let quantity_panel = |quantity: &TraceQuantity<'_>| {
         let (name, (unit, factor)) = (quantity.name, label::display_unit(quantity.unit));
-        let is_channel = quantity.channel && sides == MODELS;
+        let is_channel = quantity.channel && model_prefixes == MODELS;
         let words = if is_channel { label::channel(name) } else { label::words(name) };
         let lines = pair(&quantity.columns, factor);
         panel(name, Label::new(&words, unit), shown.contains(&name), lines)
@@ -70,7 +70,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     // Decimated rows of two files do not lie at the same instants.
     let whole =
         other.as_ref().is_some_and(|other| table.bucket_rows.or(other.bucket_rows).is_none());
-    let apart = if whole { difference(&panels) } else { None };
+    let difference_of_runs = if whole { difference(&panels) } else { None };
     for (name, column) in table.with_prefix("residual_") {
         let (unit, factor) = label::display_unit(&column.facts.unit);
         let y = column.numbers().unwrap_or_default().iter().map(|value| value * factor).collect();
@@ -86,7 +86,7 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     }
     let least = least_gaps(&gaps);
     if !gaps.is_empty() {
-        // A gap that stays wide would be a flat line at the top of a panel that reaches down to
+        // If the gap stays wide, it would be a flat line at the top of a panel that reaches down to
         // contact.
         let widest = gaps.iter().flat_map(|series| &series.y).copied().fold(0.0, f64::max);
         let near = least.iter().any(|(_, gap)| *gap < 0.5 * widest);
@@ -110,13 +110,16 @@ pub(crate) fn chart(table: &FigureTable, options: &WasherFigures) -> Result<Char
     Ok(Chart {
         title: match &other {
             Some(_) => "Nonlinear motion from static equilibrium".to_owned(),
-            None if sides == FITTED => "A measurement, and the model fitted to it".to_owned(),
+            None if model_prefixes == FITTED => {
+                "A measurement, and the model fitted to it".to_owned()
+            }
             None => "Motion of both models from static equilibrium".to_owned(),
         },
         subtitle: match &other {
-            // The point of one trace would be wrong for the other.
-            Some(_) => common_notes(&least, apart).join(" · "),
-            None => subtitle(table, &least, apart),
+            // The point of one trace would be wrong for the other, so that the subtitle has
+            // neither.
+            Some(_) => common_notes(&least, difference_of_runs).join(" · "),
+            None => subtitle(table, &least, difference_of_runs),
         } + &note,
         x_label: Label::new("Time", "s"),
         panels,
@@ -134,7 +137,7 @@ const MODELS: [&str; 2] = ["nonlinear", "linear"];
 const FITTED: [&str; 2] = ["measured", "model"];
 
 /// Returns the prefixes of a file's columns.
-fn sides(table: &FigureTable) -> [&'static str; 2] {
+fn model_prefixes(table: &FigureTable) -> [&'static str; 2] {
     if table.with_prefix("measured_").is_empty() { MODELS } else { FITTED }
 }
 
@@ -156,8 +159,8 @@ struct TraceQuantity<'a> {
 
 /// Returns the quantities of a trace: channels first, then states and forces. The gap has a panel
 /// of its own.
-fn quantities<'a>(table: &'a FigureTable, sides: [&str; 2]) -> Vec<TraceQuantity<'a>> {
-    let channels = table.with_prefix(&format!("{}_", sides[0])).into_iter();
+fn quantities<'a>(table: &'a FigureTable, model_prefixes: [&str; 2]) -> Vec<TraceQuantity<'a>> {
+    let channels = table.with_prefix(&format!("{}_", model_prefixes[0])).into_iter();
     let channels = channels.map(|(name, column)| {
         let own = Some(column.facts.unit.as_str()).filter(|unit| !unit.is_empty());
         let unit = own.unwrap_or(label::unit_of_channel(name));
@@ -165,14 +168,14 @@ fn quantities<'a>(table: &'a FigureTable, sides: [&str; 2]) -> Vec<TraceQuantity
             name,
             unit,
             channel: true,
-            columns: sides.map(|side| format!("{side}_{name}")),
+            columns: model_prefixes.map(|side| format!("{side}_{name}")),
         }
     });
     let numbers = table.columns.iter().filter(|column| column.numbers().is_some());
     let further = numbers.filter_map(|column| {
         let split = column.facts.name.split_once("_nonlinear_");
         let (name, end) = split.filter(|(name, _)| *name != "gap")?;
-        let columns = sides.map(|side| format!("{name}_{side}_{end}"));
+        let columns = model_prefixes.map(|side| format!("{name}_{side}_{end}"));
         Some(TraceQuantity { name, unit: &column.facts.unit, channel: false, columns })
     });
     channels.chain(further).collect()
@@ -184,9 +187,9 @@ fn difference(panels: &[ChartPanel]) -> Option<f64> {
     let shares = panels.iter().filter(|panel| panel.shown).filter_map(|panel| {
         let [first, second] = &panel.series[..] else { return None };
         let peak = first.y.iter().fold(0.0_f64, |peak, y| peak.max(y.abs()));
-        let apart =
+        let difference_of_runs =
             first.y.iter().zip(&second.y).map(|(a, b)| (a - b).abs()).fold(0.0_f64, f64::max);
-        (first.y.len() == second.y.len() && peak > 0.0).then(|| apart / peak)
+        (first.y.len() == second.y.len() && peak > 0.0).then(|| difference_of_runs / peak)
     });
     shares.reduce(f64::max)
 }
@@ -229,12 +232,14 @@ fn parameter(name: &str, value: f64) -> String {
 }
 
 /// Returns the notes on the least gaps and on the difference of two runs.
-fn common_notes(least_gaps_mm: &[(String, f64)], apart: Option<f64>) -> Vec<String> {
+fn common_notes(least_gaps_mm: &[(String, f64)], difference_of_runs: Option<f64>) -> Vec<String> {
     let gaps = least_gaps_mm.iter().map(|(name, gap)| format!("{gap:.2} mm {name}"));
     let gaps = gaps.collect::<Vec<_>>().join(", ");
     let gaps = (!gaps.is_empty()).then(|| format!("least gap {gaps}"));
-    let apart = apart.map(|apart| format!("largest difference {apart:.1e} of the peak"));
-    gaps.into_iter().chain(apart).collect()
+    let difference_of_runs = difference_of_runs.map(|difference_of_runs| {
+        format!("largest difference {difference_of_runs:.1e} of the peak")
+    });
+    gaps.into_iter().chain(difference_of_runs).collect()
 }
 
 /// Returns the least gap of each model that has one, in the displayed unit.
@@ -252,7 +257,7 @@ fn least_gaps(gaps: &[Series]) -> Vec<(String, f64)> {
 pub(crate) fn subtitle(
     table: &FigureTable,
     least_gaps_mm: &[(String, f64)],
-    apart: Option<f64>,
+    difference_of_runs: Option<f64>,
 ) -> String {
     let machine_sections = unbalance_and_damping(table);
     let at = together::at(&table.source);
@@ -264,7 +269,7 @@ pub(crate) fn subtitle(
     let is_new = |(name, value): &(&str, f64)| set.is_none_or(|set| set[*name] != *value);
     let phrase = machine_sections.iter().copied().chain(further).filter(is_new);
     let mut parts = table.source.notes(phrase.map(|(name, value)| parameter(name, value)));
-    parts.extend(common_notes(least_gaps_mm, apart));
+    parts.extend(common_notes(least_gaps_mm, difference_of_runs));
     if let Some(rows) = table.bucket_rows {
         parts.push(format!("least and greatest of every {rows} instants"));
     }

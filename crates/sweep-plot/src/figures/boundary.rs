@@ -118,7 +118,7 @@ fn far_side(curves: &[(String, Vec<BoundaryPoint>)], [falling, rising]: [&str; 2
     format!(" · {side} above the {line}")
 }
 
-/// Returns the quantity at its limit: the name of its column in a map.
+/// Returns the name of the quantity, which is that of its column in a map.
 fn quantity(table: &FigureTable) -> &str {
     table.source.find("quantity").and_then(Value::as_str).unwrap_or("ratio_max")
 }
@@ -154,7 +154,8 @@ fn is_growth(quantity: &str) -> bool {
     quantity.starts_with("growth")
 }
 
-/// Returns the parts of a plan that the boundary follows from, beside its limit, which is named.
+/// Returns the parts of a plan on which the boundary depends, except its limit, which the figure
+/// states.
 pub(crate) fn follows_from(table: &FigureTable) -> Vec<&'static str> {
     let known = table.source.model_kinds;
     match quantity(table) {
@@ -217,8 +218,9 @@ fn further_axes(table: &FigureTable, row: usize) -> String {
     phrase.collect::<Vec<_>>().join(", ")
 }
 
-/// Joins the points of a boundary to curves with one point at most for each x. Of several points at
-/// an x, each continues the curve with the same sides whose last point is nearest.
+/// Joins the points of a boundary to curves with at most one point for each x. If there are several
+/// points at an x, each continues the curve that has the same sides and whose last point is
+/// nearest.
 fn join_curves(grid: &[f64], places: &[BoundaryPoint]) -> Vec<Vec<BoundaryPoint>> {
     /// A gap of a curve.
     const GAP: BoundaryPoint =

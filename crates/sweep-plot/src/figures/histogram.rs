@@ -65,7 +65,7 @@ pub(crate) fn chart(scatter: &Scatter) -> Chart {
 /// Returns the title with the share of points on the good side.
 fn title(scatter: &Scatter) -> String {
     let words = match scatter.words(Side::Good) {
-        // The good side's words may be "reliable: below 2", of which the title needs the first.
+        // The words for the good side may be "reliable: below 2"; the title needs only the first.
         words if words.starts_with("reliable") => "reliable".to_owned(),
         words => format!("with {words}"),
     };

@@ -93,7 +93,8 @@ pub(crate) fn draw(
         if let Some(overlay) = overlay {
             draw_overlay(&mut scene, &panel, overlay);
         }
-        // Names are drawn over the lines, which they interrupt if there is no room beside them.
+        // The names of the sides are drawn over the lines, which they interrupt if there is no room
+        // beside them.
         if let Some(divided) = divided {
             let overlaid = overlay.iter().flat_map(|overlay| &overlay.lines);
             lines.extend(overlaid.map(|line| curve_pixels(&panel, line)));
@@ -427,7 +428,7 @@ impl<'a> CellPainter<'a> {
             };
             let size = [text_width(name, LABEL_SIZE, true) + 10.0, LABEL_SIZE + 8.0];
             let area = [panel.width, panel.height];
-            // A name is kept off the lines unless that leaves no room.
+            // A name is kept away from the lines if there is room.
             let clear = |point: [f64; 2]| inside(point) && !is_near(panel, lines, point);
             let found =
                 roomiest_place(area, size, clear).or_else(|| roomiest_place(area, size, inside));
@@ -446,7 +447,7 @@ impl<'a> CellPainter<'a> {
         let filled = |fill: Fill| shown(&|cell| self.fills[cell] == Some(fill));
         if let Some(Layer { level: Some(level), scale, .. }) = &self.layer {
             let quarter = |part: usize| scale.colour(part * COLOUR_STEPS / 4);
-            // No line is drawn between cells of one side.
+            // Cells whose points are all on one side have no line between them.
             let offset = |cell: usize| {
                 self.layer.as_ref().map_or(f64::NAN, |layer| level.offset(layer.typical(cell)))
             };

@@ -16,8 +16,8 @@ use crate::scene::{Colour, INK, MUTED, Outline, Scene, Stroke};
 
 /// Maximum number of parameters shown. Basis: with more, panels are too small to read.
 pub(crate) const MAX_PARAMETERS: usize = 5;
-/// Number of points drawn at most, about. Basis: more points overlap. Doubling it doubles the size
-/// of the figure.
+/// Approximate maximum number of points that are drawn. Basis: more points overlap. Doubling it
+/// doubles the size of the figure.
 pub(crate) const MAX_POINTS: usize = 4000;
 
 /// Left margin for the numbers and labels of the y axes, px.

@@ -56,7 +56,7 @@ pub(crate) fn read(folder: &Path, map: &CellMap, model: &dyn Figures) -> Result<
             )
         })?;
         let point = point(&at, cell, map);
-        // An index alone does not say which point of a cell of several it means.
+        // In a map whose cells have several points, an index alone does not identify a point.
         let own = if at.is_empty() && map.grid.merged() { &point } else { &at };
         let files = [(&map.table.source, &point), (&source, own)];
         together::check_agreement("--traces", &file, files, &together::history_parts(known))?;
@@ -69,7 +69,7 @@ pub(crate) fn read(folder: &Path, map: &CellMap, model: &dyn Figures) -> Result<
 
 /// Returns the cell of a trace's point in the map's grid.
 fn cell(trace: &FigureFile, at: &NamedPoint, map: &CellMap) -> Option<usize> {
-    // A file that gives its point belongs to no other, whatever its name.
+    // A file whose metadata give its point belongs to that point only, whatever its name.
     if !at.is_empty() {
         let value =
             |name: &str| at.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
