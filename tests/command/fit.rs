@@ -143,7 +143,7 @@ fn mistakes_in_a_measurement_are_reported_with_their_place() {
     let done = test_folder.sweep(&["fit", "g.toml", "run.csv", "--free", "damping_n_s_per_m"]);
     assert_eq!(done.status.code(), Some(2));
     for said_of in
-        ["run.csv:1:8", "is no channel", "run.csv:4:1", "time goes back: 0.5 s after 1 s"]
+        ["run.csv:1:8", "does not name a channel", "run.csv:4:1", "time goes back: 0.5 s after 1 s"]
     {
         assert!(all_output(&done).contains(said_of), "{said_of}: {}", all_output(&done));
     }

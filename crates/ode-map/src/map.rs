@@ -168,7 +168,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Row
     for Map<O, C, D, P>
 {
     fn layout(plan: &Plan<Self>) -> Layout {
-        Layout::of_map(axis_columns(plan), declared(columns(plan)))
+        Layout::map(axis_columns(plan), declared(columns(plan)))
     }
 }
 

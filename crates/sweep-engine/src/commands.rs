@@ -63,27 +63,27 @@ impl Arguments for Unextended {
 /// A general subcommand, which the program of every model has.
 #[derive(Debug, Subcommand)]
 pub enum GeneralCommand<A: Arguments> {
-    /// Integrate every grid point, or go on after an interruption
+    /// Integrate every grid point, or continue after an interruption
     Run(A::Run),
-    /// Check a grid file and show what it would do, without doing it
+    /// Check a grid file and describe its run, without running it
     Check(A::Check),
     /// Trace the curve where a ratio, or any number, is at its limit
     Boundary(boundary::Args),
-    /// Find parameters at which numbers are least within limits
+    /// Find the parameters that minimise numbers under conditions
     Optimise(optimise::Args),
-    /// Show what a result file holds: verdicts, extremes, metrics
+    /// Summarise a result file: verdicts, extremes, metrics
     Show(show::Args),
     /// Draw a result file
     Plot(A::Plot),
     /// Write one page to print: verdict, worst values, pictures
     Report(report::Args),
-    /// Check expressions on a result, and show the rows that break them
+    /// Check expressions on a result, and show rows that violate them
     Require(require::Args),
-    /// Say what differs between two results
+    /// Show the differences between two results
     Compare(compare::Args),
     /// Write a result as CSV or as an Excel workbook, with units
     Export(export::Args),
-    /// Show how far a run is: done, missing, failed, running
+    /// Show the progress of a run: done, missing, failed, running
     Status(A::Status),
     /// Join the finished shards of a run into its one result file
     Merge(A::Merge),

@@ -41,7 +41,10 @@ impl Exit {
         (Self::Failed, "a failure of the system or of this program"),
         (Self::BadInput, "bad input, or an unreadable file: refused before any work"),
         (Self::PointsFailed, "with --fail-on-error: done, but some points failed"),
-        (Self::NotHeld, "done: what require, report, compare or optimise asks for does not hold"),
+        (
+            Self::NotHeld,
+            "done, but a condition of require, report, compare or optimise does not hold",
+        ),
         (Self::Busy, "another run holds this output"),
         (Self::HungUp, "hung up; finished work is kept"),
         (Self::Interrupted, "interrupted; finished work is kept"),
@@ -60,7 +63,7 @@ impl Exit {
     /// Formats all codes with their meanings for `--help`.
     pub fn table() -> String {
         let line = |(exit, meaning)| format!("\n  {:>3}  {meaning}", exit as u8);
-        let outputs = "Answers go to standard output, all else to standard error.";
+        let outputs = "Results go to standard output, messages to standard error.";
         format!("{outputs}\n\nExit codes:{}", Self::ALL.map(line).concat())
     }
 }

@@ -1,5 +1,6 @@
-//! Kernels by instruction set: `cargo bench --bench kernels`. Times are per evaluation, step or
-//! trajectory of the whole lane group; divide by the lanes (1, 4, 8) for one trajectory's share.
+//! Times of kernels by instruction set: `cargo bench --bench kernels`. A time is that of an
+//! evaluation, step or trajectory in all lanes; divided by the lanes (1, 4, 8) it is that of one
+//! trajectory.
 
 use divan::{Bencher, counter::ItemsCount};
 use lane_ode::{Simd, Tolerance};
@@ -12,18 +13,20 @@ fn main() {
     divan::main();
 }
 
-/// About what `rk4-mass-scaled` takes for 1e-3; its cost does not depend on it.
+/// The caps of capped evaluations. Basis: about those of `rk4-mass-scaled` with an accuracy of
+/// 1e-3. Doubling them does not change the cost.
 const CAPS: Caps = Caps { bearings_rad_per_s: 400.0, hinge_rad_per_s: Some(400.0) };
 
 const MODELS: [ModelKind; 2] = [ModelKind::Nonlinear, ModelKind::Linear];
 
-/// Every pair of a model and an instruction set that this processor has.
+/// Returns every pair of a model and an instruction set that this processor has.
 fn kernels() -> Vec<(ModelKind, Simd)> {
     let available = Simd::ALL.into_iter().filter(|simd| simd.is_available());
     available.flat_map(|simd| MODELS.map(|model| (model, simd))).collect()
 }
 
-/// The paper's machine over the first `end_s` of its run-up, amplitudes over the second half.
+/// Prepares the paper's machine for the first `end_s` of its run-up, with amplitudes over the
+/// second half.
 fn points(simd: Simd, end_s: f64) -> Vec<Point> {
     let scenario = (
         Machine::paper(),
@@ -38,7 +41,7 @@ fn derivative(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     part(bencher, model, simd, RhsPart::Derivative, None);
 }
 
-/// With the modes of bearings and hinge capped.
+/// Measures the derivative with capped modes of bearings and hinge.
 #[divan::bench(args = kernels())]
 fn derivative_mass_scaled(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     part(bencher, model, simd, RhsPart::Derivative, Some(CAPS));
@@ -57,13 +60,13 @@ fn part(bencher: Bencher<'_, '_>, model: ModelKind, simd: Simd, part: RhsPart, c
         .bench(|| evaluate(simd, model, part, point, caps, EVALUATIONS));
 }
 
-/// A thousand RK4 steps with what is observed of them, the last half inside the window.
+/// Measures a thousand RK4 steps with their records, the second half within the window.
 #[divan::bench(args = kernels())]
 fn thousand_steps(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     trajectory(bencher, model, simd, 0.25, &Method::Rk4 { step_s: 2.5e-4 });
 }
 
-/// A second of the run-up by each method.
+/// Measures a second of the run-up by each method.
 #[divan::bench(args = kernels())]
 fn second_by_dopri5(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     let tolerance = Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: u64::MAX };
@@ -76,7 +79,7 @@ fn second_by_additive(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)
     trajectory(bencher, model, simd, 1.0, &Method::Additive(tolerance));
 }
 
-/// The whole of the paper's 50 s.
+/// Measures the whole 50 s of the paper.
 #[divan::bench(args = kernels(), sample_count = 5, sample_size = 1)]
 fn whole_trajectory(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     trajectory(bencher, model, simd, 50.0, &Method::Rk4 { step_s: 2.5e-4 });
@@ -88,7 +91,7 @@ fn trajectory(bencher: Bencher<'_, '_>, model: ModelKind, simd: Simd, end_s: f64
     bencher.counter(ItemsCount::new(points.len())).bench(|| simulate(simd, model, method, &points));
 }
 
-/// From machine to equilibrium and linear model, per lane group.
+/// Measures the preparation of a point in every lane: its equilibrium and its linear model.
 #[divan::bench(args = Simd::ALL.into_iter().filter(|simd| simd.is_available()))]
 fn preparation(bencher: Bencher<'_, '_>, simd: Simd) {
     bencher.counter(ItemsCount::new(simd.lanes())).bench(|| points(simd, 1.0));

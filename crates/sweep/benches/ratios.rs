@@ -1,6 +1,6 @@
-//! The ratios that are published, all from one run: `cargo bench --bench ratios [-- ROUNDS]` writes
-//! Markdown. What is compared takes turns, round by round, so that a slow moment of the machine
-//! falls on all; figures are medians over the rounds.
+//! Ratios of times, which are published: `cargo bench --bench ratios [-- ROUNDS]` writes them as
+//! Markdown. Subjects take turns, round by round, so that a slow moment of the computer affects all
+//! of them. Figures are medians over the rounds.
 #![allow(clippy::print_stdout)]
 
 use std::path::Path;
@@ -10,7 +10,7 @@ use std::time::Instant;
 use lane_ode::Simd;
 use washer_model::{
     BumpStop, Bushing, Dwell, Machine, Method, ModelKind, Point, Profile, Spin, Starts,
-    StepSelector, Timing, capped_method, endings, prepare, respond, simulate,
+    StepSelector, Timing, capped_method, find_endings, prepare, respond, simulate,
 };
 
 /// Number of trajectories of a kernel. Basis: the number of lanes of AVX-512. Doubling it takes two
@@ -24,7 +24,7 @@ const STEP_S: f64 = 2.5e-4;
 const ROUNDS: usize = 5;
 
 fn main() {
-    // Cargo passes `--bench` along.
+    // Cargo adds the argument `--bench`, which is not a number.
     let rounds =
         std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(ROUNDS);
     trajectories(rounds);
@@ -42,8 +42,9 @@ fn median(values: &[f64]) -> f64 {
     sorted[sorted.len() / 2]
 }
 
-/// A row per subject, its median; in the header, how far the rounds are from their medians.
-fn table(unit: &str, subjects: &[String], rounds: &[Vec<f64>]) -> Vec<f64> {
+/// Prints a table with the median of each subject, and returns the medians. The header has the
+/// greatest relative distance of a round from its median.
+fn print_table(unit: &str, subjects: &[String], rounds: &[Vec<f64>]) -> Vec<f64> {
     let medians: Vec<f64> = rounds.iter().map(|values| median(values)).collect();
     let farthest = rounds
         .iter()
@@ -88,7 +89,7 @@ fn trajectories(rounds: usize) {
     println!("One core, {TRAJECTORIES} trajectories of 50 s by RK4 at {STEP_S:e} s, with peaks:\n");
     let names: Vec<_> =
         subjects.iter().map(|(simd, name, _)| format!("{name}, {}", simd.name())).collect();
-    let medians = table("ms a trajectory", &names, &times);
+    let medians = print_table("ms a trajectory", &names, &times);
     let of = |simd: Simd, name: &str| {
         subjects
             .iter()
@@ -161,12 +162,12 @@ fn methods(rounds: usize) -> f64 {
     }
     println!(
         "One core, {}, the {} points of Fig. 12, each trajectory once; what a run adds (runs\n\
-         that are compared, rows that climb) is below:\n",
+         that are compared, refined rows) is below:\n",
         Simd::best().name(),
         points.len()
     );
     let names: Vec<_> = subjects.iter().map(|subject| subject.0.clone()).collect();
-    let medians = table("s a grid", &names, &times);
+    let medians = print_table("s a grid", &names, &times);
     println!("| ratio | |\n|---|---|");
     for (model, _) in models.iter().enumerate() {
         for method in 1..methods.len() {
@@ -194,14 +195,14 @@ fn program_s(folder: &Path, arguments: &[&str]) -> f64 {
     took_s
 }
 
-/// A folder for the program's output.
-fn temporary() -> tempfile::TempDir {
+/// Creates a folder for the program's output.
+fn temporary_folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder can be made")
 }
 
-/// The grid of Fig. 12 and its boundary, by each criterion.
+/// Measures the grid of Fig. 12 and its boundary with each criterion.
 fn boundaries(rounds: usize) {
-    let folder = temporary();
+    let folder = temporary_folder();
     let text = std::fs::read_to_string(FIG12).expect("the grid file of Fig. 12");
     let criteria = ["peak", "rms", "envelope"].map(|criterion| {
         let path = folder.path().join(format!("{criterion}.toml"));
@@ -227,7 +228,7 @@ fn boundaries(rounds: usize) {
         .iter()
         .flat_map(|(criterion, _)| commands.map(|command| format!("{criterion}: sweep {command}")))
         .collect();
-    let medians = table("s", &names, &times);
+    let medians = print_table("s", &names, &times);
     println!("| ratio | |\n|---|---|");
     for (i, (criterion, _)) in criteria.iter().enumerate() {
         let share = medians[commands.len() * i + 1] / medians[commands.len() * i];
@@ -236,8 +237,8 @@ fn boundaries(rounds: usize) {
     println!();
 }
 
-/// Responses at constant speeds, both models' with all multipliers; `pair_s` is what a point's two
-/// trajectories of 50 s take by the fast method.
+/// Measures the periodic responses of both models at held speeds, with all multipliers. `pair_s` is
+/// the time of a point's two trajectories of 50 s by the fast method.
 fn dwells(rounds: usize, pair_s: f64) {
     let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 350.0, ramp_s: 50.0 };
     let timing = Timing { end_s: 50.0, window_s: [30.0, 50.0], checkpoints: 0 };
@@ -256,7 +257,8 @@ fn dwells(rounds: usize, pair_s: f64) {
         assert!(found.iter().all(Result::is_ok));
     }
     println!("One core, a point of 0.4 kg and 140 N s/m at 210 to 350 rpm, by 1 rpm:\n");
-    let medians = table("ms a speed", &["both responses, all multipliers".to_owned()], &times);
+    let medians =
+        print_table("ms a speed", &["both responses, all multipliers".to_owned()], &times);
     println!(
         "| ratio | |\n|---|---|\n| a speed of a point against its two trajectories of 50 s, \
          rk4-mass-scaled, 1e-3 | {:.3} |\n",
@@ -273,20 +275,20 @@ fn motions(rounds: usize) {
     let mut machine = Machine::paper();
     machine.unbalance.mass_kg = 0.4;
     let spin = Spin::Table { time_s: vec![0.0], speed_rpm: vec![SPEED_RPM] };
-    let ready = |end_s: f64| -> Vec<Point> {
+    let prepare_points = |end_s: f64| -> Vec<Point> {
         let timing = Timing { end_s, window_s: [0.0, end_s], checkpoints: 0 };
         let scenarios = vec![(machine.clone(), spin.clone()); TRAJECTORIES];
         let points: Result<_, _> = prepare(Simd::best(), &scenarios, &timing).into_iter().collect();
         points.expect("the paper's machine has an equilibrium")
     };
-    let dwell = ready(1.0);
+    let dwell = prepare_points(1.0);
     let dwells = [Dwell { point: &dwell[0], speed_rpm: SPEED_RPM }];
     let starts = Starts { count: TRAJECTORIES, longest_s: 100.0, ..Starts::default() };
-    let find = || endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0);
-    // Whole windows of turns.
+    let find = || find_endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0);
+    // The time is a whole number of windows.
     let followed_s = find().map(|found| found.motions[0].time_s).expect("it has motions");
-    let as_many = ready(followed_s * SPEED_RPM / 60.0 * STEPS_A_TURN * STEP_S);
-    let as_long = ready(followed_s);
+    let as_many = prepare_points(followed_s * SPEED_RPM / 60.0 * STEPS_A_TURN * STEP_S);
+    let as_long = prepare_points(followed_s);
     let integrate = |points: &[Point]| {
         let points: Vec<&Point> = points.iter().collect();
         let method = Method::Rk4 { step_s: STEP_S };
@@ -317,7 +319,7 @@ fn motions(rounds: usize) {
         "trajectories of as many RK4 steps".to_owned(),
         format!("trajectories as long by RK4 at {STEP_S:e} s"),
     ];
-    let medians = table("ms", &names, &times);
+    let medians = print_table("ms", &names, &times);
     println!(
         "| ratio | |\n|---|---|\n\
          | motions against trajectories of as many steps | {:.2} |\n\
@@ -329,10 +331,10 @@ fn motions(rounds: usize) {
     );
 }
 
-/// Fig. 12 by the program itself; `once_s` is what the trajectories of its lowest rung that a row
-/// may hold take.
+/// Measures the map of Fig. 12 by the program. `once_s` is the time of one trajectory of each model
+/// at every point, by the coarsest level.
 fn threads(rounds: usize, once_s: f64) {
-    let folder = temporary();
+    let folder = temporary_folder();
     let counts = ["1", "2"];
     let mut times = vec![Vec::new(); counts.len()];
     for _ in 0..rounds {
@@ -344,10 +346,10 @@ fn threads(rounds: usize, once_s: f64) {
         "`sweep run sweeps/fig12.toml` (1287 points, both models), start of the program included:\n"
     );
     let names: Vec<_> = counts.iter().map(|count| format!("--threads {count}")).collect();
-    let medians = table("s a map", &names, &times);
+    let medians = print_table("s a map", &names, &times);
     println!(
         "| ratio | |\n|---|---|\n| two threads against one | {:.2} |\n| the run against its \
-         trajectories once: what checks and climbing cost | {:.2} |\n",
+         trajectories once: the cost of checks and refinement | {:.2} |\n",
         medians[0] / medians[1],
         medians[0] / once_s
     );
@@ -431,7 +433,7 @@ fn elements(rounds: usize) {
     }
     println!("One core, both models by RK4 at 2e-4 s, machines with elements:\n");
     let names = subjects.map(|(name, _)| name.to_owned());
-    let medians = table("ms a point", &names, &times);
+    let medians = print_table("ms a point", &names, &times);
     println!("| against a machine without them | |\n|---|---|");
     for (name, median) in names.iter().zip(&medians).skip(1) {
         println!("| {name} | {:.2} |", median / medians[0]);

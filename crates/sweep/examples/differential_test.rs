@@ -1,10 +1,10 @@
-//! Tests the fast method's promise: random machines, spin profiles, windows, channels, limits and
-//! criteria, each row against plain RK4.
+//! Tests the fast method's promise with random machines, spin profiles, windows, channels, limits
+//! and criteria. Each row is compared with that of plain RK4.
 //!
 //! ```sh
 //! cargo run --release -p sweep --example differential_test -- 20000      # rows
 //! cargo run --release -p sweep --example differential_test -- 20000 1    # with a seed
-//! # The grid that an exception names:
+//! # The grid of an exception, by its seed:
 //! cargo run --release -p sweep --example differential_test -- 9 1000042
 //! cargo run --release -p sweep --example differential_test -- 900 1 grazing
 //! cargo run --release -p sweep --example differential_test -- 900 1 elements
@@ -12,41 +12,40 @@
 //! cargo run --release -p sweep --example differential_test -- 900 1 tiny
 //! ```
 //!
-//! Without a seed, or with `clock` in its place, the clock gives one, which is printed.
+//! Without a seed, or with `clock` in its place, the seed is taken from the clock and printed.
 //!
 //! The promise: every row that is neither sensitive nor unconverged has RK4's status, RK4's verdict
-//! and RK4's amplitudes within the accuracy; a row is sensitive only where RK4 does not agree with
-//! itself. RK4 runs here at 1e-4 s, and at an eighth of that in grids where that is off.
-//! Exits with 1 if a row breaks the promise.
+//! and RK4's amplitudes within the accuracy. RK4 runs with a step of 1e-4 s, and with an eighth of
+//! that in grids with a row that differs. The program exits with 1 if a row breaks the promise.
 //!
-//! With `grazing`, the clearance of each grid is such that drum and tub just touch in one of its
-//! rows, and the time of their clash is compared too. With `elements`, machines have friction
-//! dampers, stops, a gasket, feet and a second unbalance, those of docs/examples/friction.toml
-//! varied, and the loads of each stop and foot are compared too. With `jumps`, the drum brakes hard
-//! within milliseconds, and RK4's step follows the bearings. With `tiny`, unbalances are 0 to 1e-3
-//! kg.
+//! With `grazing`, drum and tub just touch in one of a grid's rows, and the time of their clash is
+//! compared, too. With `elements`, machines have varied friction dampers, stops, a gasket, feet and
+//! a second unbalance, as in docs/examples/friction.toml, and the loads of each stop and foot are
+//! compared, too. With `jumps`, the drum brakes within milliseconds, and RK4 has a shorter step.
+//! With `tiny`, unbalances are 0 to 1e-3 kg.
 
 use std::process::ExitCode;
 
 use rayon::prelude::*;
 use sweep::{Integrator, Level, ModelEngine, Outcome, Plan, Status, Trajectory, Verdict};
 
-/// What is asked of the fast method.
+/// Accuracies that grids require of the fast method, by turns. Basis: the default twice, and a
+/// finer and a coarser one. Doubling them doubles the errors that are allowed.
 const ACCURACIES: [f64; 4] = [1e-3, 1e-3, 1e-4, 1e-2];
 
-/// The number of points of a grid.
-pub(crate) const ROWS_OF_GRID: u64 = 9;
+/// Number of rows of a grid: three masses by three dampings.
+pub(crate) const GRID_ROWS: u64 = 9;
 
-/// The number of grids that are tried, one after the other, until a valid one is found.
-///
-/// Basis: three in ten of them at most are refused, so all of 40 are never. Doubling it changes
-/// nothing.
+/// Maximum number of grids that are tried, one after the other, until a valid one is found. Basis:
+/// at most three in ten are refused, so one of 40 is valid. Doubling it changes nothing.
 const MAX_REFUSED: u64 = 40;
 
-/// Step of RK4 that follows bearings as stiff as the paper's (s).
-const FOLLOWING_STEP_S: f64 = 1.25e-5;
+/// Step of RK4 (s) that resolves the vibration of the bearings after jumps of the speed. Basis: an
+/// eighth of [`STEP_S`]. Doubling it makes the reference's error 16 times as large.
+const JUMP_STEP_S: f64 = 1.25e-5;
 
-/// Step of RK4 where the bearings are as stiff as the paper's (s); softer ones make it no longer.
+/// Step of RK4 (s) in all other grids. Basis: stable with bearings as stiff as the paper's, the
+/// stiffest here. Doubling it makes the reference's error 16 times as large.
 const STEP_S: f64 = 1e-4;
 
 const CHANNELS: [&str; 8] = [
@@ -60,7 +59,7 @@ const CHANNELS: [&str; 8] = [
     "tub_pitch",
 ];
 
-/// Numbers of a machine that vary, by factors up to which.
+/// The parameters that vary, each with its mean value and the greatest factor.
 const VARIED: [(&str, f64, f64); 14] = [
     ("spring_stiffness_n_per_m", 8000.0, 2.0),
     ("bearing_stiffness_n_per_m", 2e8, 1.0),
@@ -78,10 +77,10 @@ const VARIED: [(&str, f64, f64); 14] = [
     ("radial_clearance_m", 0.01, 2.0),
 ];
 
-/// The machine that has every element, but for a second unbalance.
+/// A machine with every kind of element except a second unbalance.
 const WITH_ELEMENTS: &str = include_str!("../../../docs/examples/friction.toml");
 
-/// Numbers of its elements that vary, by powers of ten up to which.
+/// The parameters of elements that vary, each with its mean value and the greatest power of ten.
 const ELEMENTS: [(&str, f64, f64); 17] = [
     ("friction_n", 50.0, 0.5),
     ("damper_2_friction_n", 50.0, 0.5),
@@ -102,7 +101,7 @@ const ELEMENTS: [(&str, f64, f64); 17] = [
     ("foot_2_z_m", -0.26, 0.1),
 ];
 
-/// What varies in a grid beside the machine's proportions.
+/// The kind of a trial: the variation of a grid besides the machine's proportions.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum TrialKind {
     Plain,
@@ -112,8 +111,8 @@ pub(crate) enum TrialKind {
     Tiny,
 }
 
-/// By their names, but for the plain one.
-const KINDS: [(&str, TrialKind); 4] = [
+/// The kinds of trials by their names on the command line, without the plain one.
+const TRIAL_KINDS: [(&str, TrialKind); 4] = [
     ("grazing", TrialKind::Grazing),
     ("elements", TrialKind::Elements),
     ("jumps", TrialKind::Jumps),
@@ -136,21 +135,21 @@ impl Rng {
         from + (to - from) * self.next()
     }
 
-    /// Even in the logarithm.
+    /// Returns a factor from `1 / most` to `most`, with a uniform logarithm.
     fn factor(&mut self, most: f64) -> f64 {
         most.powf(self.between(-1.0, 1.0))
     }
 
-    fn one<'a, T>(&mut self, of: &'a [T]) -> &'a T {
-        &of[(self.next() * of.len() as f64) as usize]
+    fn choose<'a, T>(&mut self, items: &'a [T]) -> &'a T {
+        &items[(self.next() * items.len() as f64) as usize]
     }
 }
 
-/// A grid of nine points, as a user would write it.
+/// Returns a grid file of nine points.
 fn grid(seed: u64) -> String {
     let mut rng = Rng(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
     let end_s = rng.between(4.0, 26.0);
-    let peak_rpm = *rng.one(&[120.0, 300.0, 350.0, 350.0, 500.0, 900.0]) * rng.factor(1.3);
+    let peak_rpm = *rng.choose(&[120.0, 300.0, 350.0, 350.0, 500.0, 900.0]) * rng.factor(1.3);
     let spin = match (rng.next() * 4.0) as u32 {
         0 => format!("profile = \"cycloidal\"\nramp_s = {}", end_s * rng.between(0.5, 1.2)),
         1 => format!("profile = \"triangular\"\nramp_s = {}", end_s * rng.between(0.3, 1.2)),
@@ -180,10 +179,10 @@ fn grid(seed: u64) -> String {
     }
     let mut channels: Vec<_> = CHANNELS.into_iter().filter(|_| rng.next() < 0.35).collect();
     if channels.is_empty() {
-        channels.push(*rng.one(&CHANNELS));
+        channels.push(*rng.choose(&CHANNELS));
     }
-    let criterion = *rng.one(&["peak", "peak", "peak", "envelope", "rms"]);
-    let limit = *rng.one(&[1.2, 1.5, 2.0, 2.0, 3.0, 5.0]);
+    let criterion = *rng.choose(&["peak", "peak", "peak", "envelope", "rms"]);
+    let limit = *rng.choose(&[1.2, 1.5, 2.0, 2.0, 3.0, 5.0]);
     let masses = [0.05, 0.4, 1.0].map(|mass| mass * rng.factor(1.6));
     let dampings = [60.0, 120.0, 240.0].map(|damping| damping * rng.factor(1.5));
     format!(
@@ -197,28 +196,30 @@ fn grid(seed: u64) -> String {
     )
 }
 
-/// What was found; counts of rows.
+/// The result of trials. Counts are numbers of rows.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Found {
     pub(crate) rows: u64,
     pub(crate) refused: u64,
     sensitive: u64,
-    /// Sensitive although RK4 at both steps agrees within the accuracy.
-    needlessly: u64,
+    /// Sensitive rows for which RK4 with both steps agrees within the accuracy.
+    needlessly_sensitive: u64,
     pub(crate) unconverged: u64,
-    /// Unconverged although right.
-    doubted: u64,
+    /// Unconverged rows that are within the accuracy.
+    needlessly_unconverged: u64,
     failed: u64,
     wrong_status: u64,
     wrong_verdict: u64,
-    /// Amplitudes off by more than the accuracy.
+    /// Rows whose amplitudes have an error above the accuracy.
     inaccurate: u64,
-    /// By more than the row's own `error` says, though not by more than the accuracy.
+    /// Rows whose error is above their own `error`, but within the accuracy.
     above_error: u64,
+    /// The greatest error of all other rows, as a share of the accuracy.
     worst: f64,
     by_method: [u64; Level::ALL.len()],
-    /// The greatest error as a share of the row's `error`, by method.
-    greatest_shares: [f64; Level::ALL.len()],
+    /// The greatest error as a share of the row's own `error`, by method.
+    share_of_estimate: [f64; Level::ALL.len()],
+    /// A description of each row that breaks the promise.
     pub(crate) exceptions: Vec<String>,
     /// The number of grids with exceptions. A grid is one machine, whose rows fail together.
     pub(crate) exceptional_grids: u64,
@@ -229,11 +230,11 @@ impl Found {
         self.rows += other.rows;
         self.refused += other.refused;
         self.sensitive += other.sensitive;
-        self.needlessly += other.needlessly;
+        self.needlessly_sensitive += other.needlessly_sensitive;
         self.unconverged += other.unconverged;
-        self.doubted += other.doubted;
-        for (share, more) in self.greatest_shares.iter_mut().zip(other.greatest_shares) {
-            *share = share.max(more);
+        self.needlessly_unconverged += other.needlessly_unconverged;
+        for (share, other) in self.share_of_estimate.iter_mut().zip(other.share_of_estimate) {
+            *share = share.max(other);
         }
         self.failed += other.failed;
         self.wrong_status += other.wrong_status;
@@ -241,8 +242,8 @@ impl Found {
         self.inaccurate += other.inaccurate;
         self.above_error += other.above_error;
         self.worst = self.worst.max(other.worst);
-        for (count, more) in self.by_method.iter_mut().zip(other.by_method) {
-            *count += more;
+        for (count, other) in self.by_method.iter_mut().zip(other.by_method) {
+            *count += other;
         }
         self.exceptions.extend(other.exceptions);
         self.exceptional_grids += other.exceptional_grids;
@@ -254,8 +255,7 @@ fn relative((a, b): (&f64, &f64)) -> f64 {
     relative_from(0.0, *a, *b)
 }
 
-/// Returns the difference of two numbers as a share of the second, or of `least` where that is
-/// greater.
+/// Returns the difference of two numbers relative to the second, or to `least` if that is greater.
 fn relative_from(least: f64, a: f64, b: f64) -> f64 {
     if a == b { 0.0 } else { (a - b).abs() / b.abs().max(least) }
 }
@@ -264,18 +264,16 @@ fn amplitudes_differ(a: &Trajectory, b: &Trajectory) -> f64 {
     a.amplitudes.iter().zip(&b.amplitudes).map(relative).fold(0.0, f64::max)
 }
 
-/// The error below which nothing is asked.
-///
-/// Basis: RK4 at 1e-4 s has errors of that size. Doubling it accepts rows twice as far beyond their
-/// `error` where that is below it.
+/// Minimum of the bound that a row's own `error` gives. Basis: RK4 at 1e-4 s has errors of that
+/// size. Doubling it accepts rows twice as far beyond their `error` if that is smaller.
 const ERROR_FLOOR: f64 = 1e-6;
 
-/// The greatest relative difference of two rows' numbers.
+/// Returns the greatest relative difference of the numbers of two rows.
 fn difference(plan: &Plan, a: &Outcome, b: &Outcome) -> f64 {
     let models = [(&a.nonlinear, &b.nonlinear), (&a.linear, &b.linear)];
     let amplitudes = models.iter().map(|(a, b)| amplitudes_differ(a, b));
     let metrics = metrics_differ(plan, a, b).into_iter().map(|(_, share)| share);
-    // Both are over the whole run, which goes on behind the window.
+    // Gaps and ends are those of the whole run, which goes on after the window.
     let clearance_m = plan.model.machine.radial_clearance_m;
     let gaps = models.iter().filter_map(|(a, b)| a.min_gap_m.zip(b.min_gap_m));
     let gaps = gaps.map(|(a, b)| relative_from(clearance_m, a, b));
@@ -283,11 +281,11 @@ fn difference(plan: &Plan, a: &Outcome, b: &Outcome) -> f64 {
     let ends = ends.map(|(a, b)| (a - b).abs() / plan.end_s);
     let turns = a.turn_ratios.iter().flatten().zip(b.turn_ratios.iter().flatten());
     // A ratio has the errors of both models.
-    let of_ratios = turns.map(relative).fold(0.0, f64::max) / 2.0;
-    metrics.chain(amplitudes).chain(gaps).chain(ends).fold(of_ratios, f64::max)
+    let ratios = turns.map(relative).fold(0.0, f64::max) / 2.0;
+    metrics.chain(amplitudes).chain(gaps).chain(ends).fold(ratios, f64::max)
 }
 
-/// The relative difference of each metric, by its column.
+/// Returns the relative difference of each metric, with the name of its column.
 fn metrics_differ(plan: &Plan, a: &Outcome, b: &Outcome) -> Vec<(String, f64)> {
     let models = [("nonlinear", &a.nonlinear, &b.nonlinear), ("linear", &a.linear, &b.linear)];
     let machine = &plan.model.machine;
@@ -313,42 +311,42 @@ fn statuses(outcome: &Outcome) -> [Status; 2] {
     [outcome.nonlinear.status, outcome.linear.status]
 }
 
-fn evaluated(plan: &Plan, integrator: Integrator) -> Vec<Outcome> {
+fn evaluate_with(plan: &Plan, integrator: Integrator) -> Vec<Outcome> {
     let plan = Plan { integrator, ..plan.clone() };
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
     ModelEngine::new(&plan).expect("an instruction set").evaluate_at(&values)
 }
 
-/// The clearance at which drum and tub overlap by next to nothing in one of the rows, as `--set`
-/// takes it; none if that row failed.
+/// Returns the clearance at which drum and tub just touch in one of the rows, as an argument of
+/// `--set`; `None` if that row failed.
 fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
     let mut rng = Rng(!seed);
-    let rows = evaluated(plan, Integrator::Rk4MassScaled { accuracy: 1e-3 });
-    let gap_m = rng.one(&rows).nonlinear.min_gap_m?;
+    let rows = evaluate_with(plan, Integrator::Rk4MassScaled { accuracy: 1e-3 });
+    let gap_m = rng.choose(&rows).nonlinear.min_gap_m?;
     let reach_m = plan.model.machine.radial_clearance_m - gap_m;
     let overlap = 10f64.powf(rng.between(-6.0, -1.5));
     Some(format!("radial_clearance_m={}", reach_m * (1.0 - overlap)))
 }
 
-/// A grid over the machine that has elements.
+/// Returns the grid with a machine that has elements, whose file it writes.
 fn with_elements(seed: u64, grid: &str, folder: &std::path::Path) -> String {
     let mut rng = Rng(seed.rotate_left(32));
     let unbalance = "[[further_unbalances]]\nmass_kg = 0.1\nx_m = 0.1\nradius_m = -0.2\n";
-    // Each grid has its own file, because grids are read while others are written.
+    // Each grid has a machine file of its own, because grids are read while others are written.
     let machine = format!("machine-{seed}.toml");
     std::fs::write(folder.join(&machine), format!("{WITH_ELEMENTS}\n{unbalance}"))
         .expect("the temporary folder can be written to");
     let mut set = String::new();
     for (name, value, powers) in ELEMENTS {
-        let is_of_one = name.starts_with("damper_2") && set.contains("friction_n");
-        if rng.next() < 0.5 && !is_of_one {
+        let is_set_already = name.starts_with("damper_2") && set.contains("friction_n");
+        if rng.next() < 0.5 && !is_set_already {
             set += &format!("{name} = {}\n", value * 10f64.powf(rng.between(-powers, powers)));
         }
     }
     grid.replacen("[set]\n", &format!("machine = \"{machine}\"\n[set]\n{set}"), 1)
 }
 
-/// A grid whose drum runs up, brakes to a fraction of its speed within milliseconds, and goes on.
+/// Returns the grid with a drum that runs up, brakes within milliseconds, and continues.
 fn with_jumps(seed: u64, grid: &str) -> String {
     let mut rng = Rng(seed.rotate_left(16));
     let end_s = rng.between(3.0, 6.0);
@@ -368,7 +366,7 @@ fn with_jumps(seed: u64, grid: &str) -> String {
     )
 }
 
-/// A grid of masses that hardly move anything, and of limits that such motions may pass.
+/// Returns the grid with very small unbalances, and with a ratio limit that such motions may pass.
 fn with_tiny_unbalances(seed: u64, grid: &str) -> String {
     let mut rng = Rng(seed.rotate_left(48));
     let masses = [0.0, rng.between(0.0, 1e-4), 10f64.powf(rng.between(-6.0, -3.0))];
@@ -377,12 +375,12 @@ fn with_tiny_unbalances(seed: u64, grid: &str) -> String {
     let grid = format!("{before}values = {masses:?}{after}");
     let (before, rest) = grid.split_once("ratio_limit = ").expect("a limit");
     let (_, after) = rest.split_once('\n').expect("its end");
-    let limit = *rng.one(&[1.0001, 1.001, 1.01, 1.2, 2.0]);
+    let limit = *rng.choose(&[1.0001, 1.001, 1.01, 1.2, 2.0]);
     format!("{before}ratio_limit = {limit}\n{after}")
 }
 
-/// One grid's rows against RK4.
-fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
+/// Compares the rows of a grid with those of RK4.
+fn try_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
     let path = folder.join(format!("{seed}.toml"));
     let mut text = grid(seed);
     let is_grazing = kind == TrialKind::Grazing;
@@ -402,7 +400,7 @@ fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
         text = with_tiny_unbalances(seed, &text);
     }
     let accuracy = ACCURACIES[(seed % 4) as usize];
-    let step_s = if kind == TrialKind::Jumps { FOLLOWING_STEP_S } else { STEP_S };
+    let step_s = if kind == TrialKind::Jumps { JUMP_STEP_S } else { STEP_S };
     std::fs::write(&path, &text).expect("the temporary folder can be written to");
     let mut loaded = sweep::load(&path, &[]).ok();
     if is_grazing {
@@ -415,88 +413,88 @@ fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
     let Some(plan) = loaded else {
         return Found { refused: 1, ..Found::default() };
     };
-    let evaluate = |integrator| evaluated(&plan, integrator);
+    let evaluate = |integrator| evaluate_with(&plan, integrator);
     let rows = evaluate(Integrator::Rk4MassScaled { accuracy });
-    let halved = evaluate(Integrator::Rk4 { step_s });
-    let mut reference = None;
-    let mut quarter = None;
+    let reference_rows = evaluate(Integrator::Rk4 { step_s });
+    let mut coarser_rows = None;
+    let mut finer_rows = None;
     let mut found = Found { rows: rows.len() as u64, ..Found::default() };
-    for (i, (row, halved)) in rows.iter().zip(&halved).enumerate() {
+    for (i, (row, reference)) in rows.iter().zip(&reference_rows).enumerate() {
         found.by_method[row.method as usize] += 1;
         found.failed += u64::from(statuses(row) != [Status::Ok; 2]);
-        let mut at_reference = || {
-            reference.get_or_insert_with(|| evaluate(Integrator::Rk4 { step_s: 2.0 * step_s }))[i]
+        let mut coarser = || {
+            coarser_rows.get_or_insert_with(|| evaluate(Integrator::Rk4 { step_s: 2.0 * step_s }))
+                [i]
                 .clone()
         };
         if row.sensitive == Some(true) {
             found.sensitive += 1;
-            let same = at_reference();
-            let agrees =
-                statuses(&same) == statuses(halved) && difference(&plan, &same, halved) <= accuracy;
-            found.needlessly += u64::from(agrees);
+            let coarser = coarser();
+            let agrees = statuses(&coarser) == statuses(reference)
+                && difference(&plan, &coarser, reference) <= accuracy;
+            found.needlessly_sensitive += u64::from(agrees);
             continue;
         }
-        let mut judge = halved;
-        let stated = row.error.unwrap_or(f64::INFINITY).max(ERROR_FLOOR);
-        let differs = difference(&plan, row, judge) > accuracy.min(stated)
-            || verdict(&plan, row) != verdict(&plan, judge);
+        let mut reference = reference;
+        let estimate = row.error.unwrap_or(f64::INFINITY).max(ERROR_FLOOR);
+        let differs = difference(&plan, row, reference) > accuracy.min(estimate)
+            || verdict(&plan, row) != verdict(&plan, reference);
         if differs {
-            // The judge may be the one that is off: rows are refined to shorter steps.
+            // The reference may be wrong, because rows are refined to shorter steps.
             let finer = Integrator::Rk4 { step_s: step_s / 8.0 };
-            judge = &quarter.get_or_insert_with(|| evaluate(finer))[i];
+            reference = &finer_rows.get_or_insert_with(|| evaluate(finer))[i];
         }
-        let halved = judge;
-        let error = difference(&plan, row, judge);
+        let error = difference(&plan, row, reference);
         if row.converged == Some(false) {
             found.unconverged += 1;
-            let is_right = statuses(row) == statuses(halved) && error <= accuracy;
-            found.doubted += u64::from(is_right);
+            let is_right = statuses(row) == statuses(reference) && error <= accuracy;
+            found.needlessly_unconverged += u64::from(is_right);
             continue;
         }
-        let mut complain = |count: fn(&mut Found) -> &mut u64, what: &str| {
+        let mut report = |count: fn(&mut Found) -> &mut u64, what: &str| {
             *count(&mut found) += 1;
             let method = row.method.name();
-            let stated = row.error.unwrap_or(f64::NAN);
-            let of_linear = amplitudes_differ(&row.linear, &halved.linear);
-            let metrics = metrics_differ(&plan, row, halved).into_iter();
+            let estimate = row.error.unwrap_or(f64::NAN);
+            let linear = amplitudes_differ(&row.linear, &reference.linear);
+            let metrics = metrics_differ(&plan, row, reference).into_iter();
             let worst = metrics.max_by(|(_, a), (_, b)| a.total_cmp(b));
             let (metric, share) = worst.unwrap_or_default();
             found.exceptions.push(format!(
-                "seed {seed}, row {i}, {method}: {what}; {error:.2e} ({of_linear:.2e} linear, \
-                 {share:.2e} {metric}), stated {stated:.2e}"
+                "seed {seed}, row {i}, {method}: wrong {what}, by {error:.2e} ({linear:.2e} \
+                 linear, {share:.2e} {metric}); `error` is {estimate:.2e}"
             ));
         };
-        if statuses(row) != statuses(halved) {
-            complain(|found| &mut found.wrong_status, "status");
+        if statuses(row) != statuses(reference) {
+            report(|found| &mut found.wrong_status, "status");
         } else if error > accuracy {
-            complain(|found| &mut found.inaccurate, "amplitudes");
-        } else if verdict(&plan, row) != verdict(&plan, halved) {
-            complain(|found| &mut found.wrong_verdict, "verdict");
+            report(|found| &mut found.inaccurate, "amplitudes");
+        } else if verdict(&plan, row) != verdict(&plan, reference) {
+            report(|found| &mut found.wrong_verdict, "verdict");
         } else {
             found.worst = found.worst.max(error / accuracy);
-            let share = &mut found.greatest_shares[row.method as usize];
-            *share = share.max(error / stated);
+            let share = &mut found.share_of_estimate[row.method as usize];
+            *share = share.max(error / estimate);
             found.above_error +=
-                u64::from(row.error.is_some_and(|stated| error > stated.max(ERROR_FLOOR)));
+                u64::from(row.error.is_some_and(|estimate| error > estimate.max(ERROR_FLOOR)));
         }
     }
     found.exceptional_grids = u64::from(!found.exceptions.is_empty());
     found
 }
 
-/// Returns a seed that no constant was set by.
+/// Returns a seed from the clock, which no constant was tuned to.
 pub(crate) fn seed_from_clock() -> u64 {
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     since.map_or(0, |since| since.as_secs() % 1_000_000)
 }
 
-/// Tries grids of nine rows, from a seed, or the one grid that a seed of its own names.
+/// Tries grids of nine rows from a seed on. A seed of a million or more is that of the first grid,
+/// as exceptions name it.
 pub(crate) fn try_grids(rows: u64, first: u64, kind: TrialKind) -> Found {
     let name = format!("sweep-differential-test-{}-{}", std::process::id(), kind as u8);
     let folder = std::env::temp_dir().join(name);
     std::fs::create_dir_all(&folder).expect("a temporary folder");
-    let grids = rows.div_ceil(ROWS_OF_GRID);
-    // The seed of a grid by itself, or the first of many.
+    let grids = rows.div_ceil(GRID_ROWS);
     let first = if first < 1_000_000 { first * 1_000_000 } else { first };
     let found = (first..first + grids)
         .into_par_iter()
@@ -505,7 +503,7 @@ pub(crate) fn try_grids(rows: u64, first: u64, kind: TrialKind) -> Found {
             let seeds = (0..MAX_REFUSED).map(|k| seed + k * grids);
             let mut found = Found::default();
             for seed in seeds {
-                found = found.plus(tried(seed, kind, &folder));
+                found = found.plus(try_grid(seed, kind, &folder));
                 if found.rows > 0 {
                     break;
                 }
@@ -513,7 +511,7 @@ pub(crate) fn try_grids(rows: u64, first: u64, kind: TrialKind) -> Found {
             found
         })
         .reduce(Found::default, Found::plus);
-    // What is left in the temporary folder harms nobody.
+    // A temporary folder that cannot be removed is harmless.
     let _ = std::fs::remove_dir_all(&folder);
     found
 }
@@ -526,35 +524,39 @@ fn main() -> ExitCode {
         Some(word) => word.parse().ok(),
     };
     let (Some(rows), Some(first)) = (rows, seed) else {
-        let kinds = KINDS.map(|(name, _)| name).join("|");
+        let kinds = TRIAL_KINDS.map(|(name, _)| name).join("|");
         eprintln!("usage: differential_test ROWS [SEED|clock [{kinds}]]");
         return ExitCode::from(2);
     };
-    let named = |word: String| KINDS.into_iter().find(|(name, _)| *name == word).ok_or(word);
+    let named = |word: String| TRIAL_KINDS.into_iter().find(|(name, _)| *name == word).ok_or(word);
     let kind = match words.next().map_or(Ok(("", TrialKind::Plain)), named) {
         Ok((_, kind)) => kind,
         Err(word) => {
-            eprintln!("{word} is none of {}", KINDS.map(|(name, _)| name).join(", "));
+            eprintln!("{word} is none of {}", TRIAL_KINDS.map(|(name, _)| name).join(", "));
             return ExitCode::from(2);
         }
     };
-    // A thread that waits for rows of its grid takes another grid, on the same stack.
+    // A thread that waits for rows of its grid starts another grid on the same stack.
     let pool = rayon::ThreadPoolBuilder::new().stack_size(1 << 28).build_global();
     pool.expect("nothing has used the pool");
     let found = try_grids(rows, first, kind);
-    let grids = rows.div_ceil(ROWS_OF_GRID);
+    let grids = rows.div_ceil(GRID_ROWS);
     eprintln!("{} rows of {grids} grids ({} refused), seed {first}", found.rows, found.refused);
     eprintln!("  by method {:?}: {:?}", Level::ALL.map(Level::name), found.by_method);
     eprintln!(
         "  failed {}, sensitive {} ({} of them needlessly), unconverged {} ({} of them right)",
-        found.failed, found.sensitive, found.needlessly, found.unconverged, found.doubted
+        found.failed,
+        found.sensitive,
+        found.needlessly_sensitive,
+        found.unconverged,
+        found.needlessly_unconverged
     );
     eprintln!(
         "  wrong: status {}, verdict {}, amplitudes {}; worst of the rest {:.2} of the accuracy; \
          {} above their `error`",
         found.wrong_status, found.wrong_verdict, found.inaccurate, found.worst, found.above_error
     );
-    eprintln!("  greatest error as a share of `error`, by method: {:.2?}", found.greatest_shares);
+    eprintln!("  greatest error as a share of `error`, by method: {:.2?}", found.share_of_estimate);
     found.exceptions.iter().for_each(|line| eprintln!("  {line}"));
     if found.exceptions.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

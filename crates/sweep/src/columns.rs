@@ -1,4 +1,4 @@
-//! The columns of results, and rows of outcomes: the one place that says what a file holds.
+//! The columns of results, and the rows of outcomes.
 
 use std::mem::take;
 
@@ -19,11 +19,11 @@ use crate::plan::{Plan, has_friction};
 
 impl Rows for Washer {
     fn layout(plan: &Plan) -> Layout {
-        Layout::of_map(axis_columns(plan), Columns::of_run(plan).declared())
+        Layout::map(axis_columns(plan), Columns::for_run(plan).declared())
     }
 }
 
-/// What a row's cells are taken from.
+/// The data from which the cells of a row are computed.
 struct ResultRow {
     outcome: Outcome,
     compared: Compared,
@@ -45,24 +45,23 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// Those of a run.
-    pub(crate) fn of_run(plan: &Plan) -> Self {
-        let reliability = &plan.reliability;
-        let (channels, limits) = (&reliability.channels, reliability.limits);
-        Self::of_measures(channels, limits, &plan.model.measures, has_friction(plan))
+    /// Returns the columns of a plan's run.
+    pub(crate) fn for_run(plan: &Plan) -> Self {
+        let rule = &plan.reliability;
+        Self::for_measures(&rule.channels, rule.limits, &plan.model.measures, has_friction(plan))
     }
 
-    /// The same, by what they depend on.
-    pub(crate) fn of_measures(
+    /// Returns the columns of a run with these channels, limits and measures.
+    pub(crate) fn for_measures(
         channels: &[Channel],
         limits: RatioLimits,
         measures: &Measures,
         has_friction: bool,
     ) -> Self {
         let criterion = measures.criterion;
-        let (amplitude, ratio) = (criterion.amplitude(), criterion.ratio());
-        let mut columns = amplitude_columns(channels, limits, amplitude, ratio);
-        columns.extend(verdict(channels, limits));
+        let mut columns =
+            amplitude_columns(channels, limits, criterion.amplitude(), criterion.ratio());
+        columns.extend(washer_verdict_columns(channels, limits));
         columns.extend(gap_columns());
         columns.extend(has_friction.then(friction_column));
         columns.extend(metric_columns(channels, measures));
@@ -70,26 +69,28 @@ impl Columns {
         Self { columns, channels: channels.len(), limits }
     }
 
-    /// Those of dwells at constant speeds.
-    pub(crate) fn of_dwells(plan: &Plan) -> Self {
-        let (channels, limits) = (&plan.reliability.channels, plan.reliability.limits);
+    /// Returns the columns of periodic responses at held speeds.
+    pub(crate) fn for_responses(plan: &Plan) -> Self {
+        let channels = &plan.reliability.channels;
+        let limits = plan.reliability.limits;
         let mut columns = growth_columns("");
         let amplitude = "largest deviation from equilibrium over a turn";
         let ratio = "nonlinear over linear amplitude; null where that is zero";
         columns.extend(amplitude_columns(channels, limits, amplitude, ratio));
-        columns.extend(verdict(channels, limits).into_iter().take(2));
-        let (text, statuses) = ("ok, or why there is no response", ROW_STATUSES.to_vec());
+        // A response has only the verdict's first two columns, those of the greatest ratio.
+        columns.extend(washer_verdict_columns(channels, limits).into_iter().take(2));
+        let text = "ok, or why there is no response";
         let status = |row: &ResultRow| Some(row.compared.status);
-        columns.push(ResultColumn::name("status", text, statuses, status));
+        columns.push(ResultColumn::name("status", text, ROW_STATUSES.to_vec(), status));
         Self { columns, channels: channels.len(), limits }
     }
 
-    /// What the file says of them.
+    /// Returns the names, units and descriptions of the columns, as a file declares them.
     pub(crate) fn declared(self) -> Vec<Column> {
         declared(self.columns)
     }
 
-    /// The rows of what came of a point.
+    /// Returns the rows of a point's outcome.
     pub(crate) fn done(&self, outcome: Outcome) -> Done {
         let point = outcome.point;
         let rows = outcome.into_rows().map(|outcome| row(&self.columns, &self.result(outcome)));
@@ -120,37 +121,39 @@ impl Columns {
     }
 }
 
-/// The two models by name.
+/// The two models, each with its name and its trajectory in an outcome.
 const MODELS: [(&str, fn(&Outcome) -> &Trajectory); 2] =
     [("nonlinear", |outcome| &outcome.nonlinear), ("linear", |outcome| &outcome.linear)];
 
-fn verdict(channels: &[Channel], limits: RatioLimits) -> Vec<WasherColumn> {
-    let told = "the method of the row's nonlinear numbers; with the fast method its level: \
+/// Returns the columns of the verdict, with the levels of this model's methods.
+fn washer_verdict_columns(channels: &[Channel], limits: RatioLimits) -> Vec<WasherColumn> {
+    let text = "the method of the row's nonlinear numbers; with the fast method its level: \
                 capped_0 to capped_5, rk4, additive or dop853";
-    verdict_columns(channels, limits, Level::ALL.map(Level::name).to_vec(), told)
+    verdict_columns(channels, limits, Level::ALL.map(Level::name).to_vec(), text)
 }
 
-/// Columns of the metrics that are asked for, and no others.
+/// Returns the columns of the metrics that the grid file requests.
 fn metric_columns(channels: &[Channel], measures: &Measures) -> Vec<WasherColumn> {
     let mut columns = Vec::new();
     let mut position = 0;
     for &metric in &measures.metrics {
         match metric {
             Metric::Growth => columns.extend(growth_columns("growth_")),
-            Metric::Dwell => columns.extend(dwelt_columns(channels)),
+            Metric::Dwell => columns.extend(dwell_columns(channels)),
             Metric::StaticSag => {
-                let of = |row: &ResultRow| row.outcome.static_sag_m;
+                let sag_m = |row: &ResultRow| row.outcome.static_sag_m;
                 let text = metric.facts().description;
-                columns.push(of_metric(metric, metric.column(""), text, of));
+                columns.push(metric_column(metric, metric.column(""), text, sag_m));
             }
             _ => {
                 for number in measures.metric_columns(metric) {
-                    for (model, of) in MODELS {
+                    for (model, trajectory) in MODELS {
                         let text = number.description();
                         let text = format!("{text}, {model} model; null if it failed");
-                        let of =
-                            move |row: &ResultRow| of(&row.outcome).metrics.get(position).copied();
-                        columns.push(of_metric(metric, number.column(model), text, of));
+                        let value = move |row: &ResultRow| {
+                            trajectory(&row.outcome).metrics.get(position).copied()
+                        };
+                        columns.push(metric_column(metric, number.column(model), text, value));
                     }
                     position += 1;
                 }
@@ -160,18 +163,18 @@ fn metric_columns(channels: &[Channel], measures: &Measures) -> Vec<WasherColumn
     columns
 }
 
-/// A column of a metric, with which way it is bad.
-fn of_metric(
+/// Returns a column of a metric, with its bad direction and its limit.
+fn metric_column(
     metric: Metric,
     name: String,
     text: impl Into<String>,
-    of: impl Fn(&ResultRow) -> Option<f64> + Send + Sync + 'static,
+    value: impl Fn(&ResultRow) -> Option<f64> + Send + Sync + 'static,
 ) -> WasherColumn {
-    judged(metric, ResultColumn::measured(name, metric.facts().unit, text, of))
+    with_limit(metric, ResultColumn::measured(name, metric.facts().unit, text, value))
 }
 
-/// The column, with which way the metric is bad.
-fn judged(metric: Metric, column: WasherColumn) -> WasherColumn {
+/// Returns a column with the bad direction and the limit of a metric.
+fn with_limit(metric: Metric, column: WasherColumn) -> WasherColumn {
     let MetricFacts { worse, limit, .. } = metric.facts();
     let column = column.worse(worse);
     match limit {
@@ -180,28 +183,29 @@ fn judged(metric: Metric, column: WasherColumn) -> WasherColumn {
     }
 }
 
-/// Columns of how far motions at the plan's constant speeds go.
-fn dwelt_columns(channels: &[Channel]) -> Vec<WasherColumn> {
-    let dwelt = |row: &ResultRow| -> Option<DwellPeaks> { row.outcome.dwelt };
+/// Returns the columns of the largest deviations of attractors at the plan's held speeds.
+fn dwell_columns(channels: &[Channel]) -> Vec<WasherColumn> {
+    let peaks = |row: &ResultRow| -> Option<DwellPeaks> { row.outcome.dwelt };
     let mut columns = Vec::new();
     for &channel in channels {
         let text = format!("{}: {}", channel.description(), Metric::Dwell.facts().description);
         let name = format!("dwell_{}", channel.name());
-        let of = move |row: &ResultRow| Some(dwelt(row)?.deviations[channel.index()]);
-        let column = ResultColumn::measured(name, channel.unit(), text, of);
-        columns.push(judged(Metric::Dwell, column));
+        let deviation = move |row: &ResultRow| Some(peaks(row)?.deviations[channel.index()]);
+        let column = ResultColumn::measured(name, channel.unit(), text, deviation);
+        columns.push(with_limit(Metric::Dwell, column));
     }
     let text = "the speed at which yaw or pitch of the tub, whichever is larger, goes farthest";
-    let speed = move |row: &ResultRow| Some(dwelt(row)?.speed_rpm);
+    let speed = move |row: &ResultRow| Some(peaks(row)?.speed_rpm);
     columns.push(ResultColumn::measured("dwell_speed_rpm", "rpm", text, speed));
     let text = "what that motion is, as in a file of `sweep dwell`, or that it left the model's \
                 range or did not settle";
-    let kind = move |row: &ResultRow| Some(dwelt(row)?.kind);
-    columns.push(ResultColumn::name("dwell_kind", text, Ending::KINDS.to_vec(), kind));
+    let kind = move |row: &ResultRow| Some(peaks(row)?.kind);
+    columns.push(ResultColumn::name("dwell_kind", text, Ending::KIND_NAMES.to_vec(), kind));
     columns
 }
 
-/// What the linear model's friction was taken at.
+/// Returns the column of the factor between the speed at which the linear model linearises friction
+/// and the speed of the motion.
 fn friction_column() -> WasherColumn {
     let text = "by what factor the speed amplitude at which the linear model takes the friction of \
                 a damper is off from those of the motions in the window, the greatest of all \
@@ -219,15 +223,17 @@ fn growth(row: &ResultRow) -> Option<&Growth> {
     row.outcome.growth.as_ref()
 }
 
-/// Columns of the fastest growing disturbance at a constant speed. In maps they stand behind a
-/// prefix, and the speed is one of them.
+/// Returns the columns of the fastest growing disturbance at a held speed. Maps give them a prefix
+/// and a column of the speed, which in files of responses is an axis.
 fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
     let in_map = !prefix.is_empty();
     let mut columns = Vec::new();
-    let numbers: [(&str, &str, &str, fn(&Disturbance) -> f64); 6] = [
-        ("speed_rpm", "rpm", "the plan's speed at which a disturbance grows fastest", |fastest| {
-            fastest.speed_rpm
-        }),
+    let mut numbers: Vec<(&str, &str, &str, fn(&Disturbance) -> f64)> = Vec::new();
+    if in_map {
+        let text = "the plan's speed at which a disturbance grows fastest";
+        numbers.push(("speed_rpm", "rpm", text, |fastest| fastest.speed_rpm));
+    }
+    numbers.extend::<[(&str, &str, &str, fn(&Disturbance) -> f64); 5]>([
         (
             "growth_per_s",
             "1/s",
@@ -255,29 +261,28 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
             |fastest| fastest.multiplier[0],
         ),
         ("multiplier_im", "1", "its imaginary part, not negative", |fastest| fastest.multiplier[1]),
-    ];
-    let of_dwell = usize::from(!in_map);
-    for (name, unit, text, of) in numbers.into_iter().skip(of_dwell) {
-        let of = move |row: &ResultRow| Some(of(&growth(row)?.fastest));
+    ]);
+    for (name, unit, text, number) in numbers {
+        let value = move |row: &ResultRow| Some(number(&growth(row)?.fastest));
         let name =
             if name.starts_with(prefix) { name.to_owned() } else { format!("{prefix}{name}") };
-        let column = ResultColumn::measured(name, unit, text, of);
+        let column = ResultColumn::measured(name, unit, text, value);
         let is_growth = unit == Metric::Growth.facts().unit;
-        columns.push(if is_growth { judged(Metric::Growth, column) } else { column });
+        columns.push(if is_growth { with_limit(Metric::Growth, column) } else { column });
     }
     let kind = |row: &ResultRow| Some(growth(row)?.fastest.kind());
-    let place = move |row: &ResultRow| Some(kind(row)? as usize);
+    let kind_index = move |row: &ResultRow| Some(kind(row)? as usize);
     let text =
         "what a disturbance turns the response into: stable, period_doubling, quasi_periodic, fold";
     let names = Kind::ALL.map(Kind::name).to_vec();
-    columns.push(ResultColumn::name(format!("{prefix}kind"), text, names, place));
+    columns.push(ResultColumn::name(format!("{prefix}kind"), text, names, kind_index));
     if !in_map {
         let stable = move |row: &ResultRow| Some(kind(row)? == Kind::Stable);
         let text = "true where every disturbance decays";
         columns.push(ResultColumn::flag("stable", text, stable));
     }
-    for place in 0..2 {
-        columns.extend(growing_mode_columns(prefix, place));
+    for rank in 0..2 {
+        columns.extend(growing_mode_columns(prefix, rank));
     }
     columns.extend(branch_columns(prefix));
     let on_curve = |row: &ResultRow| Some(growth(row)?.is_on_curve);
@@ -293,23 +298,23 @@ fn growth_columns(prefix: &str) -> Vec<WasherColumn> {
     columns
 }
 
-/// Columns of the branch that a response is on.
+/// Returns the columns of the branch of a response.
 fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
     let number = |row: &ResultRow| Some(u64::from(growth(row)?.branch));
-    // It says which of a speed's rows a row is, and so is never null there.
-    let is_of_speed = prefix.is_empty();
-    let kind = if is_of_speed { Holds::Count } else { Holds::KnownCount };
-    let branch = move |row: &ResultRow| number(row).or(is_of_speed.then_some(0));
+    // In files of responses the branch tells the rows of a speed apart, so it is never null there.
+    let tells_rows_apart = prefix.is_empty();
+    let kind = if tells_rows_apart { Holds::Count } else { Holds::KnownCount };
+    let branch = move |row: &ResultRow| number(row).or(tells_rows_apart.then_some(0));
     let folds = "how many folds the point's curve of responses has before this one, followed from \
                  a low speed up; of those on the curve, a machine that runs up is on the least \
                  branch that there is at a speed";
-    let end = |name: &str, side: &str, place: usize| {
+    let end = |name: &str, side: &str, index: usize| {
         let text =
             format!("speed of the fold {side} which the branch is not; null where it has none");
-        let of = move |row: &ResultRow| growth(row)?.between_rpm[place];
-        ResultColumn::measured(format!("{prefix}branch_{name}_rpm"), "rpm", text, of)
+        let fold_rpm = move |row: &ResultRow| growth(row)?.between_rpm[index];
+        ResultColumn::measured(format!("{prefix}branch_{name}_rpm"), "rpm", text, fold_rpm)
     };
-    let passed = "what of the machine's geometry the response passes, and so is no motion of the \
+    let limits = "what of the machine's geometry the response passes, and so is no motion of the \
                   machine: spring_hooks, damper_ends, clearance; null where nothing";
     let beyond = |row: &ResultRow| Some(growth(row)?.beyond? as usize);
     let names = Beyond::ALL.map(Beyond::name).to_vec();
@@ -317,15 +322,15 @@ fn branch_columns(prefix: &str) -> [WasherColumn; 4] {
         ResultColumn::new(format!("{prefix}branch"), "1", folds, kind, branch),
         end("from", "below", 0),
         end("to", "above", 1),
-        ResultColumn::name(format!("{prefix}beyond"), passed, names, beyond),
+        ResultColumn::name(format!("{prefix}beyond"), limits, names, beyond),
     ]
 }
 
-/// Columns of one of the modes that take part in what grows.
-fn growing_mode_columns(prefix: &str, place: usize) -> [WasherColumn; 3] {
-    let mode = move |row: &ResultRow| -> Option<GrowingMode> { growth(row)?.modes[place] };
-    let which = if place == 0 { "that takes most part in" } else { "next to that in" };
-    let name = format!("{prefix}mode_{}", place + 1);
+/// Returns the columns of the first or the second mode (`rank` 0 or 1) of the growing disturbance.
+fn growing_mode_columns(prefix: &str, rank: usize) -> [WasherColumn; 3] {
+    let mode = move |row: &ResultRow| -> Option<GrowingMode> { growth(row)?.modes[rank] };
+    let which = if rank == 0 { "that takes most part in" } else { "next to that in" };
+    let name = format!("{prefix}mode_{}", rank + 1);
     let text = format!(
         "number, by frequency at this speed, of the linear model's mode {which} what grows; null \
          where nothing grows, or no such mode is needed"
@@ -345,17 +350,19 @@ fn growing_mode_columns(prefix: &str, place: usize) -> [WasherColumn; 3] {
     ]
 }
 
-/// A gap that is by so much smaller is as much worse as a ratio that is greater by a factor of e.
+/// Scale of gaps (m) beside ratios: a gap that is smaller by it is as much worse as a ratio that is
+/// greater by a factor of e. Basis: the paper's machine has a clearance of 0.010 m. Doubling it
+/// halves the weight of gaps.
 const GAP_SCALE_M: f64 = 0.010;
 
-/// Columns of the least gaps, the same for every plan.
+/// Returns the columns of the least gap of each model, which every run has.
 fn gap_columns() -> [WasherColumn; 2] {
-    MODELS.map(|(model, of)| {
+    MODELS.map(|(model, trajectory)| {
         let text = format!(
             "least gap between drum and tub over the whole run, {model} model; negative where \
              they clash; null if it failed"
         );
-        let gap = move |row: &ResultRow| of(&row.outcome).min_gap_m;
+        let gap = move |row: &ResultRow| trajectory(&row.outcome).min_gap_m;
         let column = ResultColumn::measured(format!("min_gap_{model}_m"), "m", text, gap);
         column.worse(Worse::Less).limit(0.0, GAP_SCALE_M)
     })

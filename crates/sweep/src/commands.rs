@@ -1,5 +1,5 @@
-//! The command line: a module for each subcommand of this program, and for each general one to
-//! which it adds options.
+//! The command line. Each subcommand of this program has a module, and so has each general one to
+//! which this program adds options.
 
 mod check;
 mod completions;
@@ -30,7 +30,7 @@ use sweep_engine::commands::{
 use sweep_engine::{Error, Exit, nearest};
 use washer_plot::WasherFigures;
 
-/// Subcommands by what they are for, as help lists them.
+/// The headings of help, each with its subcommands.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Run", &["run", "check"]),
     ("Ask", &["boundary", "trace", "modes", "stability", "dwell", "explain", "fit", "optimise"]),
@@ -81,17 +81,17 @@ pub enum Command {
     Trace(trace::Args),
     /// Find resonance speeds, mode shapes and frequencies over speed
     Modes(modes::Args),
-    /// Find periodic responses at constant speeds, and unstable ones
-    #[command(after_long_help = held::RESPONSES_LONG)]
-    #[command(mut_arg("out", |out| out.help(out_of("stability"))))]
-    Stability(held::Args<held::Responses>),
-    /// Find the motions that held speeds end in
-    #[command(after_long_help = held::MOTIONS_LONG)]
-    #[command(mut_arg("out", |out| out.help(out_of("dwell"))))]
+    /// Find periodic responses at held speeds, and their stability
+    #[command(after_long_help = held::STABILITY_LONG_HELP)]
+    #[command(mut_arg("out", |out| out.help(out_help("stability"))))]
+    Stability(held::Args<held::ResponseOptions>),
+    /// Find the motions in which the machine ends at held speeds
+    #[command(after_long_help = held::DWELL_LONG_HELP)]
+    #[command(mut_arg("out", |out| out.help(out_help("dwell"))))]
     Dwell(held::Args<AttractorSearch>),
     /// Explain why the linear model fails at one point
     Explain(explain::Args),
-    /// Find the numbers of a machine from measured run-ups
+    /// Estimate the parameters of a machine from measured run-ups
     Fit(fit::Args),
     /// Print the script that submits a run to a Slurm cluster
     Slurm(slurm::Args),
@@ -103,30 +103,30 @@ pub enum Command {
     Completions(completions::Args),
 }
 
-/// Where the result of a command about held speeds goes, which is not where a run's goes.
-fn out_of(verb: &str) -> String {
+/// Returns the help of `--out` for a command about held speeds, whose default is not that of a run.
+fn out_help(verb: &str) -> String {
     format!("Result file [default: results/NAME-{verb}.parquet]")
 }
 
-/// The examples of a subcommand; of the program, by its name.
-fn examples_of(name: &str) -> Examples {
+/// Returns the examples of a subcommand, or those of the program for the name `sweep`.
+fn find_examples(name: &str) -> Examples {
     let parts = EXAMPLES.split("\n\n");
     let own = parts.filter_map(|part| part.strip_prefix(name)?.strip_prefix(":\n")).next();
     let lines: Vec<&str> = own.unwrap_or_default().lines().map(str::trim).collect();
     lines.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
-/// The command line with everything that its help shows.
+/// Returns the command line with the examples and the headings of its help.
 pub(crate) fn command() -> clap::Command {
     let with = |command: clap::Command, lines: Examples| match examples::shown(&lines) {
         Some(examples) => command.before_help(examples),
         None => command,
     };
-    let program = with(Cli::command(), examples_of("sweep"));
+    let program = with(Cli::command(), find_examples("sweep"));
     let names: Vec<String> =
         program.get_subcommands().map(|command| command.get_name().to_owned()).collect();
     let program = names.into_iter().fold(program, |program, name| {
-        program.mut_subcommand(&name, |command| with(command, examples_of(&name)))
+        program.mut_subcommand(&name, |command| with(command, find_examples(&name)))
     });
     let template = grouped_help(&program);
     in_groups(program).help_template(template)
@@ -142,8 +142,8 @@ fn in_groups(mut program: clap::Command) -> clap::Command {
     program
 }
 
-/// The template of the program's help. clap has headings for arguments only, so the subcommands
-/// stand in the template.
+/// Returns the template of the program's help. clap has headings for arguments only, so the
+/// template has the subcommands.
 fn grouped_help(program: &clap::Command) -> String {
     let header = program.get_styles().get_header();
     let name_style = program.get_styles().get_literal();
@@ -160,7 +160,7 @@ fn grouped_help(program: &clap::Command) -> String {
     text + &format!("{header}Options:{header:#}\n{{options}}{{after-help}}")
 }
 
-/// The command line without what help hides, for what lists every subcommand.
+/// Returns the command line without hidden subcommands, for lists of all subcommands.
 pub(crate) fn shown_command() -> clap::Command {
     let whole = command();
     let shown = whole.get_subcommands().filter(|command| !command.is_hide_set()).cloned();
@@ -172,8 +172,8 @@ pub(crate) fn shown_command() -> clap::Command {
         .subcommands(shown)
 }
 
-/// Adds the subcommand that was meant, where clap finds none near: it looks for likeness, of which
-/// a slip leaves little in a name of three letters.
+/// Adds a suggestion to the error of an unknown subcommand, if clap has none: two swapped letters
+/// leave too little of a short name for clap's measure of likeness.
 fn suggest(mut error: clap::Error) -> clap::Error {
     let typed = match (error.kind(), error.get(ContextKind::InvalidSubcommand)) {
         (ErrorKind::InvalidSubcommand, Some(ContextValue::String(typed))) => typed.clone(),
@@ -191,8 +191,8 @@ fn suggest(mut error: clap::Error) -> clap::Error {
 }
 
 impl Cli {
-    /// Reads this process's command line. Prints a mistake or the help asked for, and ends the
-    /// process.
+    /// Parses this process's command line. On a mistake or a request for help it prints a message
+    /// and ends the process.
     pub fn read() -> Self {
         let matches = command().try_get_matches().unwrap_or_else(|error| suggest(error).exit());
         Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
@@ -203,7 +203,7 @@ impl Command {
     /// Runs the subcommand.
     ///
     /// # Errors
-    /// The errors of the subcommand.
+    /// Returns the errors of the subcommand.
     pub fn run(&self) -> Result<Exit, Error> {
         match self {
             Self::General(general) => run_general(general),
@@ -216,12 +216,12 @@ impl Command {
             Self::Fit(args) => fit::run(args),
             Self::Init(args) => init::run(args),
             Self::Completions(args) => completions::run(args, shown_command()),
-            Self::Man(args) => man::run(args, command(), &examples_of),
+            Self::Man(args) => man::run(args, command(), &find_examples),
         }
     }
 }
 
-/// Runs a general subcommand over the washing machine.
+/// Runs a general subcommand with the model of the washing machine.
 fn run_general(command: &GeneralCommand<WasherArguments>) -> Result<Exit, Error> {
     match command {
         GeneralCommand::Run(args) => run::run(args),
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slip_in_a_short_subcommand_is_answered_by_its_name() {
+    fn an_error_for_a_misspelt_short_subcommand_suggests_its_name() {
         let refusal = |typed: &str| {
             suggest(command().try_get_matches_from(["sweep", typed]).unwrap_err()).to_string()
         };
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn every_command_that_names_its_output_takes_it_by_either_flag() {
+    fn every_output_option_has_a_long_and_a_short_flag() {
         let mut count = 0;
         for subcommand in command().get_subcommands() {
             for flag in subcommand.get_arguments() {
@@ -280,11 +280,11 @@ mod tests {
         assert!(count > 5, "{count}");
     }
 
-    /// The words of a line, as a shell takes them: single quotes keep spaces.
+    /// Returns the words of a line by a shell's rules: single quotes keep spaces.
     fn words(line: &str) -> Vec<String> {
         let mut words = Vec::new();
-        for (place, part) in line.split('\'').enumerate() {
-            match place % 2 {
+        for (index, part) in line.split('\'').enumerate() {
+            match index % 2 {
                 0 => words.extend(part.split_whitespace().map(str::to_owned)),
                 _ => words.push(part.to_owned()),
             }
@@ -297,10 +297,10 @@ mod tests {
         let whole = command();
         let shown = whole.get_subcommands().filter(|command| !command.is_hide_set());
         for name in shown.map(clap::Command::get_name).chain(["sweep"]) {
-            // A command's own first; what follows may go on with its output.
-            let (lines, own) =
-                (examples_of(name), format!("sweep {name}").replace("sweep sweep", "sweep "));
-            assert!(lines.first().is_some_and(|[line, _]| line.starts_with(&own)), "{name}");
+            // The first example calls the command itself; further ones may use its output.
+            let lines = find_examples(name);
+            let call = format!("sweep {name}").replace("sweep sweep", "sweep ");
+            assert!(lines.first().is_some_and(|[line, _]| line.starts_with(&call)), "{name}");
             for [line, _] in lines {
                 let line = line.split(" 2>").next().unwrap_or_default();
                 let parsed = command().try_get_matches_from(words(line));
@@ -312,10 +312,10 @@ mod tests {
     #[test]
     fn no_example_is_wider_than_a_terminal_or_changed_by_folding() {
         for name in command().get_subcommands().map(clap::Command::get_name).chain(["sweep"]) {
-            let lines = examples_of(name);
+            let lines = find_examples(name);
             let shown = examples::shown(&lines).unwrap_or_default();
             assert!(shown.lines().all(|line| line.len() <= examples::WIDEST), "{shown}");
-            // As a shell reads it, which takes a folded line for one.
+            // A shell joins folded lines.
             let words = shown.replace("\\\n", "").split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(lines.iter().all(|[line, _]| words.contains(line)), "{shown}");
         }

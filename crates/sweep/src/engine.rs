@@ -285,7 +285,7 @@ pub(crate) fn map_isolating_panics<I, R>(
 
 impl Engine for ModelEngine<'_> {
     fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, context: &RunContext<'_>) {
-        let columns = Columns::of_run(self.plan);
+        let columns = Columns::for_run(self.plan);
         let sink = |outcome: Outcome| keep(columns.done(outcome));
         let source = |most: usize| {
             let rows = std::iter::from_fn(next).take(most);

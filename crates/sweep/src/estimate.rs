@@ -57,8 +57,8 @@ const RESULT_COLUMN_BYTES: f64 = 800.0;
 /// points with 36 columns. Doubling it doubles the disk that small chunks are said to take.
 const PART_COLUMN_BYTES: f64 = 300.0;
 
-/// Integrates some points of the plan, for some seconds at most, and reckons from there for so many
-/// threads.
+/// Estimates the cost of a run on a number of threads: it integrates some points of the plan, for a
+/// few seconds at most, and extrapolates.
 ///
 /// # Errors
 /// Returns an error if the plan has no engine.

@@ -1,12 +1,12 @@
-//! The build of the program that made a file. With the plan it decides the file's bytes.
+//! The build of the program that made a file. The build and the plan decide the file's bytes.
 
 use sweep_engine::Build;
 
-/// Version of the program.
+/// The version of the program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Version of everything that decides a byte of a result: the models, the integrators, what is
-/// derived from their motions, the columns. It is raised with every change to such bytes.
+/// The version of everything that decides the bytes of a result: the models, the integrators, the
+/// metrics and the columns. It is raised with every change to these bytes.
 ///
 /// Builds of one `VERSION` and one `NUMERICS_VERSION` write the same bytes for the same input;
 /// chunks of others are never mixed with theirs. `tests/command/goldens.rs` fails when bytes change
@@ -14,5 +14,5 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// hashes.
 pub const NUMERICS_VERSION: u32 = 32;
 
-/// Both.
+/// The build of this program.
 pub(crate) const BUILD: Build = Build { version: VERSION, numerics: NUMERICS_VERSION };

@@ -1,24 +1,25 @@
-//! The sweep, for programs: from a grid file to a result file. The command `sweep` is this library
-//! with arguments.
+//! Sweeps over washing machines, from a grid file to a result file. The program `sweep` is the
+//! command line of this library.
 //!
-//! * `config` reads a grid file into a [`Plan`], or says every mistake in it. `method` is the table
-//!   of the methods of integration.
-//! * `engine` takes points of a plan through both models of `washer_model` to outcomes, of which
-//!   `columns` makes rows. `estimate` says beforehand what a run will take.
-//! * [`sweep_engine`] computes a plan's points on all cores and keeps them as they come, traces
-//!   boundaries and runs studies; [`sweep_files`] has the rules of writing and reading. `identity`
-//!   says which builds write the same bytes.
-//! * `trace` writes one point's time histories, `stability`, `dwell`, `explain` and `fit` answer
-//!   the questions of their names. [`washer_plot`] draws any of these files.
-//! * `library` is the commands' work as functions: an [`PlanEvaluator`] takes tables of points, a
-//!   [`MemoryTable`] holds a result in memory.
+//! * `config` reads a grid file into a [`Plan`], or reports all mistakes in it. `method` is the
+//!   table of the methods of integration.
+//! * `engine` integrates both models of `washer_model` at points of a plan, and `columns` makes
+//!   rows of the outcomes. `estimate` predicts the cost of a run.
+//! * [`sweep_engine`] computes the points of a plan on all cores, stores finished rows, traces
+//!   boundaries and runs studies; [`sweep_files`] reads and writes files. `identity` is the version
+//!   that decides which builds write the same bytes.
+//! * `trace` computes time histories, `stability` periodic responses, `dwell` attractors; `explain`
+//!   finds the cause of a verdict, `fit` estimates parameters from measurements. [`washer_plot`]
+//!   draws the files of all of these.
+//! * `library` has the work of the commands as functions: a [`PlanEvaluator`] evaluates tables of
+//!   points, a [`MemoryTable`] is a result in memory.
 //! * `commands` is the command line.
 //!
-//! This crate exports what the program, the fuzzer and the examples use.
+//! The crate's public items are those that the program, the fuzzer and the examples use.
 //!
 //! # Example
 //!
-//! One point of the grid of the paper's Fig. 12, in its first two seconds.
+//! A point of the grid of the paper's Fig. 12, in its first two seconds.
 //!
 //! ```
 //! use std::path::Path;

@@ -95,7 +95,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     let further = sliders.iter().map(|axis| slider(axis, axis.parameter.get(machine, spin)));
     let columns = |number: MetricColumn| ModelKind::ALL.map(|model| number.column(model.name()));
     let criterion = plan.model.measures.criterion;
-    // The description goes on about rows without a ratio, which a page does not have.
+    // The rest of the description is about rows without a ratio, which a page does not have.
     let ratio = criterion.ratio().split(';').next().unwrap_or_default();
     Ok(Live {
         setup: setup.to_numbers(),
@@ -109,7 +109,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         held_speeds_rpm,
         held_metrics: held_metrics.iter().map(|metric| metric.name().to_owned()).collect(),
         has_slow_growth,
-        motions: Ending::KINDS.map(str::to_owned).to_vec(),
+        motions: Ending::KIND_NAMES.map(str::to_owned).to_vec(),
         has_static_sag: plan.model.measures.metrics.contains(&Metric::StaticSag),
         kinds: Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
         compared: plan.reliability.channels.iter().map(|channel| channel.index()).collect(),

@@ -1,5 +1,5 @@
-//! Periodic responses over a grid and speeds: the engine of `sweep stability`, and what a finished
-//! file says.
+//! Periodic responses over a grid and held speeds: the engine of `sweep stability`, and the summary
+//! of a finished file.
 
 #[cfg(test)]
 mod tests;
@@ -105,7 +105,7 @@ impl<'a> HeldPlan<'a> {
             None => {
                 let options = json!({ "speed_rpm": speeds_rpm });
                 let metadata = (key::STABILITY, json!({ "speeds_rpm": speeds_rpm }));
-                (Columns::of_dwells(plan).declared(), options, metadata)
+                (Columns::for_responses(plan).declared(), options, metadata)
             }
         };
         let mut axes = axis_columns(plan);
@@ -140,7 +140,7 @@ impl<'a> HeldPlan<'a> {
     pub(crate) fn engine(&self) -> Result<HeldSpeedEngine<'a>, Error> {
         let analysis = match self.search {
             Some(search) => HeldAnalysis::Attractors(AttractorEngine::new(self.plan, search)),
-            None => HeldAnalysis::Responses(Columns::of_dwells(self.plan)),
+            None => HeldAnalysis::Responses(Columns::for_responses(self.plan)),
         };
         Ok(HeldSpeedEngine { held: *self, simd: simd_from_environment()?, analysis })
     }
@@ -214,7 +214,7 @@ impl HeldSpeedEngine<'_> {
         map_isolating_panics(&machines, prepare_group, || Err(Status::Panicked))
     }
 
-    /// Returns the outcome of a row: that of the first response, with the others beside it.
+    /// Returns the outcome of a row: that of the first response, with the other ones as coexisting.
     fn outcome(&self, row: u64, responses: &[Response]) -> Outcome {
         let mut outcomes = responses.iter().map(|response| self.response_outcome(row, response));
         let first = outcomes.next().unwrap_or_else(|| Outcome::failed(row, Status::NoResponse));

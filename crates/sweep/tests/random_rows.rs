@@ -1,14 +1,13 @@
-//! Random machines of every kind against plain RK4, with a seed from the clock.
+//! Tests of rows of random machines of every kind against plain RK4, with a seed from the clock.
 //!
-//! `SEED=7 cargo test --release -p sweep --test random_rows` repeats a run; `ROWS=900` asks for
-//! more rows of each kind. The generator and the promise are those of
-//! `examples/differential_test.rs`.
+//! `SEED=7 cargo test --release -p sweep --test random_rows` repeats a run; `ROWS=900` tests more
+//! rows of each kind. The generator and the promise are those of `examples/differential_test.rs`.
 
 #[path = "../examples/differential_test.rs"]
 #[allow(dead_code, reason = "the example's own command line")]
 mod differential_test;
 
-use differential_test::{Found, ROWS_OF_GRID, TrialKind, seed_from_clock, try_grids};
+use differential_test::{Found, GRID_ROWS, TrialKind, seed_from_clock, try_grids};
 
 /// The share of machines that may have rows beyond their accuracy, beside one more.
 ///
@@ -21,18 +20,18 @@ fn from_environment(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
 }
 
-/// Tries rows of a kind, and holds what was found against the promise.
+/// Tests rows of a kind against the promise.
 ///
-/// The rows of a machine fail together, so machines are counted. One machine may be exceptional
-/// beside the stated share: at the rate of [`EXCEPTIONAL_SHARE`]'s basis, more than that are
+/// The rows of a machine fail together, so machines are counted. One exceptional machine more than
+/// the given share is accepted: at the rate of [`EXCEPTIONAL_SHARE`]'s basis, more than that are
 /// exceptional in one run of some 2,000.
-fn holds(kind: TrialKind, exceptional_share: f64, greatest_unconverged_share: f64) {
+fn check_promise(kind: TrialKind, exceptional_share: f64, greatest_unconverged_share: f64) {
     let rows = from_environment("ROWS").unwrap_or(72);
     let seed = from_environment("SEED").unwrap_or_else(seed_from_clock);
     let found: Found = try_grids(rows, seed, kind);
-    // `cargo test` shows it of a test that fails.
+    // `cargo test` shows the output of a failed test.
     eprintln!("seed {seed}: {found:?}");
-    let machines = rows.div_ceil(ROWS_OF_GRID);
+    let machines = rows.div_ceil(GRID_ROWS);
     let allowed = 1 + (exceptional_share * machines as f64) as u64;
     assert!(found.exceptional_grids <= allowed, "seed {seed}: {:#?}", found.exceptions);
     let unconverged = found.unconverged as f64 / found.rows.max(1) as f64;
@@ -42,27 +41,27 @@ fn holds(kind: TrialKind, exceptional_share: f64, greatest_unconverged_share: f6
 
 #[test]
 fn rows_of_random_machines_are_within_their_accuracy() {
-    holds(TrialKind::Plain, EXCEPTIONAL_SHARE, 0.1);
+    check_promise(TrialKind::Plain, EXCEPTIONAL_SHARE, 0.1);
 }
 
 #[test]
 fn rows_that_graze_are_within_their_accuracy() {
-    holds(TrialKind::Grazing, EXCEPTIONAL_SHARE, 0.1);
+    check_promise(TrialKind::Grazing, EXCEPTIONAL_SHARE, 0.1);
 }
 
 #[test]
 fn rows_with_friction_and_stops_are_within_their_accuracy() {
-    holds(TrialKind::Elements, EXCEPTIONAL_SHARE, 0.3);
+    check_promise(TrialKind::Elements, EXCEPTIONAL_SHARE, 0.3);
 }
 
 #[test]
 fn rows_behind_a_brake_are_within_their_accuracy() {
-    holds(TrialKind::Jumps, EXCEPTIONAL_SHARE, 0.2);
+    check_promise(TrialKind::Jumps, EXCEPTIONAL_SHARE, 0.2);
 }
 
-/// Limits of 1.0001 are so near 1 that an error within the accuracy turns a verdict in one machine
-/// of five.
+/// With limits as near 1 as 1.0001, an error within the accuracy changes a verdict of one machine
+/// in five.
 #[test]
 fn most_rows_of_micrometres_are_within_their_accuracy() {
-    holds(TrialKind::Tiny, 0.5, 0.3);
+    check_promise(TrialKind::Tiny, 0.5, 0.3);
 }

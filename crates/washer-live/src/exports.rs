@@ -137,7 +137,7 @@ pub extern "C" fn growth(values: usize) -> usize {
 /// Writes the largest attractor of a point of `values` numbers at the constant speeds (rpm) that
 /// follow it in the input. Output: the code; the speed at which the tub turns farthest (NaN if no
 /// attractor was found), the attractor's kind as an index into
-/// [`washer_model::Ending::KINDS`], and the largest deviation of each channel (m, rad).
+/// [`washer_model::Ending::KIND_NAMES`], and the largest deviation of each channel (m, rad).
 #[unsafe(no_mangle)]
 pub extern "C" fn dwell(values: usize) -> usize {
     answer(|setup, input, output| {

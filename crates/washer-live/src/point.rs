@@ -4,7 +4,7 @@ use lane_ode::{Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
     Channel, Disturbance, Dwell, Machine, Method, ModelKind, Point, Response, Spin, Start, Starts,
-    Target, Timing, endings, history, prepare, respond,
+    Target, Timing, find_endings, history, prepare, respond,
 };
 use washer_row::{
     Demand, Deviations, DwellPeaks, Level, LevelRun, Next, Outcome, RefinementLevels,
@@ -264,6 +264,6 @@ pub fn dwell(
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
     let carried = vec![None; dwells.len()];
-    let found = endings(Simd::best(), &dwells, &carried, &Starts::default(), &|| false);
+    let found = find_endings(Simd::best(), &dwells, &carried, &Starts::default(), &|| false);
     Ok(DwellPeaks::from_endings(speeds_rpm, &found))
 }

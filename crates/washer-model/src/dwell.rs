@@ -1,15 +1,15 @@
-//! What a machine held at a speed ends in: its motions, by trajectories from many starts.
+//! The attractors of a machine at a held speed, by trajectories from many starts.
 //!
-//! A search, not a proof: a motion that no start leads to is not found.
+//! This is a search, not a proof: a motion that no start leads to is not found.
 
-mod course;
 mod exponent;
-mod hold;
 mod lines;
 mod multipliers;
 mod starts;
 #[cfg(test)]
 mod tests;
+mod trajectory;
+mod turns;
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -17,39 +17,46 @@ use crate::run::model::{LaneModel, Nonlinear};
 use crate::stability::orbit::Row;
 use crate::stability::settings::{Case, Settings};
 use crate::{Dwell, Modes, NoAnswer, Reading, Recorders, Response, respond};
-use course::{BLOCK, Course, Need, WINDOW, are_alike};
-use exponent::exponents;
-use hold::{Held, hold, recorded};
+use exponent::compute_exponents;
 use lane_ode::Simd;
 use multipliers::{Orbit, growths_per_s};
 use starts::{
-    Directions, Kick, MODE_DIRECTIONS, directions, disturbed, is_from_rest, kicked, kicks,
+    Directions, Kick, MODE_DIRECTIONS, add_kick, is_from_rest, kick_directions, kicks, perturb,
     random_kicks,
 };
 use std::sync::Arc;
+use trajectory::{BLOCK, HeldTrajectory, Need, WINDOW, are_close};
+use turns::{HeldState, integrate_turns, record_turns};
 
 pub use exponent::Exponent;
 
-/// Motions are the same whose largest deviations agree to this share in all channels; chaotic ones,
-/// of which no two stretches agree, and those that have not settled, to the second. What has not
-/// settled is on its way to a motion that has, if they agree to the third.
-const SAME: f64 = 0.01;
-const SAME_ROUGHLY: f64 = 0.5;
-const SAME_NEARLY: f64 = 0.05;
+/// Maximum relative difference of the largest deviations of two settled motions that are the same
+/// one, in every channel. Doubling it may take two motions for one.
+const SETTLED_TOLERANCE: f64 = 0.01;
 
-/// Rounds in which the gap between a kick that comes back and one that does not is halved.
-const HALVINGS: usize = 5;
+/// Maximum relative difference of the largest deviations of two motions that are the same one and
+/// are both chaotic or not settled. Basis: two stretches of a chaotic motion differ by that much.
+/// Doubling it takes any two such motions for one.
+const CHAOS_TOLERANCE: f64 = 0.5;
 
-/// From where and for how long motions are looked for.
+/// Maximum relative difference of the largest deviations of a motion that has not settled and of a
+/// settled one that it approaches. Doubling it may take two motions for one.
+const UNSETTLED_TOLERANCE: f64 = 0.05;
+
+/// Number of bisections between a kick after which the machine returns and one after which it does
+/// not. Doubling it divides the width of the bracket by 32.
+const BISECTIONS: usize = 5;
+
+/// The starts of the trajectories at a held speed, and their length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Starts {
-    /// How many at least, the disturbed responses among them.
+    /// The number of starts, or that of the perturbed responses if it is greater.
     pub count: usize,
     /// The hardest kick (rad/s of the tub's rocking).
     pub kick_rad_per_s: f64,
-    /// How long a trajectory may take (s).
+    /// The maximum time of a trajectory (s).
     pub longest_s: f64,
-    /// Whether to look for the smallest kick that does not come back.
+    /// Whether to search for the smallest kick after which the machine does not return.
     pub with_threshold: bool,
     /// Further records of each motion.
     pub wanted: Recorders,
@@ -67,111 +74,125 @@ impl Default for Starts {
     }
 }
 
-/// How a trajectory ended.
+/// The outcome of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum State {
-    /// It settled.
+    /// The trajectory settled.
     Ok,
-    /// It went farther than the model is good for.
+    /// The trajectory left the range in which the model holds.
     LeftRange {
-        /// When, to a turn (s).
+        /// The time at which it did, to a turn (s).
         time_s: f64,
     },
-    /// It did not settle in time.
+    /// The trajectory did not settle within [`Starts::longest_s`].
     NotSettled,
-    /// It wandered as chaos does, but trajectories from its own states ended elsewhere.
+    /// The trajectory looked chaotic, but trajectories from its states ended in other motions.
     Transient {
-        /// Its mean life (s): the time that these trajectories took together, by the number of
-        /// those that ended.
+        /// The mean life (s): the total time of these trajectories over the number of those that
+        /// ended.
         life_s: f64,
     },
 }
 
-/// What a motion settled into.
+/// The kind of a settled motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settled {
-    /// It repeats.
+    /// A motion that repeats.
     Periodic {
-        /// After so many turns.
+        /// The period in turns of the drum.
         turns: u32,
     },
-    /// Two frequencies that no turn locks: states once a turn fill a closed curve.
+    /// A motion with a second frequency that is not locked to the drum's: states once a turn fill a
+    /// closed curve.
     QuasiPeriodic {
         /// The strongest line of these states, from 0 to half the drum's speed (cycles per
-        /// minute); the drum's speed less it is another.
+        /// minute). The drum's speed less this frequency is another one.
         frequency_cpm: f64,
     },
-    /// Neighbours part: the largest Lyapunov exponent is above 0 by three standard errors, and
-    /// trajectories from eight of its states stayed in it for 240 s.
+    /// A motion whose largest Lyapunov exponent is above 0 by three standard errors, and in which
+    /// trajectories from eight of its states stayed for 240 s.
     Chaotic,
 }
 
-/// A motion that a held speed ends in.
+/// A motion in which trajectories at a held speed end: an attractor, or the reason why none was
+/// reached.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending {
-    /// How its first trajectory ended.
+    /// The outcome of the first trajectory.
     pub state: State,
-    /// What it is, once it has settled.
+    /// The kind of the motion, if it has settled.
     pub settled: Option<Settled>,
-    /// How many starts ended in it; none where only a transient did.
+    /// The number of starts that ended in the motion; 0 if only transients did.
     pub starts: u32,
-    /// The smallest kick (rad/s) off the response that led to it: 0 where a disturbed response did,
-    /// none where only a kick of the machine at rest, a transient or a carried state did.
+    /// The smallest kick off the response that led to the motion (rad/s); 0 if a perturbed response
+    /// did, `None` if only a kick of the machine at rest, a transient or a carried state did.
     pub least_kick_rad_per_s: Option<f64>,
-    /// Largest deviation from equilibrium over its last turns (32 where it repeats, 128 with two
-    /// frequencies, else 256), in the order of [`Channel::ALL`](crate::Channel::ALL) (m, rad).
+    /// The largest deviations from equilibrium over the last turns (32 of a periodic motion, 128 of
+    /// one with two frequencies, else 256), in the order of
+    /// [`Channel::ALL`](crate::Channel::ALL) (m, rad).
     pub peaks: [f64; CHANNELS],
-    /// Least gap between drum and tub at the ends of steps of these turns (m).
+    /// The least gap between drum and tub at the ends of steps of these turns (m).
     pub min_gap_m: f64,
-    /// How fast neighbours part: of periodic motions by their multipliers, without an error; of
-    /// others by a perturbed run, where their spectrum does not say what they are.
+    /// The rate at which neighbouring trajectories separate: of periodic motions from their
+    /// multipliers, without an error; of others from a perturbed run, unless their spectrum shows
+    /// two frequencies.
     pub exponent: Option<Exponent>,
-    /// How long the trajectory was followed (s).
+    /// The length of the trajectory (s).
     pub time_s: f64,
-    /// Its last state where the unbalance is up: coordinates (m, rad), then their speeds (per s).
+    /// The last state at which the unbalance is up: coordinates (m, rad), then their speeds
+    /// (per s).
     pub end: [f64; STATES],
-    /// Such states, once a turn, of its last 256 turns at most; coordinates from equilibrium.
+    /// The states at which the unbalance is up, of at most the last 256 turns; coordinates are from
+    /// equilibrium.
     pub sections: Vec<[f64; STATES]>,
-    /// What [`Starts::wanted`] asks for, over 128 further turns.
+    /// The records of [`Starts::wanted`] over 128 further turns.
     pub extra: Reading,
 }
 
-/// What was found at a speed.
+/// The motions in which a machine ends at a held speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Endings {
-    /// The periodic responses: none where none was found, and the machine then starts from rest.
+    /// The periodic responses. If none was found, the machine starts from rest.
     pub responses: Vec<Response>,
-    /// The motions in the order in which starts led to them: the first is the one that the
-    /// disturbed periodic response ends in.
+    /// The motions in the order in which starts led to them: the first is that of the perturbed
+    /// periodic response.
     pub motions: Vec<Ending>,
-    /// How many starts there were.
+    /// The number of starts.
     pub starts: u32,
-    /// The smallest kick (rad/s) that does not come back to the first motion, of those that were
-    /// tried; none where all do, or it was not asked for.
+    /// The smallest tried kick (rad/s) after which the machine does not return to the first motion;
+    /// `None` if it always returns, or without [`Starts::with_threshold`].
     pub threshold_rad_per_s: Option<f64>,
 }
 
-/// Motions of some dwells, on lanes of `simd` at most. What is found of one does not depend on the
-/// others. Of the dwells whose place in `carried` has a state, that state alone is a start,
-/// disturbed as the responses are.
+/// Finds the motions in which machines end at held speeds, on lanes of `simd` or of a narrower
+/// instruction set. The results of a dwell do not depend on the other dwells. A dwell with a state
+/// in `carried` has that state, perturbed like a response, as its only start.
 ///
 /// # Errors
-/// Per dwell, [`NoAnswer`]. Once `is_stopped` says so, [`NoAnswer::Stopped`].
-pub fn endings(
+/// Returns [`NoAnswer`] for a dwell without an answer, and [`NoAnswer::Stopped`] once `is_stopped`
+/// returns true.
+pub fn find_endings(
     simd: Simd,
     dwells: &[Dwell<'_>],
     carried: &[Option<[f64; STATES]>],
     starts: &Starts,
     is_stopped: &dyn Fn() -> bool,
 ) -> Vec<Result<Endings, NoAnswer>> {
-    endings_beside(simd, dwells, respond(dwells, is_stopped), carried, starts, is_stopped)
+    find_endings_from_responses(
+        simd,
+        dwells,
+        respond(dwells, is_stopped),
+        carried,
+        starts,
+        is_stopped,
+    )
 }
 
-/// As [`endings`], of dwells whose periodic responses are known, as [`respond`] gives them.
+/// Finds motions like [`find_endings`], given the results of [`respond`] for these dwells.
 ///
 /// # Errors
-/// As there.
-pub fn endings_beside(
+/// Returns the errors of [`find_endings`].
+pub fn find_endings_from_responses(
     simd: Simd,
     dwells: &[Dwell<'_>],
     answers: Vec<Result<Vec<Response>, NoAnswer>>,
@@ -179,170 +200,176 @@ pub fn endings_beside(
     starts: &Starts,
     is_stopped: &dyn Fn() -> bool,
 ) -> Vec<Result<Endings, NoAnswer>> {
-    let mut hunts: Vec<Result<Hunt<'_>, NoAnswer>> = Vec::with_capacity(dwells.len());
+    let mut searches: Vec<Result<SpeedSearch<'_>, NoAnswer>> = Vec::with_capacity(dwells.len());
     let mut settings: Option<Settings<'_>> = None;
     for (k, (dwell, answer)) in dwells.iter().zip(answers).enumerate() {
-        let is_same = |of: &Settings<'_>| core::ptr::eq(of.point, dwell.point);
-        let settings = match settings.take().filter(is_same) {
+        // Dwells of the same point share its settings.
+        let is_same_point = |settings: &Settings<'_>| core::ptr::eq(settings.point, dwell.point);
+        let settings = match settings.take().filter(is_same_point) {
             Some(known) => settings.insert(known),
             None => settings.insert(Settings::new(dwell.point)),
         };
         let responses = match answer {
             Ok(responses) => responses,
             Err(NoAnswer::NoResponse) => Vec::new(),
-            Err(none) => {
-                hunts.push(Err(none));
+            Err(reason) => {
+                searches.push(Err(reason));
                 continue;
             }
         };
         let carried = carried.get(k).copied().flatten();
-        let hunt = |case| Hunt::new(case, responses, carried, starts);
-        hunts.push(settings.case(dwell.speed_rpm).map(hunt));
+        let search = |case| SpeedSearch::new(case, responses, carried, starts);
+        searches.push(settings.case(dwell.speed_rpm).map(search));
     }
-    let mut is_whole = finish(simd, &mut hunts, is_stopped);
-    for hunt in hunts.iter_mut().flatten() {
-        hunt.start_survivors();
+    let mut is_complete = run_to_end(simd, &mut searches, is_stopped);
+    for search in searches.iter_mut().flatten() {
+        search.start_survivors();
     }
-    is_whole = is_whole && finish(simd, &mut hunts, is_stopped);
-    for hunt in hunts.iter_mut().flatten() {
-        hunt.find_transients();
+    is_complete = is_complete && run_to_end(simd, &mut searches, is_stopped);
+    for search in searches.iter_mut().flatten() {
+        search.find_transients();
     }
     if starts.with_threshold {
-        for hunt in hunts.iter_mut().flatten() {
-            hunt.bracket();
+        for search in searches.iter_mut().flatten() {
+            search.find_brackets();
         }
-        for _ in 0..HALVINGS {
-            for hunt in hunts.iter_mut().flatten() {
-                hunt.halve();
+        for _ in 0..BISECTIONS {
+            for search in searches.iter_mut().flatten() {
+                search.start_at_midpoints();
             }
-            is_whole = is_whole && finish(simd, &mut hunts, is_stopped);
-            for hunt in hunts.iter_mut().flatten() {
-                hunt.narrow();
+            is_complete = is_complete && run_to_end(simd, &mut searches, is_stopped);
+            for search in searches.iter_mut().flatten() {
+                search.bisect_brackets();
             }
         }
     }
-    let found = hunts.into_iter().map(|hunt| match hunt {
-        Ok(hunt) if is_whole => Ok(hunt.found()),
+    let found = searches.into_iter().map(|search| match search {
+        Ok(search) if is_complete => Ok(search.into_endings()),
         Ok(_) => Err(NoAnswer::Stopped),
-        Err(none) => Err(none),
+        Err(reason) => Err(reason),
     });
     let mut found: Vec<Result<(Endings, Row<'_>), NoAnswer>> = found.collect();
     if starts.wanted.need_all_states() {
-        record(simd, found.iter_mut().flatten(), starts.wanted);
+        record_motions(simd, found.iter_mut().flatten(), starts.wanted);
     }
     found.into_iter().map(|found| found.map(|(endings, _)| endings)).collect()
 }
 
-/// Follows motions on, with further records.
-fn record<'a, 'f>(
+/// Integrates motions further, with the recorders of `wanted`.
+fn record_motions<'a, 'f>(
     simd: Simd,
     found: impl Iterator<Item = &'f mut (Endings, Row<'a>)>,
     wanted: Recorders,
 ) where
     'a: 'f,
 {
-    let (mut motions, mut held) = (Vec::new(), Vec::new());
+    let mut motions = Vec::new();
+    let mut held = Vec::new();
     for (endings, row) in found {
-        let within = |motion: &&mut Ending| !matches!(motion.state, State::LeftRange { .. });
-        for motion in endings.motions.iter_mut().filter(within) {
-            held.push(Held { row: *row, state: motion.end });
+        let is_in_range = |motion: &&mut Ending| !matches!(motion.state, State::LeftRange { .. });
+        for motion in endings.motions.iter_mut().filter(is_in_range) {
+            held.push(HeldState { row: *row, state: motion.end });
             motions.push(motion);
         }
     }
-    for (motion, (_, extra)) in motions.into_iter().zip(recorded(simd, &held, WINDOW, wanted)) {
+    for (motion, (_, extra)) in motions.into_iter().zip(record_turns(simd, &held, WINDOW, wanted)) {
         motion.extra = extra;
     }
 }
 
-/// Takes all trajectories to their ends, those of all hunts in lanes together. False if it was
-/// stopped.
-fn finish(
+/// Integrates the trajectories of all searches together until they end. Returns false if it was
+/// stopped before.
+fn run_to_end(
     simd: Simd,
-    hunts: &mut [Result<Hunt<'_>, NoAnswer>],
+    searches: &mut [Result<SpeedSearch<'_>, NoAnswer>],
     is_stopped: &dyn Fn() -> bool,
 ) -> bool {
     loop {
         if is_stopped() {
             return false;
         }
-        let mut running: Vec<&mut Course<'_>> = Vec::new();
-        let mut asking = Vec::new();
-        let mut twins = Vec::new();
-        let mut repeating: Vec<(&mut Course<'_>, u32)> = Vec::new();
+        let mut running: Vec<&mut HeldTrajectory<'_>> = Vec::new();
+        let mut perturbed = Vec::new();
+        let mut perturbations = Vec::new();
+        let mut repeating: Vec<(&mut HeldTrajectory<'_>, u32)> = Vec::new();
         let mut orbits: Vec<Orbit<'_, '_>> = Vec::new();
-        for hunt in hunts.iter_mut().flatten() {
-            let direction = hunt.directions[MODE_DIRECTIONS - 1];
-            let case = &hunt.case;
-            for course in &mut hunt.courses {
-                match course.need {
-                    Need::Turns => running.push(course),
+        for search in searches.iter_mut().flatten() {
+            let direction = search.directions[MODE_DIRECTIONS - 1];
+            let case = &search.case;
+            for trajectory in &mut search.trajectories {
+                match trajectory.need {
+                    Need::Turns => running.push(trajectory),
                     Need::Multipliers(period) => {
-                        orbits.push(Orbit { case, held: course.held, period });
-                        repeating.push((course, period));
+                        orbits.push(Orbit { case, held: trajectory.held, period });
+                        repeating.push((trajectory, period));
                     }
                     Need::Exponent => {
-                        twins.push((course.held, direction));
-                        asking.push(course);
+                        perturbations.push((trajectory.held, direction));
+                        perturbed.push(trajectory);
                     }
                     Need::Nothing => {}
                 }
             }
         }
-        if running.is_empty() && asking.is_empty() && repeating.is_empty() {
+        if running.is_empty() && perturbed.is_empty() && repeating.is_empty() {
             return true;
         }
         let growths = growths_per_s(&orbits, is_stopped);
-        for ((course, period), growth_per_s) in repeating.into_iter().zip(growths) {
-            course.take_growth(period, growth_per_s);
+        for ((trajectory, period), growth_per_s) in repeating.into_iter().zip(growths) {
+            trajectory.add_growth(period, growth_per_s);
         }
-        let held: Vec<Held<'_>> = running.iter().map(|course| course.held).collect();
-        for (course, turns) in running.into_iter().zip(hold(simd, &held, BLOCK)) {
-            course.take(turns);
+        let held: Vec<HeldState<'_>> = running.iter().map(|trajectory| trajectory.held).collect();
+        for (trajectory, turns) in running.into_iter().zip(integrate_turns(simd, &held, BLOCK)) {
+            trajectory.add_turns(turns);
         }
-        if !asking.is_empty() {
-            for (course, exponent) in asking.into_iter().zip(exponents(simd, &twins)) {
-                course.take_exponent(exponent);
+        if !perturbed.is_empty() {
+            let exponents = compute_exponents(simd, &perturbations);
+            for (trajectory, exponent) in perturbed.into_iter().zip(exponents) {
+                trajectory.add_exponent(exponent);
             }
         }
     }
 }
 
-/// From where a trajectory starts.
+/// The start of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Origin {
-    /// A periodic response, disturbed.
+    /// A perturbed periodic response.
     Response,
-    /// A periodic response, kicked.
+    /// A kick off the first periodic response.
     Kicked(Kick),
-    /// The machine at rest, kicked, whose drum is at speed at once.
+    /// A kick of the machine at rest, whose drum turns at the held speed at once.
     Rest,
-    /// The state that another speed ended in.
+    /// The final state at another speed.
     Carried,
     /// A state of another trajectory.
     Trajectory,
 }
 
-/// The search at one dwell.
-struct Hunt<'a> {
+/// The search for the motions of a machine at a held speed.
+struct SpeedSearch<'a> {
     case: Case<'a>,
     responses: Vec<Response>,
-    from: [f64; STATES],
+    /// The state that is kicked: the first response, or rest without responses.
+    kicked_state: [f64; STATES],
     directions: Directions,
     longest_s: f64,
-    courses: Vec<Course<'a>>,
-    /// The origin of each course.
+    trajectories: Vec<HeldTrajectory<'a>>,
+    /// The origin of each trajectory.
     origins: Vec<Origin>,
-    /// Courses that are starts; the others look for the threshold, or try whether chaos survives.
+    /// The number of trajectories from starts, which come first. Further ones search for the
+    /// threshold, or test whether chaos lasts.
     starts: usize,
-    /// The number of a chaotic course, and those of the courses from its states.
+    /// The index of a chaotic trajectory, and those of the trajectories from its states.
     survivors: Vec<(usize, core::ops::Range<usize>)>,
-    /// By direction along mode shapes, sizes of kicks that come back and that do not (rad/s).
+    /// The brackets of the threshold, by direction along mode shapes: the size of a kick after
+    /// which the machine returns, and of one after which it does not (rad/s).
     brackets: [Option<[f64; 2]>; MODE_DIRECTIONS],
-    /// The smallest kick in a random direction that does not come back (rad/s).
-    random_gone: Option<f64>,
+    /// The smallest kick in a random direction after which the machine does not return (rad/s).
+    random_threshold: Option<f64>,
 }
 
-impl<'a> Hunt<'a> {
+impl<'a> SpeedSearch<'a> {
     fn new(
         case: Case<'a>,
         responses: Vec<Response>,
@@ -352,179 +379,185 @@ impl<'a> Hunt<'a> {
         let point = case.row.point;
         let frozen: Arc<Modes> = Arc::clone(&case.frozen);
         let rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(point);
-        let from = responses.first().map_or(rest, |response| response.start);
+        let kicked_state = responses.first().map_or(rest, |response| response.start);
         let mut states: Vec<([f64; STATES], Origin)> = Vec::new();
-        let directions = directions(point, &frozen, random_kicks(starts.count));
+        let directions = kick_directions(point, &frozen, random_kicks(starts.count));
         if let Some(carried) = carried {
-            states.push((disturbed(point, &frozen, &carried), Origin::Carried));
+            states.push((perturb(point, &frozen, &carried), Origin::Carried));
         } else {
             let firsts = responses.iter().map(|response| response.start);
-            let firsts: Vec<_> = if responses.is_empty() { vec![from] } else { firsts.collect() };
-            let beside = |first| (disturbed(point, &frozen, first), Origin::Response);
-            states.extend(firsts.iter().map(beside));
+            let firsts: Vec<_> =
+                if responses.is_empty() { vec![kicked_state] } else { firsts.collect() };
+            let perturbed = |first| (perturb(point, &frozen, first), Origin::Response);
+            states.extend(firsts.iter().map(perturbed));
             let count = starts.count.saturating_sub(states.len());
             for kick in kicks(count, starts.kick_rad_per_s) {
-                let (off, origin) = match is_from_rest(kick) {
+                let (state, origin) = match is_from_rest(kick) {
                     true => (&rest, Origin::Rest),
-                    false => (&from, Origin::Kicked(kick)),
+                    false => (&kicked_state, Origin::Kicked(kick)),
                 };
-                states.push((kicked(off, &directions, kick), origin));
+                states.push((add_kick(state, &directions, kick), origin));
             }
         }
-        let mut hunt = Self {
+        let mut search = Self {
             case,
             responses,
-            from,
+            kicked_state,
             directions,
             longest_s: starts.longest_s,
-            courses: Vec::new(),
+            trajectories: Vec::new(),
             origins: Vec::new(),
             starts: states.len(),
             survivors: Vec::new(),
             brackets: [None; MODE_DIRECTIONS],
-            random_gone: None,
+            random_threshold: None,
         };
         for (state, origin) in states {
-            hunt.start(state, origin);
+            search.start(state, origin);
         }
-        hunt
+        search
     }
 
     fn start(&mut self, state: [f64; STATES], origin: Origin) {
-        let held = Held { row: self.case.row, state };
+        let held = HeldState { row: self.case.row, state };
         let grows = |response: &&Response| response.growth_per_s() > 0.0;
         let unstable = self.responses.iter().filter(grows);
-        let leaves = unstable.map(|response| vec![response.start]).collect();
-        self.courses.push(Course::new(held, leaves, self.longest_s));
+        let unstable_orbits = unstable.map(|response| vec![response.start]).collect();
+        self.trajectories.push(HeldTrajectory::new(held, unstable_orbits, self.longest_s));
         self.origins.push(origin);
     }
 
-    /// Starts trajectories from states of each chaotic motion that starts ended in.
+    /// Starts trajectories from the states of each chaotic motion.
     fn start_survivors(&mut self) {
         for chaotic in 0..self.starts {
-            if !self.courses[chaotic].is_chaotic() || self.survivors_of(chaotic).is_some() {
+            if !self.trajectories[chaotic].is_chaotic() || self.find_survivors(chaotic).is_some() {
                 continue;
             }
-            let first = self.courses.len();
-            let leaves = self.courses[chaotic].leaves().to_vec();
-            for state in self.courses[chaotic].own_states() {
-                let held = Held { row: self.case.row, state };
-                self.courses.push(Course::survivor(held, leaves.clone()));
+            let first = self.trajectories.len();
+            let unstable_orbits = self.trajectories[chaotic].unstable_orbits().to_vec();
+            for state in self.trajectories[chaotic].recent_states() {
+                let held = HeldState { row: self.case.row, state };
+                self.trajectories.push(HeldTrajectory::survivor(held, unstable_orbits.clone()));
                 self.origins.push(Origin::Trajectory);
             }
-            self.survivors.push((chaotic, first..self.courses.len()));
+            self.survivors.push((chaotic, first..self.trajectories.len()));
         }
     }
 
-    /// Returns the trajectories from states of the motion that a course is in.
-    fn survivors_of(&self, course: usize) -> Option<core::ops::Range<usize>> {
-        let ending = self.courses[course].ending();
-        let of_same = |(other, _): &&(usize, core::ops::Range<usize>)| {
-            are_same(&self.courses[*other].ending(), &ending)
+    /// Returns the trajectories that started from states of a trajectory's motion.
+    fn find_survivors(&self, trajectory: usize) -> Option<core::ops::Range<usize>> {
+        let ending = self.trajectories[trajectory].ending();
+        let is_same_motion = |(other, _): &&(usize, core::ops::Range<usize>)| {
+            are_same(&self.trajectories[*other].ending(), &ending)
         };
-        self.survivors.iter().find(of_same).map(|(_, survivors)| survivors.clone())
+        self.survivors.iter().find(is_same_motion).map(|(_, survivors)| survivors.clone())
     }
 
-    /// Calls what is chaotic a transient where one of the trajectories from its states ended
-    /// elsewhere.
+    /// Marks chaotic motions as transients if one of the trajectories from their states ended in
+    /// another motion.
     fn find_transients(&mut self) {
         let mut lives: Vec<(usize, f64)> = Vec::new();
-        for chaotic in (0..self.starts).filter(|&course| self.courses[course].is_chaotic()) {
-            let Some(survivors) = self.survivors_of(chaotic) else { continue };
-            let survivors = &self.courses[survivors];
-            let ended = survivors.iter().filter(|course| course.has_ended()).count();
+        for chaotic in (0..self.starts).filter(|&start| self.trajectories[start].is_chaotic()) {
+            let Some(survivors) = self.find_survivors(chaotic) else { continue };
+            let survivors = &self.trajectories[survivors];
+            let ended = survivors.iter().filter(|trajectory| trajectory.has_ended()).count();
             if ended > 0 {
-                let time_s: f64 = survivors.iter().map(Course::time_s).sum();
+                let time_s: f64 = survivors.iter().map(HeldTrajectory::time_s).sum();
                 lives.push((chaotic, time_s / ended as f64));
             }
         }
-        for (course, life_s) in lives {
-            self.courses[course].call_transient(life_s);
+        for (trajectory, life_s) in lives {
+            self.trajectories[trajectory].mark_transient(life_s);
         }
     }
 
-    /// Whether a course ended where the first one did.
-    fn comes_back(&self, course: usize) -> bool {
-        are_same(&self.courses[0].ending(), &self.courses[course].ending())
+    /// Whether a trajectory ended in the motion of the first one.
+    fn returns(&self, trajectory: usize) -> bool {
+        are_same(&self.trajectories[0].ending(), &self.trajectories[trajectory].ending())
     }
 
-    /// Of every direction the kicks between which some stop coming back.
-    fn bracket(&mut self) {
-        for (course, origin) in self.origins.iter().enumerate() {
+    /// Brackets the threshold in every direction along mode shapes, and finds the smallest random
+    /// kick after which the machine does not return.
+    fn find_brackets(&mut self) {
+        for (trajectory, origin) in self.origins.iter().enumerate() {
             if let Origin::Kicked((direction, size)) = *origin
                 && direction >= MODE_DIRECTIONS
-                && !self.comes_back(course)
+                && !self.returns(trajectory)
             {
-                self.random_gone = Some(self.random_gone.map_or(size, |least| least.min(size)));
+                let least = self.random_threshold.map_or(size, |least| least.min(size));
+                self.random_threshold = Some(least);
             }
         }
         for direction in 0..MODE_DIRECTIONS {
             let mut kicks: Vec<(f64, bool)> = Vec::new();
-            for (course, origin) in self.origins.iter().enumerate() {
-                if let Origin::Kicked((of, size)) = *origin
-                    && of == direction
+            for (trajectory, origin) in self.origins.iter().enumerate() {
+                if let Origin::Kicked((kick_direction, size)) = *origin
+                    && kick_direction == direction
                 {
-                    kicks.push((size, self.comes_back(course)));
+                    kicks.push((size, self.returns(trajectory)));
                 }
             }
             kicks.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let gone = kicks.iter().position(|(_, comes_back)| !comes_back);
-            self.brackets[direction] = gone.map(|gone| {
-                let back = gone.checked_sub(1).map_or(0.0, |back| kicks[back].0);
-                [back, kicks[gone].0]
+            let above = kicks.iter().position(|(_, returns)| !returns);
+            self.brackets[direction] = above.map(|above| {
+                let below = above.checked_sub(1).map_or(0.0, |below| kicks[below].0);
+                [below, kicks[above].0]
             });
         }
     }
 
-    /// Starts in the middle of the brackets.
-    fn halve(&mut self) {
+    /// Starts a trajectory at the midpoint of each bracket.
+    fn start_at_midpoints(&mut self) {
         for direction in 0..MODE_DIRECTIONS {
-            if let Some([back, gone]) = self.brackets[direction] {
-                let kick = (direction, 0.5 * (back + gone));
-                self.start(kicked(&self.from, &self.directions, kick), Origin::Kicked(kick));
+            if let Some([below, above]) = self.brackets[direction] {
+                let kick = (direction, 0.5 * (below + above));
+                let state = add_kick(&self.kicked_state, &self.directions, kick);
+                self.start(state, Origin::Kicked(kick));
             }
         }
     }
 
-    /// Halves the brackets by what came of their middles.
-    fn narrow(&mut self) {
-        let asked = self.brackets.iter().flatten().count();
-        for course in self.courses.len() - asked..self.courses.len() {
-            let comes_back = self.comes_back(course);
-            if let Origin::Kicked((direction, size)) = self.origins[course]
+    /// Halves the brackets by the outcomes of the trajectories from their midpoints.
+    fn bisect_brackets(&mut self) {
+        let midpoints = self.brackets.iter().flatten().count();
+        for trajectory in self.trajectories.len() - midpoints..self.trajectories.len() {
+            let returns = self.returns(trajectory);
+            if let Origin::Kicked((direction, size)) = self.origins[trajectory]
                 && let Some(bracket) = &mut self.brackets[direction]
             {
-                bracket[usize::from(!comes_back)] = size;
+                bracket[usize::from(!returns)] = size;
             }
         }
     }
 
-    fn found(self) -> (Endings, Row<'a>) {
+    fn into_endings(self) -> (Endings, Row<'a>) {
         let mut motions: Vec<Ending> = Vec::new();
-        for (course, origin) in self.courses[..self.starts].iter().zip(&self.origins) {
-            let mut ending = course.ending();
+        for (trajectory, origin) in self.trajectories[..self.starts].iter().zip(&self.origins) {
+            let mut ending = trajectory.ending();
             ending.least_kick_rad_per_s = match origin {
                 Origin::Response => Some(0.0),
                 Origin::Kicked((_, size)) => Some(*size),
                 Origin::Rest | Origin::Carried | Origin::Trajectory => None,
             };
             match motions.iter_mut().find(|motion| are_same(motion, &ending)) {
-                Some(known) => known.also(&ending),
+                Some(known) => known.merge(&ending),
                 None => motions.push(ending),
             }
         }
         let ends_of_transients = self.survivors.iter().flat_map(|(_, survivors)| survivors.clone());
-        for course in ends_of_transients.filter(|&course| self.courses[course].has_ended()) {
-            let ending = Ending { starts: 0, ..self.courses[course].ending() };
+        for trajectory in
+            ends_of_transients.filter(|&trajectory| self.trajectories[trajectory].has_ended())
+        {
+            let ending = Ending { starts: 0, ..self.trajectories[trajectory].ending() };
             if !motions.iter().any(|motion| are_same(motion, &ending)) {
                 motions.push(ending);
             }
         }
-        let gone = self.brackets.iter().flatten().map(|[_, gone]| *gone).chain(self.random_gone);
+        let mode_thresholds = self.brackets.iter().flatten().map(|[_, above]| *above);
         let endings = Endings {
             motions,
             starts: self.starts as u32,
-            threshold_rad_per_s: gone.reduce(f64::min),
+            threshold_rad_per_s: mode_thresholds.chain(self.random_threshold).reduce(f64::min),
             responses: self.responses,
         };
         (endings, self.case.row)
@@ -538,28 +571,29 @@ fn are_same(a: &Ending, b: &Ending) -> bool {
         (State::LeftRange { .. }, _) | (_, State::LeftRange { .. }) => return false,
         _ => {}
     }
-    let is_rough = |of: &Ending| matches!(of.settled, None | Some(Settled::Chaotic));
-    let share = match (a.settled, b.settled) {
-        _ if is_rough(a) && is_rough(b) => SAME_ROUGHLY,
-        (None, _) | (_, None) => SAME_NEARLY,
-        _ => SAME,
+    let is_irregular = |ending: &Ending| matches!(ending.settled, None | Some(Settled::Chaotic));
+    let tolerance = match (a.settled, b.settled) {
+        _ if is_irregular(a) && is_irregular(b) => CHAOS_TOLERANCE,
+        (None, _) | (_, None) => UNSETTLED_TOLERANCE,
+        _ => SETTLED_TOLERANCE,
     };
-    are_alike(&a.peaks, &b.peaks, share)
+    are_close(&a.peaks, &b.peaks, tolerance)
 }
 
 impl Endings {
-    /// Whether a motion's largest deviations are about those of a periodic response: what has not
-    /// settled there comes to it or leaves it slowly.
+    /// Whether the largest deviations of a motion are near those of a periodic response. A motion
+    /// that has not settled there approaches or leaves the response slowly.
     pub fn is_near_response(&self, motion: &Ending) -> bool {
-        let near =
-            |response: &Response| are_alike(&motion.peaks, &response.nonlinear, SAME_ROUGHLY);
-        self.responses.iter().any(near)
+        let is_near =
+            |response: &Response| are_close(&motion.peaks, &response.nonlinear, CHAOS_TOLERANCE);
+        self.responses.iter().any(is_near)
     }
 }
 
 impl Ending {
-    /// What motions are, by name: in words what they do once a turn, then why that is not known.
-    pub const KINDS: [&str; 8] = [
+    /// The names of the kinds of motions: first those of settled motions, then the reasons why a
+    /// kind is not known.
+    pub const KIND_NAMES: [&str; 8] = [
         "periodic",
         "periodic_2",
         "periodic_m",
@@ -570,7 +604,7 @@ impl Ending {
         "not_settled",
     ];
 
-    /// Its position in [`Self::KINDS`].
+    /// Returns the index of the motion's kind in [`Self::KIND_NAMES`].
     pub fn kind(&self) -> usize {
         match (self.settled, self.state) {
             (Some(Settled::Periodic { turns }), _) => (turns as usize).min(3) - 1,
@@ -582,9 +616,9 @@ impl Ending {
         }
     }
 
-    /// Another start ended here. Of chaotic motions, and of what has not settled, the largest
-    /// deviations are those of all starts.
-    fn also(&mut self, other: &Self) {
+    /// Adds another start that ended in this motion. The largest deviations of motions that are
+    /// chaotic or have not settled are those of all their starts.
+    fn merge(&mut self, other: &Self) {
         let starts = self.starts + 1;
         let kicks = [self.least_kick_rad_per_s, other.least_kick_rad_per_s];
         let least_kick_rad_per_s = kicks.into_iter().flatten().reduce(f64::min);

@@ -79,7 +79,9 @@ mod steps;
 
 pub use channel::Channel;
 pub use coordinates::COORDINATES;
-pub use dwell::{Ending, Endings, Exponent, Settled, Starts, State, endings, endings_beside};
+pub use dwell::{
+    Ending, Endings, Exponent, Settled, Starts, State, find_endings, find_endings_from_responses,
+};
 pub use kind::ModelKind;
 pub use linear::Matrices;
 pub use machine::parameters::{

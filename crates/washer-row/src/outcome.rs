@@ -133,7 +133,7 @@ pub struct DwellPeaks {
     /// The speed (rpm) at which the tub has the greatest yaw or pitch.
     pub speed_rpm: f64,
     /// The kind of the attractor with the greatest yaw or pitch: the position in
-    /// [`washer_model::Ending::KINDS`].
+    /// [`washer_model::Ending::KIND_NAMES`].
     pub kind: usize,
 }
 

@@ -41,8 +41,8 @@ pub struct BoundaryOptions {
     /// fraction of its value [default: 1/480 of the range]
     #[arg(long, value_name = "WIDTH")]
     pub tolerance: Option<f64>,
-    /// Cells along each axis of the lattice that guards against islands: the finer, the smaller the
-    /// island it cannot miss, and the more points it takes
+    /// Number of cells along each axis of the lattice that finds islands: a finer lattice finds
+    /// smaller islands and takes more points
     #[arg(long, value_name = "CELLS", default_value_t = 6)]
     #[arg(value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub lattice: u16,

@@ -31,21 +31,20 @@ pub struct Args {
     /// Threads and progress.
     #[command(flatten)]
     pub effort: EffortArgs,
-    /// Start over, even if the boundary is there or another plan was begun
+    /// Start over, even if the boundary exists or the search of another plan has started
     #[arg(long)]
     pub fresh: bool,
 }
 
 /// The text that `--help` adds.
 const LONG: &str = "\
-For each value of the first axis, the places along the second where the quantity passes its \
-limit, each with the bracket it is known to lie in. Where there is no such place, or the quantity \
-leaps over its limit, the file says so and gives no number. The least and greatest value of the \
-second axis are the range, however it is written. Axes beyond the second give one curve for every \
-combination of their values.
+For each value of the first axis, the file has the crossings of the limit along the second axis, \
+each with its bracket. If there is no crossing, or the quantity jumps over its limit, the file \
+says so and has no number. The range of the search is from the least to the greatest value of the \
+second axis. Further axes give one curve for every combination of their values.
 
-The file is a pure function of its input, whatever the number of threads and interruptions. What \
-an interrupted search has found out stays in FILE.partial, and the same command goes on from \
+The file is a pure function of its input, whatever the number of threads and interruptions. An \
+interrupted search leaves its evaluations in FILE.partial, and the same command continues from \
 there.";
 
 /// Traces the boundary of a grid.
@@ -153,16 +152,15 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
             false => plan.axes.get(1).map_or("", |axis| axis.parameter.unit()),
         };
         let widest = short(widest);
-        let asked = short(search.tolerance);
-        let told = format!("at most {widest} {unit} wide (asked: {asked})");
-        text.line("brackets", told);
+        let tolerance = short(search.tolerance);
+        text.line("brackets", format!("at most {widest} {unit} wide (tolerance: {tolerance})"));
     }
     let cell = task.cell().into_iter().zip(&plan.axes);
     let cell: Vec<String> =
         cell.map(|(size, axis)| format!("{size:.3} {}", axis.parameter.unit())).collect();
     let cell = cell.join(" by ");
-    let told = format!("every island of {cell}; smaller ones may be missed (--lattice)");
-    text.line("promises", told);
+    let found = format!("of {cell} or more are found; smaller ones may be missed (--lattice)");
+    text.line("islands", found);
     text
 }
 

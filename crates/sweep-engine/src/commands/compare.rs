@@ -26,42 +26,42 @@ pub struct Args {
     /// The result to compare with: a map, a boundary, or any other Parquet file of this program
     #[arg(value_name = "A")]
     first: PathBuf,
-    /// The result that is compared
+    /// The result that is compared with it
     #[arg(value_name = "B")]
     second: PathBuf,
-    /// Print what differs as JSON
+    /// Print the differences as JSON
     #[arg(long, conflicts_with = "markdown")]
     json: bool,
-    /// Print it as Markdown, for the summary of a CI job
+    /// Print the differences as Markdown, for the summary of a CI job
     #[arg(long)]
     markdown: bool,
     /// Write the differences of maps, row by row, to a Parquet file that `sweep plot` draws
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Exit with 4 if this differs: any, plan, flips, lost, sensitive, rows, ratio=PART, gap=M,
-    /// boundary=WIDTH or COLUMN=CHANGE; may be repeated
+    /// Exit with 4 on such a difference: any, plan, flips, lost, sensitive, rows, ratio=PART,
+    /// gap=M, boundary=WIDTH or COLUMN=CHANGE; may be repeated
     #[arg(long, value_name = "WHAT", value_parser = str::parse::<FailOn>)]
     fail_on: Vec<FailOn>,
-    /// Show at most this many rows of each kind
+    /// Maximum number of rows shown of each kind
     #[arg(long, value_name = "N", default_value_t = 5)]
     rows: u16,
 }
 
 /// What `--help` adds.
 const LONG: &str = "\
-Rows are the same where the axes have the same values, to nine digits; rows of only one file are \
-counted. An axis that only one file has is left out if it has a single value. Files of different \
-kinds, or that share no row, are refused.
+Two rows are compared if their axes have the same values to nine digits; rows of only one file \
+are counted. An axis that only one file has is ignored if it has a single value. Files of \
+different kinds, and files without a common row, are refused.
 
 A sensitive row is chaotic: its digits, and perhaps its verdict, are those of one trajectory. Such \
-rows are shown apart, and only `any` and `sensitive` look at them.
+rows are shown separately, and only `any` and `sensitive` apply to them.
 
-What --fail-on takes:
-  any             anything at all differs
+Values of --fail-on:
+  any             anything differs
   plan            parameters, spin, method or version
   rows            a row is in one file only
   flips           a verdict differs, in a row that is not sensitive
-  lost            a reliable row is so no more, and not sensitive
+  lost            a row is reliable in the first file only, and not sensitive
   sensitive       a verdict differs, in a sensitive row
   ratio=0.05      a ratio changed by more than 5 % either way, or is in one file only
   gap=0.001       a least gap changed by more than 1 mm, or is in one file only

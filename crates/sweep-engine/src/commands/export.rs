@@ -13,9 +13,9 @@ pub struct Args {
     /// A result, trace, modes or boundary file, or any other Parquet file of this program
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// File to write; the ending says the format
+    /// File to write; its extension selects the format
     #[arg(value_name = "OUT", required_unless_present = "output")]
-    #[arg(help = format!("File to write; the ending {} says the format", endings()))]
+    #[arg(help = format!("File to write; its extension {} selects the format", endings()))]
     out: Option<PathBuf>,
 
     /// File to write, as an option instead of the second argument
@@ -24,7 +24,7 @@ pub struct Args {
 }
 
 impl Args {
-    /// Returns the file to write, which the command line requires in one of two places.
+    /// Returns the file to write, which is either an argument or an option.
     fn to_write(&self) -> &Path {
         self.out.as_ref().or(self.output.as_ref()).expect("required")
     }

@@ -12,18 +12,18 @@ pub struct GridArgs {
     /// Grid file
     #[arg(value_name = "GRID.toml")]
     pub grid: PathBuf,
-    /// Set a constant, over those of the grid file, or an axis, which sweeps nothing then; may be
+    /// Set a constant, in place of the grid file's value, or fix an axis at a value; may be
     /// repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub sets: Vec<String>,
-    /// The point, on the grid or between its points: a value for an axis, which sweeps nothing
-    /// then, and for any other parameter; may be repeated
+    /// Fix an axis at a value, on the grid or between its points, or set any other parameter; may
+    /// be repeated
     #[arg(long, value_name = "NAME=VALUE")]
     pub at: Vec<String>,
-    /// Call a ratio below this reliable, over the grid file's limit
+    /// Ratio below which a point is reliable, in place of the grid file's limit
     #[arg(long, value_name = "RATIO")]
     pub ratio_limit: Option<f64>,
-    /// Name of the run, over the grid file's: a result's default file, and what figures say
+    /// Name of the run, in place of the grid file's: it names the result file and titles figures
     #[arg(long, value_name = "NAME", value_parser = config::plain_name)]
     pub name: Option<String>,
 }

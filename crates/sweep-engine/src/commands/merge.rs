@@ -25,14 +25,14 @@ pub struct Args {
 /// its end.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
-    of_job(args, &plan.name, &Job::of(&plan), &args.target.output(&plan))
+    merge_job(args, &plan.name, &Job::of(&plan), &args.target.output(&plan))
 }
 
 /// Joins what the shards of a job have left.
 ///
 /// # Errors
-/// As [`run`].
-pub fn of_job(args: &Args, name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
+/// The errors of [`run`].
+pub fn merge_job(args: &Args, name: &str, job: &Job<'_>, output: &Path) -> Result<Exit, Error> {
     let interrupt = installed()?;
     let mut run = match OpenRun::open_for_merge(output, job)? {
         Opened::Open(run) => run,

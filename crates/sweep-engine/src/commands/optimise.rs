@@ -23,8 +23,8 @@ pub struct Args {
     /// Study file
     #[arg(value_name = "STUDY.toml")]
     study: PathBuf,
-    /// Set a constant of the grid file that the study names, or an axis of it, which sweeps nothing
-    /// then; may be repeated
+    /// Set a constant of the grid file that the study names, or fix an axis of it at a value; may
+    /// be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     sets: Vec<String>,
     /// File of all candidates [default: results/NAME.parquet]
@@ -33,12 +33,12 @@ pub struct Args {
     /// Write the model's own file (the file that its grids name) of the best candidate
     #[arg(long, value_name = "FILE")]
     best: Option<PathBuf>,
-    /// With --best: of this candidate instead
+    /// With --best: write the file of this candidate instead
     #[arg(long, value_name = "N", requires = "best")]
     candidate: Option<u64>,
     #[command(flatten)]
     effort: EffortArgs,
-    /// Start over, even if the file is there or another study was begun
+    /// Start over, even if the file exists or another study has started
     #[arg(long)]
     fresh: bool,
 }
@@ -46,14 +46,15 @@ pub struct Args {
 /// What `--help` adds.
 const LONG: &str = "\
 A study names a grid file, numbers to minimise or maximise, parameters with bounds, and \
-conditions as `sweep require` takes them. Every candidate is tried at all points of the grid. \
+conditions as in `sweep require`. Every candidate is evaluated at all points of the grid. \
 docs/optimise.md describes study files.
 
-Of several objectives the front is looked for: the candidates that no other beats in all of them. \
-The best is then the one of them that is nearest to the least of each.
+With several objectives the search finds the Pareto front: the candidates that no other one \
+dominates. The best candidate is the one nearest to the least value of each objective.
 
-The file is a pure function of its input, whatever the number of threads and interruptions. What \
-an interrupted search has found out stays in FILE.partial, and the same command goes on there.";
+The file is a pure function of its input, whatever the number of threads and interruptions. An \
+interrupted search leaves its evaluations in FILE.partial, and the same command continues from \
+there.";
 
 /// Most candidates that the summary lists.
 const LISTED: usize = 12;

@@ -10,7 +10,7 @@ use crate::{Error, Exit, GridInput, Listed, Swept, show};
 /// Arguments of `sweep parameters`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Grid file that gives the values; without it those that need none
+    /// Grid file whose values are listed; without it only values that need no grid have one
     #[arg(value_name = "GRID.toml")]
     grid: Option<PathBuf>,
     /// Print JSON

@@ -18,22 +18,22 @@ pub struct Args<V: ValueEnum + Send + Sync + 'static = DesignView> {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
-    /// Figure to write; the ending .svg, .pdf, .png or .html says how [default: FILE with .svg]
+    /// Figure to write; its extension .svg, .pdf, .png or .html selects the format [default: FILE
+    /// with .svg]
     #[arg(short, long, visible_alias = "out", value_name = "IMAGE")]
     pub output: Option<PathBuf>,
 
-    /// Which of a file's figures, where it has several [default: the first]; a page of a design
-    /// has all three
+    /// Figure to draw, if a file has several [default: the first]; a page of a design has all three
     #[arg(long, value_enum)]
     pub view: Option<V>,
 
-    /// Map: the column that the colours show, or `status`; over one axis again for more of them.
+    /// Map: the column that the colours show, or `status`; over a single axis it may be repeated.
     /// Design: the column over the parameters [default: ratio_max]
     #[arg(long, value_name = "COLUMN")]
     pub quantity: Vec<String>,
 
-    /// Map of three or more axes: cut an axis beyond the second at this value. Other files with
-    /// points: show those at this value
+    /// Map of three or more axes: cut an axis beyond the second at this value. Other files: show
+    /// only the points at this value
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     pub at: Vec<(String, f64)>,
 

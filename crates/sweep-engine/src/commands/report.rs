@@ -28,7 +28,7 @@ pub struct Args {
     /// The question that the page answers
     #[arg(long, value_name = "TEXT", default_value = "Where can the linear model be trusted?")]
     question: String,
-    /// What must hold, as `sweep require` takes it; may be repeated
+    /// Condition on the result, as in `sweep require`; may be repeated
     #[arg(long = "require", value_name = "EXPRESSION")]
     requirements: Vec<String>,
 }

@@ -19,20 +19,20 @@ pub struct Args {
     /// A result of `sweep run`, or any other Parquet file of this program
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// What must hold: of every row, or of the file as a whole
+    /// Condition on every row, or on the file as a whole
     #[arg(value_name = "EXPRESSION", required = true)]
     expressions: Vec<String>,
     /// Check only the rows for which this expression is true
     #[arg(long = "where", value_name = "EXPRESSION")]
     keep: Option<String>,
-    /// Let rows pass where an expression is neither true nor false because a value is missing, and
-    /// let functions over all rows leave them out
+    /// Accept rows for which an expression is neither true nor false because a value is missing,
+    /// and skip them in functions over all rows
     #[arg(long)]
     allow_null: bool,
-    /// Show at most this many offending rows of each expression, the worst first
+    /// Maximum number of violating rows shown for each expression, the worst first
     #[arg(long, value_name = "N", default_value_t = 10)]
     rows: u16,
-    /// Print what came of each expression as JSON
+    /// Print the result of each expression as JSON
     #[arg(long)]
     json: bool,
 }

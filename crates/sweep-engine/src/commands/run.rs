@@ -31,12 +31,12 @@ pub struct WorkArgs {
     /// Its threads and progress.
     #[command(flatten)]
     pub effort: EffortArgs,
-    /// Compute one of N equal shards only, to be joined by `sweep merge`; `auto/N` takes the place
+    /// Compute only one of N equal shards, which `sweep merge` joins; `auto/N` takes the number
     /// from SLURM_ARRAY_TASK_ID or JOB_COMPLETION_INDEX. In a Slurm array the default is that
-    /// array's task and count (--shard 1/1 is the whole)
+    /// array's task and count (--shard 1/1 computes the whole)
     #[arg(long, value_name = "I/N")]
     pub shard: Option<ShardRequest>,
-    /// Start over, even if the result is there or another plan was begun
+    /// Start over, even if the result exists or a run of another plan has started
     #[arg(long)]
     pub fresh: bool,
     /// Exit with 3 if any row failed
@@ -167,7 +167,7 @@ impl RunCommand<'_> {
 
     /// What came of the run, in at most twelve lines.
     fn summary(&self, report: &RunReport, finished: Finished<'_>) -> Result<String, Error> {
-        let Self { name, rows, target, options: [own, of_merge], .. } = self;
+        let Self { name, rows, target, options: [own, merge_options], .. } = self;
         let session = report.session.as_ref();
         let work = session.map(work).unwrap_or_default();
         let mut text;
@@ -186,7 +186,7 @@ impl RunCommand<'_> {
                 if let Some(failed) = failed_words(by_status) {
                     text.line("failed", failed);
                 }
-                let merge = target.command("merge") + of_merge;
+                let merge = target.command("merge") + merge_options;
                 text.line("next", format!("{merge}, when all shards are done"));
             }
             Ended::Interrupted { kept, points, .. } => {

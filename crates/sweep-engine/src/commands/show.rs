@@ -23,34 +23,34 @@ const MOST_LISTED: usize = 12;
 /// Arguments of `sweep show`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A result, trace, modes, stability or boundary file; of one that is not finished, how far it
-    /// is
+    /// A result, trace, modes, stability or boundary file; of an unfinished one the progress is
+    /// shown
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Show this many rows, and no summary [default: 10 with --by or --where]
+    /// Show this many rows, without a summary [default: 10 with --by or --where]
     #[arg(long, value_name = "N")]
     top: Option<u16>,
-    /// Order the rows by this column, the worst first, or the greatest of a column that is not bad
-    /// either way [default: file order]
+    /// Sort the rows by this column, the worst value first; a column without a bad direction is
+    /// sorted from the greatest [default: file order]
     #[arg(long, value_name = "COLUMN")]
     by: Option<String>,
-    /// Order them from the least
+    /// Sort the rows from the least value
     #[arg(long, requires = "by")]
     ascending: bool,
-    /// Order them from the greatest
+    /// Sort the rows from the greatest value
     #[arg(long, requires = "by", conflicts_with = "ascending")]
     descending: bool,
-    /// Show only rows for which this expression is true, as `sweep require` takes them
+    /// Show only rows for which this expression is true (expressions as in `sweep require`)
     #[arg(long = "where", value_name = "EXPRESSION")]
     keep: Option<String>,
-    /// Columns of the rows, separated by commas [default: the axes, the verdict, and what is asked
-    /// for]
+    /// Columns of the rows, separated by commas [default: the axes, the verdict, and the columns of
+    /// the other options]
     #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
     columns: Vec<String>,
     /// Show the unit and range of every column, not only of the metrics
     #[arg(long, conflicts_with_all = ["top", "by", "keep", "columns", "json"])]
     all: bool,
-    /// Print it as JSON, with every column
+    /// Print the summary or the rows as JSON, with every column
     #[arg(long)]
     json: bool,
 }

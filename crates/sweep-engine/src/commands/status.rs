@@ -14,7 +14,7 @@ pub struct Args {
     #[command(flatten)]
     /// The run.
     pub target: ResultArgs,
-    /// Print it as JSON
+    /// Print the progress as JSON
     #[arg(long)]
     json: bool,
 }
@@ -25,20 +25,25 @@ pub struct Args {
 /// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
-    of_job(args, &Job::of(&plan), &args.target.output(&plan), ["run", "", ""])
+    show_job(args, &Job::of(&plan), &args.target.output(&plan), ["run", "", ""])
 }
 
-/// Shows the progress of a job on its output. `again` is the command that goes on with it, what
-/// stands behind its arguments, and what behind those of `merge`.
+/// Shows the progress of a job. `again` has the command that continues it, further options of that
+/// command, and further options of `merge`.
 ///
 /// # Errors
-/// As [`run`].
-pub fn of_job(args: &Args, job: &Job<'_>, output: &Path, again: [&str; 3]) -> Result<Exit, Error> {
+/// The errors of [`run`].
+pub fn show_job(
+    args: &Args,
+    job: &Job<'_>,
+    output: &Path,
+    again: [&str; 3],
+) -> Result<Exit, Error> {
     let found = status(output, job)?;
     show(&if args.json { format!("{:#}\n", json!(found)) } else { summary(args, &found, again) })
 }
 
-fn summary(args: &Args, found: &FolderStatus, [verb, own, of_merge]: [&str; 3]) -> String {
+fn summary(args: &Args, found: &FolderStatus, [verb, own, merge_options]: [&str; 3]) -> String {
     let mut text = String::new();
     let state = match found.state {
         State::NotStarted => "not started",
@@ -78,7 +83,7 @@ fn summary(args: &Args, found: &FolderStatus, [verb, own, of_merge]: [&str; 3]) 
         }
     }
     let next = match found.state {
-        State::Complete => args.target.command("merge") + of_merge,
+        State::Complete => args.target.command("merge") + merge_options,
         _ => args.target.command(verb) + own,
     };
     if found.running.is_empty() && (found.shards.is_none() || found.state == State::Complete) {

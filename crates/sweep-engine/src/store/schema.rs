@@ -103,10 +103,10 @@ pub struct Done {
 }
 
 impl Layout {
-    /// Of a map: a row a point.
-    pub fn of_map(axes: Vec<Column>, columns: Vec<Column>) -> Self {
-        let (kind, metadata) = (FileKind::Map, Vec::new());
-        Self { axes, columns, kind, rows_a_point: 1, has_several: false, metadata }
+    /// Returns the layout of a map, which has one row for each point.
+    pub fn map(axes: Vec<Column>, columns: Vec<Column>) -> Self {
+        let kind = FileKind::Map;
+        Self { axes, columns, kind, rows_a_point: 1, has_several: false, metadata: Vec::new() }
     }
 }
 

@@ -257,7 +257,7 @@ function createMap(host, data, panel) {
       // The digits are those of the value if no step of the axis decides on them.
       ...(counts.sensitive[point] ? [element("p", {}, `The motion is chaotic ${several
         ? `at ${counts.sensitive[point]} of ${counts.points[point]} points` : "here"}: `
-        + "a near twin departs exponentially.")] : []),
+        + "a slightly disturbed trajectory departs exponentially.")] : []),
       element("p", { id: "ratio" },
         `Largest ratio ${shownValue("ratio_max", point)}${channelWords}${where}`));
     if (!Number.isNaN(columns.fail_time_s?.values[point] ?? NaN)) {

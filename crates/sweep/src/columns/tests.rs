@@ -1,4 +1,4 @@
-//! Which columns there are, in which order, and what they say.
+//! Tests of the names, the order and the descriptions of columns.
 
 use arrow_array::Float64Array;
 use sweep_engine::store::{Holds, ResultRows};
@@ -9,18 +9,18 @@ use super::*;
 const CHANNELS: [Channel; 2] = [Channel::TubFrontY, Channel::TubYaw];
 
 fn columns(measures: &Measures) -> Columns {
-    Columns::of_measures(&CHANNELS, 2.0.into(), measures, false)
+    Columns::for_measures(&CHANNELS, 2.0.into(), measures, false)
 }
 
 fn layout(measures: Measures) -> Layout {
     let axis =
         |name: &str, unit: &str| Column::new(name, unit, format!("swept {name}"), Holds::Axis);
     let axes = vec![axis("unbalance_mass_kg", "kg"), axis("damping_n_s_per_m", "N s/m")];
-    Layout::of_map(axes, columns(&measures).declared())
+    Layout::map(axes, columns(&measures).declared())
 }
 
 #[test]
-fn columns_stand_as_the_contract_says() {
+fn columns_of_a_run_are_in_the_documented_order() {
     let names: Vec<String> =
         layout(Measures::default()).schema().fields().iter().map(|f| f.name().clone()).collect();
     assert_eq!(
@@ -55,7 +55,7 @@ fn columns_stand_as_the_contract_says() {
 }
 
 #[test]
-fn metrics_have_columns_in_the_order_asked_for_and_criteria_say_what_they_are() {
+fn metrics_have_columns_in_the_requested_order_and_criteria_describe_the_amplitudes() {
     let plain = layout(Measures::default()).schema().fields().len();
     let metrics = vec![Metric::StaticSag, Metric::ClashTime, Metric::CabinetForce];
     let measures = Measures { criterion: Criterion::Rms, metrics, ..Measures::default() };

@@ -1,4 +1,5 @@
-//! `sweep check GRID.toml`: what a run would do; and which assumed numbers of its machine matter.
+//! `sweep check GRID.toml` describes a run before it starts, and ranks the assumed numbers of its
+//! machine by their effect.
 
 use arrow_array::Array;
 use sweep_engine::commands::check as engine_check;
@@ -16,19 +17,21 @@ use crate::plan::Plan;
 pub struct Args {
     #[command(flatten)]
     check: engine_check::Args,
-    /// Vary each number that the machine file leaves out within its expected range, and list them
-    /// by what they move, first those that turn the verdict
+    /// Vary each number that the machine file leaves out within its expected range, and list these
+    /// numbers by their effect, first those that change the verdict
     #[arg(long, conflicts_with = "json")]
     assumed: bool,
 }
 
-/// Points of a grid at which assumed numbers are varied. Twice as many take twice the time.
-const POINTS: u64 = 9;
+/// Maximum number of points of a grid at which assumed numbers are varied. Basis: three values of
+/// each of two axes. Doubling it doubles the time.
+const MAX_TRIAL_POINTS: u64 = 9;
 
 /// Checks a grid and shows its plan, or ranks its assumed numbers.
 ///
 /// # Errors
-/// Mistakes in the grid file, no engine for it, or standard output that cannot be written.
+/// Returns an error for mistakes in the grid file, if there is no engine for it, and if standard
+/// output cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     if !args.assumed {
         return engine_check::run::<Washer>(&args.check);
@@ -52,8 +55,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 struct Assumed {
     parameter: Parameter,
     value: f64,
-    /// The ends of its expected range at which there is such a machine: moments of inertia can be
-    /// those of no rigid body, and are kept then.
+    /// The ends of its expected range, without those at which no machine exists, such as moments of
+    /// inertia of no rigid body.
     ends: Vec<f64>,
 }
 
@@ -71,7 +74,7 @@ impl Assumed {
                 continue;
             }
             let Some(value) = parameter.get(machine, spin) else { continue };
-            let can_be = |end: &f64| {
+            let is_possible = |end: &f64| {
                 if *end == value {
                     return false;
                 }
@@ -79,46 +82,49 @@ impl Assumed {
                 parameter.set(&mut other, &mut spin.clone(), *end);
                 parameter.range().contains(*end) && other.violations().is_empty()
             };
-            let ends = assumption.ends(value, machine).into_iter().filter(can_be).collect();
+            let ends = assumption.ends(value, machine).into_iter().filter(is_possible).collect();
             all.push(Self { parameter, value, ends });
         }
         all
     }
 }
 
-/// Points of a plan, with assumed numbers as they are and at the ends of their ranges.
+/// Points of a plan, each with the assumed values and with each number at the ends of its range.
 struct Trial {
-    /// The plan as a list: for each point the machine as it is, then each number at its ends.
+    /// The plan as a list of rows: for each point the machine with all assumed values, then the
+    /// machines with one number at an end of its range.
     plan: Plan,
     assumed: Vec<Assumed>,
-    /// Rows of a point.
+    /// The number of rows of a point.
     stride: usize,
-    /// The speed at which growth is looked at (rpm).
+    /// The speed at which growth is computed (rpm): the greatest of the spin.
     plateau_rpm: f64,
 }
 
-/// What a row says.
+/// The results of a row that are compared.
 #[derive(Clone, Copy, Debug, Default)]
-struct Outcome {
-    /// Whether it was reliable.
+struct TrialOutcome {
+    /// Whether the row is reliable.
     verdict: Option<bool>,
+    /// The greatest ratio.
     ratio: Option<f64>,
     growth_per_s: Option<f64>,
 }
 
-/// What an assumed number moves, at most over points and ends.
+/// The greatest effect of an assumed number, over all points and both ends of its range.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
-struct Moved {
-    /// Points whose verdict turns, or which cannot be computed any more.
+struct Effect {
+    /// The number of points whose verdict changes or becomes undefined.
     verdicts: usize,
-    /// Change of the greatest ratio, as a part of it.
+    /// The relative change of the greatest ratio.
     ratio: f64,
+    /// The change of the growth (1/s).
     growth_per_s: f64,
 }
 
 impl Trial {
     fn new(plan: &Plan, assumed: Vec<Assumed>) -> Self {
-        let count = plan.points().min(POINTS);
+        let count = plan.points().min(MAX_TRIAL_POINTS);
         let step = |k: u64| if count > 1 { k * (plan.points() - 1) / (count - 1) } else { 0 };
         let points: Vec<Vec<f64>> = (0..count).map(|k| plan.axis_values(step(k))).collect();
         let stride = 1 + assumed.iter().map(|number| number.ends.len()).sum::<usize>();
@@ -139,16 +145,16 @@ impl Trial {
         let mut first = 1;
         for number in &assumed {
             let mut row = vec![number.value; stride];
-            for (place, end) in number.ends.iter().enumerate() {
-                row[first + place] = *end;
+            for (k, end) in number.ends.iter().enumerate() {
+                row[first + k] = *end;
             }
             first += number.ends.len();
             let values = AxisValues::List(row.repeat(points.len()));
             trial.axes.push(sweep_engine::Axis { parameter: number.parameter.clone(), values });
         }
         let rows = (stride * points.len()) as u64;
-        let (file, hash) = ("assumed numbers".to_owned(), String::new());
-        trial.design = Some(Design::List { file, points: rows, hash });
+        let file = "assumed numbers".to_owned();
+        trial.design = Some(Design::List { file, points: rows, hash: String::new() });
         Self { plan: trial, assumed, stride, plateau_rpm }
     }
 
@@ -156,11 +162,11 @@ impl Trial {
         self.plan.points()
     }
 
-    /// Computes every row; `None` if it was interrupted.
-    fn outcomes(&self, effort: Effort<'_>) -> Result<Option<Vec<Outcome>>, Error> {
+    /// Computes every row. Returns `None` if the work was interrupted.
+    fn outcomes(&self, effort: Effort<'_>) -> Result<Option<Vec<TrialOutcome>>, Error> {
         let evaluator = PlanEvaluator::new(self.plan.clone());
         let found = evaluator.all_points()?.in_memory(effort)?;
-        let mut outcomes: Vec<Outcome> = Vec::new();
+        let mut outcomes: Vec<TrialOutcome> = Vec::new();
         for batch in found.batches() {
             let numbers = |name: &str| {
                 let column = batch.column_by_name(name);
@@ -172,7 +178,7 @@ impl Trial {
             let verdicts = verdicts.and_then(|column| cells::flags(column).ok());
             for row in 0..batch.num_rows() {
                 let known = verdicts.filter(|column| !column.is_null(row));
-                outcomes.push(Outcome {
+                outcomes.push(TrialOutcome {
                     verdict: known.map(|column| column.value(row)),
                     ratio: ratios[row],
                     growth_per_s: growths[row],
@@ -182,25 +188,25 @@ impl Trial {
         Ok((outcomes.len() as u64 == self.rows()).then_some(outcomes))
     }
 
-    /// Returns what each assumed number moves, the most first.
-    fn ranked(&self, outcomes: &[Outcome]) -> Vec<(&Assumed, Moved)> {
+    /// Returns the assumed numbers with their effects, the greatest effect first.
+    fn ranked(&self, outcomes: &[TrialOutcome]) -> Vec<(&Assumed, Effect)> {
         let mut first = 1;
         let mut ranked = Vec::new();
         for number in &self.assumed {
-            let mut moved = Moved::default();
+            let mut effect = Effect::default();
             for rows in outcomes.chunks(self.stride) {
                 let ends = &rows[first..first + number.ends.len()];
-                moved.add(rows[0], ends);
+                effect.add(rows[0], ends);
             }
             first += number.ends.len();
-            ranked.push((number, moved));
+            ranked.push((number, effect));
         }
         ranked.sort_by(|(_, a), (_, b)| b.partial_cmp(a).unwrap_or(std::cmp::Ordering::Equal));
         ranked
     }
 
-    /// Returns the table that is printed.
-    fn table(&self, outcomes: &[Outcome]) -> String {
+    /// Returns the table of effects as text.
+    fn table(&self, outcomes: &[TrialOutcome]) -> String {
         let ranked = self.ranked(outcomes);
         let name = |number: &Assumed| number.parameter.name().to_owned();
         let width = ranked.iter().map(|(number, _)| name(number).len()).max().unwrap_or(0);
@@ -210,52 +216,52 @@ impl Trial {
             "{:width$}  {:>10}  {:>22}  {:>12}  {:>9}  {growth}\n",
             "assumed", "value", "expected", "verdicts", "ratio"
         );
-        for (number, moved) in &ranked {
+        for (number, effect) in &ranked {
             let expected: Vec<String> =
                 number.ends.iter().map(|end| decimal(rounded(*end))).collect();
             let expected = match expected.as_slice() {
                 [] => "kept".to_owned(),
                 ends => ends.join(" to "),
             };
-            let verdicts = format!("{} of {points}", moved.verdicts);
-            let ratio = format!("{:.1} %", 100.0 * moved.ratio);
+            let verdicts = format!("{} of {points}", effect.verdicts);
+            let ratio = format!("{:.1} %", 100.0 * effect.ratio);
             text += &format!(
                 "{:width$}  {:>10}  {expected:>22}  {verdicts:>12}  {ratio:>9}  {:.2e} /s\n",
                 name(number),
                 decimal(rounded(number.value)),
-                moved.growth_per_s
+                effect.growth_per_s
             );
         }
-        let turning: Vec<String> = ranked
+        let decisive: Vec<String> = ranked
             .iter()
-            .filter(|(_, moved)| moved.verdicts > 0)
+            .filter(|(_, effect)| effect.verdicts > 0)
             .map(|(number, _)| name(number))
             .collect();
-        text + &match turning.as_slice() {
-            [] => format!("none of them turns a verdict at {points} points of the plan\n"),
-            [one] => format!("measure {one}: it turns verdicts\n"),
-            many => format!("measure these first, which turn verdicts: {}\n", many.join(", ")),
+        text + &match decisive.as_slice() {
+            [] => format!("none of them changes a verdict at {points} points of the plan\n"),
+            [one] => format!("measure {one}: it changes verdicts\n"),
+            many => format!("measure these first, which change verdicts: {}\n", many.join(", ")),
         }
     }
 }
 
-impl Moved {
-    /// Notes the ends of a number's range at a point.
-    fn add(&mut self, own: Outcome, ends: &[Outcome]) {
-        let turns = ends.iter().any(|end| end.verdict != own.verdict);
-        self.verdicts += usize::from(turns);
+impl Effect {
+    /// Adds a point, with its outcomes for the assumed value and for the ends of the range.
+    fn add(&mut self, assumed: TrialOutcome, ends: &[TrialOutcome]) {
+        let changes = ends.iter().any(|end| end.verdict != assumed.verdict);
+        self.verdicts += usize::from(changes);
         for end in ends {
-            if let (Some(own), Some(end)) = (own.ratio, end.ratio) {
-                self.ratio = self.ratio.max((end / own - 1.0).abs());
+            if let (Some(assumed), Some(end)) = (assumed.ratio, end.ratio) {
+                self.ratio = self.ratio.max((end / assumed - 1.0).abs());
             }
-            if let (Some(own), Some(end)) = (own.growth_per_s, end.growth_per_s) {
-                self.growth_per_s = self.growth_per_s.max((end - own).abs());
+            if let (Some(assumed), Some(end)) = (assumed.growth_per_s, end.growth_per_s) {
+                self.growth_per_s = self.growth_per_s.max((end - assumed).abs());
             }
         }
     }
 }
 
-/// Returns a number of four digits, for a table.
+/// Returns a number rounded to four digits, for a table.
 fn rounded(value: f64) -> f64 {
     let text = format!("{value:.3e}");
     let number = text.parse().unwrap_or(value);
@@ -269,7 +275,7 @@ mod tests {
 
     const SHEET: &str = include_str!("starter_machine.toml");
 
-    /// A plan of a machine from a data sheet.
+    /// Returns a plan of a machine from a data sheet, with further lines of the grid file.
     fn plan(more: &str) -> Plan {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("m.toml"), SHEET).expect("it is written");
@@ -294,14 +300,15 @@ mod tests {
             || Effort { threads: Some(1), progress: ProgressMode::None, interrupt: &interrupt };
         let outcomes = trial.outcomes(effort()).unwrap().expect("nobody interrupts");
         assert_eq!(outcomes.len(), 2 * trial.stride);
-        // The rows of the machine as it is are those of the plan itself, but for their steps.
-        let own = PlanEvaluator::new(plan.clone());
-        let own = own.all_points().unwrap().in_memory(effort()).unwrap();
-        let column = own.batches()[0].column_by_name("ratio_max").expect("it is there");
+        // The rows with all assumed values are those of the plan itself, except for their steps.
+        let evaluator = PlanEvaluator::new(plan.clone());
+        let plan_rows = evaluator.all_points().unwrap().in_memory(effort()).unwrap();
+        let column = plan_rows.batches()[0].column_by_name("ratio_max").expect("it is there");
         let ratios = cells::numbers(column).unwrap();
         for (point, ratio) in ratios.into_iter().enumerate() {
-            let [own, tried] = [ratio, outcomes[point * trial.stride].ratio].map(Option::unwrap);
-            assert!((tried / own - 1.0).abs() < 0.01, "{own} {tried}");
+            let [plan_ratio, trial_ratio] =
+                [ratio, outcomes[point * trial.stride].ratio].map(Option::unwrap);
+            assert!((trial_ratio / plan_ratio - 1.0).abs() < 0.01, "{plan_ratio} {trial_ratio}");
         }
         let ranked = trial.ranked(&outcomes);
         assert!(ranked.windows(2).all(|pair| pair[0].1 >= pair[1].1));
@@ -311,17 +318,17 @@ mod tests {
     }
 
     #[test]
-    fn what_turns_a_verdict_comes_first() {
-        let outcome = |verdict, ratio| Outcome {
+    fn numbers_that_change_a_verdict_come_first() {
+        let outcome = |verdict, ratio| TrialOutcome {
             verdict: Some(verdict),
             ratio: Some(ratio),
             growth_per_s: Some(-1.0),
         };
-        let mut turned = Moved::default();
-        turned.add(outcome(true, 1.9), &[outcome(true, 1.8), outcome(false, 2.1)]);
-        let mut moved = Moved::default();
-        moved.add(outcome(true, 1.0), &[outcome(true, 1.9)]);
-        assert_eq!((turned.verdicts, moved.verdicts), (1, 0));
-        assert!(turned > moved && moved.ratio > turned.ratio);
+        let mut changing = Effect::default();
+        changing.add(outcome(true, 1.9), &[outcome(true, 1.8), outcome(false, 2.1)]);
+        let mut unchanging = Effect::default();
+        unchanging.add(outcome(true, 1.0), &[outcome(true, 1.9)]);
+        assert_eq!((changing.verdicts, unchanging.verdicts), (1, 0));
+        assert!(changing > unchanging && unchanging.ratio > changing.ratio);
     }
 }

@@ -14,7 +14,7 @@ pub struct Args {
 /// Prints the completion script of a command line.
 ///
 /// # Errors
-/// When standard output cannot be written.
+/// Returns an error if standard output cannot be written.
 pub(crate) fn run(args: &Args, program: clap::Command) -> Result<Exit, Error> {
     print(&script(args.shell, program))
 }
@@ -33,7 +33,7 @@ mod tests {
     use crate::commands::shown_command;
 
     #[test]
-    fn every_shell_completes_what_help_shows_and_nothing_else() {
+    fn every_shell_completes_visible_commands_and_no_hidden_ones() {
         for shell in Shell::value_variants() {
             let script = script(*shell, shown_command());
             for name in ["boundary", "completions", "--keep-traces", "--version"] {

@@ -1,4 +1,4 @@
-//! `sweep explain GRID.toml --at NAME=VALUE`: why the linear model fails at a point.
+//! `sweep explain GRID.toml --at NAME=VALUE` explains why the linear model fails at a point.
 
 use crate::explain::{explain, format, json};
 use crate::speeds::{Speeds, parse_speeds_above_zero};
@@ -7,7 +7,7 @@ use sweep_engine::{EffortArgs, Error, Exit, Interrupt, show};
 
 /// Arguments of `sweep explain`.
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = LONG)]
+#[command(after_long_help = LONG_HELP)]
 pub struct Args {
     #[command(flatten)]
     grid: GridArgs,
@@ -23,20 +23,20 @@ pub struct Args {
     effort: EffortArgs,
 }
 
-/// What `--help` adds.
-const LONG: &str = "\
+/// The end of `sweep explain --help`.
+const LONG_HELP: &str = "\
 Runs the point as `sweep run` does, finds the bands of speed in which the turning machine's \
 periodic response is unstable, and follows small disturbances of the run through them. A \
 disturbance is measured by its energy. docs/stability.md explains every line.";
 
-/// Explains, and prints.
+/// Explains a point and prints the explanation.
 ///
 /// # Errors
-/// Mistakes in the grid file or the options, a profile that cannot be explained, and a machine
-/// without equilibrium or modes.
+/// Returns an error for mistakes in the grid file or the options, for a profile that cannot be
+/// explained, and for a machine without equilibrium or modes.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let (plan, at) = args.grid.load_point(&args.grid.at)?;
-    // A signal ends the process: there is nothing to keep.
+    // A signal ends the process, because there are no partial results to keep.
     let interrupt = Interrupt::new();
     let found = explain(&plan, at, args.speed, args.effort.with(&interrupt))?;
     if args.json {

@@ -123,7 +123,7 @@ fn header_and_name(text: &str) -> Result<(String, String), String> {
         Some((header, name)) if Measurement::is_name(name) => {
             Ok((header.to_owned(), name.to_owned()))
         }
-        Some((_, name)) => Err(format!("`{name}` is no channel with its unit")),
+        Some((_, name)) => Err(format!("`{name}` is not a channel with its unit")),
         None => Err("expected HEADER=NAME".to_owned()),
     }
 }

@@ -1,4 +1,5 @@
-//! What commands about held speeds have in common: doing it, and which job it is.
+//! The commands about held speeds, `sweep stability` and `sweep dwell`, and the options by which
+//! `sweep status` and `sweep merge` refer to their jobs.
 
 use std::path::PathBuf;
 
@@ -14,80 +15,77 @@ use sweep_engine::commands::{merge, status};
 use sweep_engine::{Error, Exit, Job};
 use sweep_files::ParquetFile;
 
-/// Arguments of a command about held speeds, with what it asks for there.
+/// Arguments of a command about held speeds. `Options` are those of the command alone.
 #[derive(Debug, clap::Args)]
-pub struct Args<Asked: clap::Args> {
-    /// The grid, and the file.
+pub struct Args<Options: clap::Args> {
     #[command(flatten)]
     target: ResultArgs,
     /// Constant spin speeds in rpm, above 0: one, several with commas, FROM:TO:STEP
     #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
     speed: SpeedList,
-    /// What is asked for.
     #[command(flatten)]
-    asked: Asked,
-    /// How it is done.
+    options: Options,
     #[command(flatten)]
     work: WorkArgs,
 }
 
-/// The periodic responses are asked for, of which nothing more can be said.
+/// The options of `sweep stability` alone: none.
 #[derive(Clone, Copy, Debug, clap::Args)]
-pub struct Responses {}
+pub struct ResponseOptions {}
 
-impl From<Responses> for Option<AttractorSearch> {
-    fn from(_: Responses) -> Self {
+impl From<ResponseOptions> for Option<AttractorSearch> {
+    fn from(_: ResponseOptions) -> Self {
         None
     }
 }
 
-/// What `sweep stability --help` adds.
-pub(super) const RESPONSES_LONG: &str = "\
-A row for every point of the grid and every speed: the periodic response of both models while the \
-drum turns at that speed for ever, and how fast a small disturbance of the nonlinear one grows. \
-The spin profile, the window and the integrator of the grid file do not matter here, but that the \
-modes of a machine with friction are named as in that run. The result is written to \
-results/NAME-stability.parquet unless --out names a file.
+/// The end of `sweep stability --help`.
+pub(super) const STABILITY_LONG_HELP: &str = "\
+The result has a row for every point of the grid and every speed: the periodic response of both \
+models while the drum turns at that speed for ever, and the growth rate of a small disturbance of \
+the nonlinear response. The spin profile, the window and the integrator of the grid file have no \
+effect, except that modes of a machine with friction have the names of that run. The result is \
+written to results/NAME-stability.parquet unless --out names a file.
 
 The file is a pure function of its input, whatever the number of threads, shards and \
-interruptions. What an interrupted command has computed stays in FILE.partial, and the same \
-command goes on from there.";
+interruptions. An interrupted command leaves its finished rows in FILE.partial, and the same \
+command continues from there.";
 
-/// What `sweep dwell --help` adds.
-pub(super) const MOTIONS_LONG: &str = "\
-A row for every point of the grid, every speed and every motion that was found there while the \
-drum turns at that speed. Trajectories start from the periodic response, slightly disturbed, and \
-from kicks: two thirds of these in the two modes that rock most, one by one and together, the \
-others in random directions, every other one of the machine at rest. They are followed until their \
-largest deviations no longer change. It is a search, not a \
-proof: a motion that no start leads to is not found.
+/// The end of `sweep dwell --help`.
+pub(super) const DWELL_LONG_HELP: &str = "\
+The result has a row for every point of the grid, every speed and every motion that was found \
+while the drum turns at that speed. Trajectories start from the slightly disturbed periodic \
+response, and from kicks: two thirds of these act on the two modes that rock most, one by one and \
+together, the others act in random directions, every other one on the machine at rest. \
+Trajectories are followed until their largest deviations no longer change. This is a search, not \
+a proof: a motion that no start leads to is not found.
 
 The result is written to results/NAME-dwell.parquet unless --out names a file. The file is a pure \
-function of its input, whatever the number of threads, shards and interruptions. What an \
-interrupted command has computed stays in FILE.partial, and the same command goes on from there.";
+function of its input, whatever the number of threads, shards and interruptions. An interrupted \
+command leaves its finished rows in FILE.partial, and the same command continues from there.";
 
-impl<Asked: clap::Args + Copy + Into<Option<AttractorSearch>>> Args<Asked> {
-    /// Does what a search asks at these speeds, or finds the periodic responses there; says what
-    /// came of it, and how the program ends.
+impl<Options: clap::Args + Copy + Into<Option<AttractorSearch>>> Args<Options> {
+    /// Finds the attractors or the periodic responses at the speeds, and prints a summary.
     ///
     /// # Errors
-    /// Mistakes in the grid file or the options, and whatever keeps the file from being written;
-    /// finished chunks are kept.
+    /// Returns an error for mistakes in the grid file or the options, and if the file cannot be
+    /// written; finished chunks are kept.
     pub(super) fn run(&self) -> Result<Exit, Error> {
-        let Self { target, speed, asked, work } = self;
-        let search: Option<AttractorSearch> = (*asked).into();
+        let Self { target, speed, options, work } = self;
+        let search: Option<AttractorSearch> = (*options).into();
         let plan: Plan = target.grid.load()?;
         check(&plan, "--speed", &speed.to_string())?;
         let held = HeldPlan { plan: &plan, speeds_rpm: speed.values(), search };
-        let (job, output) = (held.job(), held.output(target.out.as_deref()));
-        let [own, of_merge] = options(speed, search);
+        let job = held.job();
+        let output = held.output(target.out.as_deref());
+        let [own_options, merge_options] = command_options(speed, search);
         let command = RunCommand {
             name: &plan.name,
             verb: held.verb(),
             rows: "rows",
             target,
             work,
-            options: [&own, &of_merge],
+            options: [&own_options, &merge_options],
         };
         let finished = |text: &mut String, _: &_| {
             for (name, words) in FURTHER.listed(&ParquetFile::open(&output)?)? {
@@ -102,72 +100,77 @@ impl<Asked: clap::Args + Copy + Into<Option<AttractorSearch>>> Args<Asked> {
     }
 }
 
-/// The options of a command line that ask the same, and those of `merge`.
-fn options(speed: &SpeedList, search: Option<AttractorSearch>) -> [String; 2] {
-    let own = search.map(|search| search.to_string()).unwrap_or_default();
-    let own = format!(" --speed {speed}{own}");
-    let of_merge = format!("{}{own}", if search.is_some() { " --dwell" } else { "" });
-    [own, of_merge]
+/// Returns the options that repeat a command about held speeds, and those by which `merge` refers
+/// to its job.
+fn command_options(speed: &SpeedList, search: Option<AttractorSearch>) -> [String; 2] {
+    let search_options = search.map(|search| search.to_string()).unwrap_or_default();
+    let own_options = format!(" --speed {speed}{search_options}");
+    let dwell_option = if search.is_some() { " --dwell" } else { "" };
+    let merge_options = format!("{dwell_option}{own_options}");
+    [own_options, merge_options]
 }
 
-/// Arguments of `sweep status` or `sweep merge`, of a run or of held speeds.
+/// Arguments of `sweep status` or `sweep merge` (`CommandArgs`), for a run or for held speeds.
 #[derive(Debug, clap::Args)]
-pub struct JobArgs<Of: clap::Args> {
+pub struct JobArgs<CommandArgs: clap::Args> {
     #[command(flatten)]
-    of: Of,
+    command: CommandArgs,
     #[command(flatten)]
     held: HeldArgs,
 }
 
 impl JobArgs<status::Args> {
-    /// Shows the progress, without disturbing it.
+    /// Shows the progress of the job, which may be running.
     ///
     /// # Errors
-    /// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
+    /// Returns an error for mistakes in the grid file, for a folder or file of another plan, and
+    /// for a file that cannot be read.
     pub(super) fn status(&self) -> Result<Exit, Error> {
-        let plan: Plan = self.of.target.grid.load()?;
-        let (job, output, [verb, own, of_merge]) = self.held.job(&plan, &self.of.target);
-        status::of_job(&self.of, &job, &output, [&verb, &own, &of_merge])
+        let target = &self.command.target;
+        let plan: Plan = target.grid.load()?;
+        let (job, output, again) = self.held.job(&plan, target);
+        status::show_job(&self.command, &job, &output, again.each_ref().map(String::as_str))
     }
 }
 
 impl JobArgs<merge::Args> {
-    /// Joins what the shards have left.
+    /// Merges the results of the shards.
     ///
     /// # Errors
-    /// As the engine's command.
+    /// Returns the errors of the engine's command.
     pub(super) fn merge(&self) -> Result<Exit, Error> {
-        let plan: Plan = self.of.target.grid.load()?;
-        let (job, output, _) = self.held.job(&plan, &self.of.target);
-        merge::of_job(&self.of, &plan.name, &job, &output)
+        let target = &self.command.target;
+        let plan: Plan = target.grid.load()?;
+        let (job, output, _) = self.held.job(&plan, target);
+        merge::merge_job(&self.command, &plan.name, &job, &output)
     }
 }
 
-/// Which job `status` and `merge` mean.
+/// The options by which `status` and `merge` refer to a job about held speeds.
 #[derive(Debug, clap::Args)]
 struct HeldArgs {
-    /// Constant spin speeds in rpm of `sweep stability`, or of `sweep dwell`: as there
+    /// The job of `sweep stability` at these speeds in rpm, written as in that command; with
+    /// --dwell that of `sweep dwell`
     #[arg(long, value_name = "SPEEDS", allow_hyphen_values = true)]
     speed: Option<SpeedList>,
-    /// The run is of `sweep dwell`, not of `sweep stability`
+    /// The job of `sweep dwell`, not that of `sweep stability`
     #[arg(long, requires = "speed")]
     dwell: bool,
-    /// How it looks for motions.
     #[command(flatten)]
     search: AttractorSearch,
 }
 
 impl HeldArgs {
-    /// The job on a plan and its output, the command that goes on with it, what stands behind its
-    /// arguments and what behind those of `merge`.
+    /// Returns the job on a plan, its output, and three texts: the command that continues it,
+    /// further options of that command, and further options of `merge`.
     fn job<'a>(&'a self, plan: &'a Plan, target: &ResultArgs) -> (Job<'a>, PathBuf, [String; 3]) {
         let Some(speed) = &self.speed else {
             return (Job::of(plan), target.output(plan), ["run", "", ""].map(str::to_owned));
         };
         let search = self.dwell.then_some(self.search);
         let held = HeldPlan { plan, speeds_rpm: speed.values(), search };
-        let [own, of_merge] = options(speed, search);
-        let again = [held.verb().to_owned(), own, of_merge];
+        let [own_options, merge_options] = command_options(speed, search);
+        let again = [held.verb().to_owned(), own_options, merge_options];
         (held.job(), held.output(target.out.as_deref()), again)
     }
 }

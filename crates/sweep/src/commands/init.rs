@@ -1,4 +1,4 @@
-//! `sweep init`: a grid or machine file to start from.
+//! `sweep init` writes a grid or machine file to start from.
 
 use std::path::{Path, PathBuf};
 
@@ -9,10 +9,10 @@ use sweep_engine::plan::WrittenIn;
 use sweep_engine::{Error, Exit, print, tell};
 use sweep_files::{FileError, atomic};
 
-/// The commented grid file.
+/// The commented grid file that `sweep init` writes.
 const GRID: &str = include_str!("starter.toml");
 
-/// The commented short machine file.
+/// The commented machine file that `sweep init --machine --short` writes.
 const SHORT_MACHINE: &str = include_str!("starter_machine.toml");
 
 /// Arguments of `sweep init`.
@@ -28,14 +28,14 @@ pub struct Args {
     short: bool,
 }
 
-/// Writes the file, never over another.
+/// Writes the file. It never overwrites another one.
 ///
 /// # Errors
-/// When the file exists or cannot be written.
+/// Returns an error if the file exists or cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let text = match (args.machine, args.short) {
         (true, true) => SHORT_MACHINE.to_owned(),
-        // Without --short the whole machine: scripts read it, and no number in it is assumed anew.
+        // Scripts read the complete file, in which no number is left to the rules of assumption.
         (true, false) => config::machine_file(&Machine::paper(), &WrittenIn::default()),
         (false, _) => GRID.to_owned(),
     };

@@ -1,4 +1,4 @@
-//! `sweep man DIR`: manual pages, for packagers.
+//! `sweep man DIR` writes manual pages, for packagers.
 
 use std::io;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ pub struct Args {
 /// Writes a page for the program and one for each command, with their examples.
 ///
 /// # Errors
-/// A folder that cannot be written to.
+/// Returns an error if the folder cannot be written to.
 pub(crate) fn run(
     args: &Args,
     mut program: clap::Command,
@@ -31,7 +31,7 @@ pub(crate) fn run(
     files::ready(&args.folder)?;
     let write =
         |name: &str, page: &[u8]| files::write(&args.folder.join(name), FileKind::ManPage, page);
-    // Tells each command its full name.
+    // Each command gets its full name.
     program.build();
     for command in program.get_subcommands().filter(|command| !command.is_hide_set()) {
         let name = command.get_name();
@@ -41,7 +41,7 @@ pub(crate) fn run(
     Ok(Exit::Done)
 }
 
-/// One page in the order of manual pages: the examples, with which help begins, are at the end.
+/// Returns a manual page. Unlike help, a manual page ends with the examples.
 fn page(command: &clap::Command, name: &str, examples: Examples) -> io::Result<Vec<u8>> {
     let title = if name.is_empty() { "sweep".to_owned() } else { format!("sweep-{name}") };
     let man =
@@ -71,14 +71,14 @@ fn page(command: &clap::Command, name: &str, examples: Examples) -> io::Result<V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::{command, examples_of};
+    use crate::commands::{command, find_examples};
 
     #[test]
     fn pages_have_their_name_examples_and_exit_codes() {
         let mut program = command();
         program.build();
         let run = program.find_subcommand("run").unwrap();
-        let text = String::from_utf8(page(run, "run", examples_of("run")).unwrap()).unwrap();
+        let text = String::from_utf8(page(run, "run", find_examples("run")).unwrap()).unwrap();
         for part in [
             ".TH sweep-run 1",
             "sweep run",

@@ -1,4 +1,5 @@
-//! `sweep modes [GRID.toml]`: natural frequencies over spin speed, resonance speeds, mode shapes.
+//! `sweep modes [GRID.toml]` prints natural frequencies over spin speed, resonance speeds and mode
+//! shapes.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -11,27 +12,28 @@ use crate::speeds::Speeds;
 use sweep_engine::{Error, Exit, show, tell};
 use sweep_files::{FileKind, Output};
 
-/// Modes of the suspension, which differ from exact motions most.
-const SUSPENSION_MODES: usize = 4;
+/// Number of modes that are compared with exact motions. Basis: the slowest four are modes of the
+/// suspension, which differ most. Doubling it adds lines of modes that hardly differ.
+const COMPARED_MODES: usize = 4;
 
 /// Arguments of `sweep modes`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Grid file whose machine is analysed, axes left aside; without it the built-in machine
+    /// Grid file whose machine is analysed, without its axes [default: the built-in machine]
     #[arg(value_name = "GRID.toml")]
     grid: Option<PathBuf>,
-    /// Set a constant, over those of the grid file, or an axis, which sweeps nothing then; may be
+    /// Set a constant, in place of the grid file's value, or fix an axis at a value; may be
     /// repeated
     #[arg(long = "set", value_name = "NAME=VALUE", requires = "grid")]
     sets: Vec<String>,
-    /// A point of the grid instead: a value for each axis; may be repeated
+    /// Analyse a point of the grid: give a value for each axis; may be repeated
     #[arg(long, value_name = "NAME=VALUE", requires = "grid")]
     at: Vec<String>,
     /// Spin speeds, in rpm
     #[arg(long, value_name = "FROM:TO:STEP", default_value = "0:1200:10")]
     speed: Speeds,
-    /// Beside each mode, the exact motion of the turning drum (Floquet exponents of the linear
-    /// model): two more columns, and a line on how far the two differ
+    /// Add the exact motion of the turning drum to each mode (Floquet exponents of the linear
+    /// model): two more columns, and a line on the difference
     #[arg(long)]
     exact: bool,
     /// Print everything as JSON
@@ -42,60 +44,64 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// Analyses, and prints or writes.
+/// Computes the modes, and prints them or writes them to a file.
 ///
 /// # Errors
-/// Mistakes in the grid file or the options, a machine without equilibrium or modes, and what
-/// cannot be written.
+/// Returns an error for mistakes in the grid file or the options, for a machine without equilibrium
+/// or modes, and if output cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let grid = args.grid.clone().map(|grid| WasherGridInput::file(grid, args.sets.clone()));
-    let asked = ModesInput::new(grid.as_ref(), &args.at, args.speed.to)?;
+    let input = ModesInput::new(grid.as_ref(), &args.at, args.speed.to)?;
     let output =
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
     let speeds = args.speed.values();
-    // A signal ends the process: there is nothing to keep.
-    let found = ModeAnalysis::new(&asked, &speeds, args.exact, &|| false)?;
+    // A signal ends the process, because there are no partial results to keep.
+    let found = ModeAnalysis::new(&input, &speeds, args.exact, &|| false)?;
     let Some(analysis) = found else { return Ok(Exit::Interrupted) };
     if let (Some(path), Some(output)) = (&args.out, output) {
-        output.finish(&analysis.table(&asked).into_bytes(path)?)?;
-        let (path, modes, speeds) = (path.display(), analysis.modes.len(), speeds.len());
-        tell(&format!("wrote {path}: {modes} modes at {speeds} speeds"));
+        output.finish(&analysis.table(&input).into_bytes(path)?)?;
+        let modes = analysis.modes.len();
+        tell(&format!("wrote {}: {modes} modes at {} speeds", path.display(), speeds.len()));
     }
     if args.json {
-        return show(&format!("{:#}\n", analysis.to_json(&asked.name)));
+        return show(&format!("{:#}\n", analysis.to_json(&input.name)));
     }
-    let mut text = listing(&speeds, &analysis.modes);
-    text.push_str(&differences(&analysis));
+    let mut text = mode_table(&speeds, &analysis.modes);
+    text.push_str(&difference_lines(&analysis));
     if !analysis.friction_speeds.is_empty() {
-        let taken = analysis.friction_speeds.iter().map(|(damper, speed)| {
+        let dampers = analysis.friction_speeds.iter().map(|(damper, speed)| {
             let speed = speed.as_f64().unwrap_or_default();
             format!("{} at {speed:.3} m/s", damper.replace('_', " "))
         });
-        let taken: Vec<String> = taken.collect();
-        text.push_str(&format!("friction is taken as in the run: {}\n", taken.join(", ")));
+        let dampers: Vec<String> = dampers.collect();
+        text.push_str(&format!("friction is taken as in the run: {}\n", dampers.join(", ")));
     }
     show(&text)
 }
 
-/// How far the suspension's frozen and exact motions differ, where they were asked for.
-fn differences(analysis: &ModeAnalysis) -> String {
+/// Returns lines on the differences between the suspension's modes at a frozen angle of the drum
+/// and its exact motions. They are empty without exact motions.
+fn difference_lines(analysis: &ModeAnalysis) -> String {
     let Some(exact) = &analysis.exact else { return String::new() };
-    let (speeds, modes) = (&analysis.speeds_rpm, &analysis.modes);
+    let speeds = &analysis.speeds_rpm;
+    let modes = &analysis.modes;
     let mut text =
         "The table freezes theta, as the paper does (Eqs. 43 to 45). Over whole turns the \
                     linear model's motions\nare its Floquet exponents; with these, most:\n"
             .to_owned();
-    for mode in 0..modes.len().min(SUSPENSION_MODES) {
-        let most = |of: fn(&ModeAtSpeed, &Exact) -> f64| {
-            let at = |k: usize| {
-                let apart = of(&modes[mode].at_speed[k], exact[k][mode].as_ref()?);
-                apart.is_finite().then_some((100.0 * apart, speeds[k]))
+    for mode in 0..modes.len().min(COMPARED_MODES) {
+        // The greatest difference (%) over all speeds, with its speed.
+        let greatest = |difference: fn(&ModeAtSpeed, &Exact) -> f64| {
+            let at_speed = |k: usize| {
+                let share = difference(&modes[mode].at_speed[k], exact[k][mode].as_ref()?);
+                share.is_finite().then_some((100.0 * share, speeds[k]))
             };
-            let all = (0..speeds.len()).filter_map(at);
+            let all = (0..speeds.len()).filter_map(at_speed);
             all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
         };
-        let frequency = most(|frozen, exact| exact.frequency_rpm() / frozen.frequency_rpm - 1.0);
-        let damping = most(|frozen, exact| exact.damping_ratio() / frozen.damping_ratio - 1.0);
+        let frequency =
+            greatest(|frozen, exact| exact.frequency_rpm() / frozen.frequency_rpm - 1.0);
+        let damping = greatest(|frozen, exact| exact.damping_ratio() / frozen.damping_ratio - 1.0);
         if let (Some((frequency, at)), Some((damping, damping_at))) = (frequency, damping) {
             // Writing to a String cannot fail.
             let _ = writeln!(
@@ -110,8 +116,9 @@ fn differences(analysis: &ModeAnalysis) -> String {
     text
 }
 
-/// What a reader wants of each mode, a line each.
-fn listing(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
+/// Returns the printed table of modes: a line for each resonance of a mode, and one for a mode
+/// without any.
+fn mode_table(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
     let lowest = format!("at {} rpm", decimal(speeds[0]));
     let mut text = format!(
         "mode   resonance   over a turn   damping   frequency   motion\n             \
@@ -126,7 +133,9 @@ fn listing(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
         let none = ("none".to_owned(), "-".to_owned(), &mode.at_speed[0]);
         let none = Some(none).filter(|_| mode.resonances.is_empty());
         for (resonance, turn, at) in none.into_iter().chain(rows) {
-            let (number, damping, motion) = (k + 1, at.damping_ratio, mode.motion.to_string());
+            let number = k + 1;
+            let damping = at.damping_ratio;
+            let motion = mode.motion.to_string();
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
@@ -135,18 +144,19 @@ fn listing(speeds: &[f64], modes: &[ModeOverSpeed]) -> String {
         }
     }
     if let Some((swing, mode, speed)) = widest_swing(speeds, modes) {
-        let (percent, speed) = (100.0 * swing, decimal(speed));
+        let percent = 100.0 * swing;
         let _ = writeln!(
             text,
             "Over a turn, resonant modes vary by up to +-{percent:.3} % of their mean frequency \
-             (mode {mode}, {speed} rpm)."
+             (mode {mode}, {} rpm).",
+            decimal(speed)
         );
     }
     text
 }
 
-/// Where the frequency of a mode that has a resonance varies most over a turn: half the distance
-/// from least to greatest as a share of the mean, the mode's number, the speed (rpm).
+/// Returns the greatest variation of a resonant mode's frequency over a turn (half the distance
+/// from least to greatest as a share of the mean), the mode's number, and the speed (rpm).
 fn widest_swing(speeds: &[f64], modes: &[ModeOverSpeed]) -> Option<(f64, usize, f64)> {
     let resonant = modes.iter().enumerate().filter(|(_, mode)| !mode.resonances.is_empty());
     resonant

@@ -1,4 +1,4 @@
-//! `sweep plot`: the figure that fits a file.
+//! `sweep plot` draws the figure that fits a file.
 
 use std::path::PathBuf;
 
@@ -33,12 +33,12 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub stability: Option<PathBuf>,
 
-    /// Trace: compare with this trace: both nonlinear models, the linear one left out. Dwell: how
-    /// far this trace's run goes that passes over the held speeds
+    /// Trace: compare the nonlinear model of both files, without the linear one. Dwell: add the
+    /// amplitudes of this trace, whose run passes the held speeds
     #[arg(long, value_name = "FILE")]
     pub against: Option<PathBuf>,
 
-    /// Map as .html: a page that computes, with both models in it: any point by sliders, without a
+    /// Map as .html: a page with both models, which computes any point by sliders, without a
     /// network
     #[arg(long)]
     pub live: bool,
@@ -53,10 +53,10 @@ pub struct Args {
     pub traces: Option<PathBuf>,
 }
 
-/// Draws the figure and says where it is.
+/// Draws the figure and prints its path.
 ///
 /// # Errors
-/// As the engine's command, and a map that no page can compute.
+/// Returns the errors of the engine's command, and an error for a map that no page can compute.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let live = args.live.then(|| live(&args.plot.file, &args.sliders)).transpose()?;
     let figures = WasherFigures {
@@ -68,12 +68,12 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         against: args.against.clone(),
         live,
     };
-    let further = PlotOptions {
+    let options = PlotOptions {
         view: args.plot.view.and_then(FigureView::common),
         traces: args.traces.clone(),
         ..PlotOptions::default()
     };
-    plot::draw(&args.plot, further, &figures)
+    plot::draw(&args.plot, options, &figures)
 }
 
 fn speed(text: &str) -> Result<f64, String> {
@@ -111,15 +111,15 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_none_are_refused_with_what_was_expected() {
-        for (line, said) in [
+    fn an_error_for_a_wrong_number_names_the_expected_one() {
+        for (line, expected) in [
             ("m.parquet --at spin_peak_rpm", "expected NAME=VALUE"),
             ("m.parquet --at x=nan", "`nan` is not a finite number"),
             ("m.parquet --resonances -3", "expected a speed above 0 rpm"),
             ("m.parquet --resonances 0", "expected a speed above 0 rpm"),
         ] {
             let message = parse(line).unwrap_err();
-            assert!(message.contains(said), "{line}: {message}");
+            assert!(message.contains(expected), "{line}: {message}");
         }
     }
 }

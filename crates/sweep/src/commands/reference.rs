@@ -1,5 +1,4 @@
-//! Pages of the guide that are made from the program's own tables: `docs/reference/` holds what
-//! stands here.
+//! The pages of the guide in `docs/reference/`, which are generated from the program's own tables.
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -12,7 +11,7 @@ use washer_row::{Criterion, Measures, Metric, ROW_STATUSES};
 use super::command;
 use crate::columns::Columns;
 use crate::config::machine::with_one_of_each;
-use crate::dwell::columns as of_dwells;
+use crate::dwell::columns as dwell_columns;
 use crate::method::Integrator;
 use arrow_schema::Schema;
 use sweep_engine::columns::declared;
@@ -20,13 +19,13 @@ use sweep_engine::method::{Integrator as _, default_method};
 use sweep_engine::store::{Column, Holds, Layout};
 use sweep_files::key;
 
-/// The head of a page, which says that it is generated.
+/// Returns the head of a page, with a comment that it is generated.
 fn head(title: &str) -> String {
     format!("# {title}\n\n<!-- Made by crates/sweep/src/commands/reference.rs. -->\n\n")
 }
 
-/// A table row; a bar inside a cell would end it.
-fn row(text: &mut String, cells: &[&str]) {
+/// Appends a row of a table. Bars are escaped, because they would end a cell.
+fn push_row(text: &mut String, cells: &[&str]) {
     let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
     // Writing to a String cannot fail.
     let _ = writeln!(text, "| {} |", cells.join(" | "));
@@ -36,12 +35,12 @@ fn parameters() -> String {
     let mut text = head("Parameters");
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
     let all = Parameter::all(&with_one_of_each(), &spin);
-    // Told once, before the table.
-    let how = all.iter().find_map(|parameter| parameter.source().strip_prefix("derived: "));
-    let how = how.unwrap_or_default();
-    text.push_str(&format!(include_str!("reference/parameters.txt"), how = how));
-    row(&mut text, &["name", "built in", "meaning", "values", "source"]);
-    row(&mut text, &["---"; 5]);
+    // The common source of derived parameters stands once, before the table.
+    let derivation = all.iter().find_map(|parameter| parameter.source().strip_prefix("derived: "));
+    let derivation = derivation.unwrap_or_default();
+    text.push_str(&format!(include_str!("reference/parameters.txt"), how = derivation));
+    push_row(&mut text, &["name", "built in", "meaning", "values", "source"]);
+    push_row(&mut text, &["---"; 5]);
     let machine = Machine::paper();
     let value_of = |name: &str| {
         let parameter = all.iter().find(|parameter| parameter.name() == name)?;
@@ -49,45 +48,48 @@ fn parameters() -> String {
         Some(value.to_string())
     };
     for parameter in &all {
-        let (name, description) = (parameter.name(), parameter.description());
-        let is_told = ["upwards", "sideways"].iter().any(|way| description.ends_with(way));
-        if is_told || is_a_further_one(name) {
+        let name = parameter.name();
+        let description = parameter.description();
+        // A row of three coordinates is that of the first, towards the door.
+        let is_other_coordinate =
+            ["upwards", "sideways"].iter().any(|way| description.ends_with(way));
+        if is_other_coordinate || is_further_part(name) {
             continue;
         }
-        let of_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
-        let none = if of_grid { "as the grid file says" } else { "none" };
-        let has_source = value_of(name).is_some() || of_grid;
+        let is_in_grid = matches!(parameter.target(), Target::Spin | Target::Window(_));
+        let none = if is_in_grid { "as the grid file says" } else { "none" };
+        let has_source = value_of(name).is_some() || is_in_grid;
         let source = match parameter.source() {
             _ if !has_source => String::new(),
-            source if source.strip_prefix("derived: ") == Some(how) => "derived".to_owned(),
+            source if source.strip_prefix("derived: ") == Some(derivation) => "derived".to_owned(),
             source => source.to_owned(),
         };
-        // The first of three coordinates tells of all.
-        let of_three = description.strip_suffix("towards the door");
-        let axes: &[&str] = if of_three.is_some() { &["_x", "_y", "_z"] } else { &["_x"] };
+        let coordinate = description.strip_suffix("towards the door");
+        let axes: &[&str] = if coordinate.is_some() { &["_x", "_y", "_z"] } else { &["_x"] };
         let value =
             |axis: &&str| value_of(&name.replacen("_x", axis, 1)).unwrap_or_else(|| none.into());
         let mut values: Vec<String> = axes.iter().map(value).collect();
         if values.iter().all(|value| *value == values[0]) {
             values.truncate(1);
         }
-        let name = format!("`{name}`{}", if of_three.is_some() { ", y, z" } else { "" });
-        let meaning = of_three.unwrap_or(description).trim_end_matches([',', ' ']);
-        let (values, range) = (values.join(", "), allowed(parameter.range()));
-        row(&mut text, &[&name, &values, meaning, &range, &source]);
+        let name = format!("`{name}`{}", if coordinate.is_some() { ", y, z" } else { "" });
+        let meaning = coordinate.unwrap_or(description).trim_end_matches([',', ' ']);
+        let values = values.join(", ");
+        let range = range_text(parameter.range());
+        push_row(&mut text, &[&name, &values, meaning, &range, &source]);
     }
     text
 }
 
-/// Whether a name is that of the second or a later one of several parts.
-fn is_a_further_one(name: &str) -> bool {
+/// Whether a name belongs to the second or a later one of several parts.
+fn is_further_part(name: &str) -> bool {
     ["spring_", "damper_", "stop_", "foot_", "growth_mode_"].into_iter().any(|kind| {
         let number = name.strip_prefix(kind).and_then(|rest| rest.split('_').next());
         number.and_then(|number| number.parse::<usize>().ok()).is_some_and(|number| number > 1)
     })
 }
 
-fn allowed(range: Range) -> String {
+fn range_text(range: Range) -> String {
     match range {
         Range::Any => "any".into(),
         Range::Positive => "above 0".into(),
@@ -103,17 +105,18 @@ fn methods() -> String {
         "The `method` of `[integrator]`, with its keys. [Method and \
          accuracy](../method.md)\nsays which one to take.\n\n",
     );
-    row(&mut text, &["`method`", "what it does", "key", "meaning", "default", "values"]);
-    row(&mut text, &["---"; 6]);
+    push_row(&mut text, &["`method`", "what it does", "key", "meaning", "default", "values"]);
+    push_row(&mut text, &["---"; 6]);
     for entry in Integrator::methods() {
         let is_default = entry.name == default_method::<Integrator>().name;
         let name = format!("`{}`{}", entry.name, if is_default { ", the default" } else { "" });
         // Only the first key's row has the name and the description.
         let heads = [[name.as_str(), entry.description]].into_iter().chain(iter::repeat([""; 2]));
-        for ([name, does], setting) in heads.zip(entry.settings) {
-            let (key, default) = (format!("`{}`", setting.key), format!("{:e}", setting.default));
-            let values = allowed(setting.range);
-            row(&mut text, &[name, does, &key, setting.description, &default, &values]);
+        for ([name, description], setting) in heads.zip(entry.settings) {
+            let key = format!("`{}`", setting.key);
+            let default = format!("{:e}", setting.default);
+            let values = range_text(setting.range);
+            push_row(&mut text, &[name, description, &key, setting.description, &default, &values]);
         }
     }
     text
@@ -122,10 +125,8 @@ fn methods() -> String {
 fn columns() -> String {
     let mut text = head("Columns of a result file");
     text.push_str(include_str!("reference/columns.txt"));
-    let (machine, spin) = (
-        Machine::paper(),
-        Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 },
-    );
+    let machine = Machine::paper();
+    let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
     let axes = Parameter::all(&machine, &spin)
         .into_iter()
         .filter(|parameter| ["unbalance_mass_kg", "damping_n_s_per_m"].contains(&parameter.name()))
@@ -135,21 +136,24 @@ fn columns() -> String {
         .collect();
     let metrics = Metric::ALL.to_vec();
     let measures = Measures { metrics, stops: 1, feet: 1, dampers: 1, ..Measures::default() };
-    let columns = Columns::of_measures(&Channel::ALL, 2.0.into(), &measures, true);
-    let layout = Layout::of_map(axes, columns.declared());
-    list(&mut text, &layout.schema());
+    let columns = Columns::for_measures(&Channel::ALL, 2.0.into(), &measures, true);
+    let layout = Layout::map(axes, columns.declared());
+    list_columns(&mut text, &layout.schema());
     text.push_str("\nChannels:\n\n");
-    row(&mut text, &["channel", "unit", "what moves"]);
-    row(&mut text, &["---"; 3]);
+    push_row(&mut text, &["channel", "unit", "what moves"]);
+    push_row(&mut text, &["---"; 3]);
     for channel in Channel::ALL {
-        row(&mut text, &[&format!("`{}`", channel.name()), channel.unit(), channel.description()]);
+        push_row(
+            &mut text,
+            &[&format!("`{}`", channel.name()), channel.unit(), channel.description()],
+        );
     }
     text.push_str("\nWhat `criterion` in `[reliability]` makes of a channel's columns:\n\n");
-    row(&mut text, &["criterion", "`nonlinear_` and `linear_`", "`ratio_`"]);
-    row(&mut text, &["---"; 3]);
+    push_row(&mut text, &["criterion", "`nonlinear_` and `linear_`", "`ratio_`"]);
+    push_row(&mut text, &["---"; 3]);
     for criterion in Criterion::ALL {
         let name = format!("`{}`", criterion.name());
-        row(&mut text, &[&name, criterion.amplitude(), criterion.ratio()]);
+        push_row(&mut text, &[&name, criterion.amplitude(), criterion.ratio()]);
     }
     let listed = |names: &mut dyn Iterator<Item = &'static str>| {
         names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
@@ -159,56 +163,59 @@ fn columns() -> String {
         metrics = listed(&mut Metric::ALL.iter().map(|metric| metric.name())),
         statuses = listed(&mut ROW_STATUSES.into_iter()),
     ));
-    let columns = declared(of_dwells::columns(&Channel::ALL, &Measures::default(), false));
-    list(&mut text, &Layout::of_map(Vec::new(), columns).schema());
+    let columns = declared(dwell_columns::columns(&Channel::ALL, &Measures::default(), false));
+    list_columns(&mut text, &Layout::map(Vec::new(), columns).schema());
     text
 }
 
-/// A line for each column, once for all channels and models.
-fn list(text: &mut String, columns: &Schema) {
+/// Appends a line for each column; those of all channels and models share one.
+fn list_columns(text: &mut String, columns: &Schema) {
     let mut names = HashSet::new();
-    for field in columns.fields().iter().filter(|field| !is_a_further_one(field.name())) {
-        let name = of_any(field.name());
+    for field in columns.fields().iter().filter(|field| !is_further_part(field.name())) {
+        let name = generic_name(field.name());
         if !names.insert(name.clone()) {
             continue;
         }
-        let told = |key: &str| field.metadata().get(key).map_or("", String::as_str);
-        let unit = match told("unit") {
+        let entry = |key: &str| field.metadata().get(key).map_or("", String::as_str);
+        let unit = match entry("unit") {
             "1" => "",
             _ if name.ends_with("CHANNEL") => "the channel's unit",
             unit => unit,
         };
-        let [worse, limit] = [key::WORSE, key::LIMIT].map(told);
+        let [worse, limit] = [key::WORSE, key::LIMIT].map(entry);
         let facts = [("", unit), ("worse: ", worse), ("limit: ", limit)];
         let facts = facts.iter().filter(|(_, fact)| !fact.is_empty());
-        let facts =
-            facts.map(|(what, fact)| format!("{what}{fact}")).collect::<Vec<_>>().join(", ");
-        let facts = if facts.is_empty() { facts } else { format!(" ({facts})") };
+        let facts: Vec<String> = facts.map(|(label, fact)| format!("{label}{fact}")).collect();
+        let facts = match facts.as_slice() {
+            [] => String::new(),
+            facts => format!(" ({})", facts.join(", ")),
+        };
+        let description = generic_description(entry("description"));
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "- `{name}`{facts}: {}", of_any_model(told("description")));
+        let _ = writeln!(text, "- `{name}`{facts}: {description}");
     }
 }
 
-/// A column's name, with CHANNEL and MODEL in place of one channel's and one model's.
-fn of_any(name: &str) -> String {
-    let of_channel = Channel::ALL.iter().find_map(|channel| {
+/// Returns a column's name with CHANNEL and MODEL in place of the names of a channel and a model.
+fn generic_name(name: &str) -> String {
+    let with_channel = Channel::ALL.iter().find_map(|channel| {
         ["nonlinear_", "linear_", "ratio_", "dwell_", "periodic_"].into_iter().find_map(|before| {
             (name.strip_prefix(before)? == channel.name()).then(|| format!("{before}CHANNEL"))
         })
     });
-    of_channel
+    with_channel
         .unwrap_or_else(|| name.into())
         .replace("nonlinear", "MODEL")
         .replace("linear", "MODEL")
 }
 
-/// A column's description, with that of any channel; the column's name says MODEL.
-fn of_any_model(description: &str) -> String {
-    let first = Channel::ALL
+/// Returns a column's description without the description of a channel and the name of a model.
+fn generic_description(description: &str) -> String {
+    let without_channel = Channel::ALL
         .iter()
         .find_map(|channel| description.strip_prefix(channel.description())?.strip_prefix(": "));
-    let of_all = first.unwrap_or(description).replace(", nonlinear model", "");
-    of_all.replace("; null if it failed", "")
+    let generic = without_channel.unwrap_or(description).replace(", nonlinear model", "");
+    generic.replace("; null if it failed", "")
 }
 
 fn commands(program: clap::Command) -> String {
@@ -218,22 +225,22 @@ fn commands(program: clap::Command) -> String {
     let mut program = program.term_width(100);
     program.build();
     let mut part = |title: &str, help: String, more: &str| {
-        // The usage says it.
+        // The usage names the argument already.
         let help = help.replace("Arguments:\n  <GRID.toml>  Grid file\n\n", "");
         let help: Vec<&str> = help.lines().map(str::trim_end).collect();
         // Writing to a String cannot fail.
         let _ =
             writeln!(text, "## {title}\n\n```text\n{}\n```\n{more}", help.join("\n").trim_end());
     };
-    // Examples and the flag that shows them are for a terminal.
-    let help_of_program = program.clone().before_help(None::<&'static str>).render_help();
-    part("sweep", help_of_program.to_string().trim_start().into(), "");
+    // Examples are for a terminal.
+    let program_help = program.clone().before_help(None::<&'static str>).render_help();
+    part("sweep", program_help.to_string().trim_start().into(), "");
     let shared = shared_options(&program);
     let mut options = clap::Command::new("options").disable_help_flag(true).term_width(100);
     options = options.help_template("{options}").args(shared.clone());
     part("Options of several commands", options.render_help().to_string(), "");
     for command in program.get_subcommands().filter(|command| !command.is_hide_set()) {
-        let is_shared = |arg: &clap::Arg| shared.iter().any(|of_many| is_same(of_many, arg));
+        let is_shared = |arg: &clap::Arg| shared.iter().any(|option| is_same(option, arg));
         let longs = command
             .get_arguments()
             .filter(|arg| is_shared(arg))
@@ -254,13 +261,13 @@ fn commands(program: clap::Command) -> String {
     text
 }
 
-/// Whether two commands' arguments are one option, told alike.
+/// Whether two arguments are the same option with the same help.
 fn is_same(a: &clap::Arg, b: &clap::Arg) -> bool {
-    let told = |arg: &clap::Arg| arg.get_help().map(ToString::to_string);
-    a.get_long().is_some() && a.get_long() == b.get_long() && told(a) == told(b)
+    let help = |arg: &clap::Arg| arg.get_help().map(ToString::to_string);
+    a.get_long().is_some() && a.get_long() == b.get_long() && help(a) == help(b)
 }
 
-/// Options that at least three commands have, each once; the help flag stays with its command.
+/// Returns the options that at least three commands have, each once, without `--help`.
 fn shared_options(program: &clap::Command) -> Vec<clap::Arg> {
     let visible = || program.get_subcommands().filter(|command| !command.is_hide_set());
     let mut shared: Vec<clap::Arg> = Vec::new();
@@ -274,7 +281,7 @@ fn shared_options(program: &clap::Command) -> Vec<clap::Arg> {
     shared
 }
 
-/// With `RENEW` in the environment it writes them.
+/// Checks the pages, or writes them if `RENEW` is in the environment.
 #[test]
 fn the_guide_has_these_pages() {
     let pages = [
@@ -283,14 +290,14 @@ fn the_guide_has_these_pages() {
         ("columns", columns()),
         ("commands", commands(command())),
     ];
-    for (page, made) in pages {
+    for (page, generated) in pages {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference");
         let path = folder.join(page).with_extension("md");
         if env::var_os("RENEW").is_some() {
-            fs::write(path, made).unwrap();
+            fs::write(path, generated).unwrap();
         } else {
-            let is_made = fs::read_to_string(&path).unwrap() == made;
-            assert!(is_made, "{page}.md: RENEW=1 cargo test --release -p sweep --lib reference");
+            let is_current = fs::read_to_string(&path).unwrap() == generated;
+            assert!(is_current, "{page}.md: RENEW=1 cargo test --release -p sweep --lib reference");
         }
     }
 }
@@ -298,9 +305,9 @@ fn the_guide_has_these_pages() {
 #[test]
 fn further_springs_and_dampers_are_left_out_and_nothing_else() {
     assert!(
-        is_a_further_one("spring_2_tub_x_m")
-            && is_a_further_one("damper_12_damping_n_s_per_m")
-            && is_a_further_one("foot_3_load_linear_n")
+        is_further_part("spring_2_tub_x_m")
+            && is_further_part("damper_12_damping_n_s_per_m")
+            && is_further_part("foot_3_load_linear_n")
     );
-    assert!(!is_a_further_one("spring_1_tub_x_m") && !is_a_further_one("spring_stiffness_n_per_m"));
+    assert!(!is_further_part("spring_1_tub_x_m") && !is_further_part("spring_stiffness_n_per_m"));
 }

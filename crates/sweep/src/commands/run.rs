@@ -1,4 +1,4 @@
-//! `sweep run GRID.toml`: the sweep, with time histories beside it.
+//! `sweep run GRID.toml` computes a sweep, and with an option the time histories of its points.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -16,9 +16,9 @@ use sweep_files::{self as files, ParquetFile};
 pub struct Args {
     #[command(flatten)]
     run: engine_run::Args,
-    /// Keep the time histories of every point too, decimated, in NAME.traces beside NAME.parquet:
-    /// `sweep plot NAME.parquet --traces NAME.traces -o MAP.html` shows them on a click. They take
-    /// a run of their own, some three times as long as the map
+    /// Keep the decimated time histories of every point, too, in NAME.traces beside NAME.parquet:
+    /// `sweep plot NAME.parquet --traces NAME.traces -o MAP.html` shows them on a click. They are
+    /// computed after the map and take some three times as long
     #[arg(long)]
     keep_traces: bool,
 }
@@ -26,7 +26,7 @@ pub struct Args {
 /// Runs a grid.
 ///
 /// # Errors
-/// Mistakes in the grid file, and whatever kept the run from its end.
+/// Returns an error for mistakes in the grid file, and if the run fails.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan: Plan = args.run.target.grid.load()?;
     let engine = ModelEngine::new(&plan)?;

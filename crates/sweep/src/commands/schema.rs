@@ -1,4 +1,4 @@
-//! `sweep schema`: JSON Schema of the files a user writes.
+//! `sweep schema` prints the JSON Schema of grid and machine files.
 
 use crate::config::machine;
 use sweep_engine::{Error, Exit, print};
@@ -14,7 +14,7 @@ pub struct Args {
 /// Prints the schema.
 ///
 /// # Errors
-/// When standard output cannot be written.
+/// Returns an error if standard output cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let schema = if args.machine {
         machine::schema()

@@ -1,4 +1,4 @@
-//! `sweep show FILE`: what a Parquet file of this program holds.
+//! `sweep show FILE` prints the contents of a Parquet file of this program.
 
 use crate::dwell;
 use crate::stability::tongues;
@@ -7,10 +7,10 @@ use sweep_engine::commands::show::Further;
 use sweep_files::{FileKind, ParquetFile};
 use washer_row::Metric;
 
-/// What is said beside what all models' files say.
+/// The additions of this model to the engine's `sweep show`.
 pub(super) const FURTHER: Further<'static> = Further { lines: &lines, is_of_a_metric };
 
-/// What a file about held speeds says as a whole: lines, each with its name.
+/// Returns the lines of the summary of a file about held speeds, each with its name.
 fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
     Ok(match file.kind() {
         Some(FileKind::Stability) => tongues::summarise(file)?.lines(),
@@ -19,9 +19,9 @@ fn lines(file: &ParquetFile) -> Result<Vec<(&'static str, String)>, Error> {
     })
 }
 
-/// Whether a result has this column because a metric asked for it.
+/// Whether a column belongs to a metric.
 fn is_of_a_metric(column: &str) -> bool {
-    // A column of one stop or foot has its number behind the first word.
+    // The name of a column of one stop or foot has a number after the first word.
     let words = column.split('_').filter(|word| word.parse::<u32>().is_err());
     let name = words.collect::<Vec<_>>().join("_");
     Metric::ALL.iter().any(|metric| name.starts_with(metric.name()))

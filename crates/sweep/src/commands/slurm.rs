@@ -1,4 +1,4 @@
-//! `sweep slurm GRID.toml --shards N`: the script that submits a sweep to a Slurm cluster.
+//! `sweep slurm GRID.toml --shards N` prints the script that submits a sweep to a Slurm cluster.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -8,50 +8,50 @@ use sweep_engine::commands::grid::{ResultArgs, quoted};
 use sweep_engine::store::{ShardRequest, idle_shards};
 use sweep_engine::{Error, Exit, print, tell};
 
-/// Tasks that a Slurm array may have unless its administrator allowed more (`MaxArraySize` 1001
-/// counts from 0).
-const USUAL_MOST_TASKS: u64 = 1000;
+/// Maximum number of tasks of a Slurm array, above which a note is printed. Basis: Slurm's default
+/// `MaxArraySize` of 1001, which counts from 0. Doubling it omits the note where it is needed.
+const MAX_ARRAY_TASKS: u64 = 1000;
 
 /// Arguments of `sweep slurm`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     target: ResultArgs,
-    /// Parts to compute side by side, each a task of the array
-    #[arg(long, value_name = "N", value_parser = shards)]
+    /// Number of parts that are computed side by side, each a task of the array
+    #[arg(long, value_name = "N", value_parser = parse_shards)]
     shards: u64,
     /// Time limit of a task, as sbatch takes it: 30 (minutes), 4:00:00, 2-12
-    #[arg(long, value_name = "TIME", value_parser = word)]
+    #[arg(long, value_name = "TIME", value_parser = parse_word)]
     time: Option<String>,
     /// Partition to run in
-    #[arg(long, value_name = "NAME", value_parser = word)]
+    #[arg(long, value_name = "NAME", value_parser = parse_word)]
     partition: Option<String>,
     /// Account to charge
-    #[arg(long, value_name = "NAME", value_parser = word)]
+    #[arg(long, value_name = "NAME", value_parser = parse_word)]
     account: Option<String>,
     /// Cores a task, and so its threads
     #[arg(long, value_name = "N", default_value_t = 1)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=4096))]
     cpus_per_task: u32,
     /// Memory a task, as sbatch takes it: 500M, 2G
-    #[arg(long, value_name = "SIZE", value_parser = word)]
+    #[arg(long, value_name = "SIZE", value_parser = parse_word)]
     mem: Option<String>,
     /// Anything else for sbatch, after `--`: `-- --constraint=avx512 --qos=long`
-    #[arg(last = true, value_name = "SBATCH OPTION", value_parser = word)]
+    #[arg(last = true, value_name = "SBATCH OPTION", value_parser = parse_word)]
     sbatch: Vec<String>,
 }
 
-fn shards(text: &str) -> Result<u64, String> {
+fn parse_shards(text: &str) -> Result<u64, String> {
     match format!("auto/{text}").parse() {
         Ok(ShardRequest::Auto { of }) => Ok(of),
         _ => Err(format!("expected a number of shards from 1 to 1000000; got `{text}`")),
     }
 }
 
-/// A word of a command line: a script has one line each.
-fn word(text: &str) -> Result<String, String> {
+/// Parses a word of a command line, which must fit on one line of a script.
+fn parse_word(text: &str) -> Result<String, String> {
     if text.is_empty() || text.chars().any(char::is_control) {
-        return Err("expected something on one line".into());
+        return Err("expected a text on one line".into());
     }
     Ok(text.to_owned())
 }
@@ -59,8 +59,8 @@ fn word(text: &str) -> Result<String, String> {
 /// Prints the script.
 ///
 /// # Errors
-/// Mistakes in the grid file, a working folder or program without a path, standard output that
-/// cannot be written.
+/// Returns an error for mistakes in the grid file, if the working folder or the program has no
+/// path, and if standard output cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let plan: Plan = args.target.grid.load()?;
     let no_path = |what: &'static str| {
@@ -68,9 +68,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     };
     let folder = std::env::current_dir().map_err(no_path("the working folder"))?;
     let program = std::env::current_exe().map_err(no_path("this program"))?;
-    names_fit(args, &folder, &program)?;
+    check_names(args, &folder, &program)?;
     idle_shards(plan.points(), args.shards).iter().for_each(|note| tell(note));
-    if args.shards > USUAL_MOST_TASKS {
+    if args.shards > MAX_ARRAY_TASKS {
         tell(
             "note: many clusters allow arrays of 1000 tasks (scontrol show config | grep \
              MaxArraySize); more --cpus-per-task need fewer shards",
@@ -79,9 +79,12 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     print(&script(args, &plan, &folder, &program))
 }
 
-/// Refuses names that a script cannot hold. A line break in one would end a here-document early,
+/// Checks that a script can hold all names. A line break in one would end a here-document early,
 /// and the shell would run the rest of the name.
-fn names_fit(args: &Args, folder: &Path, program: &Path) -> Result<(), Error> {
+///
+/// # Errors
+/// Returns an error for a name with control characters or not in UTF-8.
+fn check_names(args: &Args, folder: &Path, program: &Path) -> Result<(), Error> {
     let ResultArgs { grid, out } = &args.target;
     let paths = [
         ("GRID.toml", Some(grid.grid.as_path())),
@@ -93,7 +96,7 @@ fn names_fit(args: &Args, folder: &Path, program: &Path) -> Result<(), Error> {
     let sets = grid.sets.iter().map(|set| ("--set", OsStr::new(set)));
     let at = grid.at.iter().map(|at| ("--at", OsStr::new(at)));
     for (option, name) in paths.chain(sets).chain(at) {
-        if name.to_str().is_none_or(|name| word(name).is_err()) {
+        if name.to_str().is_none_or(|name| parse_word(name).is_err()) {
             let expected = "a name in UTF-8 without control characters, as a script needs";
             return Err(Error::option(option, format!("{name:?}"), expected));
         }
@@ -101,7 +104,7 @@ fn names_fit(args: &Args, folder: &Path, program: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// The script: the array, and the merge that waits for it.
+/// Returns the script, which submits the array and the merge that waits for it.
 fn script(args: &Args, plan: &Plan, folder: &Path, program: &Path) -> String {
     let output = args.target.output(plan);
     let results = match output.parent() {
@@ -137,7 +140,7 @@ fn script(args: &Args, plan: &Plan, folder: &Path, program: &Path) -> String {
     )
 }
 
-/// A file name pattern: its `%` is no reason for quotes.
+/// Returns a pattern of file names, quoted for a shell if another character than `%` needs it.
 fn quoted_pattern(pattern: &str) -> String {
     let rest = pattern.replace('%', "");
     if quoted(&rest) == rest { pattern.to_owned() } else { quoted(pattern) }
@@ -161,8 +164,9 @@ mod tests {
         Line::try_parse_from([&["slurm"], words].concat()).map(|line| line.args)
     }
 
-    /// What the script's two calls of sbatch are given: arguments, then the batch script.
-    fn submitted(script: &str, arguments: &[&str], home: &Path) -> (Vec<String>, String) {
+    /// Runs a script, with a program in place of sbatch that records its calls. Returns the lines
+    /// of all arguments and batch scripts, and the script's output.
+    fn run_script(script: &str, arguments: &[&str], home: &Path) -> (Vec<String>, String) {
         use std::io::Write;
         let bin = home.join("bin");
         std::fs::create_dir_all(&bin).unwrap();
@@ -186,14 +190,14 @@ mod tests {
             .spawn()
             .unwrap();
         shell.stdin.take().unwrap().write_all(script.as_bytes()).unwrap();
-        let told = shell.wait_with_output().unwrap();
-        assert!(told.status.success());
+        let output = shell.wait_with_output().unwrap();
+        assert!(output.status.success());
         let calls = std::fs::read_to_string(calls).unwrap();
-        (calls.lines().map(str::to_owned).collect(), String::from_utf8(told.stdout).unwrap())
+        (calls.lines().map(str::to_owned).collect(), String::from_utf8(output.stdout).unwrap())
     }
 
     #[test]
-    fn the_shell_takes_the_script_as_it_was_meant_whatever_the_names() {
+    fn a_script_submits_the_right_commands_even_with_names_that_need_quotes() {
         let home = tempfile::tempdir().unwrap();
         let grid = home.path().join("it's a grid.toml");
         let text = "name = \"half.of-it\"\n[spin]\nprofile = \"triangular\"\npeak_rpm = \
@@ -218,16 +222,16 @@ mod tests {
         .unwrap();
         let plan = args.target.grid.load().unwrap();
         let script = script(&args, &plan, home.path(), Path::new("/opt/my sweep"));
-        let (calls, told) = submitted(&script, &["--array=3,7"], home.path());
-        assert_eq!(told, "array 17, merge 17\n");
-        let place = |wanted: &str| {
+        let (calls, output) = run_script(&script, &["--array=3,7"], home.path());
+        assert_eq!(output, "array 17, merge 17\n");
+        let position = |expected: &str| {
             calls
                 .iter()
-                .position(|line| line == wanted)
-                .unwrap_or_else(|| panic!("no {wanted} in\n{}", calls.join("\n")))
+                .position(|line| line == expected)
+                .unwrap_or_else(|| panic!("no {expected} in\n{}", calls.join("\n")))
         };
-        assert!(place("--array=1-8") < place("--array=3,7"), "the later one counts");
-        for wanted in [
+        assert!(position("--array=1-8") < position("--array=3,7"), "the later one counts");
+        for expected in [
             "--job-name=half.of-it",
             "--cpus-per-task=4",
             "--requeue",
@@ -235,25 +239,25 @@ mod tests {
             "--mem=1G",
             "--comment=two words",
         ] {
-            place(wanted);
+            position(expected);
         }
-        place("--output=results/half.of-it.slurm-%A_%a.log");
-        place("--dependency=afterany:17");
+        position("--output=results/half.of-it.slurm-%A_%a.log");
+        position("--dependency=afterany:17");
         let grid = grid.replace('\'', r"'\''");
-        place(&format!(
+        position(&format!(
             "exec '/opt/my sweep' run '{grid}' --set tub_mass_kg=20 \
              --shard \"$SLURM_ARRAY_TASK_ID/8\""
         ));
-        place(&format!("exec '/opt/my sweep' merge '{grid}' --set tub_mass_kg=20"));
-        assert!(home.path().join("results").is_dir(), "Slurm makes no folder for its logs");
+        position(&format!("exec '/opt/my sweep' merge '{grid}' --set tub_mass_kg=20"));
+        assert!(home.path().join("results").is_dir(), "Slurm creates no folder for its logs");
     }
 
     #[test]
-    fn no_name_gets_out_of_its_line() {
+    fn names_with_line_breaks_are_refused() {
         use std::os::unix::ffi::OsStrExt;
         let fits = |words: &[&str], folder: &[u8], program: &str| {
             let args = parse(&[words, &["--shards", "2"]].concat()).unwrap();
-            names_fit(&args, Path::new(OsStr::from_bytes(folder)), Path::new(program)).is_ok()
+            check_names(&args, Path::new(OsStr::from_bytes(folder)), Path::new(program)).is_ok()
         };
         assert!(fits(&["it's $(a) `grid`.toml", "--out", "ü x.parquet"], b"/a b", "/sweep"));
         let out = "x\nEND\ntouch /tmp/out\n.toml";
@@ -267,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused() {
+    fn wrong_options_are_refused() {
         for words in [
             &["g.toml"] as &[&str],
             &["g.toml", "--shards", "0"],

@@ -1,4 +1,4 @@
-//! `sweep trace GRID.toml`: time histories of both models at one point, or at every one.
+//! `sweep trace GRID.toml` writes time histories of both models at one point or at all points.
 
 use std::path::PathBuf;
 
@@ -22,32 +22,32 @@ use washer_row::{Level, Trajectory, Verdict};
 pub struct Args {
     #[command(flatten)]
     grid: sweep_engine::commands::grid::GridArgs,
-    /// The point of this number in the grid, as in a result's column `point`
+    /// Trace the point with this number, which is in a result's column `point`
     #[arg(long, value_name = "N", conflicts_with_all = ["worst", "at"])]
     point: Option<u64>,
-    /// The point of the grid's result where this column is worst [default: ratio_max]
+    /// Trace the point at which this column of the grid's result is worst [default: ratio_max]
     #[arg(long, value_name = "COLUMN", conflicts_with = "at")]
     #[arg(num_args = 0..=1, default_missing_value = "ratio_max")]
     worst: Option<String>,
-    /// The result that --worst looks into [default: results/NAME.parquet]
+    /// Result file in which --worst looks for the point [default: results/NAME.parquet]
     #[arg(long, value_name = "FILE", requires = "worst")]
     result: Option<PathBuf>,
-    /// Every point of the grid, in one table with the points' numbers and axes
+    /// Trace every point of the grid, in one table with the points' numbers and axes
     #[arg(long, conflicts_with_all = ["point", "worst"])]
     all: bool,
     /// Which models to integrate
     #[arg(long, value_enum, default_value_t)]
     model: Models,
-    /// One instant a turn of the drum, where the unbalance is up
+    /// Write one instant for each turn of the drum, at which the unbalance is up
     #[arg(long, conflicts_with = "every")]
     turns: bool,
     /// Add the drum's angle
     #[arg(long)]
     angle: bool,
-    /// Time between two instants of the file, in s; the integration's steps are its own
+    /// Time between two instants of the file, in s; integration has shorter steps of its own
     #[arg(long, value_name = "S", default_value_t = 0.01)]
     every: f64,
-    /// Add rates and accelerations of the channels
+    /// Add the rates and accelerations of the channels
     #[arg(long)]
     rates: bool,
     /// Add the ten coordinates and their speeds
@@ -57,8 +57,8 @@ pub struct Args {
     /// load of each foot
     #[arg(long)]
     forces: bool,
-    /// Begin away from equilibrium, both models alike: a coordinate q1 to q10 (m, rad) or a speed
-    /// u1 to u10 (per s); may be repeated
+    /// Start both models away from equilibrium: a coordinate q1 to q10 (m, rad) or a speed u1 to
+    /// u10 (per s); may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = parse_start_value)]
     start: Vec<StartValue>,
     /// Trace file to write
@@ -66,13 +66,13 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// Integrates and writes.
+/// Integrates the models and writes the trace.
 ///
 /// # Errors
-/// Mistakes in the grid file or the options, a machine without equilibrium, and a file that cannot
-/// be written.
+/// Returns an error for mistakes in the grid file or the options, for a machine without
+/// equilibrium, and if the file cannot be written.
 pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
-    let chosen = if args.all { Vec::new() } else { chosen(args)? };
+    let chosen = if args.all { Vec::new() } else { choose_point(args)? };
     let (plan, at) = match args.all {
         true => (args.grid.load()?, None),
         false => args.grid.load_point(&chosen).map(|(plan, at)| (plan, Some(at)))?,
@@ -83,23 +83,23 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let start = start_from(&args.start);
     let output = Output::begin(&args.out, FileKind::Trace)?;
     let settings = TraceSettings { every_s, models, start, extras, capped: None };
-    // A signal ends the process: there is nothing to keep.
+    // A signal ends the process, because there are no partial results to keep.
     let traced = trace_in_pool(&plan, at, &settings, &|| false).map_err(Error::model)?;
     let TraceTable { table, instants, failures, level } = traced;
     failures.iter().for_each(|failure| tell(failure));
     output.finish(&table.into_bytes(&args.out)?)?;
-    let of = if args.all { format!(" of {} points", plan.points()) } else { String::new() };
-    let (out, end_s) = (args.out.display(), plan.end_s);
-    tell(&format!("wrote {out}: {instants} instants{of} from 0 to {end_s} s"));
-    // A map's row is of machines that start at rest, and of both models.
+    let points = if args.all { format!(" of {} points", plan.points()) } else { String::new() };
+    let out = args.out.display();
+    tell(&format!("wrote {out}: {instants} instants{points} from 0 to {} s", plan.end_s));
+    // The row of a map has both models, which start at equilibrium.
     if args.start.is_empty() && !args.all && models == Models::Both {
-        tell(compared(&plan, &chosen, level)?.trim_end());
+        tell(summarise_row(&plan, &chosen, level)?.trim_end());
     }
     Ok(Exit::Done)
 }
 
-/// The point as `--at` would give it.
-fn chosen(args: &Args) -> Result<Vec<String>, Error> {
+/// Returns the point to trace as texts `NAME=VALUE`, as in `--at`.
+fn choose_point(args: &Args) -> Result<Vec<String>, Error> {
     if args.point.is_none() && args.worst.is_none() {
         return Ok(args.grid.at.clone());
     }
@@ -107,19 +107,20 @@ fn chosen(args: &Args) -> Result<Vec<String>, Error> {
     let mut point = args.point.unwrap_or_default();
     if let Some(column) = &args.worst {
         let worse;
-        (point, worse) = worst(args, &plan, column)?;
+        (point, worse) = find_worst(args, &plan, column)?;
         tell(&format!("point {point} is where {column} is {}", worse.extreme()));
     }
     if point >= plan.points() {
         return Err(Error::option("--point", point, format!("from 0 to {}", plan.points() - 1)));
     }
     let names = plan.axes.iter().map(|axis| axis.parameter.name());
-    // The shortest decimals read back to the same values.
+    // `Display` writes the shortest decimals that parse to the same values.
     Ok(names.zip(plan.axis_values(point)).map(|(name, value)| format!("{name}={value}")).collect())
 }
 
-/// The worst point of the grid's result, and which way that is.
-fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> {
+/// Returns the point of the grid's result at which a column is worst, and the bad direction of that
+/// column.
+fn find_worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> {
     let default = || PathBuf::from(format!("results/{}.parquet", plan.name));
     let path = args.result.clone().unwrap_or_else(default);
     let refused = |expected: String| Error::option("--worst", column, expected);
@@ -148,15 +149,16 @@ fn worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Error> 
     }
 }
 
-/// Peaks of both models in the window, their ratios and the verdict: what the point's row of a map
-/// holds. `of_file` is the method of the trace.
-fn compared(plan: &Plan, at: &[String], of_file: Option<Level>) -> Result<String, Error> {
-    // What is told has nothing of held speeds.
+/// Returns the contents of the point's row in a map as text: the amplitudes of both models, their
+/// ratios and the verdict. `trace_level` is the method of the trace.
+fn summarise_row(plan: &Plan, at: &[String], trace_level: Option<Level>) -> Result<String, Error> {
+    // The text has no metrics, so those at held speeds are not computed.
     let mut plan = plan.clone();
     plan.model.held_speeds = None;
     let mut outcomes = ModelEngine::new(&plan)?.evaluate_at(&[Vec::new()]);
     let Some(outcome) = outcomes.pop() else { return Ok(String::new()) };
-    let (channels, limits) = (&plan.reliability.channels, plan.reliability.limits);
+    let channels = &plan.reliability.channels;
+    let limits = plan.reliability.limits;
     let verdict = Verdict::new(&outcome, channels.len(), limits);
     let number = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), short);
     let row = |(k, channel): (usize, &Channel)| {
@@ -172,36 +174,38 @@ fn compared(plan: &Plan, at: &[String], of_file: Option<Level>) -> Result<String
     let rows: Vec<Vec<String>> = channels.iter().enumerate().map(row).collect();
     let headings = ["", "unit", "nonlinear", "linear", "ratio"].map(str::to_owned);
     let window = span(plan.window_s, short);
-    let what = plan.model.measures.criterion.amplitude();
-    let place = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
-    let mut text = format!("{what}, {window} s{place}:\n{}", table(&headings, &rows, ""));
-    // The ratio that is beyond its limit, or the greatest.
+    let amplitude = plan.model.measures.criterion.amplitude();
+    let point = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
+    let mut text = format!("{amplitude}, {window} s{point}:\n{}", table(&headings, &rows, ""));
+    // The decisive ratio is one that is beyond its limit, or else the greatest.
     let too_low = limits.least.zip(verdict.least).filter(|(limit, (_, ratio))| ratio <= limit);
-    let told = match (verdict.greatest, too_low) {
+    let decisive = match (verdict.greatest, too_low) {
         (Some((_, ratio)), Some((limit, least))) if ratio < limits.most => {
             Some((least, "least", limit))
         }
         (greatest, _) => greatest.map(|greatest| (greatest, "greatest", limits.most)),
     };
-    let said = match (verdict.reliable, told) {
+    let verdict_text = match (verdict.reliable, decisive) {
         (Some(reliable), Some(((channel, ratio), which, limit))) => {
-            let said = if reliable { "reliable" } else { "not reliable" };
-            let (channel, ratio, limit) = (channels[channel].name(), short(ratio), short(limit));
-            format!("{said}: the {which} ratio is {ratio} ({channel}), the limit {limit}")
+            let word = if reliable { "reliable" } else { "not reliable" };
+            let channel = channels[channel].name();
+            let ratio = short(ratio);
+            let limit = short(limit);
+            format!("{word}: the {which} ratio is {ratio} ({channel}), the limit {limit}")
         }
-        _ => "undefined: no ratio is".to_owned(),
+        _ => "undefined: no ratio is defined".to_owned(),
     };
-    text.line("verdict", &said);
-    if let Some(of_file) = of_file.filter(|_| plan.integrator.direct().is_none()) {
-        let [row, file] = [outcome.method, of_file].map(Level::name);
-        let told = format!("{row}, as in the point's row of a map; the file: {file}");
-        text.line("method", told);
+    text.line("verdict", &verdict_text);
+    if let Some(trace_level) = trace_level.filter(|_| plan.integrator.direct().is_none()) {
+        let [row, trace] = [outcome.method, trace_level].map(Level::name);
+        let methods = format!("{row}, as in the point's row of a map; the file: {trace}");
+        text.line("method", methods);
     }
     if outcome.sensitive == Some(true) {
         text.line("sensitive", "chaotic: the digits are those of one trajectory");
     }
     let gaps = [&outcome.nonlinear, &outcome.linear].map(|model| number(model.min_gap_m));
-    let told = format!("{} m nonlinear, {} m linear, over the whole run", gaps[0], gaps[1]);
-    text.line("least gap", &told);
+    let gap_text = format!("{} m nonlinear, {} m linear, over the whole run", gaps[0], gaps[1]);
+    text.line("least gap", &gap_text);
     Ok(text)
 }

@@ -22,7 +22,7 @@ pub(crate) struct DwellRow {
 
 pub(crate) type DwellColumn = ResultColumn<DwellRow>;
 
-/// Number of the kinds of settled motions, which are the first of [`Ending::KINDS`].
+/// Number of the kinds of settled motions, which are the first of [`Ending::KIND_NAMES`].
 const SETTLED_KINDS: usize = 5;
 
 /// The statuses of rows.
@@ -168,7 +168,7 @@ pub(crate) fn columns(
     columns.push(ResultColumn::name(
         "kind",
         text,
-        Ending::KINDS[..SETTLED_KINDS].to_vec(),
+        Ending::KIND_NAMES[..SETTLED_KINDS].to_vec(),
         DwellRow::kind,
     ));
     let text = "after how many turns it repeats; null where it does not";
@@ -177,9 +177,11 @@ pub(crate) fn columns(
     let is_periodic = |number: &MetricColumn| number.metric.has_periodic_value();
     for number in measures.per_model().filter(is_periodic) {
         let text = format!("{}, over 128 further turns of the motion", number.description());
-        let (name, unit) = (number.column(MODELS[0]), number.metric.facts().unit);
+        let text = text.replace(" in the window", "");
+        let name = number.column(MODELS[0]);
+        let unit = number.metric.facts().unit;
         let value = move |row: &DwellRow| number.value(&row.within()?.extra);
-        columns.push(ResultColumn::measured(name, unit, text.replace(" in the window", ""), value));
+        columns.push(ResultColumn::measured(name, unit, text, value));
     }
     let numbers: [(&str, &str, &str, fn(&DwellRow) -> Option<f64>); 7] = [
         (

@@ -2,7 +2,7 @@
 //! the motions in which machines end.
 
 use lane_ode::Simd;
-use washer_model::{Dwell, Endings, Point, Response, STATE_LEN, Starts, endings, respond};
+use washer_model::{Dwell, Endings, Point, Response, STATE_LEN, Starts, find_endings, respond};
 use washer_row::{DwellPeaks, Growth, Metric, Outcome, Status};
 
 use super::map_isolating_panics;
@@ -50,7 +50,7 @@ pub(crate) fn find_motions(
 ) -> Vec<Result<Endings, Status>> {
     let find_group = |dwells: &[(Dwell<'_>, Carried)]| {
         let (dwells, carried): (Vec<_>, Vec<_>) = dwells.iter().copied().unzip();
-        let found = endings(simd, &dwells, &carried, starts, is_stopped).into_iter();
+        let found = find_endings(simd, &dwells, &carried, starts, is_stopped).into_iter();
         found.map(|found| found.map_err(Status::from)).collect()
     };
     map_isolating_panics(dwells, find_group, || Err(Status::Panicked))

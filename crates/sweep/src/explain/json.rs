@@ -100,7 +100,7 @@ fn tongue_json(tongue: &Tongue, passages: &[Passage], swept: &SweptResult) -> Va
         "resonance": tongue.resonance,
         "crossed": passages.iter().map(passage).collect::<Value>(),
         "ends_in": tongue.ends_in.as_ref().map(|motion| json!({
-            "kind": Ending::KINDS[motion.kind()],
+            "kind": Ending::KIND_NAMES[motion.kind()],
             "amplitudes": by_channel(swept, &swept.plan_channels(&motion.peaks)),
             "followed_s": motion.time_s,
         })),

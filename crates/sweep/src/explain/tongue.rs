@@ -6,7 +6,8 @@ use rayon::iter::ParallelIterator as _;
 use rayon::slice::ParallelSlice as _;
 use serde::Serialize;
 use washer_model::{
-    Beyond, Dwell, Ending, Kind, Point, Response, Responses, Starts, endings_beside, modes,
+    Beyond, Dwell, Ending, Kind, Point, Response, Responses, Starts, find_endings_from_responses,
+    modes,
 };
 
 use super::prepare_scenario;
@@ -260,7 +261,8 @@ pub(crate) fn find_endings(finder: &ResponseFinder<'_>, tongues: &[Tongue]) -> V
     let responses = tongues.iter().map(|tongue| Ok(vec![tongue.at.clone()])).collect();
     let starts = Starts { count: 1, ..Starts::default() };
     let is_stopped = || finder.interrupt.stopped();
-    let found = endings_beside(finder.simd, &dwells, responses, &[], &starts, &is_stopped);
+    let found =
+        find_endings_from_responses(finder.simd, &dwells, responses, &[], &starts, &is_stopped);
     found.into_iter().map(|found| found.ok()?.motions.into_iter().next()).collect()
 }
 

@@ -207,7 +207,7 @@ fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
     let names = all_names();
     let is_written_so = column.header.contains('_');
     nearest(&column.header, names.iter().map(String::as_str)).filter(|_| is_written_so)?;
-    let title = format!("the column `{}` is no channel", column.header);
+    let title = format!("the column `{}` does not name a channel", column.header);
     let expected = "expected a channel of `sweep trace` with its unit, as in \
                     tub_front_y_m_per_s2, tub_yaw_rad or cabinet_force_y_n";
     let refusal = Diagnostic::new(title).at(&column.name.at, expected);
@@ -404,9 +404,12 @@ mod tests {
     #[test]
     fn mistakes_have_their_places() {
         let text = refused("time_s,tub_front_y_m_s2\n0,1\n0.1,2\n0.1,3\n,4\n");
-        for said in
-            ["no channel", "did you mean `tub_front_y_m", "time goes back", "without its time"]
-        {
+        for said in [
+            "does not name a channel",
+            "did you mean `tub_front_y_m",
+            "time goes back",
+            "without its time",
+        ] {
             assert!(text.contains(said), "{said}: {text}");
         }
         assert!(text.contains(":4:") && text.contains(":5:"), "{text}");

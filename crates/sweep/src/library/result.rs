@@ -137,7 +137,8 @@ impl MemoryTable {
         }
     }
 
-    /// Draws the figure of it; the output's ending (`.svg`, `.pdf`, `.png`, `.html`) says how.
+    /// Draws the table's figure. The extension of the output (`.svg`, `.pdf`, `.png`, `.html`)
+    /// selects the format.
     ///
     /// # Errors
     /// Returns the errors of [`sweep_plot::render`] and [`Self::save`].

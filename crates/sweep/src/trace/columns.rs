@@ -1,4 +1,4 @@
-//! Columns of a trace: instants, channels, and what else is asked for.
+//! The columns of a trace: instants, channels, and the quantities of [`TraceExtras`].
 
 use std::f64::consts::TAU;
 

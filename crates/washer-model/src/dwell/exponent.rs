@@ -1,83 +1,98 @@
-//! Largest Lyapunov exponents, by near twins that are brought back close after every turn.
+//! Largest Lyapunov exponents, by perturbed runs whose separation is rescaled after every turn
+//! (Benettin's method).
 
-use super::hold::{Held, hold};
-use super::starts::size;
+use super::starts::largest_deviation;
+use super::turns::{HeldState, integrate_turns};
 use crate::coordinates::{COORDINATES, STATES, TUB};
 use crate::stability::orbit::Row;
 use core::f64::consts::TAU;
 use lane_ode::Simd;
 
-/// How close a twin is, as a share of the greatest coordinate.
-const CLOSE: f64 = 1e-7;
+/// Separation of a perturbed run after rescaling, as a share of the greatest coordinate. Basis: far
+/// above rounding, and so small that it grows linearly within a turn. Doubling it changes nothing.
+const RESCALED_SEPARATION: f64 = 1e-7;
 
-/// Turns before any count, and turns that do, in parts whose scatter gives the error.
-const FIRST_TURNS: usize = 16;
+/// Turns before the first part, in which the separation turns to the fastest growing direction.
+/// Doubling it lengthens each measurement by 16 turns.
+const TRANSIENT_TURNS: usize = 16;
+
+/// Number of parts whose scatter gives the standard error. Doubling it doubles the length of a
+/// measurement.
 const PARTS: usize = 8;
-const TURNS_A_PART: usize = 32;
 
-/// How fast neighbours part.
+/// Number of turns of a part. Doubling it doubles the length of a measurement and makes the parts
+/// less dependent on each other.
+const PART_TURNS: usize = 32;
+
+/// The rate at which trajectories from neighbouring states separate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exponent {
-    /// Largest Lyapunov exponent (1/s).
+    /// The largest Lyapunov exponent (1/s).
     pub per_s: f64,
-    /// Its standard error (1/s), from the scatter of its parts.
+    /// The standard error (1/s), from the scatter of parts; 0 for exponents from multipliers.
     pub error_per_s: f64,
 }
 
 impl Exponent {
-    /// Whether it is above 0 by more than chance: three standard errors.
+    /// Whether the exponent is above 0 by more than three standard errors.
     pub fn is_positive(&self) -> bool {
         self.per_s > 3.0 * self.error_per_s
     }
 }
 
-/// How far two states are apart, in the tub's coordinates (m, rad) and their speeds by the drum's.
-pub(super) fn apart(row: &Row<'_>, a: &[f64; STATES], b: &[f64; STATES]) -> f64 {
+/// Returns the distance of two states: the greatest over the tub's coordinates (m, rad), of which
+/// each has the difference of its speed added, over the drum's speed.
+pub(super) fn distance(row: &Row<'_>, a: &[f64; STATES], b: &[f64; STATES]) -> f64 {
     let speed = row.speed_rpm * TAU / 60.0;
-    let gap = |&i: &usize| {
+    let difference = |&i: &usize| {
         let j = COORDINATES + i;
         (a[i] - b[i]).abs() + (a[j] - b[j]).abs() / speed
     };
-    TUB.iter().map(gap).fold(0.0, f64::max)
+    TUB.iter().map(difference).fold(0.0, f64::max)
 }
 
-/// Of each the exponent from here on, with a direction of speeds in which the twin starts off; none
-/// where one leaves the model's range.
-pub(super) fn exponents(
+/// Returns the exponents of trajectories from these states on, each with the direction of speeds in
+/// which it is perturbed first; `None` if a run leaves the model's range.
+pub(super) fn compute_exponents(
     simd: Simd,
-    asked: &[(Held<'_>, [f64; COORDINATES])],
+    requests: &[(HeldState<'_>, [f64; COORDINATES])],
 ) -> Vec<Option<Exponent>> {
-    let close: Vec<f64> =
-        asked.iter().map(|(held, _)| CLOSE * size(held.row.point, &held.state)).collect();
-    let mut pairs = Vec::with_capacity(2 * asked.len());
-    for ((held, direction), close) in asked.iter().zip(&close) {
+    let rescaled: Vec<f64> = requests
+        .iter()
+        .map(|(held, _)| RESCALED_SEPARATION * largest_deviation(held.row.point, &held.state))
+        .collect();
+    // Each run is followed by its perturbed run.
+    let mut pairs = Vec::with_capacity(2 * requests.len());
+    for ((held, direction), rescaled) in requests.iter().zip(&rescaled) {
         let speed = held.row.speed_rpm * TAU / 60.0;
-        let mut twin = *held;
+        let mut perturbed = *held;
         for i in 0..COORDINATES {
-            twin.state[COORDINATES + i] += close * speed * direction[i];
+            perturbed.state[COORDINATES + i] += rescaled * speed * direction[i];
         }
-        pairs.extend([*held, twin]);
+        pairs.extend([*held, perturbed]);
     }
-    let mut parts = vec![[0.0_f64; PARTS]; asked.len()];
-    for turn in 0..FIRST_TURNS + PARTS * TURNS_A_PART {
-        let turned = hold(simd, &pairs, 1);
-        for (k, close) in close.iter().enumerate() {
-            let (Some(one), Some(twin)) = (turned[2 * k].first(), turned[2 * k + 1].first()) else {
+    let mut parts = vec![[0.0_f64; PARTS]; requests.len()];
+    for turn in 0..TRANSIENT_TURNS + PARTS * PART_TURNS {
+        let turns = integrate_turns(simd, &pairs, 1);
+        for (k, rescaled) in rescaled.iter().enumerate() {
+            let (Some(run), Some(perturbed)) = (turns[2 * k].first(), turns[2 * k + 1].first())
+            else {
                 parts[k][0] = f64::NAN;
                 continue;
             };
             let row = pairs[2 * k].row;
-            let gap = apart(&row, &one.end, &twin.end);
-            if let Some(counted) = turn.checked_sub(FIRST_TURNS) {
-                parts[k][counted / TURNS_A_PART] += libm::log(gap / close);
+            let separation = distance(&row, &run.end, &perturbed.end);
+            if let Some(counted) = turn.checked_sub(TRANSIENT_TURNS) {
+                parts[k][counted / PART_TURNS] += libm::log(separation / rescaled);
             }
-            pairs[2 * k].state = one.end;
-            pairs[2 * k + 1].state =
-                core::array::from_fn(|i| one.end[i] + (twin.end[i] - one.end[i]) * (close / gap));
+            pairs[2 * k].state = run.end;
+            pairs[2 * k + 1].state = core::array::from_fn(|i| {
+                run.end[i] + (perturbed.end[i] - run.end[i]) * (rescaled / separation)
+            });
         }
     }
-    let found = parts.iter().zip(asked).map(|(parts, (held, _))| {
-        let part_s = TURNS_A_PART as f64 * held.row.turn_s();
+    let found = parts.iter().zip(requests).map(|(parts, (held, _))| {
+        let part_s = PART_TURNS as f64 * held.row.turn_s();
         let mean = parts.iter().sum::<f64>() / PARTS as f64;
         let squares: f64 = parts.iter().map(|part| (part - mean) * (part - mean)).sum();
         let error = (squares / (PARTS * (PARTS - 1)) as f64).sqrt();

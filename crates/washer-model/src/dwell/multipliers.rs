@@ -1,6 +1,6 @@
 //! Floquet multipliers of periodic orbits of several turns.
 
-use super::hold::Held;
+use super::turns::HeldState;
 use crate::coordinates::STATES;
 use crate::stability::monodromy::{Square, per_unit};
 use crate::stability::orbit::{Asked, turns};
@@ -11,14 +11,14 @@ use lane_ode::N;
 /// A periodic orbit: a state on it, and the turns after which it repeats.
 pub(super) struct Orbit<'c, 'a> {
     pub(super) case: &'c Case<'a>,
-    pub(super) held: Held<'a>,
+    pub(super) held: HeldState<'a>,
     pub(super) period: u32,
 }
 
-/// Returns how fast the fastest growing disturbance of each orbit grows (1/s), below 0 where all
-/// decay: ln |mu| over the period, mu the largest multiplier of the suspension's motions. The
-/// monodromy matrix is the product of those of the turns. None where the eigenvalues are not
-/// finite, and for all once `is_stopped` says so.
+/// Returns the growth (1/s) of the fastest growing disturbance of each orbit, negative if all
+/// decay: ln |mu| over the period, with mu the largest multiplier of the suspension's motions. The
+/// monodromy matrix is the product of those of the turns. It returns `None` for eigenvalues that
+/// are not finite, and for all orbits once `is_stopped` returns true.
 pub(super) fn growths_per_s(
     orbits: &[Orbit<'_, '_>],
     is_stopped: &dyn Fn() -> bool,

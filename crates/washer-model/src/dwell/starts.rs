@@ -1,4 +1,4 @@
-//! Where trajectories start: beside a periodic response, and kicked off it.
+//! The starts of trajectories: perturbed periodic responses, and kicks.
 
 use crate::coordinates::{STATES, TUB, TUB_PITCH, TUB_YAW};
 use crate::modes::shape;
@@ -6,18 +6,20 @@ use crate::stability::rounded;
 use crate::steps::SUSPENSION_MODES;
 use crate::{COORDINATES, Modes, Point};
 
-/// A start is off the periodic response by this share of its greatest coordinate, in each of the
-/// suspension's modes.
-const DISTURBED: f64 = 1e-4;
+/// Perturbation of a periodic response in each of the suspension's modes, as a share of its
+/// greatest coordinate. Doubling it leaves an unstable response sooner by ln 2 over the growth.
+const PERTURBATION: f64 = 1e-4;
 
-/// The least kick is this share of the greatest.
+/// Weakest kick as a share of the hardest. Basis: kicks from 0.5 to 6 rad/s by default. Doubling it
+/// misses motions close to the response.
 const LEAST_KICK: f64 = 1.0 / 12.0;
 
-/// The number of directions along mode shapes: two modes, and both at once.
+/// Number of directions of kicks along mode shapes: two modes, and both at once. Doubling it would
+/// need further combinations of modes.
 pub(super) const MODE_DIRECTIONS: usize = 3;
 
-/// The seed of random directions: the same for every machine and speed.
-const SEED: u64 = 2021;
+/// Seed of the random directions, for every machine and speed. Another one gives other directions.
+const DIRECTION_SEED: u64 = 2021;
 
 /// A kick: the number of its direction and its size (rad/s).
 pub(super) type Kick = (usize, f64);
@@ -25,23 +27,23 @@ pub(super) type Kick = (usize, f64);
 /// The velocities of a kick of 1 rad/s, by direction.
 pub(super) type Directions = Vec<[f64; COORDINATES]>;
 
-/// The largest coordinate of the tub (m, rad), from rest.
-pub(super) fn size(point: &Point, state: &[f64; STATES]) -> f64 {
+/// Returns the largest deviation of the tub's coordinates from equilibrium (m, rad), at least 1e-4.
+pub(super) fn largest_deviation(point: &Point, state: &[f64; STATES]) -> f64 {
     let rest = point.equilibrium();
     TUB.iter().map(|&i| (state[i] - rest[i]).abs()).fold(1e-4, f64::max)
 }
 
-/// A state beside this one, in the suspension's modes.
-pub(super) fn disturbed(point: &Point, frozen: &Modes, state: &[f64; STATES]) -> [f64; STATES] {
-    let by = DISTURBED * size(point, state);
-    let mut beside = *state;
+/// Returns a state that is perturbed in each of the suspension's modes.
+pub(super) fn perturb(point: &Point, frozen: &Modes, state: &[f64; STATES]) -> [f64; STATES] {
+    let size = PERTURBATION * largest_deviation(point, state);
+    let mut perturbed = *state;
     for mode in &frozen.modes[..SUSPENSION_MODES] {
         let largest = TUB.iter().map(|&i| mode.shape[i][0].abs()).fold(0.0, f64::max);
         for i in 0..COORDINATES {
-            beside[i] += by * rounded(mode.shape[i][0] / largest);
+            perturbed[i] += size * rounded(mode.shape[i][0] / largest);
         }
     }
-    beside
+    perturbed
 }
 
 /// Returns directions of kicks: those along mode shapes, then random ones. All are combinations of
@@ -50,7 +52,7 @@ pub(super) fn disturbed(point: &Point, frozen: &Modes, state: &[f64; STATES]) ->
 /// A kick along mode shapes turns the tub by 1 rad/s: in the two modes that rock most, and in both
 /// at once. A random one has the kinetic energy of the first, and is uniform over the sphere of
 /// that energy: a basin may lie where no mode shape points.
-pub(super) fn directions(point: &Point, frozen: &Modes, random: usize) -> Directions {
+pub(super) fn kick_directions(point: &Point, frozen: &Modes, random: usize) -> Directions {
     let mut modes: Vec<(usize, f64)> = (0..SUSPENSION_MODES)
         .map(|k| {
             let motion = shape::motion(point, &frozen.mass, &frozen.modes[k].shape);
@@ -59,18 +61,20 @@ pub(super) fn directions(point: &Point, frozen: &Modes, random: usize) -> Direct
         .collect();
     modes.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     // The amplitude of a mode of unit modal mass that turns the tub by 1.
-    let amplitude = |place: usize| -> f64 {
-        let shape = &frozen.modes[modes[place].0].shape;
-        let (yaw, pitch) = (shape[TUB_YAW][0], shape[TUB_PITCH][0]);
+    let amplitude = |rank: usize| -> f64 {
+        let shape = &frozen.modes[modes[rank].0].shape;
+        let yaw = shape[TUB_YAW][0];
+        let pitch = shape[TUB_PITCH][0];
         1.0 / (yaw * yaw + pitch * pitch).sqrt()
     };
-    let unit = |place: usize| -> [f64; COORDINATES] {
-        let shape = &frozen.modes[modes[place].0].shape;
-        core::array::from_fn(|i| rounded(shape[i][0] * amplitude(place)))
+    let unit = |rank: usize| -> [f64; COORDINATES] {
+        let shape = &frozen.modes[modes[rank].0].shape;
+        core::array::from_fn(|i| rounded(shape[i][0] * amplitude(rank)))
     };
-    let (first, second) = (unit(0), unit(1));
+    let first = unit(0);
+    let second = unit(1);
     let mut directions = vec![first, second, core::array::from_fn(|i| first[i] + second[i])];
-    let mut numbers = fastrand::Rng::with_seed(SEED);
+    let mut numbers = fastrand::Rng::with_seed(DIRECTION_SEED);
     for _ in 0..random {
         let parts: [f64; SUSPENSION_MODES] = core::array::from_fn(|_| normal(&mut numbers));
         let length = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
@@ -122,8 +126,8 @@ pub(super) fn kicks(count: usize, greatest_rad_per_s: f64) -> Vec<Kick> {
     kicks
 }
 
-/// A state with a kick added.
-pub(super) fn kicked(
+/// Returns a state with the velocities of a kick added.
+pub(super) fn add_kick(
     state: &[f64; STATES],
     directions: &Directions,
     (direction, size): Kick,

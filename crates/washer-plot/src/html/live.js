@@ -217,13 +217,13 @@ function createLive(host, data) {
       element("p", { class: "kind" }, answer.isChecked ? "Checked" : "Preview, not checked"),
       element("p", { class: "verdict" }, answer.isChecked ? verdict : `${verdict}?`),
       ...(largest ? [element("p", {}, largest)] : []),
-      ...(answer.sensitive ? [element("p", {}, "The motion is chaotic: a near twin departs "
-        + "exponentially. The digits are those of one trajectory.")] : []),
+      ...(answer.sensitive ? [element("p", {}, "The motion is chaotic: a slightly disturbed "
+        + "trajectory departs exponentially. The digits are those of one trajectory.")] : []),
       numbers, ...sag);
     const took = `${answer.took.toFixed(answer.took < 10 ? 1 : 0)} ms`;
     status.textContent = answer.isChecked
-      ? `Checked in ${took}: numbers within `
-        + `${significant(Math.max(...records.map((record) => record.error)), 2)} of themselves; `
+      ? `Checked in ${took}: estimated relative error at most `
+        + `${significant(Math.max(...records.map((record) => record.error)), 2)}; `
         + `nonlinear model by ${records[0].level}, linear model by ${records[1].level}.`
       : `Preview in ${took}: peaks of both models ${answer.ms[0].toFixed(1)} ms, curves `
         + `${answer.ms.slice(1).map((ms) => ms.toFixed(1)).join(" and ")} ms, side by side.`;

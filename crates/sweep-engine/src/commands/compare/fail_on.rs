@@ -96,7 +96,7 @@ impl FailOn {
             Self::Flips => counted("verdicts that flipped", found.flips(false).count()),
             Self::Lost => {
                 let lost = found.flips(false).filter(|row| row.is_lost).count();
-                counted("reliable rows that are so no more", lost)
+                counted("rows that are no longer reliable", lost)
             }
             Self::Sensitive => {
                 counted("sensitive verdicts that flipped", found.flips(true).count())

@@ -1,4 +1,4 @@
-//! Turns at constant speeds, one after the other: trajectories in lanes, what is seen of each turn.
+//! Integration of trajectories at held speeds, turn by turn in lanes, with a record of each turn.
 
 use crate::channel::CHANNELS;
 use crate::coordinates::STATES;
@@ -9,75 +9,81 @@ use crate::stability::turn::turn;
 use crate::{ModelKind, Reading, Recorders};
 use lane_ode::{Kernel, Lane, N, Simd, System as _};
 
-/// A machine held at a speed.
+/// The state of a machine at a held speed.
 #[derive(Clone, Copy)]
-pub(super) struct Held<'a> {
+pub(super) struct HeldState<'a> {
     pub(super) row: Row<'a>,
-    /// Where the unbalance is up: coordinates (m, rad), then their speeds (per s).
+    /// The state at which the unbalance is up: coordinates (m, rad), then their speeds (per s).
     pub(super) state: [f64; STATES],
 }
 
-/// What is seen of a turn.
+/// The record of a turn of the drum.
 #[derive(Clone, Debug)]
-pub(super) struct Turn {
-    /// The state at its end.
+pub(super) struct TurnRecord {
+    /// The state at the end of the turn.
     pub(super) end: [f64; STATES],
-    /// Largest deviations from equilibrium (m, rad).
+    /// The largest deviations from equilibrium (m, rad).
     pub(super) peaks: [f64; CHANNELS],
-    /// Least gap between drum and tub at the ends of its steps (m).
+    /// The least gap between drum and tub at the ends of steps (m).
     pub(super) gap_m: f64,
 }
 
-/// So many turns of each; fewer where one leaves the model's range. They share lanes of `simd` at
-/// most, and what is found of one does not depend on the others.
-pub(super) fn hold(simd: Simd, held: &[Held<'_>], turns: usize) -> Vec<Vec<Turn>> {
-    let found = recorded(simd, held, turns, Recorders::default());
+/// Integrates a number of turns from each state. A trajectory that leaves the model's range has
+/// fewer. Trajectories share lanes of `simd` or of a narrower instruction set, and do not depend on
+/// each other.
+pub(super) fn integrate_turns(
+    simd: Simd,
+    held: &[HeldState<'_>],
+    turns: usize,
+) -> Vec<Vec<TurnRecord>> {
+    let found = record_turns(simd, held, turns, Recorders::default());
     found.into_iter().map(|(turns, _)| turns).collect()
 }
 
-/// As [`hold`], with further records of these turns if any are wanted.
-pub(super) fn recorded(
+/// Integrates like [`integrate_turns`], with the recorders of `wanted` over all turns.
+pub(super) fn record_turns(
     simd: Simd,
-    held: &[Held<'_>],
+    held: &[HeldState<'_>],
     turns: usize,
     wanted: Recorders,
-) -> Vec<(Vec<Turn>, Reading)> {
-    let find = |held: &[Held<'_>]| {
+) -> Vec<(Vec<TurnRecord>, Reading)> {
+    let find = |held: &[HeldState<'_>]| {
         let groups = held.chunks(simd.lanes());
-        let group =
-            |held: &[Held<'_>]| simd.narrowed(held.len()).dispatch(Hold { held, turns, wanted });
+        let group = |held: &[HeldState<'_>]| {
+            simd.narrowed(held.len()).dispatch(TurnsKernel { held, turns, wanted })
+        };
         groups.flat_map(group).collect()
     };
     by_kind(held, |held| (held.row.kind(), false), find)
 }
 
-/// Rows of one kind, no more than there are lanes.
-struct Hold<'a> {
-    held: &'a [Held<'a>],
+/// The integration of turns from states whose rows are of one kind.
+struct TurnsKernel<'a> {
+    held: &'a [HeldState<'a>],
     turns: usize,
     wanted: Recorders,
 }
 
-impl Kernel for Hold<'_> {
-    type Output = Vec<(Vec<Turn>, Reading)>;
+impl Kernel for TurnsKernel<'_> {
+    type Output = Vec<(Vec<TurnRecord>, Reading)>;
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut found = Vec::with_capacity(self.held.len());
         for held in self.held.chunks(T::LANES) {
-            hold_lanes(N(zero), held, self.turns, self.wanted, &mut found);
+            integrate_lanes(N(zero), held, self.turns, self.wanted, &mut found);
         }
         found
     }
 }
 
 #[inline(always)]
-fn hold_lanes<T: Lane>(
+fn integrate_lanes<T: Lane>(
     zero: N<T>,
-    held: &[Held<'_>],
+    held: &[HeldState<'_>],
     turns: usize,
     wanted: Recorders,
-    found: &mut Vec<(Vec<Turn>, Reading)>,
+    found: &mut Vec<(Vec<TurnRecord>, Reading)>,
 ) {
     let rows: Vec<Row<'_>> = held.iter().map(|held| held.row).collect();
     let clock = clock(zero, &rows);
@@ -92,21 +98,23 @@ fn hold_lanes<T: Lane>(
     found.extend(held.iter().map(|_| (Vec::with_capacity(turns), Reading::default())));
     let mut watched = Watched::new(zero, &model, &clock);
     watched.with_states = false;
-    let of = (ModelKind::Nonlinear, StepParts::new(rows[0].caps.is_none()));
-    watched.extras = ActiveRecorders::new(zero, wanted, of, rows[0].point, held.len());
+    let parts = StepParts::new(rows[0].caps.is_none());
+    let run = (ModelKind::Nonlinear, parts);
+    watched.extras = ActiveRecorders::new(zero, wanted, run, rows[0].point, held.len());
     if let Some(extras) = &mut watched.extras {
         for lane in 0..T::LANES {
             extras.set_point(lane, rows[lane.min(rows.len() - 1)].point);
         }
     }
-    for made in 0..turns {
+    for finished in 0..turns {
         turn(&model, &clock, &mut states, Some(&mut watched));
         let in_range = T::bits(model.in_range(&states[0]));
         for (lane, held) in held.iter().enumerate() {
-            let (of_lane, _) = &mut found[first + lane];
-            if in_range >> lane & 1 == 1 && of_lane.len() == made {
+            let (records, _) = &mut found[first + lane];
+            // A trajectory that has left the range has no further records.
+            if in_range >> lane & 1 == 1 && records.len() == finished {
                 let radial_m = watched.radial_squared.0.get(lane).sqrt();
-                of_lane.push(Turn {
+                records.push(TurnRecord {
                     end: core::array::from_fn(|i| states[0][i].0.get(lane)),
                     peaks: watched.peaks.lane(lane),
                     gap_m: held.row.point.clearance_m() - radial_m,
@@ -120,8 +128,8 @@ fn hold_lanes<T: Lane>(
     }
     if let Some(mut extras) = watched.extras {
         for (lane, held) in held.iter().enumerate() {
-            let (of_lane, extra) = &mut found[first + lane];
-            extras.finish(lane, lane, held.row.point, of_lane.len() < turns);
+            let (records, extra) = &mut found[first + lane];
+            extras.finish(lane, lane, held.row.point, records.len() < turns);
             *extra = core::mem::take(&mut extras.readings[lane]);
         }
     }

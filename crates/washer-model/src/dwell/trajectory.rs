@@ -1,0 +1,414 @@
+//! A trajectory at a held speed, which is integrated until it settles into a motion.
+//!
+//! A motion has settled if its states once a turn repeat after a whole number of turns and its
+//! multipliers show that the orbit is stable; if its spectrum has two frequencies; or if its
+//! largest Lyapunov exponent is positive.
+
+use super::exponent::distance;
+use super::lines::find_strongest_line;
+use super::starts::largest_deviation;
+use super::turns::{HeldState, TurnRecord};
+use super::{Ending, Settled, State};
+use crate::channel::CHANNELS;
+use crate::coordinates::{STATES, TUB_PITCH, TUB_YAW};
+use crate::{Exponent, Reading};
+
+/// Number of turns between two tests of a trajectory. Doubling it ends trajectories up to 16 turns
+/// later.
+pub(super) const BLOCK: usize = 16;
+
+/// Number of turns of a window, over which largest deviations are taken. Doubling it doubles the
+/// least time of motions that do not repeat.
+pub(super) const WINDOW: usize = 128;
+
+/// Longest period that is tested, in turns. Doubling it finds longer periods, but needs more turns
+/// than [`PERIOD_TEST_TURNS`].
+const LONGEST_PERIOD: usize = 16;
+
+/// Number of turns that must repeat. Doubling it doubles the least time of a periodic motion.
+const PERIOD_TEST_TURNS: usize = 32;
+
+/// Tolerance of the states that repeat, as a share of the motion's size. Doubling it ends
+/// trajectories sooner and less exactly.
+const PERIOD_TOLERANCE: f64 = 1e-4;
+
+/// Tolerance of the states that repeat, as a share of the motion's size, once two windows have the
+/// same largest deviations. Doubling it takes more motions with two frequencies for periodic ones.
+const WIDE_PERIOD_TOLERANCE: f64 = 1e-3;
+
+/// Factor of the tolerance by which shorter periods must fail. Basis: a disturbance that changes
+/// sign with every period and decays slowly looks like twice the period; test
+/// `slow_decay_is_not_taken_for_a_doubled_period`. Doubling it delays the end of motions of several
+/// turns.
+const SHORTER_PERIOD_FACTOR: f64 = 20.0;
+
+/// Maximum remaining change of a periodic motion that has settled, as a share of its size. Doubling
+/// it doubles the error of its amplitudes.
+const REMAINING_TOLERANCE: f64 = 2e-3;
+
+/// Minimum decrease of the changes between two stretches of [`PERIOD_TEST_TURNS`] / 2 turns, as a
+/// share, for the extrapolation of the remaining change. Basis: changes that hardly decrease would
+/// make it infinite or negative. Doubling it halves the greatest extrapolated change.
+const MIN_DECREASE: f64 = 1e-3;
+
+/// Maximum relative difference of the largest deviations of two windows of a steady motion.
+/// Doubling it ends trajectories sooner and less exactly.
+const STEADY_TOLERANCE: f64 = 3e-3;
+
+/// Maximum relative difference of the largest deviations of two windows for which a Lyapunov
+/// exponent is computed. Basis: windows of chaotic motions differ by that much. Doubling it
+/// computes exponents of motions that still grow.
+const CHAOS_WINDOW_TOLERANCE: f64 = 0.4;
+
+/// Number of windows before the first Lyapunov exponent of a motion that does not settle; the next
+/// one is computed after twice the turns. Doubling it delays the detection of chaos.
+const FIRST_EXPONENT_WINDOW: usize = 4;
+
+/// Maximum rest of the spectrum without the strongest line and its multiples, as a share, for a
+/// motion with two frequencies. Doubling it takes more motions with three frequencies for such.
+const LINE_REST: f64 = 0.1;
+
+/// Tolerance of a period, as a share of the motion's size, with which a motion with a positive
+/// exponent passes from one motion to another. Basis: chaotic motions repeat less well. Doubling it
+/// finds less chaos.
+const PASSING_PERIOD_TOLERANCE: f64 = 0.05;
+
+/// Maximum rest of the spectrum, as a share, with which a motion with a positive exponent passes
+/// from one motion to another. Basis: chaotic motions have more. Doubling it finds less chaos.
+const PASSING_LINE_REST: f64 = 0.3;
+
+/// Distance from an unstable orbit, as a share of its size, below which no motion has settled.
+/// Doubling it delays motions that are close to an unstable orbit.
+const ORBIT_CLOSE: f64 = 1e-2;
+
+/// Distance from an unstable orbit, as a share of its size, below which a motion that departs from
+/// the orbit has not settled. Doubling it delays large motions about an unstable orbit.
+const ORBIT_NEAR: f64 = 0.5;
+
+/// Minimum ratio of the distances from an unstable orbit in two successive windows with which a
+/// motion departs from it. Doubling it misses slow departures.
+const DEPARTURE_RATIO: f64 = 1.02;
+
+/// Time (s) for which trajectories from states of a chaotic motion must stay in it. Basis: a motion
+/// of 660 s of mean life ends from at least one of eight states within 240 s with a probability of
+/// 1 - exp(-8 * 240 / 660) = 0.945; test `chaos_survives_or_is_a_transient` has it. Doubling it
+/// halves the rate of escape that is detected with the same probability.
+const SURVIVAL_S: f64 = 240.0;
+
+/// Number of trajectories from states of a chaotic motion. Basis: that of [`SURVIVAL_S`]. Doubling
+/// it halves the rate of escape that is detected with the same probability.
+const SURVIVORS: usize = 8;
+
+/// The computation that a trajectory needs next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Need {
+    /// A block of turns.
+    Turns,
+    /// The multipliers of the periodic orbit, with its period in turns.
+    Multipliers(u32),
+    /// The largest Lyapunov exponent.
+    Exponent,
+    /// No computation: the trajectory has ended.
+    Nothing,
+}
+
+/// A trajectory at a held speed.
+pub(super) struct HeldTrajectory<'a> {
+    pub(super) held: HeldState<'a>,
+    /// Unstable periodic orbits, by their states once a turn, which trajectories leave slowly.
+    unstable_orbits: Vec<Vec<[f64; STATES]>>,
+    /// The turns of the last two windows.
+    turns: Vec<TurnRecord>,
+    /// The number of turns so far.
+    turn_count: usize,
+    /// The number of turns after which the trajectory ends in any case.
+    max_turns: usize,
+    pub(super) need: Need,
+    /// The number of turns before which no further exponent is computed.
+    next_exponent_turn: usize,
+    exponent: Option<Exponent>,
+    state: State,
+    settled: Option<Settled>,
+}
+
+impl<'a> HeldTrajectory<'a> {
+    pub(super) fn new(
+        held: HeldState<'a>,
+        unstable_orbits: Vec<Vec<[f64; STATES]>>,
+        longest_s: f64,
+    ) -> Self {
+        let windows = (longest_s / held.row.turn_s() / WINDOW as f64).ceil().max(2.0);
+        Self {
+            held,
+            unstable_orbits,
+            turns: Vec::with_capacity(2 * WINDOW + BLOCK),
+            turn_count: 0,
+            max_turns: windows as usize * WINDOW,
+            need: Need::Turns,
+            next_exponent_turn: 0,
+            exponent: None,
+            state: State::NotSettled,
+            settled: None,
+        }
+    }
+
+    /// Creates a trajectory from a state of a chaotic one, which tests for [`SURVIVAL_S`] whether
+    /// the motion lasts. Its exponent is not computed.
+    pub(super) fn survivor(held: HeldState<'a>, unstable_orbits: Vec<Vec<[f64; STATES]>>) -> Self {
+        Self { next_exponent_turn: usize::MAX, ..Self::new(held, unstable_orbits, SURVIVAL_S) }
+    }
+
+    /// Whether the motion is chaotic, unless survivors show that it is a transient.
+    pub(super) fn is_chaotic(&self) -> bool {
+        self.settled == Some(Settled::Chaotic)
+    }
+
+    /// Returns [`SURVIVORS`] equally spaced states of the last turns.
+    pub(super) fn recent_states(&self) -> Vec<[f64; STATES]> {
+        let every = (self.turns.len() / SURVIVORS).max(1);
+        self.turns.iter().rev().step_by(every).take(SURVIVORS).map(|turn| turn.end).collect()
+    }
+
+    /// Returns the known unstable periodic orbits.
+    pub(super) fn unstable_orbits(&self) -> &[Vec<[f64; STATES]>] {
+        &self.unstable_orbits
+    }
+
+    /// Marks the motion as a transient with a mean life (s).
+    pub(super) fn mark_transient(&mut self, life_s: f64) {
+        self.state = State::Transient { life_s };
+        self.settled = None;
+    }
+
+    /// Returns the integrated time (s).
+    pub(super) fn time_s(&self) -> f64 {
+        self.turn_count as f64 * self.turn_s()
+    }
+
+    /// Whether the trajectory has settled or left the model's range.
+    pub(super) fn has_ended(&self) -> bool {
+        self.settled.is_some() || matches!(self.state, State::LeftRange { .. })
+    }
+
+    /// Adds the next [`BLOCK`] turns and chooses the next computation. Fewer turns mean that the
+    /// trajectory has left the model's range.
+    pub(super) fn add_turns(&mut self, turns: Vec<TurnRecord>) {
+        self.turn_count += turns.len();
+        if turns.len() < BLOCK {
+            let time_s = (self.turn_count + 1) as f64 * self.turn_s();
+            self.state = State::LeftRange { time_s };
+            self.need = Need::Nothing;
+            self.turns.extend(turns);
+            return;
+        }
+        self.turns.extend(turns);
+        let surplus = self.turns.len().saturating_sub(2 * WINDOW);
+        self.turns.drain(..surplus);
+        if let Some(last) = self.turns.last() {
+            self.held.state = last.end;
+        }
+        // Near an unstable orbit a trajectory looks settled, and needs further turns.
+        if !self.is_near_unstable_orbit() {
+            self.test_motion();
+        }
+        if self.need == Need::Turns && self.turn_count >= self.max_turns {
+            self.need = Need::Nothing;
+        }
+    }
+
+    /// Tests whether the motion repeats or has two frequencies, or may be chaotic.
+    fn test_motion(&mut self) {
+        if let Some(period) = self.clear_period(PERIOD_TOLERANCE)
+            && self.has_steady_peaks(PERIOD_TEST_TURNS, PERIOD_TOLERANCE)
+            && self.remaining_change(period) < REMAINING_TOLERANCE
+        {
+            self.need = Need::Multipliers(period);
+            return;
+        }
+        if !self.turn_count.is_multiple_of(WINDOW) || self.turns.len() < 2 * WINDOW {
+            return;
+        }
+        let may_compute_exponent = self.turn_count >= self.next_exponent_turn;
+        if self.has_steady_peaks(WINDOW, STEADY_TOLERANCE) {
+            if let Some(period) = self.clear_period(WIDE_PERIOD_TOLERANCE) {
+                if self.remaining_change(period) < REMAINING_TOLERANCE {
+                    self.need = Need::Multipliers(period);
+                }
+            } else if let Some(quasi_periodic) = self.find_two_frequencies(LINE_REST) {
+                self.settle(quasi_periodic);
+            } else if may_compute_exponent {
+                self.need = Need::Exponent;
+            }
+        } else if may_compute_exponent
+            && self.turn_count >= FIRST_EXPONENT_WINDOW * WINDOW
+            && self.has_steady_peaks(WINDOW, CHAOS_WINDOW_TOLERANCE)
+        {
+            self.need = Need::Exponent;
+        }
+    }
+
+    /// Adds the growth (1/s) of the fastest growing disturbance of the periodic orbit. An orbit
+    /// whose disturbances grow is a saddle, which the trajectory passes.
+    pub(super) fn add_growth(&mut self, period: u32, growth_per_s: Option<f64>) {
+        self.need = Need::Turns;
+        match growth_per_s {
+            Some(per_s) if per_s <= 0.0 => {
+                self.exponent = Some(Exponent { per_s, error_per_s: 0.0 });
+                return self.settle(Settled::Periodic { turns: period });
+            }
+            Some(_) => {
+                let orbit = self.turns.iter().rev().take(period as usize).map(|turn| turn.end);
+                self.unstable_orbits.push(orbit.collect());
+            }
+            None => {}
+        }
+        if self.turn_count >= self.max_turns {
+            self.need = Need::Nothing;
+        }
+    }
+
+    /// Adds the largest Lyapunov exponent. A motion with a positive one is chaotic unless it passes
+    /// from one motion to another, near which it almost repeats or has few lines.
+    pub(super) fn add_exponent(&mut self, exponent: Option<Exponent>) {
+        self.need = Need::Turns;
+        self.exponent = exponent;
+        self.next_exponent_turn = 2 * self.turn_count;
+        let is_passing = self.period(PASSING_PERIOD_TOLERANCE).is_some()
+            || self.find_two_frequencies(PASSING_LINE_REST).is_some();
+        let is_positive = exponent.is_some_and(|exponent| exponent.is_positive());
+        if is_positive && !is_passing {
+            self.settle(Settled::Chaotic);
+        } else if !is_positive
+            && self.has_steady_peaks(WINDOW, STEADY_TOLERANCE)
+            && let Some(quasi_periodic) = self.find_two_frequencies(f64::INFINITY)
+        {
+            self.settle(quasi_periodic);
+        } else if self.turn_count >= self.max_turns {
+            self.need = Need::Nothing;
+        }
+    }
+
+    fn settle(&mut self, settled: Settled) {
+        self.state = State::Ok;
+        self.settled = Some(settled);
+        self.need = Need::Nothing;
+    }
+
+    fn turn_s(&self) -> f64 {
+        self.held.row.turn_s()
+    }
+
+    /// Returns a state with its coordinates from equilibrium.
+    fn deviation(&self, state: &[f64; STATES]) -> [f64; STATES] {
+        let equilibrium = self.held.row.point.equilibrium();
+        core::array::from_fn(|i| state[i] - equilibrium.get(i).copied().unwrap_or(0.0))
+    }
+
+    /// Returns the motion in which the trajectory ended.
+    pub(super) fn ending(&self) -> Ending {
+        let turn_count = match self.settled {
+            Some(Settled::Periodic { .. }) => PERIOD_TEST_TURNS,
+            Some(Settled::QuasiPeriodic { .. }) => WINDOW,
+            Some(Settled::Chaotic) | None => 2 * WINDOW,
+        };
+        let turns = &self.turns[self.turns.len().saturating_sub(turn_count)..];
+        Ending {
+            state: self.state,
+            settled: self.settled,
+            starts: 1,
+            peaks: peaks(turns),
+            min_gap_m: turns.iter().map(|turn| turn.gap_m).fold(f64::INFINITY, f64::min),
+            exponent: self.exponent,
+            least_kick_rad_per_s: None,
+            time_s: self.time_s(),
+            end: self.held.state,
+            sections: self.turns.iter().map(|turn| self.deviation(&turn.end)).collect(),
+            extra: Reading::default(),
+        }
+    }
+
+    /// Whether the trajectory is close to an unstable orbit, or near one and departs from it.
+    fn is_near_unstable_orbit(&self) -> bool {
+        let window = (self.turns.len() / 2).min(WINDOW);
+        let (before, after) = self.turns.split_at(self.turns.len() - window);
+        self.unstable_orbits.iter().any(|orbit| {
+            let sizes = orbit.iter().map(|state| largest_deviation(self.held.row.point, state));
+            let size = sizes.fold(0.0, f64::max);
+            let orbit_distance = |turn: &TurnRecord| {
+                let distances =
+                    orbit.iter().map(|state| distance(&self.held.row, &turn.end, state));
+                distances.fold(f64::INFINITY, f64::min) / size
+            };
+            let greatest =
+                |turns: &[TurnRecord]| turns.iter().map(orbit_distance).fold(0.0, f64::max);
+            let last = greatest(after);
+            let previous = greatest(&before[before.len() - window..]);
+            last < ORBIT_CLOSE || (last < ORBIT_NEAR && last > DEPARTURE_RATIO * previous)
+        })
+    }
+
+    /// Whether the largest deviations of the last turns agree with those of as many turns before.
+    fn has_steady_peaks(&self, turns: usize, tolerance: f64) -> bool {
+        let Some(first) = self.turns.len().checked_sub(2 * turns) else { return false };
+        let (before, after) = self.turns[first..].split_at(turns);
+        are_close(&peaks(before), &peaks(after), tolerance)
+    }
+
+    /// Returns the period (turns) of the last turns, within a tolerance as a share of the motion's
+    /// size.
+    fn period(&self, tolerance: f64) -> Option<u32> {
+        let first = self.turns.len().checked_sub(PERIOD_TEST_TURNS)?;
+        let deviation = |turn: &TurnRecord| largest_deviation(self.held.row.point, &turn.end);
+        let size = self.turns[first..].iter().map(deviation).fold(0.0, f64::max);
+        let repeats = |period: &usize| {
+            *period <= first
+                && (first..self.turns.len()).all(|k| {
+                    let [state, earlier] = [k, k - period].map(|k| &self.turns[k].end);
+                    distance(&self.held.row, state, earlier) < tolerance * size
+                })
+        };
+        (1..=LONGEST_PERIOD).find(repeats).map(|period| period as u32)
+    }
+
+    /// Returns [`Self::period`], if shorter periods fail by [`SHORTER_PERIOD_FACTOR`].
+    fn clear_period(&self, tolerance: f64) -> Option<u32> {
+        let period = self.period(tolerance)?;
+        (self.period(SHORTER_PERIOD_FACTOR * tolerance) == Some(period)).then_some(period)
+    }
+
+    /// Returns the remaining change of a periodic motion, as a share of its size. The changes
+    /// between stretches of whole periods are extrapolated as a geometric series.
+    fn remaining_change(&self, period: u32) -> f64 {
+        let stretch = PERIOD_TEST_TURNS / 2 / period as usize * period as usize;
+        let Some(first) = self.turns.len().checked_sub(3 * stretch) else { return f64::INFINITY };
+        let change = |from: usize| {
+            let change_at = |k: usize| {
+                distance(&self.held.row, &self.turns[k].end, &self.turns[k + stretch].end)
+            };
+            (from..from + stretch).map(change_at).fold(0.0, f64::max)
+        };
+        let previous = change(first);
+        let last = change(first + stretch);
+        let ratio = (last / previous).min(1.0 - MIN_DECREASE);
+        last * ratio / (1.0 - ratio) / largest_deviation(self.held.row.point, &self.held.state)
+    }
+
+    /// Returns a motion with two frequencies, if the rest of the spectrum of yaw and pitch once a
+    /// turn is below a share.
+    fn find_two_frequencies(&self, max_rest: f64) -> Option<Settled> {
+        let signal = |i: usize| -> Vec<f64> { self.turns.iter().map(|turn| turn.end[i]).collect() };
+        let line = find_strongest_line(&[signal(TUB_YAW), signal(TUB_PITCH)])?;
+        let frequency_cpm = line.frequency * self.held.row.speed_rpm;
+        (line.rest < max_rest).then_some(Settled::QuasiPeriodic { frequency_cpm })
+    }
+}
+
+/// Returns the largest deviations over turns.
+fn peaks(turns: &[TurnRecord]) -> [f64; CHANNELS] {
+    core::array::from_fn(|i| turns.iter().map(|turn| turn.peaks[i]).fold(0.0, f64::max))
+}
+
+/// Whether largest deviations agree to a share of the larger in every channel.
+pub(super) fn are_close(a: &[f64; CHANNELS], b: &[f64; CHANNELS], share: f64) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= share * a.max(*b))
+}
