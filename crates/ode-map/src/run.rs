@@ -8,7 +8,7 @@ use lane_ode::{
 };
 
 use crate::Oscillator;
-use crate::equations::{Case, Equations, Model};
+use crate::equations::{Equations, Model, PreparedPoint};
 
 /// Greatest number of steps of a trajectory, accepted and rejected ones together. Basis: it takes
 /// hours. Doubling it doubles the time until such a trajectory fails.
@@ -51,7 +51,7 @@ impl<const C: usize> ModelRun<C> {
 pub(crate) struct Integration<'a, O, const C: usize, const D: usize, const P: usize> {
     pub(crate) model: Model,
     pub(crate) method: Method,
-    pub(crate) cases: &'a [&'a Case<C, P>],
+    pub(crate) cases: &'a [&'a PreparedPoint<C, P>],
     pub(crate) end_s: f64,
     /// Whether to stop; the results are then meaningless.
     pub(crate) is_stopped: &'a dyn Fn() -> bool,

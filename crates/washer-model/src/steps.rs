@@ -26,10 +26,6 @@ pub(crate) const HINGE_TO_DRUM: f64 = 3.2;
 /// modes are raised by a cap near them. Basis: `sweep check` finds the longest stable step with
 /// this value; with 0.84 caps are lower and errors larger, with 0.99 steps are shorter. Doubling it
 /// leaves no step stable.
-///
-/// The rest is for the hinge, whose modes a cap near them pushes up. Basis: `sweep check` finds the
-/// longest stable step with it; with 0.84 caps are lower and errors larger, with 0.99 steps are
-/// shorter. Doubling it leaves no step stable.
 const CAP_SHARE: f64 = 0.85;
 
 /// The number of bits of a step's fraction that are kept, which is 1e-6 of the step. Basis: the

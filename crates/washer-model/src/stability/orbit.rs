@@ -496,7 +496,7 @@ impl<'m, T: Lane, M: LaneModel<T>> Watch<T, M> for Watched<'m, T, M> {
                     dx,
                     radial,
                     channels,
-                    inside,
+                    lanes_in_window: inside,
                 });
             }
             let most = self.radial_squared.0;
