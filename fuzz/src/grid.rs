@@ -45,7 +45,7 @@ fn check_plan(plan: &Plan) {
     assert!(plan.points() >= 1);
     assert_eq!(plan.axis_values(plan.points() - 1).len(), plan.axes.len());
     assert!(plan.window_s[0] < plan.window_s[1] && plan.window_s[1] <= plan.end_s);
-    assert_eq!(Job::of(plan).hash(), Job::of(plan).hash());
+    assert_eq!(Job::new(plan).hash(), Job::new(plan).hash());
     let scenarios: Vec<_> = (0..plan.corners().min(4))
         .map(|corner| {
             let scenario = plan.scenario_at(&plan.corner(corner));

@@ -188,7 +188,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swe
         let core_s_per_point = began.elapsed().as_secs_f64() / points as f64;
         let mut sampled = NameCounts::new();
         rows.iter().for_each(|row| add(&mut sampled, STATUSES[row.status()]));
-        let layout = &Job::of(plan).layout;
+        let layout = &Job::new(plan).layout;
         let result_bytes = plan.points() as f64 * layout.bytes_a_row() as f64;
         let steps = match plan.integrator.steps() {
             Steps::Checked(_) => ", until two runs agree",

@@ -103,8 +103,8 @@ pub fn run(
     };
     let (points, stored) = run.own_points();
     if let Some(shard) = run.shard() {
-        (options.tell)(&format!("shard {} of {}", shard.index, shard.of));
-        idle_shards(job.points, shard.of).iter().for_each(|note| (options.tell)(note));
+        (options.tell)(&format!("shard {} of {}", shard.index, shard.count));
+        idle_shards(job.points, shard.count).iter().for_each(|note| (options.tell)(note));
     }
     for note in run.take_notes() {
         (options.tell)(&note);
@@ -129,7 +129,7 @@ pub fn run(
         cpu_model: provenance::cpu_model(),
         simd: engine.simd().to_owned(),
         threads,
-        shard: run.shard().map(|shard| format!("{}/{}", shard.index, shard.of)),
+        shard: run.shard().map(|shard| format!("{}/{}", shard.index, shard.count)),
         points: computed,
         points_per_s: if wall_s > 0.0 { computed as f64 / wall_s } else { 0.0 },
         version: job.version.to_owned(),

@@ -1,19 +1,20 @@
-//! A run's files. Nothing computed is lost, and only the plan decides the bytes of the result.
+//! The files of a run. Finished rows survive a crash, and the bytes of the result depend on the
+//! plan alone.
 //!
 //! A run on `x.parquet` works in the folder `x.parquet.partial`:
 //!
-//! | file | what |
+//! | file | content |
 //! |---|---|
-//! | `plan.json` | the frozen plan, written first (`plan_file`) |
-//! | `shards.json` | into how many shards the run was dealt, if it was (`shard`) |
+//! | `plan.json` | the plan with which the run began; written first, never changed (`plan_file`) |
+//! | `shards.json` | the number of shards, if the run is divided into shards (`shard`) |
 //! | `part-<index>.parquet` | finished rows of a chunk (`point_parts`), or trials (`trials`) |
-//! | `*.damaged` | what was not as it had been written; kept |
-//! | `session-*.json` | how long each process worked on it, and where ([`provenance`]) |
-//! | `lock`, `shard-<i>.lock` | who is at work (`lock`) |
+//! | `*.damaged` | files that were not as a run had written them; kept for inspection |
+//! | `session-*.json` | duration and host of each process that worked on the run ([`provenance`]) |
+//! | `lock`, `shard-<i>.lock` | the processes that work on the run (`lock`) |
 //!
-//! When every part is there they are joined into the one Parquet file (`merge`), and the folder
-//! goes, unless it holds what the run did not write (`own`) or has set aside. The store knows
-//! points, axis names and outcomes; it does not know the engine that makes them.
+//! When all parts exist, they are joined into the result, a single Parquet file (`merge`). Then the
+//! folder is deleted, unless it holds files that the run did not write (`own`) or has renamed to
+//! `*.damaged`. The store knows points, axis names and rows, but not the engine that computes them.
 
 mod differences;
 mod error;
@@ -59,31 +60,33 @@ use crate::config::section::counted;
 use crate::{Axis, Model, Plan, Read};
 use sweep_files::{self as files, FileKind};
 
-/// The values of the axes at a point of the grid, first axis first.
+/// A function that returns the values of the axes at a point of the grid, in the order of the axes.
 pub type PointValues<'a> = Box<dyn Fn(u64) -> Vec<f64> + Send + Sync + 'a>;
 
-/// What the store must know of a plan.
+/// The facts about a plan that the store needs.
 pub struct Job<'a> {
-    /// Grid as run, full machine and method. Two runs are the same when this, `version` and
-    /// `numerics` are.
+    /// The grid with all options applied, the full machine, and the method. Two runs are the same
+    /// if this, `version` and `numerics` are the same.
     pub plan: Value,
-    /// Version of the program; other versions may round differently, so their chunks do not mix.
+    /// The version of the program. Other versions may round differently, so chunks of two versions
+    /// are never mixed.
     pub version: &'a str,
-    /// Version of its numerics: so may other builds of one version.
+    /// The version of the numerics. It tells builds of one program version apart whose numbers may
+    /// differ.
     pub numerics: u32,
-    /// Rows of the result.
+    /// The number of points.
     pub points: u64,
-    /// What the columns depend on.
+    /// The columns of the result.
     pub layout: Layout,
-    /// A row is reliable when its ratios are between these.
+    /// The limits between which the ratios of a reliable row lie.
     pub limits: RatioLimits,
-    /// Axis values by point.
+    /// The values of the axes at each point.
     pub axis_values: PointValues<'a>,
 }
 
 impl<'a> Job<'a> {
-    /// What the store must know of this plan, as run by this build of its program.
-    pub fn of<M: Rows>(plan: &'a Plan<M>) -> Self {
+    /// Returns the job of a plan, as this build of the program runs it.
+    pub fn new<M: Rows>(plan: &'a Plan<M>) -> Self {
         Self {
             plan: plan.to_json(),
             version: M::BUILD.version,
@@ -95,19 +98,19 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Hash of version, numerics and plan.
+    /// Returns the hash of version, numerics and plan.
     pub fn hash(&self) -> blake3::Hash {
         plan_file::plan_hash(self.version, self.numerics, &self.plan)
     }
 }
 
-/// A model whose rows can be kept.
+/// A model whose rows can be stored.
 pub trait Rows: Read {
-    /// What the rows of a result are.
+    /// Returns the layout of a result's rows.
     fn layout(plan: &Plan<Self>) -> Layout;
 }
 
-/// The axes of a plan as columns.
+/// Returns the columns of a plan's axes.
 pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<Column> {
     let column = |axis: &Axis<M>| {
         let parameter = &axis.parameter;
@@ -116,50 +119,58 @@ pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<Column> {
     plan.axes.iter().map(column).collect()
 }
 
-/// Points a chunk holds (the last may hold fewer), from the number of points alone.
+/// Returns the number of points of each chunk but the last, which may have fewer. It depends on the
+/// number of all points alone.
 ///
-/// A power of two, so that chunks fill whole SIMD lane groups: 8 for the smallest grids, so that
-/// every core gets some; then 32 to 4096, for about a thousand chunks; then 4096 each, for chunks
-/// of a megabyte.
+/// It is a power of two, so that chunks fill whole groups of SIMD lanes: 8 for the smallest grids,
+/// so that every core gets some; for larger grids 32 to 4096, which makes about a thousand chunks;
+/// for the largest 4096, which makes chunks of a megabyte.
 pub fn chunk_points(points: u64) -> u64 {
+    /// The number of points up to which a grid is small. Basis: chunks of 32 points would leave
+    /// cores without work below it. Doubling it gives grids twice as large the small chunks.
     const SMALL_GRID: u64 = 128;
-    const CHUNKS: u64 = 1024;
+    /// The desired number of chunks. Basis: an interruption loses little, and each file is worth
+    /// its overhead. Doubling it halves the chunks.
+    const DESIRED_CHUNKS: u64 = 1024;
     if points <= SMALL_GRID {
         return 8;
     }
-    points.div_ceil(CHUNKS).clamp(32, 4096).next_power_of_two()
+    points.div_ceil(DESIRED_CHUNKS).clamp(32, 4096).next_power_of_two()
 }
 
-/// What to say of shards that get no chunk, if there are any.
+/// Returns a note about shards that get no chunk, if there are any.
 pub fn idle_shards(points: u64, shards: u64) -> Option<String> {
-    let (of_chunk, chunks) = (chunk_points(points), points.div_ceil(chunk_points(points)));
+    let points_per_chunk = chunk_points(points);
+    let chunks = points.div_ceil(points_per_chunk);
     (shards > chunks).then(|| {
         let idle = shards - chunks;
-        let has = format!("{} of {of_chunk} points", counted(chunks as usize, "chunk"));
-        format!("note: with {has}, the run leaves {idle} of the {shards} shards without work")
+        let size = format!("{} of {points_per_chunk} points", counted(chunks as usize, "chunk"));
+        format!("note: with {size}, the run leaves {idle} of the {shards} shards without work")
     })
 }
 
-// The files of a folder that have one name: those of every run, and of shards.
+/// The name of the file of the plan in a run's folder.
 const PLAN: &str = "plan.json";
+/// The name of the lock of a run's folder.
 const LOCK: &str = "lock";
+/// The name of the file of the number of shards in a run's folder.
 const SHARDS: &str = "shards.json";
 
-/// The paths of one run.
+/// The paths of a run's result and of its folder of unfinished work.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Folder {
-    /// The finished file.
+    /// The path of the result.
     pub output: PathBuf,
-    /// The folder of the unfinished run, beside it.
+    /// The path of the folder of unfinished work, beside the result.
     pub path: PathBuf,
 }
 
 impl Folder {
-    /// Those of the run with this output. Neither it nor its sidecar is anything but absent or
-    /// ours.
-    pub fn of(output: &Path, layout: &Layout) -> Result<Self, StoreError> {
+    /// Returns the paths of the run with this output. Files that already exist at the output or its
+    /// sidecar must be of this program.
+    pub fn new(output: &Path, layout: &Layout) -> Result<Self, StoreError> {
         let folder = Self::beside(output, layout.kind)?;
-        files::judge(&folder.sidecar(), folder.account())?;
+        files::judge(&folder.sidecar(), folder.sidecar_kind())?;
         Ok(folder)
     }
 
@@ -170,23 +181,24 @@ impl Folder {
         Ok(Self { output: output.to_path_buf(), path: output.with_file_name(name) })
     }
 
-    /// A file of the folder.
+    /// Returns the path of a file in the folder.
     fn file(&self, name: impl AsRef<Path>) -> PathBuf {
         self.path.join(name)
     }
 
-    /// The sidecar that says how the run went.
+    /// Returns the path of the sidecar: the JSON file beside the result that describes how the run
+    /// went.
     fn sidecar(&self) -> PathBuf {
         files::beside(&self.output, "run.json")
     }
 
-    /// What kind of file that is.
-    fn account(&self) -> FileKind<'_> {
+    /// Returns the kind of the sidecar.
+    fn sidecar_kind(&self) -> FileKind<'_> {
         FileKind::Account { of: self.output.file_name().unwrap_or_default() }
     }
 }
 
-/// Returns the name of the part of this index: a chunk's, or one of a search's.
+/// Returns the name of the part with this index: that of a chunk, or the number of a search's part.
 fn part_name(index: u64) -> String {
     format!("part-{index:08}.parquet")
 }

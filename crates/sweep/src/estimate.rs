@@ -75,7 +75,7 @@ fn estimate_within(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate
     let MeasuredCost { core_s_per_point, sampled, integrated_s } =
         MeasuredCost::measure_batch(&engine, &first).unwrap_or(first);
     let chunk = chunk_points(plan.points());
-    let layout = &Job::of(plan).layout;
+    let layout = &Job::new(plan).layout;
     let row_bytes = plan.points() as f64 * layout.bytes_a_row() as f64;
     let columns = layout.schema().fields().len() as f64;
     let parts = plan.points().div_ceil(chunk) as f64;
@@ -224,7 +224,7 @@ fn memory_bytes(engine: &ModelEngine<'_>, threads: usize) -> f64 {
     let channels = plan.reliability.channels.len() as f64;
     let outcome = size_of::<Outcome>() as f64 + 2.0 * 8.0 * channels;
     let in_hand = (2 * threads + 1) as f64 * chunk_points(plan.points()) as f64 * outcome;
-    let columns = Job::of(plan).layout.schema().fields().len() as f64;
+    let columns = Job::new(plan).layout.schema().fields().len() as f64;
     let row_group = sweep_engine::store::schema::ROW_GROUP_ROWS as f64;
     let joining = row_group.min(plan.points() as f64) * columns * (8.0 + CELL_BYTES);
     PROGRAM_BYTES + in_hand.max(joining) + turn_bytes(engine, threads)

@@ -119,7 +119,7 @@ impl<'a> HeldPlan<'a> {
             has_several: true,
             metadata: vec![metadata],
         };
-        let mut job = Job::of(plan);
+        let mut job = Job::new(plan);
         job.plan[self.verb()] = options;
         Job {
             points: plan.points() * speeds,

@@ -45,7 +45,7 @@ pub(crate) fn run(bytes: &[u8]) {
     reset(home, &partial);
     fs::write(partial.join(name), &content).expect("the input is written");
 
-    let job = Job::of(&home.plan);
+    let job = Job::new(&home.plan);
     let output = home.folder.path().join("x.parquet");
     // Looking changes nothing, whatever it finds.
     let _ = status(&output, &job);
@@ -135,7 +135,7 @@ fn home() -> &'static Home {
                 tell: &|_| {},
             };
             let engine = ModelEngine::new(&plan).expect("there is an engine");
-            sweep::run(&engine, &Job::of(&plan), &output, options, &Interrupt::new())
+            sweep::run(&engine, &Job::new(&plan), &output, options, &Interrupt::new())
                 .expect("the run ends")
                 .ended
         };

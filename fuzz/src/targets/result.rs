@@ -18,7 +18,7 @@ pub(crate) fn run(bytes: &[u8]) {
     let bytes = with_digest(bytes);
     let bytes = bytes.as_slice();
     fs::write(&files.result, bytes).expect("the input is written");
-    let job = Job::of(&files.plan);
+    let job = Job::new(&files.plan);
     match status(&files.result, &job) {
         // An empty file is treated like a missing one.
         Ok(found) => assert!(found.state == State::NotStarted && bytes.is_empty(), "{found:?}"),

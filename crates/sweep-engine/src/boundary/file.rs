@@ -28,7 +28,7 @@ fn insert_word(name: &str, unit: &str, word: &str) -> String {
 impl<M: Rows> BoundaryTask<M> {
     /// Returns the job of the store: the plan, with what is asked beside the grid.
     pub fn job(&self) -> Job<'_> {
-        let mut job = Job::of(&self.plan);
+        let mut job = Job::new(&self.plan);
         job.layout.kind = FileKind::Boundary;
         job.plan["boundary"] = self.settings();
         job

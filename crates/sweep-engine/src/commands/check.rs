@@ -101,7 +101,8 @@ fn took<M: Swept>(plan: &Plan<M>, estimate: &Estimate, tried: &str) -> String {
 }
 
 fn describe<M: Swept>(axis: &Axis<M>, design: Option<&Design>) -> String {
-    let (name, count) = (axis.parameter.name(), axis.values.len());
+    let name = axis.parameter.name();
+    let count = axis.values.len();
     let values = if design.is_some() { String::new() } else { format!("{count} values ") };
     match &axis.values {
         AxisValues::Linear { from, to, .. } => format!("{name}: {values}from {from} to {to}"),

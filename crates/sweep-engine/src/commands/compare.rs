@@ -280,7 +280,8 @@ fn boundary(moved: &BoundaryShift) -> String {
             let place: Vec<String> =
                 place.map(|(name, value)| format!("{name} {}", short(*value))).collect();
             let [from, to] = farthest.bracket.map(|ends| span(ends, short));
-            let (certain, place) = (moved.count_certain(), place.join(", "));
+            let certain = moved.count_certain();
+            let place = place.join(", ");
             format!(
                 "{count} along {axis}, {certain} moved farther than brackets explain; in the mean \
                  by {least:+.3} to {greatest:+.3} {unit}; farthest at {place}: from within {from} \
@@ -338,7 +339,8 @@ fn markdown(args: &Args, found: &Comparison, broken: &[String]) -> String {
         let _ = writeln!(text, "- **`--fail-on`: {broken}**");
     }
     for PlanChange { path, first, second } in found.plan.iter().take(PLAN_SHOWN) {
-        let (first, second) = (code(&brief(first)), code(&brief(second)));
+        let first = code(&brief(first));
+        let second = code(&brief(second));
         let _ = writeln!(text, "- plan: {} from {first} to {second}", code(path));
     }
     if found.plan.len() > PLAN_SHOWN {

@@ -96,7 +96,8 @@ impl ResultArgs {
 
     /// A command line about the same run, for a user to copy.
     pub fn command(&self, verb: &str) -> String {
-        let (grid, shown) = (&self.grid, |path: &PathBuf| path.display().to_string());
+        let grid = &self.grid;
+        let shown = |path: &PathBuf| path.display().to_string();
         let sets = grid.sets().into_iter().map(|set| ("set", set));
         let further = grid.at.iter().map(|at| ("at", at.clone()));
         let further = further.chain(grid.name.iter().map(|name| ("name", name.clone())));

@@ -25,7 +25,7 @@ pub struct Args {
 /// its end.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
-    merge_job(args, &plan.name, &Job::of(&plan), &args.target.output(&plan))
+    merge_job(args, &plan.name, &Job::new(&plan), &args.target.output(&plan))
 }
 
 /// Joins what the shards of a job have left.

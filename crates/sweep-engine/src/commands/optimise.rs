@@ -94,7 +94,8 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     if let Some(note) = trials.and_then(Trials::complete) {
         tell(&note);
     }
-    let (candidates, rows) = (tried.len() as u64, study.rows());
+    let candidates = tried.len() as u64;
+    let rows = study.rows();
     let how = format!(
         "{candidates} candidates of {} in {}, {:.0} points/s",
         counted(rows as usize, "point"),
@@ -198,10 +199,14 @@ fn told<M: Swept>(
     let names: Vec<&str> =
         ["candidate", "feasible", "on_front"].into_iter().chain(sought).chain(objectives).collect();
     let chosen = candidate.or_else(|| about["best"].as_u64());
-    let (mut feasible, mut front, mut values) = (0, Vec::new(), None);
+    let mut feasible = 0;
+    let mut front = Vec::new();
+    let mut values = None;
     // The least of the first objective before the last third and in it, and what that put on the
     // front.
-    let (mut least, mut late, first_late) = ([f64::INFINITY; 2], 0, study.evolution.first_late());
+    let mut least = [f64::INFINITY; 2];
+    let mut late = 0;
+    let first_late = study.evolution.first_late();
     file.file().each_row(&names, |row| {
         let cells: Vec<Cell> = (0..names.len()).map(|column| row.cell(column)).collect();
         if cells[1] == Cell::Flag(true) {
@@ -220,7 +225,8 @@ fn told<M: Swept>(
         }
         Ok::<(), Error>(())
     })?;
-    let (all, several) = (file.rows(), study.objectives.len() > 1);
+    let all = file.rows();
+    let several = study.objectives.len() > 1;
     let ended = match front.len() {
         count if several => format!(", {count} on the front"),
         count @ 2.. => format!(", {count} of them equally good"),

@@ -37,8 +37,11 @@ fn as_text<M: Swept>(rows: &[Listed<M>]) -> String {
     let value_width = width(&|row| value(row).len());
     let unit_width = width(&|row| row.parameter.unit().len());
     let line = |row: &Listed<M>| {
-        let (name, value, unit) = (row.parameter.name(), value(row), row.parameter.unit());
-        let (meaning, source) = (row.parameter.description(), &row.source);
+        let name = row.parameter.name();
+        let value = value(row);
+        let unit = row.parameter.unit();
+        let meaning = row.parameter.description();
+        let source = &row.source;
         format!(
             "{name:name_width$}  {value:>value_width$} {unit:unit_width$}  {meaning} [{source}]\n"
         )

@@ -127,7 +127,8 @@ pub fn run<M: Swept>(
     let hashes = [key::PLAN_HASH, key::VERSION, key::NUMERICS, key::DIGEST].into_iter();
     let hashes = hashes.filter_map(|key| Some((key, file.file().value(key)?)));
     let hashes: Vec<String> = hashes.map(|(key, value)| format!("{key} {value}")).collect();
-    let (path, hashes) = (escape(&args.result.display().to_string()), escape(&hashes.join(", ")));
+    let path = escape(&args.result.display().to_string());
+    let hashes = escape(&hashes.join(", "));
     body += "<details><summary>File and hashes</summary>";
     body += &format!("<p>{path}</p><p>{hashes}</p></details>\n");
     page.finish(sheet(&args.question, &body).as_bytes())?;

@@ -89,7 +89,8 @@ pub fn execute<M: Swept>(
     interrupt: &Interrupt,
     options: &str,
 ) -> Result<RunReport, Error> {
-    let (job, output) = (&Job::of(plan), &args.target.output(plan));
+    let job = &Job::new(plan);
+    let output = &args.target.output(plan);
     let finished = |text: &mut String, tally: &Tally| {
         text.push_str(&rows(tally, job));
         text.line("file", output.display());
@@ -182,7 +183,7 @@ impl RunCommand<'_> {
                 finished(&mut text, tally)?;
             }
             Ended::Shard(shard, by_status) => {
-                text = format!("{name}, shard {} of {}: {work}\n", shard.index, shard.of);
+                text = format!("{name}, shard {} of {}: {work}\n", shard.index, shard.count);
                 if let Some(failed) = failed_words(by_status) {
                     text.line("failed", failed);
                 }
@@ -205,7 +206,8 @@ impl RunCommand<'_> {
 /// What this process did.
 fn work(session: &Session) -> String {
     let Session { simd, .. } = session;
-    let (wall, rate) = (duration(session.wall_s), per_second(session.points_per_s));
+    let wall = duration(session.wall_s);
+    let rate = per_second(session.points_per_s);
     let points = counted(session.points as usize, "point");
     let threads = counted(session.threads, "thread");
     format!("{points} in {wall}, {rate} on {threads} ({simd})")
@@ -215,7 +217,8 @@ fn work(session: &Session) -> String {
 pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
     if let Some(dwells) = &tally.dwells {
         let DwellCounts { stable, unstable, beyond, unknown } = dwells;
-        let (able, points) = (stable - beyond, tally.points);
+        let able = stable - beyond;
+        let points = tally.points;
         let beyond = match beyond {
             0 => String::new(),
             beyond => format!(", {beyond} beyond what a machine can do"),
@@ -263,7 +266,8 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
     let others = format!("{unreliable} not, {undefined} undefined");
     text.line("reliable", format!("{reliable} ({share:.1} %) {range}, {others}"));
     if *over_estimated > 0 {
-        let (share, below) = (percent(*over_estimated), short(limits.over_estimate()));
+        let share = percent(*over_estimated);
+        let below = short(limits.over_estimate());
         let rows = format!("in {over_estimated} ({share:.1} %)");
         let which = format!("{rows}, {} of them reliable", tally.over_estimated_reliable);
         let told = format!("{which}: the linear model over-estimates, a ratio is below {below}");
@@ -296,7 +300,9 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
         place => format!(" at {place}"),
     };
     if let Some(greatest) = &tally.greatest_off {
-        let (rows, most, place) = (tally.far_off, greatest.value, place(greatest.point));
+        let rows = tally.far_off;
+        let most = greatest.value;
+        let place = place(greatest.point);
         let which = format!("{rows} rows whose linear model takes it at a speed off by more than");
         text.line("friction", format!("{which} {FAR_OFF}; at most {most:.3}{place}"));
     }

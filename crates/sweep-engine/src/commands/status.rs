@@ -25,7 +25,7 @@ pub struct Args {
 /// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
-    show_job(args, &Job::of(&plan), &args.target.output(&plan), ["run", "", ""])
+    show_job(args, &Job::new(&plan), &args.target.output(&plan), ["run", "", ""])
 }
 
 /// Shows the progress of a job. `again` has the command that continues it, further options of that

@@ -181,7 +181,7 @@ impl<M: Rows> Study<M> {
 
     /// Returns the job of the store.
     pub fn job(&self) -> Job<'_> {
-        let mut job = Job::of(&self.plan);
+        let mut job = Job::new(&self.plan);
         job.layout.kind = FileKind::Optimise;
         job.plan["optimise"] = self.settings();
         job

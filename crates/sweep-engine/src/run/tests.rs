@@ -1,5 +1,5 @@
-//! Tests of the runner with an engine that evaluates a formula: threads, shards, interruptions,
-//! panics, a failing disk.
+//! Tests of the runner with an engine that computes rows by a formula: threads, shards,
+//! interruptions, panics, and a folder that vanishes.
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,23 +11,23 @@ use crate::{RowSink, RowSource};
 
 const POINTS: u64 = 81;
 
-/// Calls `on_point` before each point.
-struct Formula<F: Fn(u64) + Sync> {
-    on_point: F,
+/// An engine that calls a function before each point and counts the points that it has evaluated.
+struct FormulaEngine<F: Fn(u64) + Sync> {
+    before_point: F,
     evaluated: AtomicU64,
 }
 
-impl<F: Fn(u64) + Sync> Formula<F> {
-    fn new(on_point: F) -> Self {
-        Self { on_point, evaluated: AtomicU64::new(0) }
+impl<F: Fn(u64) + Sync> FormulaEngine<F> {
+    fn new(before_point: F) -> Self {
+        Self { before_point, evaluated: AtomicU64::new(0) }
     }
 }
 
-impl<F: Fn(u64) + Sync> Engine for Formula<F> {
+impl<F: Fn(u64) + Sync> Engine for FormulaEngine<F> {
     fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
         rayon::broadcast(|_| {
             while let Some((point, _)) = source() {
-                (self.on_point)(point);
+                (self.before_point)(point);
                 if context.stopped() {
                     return;
                 }
@@ -57,11 +57,11 @@ fn output(home: &tempfile::TempDir) -> PathBuf {
     home.path().join("x.parquet")
 }
 
-/// Runs whole with this many threads and returns the bytes.
-fn whole(points: u64, threads: usize) -> Vec<u8> {
+/// Runs the whole_run job with a number of threads, and returns the bytes of the result.
+fn whole_run(points: u64, threads: usize) -> Vec<u8> {
     let home = tempfile::tempdir().unwrap();
     let report = run(
-        &Formula::new(|_| {}),
+        &FormulaEngine::new(|_| {}),
         &synthetic::job(points),
         &output(&home),
         options(threads),
@@ -74,7 +74,7 @@ fn whole(points: u64, threads: usize) -> Vec<u8> {
 }
 
 #[test]
-fn strides_take_every_chunk_once_each_far_from_the_last() {
+fn strides_visit_every_chunk_once_in_long_steps() {
     for chunks in [1, 2, 3, 4, 41, 42, 1000, 4096] {
         let stride = stride(chunks);
         let order: Vec<u64> = (0..chunks).map(|k| k * stride % chunks).collect();
@@ -87,22 +87,22 @@ fn strides_take_every_chunk_once_each_far_from_the_last() {
 }
 
 #[test]
-fn same_bytes_for_1_2_and_4_threads() {
-    let bytes = whole(1000, 1);
+fn results_do_not_depend_on_the_number_of_threads() {
+    let bytes = whole_run(1000, 1);
     for threads in [2, 4] {
-        assert!(whole(1000, threads) == bytes, "{threads} threads");
+        assert!(whole_run(1000, threads) == bytes, "{threads} threads");
     }
 }
 
 #[test]
-fn same_bytes_for_any_number_of_shards() {
-    let bytes = whole(POINTS, 1);
-    for of in [1, 2, 3, 20] {
+fn results_do_not_depend_on_the_number_of_shards() {
+    let bytes = whole_run(POINTS, 1);
+    for count in [1, 2, 3, 20] {
         let home = tempfile::tempdir().unwrap();
         let job = synthetic::job(POINTS);
-        for index in (1..=of).rev() {
-            let shard = Some(ShardRequest::Given(Shard { index, of }));
-            let engine = Formula::new(|_| {});
+        for index in (1..=count).rev() {
+            let shard = Some(ShardRequest::Given(Shard { index, count }));
+            let engine = FormulaEngine::new(|_| {});
             let report = run(
                 &engine,
                 &job,
@@ -116,22 +116,23 @@ fn same_bytes_for_any_number_of_shards() {
                 "{report:?}"
             );
         }
-        let engine = Formula::new(|_| {});
+        let engine = FormulaEngine::new(|_| {});
         run(&engine, &job, &output(&home), options(1), &Interrupt::new()).unwrap();
         assert_eq!(engine.evaluated.into_inner(), 0, "the shards left nothing to compute");
-        assert!(fs::read(output(&home)).unwrap() == bytes, "{of} shards");
+        assert!(fs::read(output(&home)).unwrap() == bytes, "{count} shards");
     }
 }
 
 #[test]
-fn interrupted_at_any_point_it_goes_on_and_ends_in_the_same_bytes() {
-    let bytes = whole(POINTS, 1);
+fn a_run_interrupted_at_any_point_is_resumed_to_the_same_bytes() {
+    let bytes = whole_run(POINTS, 1);
     let job = synthetic::job(POINTS);
-    // Chunks hold eight points: at their edges and in their middle.
+    // Chunks have eight points, so that the run is interrupted at edges and in the middle of
+    // chunks.
     for at in (0..POINTS).step_by(4) {
         let home = tempfile::tempdir().unwrap();
         let interrupt = Interrupt::new();
-        let stopping = Formula::new(|point| {
+        let stopping = FormulaEngine::new(|point| {
             if point == at {
                 interrupt.raise(15);
             }
@@ -141,9 +142,9 @@ fn interrupted_at_any_point_it_goes_on_and_ends_in_the_same_bytes() {
             panic!("{report:?}")
         };
         let evaluated = stopping.evaluated.into_inner();
-        assert_eq!(kept, evaluated, "every row is kept, of the chunk in hand too");
+        assert_eq!(kept, evaluated, "rows of incomplete chunks are kept too");
         assert!(!output(&home).exists());
-        let resumed = Formula::new(|_| {});
+        let resumed = FormulaEngine::new(|_| {});
         run(&resumed, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
         assert_eq!(resumed.evaluated.into_inner(), POINTS - kept);
         assert!(fs::read(output(&home)).unwrap() == bytes, "interrupted at {at}");
@@ -151,40 +152,44 @@ fn interrupted_at_any_point_it_goes_on_and_ends_in_the_same_bytes() {
 }
 
 #[test]
-fn done_is_done() {
+fn a_finished_run_is_not_repeated() {
     let home = tempfile::tempdir().unwrap();
     let job = synthetic::job(POINTS);
-    run(&Formula::new(|_| {}), &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-    let again = Formula::new(|_| {});
+    run(&FormulaEngine::new(|_| {}), &job, &output(&home), options(2), &Interrupt::new()).unwrap();
+    let again = FormulaEngine::new(|_| {});
     let report = run(&again, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
     assert!(matches!(report.ended, Ended::Already(..)), "{report:?}");
     assert_eq!(again.evaluated.into_inner(), 0);
 }
 
 #[test]
-fn a_panic_that_leaves_the_engine_costs_what_it_had_not_handed_over() {
+fn a_panic_of_the_engine_loses_only_unfinished_rows() {
     let home = tempfile::tempdir().unwrap();
     let job = synthetic::job(POINTS);
-    let engine = Formula::new(|point| assert_ne!(point, 20, "twenty is too much"));
+    let engine = FormulaEngine::new(|point| assert_ne!(point, 20, "twenty is too much"));
     let error = run(&engine, &job, &output(&home), options(1), &Interrupt::new()).unwrap_err();
-    let there = engine.evaluated.into_inner();
-    assert!(there >= 4, "those of its chunk came before it");
+    let stored = engine.evaluated.into_inner();
+    assert!(stored >= 4, "points 16 to 19 come before the panic");
     assert!(!error.is_refusal());
     let text = error.to_string();
     assert!(text.contains("points 16 to 23") && text.contains("twenty is too much"), "{text}");
-    let mended = Formula::new(|_| {});
-    run(&mended, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-    assert_eq!(mended.evaluated.into_inner(), POINTS - there, "the rows before it are kept");
-    assert!(fs::read(output(&home)).unwrap() == whole(POINTS, 1));
+    let resumed = FormulaEngine::new(|_| {});
+    run(&resumed, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
+    assert_eq!(
+        resumed.evaluated.into_inner(),
+        POINTS - stored,
+        "the rows before the panic are kept"
+    );
+    assert!(fs::read(output(&home)).unwrap() == whole_run(POINTS, 1));
 }
 
 #[test]
-fn a_folder_that_vanishes_ends_the_run_with_its_path_and_advice() {
+fn a_folder_that_vanishes_ends_the_run_with_an_error() {
     let home = tempfile::tempdir().unwrap();
     let job = synthetic::job(1000);
     let partial = home.path().join("x.parquet.partial");
     let gone = home.path().join("gone");
-    let engine = Formula::new(|point| {
+    let engine = FormulaEngine::new(|point| {
         if point == 40 {
             while !partial.join("part-00000000.parquet").exists() {
                 std::thread::yield_now();
@@ -195,10 +200,10 @@ fn a_folder_that_vanishes_ends_the_run_with_its_path_and_advice() {
     let error = run(&engine, &job, &output(&home), options(1), &Interrupt::new()).unwrap_err();
     let text = error.to_string();
     assert!(text.contains("x.parquet.partial") && text.contains("bring it back"), "{text}");
-    assert!(engine.evaluated.into_inner() < 1000, "what cannot be kept is not computed");
+    assert!(engine.evaluated.into_inner() < 1000, "the run ends early");
     fs::rename(&gone, &partial).unwrap();
-    let resumed = Formula::new(|_| {});
+    let resumed = FormulaEngine::new(|_| {});
     run(&resumed, &job, &output(&home), options(2), &Interrupt::new()).unwrap();
-    assert!(resumed.evaluated.into_inner() < 1000, "what came back is used");
-    assert!(fs::read(output(&home)).unwrap() == whole(1000, 1));
+    assert!(resumed.evaluated.into_inner() < 1000, "the rows of the folder are used");
+    assert!(fs::read(output(&home)).unwrap() == whole_run(1000, 1));
 }

@@ -1,4 +1,4 @@
-//! Where two plans part.
+//! The differences between two plans.
 
 use std::fmt;
 
@@ -7,14 +7,14 @@ use serde_json::Value;
 use crate::config::section::cut;
 use sweep_files::{Step, leaves};
 
-/// One place where two plans part.
+/// A value that differs between two plans.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlanDifference {
-    /// JSON pointer into the plan.
+    /// The JSON pointer to the value in the plan.
     pub pointer: String,
-    /// Value in the older plan; `None` if it had none there.
+    /// The value in the older plan; `None` if it has none.
     pub was: Option<String>,
-    /// Value in the plan of now.
+    /// The value in the present plan; `None` if it has none.
     pub is: Option<String>,
 }
 
@@ -25,7 +25,7 @@ impl fmt::Display for PlanDifference {
     }
 }
 
-/// Every leaf at which two JSON values part.
+/// Returns every leaf at which two JSON values differ.
 pub(super) fn differences(was: &Value, is: &Value) -> Vec<PlanDifference> {
     let mut found = Vec::new();
     leaves([Some(was), Some(is)], |_, _| true, &mut Vec::new(), &mut |path, [was, is]| {
@@ -41,7 +41,7 @@ pub(super) fn differences(was: &Value, is: &Value) -> Vec<PlanDifference> {
     found
 }
 
-/// A value on one line; long ones (a whole machine part) are cut.
+/// Returns a value on one line, cut if it is long.
 fn brief(value: &Value) -> String {
     cut(&value.to_string(), 60)
 }

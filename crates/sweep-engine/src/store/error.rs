@@ -1,4 +1,4 @@
-//! What can go wrong with a run's files, each with the path and what to do about it.
+//! The errors of a run's files, each with the path and advice.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -13,16 +13,16 @@ pub enum StoreError {
     /// A file that cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Another process runs on this output.
+    /// Another process has locked this output.
     #[error("{} is in use by {}\n  = help: wait for it to end, or give another \
-             --out", output.display(), named(holders))]
+             --out", output.display(), holder_names(holders))]
     Busy {
-        /// The output both want.
+        /// The output.
         output: PathBuf,
-        /// Who holds it, as far as they could be read.
+        /// The processes that work on it, as far as their names could be read.
         holders: Vec<Holder>,
     },
-    /// The run folder belongs to another plan, or was begun by a build that computes other numbers.
+    /// The run folder belongs to another plan, or to a build whose numbers may differ.
     #[error(
         "{} was begun with another plan or by another build:\n{}  = help: end it with that plan \
          and build, give another --out, or start over with --fresh (which deletes that folder's \
@@ -33,10 +33,10 @@ pub enum StoreError {
     PlanDiffers {
         /// The run folder.
         folder: PathBuf,
-        /// Where the plans part.
+        /// The differences between the plans.
         differences: Vec<PlanDifference>,
     },
-    /// The finished output belongs to another plan, or is of a build that computes other numbers.
+    /// The output is the result of another plan, or of a build whose numbers may differ.
     #[error(
         "{} already holds the result of another plan or build:\n{}  = help: give another --out, or \
          replace it with --fresh",
@@ -44,96 +44,99 @@ pub enum StoreError {
         listed(differences)
     )]
     OutputDiffers {
-        /// The finished file.
+        /// The result.
         output: PathBuf,
-        /// Where the plans part.
+        /// The differences between the plans.
         differences: Vec<PlanDifference>,
     },
-    /// A shard that does not fit, or a plan with more numbers than a run folder keeps.
+    /// A shard that does not fit the run, or a plan that is too long for a plan file.
     #[error("{0}")]
     Refused(String),
-    /// Chunks are missing, so there is no whole result to write.
+    /// Chunks are missing, so that the result cannot be written.
     #[error("{} is incomplete: {missing} of {chunks} chunks are missing{}\n  = help: \
-         {}", folder.display(), of_shards(missing_shards), how_to_complete(missing_shards))]
+         {}", folder.display(), shard_words(missing_shards), how_to_complete(missing_shards))]
     Incomplete {
         /// The run folder.
         folder: PathBuf,
-        /// How many chunks are missing.
+        /// The number of missing chunks.
         missing: u64,
-        /// How many chunks there should be.
+        /// The number of all chunks.
         chunks: u64,
-        /// The shards they belong to, as a list such as `2,5-7`, if the run was sharded.
+        /// The shards of the missing chunks, as a list such as `2,5-7`, if the run is divided into
+        /// shards.
         missing_shards: Option<String>,
     },
-    /// There is no run to speak of.
+    /// Neither the folder nor the output exists.
     #[error("there is no run at {}: neither {} nor that file exists\n  = help: start it with \
              `sweep run`",
         output.display(), folder.display())]
     NoRun {
-        /// The output asked about.
+        /// The requested output.
         output: PathBuf,
-        /// Its run folder.
+        /// The folder in which a run on this output would work.
         folder: PathBuf,
     },
-    /// A result that is asked for before it is whole.
+    /// A result was requested before it is finished.
     #[error("{} is not finished: {}, in {}\n  = help: give the command again that began it, and it \
              goes on from there",
         .output.display(), .progress, .folder.display())]
     Unfinished {
         /// The path of the result.
         output: PathBuf,
-        /// The points done, in words.
+        /// The number of finished points, in words.
         progress: String,
-        /// The folder of its work.
+        /// The folder of the unfinished work.
         folder: PathBuf,
     },
-    /// The engine handed over something that cannot be a chunk; a defect of this program.
+    /// The engine returned rows that do not fit their chunk, which is a defect of this program.
     #[error(
         "internal error in points {first} to {last}: {reason}\n  = help: \
          the other chunks are kept; please report this with the grid file"
     )]
     Engine {
-        /// First point of the chunk.
+        /// The first point of the chunk.
         first: u64,
-        /// Last point of the chunk.
+        /// The last point of the chunk.
         last: u64,
-        /// What was wrong.
+        /// The reason.
         reason: String,
     },
-    /// Arrow or Parquet refused; a defect of this program or a file that lacks what is looked for.
+    /// An error of the Arrow or Parquet library: a defect of this program, or a file without the
+    /// expected content.
     #[error("cannot {action} {}: {source}", path.display())]
     Parquet {
-        /// What was being done, in the infinitive.
+        /// The attempted action: `"write"`.
         action: &'static str,
-        /// The file it was done to.
+        /// The file.
         path: PathBuf,
-        /// What the library answered.
+        /// The error of the library.
         source: parquet::errors::ParquetError,
     },
-    /// There are no threads to work with.
+    /// The worker threads could not be started.
     #[error(transparent)]
     Threads(#[from] ThreadsError),
 }
 
-/// A process that holds an output.
+/// A process that works on an output.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Holder {
-    /// Process id.
+    /// The process id.
     pub pid: u32,
-    /// Its machine.
+    /// The name of its host.
     pub host: String,
-    /// Its shard, 1-based, if it runs one.
+    /// The shard that it computes, from 1; `None` for the whole run.
     pub shard: Option<u64>,
 }
 
 impl StoreError {
-    /// A failure of the Parquet library at a file.
+    /// Returns a function that turns an I/O error at a file into an error of the store.
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let failed = FileError::io(action, path);
         move |source| Self::File(failed(source))
     }
 
-    /// Wraps what the Parquet library reported, as a plain I/O failure where it was one.
+    /// Returns a function that turns an error of the Parquet library into an error of the store. An
+    /// I/O error in it is unwrapped.
     pub fn parquet(
         action: &'static str,
         path: &Path,
@@ -152,7 +155,8 @@ impl StoreError {
         }
     }
 
-    /// Whether nothing was begun, because the request does not fit what is there.
+    /// Returns whether the request was refused before any work, because it does not fit the
+    /// existing files.
     pub fn is_refusal(&self) -> bool {
         match self {
             Self::PlanDiffers { .. }
@@ -174,27 +178,31 @@ fn how_to_complete(missing_shards: &Option<String>) -> &'static str {
     }
 }
 
-fn of_shards(missing: &Option<String>) -> String {
+fn shard_words(missing: &Option<String>) -> String {
     missing.as_ref().map_or(String::new(), |list| format!(", of shards {list}"))
 }
 
-fn named(holders: &[Holder]) -> String {
+fn holder_names(holders: &[Holder]) -> String {
+    /// The number of processes that are named. Basis: a message of one line.
+    const SHOWN: usize = 4;
     let name = |Holder { pid, host, shard }: &Holder| {
         let shard = shard.map_or(String::new(), |shard| format!(" (shard {shard})"));
         format!("process {pid} on {host}{shard}")
     };
-    let first: Vec<String> = holders.iter().take(4).map(name).collect();
+    let first: Vec<String> = holders.iter().take(SHOWN).map(name).collect();
     match holders.len() {
         0 => "another run".to_owned(),
-        1..=4 => first.join(", "),
-        all => format!("{} and {} more", first.join(", "), all - 4),
+        1..=SHOWN => first.join(", "),
+        all => format!("{} and {} more", first.join(", "), all - SHOWN),
     }
 }
 
-/// Differences, a line each.
+/// Returns differences, one per line.
 fn listed(differences: &[PlanDifference]) -> String {
+    /// The number of differences that are shown. Basis: half a screen.
     const SHOWN: usize = 12;
-    let mut text: String = differences.iter().take(SHOWN).map(|one| format!("  {one}\n")).collect();
+    let shown = differences.iter().take(SHOWN);
+    let mut text: String = shown.map(|difference| format!("  {difference}\n")).collect();
     if differences.len() > SHOWN {
         let more = differences.len() - SHOWN;
         let plural = if more == 1 { "" } else { "s" };

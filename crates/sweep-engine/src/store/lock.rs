@@ -1,10 +1,11 @@
-//! Who may work on an output: one whole run, or any number of shards of one run.
+//! The locks of an output. Either one process works on the whole run, or any number of processes
+//! work on its shards.
 //!
-//! Locks are the system's (`flock`), so a killed process frees its own; the files only say who
-//! holds them. A whole run and a merge hold `lock` alone; shards share it, and each also holds
-//! `shard-<i>.lock`, which says which are running. The same shard started twice is harmless and not
-//! refused: a scheduler that lost sight of a node does exactly that, and must not wait for the lost
-//! node's lock to expire.
+//! Locks are those of the system (`flock`), which releases the locks of a killed process; the files
+//! hold the names of the processes. A whole run and a merge lock the file `lock` exclusively.
+//! Shards share that lock, and each also locks a file `shard-<i>.lock`, which shows that the shard
+//! is running. A shard that is started twice is harmless and not refused: a scheduler that has lost
+//! contact with a node starts its shard again, and must not wait for the lock of that node.
 
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
@@ -15,26 +16,31 @@ use std::time::Duration;
 use super::{Folder, Holder, LOCK, StoreError};
 use sweep_files::{FileError, atomic, regular};
 
-/// Most bytes of a holder's name.
-const LONGEST_NAME: u64 = 300;
+/// The maximum length of a lock file, bytes. Basis: a process id and the longest name of a host.
+/// Doubling it accepts longer names.
+const MAX_LOCK_BYTES: u64 = 300;
 
-/// How long a lock is asked for before it counts as held: `sweep status` holds it for an instant
-/// when it looks.
+/// The number of attempts to lock a file before it counts as locked. Basis: `sweep status` locks it
+/// for less than a millisecond. Doubling it doubles the time after which a run is refused.
 const ATTEMPTS: u32 = 5;
+/// The time between two attempts. Basis: 0.2 s in all. Doubling it doubles that time.
 const PAUSE: Duration = Duration::from_millis(40);
 
-/// A held lock; dropping it, or dying, lets go.
+/// A held lock. It is released when the value is dropped or the process ends.
 #[derive(Debug)]
 pub struct Lock {
+    /// The locked file `lock`; `None` if the file system has no locks.
     _run: Option<File>,
+    /// The locked file of the shard, if there is one and no other process has locked it.
     _shard: Option<File>,
+    /// The path of the file `lock`.
     path: PathBuf,
-    /// Set when the file system has no locks and the run goes on without.
-    missing: bool,
+    /// Whether the file system has no locks, so that the run goes on without one.
+    is_unsupported: bool,
 }
 
 impl Lock {
-    /// Makes the folder if need be and takes the whole run's lock, or one shard's share of it.
+    /// Creates the folder if it does not exist, and locks it: for the whole run, or for one shard.
     pub fn acquire(folder: &Folder, shard: Option<u64>) -> Result<Self, StoreError> {
         let path = folder.file(LOCK);
         for attempt in 0..ATTEMPTS {
@@ -45,26 +51,31 @@ impl Lock {
                 .map_err(StoreError::io("make the folder", &folder.path))?;
             let mut file = match regular::open_or_create(&path) {
                 Ok(file) => file,
-                // A run that just finished removed the folder between the two lines above.
+                // A run that just finished has removed the folder since the line above created it.
                 Err(error) if error.kind() == io::ErrorKind::NotFound && attempt + 1 < ATTEMPTS => {
                     continue;
                 }
                 Err(error) => return Err(StoreError::io("open the lock", &path)(error)),
             };
-            refuse_strangers(&mut file, &path)?;
-            let taken = if shard.is_some() { file.try_lock_shared() } else { file.try_lock() };
-            match taken {
+            refuse_foreign(&mut file, &path)?;
+            let locked = if shard.is_some() { file.try_lock_shared() } else { file.try_lock() };
+            match locked {
                 Ok(()) if !atomic::is_named(&file, &path) => continue,
                 Ok(()) => {
                     let shard = match shard {
-                        Some(shard) => take_shard(folder, shard)?,
-                        None => sign(&mut file, &path).map(|()| None)?,
+                        Some(shard) => lock_shard(folder, shard)?,
+                        None => write_holder(&mut file, &path).map(|()| None)?,
                     };
-                    return Ok(Self { _run: Some(file), _shard: shard, path, missing: false });
+                    return Ok(Self {
+                        _run: Some(file),
+                        _shard: shard,
+                        path,
+                        is_unsupported: false,
+                    });
                 }
                 Err(TryLockError::WouldBlock) => {}
-                Err(TryLockError::Error(error)) if no_locks_here(&error) => {
-                    return Ok(Self { _run: None, _shard: None, path, missing: true });
+                Err(TryLockError::Error(error)) if is_unsupported(&error) => {
+                    return Ok(Self { _run: None, _shard: None, path, is_unsupported: true });
                 }
                 Err(TryLockError::Error(error)) => {
                     return Err(StoreError::io("lock", &path)(error));
@@ -74,37 +85,38 @@ impl Lock {
         Err(StoreError::Busy { output: folder.output.clone(), holders: holders(folder) })
     }
 
-    /// What a user should hear of a file system without locks.
+    /// Returns a note for the user if the file system has no locks.
     pub fn note(&self, folder: &Folder) -> Option<String> {
-        let said = "is on a file system without locks: make sure that nothing else runs on this";
-        self.missing.then(|| format!("{} {said} output", folder.path.display()))
+        let warning =
+            "is on a file system without locks: make sure that nothing else runs on this output";
+        self.is_unsupported.then(|| format!("{} {warning}", folder.path.display()))
     }
 
-    /// Deletes the lock's file while it is still held, so that no one can take it over, then lets
-    /// go.
-    pub fn retire(self) -> Result<(), StoreError> {
+    /// Deletes the lock's file, so that no process can take the lock over, and then releases the
+    /// lock.
+    pub fn delete(self) -> Result<(), StoreError> {
         Ok(atomic::remove(&self.path)?)
     }
 }
 
-/// Everyone who holds the folder now, as far as it can be read without disturbing them.
+/// Returns the processes that work in the folder now, as far as their names can be read.
 pub(super) fn holders(folder: &Folder) -> Vec<Holder> {
     let names = regular::names(&folder.path).unwrap_or_default().into_iter();
-    let lock = |name: OsString| Some((shard_of_name(name.to_str()?)?, folder.file(name)));
+    let lock = |name: OsString| Some((shard_from_name(name.to_str()?)?, folder.file(name)));
     let mut locks: Vec<(u64, PathBuf)> = names.filter_map(lock).collect();
     locks.sort_unstable();
-    let held = locks.iter().filter_map(|(shard, path)| held_by(path, Some(*shard)));
-    let mut found: Vec<Holder> = held.collect();
-    // Shards share the folder's lock, and whoever last held it alone has left his name in it.
-    if found.is_empty() {
-        found.extend(held_by(&folder.file(LOCK), None));
+    let mut holders: Vec<Holder> =
+        locks.iter().filter_map(|(shard, path)| holder(path, Some(*shard))).collect();
+    // While shards share the folder's lock, its file names the last process that held it alone.
+    if holders.is_empty() {
+        holders.extend(holder(&folder.file(LOCK), None));
     }
-    found
+    holders
 }
 
-/// A lock holds nothing, or the name that [`sign`] writes. Anything else is somebody's file.
-fn refuse_strangers(file: &mut File, path: &Path) -> Result<(), StoreError> {
-    if holds_name(file).map_err(StoreError::io("read", path))? {
+/// Refuses a file that is not a lock: one that is not empty and has no name by [`write_holder`].
+fn refuse_foreign(file: &mut File, path: &Path) -> Result<(), StoreError> {
+    if is_lock(file).map_err(StoreError::io("read", path))? {
         return Ok(());
     }
     Err(FileError::Refused {
@@ -115,10 +127,10 @@ fn refuse_strangers(file: &mut File, path: &Path) -> Result<(), StoreError> {
     .into())
 }
 
-/// Returns whether a file holds nothing, or the name that [`sign`] writes and no more.
-fn holds_name(file: &mut File) -> io::Result<bool> {
+/// Returns whether a file is a lock: it is empty, or has nothing but a name by [`write_holder`].
+fn is_lock(file: &mut File) -> io::Result<bool> {
     let mut text = Vec::new();
-    file.take(LONGEST_NAME + 1).read_to_end(&mut text)?;
+    file.take(MAX_LOCK_BYTES + 1).read_to_end(&mut text)?;
     let name = std::str::from_utf8(&text).ok().and_then(|text| text.strip_suffix('\n'));
     let is_name = name.and_then(|name| name.split_once(' ')).is_some_and(|(process, host)| {
         process.parse::<u32>().is_ok() && !host.contains(char::is_control)
@@ -126,25 +138,26 @@ fn holds_name(file: &mut File) -> io::Result<bool> {
     Ok(text.is_empty() || is_name)
 }
 
-/// Returns whether the file at a path is a lock of a shard.
-pub(super) fn is_signed(path: &Path) -> bool {
-    regular::open(path).and_then(|mut file| holds_name(&mut file)).unwrap_or(false)
+/// Returns whether the file at a path is a lock.
+pub(super) fn is_lock_file(path: &Path) -> bool {
+    regular::open(path).and_then(|mut file| is_lock(&mut file)).unwrap_or(false)
 }
 
-fn take_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
+/// Locks the file of a shard; `None` if another process has locked it.
+fn lock_shard(folder: &Folder, shard: u64) -> Result<Option<File>, StoreError> {
     let path = folder.file(shard_name(shard));
     let mut file =
         regular::open_or_create(&path).map_err(StoreError::io("open the lock", &path))?;
-    refuse_strangers(&mut file, &path)?;
+    refuse_foreign(&mut file, &path)?;
     if file.try_lock().is_err() {
         return Ok(None);
     }
-    sign(&mut file, &path)?;
+    write_holder(&mut file, &path)?;
     Ok(Some(file))
 }
 
-/// Writes this process's name into a lock it holds.
-fn sign(file: &mut File, path: &Path) -> Result<(), StoreError> {
+/// Writes the id and the host of this process into a locked file.
+fn write_holder(file: &mut File, path: &Path) -> Result<(), StoreError> {
     let name = format!("{} {}\n", std::process::id(), super::provenance::host());
     file.set_len(0)
         .and_then(|()| file.rewind())
@@ -152,32 +165,33 @@ fn sign(file: &mut File, path: &Path) -> Result<(), StoreError> {
         .map_err(StoreError::io("write the process id to", path))
 }
 
-/// Some cluster file systems are mounted without locks.
-fn no_locks_here(error: &io::Error) -> bool {
+/// Returns whether an error says that the file system has no locks, as some of clusters.
+fn is_unsupported(error: &io::Error) -> bool {
+    /// The number of the error "no locks available" on Linux.
     const ENOLCK: i32 = 37;
     error.kind() == io::ErrorKind::Unsupported
         || (cfg!(target_os = "linux") && error.raw_os_error() == Some(ENOLCK))
 }
 
-/// The shard that a lock is named after, if any.
-pub(super) fn shard_of_name(name: &str) -> Option<u64> {
+/// Returns the shard that the name of its lock file gives, if the name is one.
+pub(super) fn shard_from_name(name: &str) -> Option<u64> {
     let shard = name.strip_prefix("shard-")?.strip_suffix(".lock")?.parse().ok()?;
     (shard_name(shard) == name).then_some(shard)
 }
 
-/// The name of a shard's lock.
+/// Returns the name of a shard's lock file.
 fn shard_name(shard: u64) -> String {
     format!("shard-{shard}.lock")
 }
 
-/// The holder named in a lock file, if someone holds it.
-fn held_by(path: &Path, shard: Option<u64>) -> Option<Holder> {
+/// Returns the process that is named in a lock file, if the file is locked.
+fn holder(path: &Path, shard: Option<u64>) -> Option<Holder> {
     let file = regular::open(path).ok()?;
     if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
         return None;
     }
     let mut text = String::new();
-    file.take(LONGEST_NAME).read_to_string(&mut text).ok()?;
+    file.take(MAX_LOCK_BYTES).read_to_string(&mut text).ok()?;
     let (pid, host) = text.trim_end().split_once(' ')?;
     Some(Holder { pid: pid.parse().ok()?, host: host.to_owned(), shard })
 }
@@ -188,10 +202,10 @@ mod tests {
     use crate::store::synthetic;
 
     fn folder(home: &tempfile::TempDir) -> Folder {
-        Folder::of(&home.path().join("x.parquet"), &synthetic::layout()).unwrap()
+        Folder::new(&home.path().join("x.parquet"), &synthetic::layout()).unwrap()
     }
 
-    fn busy(result: Result<Lock, StoreError>) -> Vec<Holder> {
+    fn busy_holders(result: Result<Lock, StoreError>) -> Vec<Holder> {
         match result {
             Err(StoreError::Busy { holders, .. }) => holders,
             other => panic!("expected a busy output, got {other:?}"),
@@ -199,11 +213,11 @@ mod tests {
     }
 
     #[test]
-    fn the_second_whole_run_is_told_the_first_ones_process() {
+    fn a_second_run_is_refused_with_the_process_of_the_first() {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
         let first = Lock::acquire(&folder, None).unwrap();
-        let holders = busy(Lock::acquire(&folder, None));
+        let holders = busy_holders(Lock::acquire(&folder, None));
         assert_eq!(holders[0].pid, std::process::id());
         assert_eq!(holders[0].shard, None);
         drop(first);
@@ -211,23 +225,23 @@ mod tests {
     }
 
     #[test]
-    fn shards_share_and_keep_a_whole_run_out() {
+    fn shards_run_side_by_side_but_not_beside_a_whole_run() {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
         let shards: Vec<Lock> =
             [1, 2, 2].iter().map(|&shard| Lock::acquire(&folder, Some(shard)).unwrap()).collect();
-        let holders = busy(Lock::acquire(&folder, None));
+        let holders = busy_holders(Lock::acquire(&folder, None));
         assert_eq!(holders.iter().map(|h| h.shard).collect::<Vec<_>>(), [Some(1), Some(2)]);
         drop(shards);
         let whole = Lock::acquire(&folder, None).unwrap();
-        busy(Lock::acquire(&folder, Some(1)));
+        busy_holders(Lock::acquire(&folder, Some(1)));
         drop(whole);
         assert!(super::holders(&folder).is_empty());
     }
 
     #[cfg(unix)]
     #[test]
-    fn a_lock_is_not_written_through_a_link_nor_over_a_strangers_file() {
+    fn a_lock_overwrites_neither_the_target_of_a_link_nor_a_foreign_file() {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
         fs::create_dir_all(&folder.path).unwrap();
@@ -256,12 +270,12 @@ mod tests {
     }
 
     #[test]
-    fn a_lock_that_was_removed_with_its_folder_is_not_taken_for_held() {
+    fn a_deleted_lock_file_does_not_block_a_new_lock() {
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home);
         let first = Lock::acquire(&folder, None).unwrap();
         let stale = regular::open_or_create(&folder.file(LOCK)).unwrap();
-        first.retire().unwrap();
+        first.delete().unwrap();
         stale.try_lock().unwrap();
         assert!(!atomic::is_named(&stale, &folder.file(LOCK)));
         Lock::acquire(&folder, None).unwrap();

@@ -11,10 +11,8 @@ use parquet::errors::ParquetError;
 use tempfile::NamedTempFile;
 
 use super::open::remove;
-use super::provenance::{self};
-use super::read::{self};
-use super::schema::{self};
 use super::{Job, OpenRun, Session, StoreError, Tally};
+use super::{provenance, read, schema};
 use sweep_files::batches::from_arrow;
 use sweep_files::{self as files, ParquetFile, Writer, atomic, panics, seal};
 
@@ -27,18 +25,19 @@ struct MapWriter<'a> {
 }
 
 impl<'a> MapWriter<'a> {
-    /// Begins the file of a job, which is to be at `output`.
+    /// Begins the result file of a job in a temporary file; `output` is its later path, for
+    /// messages.
     fn begin(job: &Job<'_>, file: NamedTempFile, output: &'a Path) -> Result<Self, StoreError> {
         let schema = job.layout.schema();
         let properties = schema::properties(job);
         let handle = file.as_file().try_clone().map_err(StoreError::io("write", output))?;
         let begin = || Writer::new(BufWriter::new(handle), &schema, properties);
-        let writer = written(output, begin)?;
+        let writer = write_to(output, begin)?;
         Ok(Self { output, schema, file, writer })
     }
 
-    /// Writes a batch of a part. With the schema of the file, the batches that are held until
-    /// their row group is whole do not each hold one of their own.
+    /// Writes a batch of a part. The batch gets the schema of the result, because batches stay in
+    /// memory until their row group is complete, and a schema for each of them would take memory.
     fn write_part(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
         let batch = RecordBatch::try_new(Arc::clone(&self.schema), batch.columns().to_vec());
         let batch =
@@ -47,15 +46,15 @@ impl<'a> MapWriter<'a> {
     }
 
     fn write(&mut self, batch: &RecordBatch) -> Result<(), StoreError> {
-        written(self.output, || self.writer.write(batch))
+        write_to(self.output, || self.writer.write(batch))
     }
 
-    /// The whole file, with its digest.
+    /// Writes the end of the file and its digest, and returns the temporary file.
     fn finish(self) -> Result<NamedTempFile, StoreError> {
         let Self { output, mut file, writer, .. } = self;
-        // Closing flushes to the file. (Taking the file back out of the writer would tell a full
-        // disk as text only.)
-        written(output, || {
+        // Closing flushes to the file and returns the error of a full disk as such; `into_inner`
+        // would return only its text.
+        write_to(output, || {
             let mut file = writer.end()?;
             file.append_key_value_metadata(seal::blank());
             file.close()
@@ -65,16 +64,18 @@ impl<'a> MapWriter<'a> {
     }
 }
 
-/// Has the library write.
-fn written<T>(
+/// Runs a function that writes by the Parquet library, and turns its errors and panics into errors
+/// about the output.
+fn write_to<T>(
     output: &Path,
-    work: impl FnOnce() -> Result<T, ParquetError>,
+    write: impl FnOnce() -> Result<T, ParquetError>,
 ) -> Result<T, StoreError> {
-    panics::in_parquet("the library gave up writing", work)
+    panics::in_parquet("the library gave up writing", write)
         .map_err(StoreError::parquet("write", output))
 }
 
-/// Writes the result file of a job whose rows are in memory: the same bytes as a run's.
+/// Writes the result file of a job whose rows are in memory. The file has the same bytes as that of
+/// a run.
 ///
 /// # Errors
 /// [`StoreError::File`].
@@ -90,15 +91,16 @@ pub fn write_map(job: &Job<'_>, batches: &[RecordBatch], output: &Path) -> Resul
 }
 
 impl OpenRun {
-    /// Joins the parts into the output and syncs it into place; `None` when `stop` said so. The
-    /// folder stays until [`OpenRun::complete`].
+    /// Joins the parts into a file, and moves this to the output. Returns `None` if `stop` returns
+    /// true before the end. The folder stays until [`OpenRun::complete`].
     ///
-    /// Memory: one row group while it is encoded and one part, about 40 MB whatever the number of
-    /// points, and 150 bytes a column for each row group behind (10 MB for a billion points).
+    /// Memory: one part and one row group while it is encoded, about 40 MB for any number of
+    /// points, and 150 bytes per column for each row group that is written (10 MB for a billion
+    /// points).
     ///
     /// # Errors
-    /// [`StoreError::Incomplete`] when a chunk is missing or was found damaged (it is then set
-    /// aside, and [`OpenRun::is_missing`]); [`StoreError::File`].
+    /// [`StoreError::Incomplete`] if a chunk is missing or damaged (a damaged part is renamed, so
+    /// that [`OpenRun::is_missing`] is true of its chunk); [`StoreError::File`].
     pub fn join(
         &mut self,
         job: &Job<'_>,
@@ -118,18 +120,19 @@ impl OpenRun {
             batches.iter().try_for_each(|batch| writer.write_part(batch))?;
         }
         let file = writer.finish()?;
-        // Read back before it takes its place: what cannot be read must not replace anything.
+        // The file is read before it is moved to the output, because an unreadable one must not
+        // replace a file.
         let tally = read::tally(&ParquetFile::open(file.path())?)?;
         files::judge(&output, job.layout.kind)?;
         atomic::publish(file, &output)?;
         Ok(Some(tally))
     }
 
-    /// Ends a run whose output is in place: writes the sidecar and removes the folder. Gives what a
-    /// user should hear of.
+    /// Ends a run whose result is complete: writes the sidecar and removes the folder. Returns
+    /// notes for the user.
     ///
     /// # Errors
-    /// [`StoreError::File`] when the sidecar cannot be written.
+    /// [`StoreError::File`] if the sidecar cannot be written.
     pub fn complete(
         mut self,
         job: &Job<'_>,
@@ -138,7 +141,7 @@ impl OpenRun {
     ) -> Result<Vec<String>, StoreError> {
         let sidecar = provenance::sidecar(&self.folder, job, tally, session)?;
         let path = self.folder.sidecar();
-        files::judge(&path, self.folder.account())?;
+        files::judge(&path, self.folder.sidecar_kind())?;
         atomic::write(&self.folder.path, &path, &sidecar)?;
         let mut notes = self.take_notes();
         notes.extend(remove(&self.folder, self.lock));

@@ -1,4 +1,5 @@
-//! Opening a run on an output: whose it is, what is there, what is missing.
+//! Opening of a run: checks that the output and its folder belong to the same plan, and finds out
+//! which chunks exist.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
@@ -15,7 +16,7 @@ use super::differences::PlanDifference;
 use super::lock::Lock;
 use super::own;
 use super::part::{Damage, Unreadable};
-use super::plan_file::{Found, PlanFile, pretty, set_aside};
+use super::plan_file::{FoundPlan, PlanFile, pretty, set_aside};
 use super::point_parts::{PointPart, PointParts};
 use super::provenance::Session;
 use super::read::{self, NameCounts, ResultFile, Tally};
@@ -26,85 +27,87 @@ use crate::{Environment, StoreError};
 use sweep_files::panics::lock;
 use sweep_files::{FileError, ParquetFile, atomic, regular};
 
-/// How a run is opened.
+/// The options of opening a run.
 #[derive(Clone, Copy)]
 pub struct OpenOptions<'a> {
-    /// Start over: finished chunks go now, a finished file stays until the new one takes its place.
+    /// Whether to start over: finished chunks are deleted at once; a finished result stays until
+    /// the new one replaces it.
     pub fresh: bool,
-    /// Which part to compute; if `None`, the scheduler's variables say.
+    /// The shard to compute; if `None`, the scheduler's environment variables give it.
     pub shard: Option<ShardRequest>,
-    /// Looks up the scheduler's variables.
+    /// The function that looks up the scheduler's environment variables.
     pub environment: Environment<'a>,
 }
 
-/// What opening an output came to.
+/// The outcome of opening an output.
 #[derive(Debug)]
 pub enum Opened<F, T> {
-    /// The output is there, whole, and of this very plan.
+    /// The output exists, complete and of the same plan.
     Finished(F),
-    /// There is something to do, by what holds the lock.
+    /// There is work left; the value holds the lock.
     Open(T),
 }
 
-/// A run folder this process has a right to.
+/// A run whose folder this process has locked.
 #[derive(Debug)]
 pub struct OpenRun {
-    /// Its paths.
+    /// The paths of the result and of its folder of unfinished work.
     pub folder: Folder,
-    /// What it holds.
+    /// The lock of the folder.
     pub lock: Lock,
     parts: PointParts,
-    dealt: Option<(Shard, ShardLayout)>,
-    /// This process's chunks that are there; behind a lock because workers look while the writer
-    /// adds.
+    /// The shard of this process and the division into shards, if the run is divided.
+    shard: Option<(Shard, ShardLayout)>,
+    /// The chunks of this process that are complete; behind a mutex because workers read the set
+    /// while the writer adds to it.
     present: Mutex<BTreeSet<u64>>,
-    /// What there is of this process's other chunks, until it is taken.
+    /// The rows of this process's incomplete chunks, until [`OpenRun::take_incomplete`].
     incomplete: Mutex<BTreeMap<u64, Vec<Done>>>,
     notes: Vec<String>,
 }
 
 impl OpenRun {
-    /// Takes the output for this job, freezes its plan or finds it frozen, and looks through its
-    /// chunks.
+    /// Locks the output for this job, writes its plan or compares it with the one that an earlier
+    /// process has written, and reads the chunks that exist.
     ///
     /// # Errors
-    /// [`StoreError::Busy`] when another run holds the output, [`StoreError::PlanDiffers`],
-    /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::Refused`]
-    /// for a part that does not fit, [`StoreError::File`] for anything else at the output that is
-    /// not ours, and for the file system.
+    /// [`StoreError::Busy`] if another run has locked the output, [`StoreError::PlanDiffers`],
+    /// [`StoreError::OutputDiffers`] if the output is the result of another plan,
+    /// [`StoreError::Refused`] for a shard that does not fit, [`StoreError::File`] for a file of
+    /// another program at the output, and for errors of the file system.
     pub fn open(
         output: &Path,
         job: &Job<'_>,
         options: OpenOptions<'_>,
     ) -> Result<Opened<(ResultFile, Tally), Self>, StoreError> {
-        let folder = Folder::of(output, &job.layout)?;
+        let folder = Folder::new(output, &job.layout)?;
         let resolve = |frozen| shard::resolve(options.shard, options.environment, frozen);
-        let mut dealt = None;
-        let shard = || {
-            dealt = resolve(ShardLayout::read(&folder)?)?;
-            if options.fresh && dealt.is_some() {
+        let mut shard = None;
+        let shard_index = || {
+            shard = resolve(ShardLayout::read(&folder)?)?;
+            if options.fresh && shard.is_some() {
                 return Err(StoreError::Refused(format!(
                     "--fresh would delete what the other shards have done\n  = help: delete {} \
                      first, then start the shards",
                     folder.path.display()
                 )));
             }
-            Ok(dealt.map(|(shard, _)| shard.index))
+            Ok(shard.map(|(shard, _)| shard.index))
         };
-        let finished = || finished(&folder, job);
-        let (lock, notes) = match claim(&folder, job, options.fresh, shard, finished)? {
+        let finished = || finished_result(&folder, job);
+        let (lock, notes) = match claim(&folder, job, options.fresh, shard_index, finished)? {
             Opened::Finished(found) => return Ok(Opened::Finished(found)),
-            Opened::Open(held) => held,
+            Opened::Open(lock_and_notes) => lock_and_notes,
         };
-        if let Some((_, dealing)) = dealt {
-            let frozen = dealing.freeze(&folder)?;
-            dealt = resolve(Some(frozen))?;
+        if let Some((_, layout)) = shard {
+            let frozen = layout.freeze(&folder)?;
+            shard = resolve(Some(frozen))?;
         }
         let mut run = Self {
             folder,
             lock,
             parts: PointParts::new(job),
-            dealt,
+            shard,
             present: Mutex::default(),
             incomplete: Mutex::default(),
             notes,
@@ -113,29 +116,30 @@ impl OpenRun {
         Ok(Opened::Open(run))
     }
 
-    /// Opens what shards have left, in order to join it; never begins a run.
+    /// Opens the folder of a run in order to join the chunks of its shards. It never begins a run.
     ///
     /// # Errors
-    /// [`StoreError::NoRun`] when nothing is there; else as [`OpenRun::open`].
+    /// [`StoreError::NoRun`] if neither folder nor output exists, and the errors of
+    /// [`OpenRun::open`].
     pub fn open_for_merge(
         output: &Path,
         job: &Job<'_>,
     ) -> Result<Opened<(ResultFile, Tally), Self>, StoreError> {
-        let folder = Folder::of(output, &job.layout)?;
+        let folder = Folder::new(output, &job.layout)?;
         if !folder.path.exists() && !output.exists() {
             return Err(StoreError::NoRun { output: output.to_path_buf(), folder: folder.path });
         }
         Self::open(output, job, OpenOptions { fresh: false, shard: None, environment: &|_| None })
     }
 
-    /// Looks through the chunks again, setting aside what is not whole.
+    /// Reads the chunks again, and renames parts that are damaged.
     ///
     /// # Errors
     /// [`StoreError::File`].
     pub fn rescan(&mut self) -> Result<(), StoreError> {
         let mut present = BTreeSet::new();
         let mut incomplete = BTreeMap::new();
-        for chunk in parts_there(&self.folder)? {
+        for chunk in part_indices(&self.folder)? {
             if chunk >= self.chunks() || !self.owns(chunk) {
                 continue;
             }
@@ -158,8 +162,8 @@ impl OpenRun {
         Ok(())
     }
 
-    /// Reads a whole chunk's part; `None` if it is not there, or, with the file set aside and
-    /// noted, if it is damaged.
+    /// Reads the part of a complete chunk. Returns `None` if there is none, or if it is damaged; a
+    /// damaged part is renamed and noted.
     pub(super) fn read_whole<T>(
         &mut self,
         chunk: u64,
@@ -176,13 +180,13 @@ impl OpenRun {
         Ok(whole)
     }
 
-    /// What is kept of a point, by whichever process.
+    /// Returns the stored rows of a point, whichever process has computed them.
     pub fn known(&self, point: u64) -> Option<Done> {
         let part = self.parts.open(&self.folder, self.chunk_of(point)).ok()??;
         part.outcomes().ok()?.into_iter().find(|done| done.point == point)
     }
 
-    /// Reads the part of a chunk, if there is one. A damaged one is set aside and noted.
+    /// Reads the part of a chunk, if there is one. A damaged part is renamed and noted.
     fn read<T>(
         &mut self,
         chunk: u64,
@@ -198,11 +202,11 @@ impl OpenRun {
         }
     }
 
-    /// Keeps what there is of a chunk, in any order: when this returns, it outlives a power cut.
-    /// What is not whole is for the next process to go on from.
+    /// Writes the rows of a chunk, in any order; when this returns, they survive a power cut. The
+    /// next process resumes an incomplete chunk.
     ///
     /// # Errors
-    /// [`StoreError::Engine`] when the outcomes are not this chunk's, [`StoreError::File`].
+    /// [`StoreError::Engine`] if the rows are not of this chunk, [`StoreError::File`].
     pub fn write_chunk(
         &self,
         job: &Job<'_>,
@@ -213,7 +217,7 @@ impl OpenRun {
         let bytes = self.parts.encode(job, chunk, &outcomes)?;
         let count = outcomes.len() as u64;
         let is_whole = count == self.chunk_length(chunk);
-        // Another process with the same shard may have done it.
+        // Another process with the same shard may have written more of it.
         if !is_whole
             && let Ok(Some(known)) =
                 read_part(&self.parts, &self.folder, chunk, |part| Ok(part.points()))?
@@ -230,55 +234,55 @@ impl OpenRun {
         Ok(())
     }
 
-    /// How this process's rows that are there ended.
+    /// Counts the stored rows of this process's chunks by status.
     ///
     /// # Errors
     /// [`StoreError::File`].
     pub fn statuses(&mut self) -> Result<NameCounts, StoreError> {
         let mut counts = NameCounts::new();
-        let own = self.present().clone();
-        for chunk in own {
+        let chunks = self.present().clone();
+        for chunk in chunks {
             self.read_whole(chunk, |part| part.add_statuses(&mut counts))?;
         }
         Ok(counts)
     }
 
-    /// The outcomes there are of chunks that are not whole, to go on from.
+    /// Takes the stored rows of incomplete chunks, from which this process resumes them.
     pub fn take_incomplete(&self) -> BTreeMap<u64, Vec<Done>> {
         std::mem::take(&mut *lock(&self.incomplete))
     }
 
-    /// How many chunks make up the whole result.
+    /// Returns the number of chunks of the whole run.
     pub const fn chunks(&self) -> u64 {
         self.parts.chunks()
     }
 
-    /// The points of a chunk.
+    /// Returns the points of a chunk.
     pub fn chunk_range(&self, chunk: u64) -> Range<u64> {
         self.parts.range(chunk)
     }
 
-    /// The number of points of a chunk.
+    /// Returns the number of points of a chunk.
     fn chunk_length(&self, chunk: u64) -> u64 {
         let range = self.chunk_range(chunk);
         range.end - range.start
     }
 
-    /// The chunk that a point is in.
+    /// Returns the chunk of a point.
     pub const fn chunk_of(&self, point: u64) -> u64 {
         self.parts.chunk(point)
     }
 
-    /// The part this process computes, if not the whole.
+    /// Returns the shard of this process; `None` if it computes the whole run.
     pub fn shard(&self) -> Option<Shard> {
-        self.dealt.map(|(shard, _)| shard)
+        self.shard.map(|(shard, _)| shard)
     }
 
     fn owns(&self, chunk: u64) -> bool {
         self.shard().is_none_or(|shard| shard.owns(chunk))
     }
 
-    /// Whether a chunk is this process's to compute and not there yet.
+    /// Returns whether this process still has to compute a chunk.
     pub fn is_missing(&self, chunk: u64) -> bool {
         self.owns(chunk) && !self.present().contains(&chunk)
     }
@@ -287,29 +291,31 @@ impl OpenRun {
         lock(&self.present)
     }
 
-    /// Points this process answers for, and how many of them are there.
+    /// Returns the number of points that this process has to compute, and how many of them are
+    /// stored.
     pub fn own_points(&self) -> (u64, u64) {
         let chunks = self.chunks();
-        let own = self.shard().map_or(chunks, |shard| shard.chunks(chunks));
+        let own_chunks = self.shard().map_or(chunks, |shard| shard.chunks(chunks));
         let full = self.chunk_length(0);
-        // All chunks are full but the last of the run.
-        let short = match chunks.checked_sub(1) {
+        // Every chunk of a run is full, except perhaps the last.
+        let missing_in_last = match chunks.checked_sub(1) {
             Some(last) if self.owns(last) => full - self.chunk_length(last),
             _ => 0,
         };
-        let whole: u64 = self.present().iter().map(|&chunk| self.chunk_length(chunk)).sum();
-        let incomplete = lock(&self.incomplete);
-        let there = whole + incomplete.values().map(|some| some.len() as u64).sum::<u64>();
-        (own.saturating_mul(full).saturating_sub(short), there)
+        let mut stored: u64 = self.present().iter().map(|&chunk| self.chunk_length(chunk)).sum();
+        for rows in lock(&self.incomplete).values() {
+            stored += rows.len() as u64;
+        }
+        (own_chunks.saturating_mul(full).saturating_sub(missing_in_last), stored)
     }
 
-    /// Things a user should hear of once: damaged chunks, a file system without locks.
+    /// Takes the notes for the user: damaged chunks, a file system without locks.
     pub fn take_notes(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notes)
     }
 
-    /// Records this process's work in the folder, for the sidecar of the process that finishes the
-    /// run.
+    /// Writes a record of this process's work to the folder, for the sidecar of the process that
+    /// finishes the run.
     ///
     /// # Errors
     /// [`StoreError::File`].
@@ -320,22 +326,22 @@ impl OpenRun {
         Ok(atomic::write(&self.folder.path, &path, &pretty(&json!(session)))?)
     }
 
-    /// The error that says which chunks, and of which shards, are missing from the whole.
+    /// Returns the error about the missing chunks and the shards to which they belong.
     pub fn incomplete(&self) -> Result<StoreError, StoreError> {
         let chunks = self.chunks();
         let present = self.present();
-        let dealing = ShardLayout::read(&self.folder)?;
+        let layout = ShardLayout::read(&self.folder)?;
         Ok(StoreError::Incomplete {
             folder: self.folder.path.clone(),
             missing: chunks - present.len() as u64,
             chunks,
-            missing_shards: dealing
-                .map(|dealing| shard::list(dealing.incomplete(chunks, &present))),
+            missing_shards: layout.map(|layout| shard::list(layout.incomplete(chunks, &present))),
         })
     }
 }
 
-/// Reads the part of a chunk: `None` if there is no file, or why it is no part.
+/// Reads the part of a chunk. Returns `None` if there is no file, and the damage if the file is no
+/// such part.
 pub(super) fn read_part<T>(
     parts: &PointParts,
     folder: &Folder,
@@ -346,7 +352,7 @@ pub(super) fn read_part<T>(
     Unreadable::damage(found)
 }
 
-/// Sets the part of this index aside, and returns a note on it.
+/// Renames a damaged part to `*.damaged`, and returns a note about it.
 pub(super) fn set_part_aside(
     folder: &Folder,
     index: u64,
@@ -359,8 +365,8 @@ pub(super) fn set_part_aside(
     Ok(format!("{path}: {damage}; kept as {aside} and computed again"))
 }
 
-/// Returns the indices of the parts that have a file.
-pub(super) fn parts_there(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
+/// Returns the indices of the parts in a folder.
+pub(super) fn part_indices(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> {
     let mut parts = BTreeSet::new();
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         parts.extend(name.to_str().and_then(part_index));
@@ -368,72 +374,73 @@ pub(super) fn parts_there(folder: &Folder) -> Result<BTreeSet<u64>, StoreError> 
     Ok(parts)
 }
 
-/// The result at the output, checked; `None` if there is none.
+/// Returns the result at the output after checks; `None` if there is none.
 ///
 /// # Errors
-/// [`StoreError::OutputDiffers`] if another plan or build made it.
-pub(super) fn finished(
+/// [`StoreError::OutputDiffers`] if the file is of another plan or build.
+pub(super) fn finished_result(
     folder: &Folder,
     job: &Job<'_>,
 ) -> Result<Option<(ResultFile, Tally)>, StoreError> {
-    let Some((file, result)) = of_plan(folder, job)? else { return Ok(None) };
-    if let Some(apart) = columns_apart(file.schema(), &job.layout.schema()) {
-        let (output, differences) = (folder.output.clone(), vec![apart]);
-        return Err(StoreError::OutputDiffers { output, differences });
+    let Some((file, result)) = result_of_same_plan(folder, job)? else { return Ok(None) };
+    if let Some(difference) = column_difference(file.schema(), &job.layout.schema()) {
+        let output = folder.output.clone();
+        return Err(StoreError::OutputDiffers { output, differences: vec![difference] });
     }
     let tally = read::tally(&file)?;
     Ok(Some((result, tally)))
 }
 
-/// The file at the output and its own word, if this very plan and build made it; `None` if there is
-/// none.
+/// Returns the file at the output and its metadata; `None` if there is no file.
 ///
 /// # Errors
-/// [`StoreError::OutputDiffers`] if another plan or build made it; [`FileError::Rewritten`].
-pub(super) fn of_plan(
+/// [`StoreError::OutputDiffers`] if the file is of another plan or build; [`FileError::Rewritten`].
+pub(super) fn result_of_same_plan(
     folder: &Folder,
     job: &Job<'_>,
 ) -> Result<Option<(ParquetFile, ResultFile)>, StoreError> {
     match fs::metadata(&folder.output) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        // What some programs make of a file before its content.
+        // Some programs create an empty file before they write its content.
         Ok(found) if found.len() == 0 => return Ok(None),
         _ => {}
     }
-    let (file, kind) = (ParquetFile::open(&folder.output)?, job.layout.kind);
-    let result = ResultFile::of(&file, kind).ok_or_else(|| {
-        read::unlike(&file, format!("its metadata is not that of a {}", kind.name()))
+    let file = ParquetFile::open(&folder.output)?;
+    let kind = job.layout.kind;
+    let result = ResultFile::read(&file, kind).ok_or_else(|| {
+        read::refuse_content(&file, format!("its metadata is not that of a {}", kind.name()))
     })?;
     if result.plan_hash == job.hash().to_hex().as_str() {
-        // Files of this build carry a digest.
+        // This build writes a digest into every result.
         if !file.is_sealed() {
             return Err(FileError::Rewritten { path: folder.output.clone() }.into());
         }
         return Ok(Some((file, result)));
     }
     let ResultFile { plan, version, numerics, .. } = result;
-    let ours = PlanFile::of(job);
+    let ours = PlanFile::new(job);
     let differences = PlanFile { plan, version, numerics, ..ours.clone() }.differences(&ours);
     Err(StoreError::OutputDiffers { output: folder.output.clone(), differences })
 }
 
-/// The columns that only one of two builds has for the same plan, if they differ.
-fn columns_apart(was: &Schema, is: &Schema) -> Option<PlanDifference> {
+/// Returns the difference between the columns of two builds for the same plan, if there is one.
+fn column_difference(was: &Schema, is: &Schema) -> Option<PlanDifference> {
     let [was, is] = [was, is].map(|schema| -> Vec<&str> {
         schema.fields().iter().map(|field| field.name().as_str()).collect()
     });
-    let only = |some: &[&str], others: &[&str]| {
-        let of_some: Vec<_> = some.iter().filter(|name| !others.contains(name)).copied().collect();
-        (!of_some.is_empty()).then(|| of_some.join(", "))
+    let only = |names: &[&str], others: &[&str]| {
+        let mut further = names.to_vec();
+        further.retain(|name| !others.contains(name));
+        (!further.is_empty()).then(|| further.join(", "))
     };
     let pointer = "/columns".to_owned();
     (was != is).then(|| PlanDifference { pointer, was: only(&was, &is), is: only(&is, &was) })
 }
 
-/// Takes a folder's lock, for the `shard` if it says one, and finds this plan frozen in the folder
-/// or freezes it. Where there was none, `finished` has the first word unless the work is to start
-/// over: nothing is frozen then, nor is a folder made. With the lock comes what a user should hear
-/// of.
+/// Locks a folder, for a shard if `shard` returns one, and writes the plan to it, or checks that
+/// the plan there is the same. If there is no plan and the work is not to start over, `finished` is
+/// called first; if it returns a result, nothing is written. Returns the lock with notes for the
+/// user.
 pub(super) fn claim<T>(
     folder: &Folder,
     job: &Job<'_>,
@@ -443,9 +450,9 @@ pub(super) fn claim<T>(
 ) -> Result<Opened<T, (Lock, Vec<String>)>, StoreError> {
     if !fresh
         && !folder.path.exists()
-        && let Some(finished) = finished()?
+        && let Some(result) = finished()?
     {
-        return Ok(Opened::Finished(finished));
+        return Ok(Opened::Finished(result));
     }
     let lock = Lock::acquire(folder, shard()?)?;
     let mut notes: Vec<String> = lock.note(folder).into_iter().collect();
@@ -453,23 +460,23 @@ pub(super) fn claim<T>(
         own::clear(folder)?;
     }
     atomic::clear_leftovers(&folder.path);
-    let ours = PlanFile::of(job);
+    let ours = PlanFile::new(job);
     match PlanFile::read(folder)? {
-        Found::Plan(found) => refuse_other_plan(folder, &found, &ours)?,
-        Found::Damaged => {
+        FoundPlan::Plan(found) => refuse_other_plan(folder, &found, &ours)?,
+        FoundPlan::Damaged => {
             let aside = set_aside(&folder.file(PLAN))?;
             notes.push(format!("the frozen plan was damaged; kept as {}", aside.display()));
             ours.freeze(folder)?;
         }
-        Found::Nothing => {
-            if !fresh && let Some(finished) = finished()? {
-                // What dies between publishing its file and removing its folder leaves that.
+        FoundPlan::Nothing => {
+            if !fresh && let Some(result) = finished()? {
+                // A process that was killed after publishing its result has left the folder.
                 remove(folder, lock);
-                return Ok(Opened::Finished(finished));
+                return Ok(Opened::Finished(result));
             }
             ours.freeze(folder)?;
-            // Another process, a shard, may have been first, with another plan.
-            if let Found::Plan(found) = PlanFile::read(folder)? {
+            // Another shard may have written another plan in the meantime.
+            if let FoundPlan::Plan(found) = PlanFile::read(folder)? {
                 refuse_other_plan(folder, &found, &ours)?;
             }
         }
@@ -477,7 +484,7 @@ pub(super) fn claim<T>(
     Ok(Opened::Open((lock, notes)))
 }
 
-/// Refuses a folder that another plan was begun in.
+/// Refuses a folder in which a run of another plan has begun.
 pub(super) fn refuse_other_plan(
     folder: &Folder,
     found: &PlanFile,
@@ -492,8 +499,9 @@ pub(super) fn refuse_other_plan(
     })
 }
 
-/// Removes a folder that has served. What the run has not written, or has set aside, stays with the
-/// folder. The result does not depend on it, so a failure is only worth a note.
+/// Removes the folder of a finished run. Files that the run has not written, or has renamed as
+/// damaged, stay, and the folder with them. The result does not depend on the folder, so a failure
+/// is returned as a note.
 pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
     let path = folder.path.display();
     let removed = own::clear(folder).and_then(|others| {
@@ -509,7 +517,7 @@ pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
         Ok(others) => Some(format!(
             "the result is whole; {path} stays, for it holds what this run did not write or has \
              set aside: {}; delete it when you do not need that",
-            listed(&others)
+            abbreviated(&others)
         )),
         Err(error) => Some(format!(
             "the result is whole, but {path} could not be removed; delete it by hand ({})",
@@ -518,8 +526,9 @@ pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
     }
 }
 
-/// The first of some names, and how many more there are.
-fn listed(names: &[OsString]) -> String {
+/// Returns the first names of a list, and the number of further ones.
+fn abbreviated(names: &[OsString]) -> String {
+    /// The number of names that are shown. Basis: a note of one line.
     const SHOWN: usize = 4;
     let first: Vec<String> =
         names.iter().take(SHOWN).map(|name| name.to_string_lossy().into_owned()).collect();

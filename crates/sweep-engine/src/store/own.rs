@@ -1,4 +1,5 @@
-//! Which files of a run's folder a run has written, by what they hold: a name alone is anybody's.
+//! Recognition of the files in a run's folder that a run has written. The content decides, because
+//! another program may have written a file of the same name.
 
 use std::ffi::{OsStr, OsString};
 use std::fs;
@@ -6,14 +7,15 @@ use std::path::Path;
 
 use super::lock;
 use super::part;
-use super::plan_file::{Found, PlanFile};
+use super::plan_file::{FoundPlan, PlanFile};
 use super::provenance::{self, Session};
 use super::shard::ShardLayout;
 use super::{Folder, LOCK, PLAN, SHARDS, StoreError, part_index};
 use sweep_files::{atomic, regular};
 
-/// Deletes what a run wrote, the plan first: without it a folder is no run. The lock stays, and so
-/// do strangers' files and what was set aside, whose names this gives.
+/// Deletes the files that a run has written, the plan first, because a folder without a plan is not
+/// taken for a run. The lock stays, and so do files of other programs and damaged files. Returns
+/// the names of those others.
 ///
 /// # Errors
 /// [`StoreError::File`].
@@ -29,8 +31,8 @@ pub(super) fn clear(folder: &Folder) -> Result<Vec<OsString>, StoreError> {
     Ok(others)
 }
 
-/// Returns whether a file of the folder has a name that a run gives, and content that a run writes
-/// under it. An empty file of such a name holds nothing that could be lost.
+/// Returns whether a run has written a file of the folder, judged by name and content. Empty files
+/// of such a name count too, because deleting them loses nothing.
 fn is_own(folder: &Folder, name: &OsStr) -> bool {
     let path = folder.file(name);
     let (Some(name), Ok(found)) = (name.to_str(), fs::symlink_metadata(&path)) else {
@@ -39,16 +41,16 @@ fn is_own(folder: &Folder, name: &OsStr) -> bool {
     if !found.is_file() {
         return false;
     }
-    let holds_own = match name {
-        PLAN => matches!(PlanFile::read(folder), Ok(Found::Plan(_))),
+    let has_own_content = match name {
+        PLAN => matches!(PlanFile::read(folder), Ok(FoundPlan::Plan(_))),
         SHARDS => matches!(ShardLayout::read(folder), Ok(Some(_))),
         _ if atomic::is_temporary(name) => true,
         _ if part_index(name).is_some() => part::is_part(&path),
-        _ if lock::shard_of_name(name).is_some() => lock::is_signed(&path),
+        _ if lock::shard_from_name(name).is_some() => lock::is_lock_file(&path),
         _ if provenance::is_session(name) => is_record(&path),
         _ => return false,
     };
-    holds_own || found.len() == 0
+    has_own_content || found.len() == 0
 }
 
 /// Returns whether a file is a process's record of its work.

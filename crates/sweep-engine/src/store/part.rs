@@ -1,16 +1,16 @@
-//! Parts: finished rows of unfinished work, in Parquet files that any program reads while the work
-//! goes on.
+//! Parts: Parquet files with the finished rows of unfinished work. Any program can read them while
+//! the work goes on.
 //!
 //! A part has the columns of its job ([`PartSchema`]) and three entries of metadata of its own:
 //!
 //! | entry | content |
 //! |---|---|
 //! | `sweep.plan_hash` | the hash of the plan |
-//! | `sweep.part` | the place of the part in its job, as JSON |
+//! | `sweep.part` | the index and points of the part, as JSON |
 //! | `sweep.digest` | the BLAKE3 hash of all other bytes of the file |
 //!
-//! The digest is the one that results carry (`sweep_files::seal`). So no changed byte is taken for
-//! a row, and no part of another plan or place either.
+//! The digest is made like that of results (`sweep_files::seal`). The entries show whether a byte
+//! has changed, and whether the part is of another plan or has another index.
 
 use std::io;
 use std::path::Path;
@@ -29,7 +29,7 @@ use super::{Column, Job, Row, StoreError};
 use sweep_files::batches::from_arrow;
 use sweep_files::{CREATED_BY, FileError, ParquetFile, Writer, key, panics, seal};
 
-/// A reason why a file is not the part that is looked for.
+/// A reason why a file is not the expected part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Damage {
     #[error("it is not as it was written")]
@@ -40,12 +40,12 @@ pub(super) enum Damage {
     Rows,
 }
 
-/// A reason why there are no rows from a part.
+/// A reason why a part's rows cannot be read.
 #[derive(Debug)]
 pub(super) enum Unreadable {
-    /// The file is not the part that is looked for.
+    /// The file is not the expected part.
     Damaged(Damage),
-    /// The file cannot be read, whatever it holds.
+    /// Reading the file failed.
     Failed(StoreError),
 }
 
@@ -65,7 +65,7 @@ impl From<FileError> for Unreadable {
 }
 
 impl Unreadable {
-    /// Separates damage from failures.
+    /// Separates damage, which the inner result has, from failures of reading.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -88,11 +88,12 @@ pub(super) struct PartSchema {
 }
 
 impl PartSchema {
-    /// Returns the schema of the parts of a job with these columns.
+    /// Returns the schema of a job's parts.
     pub(super) fn new(job: &Job<'_>, columns: Vec<Column>) -> Self {
         let plan = job.hash().to_hex().to_string();
         let metadata = vec![KeyValue::new(key::PLAN_HASH.to_owned(), plan.clone())];
-        // A part is read once or twice. Compression and statistics would cost more than they gain.
+        // A part is read once or twice, so compression and statistics would take more time than
+        // they save.
         let builder = schema::writer(job.version, metadata)
             .set_compression(Compression::UNCOMPRESSED)
             .set_statistics_enabled(EnabledStatistics::None)
@@ -109,11 +110,11 @@ impl PartSchema {
         Self { plan, schema: Arc::new(Schema::new(fields)), columns, properties }
     }
 
-    /// Encodes rows of these columns as the part at a place.
+    /// Encodes rows as a part. `entry` is the entry `sweep.part` of its metadata.
     ///
     /// # Errors
     /// Returns the errors of the library, which are a defect of this program.
-    pub(super) fn encode(&self, place: &str, rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
+    pub(super) fn encode(&self, entry: &str, rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
         let arrays =
             self.columns.iter().enumerate().map(|(k, column)| {
                 column.array(rows.iter().map(|row| row.get(k).copied().flatten()))
@@ -124,7 +125,7 @@ impl PartSchema {
             let mut writer = Writer::new(Vec::new(), &self.schema, self.properties.clone())?;
             writer.write(&batch)?;
             let mut writer = writer.end()?;
-            writer.append_key_value_metadata(KeyValue::new(key::PART.to_owned(), place.to_owned()));
+            writer.append_key_value_metadata(KeyValue::new(key::PART.to_owned(), entry.to_owned()));
             writer.append_key_value_metadata(seal::blank());
             writer.into_inner()
         };
@@ -133,11 +134,11 @@ impl PartSchema {
         Ok(file.into_inner())
     }
 
-    /// Opens the part at a path, which is to be that of a place; `None` where there is no file.
-    pub(super) fn open(&self, path: &Path, place: &str) -> Result<Option<Part<'_>>, Unreadable> {
-        let Some(file) = sealed(path)? else { return Ok(None) };
+    /// Opens the part at a path; `None` if there is no file. A part with another `entry` is damage.
+    pub(super) fn open(&self, path: &Path, entry: &str) -> Result<Option<Part<'_>>, Unreadable> {
+        let Some(file) = open_sealed(path)? else { return Ok(None) };
         let is_ours = file.value(key::PLAN_HASH) == Some(&self.plan)
-            && file.value(key::PART) == Some(place)
+            && file.value(key::PART) == Some(entry)
             && *file.schema() == self.schema;
         if is_ours { Ok(Some(Part { file, schema: self })) } else { Err(Damage::Foreign.into()) }
     }
@@ -148,7 +149,7 @@ impl PartSchema {
     }
 }
 
-/// An open part, every byte of which is as it was written.
+/// An open part whose digest has been checked.
 #[derive(Debug)]
 pub(super) struct Part<'a> {
     file: ParquetFile,
@@ -187,8 +188,8 @@ impl Part<'_> {
     }
 }
 
-/// Opens a sealed file; `None` where there is none.
-fn sealed(path: &Path) -> Result<Option<ParquetFile>, Unreadable> {
+/// Opens a file that has a digest; `None` if there is no file.
+fn open_sealed(path: &Path) -> Result<Option<ParquetFile>, Unreadable> {
     match ParquetFile::open(path) {
         Err(FileError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => Ok(None),
         Ok(file) if file.is_sealed() => Ok(Some(file)),
@@ -197,7 +198,7 @@ fn sealed(path: &Path) -> Result<Option<ParquetFile>, Unreadable> {
     }
 }
 
-/// Returns whether a file is a part that this program wrote, of whichever plan, whole or not.
+/// Returns whether a file is a part that this program wrote, of any plan, damaged or not.
 pub(super) fn is_part(path: &Path) -> bool {
     let found = ParquetFile::look(path).ok();
     found.is_some_and(|file| {
@@ -206,8 +207,8 @@ pub(super) fn is_part(path: &Path) -> bool {
     })
 }
 
-/// Opens a part of the plan with this hash, whatever its columns and its place are, which is
-/// returned with it; `None` for anything else.
+/// Opens a part of the plan with this hash, with any columns. Returns the part and its entry
+/// `sweep.part`; `None` for any other file.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -215,8 +216,8 @@ pub(super) fn open_any(
     path: &Path,
     plan: &blake3::Hash,
 ) -> Result<Option<(ParquetFile, String)>, StoreError> {
-    let Ok(Some(file)) = Unreadable::damage(sealed(path))? else { return Ok(None) };
-    let is_of_plan = file.value(key::PLAN_HASH) == Some(plan.to_hex().as_str());
-    let place = file.value(key::PART).map(str::to_owned);
-    Ok(place.filter(|_| is_of_plan).map(|place| (file, place)))
+    let Ok(Some(file)) = Unreadable::damage(open_sealed(path))? else { return Ok(None) };
+    let has_same_plan = file.value(key::PLAN_HASH) == Some(plan.to_hex().as_str());
+    let entry = file.value(key::PART).map(str::to_owned);
+    Ok(entry.filter(|_| has_same_plan).map(|entry| (file, entry)))
 }

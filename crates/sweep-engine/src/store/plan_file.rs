@@ -1,4 +1,5 @@
-//! The frozen plan: what a run folder was begun with, and where another plan differs from it.
+//! The plan file: the plan with which work in a folder began, and its differences from another
+//! plan.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,42 +11,44 @@ use super::differences::differences;
 use super::{Folder, Job, PLAN, PlanDifference, StoreError};
 use sweep_files::{atomic, regular};
 
-/// Format of `plan.json`; a folder of another format is another plan.
+/// The version of the format of `plan.json`. Folders of other formats are refused as of another
+/// plan.
 const FORMAT: u32 = 3;
 
-/// What `plan.json` says.
+/// The content of `plan.json`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PlanFile {
-    /// Layout of this file and of the parts beside it.
+    /// The version of the format of this file and of the parts in the folder.
     pub format: u32,
-    /// Version of the program that began the run; another one might round differently.
+    /// The version of the program that began the run; another version might round differently.
     pub version: String,
-    /// Version of its numerics; files of format 1 had none.
+    /// The version of the numerics; files of format 1 had none.
     #[serde(default)]
     pub numerics: u32,
-    /// Hash of version, numerics and plan, hexadecimal, as in every part.
+    /// The hash of version, numerics and plan, hexadecimal; it is in the metadata of every part
+    /// too.
     pub plan_hash: String,
-    /// Rows of the result.
+    /// The number of points.
     pub points: u64,
-    /// Points a chunk; the last one may hold fewer.
+    /// The number of points of each chunk but the last, which may have fewer.
     pub chunk_points: u64,
-    /// Grid as run, full machine, method.
+    /// The grid with all options applied, the full machine, and the method.
     pub plan: Value,
 }
 
-/// What is in the plan's place in a run folder.
-pub(super) enum Found {
-    /// No plan was frozen here.
+/// The result of reading `plan.json`.
+pub(super) enum FoundPlan {
+    /// There is no file.
     Nothing,
-    /// A plan, whole.
+    /// The file is a valid plan.
     Plan(Box<PlanFile>),
-    /// A file that is not a whole plan.
+    /// The file is not a valid plan.
     Damaged,
 }
 
 impl PlanFile {
-    pub(super) fn of(job: &Job<'_>) -> Self {
+    pub(super) fn new(job: &Job<'_>) -> Self {
         Self {
             format: FORMAT,
             version: job.version.to_owned(),
@@ -58,24 +61,24 @@ impl PlanFile {
     }
 
     /// Reads the plan of a run folder.
-    pub(super) fn read(folder: &Folder) -> Result<Found, StoreError> {
+    pub(super) fn read(folder: &Folder) -> Result<FoundPlan, StoreError> {
         let path = folder.file(PLAN);
         let text = regular::if_there(regular::read_json(&path));
         let Some(text) = text.map_err(StoreError::io("read", &path))? else {
-            return Ok(Found::Nothing);
+            return Ok(FoundPlan::Nothing);
         };
-        // A file of another format need not match its hash: the run is refused with what differs.
-        let whole = |found: &Self| {
+        // A file of another format need not match its hash: it is refused with the differences.
+        let is_valid = |found: &Self| {
             let hash = plan_hash(&found.version, found.numerics, &found.plan);
             found.format != FORMAT || hash.to_hex().as_str() == found.plan_hash
         };
         Ok(match serde_json::from_slice::<Self>(&text) {
-            Ok(found) if whole(&found) => Found::Plan(Box::new(found)),
-            _ => Found::Damaged,
+            Ok(found) if is_valid(&found) => FoundPlan::Plan(Box::new(found)),
+            _ => FoundPlan::Damaged,
         })
     }
 
-    /// Writes the plan unless another process was first.
+    /// Writes the plan, unless another process has written one.
     pub(super) fn freeze(&self, folder: &Folder) -> Result<(), StoreError> {
         let text = pretty(&json!(self));
         if text.len() as u64 >= regular::LONGEST_JSON_BYTES {
@@ -90,26 +93,27 @@ impl PlanFile {
         Ok(())
     }
 
-    /// Where the plans part; empty if they are the same.
-    pub(super) fn differences(&self, is: &Self) -> Vec<PlanDifference> {
-        if self == is {
+    /// Returns the differences from another plan; none if both are the same.
+    pub(super) fn differences(&self, other: &Self) -> Vec<PlanDifference> {
+        if self == other {
             return Vec::new();
         }
-        differences(&comparable(self), &comparable(is))
+        differences(&comparable(self), &comparable(other))
     }
 }
 
-/// Pretty JSON with a final newline, for files that people may look into.
+/// Formats JSON with indentation and a final newline, for files that people may read.
 pub(super) fn pretty(value: &Value) -> Vec<u8> {
     format!("{value:#}\n").into_bytes()
 }
 
-/// Hash of the build that runs and the plan it runs.
+/// Returns the hash of a build and a plan.
 pub(super) fn plan_hash(version: &str, numerics: u32, plan: &Value) -> blake3::Hash {
     blake3::hash(format!("{version}\n{numerics}\n{plan}").as_bytes())
 }
 
-/// The plan with the facts beside it, for showing differences of either by path.
+/// Returns the plan with the other entries of the file added, so that differences of either have a
+/// path.
 fn comparable(file: &PlanFile) -> Value {
     let mut value = file.plan.clone();
     if let Value::Object(map) = &mut value {
@@ -121,8 +125,8 @@ fn comparable(file: &PlanFile) -> Value {
     value
 }
 
-/// Moves something unreadable out of the way, keeping it for whoever wants to look, under a name
-/// that nothing has yet: what was kept before stays too.
+/// Renames an unreadable file to `*.damaged`, with a number if that name is taken, so that no file
+/// is lost. Returns the new path.
 pub(super) fn set_aside(path: &Path) -> Result<PathBuf, StoreError> {
     let named = |number: u64| {
         let mut name = path.as_os_str().to_owned();
@@ -132,11 +136,11 @@ pub(super) fn set_aside(path: &Path) -> Result<PathBuf, StoreError> {
         }
         PathBuf::from(name)
     };
-    let is_free = |aside: &PathBuf| fs::symlink_metadata(aside).is_err();
-    let aside = (1..=u64::MAX).map(named).find(is_free).unwrap_or_else(|| named(1));
-    // Another shard of the same run may have set it aside first.
-    let renamed = regular::if_there(fs::rename(path, &aside));
-    renamed.map_err(StoreError::io("set aside", path)).map(|_| aside)
+    let is_free = |new_path: &PathBuf| fs::symlink_metadata(new_path).is_err();
+    let new_path = (1..=u64::MAX).map(named).find(is_free).unwrap_or_else(|| named(1));
+    // Another shard of the same run may have renamed the file already.
+    let renamed = regular::if_there(fs::rename(path, &new_path));
+    renamed.map_err(StoreError::io("set aside", path)).map(|_| new_path)
 }
 
 #[cfg(test)]
@@ -144,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn floats_survive_the_file_so_the_hash_does() {
+    fn the_hash_of_a_plan_read_back_from_json_is_the_same() {
         let plan = json!({ "x": 0.1 + 0.2, "y": 1e-300 / 3.0, "z": 2.0e-4, "n": 5e-324 });
         let back: Value =
             serde_json::from_slice(&serde_json::to_vec_pretty(&plan).unwrap()).unwrap();

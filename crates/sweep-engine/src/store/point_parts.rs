@@ -1,8 +1,8 @@
-//! The parts of a run: each has the rows of a chunk of neighbouring points, or of some of them
-//! where the process was interrupted.
+//! The parts of a run. Each has the rows of a chunk, or of some of its points if the process was
+//! interrupted.
 //!
-//! A part has the columns of the result, then those that are kept for whoever goes on with the run,
-//! and the number that the engine knows a row by, where that is not the point.
+//! A part has the columns of the result, then the columns that only a resumed run needs, and, if it
+//! differs from the point, the number by which the engine identifies a row.
 
 use std::ops::Range;
 
@@ -14,14 +14,14 @@ use super::read::{NameCounts, add};
 use super::schema::{Holds, POINT};
 use super::{Column, Done, Folder, Job, Layout, Row, StoreError, chunk_points, part_name};
 
-/// The name of the column of the numbers that the engine knows rows by.
+/// The name of the column of the numbers by which the engine identifies rows.
 const ROW_INDEX: &str = "row_index";
 
-/// The greatest number of rows of a point: 256 states of each of 32 motions. Basis: settings of
-/// `sweep dwell`. Doubling it doubles the memory that a part may take.
+/// The maximum number of rows of a point. Basis: `sweep dwell` can return 256 states of each of 32
+/// motions. Doubling it doubles the memory that a part may take.
 const MAX_POINT_ROWS: usize = 32 * 256;
 
-/// The parts of a run.
+/// The schema of a run's parts, and the division of its points into chunks.
 #[derive(Clone, Debug)]
 pub(super) struct PointParts {
     parts: PartSchema,
@@ -33,23 +33,23 @@ pub(super) struct PointParts {
 }
 
 impl PointParts {
-    /// Returns the parts of a job.
+    /// Returns the schema and the chunks of a job.
     pub(super) fn new(job: &Job<'_>) -> Self {
         let layout = job.layout.clone();
         let is_kept = |column: &&Column| column.kind == Holds::Kept;
         let mut columns: Vec<Column> = layout.all().cloned().collect();
-        let mut plain = 1 + layout.axes.len();
+        let mut in_result = 1 + layout.axes.len();
         let mut kept = columns.len();
         let mut positions = Vec::with_capacity(layout.columns.len());
         for column in &layout.columns {
-            let next = if is_kept(&column) { &mut kept } else { &mut plain };
+            let next = if is_kept(&column) { &mut kept } else { &mut in_result };
             positions.push(*next);
             *next += 1;
         }
         columns.extend(layout.columns.iter().filter(is_kept).cloned());
         if layout.rows_a_point > 1 {
-            let about = "number that an unfinished run knows the row by";
-            columns.push(Column::new(ROW_INDEX, "1", about, Holds::Count));
+            let description = "number that an unfinished run knows the row by";
+            columns.push(Column::new(ROW_INDEX, "1", description, Holds::Count));
         }
         let parts = PartSchema::new(job, columns);
         let chunk_points = chunk_points(job.points);
@@ -72,16 +72,16 @@ impl PointParts {
         point / self.chunk_points
     }
 
-    /// Returns the entry of a part's metadata that says which chunk it is of.
-    fn place(&self, chunk: u64) -> String {
+    /// Returns the entry in a part's metadata that gives its chunk.
+    fn part_entry(&self, chunk: u64) -> String {
         let Range { start, end } = self.range(chunk);
         json!({ "index": chunk, "from": start, "to": end }).to_string()
     }
 
-    /// Encodes outcomes of a chunk, in the order of their points.
+    /// Encodes rows of a chunk, in the order of their points.
     ///
     /// # Errors
-    /// [`StoreError::Engine`] when the outcomes are not this chunk's.
+    /// [`StoreError::Engine`] if the rows are not of this chunk.
     pub(super) fn encode(
         &self,
         job: &Job<'_>,
@@ -107,18 +107,18 @@ impl PointParts {
             let axes: Vec<f64> = (job.axis_values)(*point);
             for cells in found {
                 let fits = cells.len() == columns.len()
-                    && columns.iter().zip(cells).all(|(column, cell)| column.takes(*cell));
+                    && columns.iter().zip(cells).all(|(column, cell)| column.accepts(*cell));
                 if !fits {
                     return Err(reject(format!("point {point}: a row that does not fit")));
                 }
                 rows.push(self.part_row(*point, &axes, cells));
             }
         }
-        let bytes = self.parts.encode(&self.place(chunk), &rows);
+        let bytes = self.parts.encode(&self.part_entry(chunk), &rows);
         bytes.map_err(|error| reject(error.to_string()))
     }
 
-    /// Returns the cells of a row in a part's columns.
+    /// Returns a row with a cell for each column of a part.
     fn part_row(&self, point: u64, axes: &[f64], cells: &Row) -> Row {
         let mut row: Row = vec![None; self.parts.width()];
         row[0] = Some(point / self.layout.rows_a_point);
@@ -129,26 +129,25 @@ impl PointParts {
             row[*position] = *cell;
         }
         if self.layout.rows_a_point > 1 {
-            row[self.number()] = Some(point);
+            row[self.number_position()] = Some(point);
         }
         row
     }
 
-    /// Opens the part of a chunk; `None` where there is no file.
+    /// Opens the part of a chunk; `None` if there is no file.
     pub(super) fn open(
         &self,
         folder: &Folder,
         chunk: u64,
     ) -> Result<Option<PointPart<'_>>, Unreadable> {
         let path = folder.file(part_name(chunk));
-        let Some(part) = self.parts.open(&path, &self.place(chunk))? else { return Ok(None) };
+        let Some(part) = self.parts.open(&path, &self.part_entry(chunk))? else { return Ok(None) };
         let range = self.range(chunk);
-        let most = (range.end - range.start).saturating_mul(MAX_POINT_ROWS as u64);
-        if part.rows() > most {
+        let max_rows = (range.end - range.start).saturating_mul(MAX_POINT_ROWS as u64);
+        if part.rows() > max_rows {
             return Err(Damage::Rows.into());
         }
-        let number = self.number();
-        let numbers = part.cells(&[number])?;
+        let numbers = part.cells(&[self.number_position()])?;
         let mut points: Vec<u64> = numbers.into_iter().filter_map(|row| row[0]).collect();
         if self.layout.has_several {
             points.dedup();
@@ -159,13 +158,13 @@ impl PointParts {
         Ok(Some(PointPart { parts: self, part, points }))
     }
 
-    /// Returns the position of the column of the numbers that the engine knows rows by.
-    const fn number(&self) -> usize {
+    /// Returns the position of the column of the numbers by which the engine identifies rows.
+    const fn number_position(&self) -> usize {
         if self.layout.rows_a_point > 1 { self.parts.width() - 1 } else { 0 }
     }
 }
 
-/// Returns whether these are points of a range, each once and in order.
+/// Returns whether points are within a range, each once and in order.
 fn are_ordered(range: &Range<u64>, points: impl Iterator<Item = u64> + Clone) -> bool {
     points.clone().all(|point| range.contains(&point)) && points.is_sorted_by(|a, b| a < b)
 }
@@ -175,7 +174,7 @@ fn are_ordered(range: &Range<u64>, points: impl Iterator<Item = u64> + Clone) ->
 pub(super) struct PointPart<'a> {
     parts: &'a PointParts,
     part: Part<'a>,
-    /// The points that it has rows of.
+    /// The points whose rows are in the part.
     points: Vec<u64>,
 }
 
@@ -185,9 +184,9 @@ impl PointPart<'_> {
         self.points.len() as u64
     }
 
-    /// Reads the outcomes.
+    /// Reads the points with their rows.
     pub(super) fn outcomes(&self) -> Result<Vec<Done>, Unreadable> {
-        let positions = [&[self.parts.number()], &self.parts.positions[..]].concat();
+        let positions = [&[self.parts.number_position()], &self.parts.positions[..]].concat();
         let mut outcomes: Vec<Done> = Vec::with_capacity(self.points.len());
         for mut row in self.part.cells(&positions)? {
             let cells = row.split_off(1);
@@ -218,12 +217,13 @@ impl PointPart<'_> {
     }
 }
 
-/// Returns whether the place of a part is that of points of a run.
-pub(super) fn is_of_points(place: &str) -> bool {
-    serde_json::from_str::<Value>(place).is_ok_and(|place| place["from"].is_u64())
+/// Returns whether the entry in a part's metadata is that of a run, not of a search.
+pub(super) fn is_part_of_run(entry: &str) -> bool {
+    serde_json::from_str::<Value>(entry).is_ok_and(|entry| entry["from"].is_u64())
 }
 
-/// Returns the name of the column that tells the points of a part apart, whatever its layout.
-pub(super) fn number_name(has: impl Fn(&str) -> bool) -> &'static str {
+/// Returns the name of the column whose numbers differ between the points of a part. `has` returns
+/// whether the part has a column.
+pub(super) fn number_column(has: impl Fn(&str) -> bool) -> &'static str {
     if has(ROW_INDEX) { ROW_INDEX } else { POINT }
 }

@@ -1,5 +1,5 @@
-//! What varies between runs of one plan: when, where, how fast. It is kept beside the result, not
-//! in it.
+//! The facts that differ between runs of one plan: time, host and speed. They are stored beside the
+//! result, not in it.
 
 use std::fs;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -11,43 +11,44 @@ use super::plan_file::pretty;
 use super::{Folder, Job, StoreError, Tally};
 use sweep_files::regular;
 
-/// How one process worked on a run.
+/// The work of one process on a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Session {
-    /// Start, seconds since 1970 (UTC).
+    /// The start, in seconds since 1970 (UTC).
     pub started_unix_s: u64,
-    /// From start to end of this process's work.
+    /// The time from the start to the end of the work.
     pub wall_s: f64,
-    /// Machine.
+    /// The name of the host.
     pub host: String,
-    /// Process id.
+    /// The process id.
     pub pid: u32,
-    /// Processors the process may use.
+    /// The number of processors that the process may use.
     pub cpus: usize,
-    /// Processor model, where the system reports it.
+    /// The model of the processor, if the system reports it.
     pub cpu_model: Option<String>,
-    /// Instruction set the engine used.
+    /// The instruction set that the engine used.
     pub simd: String,
-    /// Worker threads.
+    /// The number of worker threads.
     pub threads: usize,
-    /// Part of the run, as `I/N`; absent for a whole run.
+    /// The shard, as `I/N`; `None` for a whole run.
     pub shard: Option<String>,
-    /// Points computed.
+    /// The number of computed points.
     pub points: u64,
-    /// Those, over `wall_s`.
+    /// The number of computed points per second of `wall_s`.
     pub points_per_s: f64,
-    /// Version of the program.
+    /// The version of the program.
     pub version: String,
 }
 
-/// The sidecar: this session and those that were recorded before. Killed sessions left no record.
+/// Returns the content of the sidecar: the counts of the result, this session, and the recorded
+/// sessions of other processes. Killed processes have left no record.
 pub fn sidecar(
     folder: &Folder,
     job: &Job<'_>,
     tally: &Tally,
     session: Option<Session>,
 ) -> Result<Vec<u8>, StoreError> {
-    let mut sessions = recorded(folder)?;
+    let mut sessions = recorded_sessions(folder)?;
     sessions.extend(session);
     sessions.sort_by(|a, b| {
         (a.started_unix_s, &a.host, a.pid).cmp(&(b.started_unix_s, &b.host, b.pid))
@@ -60,7 +61,7 @@ pub fn sidecar(
         "numerics": job.numerics,
         "plan_hash": job.hash().to_hex().as_str(),
         "points": job.points,
-        // Sum over the sessions, so shards count as if one after the other.
+        // The sum over the sessions, as if shards had run one after the other.
         "wall_s": wall_s,
         "points_per_s": if wall_s > 0.0 { computed as f64 / wall_s } else { 0.0 },
         "rows": tally,
@@ -73,8 +74,8 @@ pub fn sidecar(
     Ok(pretty(&sidecar))
 }
 
-/// Sessions on record; one that cannot be read is left out.
-fn recorded(folder: &Folder) -> Result<Vec<Session>, StoreError> {
+/// Reads the recorded sessions, without those that cannot be read.
+fn recorded_sessions(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     let mut sessions = Vec::new();
     for name in regular::names(&folder.path).map_err(StoreError::io("list", &folder.path))? {
         if name.to_str().is_some_and(is_session) {
@@ -85,12 +86,12 @@ fn recorded(folder: &Folder) -> Result<Vec<Session>, StoreError> {
     Ok(sessions)
 }
 
-/// Returns whether `OpenRun::record` writes files of this name.
+/// Returns whether a name is that of a file that `OpenRun::record` writes.
 pub(super) fn is_session(name: &str) -> bool {
     name.starts_with("session-") && name.ends_with(".json")
 }
 
-/// This machine's name.
+/// Returns the name of this host.
 pub fn host() -> String {
     #[cfg(unix)]
     let name = rustix::system::uname().nodename().to_string_lossy().into_owned();
@@ -99,14 +100,14 @@ pub fn host() -> String {
     if name.is_empty() { "unknown".into() } else { name }
 }
 
-/// The processor's model, where Linux reports it.
+/// Returns the model of the processor, if Linux reports it.
 pub fn cpu_model() -> Option<String> {
     let text = fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// Seconds since 1970.
+/// Returns the seconds since 1970.
 pub fn now_unix_s() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }

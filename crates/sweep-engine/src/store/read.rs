@@ -1,5 +1,5 @@
-//! Reading Parquet files back: whose plan a result is of, what it holds, what any file's columns
-//! range over.
+//! Reading of Parquet files: a result's plan, counts of its rows, and the ranges of the columns of
+//! any file.
 
 use std::collections::BTreeMap;
 
@@ -12,25 +12,25 @@ use sweep_files::{FileKind, ParquetFile, columns, key};
 use sweep_parameter::{RatioLimits, Worse};
 use sweep_results::ratio_limits;
 
-/// What a finished result says of itself.
+/// The metadata of a result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResultFile {
-    /// Grid as run, full machine, method.
+    /// The grid with all options applied, the full machine, and the method.
     pub plan: Value,
-    /// Hash over version, numerics and plan, hexadecimal.
+    /// The hash of version, numerics and plan, hexadecimal.
     pub plan_hash: String,
-    /// Version of the program that made it.
+    /// The version of the program that made the result.
     pub version: String,
-    /// Version of its numerics; 0 in files older than that.
+    /// The version of the numerics; 0 for files of builds that did not record it.
     pub numerics: u32,
-    /// Rows.
+    /// The number of rows.
     pub points: u64,
 }
 
 impl ResultFile {
-    /// What the metadata says; nothing of a file that is not of this kind.
-    pub fn of(file: &ParquetFile, kind: FileKind<'_>) -> Option<Self> {
-        // Other files of this program carry the plan too: a boundary's rows are not points.
+    /// Reads the metadata of a file; `None` if the file is not of this kind or lacks an entry.
+    pub fn read(file: &ParquetFile, kind: FileKind<'_>) -> Option<Self> {
+        // Files of other kinds, such as boundaries, have a plan too, but their rows are not points.
         if file.kind() != Some(kind) {
             return None;
         }
@@ -45,96 +45,99 @@ impl ResultFile {
     }
 }
 
-/// That a file is not what it is taken for.
-pub(super) fn unlike(file: &ParquetFile, reason: String) -> StoreError {
+/// Returns the error about a file with other content than expected.
+pub(super) fn refuse_content(file: &ParquetFile, reason: String) -> StoreError {
     StoreError::parquet("read", file.path())(ParquetError::General(reason))
 }
 
-/// An extreme value, and its place.
+/// An extreme value and its point.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Extreme {
     /// The value.
     pub value: f64,
-    /// Point index.
+    /// The index of the point.
     pub point: u64,
 }
 
-/// A linear model that takes friction at a speed off by more than this is that of another motion.
+/// The factor by which the speed amplitude that the linear model assumes for friction may differ
+/// from that of the motion. Basis: with more than twice the speed, the friction is that of another
+/// motion. Doubling it reports fewer rows.
 pub const FAR_OFF: f64 = 2.0;
 
 #[allow(clippy::trivially_copy_pass_by_ref)]
-fn is_none(count: &u64) -> bool {
+fn is_zero(count: &u64) -> bool {
     *count == 0
 }
 
-/// What a result holds, counted.
+/// The counts and extremes of a result's rows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Tally {
-    /// Rows.
+    /// The number of rows.
     pub points: u64,
-    /// Rows by status.
+    /// The number of rows of each status.
     pub by_status: NameCounts,
-    /// Rows whose ratio is below the limit.
+    /// The number of rows whose verdict is reliable.
     pub reliable: u64,
-    /// Rows whose ratio is at or above the limit.
+    /// The number of rows whose verdict is not reliable.
     pub unreliable: u64,
-    /// Rows without a verdict: a model failed, or nothing moves.
+    /// The number of rows without a verdict, because a model failed or nothing moves.
     pub undefined: u64,
-    /// Rows with a ratio so low that the linear model over-estimates as much as a reliable one may
-    /// under-estimate.
+    /// The number of rows in which the linear model over-estimates: a ratio is below `ratio_min`
+    /// or, if that is not given, below 1 / `ratio_limit`.
     pub over_estimated: u64,
-    /// How many of these are reliable.
+    /// The number of over-estimated rows that are reliable.
     pub over_estimated_reliable: u64,
-    /// Rows known to be chaotic.
+    /// The number of rows whose motion is known to be chaotic.
     pub sensitive: u64,
-    /// Rows whose error is above the accuracy asked for.
+    /// The number of rows whose error exceeds the requested accuracy.
     pub unconverged: u64,
-    /// Rows by the method that their numbers come from, where the file says so.
+    /// The number of rows of each method, if the file has that column.
     pub by_method: NameCounts,
-    /// The greatest error left in a row.
+    /// The greatest estimated error of a row.
     pub greatest_error: Option<Extreme>,
     /// The greatest ratio.
     pub greatest_ratio: Option<Extreme>,
     /// The least gap of the nonlinear model, m.
     pub least_gap_nonlinear_m: Option<Extreme>,
-    /// Rows whose linear model takes friction at a speed off by more than [`FAR_OFF`].
-    #[serde(skip_serializing_if = "is_none")]
+    /// The number of rows in which the linear model linearises friction at a speed that is wrong by
+    /// a factor of more than [`FAR_OFF`].
+    #[serde(skip_serializing_if = "is_zero")]
     pub far_off: u64,
-    /// The greatest factor by which a speed is off, where there is friction.
+    /// The greatest factor by which the speed for friction is wrong, if there is friction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub greatest_off: Option<Extreme>,
-    /// The counts of a `sweep stability` result, which has none of the verdicts above.
+    /// The counts of a `sweep stability` result, which has no verdicts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dwells: Option<DwellCounts>,
 }
 
-/// Rows of a result of `sweep stability`, counted.
+/// The numbers of rows of a `sweep stability` result, by stability.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct DwellCounts {
-    /// Rows whose disturbances all decay.
+    /// The number of rows in which all disturbances decay.
     pub stable: u64,
-    /// Rows with one that grows.
+    /// The number of rows in which a disturbance grows.
     pub unstable: u64,
-    /// Stable rows whose motion no machine can make.
+    /// The number of stable rows whose motion is beyond the limits of the machine.
     pub beyond: u64,
-    /// Rows without a response.
+    /// The number of rows without a response.
     pub unknown: u64,
 }
 
-/// How often each name occurs.
+/// The number of occurrences of each name.
 pub type NameCounts = BTreeMap<String, u64>;
 
-/// Rows by status, without those that are `ok`.
+/// Returns the number of rows of each status except `ok`.
 pub fn failures(by_status: &NameCounts) -> impl Iterator<Item = (&String, &u64)> {
     by_status.iter().filter(|(status, _)| *status != "ok")
 }
 
-/// Rows whose status is not `ok`.
+/// Returns the number of rows whose status is not `ok`.
 pub fn failed(by_status: &NameCounts) -> u64 {
     failures(by_status).map(|(_, count)| count).sum()
 }
 
-/// Counts one more of a name.
+/// Adds one occurrence of a name.
 pub fn add(counts: &mut NameCounts, name: &str) {
     *counts.entry(name.to_owned()).or_default() += 1;
 }
@@ -148,13 +151,14 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
     let ratios = fields.clone().filter(|name| name.starts_with("ratio_"));
     let has = |name: &str| fields.clone().any(|field| field == name);
     // A result of `sweep stability` or `sweep dwell` has no verdicts.
-    let (is_of_stability, has_verdicts) = (has("stable"), !has("stable") && !has("motion"));
+    let is_stability = has("stable");
+    let has_verdicts = !is_stability && !has("motion");
     let needed = match has_verdicts {
         true => &["point", "status", "reliable", "sensitive", "method"][..],
         false => &["point", "status"],
     };
     if let Some(name) = needed.iter().find(|name| !has(name)) {
-        return Err(unlike(file, format!("there is no column `{name}`")));
+        return Err(refuse_content(file, format!("there is no column `{name}`")));
     }
     let limits = file.json(key::PLAN).and_then(|plan| ratio_limits(&plan));
     let over = limits.map_or(0.0, RatioLimits::over_estimate);
@@ -174,7 +178,7 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
         let flag = |column| row.cell(column).flag();
         tally.points += 1;
         row.word(status).into_iter().for_each(|name| add(&mut tally.by_status, name));
-        if is_of_stability {
+        if is_stability {
             let dwells = tally.dwells.get_or_insert_default();
             match flag(stable) {
                 Some(true) => {
@@ -208,7 +212,7 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
             }
         };
         extreme(&mut tally.greatest_off, row.value(off), f64::gt);
-        // Of a run that failed nothing is left to err.
+        // The error of a failed row means nothing.
         let error = if row.word(status) == Some("ok") { row.value(error) } else { f64::NAN };
         extreme(&mut tally.greatest_error, error, f64::gt);
         extreme(&mut tally.greatest_ratio, row.value(greatest), f64::gt);
@@ -218,51 +222,53 @@ pub fn tally(file: &ParquetFile) -> Result<Tally, StoreError> {
     Ok(tally)
 }
 
-/// Which method each row's numbers come from; nothing where the file does not say.
+/// Reads the method of each row; `None` for a row without one.
 ///
 /// # Errors
 /// [`StoreError::File`].
-pub fn levels(file: &ParquetFile) -> Result<Vec<Option<String>>, StoreError> {
-    let mut levels = Vec::new();
+pub fn methods(file: &ParquetFile) -> Result<Vec<Option<String>>, StoreError> {
+    let mut methods = Vec::new();
     file.each_row(&["method"], |row| {
-        levels.push(row.word(0).map(str::to_owned));
+        methods.push(row.word(0).map(str::to_owned));
         Ok::<(), StoreError>(())
     })?;
-    Ok(levels)
+    Ok(methods)
 }
 
-/// What one column of any file holds.
+/// The range of one column of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColumnRange {
-    /// Name.
+    /// The name.
     pub name: String,
-    /// Unit from the field's metadata, if it carries one.
+    /// The unit, if the field's metadata have one.
     pub unit: Option<String>,
-    /// Which way it is bad, if the file says so.
+    /// The direction in which values are worse, if the file gives it.
     pub worse: Option<Worse>,
-    /// Rows without a value.
+    /// The number of rows without a value.
     pub nulls: u64,
-    /// Least and greatest value of a numeric column that has any.
+    /// The least and the greatest value, if there are numbers.
     pub range: Option<(f64, f64)>,
-    /// How often each value of a text or bool column occurs; the first `NAMES_SHOWN` to appear.
+    /// The values of a text or bool column with their numbers of occurrences: the first
+    /// [`MAX_NAMES`] that appear.
     pub names: Vec<(String, u64)>,
 }
 
-/// A text column of more different values is not a list of names.
-const NAMES_SHOWN: usize = 16;
+/// The maximum number of distinct texts of a column that are counted. Basis: columns of names have
+/// fewer. Doubling it counts texts of columns that are not names.
+const MAX_NAMES: usize = 16;
 
-/// What any Parquet file holds.
+/// The content of any Parquet file in short.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overview {
-    /// Its own word, if it is a result of a sweep.
+    /// The metadata of a result, if the file is a result of `sweep run`.
     pub result: Option<ResultFile>,
-    /// Rows.
+    /// The number of rows.
     pub rows: u64,
-    /// Columns in order.
+    /// The columns in the order of the file.
     pub columns: Vec<ColumnRange>,
 }
 
-/// Reads through a file, in bounded memory.
+/// Reads all of a file in bounded memory, and returns its content in short.
 ///
 /// # Errors
 /// [`StoreError::File`].
@@ -276,21 +282,25 @@ pub fn overview(file: &ParquetFile) -> Result<Overview, StoreError> {
         names: Vec::new(),
     };
     let mut ranges: Vec<ColumnRange> = file.schema().fields().iter().map(new).collect();
-    // Nothing is known of cells of types that none of our files has.
+    // Columns of types that files of this program do not have are not read.
     let known = columns(file.schema());
     let names: Vec<&str> = known.iter().map(|column| column.name.as_str()).collect();
     file.each_row(&names, |row| {
         for (k, column) in known.iter().enumerate() {
-            ranges[column.field].widen(row.value(k), row.word(k));
+            ranges[column.field].add(row.value(k), row.word(k));
         }
         Ok::<(), StoreError>(())
     })?;
-    Ok(Overview { result: ResultFile::of(file, FileKind::Map), rows: file.rows(), columns: ranges })
+    Ok(Overview {
+        result: ResultFile::read(file, FileKind::Map),
+        rows: file.rows(),
+        columns: ranges,
+    })
 }
 
 impl ColumnRange {
-    /// Takes in a number or a word, if there is one.
-    fn widen(&mut self, value: f64, word: Option<&str>) {
+    /// Adds a cell to the range: a number, a word, or neither.
+    fn add(&mut self, value: f64, word: Option<&str>) {
         if !value.is_nan() {
             let (least, greatest) = self.range.unwrap_or((value, value));
             self.range = Some((least.min(value), greatest.max(value)));
@@ -302,7 +312,7 @@ impl ColumnRange {
         };
         if let Some((_, count)) = self.names.iter_mut().find(|(known, _)| known == word) {
             *count += 1;
-        } else if self.names.len() < NAMES_SHOWN {
+        } else if self.names.len() < MAX_NAMES {
             self.names.push((word.to_owned(), 1));
         }
     }

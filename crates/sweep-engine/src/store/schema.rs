@@ -1,6 +1,5 @@
-//! The result file's columns: a function of the plan, with units and descriptions that travel in
-//! the file. A row is kept by its cells, so that neither unfinished work nor joining knows what a
-//! model computes.
+//! The columns of a result, which depend on the plan alone. The file has their units and
+//! descriptions. Rows are lists of cells, so that the store does not depend on a model's numbers.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -22,56 +21,59 @@ use super::Job;
 use sweep_files::{CREATED_BY, FileKind, key};
 use sweep_parameter::{Limit, Worse};
 
-/// Rows in a row group: fixed, so that chunking leaves no trace in the file. A group of 25 columns
-/// takes about 30 MB in memory while it is written.
+/// The number of rows of a row group, which is fixed so that the file does not depend on chunks.
+/// Basis: a group of 25 columns takes about 30 MB of memory while it is written. Doubling it
+/// doubles that.
 pub const ROW_GROUP_ROWS: usize = 1 << 17;
 
-/// Rows handed to the Parquet writer at once: fixed for the same reason, and a whole number of them
-/// makes a group.
+/// The number of rows that are passed to the Parquet writer at once, which is fixed so that the
+/// file does not depend on chunks. Basis: a divisor of [`ROW_GROUP_ROWS`]. Doubling it doubles the
+/// memory of a batch.
 pub const BATCH_ROWS: usize = 1 << 12;
 
-/// The name of the column of points.
+/// The name of the column of point indices.
 pub(super) const POINT: &str = "point";
 
-/// What a column's cells are.
+/// The type of a column's cells.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Holds {
     /// A whole number, never null.
     Count,
-    /// A whole number, if it is known.
+    /// A whole number, or null.
     KnownCount,
-    /// A number that hardly ever repeats.
+    /// A number, or null. The numbers of a column hardly ever repeat.
     Measured,
-    /// A swept value, never null.
+    /// The value of an axis, never null.
     Axis,
-    /// A number that may repeat.
+    /// A number that may repeat, or null.
     Time,
-    /// A number for whoever goes on with an unfinished run: the file does not have it.
+    /// A number that a resumed run needs. It is in parts, but not in the result.
     Kept,
-    /// True or false.
+    /// True, false, or null.
     Flag,
-    /// A position in a list of names that is the same for every row, batch and run of the plan.
+    /// An index in a list of names, or null. The list is the same for every row and batch of a
+    /// plan.
     Name(Vec<&'static str>),
 }
 
-/// A column of the file.
+/// A column of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// Name.
+    /// The name.
     pub name: String,
-    /// Unit.
+    /// The unit.
     pub unit: String,
-    /// One line.
+    /// The description, in one line.
     pub description: String,
-    /// What its cells are.
+    /// The type of the cells.
     pub kind: Holds,
-    /// Which way it is bad, if it is a number that can be.
+    /// The direction in which values are worse, if there is one.
     pub worse: Option<Worse>,
-    /// Up to where it is good, if that has a meaning of its own.
+    /// The limit between good and bad values, if there is a natural one.
     pub limit: Option<Limit>,
 }
 
-/// What the columns depend on.
+/// The columns and the kind of a result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     /// The axes, first to last.
@@ -80,25 +82,25 @@ pub struct Layout {
     pub columns: Vec<Column>,
     /// The kind of the result file.
     pub kind: FileKind<'static>,
-    /// Numbers that the engine knows rows by, of each point of the grid: 1 but where a point is
-    /// looked at several times.
+    /// The number of tasks that the engine computes for each point of the grid: more than 1 if, for
+    /// example, a point is evaluated at several held speeds. Each task has a number of its own.
     pub rows_a_point: u64,
-    /// Whether there may be several rows of one number.
+    /// Whether a task may return several rows.
     pub has_several: bool,
-    /// Further entries of the file's metadata.
+    /// Further entries in the file's metadata.
     pub metadata: Vec<(&'static str, Value)>,
 }
 
-/// The cells of a row, without its place: bits of numbers, positions of names, 0 or 1; none where
-/// null.
+/// The cells of a row, without point and axis values: bits of numbers, indices of names, 0 or 1 for
+/// false or true, `None` for null.
 pub type Row = Vec<Option<u64>>;
 
-/// The outcome of a point: one row, or several where a model finds several.
+/// A point with its rows: one, or several if the model finds several.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Done {
-    /// What the engine was asked for.
+    /// The number by which the engine identifies the point.
     pub point: u64,
-    /// At least one.
+    /// The rows, at least one.
     pub rows: Vec<Row>,
 }
 
@@ -111,18 +113,24 @@ impl Layout {
 }
 
 impl Column {
-    /// A column.
+    /// Creates a column.
     pub fn new(
         name: impl Into<String>,
         unit: &str,
         description: impl Into<String>,
         kind: Holds,
     ) -> Self {
-        let (name, description) = (name.into(), description.into());
-        Self { name, unit: unit.into(), description, kind, worse: None, limit: None }
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+            description: description.into(),
+            kind,
+            worse: None,
+            limit: None,
+        }
     }
 
-    /// The number in a cell, if it is a column of numbers.
+    /// Returns the number in a cell; `None` for null, flags and names.
     pub fn number(&self, cell: Option<u64>) -> Option<f64> {
         match self.kind {
             Holds::Count | Holds::KnownCount => cell.map(|count| count as f64),
@@ -144,20 +152,22 @@ impl Column {
         self.declared(data_type, nullable)
     }
 
-    /// The field of such data, with what the file says of the column.
+    /// Returns the Arrow field of the column, with its unit, description, worse side and limit as
+    /// metadata.
     pub(crate) fn declared(&self, data_type: DataType, nullable: bool) -> Field {
-        let mut told = HashMap::from([
+        let mut metadata = HashMap::from([
             ("unit".to_owned(), self.unit.clone()),
             ("description".to_owned(), self.description.clone()),
         ]);
-        told.extend(self.worse.map(|worse| (key::WORSE.to_owned(), worse.name().to_owned())));
-        told.extend(
+        metadata.extend(self.worse.map(|worse| (key::WORSE.to_owned(), worse.name().to_owned())));
+        metadata.extend(
             self.limit.map(|limit| (key::LIMIT.to_owned(), Value::from(limit.value).to_string())),
         );
-        Field::new(&self.name, data_type, nullable).with_metadata(told)
+        Field::new(&self.name, data_type, nullable).with_metadata(metadata)
     }
 
-    /// The column's array; cells that must be there and are not become zeros.
+    /// Returns the array of the column's cells. A missing count becomes 0, and a missing axis value
+    /// NaN.
     pub(super) fn array(
         &self,
         cells: impl Iterator<Item = Option<u64>>,
@@ -184,8 +194,8 @@ impl Column {
         })
     }
 
-    /// Returns the cells of an array that [`Column::array`] has made, or of one that was read back;
-    /// `None` of any other.
+    /// Returns the cells of an array, as the inverse of [`Column::array`]; `None` for an array of
+    /// another type.
     pub(super) fn cells(&self, array: &dyn Array) -> Option<Vec<Option<u64>>> {
         let cells: Vec<Option<u64>> = match &self.kind {
             Holds::Count | Holds::KnownCount => {
@@ -199,19 +209,19 @@ impl Column {
             Holds::Name(names) => {
                 let coded = array.as_dictionary_opt::<Int32Type>()?;
                 let words = coded.values().as_string_opt::<i32>()?.iter();
-                let place = |word: Option<&str>| names.iter().position(|name| Some(*name) == word);
-                let places: Vec<u64> = words
-                    .map(|word| place(word).map(|place| place as u64))
+                let index = |word: Option<&str>| names.iter().position(|name| Some(*name) == word);
+                let indices: Vec<u64> = words
+                    .map(|word| index(word).map(|index| index as u64))
                     .collect::<Option<_>>()?;
-                let cell = |key: Option<i32>| key.map(|key| places[key as usize]);
+                let cell = |key: Option<i32>| key.map(|key| indices[key as usize]);
                 coded.keys().iter().map(cell).collect()
             }
         };
         Some(cells)
     }
 
-    /// Whether a cell is one of this column.
-    pub(super) fn takes(&self, cell: Option<u64>) -> bool {
+    /// Returns whether a cell fits the type of the column.
+    pub(super) fn accepts(&self, cell: Option<u64>) -> bool {
         match (&self.kind, cell) {
             (Holds::Count | Holds::Axis, cell) => cell.is_some(),
             (_, None) | (Holds::KnownCount | Holds::Measured | Holds::Time | Holds::Kept, _) => {
@@ -224,12 +234,13 @@ impl Column {
 }
 
 impl Layout {
-    /// Returns the bytes of a row in a part, at most.
+    /// Returns the maximum number of bytes that a row takes in a part.
     pub fn bytes_a_row(&self) -> usize {
         8 * (1 + self.axes.len() + self.columns.len())
     }
 
-    /// Every column, in order.
+    /// Iterates over all columns of the result: the point's index, the axes, and the model's
+    /// columns.
     pub(super) fn all(&self) -> impl Iterator<Item = &Column> + Clone {
         static POINTS: std::sync::LazyLock<Column> = std::sync::LazyLock::new(|| {
             Column::new(POINT, "1", "index in grid order", Holds::Count)
@@ -238,90 +249,91 @@ impl Layout {
         std::iter::once(&*POINTS).chain(&self.axes).chain(columns)
     }
 
-    /// The Arrow schema.
+    /// Returns the Arrow schema.
     pub fn schema(&self) -> SchemaRef {
         Arc::new(Schema::new(self.all().map(Column::field).collect::<Vec<_>>()))
     }
 
-    /// The position of one of the model's columns.
+    /// Returns the position of a column among those of the model.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column.name == name)
     }
 }
 
-/// Writer settings and metadata of a result file. Nothing in them depends on when, where or how the
-/// run went.
+/// Returns the settings of the writer and the metadata of a result. They do not depend on time,
+/// host or progress of the run.
 pub fn properties(job: &Job<'_>) -> WriterProperties {
-    let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
+    let entry = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
     let mut metadata = vec![
-        pair(key::PLAN, job.plan.to_string()),
-        pair(key::PLAN_HASH, job.hash().to_hex().to_string()),
-        pair(key::VERSION, job.version.to_owned()),
-        pair(key::NUMERICS, job.numerics.to_string()),
+        entry(key::PLAN, job.plan.to_string()),
+        entry(key::PLAN_HASH, job.hash().to_hex().to_string()),
+        entry(key::VERSION, job.version.to_owned()),
+        entry(key::NUMERICS, job.numerics.to_string()),
     ];
-    metadata.extend(job.layout.metadata.iter().map(|(key, value)| pair(key, value.to_string())));
+    metadata.extend(job.layout.metadata.iter().map(|(key, value)| entry(key, value.to_string())));
     let builder = writer(job.version, metadata)
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_max_row_group_bytes(None);
-    // A dictionary of them would be written and thrown away.
-    let unlike = job.layout.all().filter(|column| column.kind == Holds::Measured);
+    // A dictionary of numbers that hardly repeat would be built and then discarded.
+    let measured = job.layout.all().filter(|column| column.kind == Holds::Measured);
     let plain = |builder: WriterPropertiesBuilder, column: &Column| {
         builder.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), false)
     };
-    unlike.fold(builder, plain).build()
+    measured.fold(builder, plain).build()
 }
 
-/// Settings of every file that this program writes.
+/// Returns the settings of the writer that all files of this program share.
 pub(crate) fn writer(version: &str, metadata: Vec<KeyValue>) -> WriterPropertiesBuilder {
     WriterProperties::builder()
-        // The library's own default names its version, and an upgrade would change the bytes.
+        // The library's default contains its version, so that an upgrade would change the bytes.
         .set_created_by(format!("{CREATED_BY}{version}"))
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_key_value_metadata(Some(metadata))
 }
 
-/// Rows on their way into a batch.
+/// A builder of batches from rows.
 pub struct ResultRows<'a> {
     layout: &'a Layout,
     schema: SchemaRef,
-    /// Each with the number that it is known by, and its place.
+    /// The rows, each with the number of its point and the values of the axes.
     rows: Vec<(u64, Vec<f64>, Row)>,
 }
 
 impl<'a> ResultRows<'a> {
-    /// The rows of a layout.
+    /// Creates a builder without rows.
     pub fn new(layout: &'a Layout) -> Self {
-        Self::sharing(layout, layout.schema())
+        Self::with_schema(layout, layout.schema())
     }
 
-    /// With the schema of other batches of this layout: every field carries its description, so
-    /// that one of their own would take 4 % of a batch's memory.
-    pub fn sharing(layout: &'a Layout, schema: SchemaRef) -> Self {
+    /// Creates a builder whose batches share the schema of others of the same layout. A schema
+    /// contains descriptions; one for each batch would take 4 % of its memory.
+    pub fn with_schema(layout: &'a Layout, schema: SchemaRef) -> Self {
         Self { layout, schema, rows: Vec::with_capacity(BATCH_ROWS) }
     }
 
-    /// The schema of its batches.
+    /// Returns the schema of the batches.
     pub fn schema(&self) -> SchemaRef {
         Arc::clone(&self.schema)
     }
 
-    /// Adds a row of a point, with the values of the axes there.
+    /// Adds a row of a point with the values of the axes.
     pub fn push(&mut self, point: u64, axis_values: Vec<f64>, row: Row) {
         self.rows.push((point, axis_values, row));
     }
 
-    /// The rows so far as a batch; leaves none.
+    /// Takes the rows that were added so far, and returns them as a batch.
     ///
     /// # Errors
-    /// Rows of another layout.
+    /// Rows that do not fit the layout.
     pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         let rows = &self.rows;
-        let a_point = self.layout.rows_a_point;
+        let rows_a_point = self.layout.rows_a_point;
         let axes = self.layout.axes.len();
         let array = |(k, column): (usize, &Column)| match k.checked_sub(1) {
-            None => column.array(rows.iter().map(|(point, ..)| Some(point / a_point))),
-            Some(axis) if axis < axes => column
-                .array(rows.iter().map(|(_, at, _)| at.get(axis).map(|value| value.to_bits()))),
+            None => column.array(rows.iter().map(|(point, ..)| Some(point / rows_a_point))),
+            Some(axis) if axis < axes => column.array(
+                rows.iter().map(|(_, values, _)| values.get(axis).map(|value| value.to_bits())),
+            ),
             Some(k) => {
                 let k = k - axes;
                 column.array(rows.iter().map(|(.., row)| row.get(k).copied().flatten()))

@@ -1,9 +1,10 @@
-//! The part of a run that this process computes, and its number in a scheduler's array.
+//! Shards: the division of a run into equal parts, each computed by one process, and their numbers
+//! in a scheduler's array.
 //!
-//! Chunk `c` belongs to shard `c mod N`, so every shard gets its share of every region of the grid.
-//! `N`, and the array number of the first shard, are frozen in `shards.json` by the first shard to
-//! start: when two lost tasks are submitted again (`--array=3,7`), the scheduler's own count says 2
-//! and its smallest number 3, and neither matters.
+//! Chunk `c` belongs to shard `c mod N`, so that every shard has chunks in every region of the
+//! grid. The first process to start writes `N` and the array number of the first shard to
+//! `shards.json`, where they stay. If two lost tasks are submitted again (`--array=3,7`), the
+//! scheduler gives a count of 2 and a least number of 3, which are ignored.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
@@ -16,39 +17,40 @@ use super::{Folder, SHARDS, StoreError};
 use crate::Environment;
 use sweep_files::{atomic, regular};
 
-/// More parts than any scheduler's array has tasks; a bound for loops over them.
+/// The maximum number of shards. Basis: no scheduler's array has more tasks, and loops over shards
+/// stay short. Doubling it doubles these loops.
 const MAX_SHARDS: u64 = 1_000_000;
 
-/// One of `of` equal parts; `index` counts from 1.
+/// A shard: one of `count` equal parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Which part, from 1.
+    /// The number of the shard, from 1.
     pub index: u64,
-    /// How many parts.
-    pub of: u64,
+    /// The number of shards.
+    pub count: u64,
 }
 
 impl Shard {
-    /// Whether a chunk is this shard's to compute.
+    /// Returns whether a chunk belongs to this shard.
     pub fn owns(self, chunk: u64) -> bool {
-        chunk % self.of == self.index - 1
+        chunk % self.count == self.index - 1
     }
 
-    /// How many of a run's chunks are its own.
+    /// Returns how many chunks of a run belong to this shard.
     pub const fn chunks(self, chunks: u64) -> u64 {
-        chunks.saturating_sub(self.index - 1).div_ceil(self.of)
+        chunks.saturating_sub(self.index - 1).div_ceil(self.count)
     }
 }
 
-/// What `--shard` said.
+/// A value of `--shard`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShardRequest {
     /// `I/N`.
     Given(Shard),
-    /// `auto/N`: the number of parts given, this one's place from the scheduler.
+    /// `auto/N`: the number of shards is given, that of this one is taken from the scheduler.
     Auto {
-        /// How many parts.
-        of: u64,
+        /// The number of shards.
+        count: u64,
     },
 }
 
@@ -58,56 +60,57 @@ impl FromStr for ShardRequest {
     fn from_str(text: &str) -> Result<Self, String> {
         let expected =
             || format!("expected I/N with I from 1 to N, or auto/N, such as 3/8; got `{text}`");
-        let (index, of) = text.split_once('/').ok_or_else(expected)?;
-        let of: u64 = of.parse().map_err(|_| expected())?;
-        if !(1..=MAX_SHARDS).contains(&of) {
-            return Err(format!("expected 1 to {MAX_SHARDS} shards; got {of}"));
+        let (index, count) = text.split_once('/').ok_or_else(expected)?;
+        let count: u64 = count.parse().map_err(|_| expected())?;
+        if !(1..=MAX_SHARDS).contains(&count) {
+            return Err(format!("expected 1 to {MAX_SHARDS} shards; got {count}"));
         }
         if index == "auto" {
-            return Ok(Self::Auto { of });
+            return Ok(Self::Auto { count });
         }
         match index.parse() {
-            Ok(index) if (1..=of).contains(&index) => Ok(Self::Given(Shard { index, of })),
+            Ok(index) if (1..=count).contains(&index) => Ok(Self::Given(Shard { index, count })),
             _ => Err(expected()),
         }
     }
 }
 
-/// What the first shard froze.
+/// The division of a run into shards, the content of `shards.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ShardLayout {
-    /// How many parts.
+    /// The number of shards.
     pub shards: u64,
-    /// The scheduler's number of shard 1.
+    /// The number of shard 1 in the scheduler's array.
     pub first_array_id: u64,
 }
 
 impl ShardLayout {
-    /// The number of shards of a run folder, if any shard has started. An unreadable file counts as
-    /// none: it only says who computes a chunk, never what is in it.
+    /// Reads the division of a run folder; `None` if no shard has started, or if the file is not
+    /// readable. It decides which process computes a chunk, but not its content.
     pub(super) fn read(folder: &Folder) -> Result<Option<Self>, StoreError> {
         let path = folder.file(SHARDS);
         let text = regular::if_there(regular::read_json(&path));
         let text = text.map_err(StoreError::io("read", &path))?;
-        let dealing = text.and_then(|text| serde_json::from_slice(&text).ok());
-        Ok(dealing.filter(|dealing: &Self| (1..=MAX_SHARDS).contains(&dealing.shards)))
+        let layout = text.and_then(|text| serde_json::from_slice(&text).ok());
+        Ok(layout.filter(|layout: &Self| (1..=MAX_SHARDS).contains(&layout.shards)))
     }
 
-    /// The shards, counted from 1, that lack a chunk.
+    /// Returns the shards, numbered from 1, of which a chunk is missing.
     pub(super) fn incomplete(self, chunks: u64, present: &BTreeSet<u64>) -> Vec<u64> {
         let mut done: BTreeMap<u64, u64> = BTreeMap::new();
         for chunk in present {
             *done.entry(chunk % self.shards + 1).or_default() += 1;
         }
         let lacks = |index: &u64| {
-            let own = Shard { index: *index, of: self.shards }.chunks(chunks);
+            let own = Shard { index: *index, count: self.shards }.chunks(chunks);
             done.get(index).copied().unwrap_or(0) < own
         };
         (1..=self.shards).filter(lacks).collect()
     }
 
-    /// Writes the dealing unless another shard was first, and says what holds.
+    /// Writes the division, unless another shard has written one. Returns the division that is in
+    /// the file.
     pub(super) fn freeze(self, folder: &Folder) -> Result<Self, StoreError> {
         let text = pretty(&json!(self));
         let path = folder.file(SHARDS);
@@ -117,57 +120,59 @@ impl ShardLayout {
         if let Some(frozen) = Self::read(folder)? {
             return Ok(frozen);
         }
-        // Not ours, or not as it was written.
+        // The file is of another program, or damaged.
         set_aside(&path)?;
         atomic::write(&folder.path, &path, &text)?;
         Ok(self)
     }
 }
 
-/// The part this process is to compute and the dealing it assumes: from the request, else from a
-/// Slurm array or a Kubernetes Indexed Job, read against what is already frozen. `None` means the
-/// whole run.
+/// Returns the shard of this process and the division into shards; `None` for the whole run. The
+/// shard is that of the request, or else that of a Slurm array or a Kubernetes Indexed Job. The
+/// division is `frozen`, which an earlier process has written, if there is one.
 ///
 /// # Errors
-/// [`StoreError::Refused`] when the request, the scheduler and the frozen dealing do not fit
-/// together.
+/// [`StoreError::Refused`] if the request, the scheduler and the frozen division contradict each
+/// other.
 pub(super) fn resolve(
     request: Option<ShardRequest>,
     environment: Environment<'_>,
     frozen: Option<ShardLayout>,
 ) -> Result<Option<(Shard, ShardLayout)>, StoreError> {
     let refuse = |text: String| Err(StoreError::Refused(text));
-    let other = |shards: u64, asked: u64, help: String| {
+    let refuse_count = |shards: u64, requested: u64, help: String| {
         refuse(format!(
-            "this run was dealt into {shards} shards by the first to start, not {asked}\n  = help: \
-             use --shard {help}"
+            "this run was divided into {shards} shards by the first to start, not {requested}\n  \
+             = help: use --shard {help}"
         ))
     };
     if let Some(ShardRequest::Given(shard)) = request {
-        let dealing = frozen.unwrap_or(ShardLayout { shards: shard.of, first_array_id: 1 });
-        let shards = dealing.shards;
-        if shards != shard.of {
+        let layout = frozen.unwrap_or(ShardLayout { shards: shard.count, first_array_id: 1 });
+        let shards = layout.shards;
+        if shards != shard.count {
             let help = format!("I/{shards}, or run it whole without --shard");
-            return other(shards, shard.of, help);
+            return refuse_count(shards, shard.count, help);
         }
-        return Ok(Some((shard, dealing)));
+        return Ok(Some((shard, layout)));
     }
-    let asked =
-        request.map(|(ShardRequest::Auto { of } | ShardRequest::Given(Shard { of, .. }))| of);
+    let requested = request
+        .map(|(ShardRequest::Auto { count } | ShardRequest::Given(Shard { count, .. }))| count);
     let Some(scheduler) = Scheduler::read(environment)? else {
-        return match asked {
+        return match requested {
             None => Ok(None),
-            Some(of) => refuse(format!(
-                "--shard auto/{of} takes its place from SLURM_ARRAY_TASK_ID or \
-                 JOB_COMPLETION_INDEX, and neither is set\n  = help: give it as --shard I/{of}"
+            Some(count) => refuse(format!(
+                "--shard auto/{count} takes its place from SLURM_ARRAY_TASK_ID or \
+                 JOB_COMPLETION_INDEX, and neither is set\n  = help: give it as --shard I/{count}"
             )),
         };
     };
-    let dealing = match (frozen, asked.or(scheduler.count)) {
-        (Some(ShardLayout { shards, .. }), Some(of)) if asked.is_some() && of != shards => {
-            return other(shards, of, format!("auto/{shards}"));
+    let layout = match (frozen, requested.or(scheduler.count)) {
+        (Some(ShardLayout { shards, .. }), Some(count))
+            if requested.is_some() && count != shards =>
+        {
+            return refuse_count(shards, count, format!("auto/{shards}"));
         }
-        (Some(dealing), _) => dealing,
+        (Some(layout), _) => layout,
         (None, Some(shards)) => ShardLayout { shards, first_array_id: scheduler.first },
         (None, None) => {
             return refuse(format!(
@@ -177,27 +182,31 @@ pub(super) fn resolve(
             ));
         }
     };
-    match scheduler.id.checked_sub(dealing.first_array_id) {
-        Some(place) if place < dealing.shards => {
-            Ok(Some((Shard { index: place + 1, of: dealing.shards }, dealing)))
+    match scheduler.id.checked_sub(layout.first_array_id) {
+        Some(offset) if offset < layout.shards => {
+            Ok(Some((Shard { index: offset + 1, count: layout.shards }, layout)))
         }
         _ => refuse(format!(
             "{} is {}, but this run's {} shards are numbered {} to {}\n  = help: submit those \
              numbers, or give --shard I/N",
             scheduler.name,
             scheduler.id,
-            dealing.shards,
-            dealing.first_array_id,
-            dealing.first_array_id.saturating_add(dealing.shards - 1)
+            layout.shards,
+            layout.first_array_id,
+            layout.first_array_id.saturating_add(layout.shards - 1)
         )),
     }
 }
 
-/// What a scheduler says of this task.
+/// The environment variables of a scheduler about this task.
 struct Scheduler {
+    /// The name of the variable with the task's number.
     name: &'static str,
+    /// The task's number in the array.
     id: u64,
+    /// The least number of the array.
     first: u64,
+    /// The number of tasks, if the scheduler gives it.
     count: Option<u64>,
 }
 
@@ -215,12 +224,12 @@ impl Scheduler {
                 number("SLURM_ARRAY_TASK_COUNT")?.filter(|count| (1..=MAX_SHARDS).contains(count));
             return Ok(Some(Self { name: "SLURM_ARRAY_TASK_ID", id, first, count }));
         }
-        let place = number("JOB_COMPLETION_INDEX")?;
-        Ok(place.map(|id| Self { name: "JOB_COMPLETION_INDEX", id, first: 0, count: None }))
+        let index = number("JOB_COMPLETION_INDEX")?;
+        Ok(index.map(|id| Self { name: "JOB_COMPLETION_INDEX", id, first: 0, count: None }))
     }
 }
 
-/// Numbers as `sbatch --array=` takes them: `2,5-7`.
+/// Formats numbers for `sbatch --array=`: `2,5-7`.
 pub fn list(numbers: impl IntoIterator<Item = u64>) -> String {
     let numbers: Vec<u64> = numbers.into_iter().collect();
     let ranges = numbers.chunk_by(|number, next| number + 1 == *next).map(|range| match range {
@@ -247,9 +256,9 @@ mod tests {
     }
 
     #[test]
-    fn requests_read_as_written() {
-        assert_eq!("3/8".parse(), Ok(ShardRequest::Given(Shard { index: 3, of: 8 })));
-        assert_eq!("auto/8".parse(), Ok(ShardRequest::Auto { of: 8 }));
+    fn values_of_the_shard_option_are_parsed() {
+        assert_eq!("3/8".parse(), Ok(ShardRequest::Given(Shard { index: 3, count: 8 })));
+        assert_eq!("auto/8".parse(), Ok(ShardRequest::Auto { count: 8 }));
         for bad in
             ["0/8", "9/8", "1/0", "auto/0", "3", "a/8", "3/", "-1/8", "3/8/2", "", "1/1000001"]
         {
@@ -260,12 +269,12 @@ mod tests {
     #[test]
     fn every_chunk_belongs_to_one_shard() {
         for chunk in 0..100 {
-            let owners = (1..=7).filter(|&index| Shard { index, of: 7 }.owns(chunk)).count();
+            let owners = (1..=7).filter(|&index| Shard { index, count: 7 }.owns(chunk)).count();
             assert_eq!(owners, 1);
         }
         for chunks in 0..30 {
             for index in 1..=7 {
-                let shard = Shard { index, of: 7 };
+                let shard = Shard { index, count: 7 };
                 assert_eq!(
                     shard.chunks(chunks),
                     (0..chunks).filter(|&chunk| shard.owns(chunk)).count() as u64
@@ -275,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_said_means_the_whole_run() {
+    fn without_option_and_scheduler_the_whole_run_is_computed() {
         assert_eq!(resolve(None, &environment(&[]), None).unwrap(), None);
     }
 
@@ -286,25 +295,25 @@ mod tests {
             ("SLURM_ARRAY_TASK_MIN", "0"),
             ("SLURM_ARRAY_TASK_COUNT", "8"),
         ]);
-        let (shard, dealing) = resolve(None, &zero_based, None).unwrap().unwrap();
-        assert_eq!(shard, Shard { index: 3, of: 8 });
-        assert_eq!(dealing, ShardLayout { shards: 8, first_array_id: 0 });
+        let (shard, layout) = resolve(None, &zero_based, None).unwrap().unwrap();
+        assert_eq!(shard, Shard { index: 3, count: 8 });
+        assert_eq!(layout, ShardLayout { shards: 8, first_array_id: 0 });
     }
 
     #[test]
-    fn a_resubmitted_part_of_the_array_keeps_the_frozen_numbers() {
+    fn resubmitted_tasks_keep_the_numbers_of_the_first_array() {
         let resubmitted = environment(&[
             ("SLURM_ARRAY_TASK_ID", "7"),
             ("SLURM_ARRAY_TASK_MIN", "3"),
             ("SLURM_ARRAY_TASK_COUNT", "2"),
         ]);
         let frozen = ShardLayout { shards: 8, first_array_id: 1 };
-        let (shard, dealing) = resolve(None, &resubmitted, Some(frozen)).unwrap().unwrap();
-        assert_eq!((shard, dealing), (Shard { index: 7, of: 8 }, frozen));
+        let (shard, layout) = resolve(None, &resubmitted, Some(frozen)).unwrap().unwrap();
+        assert_eq!((shard, layout), (Shard { index: 7, count: 8 }, frozen));
     }
 
     #[test]
-    fn an_array_with_gaps_is_refused_at_its_stray_task() {
+    fn a_task_whose_number_is_outside_the_array_is_refused() {
         let gaps = environment(&[
             ("SLURM_ARRAY_TASK_ID", "20"),
             ("SLURM_ARRAY_TASK_MIN", "0"),
@@ -314,42 +323,43 @@ mod tests {
     }
 
     #[test]
-    fn kubernetes_gives_the_place_and_the_user_the_number() {
+    fn kubernetes_gives_the_index_and_the_option_the_count() {
         let pod = environment(&[("JOB_COMPLETION_INDEX", "0")]);
-        let (shard, _) = resolve(Some(ShardRequest::Auto { of: 4 }), &pod, None).unwrap().unwrap();
-        assert_eq!(shard, Shard { index: 1, of: 4 });
+        let (shard, _) =
+            resolve(Some(ShardRequest::Auto { count: 4 }), &pod, None).unwrap().unwrap();
+        assert_eq!(shard, Shard { index: 1, count: 4 });
         assert!(refusal(resolve(None, &pod, None)).contains("auto/N"));
-        let nowhere = resolve(Some(ShardRequest::Auto { of: 4 }), &environment(&[]), None);
+        let nowhere = resolve(Some(ShardRequest::Auto { count: 4 }), &environment(&[]), None);
         assert!(refusal(nowhere).contains("--shard I/4"));
         let garbled = environment(&[("SLURM_ARRAY_TASK_ID", "x")]);
         assert!(refusal(resolve(None, &garbled, None)).contains("not a number"));
     }
 
     #[test]
-    fn another_number_of_shards_than_the_frozen_one_is_refused() {
+    fn a_count_of_shards_that_differs_from_the_file_is_refused() {
         let frozen = Some(ShardLayout { shards: 4, first_array_id: 1 });
-        let given = Some(ShardRequest::Given(Shard { index: 1, of: 8 }));
+        let given = Some(ShardRequest::Given(Shard { index: 1, count: 8 }));
         assert!(refusal(resolve(given, &environment(&[]), frozen)).contains("into 4 shards"));
         let pod = environment(&[("JOB_COMPLETION_INDEX", "1")]);
         assert!(
-            refusal(resolve(Some(ShardRequest::Auto { of: 8 }), &pod, frozen))
+            refusal(resolve(Some(ShardRequest::Auto { count: 8 }), &pod, frozen))
                 .contains("into 4 shards")
         );
     }
 
     #[test]
-    fn a_shard_lacks_something_until_its_last_chunk_is_there() {
-        let dealing = ShardLayout { shards: 4, first_array_id: 1 };
-        assert_eq!(dealing.incomplete(6, &BTreeSet::new()), [1, 2, 3, 4]);
-        assert_eq!(dealing.incomplete(6, &BTreeSet::from([0, 1, 3, 4])), [2, 3]);
+    fn a_shard_is_incomplete_until_all_its_chunks_exist() {
+        let layout = ShardLayout { shards: 4, first_array_id: 1 };
+        assert_eq!(layout.incomplete(6, &BTreeSet::new()), [1, 2, 3, 4]);
+        assert_eq!(layout.incomplete(6, &BTreeSet::from([0, 1, 3, 4])), [2, 3]);
         assert!(
-            dealing.incomplete(2, &BTreeSet::from([0, 1])).is_empty(),
+            layout.incomplete(2, &BTreeSet::from([0, 1])).is_empty(),
             "shards without a chunk lack nothing"
         );
     }
 
     #[test]
-    fn lists_read_as_sbatch_takes_them() {
+    fn numbers_are_formatted_for_sbatch() {
         assert_eq!(list([2, 5, 6, 7, 9]), "2,5-7,9");
         assert_eq!(list([]), "");
     }

@@ -1,79 +1,79 @@
-//! Progress of a run, without disturbing it.
+//! The progress of a run. Looking at it does not disturb the run.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
-use super::open::{self, parts_there, read_part};
-use super::plan_file::{Found, PlanFile};
+use super::open::{self, part_indices, read_part};
+use super::plan_file::{FoundPlan, PlanFile};
 use super::point_parts::PointParts;
 use super::read::{NameCounts, failed};
 use super::shard::{self, ShardLayout};
 use super::{Folder, Holder, Job, StoreError, lock};
 
-/// How far a run is.
+/// The stage of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum State {
-    /// Nothing is there.
+    /// There are no chunks.
     #[default]
     NotStarted,
     /// Chunks are missing.
     Unfinished,
-    /// Every chunk is there and waits for the merge.
+    /// All chunks are complete, but not yet merged.
     Complete,
-    /// The one file is there.
+    /// The result exists.
     Finished,
 }
 
-/// Progress of a run.
+/// The progress of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FolderStatus {
-    /// The finished file, or where it will be.
-    #[serde(serialize_with = "shown")]
+    /// The path of the result, which may not exist yet.
+    #[serde(serialize_with = "serialize_path")]
     pub output: PathBuf,
-    /// How far.
+    /// The stage.
     pub state: State,
-    /// Rows of the whole result.
+    /// The number of all points.
     pub points: u64,
-    /// Rows that are there.
+    /// The number of stored points.
     pub points_done: u64,
-    /// Of those, rows whose status is not `ok`.
+    /// The number of stored rows whose status is not `ok`.
     pub points_failed: u64,
-    /// Rows that are there, by status.
+    /// The number of stored rows of each status.
     pub by_status: NameCounts,
-    /// Chunks of the whole.
+    /// The number of all chunks.
     pub chunks: u64,
-    /// Chunks that are there and whole.
+    /// The number of complete chunks.
     pub chunks_done: u64,
-    /// Chunks that are not there, or damaged.
+    /// The number of chunks that are missing, incomplete or damaged.
     pub chunks_missing: u64,
-    /// Chunks that are there but not as they were written; the next run computes them again.
+    /// The chunks whose part is damaged; the next run computes them again.
     pub chunks_damaged: Vec<u64>,
-    /// Who is at work.
+    /// The processes that work on the run.
     pub running: Vec<Holder>,
-    /// Into how many shards the run was dealt, if it was.
+    /// The number of shards, if the run is divided into shards.
     pub shards: Option<u64>,
-    /// Shards with something missing that nobody is working on, as the scheduler numbers them:
-    /// `2,5-7`, for `sbatch --array=`; empty if none is.
+    /// The incomplete shards on which no process works, in the scheduler's numbers: `2,5-7`, for
+    /// `sbatch --array=`; empty if there are none.
     pub missing_shards: String,
-    /// The same shards by their numbers from 1, for `--shard I/N`.
+    /// The same shards in numbers from 1, for `--shard I/N`.
     pub missing_shard_numbers: Vec<u64>,
 }
 
-/// A path as people see it: JSON holds no other bytes than text.
-pub(super) fn shown<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+/// Serialises a path as text, because JSON cannot hold other bytes.
+pub(super) fn serialize_path<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&path.display())
 }
 
-/// Looks at an output and its folder. What would stop a run is an error here too: another plan in
-/// the folder, another result or another file at the output, a damaged result.
+/// Reads the progress of a run. Files that would make a run fail are errors here too: another plan
+/// in the folder, another result or a foreign file at the output, a damaged result.
 ///
 /// # Errors
-/// As [`super::OpenRun::open`], but never [`StoreError::Busy`].
+/// The errors of [`super::OpenRun::open`] except [`StoreError::Busy`].
 pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> {
-    let folder = Folder::of(output, &job.layout)?;
+    let folder = Folder::new(output, &job.layout)?;
     let parts = PointParts::new(job);
     let chunks = parts.chunks();
     let mut status = FolderStatus {
@@ -83,10 +83,10 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
         chunks_missing: chunks,
         ..FolderStatus::default()
     };
-    let ours = PlanFile::of(job);
+    let ours = PlanFile::new(job);
     match PlanFile::read(&folder)? {
-        Found::Plan(found) => open::refuse_other_plan(&folder, &found, &ours)?,
-        Found::Nothing => {
+        FoundPlan::Plan(found) => open::refuse_other_plan(&folder, &found, &ours)?,
+        FoundPlan::Nothing => {
             let Some((_, tally)) = open::finished(&folder, job)? else { return Ok(status) };
             return Ok(FolderStatus {
                 state: State::Finished,
@@ -98,10 +98,10 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
                 ..status
             });
         }
-        Found::Damaged => {}
+        FoundPlan::Damaged => {}
     }
     let mut present = BTreeSet::new();
-    for chunk in parts_there(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
+    for chunk in part_indices(&folder)?.into_iter().filter(|chunk| *chunk < chunks) {
         let range = parts.range(chunk);
         let mut by_status = NameCounts::new();
         let points = read_part(&parts, &folder, chunk, |part| {
@@ -119,7 +119,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
                 }
             }
             Err(_) => status.chunks_damaged.push(chunk),
-            // The run was finished, or the part set aside, a moment ago.
+            // Another process has deleted or renamed the part since it was listed.
             Ok(None) => {}
         }
     }
@@ -128,16 +128,16 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     status.chunks_missing = chunks - status.chunks_done;
     status.state = if status.chunks_missing == 0 { State::Complete } else { State::Unfinished };
     status.running = lock::holders(&folder);
-    if let Some(dealing) = ShardLayout::read(&folder)? {
+    if let Some(layout) = ShardLayout::read(&folder)? {
         let running =
             |shard: &u64| status.running.iter().any(|holder| holder.shard == Some(*shard));
         let missing =
-            dealing.incomplete(chunks, &present).into_iter().filter(|shard| !running(shard));
+            layout.incomplete(chunks, &present).into_iter().filter(|shard| !running(shard));
         status.missing_shard_numbers = missing.collect();
         let array_ids =
-            status.missing_shard_numbers.iter().map(|shard| shard - 1 + dealing.first_array_id);
+            status.missing_shard_numbers.iter().map(|shard| shard - 1 + layout.first_array_id);
         status.missing_shards = shard::list(array_ids);
-        status.shards = Some(dealing.shards);
+        status.shards = Some(layout.shards);
     }
     Ok(status)
 }
@@ -148,7 +148,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_path_that_is_no_text_is_shown() {
+    fn a_path_that_is_not_utf8_is_serialized() {
         use std::os::unix::ffi::OsStrExt as _;
         let output = std::ffi::OsStr::from_bytes(b"o\xff.parquet").into();
         let status = FolderStatus { output, ..FolderStatus::default() };

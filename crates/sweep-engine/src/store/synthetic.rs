@@ -1,14 +1,14 @@
-//! Rows from a formula, for tests of the store and the runner without a model.
+//! Rows computed by a formula, for tests of the store and the runner without a model.
 
 use serde_json::json;
 use sweep_files::FileKind;
 
 use super::{Column, Done, Holds, Job, Layout, Row};
 
-/// Statuses of rows.
+/// The statuses of rows.
 pub const STATUSES: [&str; 4] = ["ok", "diverged", "step_limit", "linear_diverged"];
 
-/// Two axes, two channels.
+/// Returns a layout with two axes and the columns of one channel.
 pub fn layout() -> Layout {
     let column =
         |name: &str, unit: &str, kind| Column::new(name, unit, format!("the {name}"), kind);
@@ -35,7 +35,7 @@ pub fn layout() -> Layout {
     }
 }
 
-/// A job of so many points.
+/// Returns a job with a number of points.
 pub fn job(points: u64) -> Job<'static> {
     Job {
         plan: json!({ "name": "synthetic", "points": points, "step_s": 2.0e-4 }),
@@ -50,12 +50,13 @@ pub fn job(points: u64) -> Job<'static> {
     }
 }
 
-/// Every kind of row comes by within 60 points: reliable, not, undefined, failed in each way.
+/// Returns the row of a point. The first 60 points have every kind of row: reliable, unreliable,
+/// undefined, and failed in each way.
 pub fn row(point: u64) -> Row {
-    let x = point as f64;
+    let index = point as f64;
     let status = if [4, 7].contains(&(point % 20)) { 1 + point / 20 % 3 } else { 0 };
-    let linear = if point % 30 == 11 { 0.0 } else { 1.0 + (0.37 * x).sin().abs() };
-    let nonlinear = linear * (0.5 + x % 5.0);
+    let linear = if point % 30 == 11 { 0.0 } else { 1.0 + (0.37 * index).sin().abs() };
+    let nonlinear = linear * (0.5 + index % 5.0);
     let is_ok = status == 0;
     let number = |value: f64| Some(value.to_bits()).filter(|_| is_ok);
     let ratio = (is_ok && linear != 0.0).then_some(nonlinear / linear);
@@ -66,15 +67,15 @@ pub fn row(point: u64) -> Row {
         ratio.map(|ratio| u64::from(ratio < 2.0)),
         [None, Some(0), Some(1)][(point % 3) as usize],
         Some(point % 2),
-        (!point.is_multiple_of(5)).then_some((1e-5 * (1.0 + x)).to_bits()),
-        (!point.is_multiple_of(5)).then_some(u64::from(x < 30.0)),
+        (!point.is_multiple_of(5)).then_some((1e-5 * (1.0 + index)).to_bits()),
+        (!point.is_multiple_of(5)).then_some(u64::from(index < 30.0)),
         Some(status),
-        (!is_ok).then_some((x / 7.0).to_bits()),
+        (!is_ok).then_some((index / 7.0).to_bits()),
         Some(1000 + point),
     ]
 }
 
-/// What came of a point.
+/// Returns a point with its row.
 pub fn done(point: u64) -> Done {
     Done { point, rows: vec![row(point)] }
 }

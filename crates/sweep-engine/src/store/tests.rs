@@ -1,4 +1,5 @@
-//! The store as a whole: the same bytes whatever happens on the way.
+//! Tests of the store as a whole: interruptions, damage and shards do not change the bytes of a
+//! result.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,13 +14,15 @@ use tempfile::TempDir;
 use super::*;
 use sweep_files::{FileError, ParquetFile, cells};
 
+mod other_files;
 mod parts;
 mod plans;
 mod result;
-mod strangers;
 
+/// The number of points of a job in most tests: ten full chunks and one of a single point.
 const POINTS: u64 = 81;
 
+/// A temporary folder for the result of a test.
 struct Home(TempDir);
 
 impl Home {
@@ -27,10 +30,12 @@ impl Home {
         Self(tempfile::tempdir().unwrap())
     }
 
+    /// Returns the path of the result.
     fn output(&self) -> PathBuf {
         self.0.path().join("x.parquet")
     }
 
+    /// Returns the folder of unfinished work.
     fn partial(&self) -> PathBuf {
         self.0.path().join("x.parquet.partial")
     }
@@ -47,18 +52,21 @@ fn open(output: &Path, job: &Job<'_>) -> OpenRun {
     }
 }
 
+/// Writes a complete chunk.
 fn write(run: &OpenRun, chunk: u64) {
     let outcomes: Vec<_> = run.chunk_range(chunk).map(synthetic::done).collect();
     run.write_chunk(&synthetic::job(POINTS), chunk, outcomes).unwrap();
 }
 
-fn write_bytes(job: &Job<'_>, chunk: u64) -> Vec<u8> {
+/// Returns the bytes of a complete chunk's part.
+fn part_bytes(job: &Job<'_>, chunk: u64) -> Vec<u8> {
     let home = Home::new();
     let run = open(&home.output(), job);
     write(&run, chunk);
     fs::read(home.partial().join(part_name(chunk))).unwrap()
 }
 
+/// Writes all missing chunks, and returns their number.
 fn write_missing(run: &OpenRun) -> u64 {
     (0..run.chunks())
         .filter(|&chunk| run.is_missing(chunk))
@@ -66,15 +74,16 @@ fn write_missing(run: &OpenRun) -> u64 {
         .count() as u64
 }
 
-/// What the result holds, and what a user should hear of.
+/// Joins the parts and completes the run. Returns the counts of the result and the notes for the
+/// user.
 fn finish(mut run: OpenRun, job: &Job<'_>) -> (Tally, Vec<String>) {
     let tally = run.join(job, &|| false).unwrap().unwrap();
     let notes = run.complete(job, &tally, None).unwrap();
     (tally, notes)
 }
 
-/// The bytes of an undisturbed run.
-fn undisturbed(points: u64) -> Vec<u8> {
+/// Returns the bytes of a result that one process has computed without interruption.
+fn bytes_of_undisturbed_run(points: u64) -> Vec<u8> {
     let home = Home::new();
     let job = synthetic::job(points);
     let run = open(&home.output(), &job);
@@ -84,14 +93,14 @@ fn undisturbed(points: u64) -> Vec<u8> {
     fs::read(home.output()).unwrap()
 }
 
-/// Columns of a search's trials.
+/// Returns the columns of a search's trials.
 fn trial_columns() -> TrialColumns {
     let axis = |name: &str| Column::new(name, "1", "a parameter", Holds::Axis);
     let answers = vec![Column::new("distance", "1", "an answer", Holds::Measured)];
     TrialColumns { keys: ["x", "y"].map(axis).to_vec(), answers }
 }
 
-/// The trials of a search.
+/// Opens the trials of a search.
 fn trials(output: &Path, job: &Job<'_>) -> Trials {
     match Trials::open(output, job, trial_columns(), false).unwrap() {
         Opened::Open(trials) => trials,

@@ -1,10 +1,11 @@
-//! The trials of a search. A search's next trials follow from the answers so far, so after an
-//! interruption it runs again over the rows that are there, and ends in the same bytes.
+//! The stored trials of a search. The next trials of a search follow from the answers so far. After
+//! an interruption the search therefore starts from its beginning, takes the answers of earlier
+//! trials from the store, and ends in the same bytes.
 //!
-//! A search on `x.parquet` works in the folder `x.parquet.partial`, under the same lock and with
-//! the same frozen plan as a run. Which points it needs is not known beforehand, so its parts have
-//! no places but their order: a part is written again with the rows that have come since, until it
-//! is full, and then the next one begins.
+//! A search on `x.parquet` works in the folder `x.parquet.partial`, with the same lock and plan
+//! file as a run. Its points are not known beforehand, so its parts are only numbered: the last
+//! part is rewritten with the rows that have been added, until it is full, and then the next part
+//! begins.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,13 +18,14 @@ use super::part::{Damage, PartSchema, Unreadable};
 use super::{Column, Folder, Job, Lock, Row, StoreError, part_name};
 use sweep_files::{FileKind, atomic};
 
-/// The number of rows of a full part. Basis: a part is written again at most once in
-/// [`WRITE_INTERVAL`], and so many rows of ten columns take a millisecond. Doubling it halves the
-/// number of files and doubles what a write costs.
+/// The number of rows of a full part. Basis: a part is rewritten at most once per
+/// [`WRITE_INTERVAL`], and writing that many rows of ten columns takes a millisecond. Doubling it
+/// halves the number of files and doubles the time of a write.
 const PART_ROWS: usize = 1024;
 
-/// The time between two writes of trials that come one by one. Basis: a kill loses the trials of a
-/// second at most, and writes take a thousandth of the time. Doubling it doubles what is lost.
+/// The minimum time between two writes of trials that are added one by one. Basis: a killed process
+/// loses the trials of one second, and writes take a thousandth of the time. Doubling it doubles
+/// the loss.
 pub const WRITE_INTERVAL: Duration = Duration::from_secs(1);
 
 /// The identity of a trial: the cells of its first columns, none of which is null.
@@ -38,30 +40,34 @@ pub struct TrialColumns {
     pub answers: Vec<Column>,
 }
 
-/// The trials of a search that this process has a right to.
+/// The stored trials of a search whose folder this process has locked.
 #[derive(Debug)]
 pub struct Trials {
     folder: Folder,
     lock: Lock,
     parts: PartSchema,
-    known: BTreeMap<Key, Row>,
-    /// The index and the rows of the last part, which is not full.
-    last: u64,
+    /// The answers of all trials.
+    answers: BTreeMap<Key, Row>,
+    /// The index of the last part.
+    last_part: u64,
+    /// The rows of the last part.
     rows: Vec<Row>,
     /// Whether the last part has rows that are not written.
     is_dirty: bool,
-    written: Instant,
+    last_write: Instant,
     notes: Vec<String>,
 }
 
 impl Trials {
-    /// Takes the output for this search, freezes its plan or finds it frozen, and reads its trials.
-    /// `fresh` starts over: trials go now, a finished file stays until the new one takes its place.
+    /// Locks the output for this search, writes its plan or compares it with the one that an
+    /// earlier process has written, and reads the stored trials. With `fresh` these are deleted at
+    /// once; a finished result stays until the new one replaces it.
     ///
     /// # Errors
-    /// [`StoreError::Busy`] when another process holds the output, [`StoreError::PlanDiffers`],
-    /// [`StoreError::OutputDiffers`] when another result is there already, [`StoreError::File`] for
-    /// anything else at the output that is not ours, and for the file system.
+    /// [`StoreError::Busy`] if another process has locked the output, [`StoreError::PlanDiffers`],
+    /// [`StoreError::OutputDiffers`] if the output is the result of another plan,
+    /// [`StoreError::File`] for a file of another program at the output, and for errors of the file
+    /// system.
     pub fn open(
         output: &Path,
         job: &Job<'_>,
@@ -70,43 +76,43 @@ impl Trials {
     ) -> Result<Opened<(), Self>, StoreError> {
         let folder = Folder::beside(output, job.layout.kind)?;
         let finished = || match job.layout.kind {
-            // The model's own file does not say which search it is from.
+            // The model's own file does not record the search that made it.
             FileKind::Own => Ok(None),
-            _ => Ok(open::of_plan(&folder, job)?.map(drop)),
+            _ => Ok(open::result_of_same_plan(&folder, job)?.map(drop)),
         };
         let (lock, notes) = match open::claim(&folder, job, fresh, || Ok(None), finished)? {
             Opened::Finished(()) => return Ok(Opened::Finished(())),
-            Opened::Open(held) => held,
+            Opened::Open(lock_and_notes) => lock_and_notes,
         };
-        let TrialColumns { mut keys, answers } = columns;
-        let width = keys.len();
-        keys.extend(answers);
+        let TrialColumns { keys: mut columns, answers } = columns;
+        let key_count = columns.len();
+        columns.extend(answers);
         let mut trials = Self {
             folder,
             lock,
-            parts: PartSchema::new(job, keys),
-            known: BTreeMap::new(),
-            last: 0,
+            parts: PartSchema::new(job, columns),
+            answers: BTreeMap::new(),
+            last_part: 0,
             rows: Vec::new(),
             is_dirty: false,
-            written: Instant::now(),
+            last_write: Instant::now(),
             notes,
         };
-        trials.read(width)?;
+        trials.read(key_count)?;
         Ok(Opened::Open(trials))
     }
 
-    /// Reads the parts that are there, setting aside what is not whole.
-    fn read(&mut self, width: usize) -> Result<(), StoreError> {
-        for index in open::parts_there(&self.folder)? {
+    /// Reads the parts, and renames damaged ones. The first `key_count` columns identify a trial.
+    fn read(&mut self, key_count: usize) -> Result<(), StoreError> {
+        for index in open::part_indices(&self.folder)? {
             match Unreadable::damage(read_rows(&self.parts, &self.folder, index))? {
                 Ok(rows) => {
                     for row in &rows {
-                        let (key, answer) = row.split_at(width);
+                        let (key, answer) = row.split_at(key_count);
                         let key = key.iter().map(|cell| cell.unwrap_or_default()).collect();
-                        self.known.insert(key, answer.to_vec());
+                        self.answers.insert(key, answer.to_vec());
                     }
-                    self.last = index;
+                    self.last_part = index;
                     self.rows = rows;
                 }
                 Err(damage) => {
@@ -118,38 +124,40 @@ impl Trials {
         Ok(())
     }
 
-    /// How many trials are there.
+    /// Returns the number of stored trials.
     pub fn count(&self) -> usize {
-        self.known.len()
+        self.answers.len()
     }
 
-    /// The answer to a trial that was made before.
+    /// Returns the answer of an earlier trial.
     pub fn recall(&self, key: &[u64]) -> Option<&Row> {
-        self.known.get(key)
+        self.answers.get(key)
     }
 
-    /// Adds an answer, which [`Trials::write`] writes.
+    /// Adds an answer, which the next [`Trials::write`] stores.
     ///
     /// # Errors
-    /// [`StoreError::File`], where the answer fills a part.
+    /// [`StoreError::File`], if the last part is full and has to be written.
     pub fn add(&mut self, key: Key, answer: Row) -> Result<(), StoreError> {
         if self.rows.len() >= PART_ROWS {
             self.write()?;
-            self.last += 1;
+            self.last_part += 1;
             self.rows.clear();
         }
         self.rows.push(key.iter().copied().map(Some).chain(answer.iter().copied()).collect());
-        self.known.insert(key, answer);
+        self.answers.insert(key, answer);
         self.is_dirty = true;
         Ok(())
     }
 
-    /// Whether there are answers to write, and none were written for a while.
+    /// Returns whether there are answers to write and the last write is at least [`WRITE_INTERVAL`]
+    /// ago.
     pub fn is_due(&self) -> bool {
-        self.is_dirty && self.written.elapsed() >= WRITE_INTERVAL
+        self.is_dirty && self.last_write.elapsed() >= WRITE_INTERVAL
     }
 
-    /// Writes the answers that are not written: when this returns, they outlive a power cut.
+    /// Writes the answers that were added since the last write. When this returns, they survive a
+    /// power cut.
     ///
     /// # Errors
     /// [`StoreError::File`].
@@ -157,34 +165,34 @@ impl Trials {
         if !self.is_dirty {
             return Ok(());
         }
-        let path = self.folder.file(part_name(self.last));
-        let bytes = self.parts.encode(&place(self.last), &self.rows);
+        let path = self.folder.file(part_name(self.last_part));
+        let bytes = self.parts.encode(&part_entry(self.last_part), &self.rows);
         let bytes = bytes.map_err(StoreError::parquet("write", &path))?;
         atomic::write(&self.folder.path, &path, &bytes)?;
         self.is_dirty = false;
-        self.written = Instant::now();
+        self.last_write = Instant::now();
         Ok(())
     }
 
-    /// Things a user should hear of once.
+    /// Takes the notes for the user.
     pub fn take_notes(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notes)
     }
 
-    /// Removes the folder of a search whose file is in place; a failure is only worth a note.
+    /// Removes the folder of a search whose result is complete. A failure is returned as a note.
     pub fn complete(self) -> Option<String> {
         open::remove(&self.folder, self.lock)
     }
 }
 
-/// Returns the entry of a part's metadata that says which of a search's parts it is.
-fn place(index: u64) -> String {
+/// Returns the entry in a part's metadata that gives its index.
+fn part_entry(index: u64) -> String {
     json!({ "index": index }).to_string()
 }
 
-/// Reads the rows of the part of this index; none where there is no file.
+/// Reads the rows of the part with this index; none if there is no file.
 fn read_rows(parts: &PartSchema, folder: &Folder, index: u64) -> Result<Vec<Row>, Unreadable> {
-    let part = parts.open(&folder.file(part_name(index)), &place(index))?;
+    let part = parts.open(&folder.file(part_name(index)), &part_entry(index))?;
     let Some(part) = part else { return Ok(Vec::new()) };
     if part.rows() > PART_ROWS as u64 {
         return Err(Damage::Rows.into());

@@ -1,5 +1,5 @@
-//! A run or a search whose result is not there yet, found by the result's name alone: without the
-//! grid file nobody knows its columns, but its plan and its parts say how far it is.
+//! The progress of a run or a search that has no result yet. It is read from the plan and the parts
+//! in the folder, without the grid file.
 
 use std::path::{Path, PathBuf};
 
@@ -8,34 +8,35 @@ use arrow_array::types::UInt64Type;
 use serde::Serialize;
 
 use super::lock;
-use super::open::parts_there;
+use super::open::part_indices;
 use super::part;
-use super::plan_file::{Found, PlanFile};
-use super::point_parts::{is_of_points, number_name};
+use super::plan_file::{FoundPlan, PlanFile};
+use super::point_parts::{is_part_of_run, number_column};
 use super::{Folder, Holder, StoreError, part_name};
 use sweep_files::ParquetFile;
 
-/// How far a run or a search without a result is.
+/// The progress of a run or a search that has no result yet.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unfinished {
-    /// Where the result will be.
-    #[serde(serialize_with = "super::status::shown")]
+    /// The path that the result will have.
+    #[serde(serialize_with = "super::status::serialize_path")]
     pub output: PathBuf,
-    /// Where its work is kept.
-    #[serde(serialize_with = "super::status::shown")]
+    /// The folder of the unfinished work.
+    #[serde(serialize_with = "super::status::serialize_path")]
     pub folder: PathBuf,
-    /// The name of its plan.
+    /// The name of the run or the search.
     pub name: String,
-    /// Points of the whole result; none of a search, which does not know them beforehand.
+    /// The number of points of the whole result; `None` for a search, which does not know it
+    /// beforehand.
     pub points: Option<u64>,
-    /// Points, or trials of a search, that are kept.
+    /// The number of stored points, or of stored trials of a search.
     pub points_done: u64,
-    /// Who is at work.
+    /// The processes that work on it.
     pub running: Vec<Holder>,
 }
 
-/// Looks for the work on a result that is not there, by the result's path or by that of its folder;
-/// nothing where there is a file, or no work on one.
+/// Looks for the unfinished work on a result. `path` is that of the result or of the folder.
+/// Returns `None` if the result exists, or if there is no unfinished work.
 ///
 /// # Errors
 /// [`StoreError::File`].
@@ -48,16 +49,16 @@ pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, StoreError> {
     let mut folder = output.clone().into_os_string();
     folder.push(".partial");
     let folder = Folder { output, path: folder.into() };
-    let Found::Plan(plan) = PlanFile::read(&folder)? else { return Ok(None) };
+    let FoundPlan::Plan(plan) = PlanFile::read(&folder)? else { return Ok(None) };
     let Ok(hash) = blake3::Hash::from_hex(&plan.plan_hash) else { return Ok(None) };
     let mut points_done = 0;
     let mut is_search = false;
-    for index in parts_there(&folder)? {
-        // The run may have finished a moment ago.
-        let Some((part, place)) = part::open_any(&folder.file(part_name(index)), &hash)? else {
+    for index in part_indices(&folder)? {
+        // The run may have deleted its parts since they were listed.
+        let Some((part, entry)) = part::open_any(&folder.file(part_name(index)), &hash)? else {
             continue;
         };
-        if is_of_points(&place) {
+        if is_part_of_run(&entry) {
             points_done += count_points(&part);
         } else {
             is_search = true;
@@ -74,10 +75,10 @@ pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, StoreError> {
     }))
 }
 
-/// Counts the points of a run's part, whose rows are in their order.
+/// Counts the points of a part, whose rows are sorted by point.
 fn count_points(part: &ParquetFile) -> u64 {
     let fields = part.schema().fields();
-    let name = number_name(|name| fields.iter().any(|field| field.name() == name));
+    let name = number_column(|name| fields.iter().any(|field| field.name() == name));
     let position = fields.iter().position(|field| field.name() == name);
     let batches = position.and_then(|position| part.batches(vec![position]).ok());
     let mut last = None;
@@ -92,10 +93,10 @@ fn count_points(part: &ParquetFile) -> u64 {
     count
 }
 
-/// Refuses a result that is not there yet, and says how far it is.
+/// Refuses a result that is unfinished, with its progress.
 ///
 /// # Errors
-/// [`StoreError::Unfinished`], and as [`unfinished`].
+/// [`StoreError::Unfinished`], and the errors of [`unfinished`].
 pub fn refuse_unfinished(path: &Path) -> Result<(), StoreError> {
     match unfinished(path)? {
         Some(found) => Err(StoreError::Unfinished {
@@ -108,7 +109,7 @@ pub fn refuse_unfinished(path: &Path) -> Result<(), StoreError> {
 }
 
 impl Unfinished {
-    /// Says how far it is, in words.
+    /// Returns the progress in words.
     pub fn progress(&self) -> String {
         let done = self.points_done;
         match self.points {

@@ -165,7 +165,7 @@ impl HeldArgs {
     /// further options of that command, and further options of `merge`.
     fn job<'a>(&'a self, plan: &'a Plan, target: &ResultArgs) -> (Job<'a>, PathBuf, [String; 3]) {
         let Some(speed) = &self.speed else {
-            return (Job::of(plan), target.output(plan), ["run", "", ""].map(str::to_owned));
+            return (Job::new(plan), target.output(plan), ["run", "", ""].map(str::to_owned));
         };
         let search = self.dwell.then_some(self.search);
         let held = HeldPlan { plan, speeds_rpm: speed.values(), search };

@@ -43,7 +43,7 @@ pub struct Args {
 
 fn parse_shards(text: &str) -> Result<u64, String> {
     match format!("auto/{text}").parse() {
-        Ok(ShardRequest::Auto { of }) => Ok(of),
+        Ok(ShardRequest::Auto { count }) => Ok(count),
         _ => Err(format!("expected a number of shards from 1 to 1000000; got `{text}`")),
     }
 }

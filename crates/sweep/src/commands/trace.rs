@@ -130,7 +130,7 @@ fn find_worst(args: &Args, plan: &Plan, column: &str) -> Result<(u64, Worse), Er
         return Err(refused(expected));
     }
     let file = ResultTable::open(&path)?;
-    let hash = Job::of(plan).hash().to_hex().to_string();
+    let hash = Job::new(plan).hash().to_hex().to_string();
     if file.file().value(key::PLAN_HASH) != Some(hash.as_str()) {
         let expected = format!("a result of this very grid, which {} is not", path.display());
         return Err(refused(expected));

@@ -156,7 +156,7 @@ fn job<'a>(problem: &'a Problem<'_>) -> Job<'a> {
         measured.update(format!("{:?}", case.measured).as_bytes());
     }
     let Problem { free, model, with_shift, method, .. } = problem;
-    let mut job = Job::of(&problem.cases[0].plan);
+    let mut job = Job::new(&problem.cases[0].plan);
     job.layout.kind = FileKind::Own;
     let plans = problem.cases.iter().map(|case| case.plan.to_json());
     job.plan["fit"] = json!({

@@ -49,7 +49,7 @@ impl PlanEvaluator {
     /// started, and if `SWEEP_SIMD` names no instruction set of this processor.
     pub fn evaluate(&self, table: &PointTable, effort: Effort<'_>) -> Result<MemoryTable, Error> {
         let points = table.assign_to_axes(&self.plan)?;
-        let mut job = Job::of(&self.plan);
+        let mut job = Job::new(&self.plan);
         job.points = table.rows() as u64;
         job.plan["design"] = json!({
             "method": "table", "points": job.points, "hash": points.hash(),
@@ -63,7 +63,7 @@ impl PlanEvaluator {
     /// # Errors
     /// Returns an error if `SWEEP_SIMD` names no instruction set of this processor.
     pub fn all_points(&self) -> Result<EvaluationTask<'_>, Error> {
-        self.run_task(Job::of(&self.plan))
+        self.run_task(Job::new(&self.plan))
     }
 
     fn run_task<'a>(&'a self, job: Job<'a>) -> Result<EvaluationTask<'a>, Error> {
@@ -138,7 +138,7 @@ impl<'a> BatchCollector<'a> {
     fn batch(&self, mut outcomes: Vec<Done>) -> Result<RecordBatch, ArrowError> {
         outcomes.sort_by_key(|outcome| outcome.point);
         let layout: &Layout = &self.job.layout;
-        let mut rows = ResultRows::sharing(layout, SchemaRef::clone(&self.schema));
+        let mut rows = ResultRows::with_schema(layout, SchemaRef::clone(&self.schema));
         for done in outcomes {
             for row in done.rows {
                 rows.push(done.point, (self.job.axis_values)(done.point), row);

@@ -33,7 +33,8 @@ pub(super) fn table(
     table.numbers("gap_change_m", "m", said, rows().map(SharedRow::gap_difference_m));
     table.worse(Worse::Less);
     for (side, [suffix, which]) in [["a", "A"], ["b", "B"]].into_iter().enumerate() {
-        let (name, said) = (format!("ratio_max_{suffix}"), format!("greatest ratio of {which}"));
+        let name = format!("ratio_max_{suffix}");
+        let said = format!("greatest ratio of {which}");
         table.numbers(&name, "1", &said, rows().map(|row| row.ratio[side]));
     }
     let said = "none, lost (reliable in A alone), gained (reliable in B alone), defined (a verdict \

@@ -1,4 +1,4 @@
-//! What columns say, and what rows become.
+//! Tests of columns and batches.
 
 use super::*;
 use crate::store::synthetic;

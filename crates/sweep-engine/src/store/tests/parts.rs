@@ -1,18 +1,18 @@
-//! Parts of runs: left anywhere, damaged, dealt to shards, counted.
+//! Tests of parts: interrupted runs, damaged parts, shards, and counts.
 
 use super::super::part::Damage;
 use super::super::point_parts::{PointPart, PointParts};
 use super::*;
 
 #[test]
-fn chunk_sizes_feed_small_grids_to_all_cores_and_bound_large_ones() {
+fn chunks_of_small_grids_are_small_and_those_of_large_grids_bounded() {
     let sizes: Vec<u64> =
         [1, 81, 128, 129, 1287, 100_000, 1_000_000, 1 << 40, u64::MAX].map(chunk_points).to_vec();
     assert_eq!(sizes, [8, 8, 8, 32, 32, 128, 1024, 4096, 4096]);
 }
 
 #[test]
-fn part_names_stand_for_parts_and_nothing_else_does() {
+fn only_names_of_parts_have_an_index() {
     for index in [0, 7, 99_999_999, 100_000_000, u64::MAX] {
         assert_eq!(part_index(&part_name(index)), Some(index));
     }
@@ -28,8 +28,8 @@ fn part_names_stand_for_parts_and_nothing_else_does() {
 }
 
 #[test]
-fn a_run_left_at_any_chunk_goes_on_from_there() {
-    let bytes = undisturbed(POINTS);
+fn a_run_interrupted_after_any_chunk_is_resumed() {
+    let bytes = bytes_of_undisturbed_run(POINTS);
     let job = synthetic::job(POINTS);
     for written in 0..=POINTS.div_ceil(8) {
         let home = Home::new();
@@ -46,43 +46,43 @@ fn a_run_left_at_any_chunk_goes_on_from_there() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
-    fn damage_to_any_chunks_is_set_aside_told_and_mended(
-        harm in prop::collection::vec((0..11_u64, any::<prop::sample::Index>(), 0..4_u8), 0..6)
+    fn damaged_parts_are_renamed_noted_and_computed_again(
+        changes in prop::collection::vec((0..11_u64, any::<prop::sample::Index>(), 0..4_u8), 0..6)
     ) {
         let home = Home::new();
         let job = synthetic::job(POINTS);
         let run = open(&home.output(), &job);
         write_missing(&run);
         drop(run);
-        let mut harmed = std::collections::BTreeSet::new();
-        for (chunk, at, how) in harm {
+        let mut damaged_chunks = std::collections::BTreeSet::new();
+        for (chunk, at, kind) in changes {
             let path = home.partial().join(part_name(chunk));
             let Ok(mut bytes) = fs::read(&path) else { continue };
             let at = at.index(bytes.len().max(1));
-            match how {
+            match kind {
                 0 => bytes.truncate(at),
                 1 if !bytes.is_empty() => bytes[at] ^= 0x40,
                 2 => bytes.push(0),
                 _ => bytes.clear(),
             }
             fs::write(&path, &bytes).unwrap();
-            let intact = bytes == { write_bytes(&job, chunk) };
-            if intact { harmed.remove(&chunk); } else { harmed.insert(chunk); }
+            let intact = bytes == { part_bytes(&job, chunk) };
+            if intact { damaged_chunks.remove(&chunk); } else { damaged_chunks.insert(chunk); }
         }
         let mut run = open(&home.output(), &job);
-        prop_assert_eq!(run.take_notes().len(), harmed.len());
-        for chunk in &harmed {
+        prop_assert_eq!(run.take_notes().len(), damaged_chunks.len());
+        for chunk in &damaged_chunks {
             let damaged = format!("{}.damaged", part_name(*chunk));
             prop_assert!(home.partial().join(damaged).exists());
         }
-        prop_assert_eq!(write_missing(&run), harmed.len() as u64);
+        prop_assert_eq!(write_missing(&run), damaged_chunks.len() as u64);
         finish(run, &job);
-        prop_assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));
+        prop_assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
     }
 }
 
 #[test]
-fn damage_after_opening_is_met_at_the_join() {
+fn damage_after_opening_is_found_by_the_join() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     let mut run = open(&home.output(), &job);
@@ -95,15 +95,15 @@ fn damage_after_opening_is_met_at_the_join() {
     assert_eq!(write_missing(&run), 2);
     let (_, notes) = finish(run, &job);
     assert!(notes[0].contains("part-00000004.parquet"), "{:?}", notes);
-    assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));
+    assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
 }
 
 #[test]
-fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
+fn shards_make_the_same_result_and_the_merge_names_missing_ones() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     let shard = |index| {
-        let shard = Some(ShardRequest::Given(Shard { index, of: 4 }));
+        let shard = Some(ShardRequest::Given(Shard { index, count: 4 }));
         match OpenRun::open(&home.output(), &job, OpenOptions { shard, ..options() }).unwrap() {
             Opened::Open(run) => run,
             Opened::Finished(..) => panic!("is not done"),
@@ -113,18 +113,20 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
         OpenRun::open_for_merge(&home.output(), &job).unwrap_err(),
         StoreError::NoRun { .. }
     ));
-    // Two at once, and one of them twice.
-    let (first, third, again) = (shard(1), shard(3), shard(3));
+    // Two shards at once, one of them in two processes.
+    let first = shard(1);
+    let third = shard(3);
+    let third_again = shard(3);
     assert_eq!(first.own_points(), (3 * 8, 0));
     assert_eq!(third.own_points(), (8 + 8 + 1, 0), "the last chunk has one point");
-    for run in [&first, &third, &again] {
+    for run in [&first, &third, &third_again] {
         write_missing(run);
     }
     let busy = OpenRun::open_for_merge(&home.output(), &job).unwrap_err();
     assert!(matches!(busy, StoreError::Busy { .. }), "{busy}");
     let running = status(&home.output(), &job).unwrap().running;
     assert_eq!(running.iter().map(|holder| holder.shard).collect::<Vec<_>>(), [Some(1), Some(3)]);
-    drop((first, third, again));
+    drop((first, third, third_again));
 
     let Opened::Open(mut merge) = OpenRun::open_for_merge(&home.output(), &job).unwrap() else {
         panic!("is not done")
@@ -140,17 +142,17 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
     );
     assert_eq!((found.chunks_done, found.chunks_missing), (6, 5));
 
-    let other =
-        OpenOptions { shard: Some(ShardRequest::Given(Shard { index: 1, of: 5 })), ..options() };
+    let other_count =
+        OpenOptions { shard: Some(ShardRequest::Given(Shard { index: 1, count: 5 })), ..options() };
     assert!(
-        OpenRun::open(&home.output(), &job, other)
+        OpenRun::open(&home.output(), &job, other_count)
             .unwrap_err()
             .to_string()
             .contains("into 4 shards")
     );
     let fresh = OpenOptions {
         fresh: true,
-        shard: Some(ShardRequest::Given(Shard { index: 2, of: 4 })),
+        shard: Some(ShardRequest::Given(Shard { index: 2, count: 4 })),
         ..options()
     };
     assert!(
@@ -168,14 +170,14 @@ fn shards_together_make_the_whole_and_the_merge_says_who_is_missing() {
         panic!("is not done")
     };
     finish(merge, &job);
-    assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));
+    assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
     let found = status(&home.output(), &job).unwrap();
     assert_eq!((found.state, found.points_done), (State::Finished, POINTS));
     assert!(found.points_failed > 0);
 }
 
 #[test]
-fn status_counts_without_touching_anything() {
+fn status_counts_without_changing_files() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     assert_eq!(status(&home.output(), &job).unwrap().state, State::NotStarted);
@@ -192,8 +194,11 @@ fn status_counts_without_touching_anything() {
     assert_eq!(found.points_failed, 2, "points 4 and 7 of the formula fail");
     assert_eq!(found.running[0].pid, std::process::id());
     assert!(home.partial().join(part_name(1)).exists());
-    let other = Job { plan: json!({}), ..synthetic::job(POINTS) };
-    assert!(matches!(status(&home.output(), &other).unwrap_err(), StoreError::PlanDiffers { .. }));
+    let other_plan = Job { plan: json!({}), ..synthetic::job(POINTS) };
+    assert!(matches!(
+        status(&home.output(), &other_plan).unwrap_err(),
+        StoreError::PlanDiffers { .. }
+    ));
 }
 
 fn outcomes(points: impl Iterator<Item = u64>) -> Vec<Done> {
@@ -201,12 +206,12 @@ fn outcomes(points: impl Iterator<Item = u64>) -> Vec<Done> {
 }
 
 #[test]
-fn a_part_is_gone_on_from_until_its_chunk_is_whole() {
+fn an_incomplete_chunk_is_resumed() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write(&run, 0);
-    // As rows come: in any order.
+    // Rows arrive in any order.
     run.write_chunk(&job, 3, outcomes([30, 25, 27].into_iter())).unwrap();
     assert_eq!(run.own_points(), (POINTS, 8 + 3));
     drop(run);
@@ -224,11 +229,11 @@ fn a_part_is_gone_on_from_until_its_chunk_is_whole() {
     assert_eq!(write_missing(&run), 10);
     assert_eq!(run.own_points(), (POINTS, POINTS));
     finish(run, &job);
-    assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));
+    assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
 }
 
 #[test]
-fn an_unfinished_run_is_found_by_its_result_and_by_its_folder() {
+fn an_unfinished_run_is_found_by_the_path_of_result_or_folder() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     assert_eq!(unfinished(&home.output()).unwrap(), None);
@@ -236,8 +241,8 @@ fn an_unfinished_run_is_found_by_its_result_and_by_its_folder() {
     write(&run, 0);
     run.write_chunk(&job, 3, outcomes([30, 25, 27].into_iter())).unwrap();
     write(&run, 5);
-    // What is not as it was written does not count.
-    fs::write(home.partial().join(part_name(5)), write_bytes(&job, 5).split_off(1)).unwrap();
+    // A damaged part does not count.
+    fs::write(home.partial().join(part_name(5)), part_bytes(&job, 5).split_off(1)).unwrap();
     for path in [home.output(), home.partial()] {
         let found = unfinished(&path).unwrap().unwrap();
         assert_eq!((found.points, found.points_done), (Some(POINTS), 8 + 3));
@@ -258,7 +263,7 @@ fn an_unfinished_run_is_found_by_its_result_and_by_its_folder() {
 }
 
 #[test]
-fn an_unfinished_search_counts_its_trials() {
+fn an_unfinished_search_shows_the_number_of_trials() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     let mut trials = trials(&home.output(), &job);
@@ -272,7 +277,7 @@ fn an_unfinished_search_counts_its_trials() {
 }
 
 #[test]
-fn a_damaged_part_is_set_aside_and_a_whole_chunk_takes_its_place() {
+fn a_damaged_part_is_renamed_and_a_new_one_replaces_it() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
@@ -287,16 +292,20 @@ fn a_damaged_part_is_set_aside_and_a_whole_chunk_takes_its_place() {
 
     let mut run = open(&home.output(), &job);
     assert!(run.take_incomplete().is_empty());
-    assert_eq!(run.take_notes().len(), 0, "it was told of when it was set aside");
+    assert_eq!(
+        run.take_notes().len(),
+        0,
+        "the damaged part was renamed and noted when it was found"
+    );
     assert!(home.partial().join("part-00000002.parquet.damaged").exists());
     write_missing(&run);
     finish(run, &job);
-    assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));
+    assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
 }
 
-/// Why the bytes in a part's place are not the part of a job.
+/// Writes bytes to the file of a part, and returns the damage that reading them finds, if any.
 fn damage(home: &Home, job: &Job<'_>, index: u64, bytes: &[u8]) -> Option<Damage> {
-    let folder = Folder::of(&home.output(), &job.layout).unwrap();
+    let folder = Folder::new(&home.output(), &job.layout).unwrap();
     fs::create_dir_all(&folder.path).unwrap();
     fs::write(folder.file(part_name(index)), bytes).unwrap();
     let read = |part: &PointPart<'_>| part.outcomes();
@@ -304,10 +313,10 @@ fn damage(home: &Home, job: &Job<'_>, index: u64, bytes: &[u8]) -> Option<Damage
 }
 
 #[test]
-fn a_flipped_bit_anywhere_in_a_part_is_found() {
+fn any_flipped_bit_in_a_part_is_found() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
-    let bytes = write_bytes(&job, 3);
+    let bytes = part_bytes(&job, 3);
     assert_eq!(damage(&home, &job, 3, &bytes), None);
     for at in 0..bytes.len() {
         let mut broken = bytes.clone();
@@ -317,10 +326,10 @@ fn a_flipped_bit_anywhere_in_a_part_is_found() {
 }
 
 #[test]
-fn a_truncation_anywhere_in_a_part_is_found() {
+fn any_truncation_of_a_part_is_found() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
-    let bytes = write_bytes(&job, 3);
+    let bytes = part_bytes(&job, 3);
     for length in (0..bytes.len()).step_by(3) {
         assert!(damage(&home, &job, 3, &bytes[..length]).is_some(), "cut to {length}");
     }
@@ -329,18 +338,18 @@ fn a_truncation_anywhere_in_a_part_is_found() {
 }
 
 #[test]
-fn a_whole_part_of_another_plan_place_or_layout_is_foreign() {
+fn parts_of_another_plan_index_or_layout_are_foreign() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
-    let bytes = write_bytes(&job, 3);
-    assert_eq!(damage(&home, &job, 4, &bytes), Some(Damage::Foreign), "another place");
-    let other = Job { numerics: 2, ..synthetic::job(POINTS) };
-    assert_eq!(damage(&home, &other, 3, &bytes), Some(Damage::Foreign), "another build");
+    let bytes = part_bytes(&job, 3);
+    assert_eq!(damage(&home, &job, 4, &bytes), Some(Damage::Foreign), "another index");
+    let other_build = Job { numerics: 2, ..synthetic::job(POINTS) };
+    assert_eq!(damage(&home, &other_build, 3, &bytes), Some(Damage::Foreign), "another build");
     let mut narrower = synthetic::job(POINTS);
     narrower.layout.columns.pop();
     assert_eq!(damage(&home, &narrower, 3, &bytes), Some(Damage::Foreign), "another layout");
-    // A result, whole and sealed, and a file of another program.
-    assert_eq!(damage(&home, &job, 3, &undisturbed(POINTS)), Some(Damage::Foreign));
+    // A result has a digest too, but is not a part.
+    assert_eq!(damage(&home, &job, 3, &bytes_of_undisturbed_run(POINTS)), Some(Damage::Foreign));
 }
 
 #[test]
@@ -349,8 +358,8 @@ fn rows_that_do_not_fit_their_part_are_refused() {
     let parts = PointParts::new(&job);
     let good = outcomes(8..16);
     let reason = |outcomes: &[Done]| parts.encode(&job, 1, outcomes).unwrap_err().to_string();
-    for some in [&good[..0], &good[1..2], &good] {
-        assert!(parts.encode(&job, 1, some).is_ok());
+    for valid in [&good[..0], &good[1..2], &good] {
+        assert!(parts.encode(&job, 1, valid).is_ok());
     }
     let swapped: Vec<Done> = good.iter().rev().cloned().collect();
     assert!(reason(&swapped).contains("8 outcomes that are not of its points"));
@@ -367,7 +376,7 @@ fn rows_that_do_not_fit_their_part_are_refused() {
     assert!(reason(&none).contains("0 rows of"), "{}", reason(&none));
 }
 
-/// A row of any cells that its columns take.
+/// Returns a strategy for rows of cells that fit the columns.
 fn any_row(columns: &[Column]) -> impl Strategy<Value = Row> + use<> {
     let cell = |column: &Column| match &column.kind {
         Holds::Count | Holds::Axis => any::<u64>().prop_map(Some).boxed(),
@@ -378,7 +387,8 @@ fn any_row(columns: &[Column]) -> impl Strategy<Value = Row> + use<> {
     columns.iter().map(cell).collect::<Vec<_>>()
 }
 
-/// A layout with every kind of column, and several rows of each of several numbers of a point.
+/// Returns a layout with every type of column, with several tasks of each point and several rows of
+/// each task.
 fn wide_layout() -> Layout {
     let mut layout = synthetic::layout();
     layout.columns.insert(2, Column::new("kept", "", "", Holds::Kept));
@@ -389,7 +399,7 @@ fn wide_layout() -> Layout {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
-    fn the_rows_of_a_part_are_those_that_were_written(
+    fn written_rows_are_read_back_unchanged(
         points in prop::collection::vec(
             prop::collection::vec(any_row(&wide_layout().columns), 1..4),
             1..8,
@@ -397,8 +407,8 @@ proptest! {
     ) {
         let home = Home::new();
         let job = Job { layout: wide_layout(), ..synthetic::job(POINTS) };
-        let done = |(rows, point)| Done { point, rows };
-        let outcomes: Vec<Done> = points.into_iter().zip(8..).map(done).collect();
+        let outcome = |(rows, point)| Done { point, rows };
+        let outcomes: Vec<Done> = points.into_iter().zip(8..).map(outcome).collect();
         let run = open(&home.output(), &job);
         run.write_chunk(&job, 1, outcomes.clone()).unwrap();
         prop_assert_eq!(run.known(8), outcomes.first().cloned());
@@ -409,7 +419,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_in_place_of_a_part_are_damage(
+    fn arbitrary_bytes_are_damage(
         bytes in prop::collection::vec(any::<u8>(), 0..400),
     ) {
         prop_assert!(damage(&Home::new(), &synthetic::job(POINTS), 1, &bytes).is_some());
@@ -417,7 +427,7 @@ proptest! {
 }
 
 #[test]
-fn a_part_has_the_columns_of_the_result_for_any_reader() {
+fn a_part_has_the_columns_of_the_result() {
     let home = Home::new();
     let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);

@@ -1,16 +1,17 @@
-//! The frozen plan: other plans, other builds, older folders.
+//! Tests of the plan file: other plans, other builds, older formats.
 
 use super::*;
 
 #[test]
-fn another_plan_is_refused_with_the_difference_until_fresh() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn another_plan_is_refused_with_the_difference_unless_fresh() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     write(&open(&home.output(), &job), 0);
-    let other = Job {
+    let other_plan = Job {
         plan: json!({ "name": "synthetic", "points": POINTS, "step_s": 1.0e-4 }),
         ..synthetic::job(POINTS)
     };
-    let error = OpenRun::open(&home.output(), &other, options()).unwrap_err();
+    let error = OpenRun::open(&home.output(), &other_plan, options()).unwrap_err();
     assert!(error.is_refusal());
     let text = error.to_string();
     assert!(text.contains("/step_s: was 0.0002, is 0.0001") && text.contains("--fresh"), "{text}");
@@ -20,7 +21,7 @@ fn another_plan_is_refused_with_the_difference_until_fresh() {
     assert!(text.contains(r#"/sweep_version: was "0.0.0-test", is "9.9.9""#), "{text}");
 
     let fresh = OpenOptions { fresh: true, ..options() };
-    let Opened::Open(run) = OpenRun::open(&home.output(), &other, fresh).unwrap() else {
+    let Opened::Open(run) = OpenRun::open(&home.output(), &other_plan, fresh).unwrap() else {
         panic!("must run")
     };
     assert!(run.is_missing(0));
@@ -32,25 +33,29 @@ fn another_plan_is_refused_with_the_difference_until_fresh() {
 }
 
 #[test]
-fn another_build_of_the_version_is_another_run() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
-    let other = Job { numerics: 2, ..synthetic::job(POINTS) };
-    let refusal = |what: Result<Opened<_, OpenRun>, StoreError>| {
-        let error = what.unwrap_err();
+fn another_build_of_the_same_version_is_refused() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
+    let other_build = Job { numerics: 2, ..synthetic::job(POINTS) };
+    let expect_refusal = |opened: Result<Opened<_, OpenRun>, StoreError>| {
+        let error = opened.unwrap_err();
         assert!(error.is_refusal());
         assert!(error.to_string().contains("/numerics: was 1, is 2"), "{error}");
     };
     let run = open(&home.output(), &job);
     write(&run, 0);
     drop(run);
-    refusal(OpenRun::open(&home.output(), &other, options()));
-    refusal(OpenRun::open_for_merge(&home.output(), &other));
+    expect_refusal(OpenRun::open(&home.output(), &other_build, options()));
+    expect_refusal(OpenRun::open_for_merge(&home.output(), &other_build));
     assert!(
-        status(&home.output(), &other).unwrap_err().to_string().contains("/numerics: was 1, is 2")
+        status(&home.output(), &other_build)
+            .unwrap_err()
+            .to_string()
+            .contains("/numerics: was 1, is 2")
     );
 
-    // A part of that build under this one's plan.
-    let foreign = write_bytes(&other, 3);
+    // A part of the other build in the folder of this one.
+    let foreign = part_bytes(&other_build, 3);
     fs::write(home.partial().join(part_name(3)), foreign).unwrap();
     let mut run = open(&home.output(), &job);
     assert!(run.is_missing(3) && !run.is_missing(0));
@@ -59,14 +64,15 @@ fn another_build_of_the_version_is_another_run() {
 
     write_missing(&run);
     finish(run, &job);
-    refusal(OpenRun::open(&home.output(), &other, options()));
+    expect_refusal(OpenRun::open(&home.output(), &other_build, options()));
     let fresh = OpenOptions { fresh: true, ..options() };
-    assert!(matches!(OpenRun::open(&home.output(), &other, fresh).unwrap(), Opened::Open(_)));
+    assert!(matches!(OpenRun::open(&home.output(), &other_build, fresh).unwrap(), Opened::Open(_)));
 }
 
 #[test]
-fn a_folder_of_an_older_format_is_refused_as_such() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn a_folder_of_an_older_format_is_refused() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     fs::create_dir(home.partial()).unwrap();
     let old = json!({
         "format": 1, "version": job.version, "plan_hash": "00", "points": POINTS, "chunk_points": 8,
@@ -83,8 +89,9 @@ fn a_folder_of_an_older_format_is_refused_as_such() {
 }
 
 #[test]
-fn a_damaged_plan_is_set_aside_and_its_parts_are_used() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn a_damaged_plan_file_is_renamed_and_the_parts_are_used() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     write(&open(&home.output(), &job), 0);
     let plan = home.partial().join("plan.json");
     let text = fs::read_to_string(&plan).unwrap();
@@ -100,15 +107,16 @@ fn a_damaged_plan_is_set_aside_and_its_parts_are_used() {
 }
 
 #[test]
-fn a_plan_of_any_length_does_not_fill_the_memory() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn json_files_of_any_length_do_not_fill_the_memory() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     drop(open(&home.output(), &job));
     for name in ["plan.json", "shards.json", "session-x-1-1.json"] {
         fs::File::create(home.partial().join(name)).unwrap().set_len(1 << 40).unwrap();
         assert!(status(&home.output(), &job).is_ok(), "{name}");
         drop(open(&home.output(), &job));
     }
-    // One that could not be read again is not written.
+    // A plan that would be too long to be read is not written.
     let numbers = vec![0.1; 2_000_000];
     let long = Job { plan: json!({ "values": numbers }), ..synthetic::job(POINTS) };
     let error = OpenRun::open(&home.output().with_file_name("y.parquet"), &long, options());

@@ -1,10 +1,11 @@
-//! The result file and its sidecar: what they say, and what is taken for them.
+//! Tests of results and sidecars: their content, and files that are refused in their place.
 
 use super::*;
 
 #[test]
-fn every_cell_is_what_the_outcome_says() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn every_cell_has_the_value_of_its_row() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
@@ -50,8 +51,9 @@ fn every_cell_is_what_the_outcome_says() {
 }
 
 #[test]
-fn the_file_says_what_it_is_and_nothing_of_where_or_when() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn the_metadata_do_not_depend_on_host_or_folder() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
@@ -84,11 +86,12 @@ fn the_file_says_what_it_is_and_nothing_of_where_or_when() {
 }
 
 #[test]
-fn chunks_leave_no_trace_across_batches() {
+fn the_result_does_not_depend_on_the_order_of_chunks() {
     // More rows than one batch, and a last chunk that is not full.
     let points = 5003;
-    let bytes = undisturbed(points);
-    let (home, job) = (Home::new(), synthetic::job(points));
+    let bytes = bytes_of_undisturbed_run(points);
+    let home = Home::new();
+    let job = synthetic::job(points);
     let run = open(&home.output(), &job);
     for chunk in (0..run.chunks()).rev() {
         write(&run, chunk);
@@ -99,8 +102,9 @@ fn chunks_leave_no_trace_across_batches() {
 }
 
 #[test]
-fn a_finished_output_is_left_alone() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn a_finished_result_is_not_computed_again() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
@@ -112,40 +116,41 @@ fn a_finished_output_is_left_alone() {
     assert_eq!((file.numerics, tally.points), (1, POINTS));
     assert!(!home.partial().exists());
 
-    let other = Job { plan: json!({ "name": "other" }), ..synthetic::job(POINTS) };
-    let error = OpenRun::open(&home.output(), &other, options()).unwrap_err();
+    let other_plan = Job { plan: json!({ "name": "other_plan" }), ..synthetic::job(POINTS) };
+    let error = OpenRun::open(&home.output(), &other_plan, options()).unwrap_err();
     assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.is_refusal(), "{error}");
-    assert!(error.to_string().contains(r#"/name: was "synthetic", is "other""#), "{error}");
+    assert!(error.to_string().contains(r#"/name: was "synthetic", is "other_plan""#), "{error}");
 
-    // A build with further columns for the same plan does not take it for its own.
-    let mut with = synthetic::job(POINTS);
-    with.layout.columns.push(Column::new("further_n", "N", "a further one", Holds::Measured));
-    let error = OpenRun::open(&home.output(), &with, options()).unwrap_err();
+    // A build with further columns for the same plan refuses the result.
+    let mut wider = synthetic::job(POINTS);
+    wider.layout.columns.push(Column::new("further_n", "N", "a further one", Holds::Measured));
+    let error = OpenRun::open(&home.output(), &wider, options()).unwrap_err();
     assert!(matches!(error, StoreError::OutputDiffers { .. }) && error.is_refusal(), "{error}");
     assert!(error.to_string().contains("further_n"), "{error}");
 
-    // Started over, the old result stays until the new one takes its place, interrupted or not.
+    // With `--fresh`, the old result stays until the new one replaces it.
     let before = fs::read(home.output()).unwrap();
     let fresh = OpenOptions { fresh: true, ..options() };
-    drop(OpenRun::open(&home.output(), &other, fresh).unwrap());
+    drop(OpenRun::open(&home.output(), &other_plan, fresh).unwrap());
     assert_eq!(fs::read(home.output()).unwrap(), before);
-    let run = open(&home.output(), &other);
+    let run = open(&home.output(), &other_plan);
     write_missing(&run);
-    finish(run, &other);
+    finish(run, &other_plan);
     assert_ne!(fs::read(home.output()).unwrap(), before);
 }
 
 #[test]
-fn no_flipped_bit_of_a_result_is_taken_for_it() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn a_result_with_a_flipped_bit_is_refused() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
     let whole = fs::read(home.output()).unwrap();
     let mut damaged = 0;
-    let places = (0..whole.len()).step_by(7);
-    let tried = places.len();
-    for at in places {
+    let positions = (0..whole.len()).step_by(7);
+    let tried = positions.len();
+    for at in positions {
         let mut bytes = whole.clone();
         bytes[at] ^= 1 << (at % 8);
         fs::write(home.output(), &bytes).unwrap();
@@ -159,14 +164,15 @@ fn no_flipped_bit_of_a_result_is_taken_for_it() {
         );
         assert!(fs::read(home.output()).unwrap() == bytes && !home.partial().exists(), "byte {at}");
     }
-    // The others have lost what makes them a result of ours: the end of the file, a key of the
-    // metadata.
+    // In the others, the bit is in the end of the file or in a key of the metadata, so that the
+    // file is not recognised as a result.
     assert!(damaged * 100 > tried * 95, "{damaged} of {tried} bytes");
 }
 
 #[test]
-fn a_result_whose_digest_is_cut_out_is_no_result_of_this_build() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn a_result_without_its_digest_is_refused() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write_missing(&run);
     finish(run, &job);
@@ -184,8 +190,9 @@ fn a_result_whose_digest_is_cut_out_is_no_result_of_this_build() {
 }
 
 #[test]
-fn results_that_differ_after_a_dot_have_a_sidecar_each() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn results_whose_names_differ_after_a_dot_have_different_sidecars() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     for (name, sidecar) in
         [("v1.0", "v1.0.run.json"), ("v1.5", "v1.5.run.json"), ("x.parquet", "x.run.json")]
     {
@@ -196,13 +203,14 @@ fn results_that_differ_after_a_dot_have_a_sidecar_each() {
         let text = fs::read_to_string(home.0.path().join(sidecar)).unwrap();
         assert_eq!(serde_json::from_str::<Value>(&text).unwrap()["file"], name);
     }
-    // They may be renamed together.
+    // A result and its sidecar may be renamed together.
     for (was, is) in [("v1.0", "w.parquet"), ("v1.0.run.json", "w.run.json")] {
         fs::rename(home.0.path().join(was), home.0.path().join(is)).unwrap();
     }
     let renamed = OpenRun::open(&home.0.path().join("w.parquet"), &job, options()).unwrap();
     assert!(matches!(renamed, Opened::Finished(..)));
-    // A result whose sidecar would be another's, and a stranger's file of its name.
+    // A result whose sidecar would be that of another result, and a foreign file with the name of
+    // the sidecar.
     let refused = |output: &Path| {
         let error = OpenRun::open(output, &job, options()).unwrap_err();
         assert!(error.is_refusal());
@@ -218,7 +226,8 @@ fn results_that_differ_after_a_dot_have_a_sidecar_each() {
 
 #[test]
 fn the_sidecar_adds_up_the_sessions() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let session = |pid, points| provenance::Session {
         started_unix_s: 1_700_000_000 + u64::from(pid),
         wall_s: 2.0,
@@ -255,14 +264,16 @@ fn the_sidecar_adds_up_the_sessions() {
 }
 
 #[test]
-fn the_tally_agrees_with_the_outcomes() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn the_counts_agree_with_the_rows() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write_missing(&run);
     let (tally, _) = finish(run, &job);
     let layout = synthetic::layout();
     let position = |name: &str| layout.position(name).unwrap();
-    let (reliable, ratio) = (position("reliable"), position("ratio_max"));
+    let reliable = position("reliable");
+    let ratio = position("ratio_max");
     let rows: Vec<_> = (0..POINTS).map(synthetic::row).collect();
     let with = |flag| rows.iter().filter(|row| row[reliable] == flag).count() as u64;
     assert_eq!(
@@ -278,8 +289,9 @@ fn the_tally_agrees_with_the_outcomes() {
 }
 
 #[test]
-fn a_stopped_join_publishes_nothing() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn a_stopped_join_writes_no_result() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let mut run = open(&home.output(), &job);
     write_missing(&run);
     assert!(run.join(&job, &|| true).unwrap().is_none());

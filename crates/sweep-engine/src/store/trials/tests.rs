@@ -1,4 +1,4 @@
-//! Trials of searches: left anywhere, damaged, of other plans.
+//! Tests of trials: interrupted searches, damaged parts, other plans.
 
 use std::fs;
 
@@ -28,15 +28,15 @@ fn open(output: &Path, job: &Job<'_>) -> Trials {
     }
 }
 
-/// A trial and its answer; no third one has any.
+/// Returns the key and the answer of trial `k`. The cost is null for every third trial.
 fn trial(k: u64) -> (Key, Row) {
     let x = 0.1 * k as f64;
     let cost = (!k.is_multiple_of(3)).then_some(x.sin().to_bits());
     (vec![k, x.to_bits()], vec![cost, Some(x.to_bits())])
 }
 
-fn add(trials: &mut Trials, some: std::ops::Range<u64>) {
-    for k in some {
+fn add(trials: &mut Trials, range: std::ops::Range<u64>) {
+    for k in range {
         let (key, answer) = trial(k);
         trials.add(key, answer).unwrap();
     }
@@ -51,12 +51,12 @@ fn parts(output: &Path) -> Vec<String> {
 }
 
 #[test]
-fn trials_outlive_their_process_in_few_parts() {
+fn trials_of_several_processes_are_stored_in_few_parts() {
     const COUNT: u64 = 2500;
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.parquet");
     let job = job(8);
-    // Processes that each write several times, and lose what they do not write.
+    // Each process writes several times, and then adds a trial that it does not write.
     for from in (0..COUNT).step_by(100) {
         let mut trials = open(&output, &job);
         assert_eq!(trials.count() as u64, from);
@@ -76,7 +76,7 @@ fn trials_outlive_their_process_in_few_parts() {
     assert_eq!(trials.recall(&[0, 1]), None);
     let names = [0, 1, 2].map(|index| format!("part-{index:08}.parquet"));
     assert_eq!(parts(&output), names);
-    // Whoever reads them finds columns by their names.
+    // The columns of parts have names.
     let first = output.with_file_name("x.parquet.partial").join(&names[0]);
     let first = ParquetFile::open(&first).unwrap();
     let fields = first.schema().fields().iter().map(|field| field.name().as_str());
@@ -87,7 +87,7 @@ fn trials_outlive_their_process_in_few_parts() {
 }
 
 #[test]
-fn a_damaged_part_costs_its_own_trials() {
+fn a_damaged_part_loses_only_the_trials_in_it() {
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.parquet");
     let job = job(8);
@@ -108,45 +108,47 @@ fn a_damaged_part_costs_its_own_trials() {
         let notes = trials.take_notes();
         assert!(notes[0].contains("part-00000001.parquet.damaged"), "{notes:?}");
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 4 + k + 1);
-        // They are made again, behind the others.
+        // The lost trials are added again, after the others.
         add(&mut trials, 1024..1034);
         trials.write().unwrap();
         drop(trials);
         let (key, answer) = trial(1030);
         assert_eq!(open(&output, &job).recall(&key), Some(&answer));
     }
-    // Somebody's file of the same name is kept.
+    // A foreign file with the name of a part is kept.
     fs::write(folder.join("part-00000001.parquet"), "my thesis").unwrap();
     drop(open(&output, &job));
-    let aside: Vec<String> = parts(&output);
+    let names: Vec<String> = parts(&output);
     let read = |name: &String| fs::read(folder.join(name)).unwrap();
-    assert!(aside.iter().any(|name| read(name) == b"my thesis"), "{aside:?}");
+    assert!(names.iter().any(|name| read(name) == b"my thesis"), "{names:?}");
 }
 
 #[test]
-fn another_plan_is_refused_and_starting_over_forgets() {
+fn another_plan_is_refused_unless_fresh() {
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.parquet");
     let ours = job(8);
-    let other = job(9);
+    let other_plan = job(9);
     let mut trials = open(&output, &ours);
     add(&mut trials, 0..5);
     trials.write().unwrap();
     drop(trials);
-    let refused = Trials::open(&output, &other, columns(), false);
+    let refused = Trials::open(&output, &other_plan, columns(), false);
     assert!(matches!(refused, Err(StoreError::PlanDiffers { .. })), "{refused:?}");
-    let Ok(Opened::Open(trials)) = Trials::open(&output, &other, columns(), true) else { panic!() };
+    let Ok(Opened::Open(trials)) = Trials::open(&output, &other_plan, columns(), true) else {
+        panic!()
+    };
     assert_eq!(trials.count(), 0);
     assert!(parts(&output).is_empty());
-    let busy = Trials::open(&output, &other, columns(), false);
+    let busy = Trials::open(&output, &other_plan, columns(), false);
     assert!(matches!(busy, Err(StoreError::Busy { .. })), "{busy:?}");
 }
 
 #[test]
-fn a_finished_file_is_known_by_its_plan() {
+fn a_finished_file_of_the_same_plan_is_recognised() {
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.parquet");
-    let [ours, other] = [8, 9].map(|points| {
+    let [ours, other_plan] = [8, 9].map(|points| {
         let job = job(points);
         let layout = Layout { kind: FileKind::Boundary, ..job.layout };
         Job { version: BUILD.version, numerics: BUILD.numerics, layout, ..job }
@@ -160,10 +162,10 @@ fn a_finished_file_is_known_by_its_plan() {
     let open = |job: &Job<'_>, fresh| Trials::open(&output, job, columns(), fresh);
     let opened = open(&ours, false);
     assert!(matches!(opened, Ok(Opened::Finished(()))), "{opened:?}");
-    let refused = open(&other, false);
+    let refused = open(&other_plan, false);
     assert!(matches!(refused, Err(StoreError::OutputDiffers { .. })), "{refused:?}");
     assert!(!home.path().join("x.parquet.partial").exists());
-    // A search that died with its file in place has left its folder.
+    // A search that was killed after writing its file has left its folder.
     let Ok(Opened::Open(_)) = open(&ours, true) else { panic!() };
     fs::remove_file(home.path().join("x.parquet.partial/plan.json")).unwrap();
     let opened = open(&ours, false);
@@ -172,7 +174,7 @@ fn a_finished_file_is_known_by_its_plan() {
 }
 
 #[test]
-fn the_model_s_own_file_is_never_taken_for_finished() {
+fn a_file_of_a_model_is_never_taken_for_a_finished_search() {
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("x.toml");
     let job = job(8);

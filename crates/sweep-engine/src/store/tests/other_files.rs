@@ -1,20 +1,22 @@
-//! What is there that is not the run's: other files, leftovers of the dead.
+//! Tests of other files in a run's folder and at its output: foreign files, and leftovers of killed
+//! processes.
 
 use super::*;
 
 #[test]
-fn starting_over_deletes_what_a_run_wrote_and_nothing_else() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn starting_over_deletes_only_files_that_a_run_wrote() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write_missing(&run);
     drop(run);
-    let theirs = ["part-notes.txt", "session-notes.md", "shard-plan.txt", "plan.json.old"];
-    for name in theirs.into_iter().chain(["shard-3.lock"]) {
+    let foreign_names = ["part-notes.txt", "session-notes.md", "shard-plan.txt", "plan.json.old"];
+    for name in foreign_names.into_iter().chain(["shard-3.lock"]) {
         fs::write(home.partial().join(name), "").unwrap();
     }
     drop(OpenRun::open(&home.output(), &job, fresh()).unwrap());
     assert_eq!(
-        names(&home),
+        file_names(&home),
         [
             "lock",
             "part-notes.txt",
@@ -26,12 +28,13 @@ fn starting_over_deletes_what_a_run_wrote_and_nothing_else() {
     );
 }
 
+/// Returns the options of a run that starts over.
 fn fresh() -> OpenOptions<'static> {
     OpenOptions { fresh: true, ..options() }
 }
 
-/// What is in the folder, sorted.
-fn names(home: &Home) -> Vec<String> {
+/// Returns the names of the files in the folder, sorted.
+fn file_names(home: &Home) -> Vec<String> {
     let entries = fs::read_dir(home.partial()).unwrap();
     let mut names: Vec<String> =
         entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
@@ -39,8 +42,8 @@ fn names(home: &Home) -> Vec<String> {
     names
 }
 
-/// Names that a run gives, and others close to them.
-const NAMES: [&str; 12] = [
+/// Names of files that a run writes, and similar ones.
+const SIMILAR_NAMES: [&str; 12] = [
     "part-00000002.parquet",
     "part-00000002.parquet.damaged",
     "plan.json.damaged",
@@ -56,7 +59,7 @@ const NAMES: [&str; 12] = [
 ];
 
 #[test]
-fn a_strangers_file_is_kept_whatever_its_name() {
+fn foreign_files_are_kept_under_any_name() {
     let job = synthetic::job(POINTS);
     for text in ["my thesis", "{}", "SWEEP", "2026 pages", "{\"shards\": 0}"] {
         for is_fresh in [false, true] {
@@ -64,7 +67,7 @@ fn a_strangers_file_is_kept_whatever_its_name() {
             let run = open(&home.output(), &job);
             write(&run, 1);
             drop(run);
-            for name in NAMES {
+            for name in SIMILAR_NAMES {
                 fs::write(home.partial().join(name), text).unwrap();
             }
             let options = OpenOptions { fresh: is_fresh, ..options() };
@@ -75,22 +78,23 @@ fn a_strangers_file_is_kept_whatever_its_name() {
             let (_, notes) = finish(run, &job);
             let note = notes.last().unwrap();
             assert!(note.contains("stays, for it holds what this run did not write"), "{note}");
-            // Set aside under another name, or where it was.
-            let left = names(&home);
-            assert_eq!(left.len(), NAMES.len(), "{left:?}");
+            // A file is kept under its name, or renamed to `*.damaged`.
+            let left = file_names(&home);
+            assert_eq!(left.len(), SIMILAR_NAMES.len(), "{left:?}");
             for name in left {
                 let found = fs::read_to_string(home.partial().join(&name)).unwrap();
                 assert_eq!(found, text, "{name}");
             }
-            assert_eq!(fs::read(home.output()).unwrap(), undisturbed(POINTS));
+            assert_eq!(fs::read(home.output()).unwrap(), bytes_of_undisturbed_run(POINTS));
         }
     }
 }
 
 #[test]
-fn what_a_run_wrote_goes_wherever_it_was_left() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
-    let shard = Some(ShardRequest::Given(Shard { index: 2, of: 4 }));
+fn starting_over_deletes_all_files_of_an_unfinished_run() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
+    let shard = Some(ShardRequest::Given(Shard { index: 2, count: 4 }));
     let sharded = OpenOptions { shard, ..options() };
     let Opened::Open(run) = OpenRun::open(&home.output(), &job, sharded).unwrap() else {
         panic!("is not done")
@@ -98,19 +102,20 @@ fn what_a_run_wrote_goes_wherever_it_was_left() {
     write_missing(&run);
     run.record(&session()).unwrap();
     drop(run);
-    let left = names(&home);
+    let left = file_names(&home);
     for name in ["plan.json", "shards.json", "shard-2.lock", "part-00000001.parquet"] {
         assert!(left.iter().any(|known| known == name), "{name}: {left:?}");
     }
     assert!(left.iter().any(|name| name.starts_with("session-")), "{left:?}");
     fs::write(home.partial().join(sweep_files::atomic::temporary_name()), "half").unwrap();
     drop(OpenRun::open(&home.output(), &job, fresh()).unwrap());
-    assert_eq!(names(&home), ["lock", "plan.json"]);
+    assert_eq!(file_names(&home), ["lock", "plan.json"]);
 }
 
 #[test]
-fn what_was_set_aside_stays_beside_what_is_set_aside_later() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn several_damaged_files_of_one_part_are_all_kept() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let run = open(&home.output(), &job);
     write_missing(&run);
     drop(run);
@@ -125,15 +130,15 @@ fn what_was_set_aside_stays_beside_what_is_set_aside_later() {
         fs::read_to_string(home.partial().join(name)).unwrap()
     };
     assert_eq!(["", "-2", "-3"].map(read), ["first", "second", "third"]);
-    // A run that finds its result whole lets them be too.
+    // A run whose result exists keeps them too.
     assert!(matches!(
         OpenRun::open(&home.output(), &job, options()).unwrap(),
         Opened::Finished(..)
     ));
-    assert_eq!(names(&home).len(), 3);
+    assert_eq!(file_names(&home).len(), 3);
 }
 
-/// A process's record of its work.
+/// Returns the record of a process's work.
 fn session() -> Session {
     Session {
         started_unix_s: 1,
@@ -152,8 +157,9 @@ fn session() -> Session {
 }
 
 #[test]
-fn a_strangers_file_is_not_overwritten() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn a_foreign_file_at_the_output_is_not_overwritten() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     fs::write(home.output(), "my thesis").unwrap();
     for fresh in [false, true] {
         let error =
@@ -174,8 +180,9 @@ fn a_strangers_file_is_not_overwritten() {
 }
 
 #[test]
-fn death_between_publishing_and_removing_the_folder_loses_nothing() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn a_process_killed_before_it_removes_the_folder_loses_nothing() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     let mut run = open(&home.output(), &job);
     write_missing(&run);
     run.join(&job, &|| false).unwrap().unwrap();
@@ -186,9 +193,9 @@ fn death_between_publishing_and_removing_the_folder_loses_nothing() {
     finish(run, &job);
     assert_eq!(fs::read(home.output()).unwrap(), bytes);
 
-    // The same, half-way through the removal: the plan goes first.
+    // A process that is killed while it removes the folder has deleted the plan first.
     fs::create_dir(home.partial()).unwrap();
-    fs::write(home.partial().join(part_name(3)), write_bytes(&job, 3)).unwrap();
+    fs::write(home.partial().join(part_name(3)), part_bytes(&job, 3)).unwrap();
     assert!(matches!(
         OpenRun::open(&home.output(), &job, options()).unwrap(),
         Opened::Finished(..)
@@ -197,18 +204,19 @@ fn death_between_publishing_and_removing_the_folder_loses_nothing() {
 }
 
 #[test]
-fn leftovers_go_and_strangers_files_in_the_folder_stay() {
-    let (home, job) = (Home::new(), synthetic::job(POINTS));
+fn temporary_files_are_deleted_and_foreign_files_kept() {
+    let home = Home::new();
+    let job = synthetic::job(POINTS);
     drop(open(&home.output(), &job));
-    let left = home.partial().join(sweep_files::atomic::temporary_name());
-    let mine = home.partial().join("notes.txt");
-    fs::write(&left, "half a part").unwrap();
-    fs::write(&mine, "mine").unwrap();
+    let temporary = home.partial().join(sweep_files::atomic::temporary_name());
+    let foreign = home.partial().join("notes.txt");
+    fs::write(&temporary, "half a part").unwrap();
+    fs::write(&foreign, "mine").unwrap();
     let run = open(&home.output(), &job);
-    assert!(!left.exists());
+    assert!(!temporary.exists());
     write_missing(&run);
     let (_, notes) = finish(run, &job);
-    assert!(mine.exists());
+    assert!(foreign.exists());
     assert!(notes[0].contains("or has set aside: notes.txt; delete"), "{:?}", notes);
     assert_eq!(fs::read_dir(home.partial()).unwrap().count(), 1);
 }
