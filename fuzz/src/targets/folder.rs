@@ -140,7 +140,7 @@ fn home() -> &'static Home {
                 .ended
         };
         // A shard of one leaves its folder.
-        let shard = Some(ShardRequest::Given(Shard { index: 1, of: 1 }));
+        let shard = Some(ShardRequest::Given(Shard { index: 1, count: 1 }));
         assert!(matches!(go(shard), Ended::Shard(..)));
         let partial = folder.path().join("x.parquet.partial");
         let names = fs::read_dir(&partial).expect("the folder is there");

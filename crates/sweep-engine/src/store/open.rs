@@ -505,7 +505,7 @@ pub(super) fn refuse_other_plan(
 pub(super) fn remove(folder: &Folder, lock: Lock) -> Option<String> {
     let path = folder.path.display();
     let removed = own::clear(folder).and_then(|others| {
-        lock.retire()?;
+        lock.delete()?;
         if others.is_empty() {
             let removed = regular::if_there(fs::remove_dir(&folder.path));
             removed.map_err(StoreError::io("remove the folder", &folder.path))?;

@@ -87,7 +87,7 @@ pub fn status(output: &Path, job: &Job<'_>) -> Result<FolderStatus, StoreError> 
     match PlanFile::read(&folder)? {
         FoundPlan::Plan(found) => open::refuse_other_plan(&folder, &found, &ours)?,
         FoundPlan::Nothing => {
-            let Some((_, tally)) = open::finished(&folder, job)? else { return Ok(status) };
+            let Some((_, tally)) = open::finished_result(&folder, job)? else { return Ok(status) };
             return Ok(FolderStatus {
                 state: State::Finished,
                 points_done: tally.points,
