@@ -86,8 +86,8 @@ impl<T: Real> Real for Dual<T> {
     }
 }
 
-/// Lanes of dual numbers: whole systems run on them, so that each lane can carry a derivative along
-/// a direction of its own.
+/// Lanes of dual numbers, over which whole systems can be evaluated. Each lane can carry a
+/// derivative along another direction.
 impl<T: Lane> Lane for Dual<T> {
     const LANES: usize = T::LANES;
     #[inline(always)]

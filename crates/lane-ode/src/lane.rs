@@ -50,7 +50,7 @@ pub trait Aside {
     fn run(self) -> Self::Output;
 }
 
-/// Runs work without any instruction set of its own.
+/// Runs work without instructions beyond the target's.
 #[inline(never)]
 pub(crate) fn out_of_line<W: Aside>(work: W) -> W::Output {
     work.run()

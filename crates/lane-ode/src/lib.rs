@@ -1,19 +1,19 @@
-//! Integrators over SIMD lanes: each lane a trajectory with its own time, no heap after set-up, the
-//! same bits on every instruction set but WebAssembly's, which cannot fuse ([`Simd::Simd128`]).
+//! Integrators over SIMD lanes. Each lane integrates a trajectory with its own time. Nothing is
+//! allocated after set-up, and results are the same bits on every instruction set except
+//! WebAssembly's, which has no fused operations ([`Simd::Simd128`]).
 //!
 //! One trajectory of a small system cannot fill a processor's vector units; eight trajectories side
-//! by side can. So a value here ([`Lane`]) carries 1, 2, 4 or 8 numbers, one per trajectory, and
-//! the lanes share nothing but the program: each has its own parameters, time, step and end, and
-//! takes up the next trajectory when it is done.
+//! by side can. So a value of this crate ([`Lane`]) carries 1, 2, 4 or 8 numbers, one per
+//! trajectory, and the lanes share only the program: each has its own parameters, time, step and
+//! end, and starts the next trajectory when its own has ended.
 //!
 //! A user writes, in this order:
 //!
-//! 1. [`System`]: x' = f(t, x), over values with operators ([`N`]). Products wait for the sum that
-//!    they are part of and fuse with it, the same way everywhere; [`Product::v`] rounds one that
-//!    is on its own.
-//! 2. [`Task`]: the trajectories of a system, each cut into [`Segment`]s at its kinks, and the
-//!    records of every [`Step`]. [`Peaks`] finds largest magnitudes between steps as well as at
-//!    them.
+//! 1. [`System`]: x' = f(t, x), over values with operators ([`N`]). A product fuses with the sum
+//!    that it is part of, in the same way on every instruction set; [`Product::v`] rounds a product
+//!    that is not part of a sum.
+//! 2. [`Task`]: the trajectories of a system, each divided into [`Segment`]s at its kinks, and what
+//!    is recorded at every [`Step`]. [`Peaks`] finds the largest magnitudes, also inside steps.
 //! 3. [`Kernel`]: the work as a whole. [`Simd::dispatch`] is compiled for every instruction set and
 //!    runs it on one.
 //!
@@ -30,18 +30,18 @@
 //!     Kernel, Lane, MAX_LANES, N, Segment, SegmentEnd, Simd, Step, System, Task, rk4,
 //! };
 //!
-//! /// k of the trajectory in each lane (1/s^2).
+//! /// The stiffness k of the trajectory in each lane (1/s^2).
 //! struct Spring<T>(N<T>);
 //!
 //! struct Springs<'a, T> {
 //!     spring: Spring<T>,
-//!     /// k of every trajectory.
+//!     /// The stiffness k of every trajectory.
 //!     all: &'a [f64],
-//!     /// How many have been given to lanes.
-//!     taken: usize,
-//!     /// Which trajectory each lane holds.
-//!     held: [usize; MAX_LANES],
-//!     /// Where each trajectory ended.
+//!     /// The number of trajectories that have started.
+//!     started: usize,
+//!     /// The index of the trajectory in each lane.
+//!     current: [usize; MAX_LANES],
+//!     /// The position at the end of each trajectory.
 //!     ends: Vec<f64>,
 //! }
 //!
@@ -76,12 +76,12 @@
 //!         x: &mut [N<T>; 2],
 //!     ) -> Option<Segment> {
 //!         if let SegmentEnd::Completed(_) = end {
-//!             self.ends[self.held[lane]] = x[0].0.get(lane);
+//!             self.ends[self.current[lane]] = x[0].0.get(lane);
 //!         }
-//!         let stiffness = *self.all.get(self.taken)?;
+//!         let stiffness = *self.all.get(self.started)?;
 //!         self.spring.0.0.set(lane, stiffness);
-//!         self.held[lane] = self.taken;
-//!         self.taken += 1;
+//!         self.current[lane] = self.started;
+//!         self.started += 1;
 //!         x[0].0.set(lane, 1.0);
 //!         x[1].0.set(lane, 0.0);
 //!         Some(Segment { start_s: 0.0, end_s: 1.0, step_s: 0.01 })
@@ -101,8 +101,8 @@
 //!     fn run<T: Lane>(self, zero: T) -> Vec<f64> {
 //!         let ends = vec![f64::NAN; self.0.len()];
 //!         let spring = Spring(N(zero));
-//!         let held = [0; MAX_LANES];
-//!         let mut springs = Springs { spring, all: self.0, taken: 0, held, ends };
+//!         let current = [0; MAX_LANES];
+//!         let mut springs = Springs { spring, all: self.0, started: 0, current, ends };
 //!         rk4::integrate(zero, &mut springs);
 //!         springs.ends
 //!     }

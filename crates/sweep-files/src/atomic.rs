@@ -85,7 +85,7 @@ pub fn begin(folder: &Path) -> Result<NamedTempFile, FileError> {
     }
 }
 
-/// Whether an open file is the one that a path names.
+/// Whether an open file is the file at a path.
 #[cfg(unix)]
 pub fn is_named(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -159,8 +159,8 @@ pub fn sync_folder(folder: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Deletes the temporary files in a folder that killed processes have left: those that nobody holds
-/// locked. A file that cannot be deleted does no harm, so that no failure is an error.
+/// Deletes the temporary files in a folder that killed processes have left: those on which no
+/// process has a lock. A file that cannot be deleted does no harm, so that no failure is an error.
 pub fn clear_leftovers(folder: &Path) {
     let names = regular::names(folder).unwrap_or_default();
     for name in names.iter().filter(|name| name.to_str().is_some_and(is_temporary)) {

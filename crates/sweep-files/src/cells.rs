@@ -52,7 +52,7 @@ pub fn flags(array: &dyn Array) -> Result<&BooleanArray, ArrowError> {
     array.as_boolean_opt().ok_or_else(|| unreadable(array, "true and false"))
 }
 
-/// Reads words, one per row. A word is stored once, however many rows have it.
+/// Reads words, one per row. The dictionary has each distinct word once.
 ///
 /// # Errors
 /// [`ArrowError::SchemaError`] if the column has another type.

@@ -1,19 +1,19 @@
 //! Keys of a Parquet file's own key-value metadata.
 
-/// The plan as JSON: grid as run, full machine, method.
+/// The plan as JSON: the grid as run, the full machine and the method.
 pub const PLAN: &str = "sweep.plan";
-/// Hash over identity and plan, hexadecimal.
+/// The hexadecimal hash of the program's identity and the plan.
 pub const PLAN_HASH: &str = "sweep.plan_hash";
 /// Version of the program.
 pub const VERSION: &str = "sweep.version";
-/// Version of the program's numerics: what decides the numbers besides the plan.
+/// The version of the program's numerics. Results depend on it and on the plan only.
 pub const NUMERICS: &str = "sweep.numerics";
-/// JSON object: column name to `type`, `unit`, `description`, and [`WORSE`] and [`LIMIT`] if
-/// the column can be bad.
+/// A JSON object with the metadata of each column by its name: `type`, `unit`, `description`, and
+/// [`WORSE`] and [`LIMIT`] if the column can be bad.
 pub const COLUMNS: &str = "sweep.columns";
 /// Direction in which a column is bad: `greater` or `less`.
 pub const WORSE: &str = "worse";
-/// The value up to which a column is good, if that has a meaning of its own.
+/// The limit between good and bad values of a column, if it has a meaning independent of the plan.
 pub const LIMIT: &str = "limit";
 /// Settings and result of a boundary: quantity, limit, tolerance, lattice, trials, rounds. In
 /// boundary files alone.
@@ -32,7 +32,7 @@ pub const OPTIMISE: &str = "sweep.optimise";
 pub const FIT: &str = "sweep.fit";
 /// The files that were compared, and the differences of their plans. In files of differences alone.
 pub const DIFFERENCES: &str = "sweep.differences";
-/// Place of a part of unfinished work. In parts alone.
+/// The position of a part among those of unfinished work. In parts alone.
 pub const PART: &str = "sweep.part";
 /// BLAKE3 hash of the whole file with zeros in this place, hexadecimal.
 pub const DIGEST: &str = "sweep.digest";

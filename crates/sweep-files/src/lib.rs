@@ -2,10 +2,10 @@
 //!
 //! Writing ([`Output`]):
 //!
-//! * A command writes where nothing is, over an empty file, or over a regular file of the
-//!   [`FileKind`] that it writes. Anything else is refused before any work: folders, symbolic
-//!   links, FIFOs, devices, and every other file. A grid file, a machine file, a list and a plotted
-//!   file are of none of these kinds, so no input is ever overwritten, whatever path leads to it.
+//! * A command writes a new file, or over an empty file, or over a regular file of the [`FileKind`]
+//!   that it writes. Anything else is refused before any work: folders, symbolic links, FIFOs,
+//!   devices, and every other file. A grid file, a machine file, a list and a plotted file are of
+//!   none of these kinds, so no input is ever overwritten, whatever path leads to it.
 //! * The bytes go into a temporary file beside it, which is synced and renamed; then the folder is
 //!   synced. A full disk, a signal or a power cut leaves the old file or the new one, never a part.
 //! * A temporary file is locked while its process lives. Those of killed processes are removed by

@@ -1,7 +1,7 @@
 //! Computes the unpacked size of a column's pages from the page headers.
 //!
-//! A page of a few kilobytes may unpack into gigabytes, and the library allocates whatever a header
-//! declares. So the headers are read before the library reads the pages.
+//! A page of a few kilobytes may unpack into gigabytes, and the library allocates the size that a
+//! header declares. So the headers are read before the library reads the pages.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -107,7 +107,7 @@ fn header(file: &mut (impl Read + Seek), at: u64, end: u64) -> Result<(Header, u
 }
 
 /// Checks that a page unpacks into at most `most` bytes. The library unpacks gzip, and no other
-/// codec, to its end whatever the header declares.
+/// codec, to its end, even beyond the size in the header.
 fn check_gzip(packed: impl Read, most: u64) -> Result<(), Refused> {
     let mut decoder = MultiGzDecoder::new(packed).take(most + 1);
     // Bytes that are not gzip pass: the library reports them.

@@ -56,12 +56,12 @@ pub fn text(panic: &(dyn Any + Send)) -> &str {
         .unwrap_or("a panic without a message")
 }
 
-/// Locks a mutex, whatever state a panic has left its content in.
+/// Locks a mutex, even if a panic has poisoned it.
 pub fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the content of a mutex, whatever state a panic has left it in.
+/// Returns the content of a mutex, even if a panic has poisoned it.
 pub fn unlocked<T>(mutex: Mutex<T>) -> T {
     mutex.into_inner().unwrap_or_else(PoisonError::into_inner)
 }

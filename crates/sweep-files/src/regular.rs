@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// Opens a regular file for reading. Anything else is an error that says what it is.
 ///
 /// # Errors
-/// An error of the system, or one that names the type of a file that is not regular.
+/// An error of the system, or an error with the type of a file that is not regular.
 pub fn open(path: &Path) -> io::Result<File> {
     // The type is checked before opening too, because opening alone starts some devices.
     expect_regular(fs::metadata(path)?.file_type())?;
@@ -29,12 +29,11 @@ const WRITER_WAIT: Duration = Duration::from_secs(2);
 #[cfg(unix)]
 const LOOK_AGAIN: Duration = Duration::from_millis(5);
 
-/// Reads at most so many bytes of a text that a user names: of a regular file, or of a pipe, as a
-/// shell's `<(...)` and `/dev/stdin` are. A named pipe that nobody writes to is an error, which
-/// comes after two seconds.
+/// Reads at most `most` bytes of a text file that a user names, or of a pipe, as a shell's `<(...)`
+/// and `/dev/stdin` are. A named pipe without a writer is an error after two seconds.
 ///
 /// # Errors
-/// What the system answers, or that the path leads to something else, in words.
+/// An error of the system, or an error with the type of a file that is neither regular nor a pipe.
 #[cfg(unix)]
 pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     use std::os::unix::fs::FileTypeExt as _;
@@ -76,10 +75,10 @@ pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads at most so many bytes of a text that a user names.
+/// Reads at most `most` bytes of a text file that a user names.
 ///
 /// # Errors
-/// What the system answers, or that the path leads to something else, in words.
+/// An error of the system, or an error with the type of a file that is neither regular nor a pipe.
 #[cfg(not(unix))]
 pub fn read_text(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
@@ -106,7 +105,7 @@ pub const LONGEST_JSON_BYTES: u64 = 16 << 20;
 /// longer parses.
 ///
 /// # Errors
-/// An error of the system, or one that names the type of a file that is not regular.
+/// An error of the system, or an error with the type of a file that is not regular.
 pub fn read_json(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.take(LONGEST_JSON_BYTES).read_to_end(&mut bytes)?;
@@ -124,7 +123,7 @@ pub(crate) fn open_to_write(path: &Path) -> io::Result<File> {
 /// Opens a regular file to read and write, and makes it if there is none. Follows no symbolic link.
 ///
 /// # Errors
-/// An error of the system, or one that names the type of a file that is not regular.
+/// An error of the system, or an error with the type of a file that is not regular.
 pub fn open_or_create(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     match without_waiting(options.read(true).write(true).create_new(true), false).open(path) {

@@ -188,17 +188,17 @@ impl Walk<'_, '_> {
         None
     }
 
-    /// One whose lowest bit is its sign.
+    /// Reads a signed number, whose lowest bit is the sign.
     fn number(&mut self) -> Option<i64> {
         let number = self.varint()?;
         Some((number >> 1) as i64 ^ -((number & 1) as i64))
     }
 }
 
-/// Numbers as a file has them.
+/// Encodes numbers as a file has them, for tests.
 #[cfg(test)]
 pub(crate) mod encode {
-    /// In groups of seven bits, the lowest first.
+    /// Encodes an unsigned number in groups of seven bits, the lowest group first.
     pub(crate) fn varint(mut rest: u64) -> Vec<u8> {
         let mut bytes = Vec::new();
         while rest >= 0x80 {
@@ -209,7 +209,7 @@ pub(crate) mod encode {
         bytes
     }
 
-    /// One whose lowest bit is its sign.
+    /// Encodes a signed number, whose lowest bit is the sign.
     pub(crate) fn number(value: i32) -> Vec<u8> {
         varint(((i64::from(value) << 1) ^ (i64::from(value) >> 63)) as u64)
     }

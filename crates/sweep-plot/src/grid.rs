@@ -1,5 +1,5 @@
-//! The cells of a map: one for each grid point, or one for a block of points if a figure cannot
-//! show so many.
+//! The cells of a map: one for each grid point, or one for a block of points if there are more than
+//! a figure can show.
 
 use super::axis::AxisScale;
 use super::label;
@@ -15,7 +15,7 @@ pub(crate) struct GridAxis {
     pub(crate) values: Vec<f64>,
     /// The borders of the cells, one more than there are cells: halfway between neighbours.
     pub(crate) borders: Vec<f64>,
-    /// The first and the last value of each block; `None` if each value has a cell of its own.
+    /// The first and the last value of each block; `None` if each cell has one value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) spans: Option<Vec<[f64; 2]>>,
     /// The rule that maps a value to its cell.

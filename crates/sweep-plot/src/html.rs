@@ -71,7 +71,7 @@ pub(crate) fn page_columns(source: &FigureFile, axes: &[SweptAxis]) -> Vec<Strin
         .collect()
 }
 
-/// Returns the maximum number of cells of a map's page with so many columns.
+/// Returns the maximum number of cells of a map's page with this number of columns.
 pub(crate) fn max_cells(columns: usize) -> usize {
     // A number takes four bytes, 5.3 in base64; each cell has its counts besides the columns.
     CELL_BYTES / (6 * (columns + 5))

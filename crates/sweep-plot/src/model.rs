@@ -1,4 +1,4 @@
-//! The interface through which a model adds figures of its own to those of every model.
+//! The interface through which a model adds its own figures to those that every model has.
 
 use serde_json::Value;
 
@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::read::{FigureFile, ModelKinds};
 use crate::table::FigureTable;
 
-/// A model's own kinds of files, their charts, and the model's text in pages. The defaults are
-/// those of a model without any.
+/// A model's own kinds of files, their charts, and the model's text in pages. By default a model
+/// has none of these.
 pub trait Figures {
     /// Returns the model's kinds of files, and the sections of a plan that results follow from.
     fn model_kinds(&self) -> ModelKinds {
@@ -73,7 +73,7 @@ pub struct LivePart {
     pub parts: &'static str,
 }
 
-/// The figures of a model that has none of its own.
+/// The figures of a model without its own figures.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CommonFigures;
 

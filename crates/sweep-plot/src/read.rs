@@ -14,7 +14,7 @@ use super::error::{PlotError, Result};
 use super::label;
 use sweep_files::{self as files, ParquetFile};
 
-/// The facts of a column without its rows, which [`super::table::FigureColumn`] has.
+/// The facts of a column; [`super::table::FigureColumn`] also has its rows.
 pub use sweep_files::Column as ColumnFacts;
 use sweep_parameter::Worse;
 
@@ -44,7 +44,7 @@ impl FigureKind {
     /// Time histories of both models at one point, or of a measurement and the fitted model.
     pub const TRACE: Self =
         Self { begins: &["nonlinear_", "measured_"], ..Self::new("trace", &["time_s"]) };
-    /// The curve on which a quantity is at its limit. A file of it has the two columns of a
+    /// The curve on which a quantity is at its limit. A file of this kind has the two columns of a
     /// bracket.
     pub const BOUNDARY: Self = Self::new("boundary", &[]);
 
@@ -69,16 +69,16 @@ impl FigureKind {
 /// The model's kinds of files and sections of plans.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ModelKinds {
-    /// The kinds of files; of two that fit a file, the first is taken.
+    /// The kinds of files. If several fit a file, the first is taken.
     pub kinds: &'static [FigureKind],
-    /// The sections of a plan that time histories follow from.
+    /// The sections of a plan on which time histories depend.
     pub history_sections: &'static [&'static str],
-    /// The sections of a plan that results at a constant speed follow from.
+    /// The sections of a plan on which results at a constant speed depend.
     pub machine_sections: &'static [&'static str],
 }
 
 impl ModelKinds {
-    /// Returns all kinds; of two that fit a file, the first is taken. A design has the columns of a
+    /// Returns all kinds. If several fit a file, the first is taken; a design has the columns of a
     /// map.
     pub fn all_kinds(self) -> impl Iterator<Item = FigureKind> {
         let own = self.kinds.iter().copied();

@@ -4,9 +4,9 @@
 /// both makes the search sixteen times slower.
 const SAMPLES: [usize; 2] = [44, 33];
 
-/// Returns the centre of the place deepest inside the region `inside` of a panel of `panel` px, for
-/// a text of `size` px; `None` if it fits nowhere. Coordinates are px from the top left corner of
-/// the panel.
+/// Returns the position that is deepest inside the region `inside` of a panel of `panel` px, for a
+/// text of `size` px; `None` if the text fits nowhere. Coordinates are px from the top left corner
+/// of the panel.
 pub(crate) fn roomiest_place(
     panel: [f64; 2],
     size: [f64; 2],

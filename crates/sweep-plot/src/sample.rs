@@ -113,9 +113,9 @@ impl SampleFile {
     }
 }
 
-/// Replaces this share of a column's cells, all by one value or each by a value of its own.
+/// Replaces this share of a column's cells, all by the same value or each by another value.
 fn damaged(array: &ArrayRef, share: f64, numbers: &mut fastrand::Rng) -> ArrayRef {
-    /// Values that break a careless figure.
+    /// Values that a figure must handle without failing.
     const BAD: [Option<f64>; 12] = [
         None,
         Some(f64::NAN),

@@ -20,7 +20,7 @@ pub(crate) enum Side {
     Good,
     /// The bad side.
     Bad,
-    /// A point without a value that did not fail: nothing was excited.
+    /// A point without a value that did not fail, because nothing was excited.
     Undefined,
     /// A point that failed.
     Failed,
@@ -239,8 +239,8 @@ impl Scatter {
 /// Bits that make the choice of drawn points independent of the choice of kept ones.
 const SECOND_CHOICE: u64 = 0x5bf0_3635_0000_0000;
 
-/// Returns whether a row is among the one in `stride` that are picked. Every `stride`-th row would
-/// lie in a part of the box if the stride is a power of two and the points are a Sobol sequence.
+/// Whether a row is picked when one row in `stride` is. Picking every `stride`-th row would leave
+/// out parts of the box if the stride is a power of two and the points are a Sobol sequence.
 fn picked(row: u64, stride: u64) -> bool {
     // The hash is SplitMix64 of Steele, Lea and Flood.
     let mixed = row.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);

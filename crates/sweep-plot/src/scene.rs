@@ -23,7 +23,7 @@ impl Colour {
         Self { alpha, ..self }
     }
 
-    /// Returns the colour that this one makes over an opaque one.
+    /// Returns the colour that results from drawing this colour over an opaque one.
     pub fn over(self, under: Self) -> Self {
         let part = f64::from(self.alpha) / 255.0;
         let [r, g, b] = [0, 1, 2].map(|k| {
@@ -184,7 +184,7 @@ impl Hatch {
 /// cells.
 const MIN_HATCH_SPACING: f64 = 2.0;
 
-/// The part of a text that is at its position.
+/// The point of a text that is placed at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Anchor {
     Start,

@@ -148,7 +148,8 @@ pub fn axes(source: &FigureFile) -> Result<Vec<SweptAxis>> {
             }
             gathered.add(value);
         }
-        // The check is made at each row, because values of scattered rows would fill the memory.
+        // The check is repeated at each row, because the values of scattered rows would fill the
+        // memory.
         let mut known = gathered.iter().map(|axis| axis.seen.len());
         let size = known.try_fold(1_usize, usize::checked_mul);
         if size.is_none_or(|size| size > source.rows.saturating_add(MAX_MISSING)) {

@@ -1,4 +1,4 @@
-//! Both models of a washing machine at single points, with exports for a page.
+//! Evaluates both models of a washing machine at single points, with exports for a page.
 //!
 //! `sweep plot --live` writes a [`Setup`] into a page: the machine, its spin and the refinement
 //! levels of the fast method, as the program chose them for the map and for the sliders. The page's

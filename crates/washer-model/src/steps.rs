@@ -43,7 +43,7 @@ pub struct StepSelector<'a> {
     is_stopped: &'a dyn Fn() -> bool,
 }
 
-/// One machine's frequencies.
+/// The frequencies of one machine.
 struct Frequencies<'a> {
     point: &'a Point,
     /// The greatest speed of the drum.

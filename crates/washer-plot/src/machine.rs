@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use sweep_plot::table::FigureTable;
 
-/// Returns the unbalance and the damping of the machine, as far as the file has them and all
-/// dampers are alike.
+/// Returns the unbalance and the damping of the machine, if the file has them and all dampers are
+/// equal.
 pub(crate) fn unbalance_and_damping(table: &FigureTable) -> Vec<(&'static str, f64)> {
     let Some(machine) = table.source.find("machine") else { return Vec::new() };
     let unbalance = machine.pointer("/unbalance/mass_kg").and_then(Value::as_f64);

@@ -104,8 +104,8 @@ const RESOLVING_RAD: [f64; 2] = [1.4, 0.2];
 
 /// The greatest number of steps of an adaptive trajectory.
 ///
-/// Basis: a trajectory of that many takes hours, so one that reaches it makes no progress. Doubling
-/// it doubles the time until such a row fails.
+/// Basis: so many steps take hours, so that a trajectory with more makes no progress. Doubling it
+/// doubles the time until such a row fails.
 pub const MAX_ADAPTIVE_STEPS: u64 = 100_000_000;
 
 /// Returns the ratio of one level's step to that of the next, for errors that decrease with this
@@ -136,11 +136,8 @@ pub(crate) fn error_of_level(level: Level, differences: &[Option<f64>]) -> Optio
 }
 
 /// Returns the amplification of unresolved ringing, from the difference of the first two levels.
-/// For a motion that amplifies nothing, this difference is below the accuracy, because the levels
-/// are chosen so; for any other, the amplification is at least the quotient of the two.
-///
-/// A motion that amplifies nothing differs there by less than the accuracy, because the levels are
-/// chosen so; one that differs by more amplifies by at least the quotient.
+/// The levels are chosen so that a motion without amplification has a difference below the
+/// accuracy. If the difference is greater, the amplification is at least the quotient of the two.
 pub(crate) fn amplification(first_difference: f64, accuracy: f64) -> f64 {
     (first_difference / accuracy).max(1.0)
 }

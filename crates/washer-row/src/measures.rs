@@ -79,7 +79,7 @@ impl Metric {
         }
     }
 
-    /// Whether each model has a value of its own. Otherwise the value belongs to the machine.
+    /// Whether each model has a separate value. Otherwise the value belongs to the machine.
     pub const fn is_per_model(self) -> bool {
         self.gauge().is_some()
     }

@@ -82,7 +82,7 @@ const FEET_METRIC: MetricFacts = MetricFacts {
 macro_rules! metrics {
     ($($(#[$attribute:meta])* $Metric:ident = $name:literal: $facts:expr;)+) => {
         named! {
-            /// An optional number of a row beside the amplitudes, with columns of its own.
+            /// An optional number of a row in addition to the amplitudes, with its own columns.
             pub enum Metric {
                 $($(#[$attribute])* $Metric = $name,)+
             }

@@ -11,7 +11,7 @@ use crate::result::PyResultTable;
 use crate::work::{WorkOptions, supervise, supervise_abandonable};
 use crate::{columns, errors, finish};
 
-/// The name of a plan without a file that has no name of its own.
+/// The name of a plan that has neither a file nor a name.
 const UNNAMED: &str = "plan";
 
 /// A validated plan.

@@ -139,8 +139,8 @@ fn ratios(
     }
 }
 
-/// Returns the ranges of the axis whose cells hold reliable and unreliable points. Ranges too close
-/// to be told apart are merged.
+/// Returns the ranges of the axis whose cells hold reliable and unreliable points. Ranges that are
+/// too close to be distinguished are merged.
 fn mixed(map: &CellMap) -> Vec<[f64; 2]> {
     let axis = &map.grid.axes[0];
     let scale = axis.scale();

@@ -4,8 +4,8 @@ use super::super::sample::SampleFile;
 use super::super::*;
 use super::{draw, message, page_data, showing, svg};
 
-/// Returns points whose ratio is 4 where the mass exceeds a half, whatever the damping; the last
-/// row failed and the one before it is undefined.
+/// Returns points whose ratio is 4 where the mass exceeds a half, for any damping; the last row
+/// failed and the one before it is undefined.
 pub(super) fn points(count: u32) -> SampleFile {
     points_with(count, |sample| sample)
 }

@@ -1,6 +1,6 @@
 //! The methods of integration: their parameters, their names in rows, and their steppers.
 //!
-//! Each stepper is compiled as a kernel of its own, because the compiler takes longer for one
+//! Each stepper is compiled as a separate kernel, because the compiler takes longer for one
 //! function with all of them than for all functions together.
 
 use crate::coordinates::STATES;
@@ -197,7 +197,7 @@ pub(crate) trait Stepper {
     fn integrate<T: Lane, P: Task<T, STATES, System: LaneModel<T>>>(self, zero: T, task: &mut P);
 }
 
-/// A stepper of fixed steps, which has no parameters of its own.
+/// A stepper of fixed steps, which has no parameters.
 pub(crate) trait FixedStepper: Stepper {
     /// The stepper.
     const NEW: Self;

@@ -34,8 +34,8 @@ impl Formula {
 
     /// Returns the greatest product of step and frequency (rad) that is used.
     ///
-    /// It is below the limit of stability, because large motions may be faster than the eigenvalues
-    /// about an equilibrium say.
+    /// This is below the formula's limit of stability, because large motions may be faster than the
+    /// eigenvalues about an equilibrium.
     pub const fn limit(self) -> f64 {
         match self {
             Self::Rk4 => STABILITY_SHARE * RK4_STABILITY_LIMIT,

@@ -1,5 +1,5 @@
-//! Tests of the speed amplitudes at which the linear model takes friction, if they are those of its
-//! own motion.
+//! Tests of the speed amplitudes at which the linear model takes friction, if they follow from the
+//! linear motion.
 
 use crate::modes::motions;
 use crate::{

@@ -215,7 +215,8 @@ fn files_of_different_plans_are_not_drawn_together() {
     other_trace.write(&traces, "point-29.parquet");
     let phrase = message(draw(map_of(), &with, "a.html"));
     assert!(phrase.contains("point-29.parquet is of another plan than"), "{phrase}");
-    // A file that gives its point belongs to no other, whatever its number.
+    // A file whose metadata give its point belongs to that point only, in spite of the number in
+    // its name.
     let astray = trace().without("at").metadata("at", r#"{"unbalance_mass_kg": 7.0}"#);
     astray.write(&traces, "point-29.parquet");
     let phrase = message(draw(map_of(), &with, "a.html"));
