@@ -1,4 +1,5 @@
-//! The command line over a model: one module a subcommand, each with its arguments and `run`.
+//! The command line of a model's program. Each subcommand has a module with its arguments and a
+//! function `run`.
 
 pub mod boundary;
 pub mod cells;
@@ -31,7 +32,7 @@ use grid::{GridArgs, ResultArgs, quoted};
 use run::installed;
 use sweep_plot::CommonFigures;
 
-/// The arguments of those general subcommands to which a program may add options.
+/// The arguments of the general subcommands to which a program may add options.
 pub trait Arguments {
     /// The arguments of `run`.
     type Run: clap::Args + fmt::Debug;
@@ -100,7 +101,8 @@ struct Cli {
     command: GeneralCommand<Unextended>,
 }
 
-/// The program of a model: does what this process's arguments say. `name` is how it is called.
+/// Runs the command that this process's arguments give, and returns its exit code. `name` is the
+/// name of the program.
 pub fn main<M: Swept>(name: &'static str) -> ExitCode {
     call_program(name);
     let matches = Cli::command().name(name).bin_name(name).get_matches();

@@ -1,4 +1,4 @@
-//! `sweep boundary GRID.toml`: the curve itself.
+//! `sweep boundary GRID.toml`: traces the curve on which a quantity is at its limit.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -50,8 +50,8 @@ there.";
 /// Traces the boundary of a grid.
 ///
 /// # Errors
-/// Mistakes in the grid file, a plan without a range to search, and whatever keeps the file from
-/// being written.
+/// Mistakes in the grid file, a plan without a range to search, and errors of evaluating points or
+/// writing the file.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.grid.load()?;
     if args.options.quantity.is_empty() {
@@ -93,7 +93,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     Ok(print_summary(text, &output))
 }
 
-/// Lists every column that a boundary can be drawn through: unit, bad side, limit, meaning.
+/// Lists every column whose limit can be traced, with unit, worse side, limit and description.
 fn listing<M: Swept>(plan: &Plan<M>) -> String {
     let columns = offered(plan);
     let width = columns.iter().map(|(column, _)| column.name.len()).max().unwrap_or(0);
@@ -176,11 +176,12 @@ const fn in_words(kind: EdgeKind) -> [&'static str; 2] {
     }
 }
 
-/// Searches, with a memory of trials if there is one, and returns the memory; nothing is found if
-/// the interrupt was raised.
+/// Traces the boundary. Stored trials are used and extended, if there are any, and returned. The
+/// curves are `None` after an interrupt.
 ///
 /// # Errors
-/// No threads; `SWEEP_SIMD` naming nothing this machine has; trials that could not be kept.
+/// Threads that cannot be started, a value of `SWEEP_SIMD` that this machine does not support, and
+/// trials that cannot be stored.
 pub fn search<M: Swept>(
     task: &BoundaryTask<M>,
     trials: Option<Trials>,

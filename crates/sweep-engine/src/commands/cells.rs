@@ -1,4 +1,4 @@
-//! Cells of results as people read them.
+//! Formatting of cells and summaries for people.
 
 use std::fmt::{Display, Write as _};
 use std::path::Path;
@@ -7,12 +7,12 @@ use super::grid::quoted;
 use crate::program::program;
 use sweep_results::Cell;
 
-/// Lines of a summary, each of a name and what is said of it.
+/// A summary of lines, each with a name and a text.
 pub trait Lines {
     /// Adds a line.
-    fn line(&mut self, name: &str, said: impl Display);
+    fn line(&mut self, name: &str, text: impl Display);
 
-    /// Adds the command that comes next, of this file.
+    /// Adds a line with the command that the user may run next on a file.
     fn next(&mut self, verb: &str, file: &Path) {
         let file = quoted(&file.display().to_string());
         self.line("next", format!("{} {verb} {file}", program()));
@@ -20,13 +20,13 @@ pub trait Lines {
 }
 
 impl Lines for String {
-    fn line(&mut self, name: &str, said: impl Display) {
+    fn line(&mut self, name: &str, text: impl Display) {
         // Writing to a String cannot fail.
-        let _ = writeln!(self, "{name:>10}  {said}");
+        let _ = writeln!(self, "{name:>10}  {text}");
     }
 }
 
-/// Six digits, without an exponent where that reads well.
+/// Formats a number with six digits, and with an exponent only if it is very large or small.
 pub fn short(value: f64) -> String {
     if value == 0.0 || (1e-4..1e9).contains(&value.abs()) {
         // Small numbers keep their digits behind the zeros.
@@ -38,14 +38,15 @@ pub fn short(value: f64) -> String {
     }
 }
 
-/// From one number to another, with all their digits where fewer do not tell them apart.
-pub fn span([from, to]: [f64; 2], said: impl Fn(f64) -> String) -> String {
-    let is_told_apart = from == to || said(from) != said(to);
-    let [from, to] = [from, to].map(|end| if is_told_apart { said(end) } else { end.to_string() });
+/// Formats a range by a function. If both ends become the same text, they are written with all
+/// digits.
+pub fn span([from, to]: [f64; 2], format: impl Fn(f64) -> String) -> String {
+    let is_distinct = from == to || format(from) != format(to);
+    let [from, to] = [from, to].map(|end| if is_distinct { format(end) } else { end.to_string() });
     format!("{from} to {to}")
 }
 
-/// A cell in a word.
+/// Formats a cell.
 pub fn word(cell: &Cell) -> String {
     match cell {
         Cell::Null => "null".to_owned(),
@@ -55,17 +56,18 @@ pub fn word(cell: &Cell) -> String {
     }
 }
 
-/// A word as a line has room for it: somebody's file may hold one of a megabyte.
+/// Shortens a text to fit a line, because a file of another program may have very long texts.
 pub fn clipped(text: &str) -> String {
-    const LONGEST: usize = 80;
-    match text.char_indices().nth(LONGEST) {
+    /// The maximum number of characters. Basis: the width of a terminal.
+    const MAX_CHARACTERS: usize = 80;
+    match text.char_indices().nth(MAX_CHARACTERS) {
         Some((end, _)) => format!("{}... ({} characters)", &text[..end], text.chars().count()),
         None => text.to_owned(),
     }
 }
 
-/// Rows under their headings, in columns that are as wide as they need to be; each line begins with
-/// `indent`.
+/// Formats a table with headings. Each column is as wide as its widest cell, and each line begins
+/// with `indent`.
 pub fn table(headings: &[String], rows: &[Vec<String>], indent: &str) -> String {
     let width = |column: usize| {
         let cells = rows.iter().filter_map(|row| row.get(column)).chain(headings.get(column));
@@ -85,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short() {
+    fn numbers_have_six_digits() {
         let shown: Vec<String> =
             [0.0, 0.05, 300.0, -1.5e-7, 2e12, 1.0 / 3.0, 0.549_999_999_999_999_9, 0.001_234_567_8]
                 .into_iter()
@@ -97,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_of_a_range_are_told_apart() {
+    fn the_ends_of_a_range_are_distinct() {
         let said = [[0.6, 0.600_000_1], [0.6, 0.6], [1.0, 2.0]].map(|ends| span(ends, short));
         assert_eq!(said, ["0.6 to 0.6000001", "0.6 to 0.6", "1 to 2"]);
     }

@@ -1,4 +1,5 @@
-//! `sweep check GRID.toml`: every mistake, or what a run would do and about how long it would take.
+//! `sweep check GRID.toml`: reports every mistake in a grid file, or else the plan of the run and
+//! an estimate of its time.
 
 use std::fmt::Write as _;
 
@@ -15,7 +16,7 @@ use sweep_parameter::{Channel as _, Parameter as _, RatioLimits};
 /// Arguments of `sweep check`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The grid.
+    /// The grid file.
     #[command(flatten)]
     pub grid: GridArgs,
     /// Print the plan as JSON, with every default and constant in place
@@ -35,11 +36,11 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let estimate = M::estimate(&plan, threads::count(None, &threads::process)?)?;
     show(&summary(&plan, &estimate))?;
     let tried = estimate.sampled.values().sum::<u64>();
-    // A plan of which nothing can be computed is no plan to run.
+    // If every tried point fails, the run would be of no use.
     Ok(if tried > 0 && failed(&estimate.sampled) == tried { Exit::Failed } else { Exit::Done })
 }
 
-/// The plan in a few lines.
+/// Formats the plan and the estimate in a few lines.
 fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
@@ -75,7 +76,7 @@ fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let threads = counted(*threads, "thread");
     line("runs on", format!("{threads}, instruction set {simd}"));
     let tried = counted(estimate.sampled.values().sum::<u64>() as usize, "point");
-    line("takes", took(plan, estimate, &tried));
+    line("takes", time_words(plan, estimate, &tried));
     let [memory, disk, result] =
         [estimate.memory_bytes, estimate.disk_bytes, estimate.result_bytes].map(size);
     let disk = format!("on disk {disk} while it runs, and at most {result} for the result");
@@ -86,8 +87,8 @@ fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
     text
 }
 
-/// The time, and what it was reckoned from.
-fn took<M: Swept>(plan: &Plan<M>, estimate: &Estimate, tried: &str) -> String {
+/// Formats the estimated time and its basis.
+fn time_words<M: Swept>(plan: &Plan<M>, estimate: &Estimate, tried: &str) -> String {
     let part = match estimate.sampled_s {
         whole if whole >= plan.end_s => String::new(),
         part => {

@@ -1,4 +1,4 @@
-//! `sweep compare A B`: what differs between two results.
+//! `sweep compare A B`: reports the differences between two results.
 
 mod differences;
 mod fail_on;
@@ -47,7 +47,7 @@ pub struct Args {
     rows: u16,
 }
 
-/// What `--help` adds.
+/// The text that `--help` adds.
 const LONG: &str = "\
 Two rows are compared if their axes have the same values to nine digits; rows of only one file \
 are counted. An axis that only one file has is ignored if it has a single value. Files of \
@@ -82,7 +82,7 @@ pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Differences)).transpose()?;
     let found = compare(&tables[0], &tables[1])?;
     if let Some([given, of]) =
-        args.fail_on.iter().find_map(|fail_on| fail_on.lacks(&found, &tables))
+        args.fail_on.iter().find_map(|fail_on| fail_on.unmet_need(&found, &tables))
     {
         return Err(Error::option("--fail-on", given, of));
     }
@@ -94,9 +94,9 @@ pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
         output.finish(&differences::table(args, &found, &tables, build).into_bytes(path)?)?;
     }
     let broken: Vec<String> =
-        args.fail_on.iter().filter_map(|fail_on| fail_on.found(&found)).collect();
+        args.fail_on.iter().filter_map(|fail_on| fail_on.violation(&found)).collect();
     if args.json {
-        show(&format!("{:#}\n", in_json(args, &found, &broken)))?;
+        show(&format!("{:#}\n", to_json(args, &found, &broken)))?;
     } else if args.markdown {
         show(&markdown(args, &found, &broken))?;
     } else {
@@ -110,7 +110,7 @@ pub fn run(args: &Args, build: Build) -> Result<Exit, Error> {
     Ok(if broken.is_empty() { Exit::Done } else { Exit::NotHeld })
 }
 
-/// A value of a plan in a word or two.
+/// Formats a value of a plan, cut if it is long.
 fn brief(value: &Value) -> String {
     match value {
         Value::Null => "absent".to_owned(),
@@ -125,7 +125,7 @@ fn number(value: Option<f64>) -> String {
 }
 
 fn verdict(row: &SharedRow, limit_side: usize) -> &'static str {
-    // The verdicts follow from the flip: what one side was, the other was not.
+    // The flip determines the verdict of either side.
     match (row.flip, limit_side) {
         (Flip::Lost, 0) | (Flip::Gained, 1) => "reliable",
         (Flip::Lost, _) | (Flip::Gained, _) => "not",
@@ -133,17 +133,17 @@ fn verdict(row: &SharedRow, limit_side: usize) -> &'static str {
     }
 }
 
-/// What both files have, and how it changed if that is told.
+/// The cells of both files, and the change between them if it is shown.
 type Cells = ([String; 2], Option<String>);
 
-/// A heading with rows beneath: what every kind of output shows.
+/// A table with a title, which every output format shows.
 struct Listed {
     title: String,
     headings: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
-/// The lists of rows, those that are empty left out.
+/// Returns the tables of rows that differ, without empty ones.
 fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
     let most = usize::from(args.rows);
     let mut lists = Vec::new();
@@ -160,9 +160,9 @@ fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
         let headings = headings.take(rows[0].len()).map(str::to_owned).collect();
         lists.push(Listed { title, headings, rows });
     };
-    // Where a ratio can be too small, the least decides too.
+    // If results have a lower limit of ratios, the least ratio decides on the verdict too.
     let two_sided = found.columns.iter().any(|column| column.name == "ratio_min");
-    let of_verdict = |row: &SharedRow, side: usize| {
+    let verdict_cell = |row: &SharedRow, side: usize| {
         let ratio = match two_sided {
             true => format!("{} to {}", number(row.least_ratio[side]), number(row.ratio[side])),
             false => number(row.ratio[side]),
@@ -175,7 +175,7 @@ fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
     for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
         let title = format!("verdicts that flipped{which}: {}", found.flips(sensitive).count());
         let rows = found.flips(sensitive).take(most).collect();
-        list(title, rows, &|row| ([0, 1].map(|side| of_verdict(row, side)), None));
+        list(title, rows, &|row| ([0, 1].map(|side| verdict_cell(row, side)), None));
     }
     for (sensitive, which) in [(false, ""), (true, " of sensitive rows")] {
         let rows = found.greatest(most, sensitive, SharedRow::ratio_deviation);
@@ -195,7 +195,7 @@ fn lists(args: &Args, found: &Comparison) -> Vec<Listed> {
     lists
 }
 
-/// The greatest changes of a column that `--fail-on` names.
+/// Returns the table of the greatest changes of a column that `--fail-on` names.
 fn column_list(fail_on: &FailOn, found: &Comparison, most: usize) -> Option<Listed> {
     let FailOn::Column(name, _) = fail_on else { return None };
     let column = found.columns.iter().find(|column| column.name == *name)?;
@@ -215,7 +215,8 @@ fn column_list(fail_on: &FailOn, found: &Comparison, most: usize) -> Option<List
     (!rows.is_empty()).then_some(Listed { title, headings, rows })
 }
 
-/// How many rows and verdicts are shared.
+/// Returns the lines of the summary, each with a name: shared rows, columns, verdicts, the
+/// boundary.
 fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
     let mut facts = Vec::new();
     let [first, second] = found.unmatched_rows;
@@ -264,7 +265,7 @@ fn facts(found: &Comparison) -> Vec<(&'static str, String)> {
     facts
 }
 
-/// How far the boundary moved.
+/// Describes the shift of the boundary.
 fn boundary(moved: &BoundaryShift) -> String {
     let BoundaryShift { axis, unit, crossings, .. } = moved;
     let count = counted(crossings.len(), "crossing");
@@ -297,7 +298,7 @@ fn boundary(moved: &BoundaryShift) -> String {
     told
 }
 
-/// What differs, for people.
+/// Formats the differences as text.
 fn text(args: &Args, found: &Comparison) -> String {
     let mut text = String::new();
     text.line("A", args.first.display());
@@ -323,10 +324,11 @@ fn text(args: &Args, found: &Comparison) -> String {
     text
 }
 
-/// Places of the plan that people are shown.
+/// The maximum number of differences of the plans that are shown. Basis: half a screen. Doubling it
+/// shows twice as many.
 const PLAN_SHOWN: usize = 12;
 
-/// What differs, for a page.
+/// Formats the differences as Markdown.
 fn markdown(args: &Args, found: &Comparison, broken: &[String]) -> String {
     let names = [&args.first, &args.second].map(|path| code(&path.display().to_string()));
     let mut text = format!("### {} compared with {}\n\n", names[1], names[0]);
@@ -362,12 +364,12 @@ fn markdown(args: &Args, found: &Comparison, broken: &[String]) -> String {
     text
 }
 
-/// A text between backticks.
+/// Formats a text as Markdown code.
 fn code(text: &str) -> String {
     format!("`{}`", text.replace('`', "'"))
 }
 
-/// A text whose signs mean nothing in Markdown.
+/// Escapes the characters of a text that have a meaning in Markdown.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
@@ -379,8 +381,8 @@ fn escaped(text: &str) -> String {
     escaped
 }
 
-/// What differs, for programs.
-fn in_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
+/// Returns the differences as JSON.
+fn to_json(args: &Args, found: &Comparison, broken: &[String]) -> Value {
     let row = |row: &SharedRow| {
         let place: serde_json::Map<String, Value> =
             found.keys.iter().cloned().zip(row.key.iter().map(|value| json!(value))).collect();

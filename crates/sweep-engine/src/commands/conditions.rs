@@ -1,13 +1,13 @@
-//! Conditions as several subcommands take them.
+//! Parsing of conditions in the arguments of several subcommands.
 
 use crate::config::{Diagnostic, Diagnostics, Location, Report};
 use crate::exit::Error;
 use sweep_results::{Condition, ResultTable};
 
-/// Reads conditions over the columns of a file.
+/// Parses conditions on the columns of a file.
 ///
 /// # Errors
-/// Every mistake in them, pointed at.
+/// Every mistake, with its position.
 pub fn parse(
     option: &str,
     texts: &[String],
@@ -26,11 +26,14 @@ pub fn parse(
     report.finish(Some(parsed))
 }
 
-/// The condition of `--where`, which chooses rows.
+/// Parses the condition of `--where`, which selects rows.
 ///
 /// # Errors
-/// Mistakes in it; [`Error::Refused`] for one of the file as a whole.
-pub fn of_rows(text: Option<&String>, table: &ResultTable) -> Result<Option<Condition>, Error> {
+/// Mistakes in the condition; [`Error::Refused`] for a condition with functions over all rows.
+pub fn parse_filter(
+    text: Option<&String>,
+    table: &ResultTable,
+) -> Result<Option<Condition>, Error> {
     let condition = parse("--where", text.map_or(&[], std::slice::from_ref), table)?.pop();
     if let Some(Condition { text, .. }) = condition.as_ref().filter(|one| one.has_aggregates()) {
         let expected =

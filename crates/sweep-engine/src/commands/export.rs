@@ -1,4 +1,4 @@
-//! `sweep export FILE OUT`: a result in another format.
+//! `sweep export FILE OUT`: writes a result in another format.
 
 use std::path::{Path, PathBuf};
 
@@ -49,7 +49,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     Ok(Exit::Done)
 }
 
-/// `.csv or .xlsx`.
+/// Returns the endings of all formats in words: `.csv or .xlsx`.
 fn endings() -> String {
     ExportFormat::ALL.map(|format| format!(".{}", format.name())).join(" or ")
 }

@@ -1,4 +1,4 @@
-//! Arguments that several subcommands take.
+//! The arguments for a grid file and its result, which several subcommands share.
 
 use std::path::PathBuf;
 
@@ -29,43 +29,43 @@ pub struct GridArgs {
 }
 
 impl GridArgs {
-    /// What is set beside `--at`, in one list.
+    /// Returns the values of `--set` and `--ratio-limit` in one list.
     pub fn sets(&self) -> Vec<String> {
         let limit = self.ratio_limit.map(|limit| format!("ratio_limit={limit}"));
         self.sets.iter().cloned().chain(limit).collect()
     }
 
-    /// The grid with all changes but `--at`.
+    /// Returns the grid with all changes except those of `--at`.
     pub fn input<M: Read>(&self) -> GridInput<M> {
         GridInput::file(self.grid.clone(), self.sets()).with_name(self.name.clone())
     }
 
-    /// The plan.
+    /// Returns the plan with all changes, and shows the notes of reading it.
     ///
     /// # Errors
     /// Every mistake in the grid file and the constants.
     pub fn load<M: Read>(&self) -> Result<Plan<M>, Diagnostics> {
         let plan = self.input().with_fixed(&self.at).load()?;
-        self.tell_aside(&plan);
+        self.show_notes(&plan);
         Ok(plan)
     }
 
-    /// The plan at one point, with the values of its axes.
+    /// Returns the plan of one point, with the values of `at` by name.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// The errors of [`Self::load`].
     pub fn load_point<M: Read>(
         &self,
         at: &[String],
     ) -> Result<(Plan<M>, NamedValues), Diagnostics> {
         let (plan, at) = self.input().load_point(at)?;
-        self.tell_aside(&plan);
+        self.show_notes(&plan);
         Ok((plan, at))
     }
 
-    /// Tells what was noticed when the grid was read; and that `--set end_s` leaves the window
-    /// where the grid file puts it.
-    fn tell_aside<M: Read>(&self, plan: &Plan<M>) {
+    /// Shows the notes of reading the grid file, and a note if `--set end_s` leaves the end of the
+    /// window unchanged.
+    fn show_notes<M: Read>(&self, plan: &Plan<M>) {
         plan.aside.notes.iter().for_each(|note| tell(note));
         let is_set = |name| self.sets.iter().any(|set| name_of(set) == name);
         let ([from, to], end_s) = (plan.window_s, plan.end_s);
@@ -77,10 +77,10 @@ impl GridArgs {
     }
 }
 
-/// A grid and where its result goes, as the commands about runs take them.
+/// The arguments for a grid file and its result.
 #[derive(Debug, clap::Args)]
 pub struct ResultArgs {
-    /// The grid.
+    /// The grid file.
     #[command(flatten)]
     pub grid: GridArgs,
     /// Result file [default: results/NAME.parquet]
@@ -89,12 +89,12 @@ pub struct ResultArgs {
 }
 
 impl ResultArgs {
-    /// The result file.
+    /// Returns the path of the result.
     pub fn output<M: Read>(&self, plan: &Plan<M>) -> PathBuf {
         self.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{}.parquet", plan.name)))
     }
 
-    /// A command line about the same run, for a user to copy.
+    /// Returns a command line with these arguments, for the user to copy.
     pub fn command(&self, verb: &str) -> String {
         let grid = &self.grid;
         let shown = |path: &PathBuf| path.display().to_string();
@@ -108,14 +108,14 @@ impl ResultArgs {
     }
 }
 
-/// The command line of this process, to copy: it goes on, so `--fresh` is no part of it.
+/// Returns the command line of this process without `--fresh`, for the user to resume it.
 pub fn typed() -> String {
     let words = std::env::args_os().skip(1).filter(|word| word != "--fresh");
     let words = words.map(|word| quoted(&word.to_string_lossy()));
     std::iter::once(program().to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
-/// A word as a shell takes it.
+/// Quotes a word for the shell, if it needs quotes.
 pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/._-=:,+".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_command_to_copy_survives_the_shell() {
+    fn a_command_line_is_quoted_for_the_shell() {
         let grid = GridArgs {
             grid: "my grids/it's.toml".into(),
             sets: vec!["mass_kg=20".into()],

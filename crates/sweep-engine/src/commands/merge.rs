@@ -1,4 +1,4 @@
-//! `sweep merge GRID.toml`: finished shards into the one file.
+//! `sweep merge GRID.toml`: joins the finished shards of a run to its result.
 
 use super::run::{done, rows};
 use super::{Lines as _, ResultArgs, installed};
@@ -11,24 +11,24 @@ use std::path::Path;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    /// The run.
+    /// The grid file and the output of the run.
     pub target: ResultArgs,
     /// Exit with 3 if any row failed
     #[arg(long)]
     fail_on_error: bool,
 }
 
-/// Joins what the shards have left.
+/// Joins the shards of a grid's run.
 ///
 /// # Errors
-/// [`crate::store::StoreError::Incomplete`] with what is missing, and whatever else keeps it from
-/// its end.
+/// Mistakes in the grid file, [`crate::store::StoreError::Incomplete`] if chunks are missing, and
+/// other errors of the store.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     merge_job(args, &plan.name, &Job::new(&plan), &args.target.output(&plan))
 }
 
-/// Joins what the shards of a job have left.
+/// Joins the shards of a job.
 ///
 /// # Errors
 /// The errors of [`run`].

@@ -1,4 +1,4 @@
-//! `sweep optimise STUDY.toml`: the least of some numbers over some parameters.
+//! `sweep optimise STUDY.toml`: minimises numbers over parameters.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -43,7 +43,7 @@ pub struct Args {
     fresh: bool,
 }
 
-/// What `--help` adds.
+/// The text that `--help` adds.
 const LONG: &str = "\
 A study names a grid file, numbers to minimise or maximise, parameters with bounds, and \
 conditions as in `sweep require`. Every candidate is evaluated at all points of the grid. \
@@ -56,13 +56,14 @@ The file is a pure function of its input, whatever the number of threads and int
 interrupted search leaves its evaluations in FILE.partial, and the same command continues from \
 there.";
 
-/// Most candidates that the summary lists.
+/// The number of candidates at which the summary begins to leave some out. Basis: half a screen.
+/// Doubling it lists twice as many.
 const LISTED: usize = 12;
 
-/// Searches, and says what came of it.
+/// Runs the search of a study, and prints a summary.
 ///
 /// # Errors
-/// Mistakes in the study and its grid file, and whatever keeps a file from being written.
+/// Mistakes in the study and its grid file, and errors of evaluating candidates or writing a file.
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let study = Study::<M>::load(&args.study, &args.sets)?;
     let default = || PathBuf::from(format!("results/{}.parquet", study.name));
@@ -75,7 +76,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         Opened::Finished(()) => {
             let how = "it is there already (--fresh searches again)";
             let effort = args.effort.with(&interrupt);
-            return told(&study, args.candidate, own, &output, how, effort);
+            return summarise(&study, args.candidate, own, &output, how, effort);
         }
     };
     trials.take_notes().iter().for_each(|note| tell(note));
@@ -102,11 +103,12 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
         duration(wall_s),
         (candidates * rows) as f64 / wall_s
     );
-    told(&study, args.candidate, own, &output, &how, args.effort.with(&interrupt))
+    summarise(&study, args.candidate, own, &output, &how, args.effort.with(&interrupt))
 }
 
-/// How far a candidate is from breaking each condition, the one with the least slack first; beyond
-/// a limit the slack is negative.
+/// Returns a line for each condition with a candidate's slack: its distance from the limit,
+/// negative if the condition is violated. The least slack comes first. Returns `None` after an
+/// interrupt.
 fn slack_lines<M: Swept>(
     study: &Study<M>,
     values: &[f64],
@@ -126,9 +128,9 @@ fn slack_lines<M: Swept>(
     Ok(Some(text))
 }
 
-/// The candidate that is nearest to keeping the conditions, and what it breaks, where none keeps
-/// them: each excess over the greatest of all candidates, added. Nothing where no candidate has
-/// numbers.
+/// Describes the candidate with the least violation, and the conditions that it violates. The
+/// violation is the sum of the excesses over the conditions, each divided by the greatest excess of
+/// all candidates. Returns `None` if no candidate has all excesses.
 fn nearest<M: Swept>(study: &Study<M>, file: &ResultTable) -> Result<Option<String>, Error> {
     let names: Vec<String> = (1..=study.conditions.len()).map(|k| format!("excess_{k}")).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -173,7 +175,7 @@ fn own_output<'a, M: Swept>(
         return Err(Error::option("--candidate", candidate, expected));
     }
     let own = Output::begin(path, FileKind::Own)?;
-    // Neither may be there yet; the folders of both are.
+    // The files may not exist yet, so the paths of their folders are compared.
     let place =
         |path: &Path| Some(atomic::parent(path).canonicalize().ok()?.join(path.file_name()?));
     if place(path) == place(output) {
@@ -182,8 +184,9 @@ fn own_output<'a, M: Swept>(
     Ok(Some((path, own)))
 }
 
-/// The file's content in short, and the model's own file of a candidate if one is asked for.
-fn told<M: Swept>(
+/// Prints a summary of the file of candidates, and writes the model's own file of a candidate if it
+/// is requested.
+fn summarise<M: Swept>(
     study: &Study<M>,
     candidate: Option<u64>,
     own: Option<(&Path, Output<'_>)>,
@@ -202,8 +205,7 @@ fn told<M: Swept>(
     let mut feasible = 0;
     let mut front = Vec::new();
     let mut values = None;
-    // The least of the first objective before the last third and in it, and what that put on the
-    // front.
+    // The least value of the first objective before and in the last third of the candidates.
     let mut least = [f64::INFINITY; 2];
     let mut late = 0;
     let first_late = study.evolution.first_late();
@@ -271,7 +273,7 @@ fn told<M: Swept>(
     }
     let apart = front.len().div_ceil(LISTED).max(1);
     let is_best = |cells: &[Cell]| cells[0].number() == about["best"].as_f64();
-    // The best stands in the table wherever it lies on the front.
+    // The best candidate is always listed.
     let listed = front.iter().enumerate();
     let listed = listed.filter(|(k, cells)| k % apart == 0 || is_best(cells));
     let listed = listed.map(|(_, cells)| cells);
@@ -296,6 +298,6 @@ fn told<M: Swept>(
     text.line("file", output.display());
     text.next("plot", output);
     tell(text.trim_end());
-    // Nothing that keeps the conditions was found.
+    // An empty front means that no candidate is feasible.
     Ok(if front.is_empty() { Exit::NotHeld } else { Exit::Done })
 }

@@ -1,4 +1,4 @@
-//! `sweep parameters`: the parameter table, for reading or for programs.
+//! `sweep parameters`: prints the table of parameters, as text or JSON.
 
 use std::path::PathBuf;
 
@@ -49,7 +49,7 @@ fn as_text<M: Swept>(rows: &[Listed<M>]) -> String {
     rows.iter().map(line).collect()
 }
 
-/// The listing as JSON.
+/// Formats the table as JSON.
 pub fn as_json<M: Swept>(rows: &[Listed<M>]) -> String {
     let row = |row: &Listed<M>| {
         json!({
@@ -64,7 +64,8 @@ pub fn as_json<M: Swept>(rows: &[Listed<M>]) -> String {
     format!("{:#}\n", rows.iter().map(row).collect::<Value>())
 }
 
-/// Bounds of a range, `null` where there is none but the common greatest magnitude.
+/// Returns the bounds of a range as JSON, `null` for an end that only the common greatest magnitude
+/// limits.
 fn range(range: Range) -> Value {
     let [least, greatest] = range.bounds();
     json!({ "least": least, "greatest": greatest, "zero_excluded": range.excludes_zero() })

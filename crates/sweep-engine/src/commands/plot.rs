@@ -1,4 +1,4 @@
-//! `plot`: the figure that fits a file.
+//! `plot`: draws a figure of a file.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use sweep_files::beside;
 use sweep_plot::{CommonFigures, DesignView, Figures, PlotError, PlotOptions, render};
 use sweep_results::nearest;
 
-/// Arguments of `plot`, of a model with these views.
+/// The arguments of `plot` for a model with these views.
 #[derive(Debug, clap::Args)]
 pub struct Args<V: ValueEnum + Send + Sync + 'static = DesignView> {
     /// A result file
@@ -42,18 +42,18 @@ pub struct Args<V: ValueEnum + Send + Sync + 'static = DesignView> {
     pub boundary: Option<PathBuf>,
 }
 
-/// Draws the figure and says where it is.
+/// Draws the figure, and prints its path.
 ///
 /// # Errors
-/// As [`render`].
+/// The errors of [`render`], and a result that is not finished.
 pub fn run(args: &Args) -> Result<Exit, Error> {
     draw(args, PlotOptions { view: args.view, ..PlotOptions::default() }, &CommonFigures)
 }
 
-/// As [`run`], with what arguments of the model say further.
+/// Draws the figure with further options of a model and its own figures, and prints its path.
 ///
 /// # Errors
-/// As [`render`].
+/// The errors of [`render`], and a result that is not finished.
 pub fn draw<V: ValueEnum + Send + Sync>(
     args: &Args<V>,
     further: PlotOptions,
@@ -67,13 +67,13 @@ pub fn draw<V: ValueEnum + Send + Sync>(
         ..further
     };
     refuse_unfinished(&args.file)?;
-    render(&args.file, &options, model, &output).map_err(told_near)?;
+    render(&args.file, &options, model, &output).map_err(suggest_name)?;
     tell(&format!("wrote {}", output.display()));
     Ok(Exit::Done)
 }
 
-/// Adds the nearest valid name to the refusal of a misspelt one.
-fn told_near(error: PlotError) -> PlotError {
+/// Adds the nearest valid name to the error about an unknown one.
+fn suggest_name(error: PlotError) -> PlotError {
     let PlotError::NotThere { refusal, given, valid } = &error else { return error };
     match nearest(given, valid.iter().map(String::as_str)) {
         Some(near) => PlotError::Unfit(format!("{refusal}\n  = help: is `{near}` meant?")),

@@ -1,4 +1,4 @@
-//! `sweep report RESULT [FILE ...]`: one page to print, for whoever decides.
+//! `sweep report RESULT [FILE ...]`: writes a page to print with the verdicts of a result.
 
 use std::path::{Path, PathBuf};
 
@@ -69,7 +69,7 @@ pub fn run<M: Swept>(
     let mut body = format!("<header><h1>{question}</h1><p>{}</p></header>\n", escape(name));
     let tally = tally(file.file())?;
     let limits = ratio_limits(&plan);
-    // Nulls are counted as share() counts them: they are on neither side.
+    // Rows without a verdict count on neither side, as in share().
     let judged = tally.points.saturating_sub(tally.undefined);
     let share = 100.0 * tally.reliable as f64 / (judged as f64).max(1.0);
     let Tally { reliable, points, sensitive, undefined, over_estimated, .. } = &tally;
@@ -122,7 +122,7 @@ pub fn run<M: Swept>(
         body += &table(title.trim_end_matches(" at "), &heads, &found);
     }
     body += &about;
-    // A result holds its numbers, whoever wrote them.
+    // A result does not have the sources of its numbers.
     body += "<p>Where each number is from: sweep parameters, with the grid file.</p>\n";
     let hashes = [key::PLAN_HASH, key::VERSION, key::NUMERICS, key::DIGEST].into_iter();
     let hashes = hashes.filter_map(|key| Some((key, file.file().value(key)?)));
@@ -136,13 +136,13 @@ pub fn run<M: Swept>(
     Ok(if held { Exit::Done } else { Exit::NotHeld })
 }
 
-/// Whether an argument that names no file looks like an expression.
+/// Returns whether an argument looks like an expression and is not a file.
 fn is_expression(path: &Path) -> bool {
     let is_operator = |c: char| "<>=()".contains(c);
     !path.exists() && path.to_string_lossy().contains(is_operator)
 }
 
-/// What a reliable ratio is.
+/// Describes the range of reliable ratios.
 fn within(limits: RatioLimits) -> String {
     let most = short(limits.most);
     limits.least.map_or_else(
@@ -151,8 +151,9 @@ fn within(limits: RatioLimits) -> String {
     )
 }
 
-/// The worst value, its limit and its place, for every quantity that is bad one way, but those of
-/// the linear model. What has numbers, as of the second foot, is among those of all.
+/// Returns the worst value, its limit and its point for every column that has a worse side. Columns
+/// of the linear model are left out, and columns of numbered elements, whose extremes other columns
+/// have.
 fn worst(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
     let axes = file.axes();
     let mut found = Vec::new();
@@ -177,7 +178,7 @@ fn worst(file: &ResultTable) -> Result<Vec<Vec<String>>, Error> {
     Ok(found)
 }
 
-/// Values of the axes in words.
+/// Formats the values of the axes.
 fn place(file: &ResultTable, at: &[Cell]) -> String {
     let unit_of = |name: &str| file.column(name).map_or("", |column| column.unit.as_str());
     let axes = file.axes().into_iter().zip(at);
@@ -186,7 +187,7 @@ fn place(file: &ResultTable, at: &[Cell]) -> String {
     values.collect::<Vec<_>>().join(", ")
 }
 
-/// A number, which stays with its unit on one line.
+/// Joins a number and its unit by a space at which no line breaks.
 fn with_unit(text: String, unit: &str) -> String {
     match unit {
         "" => text,

@@ -1,4 +1,4 @@
-//! `sweep require FILE EXPRESSION ...`: a gate.
+//! `sweep require FILE EXPRESSION ...`: checks conditions on a result.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -37,7 +37,7 @@ pub struct Args {
     json: bool,
 }
 
-/// What `--help` adds.
+/// The text that `--help` adds.
 const LONG: &str = "\
 An expression compares columns (`sweep show FILE` lists them), numbers and texts in quotes by < <= \
 > >= == !=, joins comparisons by and, or, not, and calculates by + - * / and abs(). \
@@ -65,7 +65,7 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     refuse_unfinished(&args.file)?;
     let file = ResultTable::open(&args.file)?;
     let conditions = conditions::parse("EXPRESSION", &args.expressions, &file)?;
-    let keep = conditions::of_rows(args.keep.as_ref(), &file)?;
+    let keep = conditions::parse_filter(args.keep.as_ref(), &file)?;
     let shown = usize::from(args.rows);
     let is_random = is_random(&file);
     let checked = conditions
@@ -91,21 +91,21 @@ pub fn run(args: &Args) -> Result<Exit, Error> {
     Ok(if holds { Exit::Done } else { Exit::NotHeld })
 }
 
-/// An expression with what came of it.
+/// An expression with the result of its check.
 #[derive(Serialize)]
 struct Gate {
     #[serde(flatten)]
     whole: Checked,
-    /// For each function over all rows that is a share of points at random, the interval in which
-    /// the share of all such points lies with 95 % confidence.
+    /// The 95 % confidence interval of each function over all rows; `None` for functions other than
+    /// shares of random points.
     intervals: Vec<Option<[f64; 2]>>,
-    /// Of an expression that fails, what it joins by `and`.
+    /// The results of the parts that an expression joins by `and`, if the expression fails.
     parts: Vec<Checked>,
 }
 
-/// Returns whether a file's rows are points at random, so that a share of them is known to an
-/// interval. Points of a sequence or a hypercube are spread more evenly: their interval is no
-/// wider.
+/// Returns whether a design placed the points at random, so that a share of them has a confidence
+/// interval. Sobol points and Latin hypercubes are more even than random points, so that their
+/// interval is no wider.
 fn is_random(file: &ResultTable) -> bool {
     let method = file.plan.as_ref().and_then(|plan| plan["design"]["method"].as_str());
     method.is_some_and(|method| method != "list")
@@ -113,14 +113,14 @@ fn is_random(file: &ResultTable) -> bool {
 
 /// Computes Wilson's interval of every share.
 fn intervals(checked: &Checked, is_random: bool) -> Vec<Option<[f64; 2]>> {
-    let of = |(count, rows): (&Option<u64>, &u64)| {
+    let interval = |(count, rows): (&Option<u64>, &u64)| {
         let share = Share::wilson((*count)?, *rows).filter(|_| is_random)?;
         Some([share.low, share.high])
     };
-    checked.share_counts.iter().zip(&checked.folded_rows).map(of).collect()
+    checked.share_counts.iter().zip(&checked.folded_rows).map(interval).collect()
 }
 
-/// Checks what an expression that fails joins by `and`, each by itself.
+/// Checks each part that an expression joins by `and`, if the expression fails.
 fn parts(
     file: &ResultTable,
     condition: &Condition,
@@ -138,7 +138,7 @@ fn parts(
     Ok(checked.collect::<Result<Vec<_>, _>>()?)
 }
 
-/// What came of an expression, and of what it joins by `and` where it fails.
+/// Formats the result of an expression and of its parts.
 fn format_gate(args: &Args, gate: &Gate, is_random: bool) -> String {
     let mut text = format_checked(args, &gate.whole, &gate.intervals);
     for part in &gate.parts {
@@ -148,7 +148,7 @@ fn format_gate(args: &Args, gate: &Gate, is_random: bool) -> String {
     text
 }
 
-/// A share with its interval.
+/// Formats a value with its confidence interval, if it has one.
 fn with_interval(cell: &Cell, interval: Option<&Option<[f64; 2]>>) -> String {
     match interval {
         Some(Some([low, high])) => {
@@ -159,7 +159,7 @@ fn with_interval(cell: &Cell, interval: Option<&Option<[f64; 2]>>) -> String {
     }
 }
 
-/// What came of an expression: a line, and the rows that do not keep it.
+/// Formats the result of an expression: a line, and a table of the rows that violate it.
 fn format_checked(args: &Args, checked: &Checked, intervals: &[Option<[f64; 2]>]) -> String {
     let verdict = if checked.holds { "holds" } else { "FAILS" };
     let mut text = format!("{verdict}  {}", checked.expression);

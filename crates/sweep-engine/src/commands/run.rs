@@ -1,4 +1,4 @@
-//! `sweep run GRID.toml`: the sweep.
+//! `sweep run GRID.toml`: computes the rows of a grid.
 
 use std::path::Path;
 
@@ -14,21 +14,22 @@ use crate::{
 use sweep_parameter::RatioLimits;
 use sweep_plot::Share;
 
-/// Arguments of `sweep run`.
+/// The arguments of `sweep run`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The run.
+    /// The grid file and the output of the run.
     #[command(flatten)]
     pub target: ResultArgs,
-    /// How it is done.
+    /// The threads, the progress, the shard, and whether to start over.
     #[command(flatten)]
     pub work: WorkArgs,
 }
 
-/// How a run is done, by whichever engine.
+/// The arguments for the work of a run, which do not change its result: threads, progress, shard,
+/// and whether to start over.
 #[derive(Debug, clap::Args)]
 pub struct WorkArgs {
-    /// Its threads and progress.
+    /// The threads and the progress.
     #[command(flatten)]
     pub effort: EffortArgs,
     /// Compute only one of N equal shards, which `sweep merge` joins; `auto/N` takes the number
@@ -45,7 +46,7 @@ pub struct WorkArgs {
 }
 
 impl WorkArgs {
-    /// As the runner takes them.
+    /// Returns the options for the runner.
     fn options(&self) -> Result<RunOptions<'static>, Error> {
         Ok(RunOptions {
             threads: threads::count(self.effort.threads, &threads::process)?,
@@ -61,7 +62,7 @@ impl WorkArgs {
 /// Runs a grid.
 ///
 /// # Errors
-/// Mistakes in the grid file, and whatever kept the run from its end.
+/// Mistakes in the grid file, and the errors of [`execute`].
 pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     let engine = M::engine(&plan, None)?;
@@ -69,19 +70,19 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
     Ok(exit(&args.work, &report))
 }
 
-/// Signals, heeded from now on.
+/// Installs the signal handlers of this process.
 ///
 /// # Errors
-/// What the system refuses.
+/// Handlers that the system refuses.
 pub fn installed() -> Result<Interrupt, Error> {
     Interrupt::install().map_err(Error::signals)
 }
 
-/// Runs a plan, with an engine made for it, and prints a summary. `options` are what the command
-/// line has beside these arguments.
+/// Runs a plan by an engine that was made for it, and prints a summary. `options` are further
+/// arguments of the command line, which the summary repeats.
 ///
 /// # Errors
-/// Whatever of [`crate::store::StoreError`] kept it from its end; finished chunks are kept.
+/// Any [`crate::store::StoreError`]. Finished chunks are stored before.
 pub fn execute<M: Swept>(
     args: &Args,
     plan: &Plan<M>,
@@ -111,7 +112,7 @@ pub fn execute<M: Swept>(
     run.execute(engine, job, output, interrupt, &finished)
 }
 
-/// How a run ends the program.
+/// Returns the exit code of a run.
 pub fn exit(work: &WorkArgs, report: &RunReport) -> Exit {
     let by_status = match &report.ended {
         Ended::Interrupted { signal, .. } => return Exit::interrupted(Some(*signal)),
@@ -121,37 +122,38 @@ pub fn exit(work: &WorkArgs, report: &RunReport) -> Exit {
     done(work.fail_on_error, by_status)
 }
 
-/// How what is done ends the program.
+/// Returns the exit code of finished work, by the statuses of its rows.
 pub(super) fn done(fail_on_error: bool, by_status: &NameCounts) -> Exit {
     let is_failure = fail_on_error && failed(by_status) > 0;
     if is_failure { Exit::PointsFailed } else { Exit::Done }
 }
 
-/// A command that computes the rows of a file, as its summary speaks of it.
+/// A command that computes the rows of a file, with the words of its summary.
 pub struct RunCommand<'a> {
     /// The name of the run.
     pub name: &'a str,
-    /// The command.
+    /// The name of the command.
     pub verb: &'static str,
-    /// What its rows are called.
+    /// The plural noun for the rows.
     pub rows: &'static str,
-    /// The run.
+    /// The grid file and the output of the run.
     pub target: &'a ResultArgs,
-    /// How it is done.
+    /// The threads, the progress, the shard, and whether to start over.
     pub work: &'a WorkArgs,
-    /// Options beside the target's, to copy: those of the command, and those that tell `merge` the
-    /// same. Each begins with a space, or is empty.
+    /// Further arguments for the command lines in the summary: those of this command, and those of
+    /// `merge`. Each begins with a space, or is empty.
     pub options: [&'a str; 2],
 }
 
-/// Says what a finished file holds, where it is and what to do with it.
+/// A function that adds lines about a finished file to the summary: its content, its path, and the
+/// next command.
 type Finished<'a> = &'a dyn Fn(&mut String, &Tally) -> Result<(), Error>;
 
 impl RunCommand<'_> {
     /// Computes the rows and prints a summary.
     ///
     /// # Errors
-    /// Whatever keeps the file from being written; finished chunks are kept.
+    /// Errors of evaluating points or writing files. Finished chunks are stored before.
     pub fn execute(
         &self,
         engine: &dyn Engine,
@@ -166,7 +168,7 @@ impl RunCommand<'_> {
         Ok(report)
     }
 
-    /// What came of the run, in at most twelve lines.
+    /// Returns the summary of the run, at most twelve lines.
     fn summary(&self, report: &RunReport, finished: Finished<'_>) -> Result<String, Error> {
         let Self { name, rows, target, options: [own, merge_options], .. } = self;
         let session = report.session.as_ref();
@@ -203,7 +205,7 @@ impl RunCommand<'_> {
     }
 }
 
-/// What this process did.
+/// Describes the work of this process.
 fn work(session: &Session) -> String {
     let Session { simd, .. } = session;
     let wall = duration(session.wall_s);
@@ -213,7 +215,7 @@ fn work(session: &Session) -> String {
     format!("{points} in {wall}, {rate} on {threads} ({simd})")
 }
 
-/// A result's rows: verdicts, failures, extremes. At most six lines.
+/// Formats the counts of a result in at most six lines: verdicts, failures, extremes.
 pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
     if let Some(dwells) = &tally.dwells {
         let DwellCounts { stable, unstable, beyond, unknown } = dwells;
@@ -237,8 +239,8 @@ pub fn rows(tally: &Tally, job: &Job<'_>) -> String {
     counts(tally, job.limits, &at)
 }
 
-/// The share of reliable points among those with a verdict, with the interval in which the true
-/// share lies with 95 % confidence if points are independent and at random.
+/// Formats the share of reliable points among those with a verdict, with its 95 % confidence
+/// interval for independent random points.
 fn share(tally: &Tally) -> String {
     match Share::wilson(tally.reliable, tally.reliable + tally.unreliable) {
         None => "no point has a verdict".to_owned(),
@@ -251,7 +253,8 @@ fn share(tally: &Tally) -> String {
     }
 }
 
-/// As [`rows`], where `at` says where a point lies.
+/// Formats the counts of a result like [`rows`]. `at` returns the values of the axes at a point, in
+/// words.
 pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) -> String {
     let mut text = String::new();
     let percent = |count: u64| 100.0 * count as f64 / tally.points.max(1) as f64;
@@ -289,7 +292,7 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
     if let Some(greatest) = &tally.greatest_error {
         let methods: Vec<String> =
             tally.by_method.iter().map(|(method, count)| format!("{count} {method}")).collect();
-        // What failed has no finite one.
+        // Rows of failed models have an infinite error.
         let error = Some(greatest.value).filter(|error| error.is_finite());
         let left = error.map(|error| format!("at most {error:.1e} left in a row; "));
         let left = left.unwrap_or_default();
@@ -315,7 +318,7 @@ pub fn counts(tally: &Tally, limits: RatioLimits, at: &dyn Fn(u64) -> String) ->
     text
 }
 
-/// How many failed and why, if any did.
+/// Returns the number of failed rows of each status, in words; `None` if there are none.
 pub(super) fn failed_words(by_status: &NameCounts) -> Option<String> {
     let failed = failures(by_status).map(|(status, count)| format!("{count} {status}"));
     let failed = failed.collect::<Vec<_>>().join(", ");
@@ -328,7 +331,7 @@ mod tests {
     use crate::store::read::Extreme;
 
     #[test]
-    fn an_error_that_nothing_has_is_left_out() {
+    fn an_infinite_error_is_left_out() {
         let greatest_error = Some(Extreme { value: f64::INFINITY, point: 0 });
         let by_method = [("capped_1".to_owned(), 1)].into();
         let tally = Tally { points: 1, greatest_error, by_method, ..Tally::default() };
@@ -337,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn the_share_is_of_points_with_a_verdict() {
+    fn the_share_counts_only_points_with_a_verdict() {
         let tally = |reliable, unreliable| Tally { reliable, unreliable, ..Tally::default() };
         let said = share(&tally(8, 2));
         assert!(said.starts_with("80.0 % reliable, with 95 % confidence 49.0 to 94.3 %"), "{said}");

@@ -1,4 +1,4 @@
-//! `sweep show FILE`: what a Parquet file of this program holds.
+//! `sweep show FILE`: shows the content of a Parquet file.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -14,10 +14,11 @@ use sweep_files::{ParquetFile, key};
 use sweep_parameter::Worse;
 use sweep_results::{Cell, Condition, ResultTable, ratio_limits, top};
 
-/// Rows shown where none are asked for by number.
+/// The number of rows that are shown without `--top`.
 const ROWS_SHOWN: u16 = 10;
 
-/// Lines of one name that are shown.
+/// The maximum number of lines of one name that are shown. Basis: half a screen. Doubling it shows
+/// twice as many.
 const MOST_LISTED: usize = 12;
 
 /// Arguments of `sweep show`.
@@ -55,20 +56,20 @@ pub struct Args {
     json: bool,
 }
 
-/// What a model's files say beside what all do.
+/// The lines that a model adds to the summary of its files.
 pub struct Further<'a> {
-    /// Lines about a file that is no map, each with its name.
+    /// The function that returns lines about a file other than a map, each with a name.
     pub lines: &'a dyn Fn(&ParquetFile) -> Result<Vec<(&'static str, String)>, Error>,
-    /// Whether a column of a map is of a metric, and so is shown.
+    /// The function that returns whether a column of a map is that of a metric, and is shown.
     pub is_of_a_metric: fn(&str) -> bool,
 }
 
 impl Further<'_> {
-    /// Nothing.
+    /// No lines and no metrics.
     pub const NONE: Further<'static> =
         Further { lines: &|_| Ok(Vec::new()), is_of_a_metric: |_| false };
 
-    /// The lines about a file; of many of one name the first.
+    /// Returns the lines about a file, of lines of one name only the first.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -102,7 +103,7 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
     let opened = ParquetFile::open(&args.file)?;
     let file = overview(&opened)?;
     if args.json {
-        let mut said = in_json(args, &opened, &file)?;
+        let mut said = to_json(args, &opened, &file)?;
         said["lines"] = json!((further.lines)(&opened)?);
         return show(&format!("{said:#}\n"));
     }
@@ -146,7 +147,7 @@ pub fn run(args: &Args, further: &Further<'_>) -> Result<Exit, Error> {
     show(&text)
 }
 
-/// How far a run or a search without a result is.
+/// Formats the progress of a run or a search that has no result yet.
 fn progress(found: &Unfinished) -> String {
     let mut text = String::new();
     text.line("file", found.output.display());
@@ -163,10 +164,10 @@ fn progress(found: &Unfinished) -> String {
     text
 }
 
-/// Some rows of the file.
+/// Shows some rows of the file.
 fn rows(args: &Args) -> Result<Exit, Error> {
     let file = ResultTable::open(&args.file)?;
-    let keep = conditions::of_rows(args.keep.as_ref(), &file)?;
+    let keep = conditions::parse_filter(args.keep.as_ref(), &file)?;
     let columns = shown_columns(args, &file, keep.as_ref());
     let order = |by| match (args.ascending, args.descending) {
         (true, _) => Worse::Less,
@@ -190,8 +191,8 @@ fn rows(args: &Args) -> Result<Exit, Error> {
     show(&table(&columns, &rows, ""))
 }
 
-/// The columns to show of rows: those asked for, or where a row is, how its verdict came about, and
-/// what the order and the filter go by.
+/// Returns the columns of the rows to show: those of `--columns`, or else the axes, the verdict
+/// with its ratio, and the columns of `--by` and `--where`.
 fn shown_columns(args: &Args, file: &ResultTable, keep: Option<&Condition>) -> Vec<String> {
     if !args.columns.is_empty() {
         return args.columns.clone();
@@ -214,8 +215,8 @@ fn shown_columns(args: &Args, file: &ResultTable, keep: Option<&Condition>) -> V
     columns
 }
 
-/// Everything that the text says, and the whole plan.
-fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, Error> {
+/// Returns the content of the text as JSON, with the whole plan.
+fn to_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, Error> {
     let column = |column: &ColumnRange| {
         let counts = || column.names.iter().cloned().collect::<Value>();
         json!({
@@ -252,7 +253,7 @@ fn in_json(args: &Args, opened: &ParquetFile, file: &Overview) -> Result<Value, 
     Ok(said)
 }
 
-/// The points of the extremes that a summary names, in axis values.
+/// Reads the values of the axes at the points of the extremes.
 fn extremes_at(
     file: &ParquetFile,
     result: &ResultFile,
@@ -303,7 +304,7 @@ fn provenance(text: &mut String, result: &ResultFile) {
     }
 }
 
-/// A small JSON value on one line, as a person would write it.
+/// Formats a JSON value on one line, without quotes and brackets.
 fn brief(value: &Value) -> String {
     let list = |parts: Vec<String>| parts.join(", ");
     match value {
@@ -325,7 +326,8 @@ fn axes(plan: &Value) -> &[Value] {
     plan["axis"].as_array().map_or(&[], Vec::as_slice)
 }
 
-/// All columns with their units and ranges, or those of metrics and how many others there are.
+/// Adds lines about columns with their units and ranges: all columns, or those of metrics and the
+/// number of others.
 fn columns(text: &mut String, file: &Overview, all: bool, is_shown: fn(&str) -> bool) {
     text.line("rows", file.rows);
     let shown: Vec<&ColumnRange> =
@@ -361,7 +363,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_read_as_a_person_would_write_them() {
+    fn json_values_are_shown_without_quotes_and_brackets() {
         let spin = serde_json::json!({ "profile": "ramp", "peak": 350.0 });
         assert_eq!(brief(&spin), "peak 350, profile ramp");
         assert_eq!(brief(&serde_json::json!([1, 2.5])), "1, 2.5");

@@ -1,4 +1,4 @@
-//! `sweep status GRID.toml`: progress of a run.
+//! `sweep status GRID.toml`: shows the progress of a run.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::{Error, Exit, Job, Plan, Swept, show};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    /// The run.
+    /// The grid file and the output of the run.
     pub target: ResultArgs,
     /// Print the progress as JSON
     #[arg(long)]

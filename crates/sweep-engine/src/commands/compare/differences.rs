@@ -1,4 +1,4 @@
-//! The file of differences, which `sweep plot` draws.
+//! The file of the differences between two results, which `sweep plot` draws.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use sweep_files::key;
 use sweep_parameter::Worse;
 use sweep_results::{Comparison, ResultTable, SharedRow};
 
-/// The file of differences: one row per row that both have.
+/// Returns the table of differences, with one row for each row that both results have.
 pub(super) fn table(
     args: &Args,
     found: &Comparison,

@@ -1,4 +1,4 @@
-//! `--fail-on`: which differences a comparison may not have.
+//! The option `--fail-on`: differences that a comparison must not have.
 
 use std::str::FromStr;
 
@@ -6,7 +6,7 @@ use super::short;
 use sweep_files::CellKind;
 use sweep_results::{Comparison, ResultTable};
 
-/// What makes the comparison fail.
+/// A kind of difference that makes the comparison fail.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum FailOn {
     Any,
@@ -18,7 +18,7 @@ pub(super) enum FailOn {
     Ratio(f64),
     Gap(f64),
     Boundary(f64),
-    /// A column of numbers, and how far it may change.
+    /// A column of numbers, and the greatest change that is allowed.
     Column(String, f64),
 }
 
@@ -59,10 +59,14 @@ impl FromStr for FailOn {
 }
 
 impl FailOn {
-    /// Its name and the kind of files that it needs, where these are of another kind: the gate
-    /// would never close.
-    pub(super) fn lacks(&self, found: &Comparison, tables: &[ResultTable; 2]) -> Option<[&str; 2]> {
-        let (has, lacks) = match self {
+    /// Returns the name of the check and the files that it needs, if these files are of another
+    /// kind, so that the check could never fail.
+    pub(super) fn unmet_need(
+        &self,
+        found: &Comparison,
+        tables: &[ResultTable; 2],
+    ) -> Option<[&str; 2]> {
+        let (is_met, need) = match self {
             Self::Any | Self::Plan | Self::Rows => return None,
             Self::Flips => (found.has_verdicts, ["flips", "two files with verdicts"]),
             Self::Lost => (found.has_verdicts, ["lost", "two files with verdicts"]),
@@ -80,11 +84,11 @@ impl FailOn {
                 (has, [name.as_str(), "a column of numbers in both files that is no axis"])
             }
         };
-        (!has).then_some(lacks)
+        (!is_met).then_some(need)
     }
 
-    /// The differences that it forbids, in words; `None` without any.
-    pub(super) fn found(&self, found: &Comparison) -> Option<String> {
+    /// Describes the forbidden differences between the files; `None` if there are none.
+    pub(super) fn violation(&self, found: &Comparison) -> Option<String> {
         let steady = || found.shared.iter().filter(|row| !row.sensitive);
         let counted = |what: &str, count: usize| (count > 0).then(|| format!("{what}: {count}"));
         match self {
@@ -138,7 +142,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_makes_it_fail_is_read_as_documented() {
+    fn values_of_fail_on_are_parsed() {
         assert_eq!("flips".parse(), Ok(FailOn::Flips));
         assert_eq!("ratio=0.05".parse(), Ok(FailOn::Ratio(0.05)));
         assert_eq!("boundary=2".parse(), Ok(FailOn::Boundary(2.0)));
