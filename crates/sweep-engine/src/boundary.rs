@@ -71,7 +71,7 @@ named! {
     pub enum EdgeKind {
         /// The quantity passes its limit continuously within the bracket.
         Crossing = "crossing",
-        /// The quantity leaps over its limit within the bracket, however closely one looks.
+        /// The quantity jumps over its limit within the bracket.
         Jump = "jump",
         /// On one side of the bracket the quantity is not defined (a model failed, or there is
         /// nothing to compare).
@@ -85,7 +85,7 @@ named! {
     }
 }
 
-/// A place where the side changes, or the news that there is none.
+/// An edge: a position at which the side changes, or the statement that there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
     /// The kind.

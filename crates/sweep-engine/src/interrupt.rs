@@ -23,8 +23,8 @@ pub fn survive_file_size_limits() -> io::Result<()> {
     Ok(())
 }
 
-/// Draws the random numbers that the standard library's maps begin with, while a failure can be
-/// told: later it would be a panic.
+/// Draws the random numbers that the standard library's hash maps need, so that a failure is an
+/// error at the start and not a panic later.
 ///
 /// # Errors
 /// A system that gives none.

@@ -2,10 +2,9 @@
 //!
 //! 1. Open or create the run's folder, and find the missing chunks.
 //! 2. Have the engine evaluate their rows on all cores.
-//! 3. Write each chunk as a part when its rows are complete, and at the end the rows of incomplete
-//!    chunks,
-//!    which a signal or an error leaves.
-//! 4. Join their parts to the result file.
+//! 3. Write each chunk as a part when it is complete. After a signal or an error, write the rows of
+//!    incomplete chunks too.
+//! 4. Join the parts to the result.
 //!
 //! Memory: at most a chunk for each thread (4096 points, about 2 MB) and as many that wait for the
 //! disk, then about 40 MB for the join. Only the set of missing chunks grows with the number of
@@ -53,9 +52,9 @@ pub struct RunOptions<'a> {
 /// The end of a run, other than an error.
 #[derive(Debug)]
 pub enum Ended {
-    /// The output existed already.
+    /// The result existed already.
     Already(Box<ResultFile>, Box<Tally>),
-    /// The output was completed.
+    /// The run was completed.
     Finished(Box<Tally>),
     /// The shard was completed, with these numbers of rows by status. `sweep merge` joins all
     /// shards.

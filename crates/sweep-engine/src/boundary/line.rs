@@ -9,15 +9,16 @@ use super::itp::Itp;
 use super::sample::{LimitSide, LineSample, SideInterval, Span};
 use super::{Edge, EdgeKind};
 
-/// Change of the distance over a bracket within tolerance that may be a jump: a factor of 1.5 in a
-/// ratio. Basis: the next decision of a reader changes with the ratio by so much, whatever the
-/// place. Doubling it reports jumps by up to a factor of 2.25 as crossings.
-const JUMP: f64 = 0.405;
-/// Width of a bracket, in tolerances, in which a change by [`JUMP`] is a jump. Basis: a crossing as
-/// steep is located to a sixteenth of what is asked. Doubling it saves one trial per jump.
+/// The change of the distance over a narrow bracket above which the edge is a jump. Basis: ln 1.5,
+/// a factor of 1.5 in a ratio, which changes a reader's decision. Doubling it reports jumps by a
+/// factor of up to 2.25 as crossings.
+const JUMP_LN_RATIO: f64 = 0.405;
+/// The width, in tolerances, to which a bracket that may contain a jump is narrowed. Basis: a steep
+/// crossing in it is then located to a sixteenth of the tolerance. Doubling it saves one trial per
+/// jump.
 const JUMP_WIDTH: f64 = 1.0 / 16.0;
 
-/// A line in the making.
+/// The search along a line.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LineSearch {
     /// The samples in order of position, no two at the same.
@@ -110,7 +111,7 @@ impl LineSearch {
         let mut places = Vec::new();
         for gap in marks.windows(2) {
             let width = gap[1] - gap[0];
-            // Rounding is no reason for one more.
+            // Rounding must not add a piece.
             let pieces = libm::ceil(width / widest - 1e-6);
             let cuts = (1..pieces as usize).map(|k| gap[0] + width * (k as f64 / pieces));
             places.extend(cuts.filter(is_new));
@@ -147,7 +148,8 @@ impl LineSearch {
         let mut edges = Vec::new();
         for [low, high] in self.changes() {
             let is_narrow = high.at - low.at <= span.tolerance;
-            let is_jump = |change: f64| !change.is_finite() || (change.abs() > JUMP && is_narrow);
+            let is_jump =
+                |change: f64| !change.is_finite() || (change.abs() > JUMP_LN_RATIO && is_narrow);
             let kind = match (low.distance, high.distance) {
                 (Some(at_low), Some(at_high)) if is_jump(at_low - at_high) => EdgeKind::Jump,
                 (Some(_), Some(_)) => EdgeKind::Crossing,
@@ -180,11 +182,11 @@ fn is_open(low: &LineSample, high: &LineSample, span: &Span) -> bool {
     let middle = 0.5 * (low.at + high.at);
     let may_jump = match (low.finite_distance(), high.finite_distance()) {
         (Some(at_low), Some(at_high)) => {
-            (at_low - at_high).abs() > JUMP && width > JUMP_WIDTH * span.tolerance
+            (at_low - at_high).abs() > JUMP_LN_RATIO && width > JUMP_WIDTH * span.tolerance
         }
         _ => false,
     };
-    // Rounding ends it too.
+    // A bracket whose middle rounds to one of its ends cannot be narrowed.
     (width > span.tolerance || may_jump) && low.at < middle && middle < high.at
 }
 

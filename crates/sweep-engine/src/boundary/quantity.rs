@@ -12,7 +12,7 @@ use crate::{Error, Plan, Swept, nearest};
 
 /// The prefix of the columns of ratios.
 const RATIO: &str = "ratio_";
-/// The column of the least ratio.
+/// The name of the column of the least ratio.
 const LEAST_RATIO: &str = "ratio_min";
 
 /// A quantity with a limit, named as its column in a result file.
@@ -35,7 +35,7 @@ pub struct TracedQuantity {
 pub enum Scale {
     /// The logarithm of the quantity over its limit.
     Logarithm,
-    /// The difference over this.
+    /// The difference, divided by this number.
     Over(f64),
 }
 
@@ -45,7 +45,8 @@ impl TracedQuantity {
         match (self.scale, self.worse) {
             (Scale::Logarithm, worse) => {
                 let distance = worse.excess(libm::log(value / self.limit), 0.0);
-                // A ratio one rounding on the good side of the limit is still there.
+                // A ratio on the good side of the limit stays there, even if its logarithm rounds
+                // to 0.
                 let is_good = worse.excess(value, self.limit) < 0.0;
                 if is_good { distance.min(-f64::MIN_POSITIVE) } else { distance }
             }
@@ -63,11 +64,10 @@ impl TracedQuantity {
     }
 }
 
-/// Returns every column that a boundary of this plan can be drawn through, each with the plan that
-/// computes it: a channel is compared even if the grid file leaves it out, and so is a metric
-/// measured that the model can have.
+/// Returns every column whose limit can be traced, each with a plan that computes it. This includes
+/// channels and metrics that the grid file leaves out.
 pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
-    // A search of one channel does not make sure of the others.
+    // The plan of a channel's columns compares this channel alone.
     let channel_plan = |channel: &M::Channel| {
         let mut plan = plan.clone();
         plan.reliability.channels = vec![*channel];
@@ -88,7 +88,7 @@ pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
             }
         }
     }
-    // The verdict's ratios foremost.
+    // The ratios that decide on the verdict come first.
     offered.sort_by_key(|(column, _)| !["ratio_max", LEAST_RATIO].contains(&&*column.name));
     offered
 }
@@ -194,9 +194,10 @@ fn plans_by_columns<M: Swept>(plan: &Plan<M>) -> Vec<Plan<M>> {
     plans
 }
 
-/// Computes the number of an expression in a row. A condition's is its margin: the distance of its
-/// comparisons from turning, over their greater operands, negative where it does not hold; 1 and -1
-/// where it compares no numbers.
+/// Computes the value of an expression in a row. For a condition this is its margin: the distance
+/// of its operands as a share of the greater one, negative where the condition does not hold. Of
+/// several comparisons the one that decides counts; a condition that compares no numbers has 1 or
+/// -1.
 ///
 /// # Errors
 /// A batch without the columns of the expression.
@@ -218,8 +219,8 @@ fn channel_columns(name: &str) -> [String; 3] {
     [RATIO, "nonlinear_", "linear_"].map(|kind| format!("{kind}{name}"))
 }
 
-/// Returns the column of this name at a limit, its own if none is given, and the plan that computes
-/// it.
+/// Returns the column of this name as a quantity, and the plan that computes it. The limit is the
+/// column's own if none is given.
 ///
 /// # Errors
 /// A column that the plan's rows cannot have, or that has no limit of its own where none is given.

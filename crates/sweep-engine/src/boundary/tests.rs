@@ -196,10 +196,10 @@ fn a_narrow_dip_beside_the_crossing_is_found_and_followed() {
 }
 
 #[test]
-fn a_pocket_that_ends_between_two_rows_is_found_in_the_last_that_has_it() {
-    // The region is like that over damper 1's height on the cabinet and damping: reliable from a
-    // line that bends up at the lowest heights to one that leaves the range at 0.125 m, is at 180 N
-    // s/m at 0.1125 m, and meets the other line at 0.1 m.
+fn a_pocket_that_ends_between_rows_is_found_up_to_its_last_row() {
+    // The axes are the height of damper 1 on the cabinet and the damping. The reliable region lies
+    // between two lines. The lower one rises steeply at the lowest heights; the upper one leaves
+    // the range at 0.125 m, is at 180 N s/m at 0.1125 m, and meets the lower one at 0.1 m.
     let heights: Vec<f64> = (0..17).map(|k| 0.1 + 0.0125 * f64::from(k)).collect();
     let bottom = |height: f64| 97.0 + 0.3 / (height - 0.09);
     let pocket = |height: f64, damping: f64| {

@@ -234,7 +234,7 @@ impl<'a> Block<'a> {
             let Some(own) = self.neighbour(curve, rank) else { continue };
             let mut places = Vec::new();
             for step in [-1, 1] {
-                let at_offset = |by| self.neighbour(curve, rank.checked_add_signed(by)?);
+                let at_offset = |offset| self.neighbour(curve, rank.checked_add_signed(offset)?);
                 let Some(neighbour) = at_offset(step) else { continue };
                 let pair = LinePair { own, neighbour, beyond: at_offset(2 * step) };
                 for interval in pair.disputed(self.cell, &self.span) {

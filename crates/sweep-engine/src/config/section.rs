@@ -376,7 +376,7 @@ struct RemovedWord {
     reason: &'static str,
 }
 
-/// |/// The words that were removed.
+/// The words that were removed.
 const REMOVED_WORDS: [RemovedWord; 1] = [RemovedWord {
     key: "method",
     word: "rodas5p",

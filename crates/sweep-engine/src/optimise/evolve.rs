@@ -67,14 +67,14 @@ impl Candidate {
     }
 }
 
-/// Returns all candidates in order. `ask` evaluates whole generations of positions; all numbers are
-/// minimised. Equal numbers lead to equal positions.
+/// Returns all candidates in order. `evaluate` returns the numbers of a generation of positions. All
+/// numbers are minimised, and equal numbers lead to equal positions.
 ///
 /// # Errors
-/// The errors of `ask`.
+/// The errors of `evaluate`.
 pub fn evolve<E>(
     evolution: &Evolution,
-    ask: &mut dyn FnMut(&[Vec<f64>]) -> Result<Vec<Option<Vec<f64>>>, E>,
+    evaluate: &mut dyn FnMut(&[Vec<f64>]) -> Result<Vec<Option<Vec<f64>>>, E>,
 ) -> Result<Vec<Candidate>, E> {
     let Evolution { parameters, objectives, population, candidates, seed } = *evolution;
     let mut tried: Vec<Candidate> = Vec::new();
@@ -98,7 +98,7 @@ pub fn evolve<E>(
             mutant(&tried, &members, (k as usize, near), number, evolution)
         };
         let places: Vec<Vec<f64>> = (0..count).map(place).collect();
-        let answers = ask(&places)?;
+        let answers = evaluate(&places)?;
         let trials = places.into_iter().zip(answers);
         tried.extend(trials.map(|(place, answers)| Candidate { place, answers, generation }));
         if generation == 0 {
@@ -172,7 +172,7 @@ struct Ranks<'a> {
     tried: &'a [Candidate],
     objectives: usize,
     /// The sum of each candidate's violations, each divided by the greatest of all candidates.
-    broken: Vec<f64>,
+    violations: Vec<f64>,
 }
 
 impl<'a> Ranks<'a> {
@@ -182,13 +182,13 @@ impl<'a> Ranks<'a> {
         let greatest: Vec<f64> = (0..conditions)
             .map(|k| excesses().map(|all| all[k]).fold(f64::MIN_POSITIVE, f64::max))
             .collect();
-        let broken = |one: &Candidate| match &one.answers {
+        let violation = |one: &Candidate| match &one.answers {
             Some(all) => {
                 all[objectives..].iter().zip(&greatest).map(|(own, most)| own / most).sum()
             }
             None => f64::INFINITY,
         };
-        Self { tried, objectives, broken: tried.iter().map(broken).collect() }
+        Self { tried, objectives, violations: tried.iter().map(violation).collect() }
     }
 
     fn objectives(&self, candidate: usize) -> &[f64] {
@@ -197,7 +197,7 @@ impl<'a> Ranks<'a> {
 
     /// Compares two candidates: `Less` if the first is better, `None` if neither dominates.
     fn compare(&self, first: usize, second: usize) -> Option<Ordering> {
-        let [a, b] = [self.broken[first], self.broken[second]];
+        let [a, b] = [self.violations[first], self.violations[second]];
         if a > 0.0 || b > 0.0 {
             return Some(a.total_cmp(&b));
         }
@@ -259,23 +259,23 @@ mod tests {
     use super::*;
 
     fn tried(evolution: Evolution, answer: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Vec<Candidate> {
-        let mut ask = |places: &[Vec<f64>]| {
+        let mut evaluate = |places: &[Vec<f64>]| {
             Ok::<_, Infallible>(places.iter().map(|place| answer(place)).collect())
         };
-        let Ok(tried) = evolve(&evolution, &mut ask);
+        let Ok(tried) = evolve(&evolution, &mut evaluate);
         assert_eq!(tried.len() as u64, evolution.candidates);
         assert!(tried.iter().flat_map(|one| &one.place).all(|x| (0.0..=1.0).contains(x)));
         tried
     }
 
-    const ONE: Evolution =
+    const SEARCH: Evolution =
         Evolution { parameters: 2, objectives: 1, population: 32, candidates: 1500, seed: 1 };
 
     #[test]
     fn rosenbrocks_function_is_minimised() {
         // The function is Rosenbrock's in [-2, 2], with its minimum at (1, 1): (0.75, 0.75) of the
         // box.
-        let found = tried(ONE, |at| {
+        let found = tried(SEARCH, |at| {
             let [x, y] = [4.0 * at[0] - 2.0, 4.0 * at[1] - 2.0];
             Some(vec![(1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2)])
         });
@@ -284,9 +284,9 @@ mod tests {
     }
 
     #[test]
-    fn the_minimum_satisfies_constraints_and_has_numbers() {
+    fn the_minimum_is_feasible_and_has_objectives() {
         // The minimum of x + y with x y >= 0.25 is at (0.5, 0.5); there are no numbers for x > 0.9.
-        let found = tried(ONE, |at| {
+        let found = tried(SEARCH, |at| {
             let number = vec![at[0] + at[1], (0.25 - at[0] * at[1]).max(0.0)];
             (at[0] <= 0.9).then_some(number)
         });
@@ -299,8 +299,8 @@ mod tests {
     #[test]
     fn a_pareto_front_is_covered_from_end_to_end() {
         // The problem is Schaffer's, with the front from x = 0 to 2, where sqrt(f) + sqrt(g) = 2.
-        let two = Evolution { parameters: 1, objectives: 2, ..ONE };
-        let found = tried(two, |at| {
+        let two_objectives = Evolution { parameters: 1, objectives: 2, ..SEARCH };
+        let found = tried(two_objectives, |at| {
             let x = 20.0 * at[0] - 10.0;
             Some(vec![x * x, (x - 2.0) * (x - 2.0)])
         });
@@ -318,7 +318,7 @@ mod tests {
         // Without trials from the best candidate the median of these exceeds 1e-4.
         let bowl = |at: &[f64]| (at[0] - 0.3).powi(2) + 3.0 * (at[1] - 0.6).powi(2);
         let least = |seed| {
-            let short = Evolution { candidates: 256, seed, ..ONE };
+            let short = Evolution { candidates: 256, seed, ..SEARCH };
             let found = tried(short, |at| Some(vec![bowl(at)]));
             bowl(&found[front(&found, 1)[0]].place)
         };
@@ -330,8 +330,8 @@ mod tests {
     #[test]
     fn equal_answers_lead_to_equal_candidates() {
         let sphere = |at: &[f64]| Some(vec![at.iter().map(|x| x * x).sum()]);
-        let short = Evolution { candidates: 150, ..ONE };
-        assert_eq!(tried(ONE, sphere)[..100], tried(short, sphere)[..100]);
+        let short = Evolution { candidates: 150, ..SEARCH };
+        assert_eq!(tried(SEARCH, sphere)[..100], tried(short, sphere)[..100]);
         assert_ne!(tried(short, sphere), tried(Evolution { seed: 2, ..short }, sphere));
     }
 }

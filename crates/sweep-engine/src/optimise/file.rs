@@ -76,7 +76,7 @@ fn excess_name(condition: usize) -> String {
     format!("excess_{}", condition + 1)
 }
 
-/// The parameters of a study.
+/// Returns the axes of a study's parameters.
 pub fn parameters<M: Rows>(study: &Study<M>) -> &[Axis<M>] {
     &study.plan.axes[study.grid.axes.len()..]
 }

@@ -154,18 +154,18 @@ impl<'t> TableLayout<'t> {
         let by_line = |line: &TextLine<'_>| stated.unwrap_or_else(|| separator(line.text));
         let words = |line: &TextLine<'_>| line.cells(WHITE_SPACE).count();
         // A single name may have several words; cells separated by spaces are so in every row.
-        let by = |k: usize| match by_line(&first[k]) {
+        let separator_at = |k: usize| match by_line(&first[k]) {
             WHITE_SPACE if first.get(k + 1).map(words) != Some(words(&first[k])) => ',',
             found => found,
         };
         // The best line has known names and stands above rows of numbers; others serve if there is
         // none.
         let rank = |k: usize| {
-            let by = by(k);
-            let Some(cells) = texts(first[k], by) else { return (0, false, 0) };
+            let separator = separator_at(k);
+            let Some(cells) = texts(first[k], separator) else { return (0, false, 0) };
             let known =
                 cells.into_iter().filter(|cell| !is_number(cell) && names.has(cell)).count();
-            (known.min(1), is_above_rows(&first[k..], by), known)
+            (known.min(1), is_above_rows(&first[k..], separator), known)
         };
         let mut place = 0;
         let mut best = rank(0);
@@ -183,7 +183,7 @@ impl<'t> TableLayout<'t> {
         if let Some(commented) = commented_header(text, header, &by_line) {
             return Ok(Some(commented));
         }
-        let separator = by(place);
+        let separator = separator_at(place);
         let below = first.get(place + 1);
         let count = texts(header, separator).map_or(0, |names| names.len());
         let units = below.and_then(|line| units(*line, separator, count));
@@ -193,7 +193,7 @@ impl<'t> TableLayout<'t> {
             header,
             units: units.unwrap_or_default(),
             notation: None,
-            rows: after(text, last),
+            rows: end_of_line(text, last),
             is_labview: false,
             preamble: place,
         }))
@@ -237,7 +237,7 @@ impl<'t> TableLayout<'t> {
         let Some(header) = first.get(end + 1).copied() else {
             return Err("it is a LabVIEW file without signals".to_owned());
         };
-        let rows = after(text, header);
+        let rows = end_of_line(text, header);
         if text[rows..].contains(END) {
             return Err(SEGMENTS.to_owned());
         }
@@ -270,12 +270,12 @@ fn commented_header<'t>(
     let names = line.text.trim_start().strip_prefix('#')?;
     let offset = line.offset + line.text.len() - names.len();
     let header = TextLine { start, text: names, offset };
-    let by = separator(&header);
-    let count = texts(header, by)?.len();
-    let numbers = texts(row, by)?;
+    let separator = separator(&header);
+    let count = texts(header, separator)?.len();
+    let numbers = texts(row, separator)?;
     let is_row = numbers.len() == count && numbers.into_iter().all(is_number);
     is_row.then_some(TableLayout {
-        separator: by,
+        separator,
         header,
         units: Vec::new(),
         notation: None,
@@ -293,7 +293,7 @@ fn texts(line: TextLine<'_>, separator: char) -> Option<Vec<&str>> {
 }
 
 /// Returns the byte after a line.
-fn after(text: &str, line: TextLine<'_>) -> usize {
+fn end_of_line(text: &str, line: TextLine<'_>) -> usize {
     let end = text[line.start..].find('\n');
     end.map_or(text.len(), |end| line.start + end + 1)
 }
@@ -323,7 +323,9 @@ fn separator(line: &str) -> char {
 /// Returns whether a cell is a number in any notation.
 fn is_number(cell: &str) -> bool {
     cell.contains(|letter: char| letter.is_ascii_digit())
-        && [Notation::POINT, Notation::COMMA].into_iter().any(|by| by.number(cell).is_some())
+        && [Notation::POINT, Notation::COMMA]
+            .into_iter()
+            .any(|notation| notation.number(cell).is_some())
 }
 
 /// Returns whether the first of these lines has as many names as the next row has numbers.

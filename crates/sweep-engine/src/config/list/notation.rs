@@ -71,7 +71,7 @@ impl Notation {
             return cell.parse().ok();
         }
         let cell = ungrouped(cell);
-        let thousands = other(self.decimal);
+        let thousands = other_mark(self.decimal);
         match mark_evidence(&cell) {
             MarkEvidence::Nothing if cell.contains(MARKS) => None,
             MarkEvidence::Decimal(mark) if mark != self.decimal => None,
@@ -94,7 +94,7 @@ impl NotationEvidence {
             MarkEvidence::Thousands(mark) => (&mut self.thousands, mark),
             MarkEvidence::Either(mark) => (&mut self.either, mark),
         };
-        kinds[place(mark)].get_or_insert_with(|| Evidence { cell: cell.to_owned(), at });
+        kinds[mark_index(mark)].get_or_insert_with(|| Evidence { cell: cell.to_owned(), at });
     }
 
     /// Returns the notation in which every cell is a number. `has_commas` says that commas separate
@@ -130,13 +130,13 @@ impl Evidence {
 }
 
 /// Returns the index of a mark in [`MARKS`].
-fn place(mark: char) -> usize {
+fn mark_index(mark: char) -> usize {
     usize::from(mark == MARKS[1])
 }
 
 /// Returns the mark of thousands for a decimal mark.
-fn other(mark: char) -> char {
-    MARKS[1 - place(mark)]
+fn other_mark(mark: char) -> char {
+    MARKS[1 - mark_index(mark)]
 }
 
 /// Returns the evidence of a cell.
@@ -155,8 +155,8 @@ fn mark_evidence(cell: &str) -> MarkEvidence {
         let is_whole = !has_exponent && is_grouped(mantissa, mark);
         return if is_whole { MarkEvidence::Thousands(mark) } else { MarkEvidence::Nothing };
     }
-    if before.contains(other(mark)) {
-        let is_number = is_grouped(before, other(mark));
+    if before.contains(other_mark(mark)) {
+        let is_number = is_grouped(before, other_mark(mark));
         return if is_number { MarkEvidence::Decimal(mark) } else { MarkEvidence::Nothing };
     }
     match is_digits(before) {

@@ -3,17 +3,17 @@
 /// A conversion factor as a quotient, so that 300 g are exactly 0.3 kg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct UnitScale {
-    times: f64,
-    by: f64,
+    numerator: f64,
+    denominator: f64,
 }
 
 impl UnitScale {
     /// The factor between equal units.
-    pub(super) const ONE: Self = Self { times: 1.0, by: 1.0 };
+    pub(super) const ONE: Self = Self { numerator: 1.0, denominator: 1.0 };
 
     /// Converts a number to the other unit.
     pub(super) fn apply(self, value: f64) -> f64 {
-        value * self.times / self.by
+        value * self.numerator / self.denominator
     }
 }
 
@@ -27,10 +27,10 @@ struct UnitEntry {
 const fn unit(
     names: &'static [&'static str],
     base: &'static str,
-    times: f64,
-    by: f64,
+    numerator: f64,
+    denominator: f64,
 ) -> UnitEntry {
-    UnitEntry { names, base, size: UnitScale { times, by } }
+    UnitEntry { names, base, size: UnitScale { numerator, denominator } }
 }
 
 /// Standard gravity, the unit of accelerometers (m/s^2), exact by definition.
@@ -125,7 +125,10 @@ pub(super) fn scale(from: &str, to: &str) -> Option<UnitScale> {
     if from.size == to.size {
         return Some(UnitScale::ONE);
     }
-    Some(UnitScale { times: from.size.times * to.size.by, by: from.size.by * to.size.times })
+    Some(UnitScale {
+        numerator: from.size.numerator * to.size.denominator,
+        denominator: from.size.denominator * to.size.numerator,
+    })
 }
 
 /// The endings of names for each base unit.
