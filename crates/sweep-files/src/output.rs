@@ -229,8 +229,8 @@ mod tests {
                     Output::begin(&path, kind).unwrap().finish(b"new").unwrap();
                     assert_eq!(fs::read(&path).unwrap(), b"new");
                 } else {
-                    let said = refusal(&path, kind);
-                    assert!(said.contains(kind.name()), "{said}");
+                    let message = refusal(&path, kind);
+                    assert!(message.contains(kind.name()), "{message}");
                     assert!(fs::read(&path).unwrap() == before);
                 }
             }
@@ -272,16 +272,16 @@ mod tests {
     #[test]
     fn names_of_folders_are_refused() {
         let home = tempfile::tempdir().unwrap();
-        let said = refusal(home.path(), FileKind::Map);
-        assert!(said.contains("it is a folder"), "{said}");
+        let message = refusal(home.path(), FileKind::Map);
+        assert!(message.contains("it is a folder"), "{message}");
         for (name, expected) in [
             ("new/", "it is the name of a folder"),
             ("new/.", "it is the name of a folder"),
             ("new/..", "it has no file name"),
         ] {
-            let said =
+            let message =
                 refusal(&PathBuf::from(format!("{}/{name}", home.path().display())), FileKind::Map);
-            assert!(said.contains(expected), "{name}: {said}");
+            assert!(message.contains(expected), "{name}: {message}");
         }
         refusal(Path::new("/"), FileKind::Map);
         refusal(Path::new(""), FileKind::Map);
@@ -307,8 +307,8 @@ mod tests {
                 (&dangling, "it is a symbolic link"),
                 (&PathBuf::from("/dev/null"), "it is a device"),
             ] {
-                let said = refusal(path, kind);
-                assert!(said.contains(expected), "{said}");
+                let message = refusal(path, kind);
+                assert!(message.contains(expected), "{message}");
             }
             assert!(fs::read(&target).unwrap() == example(kind));
         }

@@ -71,11 +71,11 @@ impl ResultTable {
     /// # Errors
     /// Those of [`ParquetFile::open`].
     pub fn open(path: &Path) -> Result<Self, FileError> {
-        Ok(Self::of(ParquetFile::open(path)?))
+        Ok(Self::from_file(ParquetFile::open(path)?))
     }
 
     /// Makes the table of an open file.
-    pub fn of(file: ParquetFile) -> Self {
+    pub fn from_file(file: ParquetFile) -> Self {
         let columns = columns(file.schema());
         let plan = file.json(key::PLAN);
         Self { columns, plan, file }
@@ -200,7 +200,7 @@ impl Rows {
     ///
     /// # Errors
     /// Fails if the batch's columns have other types.
-    pub fn of(batch: &RecordBatch, columns: &[Column]) -> Result<Self, ArrowError> {
+    pub fn from_batch(batch: &RecordBatch, columns: &[Column]) -> Result<Self, ArrowError> {
         let decoded = |column: &Column| decode(batch.column(column.field), column.kind);
         let columns = columns.iter().map(decoded).collect::<Result<Vec<_>, _>>()?;
         let places = (0..columns.len()).map(Some).collect();

@@ -120,7 +120,7 @@ impl Goal {
         of: impl Fn(&ExpressionNode, &EvaluationContext<'_>) -> Option<T>,
         reduce: impl Fn(T, T) -> T,
     ) -> Result<Option<T>, ArrowError> {
-        let rows = Rows::of(batch, &self.columns)?;
+        let rows = Rows::from_batch(batch, &self.columns)?;
         let context =
             |row| EvaluationContext { row: rows.row(row), first_column: 0, aggregates: &[] };
         let aggregate = |(function, node): &(Aggregate, ExpressionNode)| {

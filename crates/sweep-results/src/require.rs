@@ -134,24 +134,24 @@ mod tests {
     // diverged; row 4 is sensitive.
     #[test]
     fn violating_rows_are_listed_with_their_keys() {
-        let found = checked("ratio_max < 2", None, false);
-        assert!(!found.holds && found.by_row);
-        assert_eq!((found.rows, found.failing, found.undefined), (6, 2, 1));
-        assert_eq!(found.offenders.iter().map(|o| o.row).collect::<Vec<_>>(), [2, 3, 4]);
-        let first = &found.offenders[0];
+        let result = checked("ratio_max < 2", None, false);
+        assert!(!result.holds && result.by_row);
+        assert_eq!((result.rows, result.failing, result.undefined), (6, 2, 1));
+        assert_eq!(result.offenders.iter().map(|o| o.row).collect::<Vec<_>>(), [2, 3, 4]);
+        let first = &result.offenders[0];
         let names: Vec<&str> = first.cells.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["point", "unbalance_mass_kg", "damping_n_s_per_m", "ratio_max"]);
         assert_eq!(first.cells[1].1, Cell::Number(0.1));
         assert_eq!(first.cells[3].1, Cell::Number(2.5));
-        assert!(found.offenders[1].undefined);
+        assert!(result.offenders[1].undefined);
     }
 
     #[test]
     fn the_worst_offenders_come_first() {
         // The gaps are 0.009, 0.0085, 0.0075, null, 0.006, 0.0088 m.
-        let found = checked("min_gap_nonlinear_m > 0.0089", None, false);
-        assert_eq!((found.failing, found.undefined), (4, 1));
-        assert_eq!(found.offenders.iter().map(|o| o.row).collect::<Vec<_>>(), [4, 2, 1]);
+        let result = checked("min_gap_nonlinear_m > 0.0089", None, false);
+        assert_eq!((result.failing, result.undefined), (4, 1));
+        assert_eq!(result.offenders.iter().map(|o| o.row).collect::<Vec<_>>(), [4, 2, 1]);
     }
 
     #[test]
@@ -167,9 +167,9 @@ mod tests {
 
     #[test]
     fn rows_outside_the_filter_are_not_checked_and_no_condition_holds_for_no_rows() {
-        let found = checked("ratio_max < 3", Some("not sensitive and status == \"ok\""), false);
-        assert!(found.holds, "{found:?}");
-        assert_eq!(found.rows, 4);
+        let result = checked("ratio_max < 3", Some("not sensitive and status == \"ok\""), false);
+        assert!(result.holds, "{result:?}");
+        assert_eq!(result.rows, 4);
         assert!(!checked("ratio_max < 3", Some("status == \"panicked\""), false).holds);
         assert!(!checked("count(reliable) == 0", Some("status == \"panicked\""), false).holds);
     }
@@ -189,9 +189,9 @@ mod tests {
             ("max(-ratio_max) < -1", false),
             ("count(status != \"ok\") < 1", false),
         ] {
-            let found = checked(text, None, true);
-            assert!(!found.by_row);
-            assert_eq!(found.holds, holds, "{text}: {found:?}");
+            let result = checked(text, None, true);
+            assert!(!result.by_row);
+            assert_eq!(result.holds, holds, "{text}: {result:?}");
         }
         let mixed = checked("ratio_max <= max(ratio_max)", None, true);
         assert!(mixed.holds && mixed.by_row);
@@ -202,9 +202,9 @@ mod tests {
 
     #[test]
     fn shares_come_with_their_counts() {
-        let found = checked("share(reliable) > 0.5 and mean(ratio_max) < 9", None, true);
-        assert_eq!(found.share_counts, [Some(3), None]);
-        assert_eq!(found.folded_rows, [5, 5]);
+        let result = checked("share(reliable) > 0.5 and mean(ratio_max) < 9", None, true);
+        assert_eq!(result.share_counts, [Some(3), None]);
+        assert_eq!(result.folded_rows, [5, 5]);
     }
 
     #[test]
@@ -261,9 +261,9 @@ mod tests {
             "not (max(ratio_max) > 9)",
             "ratio_max is null or ratio_max <= max(ratio_max)",
         ] {
-            let found = checked(text, None, false);
-            assert!(!found.holds, "{text}: {found:?}");
-            assert_eq!((found.rows, &found.folded_rows[..]), (6, &[5][..]), "{text}");
+            let result = checked(text, None, false);
+            assert!(!result.holds, "{text}: {result:?}");
+            assert_eq!((result.rows, &result.folded_rows[..]), (6, &[5][..]), "{text}");
             assert!(checked(text, None, true).holds, "{text}");
             assert!(checked(text, Some("ratio_max is not null"), false).holds, "{text}");
         }

@@ -23,11 +23,11 @@ fn map(ratios: &[Option<f64>]) -> ResultTable {
 
 #[test]
 fn a_file_equals_itself() {
-    let found = compare(&map(&RATIOS), &map(&RATIOS)).unwrap();
-    assert!(found.is_empty(), "{found:?}");
-    assert_eq!((found.shared.len(), found.flips(false).count()), (6, 0));
-    assert!(found.greatest(5, false, SharedRow::ratio_deviation).is_empty());
-    let shift = found.boundary.unwrap();
+    let comparison = compare(&map(&RATIOS), &map(&RATIOS)).unwrap();
+    assert!(comparison.is_empty(), "{comparison:?}");
+    assert_eq!((comparison.shared.len(), comparison.flips(false).count()), (6, 0));
+    assert!(comparison.greatest(5, false, SharedRow::ratio_deviation).is_empty());
+    let shift = comparison.boundary.unwrap();
     assert!(
         shift.unmatched_lines.is_empty()
             && shift.crossings.iter().all(|c| c.shift_range() == [0.0; 2])
@@ -41,31 +41,32 @@ fn flips_are_found_and_sensitive_rows_are_separate() {
     ratios[2] = Some(1.25); // not reliable before
     ratios[3] = Some(1.0); // failed before
     ratios[4] = Some(1.0); // not reliable before, and sensitive
-    let found = compare(&map(&RATIOS), &map(&ratios)).unwrap();
-    let flips =
-        |sensitive| found.flips(sensitive).map(|row| (row.rows[0], row.flip)).collect::<Vec<_>>();
+    let comparison = compare(&map(&RATIOS), &map(&ratios)).unwrap();
+    let flips = |sensitive| {
+        comparison.flips(sensitive).map(|row| (row.rows[0], row.flip)).collect::<Vec<_>>()
+    };
     assert_eq!(flips(false), [(1, Flip::Lost), (2, Flip::Gained), (3, Flip::Defined)]);
     assert_eq!(flips(true), [(4, Flip::Gained)]);
-    let lost = |found: &Comparison| found.shared.iter().filter(|row| row.is_lost).count();
-    assert_eq!(lost(&found), 1);
+    let lost = |comparison: &Comparison| comparison.shared.iter().filter(|row| row.is_lost).count();
+    assert_eq!(lost(&comparison), 1);
     ratios[0] = None; // reliable before
     assert_eq!(lost(&compare(&map(&RATIOS), &map(&ratios)).unwrap()), 2);
-    let greatest = found.greatest(3, false, SharedRow::ratio_deviation);
+    let greatest = comparison.greatest(3, false, SharedRow::ratio_deviation);
     assert_eq!(greatest.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [3, 2, 1]);
     assert!((greatest[1].ratio_deviation() - 1.0).abs() < 1e-12, "2.5 to 1.25 is a factor of two");
-    let gap = found.greatest(2, false, SharedRow::gap_deviation_m)[1];
+    let gap = comparison.greatest(2, false, SharedRow::gap_deviation_m)[1];
     assert!((gap.gap_deviation_m() - 1.25e-3).abs() < 1e-12, "{gap:?}");
-    assert!(found.shared.iter().filter(|row| row.differs).count() == 4);
-    assert!(found.columns.iter().any(|column| column.name == "ratio_max" && column.rows == 4));
-    assert!(!found.is_empty());
+    assert!(comparison.shared.iter().filter(|row| row.differs).count() == 4);
+    assert!(comparison.columns.iter().any(|column| column.name == "ratio_max" && column.rows == 4));
+    assert!(!comparison.is_empty());
 }
 
 #[test]
 fn over_estimated_rows_are_counted_in_both_files() {
     let mut ratios = RATIOS;
     ratios[0] = Some(0.4);
-    let found = compare(&map(&RATIOS), &map(&ratios)).unwrap();
-    assert_eq!(found.over_estimated, Some([0, 1]));
+    let comparison = compare(&map(&RATIOS), &map(&ratios)).unwrap();
+    assert_eq!(comparison.over_estimated, Some([0, 1]));
 }
 
 #[test]
@@ -73,13 +74,13 @@ fn deviations_from_missing_numbers_are_infinite() {
     let mut ratios = RATIOS;
     ratios[0] = None;
     ratios[3] = Some(1.0); // failed before
-    let found = compare(&map(&RATIOS), &map(&ratios)).unwrap();
+    let comparison = compare(&map(&RATIOS), &map(&ratios)).unwrap();
     for deviation in [SharedRow::ratio_deviation, SharedRow::gap_deviation_m] {
-        let rows = found.greatest(5, false, deviation);
+        let rows = comparison.greatest(5, false, deviation);
         assert_eq!(rows.iter().map(|row| row.rows[0]).collect::<Vec<_>>(), [0, 3]);
         assert!(rows.iter().all(|row| deviation(row) == f64::INFINITY));
     }
-    assert!(found.has_ratios && found.has_gaps);
+    assert!(comparison.has_ratios && comparison.has_gaps);
     let boundaries = compare(&boundary(&[Some(1.0)]), &boundary(&[Some(1.0)])).unwrap();
     assert!(!boundaries.has_ratios && !boundaries.has_gaps);
 }
@@ -90,10 +91,13 @@ fn changed_plan_values_are_named() {
     plan["machine"]["body"]["mass_kg"] = json!(20.0);
     plan["set"] = json!({ "body_mass_kg": 20.0 });
     let second = file(sample::map(&RATIOS), &[(key::PLAN, plan)]);
-    let found = compare(&map(&RATIOS), &second).unwrap();
-    let paths: Vec<&str> = found.plan.iter().map(|change| change.path.as_str()).collect();
+    let comparison = compare(&map(&RATIOS), &second).unwrap();
+    let paths: Vec<&str> = comparison.plan.iter().map(|change| change.path.as_str()).collect();
     assert_eq!(paths, ["machine.body.mass_kg", "set"]);
-    assert_eq!((&found.plan[0].first, &found.plan[0].second), (&json!(24.0), &json!(20.0)));
+    assert_eq!(
+        (&comparison.plan[0].first, &comparison.plan[0].second),
+        (&json!(24.0), &json!(20.0))
+    );
 }
 
 #[test]
@@ -105,9 +109,9 @@ fn maps_of_different_grids_are_compared_at_common_points() {
     let dampings = [60.0, 70.0 * (1.0 + 1e-15), 90.0].map(Some);
     columns[2] = ("damping_n_s_per_m", "N s/m", numbers(&dampings));
     let second = file(columns, &[(key::PLAN, plan)]);
-    let found = compare(&map(&RATIOS), &second).unwrap();
-    assert_eq!((found.shared.len(), found.unmatched_rows), (2, [4, 1]));
-    assert!(found.columns.is_empty(), "{:?}", found.columns);
+    let comparison = compare(&map(&RATIOS), &second).unwrap();
+    assert_eq!((comparison.shared.len(), comparison.unmatched_rows), (2, [4, 1]));
+    assert!(comparison.columns.is_empty(), "{:?}", comparison.columns);
 }
 
 #[test]
@@ -120,9 +124,9 @@ fn an_axis_of_one_value_may_be_missing_in_the_other_file() {
         columns.insert(3, ("forcing_rad_per_s", "rad/s", numbers(&values)));
         file(columns, &[(key::PLAN, plan)])
     };
-    let found = compare(&map(&RATIOS), &with_spin(&[350.0; 6])).unwrap();
-    assert_eq!(found.fixed, [(1, "forcing_rad_per_s".to_owned(), 350.0)]);
-    assert_eq!(found.shared.len(), 6);
+    let comparison = compare(&map(&RATIOS), &with_spin(&[350.0; 6])).unwrap();
+    assert_eq!(comparison.fixed, [(1, "forcing_rad_per_s".to_owned(), 350.0)]);
+    assert_eq!(comparison.shared.len(), 6);
     let two = with_spin(&[300.0, 300.0, 300.0, 350.0, 350.0, 350.0]);
     let refused = compare(&map(&RATIOS), &two).unwrap_err();
     assert!(matches!(refused, ResultsError::Refused(_)));
@@ -154,9 +158,9 @@ fn rows_with_equal_keys_are_paired_in_order() {
         ];
         file(columns, &[(key::PLAN, plan)])
     };
-    let found = compare(&listed([1.0, 3.0]), &listed([1.0, 4.0])).unwrap();
-    assert_eq!(found.shared.iter().map(|row| row.rows).collect::<Vec<_>>(), [[0, 0], [1, 1]]);
-    assert_eq!(found.columns[0].rows, 1);
+    let comparison = compare(&listed([1.0, 3.0]), &listed([1.0, 4.0])).unwrap();
+    assert_eq!(comparison.shared.iter().map(|row| row.rows).collect::<Vec<_>>(), [[0, 0], [1, 1]]);
+    assert_eq!(comparison.columns[0].rows, 1);
 }
 
 /// Returns a boundary file with a mass for each position; brackets are 0.5 wide, `None` is a line
@@ -181,8 +185,8 @@ fn boundary(at: &[Option<f64>]) -> ResultTable {
 fn a_shift_is_certain_only_beyond_the_brackets() {
     let first = boundary(&[Some(100.0), Some(120.0), None, Some(140.0)]);
     let second = boundary(&[Some(100.3), Some(123.0), Some(150.0), Some(140.0)]);
-    let found = compare(&first, &second).unwrap();
-    let shift = found.boundary.unwrap();
+    let comparison = compare(&first, &second).unwrap();
+    let shift = comparison.boundary.unwrap();
     assert_eq!((shift.axis.as_str(), shift.unit.as_str()), ("damping_n_s_per_m", "N s/m"));
     assert_eq!((shift.crossings.len(), shift.count_certain()), (3, 1));
     let farthest = shift.farthest().unwrap();
