@@ -67,8 +67,8 @@ impl Candidate {
     }
 }
 
-/// Returns all candidates in order. `evaluate` returns the numbers of a generation of positions. All
-/// numbers are minimised, and equal numbers lead to equal positions.
+/// Returns all candidates in order. `evaluate` returns the numbers of a generation of positions.
+/// All numbers are minimised, and equal numbers lead to equal positions.
 ///
 /// # Errors
 /// The errors of `evaluate`.
