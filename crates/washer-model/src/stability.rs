@@ -131,9 +131,9 @@ pub struct Participant {
     pub mode: usize,
     /// The damped natural frequency while the drum turns (cycles per minute).
     pub frequency_cpm: f64,
-    /// What moves.
+    /// The motion of the mode.
     pub motion: ModeMotion,
-    /// Its share of the growing motion's energy.
+    /// The mode's share of the growing motion's energy.
     pub share: f64,
 }
 

@@ -42,7 +42,7 @@ pub struct Args {
     fresh: bool,
 }
 
-/// What `--help` adds.
+/// The end of `sweep fit --help`.
 const LONG: &str = "\
 Columns are channels of `sweep trace` with their units: tub_front_y_m, tub_yaw_rad, rates \
 (tub_yaw_rad_per_s), accelerations (tub_front_y_m_per_s2), cabinet_force_y_n. Other units are \
@@ -128,7 +128,8 @@ fn header_and_name(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// The file of curves of a case: the first has the name itself.
+/// Returns the path of a case's file of curves: the given path for the first case, and one with a
+/// number for each further case.
 fn numbered(path: &Path, case: usize) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let ending = path.extension().unwrap_or_default().to_string_lossy();
@@ -138,7 +139,8 @@ fn numbered(path: &Path, case: usize) -> PathBuf {
     }
 }
 
-/// A file and the constants after its name; a file whose own name has an @ is taken as it is.
+/// Splits an argument into a path and the constants after `@`. The name of an existing file may
+/// have an `@` itself.
 fn parted(text: &str) -> (&Path, Vec<String>) {
     match text.rsplit_once('@') {
         Some((path, constants)) if !Path::new(text).exists() => {

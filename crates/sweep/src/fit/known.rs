@@ -2,8 +2,8 @@
 //!
 //! An estimate holds for the fixed numbers of its machine. If these are off by d, the free numbers
 //! make up for it as far as they can. Let J be the slopes of the model by the unknowns, K those by
-//! the fixed numbers in standard deviations, W the weights, A = J' W J, and r the residual. To first
-//! order, unknowns and fixed numbers together have the posterior information [J K]' W [J K] +
+//! the fixed numbers in standard deviations, W the weights, A = J' W J, and r the residual. To
+//! first order, unknowns and fixed numbers together have the posterior information [J K]' W [J K] +
 //! diag(0, 1), since d has the covariance 1 before the record. By its Schur complement, with B =
 //! A^-1 J' W K and M = 1 - J A^-1 J' W,
 //!

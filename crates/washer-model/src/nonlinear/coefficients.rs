@@ -48,7 +48,7 @@ lane_struct! {
         /// The inertia about the hinge of the drum, and of a reduced mass mu at rho, in drum axes.
         drum_i11: N<T>, drum_i22: N<T>, drum_i33: N<T>, drum_i12: N<T>, drum_i13: N<T>,
         drum_i23: N<T>,
-        /// Whether the drum has an unbalance outside the plane of d1 and d2. Otherwise `rho_3`,
+        /// True if a drum has an unbalance outside the plane of d1 and d2. Otherwise `rho_3`,
         /// `drum_i13` and `drum_i23` are zero, and the equations skip their terms.
         is_skewed: InAnyLane<T>,
         flexure_stiffness: N<T>,

@@ -24,11 +24,11 @@ lane_struct! {
         dampers: Vec<DamperCoefficients<T>>,
         stops: Vec<StopCoefficients<T>>,
         bushings: Vec<BushingCoefficients<T>>,
-        /// Whether the machine has springs with a cubic term.
+        /// True if a machine has springs with a cubic term.
         has_cubic_springs: InAnyLane<T>,
-        /// Whether the machine has dampers with friction or outer damping.
+        /// True if a machine has dampers with friction or outer damping.
         has_friction: InAnyLane<T>,
-        /// Whether the machine has optional forces: cubic springs, friction, stops or bushings.
+        /// True if a machine has optional forces: cubic springs, friction, stops or bushings.
         /// Without them the equations skip their evaluation.
         has_optional: InAnyLane<T>,
     }
@@ -230,7 +230,7 @@ lane_struct! {
         /// The square of the length sigma over which forces beyond the free stroke set in; 0
         /// without a free stroke.
         softness_squared: N<T>,
-        /// Whether the damper has a free stroke or outer damping.
+        /// True if a damper has a free stroke or outer damping.
         has_stage: InAnyLane<T>,
     }
 }
