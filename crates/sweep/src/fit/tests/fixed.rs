@@ -35,6 +35,51 @@ fn intervals_count_what_the_fixed_numbers_may_be_off() {
     }
 }
 
+/// With the fixed number among the unknowns and its tolerance as a prior, the inverse of the normal
+/// matrix is the posterior covariance, and a step of Gauss and Newton's leads to the mean.
+#[test]
+fn tolerances_are_the_prior_of_an_unknown() {
+    let mut case = case_at(&VISCOUS, 0.95, reference("viscous", 8.0));
+    case.plan.model.machine.unbalance.radius_m *= 1.05;
+    let radius_m = case.plan.model.machine.unbalance.radius_m;
+    let mut names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
+    let cases = vec![case];
+    let work = FitWork { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
+    let fitted = fit(cases.clone(), &options(&names), &work).unwrap().unwrap();
+    let Fitted { problem, mut x, against, .. } = fitted;
+    let summary = problem.summary(&against);
+    let variances: Vec<f64> = summary.sigma.iter().map(|sigma| sigma * sigma).collect();
+    let known = ["none", "unbalance_radius_m=5%"].map(str::to_owned);
+    let known = Known::read(&known, &cases[0], &problem.free).unwrap();
+    let found = known.influences(&problem, &x, &against, &summary, &variances);
+    let radius = names.len();
+    names.push("unbalance_radius_m");
+    x.insert(radius, radius_m);
+    let free = free(&options(&names), &cases).unwrap();
+    let Problem { model, with_shift, method, simd, stop, .. } = problem;
+    let joint = Problem { cases, free, model, with_shift, method, simd, stop };
+    let Summary { mut normal, pull, .. } = joint.summary(&joint.against(&x).unwrap());
+    normal[radius][radius] += 1.0 / (0.05 * radius_m).powi(2);
+    let covariance = algebra::inverse(&normal);
+    let moved: Vec<f64> = covariance.iter().map(|row| algebra::dot(row, &pull)).collect();
+    let number = &found.numbers[0];
+    println!("{radius_m} m: moved by {moved:?}, {number:?}");
+    assert!((number.error / covariance[radius][radius].sqrt() - 1.0).abs() < 0.01, "{number:?}");
+    let by_noise = algebra::inverse(&summary.normal);
+    let unknowns: Vec<usize> = (0..x.len()).filter(|k| *k != radius).collect();
+    for (i, &row) in unknowns.iter().enumerate() {
+        let error = |k: usize| covariance[k][k].sqrt();
+        for (j, &column) in unknowns.iter().enumerate() {
+            let ours = by_noise[i][j] + number.moves[i] * number.moves[j];
+            let off = (ours - covariance[row][column]) / (error(row) * error(column));
+            assert!(off.abs() < 0.01, "{row}, {column}: {ours}, {covariance:?}");
+        }
+        let square = found.covariance[i][i] - number.moves[i].powi(2);
+        let off = (square.max(0.0).sqrt() - moved[row].abs()) / error(row);
+        assert!(off.abs() < 0.05, "{row}: {square}, {moved:?}");
+    }
+}
+
 /// A number that the record tells from all free ones widens intervals no farther than it leaves the
 /// number open.
 #[test]
