@@ -95,7 +95,10 @@ fn brackets_of_a_logarithmic_axis_are_relative() {
     let messages = String::from_utf8_lossy(&done.stderr);
     let widest = messages.split("brackets  at most ").nth(1).expect("brackets").split(' ').next();
     let widest: f64 = widest.expect("a number").parse().expect("a number");
-    assert!(widest <= 0.01 && messages.contains("of its value wide (asked: 0.01)"), "{messages}");
+    assert!(
+        widest <= 0.01 && messages.contains("of its value wide (tolerance: 0.01)"),
+        "{messages}"
+    );
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Test of the bytes of results by every method and command against recorded hashes, which change
 //! only together with the version of the numerics.
 //!
-//! `scripts/release/raise_numerics.sh` raises that version and writes the new hashes.
+//! `scripts/release/raise_numerics.sh` raises that version and writes the new hashes. Beside them,
+//! `tests/goldens.csv` has the numbers of some maps, so that a diff shows what a change has moved.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -33,6 +34,9 @@ const RK4: &str = "integrator = { method = \"rk4\", step_s = 2e-4 }\n";
 /// Metrics, which add columns to a map.
 const METRICS: &str = "metrics = [\"cabinet_force\", \"clash_time\", \"static_sag\"]\n";
 
+/// The maps whose numbers the readable record has, one for each kind of method.
+const TABULATED: [&str; 3] = ["map by rk4", "map by additive", "map by rk4-mass-scaled"];
+
 /// The greatest relative difference of a frequency from the record. Basis: the rounding of linear
 /// algebra depends on the processor. Doubling it would find the same faults.
 const MODES_TOLERANCE: f64 = 1e-9;
@@ -56,8 +60,20 @@ fn sweep(test_folder: &TempDir, words: &[&str]) -> Vec<u8> {
     done.stdout
 }
 
-/// Returns the hash of the file that a command writes for a grid.
-fn hash(grid: &str, command: &[&str]) -> String {
+/// Returns the path of the readable record.
+fn readable_record() -> PathBuf {
+    record().with_extension("csv")
+}
+
+/// The file that a command has written for a grid.
+struct Golden {
+    hash: String,
+    /// The file as CSV: units and descriptions, a header, and the rows.
+    csv: String,
+}
+
+/// Runs a command for a grid.
+fn golden(grid: &str, command: &[&str]) -> Golden {
     let test_folder = tempfile::tempdir().expect("a temporary folder");
     fs::write(test_folder.path().join("grid.toml"), grid).expect("the grid is written");
     let list = "unbalance_mass_kg,damping_n_s_per_m\n0.1,80\n0.7,211.5\n0.33,120\n";
@@ -66,16 +82,71 @@ fn hash(grid: &str, command: &[&str]) -> String {
     sweep(&test_folder, &[&[*verb, "grid.toml", "--out", "out.parquet"], options].concat());
     let bytes =
         fs::read(test_folder.path().join("out.parquet")).expect("the command has written its file");
-    blake3::hash(&bytes).to_hex().to_string()
+    sweep(&test_folder, &["export", "out.parquet", "out.csv"]);
+    let csv = fs::read_to_string(test_folder.path().join("out.csv")).expect("the export is there");
+    Golden { hash: blake3::hash(&bytes).to_hex().to_string(), csv }
 }
 
-fn hashes() -> BTreeMap<&'static str, String> {
+/// Returns the rows of some goldens as one table: the golden, then the columns of maps, with six
+/// significant digits.
+fn readable(goldens: &BTreeMap<&'static str, Golden>) -> String {
+    let mut table = String::new();
+    for name in TABULATED {
+        let lines = goldens[name].csv.lines().filter(|line| !line.starts_with('#'));
+        for (k, line) in lines.enumerate() {
+            let cells: Vec<String> = line.split(',').map(rounded).collect();
+            match k {
+                0 if table.is_empty() => table = format!("golden,{}\n", cells.join(",")),
+                0 => {}
+                _ => table += &format!("{name},{}\n", cells.join(",")),
+            }
+        }
+    }
+    table
+}
+
+/// Returns a number with six significant digits, and any other text as it is.
+fn rounded(cell: &str) -> String {
+    match cell.parse::<f64>() {
+        Ok(number) if number.fract() != 0.0 => format!("{number:.5e}"),
+        _ => cell.to_owned(),
+    }
+}
+
+/// Returns the greatest relative change of each column between two readable records, a line each.
+fn changes(before: &str, now: &str) -> String {
+    let cells = |text: &str| -> Vec<Vec<String>> {
+        text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
+    };
+    let before = cells(before);
+    let now = cells(now);
+    let Some(header) = now.first().filter(|header| before.first() == Some(*header)) else {
+        return "the columns have changed".to_owned();
+    };
+    let mut text = String::new();
+    for (column, name) in header.iter().enumerate() {
+        let mut greatest = 0.0_f64;
+        for (row, was) in now.iter().zip(&before).skip(1) {
+            let share = match (row[column].parse::<f64>(), was[column].parse::<f64>()) {
+                (Ok(is), Ok(was)) => (is - was).abs() / was.abs().max(f64::MIN_POSITIVE),
+                _ => f64::from(u8::from(row[column] != was[column])),
+            };
+            greatest = greatest.max(share);
+        }
+        if greatest > 0.0 {
+            text += &format!("  {name}: {greatest:.1e}\n");
+        }
+    }
+    text
+}
+
+fn goldens() -> BTreeMap<&'static str, Golden> {
     let run: &[&str] = &["run", "--progress", "none"];
     let map =
-        |integrator: &str| hash(&format!("{SPIN}integrator = {{ {integrator} }}\n{AXES}"), run);
-    let design = |design: &str| hash(&format!("{SPIN}{RK4}design = {{ {design} }}\n{BOX}"), run);
+        |integrator: &str| golden(&format!("{SPIN}integrator = {{ {integrator} }}\n{AXES}"), run);
+    let design = |design: &str| golden(&format!("{SPIN}{RK4}design = {{ {design} }}\n{BOX}"), run);
     let judged = |criterion: &str| {
-        hash(
+        golden(
             &format!("{METRICS}{SPIN}{RK4}reliability = {{ criterion = \"{criterion}\" }}\n{AXES}"),
             run,
         )
@@ -94,13 +165,13 @@ fn hashes() -> BTreeMap<&'static str, String> {
         ("map of sobol's sequence", design("method = \"sobol\", points = 8, seed = 3")),
         (
             "map of a list",
-            hash(
+            golden(
                 &format!("{SPIN}{RK4}design = {{ method = \"list\", file = \"list.csv\" }}\n"),
                 run,
             ),
         ),
-        ("boundary", hash(&format!("{SPIN}{RK4}{AXES}"), boundary)),
-        ("trace", hash(&format!("{SPIN}{RK4}{AXES}"), &[trace, &point].concat())),
+        ("boundary", golden(&format!("{SPIN}{RK4}{AXES}"), boundary)),
+        ("trace", golden(&format!("{SPIN}{RK4}{AXES}"), &[trace, &point].concat())),
     ])
 }
 
@@ -121,7 +192,11 @@ fn modes() -> Vec<f64> {
 
 #[test]
 fn bytes_change_only_with_the_version_of_the_numerics() {
-    let hashes = hashes();
+    let goldens = goldens();
+    let hashes: BTreeMap<&str, &str> =
+        goldens.iter().map(|(name, golden)| (*name, golden.hash.as_str())).collect();
+    let table = readable(&goldens);
+    let recorded_table = fs::read_to_string(readable_record()).unwrap_or_default();
     let modes = modes();
     let now = json!({
         "version": VERSION,
@@ -136,7 +211,7 @@ fn bytes_change_only_with_the_version_of_the_numerics() {
 
     let mut changed: Vec<&str> = hashes
         .iter()
-        .filter(|(name, hash)| was["hashes"][**name] != **hash)
+        .filter(|(name, hash)| was["hashes"][**name] != ***hash)
         .map(|(name, _)| *name)
         .collect();
     let recorded = was["modes"].as_array().cloned().unwrap_or_default();
@@ -147,15 +222,20 @@ fn bytes_change_only_with_the_version_of_the_numerics() {
     {
         changed.push("modes");
     }
+    if recorded_table != table {
+        changed.push("tests/goldens.csv");
+    }
     if changed.is_empty() && same_build {
         return;
     }
     assert!(
         !same_build,
         "these bytes have changed, and NUMERICS_VERSION is still {NUMERICS_VERSION}: {}.\n\
+         Greatest relative changes in tests/goldens.csv:\n{}\
          If they were meant to, raise it and write the new hashes by\n\
          scripts/release/raise_numerics.sh",
-        changed.join(", ")
+        changed.join(", "),
+        changes(&recorded_table, &table)
     );
     assert!(
         update,
@@ -165,4 +245,14 @@ fn bytes_change_only_with_the_version_of_the_numerics() {
         was["version"], was["numerics"]
     );
     fs::write(record(), format!("{now:#}\n")).expect("tests/goldens.json is written");
+    fs::write(readable_record(), &table).expect("tests/goldens.csv is written");
+}
+
+#[test]
+fn changes_of_numbers_are_told_by_column() {
+    let before = "golden,point,ratio_max,method\nmap,0,1.50000e0,rk4\nmap,1,2.00000e0,rk4\n";
+    let now = before.replace("2.00000e0,rk4", "2.20000e0,additive");
+    assert_eq!(changes(before, before), "");
+    assert_eq!(changes(before, &now), "  ratio_max: 1.0e-1\n  method: 1.0e0\n");
+    assert_eq!(changes("golden,point\n", before), "the columns have changed");
 }

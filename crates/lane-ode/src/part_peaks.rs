@@ -43,8 +43,8 @@ impl<T: Lane, const M: usize> PartPeaks<T, M> {
         self.part_end_s.0.set(lane, first);
     }
 
-    /// Returns the peaks of one lane's parts and ends its trajectory. The last part may be
-    /// incomplete.
+    /// Returns the peaks of one lane between its cuts and ends its trajectory. The last stretch may
+    /// be incomplete.
     pub fn finish(&mut self, lane: usize) -> Vec<[f64; M]> {
         self.part_end_s.0.set(lane, f64::INFINITY);
         let mut parts = core::mem::take(&mut self.parts[lane]);

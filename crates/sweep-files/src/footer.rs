@@ -293,7 +293,7 @@ mod tests {
 
     #[test]
     fn groups_that_are_nested_too_deeply_are_refused() {
-        // The root is a group too.
+        // The root counts as one level of nesting.
         let chain = |groups| std::iter::repeat_n(1, groups).chain([0]);
         assert_eq!(message(&file(chain(DEEPEST), &[])), "fine");
         let refusal = message(&file(chain(DEEPEST + 1), &[]));
@@ -301,7 +301,7 @@ mod tests {
         // Groups side by side are not nested.
         let beside = [150].into_iter().chain([1, 0].repeat(150));
         assert_eq!(message(&file(beside, &[])), "fine");
-        // The last child of a group may be a group too.
+        // Each group has a leaf and a further group, so the last child counts to the depth.
         let comb = [2].into_iter().chain([0, 2].repeat(DEEPEST)).chain([0, 0]);
         assert_eq!(message(&file(comb, &[])), "its columns are nested more than 100 deep");
     }

@@ -38,7 +38,7 @@ pub(crate) struct DesignParameter {
     pub(crate) label: Label,
     /// Whether the parameter is spread evenly by its logarithm.
     pub(crate) log: bool,
-    /// The value at each kept point.
+    /// The parameter's value at each point that is drawn.
     pub(crate) values: Vec<f64>,
     /// The influence on the quantity; `None` if the quantity is constant.
     pub(crate) influence: Option<RankInfluence>,

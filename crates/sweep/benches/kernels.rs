@@ -66,7 +66,7 @@ fn thousand_steps(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     trajectory(bencher, model, simd, 0.25, &Method::Rk4 { step_s: 2.5e-4 });
 }
 
-/// Measures a second of the run-up by each method.
+/// Measures a second of the run-up by Dormand-Prince.
 #[divan::bench(args = kernels())]
 fn second_by_dopri5(bencher: Bencher<'_, '_>, (model, simd): (ModelKind, Simd)) {
     let tolerance = Tolerance { relative: 1e-6, absolute: 1e-9, max_steps: u64::MAX };

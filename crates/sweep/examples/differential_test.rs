@@ -80,7 +80,8 @@ const VARIED: [(&str, f64, f64); 14] = [
 /// A machine with every kind of element except a second unbalance.
 const WITH_ELEMENTS: &str = include_str!("../../../docs/examples/friction.toml");
 
-/// The parameters of elements that vary, each with its mean value and the greatest power of ten.
+/// The parameters of elements that vary, each with its middle value m and an exponent e: values are
+/// between m / 10^e and m * 10^e.
 const ELEMENTS: [(&str, f64, f64); 17] = [
     ("friction_n", 50.0, 0.5),
     ("damper_2_friction_n", 50.0, 0.5),

@@ -121,11 +121,11 @@ pub(crate) struct Fitted<'a> {
     pub(crate) evaluations: Option<Evaluations>,
 }
 
-/// The means of a fit: its end, its listener and its journal.
+/// The context of a fit: cancellation, progress and stored evaluations.
 pub(crate) struct FitWork<'a> {
-    /// Ends it early; what comes then means nothing.
+    /// The cancellation. The result of a cancelled fit means nothing.
     pub(crate) stop: Cancel<'a>,
-    /// Hears of every evaluation: how many there were.
+    /// The listener that is called after every evaluation with their number.
     pub(crate) seen: &'a (dyn Fn(usize) + Sync),
     /// The machine file beside which evaluations are kept.
     pub(crate) output: Option<&'a Path>,
@@ -149,7 +149,7 @@ pub(crate) fn case(
     Ok(FitCase { plan, measured, smoothed })
 }
 
-/// A value for every axis of several that has no constant.
+/// Returns the middle value of every axis that has several values and no constant, as NAME=VALUE.
 fn middle(grid: &WasherGridInput, constants: &[String]) -> Result<Vec<String>, Diagnostics> {
     let plan = grid.load()?;
     let is_given = |name: &str| constants.iter().any(|it| it.split('=').next() == Some(name));
@@ -179,7 +179,8 @@ fn free(options: &FitOptions, cases: &[FitCase]) -> Result<Vec<Free>, Diagnostic
     mistakes.finish(Some(found))
 }
 
-/// Reads a free number of a case, beside those that are known, and reports what is wrong with it.
+/// Reads a free parameter of a case, in addition to those already read, and reports what is wrong
+/// with it.
 fn free_number(
     text: &str,
     case: &FitCase,
@@ -414,8 +415,9 @@ fn bootstrap(
     count: u32,
     work: &FitWork<'_>,
 ) -> Result<Vec<Vec<f64>>, DescentEnd> {
-    /// The number of samples of a block. Basis: residuals of the tests are correlated over some
-    /// ten. Doubling it keeps slower correlations, and has fewer blocks.
+    /// The number of samples in a block of the block bootstrap. Basis: residuals of the test data
+    /// are correlated over some ten samples. Doubling it preserves slower correlations, but leaves
+    /// fewer blocks.
     const BLOCK: usize = 100;
     let measured = problem.cases.clone();
     let draw = Design::Spread { rule: DesignRule::MonteCarlo, points: 0, seed: SEED };
@@ -548,8 +550,8 @@ impl MinimumSearch<'_> {
     }
 }
 
-/// Returns so many draws from the standard normal distribution, evenly spread: the k-th number of a
-/// draw.
+/// Returns a function of a draw and k: the k-th component of one of `count` draws from the standard
+/// normal distribution by a Latin hypercube.
 fn evenly(count: u64) -> impl Fn(u64, usize) -> f64 {
     let design = Design::Spread { rule: DesignRule::LatinHypercube, points: count, seed: SEED };
     let shape = DistributionShape::Normal { mean: 0.0, sd: 1.0 };

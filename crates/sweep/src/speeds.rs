@@ -60,9 +60,9 @@ impl Speeds {
         let speeds = Self::new(from, to, second - from).check().ok()?;
         let is_close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * to;
         let values = speeds.values();
-        let is_even =
+        let is_equally_spaced =
             values.len() == speeds_rpm.len() && values.iter().zip(speeds_rpm).all(is_close);
-        is_even.then_some(speeds)
+        is_equally_spaced.then_some(speeds)
     }
 
     /// Returns the speeds (rpm). The last one is exactly `to`.

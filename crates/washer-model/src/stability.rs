@@ -92,7 +92,8 @@ pub struct Response {
     pub start: [f64; STATES],
     /// Floquet multiplier of the nonlinear response, real and imaginary part (not negative): the
     /// largest of those whose motion is the suspension's. Motions of the bearings are left out, and
-    /// those of the hinge while the drum is slow beside it: their modes are capped.
+    /// so are those of the hinge while its modes are fast compared with the drum's speed, because
+    /// these modes are capped.
     pub multiplier: [f64; 2],
     /// Modes that take part in what grows, most first; none if nothing grows.
     pub participants: Vec<Participant>,

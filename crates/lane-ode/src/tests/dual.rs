@@ -12,7 +12,7 @@ struct Case {
     by_hand: fn(f64) -> [f64; 2],
 }
 
-/// Makes a case of an expression, which is the source of all three functions.
+/// Makes a case from one expression, compiled for plain numbers, for duals and for duals of duals.
 macro_rules! case {
     ($name:literal, |$x:ident| $f:expr, |$y:ident| $by_hand:expr) => {
         Case {

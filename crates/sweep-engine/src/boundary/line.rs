@@ -143,7 +143,8 @@ impl LineSearch {
         intervals
     }
 
-    /// Returns the edges in order; `value` turns positions into values of the second axis.
+    /// Returns the places where the line changes sides, in order; `value` turns positions into
+    /// values of the second axis.
     pub(super) fn edges(&self, span: &Span, value: &dyn Fn(f64) -> f64) -> Vec<Edge> {
         let mut edges = Vec::new();
         for [low, high] in self.changes() {

@@ -25,7 +25,7 @@ pub struct SetConstant<M: Model> {
     pub parameter: M::Parameter,
     /// The value with its location.
     pub value: Located<f64>,
-    /// The single numbers that it writes.
+    /// The names of the single numbers that the argument sets; several for a vector.
     pub parts: Vec<Cow<'static, str>>,
     /// Whether it overrides the file, and so fixes a swept parameter.
     pub is_over_file: bool,

@@ -46,7 +46,8 @@ pub fn constants<M: Read>(
         .collect();
 }
 
-/// Replaces the axes by one point: `at` gives every axis of several values one, and may give more.
+/// Replaces the axes by one point: `at` has a value for each axis of several values, and may have
+/// values of other parameters.
 pub fn point<M: Read>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
     let constants = arguments("--at", at, draft);
     let named = |name: &str| at.iter().any(|argument| name_of(argument) == name);

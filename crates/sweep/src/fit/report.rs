@@ -35,7 +35,7 @@ pub(crate) struct FitReport {
     /// Whether the model is known to follow the measurement within its noise. If not, there are no
     /// intervals.
     pub(crate) follows: bool,
-    /// Why not.
+    /// The reason why the model is not known to follow the measurement.
     pub(crate) objection: Option<String>,
     pub(crate) parameters: Vec<Fit>,
     /// Row by row in the order of the parameters.

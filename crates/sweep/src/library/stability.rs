@@ -8,8 +8,8 @@ use crate::stability::{HeldPlan, check};
 use sweep_engine::Error;
 
 /// Returns the task to find the motions of each point of a plan's grid at increasing held speeds
-/// (rpm). With a search they are those in which the machine ends, otherwise the periodic responses
-/// of both models with the growth of disturbances. Speeds vary fastest.
+/// (rpm): with a search the attractors, without one the periodic responses of both models with the
+/// growth of disturbances. Speeds vary fastest.
 ///
 /// # Errors
 /// Returns an error if speeds do not increase, if an axis has no meaning at a held speed, if an

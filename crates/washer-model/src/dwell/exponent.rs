@@ -12,7 +12,7 @@ use lane_ode::Simd;
 /// above rounding, and so small that it grows linearly within a turn. Doubling it changes nothing.
 const RESCALED_SEPARATION: f64 = 1e-7;
 
-/// Turns before the first part, in which the separation turns to the fastest growing direction.
+/// Turns before the measurement, in which the separation aligns with the fastest growing direction.
 /// Doubling it lengthens each measurement by 16 turns.
 const TRANSIENT_TURNS: usize = 16;
 

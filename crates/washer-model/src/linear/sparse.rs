@@ -64,8 +64,8 @@ macro_rules! sparse_sums {
 }
 pub(crate) use sparse_sums;
 
-/// The coefficients that a table lacks, by entry, then function. The list is empty if all of them
-/// vanish.
+/// The coefficients of terms that the compile-time table does not have, by entry, then function.
+/// The list is empty if all of them are 0, as for most machines.
 #[derive(Clone, Debug)]
 pub(crate) struct FurtherTerms<T> {
     zero: N<T>,
@@ -117,8 +117,8 @@ impl<T: Lane> FurtherTerms<T> {
     }
 }
 
-/// The addition of further terms. Coefficients of zero add zeros, so that no machine's bits depend
-/// on the machines in the other lanes.
+/// The addition of further terms. A lane whose machine lacks a term adds 0, so its result does not
+/// depend on the machines in the other lanes.
 struct AddFurtherTerms<'a, T, V, const FUNCTIONS: usize, const ENTRIES: usize> {
     coefficients: &'a [N<T>],
     functions: &'a [V; FUNCTIONS],

@@ -136,7 +136,7 @@ pub(crate) struct RotorAt<T> {
 struct BearingsAt<T> {
     /// The inverse of w^2 K^-1 + C.
     system_inverse: Symmetric4<T>,
-    /// The factor of the deflection, w^2 + theta'^2.
+    /// The factor of the deflection, w^2 + theta'^2, with w the cap of the bearings' modes.
     per_deflection: N<T>,
     rotor: RotorPerLoad<T>,
 }

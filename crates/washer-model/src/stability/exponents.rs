@@ -67,7 +67,7 @@ pub fn exact_motions(point: &Point, speed_rpm: f64) -> Result<Vec<Exact>, NoAnsw
     let values = decomposition.S().column_vector();
     let vectors = decomposition.U();
     let frozen = modes(point, 0.0, speed).map_err(|_| NoAnswer::Eigenvalues)?;
-    // The part of each mode in each motion.
+    // The similarity of each motion with each mode.
     let mut likeness = Vec::with_capacity(STATES * COORDINATES);
     for k in 0..STATES {
         let vector = Mat::from_fn(STATES, 1, |i, _| vectors[(i, k)]);

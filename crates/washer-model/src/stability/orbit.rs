@@ -125,7 +125,7 @@ pub(crate) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<T
         let turns = Turns { asked, is_stopped };
         // Wide lanes that are mostly empty take longer than narrow ones.
         let is_few = asked.len() <= Simd::narrow().lanes();
-        // Derivatives of the steps fill them with disturbances, of however few turns.
+        // Rows that differentiate their steps fill all lanes with disturbances, even for one turn.
         let is_filled = asked.iter().any(|asked| asked.is_seen && asked.row.is_stepwise());
         if is_few && !is_filled {
             Simd::dispatch_narrow(turns)
@@ -154,7 +154,7 @@ pub(crate) fn by_kind<A: Copy, R>(
     found.into_iter().flatten().collect()
 }
 
-/// Turns of one kind.
+/// Integrations over a turn, all of one model and kind of step.
 struct Turns<'a> {
     asked: &'a [Asked<'a>],
     is_stopped: &'a dyn Fn() -> bool,
@@ -330,8 +330,8 @@ pub(super) fn together(rows: &[Row<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<L
     by_kind(rows, |row| (row.kind(), false), find)
 }
 
-/// Computes the responses of one kind. The map is affine, so that one linear solve finds what it
-/// returns to.
+/// Computes the linear responses of rows of one kind. The map over a turn is affine, so one linear
+/// solve finds its fixed point.
 struct OfLinear<'a> {
     rows: &'a [Row<'a>],
     is_stopped: &'a dyn Fn() -> bool,
@@ -401,14 +401,14 @@ fn linear<T: Lane>(zero: N<T>, rows: &[Row<'_>], found: &mut Vec<LinearResponse>
 pub(crate) struct Watched<'m, T, M> {
     model: &'m M,
     clock: &'m Clock<T>,
-    /// The number of even instants in a turn.
+    /// The number of equally spaced instants in a turn.
     instants: usize,
     /// Whether to keep states at these.
     pub(crate) with_states: bool,
     pub(crate) peaks: Peaks<T, CHANNELS>,
     /// The greatest distance of the drum from the tub's axis, squared (m^2).
     pub(crate) radial_squared: N<T>,
-    /// At even instants, the first at the turn's start.
+    /// The states at these instants, the first at the turn's start.
     states: Vec<[N<T>; STATES]>,
     /// Forces with corners at the start, middle and end of all steps, if these are wanted.
     forces: Vec<CornerForce<T>>,

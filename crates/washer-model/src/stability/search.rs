@@ -1,5 +1,5 @@
-//! Searches that live on turns: many of them side by side, and the one for a periodic response at
-//! one speed.
+//! Searches driven by integrations over a turn: the driver of many side by side, and the search for
+//! a periodic response at one speed.
 
 use super::monodromy::Square;
 use super::orbit::{Asked, Row, Seen, Turned, turns};
@@ -55,10 +55,11 @@ const LEAST_SIZE: f64 = 1e-4;
 /// The matrix is taken anew where a correction leaves more than this share of what was missing.
 const FAST_ENOUGH: f64 = 0.2;
 
-/// Less than this is missing no more after a correction by a state's own matrix.
+/// The miss after which a correction by the Jacobian at the state itself is the last one. Basis:
+/// such a correction squares the miss. Doubling it ends searches a correction earlier.
 const NEXT_IS_LAST: f64 = 1e-3;
 
-/// The distance (m, rad; of speeds, times the drum's) within which a known response repels a
+/// The distance (m, rad; speeds over the drum's speed) within which a known response repels a
 /// search. Basis: neighbours beside a fold are some millimetres apart, as in test
 /// `a_branch_that_was_lost_is_found_again`. Doubling it makes searches pass neighbours that they
 /// are meant to find.
@@ -205,8 +206,8 @@ impl<'a> Solve<'a> {
         self.state
     }
 
-    /// Returns the state where the unbalance is up, and what is seen of the turn from there; none
-    /// where there is no response.
+    /// Returns the state with the unbalance up and the record of the turn from there; `None` if no
+    /// response was found.
     pub(super) fn found(self) -> Option<([f64; STATES], Box<Seen>)> {
         Some((self.state, self.found?))
     }
@@ -270,7 +271,7 @@ impl<'a> Search<'a> for Solve<'a> {
             let rate = if self.missing.is_finite() { missing / self.missing } else { 1.0 };
             let is_close =
                 missing * rate.min(1.0) < LAST_LOOK_MISS || is_own && missing < NEXT_IS_LAST;
-            // A search that known responses still push is not there.
+            // A search that known responses still deflect has not converged.
             self.is_last = is_close && (share - 1.0).abs() < DEFLATION_LEFT;
             if is_borrowed {
                 self.factors = None;

@@ -11,7 +11,7 @@ const ROWS: u32 = 39;
 /// The distance of samples of the truth, half a tolerance. The lattice's columns are among them.
 const STEP: f64 = 0.25;
 
-/// A stretch of a row on one side.
+/// A stretch of a lattice line on one side of the limit.
 #[derive(Clone, Copy, Debug)]
 struct RowStretch {
     from: f64,
@@ -37,7 +37,7 @@ struct Pocket {
     size: [f64; 2],
     shear: f64,
     depth: f64,
-    /// The end of the first axis towards which it opens; 0 for an ellipse.
+    /// The end of the first axis at which the region is open, -1 or 1; 0 for a closed ellipse.
     opens: f64,
     is_reliable: bool,
 }
@@ -176,8 +176,8 @@ fn common_stretches(sides: &[Vec<bool>], rows: usize) -> Vec<(usize, Vec<RowStre
     found
 }
 
-/// Islands as large as a cell of the lattice are promised in every row that passes them; smaller
-/// ones are counted.
+/// The search must find islands of at least a lattice cell on every lattice line that crosses them;
+/// smaller ones that it misses are counted.
 #[test]
 fn random_level_sets() {
     let clock = std::time::SystemTime::UNIX_EPOCH.elapsed().map_or(0, |now| now.as_nanos() as u64);

@@ -165,7 +165,7 @@ fn a_finished_file_of_the_same_plan_is_recognised() {
     let refused = open(&other_plan, false);
     assert!(matches!(refused, Err(StoreError::OutputDiffers { .. })), "{refused:?}");
     assert!(!home.path().join("x.parquet.partial").exists());
-    // A search that was killed after writing its file has left its folder.
+    // A search that was killed after it wrote its file leaves its folder behind.
     let Ok(Opened::Open(_)) = open(&ours, true) else { panic!() };
     fs::remove_file(home.path().join("x.parquet.partial/plan.json")).unwrap();
     let opened = open(&ours, false);
