@@ -249,7 +249,7 @@ pub struct ColumnRange {
     /// The least and the greatest value, if there are numbers.
     pub range: Option<(f64, f64)>,
     /// The values of a text or bool column with their numbers of occurrences: the first
-    /// [`MAX_NAMES`] that appear.
+    /// `MAX_NAMES` that appear.
     pub names: Vec<(String, u64)>,
 }
 
