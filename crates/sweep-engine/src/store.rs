@@ -53,10 +53,10 @@ pub use status::{FolderStatus, State, status};
 pub use trials::{Key, TrialColumns, Trials, WRITE_INTERVAL};
 pub use unfinished::{Unfinished, refuse_unfinished, unfinished};
 
-use sweep_parameter::{Parameter as _, RatioLimits};
+use sweep_parameter::RatioLimits;
 
 use crate::config::section::counted;
-use crate::{Axis, Model, Plan, Read};
+use crate::{Axis, Model, Plan};
 use sweep_files::{self as files, FileKind};
 
 /// The values of the axes at a point of the grid, first axis first.
@@ -83,11 +83,11 @@ pub struct Job<'a> {
 
 impl<'a> Job<'a> {
     /// What the store must know of this plan, as run by this build of its program.
-    pub fn of<M: Rows>(plan: &'a Plan<M>) -> Self {
+    pub fn of<M: Model>(plan: &'a Plan<M>) -> Self {
         Self {
             plan: plan.to_json(),
-            version: M::BUILD.version,
-            numerics: M::BUILD.numerics,
+            version: M::ABOUT.build.version,
+            numerics: M::ABOUT.build.numerics,
             points: plan.points(),
             layout: M::layout(plan),
             limits: plan.reliability.limits,
@@ -101,17 +101,11 @@ impl<'a> Job<'a> {
     }
 }
 
-/// A model whose rows can be kept.
-pub trait Rows: Read {
-    /// What the rows of a result are.
-    fn layout(plan: &Plan<Self>) -> Layout;
-}
-
 /// The axes of a plan as columns.
 pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<Column> {
     let column = |axis: &Axis<M>| {
         let parameter = &axis.parameter;
-        Column::new(parameter.name(), parameter.unit(), parameter.description(), Holds::Axis)
+        Column::new(&*parameter.name, parameter.unit, parameter.description, Holds::Axis)
     };
     plan.axes.iter().map(column).collect()
 }

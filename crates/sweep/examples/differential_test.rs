@@ -29,7 +29,10 @@
 use std::process::ExitCode;
 
 use rayon::prelude::*;
-use sweep::{Integrator, Level, ModelEngine, Outcome, Plan, Status, Trajectory, Verdict};
+use sweep::{
+    Integrator, Level, ModelEngine, Outcome, Plan, Status, Trajectory, Verdict, rk4,
+    rk4_mass_scaled,
+};
 
 /// What is asked of the fast method.
 const ACCURACIES: [f64; 4] = [1e-3, 1e-3, 1e-4, 1e-2];
@@ -323,7 +326,7 @@ fn evaluated(plan: &Plan, integrator: Integrator) -> Vec<Outcome> {
 /// takes it; none if that row failed.
 fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
     let mut rng = Rng(!seed);
-    let rows = evaluated(plan, Integrator::Rk4MassScaled { accuracy: 1e-3 });
+    let rows = evaluated(plan, rk4_mass_scaled(1e-3));
     let gap_m = rng.one(&rows).nonlinear.min_gap_m?;
     let reach_m = plan.model.machine.radial_clearance_m - gap_m;
     let overlap = 10f64.powf(rng.between(-6.0, -1.5));
@@ -416,18 +419,16 @@ fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
         return Found { refused: 1, ..Found::default() };
     };
     let evaluate = |integrator| evaluated(&plan, integrator);
-    let rows = evaluate(Integrator::Rk4MassScaled { accuracy });
-    let halved = evaluate(Integrator::Rk4 { step_s });
+    let rows = evaluate(rk4_mass_scaled(accuracy));
+    let halved = evaluate(rk4(step_s));
     let mut reference = None;
     let mut quarter = None;
     let mut found = Found { rows: rows.len() as u64, ..Found::default() };
     for (i, (row, halved)) in rows.iter().zip(&halved).enumerate() {
         found.by_method[row.method as usize] += 1;
         found.failed += u64::from(statuses(row) != [Status::Ok; 2]);
-        let mut at_reference = || {
-            reference.get_or_insert_with(|| evaluate(Integrator::Rk4 { step_s: 2.0 * step_s }))[i]
-                .clone()
-        };
+        let mut at_reference =
+            || reference.get_or_insert_with(|| evaluate(rk4(2.0 * step_s)))[i].clone();
         if row.sensitive == Some(true) {
             found.sensitive += 1;
             let same = at_reference();
@@ -442,7 +443,7 @@ fn tried(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
             || verdict(&plan, row) != verdict(&plan, judge);
         if differs {
             // The judge may be the one that is off: rows are refined to shorter steps.
-            let finer = Integrator::Rk4 { step_s: step_s / 8.0 };
+            let finer = rk4(step_s / 8.0);
             judge = &quarter.get_or_insert_with(|| evaluate(finer))[i];
         }
         let halved = judge;

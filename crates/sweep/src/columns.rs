@@ -6,7 +6,7 @@ use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
 use sweep_engine::store::read::FAR_OFF;
-use sweep_engine::store::{Column, Done, Holds, Layout, Rows, axis_columns};
+use sweep_engine::store::{Column, Done, Holds};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, ModeMotion};
 use washer_row::{
@@ -14,14 +14,8 @@ use washer_row::{
     Trajectory, Verdict, row_status,
 };
 
-use crate::model::Washer;
-use crate::plan::{Plan, has_friction};
-
-impl Rows for Washer {
-    fn layout(plan: &Plan) -> Layout {
-        Layout::of_map(axis_columns(plan), Columns::of_run(plan).declared())
-    }
-}
+use crate::model::described;
+use crate::plan::{Plan, compared_channels, has_friction};
 
 /// What a row's cells are taken from.
 struct ResultRow {
@@ -47,9 +41,9 @@ pub(crate) struct Columns {
 impl Columns {
     /// Those of a run.
     pub(crate) fn of_run(plan: &Plan) -> Self {
-        let reliability = &plan.reliability;
-        let (channels, limits) = (&reliability.channels, reliability.limits);
-        Self::of_measures(channels, limits, &plan.model.measures, has_friction(plan))
+        let channels = compared_channels(plan);
+        let limits = plan.reliability.limits;
+        Self::of_measures(&channels, limits, &plan.model.measures, has_friction(plan))
     }
 
     /// The same, by what they depend on.
@@ -61,7 +55,7 @@ impl Columns {
     ) -> Self {
         let criterion = measures.criterion;
         let (amplitude, ratio) = (criterion.amplitude(), criterion.ratio());
-        let mut columns = amplitude_columns(channels, limits, amplitude, ratio);
+        let mut columns = amplitude_columns(&all_described(channels), limits, amplitude, ratio);
         columns.extend(verdict(channels, limits));
         columns.extend(gap_columns());
         columns.extend(has_friction.then(friction_column));
@@ -72,11 +66,12 @@ impl Columns {
 
     /// Those of dwells at constant speeds.
     pub(crate) fn of_dwells(plan: &Plan) -> Self {
-        let (channels, limits) = (&plan.reliability.channels, plan.reliability.limits);
+        let channels = &compared_channels(plan);
+        let limits = plan.reliability.limits;
         let mut columns = growth_columns("");
         let amplitude = "largest deviation from equilibrium over a turn";
         let ratio = "nonlinear over linear amplitude; null where that is zero";
-        columns.extend(amplitude_columns(channels, limits, amplitude, ratio));
+        columns.extend(amplitude_columns(&all_described(channels), limits, amplitude, ratio));
         columns.extend(verdict(channels, limits).into_iter().take(2));
         let (text, statuses) = ("ok, or why there is no response", ROW_STATUSES.to_vec());
         let status = |row: &ResultRow| Some(row.compared.status);
@@ -124,10 +119,15 @@ impl Columns {
 const MODELS: [(&str, fn(&Outcome) -> &Trajectory); 2] =
     [("nonlinear", |outcome| &outcome.nonlinear), ("linear", |outcome| &outcome.linear)];
 
+/// Returns what the engine knows of channels.
+fn all_described(channels: &[Channel]) -> Vec<sweep_parameter::Channel> {
+    channels.iter().map(|channel| described(*channel)).collect()
+}
+
 fn verdict(channels: &[Channel], limits: RatioLimits) -> Vec<WasherColumn> {
     let told = "the method of the row's nonlinear numbers; with the fast method its level: \
                 capped_0 to capped_5, rk4, additive or dop853";
-    verdict_columns(channels, limits, Level::ALL.map(Level::name).to_vec(), told)
+    verdict_columns(&all_described(channels), limits, Level::ALL.map(Level::name).to_vec(), told)
 }
 
 /// Columns of the metrics that are asked for, and no others.

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use crate::engine::ModelEngine;
-use crate::plan::Plan;
+use crate::method::direct;
+use crate::plan::{Plan, compared_channels};
 use crate::trace::{
     Models, StartValue, TraceExtras, TraceSettings, TraceTable, check_spacing, parse_start_value,
     start_from, trace_in_pool,
@@ -113,7 +114,7 @@ fn chosen(args: &Args) -> Result<Vec<String>, Error> {
     if point >= plan.points() {
         return Err(Error::option("--point", point, format!("from 0 to {}", plan.points() - 1)));
     }
-    let names = plan.axes.iter().map(|axis| axis.parameter.name());
+    let names = plan.axes.iter().map(|axis| &*axis.parameter.name);
     // The shortest decimals read back to the same values.
     Ok(names.zip(plan.axis_values(point)).map(|(name, value)| format!("{name}={value}")).collect())
 }
@@ -156,7 +157,7 @@ fn compared(plan: &Plan, at: &[String], of_file: Option<Level>) -> Result<String
     plan.model.held_speeds = None;
     let mut outcomes = ModelEngine::new(&plan)?.evaluate_at(&[Vec::new()]);
     let Some(outcome) = outcomes.pop() else { return Ok(String::new()) };
-    let (channels, limits) = (&plan.reliability.channels, plan.reliability.limits);
+    let (channels, limits) = (&compared_channels(&plan), plan.reliability.limits);
     let verdict = Verdict::new(&outcome, channels.len(), limits);
     let number = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), short);
     let row = |(k, channel): (usize, &Channel)| {
@@ -192,7 +193,7 @@ fn compared(plan: &Plan, at: &[String], of_file: Option<Level>) -> Result<String
         _ => "undefined: no ratio is".to_owned(),
     };
     text.line("verdict", &said);
-    if let Some(of_file) = of_file.filter(|_| plan.integrator.direct().is_none()) {
+    if let Some(of_file) = of_file.filter(|_| direct(&plan.integrator).is_none()) {
         let [row, file] = [outcome.method, of_file].map(Level::name);
         let told = format!("{row}, as in the point's row of a map; the file: {file}");
         text.line("method", told);
