@@ -144,7 +144,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
     let mut slope_before = x;
     let mut length = zero;
     let mut is_fresh = lanes.start_pending_lanes(task, &mut x);
-    while lanes.are_active() && !task.is_stopped() {
+    while lanes.are_active() && !task.cancel().is_requested() {
         let forcing = task.system().forcing_aside(lanes.time);
         k[0] = task.system().derivative(&forcing, &x);
         if is_fresh {

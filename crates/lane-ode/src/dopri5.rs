@@ -79,7 +79,7 @@ pub fn integrate<T: Lane, const D: usize, P: Task<T, D>>(
 
     loop {
         is_fresh |= lanes.start_pending_lanes(task, &mut x);
-        if task.is_stopped() || !lanes.are_active() {
+        if task.cancel().is_requested() || !lanes.are_active() {
             return;
         }
         let h = lanes.steps();

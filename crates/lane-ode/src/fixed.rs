@@ -85,7 +85,7 @@ impl<T: Lane> FixedSegments<T> {
             self.clock.total.0.set(lane, steps as f64);
             self.index.0.set(lane, 0.0);
         }
-        if task.is_stopped() {
+        if task.cancel().is_requested() {
             return None;
         }
         let active = self.lanes[..T::LANES].iter().filter(|lane| lane.is_active);

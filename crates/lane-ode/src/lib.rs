@@ -121,6 +121,7 @@
 mod aarch64;
 mod adaptive;
 pub mod additive;
+mod cancel;
 mod control;
 pub mod dop853;
 pub mod dopri5;
@@ -148,6 +149,7 @@ mod wasm32;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+pub use cancel::Cancel;
 pub use control::Tolerance;
 pub use dual::Dual;
 pub use fixed::STEPS_AT_ONCE;

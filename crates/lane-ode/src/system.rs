@@ -1,6 +1,6 @@
 //! The interface of integrators: systems, trajectories, and the steps that observers receive.
 
-use crate::{Aside, Lane, N};
+use crate::{Aside, Cancel, Lane, N};
 
 /// A first-order system x' = f(t, x) with `D` states, over lanes.
 pub trait System<T: Lane, const D: usize> {
@@ -109,8 +109,8 @@ pub trait Task<T: Lane, const D: usize> {
 
     /// Whether to stop; unfinished trajectories are then abandoned. It is called at least every
     /// [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps, because a segment may take hours.
-    fn is_stopped(&self) -> bool {
-        false
+    fn cancel(&self) -> Cancel<'_> {
+        Cancel::Never
     }
 }
 

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::marker::PhantomData;
 
-use lane_ode::{MAX_LANES, Simd};
+use lane_ode::{Cancel, MAX_LANES, Simd};
 use serde_json::Value;
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
@@ -192,7 +192,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     RowEvaluator<'_, O, C, D, P>
 {
     /// Computes rows at points with these values of the axes, in lanes.
-    fn compared(&self, axis_values: &[Vec<f64>], is_stopped: &dyn Fn() -> bool) -> Vec<Compared> {
+    fn compared(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<Compared> {
         let channels = self.channels();
         let limits = self.plan.reliability.limits;
         let method = self.common_method().1;
@@ -227,7 +227,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
                 ratios,
             }
         };
-        self.rows(axis_values, is_stopped).into_iter().map(compared).collect()
+        self.rows(axis_values, cancel).into_iter().map(compared).collect()
     }
 
     /// Returns the indices of the coordinates that the plan compares.
@@ -246,7 +246,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         }
     }
 
-    fn rows(&self, axis_values: &[Vec<f64>], is_stopped: &dyn Fn() -> bool) -> Vec<PointRuns<C>> {
+    fn rows(&self, axis_values: &[Vec<f64>], cancel: Cancel<'_>) -> Vec<PointRuns<C>> {
         let ready = |values: &Vec<f64>| {
             let Scenario { model, window_s } = self.plan.scenario_at(values);
             PreparedPoint::new::<O, D>(model.values, window_s)
@@ -259,7 +259,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
             vec![PointRuns { runs: [none; 2], error: None, converged: None }; cases.len()];
         if let (Some(method), _) = self.common_method() {
             for (place, runs) in
-                places.into_iter().zip(self.run_both_models(method, &prepared, is_stopped))
+                places.into_iter().zip(self.run_both_models(method, &prepared, cancel))
             {
                 rows[place].runs = runs;
             }
@@ -267,8 +267,8 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         }
         // Each point has its own steps, so that a row does not depend on the other points.
         for (place, case) in places.into_iter().zip(prepared) {
-            self.refine(&mut rows[place], case, is_stopped);
-            if is_stopped() {
+            self.refine(&mut rows[place], case, cancel);
+            if cancel.is_requested() {
                 break;
             }
         }
@@ -280,7 +280,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
         &self,
         method: Method,
         cases: &[&PreparedPoint<C, P>],
-        is_stopped: &dyn Fn() -> bool,
+        cancel: Cancel<'_>,
     ) -> Vec<[ModelRun<C>; 2]> {
         let end_s = self.plan.end_s;
         let runs = |model| {
@@ -289,7 +289,7 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
                 method,
                 cases,
                 end_s,
-                is_stopped,
+                cancel,
                 oscillator: PhantomData,
             }
             .runs()
@@ -299,17 +299,12 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
     }
 
     /// Integrates both models with steps that are halved until two runs agree.
-    fn refine(
-        &self,
-        row: &mut PointRuns<C>,
-        case: &PreparedPoint<C, P>,
-        is_stopped: &dyn Fn() -> bool,
-    ) {
+    fn refine(&self, row: &mut PointRuns<C>, case: &PreparedPoint<C, P>, cancel: Cancel<'_>) {
         let Steps::Checked(accuracy) = self.plan.integrator.steps() else { return };
         let channels = self.channels();
         let mut step_s = (FIRST_STEP_RAD / case.fastest_rad_per_s()).min(self.plan.end_s / 8.0);
         for run_index in 0..MAX_HALVING_RUNS {
-            let now = self.run_both_models(Method::Rk4(step_s), &[case], is_stopped)[0];
+            let now = self.run_both_models(Method::Rk4(step_s), &[case], cancel)[0];
             row.error =
                 if run_index > 0 { error_of_finer(&row.runs, &now, &channels) } else { None };
             row.converged = Some(row.error.is_some_and(|error| error <= accuracy));

@@ -3,8 +3,8 @@
 use std::marker::PhantomData;
 
 use lane_ode::{
-    Forcing, Kernel, Lane, MAX_LANES, N, Peaks, Sample, Segment, SegmentEnd, Simd, Step, Task,
-    Tolerance, dopri5, rk4,
+    Cancel, Forcing, Kernel, Lane, MAX_LANES, N, Peaks, Sample, Segment, SegmentEnd, Simd, Step,
+    Task, Tolerance, dopri5, rk4,
 };
 
 use crate::Oscillator;
@@ -53,8 +53,8 @@ pub(crate) struct Integration<'a, O, const C: usize, const D: usize, const P: us
     pub(crate) method: Method,
     pub(crate) cases: &'a [&'a PreparedPoint<C, P>],
     pub(crate) end_s: f64,
-    /// Whether to stop; the results are then meaningless.
-    pub(crate) is_stopped: &'a dyn Fn() -> bool,
+    /// The request to stop; the results are then meaningless.
+    pub(crate) cancel: Cancel<'a>,
     pub(crate) oscillator: PhantomData<O>,
 }
 
@@ -203,7 +203,7 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
         self.peaks.advance(step.length_s, &samples, counts);
     }
 
-    fn is_stopped(&self) -> bool {
-        (self.integration.is_stopped)()
+    fn cancel(&self) -> Cancel<'_> {
+        self.integration.cancel
     }
 }

@@ -80,6 +80,11 @@ impl Interrupt {
         self.stop.store(true, Ordering::Release);
     }
 
+    /// Returns the flag itself, which long computations poll.
+    pub fn flag(&self) -> &AtomicBool {
+        &self.stop
+    }
+
     /// Returns whether the flag is set.
     pub fn stopped(&self) -> bool {
         self.stop.load(Ordering::Acquire)

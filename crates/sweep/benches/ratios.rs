@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use lane_ode::Simd;
+use lane_ode::{Cancel, Simd};
 use washer_model::{
     BumpStop, Bushing, Dwell, Machine, Method, ModelKind, Point, Profile, Spin, Starts,
     StepSelector, Timing, capped_method, find_endings, prepare, respond, simulate,
@@ -252,7 +252,7 @@ fn dwells(rounds: usize, pair_s: f64) {
     let mut times = vec![Vec::new()];
     for _ in 0..rounds {
         let begin = Instant::now();
-        let found = respond(&dwells, &|| false);
+        let found = respond(&dwells, Cancel::Never);
         times[0].push(begin.elapsed().as_secs_f64() * 1e3 / dwells.len() as f64);
         assert!(found.iter().all(Result::is_ok));
     }
@@ -284,7 +284,7 @@ fn motions(rounds: usize) {
     let dwell = prepare_points(1.0);
     let dwells = [Dwell { point: &dwell[0], speed_rpm: SPEED_RPM }];
     let starts = Starts { count: TRAJECTORIES, longest_s: 100.0, ..Starts::default() };
-    let find = || find_endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0);
+    let find = || find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0);
     // The time is a whole number of windows.
     let followed_s = find().map(|found| found.motions[0].time_s).expect("it has motions");
     let as_many = prepare_points(followed_s * SPEED_RPM / 60.0 * STEPS_A_TURN * STEP_S);
@@ -299,7 +299,7 @@ fn motions(rounds: usize) {
     for _ in 0..rounds {
         let works: [&dyn Fn(); 4] = [
             &|| assert!(find().is_ok()),
-            &|| assert!(respond(&dwells, &|| false)[0].is_ok()),
+            &|| assert!(respond(&dwells, Cancel::Never)[0].is_ok()),
             &|| integrate(&as_many),
             &|| integrate(&as_long),
         ];

@@ -8,7 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use lane_ode::Simd;
+use lane_ode::{Cancel, Simd};
 use serde_json::{Value, json};
 use sweep_parameter::named;
 use washer_model::{Dwell, Endings, Gauge, Recorders, Starts, State, decimal};
@@ -217,7 +217,7 @@ impl AttractorEngine {
         let Some(carry) = self.search.carry else {
             let dwells: Vec<(Dwell<'_>, Carried)> =
                 requested.iter().map(|(_, dwell)| (*dwell, None)).collect();
-            let found = find_motions(simd, &dwells, &self.starts, &is_stopped);
+            let found = find_motions(simd, &dwells, &self.starts, Cancel::When(&is_stopped));
             for ((row, _), found) in requested.iter().zip(found) {
                 keep(self.found_rows(*row, found));
             }
@@ -248,7 +248,7 @@ impl AttractorEngine {
                 (Dwell { point: groups[*k][0].1.point, speed_rpm }, carried[*k])
             };
             let dwells: Vec<(Dwell<'_>, Carried)> = needed.iter().map(dwell).collect();
-            let found = find_motions(simd, &dwells, &self.starts, &is_stopped);
+            let found = find_motions(simd, &dwells, &self.starts, Cancel::When(&is_stopped));
             if is_stopped() {
                 return;
             }

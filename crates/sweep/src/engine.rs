@@ -12,7 +12,7 @@ pub(crate) use sweep_engine::{Engine, Evaluator, RunContext};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex};
 
-use lane_ode::Simd;
+use lane_ode::{Cancel, Simd};
 use once_cell::sync::OnceCell;
 use pool::{OutcomeSink, PointSource, Pool};
 use washer_model::{Machine, Method, ModelKind, Point, Spin, StepSelector, Timing, prepare};
@@ -133,14 +133,14 @@ impl<'a> ModelEngine<'a> {
 
     /// Returns the refinement levels of both models.
     pub(crate) fn levels(&self) -> &[RefinementLevels; 2] {
-        self.levels.get_or_init(|| self.find_levels(&|| false))
+        self.levels.get_or_init(|| self.find_levels(Cancel::Never))
     }
 
     /// Returns [`Self::levels`], or `None` if the context stops the search.
     fn levels_under(&self, context: &RunContext<'_>) -> Option<&[RefinementLevels; 2]> {
         // The standard library's cell has no `get_or_try_init` yet.
         let find = || {
-            let found = self.find_levels(&|| context.stopped());
+            let found = self.find_levels(Cancel::When(&|| context.stopped()));
             // A search that was stopped may lack levels.
             if context.stopped() { Err(()) } else { Ok(found) }
         };
@@ -158,7 +158,7 @@ impl<'a> ModelEngine<'a> {
         Some(CappedRun { level, methods, checkpoints: self.timing.checkpoints })
     }
 
-    fn find_levels(&self, is_stopped: &dyn Fn() -> bool) -> [RefinementLevels; 2] {
+    fn find_levels(&self, cancel: Cancel<'_>) -> [RefinementLevels; 2] {
         if let Some((level, method)) = direct(&self.plan.integrator) {
             return ModelKind::ALL.map(|_| RefinementLevels::direct(level, method));
         }
@@ -170,7 +170,7 @@ impl<'a> ModelEngine<'a> {
             .iter()
             .zip(&scenarios)
             .filter_map(|(point, scenario)| Some((point.as_ref().ok()?, &scenario.model.spin)));
-        let steps = StepSelector::until(points, self.plan.end_s, is_stopped);
+        let steps = StepSelector::until(points, self.plan.end_s, cancel);
         ModelKind::ALL.map(|model| refinement_levels(&steps, model, self.rule.accuracy))
     }
 
@@ -262,10 +262,11 @@ impl<'a> ModelEngine<'a> {
         points: &[&Point],
         context: &RunContext<'_>,
     ) -> Vec<LevelRun> {
-        let stop = || context.stopped();
+        let is_stopped = || context.stopped();
+        let cancel = Cancel::When(&is_stopped);
         let integrate_group = |points: &[&Point]| {
             let simd = self.simd_for(points.len());
-            integrate_points(simd, ModelKind::ALL[model], method, points, &self.rule, &stop)
+            integrate_points(simd, ModelKind::ALL[model], method, points, &self.rule, cancel)
                 .unwrap_or_default()
         };
         let panicked = || LevelRun::failed(Status::Panicked);

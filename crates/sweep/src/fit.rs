@@ -29,9 +29,9 @@ use washer_model::{Method, ModelKind, Parameter, Target};
 
 use crate::config::WasherGridInput;
 use crate::engine::simd_from_environment;
+use lane_ode::Cancel;
 use sweep_engine::config::{Diagnostic, Location, Report as Mistakes};
 use sweep_engine::design::{DesignRule, DistributionShape};
-use sweep_engine::threads::Cancel;
 use sweep_engine::{Design, Diagnostics, Distribution, Error};
 
 use algebra::Symmetric;
@@ -124,7 +124,7 @@ pub(crate) struct Fitted<'a> {
 /// The context of a fit: cancellation, progress and stored evaluations.
 pub(crate) struct FitWork<'a> {
     /// The cancellation. The result of a cancelled fit means nothing.
-    pub(crate) stop: Cancel<'a>,
+    pub(crate) cancel: Cancel<'a>,
     /// The listener that is called after every evaluation with their number.
     pub(crate) seen: &'a (dyn Fn(usize) + Sync),
     /// The machine file beside which evaluations are kept.
@@ -261,8 +261,8 @@ fn fitted<'a>(
     let model = ModelKind::named(&options.model).unwrap_or(ModelKind::Nonlinear);
     let simd = simd_from_environment()?;
     let with_shift = !options.no_shift;
-    let stop = work.stop;
-    let mut problem = Problem { cases, free, model, with_shift, method, simd, stop };
+    let cancel = work.cancel;
+    let mut problem = Problem { cases, free, model, with_shift, method, simd, cancel };
     let samples: usize = problem.cases.iter().map(|case| case.measured.count()).sum();
     let unknowns = problem.unknowns() + problem.signals().count();
     if unknowns >= samples {
@@ -350,7 +350,7 @@ fn fitted<'a>(
         draws: options.draws.into(),
     };
     let report = found.report()?;
-    if stop() {
+    if cancel.is_requested() {
         return Err(DescentEnd::Stopped);
     }
     Ok(Fitted { problem, x: best.x, against, report, evaluations: kept })
@@ -461,7 +461,7 @@ impl MinimumSearch<'_> {
     fn evaluate(&self, x: &[f64]) -> Result<Option<Summary>, DescentEnd> {
         let find = || {
             let found = self.problem.against(x);
-            if (self.problem.stop)() {
+            if self.problem.cancel.is_requested() {
                 return Err(DescentEnd::Stopped);
             }
             Ok(found.map(|against| self.problem.summary(&against)))

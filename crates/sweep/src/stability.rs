@@ -8,7 +8,7 @@ pub(crate) mod tongues;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use lane_ode::Simd;
+use lane_ode::{Cancel, Simd};
 use serde_json::json;
 use washer_model::{Dwell, Machine, Point, Response, Spin, Target, prepare};
 use washer_row::{Growth, Outcome, Status, Trajectory};
@@ -197,7 +197,9 @@ impl HeldSpeedEvaluator<'_> {
         match &self.analysis {
             HeldAnalysis::Responses(columns) => {
                 let dwells: Vec<Dwell<'_>> = requests.iter().map(|(_, dwell)| *dwell).collect();
-                for ((row, _), found) in requests.iter().zip(find_responses(&dwells, &is_stopped)) {
+                for ((row, _), found) in
+                    requests.iter().zip(find_responses(&dwells, Cancel::When(&is_stopped)))
+                {
                     let failed = |status| Outcome::failed(*row, status);
                     let outcome = found.map_or_else(failed, |found| self.outcome(*row, &found));
                     keep(columns.done(outcome));

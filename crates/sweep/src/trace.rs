@@ -17,8 +17,8 @@ use crate::engine::{CappedRun, reference_method};
 use crate::method::{direct, rk4};
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, friction_speeds, prepare_point};
+use lane_ode::Cancel;
 use sweep_engine::config::NamedValues;
-use sweep_engine::threads::Cancel;
 use sweep_engine::{Error, Table, threads};
 use sweep_files::key;
 use washer_row::Level;
@@ -170,13 +170,13 @@ pub(crate) fn trace_in_pool(
     plan: &Plan,
     at: Option<Vec<(String, f64)>>,
     settings: &TraceSettings,
-    stop: Cancel<'_>,
+    cancel: Cancel<'_>,
 ) -> Result<TraceTable, NoEquilibrium> {
     // A single point has at most two integrations, one of each model.
     let thread_count = if at.is_some() { 2 } else { threads::cores() };
     let work = || match at {
-        Some(at) => trace_scenario(plan, plan.scenario(0), at, settings, stop),
-        None => Ok(trace_all_points(plan, settings, stop)),
+        Some(at) => trace_scenario(plan, plan.scenario(0), at, settings, cancel),
+        None => Ok(trace_all_points(plan, settings, cancel)),
     };
     match threads::pool(thread_count) {
         Ok(pool) => pool.install(work),
@@ -196,11 +196,11 @@ pub(crate) fn trace_scenario(
     scenario: Scenario,
     at: NamedValues,
     settings: &TraceSettings,
-    stop: Cancel<'_>,
+    cancel: Cancel<'_>,
 ) -> Result<TraceTable, NoEquilibrium> {
     let run = TraceRun::new(plan, scenario, settings)?;
     let runs = [&run];
-    let models = integrate(&runs, settings.models, stop);
+    let models = integrate(&runs, settings.models, cancel);
     let mut table = Table::new(crate::identity::BUILD);
     let failures = add_columns(&mut table, &runs, &models, settings.extras);
     let failure = |kind: ModelKind| {
@@ -232,7 +232,7 @@ pub(crate) fn trace_scenario(
 pub(crate) fn trace_all_points(
     plan: &Plan,
     settings: &TraceSettings,
-    stop: Cancel<'_>,
+    cancel: Cancel<'_>,
 ) -> TraceTable {
     let mut failures = Vec::new();
     let mut numbered_runs = Vec::new();
@@ -243,7 +243,7 @@ pub(crate) fn trace_all_points(
         }
     }
     let runs: Vec<&TraceRun> = numbered_runs.iter().map(|(_, run)| run).collect();
-    let models = integrate(&runs, settings.models, stop);
+    let models = integrate(&runs, settings.models, cancel);
     let mut table = Table::new(crate::identity::BUILD);
     let rows = || numbered_runs.iter().map(|(number, run)| (*number, run.times_s.len()));
     let numbers = rows().flat_map(|(number, count)| repeat_n(number, count));
@@ -304,7 +304,7 @@ impl TraceRun {
 fn integrate<'a>(
     runs: &[&'a TraceRun],
     models: Models,
-    stop: Cancel<'_>,
+    cancel: Cancel<'_>,
 ) -> Vec<(ModelKind, Vec<History<'a>>)> {
     let kinds = models.kinds();
     let groups: Vec<(ModelKind, &[&'a TraceRun])> = kinds
@@ -318,7 +318,7 @@ fn integrate<'a>(
             start: run.start,
             times_s: run.times_s.clone(),
         });
-        histories(kind, requests.collect(), stop)
+        histories(kind, requests.collect(), cancel)
     };
     let by_group: Vec<Vec<History<'a>>> = match rayon::current_thread_index() {
         Some(_) => groups.par_iter().map(integrate_group).collect(),

@@ -1,6 +1,6 @@
 //! Evaluation of single points.
 
-use lane_ode::{Failure, Simd};
+use lane_ode::{Cancel, Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
     Channel, Disturbance, Dwell, Machine, Method, ModelKind, Point, Response, Spin, Start, Starts,
@@ -199,7 +199,7 @@ pub fn check(setup: &Setup, values: &[f64]) -> Result<Answer, NoPoint> {
 
 fn run_method(model: usize, method: &Method, points: &[&Point], rule: &RowRule) -> Vec<LevelRun> {
     let found =
-        integrate_points(Simd::best(), ModelKind::ALL[model], method, points, rule, &|| false);
+        integrate_points(Simd::best(), ModelKind::ALL[model], method, points, rule, Cancel::Never);
     found.unwrap_or_default()
 }
 
@@ -246,7 +246,7 @@ pub fn growth(
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
     let disturbance = |first: &Response| (first.disturbance(), first.is_on_curve);
-    let answers = respond(&dwells, &|| false).into_iter();
+    let answers = respond(&dwells, Cancel::Never).into_iter();
     Ok(answers.map(|answer| answer.ok()?.first().map(disturbance)).collect())
 }
 
@@ -264,6 +264,6 @@ pub fn dwell(
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
     let carried = vec![None; dwells.len()];
-    let found = find_endings(Simd::best(), &dwells, &carried, &Starts::default(), &|| false);
+    let found = find_endings(Simd::best(), &dwells, &carried, &Starts::default(), Cancel::Never);
     Ok(DwellPeaks::from_endings(speeds_rpm, &found))
 }

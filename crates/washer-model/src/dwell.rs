@@ -18,7 +18,7 @@ use crate::stability::orbit::Row;
 use crate::stability::settings::{Case, Settings};
 use crate::{Dwell, Modes, NoAnswer, Reading, Recorders, Response, respond};
 use exponent::compute_exponents;
-use lane_ode::Simd;
+use lane_ode::{Cancel, Simd};
 use multipliers::{Orbit, growths_per_s};
 use starts::{
     Directions, Kick, MODE_DIRECTIONS, add_kick, is_from_rest, kick_directions, kicks, perturb,
@@ -176,16 +176,9 @@ pub fn find_endings(
     dwells: &[Dwell<'_>],
     carried: &[Option<[f64; STATES]>],
     starts: &Starts,
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> Vec<Result<Endings, NoAnswer>> {
-    find_endings_from_responses(
-        simd,
-        dwells,
-        respond(dwells, is_stopped),
-        carried,
-        starts,
-        is_stopped,
-    )
+    find_endings_from_responses(simd, dwells, respond(dwells, cancel), carried, starts, cancel)
 }
 
 /// Finds motions like [`find_endings`], given the results of [`respond`] for these dwells.
@@ -198,7 +191,7 @@ pub fn find_endings_from_responses(
     answers: Vec<Result<Vec<Response>, NoAnswer>>,
     carried: &[Option<[f64; STATES]>],
     starts: &Starts,
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> Vec<Result<Endings, NoAnswer>> {
     let mut searches: Vec<Result<SpeedSearch<'_>, NoAnswer>> = Vec::with_capacity(dwells.len());
     let mut settings: Option<Settings<'_>> = None;
@@ -221,11 +214,11 @@ pub fn find_endings_from_responses(
         let search = |case| SpeedSearch::new(case, responses, carried, starts);
         searches.push(settings.case(dwell.speed_rpm).map(search));
     }
-    let mut is_complete = run_to_end(simd, &mut searches, is_stopped);
+    let mut is_complete = run_to_end(simd, &mut searches, cancel);
     for search in searches.iter_mut().flatten() {
         search.start_survivors();
     }
-    is_complete = is_complete && run_to_end(simd, &mut searches, is_stopped);
+    is_complete = is_complete && run_to_end(simd, &mut searches, cancel);
     for search in searches.iter_mut().flatten() {
         search.find_transients();
     }
@@ -237,7 +230,7 @@ pub fn find_endings_from_responses(
             for search in searches.iter_mut().flatten() {
                 search.start_at_midpoints();
             }
-            is_complete = is_complete && run_to_end(simd, &mut searches, is_stopped);
+            is_complete = is_complete && run_to_end(simd, &mut searches, cancel);
             for search in searches.iter_mut().flatten() {
                 search.bisect_brackets();
             }
@@ -282,10 +275,10 @@ fn record_motions<'a, 'f>(
 fn run_to_end(
     simd: Simd,
     searches: &mut [Result<SpeedSearch<'_>, NoAnswer>],
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> bool {
     loop {
-        if is_stopped() {
+        if cancel.is_requested() {
             return false;
         }
         let mut running: Vec<&mut HeldTrajectory<'_>> = Vec::new();
@@ -314,7 +307,7 @@ fn run_to_end(
         if running.is_empty() && perturbed.is_empty() && repeating.is_empty() {
             return true;
         }
-        let growths = growths_per_s(&orbits, is_stopped);
+        let growths = growths_per_s(&orbits, cancel);
         for ((trajectory, period), growth_per_s) in repeating.into_iter().zip(growths) {
             trajectory.add_growth(period, growth_per_s);
         }

@@ -111,7 +111,7 @@ pub use run::history::{
 pub use run::suspension::{Forces, stops_at_rest_n};
 pub use run::{
     Checkpoint, Checkpoints, Gauge, Level, Method, MethodNumbers, Reading, Record, Recorders,
-    Snapshot, StopRequest, simulate, simulate_until, simulate_with,
+    Snapshot, simulate, simulate_until, simulate_with,
 };
 pub use stability::{
     Beyond, Crossed, Crossing, Disturbance, Dwell, Exact, Kind, LeftRange, NoAnswer, Participant,

@@ -28,12 +28,9 @@ use crate::{COORDINATES, ModelKind, Point};
 use active_recorders::{ActiveRecorders, ObservedState, StepParts};
 use core::marker::PhantomData;
 use lane_ode::{
-    Aside, Count, Failure, Kernel, Lane, MAX_LANES, N, Peaks, Sample, Segment, SegmentEnd, Simd,
-    Step, Task,
+    Aside, Cancel, Count, Failure, Kernel, Lane, MAX_LANES, N, Peaks, Sample, Segment, SegmentEnd,
+    Simd, Step, Task,
 };
-
-/// A function that returns true once the computation shall stop.
-pub type StopRequest<'a> = &'a dyn Fn() -> bool;
 
 /// The coordinates at the ends of a trajectory's segments, up to its own end.
 pub type Checkpoints = Vec<Checkpoint>;
@@ -76,7 +73,7 @@ pub fn simulate_with(
     points: &[&Point],
     recorders: Recorders,
 ) -> (Vec<Record>, Vec<Reading>) {
-    simulate_until(simd, model, method, points, recorders, &|| false).unwrap_or_default()
+    simulate_until(simd, model, method, points, recorders, Cancel::Never).unwrap_or_default()
 }
 
 /// Integrates one model at every point, like [`simulate_with`]. Returns `None` if `stop` returned
@@ -88,12 +85,12 @@ pub fn simulate_until(
     method: &Method,
     points: &[&Point],
     recorders: Recorders,
-    stop: StopRequest<'_>,
+    cancel: Cancel<'_>,
 ) -> Option<(Vec<Record>, Vec<Reading>)> {
     if points.is_empty() {
         return Some((Vec::new(), Vec::new()));
     }
-    let request = (SimulationRequest { points, method, recorders, stop }, simd);
+    let request = (SimulationRequest { points, method, recorders, cancel }, simd);
     match model {
         ModelKind::Nonlinear => method.visit_stepper::<NonlinearFamily, _>(request),
         ModelKind::Linear => method.visit_stepper::<LinearFamily, _>(request),
@@ -105,7 +102,7 @@ struct SimulationRequest<'a> {
     points: &'a [&'a Point],
     method: &'a Method,
     recorders: Recorders,
-    stop: StopRequest<'a>,
+    cancel: Cancel<'a>,
 }
 
 impl<F: ModelFamily> StepperVisitor<F> for (SimulationRequest<'_>, Simd) {
@@ -155,7 +152,7 @@ struct LaneState {
 struct SimulationTask<'a, T, M> {
     model: M,
     points: &'a [&'a Point],
-    stop: StopRequest<'a>,
+    cancel: Cancel<'a>,
     /// The number of points that have started.
     started: usize,
     /// The number of points that have ended.
@@ -244,8 +241,8 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SimulationTask<'_, T, M> {
         self.radial.advance(step.length_s, &[squared(&radial)], all_lanes(self.windows));
     }
 
-    fn is_stopped(&self) -> bool {
-        (self.stop)()
+    fn cancel(&self) -> Cancel<'_> {
+        self.cancel
     }
 }
 
@@ -284,7 +281,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
     /// Creates the task before any point has started. There is at least one point.
     #[inline(always)]
     fn new(zero: N<T>, request: SimulationRequest<'a>, model: ModelKind) -> Self {
-        let SimulationRequest { points, method, recorders, stop } = request;
+        let SimulationRequest { points, method, recorders, cancel } = request;
         let parts = StepParts::for_method(method);
         let reserved = |point: &&Point| Vec::with_capacity(point.segments.len());
         let checkpoints = match recorders.checkpoints {
@@ -294,7 +291,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SimulationTask<'a, T, M> {
         Self {
             model: M::splat(zero, points[0], coupling(method, zero)),
             points,
-            stop,
+            cancel,
             started: 0,
             finished: 0,
             lanes: [LaneState::default(); MAX_LANES],

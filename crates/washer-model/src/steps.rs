@@ -10,6 +10,7 @@ pub(crate) mod formula;
 use crate::highest_frequency_rad_per_s;
 use crate::modes::{highest_with_caps, motions};
 use crate::{Caps, Formula, Method, ModelKind, NoModes, Point, Spin};
+use lane_ode::Cancel;
 
 /// The number of modes of the suspension: yaw, pitch and two translations.
 pub(crate) const SUSPENSION_MODES: usize = 4;
@@ -40,7 +41,7 @@ const BISECTIONS: usize = 10;
 /// The machines of a run with the frequencies that bound their steps.
 pub struct StepSelector<'a> {
     machines: Vec<Result<Frequencies<'a>, NoModes>>,
-    is_stopped: &'a dyn Fn() -> bool,
+    cancel: Cancel<'a>,
 }
 
 /// The frequencies of one machine.
@@ -99,7 +100,7 @@ pub fn capped_method(model: ModelKind, step_s: f64) -> Method {
 impl<'a> StepSelector<'a> {
     /// Creates a selector for points with their spins, which last until `end_s`.
     pub fn new(points: impl IntoIterator<Item = (&'a Point, &'a Spin)>, end_s: f64) -> Self {
-        Self::until(points, end_s, &|| false)
+        Self::until(points, end_s, Cancel::Never)
     }
 
     /// Creates a selector as [`Self::new`] does, but calls `is_stopped` before each machine's
@@ -109,11 +110,11 @@ impl<'a> StepSelector<'a> {
     pub fn until(
         points: impl IntoIterator<Item = (&'a Point, &'a Spin)>,
         end_s: f64,
-        is_stopped: &'a dyn Fn() -> bool,
+        cancel: Cancel<'a>,
     ) -> Self {
-        let points = points.into_iter().take_while(|_| !is_stopped());
+        let points = points.into_iter().take_while(|_| !cancel.is_requested());
         let machines = points.map(|(point, spin)| Frequencies::new(point, spin, end_s)).collect();
-        Self { machines, is_stopped }
+        Self { machines, cancel }
     }
 
     /// Returns the longest step (s) at which a formula is stable at all points without capped
@@ -163,7 +164,7 @@ impl<'a> StepSelector<'a> {
             let between_s = (stable_s * unstable_s).sqrt();
             let mut is_stable = true;
             for machine in &machines {
-                if (self.is_stopped)() {
+                if self.cancel.is_requested() {
                     return Ok(None);
                 }
                 is_stable = is_stable && machine.is_stable(model, between_s)?;

@@ -1,6 +1,6 @@
 //! Trajectories of one model at one refinement level, and the numbers that rows take from them.
 
-use lane_ode::{Failure, Simd};
+use lane_ode::{Cancel, Failure, Simd};
 use sweep_parameter::RatioLimits;
 use washer_model::{
     Channel, Checkpoints, Gauge, Method, ModelKind, Point, Reading, Record, Recorders,
@@ -64,7 +64,7 @@ impl LevelRun {
     }
 }
 
-/// Integrates one model at every point by one method; returns `None` if `is_stopped` returned true
+/// Integrates one model at every point by one method; returns `None` if `cancel` was requested
 /// before the end.
 pub fn integrate_points(
     simd: Simd,
@@ -72,13 +72,13 @@ pub fn integrate_points(
     method: &Method,
     points: &[&Point],
     rule: &RowRule,
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> Option<Vec<LevelRun>> {
     let mut friction_speeds = points.iter().flat_map(|point| point.friction_speeds());
     let mut recorders = rule.recorders();
     recorders.gauges[Gauge::DamperSpeed as usize] |=
         friction_speeds.any(|speed| model == ModelKind::Linear || !speed.is_own);
-    let (records, readings) = simulate_until(simd, model, method, points, recorders, is_stopped)?;
+    let (records, readings) = simulate_until(simd, model, method, points, recorders, cancel)?;
     // There are no readings if no recorder is in use.
     let mut readings = readings.into_iter();
     let run = |(record, point): (&Record, &&Point)| {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::config::{self, WasherGridInput};
 use crate::fit::{self, Evaluations, FitOptions, FitWork, Measurement};
+use lane_ode::Cancel;
 use sweep_engine::commands::grid::{GridArgs, typed};
 use sweep_engine::{EffortArgs, Error, Exit, Interrupt, Progress, show, tell, threads};
 use sweep_files::{FileKind, OWN_FILE, Output};
@@ -87,9 +88,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let interrupt = Interrupt::install().map_err(Error::signals)?;
     let progress = Progress::for_search(args.effort.progress, 0, "", 0);
     let seen = |made: usize| progress.show_search(0, made as u64);
-    let stop = || interrupt.stopped();
+    let cancel = Cancel::Flag(interrupt.flag());
     let output = args.out.as_deref();
-    let work = FitWork { stop: &stop, seen: &seen, output, fresh: args.fresh };
+    let work = FitWork { cancel, seen: &seen, output, fresh: args.fresh };
     let threads = threads::count(args.effort.threads, &threads::process)?;
     let found = threads::pool(threads)?.install(|| fit::fit(cases, &args.options, &work))?;
     progress.finish();

@@ -4,6 +4,7 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
+use lane_ode::Cancel;
 use washer_model::{Exact, ModeAtSpeed, ModeOverSpeed, decimal};
 
 use crate::config::WasherGridInput;
@@ -56,7 +57,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         args.out.as_deref().map(|path| Output::begin(path, FileKind::Modes)).transpose()?;
     let speeds = args.speed.values();
     // A signal ends the process, because there are no partial results to keep.
-    let found = ModeAnalysis::new(&input, &speeds, args.exact, &|| false)?;
+    let found = ModeAnalysis::new(&input, &speeds, args.exact, Cancel::Never)?;
     let Some(analysis) = found else { return Ok(Exit::Interrupted) };
     if let (Some(path), Some(output)) = (&args.out, output) {
         output.finish(&analysis.table(&input).into_bytes(path)?)?;

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
 use crate::trace::{MAX_POINT_TRACES, write_point_traces};
+use lane_ode::Cancel;
 use sweep_engine::commands::run as engine_run;
 use sweep_engine::commands::run::{execute, exit, installed};
 use sweep_engine::run::Ended;
@@ -49,8 +50,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
         let kept = AtomicU64::new(0);
         let done = || progress.show(kept.fetch_add(1, Ordering::Relaxed) + 1);
         let map = ParquetFile::open(&output)?;
-        let stop = || interrupt.stopped();
-        let ended = write_point_traces(&engine, &map, &folder, threads, &stop, &done);
+        let cancel = Cancel::Flag(interrupt.flag());
+        let ended = write_point_traces(&engine, &map, &folder, threads, cancel, &done);
         progress.finish();
         ended?;
         if let Some(signal) = interrupt.signal() {

@@ -9,6 +9,7 @@ use crate::trace::{
     Models, StartValue, TraceExtras, TraceSettings, TraceTable, check_spacing, parse_start_value,
     start_from, trace_in_pool,
 };
+use lane_ode::Cancel;
 use sweep_engine::commands::cells::{Lines as _, short, span, table};
 use sweep_engine::commands::grid::quoted;
 use sweep_engine::{Error, Exit, Job, tell};
@@ -85,7 +86,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     let output = Output::begin(&args.out, FileKind::Trace)?;
     let settings = TraceSettings { every_s, models, start, extras, capped: None };
     // A signal ends the process, because there are no partial results to keep.
-    let traced = trace_in_pool(&plan, at, &settings, &|| false).map_err(Error::model)?;
+    let traced = trace_in_pool(&plan, at, &settings, Cancel::Never).map_err(Error::model)?;
     let TraceTable { table, instants, failures, level } = traced;
     failures.iter().for_each(|failure| tell(failure));
     output.finish(&table.into_bytes(&args.out)?)?;

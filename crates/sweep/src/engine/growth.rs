@@ -1,7 +1,7 @@
 //! Machines at held speeds: their periodic responses, the growth of disturbances about these, and
 //! the motions in which machines end.
 
-use lane_ode::Simd;
+use lane_ode::{Cancel, Simd};
 use washer_model::{Dwell, Endings, Point, Response, STATE_LEN, Starts, find_endings, respond};
 use washer_row::{DwellPeaks, Growth, Metric, Outcome, Status};
 
@@ -11,14 +11,14 @@ use super::map_isolating_panics;
 pub(crate) type Carried = Option<[f64; STATE_LEN]>;
 
 /// Returns the periodic responses of points at held speeds, or the status of a point without one.
-/// The first response is that of a machine that runs up. Once `is_stopped` returns true, the result
+/// The first response is that of a machine that runs up. Once `cancel` is requested, the result
 /// is meaningless.
 pub(crate) fn find_responses(
     dwells: &[Dwell<'_>],
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> Vec<Result<Vec<Response>, Status>> {
     let find_group = |dwells: &[Dwell<'_>]| {
-        let answers = respond(dwells, is_stopped).into_iter();
+        let answers = respond(dwells, cancel).into_iter();
         answers.map(|answer| answer.map_err(Status::from)).collect()
     };
     map_isolating_panics(dwells, find_group, || Err(Status::Panicked))
@@ -41,16 +41,16 @@ pub(crate) fn fastest_growth(found: &[Result<Vec<Response>, Status>]) -> Option<
 }
 
 /// Returns the motions in which points end at held speeds, or the status of a point without one.
-/// Once `is_stopped` returns true, the result is meaningless.
+/// Once `cancel` is requested, the result is meaningless.
 pub(crate) fn find_motions(
     simd: Simd,
     dwells: &[(Dwell<'_>, Carried)],
     starts: &Starts,
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> Vec<Result<Endings, Status>> {
     let find_group = |dwells: &[(Dwell<'_>, Carried)]| {
         let (dwells, carried): (Vec<_>, Vec<_>) = dwells.iter().copied().unzip();
-        let found = find_endings(simd, &dwells, &carried, starts, is_stopped).into_iter();
+        let found = find_endings(simd, &dwells, &carried, starts, cancel).into_iter();
         found.map(|found| found.map_err(Status::from)).collect()
     };
     map_isolating_panics(dwells, find_group, || Err(Status::Panicked))
@@ -63,19 +63,19 @@ pub(super) fn add_held_speed_metrics(
     rows: &mut [(&mut Outcome, &Point)],
     simd: Simd,
     (speeds_rpm, metrics): (&[f64], &[Metric]),
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) {
     let at_speeds = |point| speeds_rpm.iter().map(move |&speed_rpm| Dwell { point, speed_rpm });
     let dwells: Vec<Dwell<'_>> = rows.iter().flat_map(|(_, point)| at_speeds(*point)).collect();
     if metrics.contains(&Metric::Growth) {
-        let found = find_responses(&dwells, is_stopped);
+        let found = find_responses(&dwells, cancel);
         for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
             outcome.growth = fastest_growth(found);
         }
     }
     if metrics.contains(&Metric::Dwell) {
         let dwells: Vec<_> = dwells.iter().map(|dwell| (*dwell, None)).collect();
-        let found = find_motions(simd, &dwells, &Starts::default(), is_stopped);
+        let found = find_motions(simd, &dwells, &Starts::default(), cancel);
         for ((outcome, _), found) in rows.iter_mut().zip(found.chunks(speeds_rpm.len())) {
             outcome.dwelt = DwellPeaks::from_endings(speeds_rpm, found);
         }

@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::Duration;
 
+use lane_ode::Cancel;
 use lane_ode::MAX_LANES;
 use washer_model::{Method, Point};
 use washer_row::{Next, Outcome, RefinementRule, RowRefinement, Status};
@@ -244,7 +245,7 @@ impl Pool<'_> {
                 .filter_map(|(outcome, point)| point.as_deref().ok().map(|point| (outcome, point)))
                 .collect();
             let simd = self.engine.widest_simd();
-            growth::add_held_speed_metrics(&mut rows, simd, metrics, &is_stopped);
+            growth::add_held_speed_metrics(&mut rows, simd, metrics, Cancel::When(&is_stopped));
             if is_stopped() {
                 return;
             }

@@ -1,7 +1,7 @@
 //! The tongues of a point, which are ranges of speed in which its periodic response is unstable:
 //! their edges, their frequencies, and the damping that closes them.
 
-use lane_ode::Simd;
+use lane_ode::{Cancel, Simd};
 use rayon::iter::ParallelIterator as _;
 use rayon::slice::ParallelSlice as _;
 use serde::Serialize;
@@ -97,8 +97,8 @@ pub(crate) struct ResponseFinder<'a> {
 impl ResponseFinder<'_> {
     /// Follows the curve of responses up to a speed (rpm).
     pub(crate) fn follow(&mut self, fastest_rpm: f64) {
-        let is_stopped = || self.interrupt.stopped();
-        self.curves = Responses::follow(&[(self.point, fastest_rpm)], None, &is_stopped);
+        let cancel = Cancel::Flag(self.interrupt.flag());
+        self.curves = Responses::follow(&[(self.point, fastest_rpm)], None, cancel);
     }
 
     /// Returns the response of a machine that runs up at each speed, if there is one. It uses all
@@ -107,11 +107,11 @@ impl ResponseFinder<'_> {
         let find_batch = |speeds: &[f64]| {
             let requests: Vec<(usize, f64)> =
                 speeds.iter().map(|&speed_rpm| (0, speed_rpm)).collect();
-            let is_stopped = || self.interrupt.stopped();
-            if is_stopped() {
+            let cancel = Cancel::Flag(self.interrupt.flag());
+            if cancel.is_requested() {
                 return vec![None; speeds.len()];
             }
-            let found = Responses::at(&mut self.curves.clone(), &requests, &is_stopped);
+            let found = Responses::at(&mut self.curves.clone(), &requests, cancel);
             (self.count_speeds)(found.len());
             let first = |answer: Result<Vec<_>, _>| answer.ok()?.into_iter().next();
             found.into_iter().map(first).collect::<Vec<_>>()
@@ -260,9 +260,8 @@ pub(crate) fn find_endings(finder: &ResponseFinder<'_>, tongues: &[Tongue]) -> V
     let dwells: Vec<Dwell<'_>> = tongues.iter().map(dwell).collect();
     let responses = tongues.iter().map(|tongue| Ok(vec![tongue.at.clone()])).collect();
     let starts = Starts { count: 1, ..Starts::default() };
-    let is_stopped = || finder.interrupt.stopped();
-    let found =
-        find_endings_from_responses(finder.simd, &dwells, responses, &[], &starts, &is_stopped);
+    let cancel = Cancel::Flag(finder.interrupt.flag());
+    let found = find_endings_from_responses(finder.simd, &dwells, responses, &[], &starts, cancel);
     found.into_iter().map(|found| found.ok()?.motions.into_iter().next()).collect()
 }
 
@@ -488,12 +487,12 @@ impl Tongue {
         };
         let points: Vec<Option<Point>> = factors.iter().map(|&factor| machine(factor)).collect();
         let range_rpm = self.searched_rpm();
-        let is_stopped = || finder.interrupt.stopped();
+        let cancel = Cancel::Flag(finder.interrupt.flag());
         let machines: Vec<(&Point, f64)> =
             points.iter().flatten().map(|point| (point, range_rpm[1])).collect();
         // The curves begin below the tongue, at the response of the machine with its own damping.
         let below = finder.find_responses(&[range_rpm[0]]).pop().flatten();
-        let mut curves = Responses::follow(&machines, below.as_ref(), &is_stopped);
+        let mut curves = Responses::follow(&machines, below.as_ref(), cancel);
         let mut growths = vec![f64::NEG_INFINITY; machines.len()];
         let mut around = vec![range_rpm; machines.len()];
         let mut count = DAMPING_TRIAL_SPEEDS;
@@ -508,7 +507,7 @@ impl Tongue {
                     speeds.map(move |rpm| (k, rpm))
                 })
                 .collect();
-            let found = Responses::at(&mut curves, &requests, &is_stopped);
+            let found = Responses::at(&mut curves, &requests, cancel);
             (finder.count_speeds)(found.len());
             // The speed of a greater growth than before; 0 if this round has none.
             let mut greatest_rpm = vec![0.0; machines.len()];

@@ -18,8 +18,8 @@ use super::speed::Smoothed;
 use crate::engine::reference_step_s;
 use crate::method::direct;
 use crate::plan::{Plan, prepare_point};
+use lane_ode::Cancel;
 use sweep_engine::plan::WrittenIn;
-use sweep_engine::threads::Cancel;
 
 /// Neighbours are this share of a number away from it.
 const NEAR: f64 = 1e-5;
@@ -93,7 +93,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) method: Method,
     pub(crate) simd: Simd,
     /// Ends the work early; what comes then means nothing.
-    pub(crate) stop: Cancel<'a>,
+    pub(crate) cancel: Cancel<'a>,
 }
 
 /// A machine, its spin, and the shift of the clock that it is seen by (s).
@@ -252,8 +252,7 @@ impl Problem<'_> {
                 .collect();
             let all: Vec<&Point> = points.iter().map(|(_, point)| point).collect();
             let model = self.model;
-            let stop = || (self.stop)();
-            let ended = simulate_until(self.simd, model, &self.method, &all, wanted, &stop);
+            let ended = simulate_until(self.simd, model, &self.method, &all, wanted, self.cancel);
             let extras = ended.map_or_else(Vec::new, |(_, extras)| extras);
             let mut found: Vec<Option<T>> = group.iter().map(|_| None).collect();
             for ((place, point), extra) in points.iter().zip(extras) {

@@ -5,6 +5,7 @@ mod fixed;
 use std::path::Path;
 
 use super::*;
+use lane_ode::Cancel;
 use sweep_engine::design::{Design, DesignRule};
 use sweep_files::ParquetFile;
 
@@ -58,7 +59,7 @@ fn options(free: &[&str]) -> FitOptions {
 }
 
 fn fitted(cases: Vec<FitCase>, options: &FitOptions) -> FitReport {
-    let work = FitWork { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
+    let work = FitWork { cancel: Cancel::Never, seen: &|_| {}, output: None, fresh: false };
     fit(cases, options, &work).unwrap().unwrap().report
 }
 
@@ -98,7 +99,8 @@ fn the_model_at_the_truth_is_the_exact_record() {
         let simd = simd_from_environment().unwrap();
         let free = Vec::new();
         let with_shift = false;
-        let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
+        let problem =
+            Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never };
         for one in problem.against(&[]).unwrap() {
             let values = &problem.cases[0].measured.signals[one.signal].values;
             let largest =
@@ -161,7 +163,7 @@ fn a_search_that_came_to_no_end_gives_no_intervals() {
     let simd = simd_from_environment().unwrap();
     let free = free(&options(&["damping_n_s_per_m"]), &cases).unwrap();
     let with_shift = false;
-    let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
+    let problem = Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never };
     let x = problem.start();
     let against = problem.against(&x).unwrap();
     let summary = problem.summary(&against);
@@ -201,7 +203,7 @@ fn a_fitted_machine_file_says_where_its_numbers_are_from() {
     let model = ModelKind::Nonlinear;
     let simd = simd_from_environment().unwrap();
     let with_shift = false;
-    let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
+    let problem = Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never };
     let (machine, _) = problem.machine(0, &problem.start());
     let text = crate::config::machine_file(&machine, &problem.written());
     let said = |key: &str| text.lines().find(|line| line.starts_with(key)).unwrap();
@@ -265,7 +267,8 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
         let simd = simd_from_environment().unwrap();
         let free = free(&options(&names), &cases).unwrap();
         let with_shift = true;
-        let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
+        let problem =
+            Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never };
         let exact = problem.against(&problem.start()).unwrap();
         // Growth is by the motion itself, or by its envelope over half a second.
         for (correlation, growth, by_envelope) in [
@@ -353,7 +356,7 @@ fn a_linear_model_says_what_the_nonlinear_one_would_have() {
 #[test]
 fn what_cannot_be_fitted_is_said() {
     let wrong = |free: &[&str], measured: Measurement| {
-        let work = FitWork { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
+        let work = FitWork { cancel: Cancel::Never, seen: &|_| {}, output: None, fresh: false };
         let cases = vec![case_at(&VISCOUS, 1.0, measured)];
         match fit(cases, &options(free), &work) {
             Err(error) => error.to_string(),
@@ -432,7 +435,7 @@ fn a_number_that_does_not_count_at_the_start_is_found_from_others() {
     let start = [("friction_n", 0.0), FRICTION[0], FRICTION[1], FRICTION[2]];
     let cases = || vec![case_at(&start, 1.0, reference("friction", 8.0))];
     let mut options = options(&["friction_n=0:60", "friction_speed_m_per_s=0.005:0.02"]);
-    let work = FitWork { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
+    let work = FitWork { cancel: Cancel::Never, seen: &|_| {}, output: None, fresh: false };
     let error = fit(cases(), &options, &work).err().unwrap().to_string();
     assert!(error.contains("does not depend on friction_speed_m_per_s"), "{error}");
     options.starts = 6;
@@ -488,7 +491,7 @@ fn a_wrong_unit_of_speed_is_no_wrong_unit_of_a_channel() {
     let simd = simd_from_environment().unwrap();
     let free = Vec::new();
     let with_shift = false;
-    let problem = Problem { cases, free, model, with_shift, method, simd, stop: &|| false };
+    let problem = Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never };
     let mut against = problem.against(&[]).unwrap();
     let yaw = &mut against[2];
     let column = problem.cases[0].measured.signals[2].quantity.column();
@@ -555,7 +558,8 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
         made.fetch_add(1, Ordering::Relaxed);
     };
     let stop = || made.load(Ordering::Relaxed) >= 3;
-    let work = FitWork { stop: &stop, seen: &seen, output: Some(&output), fresh: false };
+    let work =
+        FitWork { cancel: Cancel::When(&stop), seen: &seen, output: Some(&output), fresh: false };
     assert!(fit(cases(), &options, &work).unwrap().is_none());
     let part = ParquetFile::open(&partial.join("part-00000000.parquet")).unwrap();
     // The start is evaluated once, though a descent asks for it again.
@@ -565,8 +569,12 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     assert_eq!(fields.collect::<Vec<_>>(), expected);
 
     // Another fit leaves them alone, and so does a second process.
-    let stopped = || true;
-    let work = FitWork { stop: &stopped, seen: &|_| {}, output: Some(&output), fresh: false };
+    let work = FitWork {
+        cancel: Cancel::When(&|| true),
+        seen: &|_| {},
+        output: Some(&output),
+        fresh: false,
+    };
     let other = FitOptions { no_shift: true, ..options.clone() };
     let error = fit(cases(), &other, &work).err().unwrap().to_string();
     assert!(error.contains("/fit/shift: was true, is false"), "{error}");
@@ -575,7 +583,7 @@ fn an_interrupted_fit_goes_on_to_the_same_bits() {
     let seen = |_| {
         made.fetch_add(1, Ordering::Relaxed);
     };
-    let work = FitWork { stop: &|| false, seen: &seen, output: Some(&output), fresh: false };
+    let work = FitWork { cancel: Cancel::Never, seen: &seen, output: Some(&output), fresh: false };
     let resumed = fit(cases(), &options, &work).unwrap().unwrap();
     assert_eq!(serde_json::json!(resumed.report), serde_json::json!(whole));
     let busy = fit(cases(), &options, &work).err().unwrap().to_string();
@@ -593,7 +601,8 @@ fn a_damaged_part_of_a_fit_costs_its_evaluations() {
     let options = options(&["damping_n_s_per_m"]);
     let whole = fitted(cases(), &options);
     let fit = || {
-        let work = FitWork { stop: &|| false, seen: &|_| {}, output: Some(&output), fresh: false };
+        let work =
+            FitWork { cancel: Cancel::Never, seen: &|_| {}, output: Some(&output), fresh: false };
         fit(cases(), &options, &work).unwrap().unwrap()
     };
     drop(fit());

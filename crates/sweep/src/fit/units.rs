@@ -207,7 +207,7 @@ fn explained_by_short_fit(
     let start = trial.start();
     let evaluate = |x: &[f64]| {
         let against = trial.against(x);
-        if (trial.stop)() {
+        if trial.cancel.is_requested() {
             return Err(DescentEnd::Stopped);
         }
         Ok(against.map(|against| trial.summary(&against)))

@@ -114,7 +114,8 @@ impl OnMap<'_> {
         let points: Vec<Vec<f64>> =
             sets.iter().map(|set| own.iter().map(|&k| set[k]).collect()).collect();
         let engine = ModelEngine::new(&plan)?;
-        let outcomes = if (problem.stop)() { Vec::new() } else { engine.evaluate_at(&points) };
+        let outcomes =
+            if problem.cancel.is_requested() { Vec::new() } else { engine.evaluate_at(&points) };
         let channels = plan.reliability.channels.len();
         let limits = plan.reliability.limits;
         let verdict = |outcome: &Outcome| RowVerdict::new(outcome, channels, limits);
@@ -183,7 +184,7 @@ impl OnMap<'_> {
         let point = prepare_point(machine, spin, &timing(plan)).ok()?;
         let dwells: Vec<Dwell<'_>> =
             speeds.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
-        Some(find_responses(&dwells, &|| (self.problem.stop)()))
+        Some(find_responses(&dwells, self.problem.cancel))
     }
 
     /// Computes the 95 % interval of the growth at the speed where it is greatest: to first order

@@ -1,5 +1,6 @@
 //! Fits of a machine's parameters to measured run-ups, as data and as text.
 
+use lane_ode::Cancel;
 use serde_json::json;
 
 use super::{Effort, Explained, PointTable};
@@ -32,8 +33,8 @@ pub fn fit_tables(
         }
         cases.push(fit::case(grid, &constants, measured)?);
     }
-    let stop = || effort.interrupt.stopped();
-    let work = FitWork { stop: &stop, seen: &|_| {}, output: None, fresh: false };
+    let cancel = Cancel::Flag(effort.interrupt.flag());
+    let work = FitWork { cancel, seen: &|_| {}, output: None, fresh: false };
     let found = threads::pool(effort.threads()?)?.install(|| fit::fit(cases, options, &work))?;
     Ok(found.map(|fitted| Explained { found: json!(fitted.report), text: fitted.report.text() }))
 }

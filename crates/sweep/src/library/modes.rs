@@ -2,8 +2,8 @@
 
 use serde_json::{Map, Value, json};
 use washer_model::{
-    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Profile, Spin, StopRequest,
-    Timing, campbell_until, exact_motions,
+    COORDINATES, Exact, Machine, ModeAtSpeed, ModeOverSpeed, Point, Profile, Spin, Timing,
+    campbell_until, exact_motions,
 };
 
 use super::check_speeds;
@@ -11,6 +11,7 @@ use super::result::MemoryTable;
 use crate::config::{self, Diagnostics, WasherGridInput};
 use crate::model::Washer;
 use crate::plan::{friction_speeds, prepare_point, timing};
+use lane_ode::Cancel;
 use sweep_engine::{Error, Interrupt, Table};
 use sweep_files::{FileKind, key};
 
@@ -29,7 +30,7 @@ pub fn find_modes(
 ) -> Result<Option<MemoryTable>, Error> {
     check_speeds(speeds_rpm, 2, |speed| speed >= 0.0, ", 0 or greater")?;
     let input = ModesInput::new(grid, at, speeds_rpm[speeds_rpm.len() - 1])?;
-    let analysis = ModeAnalysis::new(&input, speeds_rpm, false, &|| interrupt.stopped())?;
+    let analysis = ModeAnalysis::new(&input, speeds_rpm, false, Cancel::Flag(interrupt.flag()))?;
     let table =
         |analysis: ModeAnalysis| MemoryTable::from_table(FileKind::Modes, analysis.table(&input));
     analysis.map(table).transpose()
@@ -87,8 +88,8 @@ pub(crate) struct ModeAnalysis {
 }
 
 impl ModeAnalysis {
-    /// Computes the modes at each speed (rpm), with exact motions if `is_exact`; `None` once `stop`
-    /// returns true. Friction is linearised at the speeds of the run.
+    /// Computes the modes at each speed (rpm), with exact motions if `is_exact`; `None` after a
+    /// request to cancel. Friction is linearised at the speeds of the run.
     ///
     /// # Errors
     /// Returns an error if the machine has no equilibrium, or if its modes cannot be computed.
@@ -96,11 +97,11 @@ impl ModeAnalysis {
         input: &ModesInput,
         speeds_rpm: &[f64],
         is_exact: bool,
-        stop: StopRequest<'_>,
+        cancel: Cancel<'_>,
     ) -> Result<Option<Self>, Error> {
         let point = prepare_point(input.machine.clone(), input.spin.clone(), &input.timing);
         let point = point.map_err(Error::model)?;
-        let modes = campbell_until(&point, speeds_rpm, stop).map_err(Error::model)?;
+        let modes = campbell_until(&point, speeds_rpm, cancel).map_err(Error::model)?;
         let Some(modes) = modes else { return Ok(None) };
         let exact =
             if is_exact { Some(exact_at_speeds(&point, speeds_rpm, &modes)?) } else { None };

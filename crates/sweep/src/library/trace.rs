@@ -1,6 +1,7 @@
 //! Time histories at one point or at all points of a grid, in memory.
 
 use clap::ValueEnum as _;
+use lane_ode::Cancel;
 
 use super::result::MemoryTable;
 use crate::config::WasherGridInput;
@@ -58,8 +59,8 @@ pub fn trace_point(
             .map_err(|_| Error::option("model", name, "nonlinear, linear or both"))?,
     };
     let settings = TraceSettings { every_s, models, start, extras: options.extras, capped: None };
-    let stop = || interrupt.stopped();
-    let trace = trace_in_pool(&plan, at, &settings, &stop).map_err(Error::model)?;
+    let cancel = Cancel::Flag(interrupt.flag());
+    let trace = trace_in_pool(&plan, at, &settings, cancel).map_err(Error::model)?;
     if interrupt.stopped() {
         return Ok(None);
     }

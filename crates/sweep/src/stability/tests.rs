@@ -1,7 +1,7 @@
 //! Tests against responses and attractors that independent programs found. The machines are in
 //! `tests/held`.
 
-use lane_ode::Simd;
+use lane_ode::{Cancel, Simd};
 use washer_model::{
     Channel, Dwell, Point, Response, Settled, Starts, State, find_endings, respond,
 };
@@ -19,7 +19,7 @@ fn point(name: &str) -> Point {
 fn find_responses(point: &Point, speeds_rpm: &[f64]) -> Vec<Vec<Response>> {
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point, speed_rpm }).collect();
-    respond(&dwells, &|| false).into_iter().map(|found| found.unwrap_or_default()).collect()
+    respond(&dwells, Cancel::Never).into_iter().map(|found| found.unwrap_or_default()).collect()
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn a_saddle_is_no_attractor() {
     let point = point("74002_13");
     let dwells = [Dwell { point: &point, speed_rpm: 414.0 }];
     let starts = Starts { count: 1, ..Starts::default() };
-    let found = find_endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0).unwrap();
+    let found = find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
     let motion = &found.motions[0];
     assert_eq!(motion.settled, Some(Settled::Periodic { turns: 4 }));
     let yaw_rad = motion.peaks[Channel::TubYaw.index()];
@@ -69,7 +69,7 @@ fn a_saddle_is_no_attractor() {
 fn chaos_survives_or_is_a_transient() {
     let point = point("74001_8");
     let dwells = [Dwell { point: &point, speed_rpm: 306.0 }];
-    let found = find_endings(Simd::best(), &dwells, &[], &Starts::default(), &|| false);
+    let found = find_endings(Simd::best(), &dwells, &[], &Starts::default(), Cancel::Never);
     let found = found.into_iter().next().unwrap().unwrap();
     assert!(found.motions.iter().all(|motion| motion.settled != Some(Settled::Chaotic)));
     let is_transient = |state| matches!(state, State::Transient { life_s } if life_s > 0.0);
@@ -83,7 +83,7 @@ fn chaos_survives_or_is_a_transient() {
 fn an_attractor_far_from_the_response_is_found_from_rest() {
     let point = point("74001_11");
     let dwells = [Dwell { point: &point, speed_rpm: 404.1 }];
-    let found = find_endings(Simd::best(), &dwells, &[], &Starts::default(), &|| false);
+    let found = find_endings(Simd::best(), &dwells, &[], &Starts::default(), Cancel::Never);
     let found = found.into_iter().next().unwrap().unwrap();
     let is_expected = |motion: &&washer_model::Ending| {
         motion.settled == Some(Settled::Periodic { turns: 4 })
@@ -104,7 +104,7 @@ fn a_textbook_machine_ends_in_its_response() {
     let dwells: Vec<Dwell<'_>> =
         speeds_rpm.iter().map(|&speed_rpm| Dwell { point: &point, speed_rpm }).collect();
     let starts = Starts { count: 3, ..Starts::default() };
-    let all = find_endings(Simd::best(), &dwells, &[], &starts, &|| false);
+    let all = find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never);
     for (found, rpm) in all.into_iter().zip(speeds_rpm) {
         let found = found.unwrap();
         let motion = &found.motions[0];

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use lane_ode::Cancel;
 use rayon::iter::{IndexedParallelIterator as _, IntoParallelIterator as _, ParallelIterator as _};
 use sweep_engine::store::read;
-use sweep_engine::threads::Cancel;
 use sweep_engine::{StoreError, threads};
 use sweep_files::{self as files, FileKind, ParquetFile, key, regular};
 use washer_model::Start;
@@ -36,7 +36,7 @@ pub(crate) fn write_point_traces(
     result: &ParquetFile,
     folder: &Path,
     threads: usize,
-    stop: Cancel<'_>,
+    cancel: Cancel<'_>,
     on_point: &(dyn Fn() + Sync),
 ) -> Result<(), StoreError> {
     let plan = engine.plan();
@@ -46,7 +46,7 @@ pub(crate) fn write_point_traces(
     threads::pool(threads)?.install(|| {
         levels.into_par_iter().enumerate().try_for_each(|(point, level)| {
             let point = point as u64;
-            if stop() {
+            if cancel.is_requested() {
                 return Ok(());
             }
             let names = plan.axes.iter().map(|axis| axis.parameter.name.to_string());
@@ -59,8 +59,8 @@ pub(crate) fn write_point_traces(
                 extras: TraceExtras::default(),
                 capped: level.and_then(|level| engine.capped_run(level)),
             };
-            let traced = trace_scenario(plan, plan.scenario(point), at, &settings, stop);
-            if stop() {
+            let traced = trace_scenario(plan, plan.scenario(point), at, &settings, cancel);
+            if cancel.is_requested() {
                 return Ok(());
             }
             // A point without equilibrium is an error here; its row in the map reports that.

@@ -1,6 +1,7 @@
 use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray as _;
 use arrow_array::types::Float64Type;
+use lane_ode::Cancel;
 
 use super::*;
 use crate::engine::ModelEngine;
@@ -48,7 +49,7 @@ fn a_trace_with_friction_is_as_accurate_as_its_row() {
             capped: None,
         };
         let traced =
-            trace_scenario(&plan, plan.scenario(0), Vec::new(), &settings, &|| false).unwrap();
+            trace_scenario(&plan, plan.scenario(0), Vec::new(), &settings, Cancel::Never).unwrap();
         let rows = traced.table.finish().unwrap().0;
         let column = rows.column_by_name("foot_1_load_nonlinear_n").unwrap();
         (column.as_primitive::<Float64Type>().values()[3200..].to_vec(), traced.level)
@@ -88,7 +89,7 @@ fn a_trace_by_a_rows_method_is_the_trajectory_of_the_row() {
             capped: Some(capped),
         };
         let scenario = plan.scenario(row.point);
-        let trace = trace_scenario(&plan, scenario, Vec::new(), &settings, &|| false);
+        let trace = trace_scenario(&plan, scenario, Vec::new(), &settings, Cancel::Never);
         let (rows, _) = trace.unwrap().table.finish().unwrap();
         // The row's level is that of the nonlinear model; the linear one may have another. Peaks
         // between long steps have an error of 1e-5.
@@ -121,13 +122,14 @@ fn points_integrated_together_have_the_bits_that_each_has_alone() {
         let extras = TraceExtras { rates: true, states: true, forces: true, angle: true };
         let settings =
             TraceSettings { every_s, models, start: Start::default(), extras, capped: None };
-        let all = trace_all_points(&plan, &settings, &|| false);
+        let all = trace_all_points(&plan, &settings, Cancel::Never);
         assert_eq!(every_s.is_none(), all.instants < 9 * 20);
         let (all, _) = all.table.finish().unwrap();
         let mut from = 0;
         for point in 0..plan.points() {
-            let one = trace_scenario(&plan, plan.scenario(point), Vec::new(), &settings, &|| false)
-                .unwrap();
+            let one =
+                trace_scenario(&plan, plan.scenario(point), Vec::new(), &settings, Cancel::Never)
+                    .unwrap();
             let (one, _) = one.table.finish().unwrap();
             for (k, field) in one.schema().fields().iter().enumerate() {
                 let together = all.column_by_name(field.name()).unwrap();
@@ -172,7 +174,7 @@ fn the_angle_of_a_whole_turn_is_zero() {
         extras,
         capped: None,
     };
-    let all = trace_all_points(&plan_with_ramp(4.05), &settings, &|| false);
+    let all = trace_all_points(&plan_with_ramp(4.05), &settings, Cancel::Never);
     assert_eq!(all.instants, 2 * 31);
     let (rows, _) = all.table.finish().unwrap();
     assert_eq!(peak(&rows, "drum_angle_rad", 0), 0.0);

@@ -6,7 +6,7 @@ use crate::stability::monodromy::{Square, per_unit};
 use crate::stability::orbit::{Asked, turns};
 use crate::stability::respond::leading_multiplier;
 use crate::stability::settings::Case;
-use lane_ode::N;
+use lane_ode::{Cancel, N};
 
 /// A periodic orbit: a state on it, and the turns after which it repeats.
 pub(super) struct Orbit<'c, 'a> {
@@ -19,10 +19,7 @@ pub(super) struct Orbit<'c, 'a> {
 /// decay: ln |mu| over the period, with mu the largest multiplier of the suspension's motions. The
 /// monodromy matrix is the product of those of the turns. It returns `None` for eigenvalues that
 /// are not finite, and for all orbits once `is_stopped` returns true.
-pub(super) fn growths_per_s(
-    orbits: &[Orbit<'_, '_>],
-    is_stopped: &dyn Fn() -> bool,
-) -> Vec<Option<f64>> {
+pub(super) fn growths_per_s(orbits: &[Orbit<'_, '_>], cancel: Cancel<'_>) -> Vec<Option<f64>> {
     let mut matrices: Vec<Option<Square>> = vec![None; orbits.len()];
     let mut states: Vec<[f64; STATES]> = orbits.iter().map(|orbit| orbit.held.state).collect();
     let longest = orbits.iter().map(|orbit| orbit.period).max().unwrap_or(0);
@@ -32,8 +29,8 @@ pub(super) fn growths_per_s(
             .iter()
             .map(|&k| Asked { row: orbits[k].held.row, start: states[k], is_seen: true })
             .collect();
-        let turned = turns(&asked, is_stopped);
-        if is_stopped() {
+        let turned = turns(&asked, cancel);
+        if cancel.is_requested() {
             return vec![None; orbits.len()];
         }
         for (k, turned) in open.into_iter().zip(turned) {

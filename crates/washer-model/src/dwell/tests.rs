@@ -5,6 +5,7 @@ use crate::coordinates::{COORDINATES, TUB_YAW};
 use crate::tests::elements::machine;
 use crate::tests::reference::reference;
 use crate::{Channel, Method, ModelKind, Spin, Start, Timing, history, prepare};
+use lane_ode::Cancel;
 use serde_json::{Value, json};
 
 const CHANNEL: [(Channel, &str); 4] = [
@@ -53,7 +54,7 @@ fn compare_motions(is_selected: impl Fn(&str, f64) -> bool) {
             .map(|at| Dwell { point: &point, speed_rpm: at["speed_rpm"].as_f64().unwrap() })
             .collect();
         let begin = std::time::Instant::now();
-        let found = find_endings(Simd::best(), &dwells, &[], &Starts::default(), &|| false);
+        let found = find_endings(Simd::best(), &dwells, &[], &Starts::default(), Cancel::Never);
         println!("{name}: {} speeds in {:.1} s", at.len(), begin.elapsed().as_secs_f64());
         for (at, found) in at.iter().zip(found) {
             let found = found.unwrap();
@@ -146,7 +147,7 @@ fn slow_decay_is_not_taken_for_a_doubled_period() {
         prepare_at(&json!({ "unbalance_mass_kg": 0.4, "damping_n_s_per_m": 140.0 }), 100.0, 1.0);
     let dwells = [Dwell { point: &point, speed_rpm: 317.0 }];
     let starts = Starts { longest_s: 120.0, ..Starts::default() };
-    let found = find_endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0).unwrap();
+    let found = find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
     assert!((-2e-3..0.0).contains(&found.responses[0].growth_per_s()));
     for motion in &found.motions {
         let settled = motion.settled;
@@ -194,7 +195,8 @@ fn random_motions_continue_unchanged_in_short_steps() {
         let point = prepare_at(&keys, 100.0, 1.0);
         let starts = Starts { count: 4, kick_rad_per_s, ..Starts::default() };
         let dwells = [Dwell { point: &point, speed_rpm }];
-        let found = find_endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0).unwrap();
+        let found =
+            find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
         for motion in &found.motions {
             counts[motion.kind()] += 1;
             if matches!(motion.settled, None | Some(Settled::Chaotic)) {
@@ -241,7 +243,8 @@ fn random_kicks_end_in_motions_that_the_search_found() {
         let point = prepare_at(&keys, 100.0, 1.0);
         let dwells = [Dwell { point: &point, speed_rpm }];
         let starts = Starts::default();
-        let found = find_endings(Simd::best(), &dwells, &[], &starts, &|| false).remove(0).unwrap();
+        let found =
+            find_endings(Simd::best(), &dwells, &[], &starts, Cancel::Never).remove(0).unwrap();
         let case = Settings::new(&point).case(speed_rpm).unwrap().without_caps().unwrap();
         let rest = <Nonlinear<f64> as LaneModel<f64>>::at_rest(&point);
         let response = found.responses.first().map_or(rest, |response| response.start);

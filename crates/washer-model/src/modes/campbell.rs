@@ -10,6 +10,7 @@ use crate::modes::assurance;
 use crate::modes::shape::motion;
 use crate::{COORDINATES, Mode, ModeMotion, Modes, NoModes, Point, modes};
 use core::f64::consts::TAU;
+use lane_ode::Cancel;
 
 /// The number of angles over which frequencies are averaged. Basis: twelve suffice for the mean
 /// over harmonics 1 and 2 of theta; with 36 the least and the greatest frequency are within 1 -
@@ -78,7 +79,7 @@ pub struct ModeOverSpeed {
 /// # Errors
 /// [`NoModes`] at any of the speeds.
 pub fn campbell(point: &Point, speeds_rpm: &[f64]) -> Result<Vec<ModeOverSpeed>, NoModes> {
-    Ok(campbell_until(point, speeds_rpm, &|| false)?.unwrap_or_default())
+    Ok(campbell_until(point, speeds_rpm, Cancel::Never)?.unwrap_or_default())
 }
 
 /// Follows every mode as [`campbell`] does, until `stop` returns true at a speed; then `None`.
@@ -88,13 +89,13 @@ pub fn campbell(point: &Point, speeds_rpm: &[f64]) -> Result<Vec<ModeOverSpeed>,
 pub fn campbell_until(
     point: &Point,
     speeds_rpm: &[f64],
-    stop: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> Result<Option<Vec<ModeOverSpeed>>, NoModes> {
     let Some(&lowest) = speeds_rpm.first() else { return Ok(Some(Vec::new())) };
     let mut followed = Vec::with_capacity(speeds_rpm.len());
     let mut current = modes(point, 0.0, rad_per_s(lowest))?;
     for (k, &speed) in speeds_rpm.iter().enumerate() {
-        if stop() {
+        if cancel.is_requested() {
             return Ok(None);
         }
         if k > 0 {

@@ -18,10 +18,11 @@ use crate::run::method::{
 use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::run::snapshots::share_of_step;
 use crate::run::suspension::forces;
-use crate::{COORDINATES, Forces, Method, ModelKind, Point, StopRequest};
+use crate::{COORDINATES, Forces, Method, ModelKind, Point};
 use core::marker::PhantomData;
 use lane_ode::{
-    Aside, Failure, Kernel, Lane, MAX_LANES, N, Sample, Segment, SegmentEnd, Simd, Step, Task,
+    Aside, Cancel, Failure, Kernel, Lane, MAX_LANES, N, Sample, Segment, SegmentEnd, Simd, Step,
+    Task,
 };
 
 /// A trajectory at given instants.
@@ -73,7 +74,7 @@ pub fn history<'a>(
     let end_s = point.segments.last().map_or(0.0, |segment| segment.end_s);
     let times_s = (0..instant_count(end_s, every_s)).map(|k| k as f64 * every_s).collect();
     let requests = [HistoryRequest { point, method: *method, start: *start, times_s }];
-    let sampled = integrate(model, &requests, &|| false).pop().unwrap_or_default();
+    let sampled = integrate(model, &requests, Cancel::Never).pop().unwrap_or_default();
     let [request] = requests;
     History::new(model, request, sampled)
 }
@@ -103,7 +104,7 @@ pub struct HistoryRequest<'a> {
 pub fn histories<'a>(
     model: ModelKind,
     requests: Vec<HistoryRequest<'a>>,
-    stop: StopRequest<'_>,
+    cancel: Cancel<'_>,
 ) -> Vec<History<'a>> {
     let is_rk4 = requests.iter().all(|request| matches!(request.method, Method::Rk4 { .. }));
     let batch_len = if is_rk4 { histories_per_batch() } else { 1 };
@@ -114,7 +115,7 @@ pub fn histories<'a>(
         if batch.is_empty() {
             return histories;
         }
-        let sampled = integrate(model, &batch, stop);
+        let sampled = integrate(model, &batch, cancel);
         for (request, states) in batch.into_iter().zip(sampled) {
             histories.push(History::new(model, request, states));
         }
@@ -130,27 +131,27 @@ pub fn histories_per_batch() -> usize {
 fn integrate(
     model: ModelKind,
     requests: &[HistoryRequest<'_>],
-    stop: StopRequest<'_>,
+    cancel: Cancel<'_>,
 ) -> Vec<SampledStates> {
     match model {
-        ModelKind::Nonlinear => integrate_family::<NonlinearFamily>(requests, stop),
-        ModelKind::Linear => integrate_family::<LinearFamily>(requests, stop),
+        ModelKind::Nonlinear => integrate_family::<NonlinearFamily>(requests, cancel),
+        ModelKind::Linear => integrate_family::<LinearFamily>(requests, cancel),
     }
 }
 
 /// Integrates a single request in one lane by any method, or several ones in lanes by RK4.
 fn integrate_family<F: ModelFamily>(
     requests: &[HistoryRequest<'_>],
-    stop: StopRequest<'_>,
+    cancel: Cancel<'_>,
 ) -> Vec<SampledStates> {
     let family = PhantomData::<F>;
     match requests {
         [single] => {
-            single.method.visit_stepper(SampleHistories { requests, stop, stepper: (), family })
+            single.method.visit_stepper(SampleHistories { requests, cancel, stepper: (), family })
         }
         _ => {
             let stepper = Rk4Stepper;
-            Simd::dispatch_narrow(SampleHistories { requests, stop, stepper, family })
+            Simd::dispatch_narrow(SampleHistories { requests, cancel, stepper, family })
         }
     }
 }
@@ -159,8 +160,8 @@ impl<F: ModelFamily> StepperVisitor<F> for SampleHistories<'_, F, ()> {
     type Output = Vec<SampledStates>;
 
     fn visit<S: Stepper>(self, stepper: S) -> Vec<SampledStates> {
-        let Self { requests, stop, family, .. } = self;
-        Simd::one_lane(SampleHistories { requests, stop, stepper, family })
+        let Self { requests, cancel, family, .. } = self;
+        Simd::one_lane(SampleHistories { requests, cancel, stepper, family })
     }
 }
 
@@ -241,7 +242,7 @@ struct SampledStates {
 struct SampleHistories<'a, F, S> {
     /// The requests, at most as many as there are lanes.
     requests: &'a [HistoryRequest<'a>],
-    stop: StopRequest<'a>,
+    cancel: Cancel<'a>,
     stepper: S,
     family: PhantomData<F>,
 }
@@ -251,7 +252,7 @@ impl<F: ModelFamily, S: Stepper> Kernel for SampleHistories<'_, F, S> {
 
     #[inline(always)]
     fn run<T: Lane>(self, zero: T) -> Self::Output {
-        let mut task = SamplingTask::<T, F::Over<T>>::new(N(zero), self.requests, self.stop);
+        let mut task = SamplingTask::<T, F::Over<T>>::new(N(zero), self.requests, self.cancel);
         self.stepper.integrate(zero, &mut task);
         task.sampled
     }
@@ -271,7 +272,7 @@ struct SamplingTask<'a, T, M> {
     model: M,
     zero: N<T>,
     requests: &'a [HistoryRequest<'a>],
-    stop: StopRequest<'a>,
+    cancel: Cancel<'a>,
     /// The index of each lane's segment, once the lane has started.
     segments: [Option<usize>; MAX_LANES],
     sampled: Vec<SampledStates>,
@@ -279,7 +280,7 @@ struct SamplingTask<'a, T, M> {
 
 impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
     #[inline(always)]
-    fn new(zero: N<T>, requests: &'a [HistoryRequest<'a>], stop: StopRequest<'a>) -> Self {
+    fn new(zero: N<T>, requests: &'a [HistoryRequest<'a>], cancel: Cancel<'a>) -> Self {
         let HistoryRequest { point, method, .. } = &requests[0];
         let mut model = M::splat(zero, point, coupling(method, zero));
         for (lane, request) in requests.iter().enumerate().skip(1) {
@@ -294,7 +295,7 @@ impl<'a, T: Lane, M: LaneModel<T>> SamplingTask<'a, T, M> {
             SampledStates { states: vec![start], failure: None }
         };
         let sampled = requests.iter().map(initial_state_only).collect();
-        Self { model, zero, requests, stop, segments: [None; MAX_LANES], sampled }
+        Self { model, zero, requests, cancel, segments: [None; MAX_LANES], sampled }
     }
 }
 
@@ -370,8 +371,8 @@ impl<T: Lane, M: LaneModel<T>> Task<T, STATES> for SamplingTask<'_, T, M> {
         }
     }
 
-    fn is_stopped(&self) -> bool {
-        (self.stop)()
+    fn cancel(&self) -> Cancel<'_> {
+        self.cancel
     }
 }
 

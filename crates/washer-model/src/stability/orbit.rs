@@ -21,7 +21,7 @@ use crate::run::model::{LaneModel, Linear, Nonlinear};
 use crate::run::suspension::damper_speeds_m_per_s;
 use core::array::from_fn;
 use lane_ode::rk4::RK4_STABILITY_LIMIT;
-use lane_ode::{Aside, Kernel, Lane, Lu, N, Peaks, Simd};
+use lane_ode::{Aside, Cancel, Kernel, Lane, Lu, N, Peaks, Simd};
 
 /// Step times cap, as a share of the formula's limit. Gyroscopic effects may make whirls of the
 /// capped hinge faster than its cap.
@@ -117,12 +117,12 @@ pub(crate) struct Seen {
 }
 
 /// Takes turns, in lanes, those of a kind together. What is found of one does not depend on the
-/// others. Once `is_stopped` says so, some are missing.
-pub(crate) fn turns(asked: &[Asked<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<Turned> {
+/// others. Once `cancel` is requested, some are missing.
+pub(crate) fn turns(asked: &[Asked<'_>], cancel: Cancel<'_>) -> Vec<Turned> {
     // Turns of a kind that are seen come first.
     let kind = |asked: &Asked<'_>| (asked.row.kind(), !asked.is_seen);
     by_kind(asked, kind, |asked| {
-        let turns = Turns { asked, is_stopped };
+        let turns = Turns { asked, cancel };
         // Wide lanes that are mostly empty take longer than narrow ones.
         let is_few = asked.len() <= Simd::narrow().lanes();
         // Rows that differentiate their steps fill all lanes with disturbances, even for one turn.
@@ -157,7 +157,7 @@ pub(crate) fn by_kind<A: Copy, R>(
 /// Integrations over a turn, all of one model and kind of step.
 struct Turns<'a> {
     asked: &'a [Asked<'a>],
-    is_stopped: &'a dyn Fn() -> bool,
+    cancel: Cancel<'a>,
 }
 
 impl Kernel for Turns<'_> {
@@ -171,7 +171,7 @@ impl Kernel for Turns<'_> {
         let is_weighed = first.is_seen && !first.row.is_stepwise();
         let weights = if is_weighed { weights(steps, instants) } else { Vec::new() };
         for asked in self.asked.chunks(T::LANES) {
-            if (self.is_stopped)() {
+            if self.cancel.is_requested() {
                 break;
             }
             see(N(zero), asked, &weights, &mut turned);
@@ -294,11 +294,8 @@ impl LinearResponse {
 
 /// Returns the linear model's responses. Where the speeds at which it takes friction are the
 /// motion's own, they are those of the response. Once `is_stopped` says so, some are missing.
-pub(super) fn linear_responses(
-    rows: &[Row<'_>],
-    is_stopped: &dyn Fn() -> bool,
-) -> Vec<LinearResponse> {
-    let mut found = together(rows, is_stopped);
+pub(super) fn linear_responses(rows: &[Row<'_>], cancel: Cancel<'_>) -> Vec<LinearResponse> {
+    let mut found = together(rows, cancel);
     let searched = |(k, row): (usize, &Row<'_>)| Some((k, Search::from_least(row.point)?));
     let mut open: Vec<(usize, Search)> = rows.iter().enumerate().filter_map(searched).collect();
     for _ in 0..MAX_RUNS {
@@ -307,8 +304,8 @@ pub(super) fn linear_responses(
         };
         let points: Vec<Point> = open.iter().map(at_speeds).collect();
         let asked = open.iter().zip(&points).map(|((k, _), point)| Row { point, ..rows[*k] });
-        let responses = together(&asked.collect::<Vec<_>>(), is_stopped);
-        if is_stopped() {
+        let responses = together(&asked.collect::<Vec<_>>(), cancel);
+        if cancel.is_requested() {
             break;
         }
         let mut left = Vec::new();
@@ -325,8 +322,8 @@ pub(super) fn linear_responses(
 
 /// Computes the responses with friction taken at the points' speeds, in lanes, those of a kind
 /// together.
-pub(super) fn together(rows: &[Row<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<LinearResponse> {
-    let find = |rows: &[Row<'_>]| Simd::dispatch_narrow(OfLinear { rows, is_stopped });
+pub(super) fn together(rows: &[Row<'_>], cancel: Cancel<'_>) -> Vec<LinearResponse> {
+    let find = |rows: &[Row<'_>]| Simd::dispatch_narrow(OfLinear { rows, cancel });
     by_kind(rows, |row| (row.kind(), false), find)
 }
 
@@ -334,7 +331,7 @@ pub(super) fn together(rows: &[Row<'_>], is_stopped: &dyn Fn() -> bool) -> Vec<L
 /// solve finds its fixed point.
 struct OfLinear<'a> {
     rows: &'a [Row<'a>],
-    is_stopped: &'a dyn Fn() -> bool,
+    cancel: Cancel<'a>,
 }
 
 impl Kernel for OfLinear<'_> {
@@ -344,7 +341,7 @@ impl Kernel for OfLinear<'_> {
     fn run<T: Lane>(self, zero: T) -> Self::Output {
         let mut found = Vec::with_capacity(self.rows.len());
         for rows in self.rows.chunks(T::LANES) {
-            if (self.is_stopped)() {
+            if self.cancel.is_requested() {
                 break;
             }
             linear(N(zero), rows, &mut found);

@@ -16,6 +16,7 @@ use crate::run::suspension::attachments;
 use crate::steps::SUSPENSION_MODES;
 use core::f64::consts::TAU;
 use faer::{Mat, c64};
+use lane_ode::Cancel;
 
 /// A motion is judged if the modes that are right have this share of its energy.
 const JUDGED_SHARE: f64 = 0.5;
@@ -60,10 +61,7 @@ const LONGEST_TRANSIENT_S: f64 = 120.0;
 
 /// Returns the periodic responses at constant speeds, on lanes; a run of dwells of one point shares
 /// its curve of responses. Per dwell as [`Responses::at`].
-pub fn respond(
-    dwells: &[Dwell<'_>],
-    is_stopped: &dyn Fn() -> bool,
-) -> Vec<Result<Vec<Response>, NoAnswer>> {
+pub fn respond(dwells: &[Dwell<'_>], cancel: Cancel<'_>) -> Vec<Result<Vec<Response>, NoAnswer>> {
     let same = |a: &Dwell<'_>, b: &Dwell<'_>| core::ptr::eq(a.point, b.point);
     let mut points = Vec::new();
     let mut asked = Vec::new();
@@ -72,8 +70,8 @@ pub fn respond(
         asked.extend(group.iter().map(|dwell| (points.len(), dwell.speed_rpm)));
         points.push((group[0].point, fastest_rpm));
     }
-    let mut followed = Responses::follow(&points, None, is_stopped);
-    Responses::at(&mut followed, &asked, is_stopped)
+    let mut followed = Responses::follow(&points, None, cancel);
+    Responses::at(&mut followed, &asked, cancel)
 }
 
 /// A point's periodic responses over speed.
@@ -88,12 +86,12 @@ pub struct Responses<'a> {
 impl<'a> Responses<'a> {
     /// Follows the responses of some points from a low speed up, each to the fastest speed (rpm)
     /// that will be asked for; on lanes. `from` another machine's response, it begins with the one
-    /// nearby at that speed. What there is when `is_stopped` says so means nothing.
+    /// nearby at that speed. What there is when `cancel` is requested means nothing.
     #[must_use]
     pub fn follow(
         points: &[(&'a Point, f64)],
         from: Option<&Response>,
-        is_stopped: &dyn Fn() -> bool,
+        cancel: Cancel<'_>,
     ) -> Vec<Self> {
         let begun = points.iter().map(|&(point, fastest_rpm)| {
             let curve = Curve::new(Settings::new(point));
@@ -102,7 +100,7 @@ impl<'a> Responses<'a> {
             let until_rpm = from.map_or(BEYOND, |_| 1.0) * fastest_rpm;
             (curve, lowest.map(|lowest| [lowest, until_rpm]))
         });
-        let Some(up) = followed(begun.collect(), from, is_stopped) else { return Vec::new() };
+        let Some(up) = followed(begun.collect(), from, cancel) else { return Vec::new() };
         // A remedy is tried on its own branch alone.
         let is_lost = |curve: &Curve<'_>, rpm: f64| from.is_none() && curve.is_lost(rpm);
         let lost = up.iter().zip(points).filter(|(curve, (_, rpm))| is_lost(curve, *rpm));
@@ -111,7 +109,7 @@ impl<'a> Responses<'a> {
             let ends = highest.ok().zip(lowest.ok()).filter(|(highest, lowest)| highest > lowest);
             (Curve::new(Settings::new(point)), ends.map(<[f64; 2]>::from))
         });
-        let Some(down) = followed(begun.collect(), None, is_stopped) else { return Vec::new() };
+        let Some(down) = followed(begun.collect(), None, cancel) else { return Vec::new() };
         let mut down = down.into_iter();
         let all = up.into_iter().zip(points).map(|(up, (_, rpm))| {
             let down = if is_lost(&up, *rpm) { down.next() } else { None };
@@ -143,14 +141,14 @@ impl<'a> Responses<'a> {
     /// Runge-Kutta in steps that follow its bearings.
     ///
     /// # Errors
-    /// Per place and speed, [`NoAnswer`]. Once `is_stopped` says so, [`NoAnswer::Stopped`].
+    /// Per place and speed, [`NoAnswer`]. Once `cancel` is requested, [`NoAnswer::Stopped`].
     pub fn at(
         followed: &mut [Self],
         asked: &[(usize, f64)],
-        is_stopped: &dyn Fn() -> bool,
+        cancel: Cancel<'_>,
     ) -> Vec<Result<Vec<Response>, NoAnswer>> {
         let stopped = || asked.iter().map(|_| Err(NoAnswer::Stopped)).collect();
-        if is_stopped() {
+        if cancel.is_requested() {
             return stopped();
         }
         let mut cases = Vec::with_capacity(asked.len());
@@ -161,7 +159,7 @@ impl<'a> Responses<'a> {
             rows.extend(case.as_ref().ok().map(|case| up.settings.linear(case.row)));
             cases.push(case);
         }
-        let mut linear = linear_responses(&rows, is_stopped).into_iter();
+        let mut linear = linear_responses(&rows, cancel).into_iter();
         let (mut looked, mut solves): (Vec<Look<'_>>, Vec<Solve<'_>>) = Default::default();
         for (number, (case, (place, speed_rpm))) in cases.iter().zip(asked).enumerate() {
             let Ok(case) = case else { continue };
@@ -183,20 +181,20 @@ impl<'a> Responses<'a> {
                 looked.push(Look { number, case: case.clone(), guess, linear: linear.peaks });
             }
         }
-        if !finish(&mut solves, is_stopped) {
+        if !finish(&mut solves, cancel) {
             return stopped();
         }
         let mut found: Vec<Result<Response, NoAnswer>> =
             looked.iter().zip(solves).map(|(look, solve)| look.answer(solve)).collect();
-        if is_stopped() || !search_again(&looked, &mut found, is_stopped) {
+        if cancel.is_requested() || !search_again(&looked, &mut found, cancel) {
             return stopped();
         }
         forget_known(&looked, &mut found);
-        if !find_lost_branches(&looked, &mut found, is_stopped) {
+        if !find_lost_branches(&looked, &mut found, cancel) {
             return stopped();
         }
         // Responses close to an edge, or moved by the caps, are asked of the machine as it is.
-        let are_moved = are_moved(&looked, &found, is_stopped);
+        let are_moved = are_moved(&looked, &found, cancel);
         let mut close = Vec::new();
         for (place, response) in found.iter().enumerate() {
             let Ok(response) = response else { continue };
@@ -217,7 +215,7 @@ impl<'a> Responses<'a> {
         }
         let starts: Vec<(usize, [f64; STATES])> =
             searches.iter().map(|(place, solve)| (*place, solve.start())).collect();
-        if !take_found(&looked, &mut found, searches, is_stopped) {
+        if !take_found(&looked, &mut found, searches, cancel) {
             return stopped();
         }
         // A harmonic that rings the hinge may be far from the capped machine's response.
@@ -230,11 +228,11 @@ impl<'a> Responses<'a> {
             let searches =
                 missing.map(|(place, start)| (*place, way(&looked[*place].case, *start)));
             let searches: Vec<(usize, Solve<'_>)> = searches.collect();
-            if !take_found(&looked, &mut found, searches, is_stopped) {
+            if !take_found(&looked, &mut found, searches, cancel) {
                 return stopped();
             }
         }
-        if !find_lost_branches(&looked, &mut found, is_stopped) {
+        if !find_lost_branches(&looked, &mut found, cancel) {
             return stopped();
         }
         let none = |case: Result<Case<'_>, NoAnswer>| case.err().unwrap_or(NoAnswer::NoResponse);
@@ -254,11 +252,11 @@ impl<'a> Responses<'a> {
 }
 
 /// Curves followed between two speeds (rpm), each from the linear model's response, or `from`
-/// another machine's; none once `is_stopped` says so.
+/// another machine's; none once `cancel` is requested.
 fn followed<'a>(
     begun: Vec<(Curve<'a>, Option<[f64; 2]>)>,
     from: Option<&Response>,
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> Option<Vec<Curve<'a>>> {
     let (mut curves, ends): (Vec<Curve<'a>>, Vec<Option<[f64; 2]>>) = begun.into_iter().unzip();
     let starts: Vec<Option<Row<'_>>> = curves
@@ -274,7 +272,7 @@ fn followed<'a>(
             Some(Row { point: curve.settings.without_friction(), ..(*start)? })
         })
         .collect();
-    let linear = together(&rows, is_stopped);
+    let linear = together(&rows, cancel);
     let begun = starts.iter().flatten().zip(&linear);
     let mut solves: Vec<Solve<'_>> = begun
         .map(|(row, linear)| {
@@ -282,7 +280,7 @@ fn followed<'a>(
             Solve::new(*row, from.map_or_else(at_linear, |it| it.start), None)
         })
         .collect();
-    let is_whole = finish(&mut solves, is_stopped);
+    let is_whole = finish(&mut solves, cancel);
     let mut solves = solves.into_iter();
     for ((curve, ends), start) in curves.iter_mut().zip(&ends).zip(&starts) {
         if let (Some(row), Some([_, until_rpm])) = (start, ends)
@@ -291,17 +289,17 @@ fn followed<'a>(
             curve.begin(row.speed_rpm, &state, *until_rpm);
         }
     }
-    (is_whole && finish(&mut curves, is_stopped)).then_some(curves)
+    (is_whole && finish(&mut curves, cancel)).then_some(curves)
 }
 
 /// Searches again for responses that were not found. Those that a curve has are searched by damped
 /// steps. At a speed at which nothing is found then, the machine turns from the linear model's
 /// response until its transient has decayed: it is in a stable response, if it comes to one.
-/// Returns false once `is_stopped` says so.
+/// Returns false once `cancel` is requested.
 fn search_again(
     looked: &[Look<'_>],
     found: &mut [Result<Response, NoAnswer>],
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> bool {
     let mut again: Vec<(usize, Solve<'_>)> = Vec::new();
     for (place, look) in looked.iter().enumerate() {
@@ -309,7 +307,7 @@ fn search_again(
             again.push((place, Solve::damped(look.case.row, look.guess.state, DAMPED_STEP)));
         }
     }
-    if !take_found(looked, found, again, is_stopped) {
+    if !take_found(looked, found, again, cancel) {
         return false;
     }
     let mut again: Vec<(usize, Solve<'_>)> = Vec::new();
@@ -323,7 +321,7 @@ fn search_again(
             again.push((place, Solve::after_transient(row, state, turns)));
         }
     }
-    take_found(looked, found, again, is_stopped)
+    take_found(looked, found, again, cancel)
 }
 
 /// Finds branches that were lost to their neighbours.
@@ -332,11 +330,11 @@ fn search_again(
 /// that are neighbours there have an even and an odd number, and branches vanish in pairs, at
 /// folds. Where an odd number of a curve's guesses has no response of its own, one was lost:
 /// searches that are repelled by the responses known at that speed find it. Returns false once
-/// `is_stopped` says so.
+/// `cancel` says so.
 fn find_lost_branches(
     looked: &[Look<'_>],
     found: &mut [Result<Response, NoAnswer>],
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> bool {
     forget_twice_found(looked, found);
     let mut searches: Vec<(usize, Solve<'_>)> = Vec::new();
@@ -357,7 +355,7 @@ fn find_lost_branches(
             searches.push((place, solve));
         }
     }
-    let is_whole = take_found(looked, found, searches, is_stopped);
+    let is_whole = take_found(looked, found, searches, cancel);
     forget_twice_found(looked, found);
     is_whole
 }
@@ -405,10 +403,10 @@ fn take_found<'a>(
     looked: &[Look<'a>],
     found: &mut [Result<Response, NoAnswer>],
     searches: Vec<(usize, Solve<'a>)>,
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> bool {
     let (places, mut solves): (Vec<usize>, Vec<Solve<'_>>) = searches.into_iter().unzip();
-    if !finish(&mut solves, is_stopped) {
+    if !finish(&mut solves, cancel) {
         return false;
     }
     for (place, solve) in places.into_iter().zip(solves) {
@@ -441,7 +439,7 @@ fn forget_known(looked: &[Look<'_>], found: &mut [Result<Response, NoAnswer>]) {
 fn are_moved(
     looked: &[Look<'_>],
     found: &[Result<Response, NoAnswer>],
-    is_stopped: &dyn Fn() -> bool,
+    cancel: Cancel<'_>,
 ) -> Vec<bool> {
     let mut are_moved = vec![false; looked.len()];
     let mut places = Vec::new();
@@ -457,7 +455,7 @@ fn are_moved(
             asked.push(Asked { row: plain.row, start: response.start, is_seen: false });
         }
     }
-    for ((place, asked), turned) in places.into_iter().zip(&asked).zip(turns(&asked, is_stopped)) {
+    for ((place, asked), turned) in places.into_iter().zip(&asked).zip(turns(&asked, cancel)) {
         let Row { point, speed_rpm, .. } = asked.row;
         let missing = missing(point, speed_rpm, &asked.start, &turned.end);
         are_moved[place] = missing.is_nan() || missing > RETURN_MISS;
@@ -578,7 +576,7 @@ mod tests {
     #[test]
     fn a_branch_that_was_lost_is_found_again() {
         let point = prepared(with(0.3, 30.0), 100.0);
-        let mut followed = Responses::follow(&[(&point, 255.0)], None, &|| false).remove(0);
+        let mut followed = Responses::follow(&[(&point, 255.0)], None, Cancel::Never).remove(0);
         let case = followed.up.settings.case(255.0).unwrap();
         let guesses = followed.guesses(255.0).into_iter();
         let looked: Vec<Look<'_>> = guesses
@@ -587,7 +585,7 @@ mod tests {
         let searches = looked.iter();
         let searches = searches.map(|look| Solve::new(look.case.row, look.guess.state, None));
         let mut solves: Vec<Solve<'_>> = searches.collect();
-        assert!(finish(&mut solves, &|| false));
+        assert!(finish(&mut solves, Cancel::Never));
         let answers = looked.iter().zip(solves).map(|(look, solve)| look.answer(solve));
         let found: Vec<Result<Response, NoAnswer>> = answers.collect();
         let branches = found.iter().map(|response| response.as_ref().unwrap().branch);
@@ -596,7 +594,7 @@ mod tests {
             for instead in [Err(NoAnswer::NoResponse), found[(place + 1) % 3].clone()] {
                 let mut lost = found.clone();
                 lost[place] = instead;
-                assert!(find_lost_branches(&looked, &mut lost, &|| false));
+                assert!(find_lost_branches(&looked, &mut lost, Cancel::Never));
                 let [again, before] =
                     [&lost, &found].map(|found| found[place].as_ref().unwrap().start);
                 let apart = (0..COORDINATES).map(|i| (again[i] - before[i]).abs());
@@ -605,7 +603,7 @@ mod tests {
         }
         // An even number may have vanished together, at a fold: they are not searched for.
         let mut none = vec![Err(NoAnswer::NoResponse), found[1].clone(), Err(NoAnswer::NoResponse)];
-        assert!(find_lost_branches(&looked, &mut none, &|| false));
+        assert!(find_lost_branches(&looked, &mut none, Cancel::Never));
         assert!(is_missing(&none[0]) && is_missing(&none[2]));
     }
 }

@@ -6,7 +6,7 @@ use super::orbit::{Asked, Row, Seen, Turned, turns};
 use crate::coordinates::{COORDINATES, STATES};
 use crate::point::Point;
 use core::f64::consts::TAU;
-use lane_ode::{Aside, Lu, N, Simd};
+use lane_ode::{Aside, Cancel, Lu, N, Simd};
 
 /// A search that asks for turns until it is over.
 pub(super) trait Search<'a> {
@@ -17,17 +17,17 @@ pub(super) trait Search<'a> {
     fn take(&mut self, turned: Vec<Turned>);
 }
 
-/// Takes searches to their ends, the turns of all of them in lanes together. False if `is_stopped`
+/// Takes searches to their ends, the turns of all of them in lanes together. False if `cancel`
 /// said so before that.
-pub(super) fn finish<'a, S: Search<'a>>(searches: &mut [S], is_stopped: &dyn Fn() -> bool) -> bool {
+pub(super) fn finish<'a, S: Search<'a>>(searches: &mut [S], cancel: Cancel<'_>) -> bool {
     loop {
         let wanted: Vec<Vec<Asked<'a>>> = searches.iter_mut().map(Search::wants).collect();
         let asked: Vec<Asked<'a>> = wanted.concat();
         if asked.is_empty() {
             return true;
         }
-        let mut turned = turns(&asked, is_stopped).into_iter();
-        if is_stopped() {
+        let mut turned = turns(&asked, cancel).into_iter();
+        if cancel.is_requested() {
             return false;
         }
         for (search, wanted) in searches.iter_mut().zip(wanted) {

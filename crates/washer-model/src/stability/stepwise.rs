@@ -66,7 +66,7 @@ mod tests {
         let [without, others @ ..] = points.each_ref().map(|point| {
             let dwells = [60.0, 110.0, 185.0, 255.0].map(|speed_rpm| Dwell { point, speed_rpm });
             let found: Vec<_> =
-                respond(&dwells, &|| false).into_iter().map(Result::unwrap).collect();
+                respond(&dwells, lane_ode::Cancel::Never).into_iter().map(Result::unwrap).collect();
             found.concat().into_iter().filter(|response| response.is_on_curve).collect::<Vec<_>>()
         });
         // At 255 rpm it has three.

@@ -13,7 +13,7 @@ use crate::steps::SUSPENSION_MODES;
 use crate::tests::reference::reference;
 use crate::{BumpStop, Channel, Machine, Method, ModelKind, Spin, Start, Timing, history, prepare};
 use faer::{Mat, c64};
-use lane_ode::Simd;
+use lane_ode::{Cancel, Simd};
 use serde_json::Value;
 use std::f64::consts::PI;
 
@@ -67,7 +67,7 @@ fn over_point(point: &Point, speeds_rpm: &[f64]) -> Vec<Response> {
 
 /// All responses of some dwells.
 fn all(dwells: &[Dwell<'_>]) -> Vec<Result<Vec<Response>, NoAnswer>> {
-    respond(dwells, &|| false)
+    respond(dwells, Cancel::Never)
 }
 
 fn at(machine: Machine, speed_rpm: f64) -> Response {
@@ -88,7 +88,7 @@ fn plain(machine: Machine, speed_rpm: f64, start: [f64; STATES]) -> Vec<c64> {
 /// Finds a row's response near a state, and every multiplier.
 fn found(row: &Row<'_>, start: [f64; STATES]) -> ([f64; STATES], Vec<c64>) {
     let mut solves = [Solve::new(*row, start, None)];
-    assert!(finish(&mut solves, &|| false));
+    assert!(finish(&mut solves, Cancel::Never));
     let [solve] = solves;
     let (start, seen) = solve.found().unwrap();
     let unit = |i: usize| if i < COORDINATES { 1.0 } else { row.unit_per_s() };
@@ -599,7 +599,7 @@ fn followed_responses_are_those_of_short_steps() {
                 Some(Solve::new(settings.case(speed(step)).unwrap().row, (*state)?, None))
             })
             .collect();
-        assert!(finish(&mut solves, &|| false));
+        assert!(finish(&mut solves, Cancel::Never));
         let mut solves = solves.into_iter();
         for (k, state) in states.iter_mut().enumerate() {
             let Some(from) = *state else { continue };
@@ -660,7 +660,7 @@ fn near_resonances_of_the_hinge_responses_are_those_of_the_machine_as_it_is() {
             Solve::new(settings.case(rpm).unwrap().without_caps().unwrap().row, ours.start, None)
         })
         .collect();
-    assert!(finish(&mut plain, &|| false));
+    assert!(finish(&mut plain, Cancel::Never));
     let mut worst = 0.0_f64;
     for (ours, plain) in ours.iter().zip(plain) {
         let plain = plain.found().unwrap().1.peaks;
@@ -727,7 +727,7 @@ fn a_linear_response_takes_friction_at_its_own_speed() {
         let machine = crate::tests::friction::machine(0.3, [40.0, 60.0], given_m_per_s);
         let point = prepared(machine, speed_rpm);
         let case = Settings::new(&point).case(150.0).unwrap();
-        let peaks = linear_responses(&[case.row], &|| false).remove(0).peaks;
+        let peaks = linear_responses(&[case.row], Cancel::Never).remove(0).peaks;
         (point.friction_speeds()[0].speed_m_per_s, peaks[Channel::TubFrontZ.index()])
     };
     let [(slow_m_per_s, slow_m), (fast_m_per_s, fast_m)] = [of(60.0, None), of(300.0, None)];

@@ -6,8 +6,8 @@ use crate::{
     Caps, Machine, Method, ModelKind, Point, Profile, Reading, Record, Recorders, Spin, Timing,
     prepare, simulate_until, simulate_with,
 };
-use core::cell::Cell;
-use lane_ode::{STEPS_AT_ONCE, Simd, Tolerance};
+use core::sync::atomic::{AtomicU32, Ordering};
+use lane_ode::{Cancel, STEPS_AT_ONCE, Simd, Tolerance};
 
 type Scenario = (Machine, Spin);
 
@@ -200,19 +200,27 @@ fn every_method_stops_within_a_segment() {
     let adaptive = [Method::Dopri5(tolerance), Method::Additive(tolerance)];
     for method in [Method::Rk4 { step_s: 2e-5 }, dop853].into_iter().chain(adaptive) {
         for model in MODELS {
-            let calls = Cell::new(0);
+            let calls = AtomicU32::new(0);
             let until = |max_calls: u32| {
-                calls.set(0);
-                let stop = || {
-                    calls.set(calls.get() + 1);
-                    calls.get() > max_calls
-                };
-                simulate_until(Simd::best(), model, &method, &[&point], Recorders::default(), &stop)
+                calls.store(0, Ordering::Relaxed);
+                let stop = || calls.fetch_add(1, Ordering::Relaxed) >= max_calls;
+                simulate_until(
+                    Simd::best(),
+                    model,
+                    &method,
+                    &[&point],
+                    Recorders::default(),
+                    Cancel::When(&stop),
+                )
             };
             assert!(until(u32::MAX).is_some_and(|(records, _)| records[0].failure.is_none()));
-            assert!(calls.get() > 3, "{model:?} by {method:?}: {} calls", calls.get());
+            assert!(
+                calls.load(Ordering::Relaxed) > 3,
+                "{model:?} by {method:?}: {} calls",
+                calls.load(Ordering::Relaxed)
+            );
             assert_eq!(until(2), None, "{model:?} by {method:?}");
-            assert_eq!(calls.get(), 3, "{model:?} by {method:?}");
+            assert_eq!(calls.load(Ordering::Relaxed), 3, "{model:?} by {method:?}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Fits whose fixed numbers are off, and the tolerances of these.
 
 use super::*;
+use lane_ode::Cancel;
 
 #[test]
 fn intervals_count_what_the_fixed_numbers_may_be_off() {
@@ -44,7 +45,7 @@ fn tolerances_are_the_prior_of_an_unknown() {
     let radius_m = case.plan.model.machine.unbalance.radius_m;
     let mut names: Vec<&str> = VISCOUS.iter().map(|(name, _)| *name).collect();
     let cases = vec![case];
-    let work = FitWork { stop: &|| false, seen: &|_| {}, output: None, fresh: false };
+    let work = FitWork { cancel: Cancel::Never, seen: &|_| {}, output: None, fresh: false };
     let fitted = fit(cases.clone(), &options(&names), &work).unwrap().unwrap();
     let Fitted { problem, mut x, against, .. } = fitted;
     let summary = problem.summary(&against);
@@ -56,8 +57,8 @@ fn tolerances_are_the_prior_of_an_unknown() {
     names.push("unbalance_radius_m");
     x.insert(radius, radius_m);
     let free = free(&options(&names), &cases).unwrap();
-    let Problem { model, with_shift, method, simd, stop, .. } = problem;
-    let joint = Problem { cases, free, model, with_shift, method, simd, stop };
+    let Problem { model, with_shift, method, simd, cancel, .. } = problem;
+    let joint = Problem { cases, free, model, with_shift, method, simd, cancel };
     let Summary { mut normal, pull, .. } = joint.summary(&joint.against(&x).unwrap());
     normal[radius][radius] += 1.0 / (0.05 * radius_m).powi(2);
     let covariance = algebra::inverse(&normal);

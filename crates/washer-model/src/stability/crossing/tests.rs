@@ -3,6 +3,7 @@ use super::*;
 use crate::machine::Machine;
 use crate::machine::spin::{Profile, Spin};
 use crate::point::{Timing, prepare};
+use lane_ode::Cancel;
 
 const STEP_S: f64 = 2e-4;
 
@@ -64,7 +65,7 @@ fn a_crossing_of_no_length_amplifies_nothing() {
 #[test]
 fn a_run_on_its_response_departs_by_nothing() {
     let point = point(Spin::Table { time_s: vec![0.0], speed_rpm: vec![225.0] });
-    let response = respond(&[Dwell { point: &point, speed_rpm: 225.0 }], &|| false);
+    let response = respond(&[Dwell { point: &point, speed_rpm: 225.0 }], Cancel::Never);
     let response = response.into_iter().next().unwrap().unwrap().remove(0);
     for at_s in [0.0_f64, 0.1, 0.2, 1.0] {
         let followed = run(&point, STEP_S, [0.0, at_s.max(1e-12)], &response.start).end;
@@ -93,7 +94,7 @@ fn peaks_are_of_the_window_and_of_the_run_that_was_put_on_its_response() {
         assert!((part[i] / late[i] - 1.0).abs() < 1e-6);
     }
     // The ramp of two seconds leaves much that the response has not.
-    let response = respond(&[Dwell { point: &point, speed_rpm: 225.0 }], &|| false);
+    let response = respond(&[Dwell { point: &point, speed_rpm: 225.0 }], Cancel::Never);
     let response = response.into_iter().next().unwrap().unwrap().remove(0);
     let crossing = forwards([1.8, 2.2], Some(&response));
     let quiet = peaks_without_departures(&point, STEP_S, &[crossing], [1.9, 3.0]).unwrap();
@@ -124,7 +125,7 @@ fn backwards_the_response_is_the_mirrored_machines() {
     };
     let point = held(&machine, -225.0);
     let image = held(&machine.mirrored(), 225.0);
-    let response = respond(&[Dwell { point: &image, speed_rpm: 225.0 }], &|| false);
+    let response = respond(&[Dwell { point: &image, speed_rpm: 225.0 }], Cancel::Never);
     let response = response.into_iter().next().unwrap().unwrap().remove(0);
     for at_s in [1e-12, 0.1, 0.2, 1.0] {
         let start = mirrored(&response.start);

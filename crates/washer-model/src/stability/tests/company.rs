@@ -3,6 +3,7 @@
 use super::*;
 use crate::stability::orbit::{Asked, Turned, turns};
 use crate::{Bushing, Unbalance};
+use lane_ode::Cancel;
 
 /// A random machine with the elements of `kinds`' bits: friction, stops, stiffening springs, a
 /// bushing, a second unbalance.
@@ -92,9 +93,9 @@ fn turns_do_not_depend_on_company() {
             });
             asked.push(Asked { row, start, is_seen: numbers.bool() });
         }
-        let together = turns(&asked, &|| false);
+        let together = turns(&asked, Cancel::Never);
         for (asked, together) in asked.iter().zip(&together) {
-            let alone = turns(core::slice::from_ref(asked), &|| false).remove(0);
+            let alone = turns(core::slice::from_ref(asked), Cancel::Never).remove(0);
             let kind = asked.row.kind();
             assert!(
                 bits(&alone) == bits(together),
