@@ -9,8 +9,8 @@ mod equations;
 mod map;
 mod run;
 
-pub use map::{Integrator, Map};
-pub use sweep_parameter::Range;
+pub use map::Map;
+pub use sweep_parameter::{Channel as Coordinate, Range};
 
 use std::process::ExitCode;
 
@@ -31,17 +31,6 @@ pub struct Parameter {
     pub default: f64,
     /// The source of the default value.
     pub source: &'static str,
-}
-
-/// A coordinate of an oscillator, which is compared between the models.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coordinate {
-    /// The name in grid files; columns are called `nonlinear_NAME` and the like.
-    pub name: &'static str,
-    /// The unit.
-    pub unit: &'static str,
-    /// The meaning, in a phrase.
-    pub description: &'static str,
 }
 
 /// An oscillator with `C` coordinates q, for which q'' = accelerations(q, q') + forcing(t), and `P`

@@ -1,36 +1,47 @@
 //! An oscillator as a model of the engine.
 
+use std::borrow::Cow;
 use std::marker::PhantomData;
-use std::time::Instant;
 
 use lane_ode::{MAX_LANES, Simd};
-use serde_json::{Map as JsonMap, Value};
+use serde_json::Value;
 use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
 use sweep_engine::config::Keys;
-use sweep_engine::config::schema::set;
-use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Steps};
-use sweep_engine::store::read::{NameCounts, add};
+use sweep_engine::method::{ACCURACY, ATOL, IntegrationMethod, RTOL, STEP_S, StepControl, Steps};
 use sweep_engine::store::{Done, Layout, axis_columns};
 use sweep_engine::{
-    Build, Engine, Error, Estimate, GridInput, Job, Listed, Model as EngineModel, Plan, Read,
-    RowSink, RowSource, Rows, RunContext, Scenario, Swept, methods,
+    About, Build, Engine, Error, Evaluator, GridInput, GridTable, Model as EngineModel,
+    ModelParameter, Plan, RowSink, RowSource, RunContext, Scenario,
 };
-use sweep_parameter::{Channel, Range, UnknownParameter};
+use sweep_parameter::Range;
 
 use crate::equations::{Model, PreparedPoint};
 use crate::run::{Integration, Method, ModelRun};
 use crate::{Coordinate, Oscillator, Parameter};
 
-methods! {
-    Rk4 = "rk4", "classical Runge-Kutta of order 4, in fixed steps" { step_s: STEP_S }
-        Steps::Fixed(step_s);
-    Dopri5 = "dopri5", "Dormand-Prince 5(4), adaptive" { rtol: RTOL, atol: ATOL } Steps::ByError;
-    Rk4Halved = "rk4-halved", "rk4 in steps that are halved until two runs agree" {
-        accuracy: ACCURACY
-    } Steps::Checked(accuracy);
-}
+/// The methods of integration.
+static INTEGRATION_METHODS: [IntegrationMethod; 3] = [
+    IntegrationMethod {
+        name: "rk4",
+        description: "classical Runge-Kutta of order 4, in fixed steps",
+        settings: &[STEP_S],
+        steps: StepControl::Fixed,
+    },
+    IntegrationMethod {
+        name: "dopri5",
+        description: "Dormand-Prince 5(4), adaptive",
+        settings: &[RTOL, ATOL],
+        steps: StepControl::ByError,
+    },
+    IntegrationMethod {
+        name: "rk4-halved",
+        description: "rk4 in steps that are halved until two runs agree",
+        settings: &[ACCURACY],
+        steps: StepControl::Checked,
+    },
+];
 
 /// First step of the halving method, as the product of step and the linear model's highest
 /// frequency (rad). Basis: order 4 is then stable. Doubling it adds a useless first run.
@@ -71,156 +82,71 @@ pub struct Map<O, const C: usize, const D: usize, const P: usize> {
 }
 
 /// The edges of the window, which can be set and swept like parameters.
-const EDGES: [Parameter; 2] = [
-    edge("window_from_s", "where the window begins"),
-    edge("window_to_s", "where the window ends"),
-];
-
-const fn edge(name: &'static str, description: &'static str) -> Parameter {
-    let source = "the grid file's [time]";
-    Parameter { name, unit: "s", description, range: Range::NonNegative, default: 0.0, source }
-}
-
-impl sweep_parameter::Parameter for Parameter {
-    fn name(&self) -> &str {
-        self.name
-    }
-
-    fn unit(&self) -> &'static str {
-        self.unit
-    }
-
-    fn description(&self) -> &'static str {
-        self.description
-    }
-
-    fn range(&self) -> Range {
-        self.range
-    }
-
-    fn window_edge(&self) -> Option<usize> {
-        EDGES.iter().position(|edge| edge == self)
-    }
-}
-
-impl Channel for Coordinate {
-    fn name(self) -> &'static str {
-        self.name
-    }
-
-    fn unit(self) -> &'static str {
-        self.unit
-    }
-
-    fn description(self) -> &'static str {
-        self.description
-    }
-}
+const EDGES: [(&str, &str); 2] =
+    [("window_from_s", "where the window begins"), ("window_to_s", "where the window ends")];
 
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> EngineModel
     for Map<O, C, D, P>
 {
-    type Parameter = Parameter;
-    type Channel = Coordinate;
-    type Integrator = Integrator;
+    /// The position among the oscillator's parameters, behind which the window's edges are.
+    type Handle = usize;
 
-    const BUILD: Build = Build { version: O::VERSION, numerics: 1 };
+    const ABOUT: About = About::new(
+        Build { version: O::VERSION, numerics: 1 },
+        &O::COORDINATES,
+        &INTEGRATION_METHODS,
+    );
 
-    fn channels() -> &'static [Coordinate] {
-        &O::COORDINATES
-    }
-
-    fn parameters(&self) -> Vec<Parameter> {
-        O::PARAMETERS.into_iter().chain(EDGES).collect()
-    }
-
-    fn find(&self, name: &str) -> Result<Parameter, UnknownParameter> {
-        let found = self.parameters().into_iter().find(|one| one.name == name);
-        found.ok_or_else(UnknownParameter::strange)
-    }
-
-    fn write(&mut self, parameter: &Parameter, value: f64) {
-        if let Some(place) = O::PARAMETERS.iter().position(|one| one.name == parameter.name) {
-            self.values[place] = value;
-        }
-    }
-}
-
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Read
-    for Map<O, C, D, P>
-{
     fn blank() -> Self {
         Self { values: O::PARAMETERS.map(|one| one.default), oscillator: PhantomData }
     }
 
-    fn walk(&mut self, keys: &mut Keys<'_>, _: Option<&GridInput<Self>>) {
-        let named = O::PARAMETERS.iter().zip(self.values);
-        let pair = |(one, value): (&Parameter, f64)| (one.name.to_owned(), Value::from(value));
-        keys.write("parameters", named.map(pair).collect());
+    fn parameters(&self) -> Vec<ModelParameter<Self>> {
+        let own = O::PARAMETERS.into_iter().zip(self.values).map(|(one, value)| {
+            let Parameter { name, unit, description, range, source, .. } = one;
+            (name, unit, description, range, source, Some(value))
+        });
+        let source = "the grid file's [time]";
+        let edges = EDGES
+            .into_iter()
+            .map(|(name, description)| (name, "s", description, Range::NonNegative, source, None));
+        let parameter = |(handle, (name, unit, description, range, source, value))| {
+            let window_edge = usize::checked_sub(handle, P);
+            sweep_parameter::Parameter {
+                name: Cow::Borrowed(name),
+                unit,
+                description,
+                range,
+                source,
+                value,
+                parts: vec![Cow::Borrowed(name)],
+                window_edge,
+                is_in_grid: window_edge.is_some(),
+                handle,
+            }
+        };
+        own.chain(edges).enumerate().map(parameter).collect()
     }
 
-    fn schema_of_set() -> Value {
-        set(&Self::blank().parameters(), JsonMap::new())
+    fn write(&mut self, handle: &usize, value: f64) {
+        self.values[*handle] = value;
     }
-}
 
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Rows
-    for Map<O, C, D, P>
-{
+    fn walk(&mut self, table: GridTable, keys: &mut Keys<'_>, _: Option<&GridInput<Self>>) {
+        if table == GridTable::Top {
+            let named = O::PARAMETERS.iter().zip(self.values);
+            let pair = |(one, value): (&Parameter, f64)| (one.name.to_owned(), Value::from(value));
+            keys.write("parameters", named.map(pair).collect());
+        }
+    }
+
     fn layout(plan: &Plan<Self>) -> Layout {
         Layout::map(axis_columns(plan), declared(columns(plan)))
     }
-}
 
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Swept
-    for Map<O, C, D, P>
-{
-    fn engine<'a>(plan: &'a Plan<Self>, _: Option<&str>) -> Result<Box<dyn Engine + 'a>, Error> {
+    fn engine<'a>(plan: &'a Plan<Self>, _: Option<&str>) -> Result<Engine<'a>, Error> {
         Simd::check().map_err(Error::model)?;
-        Ok(Box::new(Evaluator { plan }))
-    }
-
-    fn estimate(plan: &Plan<Self>, threads: usize) -> Result<Estimate, Error> {
-        let points = plan.points().min(MAX_LANES as u64);
-        let some: Vec<Vec<f64>> = (0..points).map(|k| plan.axis_values(k)).collect();
-        let began = Instant::now();
-        let rows = Evaluator { plan }.rows(&some, &|| false);
-        let core_s_per_point = began.elapsed().as_secs_f64() / points as f64;
-        let mut sampled = NameCounts::new();
-        rows.iter().for_each(|row| add(&mut sampled, STATUSES[row.status()]));
-        let layout = &Job::new(plan).layout;
-        let result_bytes = plan.points() as f64 * layout.bytes_a_row() as f64;
-        let steps = match plan.integrator.steps() {
-            Steps::Checked(_) => ", until two runs agree",
-            Steps::Fixed(_) => ", two trajectories per point",
-            Steps::ByError => ": steps as it needs",
-        };
-        Ok(Estimate {
-            simd: Simd::best().name().to_owned(),
-            threads,
-            wall_s: plan.points() as f64 * core_s_per_point / threads as f64,
-            core_s_per_point,
-            sampled,
-            sampled_s: plan.end_s,
-            // The memory of unfinished chunks, or of a row group.
-            memory_bytes: 14e6 + result_bytes.min(40e6),
-            disk_bytes: result_bytes,
-            result_bytes,
-            method: format!("{}{steps}", plan.integrator),
-        })
-    }
-
-    fn listed(plan: Option<&Plan<Self>>) -> Vec<Listed<Self>> {
-        let own = O::PARAMETERS.into_iter().enumerate().map(|(k, parameter)| {
-            let value = plan.map_or(parameter.default, |plan| plan.model.values[k]);
-            let source = if value == parameter.default { parameter.source } else { "given" };
-            Listed { parameter, value: Some(value), source: source.to_owned() }
-        });
-        let edges = EDGES.into_iter().enumerate().map(|(k, parameter)| {
-            let value = plan.map(|plan| plan.window_s[k]);
-            Listed { parameter, value, source: parameter.source.to_owned() }
-        });
-        own.chain(edges).collect()
+        Ok(Engine::new(RowEvaluator { plan }, Simd::best().name()))
     }
 }
 
@@ -258,12 +184,12 @@ fn columns<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usiz
 }
 
 /// The engine that computes the rows of a plan.
-struct Evaluator<'a, O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> {
+struct RowEvaluator<'a, O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> {
     plan: &'a Plan<Map<O, C, D, P>>,
 }
 
 impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
-    Evaluator<'_, O, C, D, P>
+    RowEvaluator<'_, O, C, D, P>
 {
     /// Computes rows at points with these values of the axes, in lanes.
     fn compared(&self, axis_values: &[Vec<f64>], is_stopped: &dyn Fn() -> bool) -> Vec<Compared> {
@@ -312,10 +238,11 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize>
 
     /// Returns the method if it is the same for all rows, and the index of its name.
     fn common_method(&self) -> (Option<Method>, usize) {
-        match self.plan.integrator {
-            Integrator::Rk4 { step_s } => (Some(Method::Rk4(step_s)), 0),
-            Integrator::Dopri5 { rtol, atol } => (Some(Method::Dopri5(rtol, atol)), 1),
-            Integrator::Rk4Halved { .. } => (None, 0),
+        let settings = self.plan.integrator.settings();
+        match (self.plan.integrator.steps(), &settings[..]) {
+            (Steps::Fixed(step_s), _) => (Some(Method::Rk4(step_s)), 0),
+            (Steps::ByError, &[(_, rtol), (_, atol)]) => (Some(Method::Dopri5(rtol, atol)), 1),
+            _ => (None, 0),
         }
     }
 
@@ -417,8 +344,8 @@ fn error_of_finer<const C: usize>(
     Some(CONTRACTION * greatest)
 }
 
-impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Engine
-    for Evaluator<'_, O, C, D, P>
+impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Evaluator
+    for RowEvaluator<'_, O, C, D, P>
 {
     fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
         let columns = columns(self.plan);
@@ -439,9 +366,5 @@ impl<O: Oscillator<C, D, P>, const C: usize, const D: usize, const P: usize> Eng
                 }
             }
         });
-    }
-
-    fn simd(&self) -> &str {
-        Simd::best().name()
     }
 }

@@ -122,8 +122,8 @@ pub fn declared<R>(columns: Vec<ResultColumn<R>>) -> Vec<Column> {
 
 /// Creates the columns of both models' amplitudes and of the ratios. `amplitude` and `ratio`
 /// describe them.
-pub fn amplitude_columns<R: AsRef<Compared>, C: Channel>(
-    channels: &[C],
+pub fn amplitude_columns<R: AsRef<Compared>>(
+    channels: &[Channel],
     limits: RatioLimits,
     amplitude: &str,
     ratio: &str,
@@ -131,17 +131,17 @@ pub fn amplitude_columns<R: AsRef<Compared>, C: Channel>(
     let mut columns = Vec::new();
     for (k, model) in MODELS.into_iter().enumerate() {
         for (i, channel) in channels.iter().enumerate() {
-            let motion = channel.description();
+            let motion = channel.description;
             let text = format!("{motion}: {amplitude}, {model} model; null if it failed");
-            let name = format!("{model}_{}", channel.name());
+            let name = format!("{model}_{}", channel.name);
             let get = move |row: &R| row.as_ref().amplitudes[k].get(i).copied();
-            let column = ResultColumn::measured(name, channel.unit(), text, get);
+            let column = ResultColumn::measured(name, channel.unit, text, get);
             columns.push(column.worse(Worse::Greater));
         }
     }
     for (i, channel) in channels.iter().enumerate() {
-        let text = format!("{}: {ratio}", channel.description());
-        let name = format!("ratio_{}", channel.name());
+        let text = format!("{}: {ratio}", channel.description);
+        let name = format!("ratio_{}", channel.name);
         let get = move |row: &R| row.as_ref().ratios.get(i).copied().flatten();
         let column = ResultColumn::measured(name, "1", text, get);
         columns.push(column.worse(Worse::Greater).limit(limits.most, 1.0));
@@ -151,8 +151,8 @@ pub fn amplitude_columns<R: AsRef<Compared>, C: Channel>(
 
 /// Creates the columns of the greatest ratio and its channel, of the verdict, and of the estimated
 /// error. `methods` are the names of methods, `method_description` describes the column of them.
-pub fn verdict_columns<R: AsRef<Compared>, C: Channel>(
-    channels: &[C],
+pub fn verdict_columns<R: AsRef<Compared>>(
+    channels: &[Channel],
     limits: RatioLimits,
     methods: Vec<&'static str>,
     method_description: &str,
@@ -186,14 +186,14 @@ pub fn verdict_columns<R: AsRef<Compared>, C: Channel>(
 }
 
 /// Creates the columns of the greatest or the least ratio and of its channel.
-fn extreme_ratio<R: AsRef<Compared>, C: Channel>(
-    channels: &[C],
+fn extreme_ratio<R: AsRef<Compared>>(
+    channels: &[Channel],
     name: &str,
     extreme: fn(&Compared) -> Option<(usize, f64)>,
     worse: Worse,
     limit: f64,
 ) -> Vec<ResultColumn<R>> {
-    let names = channels.iter().map(|channel| channel.name()).collect();
+    let names = channels.iter().map(|channel| channel.name).collect();
     let ratio = move |row: &R| extreme(row.as_ref()).map(|(_, ratio)| ratio);
     let channel = move |row: &R| extreme(row.as_ref()).map(|(channel, _)| channel);
     let text = format!("{} of the defined ratios; null if none is", worse.extreme());

@@ -26,7 +26,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::program::call_program;
-use crate::{Error, Exit, Swept, expect_random_numbers, survive_file_size_limits};
+use crate::{Error, Exit, Model, expect_random_numbers, survive_file_size_limits};
 use cells::{Lines, clipped, short, span, table, word};
 use grid::{GridArgs, ResultArgs, quoted};
 use run::installed;
@@ -103,7 +103,7 @@ struct Cli {
 
 /// Runs the command that this process's arguments give, and returns its exit code. `name` is the
 /// name of the program.
-pub fn main<M: Swept>(name: &'static str) -> ExitCode {
+pub fn main<M: Model>(name: &'static str) -> ExitCode {
     call_program(name);
     let matches = Cli::command().name(name).bin_name(name).get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
@@ -114,7 +114,7 @@ pub fn main<M: Swept>(name: &'static str) -> ExitCode {
     exit.into()
 }
 
-fn run<M: Swept>(command: &GeneralCommand<Unextended>) -> Result<Exit, Error> {
+fn run<M: Model>(command: &GeneralCommand<Unextended>) -> Result<Exit, Error> {
     survive_file_size_limits().map_err(Error::signals)?;
     expect_random_numbers()?;
     match command {
@@ -128,7 +128,7 @@ fn run<M: Swept>(command: &GeneralCommand<Unextended>) -> Result<Exit, Error> {
             report::run::<M>(args, &show::Further::NONE, &|_| Vec::new(), &CommonFigures)
         }
         GeneralCommand::Require(args) => require::run(args),
-        GeneralCommand::Compare(args) => compare::run(args, M::BUILD),
+        GeneralCommand::Compare(args) => compare::run(args, M::ABOUT.build),
         GeneralCommand::Export(args) => export::run(args),
         GeneralCommand::Status(args) => status::run::<M>(args),
         GeneralCommand::Merge(args) => merge::run::<M>(args),

@@ -32,7 +32,6 @@ pub mod list;
 pub mod parameters;
 mod plan_to_toml;
 mod points;
-pub mod read;
 mod render;
 pub mod report;
 pub mod schema;
@@ -51,7 +50,6 @@ pub use draft::Draft;
 pub use form::Form;
 pub use keys::{Key, KeyWalk, Keys};
 pub use points::{check_columns, not_numbers, other_length};
-pub use read::Read;
 pub use report::{Diagnostic, Diagnostics, Mistake, Report};
 pub use section::{Field, Section, quoted, refused_number, short, unknown_word, written_twice};
 pub use sections::plain_name;
@@ -60,6 +58,7 @@ pub use written::NamedArgument;
 
 use serde_json::Value;
 
+use crate::Model;
 use crate::plan::{Plan, ReadingNotes, WrittenIn};
 
 /// A grid as a user gives it: a file or a text, with constants `NAME=VALUE` that override its own.
@@ -78,7 +77,7 @@ pub struct GridInput<M> {
     model: PhantomData<M>,
 }
 
-impl<M: Read> GridInput<M> {
+impl<M: Model> GridInput<M> {
     /// Returns the input of a grid file. Paths in it are relative to its folder.
     pub fn file(path: PathBuf, sets: Vec<String>) -> Self {
         let name = None;
@@ -97,11 +96,12 @@ impl<M: Read> GridInput<M> {
     /// Returns the grid of a result from the plan in it (`Plan::to_json`), without the points of a
     /// design.
     pub fn from_plan(name: &str, plan: &Value) -> Self {
+        let own_key = M::ABOUT.own_file.map(|file| file.key);
         let is_read = |key: &str| {
-            !["design", "set", "boundary", "optimise"].contains(&key) && Some(key) != M::OWN_FILE
+            !["design", "set", "boundary", "optimise"].contains(&key) && Some(key) != own_key
         };
         let top = plan.as_object().into_iter().flatten().filter(|(key, _)| is_read(key));
-        let own = M::OWN_FILE.and_then(|key| plan.get(key)?.as_object());
+        let own = own_key.and_then(|key| plan.get(key)?.as_object());
         Self {
             text: Some(plan_to_toml::file(top)),
             own_file: own.map(plan_to_toml::file),
@@ -144,7 +144,7 @@ impl<M: Read> GridInput<M> {
 /// Parameters by name with their values.
 pub type NamedValues = Vec<(String, f64)>;
 
-fn resolve<M: Read, T>(
+fn resolve<M: Model, T>(
     input: &GridInput<M>,
     finish: impl FnOnce(&mut Draft<'_, M>) -> T,
 ) -> Result<(Plan<M>, T), Diagnostics> {

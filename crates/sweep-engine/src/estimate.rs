@@ -1,6 +1,14 @@
 //! The estimate of a run's time and memory, as `check` shows it.
 
-use crate::store::read::NameCounts;
+use std::sync::Mutex;
+use std::time::Instant;
+
+use sweep_files::panics::{lock, unlocked};
+
+use crate::method::Steps;
+use crate::store::read::{NameCounts, add};
+use crate::store::{Done, Holds};
+use crate::{Error, Interrupt, Model, Plan, RunContext, threads};
 
 /// The estimated time, memory and disk space of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +33,76 @@ pub struct Estimate {
     pub result_bytes: f64,
     /// The steps of the method, in words.
     pub method: String,
+    /// The words after "below 2" in the sentence on the verdict, where ratios are not those of the
+    /// largest deviations.
+    pub criterion: &'static str,
+    /// The model's notes on the plan, each with its heading.
+    pub notes: Vec<(&'static str, String)>,
+}
+
+/// The number of points that a default estimate evaluates. Basis: the lanes of the widest
+/// instruction set. Doubling it doubles the time of an estimate.
+const SAMPLED_POINTS: u64 = 8;
+
+/// Memory (bytes) of the program, its libraries and buffers without points. Basis: measured in
+/// docs/scaling.md. Doubling it overestimates small runs.
+const PROGRAM_BYTES: f64 = 14e6;
+
+/// Memory (bytes) of a row group while it is encoded, at most. Basis: measured in docs/scaling.md.
+/// Doubling it overestimates large results.
+const ROW_GROUP_BYTES: f64 = 40e6;
+
+impl Estimate {
+    /// Estimates a run from its first rows, which one thread evaluates.
+    ///
+    /// # Errors
+    /// A plan that has no engine, or a thread that cannot be started.
+    pub fn from_first_rows<M: Model>(plan: &Plan<M>, threads: usize) -> Result<Self, Error> {
+        let points = plan.points().min(SAMPLED_POINTS);
+        let engine = M::engine(plan, None)?;
+        let next = Mutex::new(0..points);
+        let source = || lock(&next).next().map(|point| (point, plan.axis_values(point)));
+        let rows = Mutex::new(Vec::new());
+        let sink = |done: Done| lock(&rows).extend(done.rows);
+        let interrupt = Interrupt::new();
+        let context = RunContext::new(&interrupt);
+        let pool = threads::pool(1)?;
+        let began = Instant::now();
+        pool.install(|| engine.evaluator.evaluate(&source, &sink, &context));
+        let core_s_per_point = began.elapsed().as_secs_f64() / points as f64;
+        let layout = M::layout(plan);
+        let status = layout.columns.iter().enumerate().find_map(|(k, column)| match &column.kind {
+            Holds::Name(names) if column.name == "status" => Some((k, names)),
+            _ => None,
+        });
+        let mut sampled = NameCounts::new();
+        if let Some((k, names)) = status {
+            for row in unlocked(rows) {
+                let name = row.get(k).copied().flatten().and_then(|name| names.get(name as usize));
+                name.iter().for_each(|name| add(&mut sampled, name));
+            }
+        }
+        let result_bytes = plan.points() as f64 * layout.bytes_a_row() as f64;
+        let steps = match plan.integrator.steps() {
+            Steps::Checked(_) => ", until two runs agree",
+            Steps::Fixed(_) => ", two trajectories per point",
+            Steps::ByError => ": steps as it needs",
+        };
+        Ok(Self {
+            simd: engine.simd.to_owned(),
+            threads,
+            wall_s: plan.points() as f64 * core_s_per_point / threads as f64,
+            core_s_per_point,
+            sampled,
+            sampled_s: plan.end_s,
+            memory_bytes: PROGRAM_BYTES + result_bytes.min(ROW_GROUP_BYTES),
+            disk_bytes: result_bytes,
+            result_bytes,
+            method: format!("{}{steps}", plan.integrator),
+            criterion: "",
+            notes: Vec::new(),
+        })
+    }
 }
 
 /// Formats a size with three digits.

@@ -7,8 +7,8 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 
 use rayon::ThreadPool;
 
+use crate::engine::IncompleteGroups;
 use crate::store::{Done, Key, Trials, WRITE_INTERVAL};
-use crate::watch::IncompleteGroups;
 use crate::{Engine, Interrupt, RunContext, StoreError, ThreadsError, threads};
 use sweep_files::panics::{lock, unlocked};
 
@@ -40,7 +40,7 @@ pub type RequestValues = Vec<Option<f64>>;
 
 /// An engine with a cache of responses.
 pub struct CachedEvaluator<'a> {
-    engine: Box<dyn Engine + 'a>,
+    engine: Engine<'a>,
     pool: ThreadPool,
     interrupt: &'a Interrupt,
     /// The cache, in memory and on disk; `None` where nothing is stored.
@@ -56,7 +56,7 @@ impl<'a> CachedEvaluator<'a> {
     /// # Errors
     /// [`ThreadsError::Start`].
     pub fn new(
-        engine: Box<dyn Engine + 'a>,
+        engine: Engine<'a>,
         threads: usize,
         interrupt: &'a Interrupt,
         cache: Option<Trials>,
@@ -105,7 +105,7 @@ impl<'a> CachedEvaluator<'a> {
         let mut failure = None;
         let groups = IncompleteGroups::default();
         let (sender, receiver) = channel();
-        let engine = &self.engine;
+        let evaluator = &self.engine.evaluator;
         // The calling thread writes while the pool evaluates.
         self.pool.in_place_scope(|scope| {
             if missing.is_empty() {
@@ -120,7 +120,7 @@ impl<'a> CachedEvaluator<'a> {
                         // The receiver outlives the engine's work.
                         let _ = sender.send((k, respond(k, results)));
                     };
-                    engine.evaluate(&source, &sink, &context);
+                    evaluator.evaluate(&source, &sink, &context);
                 });
             }
             loop {

@@ -53,19 +53,31 @@ pub const ACCURACY: Setting = Setting {
     help: "",
 };
 
-/// A row of the table of methods.
-pub struct Entry<I: 'static> {
+/// The step control of a method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepControl {
+    /// Fixed steps of the first setting's length (s), except those that end at an edge of the
+    /// window.
+    Fixed,
+    /// Steps that follow the error estimate.
+    ByError,
+    /// Fixed steps, refined until two levels agree to the first setting's relative accuracy.
+    Checked,
+}
+
+/// A method of integration: a row of a model's table, the last row of which is the default.
+pub struct IntegrationMethod {
     /// The name in grid files, results and messages.
     pub name: &'static str,
     /// The description in one line.
     pub description: &'static str,
     /// The settings.
     pub settings: &'static [Setting],
-    /// The constructor, which requests the value of each setting once.
-    pub with: fn(&mut dyn FnMut(&Setting) -> f64) -> I,
+    /// The step control.
+    pub steps: StepControl,
 }
 
-/// The step control of a method.
+/// The steps of a method with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steps {
     /// Fixed steps of this length (s), except those that end at an edge of the window.
@@ -76,22 +88,55 @@ pub enum Steps {
     Checked(f64),
 }
 
-/// An integration method with its settings. [`crate::methods!`] declares a model's methods.
-pub trait Integrator: Copy + PartialEq + fmt::Debug + fmt::Display + Send + Sync + 'static {
-    /// Returns every method, in the order of messages and pages; the last is the default.
-    fn methods() -> &'static [Entry<Self>];
+/// A method of integration with the values of its settings.
+#[derive(Clone)]
+pub struct Integrator {
+    method: &'static IntegrationMethod,
+    /// The values, in the order of the method's settings.
+    values: Vec<f64>,
+}
 
+impl IntegrationMethod {
+    /// Returns the method with every setting at its default.
+    pub fn with_defaults(&'static self) -> Integrator {
+        self.with(|setting| setting.default)
+    }
+
+    /// Returns the method with the value that a function gives each setting.
+    pub fn with(&'static self, value: impl FnMut(&Setting) -> f64) -> Integrator {
+        Integrator { method: self, values: self.settings.iter().map(value).collect() }
+    }
+
+    /// Returns whether the method has a setting.
+    pub fn has(&self, key: &str) -> bool {
+        self.settings.iter().any(|setting| setting.key == key)
+    }
+}
+
+impl Integrator {
     /// Returns the name in grid files.
-    fn name(&self) -> &'static str;
+    pub const fn name(&self) -> &'static str {
+        self.method.name
+    }
 
     /// Returns each setting's key and value, in the order of the table.
-    fn settings(&self) -> Vec<(&'static str, f64)>;
+    pub fn settings(&self) -> Vec<(&'static str, f64)> {
+        let keys = self.method.settings.iter().map(|setting| setting.key);
+        keys.zip(self.values.iter().copied()).collect()
+    }
 
-    /// Returns the step control.
-    fn steps(&self) -> Steps;
+    /// Returns the steps.
+    pub fn steps(&self) -> Steps {
+        let first = self.values.first().copied().unwrap_or_default();
+        match self.method.steps {
+            StepControl::Fixed => Steps::Fixed(first),
+            StepControl::ByError => Steps::ByError,
+            StepControl::Checked => Steps::Checked(first),
+        }
+    }
 
     /// Returns the method as plans write it in JSON.
-    fn to_json(self) -> Value {
+    pub fn to_json(&self) -> Value {
         let mut json = json!({ "method": self.name() });
         for (key, value) in self.settings() {
             json[key] = value.into();
@@ -100,83 +145,23 @@ pub trait Integrator: Copy + PartialEq + fmt::Debug + fmt::Display + Send + Sync
     }
 }
 
-/// Declares the methods of a model: an enum with a variant for each method, and a table with names,
-/// descriptions and settings. A row ends with the method's [`Steps`].
-#[macro_export]
-macro_rules! methods {
-    ($($method:ident = $name:literal, $description:literal {
-        $($key:ident: $setting:expr),+
-    } $steps:expr;)+) => {
-        /// An integration method with its settings.
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub enum Integrator {
-            $(
-                #[doc = concat!("`", $name, "`: ", $description, ".")]
-                $method {
-                    $(
-                        #[doc = concat!("The setting `", stringify!($key), "` of grid files.")]
-                        $key: f64
-                    ),+
-                }
-            ),+
-        }
-
-        impl $crate::method::Integrator for Integrator {
-            fn methods() -> &'static [$crate::method::Entry<Self>] {
-                static METHODS: &[$crate::method::Entry<Integrator>] = &[$(
-                    $crate::method::Entry {
-                        name: $name,
-                        description: $description,
-                        settings: &[$($setting),+],
-                        with: |number| Integrator::$method { $($key: number(&$setting)),+ },
-                    }
-                ),+];
-                METHODS
-            }
-
-            fn name(&self) -> &'static str {
-                match self { $(Self::$method { .. } => $name),+ }
-            }
-
-            fn settings(&self) -> Vec<(&'static str, f64)> {
-                match *self {
-                    $(Self::$method { $($key),+ } => vec![$((stringify!($key), $key)),+]),+
-                }
-            }
-
-            #[allow(unused_variables, reason = "few methods' steps are by all of their settings")]
-            fn steps(&self) -> $crate::method::Steps {
-                match *self {
-                    $(Self::$method { $($key),+ } => $steps),+
-                }
-            }
-        }
-
-        /// Formats name and settings: `dopri5, rtol 1e-6, atol 1e-9`.
-        impl std::fmt::Display for Integrator {
-            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                use $crate::method::Integrator as _;
-                f.write_str(self.name())?;
-                let mut settings = self.settings().into_iter();
-                settings.try_for_each(|(key, value)| write!(f, ", {key} {value:e}"))
-            }
-        }
-    };
-}
-
-/// Returns the method of grid files that name none.
-pub fn default_method<I: Integrator>() -> &'static Entry<I> {
-    &I::methods()[I::methods().len() - 1]
-}
-
-impl<I> Entry<I> {
-    /// Returns whether the method has a setting.
-    pub fn has(&self, key: &str) -> bool {
-        self.settings.iter().any(|setting| setting.key == key)
+impl PartialEq for Integrator {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name() && self.values == other.values
     }
+}
 
-    /// Returns the method with every setting at its default.
-    pub fn with_defaults(&self) -> I {
-        (self.with)(&mut |setting| setting.default)
+impl fmt::Debug for Integrator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// Formats name and settings: `dopri5, rtol 1e-6, atol 1e-9`.
+impl fmt::Display for Integrator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        let mut settings = self.settings().into_iter();
+        settings.try_for_each(|(key, value)| write!(f, ", {key} {value:e}"))
     }
 }

@@ -1,56 +1,72 @@
-//! The trait of models: named parameters with values.
+//! The facts about a model that are the same for every plan.
 
-use std::borrow::Cow;
-use std::fmt;
-
-use sweep_parameter::{Channel, Parameter, UnknownParameter};
+use sweep_parameter::Channel;
 
 use crate::build::Build;
-use crate::method::Integrator;
+use crate::method::IntegrationMethod;
 
-/// A model that can be swept. A value holds the model's parameters as a grid file sets them; the
-/// points of a plan differ from it in the values of the axes only.
-///
-/// [`crate::config::Read`] reads the model's part of a grid file, [`crate::store::Rows`] declares
-/// the columns of its rows, and [`crate::swept::Swept`] creates the engine that computes them.
-pub trait Model: Clone + PartialEq + fmt::Debug + Send + Sync + Sized + 'static {
-    /// The type of parameters, which can be set and swept.
-    type Parameter: Parameter;
-    /// The type of channels, the compared motions.
-    type Channel: Channel;
-    /// The type of integration methods.
-    type Integrator: Integrator;
+/// A table of the grid file in which a model has keys of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GridTable {
+    /// The top of the file, and the model's own tables.
+    Top,
+    /// `[reliability]`.
+    Reliability,
+}
 
+/// The facts about a model that are the same for every plan.
+#[derive(Clone, Copy)]
+pub struct About {
     /// The build that results name.
-    const BUILD: Build;
+    pub build: Build,
+    /// The channels, in the order of columns.
+    pub channels: &'static [Channel],
+    /// The channels that are compared if the grid file names none.
+    pub default_channels: &'static [Channel],
+    /// The methods of integration, in the order of messages and pages; the last is the default.
+    pub methods: &'static [IntegrationMethod],
+    /// The model's own file, which grids may name.
+    pub own_file: Option<OwnFile>,
+    /// The advice for a user without a grid file.
+    pub to_start: Option<&'static str>,
+    /// The settings that columns require which not every plan has, by the beginning of the
+    /// columns' names up to the first underscore.
+    pub needed: &'static [(&'static str, &'static str)],
+    /// The sentence on such columns in the message about an unknown one.
+    pub further: &'static str,
+}
 
-    /// Returns every channel.
-    fn channels() -> &'static [Self::Channel];
+/// A file of a model's own.
+#[derive(Clone, Copy, Debug)]
+pub struct OwnFile {
+    /// The key by which a grid names it.
+    pub key: &'static str,
+    /// The keys at the top of the file.
+    pub keys: &'static [&'static str],
+}
 
-    /// Returns the channels that are compared if the grid file names none.
-    fn default_channels() -> Vec<Self::Channel> {
-        Self::channels().to_vec()
+impl About {
+    /// Creates the facts about a model without a file and optional columns of its own, which
+    /// compares all channels.
+    pub const fn new(
+        build: Build,
+        channels: &'static [Channel],
+        methods: &'static [IntegrationMethod],
+    ) -> Self {
+        Self {
+            build,
+            channels,
+            default_channels: channels,
+            methods,
+            own_file: None,
+            to_start: None,
+            needed: &[],
+            further: "",
+        }
     }
 
-    /// Returns every parameter.
-    fn parameters(&self) -> Vec<Self::Parameter>;
-
-    /// Returns the parameter of a name.
-    ///
-    /// # Errors
-    /// An unknown name, with the reason.
-    fn find(&self, name: &str) -> Result<Self::Parameter, UnknownParameter>;
-
-    /// Returns the names of the single numbers that a parameter writes; by default its own name.
-    fn parts(&self, parameter: &Self::Parameter) -> Vec<Cow<'static, str>> {
-        vec![parameter.name().to_owned().into()]
+    /// Returns the method of grid files that name none.
+    pub const fn default_method(&self) -> &'static IntegrationMethod {
+        &self.methods[self.methods.len() - 1]
     }
-
-    /// Returns the model's own value of a parameter, if it has one number for it.
-    fn value(&self, _: &Self::Parameter) -> Option<f64> {
-        None
-    }
-
-    /// Writes a parameter's value, which is in its range.
-    fn write(&mut self, parameter: &Self::Parameter, value: f64);
 }

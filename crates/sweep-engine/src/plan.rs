@@ -4,9 +4,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
-use sweep_parameter::{Parameter as _, Range, RatioLimits};
+use sweep_parameter::{Channel, Range, RatioLimits};
 
-use crate::{Design, Distribution, Model};
+use crate::method::Integrator;
+use crate::{Design, Distribution, Model, ModelParameter};
 
 /// The greatest number of grid points that is accepted. Basis: four months at a hundred thousand
 /// points per second. Doubling it accepts runs of eight months.
@@ -43,13 +44,13 @@ pub struct Plan<M: Model> {
     /// The closed interval over which amplitudes are taken.
     pub window_s: [f64; 2],
     /// The method and its settings.
-    pub integrator: M::Integrator,
+    pub integrator: Integrator,
     /// The axes of the grid, the first of which varies slowest, or the parameters of the design.
     pub axes: Vec<Axis<M>>,
     /// The design of the points, if they are not the grid of the axes.
     pub design: Option<Design>,
     /// The rule of the verdict.
-    pub reliability: Reliability<M>,
+    pub reliability: Reliability,
     /// The values of `--set`, by name.
     pub set: Vec<(String, Value)>,
     /// The sources of the numbers.
@@ -112,7 +113,7 @@ impl PartialEq for WrittenIn {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis<M: Model> {
     /// The parameter.
-    pub parameter: M::Parameter,
+    pub parameter: ModelParameter<M>,
     /// The values along the axis.
     pub values: AxisValues,
 }
@@ -322,11 +323,11 @@ impl<M: Model> Plan<M> {
 
 /// The rule of the verdict.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reliability<M: Model> {
+pub struct Reliability {
     /// The limits between which the ratios of a reliable point are.
     pub limits: RatioLimits,
     /// The compared channels, in column order.
-    pub channels: Vec<M::Channel>,
+    pub channels: Vec<Channel>,
 }
 
 /// The input of a point: the model and the window, with the values of the axes written into them.
@@ -340,10 +341,10 @@ pub struct Scenario<M> {
 
 impl<M: Model> Scenario<M> {
     /// Writes a parameter into the model or the window.
-    pub fn write(&mut self, parameter: &M::Parameter, value: f64) {
-        match parameter.window_edge() {
+    pub fn write(&mut self, parameter: &ModelParameter<M>, value: f64) {
+        match parameter.window_edge {
             Some(edge) => self.window_s[edge] = value,
-            None => self.model.write(parameter, value),
+            None => self.model.write(&parameter.handle, value),
         }
     }
 }

@@ -18,13 +18,13 @@ use std::sync::Mutex;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
+use crate::engine::IncompleteGroups;
 use crate::store::provenance::{self, Session};
 use crate::store::read::NameCounts;
 use crate::store::{
     Done, OpenOptions, OpenRun, Opened, ResultFile, Shard, ShardRequest, Tally, idle_shards,
 };
 use crate::threads::{self};
-use crate::watch::IncompleteGroups;
 use crate::{Engine, Environment, Interrupt, Job, Progress, ProgressMode, RunContext, StoreError};
 use sweep_files::panics::{self, lock, unlocked};
 
@@ -86,7 +86,7 @@ pub struct RunReport {
 /// # Errors
 /// Any [`StoreError`]. Complete chunks are stored before.
 pub fn run(
-    engine: &dyn Engine,
+    engine: &Engine<'_>,
     job: &Job<'_>,
     output: &Path,
     options: RunOptions<'_>,
@@ -126,7 +126,7 @@ pub fn run(
         pid: std::process::id(),
         cpus: threads::cores(),
         cpu_model: provenance::cpu_model(),
-        simd: engine.simd().to_owned(),
+        simd: engine.simd.to_owned(),
         threads,
         shard: run.shard().map(|shard| format!("{}/{}", shard.index, shard.count)),
         points: computed,
@@ -162,7 +162,7 @@ pub fn run(
 
 /// The parts of a run that do not change while it runs.
 struct Runner<'a> {
-    engine: &'a dyn Engine,
+    engine: &'a Engine<'a>,
     job: &'a Job<'a>,
     threads: usize,
     progress: &'a Progress,
@@ -247,7 +247,7 @@ impl<'a> ChunkCollector<'a> {
         let incomplete = run.take_incomplete();
         let stored: BTreeSet<u64> = incomplete.values().flatten().map(|row| row.point).collect();
         let chunks = run.chunks();
-        let stride = if runner.engine.is_helped_by_neighbours() { 1 } else { stride(chunks) };
+        let stride = if runner.engine.is_helped_by_neighbours { 1 } else { stride(chunks) };
         let queue = (0..chunks)
             .map(move |k| (u128::from(k) * u128::from(stride) % u128::from(chunks)) as u64)
             .filter(|&chunk| run.is_missing(chunk))
@@ -283,7 +283,7 @@ impl<'a> ChunkCollector<'a> {
             Some((point, (job.axis_values)(point)))
         };
         let sink = |row| self.collect(row);
-        let evaluate = || engine.evaluate(&source, &sink, self.context);
+        let evaluate = || engine.evaluator.evaluate(&source, &sink, self.context);
         let reason = match catch_unwind(AssertUnwindSafe(evaluate)) {
             Err(panic) => format!("the engine panicked: {}", panics::text(panic.as_ref())),
             Ok(()) if self.context.stopped() => return Ok(()),

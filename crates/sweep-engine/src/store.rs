@@ -54,10 +54,10 @@ pub use status::{FolderStatus, State, status};
 pub use trials::{Key, TrialColumns, Trials, WRITE_INTERVAL};
 pub use unfinished::{Unfinished, refuse_unfinished, unfinished};
 
-use sweep_parameter::{Parameter as _, RatioLimits};
+use sweep_parameter::RatioLimits;
 
 use crate::config::section::counted;
-use crate::{Axis, Model, Plan, Read};
+use crate::{Axis, Model, Plan};
 use sweep_files::{self as files, FileKind};
 
 /// A function that returns the values of the axes at a point of the grid, in the order of the axes.
@@ -86,11 +86,11 @@ pub struct Job<'a> {
 
 impl<'a> Job<'a> {
     /// Returns the job of a plan, as this build of the program runs it.
-    pub fn new<M: Rows>(plan: &'a Plan<M>) -> Self {
+    pub fn new<M: Model>(plan: &'a Plan<M>) -> Self {
         Self {
             plan: plan.to_json(),
-            version: M::BUILD.version,
-            numerics: M::BUILD.numerics,
+            version: M::ABOUT.build.version,
+            numerics: M::ABOUT.build.numerics,
             points: plan.points(),
             layout: M::layout(plan),
             limits: plan.reliability.limits,
@@ -104,17 +104,11 @@ impl<'a> Job<'a> {
     }
 }
 
-/// A model whose rows can be stored.
-pub trait Rows: Read {
-    /// Returns the layout of a result's rows.
-    fn layout(plan: &Plan<Self>) -> Layout;
-}
-
 /// Returns the columns of a plan's axes.
 pub fn axis_columns<M: Model>(plan: &Plan<M>) -> Vec<Column> {
     let column = |axis: &Axis<M>| {
         let parameter = &axis.parameter;
-        Column::new(parameter.name(), parameter.unit(), parameter.description(), Holds::Axis)
+        Column::new(&*parameter.name, parameter.unit, parameter.description, Holds::Axis)
     };
     plan.axes.iter().map(column).collect()
 }

@@ -48,10 +48,10 @@ impl Table {
     /// Adds a column of a parameter's values.
     pub fn parameter(
         &mut self,
-        parameter: &impl Parameter,
+        parameter: &Parameter<impl Sized>,
         values: impl IntoIterator<Item = Option<f64>>,
     ) {
-        self.numbers(parameter.name(), parameter.unit(), parameter.description(), values);
+        self.numbers(&parameter.name, parameter.unit, parameter.description, values);
     }
 
     /// Sets the direction in which values of the last column are worse.

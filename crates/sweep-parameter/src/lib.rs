@@ -4,31 +4,51 @@
 
 mod named;
 
+use std::borrow::Cow;
 use std::fmt;
 
-/// A number that can be set and swept.
-pub trait Parameter: Clone + PartialEq + fmt::Debug + Send + Sync {
-    /// Returns the name in grid files, on the command line and of the result's column.
-    fn name(&self) -> &str;
-    /// Returns the unit, as in the name's suffix but readable.
-    fn unit(&self) -> &'static str;
-    /// Returns the meaning, in a phrase.
-    fn description(&self) -> &'static str;
-    /// Returns the values that the parameter may take.
-    fn range(&self) -> Range;
-    /// Returns which edge of the window this parameter sets (0: the beginning, 1: the end), if it
-    /// sets one. The window is part of the plan, not of the model.
-    fn window_edge(&self) -> Option<usize>;
+/// A number that can be set and swept. `H` is the model's handle of it. Parameters of one name are
+/// equal.
+#[derive(Clone, Debug)]
+pub struct Parameter<H> {
+    /// The name in grid files, on the command line and of the result's column.
+    pub name: Cow<'static, str>,
+    /// The unit, as in the name's suffix but readable.
+    pub unit: &'static str,
+    /// The meaning, in a phrase.
+    pub description: &'static str,
+    /// The values that the parameter may take.
+    pub range: Range,
+    /// The source of the model's own value, in words.
+    pub source: &'static str,
+    /// The model's own value, if it has one number for the parameter.
+    pub value: Option<f64>,
+    /// The names of the single numbers that the parameter writes; mostly its own name.
+    pub parts: Vec<Cow<'static, str>>,
+    /// The edge of the window that this parameter sets (0: the beginning, 1: the end), if it sets
+    /// one. The window is part of the plan, not of the model.
+    pub window_edge: Option<usize>,
+    /// Whether a section of the grid file gives the value, so that there is none without a file.
+    pub is_in_grid: bool,
+    /// The model's handle, by which it writes a value.
+    pub handle: H,
+}
+
+impl<H> PartialEq for Parameter<H> {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
 }
 
 /// A motion that is compared between two models.
-pub trait Channel: Copy + PartialEq + fmt::Debug + Send + Sync + 'static {
-    /// Returns the name in grid files and column names.
-    fn name(self) -> &'static str;
-    /// Returns the unit.
-    fn unit(self) -> &'static str;
-    /// Returns a one-line description, for column dictionaries and pages.
-    fn description(self) -> &'static str;
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// The name in grid files and column names.
+    pub name: &'static str,
+    /// The unit.
+    pub unit: &'static str,
+    /// The description in a line, for column dictionaries and pages.
+    pub description: &'static str,
 }
 
 /// The reason why a name is not that of a parameter.

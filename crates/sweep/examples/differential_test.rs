@@ -27,7 +27,10 @@
 use std::process::ExitCode;
 
 use rayon::prelude::*;
-use sweep::{Integrator, Level, ModelEngine, Outcome, Plan, Status, Trajectory, Verdict};
+use sweep::{
+    Integrator, Level, ModelEngine, Outcome, Plan, Status, Trajectory, Verdict, rk4,
+    rk4_mass_scaled,
+};
 
 /// Accuracies that grids require of the fast method, by turns. Basis: the default twice, and a
 /// finer and a coarser one. Doubling them doubles the errors that are allowed.
@@ -322,7 +325,7 @@ fn evaluate_with(plan: &Plan, integrator: Integrator) -> Vec<Outcome> {
 /// `--set`; `None` if that row failed.
 fn grazing_clearance(seed: u64, plan: &Plan) -> Option<String> {
     let mut rng = Rng(!seed);
-    let rows = evaluate_with(plan, Integrator::Rk4MassScaled { accuracy: 1e-3 });
+    let rows = evaluate_with(plan, rk4_mass_scaled(1e-3));
     let gap_m = rng.choose(&rows).nonlinear.min_gap_m?;
     let reach_m = plan.model.machine.radial_clearance_m - gap_m;
     let overlap = 10f64.powf(rng.between(-6.0, -1.5));
@@ -415,19 +418,16 @@ fn try_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
         return Found { refused: 1, ..Found::default() };
     };
     let evaluate = |integrator| evaluate_with(&plan, integrator);
-    let rows = evaluate(Integrator::Rk4MassScaled { accuracy });
-    let reference_rows = evaluate(Integrator::Rk4 { step_s });
+    let rows = evaluate(rk4_mass_scaled(accuracy));
+    let reference_rows = evaluate(rk4(step_s));
     let mut coarser_rows = None;
     let mut finer_rows = None;
     let mut found = Found { rows: rows.len() as u64, ..Found::default() };
     for (i, (row, reference)) in rows.iter().zip(&reference_rows).enumerate() {
         found.by_method[row.method as usize] += 1;
         found.failed += u64::from(statuses(row) != [Status::Ok; 2]);
-        let mut coarser = || {
-            coarser_rows.get_or_insert_with(|| evaluate(Integrator::Rk4 { step_s: 2.0 * step_s }))
-                [i]
-                .clone()
-        };
+        let mut coarser =
+            || coarser_rows.get_or_insert_with(|| evaluate(rk4(2.0 * step_s)))[i].clone();
         if row.sensitive == Some(true) {
             found.sensitive += 1;
             let coarser = coarser();
@@ -442,7 +442,7 @@ fn try_grid(seed: u64, kind: TrialKind, folder: &std::path::Path) -> Found {
             || verdict(&plan, row) != verdict(&plan, reference);
         if differs {
             // The reference may be wrong, because rows are refined to shorter steps.
-            let finer = Integrator::Rk4 { step_s: step_s / 8.0 };
+            let finer = rk4(step_s / 8.0);
             reference = &finer_rows.get_or_insert_with(|| evaluate(finer))[i];
         }
         let error = difference(&plan, row, reference);

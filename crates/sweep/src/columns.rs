@@ -6,7 +6,7 @@ use sweep_engine::columns::{
     Compared, ResultColumn, amplitude_columns, declared, row, run_columns, verdict_columns,
 };
 use sweep_engine::store::read::FAR_OFF;
-use sweep_engine::store::{Column, Done, Holds, Layout, Rows, axis_columns};
+use sweep_engine::store::{Column, Done, Holds};
 use sweep_parameter::{Limit, RatioLimits, Worse};
 use washer_model::{Beyond, Channel, Disturbance, Ending, Kind, ModeMotion};
 use washer_row::{
@@ -14,14 +14,8 @@ use washer_row::{
     Trajectory, Verdict, row_status,
 };
 
-use crate::model::Washer;
-use crate::plan::{Plan, has_friction};
-
-impl Rows for Washer {
-    fn layout(plan: &Plan) -> Layout {
-        Layout::map(axis_columns(plan), Columns::for_run(plan).declared())
-    }
-}
+use crate::model::described;
+use crate::plan::{Plan, compared_channels, has_friction};
 
 /// The data from which the cells of a row are computed.
 struct ResultRow {
@@ -47,8 +41,9 @@ pub(crate) struct Columns {
 impl Columns {
     /// Returns the columns of a plan's run.
     pub(crate) fn for_run(plan: &Plan) -> Self {
-        let rule = &plan.reliability;
-        Self::for_measures(&rule.channels, rule.limits, &plan.model.measures, has_friction(plan))
+        let channels = compared_channels(plan);
+        let limits = plan.reliability.limits;
+        Self::for_measures(&channels, limits, &plan.model.measures, has_friction(plan))
     }
 
     /// Returns the columns of a run with these channels, limits and measures.
@@ -59,8 +54,12 @@ impl Columns {
         has_friction: bool,
     ) -> Self {
         let criterion = measures.criterion;
-        let mut columns =
-            amplitude_columns(channels, limits, criterion.amplitude(), criterion.ratio());
+        let mut columns = amplitude_columns(
+            &descriptions(channels),
+            limits,
+            criterion.amplitude(),
+            criterion.ratio(),
+        );
         columns.extend(washer_verdict_columns(channels, limits));
         columns.extend(gap_columns());
         columns.extend(has_friction.then(friction_column));
@@ -71,12 +70,12 @@ impl Columns {
 
     /// Returns the columns of periodic responses at held speeds.
     pub(crate) fn for_responses(plan: &Plan) -> Self {
-        let channels = &plan.reliability.channels;
+        let channels = &compared_channels(plan);
         let limits = plan.reliability.limits;
         let mut columns = growth_columns("");
         let amplitude = "largest deviation from equilibrium over a turn";
         let ratio = "nonlinear over linear amplitude; null where that is zero";
-        columns.extend(amplitude_columns(channels, limits, amplitude, ratio));
+        columns.extend(amplitude_columns(&descriptions(channels), limits, amplitude, ratio));
         // A response has only the verdict's first two columns, those of the greatest ratio.
         columns.extend(washer_verdict_columns(channels, limits).into_iter().take(2));
         let text = "ok, or why there is no response";
@@ -125,11 +124,16 @@ impl Columns {
 const MODELS: [(&str, fn(&Outcome) -> &Trajectory); 2] =
     [("nonlinear", |outcome| &outcome.nonlinear), ("linear", |outcome| &outcome.linear)];
 
+/// Returns the engine's descriptions of channels.
+fn descriptions(channels: &[Channel]) -> Vec<sweep_parameter::Channel> {
+    channels.iter().map(|channel| described(*channel)).collect()
+}
+
 /// Returns the columns of the verdict, with the levels of this model's methods.
 fn washer_verdict_columns(channels: &[Channel], limits: RatioLimits) -> Vec<WasherColumn> {
     let text = "the method of the row's nonlinear numbers; with the fast method its level: \
                 capped_0 to capped_5, rk4, additive or dop853";
-    verdict_columns(channels, limits, Level::ALL.map(Level::name).to_vec(), text)
+    verdict_columns(&descriptions(channels), limits, Level::ALL.map(Level::name).to_vec(), text)
 }
 
 /// Returns the columns of the metrics that the grid file requests.

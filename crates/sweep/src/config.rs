@@ -10,9 +10,9 @@
 pub(crate) mod grid;
 pub(crate) mod machine;
 mod plausible;
-mod read;
+pub(crate) mod read;
 mod schema;
-mod spin;
+pub(crate) mod spin;
 #[cfg(test)]
 mod tests;
 mod validate;

@@ -15,7 +15,7 @@ use washer_model::{Dwell, Endings, Gauge, Recorders, Starts, State, decimal};
 use washer_row::Status;
 
 use crate::engine::{Carried, find_motions};
-use crate::plan::Plan;
+use crate::plan::{Plan, compared_channels};
 use columns::{DwellColumn, DwellRow};
 use sweep_engine::columns::{declared, row};
 use sweep_engine::store::{Column, Done};
@@ -156,7 +156,7 @@ impl AttractorSearch {
     }
 
     fn row_columns(&self, plan: &Plan) -> Vec<DwellColumn> {
-        let channels = &plan.reliability.channels;
+        let channels = &compared_channels(plan);
         let measures = &plan.model.measures;
         let mut columns = columns::columns(channels, measures, self.sections > 0);
         columns.extend(self.carry.is_some().then(columns::carried_columns).into_iter().flatten());
@@ -296,7 +296,7 @@ mod tests {
 
     use super::*;
     use crate::stability::HeldPlan;
-    use sweep_engine::{Engine as _, Interrupt, RowLookup};
+    use sweep_engine::{Interrupt, RowLookup};
     use sweep_files::panics::{lock, unlocked};
 
     #[test]
@@ -319,7 +319,7 @@ mod tests {
             let remaining = Mutex::new(rows);
             let finished = Mutex::new(Vec::new());
             let next = || lock(&remaining).next().map(|row| (row, Vec::new()));
-            engine.evaluate(
+            engine.evaluator.evaluate(
                 &next,
                 &|row| lock(&finished).push(row),
                 &RunContext::with_known_rows(&interrupt, known),

@@ -7,7 +7,7 @@ mod reference;
 
 pub(crate) use growth::{Carried, fastest_growth, find_motions, find_responses};
 pub(crate) use reference::{reference_method, reference_step_s};
-pub(crate) use sweep_engine::{Engine, RunContext};
+pub(crate) use sweep_engine::{Engine, Evaluator, RunContext};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex};
@@ -22,8 +22,9 @@ use washer_row::{
 };
 
 use crate::columns::Columns;
-use crate::plan::{Plan, Scenario};
-use sweep_engine::method::{Integrator as _, Steps};
+use crate::method::direct;
+use crate::plan::{Plan, Scenario, compared_channels};
+use sweep_engine::method::Steps;
 use sweep_engine::{Error, Interrupt, RowSink, RowSource};
 use sweep_files::panics::{lock, unlocked};
 
@@ -85,6 +86,30 @@ impl<'a> ModelEngine<'a> {
         Ok(Self::with_simd(forced_simd()?, plan))
     }
 
+    /// Returns an engine for a plan of which one column is read.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Self::new`].
+    pub(crate) fn for_column(plan: &'a Plan, only: Option<&str>) -> Result<Self, Error> {
+        // A search for a ratio's limit needs only the side of the limit. The limits of other
+        // columns are not known to the engine, so these need complete rows.
+        let has_prefix = |prefix| only.is_some_and(|only| only.starts_with(prefix));
+        let demand = if has_prefix("ratio_") {
+            Demand::Side
+        } else if has_prefix("growth_") || has_prefix("dwell_") {
+            Demand::Growth
+        } else {
+            Demand::Row
+        };
+        Ok(Self { demand, ..Self::new(plan)? })
+    }
+
+    /// Returns the engine as commands use it.
+    pub fn into_engine(self) -> Engine<'a> {
+        let simd = self.widest_simd().name();
+        Engine::new(self, simd)
+    }
+
     fn with_simd(forced: Option<Simd>, plan: &'a Plan) -> Self {
         let is_checked = matches!(plan.integrator.steps(), Steps::Checked(_));
         let checkpoints = if is_checked { CHECKPOINTS } else { 0 };
@@ -134,7 +159,7 @@ impl<'a> ModelEngine<'a> {
     }
 
     fn find_levels(&self, is_stopped: &dyn Fn() -> bool) -> [RefinementLevels; 2] {
-        if let Some((level, method)) = self.plan.integrator.direct() {
+        if let Some((level, method)) = direct(&self.plan.integrator) {
             return ModelKind::ALL.map(|_| RefinementLevels::direct(level, method));
         }
         // The corners of the grid have the extremes of the machines' frequencies.
@@ -200,7 +225,7 @@ impl<'a> ModelEngine<'a> {
     }
 
     /// Returns the instruction set of the widest groups.
-    fn widest_simd(&self) -> Simd {
+    pub(crate) fn widest_simd(&self) -> Simd {
         self.forced.unwrap_or_else(Simd::best)
     }
 
@@ -260,7 +285,7 @@ pub(crate) fn rule(plan: &Plan) -> RowRule {
         window_s: plan.window_s,
         accuracy,
         limits: plan.reliability.limits,
-        channels: plan.reliability.channels.clone(),
+        channels: compared_channels(plan),
         measures: plan.model.measures.clone(),
     }
 }
@@ -283,7 +308,7 @@ pub(crate) fn map_isolating_panics<I, R>(
     })
 }
 
-impl Engine for ModelEngine<'_> {
+impl Evaluator for ModelEngine<'_> {
     fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, context: &RunContext<'_>) {
         let columns = Columns::for_run(self.plan);
         let sink = |outcome: Outcome| keep(columns.done(outcome));
@@ -292,10 +317,6 @@ impl Engine for ModelEngine<'_> {
             rows.map(|(row, values)| (row, self.plan.scenario_at(&values))).collect()
         };
         self.integrate_rows(&source, &sink, context);
-    }
-
-    fn simd(&self) -> &str {
-        self.widest_simd().name()
     }
 }
 

@@ -6,12 +6,13 @@ use washer_model::ModelKind;
 use washer_row::{Deviations, Metric, Outcome, ROW_STATUSES, RefinementLevels, row_status};
 
 use crate::engine::ModelEngine;
+use crate::notes::{criterion_words, plan_notes};
 use crate::plan::Plan;
-use sweep_engine::method::{Integrator as _, Steps};
+use sweep_engine::method::Steps;
 use sweep_engine::plan::shortest_step_s;
 use sweep_engine::store::chunk_points;
 use sweep_engine::store::read::{NameCounts, add};
-use sweep_engine::{Engine, Error, Estimate, Interrupt, Job, RunContext};
+use sweep_engine::{Error, Estimate, Interrupt, Job, RunContext};
 
 /// Time (s) that the integration of beginnings must take: they become longer until it does. Basis:
 /// far above the resolution of clocks. Doubling it doubles the time of an estimate.
@@ -83,7 +84,7 @@ fn estimate_within(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate
     let rounds = plan.points().div_ceil(chunk).div_ceil(threads as u64);
     let points_a_thread = (rounds * chunk).min(plan.points());
     Ok(Estimate {
-        simd: engine.simd().to_owned(),
+        simd: engine.widest_simd().name().to_owned(),
         threads,
         wall_s: points_a_thread as f64 * core_s_per_point,
         core_s_per_point,
@@ -93,6 +94,8 @@ fn estimate_within(plan: &Plan, threads: usize, whole_s: f64) -> Result<Estimate
         disk_bytes: row_bytes + parts * columns * PART_COLUMN_BYTES,
         result_bytes: row_bytes + columns * RESULT_COLUMN_BYTES,
         method: method(plan, &engine.levels()[0]),
+        criterion: criterion_words(plan),
+        notes: plan_notes(plan),
     })
 }
 

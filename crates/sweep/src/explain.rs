@@ -16,7 +16,7 @@ use washer_model::{
 };
 
 use crate::engine::{ModelEngine, reference_step_s, simd_from_environment};
-use crate::plan::{self, Plan, Scenario};
+use crate::plan::{self, Plan, Scenario, compared_channels};
 use crate::speeds::Speeds;
 use sweep_engine::config::NamedValues;
 use sweep_engine::{Effort, Error, Interrupt, Progress, RunContext, threads};
@@ -275,7 +275,7 @@ fn prepare_scenario(plan: &Plan, scenario: &Scenario) -> Result<Point, NoEquilib
 /// meaningless.
 fn swept_result(plan: &Plan, interrupt: &Interrupt) -> Result<SweptResult, Error> {
     let scenario = plan.scenario(0);
-    let channels = plan.reliability.channels.clone();
+    let channels = compared_channels(plan);
     let engine = ModelEngine::new(plan)?;
     let context = RunContext::new(interrupt);
     let outcomes = engine.evaluate_in_context(&[Vec::new()], &context);

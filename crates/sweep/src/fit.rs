@@ -154,10 +154,10 @@ fn middle(grid: &WasherGridInput, constants: &[String]) -> Result<Vec<String>, D
     let plan = grid.load()?;
     let is_given = |name: &str| constants.iter().any(|it| it.split('=').next() == Some(name));
     let several =
-        plan.axes.iter().filter(|axis| axis.values.len() > 1 && !is_given(axis.parameter.name()));
+        plan.axes.iter().filter(|axis| axis.values.len() > 1 && !is_given(&axis.parameter.name));
     let value = |axis: &crate::plan::Axis| {
         let [from, to] = axis.values.extremes();
-        format!("{}={}", axis.parameter.name(), 0.5 * (from + to))
+        format!("{}={}", axis.parameter.name, 0.5 * (from + to))
     };
     Ok(several.map(value).collect())
 }

@@ -50,14 +50,15 @@ mod library;
 mod live;
 mod method;
 mod model;
+mod notes;
 mod places;
 mod plan;
 mod speeds;
 mod stability;
-mod swept;
 #[cfg(test)]
 mod tests;
 mod trace;
+mod washer;
 
 pub use commands::Cli;
 pub use config::{Diagnostics, Mistake, WasherGridInput, load};
@@ -70,7 +71,7 @@ pub use library::{
     RanToFile, TraceOptions, explain_point, find_boundary, find_modes, fit_tables, hold_speeds,
     list_parameters, optimise_study, trace_point,
 };
-pub use method::Integrator;
+pub use method::{Integrator, rk4, rk4_mass_scaled};
 pub use model::Washer;
 pub use plan::Plan;
 pub use sweep_engine::progress::ProgressMode;

@@ -25,9 +25,9 @@ pub use search::{BoundaryOptions, find_boundary, optimise_study};
 pub use stability::hold_speeds;
 pub use trace::{TraceOptions, trace_point};
 
-use sweep_engine::commands::parameters::as_json;
+use sweep_engine::Error;
+use sweep_engine::commands::parameters::{as_json, listed};
 pub use sweep_engine::effort::Effort;
-use sweep_engine::{Error, Swept as _};
 
 use crate::model::Washer;
 use crate::plan::Plan;
@@ -37,7 +37,7 @@ use crate::speeds::MAX_SPEEDS;
 /// `range` and `source`. The values are those of the plan without its axes, or those of the
 /// built-in machine.
 pub fn list_parameters(plan: Option<&Plan>) -> String {
-    as_json(&Washer::listed(plan))
+    as_json(&listed::<Washer>(plan))
 }
 
 /// Returns the error for a list of speeds that is refused.

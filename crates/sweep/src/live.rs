@@ -6,18 +6,20 @@ use std::path::Path;
 
 use sweep_files::{ParquetFile, key};
 use washer_live::{Setup, Sliders};
-use washer_model::{Channel, Ending, Kind, ModeOverSpeed, ModelKind, Parameter, campbell};
+use washer_model::{Channel, Ending, Kind, ModeOverSpeed, ModelKind, campbell};
 use washer_plot::{Live, Slider};
 use washer_row::{Level, Metric, MetricColumn};
 
 use crate::config::WasherGridInput;
 use crate::engine::{CHECKPOINTS, ModelEngine, rule};
-use crate::method::Integrator;
+use crate::method::rk4_mass_scaled;
 use crate::model::Washer;
-use crate::plan::{Axis, Plan, axis_between, corners_of_forces, prepare_point, timing};
-use sweep_engine::Error;
+use crate::plan::{
+    Axis, Plan, axis_between, compared_channels, corners_of_forces, prepare_point, timing,
+};
 use sweep_engine::method::ACCURACY;
 use sweep_engine::store::read::overview;
+use sweep_engine::{Error, Model as _};
 
 /// Parameters with sliders besides the axes, if the machine has them.
 const OFFERED: [&str; 6] = [
@@ -91,8 +93,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
     };
     let (setup, words) = setup(&plan, &sliders)?;
     let axes = plan.axes.iter().map(|axis| slider(axis, None));
-    let Washer { machine, spin, .. } = &plan.model;
-    let further = sliders.iter().map(|axis| slider(axis, axis.parameter.get(machine, spin)));
+    let further = sliders.iter().map(|axis| slider(axis, axis.parameter.value));
     let columns = |number: MetricColumn| ModelKind::ALL.map(|model| number.column(model.name()));
     let criterion = plan.model.measures.criterion;
     // The rest of the description is about rows without a ratio, which a page does not have.
@@ -112,7 +113,7 @@ pub(crate) fn live(file: &Path, ranges: &[SliderRange]) -> Result<Live, Error> {
         motions: Ending::KIND_NAMES.map(str::to_owned).to_vec(),
         has_static_sag: plan.model.measures.metrics.contains(&Metric::StaticSag),
         kinds: Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
-        compared: plan.reliability.channels.iter().map(|channel| channel.index()).collect(),
+        compared: compared_channels(&plan).iter().map(|channel| channel.index()).collect(),
         levels: Level::ALL.map(|level| level.name().to_owned()).to_vec(),
         accuracy: setup.rule.accuracy,
         ratio_limit: setup.rule.limits.most,
@@ -148,8 +149,8 @@ pub(crate) fn resonance_rows(plan: &Plan) -> Vec<[String; 3]> {
 fn slider(Axis { parameter, values }: &Axis, value: Option<f64>) -> Slider {
     let [from, to] = values.extremes();
     Slider {
-        name: parameter.name().to_owned(),
-        description: parameter.description().to_owned(),
+        name: parameter.name.to_string(),
+        description: parameter.description.to_owned(),
         from,
         to,
         value,
@@ -174,7 +175,7 @@ fn plan_from_map(file: &Path) -> Result<Plan, Error> {
     let columns = overview(&opened)?.columns;
     for axis in axes.as_array().into_iter().flatten() {
         let name = axis["parameter"].as_str().unwrap_or_default();
-        let parameter = Parameter::find(name, &plan.model.machine, &plan.model.spin);
+        let parameter = plan.model.find(name);
         let [from, to] = ["from", "to"].map(|end| axis["range"][end].as_f64());
         let in_file = || columns.iter().find(|column| column.name == name)?.range;
         if let (Ok(parameter), Some((from, to))) = (parameter, from.zip(to).or_else(in_file)) {
@@ -195,12 +196,11 @@ fn take_held_metrics(plan: &mut Plan) -> (Vec<f64>, Vec<Metric>) {
 
 /// Returns sliders about the plan's values, for the ranges that machines can have.
 fn usual_sliders(plan: &Plan) -> Vec<Axis> {
-    let is_axis = |name: &str| plan.axes.iter().any(|axis| axis.parameter.name() == name);
+    let is_axis = |name: &str| plan.axes.iter().any(|axis| axis.parameter.name == name);
     let offered = OFFERED.into_iter().filter(|name| !is_axis(name));
-    let Washer { machine, spin, .. } = &plan.model;
     let range = |name| {
-        let parameter = Parameter::find(name, machine, spin).ok()?;
-        let value = parameter.get(machine, spin).filter(|value| *value != 0.0)?;
+        let parameter = plan.model.find(name).ok()?;
+        let value = parameter.value.filter(|value| *value != 0.0)?;
         let ends = [(1.0 - SLIDER_SPREAD) * value, (1.0 + SLIDER_SPREAD) * value];
         let [from, to] = if value > 0.0 { ends } else { [ends[1], ends[0]] };
         let range = axis_between(parameter, from, to);
@@ -215,11 +215,13 @@ fn requested_sliders(plan: &Plan, ranges: &[SliderRange]) -> Result<Vec<Axis>, E
     for SliderRange { name, from, to } in ranges {
         let refused =
             |expected: String| Error::option("--slider", format!("{name}={from}:{to}"), expected);
-        let parameter = Parameter::find(name, &plan.model.machine, &plan.model.spin)
+        let parameter = plan
+            .model
+            .find(name)
             .map_err(|why| refused(format!("a name of `sweep parameters`: {why}")))?;
         let has_slider = plan.axes.iter().chain(&found).any(|axis| axis.parameter == parameter);
-        let is_spread = parameter.get(&plan.model.machine, &plan.model.spin).is_none();
-        let range = parameter.range();
+        let is_spread = parameter.value.is_none();
+        let range = parameter.range;
         let beyond = [*from, *to].into_iter().find(|end| !range.contains(*end));
         found.push(axis_between(parameter, *from, *to));
         let expected = match beyond {
@@ -255,14 +257,14 @@ fn setup(plan: &Plan, sliders: &[Axis]) -> Result<(Setup, [Vec<String>; 2]), Err
     // A page uses the fast method, with the accuracy of the map's method if it has one.
     let map_accuracy = rule(plan).accuracy;
     let accuracy = if map_accuracy.is_finite() { map_accuracy } else { ACCURACY.default };
-    let plan = &Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
+    let plan = &Plan { integrator: rk4_mass_scaled(accuracy), ..plan.clone() };
     let levels = ModelEngine::new(plan)?.levels().clone();
     let wide = with_sliders(plan, sliders);
     let wide_levels = ModelEngine::new(&wide)?.levels().clone();
     let words = ModelKind::ALL.map(|model| {
         levels[model as usize].levels.iter().map(|level| level.describe(model)).collect()
     });
-    let parameters = wide.axes.iter().map(|axis| axis.parameter.clone()).collect();
+    let parameters = wide.axes.iter().map(|axis| axis.parameter.handle.clone()).collect();
     let setup = Setup {
         machine: plan.model.machine.clone(),
         spin: plan.model.spin.clone(),

@@ -2,8 +2,8 @@
 //! `washer_model`'s.
 
 use lane_ode::Tolerance;
-use sweep_engine::method::{ACCURACY, ATOL, Integrator as _, RTOL, STEP_S, Setting, Steps};
-use sweep_engine::methods;
+pub use sweep_engine::method::Integrator;
+use sweep_engine::method::{ACCURACY, ATOL, IntegrationMethod, RTOL, STEP_S, Setting, StepControl};
 use sweep_parameter::Range;
 use washer_model::{Method, MethodNumbers};
 use washer_row::{Level, MAX_ADAPTIVE_STEPS};
@@ -19,45 +19,72 @@ const LEVELS_ACCURACY: Setting = Setting {
     ..ACCURACY
 };
 
-methods! {
-    Rk4 = "rk4", "classical Runge-Kutta of order 4, in fixed steps" { step_s: STEP_S }
-        Steps::Fixed(step_s);
-    Dopri5 = "dopri5", "Dormand-Prince 5(4), adaptive" { rtol: RTOL, atol: ATOL } Steps::ByError;
-    Additive = "additive", "ARK5(4)8L[2]SA, adaptive, the springs of bearings and hinge implicit: \
-                            for bearings too stiff for the others" { rtol: RTOL, atol: ATOL }
-        Steps::ByError;
-    Rk4MassScaled = "rk4-mass-scaled", "the fast method: capped modes of the bearings, at finer \
-                                        and finer levels until two agree" {
-        accuracy: LEVELS_ACCURACY
-    } Steps::Checked(accuracy);
+/// The methods of grid files; the last is the default.
+pub(crate) static METHODS: [IntegrationMethod; 4] = [
+    IntegrationMethod {
+        name: "rk4",
+        description: "classical Runge-Kutta of order 4, in fixed steps",
+        settings: &[STEP_S],
+        steps: StepControl::Fixed,
+    },
+    IntegrationMethod {
+        name: "dopri5",
+        description: "Dormand-Prince 5(4), adaptive",
+        settings: &[RTOL, ATOL],
+        steps: StepControl::ByError,
+    },
+    IntegrationMethod {
+        name: "additive",
+        description: "ARK5(4)8L[2]SA, adaptive, the springs of bearings and hinge implicit: for \
+                      bearings too stiff for the others",
+        settings: &[RTOL, ATOL],
+        steps: StepControl::ByError,
+    },
+    IntegrationMethod {
+        name: "rk4-mass-scaled",
+        description: "the fast method: capped modes of the bearings, at finer and finer levels \
+                      until two agree",
+        settings: &[LEVELS_ACCURACY],
+        steps: StepControl::Checked,
+    },
+];
+
+/// Returns the classical Runge-Kutta method in fixed steps (s).
+pub fn rk4(step_s: f64) -> Integrator {
+    METHODS[0].with(|_| step_s)
 }
 
-impl Integrator {
-    /// Returns the level and the method by which each trajectory is integrated; `None` for the fast
-    /// method, which compares levels.
-    pub fn direct(&self) -> Option<(Level, Method)> {
-        let level = Level::named(self.name())?;
-        let mut method = Method::without_numbers(level);
-        match (method.numbers(), &self.settings()[..]) {
-            (MethodNumbers::Step(step_s), [(_, value)]) => *step_s = *value,
-            (MethodNumbers::Tolerance(tolerance), &[(_, relative), (_, absolute)]) => {
-                *tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
-            }
-            _ => return None,
+/// Returns the fast method with a relative accuracy.
+pub fn rk4_mass_scaled(accuracy: f64) -> Integrator {
+    METHODS[3].with(|_| accuracy)
+}
+
+/// Returns the level and the method by which each trajectory is integrated; `None` for the fast
+/// method, which compares levels.
+pub(crate) fn direct(integrator: &Integrator) -> Option<(Level, Method)> {
+    let level = Level::named(integrator.name())?;
+    let mut method = Method::without_numbers(level);
+    match (method.numbers(), &integrator.settings()[..]) {
+        (MethodNumbers::Step(step_s), [(_, value)]) => *step_s = *value,
+        (MethodNumbers::Tolerance(tolerance), &[(_, relative), (_, absolute)]) => {
+            *tolerance = Tolerance { relative, absolute, max_steps: MAX_ADAPTIVE_STEPS };
         }
-        Some((level, method))
+        _ => return None,
     }
+    Some((level, method))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use serde_json::json;
-    use sweep_engine::method::default_method;
+    use sweep_engine::Model as _;
+
+    use crate::model::Washer;
 
     #[test]
     fn a_row_of_the_table_says_what_its_method_does() {
-        for entry in Integrator::methods() {
+        for entry in METHODS.iter() {
             let method = entry.with_defaults();
             assert_eq!(method.name(), entry.name);
             let keys: Vec<_> = entry.settings.iter().map(|setting| setting.key).collect();
@@ -67,7 +94,7 @@ mod tests {
                 assert!(setting.range.contains(value), "{key} = {value}");
                 assert_eq!(method.to_json()[key], value);
             }
-            if let Some((level, _)) = method.direct() {
+            if let Some((level, _)) = direct(&method) {
                 assert_eq!(level.name(), entry.name, "a row names its method");
             }
         }
@@ -75,7 +102,7 @@ mod tests {
 
     #[test]
     fn a_key_means_the_same_to_every_method() {
-        let all = || Integrator::methods().iter().flat_map(|entry| entry.settings);
+        let all = || METHODS.iter().flat_map(|entry| entry.settings);
         for (one, other) in all().flat_map(|one| all().map(move |other| (one, other))) {
             let same = (one.range, one.default) == (other.range, other.default);
             assert!(one.key != other.key || same, "{}", one.key);
@@ -84,13 +111,13 @@ mod tests {
 
     #[test]
     fn the_default_is_the_fast_method() {
-        let method = default_method::<Integrator>().with_defaults();
-        assert_eq!(method, Integrator::Rk4MassScaled { accuracy: 1e-3 });
+        let method = Washer::ABOUT.default_method().with_defaults();
+        assert_eq!(method, rk4_mass_scaled(1e-3));
     }
 
     #[test]
     fn methods_are_shown_and_written_as_ever() {
-        let method = Integrator::Dopri5 { rtol: 1e-5, atol: 1e-8 };
+        let method = METHODS[1].with(|setting| if setting.key == "rtol" { 1e-5 } else { 1e-8 });
         assert_eq!(method.to_string(), "dopri5, rtol 1e-5, atol 1e-8");
         assert_eq!(method.to_json(), json!({ "method": "dopri5", "rtol": 1e-5, "atol": 1e-8 }));
     }

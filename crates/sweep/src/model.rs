@@ -1,24 +1,42 @@
-//! The washing machine as a model of the engine: its parameters.
+//! The washing machine's part of a plan, and what the engine knows of its parameters and channels.
 
-use std::borrow::Cow;
-
-use sweep_engine::{Build, Model};
-use washer_model::{Channel, Machine, Parameter, Spin, UnknownParameter};
+use sweep_engine::ModelParameter;
+use washer_model::{Channel, Machine, Parameter, Spin, Target};
 use washer_row::Measures;
 
-use crate::identity::BUILD;
-use crate::method::Integrator;
 use crate::speeds::SpeedList;
 
-/// Channels that are compared if the grid file names none.
-const DEFAULT_CHANNELS: [Channel; 6] = [
-    Channel::TubFrontY,
-    Channel::TubFrontZ,
-    Channel::DrumFrontY,
-    Channel::DrumFrontZ,
-    Channel::TubYaw,
-    Channel::TubPitch,
-];
+/// Returns what the engine knows of a channel.
+pub(crate) const fn described(channel: Channel) -> sweep_parameter::Channel {
+    sweep_parameter::Channel {
+        name: channel.name(),
+        unit: channel.unit(),
+        description: channel.description(),
+    }
+}
+
+/// Returns what the engine knows of a parameter of a machine and a spin.
+pub(crate) fn engine_parameter(
+    parameter: Parameter,
+    machine: &Machine,
+    spin: &Spin,
+) -> ModelParameter<Washer> {
+    sweep_parameter::Parameter {
+        name: parameter.name().to_owned().into(),
+        unit: parameter.unit(),
+        description: parameter.description(),
+        range: parameter.range(),
+        source: parameter.source(),
+        value: parameter.get(machine, spin),
+        parts: parameter.parts(machine),
+        window_edge: match parameter.target() {
+            Target::Window(edge) => Some(edge),
+            _ => None,
+        },
+        is_in_grid: matches!(parameter.target(), Target::Spin | Target::Window(_)),
+        handle: parameter,
+    }
+}
 
 /// The washing machine's part of a plan, from a grid file.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,38 +51,9 @@ pub struct Washer {
     pub held_speeds: Option<SpeedList>,
 }
 
-impl Model for Washer {
-    type Parameter = Parameter;
-    type Channel = Channel;
-    type Integrator = Integrator;
-
-    const BUILD: Build = BUILD;
-
-    fn channels() -> &'static [Channel] {
-        &Channel::ALL
-    }
-
-    fn default_channels() -> Vec<Channel> {
-        DEFAULT_CHANNELS.to_vec()
-    }
-
-    fn parameters(&self) -> Vec<Parameter> {
-        Parameter::all(&self.machine, &self.spin)
-    }
-
-    fn find(&self, name: &str) -> Result<Parameter, UnknownParameter> {
-        Parameter::find(name, &self.machine, &self.spin)
-    }
-
-    fn parts(&self, parameter: &Parameter) -> Vec<Cow<'static, str>> {
-        parameter.parts(&self.machine)
-    }
-
-    fn value(&self, parameter: &Parameter) -> Option<f64> {
-        parameter.get(&self.machine, &self.spin)
-    }
-
-    fn write(&mut self, parameter: &Parameter, value: f64) {
-        parameter.set(&mut self.machine, &mut self.spin, value);
+impl Washer {
+    /// Returns what the engine knows of a parameter, with its value.
+    pub(crate) fn parameter(&self, parameter: Parameter) -> ModelParameter<Self> {
+        engine_parameter(parameter, &self.machine, &self.spin)
     }
 }

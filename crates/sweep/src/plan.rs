@@ -2,7 +2,8 @@
 
 use lane_ode::Simd;
 use serde_json::{Map, Value};
-use washer_model::{Machine, NoEquilibrium, Parameter, Point, Spin, Timing, prepare};
+use sweep_engine::ModelParameter;
+use washer_model::{Channel, Machine, NoEquilibrium, Point, Spin, Timing, prepare};
 
 use crate::model::Washer;
 
@@ -22,8 +23,15 @@ pub(crate) fn timing(plan: &Plan) -> Timing {
     Timing { end_s: plan.end_s, window_s: plan.window_s, checkpoints: 0 }
 }
 
+/// Returns the channels that a plan compares.
+pub(crate) fn compared_channels(plan: &Plan) -> Vec<Channel> {
+    let channels = plan.reliability.channels.iter();
+    let find = |name| Channel::ALL.into_iter().find(|channel| channel.name() == name);
+    channels.filter_map(|channel| find(channel.name)).collect()
+}
+
 /// Returns an axis with two values.
-pub(crate) fn axis_between(parameter: Parameter, from: f64, to: f64) -> Axis {
+pub(crate) fn axis_between(parameter: ModelParameter<Washer>, from: f64, to: f64) -> Axis {
     Axis { parameter, values: AxisValues::Linear { from, to, count: 2 } }
 }
 
@@ -49,7 +57,7 @@ pub(crate) fn friction_speeds(point: &Point) -> Map<String, Value> {
 /// Whether some damper has friction at some point of a plan.
 pub(crate) fn has_friction(plan: &Plan) -> bool {
     plan.model.machine.dampers.iter().any(|damper| damper.friction_n != 0.0)
-        || plan.axes.iter().any(|axis| axis.parameter.name().ends_with("friction_n"))
+        || plan.axes.iter().any(|axis| axis.parameter.name.ends_with("friction_n"))
 }
 
 /// Returns the elements whose forces have corners at some point of a plan, as text; `None` if all
@@ -65,12 +73,10 @@ pub(crate) fn corners_of_forces(plan: &Plan) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use washer_model::Channel;
-
     use super::*;
-    use crate::method::Integrator;
+    use crate::method::rk4_mass_scaled;
     use sweep_engine::design::{Design, DesignRule};
-    use sweep_engine::{AxisValues, Reliability};
+    use sweep_engine::{AxisValues, Model as _, Reliability};
     use washer_model::{Machine, Parameter, Profile, Spin};
     use washer_row::Measures;
 
@@ -78,7 +84,11 @@ mod tests {
         let machine = Machine::paper();
         let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
         let axis = |(name, values): &(&str, AxisValues)| Axis {
-            parameter: Parameter::find(name, &machine, &spin).unwrap(),
+            parameter: crate::model::engine_parameter(
+                Parameter::find(name, &machine, &spin).unwrap(),
+                &machine,
+                &spin,
+            ),
             values: values.clone(),
         };
         Plan {
@@ -88,8 +98,11 @@ mod tests {
             model: Washer { machine, spin, measures: Measures::default(), held_speeds: None },
             end_s: 50.0,
             window_s: [30.0, 50.0],
-            integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 },
-            reliability: Reliability { limits: 2.0.into(), channels: Channel::ALL.to_vec() },
+            integrator: rk4_mass_scaled(1e-3),
+            reliability: Reliability {
+                limits: 2.0.into(),
+                channels: Washer::ABOUT.channels.to_vec(),
+            },
             set: Vec::new(),
             written: Default::default(),
             aside: Default::default(),

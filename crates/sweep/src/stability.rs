@@ -16,9 +16,9 @@ use washer_row::{Growth, Outcome, Status, Trajectory};
 use crate::columns::Columns;
 use crate::dwell::{AttractorEngine, AttractorSearch};
 use crate::engine::{
-    Engine, RunContext, find_responses, map_isolating_panics, simd_from_environment,
+    Engine, Evaluator, RunContext, find_responses, map_isolating_panics, simd_from_environment,
 };
-use crate::plan::{Plan, timing};
+use crate::plan::{Plan, compared_channels, timing};
 use sweep_engine::store::{Column, Holds, Layout, axis_columns};
 use sweep_engine::{Error, Job, RowSink, RowSource};
 use sweep_files::{FileKind, key};
@@ -41,8 +41,8 @@ const ROWS_TOGETHER: [u64; 2] = [32, 2048];
 pub(crate) fn check(plan: &Plan, option: &'static str, given: &str) -> Result<(), Error> {
     let refuse = |expected: String| Err(Error::option(option, given, expected));
     for axis in &plan.axes {
-        let name = axis.parameter.name();
-        match axis.parameter.target() {
+        let name = &axis.parameter.name;
+        match axis.parameter.handle.target() {
             Target::Spin => {
                 return refuse(format!(
                     "a grid without the axis `{name}`: here the drum is held at each speed of \
@@ -137,12 +137,19 @@ impl<'a> HeldPlan<'a> {
     ///
     /// # Errors
     /// Returns an error if this processor has no instruction set of that name.
-    pub(crate) fn engine(&self) -> Result<HeldSpeedEngine<'a>, Error> {
+    pub(crate) fn engine(&self) -> Result<Engine<'a>, Error> {
         let analysis = match self.search {
             Some(search) => HeldAnalysis::Attractors(AttractorEngine::new(self.plan, search)),
             None => HeldAnalysis::Responses(Columns::for_responses(self.plan)),
         };
-        Ok(HeldSpeedEngine { held: *self, simd: simd_from_environment()?, analysis })
+        let simd = simd_from_environment()?;
+        let simd_name = match analysis {
+            HeldAnalysis::Responses(_) => Simd::best().name(),
+            HeldAnalysis::Attractors(_) => simd.name(),
+        };
+        let evaluator = HeldSpeedEvaluator { held: *self, simd, analysis };
+        // The rows of a point share its curve of responses.
+        Ok(Engine { is_helped_by_neighbours: true, ..Engine::new(evaluator, simd_name) })
     }
 }
 
@@ -154,14 +161,14 @@ enum HeldAnalysis {
     Attractors(AttractorEngine),
 }
 
-/// An engine for rows at held speeds. Row r is the point r / speeds at the speed r % speeds.
-pub(crate) struct HeldSpeedEngine<'a> {
+/// An evaluator of rows at held speeds. Row r is the point r / speeds at the speed r % speeds.
+pub(crate) struct HeldSpeedEvaluator<'a> {
     held: HeldPlan<'a>,
     simd: Simd,
     analysis: HeldAnalysis,
 }
 
-impl HeldSpeedEngine<'_> {
+impl HeldSpeedEvaluator<'_> {
     /// Computes these rows, which share the lanes, and passes them to `keep`.
     fn evaluate_rows(&self, rows: &[u64], keep: &RowSink<'_>, context: &RunContext<'_>) {
         // Rows of a stopped search are meaningless.
@@ -222,7 +229,7 @@ impl HeldSpeedEngine<'_> {
     }
 
     fn response_outcome(&self, row: u64, response: &Response) -> Outcome {
-        let channels = &self.held.plan.reliability.channels;
+        let channels = compared_channels(self.held.plan);
         let trajectory = |amplitudes: &[f64]| Trajectory {
             amplitudes: channels.iter().map(|channel| amplitudes[channel.index()]).collect(),
             ..Trajectory::default()
@@ -233,7 +240,7 @@ impl HeldSpeedEngine<'_> {
     }
 }
 
-impl Engine for HeldSpeedEngine<'_> {
+impl Evaluator for HeldSpeedEvaluator<'_> {
     fn evaluate(&self, next: &RowSource<'_>, keep: &RowSink<'_>, context: &RunContext<'_>) {
         let speeds = self.held.speeds_rpm.len() as u64;
         // A small job is divided between all threads.
@@ -255,17 +262,5 @@ impl Engine for HeldSpeedEngine<'_> {
                 self.evaluate_rows(&rows, keep, context);
             }
         });
-    }
-
-    /// Returns true, because the rows of a point share its curve of responses.
-    fn is_helped_by_neighbours(&self) -> bool {
-        true
-    }
-
-    fn simd(&self) -> &str {
-        match self.analysis {
-            HeldAnalysis::Responses(_) => Simd::best().name(),
-            HeldAnalysis::Attractors(_) => self.simd.name(),
-        }
     }
 }

@@ -14,11 +14,10 @@ use washer_model::{
 };
 
 use crate::engine::{CappedRun, reference_method};
-use crate::method::Integrator;
+use crate::method::{direct, rk4};
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, friction_speeds, prepare_point};
 use sweep_engine::config::NamedValues;
-use sweep_engine::method::Integrator as _;
 use sweep_engine::threads::Cancel;
 use sweep_engine::{Error, Table, threads};
 use sweep_files::key;
@@ -360,15 +359,13 @@ fn methods(
     if let Some(CappedRun { level, methods, .. }) = capped {
         return (methods, level, json_with_level(level));
     }
-    match plan.integrator.direct() {
+    match direct(&plan.integrator) {
         Some((level, method)) => ([method; 2], level, plan.integrator.to_json()),
         None => {
             let steps = StepSelector::new([(point, spin)], plan.end_s);
             let methods = ModelKind::ALL.map(|model| reference_method(&steps, model));
             match methods[0] {
-                Method::Rk4 { step_s } => {
-                    (methods, Level::Rk4, Integrator::Rk4 { step_s }.to_json())
-                }
+                Method::Rk4 { step_s } => (methods, Level::Rk4, rk4(step_s).to_json()),
                 _ => (methods, Level::Dop853, json_with_level(Level::Dop853)),
             }
         }

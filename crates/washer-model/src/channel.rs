@@ -119,20 +119,6 @@ macro_rules! declare {
 }
 channels!(declare);
 
-impl sweep_parameter::Channel for Channel {
-    fn name(self) -> &'static str {
-        self.name()
-    }
-
-    fn unit(self) -> &'static str {
-        self.unit()
-    }
-
-    fn description(self) -> &'static str {
-        self.description()
-    }
-}
-
 /// Returns a name that ends with a zero byte as a C string.
 const fn terminated(name: &'static str) -> &'static CStr {
     match CStr::from_bytes_with_nul(name.as_bytes()) {

@@ -226,7 +226,7 @@ impl PyPlan {
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let axes = PyDict::new(py);
         for axis in &self.evaluator.plan().axes {
-            axes.set_item(axis.parameter.name(), <(f64, f64)>::from(axis.values.extremes()))?;
+            axes.set_item(&*axis.parameter.name, <(f64, f64)>::from(axis.values.extremes()))?;
         }
         Ok(axes)
     }
@@ -244,7 +244,7 @@ impl PyPlan {
 
     fn __repr__(&self) -> String {
         let plan = self.evaluator.plan();
-        let axes: Vec<&str> = plan.axes.iter().map(|axis| axis.parameter.name()).collect();
+        let axes: Vec<&str> = plan.axes.iter().map(|axis| &*axis.parameter.name).collect();
         let axes = if axes.is_empty() { "no axes".to_owned() } else { axes.join(", ") };
         format!("<washer_sweep.Plan {}: {} points over {axes}>", plan.name, plan.points())
     }

@@ -135,7 +135,7 @@ fn home() -> &'static Home {
                 tell: &|_| {},
             };
             let engine = ModelEngine::new(&plan).expect("there is an engine");
-            sweep::run(&engine, &Job::new(&plan), &output, options, &Interrupt::new())
+            sweep::run(&engine.into_engine(), &Job::new(&plan), &output, options, &Interrupt::new())
                 .expect("the run ends")
                 .ended
         };

@@ -2,10 +2,10 @@
 //! has none.
 
 use serde_json::{Value, json};
-use sweep_parameter::{Parameter as _, unit_suffix};
+use sweep_parameter::unit_suffix;
 
 use super::{BoundaryTask, Edge, Traced, TracedQuantity, TracedRow};
-use crate::{Job, Rows, Table};
+use crate::{Job, Model, Table};
 use sweep_files::{FileKind, key};
 
 /// A row of the file.
@@ -25,7 +25,7 @@ fn insert_word(name: &str, unit: &str, word: &str) -> String {
     format!("{stem}_{word}{}", &name[stem.len()..])
 }
 
-impl<M: Rows> BoundaryTask<M> {
+impl<M: Model> BoundaryTask<M> {
     /// Returns the job of the store: the plan, with what is asked beside the grid.
     pub fn job(&self) -> Job<'_> {
         let mut job = Job::new(&self.plan);
@@ -49,7 +49,7 @@ impl<M: Rows> BoundaryTask<M> {
         about["worse"] = self.quantity.worse.name().into();
         about["points"] = traced.trials.into();
         about["rounds"] = traced.rounds.into();
-        let mut table = Table::new(M::BUILD);
+        let mut table = Table::new(M::ABOUT.build);
         self.add_columns(&mut table, traced);
         let job = self.job();
         table.metadata(key::PLAN, &job.plan);
@@ -101,10 +101,10 @@ impl<M: Rows> BoundaryTask<M> {
     /// Adds both axes, the bracket, and the axes beyond the second.
     fn add_axes(&self, table: &mut Table, lines: &[EdgeRow<'_>]) {
         let [first, second, further @ ..] = self.plan.axes.as_slice() else { return };
-        let name = second.parameter.name();
-        let unit = second.parameter.unit();
+        let name = &*second.parameter.name;
+        let unit = second.parameter.unit;
         table.parameter(&first.parameter, lines.iter().map(|line| Some(line.row.first)));
-        let what = second.parameter.description();
+        let what = second.parameter.description;
         let TracedQuantity { name: quantity, limit, .. } = &self.quantity;
         let description =
             format!("{what}, where {quantity} = {limit}; null unless it is a crossing");

@@ -3,12 +3,12 @@
 
 use arrow_array::RecordBatch;
 use arrow_schema::ArrowError;
-use sweep_parameter::{Channel as _, Worse};
+use sweep_parameter::{Channel, Worse};
 use sweep_results::{Column as KnownColumn, Goal, columns};
 
 use crate::config::{Diagnostic, Location, Report};
 use crate::store::{Column, Holds};
-use crate::{Error, Plan, Swept, nearest};
+use crate::{Error, Model, Plan, nearest};
 
 /// The prefix of the columns of ratios.
 const RATIO: &str = "ratio_";
@@ -66,17 +66,17 @@ impl TracedQuantity {
 
 /// Returns every column whose limit can be traced, each with a plan that computes it. This includes
 /// channels and metrics that the grid file leaves out.
-pub fn offered<M: Swept>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
+pub fn offered<M: Model>(plan: &Plan<M>) -> Vec<(Column, Plan<M>)> {
     // The plan of a channel's columns compares this channel alone.
-    let channel_plan = |channel: &M::Channel| {
+    let channel_plan = |channel: &Channel| {
         let mut plan = plan.clone();
         plan.reliability.channels = vec![*channel];
-        (plan, Some(channel_columns(channel.name())))
+        (plan, Some(channel_columns(channel.name)))
     };
     let mut least = plan.clone();
     least.reliability.limits.least = Some(plan.reliability.limits.over_estimate());
     let further = [plan.clone(), least].into_iter().chain(M::variants(plan));
-    let plans = M::channels().iter().map(channel_plan).chain(further.map(|plan| (plan, None)));
+    let plans = M::ABOUT.channels.iter().map(channel_plan).chain(further.map(|plan| (plan, None)));
     let mut offered: Vec<(Column, Plan<M>)> = Vec::new();
     for (plan, only) in plans {
         for column in M::layout(&plan).columns {
@@ -100,7 +100,7 @@ pub fn is_name(text: &str) -> bool {
 
 /// A quantity that an expression computes from the columns of a row.
 #[derive(Debug)]
-pub struct Derived<M: Swept> {
+pub struct Derived<M: Model> {
     /// The quantity.
     pub quantity: TracedQuantity,
     /// The expression.
@@ -115,7 +115,7 @@ pub struct Derived<M: Swept> {
 /// # Errors
 /// A mistake in the expression, columns that no plan has together, or a limit that is missing or
 /// one too many.
-pub fn derived<M: Swept>(
+pub fn derived<M: Model>(
     plan: &Plan<M>,
     text: &str,
     limit: Option<f64>,
@@ -184,13 +184,13 @@ pub fn derived<M: Swept>(
 
 /// Returns plans of the same points with more and more columns: the plan itself, each with a
 /// further measurement, one with all of them, and one with all channels too.
-fn plans_by_columns<M: Swept>(plan: &Plan<M>) -> Vec<Plan<M>> {
-    let complete = M::complete(plan);
-    let mut with_channels = complete.clone();
-    with_channels.reliability.channels = M::channels().to_vec();
+fn plans_by_columns<M: Model>(plan: &Plan<M>) -> Vec<Plan<M>> {
+    let variants = M::variants(plan);
+    let mut with_channels = variants.last().unwrap_or(plan).clone();
+    with_channels.reliability.channels = M::ABOUT.channels.to_vec();
     let mut plans = vec![plan.clone()];
-    plans.extend(M::variants(plan));
-    plans.extend([complete, with_channels]);
+    plans.extend(variants);
+    plans.push(with_channels);
     plans
 }
 
@@ -224,7 +224,7 @@ fn channel_columns(name: &str) -> [String; 3] {
 ///
 /// # Errors
 /// A column that the plan's rows cannot have, or that has no limit of its own where none is given.
-pub fn traced<M: Swept>(
+pub fn traced<M: Model>(
     plan: &Plan<M>,
     name: &str,
     limit: Option<f64>,
@@ -234,18 +234,20 @@ pub fn traced<M: Swept>(
         let names = || offered.iter().map(|(column, _)| column.name.as_str());
         let kind = |name: &str| name.split('_').next().map(str::to_owned);
         let is_of_kind = |known: &str| kind(known) == kind(name);
-        if let Some(needed) = M::needed(name).filter(|_| !names().any(is_of_kind)) {
+        let needed =
+            M::ABOUT.needed.iter().find(|(prefix, _)| kind(name).as_deref() == Some(prefix));
+        if let Some((_, needed)) = needed.filter(|_| !names().any(is_of_kind)) {
             return Err(Error::option("--quantity", name, needed));
         }
         let meant = nearest(name, names());
         let meant = meant.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
         let known_columns: Vec<String> =
-            M::channels().iter().flat_map(|channel| channel_columns(channel.name())).collect();
+            M::ABOUT.channels.iter().flat_map(|channel| channel_columns(channel.name)).collect();
         let is_of_channel = |name: &&str| known_columns.iter().any(|known| known == name);
         let names: Vec<&str> = names().filter(|name| !is_of_channel(name)).collect();
         let names = names.join(", ");
         let [ratio, nonlinear, linear] = channel_columns("CHANNEL");
-        let further = M::FURTHER;
+        let further = M::ABOUT.further;
         let expected = format!("one of {names}, {ratio}, {nonlinear}, {linear}{further}{meant}");
         return Err(Error::option("--quantity", name, expected));
     };

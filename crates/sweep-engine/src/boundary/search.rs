@@ -6,11 +6,8 @@ use super::{BoundaryTrial, SearchRange, TracedQuantity};
 use crate::config::written::finite;
 use crate::evaluator::{CachedEvaluator, RequestValues, Stopped};
 use crate::optimise::search::defect;
-use crate::store::{
-    Column, Done, Holds, Key, Layout, ResultRows, Rows, TrialColumns, axis_columns,
-};
-use crate::{AxisValues, Error, Model, Plan, StoreError, Swept};
-use sweep_parameter::Parameter as _;
+use crate::store::{Column, Done, Holds, Key, Layout, ResultRows, TrialColumns, axis_columns};
+use crate::{AxisValues, Error, Model, Plan, StoreError};
 use sweep_results::Goal;
 
 /// The most lines of all curves together. Basis: the traced rows of so many stay below a gigabyte
@@ -65,7 +62,7 @@ pub struct BoundaryTask<M: Model> {
     pub search: SearchRange,
 }
 
-impl<M: Rows + Swept> BoundaryTask<M> {
+impl<M: Model> BoundaryTask<M> {
     /// Returns the task of a plan.
     ///
     /// # Errors
@@ -100,7 +97,7 @@ impl<M: Rows + Swept> BoundaryTask<M> {
             return refused(format!(
                 "the second axis, `{}`, has one value: give it the range to search, as range = {{ \
                  from, to, count }} or as `values` whose least and greatest are its ends",
-                second.parameter.name()
+                second.parameter.name
             ));
         }
         // Plans hold at most 1e12 points, so the products fit.

@@ -11,9 +11,9 @@ use crate::boundary::{BoundaryOptions, BoundaryTask, EdgeKind, Traced, TracedRow
 use crate::config::section::counted;
 use crate::evaluator::{CachedEvaluator, Stopped};
 use crate::store::{Column, Opened, Trials};
-use crate::{Effort, EffortArgs, Error, Exit, Plan, Progress, Swept, duration, show, tell};
+use crate::{Effort, EffortArgs, Error, Exit, Model, Plan, Progress, duration, show, tell};
 use sweep_files::{FileKind, Output};
-use sweep_parameter::{Parameter as _, Worse};
+use sweep_parameter::Worse;
 
 /// Arguments of `sweep boundary`.
 #[derive(Debug, clap::Args)]
@@ -52,7 +52,7 @@ there.";
 /// # Errors
 /// Mistakes in the grid file, a plan without a range to search, and errors of evaluating points or
 /// writing the file.
-pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.grid.load()?;
     if args.options.quantity.is_empty() {
         return show(&listing(&plan));
@@ -94,7 +94,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
 }
 
 /// Lists every column whose limit can be traced, with unit, worse side, limit and description.
-fn listing<M: Swept>(plan: &Plan<M>) -> String {
+fn listing<M: Model>(plan: &Plan<M>) -> String {
     let columns = offered(plan);
     let width = columns.iter().map(|(column, _)| column.name.len()).max().unwrap_or(0);
     let row = |(column, _): &(Column, Plan<M>)| {
@@ -115,7 +115,7 @@ fn print_summary(mut text: String, output: &Path) -> Exit {
     Exit::Done
 }
 
-fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> String {
+fn summary<M: Model>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> String {
     let BoundaryTask { plan, quantity, search, .. } = task;
     let grid: f64 = plan.axes.iter().map(|axis| axis.values.len() as f64).product();
     let mut text = format!(
@@ -149,7 +149,7 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
     if let Some(widest) = brackets.map(width).reduce(f64::max) {
         let unit = match search.second_log {
             true => "of its value",
-            false => plan.axes.get(1).map_or("", |axis| axis.parameter.unit()),
+            false => plan.axes.get(1).map_or("", |axis| axis.parameter.unit),
         };
         let widest = short(widest);
         let tolerance = short(search.tolerance);
@@ -157,7 +157,7 @@ fn summary<M: Swept>(task: &BoundaryTask<M>, traced: &Traced, wall_s: f64) -> St
     }
     let cell = task.cell().into_iter().zip(&plan.axes);
     let cell: Vec<String> =
-        cell.map(|(size, axis)| format!("{size:.3} {}", axis.parameter.unit())).collect();
+        cell.map(|(size, axis)| format!("{size:.3} {}", axis.parameter.unit)).collect();
     let cell = cell.join(" by ");
     let found = format!("of {cell} or more are found; smaller ones may be missed (--lattice)");
     text.line("islands", found);
@@ -182,7 +182,7 @@ const fn in_words(kind: EdgeKind) -> [&'static str; 2] {
 /// # Errors
 /// Threads that cannot be started, a value of `SWEEP_SIMD` that this machine does not support, and
 /// trials that cannot be stored.
-pub fn search<M: Swept>(
+pub fn search<M: Model>(
     task: &BoundaryTask<M>,
     trials: Option<Trials>,
     effort: Effort<'_>,

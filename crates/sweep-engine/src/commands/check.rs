@@ -8,10 +8,10 @@ use super::{GridArgs, short, span};
 use crate::config::section::counted;
 use crate::design::{Design, Distribution};
 use crate::estimate::size;
-use crate::method::{Integrator as _, Steps};
+use crate::method::Steps;
 use crate::store::read::failed;
-use crate::{Axis, AxisValues, Error, Estimate, Exit, Plan, Swept, duration, show, threads};
-use sweep_parameter::{Channel as _, Parameter as _, RatioLimits};
+use crate::{Axis, AxisValues, Error, Estimate, Exit, Model, Plan, duration, show, threads};
+use sweep_parameter::RatioLimits;
 
 /// Arguments of `sweep check`.
 #[derive(Debug, clap::Args)]
@@ -28,7 +28,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Mistakes in the grid file, no engine for it, or standard output that cannot be written.
-pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.grid.load()?;
     if args.json {
         return show(&format!("{:#}\n", plan.to_json()));
@@ -41,7 +41,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
 }
 
 /// Formats the plan and the estimate in a few lines.
-fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
+fn summary<M: Model>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         // Writing to a String cannot fail.
@@ -62,13 +62,13 @@ fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
     let (end_s, [from_s, to_s]) = (plan.end_s, plan.window_s);
     line("time", format!("0 to {end_s} s, window {from_s} to {to_s} s"));
     line("method", estimate.method.clone());
-    for (name, words) in M::words(plan) {
-        line(name, words);
+    for (name, note) in &estimate.notes {
+        line(name, note.clone());
     }
-    let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name()).collect();
+    let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name).collect();
     line("channels", channels.join(", "));
-    let (RatioLimits { most, least }, criterion) =
-        (plan.reliability.limits, plan.model.criterion());
+    let RatioLimits { most, least } = plan.reliability.limits;
+    let criterion = estimate.criterion;
     let least = least.map_or(String::new(), |least| format!(" and above {least}"));
     line("verdict", format!("reliable where every ratio is below {most}{least}{criterion}"));
     line("output", format!("results/{}.parquet", plan.name));
@@ -88,7 +88,7 @@ fn summary<M: Swept>(plan: &Plan<M>, estimate: &Estimate) -> String {
 }
 
 /// Formats the estimated time and its basis.
-fn time_words<M: Swept>(plan: &Plan<M>, estimate: &Estimate, tried: &str) -> String {
+fn time_words<M: Model>(plan: &Plan<M>, estimate: &Estimate, tried: &str) -> String {
     let part = match estimate.sampled_s {
         whole if whole >= plan.end_s => String::new(),
         part => {
@@ -101,8 +101,8 @@ fn time_words<M: Swept>(plan: &Plan<M>, estimate: &Estimate, tried: &str) -> Str
     format!("about {about}: an estimate, from {tried} integrated just now{part}")
 }
 
-fn describe<M: Swept>(axis: &Axis<M>, design: Option<&Design>) -> String {
-    let name = axis.parameter.name();
+fn describe<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> String {
+    let name = &axis.parameter.name;
     let count = axis.values.len();
     let values = if design.is_some() { String::new() } else { format!("{count} values ") };
     match &axis.values {

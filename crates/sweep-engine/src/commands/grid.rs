@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::config::written::name_of;
 use crate::config::{self, NamedValues};
-use crate::{Diagnostics, GridInput, Plan, Read, program, tell};
+use crate::{Diagnostics, GridInput, Model, Plan, program, tell};
 
 /// A grid file and changes to its constants, as most commands take them.
 #[derive(Debug, clap::Args)]
@@ -36,7 +36,7 @@ impl GridArgs {
     }
 
     /// Returns the grid with all changes except those of `--at`.
-    pub fn input<M: Read>(&self) -> GridInput<M> {
+    pub fn input<M: Model>(&self) -> GridInput<M> {
         GridInput::file(self.grid.clone(), self.sets()).with_name(self.name.clone())
     }
 
@@ -44,7 +44,7 @@ impl GridArgs {
     ///
     /// # Errors
     /// Every mistake in the grid file and the constants.
-    pub fn load<M: Read>(&self) -> Result<Plan<M>, Diagnostics> {
+    pub fn load<M: Model>(&self) -> Result<Plan<M>, Diagnostics> {
         let plan = self.input().with_fixed(&self.at).load()?;
         self.show_notes(&plan);
         Ok(plan)
@@ -54,7 +54,7 @@ impl GridArgs {
     ///
     /// # Errors
     /// The errors of [`Self::load`].
-    pub fn load_point<M: Read>(
+    pub fn load_point<M: Model>(
         &self,
         at: &[String],
     ) -> Result<(Plan<M>, NamedValues), Diagnostics> {
@@ -65,7 +65,7 @@ impl GridArgs {
 
     /// Shows the notes of reading the grid file, and a note if `--set end_s` leaves the end of the
     /// window unchanged.
-    fn show_notes<M: Read>(&self, plan: &Plan<M>) {
+    fn show_notes<M: Model>(&self, plan: &Plan<M>) {
         plan.aside.notes.iter().for_each(|note| tell(note));
         let is_set = |name| self.sets.iter().any(|set| name_of(set) == name);
         let ([from, to], end_s) = (plan.window_s, plan.end_s);
@@ -90,7 +90,7 @@ pub struct ResultArgs {
 
 impl ResultArgs {
     /// Returns the path of the result.
-    pub fn output<M: Read>(&self, plan: &Plan<M>) -> PathBuf {
+    pub fn output<M: Model>(&self, plan: &Plan<M>) -> PathBuf {
         self.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{}.parquet", plan.name)))
     }
 

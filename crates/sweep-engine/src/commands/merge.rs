@@ -4,7 +4,7 @@ use super::run::{done, rows};
 use super::{Lines as _, ResultArgs, installed};
 use crate::config::section::counted;
 use crate::store::{OpenRun, Opened};
-use crate::{Error, Exit, Job, Plan, Swept, tell};
+use crate::{Error, Exit, Job, Model, Plan, tell};
 use std::path::Path;
 
 /// Arguments of `sweep merge`.
@@ -23,7 +23,7 @@ pub struct Args {
 /// # Errors
 /// Mistakes in the grid file, [`crate::store::StoreError::Incomplete`] if chunks are missing, and
 /// other errors of the store.
-pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     merge_job(args, &plan.name, &Job::new(&plan), &args.target.output(&plan))
 }

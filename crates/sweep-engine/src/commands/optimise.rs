@@ -11,9 +11,8 @@ use crate::optimise::file::{own_file, parameters, table, trial_columns};
 use crate::optimise::search::{search, slacks};
 use crate::optimise::study::{Objective, SearchedParameter, Study};
 use crate::store::{Opened, Trials};
-use crate::{Effort, EffortArgs, Error, Exit, Swept, duration, tell};
+use crate::{Effort, EffortArgs, Error, Exit, Model, duration, tell};
 use sweep_files::{FileKind, OWN_FILE, Output, atomic, key};
-use sweep_parameter::Parameter as _;
 use sweep_results::{Cell, ResultTable, Slack};
 
 /// Arguments of `sweep optimise`.
@@ -64,7 +63,7 @@ const LISTED: usize = 12;
 ///
 /// # Errors
 /// Mistakes in the study and its grid file, and errors of evaluating candidates or writing a file.
-pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
     let study = Study::<M>::load(&args.study, &args.sets)?;
     let default = || PathBuf::from(format!("results/{}.parquet", study.name));
     let output = args.out.clone().unwrap_or_else(default);
@@ -109,7 +108,7 @@ pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
 /// Returns a line for each condition with a candidate's slack: its distance from the limit,
 /// negative if the condition is violated. The least slack comes first. Returns `None` after an
 /// interrupt.
-fn slack_lines<M: Swept>(
+fn slack_lines<M: Model>(
     study: &Study<M>,
     values: &[f64],
     effort: Effort<'_>,
@@ -131,7 +130,7 @@ fn slack_lines<M: Swept>(
 /// Describes the candidate with the least violation, and the conditions that it violates. The
 /// violation is the sum of the excesses over the conditions, each divided by the greatest excess of
 /// all candidates. Returns `None` if no candidate has all excesses.
-fn nearest<M: Swept>(study: &Study<M>, file: &ResultTable) -> Result<Option<String>, Error> {
+fn nearest<M: Model>(study: &Study<M>, file: &ResultTable) -> Result<Option<String>, Error> {
     let names: Vec<String> = (1..=study.conditions.len()).map(|k| format!("excess_{k}")).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let mut rows: Vec<(u64, Vec<f64>)> = Vec::new();
@@ -159,14 +158,14 @@ fn nearest<M: Swept>(study: &Study<M>, file: &ResultTable) -> Result<Option<Stri
 }
 
 /// Claims the path of the model's own file, if one is asked for, before the search.
-fn own_output<'a, M: Swept>(
+fn own_output<'a, M: Model>(
     study: &Study<M>,
     args: &'a Args,
     output: &Path,
 ) -> Result<Option<(&'a Path, Output<'a>)>, Error> {
     let Some(path) = args.best.as_deref() else { return Ok(None) };
     let refused = |expected: &str| Err(Error::option("--best", path.display(), expected));
-    if M::OWN_FILE.is_none() {
+    if M::ABOUT.own_file.is_none() {
         return refused("a model with a file of its own");
     }
     let candidates = study.evolution.candidates;
@@ -186,7 +185,7 @@ fn own_output<'a, M: Swept>(
 
 /// Prints a summary of the file of candidates, and writes the model's own file of a candidate if it
 /// is requested.
-fn summarise<M: Swept>(
+fn summarise<M: Model>(
     study: &Study<M>,
     candidate: Option<u64>,
     own: Option<(&Path, Output<'_>)>,
@@ -197,7 +196,7 @@ fn summarise<M: Swept>(
     let mut text = format!("{}: {how}\n", study.name);
     let file = ResultTable::open(output)?;
     let about = file.file().json(key::OPTIMISE).unwrap_or_default();
-    let sought = parameters(study).iter().map(|axis| axis.parameter.name());
+    let sought = parameters(study).iter().map(|axis| &*axis.parameter.name);
     let objectives = study.objectives.iter().map(|one| one.name.as_str());
     let names: Vec<&str> =
         ["candidate", "feasible", "on_front"].into_iter().chain(sought).chain(objectives).collect();
@@ -263,7 +262,7 @@ fn summarise<M: Swept>(
     let ends: Vec<&str> = bounded
         .zip(parameters(study))
         .filter(|(bounded, _)| is_at_end(bounded))
-        .map(|(_, axis)| axis.parameter.name())
+        .map(|(_, axis)| &*axis.parameter.name)
         .collect();
     if !ends.is_empty() {
         text.line(

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
-use sweep_parameter::{Parameter as _, Range};
+use sweep_parameter::Range;
 
-use crate::{Error, Exit, GridInput, Listed, Swept, show};
+use crate::{Error, Exit, GridInput, Model, ModelParameter, Plan, show};
 
 /// Arguments of `sweep parameters`.
 #[derive(Debug, clap::Args)]
@@ -22,25 +22,55 @@ pub struct Args {
 ///
 /// # Errors
 /// Mistakes in the grid file, or standard output that cannot be written.
-pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
     let plan =
         args.grid.clone().map(|grid| GridInput::<M>::file(grid, Vec::new()).load()).transpose()?;
-    let rows = M::listed(plan.as_ref());
+    let rows = listed(plan.as_ref());
     show(&if args.json { as_json(&rows) } else { as_text(&rows) })
 }
 
-fn as_text<M: Swept>(rows: &[Listed<M>]) -> String {
+/// A line of the listing of parameters.
+pub struct Listed<M: Model> {
+    /// The parameter.
+    pub parameter: ModelParameter<M>,
+    /// The value, if there is one.
+    pub value: Option<f64>,
+    /// The source of the value.
+    pub source: String,
+}
+
+/// Returns the lines of the listing; without a plan, those of the model's default values.
+pub fn listed<M: Model>(plan: Option<&Plan<M>>) -> Vec<Listed<M>> {
+    let line = |parameter: ModelParameter<M>| {
+        let value = match parameter.window_edge {
+            Some(edge) => plan.map(|plan| plan.window_s[edge]),
+            None => parameter.value.filter(|_| plan.is_some() || !parameter.is_in_grid),
+        };
+        // A parameter of several numbers has the sources of all of them.
+        let written = plan.filter(|_| !parameter.is_in_grid);
+        let written = written.and_then(|plan| plan.written.source(&parameter.parts));
+        let source = written.unwrap_or_else(|| parameter.source.to_owned());
+        Listed { parameter, value, source }
+    };
+    let parameters = match plan {
+        Some(plan) => plan.model.parameters(),
+        None => M::blank().parameters(),
+    };
+    parameters.into_iter().map(line).collect()
+}
+
+fn as_text<M: Model>(rows: &[Listed<M>]) -> String {
     let value =
         |row: &Listed<M>| row.value.map_or_else(|| "-".to_owned(), |value| value.to_string());
     let width = |length: &dyn Fn(&Listed<M>) -> usize| rows.iter().map(length).max().unwrap_or(0);
-    let name_width = width(&|row| row.parameter.name().len());
+    let name_width = width(&|row| row.parameter.name.len());
     let value_width = width(&|row| value(row).len());
-    let unit_width = width(&|row| row.parameter.unit().len());
+    let unit_width = width(&|row| row.parameter.unit.len());
     let line = |row: &Listed<M>| {
-        let name = row.parameter.name();
+        let name = &row.parameter.name;
         let value = value(row);
-        let unit = row.parameter.unit();
-        let meaning = row.parameter.description();
+        let unit = row.parameter.unit;
+        let meaning = row.parameter.description;
         let source = &row.source;
         format!(
             "{name:name_width$}  {value:>value_width$} {unit:unit_width$}  {meaning} [{source}]\n"
@@ -50,14 +80,14 @@ fn as_text<M: Swept>(rows: &[Listed<M>]) -> String {
 }
 
 /// Formats the table as JSON.
-pub fn as_json<M: Swept>(rows: &[Listed<M>]) -> String {
+pub fn as_json<M: Model>(rows: &[Listed<M>]) -> String {
     let row = |row: &Listed<M>| {
         json!({
-            "name": row.parameter.name(),
+            "name": row.parameter.name,
             "value": row.value,
-            "unit": row.parameter.unit(),
-            "description": row.parameter.description(),
-            "range": range(row.parameter.range()),
+            "unit": row.parameter.unit,
+            "description": row.parameter.description,
+            "range": range(row.parameter.range),
             "source": row.source,
         })
     };

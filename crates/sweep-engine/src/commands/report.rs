@@ -7,7 +7,7 @@ use super::{conditions, short, word};
 use crate::columns::MODELS;
 use crate::store::read::{Tally, tally};
 use crate::store::refuse_unfinished;
-use crate::{Error, Exit, GridInput, Plan, Swept, tell};
+use crate::{Error, Exit, GridInput, Model, Plan, tell};
 use sweep_files::{FileKind, Output, ParquetFile, key};
 use sweep_parameter::RatioLimits;
 use sweep_plot::{Figures, described, escape, quantity, sheet, significant, table, words};
@@ -42,7 +42,7 @@ pub type Resonances<M> = dyn Fn(&Plan<M>) -> Vec<[String; 3]>;
 /// # Errors
 /// Files that cannot be read or drawn, mistakes in the requirements, and a page that cannot be
 /// written.
-pub fn run<M: Swept>(
+pub fn run<M: Model>(
     args: &Args,
     further: &Further<'_>,
     resonances: &Resonances<M>,

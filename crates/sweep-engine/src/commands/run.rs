@@ -9,7 +9,7 @@ use crate::run::{self as runner, Ended, RunOptions, RunReport};
 use crate::store::read::{DwellCounts, FAR_OFF, NameCounts, failed, failures};
 use crate::store::{Session, ShardRequest, Tally};
 use crate::{
-    Design, EffortArgs, Engine, Error, Exit, Interrupt, Job, Plan, Swept, duration, tell, threads,
+    Design, EffortArgs, Engine, Error, Exit, Interrupt, Job, Model, Plan, duration, tell, threads,
 };
 use sweep_parameter::RatioLimits;
 use sweep_plot::Share;
@@ -63,10 +63,10 @@ impl WorkArgs {
 ///
 /// # Errors
 /// Mistakes in the grid file, and the errors of [`execute`].
-pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     let engine = M::engine(&plan, None)?;
-    let report = execute(args, &plan, engine.as_ref(), &installed()?, "")?;
+    let report = execute(args, &plan, &engine, &installed()?, "")?;
     Ok(exit(&args.work, &report))
 }
 
@@ -83,10 +83,10 @@ pub fn installed() -> Result<Interrupt, Error> {
 ///
 /// # Errors
 /// Any [`crate::store::StoreError`]. Finished chunks are stored before.
-pub fn execute<M: Swept>(
+pub fn execute<M: Model>(
     args: &Args,
     plan: &Plan<M>,
-    engine: &dyn Engine,
+    engine: &Engine<'_>,
     interrupt: &Interrupt,
     options: &str,
 ) -> Result<RunReport, Error> {
@@ -156,7 +156,7 @@ impl RunCommand<'_> {
     /// Errors of evaluating points or writing files. Finished chunks are stored before.
     pub fn execute(
         &self,
-        engine: &dyn Engine,
+        engine: &Engine<'_>,
         job: &Job<'_>,
         output: &Path,
         interrupt: &Interrupt,

@@ -1,7 +1,7 @@
 //! `schema`: the JSON Schema of grid files.
 
 use crate::config::schema::grid;
-use crate::{Error, Exit, Swept, print};
+use crate::{Error, Exit, Model, print};
 
 /// Arguments of `schema`.
 #[derive(Debug, clap::Args)]
@@ -11,6 +11,6 @@ pub struct Args {}
 ///
 /// # Errors
 /// When standard output cannot be written.
-pub fn run<M: Swept>(_: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(_: &Args) -> Result<Exit, Error> {
     print(&format!("{:#}\n", grid::<M>()))
 }

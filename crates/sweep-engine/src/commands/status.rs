@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::{Lines as _, ResultArgs};
 use crate::store::{FolderStatus, State, shard_list, status};
-use crate::{Error, Exit, Job, Plan, Swept, show};
+use crate::{Error, Exit, Job, Model, Plan, show};
 
 /// Arguments of `sweep status`.
 #[derive(Debug, clap::Args)]
@@ -23,7 +23,7 @@ pub struct Args {
 ///
 /// # Errors
 /// Mistakes in the grid file, a folder or file of another plan, a file that cannot be read.
-pub fn run<M: Swept>(args: &Args) -> Result<Exit, Error> {
+pub fn run<M: Model>(args: &Args) -> Result<Exit, Error> {
     let plan: Plan<M> = args.target.grid.load()?;
     show_job(args, &Job::new(&plan), &args.target.output(&plan), ["run", "", ""])
 }

@@ -1,6 +1,6 @@
 //! Axes: parameters with the values that a grid, a design or a list gives them.
 
-use sweep_parameter::{Parameter as _, Range, decimal};
+use sweep_parameter::{Range, decimal};
 use sweep_results::nearest;
 
 use super::draft::ClaimedNumbers;
@@ -8,28 +8,29 @@ use super::list::{self, List};
 use super::parameters::{MAX_COMPARED_NAMES, find};
 use super::report::{Diagnostic, Report};
 use super::section::check_number;
-use super::{Draft, Field, Located, Location, Read, Section, quoted, refused_number, short};
+use super::{Draft, Field, Located, Location, Section, quoted, refused_number, short};
+use crate::Model;
 use crate::design::{DesignRule, DistributionShape, MOST_AXES, TAIL_DEVIATIONS};
 use crate::plan::MAX_POINTS;
-use crate::{Axis, AxisValues, Design, Distribution};
+use crate::{Axis, AxisValues, Design, Distribution, ModelParameter};
 
 /// Claims the numbers that an axis writes. Returns false, after a report, if another axis writes
 /// them. `is_about` says that the axis is a tolerance about the model's own number.
-fn claim<M: Read>(
+fn claim<M: Model>(
     name: &Located<&str>,
-    parameter: &M::Parameter,
+    parameter: &ModelParameter<M>,
     swept: &mut ClaimedNumbers,
     is_about: bool,
     draft: &Draft<'_, M>,
 ) -> bool {
     let report = draft.report;
-    let parts = draft.plan.model.parts(parameter);
+    let parts = &parameter.parts;
     if !swept.claim(name, parts.clone(), report) {
         return false;
     }
     // A tolerance lies about the constant, so that the constant has an effect.
     for constant in draft.constants.iter().filter(|_| !is_about) {
-        if constant.parts.iter().all(|part| parts.contains(part)) {
+        if constant.parameter.parts.iter().all(|part| parts.contains(part)) {
             let title = format!(
                 "`{}` is swept by an axis: this constant has no effect",
                 constant.name.value
@@ -43,14 +44,14 @@ fn claim<M: Read>(
 }
 
 /// Returns whether options fix all numbers of an axis, which then sweeps nothing.
-fn is_fixed<M: Read>(parameter: &M::Parameter, draft: &Draft<'_, M>) -> bool {
-    let parts = draft.plan.model.parts(parameter);
+fn is_fixed<M: Model>(parameter: &ModelParameter<M>, draft: &Draft<'_, M>) -> bool {
+    let parts = &parameter.parts;
     let mut options = draft.constants.iter().filter(|constant| constant.is_over_file);
-    options.any(|constant| parts.iter().all(|part| constant.parts.contains(part)))
+    options.any(|constant| parts.iter().all(|part| constant.parameter.parts.contains(part)))
 }
 
 /// Reads every `[[axis]]`: the values of a grid, or the ranges of a design.
-pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Draft<'_, M>) {
+pub fn axes<M: Model>(root: &Section<'_>, design: Option<Design>, draft: &mut Draft<'_, M>) {
     let report = root.report;
     let mut swept = ClaimedNumbers::default();
     let sections = root.tables("axis");
@@ -111,13 +112,13 @@ pub fn axes<M: Read>(root: &Section<'_>, design: Option<Design>, draft: &mut Dra
 }
 
 /// Adds an axis to the plan.
-pub fn add<M: Read>(axis: Axis<M>, at: Location, draft: &mut Draft<'_, M>) {
+pub fn add<M: Model>(axis: Axis<M>, at: Location, draft: &mut Draft<'_, M>) {
     draft.report.put(format!("axis[{}]", draft.plan.axes.len()), at);
     draft.plan.axes.push(axis);
 }
 
 /// Makes the columns of a list the plan's axes.
-pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draft<'_, M>) {
+pub fn listed_axes<M: Model>(root: &Section<'_>, mut list: List, draft: &mut Draft<'_, M>) {
     let report = root.report;
     for section in root.tables("axis") {
         let expected = "the columns of the list are the axes; remove this";
@@ -131,7 +132,7 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
             continue;
         }
         let Some(parameter) = find(&name, draft) else { continue };
-        let range = parameter.range();
+        let range = parameter.range;
         let mut sound = true;
         for (row, &value) in
             column.values.iter().enumerate().filter(|(_, value)| !range.contains(**value))
@@ -161,11 +162,11 @@ pub fn listed_axes<M: Read>(root: &Section<'_>, mut list: List, draft: &mut Draf
 }
 
 /// Returns whether a name is so different from all parameters that its column holds something else.
-fn is_foreign<M: Read>(name: &Located<&str>, draft: &Draft<'_, M>) -> bool {
+fn is_foreign<M: Model>(name: &Located<&str>, draft: &Draft<'_, M>) -> bool {
     let model = &draft.plan.model;
     let Err(error) = model.find(name.value) else { return false };
     let all = model.parameters();
-    let near = nearest(name.value, all.iter().take(MAX_COMPARED_NAMES).map(|one| one.name()));
+    let near = nearest(name.value, all.iter().take(MAX_COMPARED_NAMES).map(|one| &*one.name));
     error.is_strange && near.is_none()
 }
 
@@ -187,13 +188,13 @@ struct SweptFacts<'p> {
 }
 
 impl<'p> SweptFacts<'p> {
-    fn new<M: Read>(parameter: &'p M::Parameter, draft: &Draft<'_, M>) -> Self {
+    fn new<M: Model>(parameter: &'p ModelParameter<M>, draft: &Draft<'_, M>) -> Self {
         let plan = &draft.plan;
-        let value = match parameter.window_edge() {
+        let value = match parameter.window_edge {
             Some(edge) => Some(plan.window_s[edge]),
-            None => plan.model.value(parameter),
+            None => parameter.value,
         };
-        Self { name: parameter.name(), range: parameter.range(), value }
+        Self { name: &parameter.name, range: parameter.range, value }
     }
 
     /// Reads `tolerance`: a range about the model's own number, by a distance in its unit or in

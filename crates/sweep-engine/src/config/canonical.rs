@@ -1,12 +1,12 @@
 //! A plan as canonical JSON: the input in a result file, and the text by which plans are compared.
 
 use serde_json::{Value, json};
-use sweep_parameter::Parameter as _;
 
-use super::{Keys, Read, sections};
+use super::{Keys, sections};
+use crate::Model;
 use crate::{Axis, AxisValues, Design, Distribution, Plan};
 
-impl<M: Read> Plan<M> {
+impl<M: Model> Plan<M> {
     /// Returns the plan with all defaults and constants, in the keys of grid files: `name`, `time`,
     /// `integrator`, `axis`, `reliability`, the model's own keys, and under `set` the changes by
     /// `--set`, if there are any.
@@ -20,7 +20,7 @@ impl<M: Read> Plan<M> {
             model: self.model.clone(),
             end_s: self.end_s,
             window_s: self.window_s,
-            integrator: self.integrator,
+            integrator: self.integrator.clone(),
             design: self.design.clone(),
             reliability: self.reliability.clone(),
             ..Self::blank()
@@ -37,8 +37,8 @@ impl<M: Read> Plan<M> {
     }
 }
 
-fn axis<M: Read>(axis: &Axis<M>, design: Option<&Design>) -> Value {
-    let parameter = axis.parameter.name();
+fn axis<M: Model>(axis: &Axis<M>, design: Option<&Design>) -> Value {
+    let parameter = &axis.parameter.name;
     if let Some(Design::List { .. }) = design {
         // The values are columns of the result, and the design's hash covers them.
         return json!({ "parameter": parameter });

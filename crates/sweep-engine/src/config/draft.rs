@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use super::{Located, Report, written_twice};
-use crate::{Model, Plan};
+use crate::{Model, ModelParameter, Plan};
 
 /// A plan while it is read; it is valid only if nothing was reported.
 pub struct Draft<'a, M: Model> {
@@ -22,11 +22,9 @@ pub struct SetConstant<M: Model> {
     /// The name with its location.
     pub name: Located<String>,
     /// The parameter.
-    pub parameter: M::Parameter,
+    pub parameter: ModelParameter<M>,
     /// The value with its location.
     pub value: Located<f64>,
-    /// The names of the single numbers that the argument sets; several for a vector.
-    pub parts: Vec<Cow<'static, str>>,
     /// Whether it overrides the file, and so fixes a swept parameter.
     pub is_over_file: bool,
 }

@@ -139,6 +139,6 @@ pub fn number(range: Range) -> Value {
 }
 
 /// Returns the description of a parameter's number in schemas.
-pub fn describe_parameter(parameter: &impl Parameter) -> String {
-    format!("{}, {}", parameter.description(), parameter.unit())
+pub fn describe_parameter(parameter: &Parameter<impl Sized>) -> String {
+    format!("{}, {}", parameter.description, parameter.unit)
 }

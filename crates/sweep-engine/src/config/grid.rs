@@ -7,26 +7,26 @@ use super::source::{Location, SourceId, is_blank};
 use super::syntax::{self, parse};
 use super::written::name_of;
 use super::{
-    Diagnostic, Field, GridInput, KeyWalk, Keys, Located, Read, Report, Section, axes, design,
-    list, parameters,
+    Diagnostic, Field, GridInput, KeyWalk, Keys, Located, Report, Section, axes, design, list,
+    parameters,
 };
+use crate::Model;
 use crate::{Design, Plan, program};
-use sweep_parameter::Parameter as _;
 use toml::de::DeTable;
 
 /// Reads the grid file and applies the constants. Returns `None` if the file has no text.
-pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
+pub fn draft<'a, M: Model>(input: &GridInput<M>, report: &'a Report) -> Option<Draft<'a, M>> {
     let GridInput { path, text, sets, at, .. } = input;
     let shown = path.display();
     let (text, source) = match text {
         Some(text) => (text.clone(), report.add(shown.to_string(), text.as_str())),
-        None => syntax::text(path, "grid", M::TO_START, report)?,
+        None => syntax::text(path, "grid", M::ABOUT.to_start, report)?,
     };
     if is_blank(&text) {
         let at = Location::new(source, 0..0);
         let refusal =
             Diagnostic::new(format!("the grid file {shown} is empty")).at(&at, "expected a grid");
-        report.push(M::TO_START.into_iter().fold(refusal, Diagnostic::help));
+        report.push(M::ABOUT.to_start.into_iter().fold(refusal, Diagnostic::help));
         return None;
     }
     let table = parse(&text, source, report);
@@ -50,7 +50,7 @@ pub fn draft<'a, M: Read>(input: &GridInput<M>, report: &'a Report) -> Option<Dr
             let model = draft.plan.model.clone();
             let known = |name: &str| {
                 let parameter = model.find(name).ok()?;
-                Some((parameter.name().to_owned(), parameter.unit().to_owned()))
+                Some((parameter.name.into_owned(), parameter.unit.to_owned()))
             };
             let names = list::Names { known: &known, renamed: &draft.plan.aside.columns };
             match list::read(&file, path, &names, report) {
@@ -86,7 +86,7 @@ pub const STUDY: [&str; 8] =
 
 /// Rejects a file of another kind: most of its keys belong to that kind, and none to this kind
 /// alone. Returns whether it was rejected.
-pub fn is_another<M: Read>(
+pub fn is_another<M: Model>(
     own: &str,
     table: &DeTable<'_>,
     source: SourceId,
@@ -98,14 +98,15 @@ pub fn is_another<M: Read>(
             ["set", "axis", "columns"].contains(&key) || grid["properties"].get(key).is_some()
         }
         "study" => STUDY.contains(&key),
-        _ => M::is_own_key(key),
+        _ => M::ABOUT.own_file.is_some_and(|file| file.keys.contains(&key)),
     };
     let keys: Vec<&str> = table.keys().map(|key| &**key.get_ref()).collect();
     let is = |kind: &&str| {
         let theirs = keys.iter().filter(|key| has(kind, key)).count();
         2 * theirs > keys.len() && keys.iter().all(|key| has(kind, key) || !has(own, key))
     };
-    let kinds = [own, "grid", "study", M::OWN_FILE.unwrap_or_default()];
+    let own_key = M::ABOUT.own_file.map_or("", |file| file.key);
+    let kinds = [own, "grid", "study", own_key];
     let Some(kind) = kinds.into_iter().find(is).filter(|kind| *kind != own) else { return false };
     report.push_with(|sources| {
         let program = program();

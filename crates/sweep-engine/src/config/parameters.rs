@@ -1,20 +1,21 @@
 //! Constants (`[set]`, `--set`, `--at`): parameters by name with their values.
 
-use sweep_parameter::{Parameter as _, Range, UnknownParameter};
+use sweep_parameter::{Range, UnknownParameter};
 
 use super::draft::{ClaimedNumbers, Draft, SetConstant};
 use super::written::name_of;
 use super::{
-    Diagnostic, Located, NamedArgument, NamedValues, Read, Section, quoted, sections::described,
+    Diagnostic, Located, NamedArgument, NamedValues, Section, quoted, sections::described,
 };
-use crate::{Plan, program};
+use crate::Model;
+use crate::{ModelParameter, Plan, program};
 
 /// Number of names that are compared for a suggestion. Basis: a machine of thousands of springs has
 /// more, and the comparison of all would take long.
 pub(super) const MAX_COMPARED_NAMES: usize = 400;
 
 /// Reads `[set]`, then `--set` and `--at`, which override it, and writes them into the plan.
-pub fn constants<M: Read>(
+pub fn constants<M: Model>(
     root: &Section<'_>,
     sets: Vec<&String>,
     at: &[String],
@@ -48,17 +49,17 @@ pub fn constants<M: Read>(
 
 /// Replaces the axes by one point: `at` has a value for each axis of several values, and may have
 /// values of other parameters.
-pub fn point<M: Read>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
+pub fn point<M: Model>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
     let constants = arguments("--at", at, draft);
     let named = |name: &str| at.iter().any(|argument| name_of(argument) == name);
     for (k, axis) in std::mem::take(&mut draft.plan.axes).into_iter().enumerate() {
-        if named(axis.parameter.name()) {
+        if named(&axis.parameter.name) {
             continue;
         }
         if axis.values.len() == 1 {
             write(&axis.parameter, &mut draft.plan, axis.values.value(0));
         } else if let Some(place) = draft.report.place(&format!("axis[{k}]")) {
-            let name = axis.parameter.name();
+            let name = &axis.parameter.name;
             let title = format!("a point of the grid needs a value of `{name}`");
             let expected = format!("expected --at {name}=VALUE for this axis");
             draft.report.refuse::<()>(&place, title, expected);
@@ -70,7 +71,7 @@ pub fn point<M: Read>(at: &[String], draft: &mut Draft<'_, M>) -> NamedValues {
 }
 
 /// Reads NAME=VALUE arguments.
-fn arguments<'a, M: Read>(
+fn arguments<'a, M: Model>(
     option: &str,
     arguments: impl IntoIterator<Item = &'a String>,
     draft: &Draft<'a, M>,
@@ -83,27 +84,26 @@ fn arguments<'a, M: Read>(
 }
 
 /// Returns a constant if its name is a parameter and `number` gives a value in its range.
-fn constant<M: Read>(
+fn constant<M: Model>(
     name: Located<&str>,
     number: impl FnOnce(Range) -> Option<Located<f64>>,
     is_over_file: bool,
     draft: &Draft<'_, M>,
 ) -> Option<SetConstant<M>> {
     let parameter = find(&name, draft)?;
-    let value = number(parameter.range())?;
-    let parts = draft.plan.model.parts(&parameter);
+    let value = number(parameter.range)?;
     let name = Located { value: name.value.to_owned(), at: name.at };
-    Some(SetConstant { name, parameter, value, parts, is_over_file })
+    Some(SetConstant { name, parameter, value, is_over_file })
 }
 
 /// Finds the parameter of this name; an unknown name is reported.
-pub fn find<M: Read>(name: &Located<&str>, draft: &Draft<'_, M>) -> Option<M::Parameter> {
+pub fn find<M: Model>(name: &Located<&str>, draft: &Draft<'_, M>) -> Option<ModelParameter<M>> {
     let refuse = |error| draft.report.push_with(|_| unknown(name, &error, &draft.plan.model));
     draft.plan.model.find(name.value).map_err(refuse).ok()
 }
 
 /// Returns the mistake of a name that is no parameter.
-pub fn unknown<M: Read>(
+pub fn unknown<M: Model>(
     name: &Located<&str>,
     UnknownParameter { reason, is_strange }: &UnknownParameter,
     model: &M,
@@ -123,7 +123,7 @@ pub fn unknown<M: Read>(
         (true, None) => {
             let all = model.parameters();
             let near = diagnostic
-                .nearest(name.value, all.iter().take(MAX_COMPARED_NAMES).map(|one| one.name()));
+                .nearest(name.value, all.iter().take(MAX_COMPARED_NAMES).map(|one| &*one.name));
             near.help(format!("`{} parameters` lists every name", program()))
         }
         (false, _) => diagnostic,
@@ -131,12 +131,12 @@ pub fn unknown<M: Read>(
 }
 
 /// Writes constants of equal precedence.
-fn apply<M: Read>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
+fn apply<M: Model>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
     let mut claimed = ClaimedNumbers::default();
     for constant in constants {
-        if claimed.claim(&constant.name, constant.parts.clone(), draft.report) {
+        if claimed.claim(&constant.name, constant.parameter.parts.clone(), draft.report) {
             write(&constant.parameter, &mut draft.plan, constant.value.value);
-            for part in &constant.parts {
+            for part in &constant.parameter.parts {
                 draft.report.put(part.clone(), constant.value.at.clone());
             }
             draft.constants.push(constant.clone());
@@ -144,9 +144,9 @@ fn apply<M: Read>(constants: &[SetConstant<M>], draft: &mut Draft<'_, M>) {
     }
 }
 
-fn write<M: Read>(parameter: &M::Parameter, plan: &mut Plan<M>, value: f64) {
-    match parameter.window_edge() {
+fn write<M: Model>(parameter: &ModelParameter<M>, plan: &mut Plan<M>, value: f64) {
+    match parameter.window_edge {
         Some(edge) => plan.window_s[edge] = value,
-        None => plan.model.write(parameter, value),
+        None => plan.model.write(&parameter.handle, value),
     }
 }

@@ -1,9 +1,8 @@
 //! Checks of a table whose columns are the axes of a plan, in place of its grid.
 
-use sweep_parameter::Parameter as _;
-
 use super::parameters::unknown;
-use super::{Diagnostic, Diagnostics, Located, Location, Read, Report, quoted, refused_number};
+use super::{Diagnostic, Diagnostics, Located, Location, Report, quoted, refused_number};
+use crate::Model;
 use crate::{Axis, Plan};
 
 /// Finds the column of each axis of a plan: its index in `names`, or `None` for an axis of one
@@ -13,7 +12,7 @@ use crate::{Axis, Plan};
 ///
 /// # Errors
 /// Every mistake: columns that are unknown, no axis, repeated or missing, and values out of range.
-pub fn check_columns<M: Read, V>(
+pub fn check_columns<M: Model, V>(
     plan: &Plan<M>,
     names: &[&str],
     values: impl Fn(usize) -> V,
@@ -26,7 +25,7 @@ where
     let mut axis_columns: Vec<Option<usize>> = vec![None; plan.axes.len()];
     for (k, (&value, at)) in names.iter().zip(&places).enumerate() {
         let name = Located { value, at: at.clone() };
-        let place = plan.axes.iter().position(|axis| axis.parameter.name() == name.value);
+        let place = plan.axes.iter().position(|axis| axis.parameter.name == name.value);
         let Some(place) = place else {
             report.push_with(|_| no_axis(&name, plan));
             continue;
@@ -50,7 +49,7 @@ where
     }
     for (axis, column) in plan.axes.iter().zip(&axis_columns) {
         if column.is_none() && axis.values.len() > 1 {
-            let name = axis.parameter.name();
+            let name = &axis.parameter.name;
             let title = format!("the table has no column {}", quoted(name));
             let whole = Location::new(source, 0..places.last().map_or(0, |last| last.span.end));
             let expected = "expected a column for every axis of the plan";
@@ -81,7 +80,7 @@ fn column_mistake(names: &[String], column: usize, title: String, expected: Stri
 }
 
 /// Returns the mistake of a value that is not on its axis.
-fn off_axis<M: Read>(
+fn off_axis<M: Model>(
     value: Option<f64>,
     row: usize,
     axis: &Axis<M>,
@@ -89,7 +88,7 @@ fn off_axis<M: Read>(
     name: &Located<&str>,
 ) -> Diagnostic {
     let what = format!("row {} of {}", row + 1, quoted(name.value));
-    let range = axis.parameter.range();
+    let range = axis.parameter.range;
     match value {
         None => Diagnostic::new(format!("{what} has no value"))
             .at(&name.at, format!("expected {range}")),
@@ -97,7 +96,7 @@ fn off_axis<M: Read>(
         Some(value) => {
             let title = format!("{what} = {value} is off the plan's axis");
             let expected = format!("expected a number from {least} to {greatest}");
-            let axis = axis.parameter.name();
+            let axis = &axis.parameter.name;
             Diagnostic::new(title)
                 .at(&name.at, expected)
                 .help(format!("give `{axis}` a wider range in the plan's [[axis]]"))
@@ -106,11 +105,11 @@ fn off_axis<M: Read>(
 }
 
 /// Returns the mistake of a column that is no axis: a fixed parameter, or an unknown name.
-fn no_axis<M: Read>(name: &Located<&str>, plan: &Plan<M>) -> Diagnostic {
+fn no_axis<M: Model>(name: &Located<&str>, plan: &Plan<M>) -> Diagnostic {
     if let Err(error) = plan.model.find(name.value) {
         return unknown(name, &error, &plan.model);
     }
-    let axes: Vec<String> = plan.axes.iter().map(|axis| quoted(axis.parameter.name())).collect();
+    let axes: Vec<String> = plan.axes.iter().map(|axis| quoted(&axis.parameter.name)).collect();
     let expected = match axes.as_slice() {
         [] => "this plan has no [[axis]]".to_owned(),
         axes => format!("expected the plan's axes: {}", axes.join(", ")),

@@ -8,14 +8,15 @@ use super::axes::DISTRIBUTIONS;
 use super::form::{describe_parameter, number};
 use super::keys::table;
 use super::sections::described;
-use super::{Form, Key, Read};
+use super::{Form, Key};
+use crate::Model;
 use crate::plan::MAX_POINTS;
 
 /// The identifier of the draft.
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
 /// Returns the schema of a model's grid files.
-pub fn grid<M: Read>() -> Value {
+pub fn grid<M: Model>() -> Value {
     let mut described = described::<M>();
     let key = Key::new("set", "constants, by the names of `sweep parameters`");
     described.add(key, M::schema_of_set());
@@ -46,17 +47,17 @@ pub fn document(title: &str, mut schema: Value) -> Value {
 }
 
 /// Returns the schema of a parameter's number.
-pub fn parameter_schema(parameter: &impl Parameter) -> Value {
-    let mut schema = number(parameter.range());
+pub fn parameter_schema(parameter: &Parameter<impl Sized>) -> Value {
+    let mut schema = number(parameter.range);
     schema["description"] = describe_parameter(parameter).into();
     schema
 }
 
 /// Returns the schema of `[set]`: parameters by name, and numbered elements as patterns.
-pub fn set(parameters: &[impl Parameter], patterns: Map<String, Value>) -> Value {
+pub fn set(parameters: &[Parameter<impl Sized>], patterns: Map<String, Value>) -> Value {
     let properties: Map<String, Value> = parameters
         .iter()
-        .map(|parameter| (parameter.name().to_owned(), parameter_schema(parameter)))
+        .map(|parameter| (parameter.name.to_string(), parameter_schema(parameter)))
         .collect();
     json!({
         "type": "object",

@@ -4,18 +4,19 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::json;
-use sweep_parameter::{Channel, Range, decimal};
+use sweep_parameter::{Range, decimal};
 
 use super::form::Numbers;
 use super::keys::{Description, Variants};
 use super::{
-    Diagnostic, Field, Form, GridInput, Key, KeyWalk, Keys, Located, Location, Read, Report,
-    Section, design,
+    Diagnostic, Field, Form, GridInput, Key, KeyWalk, Keys, Located, Location, Report, Section,
+    design,
 };
-use crate::method::{Integrator, Setting, default_method};
+use crate::method::{IntegrationMethod, Integrator, Setting};
 use crate::plan::{MAX_END_S, Plan, RATIO_MIN, ReadingNotes, Reliability, WrittenIn};
+use crate::{GridTable, Model};
 
-impl<M: Read> Plan<M> {
+impl<M: Model> Plan<M> {
     /// Returns the plan of a grid file without keys: the defaults.
     pub(super) fn blank() -> Self {
         let end_s = 50.0;
@@ -24,10 +25,13 @@ impl<M: Read> Plan<M> {
             model: M::blank(),
             end_s,
             window_s: [0.0, end_s],
-            integrator: default_method::<M::Integrator>().with_defaults(),
+            integrator: M::ABOUT.default_method().with_defaults(),
             axes: Vec::new(),
             design: None,
-            reliability: Reliability { limits: 2.0.into(), channels: M::default_channels() },
+            reliability: Reliability {
+                limits: 2.0.into(),
+                channels: M::ABOUT.default_channels.to_vec(),
+            },
             set: Vec::new(),
             written: WrittenIn::default(),
             aside: ReadingNotes::default(),
@@ -36,18 +40,18 @@ impl<M: Read> Plan<M> {
 }
 
 /// Walks over every key of a plan except its axes and `[set]`.
-pub fn walk<M: Read>(plan: &mut Plan<M>, keys: &mut Keys<'_>) {
+pub fn walk<M: Model>(plan: &mut Plan<M>, keys: &mut Keys<'_>) {
     sections(plan, keys, None);
     design::walk(&mut plan.design, keys);
 }
 
 /// Returns the description of the keys of grid files, except axes and `[set]`.
-pub fn described<M: Read>() -> Description {
+pub fn described<M: Model>() -> Description {
     Keys::described(true, |keys| walk(&mut Plan::<M>::blank(), keys))
 }
 
 /// Walks over the keys that are read before `[set]`; `input` is the grid that is read.
-pub(super) fn sections<M: Read>(
+pub(super) fn sections<M: Model>(
     plan: &mut Plan<M>,
     keys: &mut Keys<'_>,
     input: Option<&GridInput<M>>,
@@ -62,18 +66,18 @@ pub(super) fn sections<M: Read>(
         Field::Given(Located { value: name.into(), at: root.at().clone() })
     };
     keys.key(Key::new("name", about), &Form::Own(&read, schema), name);
-    model.walk(keys, input);
+    model.walk(GridTable::Top, keys, input);
     keys.table(Key::new("time", "").needed("a section [time]"), |keys| time(end_s, window_s, keys));
-    keys.table(Key::new("integrator", ""), |keys| method(integrator, keys));
+    keys.table(Key::new("integrator", ""), |keys| method(M::ABOUT.methods, integrator, keys));
     keys.table(Key::new("reliability", ""), |keys| {
-        model.walk_reliability(keys);
+        model.walk(GridTable::Reliability, keys, input);
         let Reliability { limits, channels } = reliability;
         let key = Key::new("ratio_limit", "a point is reliable where every ratio is below this");
         keys.key(key.set(), &Form::Number(Range::Positive), &mut limits.most);
         let about = "if given, a point is reliable where every ratio is above this too";
         keys.key(Key::new("ratio_min", about).set(), &Form::Number(RATIO_MIN), &mut limits.least);
         let key = Key::new("channels", "channels that are compared").set();
-        keys.words(key, "channel", M::channels(), M::Channel::name, channels);
+        keys.words(key, "channel", M::ABOUT.channels, |channel| channel.name, channels);
     });
 }
 
@@ -189,8 +193,7 @@ fn window(
 }
 
 /// Walks over the method and its settings.
-fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
-    let all = I::methods();
+fn method(all: &'static [IntegrationMethod], integrator: &mut Integrator, keys: &mut Keys<'_>) {
     let variants = Variants {
         all: all.iter().map(|entry| (entry.name, entry.description)).collect(),
         default: Some(all.len() - 1),
@@ -216,7 +219,7 @@ fn method<I: Integrator>(integrator: &mut I, keys: &mut Keys<'_>) {
         }
         // Settings that the old and the new method share keep their values.
         let was = integrator.settings();
-        *integrator = (entry.with)(&mut |&Setting { key, range, default, description, help }| {
+        *integrator = entry.with(|&Setting { key, range, default, description, help }| {
             let was = was.iter().find(|(known, _)| *known == key);
             let mut number = was.map_or(default, |(_, number)| *number);
             let setting = Key::new(key, description).set();

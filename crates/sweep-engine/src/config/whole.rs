@@ -6,9 +6,9 @@ use std::iter::{once, repeat};
 use sweep_parameter::decimal;
 
 use super::{Diagnostic, Draft, Location, Sources};
-use crate::method::{Integrator as _, Steps};
+use crate::method::Steps;
 use crate::plan::{MAX_STEPS, shortest_step_s};
-use crate::{Model, Scenario};
+use crate::{Model, ModelParameter, Scenario};
 
 /// Reports a window that is invalid at a corner of the grid.
 pub fn windows<M: Model>(draft: &Draft<'_, M>) {
@@ -55,9 +55,8 @@ pub fn refuse<M: Model>(draft: &Draft<'_, M>, title: String, concerns: &[String]
 /// Returns the locations of the concerned numbers: the axes that sweep them first, then files and
 /// arguments.
 fn places<M: Model>(draft: &Draft<'_, M>, concerns: &[String], sources: &Sources) -> Vec<Location> {
-    let sweeps = |parameter: &M::Parameter| {
-        let parts = draft.plan.model.parts(parameter);
-        parts.iter().any(|part| concerns.iter().any(|key| key == part))
+    let sweeps = |parameter: &ModelParameter<M>| {
+        parameter.parts.iter().any(|part| concerns.iter().any(|key| key == part))
     };
     let axes = draft.plan.axes.iter().enumerate().filter(|(_, axis)| sweeps(&axis.parameter));
     let axes = axes.filter_map(|(k, _)| draft.report.place(&format!("axis[{k}]")));

@@ -1,19 +1,18 @@
 //! The file of a study: a row for each candidate, in the order of evaluation.
 
 use sweep_files::key;
-use sweep_parameter::Parameter as _;
 use sweep_results::Goal;
 
 use super::study::Objective;
 use super::{Candidate, Study, front};
 use crate::store::{Column, Holds, TrialColumns};
-use crate::{Axis, GridInput, Rows, Table};
+use crate::{Axis, GridInput, Model, Table};
 
 /// Returns the table of a study's candidates.
-pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
+pub fn table<M: Model>(study: &Study<M>, tried: &[Candidate]) -> Table {
     let objectives = study.objectives.len();
     let front = front(tried, objectives);
-    let mut table = Table::new(M::BUILD);
+    let mut table = Table::new(M::ABOUT.build);
     table.counts("candidate", "index, in the order of trial", 0..tried.len() as u64);
     table.counts("generation", "from 0", tried.iter().map(|one| one.generation));
     let values: Vec<Vec<f64>> = tried.iter().map(|one| study.values(&one.place)).collect();
@@ -50,11 +49,11 @@ pub fn table<M: Rows>(study: &Study<M>, tried: &[Candidate]) -> Table {
 
 /// Returns the columns of trials: the candidate and its parameters, then its objectives and its
 /// excesses over the conditions.
-pub fn trial_columns<M: Rows>(study: &Study<M>) -> TrialColumns {
+pub fn trial_columns<M: Model>(study: &Study<M>) -> TrialColumns {
     let number = Column::new("candidate", "1", "index, in the order of trial", Holds::Count);
     let mut keys = vec![number];
     keys.extend(parameters(study).iter().map(|Axis { parameter, .. }| {
-        Column::new(parameter.name(), parameter.unit(), parameter.description(), Holds::Axis)
+        Column::new(&*parameter.name, parameter.unit, parameter.description, Holds::Axis)
     }));
     let mut answers = Vec::with_capacity(study.answers());
     for Objective { name, goal, .. } in &study.objectives {
@@ -77,7 +76,7 @@ fn excess_name(condition: usize) -> String {
 }
 
 /// Returns the axes of a study's parameters.
-pub fn parameters<M: Rows>(study: &Study<M>) -> &[Axis<M>] {
+pub fn parameters<M: Model>(study: &Study<M>) -> &[Axis<M>] {
     &study.plan.axes[study.grid.axes.len()..]
 }
 
@@ -103,7 +102,7 @@ fn best(tried: &[Candidate], front: &[usize], objectives: usize) -> Option<usize
 }
 
 /// Returns the model's own file with these values of the parameters, if the model has one.
-pub fn own_file<M: Rows>(study: &Study<M>, values: &[f64]) -> Option<String> {
+pub fn own_file<M: Model>(study: &Study<M>, values: &[f64]) -> Option<String> {
     let mut plan = study.grid.clone();
     let mut scenario = crate::plan::Scenario { model: plan.model, window_s: plan.window_s };
     for (axis, &value) in parameters(study).iter().zip(values) {

@@ -8,7 +8,7 @@ use arrow_schema::ArrowError;
 use super::{Candidate, Study, evolve};
 use crate::evaluator::{CachedEvaluator, RequestValues, Stopped};
 use crate::store::{Done, Key, Layout, ResultRows, Row, Trials};
-use crate::{Effort, Error, Progress, StoreError, Swept};
+use crate::{Effort, Error, Model, Progress, StoreError};
 use sweep_files::panics::{lock, unlocked};
 use sweep_results::{Goal, Slack};
 
@@ -17,7 +17,7 @@ use sweep_results::{Goal, Slack};
 ///
 /// # Errors
 /// A model without an engine, threads that cannot be started, and trials that cannot be stored.
-pub fn search<M: Swept>(
+pub fn search<M: Model>(
     study: &Study<M>,
     trials: Option<Trials>,
     effort: Effort<'_>,
@@ -55,7 +55,7 @@ pub fn search<M: Swept>(
 ///
 /// # Errors
 /// A model without an engine, and threads that cannot be started.
-pub fn slacks<M: Swept>(
+pub fn slacks<M: Model>(
     study: &Study<M>,
     values: &[f64],
     effort: Effort<'_>,
@@ -84,7 +84,7 @@ pub(crate) fn defect(error: ArrowError) -> StoreError {
 }
 
 /// Returns the objectives of a candidate, then its constraint violations.
-fn answer<M: Swept>(
+fn answer<M: Model>(
     study: &Study<M>,
     layout: &Layout,
     values: &[f64],
@@ -100,7 +100,7 @@ fn answer<M: Swept>(
 }
 
 /// Returns the rows of a candidate's points as a batch.
-fn batch<M: Swept>(
+fn batch<M: Model>(
     study: &Study<M>,
     layout: &Layout,
     values: &[f64],

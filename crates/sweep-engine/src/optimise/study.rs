@@ -1,11 +1,10 @@
 //! Study files: objectives, parameters and conditions of an optimisation.
 
-use std::borrow::Cow;
 use std::path::Path;
 
 use serde_json::{Value, json};
 use sweep_files::FileKind;
-use sweep_parameter::{Parameter as _, Range};
+use sweep_parameter::Range;
 use sweep_results::{Column, ExpressionError, Goal, columns};
 
 use super::Evolution;
@@ -21,7 +20,7 @@ use crate::config::{
     Diagnostic, Draft, Field, Located, Location, Report, Section, whole, written_twice,
 };
 use crate::design::{DesignRule, MOST_AXES};
-use crate::{AxisValues, Design, Diagnostics, GridInput, Job, Model, Plan, Rows};
+use crate::{AxisValues, Design, Diagnostics, GridInput, Job, Model, ModelParameter, Plan};
 
 /// Maximum number of candidates. Basis: a file of some 100 MB. Doubling it doubles that.
 const MAX_CANDIDATES: u64 = 1_000_000;
@@ -74,7 +73,7 @@ pub struct Objective {
     pub sign: f64,
 }
 
-impl<M: Rows> Study<M> {
+impl<M: Model> Study<M> {
     /// Reads a study file and the grid file that it names; `sets` override constants of the grid.
     ///
     /// # Errors
@@ -118,7 +117,7 @@ impl<M: Rows> Study<M> {
         }
         let plan = draft.map(|draft| draft.plan);
         let axes = plan.as_ref().map_or(&[][..], |plan| &plan.axes);
-        let names: Vec<String> = axes.iter().map(|axis| axis.parameter.name().to_owned()).collect();
+        let names: Vec<String> = axes.iter().map(|axis| axis.parameter.name.to_string()).collect();
         let known = plan.as_ref().map_or_else(Vec::new, |plan| columns(&M::layout(plan).schema()));
         let rows = grid.as_ref().map_or(1, Plan::points);
         if rows > MAX_ROWS {
@@ -217,7 +216,7 @@ fn flatten<M: Model>(plan: &mut Plan<M>) {
 }
 
 /// Reads every `[[parameter]]` and adds an axis for each valid one.
-fn parameters<M: Rows>(
+fn parameters<M: Model>(
     root: &Section<'_>,
     sections: Vec<Section<'_>>,
     design: Option<&Design>,
@@ -236,7 +235,7 @@ fn parameters<M: Rows>(
         let name = section.require(section.text("name"), "name", "the name of a parameter");
         let tolerance = section.number("tolerance", Range::NonNegative);
         let found = name.as_ref().zip(draft.as_ref()).and_then(|(name, draft)| find(name, draft));
-        let range = found.as_ref().map_or(Range::Any, |parameter| parameter.range());
+        let range = found.as_ref().map_or(Range::Any, |parameter| parameter.range);
         section.misplace(&["count"], "the study has `candidates`, and finds the values itself");
         let bounds = spacing(section, range, Some(2));
         let spread = match tolerance {
@@ -260,15 +259,15 @@ fn parameters<M: Rows>(
         else {
             continue;
         };
-        let model = &draft.plan.model;
-        let parts = model.parts(&parameter);
-        let shares = |theirs: &[Cow<'_, str>]| theirs.iter().any(|part| parts.contains(part));
-        let set = draft.constants.iter().find(|one| one.is_over_file && shares(&one.parts));
+        let shares = |theirs: &ModelParameter<M>| {
+            theirs.parts.iter().any(|part| parameter.parts.contains(part))
+        };
+        let set = draft.constants.iter().find(|one| one.is_over_file && shares(&one.parameter));
         let swept = || {
             let mut axes = draft.plan.axes.iter().enumerate();
-            let (k, axis) = axes.find(|(_, axis)| shares(&model.parts(&axis.parameter)))?;
+            let (k, axis) = axes.find(|(_, axis)| shares(&axis.parameter))?;
             let at = report.place(&format!("axis[{k}]"))?;
-            Some(Located { value: axis.parameter.name().to_owned(), at })
+            Some(Located { value: axis.parameter.name.to_string(), at })
         };
         if let Some(first) = set.map(|constant| constant.name.clone()).or_else(swept) {
             report.push(written_twice(&name, &first));
@@ -289,7 +288,7 @@ fn parameters<M: Rows>(
 }
 
 /// Returns whether a design has room for another axis.
-fn spreads<M: Rows>(design: Option<&Design>, draft: &Option<Draft<'_, M>>) -> bool {
+fn spreads<M: Model>(design: Option<&Design>, draft: &Option<Draft<'_, M>>) -> bool {
     let axes = draft.as_ref().map_or(0, |draft| draft.plan.axes.len());
     match design {
         None | Some(Design::List { .. }) => false,

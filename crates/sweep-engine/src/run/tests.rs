@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::*;
 use crate::store::synthetic;
-use crate::{RowSink, RowSource};
+use crate::{Evaluator, RowSink, RowSource};
 
 const POINTS: u64 = 81;
 
@@ -23,7 +23,7 @@ impl<F: Fn(u64) + Sync> FormulaEngine<F> {
     }
 }
 
-impl<F: Fn(u64) + Sync> Engine for FormulaEngine<F> {
+impl<F: Fn(u64) + Sync> Evaluator for &FormulaEngine<F> {
     fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>) {
         rayon::broadcast(|_| {
             while let Some((point, _)) = source() {
@@ -36,10 +36,17 @@ impl<F: Fn(u64) + Sync> Engine for FormulaEngine<F> {
             }
         });
     }
+}
 
-    fn simd(&self) -> &str {
-        "none"
-    }
+/// Runs a job with the engine of a formula.
+fn run(
+    formula: &FormulaEngine<impl Fn(u64) + Sync>,
+    job: &Job<'_>,
+    output: &Path,
+    options: RunOptions<'_>,
+    interrupt: &Interrupt,
+) -> Result<RunReport, StoreError> {
+    super::run(&Engine::new(formula, "none"), job, output, options, interrupt)
 }
 
 fn options(threads: usize) -> RunOptions<'static> {

@@ -12,11 +12,11 @@ fn columns(measures: &Measures) -> Columns {
     Columns::for_measures(&CHANNELS, 2.0.into(), measures, false)
 }
 
-fn layout(measures: Measures) -> Layout {
+fn layout(measures: Measures) -> sweep_engine::store::Layout {
     let axis =
         |name: &str, unit: &str| Column::new(name, unit, format!("swept {name}"), Holds::Axis);
     let axes = vec![axis("unbalance_mass_kg", "kg"), axis("damping_n_s_per_m", "N s/m")];
-    Layout::map(axes, columns(&measures).declared())
+    sweep_engine::store::Layout::map(axes, columns(&measures).declared())
 }
 
 #[test]

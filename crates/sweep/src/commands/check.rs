@@ -66,9 +66,10 @@ impl Assumed {
         let Washer { machine, spin, .. } = &plan.model;
         let mut all = Vec::new();
         for parameter in Parameter::all(machine, spin) {
-            let is_swept = plan.axes.iter().any(|axis| {
-                axis.parameter.parts(machine).iter().any(|part| part == parameter.name())
-            });
+            let is_swept = plan
+                .axes
+                .iter()
+                .any(|axis| axis.parameter.parts.iter().any(|part| part == parameter.name()));
             let Some(assumption) = parameter.assumption() else { continue };
             if is_swept || !plan.written.is_assumed(parameter.name()) {
                 continue;
@@ -150,7 +151,10 @@ impl Trial {
             }
             first += number.ends.len();
             let values = AxisValues::List(row.repeat(points.len()));
-            trial.axes.push(sweep_engine::Axis { parameter: number.parameter.clone(), values });
+            trial.axes.push(sweep_engine::Axis {
+                parameter: plan.model.parameter(number.parameter.clone()),
+                values,
+            });
         }
         let rows = (stride * points.len()) as u64;
         let file = "assumed numbers".to_owned();

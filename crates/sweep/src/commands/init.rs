@@ -64,12 +64,11 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::method::Integrator;
-    use sweep_engine::method::Integrator as _;
+    use crate::method::METHODS;
 
     #[test]
     fn the_starter_shows_every_method_and_setting() {
-        for entry in Integrator::methods() {
+        for entry in &METHODS {
             assert!(GRID.contains(&format!("\"{}\"", entry.name)), "no {}", entry.name);
             for setting in entry.settings {
                 let line = format!("{} = {:e}", setting.key, setting.default);

@@ -12,10 +12,10 @@ use super::command;
 use crate::columns::Columns;
 use crate::config::machine::with_one_of_each;
 use crate::dwell::columns as dwell_columns;
-use crate::method::Integrator;
+use crate::method::METHODS;
 use arrow_schema::Schema;
+use sweep_engine::Model as _;
 use sweep_engine::columns::declared;
-use sweep_engine::method::{Integrator as _, default_method};
 use sweep_engine::store::{Column, Holds, Layout};
 use sweep_files::key;
 
@@ -107,8 +107,8 @@ fn methods() -> String {
     );
     push_row(&mut text, &["`method`", "what it does", "key", "meaning", "default", "values"]);
     push_row(&mut text, &["---"; 6]);
-    for entry in Integrator::methods() {
-        let is_default = entry.name == default_method::<Integrator>().name;
+    for entry in &METHODS {
+        let is_default = entry.name == crate::Washer::ABOUT.default_method().name;
         let name = format!("`{}`{}", entry.name, if is_default { ", the default" } else { "" });
         // Only the first key's row has the name and the description.
         let heads = [[name.as_str(), entry.description]].into_iter().chain(iter::repeat([""; 2]));

@@ -38,7 +38,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, Error> {
     }
     let interrupt = installed()?;
     let options = if args.keep_traces { " --keep-traces" } else { "" };
-    let report = execute(&args.run, &plan, &engine, &interrupt, options)?;
+    let report =
+        execute(&args.run, &plan, &engine.for_plan(&plan).into_engine(), &interrupt, options)?;
     let output = args.run.target.output(&plan);
     if args.keep_traces && matches!(report.ended, Ended::Already(..) | Ended::Finished(_)) {
         let threads = threads::count(args.run.work.effort.threads, &threads::process)?;

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use crate::engine::ModelEngine;
-use crate::plan::Plan;
+use crate::method::direct;
+use crate::plan::{Plan, compared_channels};
 use crate::trace::{
     Models, StartValue, TraceExtras, TraceSettings, TraceTable, check_spacing, parse_start_value,
     start_from, trace_in_pool,
@@ -113,7 +114,7 @@ fn choose_point(args: &Args) -> Result<Vec<String>, Error> {
     if point >= plan.points() {
         return Err(Error::option("--point", point, format!("from 0 to {}", plan.points() - 1)));
     }
-    let names = plan.axes.iter().map(|axis| axis.parameter.name());
+    let names = plan.axes.iter().map(|axis| &*axis.parameter.name);
     // `Display` writes the shortest decimals that parse to the same values.
     Ok(names.zip(plan.axis_values(point)).map(|(name, value)| format!("{name}={value}")).collect())
 }
@@ -157,7 +158,7 @@ fn summarise_row(plan: &Plan, at: &[String], trace_level: Option<Level>) -> Resu
     plan.model.held_speeds = None;
     let mut outcomes = ModelEngine::new(&plan)?.evaluate_at(&[Vec::new()]);
     let Some(outcome) = outcomes.pop() else { return Ok(String::new()) };
-    let channels = &plan.reliability.channels;
+    let channels = &compared_channels(&plan);
     let limits = plan.reliability.limits;
     let verdict = Verdict::new(&outcome, channels.len(), limits);
     let number = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), short);
@@ -196,7 +197,7 @@ fn summarise_row(plan: &Plan, at: &[String], trace_level: Option<Level>) -> Resu
         _ => "undefined: no ratio is defined".to_owned(),
     };
     text.line("verdict", &verdict_text);
-    if let Some(trace_level) = trace_level.filter(|_| plan.integrator.direct().is_none()) {
+    if let Some(trace_level) = trace_level.filter(|_| direct(&plan.integrator).is_none()) {
         let [row, trace] = [outcome.method, trace_level].map(Level::name);
         let methods = format!("{row}, as in the point's row of a map; the file: {trace}");
         text.line("method", methods);

@@ -3,6 +3,7 @@
 
 mod sheet;
 
+use crate::model::engine_parameter;
 use std::slice;
 use std::sync::LazyLock;
 
@@ -259,14 +260,25 @@ pub(crate) fn to_json(machine: &Machine) -> Value {
     Keys::described(false, |keys| walk(&mut machine.clone(), keys)).finish()
 }
 
-/// Whether machine files have this key at the top.
-pub(super) fn is_key(key: &str) -> bool {
-    let mut parts = SECTIONS.iter().zip(&*KEYS);
-    parts.any(|(section, own)| match section.name {
-        "" => key == MOVING_MASS || own.iter().any(|own| own.name == key),
-        section => section == key,
-    })
-}
+/// The keys at the top of machine files.
+pub(crate) const MACHINE_KEYS: [&str; 16] = [
+    "gravity_m_per_s2",
+    "radial_clearance_m",
+    MOVING_MASS,
+    "tub",
+    "shaft",
+    "drum",
+    "unbalance",
+    "flexure",
+    "bearings",
+    "cabinet",
+    "springs",
+    "dampers",
+    "stops",
+    "bushings",
+    "further_unbalances",
+    "feet",
+];
 
 /// Walks over every section.
 fn walk(machine: &mut Machine, keys: &mut Keys<'_>) {
@@ -374,12 +386,18 @@ impl MachineKey {
                 )
             }
             IfOmitted::Auto => {
-                let schema = json!({ "anyOf": [parameter_schema(first), { "const": AUTO }] });
+                let schema =
+                    parameter_schema(&engine_parameter(first.clone(), machine, &no_spin()));
+                let schema = json!({ "anyOf": [schema, { "const": AUTO }] });
                 (Form::Own(&or_auto, schema), String::new(), String::new())
             }
             _ => {
                 let expected = format!("{}: {}", first.description(), first.range());
-                (Form::Number(first.range()), describe_parameter(first), expected)
+                (
+                    Form::Number(first.range()),
+                    describe_parameter(&engine_parameter(first.clone(), machine, &no_spin())),
+                    expected,
+                )
             }
         };
         let is_assumed = keys.is_schema() || sheet.is_given;
@@ -481,4 +499,22 @@ pub(crate) fn to_toml(machine: &Machine, written: &WrittenIn) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn the_listed_keys_are_those_that_are_read() {
+        let top = |(section, own): (&MachineSection, &Vec<MachineKey>)| match section.name {
+            "" => own.iter().map(|key| key.name.clone()).collect(),
+            name => vec![name.to_owned()],
+        };
+        let mut read: BTreeSet<String> = SECTIONS.iter().zip(&*KEYS).flat_map(top).collect();
+        read.insert(MOVING_MASS.to_owned());
+        assert_eq!(read, MACHINE_KEYS.map(str::to_owned).into());
+    }
 }

@@ -32,7 +32,7 @@ pub(super) fn note_unusual_numbers(draft: &Draft<'_, Washer>) {
     }
     for axis in &plan.axes {
         let ends = axis.values.extremes();
-        notes.extend(ends.into_iter().find_map(|end| unusual_note(&axis.parameter, end)));
+        notes.extend(ends.into_iter().find_map(|end| unusual_note(&axis.parameter.handle, end)));
     }
     let unbalance_kg = machine.unbalance.mass_kg;
     let moving_kg = machine.tub.mass_kg + machine.shaft.mass_kg + machine.drum.mass_kg;

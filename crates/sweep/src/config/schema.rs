@@ -1,5 +1,6 @@
 //! JSON Schema of `[set]` in grid files.
 
+use crate::model::engine_parameter;
 use serde_json::{Map, Value};
 use sweep_engine::config::schema::{parameter_schema, set as set_schema};
 use washer_model::{ElementList, Parameter, Profile, Spin};
@@ -8,16 +9,18 @@ use super::machine::with_one_of_each;
 
 /// Returns the schema of `[set]`. Parameters are properties; those of numbered elements are
 /// patterns.
-pub(super) fn schema_of_set() -> Value {
+pub(crate) fn schema_of_set() -> Value {
     let spin = Spin::Ramped { profile: Profile::Triangular, peak_rpm: 0.0, ramp_s: 0.0 };
     let machine = with_one_of_each();
-    let mut all = Parameter::all(&machine, &spin);
     let table = Spin::Table { time_s: vec![0.0], speed_rpm: vec![0.0] };
-    all.extend(Parameter::all(&machine, &table));
+    let all = [spin, table].map(|spin| {
+        let all = Parameter::all(&machine, &spin).into_iter();
+        all.map(|parameter| engine_parameter(parameter, &machine, &spin)).collect::<Vec<_>>()
+    });
     let mut single = Vec::new();
     let mut patterns = Map::new();
-    for parameter in &all {
-        let name = parameter.name();
+    for parameter in all.iter().flatten() {
+        let name = &parameter.name;
         let lists = ElementList::all().map(|list| (list.element, list.first));
         let mut lists = lists.chain([("spin_table", 1)]);
         let rest = |element| name.strip_prefix(element)?.strip_prefix('_');

@@ -2,6 +2,7 @@
 
 mod cycle;
 
+use crate::model::engine_parameter;
 use std::path::Path;
 
 use sweep_engine::config::form::{Numbers, describe_parameter};
@@ -17,7 +18,7 @@ use cycle::Joints;
 pub(super) const MAX_ROWS: usize = 20_000;
 
 /// The spin in place of a wrong one, so that axes over its numbers are known.
-pub(super) const BLANK: Spin =
+pub(crate) const BLANK: Spin =
     Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 };
 
 /// Returns a description of a profile that is given by a peak and a ramp.
@@ -128,9 +129,10 @@ fn walk_ramp(profile: Profile, spin: &mut Spin, keys: &mut Keys<'_>) {
         ("ramp_s", "spin_ramp_s", "the duration of the run-up in s", &mut *ramp_s),
     ] {
         if let Ok(parameter) = Parameter::find(parameter, &Machine::paper(), &BLANK) {
-            let about = describe_parameter(&parameter);
+            let range = parameter.range();
+            let about = describe_parameter(&engine_parameter(parameter, &Machine::paper(), &BLANK));
             let key = Key::new(key, &about).needed(expected);
-            let found = keys.key(key, &Form::Number(parameter.range()), value);
+            let found = keys.key(key, &Form::Number(range), value);
             is_right &= matches!(found, Field::Given(_)) || keys.section().is_none();
         }
     }

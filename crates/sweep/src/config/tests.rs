@@ -21,7 +21,7 @@ use washer_model::{Machine, Profile, Spin};
 use washer_row::{Measures, Metric};
 
 use super::*;
-use crate::method::Integrator;
+use crate::method::{METHODS, rk4, rk4_mass_scaled};
 use crate::plan::AxisValues;
 use sweep_engine::design::{Design, DesignRule};
 use sweep_engine::plan::WrittenIn;
@@ -124,23 +124,24 @@ fn omitted_keys_have_their_defaults() {
         Spin::Ramped { profile: Profile::Triangular, peak_rpm: 350.0, ramp_s: 50.0 }
     );
     assert_eq!((plan.end_s, plan.window_s), (50.0, [0.0, 50.0]));
-    assert_eq!(plan.integrator, Integrator::Rk4MassScaled { accuracy: 1e-3 });
+    assert_eq!(plan.integrator, rk4_mass_scaled(1e-3));
     assert_eq!(plan.points(), 1);
     assert_eq!(plan.reliability.limits, 2.0.into());
-    let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name()).collect();
+    let channels: Vec<_> = plan.reliability.channels.iter().map(|channel| channel.name).collect();
     assert_eq!(
         channels,
         ["tub_front_y", "tub_front_z", "drum_front_y", "drum_front_z", "tub_yaw", "tub_pitch"]
     );
+    let adaptive = |name: &str, rtol: f64, atol: f64| {
+        let method = METHODS.iter().find(|method| method.name == name).unwrap();
+        method.with(|setting| if setting.key == "rtol" { rtol } else { atol })
+    };
     let method =
         |text: &str| load_text(format!("{SMALLEST}[integrator]\n{text}"), &[]).unwrap().integrator;
-    assert_eq!(method("method = \"rk4\""), Integrator::Rk4 { step_s: 2e-4 });
-    assert_eq!(method("method = \"dopri5\""), Integrator::Dopri5 { rtol: 1e-6, atol: 1e-9 });
-    assert_eq!(
-        method("method = \"additive\"\nrtol = 1e-8"),
-        Integrator::Additive { rtol: 1e-8, atol: 1e-9 }
-    );
-    assert_eq!(method("accuracy = 1e-4"), Integrator::Rk4MassScaled { accuracy: 1e-4 });
+    assert_eq!(method("method = \"rk4\""), rk4(2e-4));
+    assert_eq!(method("method = \"dopri5\""), adaptive("dopri5", 1e-6, 1e-9));
+    assert_eq!(method("method = \"additive\"\nrtol = 1e-8"), adaptive("additive", 1e-8, 1e-9));
+    assert_eq!(method("accuracy = 1e-4"), rk4_mass_scaled(1e-4));
 }
 
 #[test]

@@ -8,14 +8,14 @@ use washer_model::{
     ElementList, NoModes, Point, Spin, Target, Violation, decimal,
     highest_explicit_frequency_rad_per_s, highest_frequency_rad_per_s, prepare,
 };
-use washer_row::Criterion;
+use washer_row::{Criterion, Level};
 
-use crate::method::{Integrator, REFERENCE_SHARE};
+use crate::method::{REFERENCE_SHARE, direct};
 use crate::model::Washer;
 use crate::plan::{Plan, Scenario, timing};
 use sweep_engine::config::whole::{refuse, refuse_step, window};
 use sweep_engine::config::{Diagnostic, Draft};
-use sweep_engine::method::{Integrator as _, Steps};
+use sweep_engine::method::Steps;
 use sweep_engine::plan::{MAX_STEPS, shortest_step_s};
 
 /// Maximum number of turns of the drum in a window for the criterion that compares turns. Basis: 20
@@ -75,7 +75,7 @@ impl VaryingParts {
 
     fn new(plan: &Plan) -> Self {
         let any = |is_part: fn(Target) -> bool| {
-            plan.axes.iter().any(|axis| is_part(axis.parameter.target()))
+            plan.axes.iter().any(|axis| is_part(axis.parameter.handle.target()))
         };
         Self {
             machine: any(|target| !matches!(target, Target::Spin | Target::Window(_))),
@@ -188,7 +188,8 @@ pub(crate) fn check_stability(draft: &Draft<'_, Washer>) {
     let end_s = draft.plan.end_s;
     let is_too_fast =
         |frequency: f64| share * RK4_STABILITY_LIMIT / frequency < shortest_step_s(end_s);
-    let is_additive = matches!(draft.plan.integrator, Integrator::Additive { .. });
+    let is_additive =
+        direct(&draft.plan.integrator).is_some_and(|(level, _)| level == Level::Additive);
     let by_method = if is_additive {
         highest_explicit_frequency_rad_per_s
     } else {

@@ -16,6 +16,7 @@ use super::algebra::{centred, dot};
 use super::measured::{Measurement, Signal, SignalQuantity};
 use super::speed::Smoothed;
 use crate::engine::reference_step_s;
+use crate::method::direct;
 use crate::plan::{Plan, prepare_point};
 use sweep_engine::plan::WrittenIn;
 use sweep_engine::threads::Cancel;
@@ -129,7 +130,7 @@ impl Problem<'_> {
     /// Selects the integration method: the grid's where that is one, else the reference's step,
     /// which depends on the machine at the start alone.
     pub(crate) fn method(cases: &[FitCase]) -> Result<Method, washer_model::NoEquilibrium> {
-        if let Some((_, method)) = cases.iter().find_map(|case| case.plan.integrator.direct()) {
+        if let Some((_, method)) = cases.iter().find_map(|case| direct(&case.plan.integrator)) {
             return Ok(method);
         }
         let mut step_s = f64::INFINITY;

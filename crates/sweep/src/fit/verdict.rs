@@ -105,7 +105,7 @@ impl OnMap<'_> {
             let values = || sets.iter().map(|set| set[k]);
             let from = values().fold(f64::INFINITY, f64::min);
             let to = values().fold(f64::NEG_INFINITY, f64::max);
-            let parameter = problem.free[k].parameter.clone();
+            let parameter = plan.model.parameter(problem.free[k].parameter.clone());
             plan.axes.push(match from < to {
                 true => axis_between(parameter, from, to),
                 false => Axis { parameter, values: AxisValues::List(vec![from]) },

@@ -15,8 +15,8 @@ use super::result::MemoryTable;
 use super::run::EvaluationTask;
 use crate::engine::ModelEngine;
 use crate::plan::Plan;
+use sweep_engine::engine::IncompleteGroups;
 use sweep_engine::store::{BATCH_ROWS, Done, Layout, ResultRows};
-use sweep_engine::watch::IncompleteGroups;
 use sweep_engine::{Error, Job, Progress, RunContext, StoreError, threads};
 use sweep_files::panics::{self, lock};
 use washer_row::RefinementLevels;
@@ -69,7 +69,7 @@ impl PlanEvaluator {
     fn run_task<'a>(&'a self, job: Job<'a>) -> Result<EvaluationTask<'a>, Error> {
         let mut engine = ModelEngine::new(&self.plan)?;
         engine.levels = Arc::clone(&self.levels);
-        Ok(EvaluationTask { job, engine: Box::new(engine) })
+        Ok(EvaluationTask { job, engine: engine.into_engine() })
     }
 }
 
@@ -96,7 +96,7 @@ impl EvaluationTask<'_> {
             collector.add(outcome, &context);
             progress.show(context.points_done());
         };
-        let evaluate = || pool.install(|| engine.evaluate(&next, &keep, &context));
+        let evaluate = || pool.install(|| engine.evaluator.evaluate(&next, &keep, &context));
         let evaluated = catch_unwind(AssertUnwindSafe(evaluate));
         progress.finish();
         evaluated.map_err(|panic| {

@@ -24,7 +24,7 @@ pub enum RanToFile {
 /// A job with the engine that computes its rows.
 pub struct EvaluationTask<'a> {
     pub(super) job: Job<'a>,
-    pub(super) engine: Box<dyn Engine + 'a>,
+    pub(super) engine: Engine<'a>,
 }
 
 impl EvaluationTask<'_> {
@@ -48,7 +48,7 @@ impl EvaluationTask<'_> {
             environment: &|_| None,
             tell,
         };
-        let report = runner::run(&*self.engine, &self.job, output, options, effort.interrupt)?;
+        let report = runner::run(&self.engine, &self.job, output, options, effort.interrupt)?;
         report.notes.iter().for_each(|note| tell(note));
         Ok(match report.ended {
             Ended::Already(..) | Ended::Finished(_) => RanToFile::Whole(MemoryTable::read(output)?),

@@ -24,5 +24,5 @@ pub fn hold_speeds<'a>(
     check(plan, "speeds", &format!("with {} values", speeds_rpm.len()))?;
     search.map_or(Ok(()), |search| search.check())?;
     let held = HeldPlan { plan, speeds_rpm, search };
-    Ok(EvaluationTask { job: held.job(), engine: Box::new(held.engine()?) })
+    Ok(EvaluationTask { job: held.job(), engine: held.engine()? })
 }

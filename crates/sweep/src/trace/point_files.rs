@@ -49,7 +49,7 @@ pub(crate) fn write_point_traces(
             if stop() {
                 return Ok(());
             }
-            let names = plan.axes.iter().map(|axis| axis.parameter.name().to_owned());
+            let names = plan.axes.iter().map(|axis| axis.parameter.name.to_string());
             let at = names.zip(plan.axis_values(point)).collect();
             let level = level.and_then(|name| Level::named(&name));
             let settings = TraceSettings {

@@ -96,7 +96,7 @@ fn a_trace_by_a_rows_method_is_the_trajectory_of_the_row() {
             [("nonlinear", &row.nonlinear, 1e-5), ("linear", &row.linear, 1e-3)]
         {
             for (channel, amplitude) in plan.reliability.channels.iter().zip(&model.amplitudes) {
-                let sampled = peak(&rows, &format!("{name}_{}", channel.name()), from);
+                let sampled = peak(&rows, &format!("{name}_{}", channel.name), from);
                 // The trace may miss the peak, which lies between two instants.
                 let share = sampled / amplitude;
                 assert!((0.998..1.0 + over).contains(&share), "{row:?} {channel:?}: {share}");

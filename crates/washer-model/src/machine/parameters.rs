@@ -132,31 +132,6 @@ impl Target {
     }
 }
 
-impl sweep_parameter::Parameter for Parameter {
-    fn name(&self) -> &str {
-        self.name()
-    }
-
-    fn unit(&self) -> &'static str {
-        self.unit()
-    }
-
-    fn description(&self) -> &'static str {
-        self.description()
-    }
-
-    fn range(&self) -> Range {
-        self.range()
-    }
-
-    fn window_edge(&self) -> Option<usize> {
-        match self.target() {
-            Target::Window(edge) => Some(edge),
-            _ => None,
-        }
-    }
-}
-
 impl PartialEq for Parameter {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name

@@ -19,7 +19,7 @@ fn load_list(more: &str, list: &str) -> Result<Plan, String> {
 fn units_are_converted_and_ignored_columns_are_noted() {
     let list = "Unbalance mass [g];weather;damping_n_s_per_mm\n300;fair;0,12\n450;foul;0,1\n";
     let plan = load_list("", list).unwrap();
-    let names: Vec<&str> = plan.axes.iter().map(|axis| axis.parameter.name()).collect();
+    let names: Vec<&str> = plan.axes.iter().map(|axis| &*axis.parameter.name).collect();
     assert_eq!(names, ["unbalance_mass_kg", "damping_n_s_per_m"]);
     assert_eq!([plan.axis_values(0), plan.axis_values(1)], [[0.3, 120.0], [0.45, 100.0]]);
     let notes = plan.aside.notes.join("\n");

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use washer_row::{Level, Verdict};
 
 use super::super::*;
-use crate::method::Integrator;
+use crate::method::{rk4, rk4_mass_scaled};
 
 fn load(text: &str) -> Plan {
     let folder = tempfile::tempdir().unwrap();
@@ -47,12 +47,12 @@ fn error(a: &Outcome, b: &Outcome) -> f64 {
 
 /// Computes all rows by plain RK4 with a step (s).
 fn rows_by_rk4(plan: &Plan, step_s: f64) -> Vec<Outcome> {
-    rows(&Plan { integrator: Integrator::Rk4 { step_s }, ..plan.clone() })
+    rows(&Plan { integrator: rk4(step_s), ..plan.clone() })
 }
 
 /// Computes the row of one point by plain RK4 with a step (s).
 fn row_by_rk4(plan: &Plan, point: u64, step_s: f64) -> Outcome {
-    let plan = Plan { integrator: Integrator::Rk4 { step_s }, ..plan.clone() };
+    let plan = Plan { integrator: rk4(step_s), ..plan.clone() };
     ModelEngine::new(&plan).unwrap().evaluate_at(&[plan.axis_values(point)]).remove(0)
 }
 
@@ -65,7 +65,7 @@ fn compare_with_rk4(plan: &Plan, accuracy: f64) -> Vec<Outcome> {
 /// Every row that is marked as converged must have the same verdict and an error within 5 times the
 /// accuracy, and few rows may exceed the accuracy itself.
 fn compare_with_rk4_at(step_s: f64, plan: &Plan, accuracy: f64) -> Vec<Outcome> {
-    let fast = Plan { integrator: Integrator::Rk4MassScaled { accuracy }, ..plan.clone() };
+    let fast = Plan { integrator: rk4_mass_scaled(accuracy), ..plan.clone() };
     let rows = rows(&fast);
     let expected = rows_by_rk4(plan, step_s);
     let mut rows_beyond = 0;
@@ -269,7 +269,7 @@ fn a_row_near_the_limit_is_refined() {
 #[test]
 fn a_row_does_not_depend_on_the_rows_beside_it() {
     let plan = load(include_str!("../../../../../sweeps/quick.toml"));
-    let plan = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };
+    let plan = Plan { integrator: rk4_mass_scaled(1e-3), ..plan };
     let engine = ModelEngine::new(&plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
     let together = engine.evaluate_at(&values);
@@ -284,7 +284,7 @@ fn a_row_does_not_depend_on_the_rows_beside_it() {
 #[test]
 fn a_search_for_the_verdict_alone_gives_the_rows_verdict() {
     let plan = load(include_str!("../../../../../sweeps/quick.toml"));
-    let plan = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };
+    let plan = Plan { integrator: rk4_mass_scaled(1e-3), ..plan };
     let engine = ModelEngine::new(&plan).unwrap();
     let values: Vec<_> = (0..plan.points()).map(|point| plan.axis_values(point)).collect();
     let side_engine = ModelEngine { demand: Demand::Side, ..ModelEngine::new(&plan).unwrap() };
@@ -309,10 +309,10 @@ fn rows_of_a_drum_that_brakes_hard_follow_the_bearings() {
              [[axis]]\nparameter = \"damping_n_s_per_m\"\nvalues = [110, 280]\n",
             1.5 + brake_s
         ));
-        let fast = Plan { integrator: Integrator::Rk4MassScaled { accuracy: 1e-3 }, ..plan };
+        let fast = Plan { integrator: rk4_mass_scaled(1e-3), ..plan };
         let found = rows(&fast);
         // This step times the frequency of the bearings' fastest mode is 0.12.
-        let following = Integrator::Rk4 { step_s: 1.25e-5 };
+        let following = rk4(1.25e-5);
         let expected = rows(&Plan { integrator: following, ..fast });
         for (row, expected) in found.iter().zip(&expected) {
             assert_eq!((row.converged, row.sensitive), (Some(true), Some(false)), "{row:?}");

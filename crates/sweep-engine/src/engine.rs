@@ -1,5 +1,5 @@
-//! The interface between an engine and the run it serves: rows come from a source, results go to a
-//! sink, and a context carries cancellation, progress and known rows.
+//! The interface between an evaluator and the run it serves: rows come from a source, results go to
+//! a sink, and a context carries cancellation, progress and known rows.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -18,8 +18,8 @@ pub type RowSink<'a> = dyn Fn(Done) + Sync + 'a;
 /// A lookup of a row that was evaluated before.
 pub type RowLookup<'a> = dyn Fn(u64) -> Option<Done> + Sync + 'a;
 
-/// An engine, which evaluates the rows of a plan.
-pub trait Engine: Sync {
+/// An evaluator of the rows of a plan.
+pub trait Evaluator: Sync {
     /// Evaluates rows until the source is empty, on the grid or between its points, and passes each
     /// result to the sink, in any order. Leaves rows unevaluated only if [`RunContext::stopped`]
     /// holds. Works on all threads of the rayon pool that it is called in, and calls source and
@@ -28,14 +28,23 @@ pub trait Engine: Sync {
     /// A row that fails, even by a panic, is a result. A panic that leaves this function loses all
     /// rows that have left the source and not reached the sink.
     fn evaluate(&self, source: &RowSource<'_>, sink: &RowSink<'_>, context: &RunContext<'_>);
+}
 
-    /// Returns the name of the instruction set in use.
-    fn simd(&self) -> &str;
-
-    /// Returns whether consecutive rows share work. The source then keeps to the grid's order, and
+/// An evaluator with the facts that a run needs of it.
+pub struct Engine<'a> {
+    /// The evaluator.
+    pub evaluator: Box<dyn Evaluator + 'a>,
+    /// The name of the instruction set in use.
+    pub simd: &'static str,
+    /// Whether consecutive rows share work. The source then keeps to the grid's order, and
     /// otherwise takes chunks that are far apart.
-    fn is_helped_by_neighbours(&self) -> bool {
-        false
+    pub is_helped_by_neighbours: bool,
+}
+
+impl<'a> Engine<'a> {
+    /// Creates an engine of an evaluator whose rows share no work.
+    pub fn new(evaluator: impl Evaluator + 'a, simd: &'static str) -> Self {
+        Self { evaluator: Box::new(evaluator), simd, is_helped_by_neighbours: false }
     }
 }
 

@@ -1,0 +1,183 @@
+//! The washing machine as a model of the engine.
+
+use serde_json::Value;
+use sweep_engine::config::{Draft, Keys};
+use sweep_engine::store::{Layout, axis_columns};
+use sweep_engine::{About, Engine, Error, Estimate, GridTable, Model, ModelParameter, OwnFile};
+use washer_model::{Channel, Machine, Parameter, UnknownParameter};
+use washer_row::{Measures, Metric};
+
+use crate::columns::Columns;
+use crate::config::grid::missing_part;
+use crate::config::{WasherGridInput, read, spin};
+use crate::engine::ModelEngine;
+use crate::identity::BUILD;
+use crate::method::METHODS;
+use crate::model::{Washer, described};
+use crate::plan::Plan;
+
+/// Channels that are compared if the grid file names none.
+const DEFAULT_CHANNELS: [sweep_parameter::Channel; 6] = [
+    described(Channel::TubFrontY),
+    described(Channel::TubFrontZ),
+    described(Channel::DrumFrontY),
+    described(Channel::DrumFrontZ),
+    described(Channel::TubYaw),
+    described(Channel::TubPitch),
+];
+
+/// All channels, in the order of the models' output.
+const CHANNELS: [sweep_parameter::Channel; Channel::ALL.len()] = {
+    let mut channels = [described(Channel::TubFrontY); Channel::ALL.len()];
+    let mut k = 0;
+    while k < channels.len() {
+        channels[k] = described(Channel::ALL[k]);
+        k += 1;
+    }
+    channels
+};
+
+impl Model for Washer {
+    type Handle = Parameter;
+
+    const ABOUT: About = About {
+        default_channels: &DEFAULT_CHANNELS,
+        own_file: Some(OwnFile { key: "machine", keys: &read::MACHINE_KEYS }),
+        to_start: Some("`sweep init FILE` writes a grid file to start from"),
+        needed: &[
+            ("growth", HELD_SPEEDS),
+            ("dwell", HELD_SPEEDS),
+            ("foot", CABINET),
+            ("slip", CABINET),
+            ("walk", CABINET),
+            ("stop", "a machine with [[stops]]"),
+        ],
+        further: "; a machine with [cabinet] and feet, with stops, and a grid file with \
+                  [stability] have more",
+        ..About::new(BUILD, &CHANNELS, &METHODS)
+    };
+
+    fn blank() -> Self {
+        Self {
+            machine: Machine::paper(),
+            spin: spin::BLANK,
+            measures: Measures::default(),
+            held_speeds: None,
+        }
+    }
+
+    fn parameters(&self) -> Vec<ModelParameter<Self>> {
+        let all = Parameter::all(&self.machine, &self.spin).into_iter();
+        all.map(|parameter| self.parameter(parameter)).collect()
+    }
+
+    fn find(&self, name: &str) -> Result<ModelParameter<Self>, UnknownParameter> {
+        Parameter::find(name, &self.machine, &self.spin).map(|found| self.parameter(found))
+    }
+
+    fn write(&mut self, parameter: &Parameter, value: f64) {
+        parameter.set(&mut self.machine, &mut self.spin, value);
+    }
+
+    fn walk(&mut self, table: GridTable, keys: &mut Keys<'_>, input: Option<&WasherGridInput>) {
+        match table {
+            GridTable::Top => read::walk_top(self, keys, input),
+            GridTable::Reliability => read::walk_reliability(&mut self.measures, keys),
+        }
+    }
+
+    fn check(draft: &Draft<'_, Self>) {
+        read::check(draft);
+    }
+
+    fn schema_of_set() -> Value {
+        read::schema_of_set()
+    }
+
+    fn layout(plan: &Plan) -> Layout {
+        Layout::map(axis_columns(plan), Columns::for_run(plan).declared())
+    }
+
+    fn engine<'a>(plan: &'a Plan, only: Option<&str>) -> Result<Engine<'a>, Error> {
+        Ok(ModelEngine::for_column(plan, only)?.into_engine())
+    }
+
+    fn estimate(plan: &Plan, threads: usize) -> Result<Estimate, Error> {
+        crate::estimate::estimate(plan, threads)
+    }
+
+    fn variants(plan: &Plan) -> Vec<Plan> {
+        let can_have = |metric: &Metric| match metric {
+            metric if metric.is_at_held_speeds() => plan.model.held_speeds.is_some(),
+            metric => missing_part(*metric, &plan.model.machine).is_none(),
+        };
+        let all: Vec<Metric> = Metric::ALL.into_iter().filter(can_have).collect();
+        let single = all.iter().map(|metric| vec![*metric]);
+        let with_metrics = |metrics: Vec<Metric>| {
+            let mut plan = plan.clone();
+            plan.model.measures.metrics = metrics;
+            plan
+        };
+        single.chain([all.clone()]).map(with_metrics).collect()
+    }
+}
+
+/// The requirement of columns at held speeds.
+const HELD_SPEEDS: &str = "[stability] in the grid file, with the speeds of dwells";
+/// The requirement of columns of the cabinet's feet.
+const CABINET: &str = "a machine with [cabinet] and [[feet]]";
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use washer_model::{Profile, Spin};
+
+    use super::*;
+    use sweep_engine::commands::parameters::{as_json, listed};
+    use sweep_engine::plan::WrittenIn;
+
+    #[test]
+    fn json_has_every_parameter() {
+        let spin = Spin::Ramped { profile: Profile::Ramp, peak_rpm: 120.0, ramp_s: 2.0 };
+        let json: Value = serde_json::from_str(&as_json(&listed::<Washer>(None))).unwrap();
+        assert_eq!(
+            json.as_array().map(Vec::len),
+            Some(Parameter::all(&Machine::paper(), &spin).len())
+        );
+        assert_eq!(json[0]["name"], "gravity_m_per_s2");
+    }
+
+    #[test]
+    fn a_number_that_a_user_wrote_has_the_user_as_its_source() {
+        let folder = tempfile::tempdir().unwrap();
+        let machine = crate::config::machine_file(&Machine::paper(), &WrittenIn::default())
+            + "friction_n = 40\nfriction_linear_speed_m_per_s = \"auto\"\n";
+        std::fs::write(folder.path().join("own.toml"), machine).unwrap();
+        let grid = folder.path().join("grid.toml");
+        let text = "spin = { profile = \"ramp\", peak_rpm = 120, ramp_s = 2 }\ntime.end_s = 2\n";
+        let sources = |named: &str, sets: &[&str]| {
+            std::fs::write(&grid, format!("{named}{text}")).unwrap();
+            let sets: Vec<String> = sets.iter().copied().map(str::to_owned).collect();
+            let plan = crate::config::load(&grid, &sets).unwrap();
+            move |name: &str| {
+                let rows = listed(Some(&plan));
+                rows.iter().find(|row| row.parameter.name == name).unwrap().source.clone()
+            }
+        };
+        let own = sources("machine = \"own.toml\"\n", &["damper_1_damping_n_s_per_m=140"]);
+        let file = folder.path().join("own.toml").display().to_string();
+        assert_eq!(own("tub_mass_kg"), format!("given: {file}"));
+        assert_eq!(own("damper_1_damping_n_s_per_m"), "given: --set");
+        assert_eq!(own("damping_n_s_per_m"), format!("given: --set, {file}"));
+        assert_eq!(own("spring_1_cubic_n_per_m3"), "assumed: none unless given");
+        assert_eq!(own("damper_2_friction_n"), format!("given: {file}"));
+        // The word "auto" in the file leaves this number to the program.
+        let speed = own("damper_2_friction_linear_speed_m_per_s");
+        assert_eq!(speed, "assumed: that of the linear motion");
+        assert_eq!(own("spin_peak_rpm"), "the grid file's [spin]");
+        let built_in = sources("", &["tub_mass_kg=23.87"]);
+        assert_eq!(built_in("tub_mass_kg"), "given: --set");
+        assert_eq!(built_in("shaft_mass_kg"), "paper, Table 2");
+    }
+}
