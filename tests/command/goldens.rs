@@ -65,11 +65,10 @@ fn readable_record() -> PathBuf {
     record().with_extension("csv")
 }
 
-/// The file that a command has written for a grid.
+/// The file that a command has written for a grid, in its folder.
 struct Golden {
+    test_folder: TempDir,
     hash: String,
-    /// The file as CSV: units and descriptions, a header, and the rows.
-    csv: String,
 }
 
 /// Runs a command for a grid.
@@ -82,9 +81,7 @@ fn golden(grid: &str, command: &[&str]) -> Golden {
     sweep(&test_folder, &[&[*verb, "grid.toml", "--out", "out.parquet"], options].concat());
     let bytes =
         fs::read(test_folder.path().join("out.parquet")).expect("the command has written its file");
-    sweep(&test_folder, &["export", "out.parquet", "out.csv"]);
-    let csv = fs::read_to_string(test_folder.path().join("out.csv")).expect("the export is there");
-    Golden { hash: blake3::hash(&bytes).to_hex().to_string(), csv }
+    Golden { test_folder, hash: blake3::hash(&bytes).to_hex().to_string() }
 }
 
 /// Returns the rows of some goldens as one table: the golden, then the columns of maps, with six
@@ -92,7 +89,11 @@ fn golden(grid: &str, command: &[&str]) -> Golden {
 fn readable(goldens: &BTreeMap<&'static str, Golden>) -> String {
     let mut table = String::new();
     for name in TABULATED {
-        let lines = goldens[name].csv.lines().filter(|line| !line.starts_with('#'));
+        let test_folder = &goldens[name].test_folder;
+        sweep(test_folder, &["export", "out.parquet", "out.csv"]);
+        let csv = fs::read_to_string(test_folder.path().join("out.csv"));
+        let csv = csv.expect("the export is there");
+        let lines = csv.lines().filter(|line| !line.starts_with('#'));
         for (k, line) in lines.enumerate() {
             let cells: Vec<String> = line.split(',').map(rounded).collect();
             match k {

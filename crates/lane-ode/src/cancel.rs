@@ -1,9 +1,9 @@
-//! The request to stop a long computation.
+//! The cancellation of long computations.
 
 use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// A request to stop a computation, which polls it. Once it is made, the computation ends soon, and
+/// A cancellation, which a computation polls. Once it is requested, the computation ends soon, and
 /// its result is meaningless or a part of the whole.
 #[derive(Clone, Copy, Default)]
 pub enum Cancel<'a> {

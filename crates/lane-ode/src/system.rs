@@ -107,8 +107,9 @@ pub trait Task<T: Lane, const D: usize> {
     /// Receives a step of every lane, of zero length in idle lanes.
     fn observe(&mut self, forcing: &Forcing<Self, T, D>, step: &Step<'_, T, D>);
 
-    /// Whether to stop; unfinished trajectories are then abandoned. It is called at least every
-    /// [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps, because a segment may take hours.
+    /// Returns the cancellation of the computation, which abandons unfinished trajectories. It is
+    /// polled at least every [`STEPS_AT_ONCE`](crate::STEPS_AT_ONCE) steps, because a segment may
+    /// take hours.
     fn cancel(&self) -> Cancel<'_> {
         Cancel::Never
     }

@@ -167,7 +167,8 @@ impl<O: Oscillator<C, D, P>, T: Lane, const C: usize, const D: usize, const P: u
                 // The run is divided into segments at the edges of the window.
                 let [from_s, to_s] = self.integration.cases[self.current[lane].0].window_s;
                 let ends = [0.0, from_s, to_s, self.integration.end_s];
-                let (start_s, end_s) = (ends[segment], ends[segment + 1]);
+                let start_s = ends[segment];
+                let end_s = ends[segment + 1];
                 // A segment is empty if the window begins with the run or ends with it.
                 if start_s < end_s {
                     self.current[lane].1 = segment;

@@ -362,7 +362,7 @@ fn no_answer() -> Error {
     Error::Refused(said.to_owned())
 }
 
-/// By how many standard errors another model would move each unknown.
+/// Returns the move of each unknown by another model, in standard errors.
 fn effect(
     covariance: &[Vec<f64>],
     summary: &Summary,
@@ -453,7 +453,7 @@ struct MinimumSearch<'a> {
     problem: &'a Problem<'a>,
     kept: Option<&'a Evaluations>,
     work: &'a FitWork<'a>,
-    /// How many evaluations were made.
+    /// The number of evaluations so far.
     made: &'a AtomicUsize,
 }
 

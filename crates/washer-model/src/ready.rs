@@ -122,8 +122,8 @@ impl Search {
             (0..steps.len()).map(|k| self.next(k, residuals[k], steps[k])).collect();
         let changes = difference(&next, &self.reciprocals);
         let is_small = |change: &[f64]| {
-            let changes = change.iter().zip(&self.reciprocals);
-            changes.fold(true, |all, (by, now)| all && by.abs() <= SPEED_TOLERANCE * now)
+            let mut changes = change.iter().zip(&self.reciprocals);
+            changes.all(|(by, now)| by.abs() <= SPEED_TOLERANCE * now)
         };
         if is_small(&residuals) && is_small(&changes) {
             return true;

@@ -58,7 +58,7 @@ pub struct FolderStatus {
     /// The incomplete shards on which no process works, in the scheduler's numbers: `2,5-7`, for
     /// `sbatch --array=`; empty if there are none.
     pub missing_shards: String,
-    /// The same shards in numbers from 1, for `--shard I/N`.
+    /// The numbers of these shards from 1, for `--shard I/N`.
     pub missing_shard_numbers: Vec<u64>,
 }
 

@@ -255,8 +255,7 @@ impl Known {
         let eigen = Symmetric::of(&moment);
         let direction = |(value, vector): (&f64, &Vec<f64>)| {
             let size = value.max(0.0).sqrt();
-            let errors_by = vector.iter().map(|entry| size * entry);
-            let errors_by: Vec<f64> = errors_by.collect();
+            let errors_by: Vec<f64> = vector.iter().map(|entry| size * entry).collect();
             let changes = errors.iter().zip(&errors_by).filter_map(|(error, by)| {
                 let parameter = error.influence.parameter.clone()?;
                 Some((parameter, by * error.influence.tolerance))

@@ -218,7 +218,7 @@ fn misspelt(column: &ListColumn) -> Option<Diagnostic> {
 fn judged(name: String, table: NumberTable, report: &Report) -> Measurement {
     let clock = table.columns.iter().find(|column| column.name.value == "time_s");
     let early = clock.map_or(0, |clock| clock.values.iter().take_while(|t| **t < 0.0).count());
-    // Of a file of `sweep trace` the nonlinear motion is taken.
+    // A file of `sweep trace` counts as a measurement of its nonlinear motion.
     let is_trace = table.columns.iter().any(|column| column.header.starts_with(TRACED));
     let notes = if is_trace { Vec::new() } else { table.notes() };
     let headers = table.columns.iter().map(|column| column.header.clone()).collect();

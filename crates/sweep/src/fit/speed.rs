@@ -44,8 +44,8 @@ pub(crate) fn smoothed(time_s: &[f64], speed_rpm: &[f64]) -> Option<Smoothed> {
     let greatest = samples.iter().fold(0.0_f64, |most, [_, speed]| most.max(speed.abs()));
     let (rounding_rpm, held) = stairs(&samples).unwrap_or((0.0, 0.0));
     let noise_rpm = noise(&samples).max(LEAST_NOISE * greatest).max(rounding_rpm);
-    // As the Bayesian information criterion weighs a knot, whose place counts too; and no stair is
-    // worth one.
+    // The weight of a knot by the Bayesian information criterion, where its position counts too. A
+    // stair of the tachometer's digits is worth no knot.
     let worth = (3.0 * libm::log(samples.len() as f64)).max(2.0 * held) * noise_rpm * noise_rpm;
     let mut knots = vec![*first, *last];
     let mut speeds = fitted(&samples, &knots)?;
@@ -94,8 +94,9 @@ fn noise(samples: &[[f64; 2]]) -> f64 {
     quantile(distances, 0.5).map_or(0.0, |median| median / 0.674_489_75)
 }
 
-/// Of a tachometer whose digits are coarser than its noise: the error of rounding, and how many
-/// samples a digit usually stays. Neighbours say nothing of its noise: most are equal.
+/// Returns the rounding error of a tachometer whose digits are coarser than its noise, and the
+/// usual number of samples between changes of a digit. Neighbouring samples do not show the noise
+/// of such a tachometer, because most of them are equal.
 fn stairs(samples: &[[f64; 2]]) -> Option<(f64, f64)> {
     let steps = samples.windows(2).map(|pair| (pair[1][1] - pair[0][1]).abs());
     let steps = steps.filter(|step| *step > 0.0);
@@ -118,7 +119,7 @@ struct Normal {
 }
 
 impl Normal {
-    /// Of the splines with these knots; and their right side.
+    /// Computes the normal equations of splines with these knots, and their right side.
     fn of(samples: &[[f64; 2]], knots: &[f64]) -> (Self, Vec<f64>) {
         let (mut diagonal, mut beside, mut right) =
             (vec![0.0; knots.len()], vec![0.0; knots.len()], vec![0.0; knots.len()]);

@@ -58,6 +58,14 @@ fn options(free: &[&str]) -> FitOptions {
     }
 }
 
+/// Returns the problem of fitting the nonlinear model by the method that commands choose.
+fn problem(cases: Vec<FitCase>, free: Vec<Free>, with_shift: bool) -> Problem<'static> {
+    let method = Problem::method(&cases).unwrap();
+    let simd = simd_from_environment().unwrap();
+    let model = ModelKind::Nonlinear;
+    Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never }
+}
+
 fn fitted(cases: Vec<FitCase>, options: &FitOptions) -> FitReport {
     let work = FitWork { cancel: Cancel::Never, seen: &|_| {}, output: None, fresh: false };
     fit(cases, options, &work).unwrap().unwrap().report
@@ -94,13 +102,7 @@ pub(super) fn noise(seed: u64, signal: usize, count: usize, correlation: f64) ->
 fn the_model_at_the_truth_is_the_exact_record() {
     for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
         let cases = vec![case_at(truth, 1.0, reference(name, 8.0))];
-        let method = Problem::method(&cases).unwrap();
-        let model = ModelKind::Nonlinear;
-        let simd = simd_from_environment().unwrap();
-        let free = Vec::new();
-        let with_shift = false;
-        let problem =
-            Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never };
+        let problem = problem(cases, Vec::new(), false);
         for one in problem.against(&[]).unwrap() {
             let values = &problem.cases[0].measured.signals[one.signal].values;
             let largest =
@@ -158,12 +160,8 @@ fn an_interval_goes_no_farther_than_its_range() {
 #[test]
 fn a_search_that_came_to_no_end_gives_no_intervals() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 3.0))];
-    let method = Problem::method(&cases).unwrap();
-    let model = ModelKind::Nonlinear;
-    let simd = simd_from_environment().unwrap();
     let free = free(&options(&["damping_n_s_per_m"]), &cases).unwrap();
-    let with_shift = false;
-    let problem = Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never };
+    let problem = problem(cases, free, false);
     let x = problem.start();
     let against = problem.against(&x).unwrap();
     let summary = problem.summary(&against);
@@ -199,11 +197,7 @@ fn a_fitted_machine_file_says_where_its_numbers_are_from() {
     let start = [VISCOUS[0], VISCOUS[1], ("friction_n", 5.0)];
     let cases = vec![case_at(&start, 1.0, reference("viscous", 1.0))];
     let free = free(&options(&["damping_n_s_per_m"]), &cases).unwrap();
-    let method = Problem::method(&cases).unwrap();
-    let model = ModelKind::Nonlinear;
-    let simd = simd_from_environment().unwrap();
-    let with_shift = false;
-    let problem = Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never };
+    let problem = problem(cases, free, false);
     let (machine, _) = problem.machine(0, &problem.start());
     let text = crate::config::machine_file(&machine, &problem.written());
     let said = |key: &str| text.lines().find(|line| line.starts_with(key)).unwrap();
@@ -262,13 +256,8 @@ fn intervals_know_that_noise_is_correlated_or_grows() {
     for (name, truth) in [("viscous_exact", &VISCOUS[..]), ("friction_exact", &FRICTION[..])] {
         let names: Vec<&str> = truth.iter().map(|(name, _)| *name).collect();
         let cases = vec![case_at(truth, 1.0, reference(name, 24.0))];
-        let method = Problem::method(&cases).unwrap();
-        let model = ModelKind::Nonlinear;
-        let simd = simd_from_environment().unwrap();
         let free = free(&options(&names), &cases).unwrap();
-        let with_shift = true;
-        let problem =
-            Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never };
+        let problem = problem(cases, free, true);
         let exact = problem.against(&problem.start()).unwrap();
         // Growth is by the motion itself, or by its envelope over half a second.
         for (correlation, growth, by_envelope) in [
@@ -486,12 +475,7 @@ fn a_wrong_unit_of_speed_or_time_is_named() {
 #[test]
 fn a_wrong_unit_of_speed_is_no_wrong_unit_of_a_channel() {
     let cases = vec![case_at(&VISCOUS, 1.0, reference("viscous", 3.0))];
-    let method = Problem::method(&cases).unwrap();
-    let model = ModelKind::Nonlinear;
-    let simd = simd_from_environment().unwrap();
-    let free = Vec::new();
-    let with_shift = false;
-    let problem = Problem { cases, free, model, with_shift, method, simd, cancel: Cancel::Never };
+    let problem = problem(cases, Vec::new(), false);
     let mut against = problem.against(&[]).unwrap();
     let yaw = &mut against[2];
     let column = problem.cases[0].measured.signals[2].quantity.column();

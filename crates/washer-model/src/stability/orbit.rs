@@ -478,9 +478,6 @@ impl<'m, T: Lane, M: LaneModel<T>> Watch<T, M> for Watched<'m, T, M> {
                 self.peaks.advance(self.clock.step_s, &channels, everywhere);
             }
             if let Some(extras) = &mut self.extras {
-                let radial = &radial;
-                let channels = &channels;
-                let inside = everywhere;
                 let step = if k == 0 {
                     None
                 } else {
@@ -491,9 +488,9 @@ impl<'m, T: Lane, M: LaneModel<T>> Watch<T, M> for Watched<'m, T, M> {
                     step,
                     x,
                     dx,
-                    radial,
-                    channels,
-                    lanes_in_window: inside,
+                    radial: &radial,
+                    channels: &channels,
+                    lanes_in_window: everywhere,
                 });
             }
             let most = self.radial_squared.0;
